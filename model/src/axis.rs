@@ -1,0 +1,93 @@
+//! One axis of a machine: what turns or slides, about or along which line.
+
+use crate::frames::{Coordinate, Point, Turn, cross_nominal, turn_about_nominal};
+use crate::scalar::{Nominal, Scalar};
+
+/// Whether an axis slides or turns.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub enum AxisKind {
+    /// Slides along its direction; positions in mm.
+    Linear,
+    /// Turns about its direction; positions in radians.
+    Rotary,
+}
+
+impl AxisKind {
+    /// The kind that ISO 841 gives a one-letter name: A, B, C turn and X, Y, Z, U, V, W slide.
+    pub fn of_letter(name: &str) -> Option<AxisKind> {
+        match name {
+            "A" | "B" | "C" => Some(AxisKind::Rotary),
+            "X" | "Y" | "Z" | "U" | "V" | "W" => Some(AxisKind::Linear),
+            _ => None,
+        }
+    }
+}
+
+/// An axis with its line in the reference frame R, all axes at zero.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Axis {
+    /// The name that the structural code uses.
+    pub name: String,
+    /// Linear or rotary.
+    pub kind: AxisKind,
+    /// Unit vector in R: the physical direction of the moving body for an increasing command.
+    pub direction: [f64; 3],
+    /// A point of the axis in R, mm.
+    pub origin_mm: [f64; 3],
+    /// Least and greatest position where stated, mm or radians.
+    pub travel: Option<[f64; 2]>,
+}
+
+impl Axis {
+    /// The direction that ISO 841 gives a one-letter name: R's X for A, X and U, and so on.
+    pub fn direction_of_letter(name: &str) -> Option<[f64; 3]> {
+        match name {
+            "A" | "X" | "U" => Some([1.0, 0.0, 0.0]),
+            "B" | "Y" | "V" => Some([0.0, 1.0, 0.0]),
+            "C" | "Z" | "W" => Some([0.0, 0.0, 1.0]),
+            _ => None,
+        }
+    }
+
+    /// R's coordinate axis that the direction lies along, with its sign, if it lies along one.
+    pub fn principal(&self) -> Option<(Coordinate, f64)> {
+        Coordinate::ALL.into_iter().find_map(|coordinate| {
+            let along = self.direction[coordinate.index()];
+            (along.abs() == 1.0).then_some((coordinate, along))
+        })
+    }
+
+    /// The freedom that the axis itself moves in: `EB` for an axis that turns about ±Y, `EX` for one that slides along ±X; the
+    /// largest component of the direction where it lies along none.
+    pub fn own_freedom(&self) -> crate::component::Freedom {
+        let mut largest = 0;
+        for index in 1..3 {
+            if self.direction[index].abs() > self.direction[largest].abs() {
+                largest = index;
+            }
+        }
+        let offset = match self.kind {
+            AxisKind::Linear => 0,
+            AxisKind::Rotary => 3,
+        };
+        crate::component::Freedom::ALL[largest + offset]
+    }
+
+    /// `Rot(d, q) · point`, for a point given from the axis' origin.
+    pub(crate) fn rotate<S: Scalar>(&self, turn: Turn<S::Nominal>, point: Point<S>) -> Point<S> {
+        if let Some((coordinate, sign)) = self.principal() {
+            let sin = if sign > 0.0 { turn.sin } else { -turn.sin };
+            return turn_about_nominal(coordinate, Turn { sin, cos: turn.cos }, point);
+        }
+        // Rodrigues: p cos q + (d × p) sin q + d (d·p)(1 − cos q).
+        let [dx, dy, dz] = self.direction.map(S::Nominal::constant);
+        let [x, y, z] = point.0;
+        let along = (x * dx + y * dy + z * dz) * (S::Nominal::constant(1.0) - turn.cos);
+        let across = cross_nominal([-x, -y, -z], self.direction).0;
+        Point([
+            x * turn.cos + across[0] * turn.sin + along * dx,
+            y * turn.cos + across[1] * turn.sin + along * dy,
+            z * turn.cos + across[2] * turn.sin + along * dz,
+        ])
+    }
+}

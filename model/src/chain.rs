@@ -1,0 +1,308 @@
+//! The kinematic chain, written once.
+//!
+//! From the bed outwards `P_w = T_A T_C w` on the workpiece side and `P_s = T_Y T_X T_Z s` on the tool side of `w C A b Y X Z t`,
+//!
+//! ```text
+//! rotary axis, direction d, origin o:   T(q) = Trans(o) · E0 · E(q) · Rot(d, q) · Trans(−o)
+//! linear axis:                          T(q) = Trans(o + q·d′) · E(q) · Trans(−o),   d′ = d + ω0 × d
+//! ```
+//!
+//! with `E0 = Trans(EX0k, EY0k, EZ0k) · Rx(EA0k) · Ry(EB0k) · Rz(EC0k)` the location errors, `E(q)` the error motions in the same
+//! order, and ω0 the squareness errors `(EA0k, EB0k, EC0k)` of a linear axis.
+
+use crate::axis::{Axis, AxisKind};
+use crate::code::StructuralCode;
+use crate::component::{ErrorKind, ErrorName};
+use crate::error::ModelError;
+use crate::frames::{Point, Rotation, SmallMotion, Turn, cross_nominal};
+use crate::scalar::{Nominal, Scalar};
+
+/// Errors an axis can have: six location errors, then six error motions.
+pub const ERRORS_PER_AXIS: usize = 12;
+
+/// A machine: axes in a serial chain from workpiece over bed to tool.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Machine {
+    /// A name for people.
+    pub name: String,
+    /// The axes in the order of the structural code, from workpiece to tool.
+    pub axes: Vec<Axis>,
+    /// How many of them lie on the workpiece side.
+    pub workpiece_side: usize,
+    /// How error angles rotate.
+    pub rotation: Rotation,
+    /// Direction of gravity in R, a unit vector.
+    pub gravity: [f64; 3],
+}
+
+/// Where an axis stands: its position, and for a rotary axis its sine and cosine, taken once.
+#[derive(Clone, Copy, Debug)]
+pub struct AxisPosition<N> {
+    /// mm or radians.
+    pub value: N,
+    /// Sine and cosine of a rotary axis; of no meaning for a linear one.
+    pub turn: Turn<N>,
+}
+
+impl<N: Nominal> AxisPosition<N> {
+    /// The position of an axis of this kind.
+    pub fn new(kind: AxisKind, value: N) -> Self {
+        let turn = match kind {
+            AxisKind::Rotary => Turn::by(value),
+            AxisKind::Linear => Turn {
+                sin: N::constant(0.0),
+                cos: N::constant(1.0),
+            },
+        };
+        AxisPosition { value, turn }
+    }
+}
+
+/// The errors of one axis, made ready to push points through. `None` is an exact zero and costs nothing.
+#[derive(Clone, Copy, Debug)]
+pub struct BodyErrors<S> {
+    location: Option<SmallMotion<S>>,
+    squareness: Option<[S; 3]>,
+    motion: Option<SmallMotion<S>>,
+}
+
+impl<S: Scalar> BodyErrors<S> {
+    /// No errors.
+    pub const NONE: BodyErrors<S> = BodyErrors {
+        location: None,
+        squareness: None,
+        motion: None,
+    };
+
+    /// From location errors and error motions, each `[EX, EY, EZ, EA, EB, EC]` in mm and radians.
+    pub fn new(kind: AxisKind, rotation: Rotation, location: Option<[S; 6]>, motion: Option<[S; 6]>) -> Self {
+        let motion = motion.map(|six| SmallMotion::new(six, rotation));
+        match kind {
+            AxisKind::Rotary => BodyErrors {
+                location: location.map(|six| SmallMotion::new(six, rotation)),
+                squareness: None,
+                motion,
+            },
+            AxisKind::Linear => BodyErrors {
+                location: None,
+                squareness: location.map(|six| [six[3], six[4], six[5]]),
+                motion,
+            },
+        }
+    }
+}
+
+impl Machine {
+    /// A machine for a structural code of ISO 841 letters: R's directions, origins in R's origin, no travel stated.
+    ///
+    /// # Errors
+    /// If the code cannot be read or an axis is no ISO 841 letter.
+    pub fn from_code(text: &str) -> Result<Machine, ModelError> {
+        let code = StructuralCode::parse(text)?;
+        let axes = code
+            .axes()
+            .map(|name| {
+                let kind = AxisKind::of_letter(name);
+                let direction = Axis::direction_of_letter(name);
+                let (Some(kind), Some(direction)) = (kind, direction) else {
+                    return Err(ModelError::UnknownAxisKind { axis: name.clone() });
+                };
+                Ok(Axis {
+                    name: name.clone(),
+                    kind,
+                    direction,
+                    origin_mm: [0.0; 3],
+                    travel: None,
+                })
+            })
+            .collect::<Result<Vec<_>, _>>()?;
+        Ok(Machine {
+            name: text.to_string(),
+            workpiece_side: code.workpiece_side.len(),
+            axes,
+            rotation: Rotation::Exact,
+            gravity: [0.0, 0.0, -1.0],
+        })
+    }
+
+    /// The structural code, spaced.
+    pub fn code(&self) -> String {
+        let names = |axes: &[Axis]| axes.iter().map(|axis| axis.name.clone()).collect();
+        StructuralCode {
+            workpiece_side: names(&self.axes[..self.workpiece_side]),
+            tool_side: names(&self.axes[self.workpiece_side..]),
+        }
+        .spaced()
+    }
+
+    /// The place of an axis in [`Machine::axes`].
+    pub fn axis_index(&self, name: &str) -> Option<usize> {
+        self.axes.iter().position(|axis| axis.name == name)
+    }
+
+    /// How many error slots the machine has: [`ERRORS_PER_AXIS`] for each axis, in the order of [`Machine::axes`].
+    pub fn error_slots(&self) -> usize {
+        self.axes.len() * ERRORS_PER_AXIS
+    }
+
+    /// The slot of an error, or `None` where the machine has no such axis.
+    pub fn error_slot(&self, name: &ErrorName) -> Option<usize> {
+        let axis = self.axis_index(&name.axis)?;
+        let kind = match name.kind {
+            ErrorKind::Location => 0,
+            ErrorKind::Motion => 6,
+        };
+        Some(axis * ERRORS_PER_AXIS + kind + name.freedom.index())
+    }
+
+    /// The name of the error in a slot.
+    pub fn error_name(&self, slot: usize) -> ErrorName {
+        let within = slot % ERRORS_PER_AXIS;
+        ErrorName {
+            kind: if within < 6 {
+                ErrorKind::Location
+            } else {
+                ErrorKind::Motion
+            },
+            freedom: crate::component::Freedom::ALL[within % 6],
+            axis: self.axes[slot / ERRORS_PER_AXIS].name.clone(),
+        }
+    }
+
+    /// The errors of every axis, made ready, from slots for which `carried` holds; the others are exact zeros.
+    /// `slot(i)` gives the value of slot `i`.
+    pub fn body_errors<S: Scalar>(
+        &self,
+        carried: impl Fn(usize) -> bool,
+        slot: impl Fn(usize) -> S,
+    ) -> Vec<BodyErrors<S>> {
+        let six = |start: usize| {
+            (start..start + 6).any(&carried).then(|| {
+                std::array::from_fn(|i| {
+                    if carried(start + i) {
+                        slot(start + i)
+                    } else {
+                        S::constant(0.0)
+                    }
+                })
+            })
+        };
+        self.axes
+            .iter()
+            .enumerate()
+            .map(|(index, axis)| {
+                let start = index * ERRORS_PER_AXIS;
+                BodyErrors::new(axis.kind, self.rotation, six(start), six(start + 6))
+            })
+            .collect()
+    }
+
+    /// A point of the table frame in R: `P_w`.
+    pub fn workpiece_point<S: Scalar>(
+        &self,
+        state: &[AxisPosition<S::Nominal>],
+        errors: &[BodyErrors<S>],
+        point: Point<S>,
+    ) -> Point<S> {
+        (0..self.workpiece_side).fold(point, |point, index| {
+            push(&self.axes[index], &state[index], &errors[index], point)
+        })
+    }
+
+    /// A point of the tool frame in R: `P_s`.
+    pub fn tool_point<S: Scalar>(
+        &self,
+        state: &[AxisPosition<S::Nominal>],
+        errors: &[BodyErrors<S>],
+        point: Point<S>,
+    ) -> Point<S> {
+        (self.workpiece_side..self.axes.len())
+            .rev()
+            .fold(point, |point, index| {
+                push(&self.axes[index], &state[index], &errors[index], point)
+            })
+    }
+
+    /// The moment about axis `index` that a unit weight at `point_mm` of the tool frame (of the table frame for an axis on the
+    /// workpiece side) exerts, in mm (newton millimetre a newton): `d · ((p − o) × g)` with the nominal chain.
+    pub fn gravity_moment_mm(&self, index: usize, state: &[AxisPosition<f64>], point_mm: [f64; 3]) -> f64 {
+        let none = vec![BodyErrors::<f64>::NONE; self.axes.len()];
+        let workpiece = index < self.workpiece_side;
+        let whole = |point| {
+            if workpiece {
+                self.workpiece_point(state, &none, Point(point)).0
+            } else {
+                self.tool_point(state, &none, Point(point)).0
+            }
+        };
+        // The axis' own line is carried by the bodies between it and the bed only.
+        let carried = |point: [f64; 3]| {
+            let outside: Vec<usize> = if workpiece {
+                (index + 1..self.workpiece_side).collect()
+            } else {
+                (self.workpiece_side..index).rev().collect()
+            };
+            outside.into_iter().fold(Point(point), |point, k| {
+                push(&self.axes[k], &state[k], &none[k], point)
+            })
+        };
+        let axis = &self.axes[index];
+        let origin = carried(axis.origin_mm).0;
+        let tip: [f64; 3] = std::array::from_fn(|i| axis.origin_mm[i] + axis.direction[i]);
+        let tip = carried(tip).0;
+        let load = whole(point_mm);
+        let direction: [f64; 3] = std::array::from_fn(|i| tip[i] - origin[i]);
+        let lever = std::array::from_fn(|i| load[i] - origin[i]);
+        let moment = crate::frames::cross(lever, Point(self.gravity)).0;
+        (0..3).map(|i| direction[i] * moment[i]).sum()
+    }
+}
+
+/// A point on the moved side of an axis, seen from its other side.
+fn push<S: Scalar>(
+    axis: &Axis,
+    position: &AxisPosition<S::Nominal>,
+    errors: &BodyErrors<S>,
+    point: Point<S>,
+) -> Point<S> {
+    let at_origin = axis.origin_mm == [0.0; 3];
+    let to_origin = axis.origin_mm.map(|o| S::Nominal::constant(-o));
+    let from_origin = axis.origin_mm.map(S::Nominal::constant);
+    let mut point = if at_origin {
+        point
+    } else {
+        point.shifted(to_origin)
+    };
+    if axis.kind == AxisKind::Rotary {
+        point = axis.rotate(position.turn, point);
+    }
+    if let Some(motion) = &errors.motion {
+        point = motion.push(point);
+    }
+    if let Some(location) = &errors.location {
+        point = location.push(point);
+    }
+    if axis.kind == AxisKind::Linear {
+        for i in 0..3 {
+            if axis.direction[i] != 0.0 {
+                let along = if axis.direction[i] == 1.0 {
+                    position.value
+                } else {
+                    position.value * S::Nominal::constant(axis.direction[i])
+                };
+                point.0[i] = point.0[i] + along;
+            }
+        }
+        if let Some(squareness) = errors.squareness {
+            let tilt = cross_nominal::<S>(squareness, axis.direction);
+            for i in 0..3 {
+                point.0[i] = point.0[i] + tilt.0[i] * position.value;
+            }
+        }
+    }
+    if at_origin {
+        point
+    } else {
+        point.shifted(from_origin)
+    }
+}

@@ -1,0 +1,74 @@
+//! Structural codes: the order of bodies from workpiece to tool, `b` the bed.
+//!
+//! `w C A b Y X Z t` (spaced, any axis names) and `[wCAbYXZt]` (compact, one letter an axis) say the same.
+
+use crate::error::ModelError;
+
+/// The axes of a structural code, as written.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct StructuralCode {
+    /// Axes between workpiece and bed, from the workpiece to the bed.
+    pub workpiece_side: Vec<String>,
+    /// Axes between bed and tool, from the bed to the tool.
+    pub tool_side: Vec<String>,
+}
+
+impl StructuralCode {
+    /// Reads either form.
+    ///
+    /// # Errors
+    /// Names what is missing: `w` at the start, `t` at the end, exactly one `b`, each axis once.
+    pub fn parse(text: &str) -> Result<StructuralCode, ModelError> {
+        let fault = |found: String| ModelError::StructuralCode {
+            code: text.to_string(),
+            found,
+        };
+        let inner = text.trim().trim_start_matches('[').trim_end_matches(']').trim();
+        let bodies: Vec<String> = if inner.contains(char::is_whitespace) {
+            inner.split_whitespace().map(str::to_string).collect()
+        } else {
+            inner.chars().map(String::from).collect()
+        };
+        if bodies.first().map(String::as_str) != Some("w") {
+            return Err(fault("it does not start with the workpiece `w`".into()));
+        }
+        if bodies.len() < 2 || bodies.last().map(String::as_str) != Some("t") {
+            return Err(fault("it does not end with the tool `t`".into()));
+        }
+        let between = &bodies[1..bodies.len() - 1];
+        let beds = between.iter().filter(|body| *body == "b").count();
+        if beds != 1 {
+            return Err(fault(format!("it holds {beds} beds `b` where one is needed")));
+        }
+        for (index, body) in between.iter().enumerate() {
+            let named = body.chars().next().is_some_and(char::is_alphabetic)
+                && body.chars().all(char::is_alphanumeric);
+            if !named || body == "w" || body == "t" {
+                return Err(fault(format!("`{body}` is no axis name")));
+            }
+            if between[..index].contains(body) {
+                return Err(fault(format!("`{body}` stands in it twice")));
+            }
+        }
+        let bed = between.iter().position(|body| body == "b").unwrap_or(0);
+        Ok(StructuralCode {
+            workpiece_side: between[..bed].to_vec(),
+            tool_side: between[bed + 1..].to_vec(),
+        })
+    }
+
+    /// The axes from workpiece to tool.
+    pub fn axes(&self) -> impl Iterator<Item = &String> {
+        self.workpiece_side.iter().chain(&self.tool_side)
+    }
+
+    /// The spaced form.
+    pub fn spaced(&self) -> String {
+        let mut bodies = vec!["w"];
+        bodies.extend(self.workpiece_side.iter().map(String::as_str));
+        bodies.push("b");
+        bodies.extend(self.tool_side.iter().map(String::as_str));
+        bodies.push("t");
+        bodies.join(" ")
+    }
+}

@@ -1,0 +1,129 @@
+//! Error components by the names of ISO 230-1, and by the short names of the literature.
+//!
+//! `EX0C` is the location error of C in X (a position-independent error, PIGE), `EXC` its error motion in X
+//! (position-dependent, PDGE). The literature writes `e_x0c` for the first and `θ_x0c` for `EA0C`.
+
+use std::fmt;
+
+/// One of the six freedoms of a rigid body: translations along and rotations about R's X, Y, Z.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
+#[allow(missing_docs)]
+pub enum Freedom {
+    X,
+    Y,
+    Z,
+    A,
+    B,
+    C,
+}
+
+impl Freedom {
+    /// In the order in which errors are applied: X, Y, Z, A, B, C.
+    pub const ALL: [Freedom; 6] = [
+        Freedom::X,
+        Freedom::Y,
+        Freedom::Z,
+        Freedom::A,
+        Freedom::B,
+        Freedom::C,
+    ];
+
+    /// 0 to 5.
+    pub fn index(self) -> usize {
+        self as usize
+    }
+
+    /// Whether it is a rotation (A, B, C).
+    pub fn is_angle(self) -> bool {
+        self.index() >= 3
+    }
+
+    /// The letter of ISO 230-1.
+    pub fn letter(self) -> char {
+        ['X', 'Y', 'Z', 'A', 'B', 'C'][self.index()]
+    }
+}
+
+/// Location error or error motion.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
+pub enum ErrorKind {
+    /// Position-independent (PIGE): where the axis lies; for a linear axis its squareness.
+    Location,
+    /// Position-dependent (PDGE): how the moving body strays.
+    Motion,
+}
+
+/// The name of an error of an axis: `EX0C`, `EZC`, `EBJ2`.
+#[derive(Clone, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
+pub struct ErrorName {
+    /// Location error or error motion.
+    pub kind: ErrorKind,
+    /// Which freedom of the moved body.
+    pub freedom: Freedom,
+    /// The axis it belongs to.
+    pub axis: String,
+}
+
+impl ErrorName {
+    /// Reads an ISO 230-1 name (`EX0C`, `EBJ2`) or a literature alias (`e_x0c`, `e_x,0c`, `θ_y0a`, `theta_y0a`).
+    /// `None` when it is neither; whether the axis exists is not checked.
+    pub fn parse(text: &str) -> Option<ErrorName> {
+        let text = text.trim();
+        let iso = || {
+            let mut characters = text.strip_prefix('E')?.chars();
+            let letter = characters.next()?;
+            let freedom = Freedom::ALL.into_iter().find(|f| f.letter() == letter)?;
+            ErrorName::with_rest(freedom, characters.as_str())
+        };
+        let literature = || {
+            let (rest, angle) = if let Some(rest) = text.strip_prefix("e_") {
+                (rest, false)
+            } else {
+                let rest = text.strip_prefix("θ_").or_else(|| text.strip_prefix("theta_"))?;
+                (rest, true)
+            };
+            let mut characters = rest.chars();
+            let index = ['x', 'y', 'z']
+                .iter()
+                .position(|c| characters.clone().next() == Some(*c))?;
+            characters.next();
+            let freedom = Freedom::ALL[index + if angle { 3 } else { 0 }];
+            let rest = characters.as_str().trim_start_matches(',');
+            ErrorName::with_rest(freedom, &rest.to_uppercase())
+        };
+        iso().or_else(literature)
+    }
+
+    fn with_rest(freedom: Freedom, rest: &str) -> Option<ErrorName> {
+        let (kind, axis) = match rest.strip_prefix('0') {
+            Some(axis) => (ErrorKind::Location, axis),
+            None => (ErrorKind::Motion, rest),
+        };
+        let valid =
+            axis.chars().next().is_some_and(char::is_alphabetic) && axis.chars().all(char::is_alphanumeric);
+        valid.then(|| ErrorName {
+            kind,
+            freedom,
+            axis: axis.to_string(),
+        })
+    }
+
+    /// The short name of the literature: `e_x0c`, `θ_z0c`.
+    pub fn literature(&self) -> String {
+        let index = self.freedom.index();
+        let symbol = if self.freedom.is_angle() { "θ" } else { "e" };
+        let zero = if self.kind == ErrorKind::Location { "0" } else { "" };
+        format!(
+            "{symbol}_{}{zero}{}",
+            ['x', 'y', 'z'][index % 3],
+            self.axis.to_lowercase()
+        )
+    }
+}
+
+impl fmt::Display for ErrorName {
+    fn fmt(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let zero = if self.kind == ErrorKind::Location { "0" } else { "" };
+        write!(formatter, "E{}{zero}{}", self.freedom.letter(), self.axis)
+    }
+}

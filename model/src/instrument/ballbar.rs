@@ -1,0 +1,89 @@
+//! The double ball bar: `L = ‖P_w − P_s‖`, the distance between a ball on the table and a ball in the spindle.
+//!
+//! The reading uses the stated length of the bar: a bar that is `δ` longer than stated reads `L − δ`. A sensor whose gain is off by
+//! `k` adds `k·(L − L_bar)`.
+
+use super::{InsideUnit, InstrumentUnknown, SharedBy, displaced};
+use crate::chain::{AxisPosition, BodyErrors, Machine};
+use crate::frames::Point;
+use crate::scalar::Scalar;
+
+const fn ball(thing: &'static str, coordinate: &'static str, by: SharedBy) -> InstrumentUnknown {
+    InstrumentUnknown {
+        thing,
+        coordinate,
+        unit: InsideUnit::Millimetre,
+        shared_by: by,
+    }
+}
+
+/// Both balls, the bar's length, the sensor's gain.
+pub const UNKNOWNS: [InstrumentUnknown; 8] = [
+    ball("workpiece_ball", "x", SharedBy::Setup),
+    ball("workpiece_ball", "y", SharedBy::Setup),
+    ball("workpiece_ball", "z", SharedBy::Setup),
+    ball("spindle_ball", "x", SharedBy::SpindleSetup),
+    ball("spindle_ball", "y", SharedBy::SpindleSetup),
+    ball("spindle_ball", "z", SharedBy::SpindleSetup),
+    ball("bar", "", SharedBy::BarSetup),
+    InstrumentUnknown {
+        thing: "gain",
+        coordinate: "",
+        unit: InsideUnit::Ratio,
+        shared_by: SharedBy::Session,
+    },
+];
+
+/// Place of the bar's length among [`UNKNOWNS`].
+pub const BAR: usize = 6;
+/// Place of the sensor's gain among [`UNKNOWNS`].
+pub const GAIN: usize = 7;
+
+/// A ball bar as set up for one test, lengths in mm.
+#[derive(Clone, Debug, PartialEq)]
+pub struct BallBar<N> {
+    /// Centre of the workpiece ball in the table frame.
+    pub workpiece_ball: [N; 3],
+    /// Centre of the spindle ball in the tool frame.
+    pub spindle_ball: [N; 3],
+    /// Calibrated length of the bar.
+    pub bar: N,
+}
+
+impl<N: crate::scalar::Nominal> BallBar<N> {
+    /// The two ball centres in R: workpiece ball, spindle ball.
+    pub fn balls<S: Scalar<Nominal = N>>(
+        &self,
+        machine: &Machine,
+        state: &[AxisPosition<N>],
+        errors: &[BodyErrors<S>],
+        unknown: &impl Fn(usize) -> Option<S>,
+    ) -> (Point<S>, Point<S>) {
+        let workpiece = displaced(self.workpiece_ball, 0, unknown);
+        let spindle = displaced(self.spindle_ball, 3, unknown);
+        (
+            machine.workpiece_point(state, errors, workpiece),
+            machine.tool_point(state, errors, spindle),
+        )
+    }
+
+    /// The reading, mm.
+    pub fn read<S: Scalar<Nominal = N>>(
+        &self,
+        machine: &Machine,
+        state: &[AxisPosition<N>],
+        errors: &[BodyErrors<S>],
+        unknown: impl Fn(usize) -> Option<S>,
+    ) -> S {
+        let (workpiece, spindle) = self.balls(machine, state, errors, &unknown);
+        let distance = workpiece.minus(spindle).norm();
+        let length = match unknown(BAR) {
+            Some(bar) => distance - bar,
+            None => distance,
+        };
+        match unknown(GAIN) {
+            Some(gain) => length + gain * (distance - self.bar),
+            None => length,
+        }
+    }
+}

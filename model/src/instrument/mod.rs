@@ -1,0 +1,181 @@
+//! Instruments: functions from chain and state to readings, over the open scalar.
+//!
+//! A new instrument is one file here: its nominal geometry, its unknowns in a fixed order, and `read`.
+
+pub mod ballbar;
+pub mod socket;
+pub mod tracker;
+
+use crate::chain::{AxisPosition, BodyErrors, Machine};
+use crate::scalar::Scalar;
+
+/// The scalar coordinates of one reading: one length, or three coordinates; mm.
+#[derive(Clone, Copy, Debug)]
+pub struct Reading<S> {
+    values: [S; 3],
+    count: usize,
+}
+
+impl<S: Scalar> Reading<S> {
+    /// A reading of one length.
+    pub fn length(value: S) -> Self {
+        let zero = S::constant(0.0);
+        Reading {
+            values: [value, zero, zero],
+            count: 1,
+        }
+    }
+
+    /// A reading of three coordinates.
+    pub fn vector(values: [S; 3]) -> Self {
+        Reading { values, count: 3 }
+    }
+
+    /// The coordinates.
+    pub fn coordinates(&self) -> &[S] {
+        &self.values[..self.count]
+    }
+}
+
+/// What kind of instrument a session uses.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub enum InstrumentKind {
+    /// A double ball bar.
+    BallBar,
+    /// A laser tracker.
+    Tracker,
+    /// A ball in fixed sockets.
+    Socket,
+}
+
+impl InstrumentKind {
+    /// The word that a session file uses.
+    pub fn word(self) -> &'static str {
+        match self {
+            InstrumentKind::BallBar => "ballbar",
+            InstrumentKind::Tracker => "tracker",
+            InstrumentKind::Socket => "socket",
+        }
+    }
+
+    /// Scalar coordinates of a reading.
+    pub fn coordinates(self) -> usize {
+        match self {
+            InstrumentKind::BallBar => 1,
+            InstrumentKind::Tracker | InstrumentKind::Socket => 3,
+        }
+    }
+
+    /// The instrument's own unknowns in the order of its slots.
+    pub fn unknowns(self) -> &'static [InstrumentUnknown] {
+        match self {
+            InstrumentKind::BallBar => &ballbar::UNKNOWNS,
+            InstrumentKind::Tracker => &tracker::UNKNOWNS,
+            InstrumentKind::Socket => &socket::UNKNOWNS,
+        }
+    }
+}
+
+/// What an instrument's unknown belongs to: tests that share the thing share the unknown.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub enum SharedBy {
+    /// Tests of one `setup`: the workpiece ball as it is mounted.
+    Setup,
+    /// Tests of one `spindle_setup`: the spindle ball as it is mounted.
+    SpindleSetup,
+    /// Tests of one `bar_setup`: the bar as it is assembled.
+    BarSetup,
+    /// Tests of one `socket`.
+    Socket,
+    /// All tests of the session.
+    Session,
+}
+
+/// One of an instrument's own unknowns.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct InstrumentUnknown {
+    /// The thing: `workpiece_ball`, `spindle_ball`, `bar`, `tracker`, `target`, `socket`, `ball`.
+    pub thing: &'static str,
+    /// Its coordinate, `x` … `c`, or empty.
+    pub coordinate: &'static str,
+    /// The unit inside.
+    pub unit: InsideUnit,
+    /// Which tests share it.
+    pub shared_by: SharedBy,
+}
+
+/// Unit of a quantity inside the program.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub enum InsideUnit {
+    /// mm; printed in µm.
+    Millimetre,
+    /// rad; printed in arcsec.
+    Radian,
+    /// Dimensionless; printed in µm/m.
+    Ratio,
+}
+
+/// An instrument as set up for one test: its nominal geometry.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Station<N> {
+    /// A ball bar.
+    BallBar(ballbar::BallBar<N>),
+    /// A tracker.
+    Tracker(tracker::Tracker<N>),
+    /// A socket.
+    Socket(socket::Socket<N>),
+}
+
+impl<N> Station<N> {
+    /// What kind it is.
+    pub fn kind(&self) -> InstrumentKind {
+        match self {
+            Station::BallBar(_) => InstrumentKind::BallBar,
+            Station::Tracker(_) => InstrumentKind::Tracker,
+            Station::Socket(_) => InstrumentKind::Socket,
+        }
+    }
+
+    /// The reading for a state of the axes, errors of the machine, and values of the instrument's own unknowns (mm, rad, in
+    /// the order of [`InstrumentKind::unknowns`]; `None` is an exact zero).
+    pub fn read<S: Scalar<Nominal = N>>(
+        &self,
+        machine: &Machine,
+        state: &[AxisPosition<N>],
+        errors: &[BodyErrors<S>],
+        unknown: impl Fn(usize) -> Option<S>,
+    ) -> Reading<S>
+    where
+        N: crate::scalar::Nominal,
+    {
+        match self {
+            Station::BallBar(bar) => Reading::length(bar.read(machine, state, errors, unknown)),
+            Station::Tracker(tracker) => Reading::vector(tracker.read(machine, state, errors, unknown).0),
+            Station::Socket(socket) => Reading::vector(socket.read(machine, state, errors, unknown).0),
+        }
+    }
+
+    /// The point of the tool frame that the instrument holds, mm.
+    pub fn tool_point_mm(&self) -> [N; 3]
+    where
+        N: Copy,
+    {
+        match self {
+            Station::BallBar(bar) => bar.spindle_ball,
+            Station::Tracker(tracker) => tracker.target,
+            Station::Socket(socket) => socket.ball,
+        }
+    }
+}
+
+/// A nominal point, displaced by three unknowns where they are carried.
+fn displaced<S: Scalar>(
+    nominal: [S::Nominal; 3],
+    first: usize,
+    unknown: &impl Fn(usize) -> Option<S>,
+) -> crate::frames::Point<S> {
+    crate::frames::Point(std::array::from_fn(|i| match unknown(first + i) {
+        Some(displacement) => displacement + nominal[i],
+        None => S::nominal(nominal[i]),
+    }))
+}

@@ -1,0 +1,61 @@
+//! A ball in fixed sockets: the tool's ball sits in one of a few places, so every pose of one socket is the same point.
+//!
+//! The reading is the closure `P_s − s`, the ball in R less the socket in R; what is observed is zero.
+
+use super::{InsideUnit, InstrumentUnknown, SharedBy, displaced};
+use crate::chain::{AxisPosition, BodyErrors, Machine};
+use crate::frames::Point;
+use crate::scalar::Scalar;
+
+const fn unknown(thing: &'static str, coordinate: &'static str, shared_by: SharedBy) -> InstrumentUnknown {
+    InstrumentUnknown {
+        thing,
+        coordinate,
+        unit: InsideUnit::Millimetre,
+        shared_by,
+    }
+}
+
+/// The socket in R, then the ball in the tool frame.
+pub const UNKNOWNS: [InstrumentUnknown; 6] = [
+    unknown("socket", "x", SharedBy::Socket),
+    unknown("socket", "y", SharedBy::Socket),
+    unknown("socket", "z", SharedBy::Socket),
+    unknown("ball", "x", SharedBy::SpindleSetup),
+    unknown("ball", "y", SharedBy::SpindleSetup),
+    unknown("ball", "z", SharedBy::SpindleSetup),
+];
+
+/// A ball and the socket it sits in, mm.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Socket<N> {
+    /// Centre of the ball in the tool frame.
+    pub ball: [N; 3],
+    /// Centre of the socket in R.
+    pub socket: [N; 3],
+}
+
+impl<N: crate::scalar::Nominal> Socket<N> {
+    /// The ball in R.
+    pub fn ball_point<S: Scalar<Nominal = N>>(
+        &self,
+        machine: &Machine,
+        state: &[AxisPosition<N>],
+        errors: &[BodyErrors<S>],
+        unknown: &impl Fn(usize) -> Option<S>,
+    ) -> Point<S> {
+        machine.tool_point(state, errors, displaced(self.ball, 3, unknown))
+    }
+
+    /// The closure: ball less socket, mm.
+    pub fn read<S: Scalar<Nominal = N>>(
+        &self,
+        machine: &Machine,
+        state: &[AxisPosition<N>],
+        errors: &[BodyErrors<S>],
+        unknown: impl Fn(usize) -> Option<S>,
+    ) -> Point<S> {
+        let ball = self.ball_point(machine, state, errors, &unknown);
+        ball.minus(displaced(self.socket, 0, &unknown))
+    }
+}
