@@ -17,6 +17,7 @@ pub mod error;
 pub mod frames;
 pub mod instrument;
 pub mod scalar;
+pub mod sensitivity;
 pub mod session;
 
 pub use error::ModelError;
