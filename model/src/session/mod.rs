@@ -2,11 +2,14 @@
 //!
 //! A session file is read by [`read::session`]; what comes out has been checked, is in mm, rad and s, and names no unit again.
 
+mod document;
 pub mod expression;
 pub mod motion;
+mod plan;
+mod reach;
 pub mod read;
 pub mod readings;
-pub mod table;
+mod table;
 
 use std::path::PathBuf;
 

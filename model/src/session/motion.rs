@@ -1,5 +1,20 @@
 //! How the axes move in a planned test.
 
+use std::path::Path;
+
+use super::readings::Readings;
+use super::{Session, Test, plan};
+use crate::chain::Machine;
+use crate::error::{ModelError, Place};
+use crate::instrument::Station;
+use crate::session::read::quantity;
+
+/// Most readings of one planned test.
+pub const MOST_READINGS: usize = 1_000_000;
+
+/// Pause between the tests of a planned session, s.
+const BETWEEN_TESTS_S: f64 = 120.0;
+
 /// The movement of a planned test, positions in mm and rad.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Motion {
@@ -75,4 +90,137 @@ pub enum FollowOffset {
     Tangential,
     /// Along the axis.
     Axial,
+}
+
+/// The states that a test is planned to read at: positions, runs and times, with nothing observed yet.
+///
+/// A test without a movement of its own (`path = { kind = "list" }`) gives those of its data.
+///
+/// # Errors
+/// If an axis would leave its travel, the balls cannot be kept where the path wants them, or there is no plan.
+pub fn planned(machine: &Machine, test: &Test) -> Result<Readings, ModelError> {
+    checked_plan(machine, test).map_err(|(message, help)| ModelError::Input {
+        place: Place::file(Path::new("plan")),
+        message,
+        help: Some(help),
+    })
+}
+
+/// The plan of every test of a session, one after the other in time.
+///
+/// # Errors
+/// As [`planned`].
+pub fn planned_session(session: &Session) -> Result<Vec<Readings>, ModelError> {
+    let mut start_s = 0.0;
+    session
+        .tests
+        .iter()
+        .map(|test| {
+            let mut readings =
+                checked_plan(&session.machine, test).map_err(|(message, help)| ModelError::Input {
+                    place: Place::file(&session.file),
+                    message,
+                    help: Some(help),
+                })?;
+            for time in &mut readings.time_s {
+                *time += start_s;
+            }
+            if let Some(end_s) = readings.time_s.last() {
+                start_s = end_s + BETWEEN_TESTS_S;
+            }
+            Ok(readings)
+        })
+        .collect()
+}
+
+/// As [`planned`], a fault as message and help.
+pub(crate) fn checked_plan(machine: &Machine, test: &Test) -> Result<Readings, (String, String)> {
+    let mut readings = match &test.motion {
+        Some(Motion::List) | None => {
+            let Some(data) = &test.readings else {
+                return Err((
+                    format!(
+                        "test \"{}\" has no movement to plan and no data to take its states from",
+                        test.name
+                    ),
+                    "add `sweep = { … }` or `path = { … }`, or read its data".into(),
+                ));
+            };
+            return Ok(data.clone());
+        }
+        Some(motion) => plan::states(machine, test, motion)?,
+    };
+    readings.coordinates = test.station.kind().coordinates();
+    readings.observed = vec![0.0; readings.rows() * readings.coordinates];
+    match beyond_travel(machine, &readings) {
+        None => Ok(readings),
+        Some(beyond) => Err((
+            format!("test \"{}\": {beyond}", test.name),
+            "plan within the travel of the machine, or correct `travel_mm` / `travel_deg`".into(),
+        )),
+    }
+}
+
+/// What an axis does beyond its travel, if one does.
+pub(crate) fn beyond_travel(machine: &Machine, readings: &Readings) -> Option<String> {
+    machine
+        .axes
+        .iter()
+        .zip(&readings.positions)
+        .find_map(|(axis, positions)| {
+            let [least, greatest] = axis.travel?;
+            let slack = 1e-9 * (1.0 + least.abs().max(greatest.abs()));
+            let beyond = positions
+                .iter()
+                .find(|&&q| q < least - slack || q > greatest + slack)?;
+            let outside = |q: f64| quantity::outside(axis.kind, q);
+            Some(format!(
+                "axis `{}` goes to {:.3} {unit}; its travel is {} to {} {unit}",
+                axis.name,
+                outside(*beyond),
+                outside(least),
+                outside(greatest),
+                unit = quantity::unit_word(axis.kind),
+            ))
+        })
+}
+
+/// The axes that a movement names.
+pub(crate) fn moved(motion: Option<&Motion>) -> Vec<usize> {
+    match motion {
+        Some(Motion::Sweep { axis, .. } | Motion::Follow { axis, .. }) => vec![*axis],
+        Some(Motion::Circle { first, second, .. }) => vec![*first, *second],
+        Some(Motion::List) | None => Vec::new(),
+    }
+}
+
+/// Puts linear axes that a circle does not move, and that the test leaves open, where the circle's centre lies in its plane.
+pub(crate) fn stand(
+    machine: &Machine,
+    station: &Station<f64>,
+    motion: Option<&Motion>,
+    listed: &[bool],
+    at: &mut [f64],
+) {
+    if let (
+        Station::BallBar(bar),
+        Some(Motion::Circle {
+            first,
+            second,
+            centre,
+            ..
+        }),
+    ) = (station, motion)
+    {
+        let open: Vec<usize> = plan::linear_axes(machine)
+            .into_iter()
+            .filter(|axis| !listed[*axis] || axis == first || axis == second)
+            .collect();
+        let placed = plan::placed(machine, bar, at, &open, *centre);
+        for axis in open {
+            if axis != *first && axis != *second {
+                at[axis] = placed.0[axis];
+            }
+        }
+    }
 }

@@ -33,6 +33,33 @@ impl Readings {
         self.positions.first().map_or(0, Vec::len)
     }
 
+    /// Some of the rows, in the order given.
+    pub fn of_rows(&self, rows: &[usize]) -> Readings {
+        fn of<T: Copy>(column: &[T], rows: &[usize]) -> Vec<T> {
+            if column.is_empty() {
+                return Vec::new();
+            }
+            rows.iter().map(|&row| column[row]).collect()
+        }
+        Readings {
+            file: self.file.clone(),
+            line: of(&self.line, rows),
+            run: of(&self.run, rows),
+            time_s: of(&self.time_s, rows),
+            temperature_c: of(&self.temperature_c, rows),
+            positions: self.positions.iter().map(|column| of(column, rows)).collect(),
+            coordinates: self.coordinates,
+            observed: rows
+                .iter()
+                .flat_map(|&row| {
+                    let start = row * self.coordinates;
+                    self.observed.get(start..start + self.coordinates).unwrap_or(&[])
+                })
+                .copied()
+                .collect(),
+        }
+    }
+
     /// Where the axes stand at a row.
     pub fn state(&self, machine: &Machine, row: usize, state: &mut Vec<AxisPosition<f64>>) {
         state.clear();

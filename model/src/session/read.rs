@@ -1,1 +1,0 @@
-//! Machine and session files.
