@@ -47,6 +47,7 @@ pub fn samples(
 ) -> Option<Vec<DriverSample<f64>>> {
     let plain = |value: f64, rate: f64| DriverSample { value, rate, direction: 1.0, ..DriverSample::default() };
     match driver {
+        Driver::None => Some(vec![plain(0.0, 0.0); model.rows()]),
         Driver::Axis(name) => {
             let axis = machine.axis_index(name)?;
             Some(readings.axis_samples(axis, machine.axes[axis].kind))

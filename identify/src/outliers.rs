@@ -1,6 +1,6 @@
 //! Wild readings: judged against their neighbours, or among independent poses against the bulk, and left out by name.
 //!
-//! Structure must not be called wild. Along a run a residual is therefore compared with the median of its neighbours, not with zero
+//! Structure must not be called wild. Along a run a residual is therefore compared with the medians of its neighbours on either side, not with zero
 //! (Hampel's identifier: Davies & Gather, J. Am. Stat. Assoc. 88 (1993) 782). Poses have no neighbours; there a residual is wild when it is far
 //! out of all proportion to the bulk.
 
@@ -54,10 +54,21 @@ fn wild_along_runs(readings: &Readings, residual: &[f64], coordinates: usize, si
             let value = |row: usize| residual[row * coordinates + coordinate];
             let mut deviations: Vec<f64> = Vec::with_capacity(run.len());
             for row in run.clone() {
+                // Beside a step (backlash at a reversal) one of the two sides agrees; a wild reading agrees with neither.
                 let start = row.saturating_sub(NEIGHBOURS).max(run.start);
                 let end = (row + NEIGHBOURS + 1).min(run.end);
-                let mut window: Vec<f64> = (start..end).filter(|other| *other != row).map(value).collect();
-                deviations.push(value(row) - median(&mut window));
+                let from = |side: std::ops::Range<usize>| {
+                    let mut window: Vec<f64> = side.map(value).collect();
+                    if window.len() < 3 { None } else { Some(value(row) - median(&mut window)) }
+                };
+                let deviation = match (from(start..row), from(row + 1..end)) {
+                    (Some(before), Some(after)) if before * after <= 0.0 => 0.0,
+                    (Some(before), Some(after)) if before.abs() < after.abs() => before,
+                    (_, Some(after)) => after,
+                    (Some(before), None) => before,
+                    (None, None) => 0.0,
+                };
+                deviations.push(deviation);
             }
             let mut sizes: Vec<f64> = deviations.iter().map(|d| d.abs()).collect();
             // 1.4826: the standard deviation of a Gaussian in median absolute deviations.

@@ -259,11 +259,7 @@ fn drivers(problem: &Problem<'_>, sampling: &Sampling, choice: DriverChoice, com
             .collect()
     };
     match choice {
-        // A constant follows nothing; any axis names it, time is the neutral choice.
-        DriverChoice::None => vec![match own {
-            Some(axis) => Driver::Axis(machine.axes[axis].name.clone()),
-            None => Driver::Axis(machine.axes[0].name.clone()),
-        }],
+        DriverChoice::None => vec![Driver::None],
         DriverChoice::Own => own_of_kind(None),
         DriverChoice::OwnRotary => own_of_kind(Some(AxisKind::Rotary)),
         DriverChoice::OwnLinear => own_of_kind(Some(AxisKind::Linear)),

@@ -66,6 +66,8 @@ impl fmt::Display for Component {
 /// What a component follows.
 #[derive(Clone, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
 pub enum Driver {
+    /// Nothing: the driver of a constant.
+    None,
     /// The position (and with it the direction and speed) of an axis.
     Axis(String),
     /// Time since the session's first reading, s.
@@ -77,9 +79,10 @@ pub enum Driver {
 }
 
 impl Driver {
-    /// Reads `time`, `temperature`, `gravity`; anything else is the name of an axis.
+    /// Reads `none`, `time`, `temperature`, `gravity`; anything else is the name of an axis.
     pub fn parse(text: &str) -> Driver {
         match text {
+            "none" => Driver::None,
             "time" => Driver::Time,
             "temperature" => Driver::Temperature,
             "gravity" => Driver::Gravity,
@@ -91,6 +94,7 @@ impl Driver {
 impl fmt::Display for Driver {
     fn fmt(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
         formatter.write_str(match self {
+            Driver::None => "none",
             Driver::Axis(axis) => axis,
             Driver::Time => "time",
             Driver::Temperature => "temperature",

@@ -1,0 +1,5 @@
+//! Close the loop.
+
+pub mod columns;
+pub mod library;
+pub mod moments;
