@@ -181,7 +181,7 @@ impl DriverUnit {
             },
             Driver::Time => DriverUnit::Second,
             Driver::Temperature => DriverUnit::Celsius,
-            Driver::Gravity => DriverUnit::Metre,
+            Driver::Gravity | Driver::None => DriverUnit::Metre,
         }
     }
 
