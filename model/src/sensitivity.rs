@@ -3,18 +3,17 @@
 //! A *slot* is a component that the chain can see: the machine's errors ([`crate::chain::ERRORS_PER_AXIS`] an axis), then the instrument's own
 //! unknowns. Slots are seeded in packs; a slot that is neither seeded nor different from zero is left out of the chain altogether.
 
-use num_dual::{Derivative, DualSVec64};
-
 use crate::axis::AxisKind;
 use crate::chain::{AxisPosition, BodyErrors, Machine};
+use crate::gradient::Gradient;
 use crate::instrument::Station;
 use crate::scalar::Scalar;
 use crate::session::readings::Readings;
 
 /// Slots seeded at once.
-const PACK: usize = 6;
+const PACK: usize = 8;
 
-type PackDual = DualSVec64<PACK>;
+type PackDual = Gradient<PACK>;
 
 /// What the components are, reading by reading.
 #[derive(Clone, Debug, Default)]
@@ -168,12 +167,8 @@ impl<'a> TestModel<'a> {
             let seeded = |slot: usize, row: usize| -> PackDual {
                 let value = values.at(slot, row);
                 match pack.iter().position(|seed| *seed == slot) {
-                    Some(place) => {
-                        let mut seed = nalgebra::SVector::<f64, PACK>::zeros();
-                        seed[place] = 1.0;
-                        PackDual::new(value, Derivative::some(seed))
-                    }
-                    None => PackDual::from_re(value),
+                    Some(place) => PackDual::seed(value, place),
+                    None => PackDual::constant(value),
                 }
             };
             let bodies_at = |row: usize| self.machine.body_errors(carried, |slot| seeded(slot, row));
@@ -185,12 +180,10 @@ impl<'a> TestModel<'a> {
                 let reading = self.read(row, &bodies, carried, |slot| seeded(slot, row));
                 for value in reading.coordinates() {
                     if pack_index == 0 {
-                        result.readings_mm.push(value.re);
+                        result.readings_mm.push(value.value);
                     }
-                    let gradient =
-                        value.eps.unwrap_generic(nalgebra::Const::<PACK>, nalgebra::Const::<1>);
                     for place in 0..pack.len() {
-                        result.derivatives[pack_index * PACK + place].push(gradient[place]);
+                        result.derivatives[pack_index * PACK + place].push(value.by[place]);
                     }
                 }
             }
