@@ -44,7 +44,11 @@ impl NoiseSource {
 impl Noise {
     /// White noise.
     pub fn white(sigma_mm: f64, source: NoiseSource) -> Noise {
-        Noise { sigma_mm, memory: Vec::new(), source }
+        Noise {
+            sigma_mm,
+            memory: Vec::new(),
+            source,
+        }
     }
 
     /// Standard deviation of what a reading adds to the readings before it, mm: the innovation.
@@ -124,7 +128,9 @@ impl PureError {
             .iter()
             .flatten()
             .flatten()
-            .fold((0.0, 0_usize), |(sum, count), value| (sum + value * value, count + 1));
+            .fold((0.0, 0_usize), |(sum, count), value| {
+                (sum + value * value, count + 1)
+            });
         (self.freedom >= 10).then(|| (sum / count as f64).sqrt())
     }
 }

@@ -31,7 +31,10 @@ impl<const N: usize> Gradient<N> {
 
     #[inline(always)]
     fn chain(self, value: f64, slope: f64) -> Self {
-        Gradient { value, by: std::array::from_fn(|i| slope * self.by[i]) }
+        Gradient {
+            value,
+            by: std::array::from_fn(|i| slope * self.by[i]),
+        }
     }
 }
 
@@ -39,7 +42,10 @@ impl<const N: usize> Add for Gradient<N> {
     type Output = Self;
     #[inline(always)]
     fn add(self, other: Self) -> Self {
-        Gradient { value: self.value + other.value, by: std::array::from_fn(|i| self.by[i] + other.by[i]) }
+        Gradient {
+            value: self.value + other.value,
+            by: std::array::from_fn(|i| self.by[i] + other.by[i]),
+        }
     }
 }
 
@@ -47,7 +53,10 @@ impl<const N: usize> Sub for Gradient<N> {
     type Output = Self;
     #[inline(always)]
     fn sub(self, other: Self) -> Self {
-        Gradient { value: self.value - other.value, by: std::array::from_fn(|i| self.by[i] - other.by[i]) }
+        Gradient {
+            value: self.value - other.value,
+            by: std::array::from_fn(|i| self.by[i] - other.by[i]),
+        }
     }
 }
 
@@ -56,7 +65,10 @@ impl<const N: usize> Mul for Gradient<N> {
     #[inline(always)]
     fn mul(self, other: Self) -> Self {
         let by = std::array::from_fn(|i| self.value * other.by[i] + other.value * self.by[i]);
-        Gradient { value: self.value * other.value, by }
+        Gradient {
+            value: self.value * other.value,
+            by,
+        }
     }
 }
 
@@ -74,7 +86,10 @@ impl<const N: usize> Neg for Gradient<N> {
     type Output = Self;
     #[inline(always)]
     fn neg(self) -> Self {
-        Gradient { value: -self.value, by: self.by.map(|d| -d) }
+        Gradient {
+            value: -self.value,
+            by: self.by.map(|d| -d),
+        }
     }
 }
 
@@ -82,7 +97,10 @@ impl<const N: usize> Add<f64> for Gradient<N> {
     type Output = Self;
     #[inline(always)]
     fn add(self, other: f64) -> Self {
-        Gradient { value: self.value + other, by: self.by }
+        Gradient {
+            value: self.value + other,
+            by: self.by,
+        }
     }
 }
 
@@ -90,7 +108,10 @@ impl<const N: usize> Sub<f64> for Gradient<N> {
     type Output = Self;
     #[inline(always)]
     fn sub(self, other: f64) -> Self {
-        Gradient { value: self.value - other, by: self.by }
+        Gradient {
+            value: self.value - other,
+            by: self.by,
+        }
     }
 }
 

@@ -102,8 +102,7 @@ impl Moments {
                     .iter()
                     .map(|range| {
                         let part = block.as_ref().subrows(range.start, range.len());
-                        let cross =
-                            transposed_product(side.as_ref().subrows(range.start, range.len()), part);
+                        let cross = transposed_product(side.as_ref().subrows(range.start, range.len()), part);
                         let mut start = 0;
                         let own: Vec<Mat<f64>> = chosen
                             .iter()
@@ -152,7 +151,15 @@ impl Moments {
             });
         }
         let null_base = transposed_product(model.as_ref(), null.as_ref());
-        Ok(Moments { folds, null_cross, null_base, first, count, base_columns: model, null })
+        Ok(Moments {
+            folds,
+            null_cross,
+            null_base,
+            first,
+            count,
+            base_columns: model,
+            null,
+        })
     }
 
     /// Number of base columns so far.
@@ -240,7 +247,11 @@ impl Moments {
             for k in 0..layout.count {
                 let fresh_norm = fresh.col(k).subrows(range.start, range.len()).norm_l2();
                 let own_norm = self.folds[fold].own[candidate][(k, k)].max(0.0).sqrt();
-                let ratio = if own_norm > 0.0 { fresh_norm / own_norm } else { 0.0 };
+                let ratio = if own_norm > 0.0 {
+                    fresh_norm / own_norm
+                } else {
+                    0.0
+                };
                 let value = self.folds[fold].cross_y[own_first + k] * ratio;
                 self.folds[fold].base_y.push(value);
             }
@@ -257,7 +268,11 @@ impl Moments {
 
 fn stacked(above: &Mat<f64>, below: &Mat<f64>) -> Mat<f64> {
     Mat::from_fn(above.nrows() + below.nrows(), above.ncols(), |i, j| {
-        if i < above.nrows() { above[(i, j)] } else { below[(i - above.nrows(), j)] }
+        if i < above.nrows() {
+            above[(i, j)]
+        } else {
+            below[(i - above.nrows(), j)]
+        }
     })
 }
 
