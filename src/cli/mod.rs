@@ -4,6 +4,7 @@ mod failure;
 mod fit;
 mod output;
 mod table;
+mod trace;
 
 use std::path::PathBuf;
 use std::process::ExitCode;
@@ -29,6 +30,9 @@ enum Command {
     /// Identify errors from readings, with uncertainties.
     #[command(after_help = "Example:\n  abbe fit sessions/hermle-c600u/measured.toml --json fit.json")]
     Fit(fit::FitArguments),
+    /// Close the loop: trace what the fit leaves over to the effect that the model lacks.
+    #[command(after_help = "Example:\n  abbe trace sessions/hermle-c600u/measured/session.toml --json trace.json --write next.toml")]
+    Trace(trace::TraceArguments),
 }
 
 /// What every command that reads a session takes.
@@ -60,6 +64,7 @@ pub fn run() -> ExitCode {
     let arguments = Arguments::parse();
     let outcome = match arguments.command {
         Command::Fit(arguments) => fit::run(&arguments),
+        Command::Trace(arguments) => trace::run(&arguments),
     };
     match outcome {
         Ok(()) => ExitCode::SUCCESS,

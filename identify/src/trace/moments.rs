@@ -199,6 +199,27 @@ impl Moments {
         });
     }
 
+    /// What a layout would gain on all readings beside a model trained on all readings.
+    pub fn gain_of(&self, columns: &Columns<'_, '_>, layout: &Layout, model: &super::score::Trained<'_>) -> f64 {
+        let (base, inverse, base_y) = (&model.base, &model.inverse, &model.base_y);
+        let mut fresh = Mat::zeros(columns.rows(), layout.count);
+        columns.fill(&[layout], fresh.as_mut());
+        let cross_all = transposed_product(self.base_columns.as_ref(), fresh.as_ref());
+        let cross = Mat::from_fn(base.len(), layout.count, |i, k| cross_all[(base[i], k)]);
+        let own = transposed_product(fresh.as_ref(), fresh.as_ref());
+        let solved = inverse * &cross;
+        let d = Mat::from_fn(layout.count, layout.count, |k, l| {
+            own[(k, l)] - (0..base.len()).map(|i| cross[(i, k)] * solved[(i, l)]).sum::<f64>()
+        });
+        let g: Vec<f64> = (0..layout.count)
+            .map(|k| {
+                let with_y: f64 = (0..columns.rows()).map(|i| fresh[(i, k)] * self.residual[i]).sum();
+                with_y - (0..base.len()).map(|i| solved[(i, k)] * base_y[i]).sum::<f64>()
+            })
+            .collect();
+        super::score::quadratic_gain(&d, &own, &g)
+    }
+
     /// Model, residual and null draws side by side: one product with each chunk of candidates.
     fn side(&self) -> Mat<f64> {
         beside(&self.base_columns, &self.residual, &self.null)

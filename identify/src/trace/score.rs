@@ -53,13 +53,13 @@ pub struct Trained<'m> {
     /// The folds it is trained on.
     pub folds: Vec<usize>,
     /// `(XᵀX)⁻¹`.
-    inverse: Mat<f64>,
+    pub inverse: Mat<f64>,
     /// `(XᵀX)⁻¹ Xᵀ C`.
     solved: Mat<f64>,
     /// `Xᵀ C`.
     cross: Mat<f64>,
     /// `Xᵀ y`.
-    base_y: Vec<f64>,
+    pub base_y: Vec<f64>,
     /// Coefficients of the base columns: `(XᵀX)⁻¹ Xᵀ y`.
     pub coefficients: Vec<f64>,
 }
@@ -168,7 +168,7 @@ impl<'m> Trained<'m> {
             .par_chunks(64)
             .map(|chunk| {
                 let mut best = vec![f64::NEG_INFINITY; draws];
-                for &candidate in chunk {
+                for &candidate in chunk.iter().filter(|candidate| costs[**candidate].is_finite()) {
                     let (d, _, own) = self.projected(candidate);
                     let inverse = Visible::of(&d, &own);
                     if inverse.freedom == 0 {
@@ -263,6 +263,11 @@ impl<'m> Trained<'m> {
         }
         sum
     }
+}
+
+/// `gᵀ D⁻¹ g` on the directions that are seen.
+pub fn quadratic_gain(d: &Mat<f64>, own: &Mat<f64>, g: &[f64]) -> f64 {
+    Visible::of(d, own).quadratic(g)
 }
 
 /// The inverse of a candidate's projected product on the directions that are seen.

@@ -57,6 +57,8 @@ pub struct Search<'s> {
     pub held_out: Vec<f64>,
     /// The best score on readings without structure that is exceeded with the probability of the stop, by round.
     pub thresholds: Vec<f64>,
+    /// Whether candidates of last resort are tried.
+    pub last_resort: bool,
     stop: Stop,
 }
 
@@ -98,11 +100,16 @@ impl<'s> Search<'s> {
             materialised: Vec::new(),
             held_out: Vec::new(),
             thresholds: Vec::new(),
+            last_resort: false,
             stop,
         };
         let before = search.held_out_now();
         search.held_out.push(before);
         search
+    }
+
+    fn is_held_back(&self, candidate: usize) -> bool {
+        self.candidates[candidate].last_resort && !self.last_resort
     }
 
     fn all_folds(&self) -> Vec<usize> {
@@ -162,7 +169,7 @@ impl<'s> Search<'s> {
         let gains = model.gains();
         let mut best: Option<(usize, f64)> = None;
         for (candidate, gain) in gains.iter().enumerate() {
-            if taken.contains(&candidate) {
+            if taken.contains(&candidate) || self.is_held_back(candidate) {
                 continue;
             }
             let score = self.score(candidate, gain, variance);
@@ -183,7 +190,8 @@ impl<'s> Search<'s> {
         let mut first = best;
         let mut first_gain = of_best.clone();
         for (candidate, gain) in model.gains().iter().enumerate() {
-            if taken.contains(&candidate) || gain.freedom == 0 || evidence(gain) < least {
+            let passed_over = taken.contains(&candidate) || self.is_held_back(candidate);
+            if passed_over || gain.freedom == 0 || evidence(gain) < least {
                 continue;
             }
             let cost = self.candidates[candidate].cost;
@@ -202,7 +210,9 @@ impl<'s> Search<'s> {
         let (winner, score, null) = {
             let model = self.model_without(None);
             let Some((best, score)) = self.best_of(&model, &taken) else { return Round::Done { p_value: 1.0 } };
-            let costs: Vec<f64> = self.candidates.iter().map(|candidate| candidate.cost).collect();
+            let costs: Vec<f64> = (0..self.candidates.len())
+                .map(|c| if self.is_held_back(c) { f64::INFINITY } else { self.candidates[c].cost })
+                .collect();
             let null = model.null_best(&costs, self.null_variance());
             (self.named_first(&model, best), score, null)
         };
@@ -311,6 +321,20 @@ impl<'s> Search<'s> {
 
     fn held_out_now(&self) -> f64 {
         self.all_folds().into_iter().map(|fold| self.model_of_fold(fold).sum_of_squares_on(fold)).sum()
+    }
+
+    /// What any effect would gain beside all that has been taken; `None` where the data lack what it follows.
+    pub fn gain_of(&self, effect: &abbe_model::effect::Effect) -> Option<f64> {
+        let layout = self.columns.layout_uncached(effect)?;
+        let model = self.model_without(None);
+        Some(self.moments.gain_of(self.columns, &layout, &model))
+    }
+
+    /// The lengths of a candidate's columns over all readings.
+    pub fn norms(&self, candidate: usize) -> Vec<f64> {
+        (0..self.moments.count[candidate])
+            .map(|k| self.moments.folds.iter().map(|fold| fold.own[candidate][(k, k)]).sum::<f64>().max(0.0).sqrt())
+            .collect()
     }
 
     /// Adds a candidate to those that are looked for.
