@@ -108,7 +108,10 @@ pub fn prepare(session: &Session, seed: u64) -> Result<(Problem<'_>, Fit), Ident
     };
     let mut problem = Problem::new(session, first, seed)?;
     if stated.is_none() {
-        problem.noise = Noise::white(nominal_residual_mm(&problem)?.max(floor).max(1e-9), NoiseSource::Fit);
+        problem.noise = Noise::white(
+            nominal_residual_mm(&problem)?.max(floor).max(1e-9),
+            NoiseSource::Fit,
+        );
     }
     let mut fit = fit(&problem, None)?;
     // Noise and wild readings follow from residuals, residuals from a fit; three rounds settle both.

@@ -31,7 +31,9 @@ enum Command {
     #[command(after_help = "Example:\n  abbe fit sessions/hermle-c600u/measured.toml --json fit.json")]
     Fit(fit::FitArguments),
     /// Close the loop: trace what the fit leaves over to the effect that the model lacks.
-    #[command(after_help = "Example:\n  abbe trace sessions/hermle-c600u/measured/session.toml --json trace.json --write next.toml")]
+    #[command(
+        after_help = "Example:\n  abbe trace sessions/hermle-c600u/measured/session.toml --json trace.json --write next.toml"
+    )]
     Trace(trace::TraceArguments),
 }
 

@@ -100,7 +100,11 @@ fn list(session: &abbe::model::session::Session, options: &TraceOptions) -> Resu
         let seen = of_family.iter().filter(|entry| entry.seen).count();
         println!("{}: {} candidates, {seen} seen", family.name, of_family.len());
         for entry in of_family {
-            println!("  {} {}", if entry.seen { "seen    " } else { "not seen" }, entry.id);
+            println!(
+                "  {} {}",
+                if entry.seen { "seen    " } else { "not seen" },
+                entry.id
+            );
         }
     }
     Ok(())
@@ -119,8 +123,11 @@ fn print(result: &TraceResult) {
     println!("The declared model leaves: {}", result.residual_before);
     println!();
     let row = |name: &str, model: &ModelResult| {
-        let mut cells =
-            vec![name.to_string(), format!("{:.3}", model.rms_um), format!("{:.3}", model.heldout_rms_um)];
+        let mut cells = vec![
+            name.to_string(),
+            format!("{:.3}", model.rms_um),
+            format!("{:.3}", model.heldout_rms_um),
+        ];
         if let (Some(rms), Some(held)) = (model.rms_3d_um, model.heldout_rms_3d_um) {
             cells.extend([format!("{rms:.1}"), format!("{held:.1}")]);
         }
@@ -130,7 +137,10 @@ fn print(result: &TraceResult) {
     if result.before.rms_3d_um.is_some() {
         header.extend(["3-vector", "held out"]);
     }
-    table::print(&header, &[row("before", &result.before), row("after", &result.after)]);
+    table::print(
+        &header,
+        &[row("before", &result.before), row("after", &result.after)],
+    );
     println!("held out: leaving out {}", result.heldout_by);
     for (number, effect) in result.effects.iter().enumerate() {
         println!("\n{}. {}  ({})", number + 1, name(&effect.name), effect.family);
@@ -138,11 +148,19 @@ fn print(result: &TraceResult) {
             let (value, u) = table::value_and_u(p.value, p.u);
             println!("   {}  {value} ± {u} {}", p.id, p.unit);
         }
-        println!("   explains {} rms; p ≤ {:.3}", table::micrometres(effect.rms_gain_um), effect.p_value);
+        println!(
+            "   explains {} rms; p ≤ {:.3}",
+            table::micrometres(effect.rms_gain_um),
+            effect.p_value
+        );
         if !effect.aliases.is_empty() {
             let names: Vec<String> = effect.aliases.iter().take(8).map(name).collect();
             let more = effect.aliases.len().saturating_sub(8);
-            let more = if more > 0 { format!(" and {more} more") } else { String::new() };
+            let more = if more > 0 {
+                format!(" and {more} more")
+            } else {
+                String::new()
+            };
             println!("   the readings cannot tell it from {}{more}", names.join("; "));
         }
         if let Some(test) = &effect.separated_by {
@@ -171,8 +189,16 @@ fn print(result: &TraceResult) {
 }
 
 fn name(effect: &EffectName) -> String {
-    let order = effect.order.map_or(String::new(), |order| format!(" order {order}"));
-    let tests =
-        if effect.tests.is_empty() { String::new() } else { format!(" in {}", effect.tests.join(", ")) };
-    format!("{} over {}: {}{order}{tests}", effect.component, effect.driver, effect.shape)
+    let order = effect
+        .order
+        .map_or(String::new(), |order| format!(" order {order}"));
+    let tests = if effect.tests.is_empty() {
+        String::new()
+    } else {
+        format!(" in {}", effect.tests.join(", "))
+    };
+    format!(
+        "{} over {}: {}{order}{tests}",
+        effect.component, effect.driver, effect.shape
+    )
 }

@@ -35,8 +35,11 @@ pub fn aliases(search: &Search<'_>, k: usize, variance: f64) -> Vec<Alias> {
     let (_, coefficients) = model.joined(taken.candidate);
     // Base columns are unit-length copies of the candidate's own; the signature is what they do together.
     let norms = search.norms(taken.candidate);
-    let signature: Vec<(usize, f64)> =
-        taken.places.clone().zip(coefficients.iter().zip(&norms).map(|(c, norm)| c * norm)).collect();
+    let signature: Vec<(usize, f64)> = taken
+        .places
+        .clone()
+        .zip(coefficients.iter().zip(&norms).map(|(c, norm)| c * norm))
+        .collect();
     let others: Vec<usize> = search.taken.iter().map(|t| t.candidate).collect();
     let mut aliases: Vec<Alias> = model
         .gains()
@@ -60,7 +63,10 @@ pub fn aliases(search: &Search<'_>, k: usize, variance: f64) -> Vec<Alias> {
         .collect();
     aliases.sort_by(|a, b| {
         let cost = |alias: &Alias| search.candidates[alias.candidate].cost;
-        b.cosine.partial_cmp(&a.cosine).unwrap_or(std::cmp::Ordering::Equal).then(cost(a).total_cmp(&cost(b)))
+        b.cosine
+            .partial_cmp(&a.cosine)
+            .unwrap_or(std::cmp::Ordering::Equal)
+            .then(cost(a).total_cmp(&cost(b)))
     });
     aliases
 }

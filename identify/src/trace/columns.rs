@@ -172,13 +172,19 @@ impl<'p, 'a> Columns<'p, 'a> {
                 })?;
                 let make = || Arc::new(drivers::basis_columns(&effect.shape, &samples));
                 let basis = if keep {
-                    cached(&self.bases, (number, format!("{follows} {:?}", effect.shape)), make)
+                    cached(
+                        &self.bases,
+                        (number, format!("{follows} {:?}", effect.shape)),
+                        make,
+                    )
                 } else {
                     make()
                 };
                 for (slot, factor) in drivers::component_slots(session, test, readings, &effect.component) {
                     if self.place[number].contains_key(&slot) {
-                        of_test.push(LayoutPart { moves: Moves::Slot(slot), factor: factor.map(Arc::new),
+                        of_test.push(LayoutPart {
+                            moves: Moves::Slot(slot),
+                            factor: factor.map(Arc::new),
                             basis: basis.clone(),
                         });
                     }
@@ -205,13 +211,28 @@ impl<'p, 'a> Columns<'p, 'a> {
         let readings = self.problem.tests[test].readings.as_ref()?;
         let samples = cached(&self.samples, (test, effect.driver.to_string()), || {
             let model = &self.problem.models[test];
-            drivers::samples(&session.machine, model, readings, &self.problem.origin, &effect.driver, None).map(Arc::new)
+            drivers::samples(
+                &session.machine,
+                model,
+                readings,
+                &self.problem.origin,
+                &effect.driver,
+                None,
+            )
+            .map(Arc::new)
         })?;
         let basis = Arc::new(drivers::basis_columns(&effect.shape, &samples));
         let factor = by_direction.then(|| Arc::new(samples.iter().map(|sample| sample.direction).collect()));
         let mut parts = vec![Vec::new(); self.problem.tests.len()];
-        parts[test].push(LayoutPart { moves: Moves::Reading(coordinate), factor, basis });
-        Some(Layout { count: effect.shape.coefficients(), parts })
+        parts[test].push(LayoutPart {
+            moves: Moves::Reading(coordinate),
+            factor,
+            basis,
+        });
+        Some(Layout {
+            count: effect.shape.coefficients(),
+            parts,
+        })
     }
 
     /// Fills columns with the whitened rows of layouts, one after another.

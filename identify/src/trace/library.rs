@@ -125,10 +125,12 @@ pub fn candidates(problem: &Problem<'_>) -> Result<Vec<Candidate>, IdentifyError
                         tests,
                     };
                     let cost = family.simplicity + extra + tilt_cost(problem, &component);
+                    let last_resort = family.last_resort;
                     candidates.push(Candidate {
                         effect,
                         family: number,
                         cost,
+                        last_resort,
                     });
                 }
             }
@@ -537,7 +539,11 @@ fn half(span: f64) -> f64 {
 fn tilt_cost(problem: &Problem<'_>, component: &Component) -> f64 {
     match component {
         Component::Axis(name) if name.freedom.is_angle() => {
-            let own = problem.session.machine.axis_index(&name.axis).map(|axis| problem.session.machine.axes[axis].own_freedom());
+            let own = problem
+                .session
+                .machine
+                .axis_index(&name.axis)
+                .map(|axis| problem.session.machine.axes[axis].own_freedom());
             if own == Some(name.freedom) { 0.0 } else { 1.0 }
         }
         _ => 0.0,

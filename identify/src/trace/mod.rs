@@ -122,39 +122,67 @@ pub fn trace<'a>(
     let columns = Columns::new(&problem, &before_fit.beta)?;
     let start = Start::of(&problem, &columns, &before_fit)?;
     let null = |residual: &[f64], residuals: &[Vec<f64>], salt: u64| {
-        null::draws(&problem, &columns, residuals, residual, options.draws, options.seed.wrapping_add(salt))
+        null::draws(
+            &problem,
+            &columns,
+            residuals,
+            residual,
+            options.draws,
+            options.seed.wrapping_add(salt),
+        )
     };
     let draws = null(&start.residual, &before_fit.residuals, 0);
     let structure_before = if poses {
         None
     } else {
         let (model, prior) = (start.model.clone(), start.prior());
-        Some(remainder::structure(&problem, &columns, model, &start.residual, draws.clone(), &prior))
+        Some(remainder::structure(
+            &problem,
+            &columns,
+            model,
+            &start.residual,
+            draws.clone(),
+            &prior,
+        ))
     };
 
     let mut candidates = library::candidates(&problem)?;
     candidates.retain(|candidate| chosen(options, &candidate.effect.id()));
     let (candidates, layouts): (Vec<Candidate>, Vec<Layout>) = candidates
         .into_iter()
-        .filter_map(|candidate| columns.layout(&candidate.effect).map(|layout| (candidate, layout)))
+        .filter_map(|candidate| {
+            columns
+                .layout(&candidate.effect)
+                .map(|layout| (candidate, layout))
+        })
         .unzip();
     progress(Progress::Screening(candidates.len()));
     let (model, prior) = (start.model.clone(), start.prior());
     let moments = Moments::new(&columns, &layouts, model, &start.residual, draws);
     let stop = Stop {
         significance: options.significance,
-        most: options.max_effects.unwrap_or(if poses { MOST_OF_POSES } else { MOST_ALONG_RUNS }),
+        most: options
+            .max_effects
+            .unwrap_or(if poses { MOST_OF_POSES } else { MOST_ALONG_RUNS }),
         in_residual_variance: poses,
     };
     let mut search = Search::new(&columns, candidates, layouts, moments, prior, stop);
-    let seen = search.model_without(None).gains().iter().filter(|gain| gain.freedom > 0).count();
+    let seen = search
+        .model_without(None)
+        .gains()
+        .iter()
+        .filter(|gain| gain.freedom > 0)
+        .count();
     let looked_for = search.candidates.len();
     let scale_um = problem.noise.sigma_mm * 1e3;
     let rms_um = |sum: f64| (sum / columns.rows().max(1) as f64).sqrt() * scale_um;
     let mut last_p_value = search_on(&mut search, poses, &rms_um, progress);
     progress(Progress::Judging);
     let mut judged = judge(&problem, &before_fit, &search, options, structure_before.as_ref())?;
-    let unexplained = judged.structure.as_ref().is_none_or(|structure| structure.p_value <= STRUCTURED);
+    let unexplained = judged
+        .structure
+        .as_ref()
+        .is_none_or(|structure| structure.p_value <= STRUCTURED);
     if unexplained && last_p_value < 1.0 + f64::EPSILON && search.taken.len() < stop.most {
         // Nothing simpler is left: free curves.
         search.last_resort = true;
@@ -164,7 +192,12 @@ pub fn trace<'a>(
             judged = judge(&problem, &before_fit, &search, options, structure_before.as_ref())?;
         }
     }
-    let Judged { after, after_fit, effects, structure: structure_after } = judged;
+    let Judged {
+        after,
+        after_fit,
+        effects,
+        structure: structure_after,
+    } = judged;
     let result = report::report(&report::Findings {
         before: &problem,
         before_fit: &before_fit,
@@ -180,7 +213,14 @@ pub fn trace<'a>(
     })?;
     drop(search);
     drop(columns);
-    Ok(Trace { before: problem, before_fit, after, after_fit, effects, result })
+    Ok(Trace {
+        before: problem,
+        before_fit,
+        after,
+        after_fit,
+        effects,
+        result,
+    })
 }
 
 /// Rounds until nothing earns its place any more, or the user has seen enough; the p-value of the best that was not taken.
@@ -222,8 +262,11 @@ fn judge<'a>(
     options: &TraceOptions,
     structure_before: Option<&remainder::Structure>,
 ) -> Result<Judged<'a>, IdentifyError> {
-    let effects: Vec<Effect> =
-        search.taken.iter().map(|taken| search.candidates[taken.candidate].effect.clone()).collect();
+    let effects: Vec<Effect> = search
+        .taken
+        .iter()
+        .map(|taken| search.candidates[taken.candidate].effect.clone())
+        .collect();
     if effects.is_empty() {
         return Ok(Judged {
             after: problem.clone(),
@@ -243,13 +286,31 @@ fn judge<'a>(
             let columns = Columns::new(&after, &after_fit.beta)?;
             let end = Start::of(&after, &columns, &after_fit)?;
             let seed = options.seed.wrapping_add(1);
-            let draws =
-                null::draws(&after, &columns, &after_fit.residuals, &end.residual, options.draws, seed);
+            let draws = null::draws(
+                &after,
+                &columns,
+                &after_fit.residuals,
+                &end.residual,
+                options.draws,
+                seed,
+            );
             let prior = end.prior();
-            Some(remainder::structure(&after, &columns, end.model, &end.residual, draws, &prior))
+            Some(remainder::structure(
+                &after,
+                &columns,
+                end.model,
+                &end.residual,
+                draws,
+                &prior,
+            ))
         }
     };
-    Ok(Judged { after, after_fit, effects, structure })
+    Ok(Judged {
+        after,
+        after_fit,
+        effects,
+        structure,
+    })
 }
 
 fn chosen(options: &TraceOptions, id: &str) -> bool {
@@ -271,7 +332,9 @@ fn give_noise_memory(problem: &mut Problem<'_>, fit: &Fit) -> bool {
     }
     let kept = |test: usize, row: usize| !problem.rejected[test][row];
     let pure = PureError::of(&problem.tests, &fit.residuals, kept);
-    let Some(memory) = pure.memory(&problem.tests, kept) else { return false };
+    let Some(memory) = pure.memory(&problem.tests, kept) else {
+        return false;
+    };
     let mut noise = problem.noise.clone();
     noise.memory = memory;
     if let Some(sigma) = pure.sigma_mm() {
@@ -313,7 +376,13 @@ impl Start {
         let (of_prior, prior_residual, _) = prior.parts();
         let prior_rows = &of_prior * &to_unknowns;
         debug_assert_eq!(model.ncols(), rank);
-        Ok(Start { model, residual, to_unknowns, prior_rows, prior_residual })
+        Ok(Start {
+            model,
+            residual,
+            to_unknowns,
+            prior_rows,
+            prior_residual,
+        })
     }
 
     fn prior(&self) -> PriorMoments {
@@ -338,7 +407,11 @@ fn inverse_of_triangle(r: &Mat<f64>) -> Mat<f64> {
         for i in (0..=column).rev() {
             let unit = if i == column { 1.0 } else { 0.0 };
             let sum: f64 = (i + 1..=column).map(|k| r[(i, k)] * inverse[(k, column)]).sum();
-            inverse[(i, column)] = if r[(i, i)] != 0.0 { (unit - sum) / r[(i, i)] } else { 0.0 };
+            inverse[(i, column)] = if r[(i, i)] != 0.0 {
+                (unit - sum) / r[(i, i)]
+            } else {
+                0.0
+            };
         }
     }
     inverse
@@ -367,7 +440,11 @@ pub fn list(session: &Session, options: &TraceOptions) -> Result<Vec<ListEntry>,
     let (candidates, layouts): (Vec<Candidate>, Vec<Layout>) = library::candidates(&problem)?
         .into_iter()
         .filter(|candidate| chosen(options, &candidate.effect.id()))
-        .filter_map(|candidate| columns.layout(&candidate.effect).map(|layout| (candidate, layout)))
+        .filter_map(|candidate| {
+            columns
+                .layout(&candidate.effect)
+                .map(|layout| (candidate, layout))
+        })
         .unzip();
     let none = Mat::zeros(columns.rows(), 0);
     let moments = Moments::new(&columns, &layouts, start.model, &start.residual, none);

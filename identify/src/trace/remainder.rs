@@ -41,8 +41,11 @@ fn detectors(problem: &Problem<'_>, columns: &Columns<'_, '_>) -> Vec<Detector> 
             };
             for coordinate in 0..readings.coordinates {
                 if let Some(layout) = columns.reading_layout(&effect, number, coordinate, by_direction) {
-                    let named =
-                        if readings.coordinates == 3 { format!("{words} in {}", ["x", "y", "z"][coordinate]) } else { words.clone() };
+                    let named = if readings.coordinates == 3 {
+                        format!("{words} in {}", ["x", "y", "z"][coordinate])
+                    } else {
+                        words.clone()
+                    };
                     detectors.push(Detector { layout, words: named });
                 }
             }
@@ -66,31 +69,79 @@ fn detectors(problem: &Problem<'_>, columns: &Columns<'_, '_>) -> Vec<Detector> 
                 let words = format!("a wave over {name} with a period of {length} in {}", test.name);
                 add(&driver, Shape::Periodic { period }, false, words.clone());
                 if half_cycles <= 16 {
-                    add(&driver, Shape::Periodic { period }, true, format!("{words}, opposite in the two directions"));
+                    add(
+                        &driver,
+                        Shape::Periodic { period },
+                        true,
+                        format!("{words}, opposite in the two directions"),
+                    );
                 }
             }
             for intervals in [6, 12, 24] {
-                let shape = Shape::Curve { from: low, to: high, intervals, closed: false };
-                add(&driver, shape, false, format!("a curve over {name} in {}", test.name));
+                let shape = Shape::Curve {
+                    from: low,
+                    to: high,
+                    intervals,
+                    closed: false,
+                };
+                add(
+                    &driver,
+                    shape,
+                    false,
+                    format!("a curve over {name} in {}", test.name),
+                );
             }
             for share in [0.02, 0.06] {
                 let width = share * (high - low);
                 for k in 0..(0.5 / share) as usize {
                     let centre = low + (high - low) * (k as f64 + 0.5) * 2.0 * share;
-                    let place = if rotary { format!("{:.1}°", centre.to_degrees()) } else { format!("{centre:.1} mm") };
-                    let shape = Shape::Local { centre, width, recurs: None };
-                    add(&driver, shape, false, format!("a feature at {name} = {place} in {}", test.name));
+                    let place = if rotary {
+                        format!("{:.1}°", centre.to_degrees())
+                    } else {
+                        format!("{centre:.1} mm")
+                    };
+                    let shape = Shape::Local {
+                        centre,
+                        width,
+                        recurs: None,
+                    };
+                    add(
+                        &driver,
+                        shape,
+                        false,
+                        format!("a feature at {name} = {place} in {}", test.name),
+                    );
                 }
             }
-            add(&driver, Shape::Backlash, false, format!("a difference between the directions of {name} in {}", test.name));
+            add(
+                &driver,
+                Shape::Backlash,
+                false,
+                format!("a difference between the directions of {name} in {}", test.name),
+            );
         }
         if !readings.time_s.is_empty() && readings.rows() > 1 {
             let first = readings.time_s[0] - problem.origin.time_s;
             let last = readings.time_s[readings.rows() - 1] - problem.origin.time_s;
-            add(&Driver::Time, Shape::Drift, false, format!("a drift over time in {}", test.name));
+            add(
+                &Driver::Time,
+                Shape::Drift,
+                false,
+                format!("a drift over time in {}", test.name),
+            );
             if last > first {
-                let shape = Shape::Curve { from: first, to: last, intervals: 6, closed: false };
-                add(&Driver::Time, shape, false, format!("a slow change over time in {}", test.name));
+                let shape = Shape::Curve {
+                    from: first,
+                    to: last,
+                    intervals: 6,
+                    closed: false,
+                };
+                add(
+                    &Driver::Time,
+                    shape,
+                    false,
+                    format!("a slow change over time in {}", test.name),
+                );
             }
         }
     }
@@ -108,7 +159,11 @@ pub fn structure(
 ) -> Structure {
     let detectors = detectors(problem, columns);
     if detectors.is_empty() {
-        return Structure { p_value: 1.0, excess: 0.0, words: "nothing to look at".to_string() };
+        return Structure {
+            p_value: 1.0,
+            excess: 0.0,
+            words: "nothing to look at".to_string(),
+        };
     }
     let layouts: Vec<Layout> = detectors.iter().map(|detector| detector.layout.clone()).collect();
     let rank = model.ncols();
@@ -128,7 +183,12 @@ pub fn structure(
     let null_best = trained.null_best(&vec![0.0; layouts.len()], 1.0);
     let above = null_best.iter().filter(|score| **score >= best.1).count();
     let p_value = (above + 1) as f64 / (null_best.len() + 1) as f64;
-    let size_um = (2.0 * best.2.max(0.0) / columns.rows().max(1) as f64).sqrt() * problem.noise.sigma_mm * 1e3;
+    let size_um =
+        (2.0 * best.2.max(0.0) / columns.rows().max(1) as f64).sqrt() * problem.noise.sigma_mm * 1e3;
     let words = format!("{} ({size_um:.2} µm over all readings)", detectors[best.0].words);
-    Structure { p_value, excess: best.2.max(0.0), words }
+    Structure {
+        p_value,
+        excess: best.2.max(0.0),
+        words,
+    }
 }

@@ -40,7 +40,14 @@ pub fn effect_name(effect: &Effect) -> EffectName {
 }
 
 pub(super) fn report(findings: &Findings<'_, '_>) -> Result<TraceResult, IdentifyError> {
-    let Findings { before, before_fit, after, after_fit, search, .. } = findings;
+    let Findings {
+        before,
+        before_fit,
+        after,
+        after_fit,
+        search,
+        ..
+    } = findings;
     let whitened_rows = search.columns.rows().max(1) as f64;
     let in_residual_variance = findings.structure_after.is_none();
     let held_out_um = |sum: f64, scale: f64| (sum / whitened_rows).sqrt() * scale;
@@ -55,7 +62,12 @@ pub(super) fn report(findings: &Findings<'_, '_>) -> Result<TraceResult, Identif
     let mut effects = Vec::new();
     let mut alias_shifts = vec![0.0_f64; before_fit.beta.len()];
     let variance = if in_residual_variance {
-        let sum: f64 = after_fit.residuals.iter().flatten().map(|v| (v / after.noise.sigma_mm).powi(2)).sum();
+        let sum: f64 = after_fit
+            .residuals
+            .iter()
+            .flatten()
+            .map(|v| (v / after.noise.sigma_mm).powi(2))
+            .sum();
         (sum / whitened_rows).max(1.0)
     } else {
         1.0
@@ -69,12 +81,18 @@ pub(super) fn report(findings: &Findings<'_, '_>) -> Result<TraceResult, Identif
         let gain = model.gain(taken.candidate).gain;
         effects.push(EffectResult {
             name: effect_name(&candidate.effect),
-            family: families.get(candidate.family).map(|family| family.name.clone()).unwrap_or_default(),
+            family: families
+                .get(candidate.family)
+                .map(|family| family.name.clone())
+                .unwrap_or_default(),
             parameters: parameters_of(after, after_fit, k + before.parameters.effects.len()),
             p_value: taken.p_value,
             rms_gain_um: (gain / whitened_rows).sqrt() * before.noise.sigma_mm * 1e3,
             heldout_rms_um: held_out_um(search.held_out.get(k + 1).copied().unwrap_or(last), scale),
-            aliases: aliases.iter().map(|a| effect_name(&search.candidates[a.candidate].effect)).collect(),
+            aliases: aliases
+                .iter()
+                .map(|a| effect_name(&search.candidates[a.candidate].effect))
+                .collect(),
             separated_by: None,
         });
     }
@@ -88,7 +106,11 @@ pub(super) fn report(findings: &Findings<'_, '_>) -> Result<TraceResult, Identif
     let (verdict, remainder) = verdict(findings, &mut effects);
     let moved = moved(&before_result.parameters, &after_result.parameters);
     let mut warnings = before.session.warnings.clone();
-    if search.taken.iter().any(|taken| taken.p_value > 0.5 / 200.0 && taken.p_value < 0.0051) {
+    if search
+        .taken
+        .iter()
+        .any(|taken| taken.p_value > 0.5 / 200.0 && taken.p_value < 0.0051)
+    {
         // The floor of the null: the p-value is an upper bound.
         warnings.retain(|warning| !warning.is_empty());
     }
@@ -133,7 +155,9 @@ fn model_result(problem: &Problem<'_>, fit: &Fit, held_out_mm: f64) -> ModelResu
 
 /// The parameters of the `number`-th effect.
 fn parameters_of(problem: &Problem<'_>, fit: &Fit, number: usize) -> Vec<ParameterResult> {
-    let Some(effect) = problem.parameters.effects.get(number) else { return Vec::new() };
+    let Some(effect) = problem.parameters.effects.get(number) else {
+        return Vec::new();
+    };
     let id = effect.id();
     let has = problem
         .parameters
@@ -169,8 +193,11 @@ fn widen(shifts: &mut [f64], aliases: &[Alias], named: &[f64], start: &Start) {
 fn verdict(findings: &Findings<'_, '_>, effects: &mut Vec<EffectResult>) -> (String, Remainder) {
     let Some(after) = findings.structure_after else {
         let word = if effects.is_empty() { "clean" } else { "explained" };
-        let remainder =
-            Remainder { structured: false, p_value: findings.last_p_value, place: None };
+        let remainder = Remainder {
+            structured: false,
+            p_value: findings.last_p_value,
+            place: None,
+        };
         return (word.to_string(), remainder);
     };
     let structured = after.p_value <= STRUCTURED;
@@ -179,7 +206,9 @@ fn verdict(findings: &Findings<'_, '_>, effects: &mut Vec<EffectResult>) -> (Str
         p_value: after.p_value,
         place: structured.then(|| after.words.clone()),
     };
-    let before = findings.structure_before.map_or(0.0, |structure| structure.excess);
+    let before = findings
+        .structure_before
+        .map_or(0.0, |structure| structure.excess);
     let share = if before > 0.0 { after.excess / before } else { 0.0 };
     let word = match (effects.is_empty(), structured) {
         (true, false) => "clean",

@@ -12,7 +12,9 @@ const STEPS: usize = 24;
 pub fn sharpen(search: &mut Search<'_>, candidate: usize) -> usize {
     let original = search.candidates[candidate].clone();
     let mut effect = original.effect.clone();
-    let Some(brackets) = brackets(&effect.shape) else { return candidate };
+    let Some(brackets) = brackets(&effect.shape) else {
+        return candidate;
+    };
     let mut best = search.gain_of(&effect).unwrap_or(0.0);
     let before = best;
     for _ in 0..2 {
@@ -49,7 +51,9 @@ pub fn sharpen(search: &mut Search<'_>, candidate: usize) -> usize {
     if best <= before * (1.0 + 1e-6) {
         return candidate;
     }
-    let Some(layout) = search.columns.layout(&effect) else { return candidate };
+    let Some(layout) = search.columns.layout(&effect) else {
+        return candidate;
+    };
     search.append(Candidate { effect, ..original }, layout)
 }
 
@@ -60,9 +64,10 @@ fn brackets(shape: &Shape) -> Option<Vec<(usize, f64, f64)>> {
         Shape::Periodic { period } => Some(vec![(0, period * 0.94, period * 1.06)]),
         Shape::Warmup { tau_s } => Some(vec![(0, tau_s * 0.5, tau_s * 2.0)]),
         Shape::ReversalSpike { width } => Some(vec![(0, width * 0.4, width * 2.5)]),
-        Shape::Local { centre, width, .. } => {
-            Some(vec![(0, centre - width, centre + width), (1, width * 0.5, width * 2.0)])
-        }
+        Shape::Local { centre, width, .. } => Some(vec![
+            (0, centre - width, centre + width),
+            (1, width * 0.5, width * 2.0),
+        ]),
         _ => None,
     }
 }
