@@ -1,0 +1,4 @@
+//! The plant and the study of trace on it.
+
+mod plant;
+mod study;
