@@ -79,7 +79,7 @@ impl LeastSquares for SeenDirections<'_, '_> {
 }
 
 /// The triangle of `[J·N | r]` from that of `[J | r]`.
-fn in_directions(triangle: &Triangle, basis: &Mat<f64>) -> Triangle {
+pub fn in_directions(triangle: &Triangle, basis: &Mat<f64>) -> Triangle {
     let (r, c, rest) = triangle.parts();
     let (n, rank) = (basis.nrows(), basis.ncols());
     let reduced = &r * basis;
@@ -107,6 +107,12 @@ pub fn prepare(session: &Session, seed: u64) -> Result<(Problem<'_>, Fit), Ident
         None => Noise::white(FIRST_GUESS_MM.max(floor), NoiseSource::Fit),
     };
     let mut problem = Problem::new(session, first, seed)?;
+    if stated.is_none() {
+        problem.noise = Noise::white(
+            nominal_residual_mm(&problem)?.max(floor).max(1e-9),
+            NoiseSource::Fit,
+        );
+    }
     let mut fit = fit(&problem, None)?;
     // Noise and wild readings follow from residuals, residuals from a fit; three rounds settle both.
     for _ in 0..3 {
@@ -126,6 +132,28 @@ pub fn prepare(session: &Session, seed: u64) -> Result<(Problem<'_>, Fit), Ident
         fit = self::fit(&problem, Some(&fit.beta))?;
     }
     Ok((problem, fit))
+}
+
+/// What the nominal machine leaves over, mm, once the set-ups are fitted to it (linearised): noise for a first decision on what is seen. The
+/// machine's errors stay out of it: among sockets, shrinking the machine to nothing would explain every reading.
+fn nominal_residual_mm(problem: &Problem<'_>) -> Result<f64, IdentifyError> {
+    let list = &problem.parameters.list;
+    let nominal = vec![0.0; list.len()];
+    let mut whole = Triangle::new(list.len());
+    for triangle in problem.triangles(&nominal)? {
+        whole.merge(&triangle);
+    }
+    let (r, c, rest) = whole.parts();
+    let setups: Vec<usize> = (0..list.len()).filter(|j| list[*j].role == Role::Setup).collect();
+    let rows = Mat::from_fn(list.len(), setups.len() + 1, |i, j| match setups.get(j) {
+        Some(setup) => r[(i, *setup)],
+        None => c[i],
+    });
+    let mut of_setups = Triangle::new(setups.len());
+    of_setups.absorb(rows.as_ref());
+    let count = (problem.readings() * problem.coordinates()) as f64;
+    let sum_of_squares = of_setups.parts().2 + rest;
+    Ok((sum_of_squares / count.max(1.0)).sqrt() * problem.noise.sigma_mm)
 }
 
 fn estimated_noise(problem: &Problem<'_>, fit: &Fit, floor: f64) -> Noise {
@@ -374,7 +402,8 @@ pub fn unobservable(problem: &Problem<'_>, rank: &Rank) -> Vec<Unobservable> {
         .collect()
 }
 
-fn rejected(problem: &Problem<'_>, fit: &Fit) -> Vec<Rejected> {
+/// The readings that are left out, by name.
+pub fn rejected(problem: &Problem<'_>, fit: &Fit) -> Vec<Rejected> {
     let coordinates = problem.coordinates();
     let mut list = Vec::new();
     for (number, test) in problem.tests.iter().enumerate() {

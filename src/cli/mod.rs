@@ -7,6 +7,7 @@ mod new;
 mod output;
 mod simulate;
 mod table;
+mod trace;
 
 use std::path::PathBuf;
 use std::process::ExitCode;
@@ -38,6 +39,11 @@ enum Command {
     /// Draw readings from a plan with given errors.
     #[command(after_help = simulate::HELP)]
     Simulate(Box<simulate::SimulateArguments>),
+    /// Close the loop: trace what the fit leaves over to the effect that the model lacks.
+    #[command(
+        after_help = "Example:\n  abbe trace sessions/hermle-c600u/measured/session.toml --json trace.json --write next.toml"
+    )]
+    Trace(trace::TraceArguments),
 }
 
 /// What every command that reads a session takes.
@@ -71,6 +77,7 @@ pub fn run() -> ExitCode {
         Command::Fit(arguments) => fit::run(&arguments),
         Command::New(arguments) => new::run(&arguments),
         Command::Simulate(arguments) => simulate::run(&arguments),
+        Command::Trace(arguments) => trace::run(&arguments),
     };
     match outcome {
         Ok(()) => ExitCode::SUCCESS,
