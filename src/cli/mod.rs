@@ -31,7 +31,9 @@ const EXAMPLES: &str = "Examples:
 #[derive(Subcommand)]
 enum Command {
     /// Identify errors from readings, with uncertainties.
-    #[command(after_help = "Example:\n  abbe fit sessions/hermle-c600u/measured/session.toml --json fit.json")]
+    #[command(
+        after_help = "Example:\n  abbe fit sessions/hermle-c600u/measured/session.toml --json fit.json"
+    )]
     Fit(fit::FitArguments),
     /// Start from a ready session.
     #[command(after_help = new::HELP)]

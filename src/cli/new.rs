@@ -51,6 +51,13 @@ const TEMPLATES: &[Template] = &[
         files: files!("hermle-c600u": "machine.toml", "chapter4.toml", "chapter5.toml", "chapter6.toml"),
     },
     Template {
+        name: "hermle-c600u-measured",
+        about: "the same machine measured, simulated readings with an effect to trace",
+        files: files!(
+            "hermle-c600u/measured": "machine.toml", "A100.csv", "A150.csv", "C100.csv", "C150.csv", "session.toml"
+        ),
+    },
+    Template {
         name: "kuka-iiwa14",
         about: "seven-axis robot whose ball sits in sockets (public data set, to be fetched)",
         files: files!("kuka-iiwa14": "machine.toml", "session.toml"),

@@ -41,7 +41,7 @@ pub struct SimulateArguments {
     #[arg(long = "errors", value_name = "FILE")]
     file: Option<PathBuf>,
     /// Standard deviation of the noise, µm; the session's own if not given.
-    #[arg(long, value_name = "X")]
+    #[arg(long, value_name = "X", allow_negative_numbers = true)]
     noise_um: Option<f64>,
     /// Draw set-up quantities from what the session says is known of them.
     #[arg(long)]
@@ -222,7 +222,13 @@ fn report(session: &Session, simulated: &Simulated, arguments: &SimulateArgument
     let rows: Vec<Vec<String>> = report
         .truth
         .iter()
-        .map(|value| vec![value.id.clone(), format!("{:.4}", value.value), value.unit.clone()])
+        .map(|value| {
+            vec![
+                value.id.clone(),
+                format!("{:.4}", value.value),
+                value.unit.clone(),
+            ]
+        })
         .collect();
     if rows.is_empty() {
         println!("no error: the nominal machine");

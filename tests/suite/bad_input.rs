@@ -69,7 +69,11 @@ fn with_data(from: &str, to: &str, parts: &[&str]) {
 #[test]
 fn the_session_itself_is_good() {
     let folder = tempfile::tempdir().unwrap();
-    for (name, text) in [("machine.toml", MACHINE), ("session.toml", SESSION), ("C100.csv", DATA)] {
+    for (name, text) in [
+        ("machine.toml", MACHINE),
+        ("session.toml", SESSION),
+        ("C100.csv", DATA),
+    ] {
         fs::write(folder.path().join(name), text).unwrap();
     }
     let output = abbe(&["fit", text(&folder.path().join("session.toml"))]);
@@ -85,7 +89,11 @@ fn an_unknown_key() {
     with_session(
         "noise_um",
         "nois_um",
-        &["session.toml:6", "knows no key `nois_um`", "did you mean `noise_um`?"],
+        &[
+            "session.toml:6",
+            "knows no key `nois_um`",
+            "did you mean `noise_um`?",
+        ],
     );
 }
 
@@ -138,7 +146,10 @@ fn not_a_number() {
 fn an_empty_data_file() {
     holds(&told(MACHINE, SESSION, Some("")), &["C100.csv", "empty"]);
     let header = DATA.lines().next().unwrap();
-    holds(&told(MACHINE, SESSION, Some(header)), &["C100.csv", "no readings"]);
+    holds(
+        &told(MACHINE, SESSION, Some(header)),
+        &["C100.csv", "a header without readings"],
+    );
 }
 
 #[test]
@@ -176,7 +187,8 @@ fn an_axis_without_a_table_and_a_table_without_an_axis() {
 
 #[test]
 fn an_effect_on_an_axis_that_the_machine_lacks() {
-    let effect = "[[effect]]\ncomponent = \"EZB\"\ndriver = \"C\"\nshape = \"harmonic\"\norder = 2\n\n[[test]]";
+    let effect =
+        "[[effect]]\ncomponent = \"EZB\"\ndriver = \"C\"\nshape = \"harmonic\"\norder = 2\n\n[[test]]";
     with_session(
         "[[test]]",
         effect,
@@ -186,16 +198,22 @@ fn an_effect_on_an_axis_that_the_machine_lacks() {
 
 #[test]
 fn a_bar_that_cannot_reach() {
-    with_session("bar_mm = 100.0", "bar_mm = 150.0", &["C100", "150", "mm"]);
-    // Degrees in a column of radians.
-    let session = SESSION.replace(
-        "spindle_ball_mm = [0, 0, 0]",
-        "spindle_ball_mm = [-50, 0, 0]\ncolumns = { c_rad = \"angle\" }",
+    with_session(
+        "[0, 100, 0]",
+        "[0, 100, 60]",
+        &[
+            "session.toml:8",
+            "a bar of 100.0000 mm cannot reach",
+            "116.619 mm apart",
+            "degrees taken for radians",
+        ],
     );
-    let data = DATA.replace("c_deg", "angle");
+    // Degrees in a column of radians: the balls stay together at 0 only.
+    let session = SESSION.replace("spindle_ball_mm = [0, 0, 0]", "spindle_ball_mm = [0, 100, 100]");
+    let data = "a_rad,length_mm\n0,100.0\n30,100.0\n60,100.0\n";
     holds(
-        &told(MACHINE, &session, Some(&data)),
-        &["C100.csv", "degrees", "radians"],
+        &told(MACHINE, &session, Some(data)),
+        &["cannot reach", "degrees taken for radians"],
     );
 }
 
@@ -227,7 +245,10 @@ fn help_has_examples_and_status_0() {
     ] {
         let output = abbe(arguments);
         assert!(output.status.success());
-        assert!(String::from_utf8(output.stdout).unwrap().contains("Example"), "{arguments:?}");
+        assert!(
+            String::from_utf8(output.stdout).unwrap().contains("Example"),
+            "{arguments:?}"
+        );
     }
 }
 
@@ -236,6 +257,10 @@ fn files_that_are_none() {
     for path in ["nowhere/session.toml", "."] {
         let output = abbe(&["fit", path]);
         assert_eq!(output.status.code(), Some(1));
-        assert!(String::from_utf8(output.stderr).unwrap().contains("the session file"));
+        assert!(
+            String::from_utf8(output.stderr)
+                .unwrap()
+                .contains("the session file")
+        );
     }
 }

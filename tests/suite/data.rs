@@ -4,10 +4,8 @@ use std::path::PathBuf;
 
 /// A file or folder of the public data. Where it is not there the test is skipped by name, except in CI, where it fails.
 pub fn data(test: &str, path: &str) -> Option<PathBuf> {
-    let folder = std::env::var_os("ABBE_DATA").map_or_else(
-        || super::workspace().join("../shared/data"),
-        PathBuf::from,
-    );
+    let folder = std::env::var_os("ABBE_DATA")
+        .map_or_else(|| super::workspace().join("../shared/data"), PathBuf::from);
     let found = folder.join(path);
     if found.exists() {
         return Some(found);

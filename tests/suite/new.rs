@@ -56,5 +56,8 @@ fn an_unknown_template_names_those_there_are() {
     let told = abbe(&["new", text(&folder.path().join("a")), "--template", "hermle"]);
     assert_eq!(told.status.code(), Some(1));
     let told = String::from_utf8_lossy(&told.stderr).into_owned();
-    assert!(told.contains("no template `hermle`") && told.contains("kuka-iiwa14"), "{told}");
+    assert!(
+        told.contains("no template `hermle`") && told.contains("kuka-iiwa14"),
+        "{told}"
+    );
 }

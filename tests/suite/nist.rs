@@ -32,14 +32,20 @@ impl<const N: usize> Certified<N> {
         };
         for k in 0..N {
             let label = format!("b{} =", k + 1);
-            let line = text.lines().find_map(|line| line.trim().strip_prefix(&label)).unwrap();
+            let line = text
+                .lines()
+                .find_map(|line| line.trim().strip_prefix(&label))
+                .unwrap();
             let [a, b, value, deviation] = numbers(line)[..] else {
                 panic!("{line}");
             };
             (certified.starts[0][k], certified.starts[1][k]) = (a, b);
             (certified.values[k], certified.deviations[k]) = (value, deviation);
         }
-        let data = text.lines().skip_while(|line| !line.trim().starts_with("Data:   y")).skip(1);
+        let data = text
+            .lines()
+            .skip_while(|line| !line.trim().starts_with("Data:   y"))
+            .skip(1);
         for line in data {
             if let [y, x] = numbers(line)[..] {
                 certified.readings.push((y, x));

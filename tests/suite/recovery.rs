@@ -107,7 +107,12 @@ fn pulls_have_mean_0_and_standard_deviation_1_over_200_draws() {
             let (session, truth) = measured(&plan, &simulation);
             let (problem, fit) = prepare(&session, 1).unwrap();
             let list = &problem.parameters.list;
-            assert!(list.iter().filter(|p| matches!(p.prior, Prior::Gaussian(_))).count() == 19);
+            assert!(
+                list.iter()
+                    .filter(|p| matches!(p.prior, Prior::Gaussian(_)))
+                    .count()
+                    == 19
+            );
             list.iter()
                 .map(|parameter| {
                     let (_, value, _) = truth.iter().find(|(id, ..)| *id == parameter.id).unwrap();
@@ -122,7 +127,10 @@ fn pulls_have_mean_0_and_standard_deviation_1_over_200_draws() {
     let (problem, _) = prepare(&session, 1).unwrap();
     for (index, parameter) in problem.parameters.list.iter().enumerate() {
         let mean = draws.iter().map(|pulls| pulls[index]).sum::<f64>() / count;
-        let square = draws.iter().map(|pulls| (pulls[index] - mean).powi(2)).sum::<f64>();
+        let square = draws
+            .iter()
+            .map(|pulls| (pulls[index] - mean).powi(2))
+            .sum::<f64>();
         let deviation = (square / (count - 1.0)).sqrt();
         println!("{:24} mean {mean:6.3} sd {deviation:.3}", parameter.id);
         // Three standard deviations of a mean and of a standard deviation of that many.

@@ -62,7 +62,14 @@ fn the_same_seed_gives_the_same_bytes_and_another_does_not() {
             &["--error", "EY0A=35.3um", "--seed", seed, "--draw-setups"],
         );
     }
-    for file in ["session.toml", "machine.toml", "A100.csv", "A150.csv", "C100.csv", "C150.csv"] {
+    for file in [
+        "session.toml",
+        "machine.toml",
+        "A100.csv",
+        "A150.csv",
+        "C100.csv",
+        "C150.csv",
+    ] {
         let of = |name: &str| fs::read(out(name).join(file)).unwrap();
         assert!(of("a") == of("b"), "{file}");
         assert_eq!(of("a") == of("c"), !file.ends_with(".csv"), "{file}");
@@ -71,7 +78,10 @@ fn the_same_seed_gives_the_same_bytes_and_another_does_not() {
     assert_eq!(session.tests.len(), 4);
     for value in &session.tests[2].readings.as_ref().unwrap().observed {
         let steps = value / 1e-4;
-        assert!((steps - steps.round()).abs() < 1e-6, "{value} is no multiple of 0.1 um");
+        assert!(
+            (steps - steps.round()).abs() < 1e-6,
+            "{value} is no multiple of 0.1 um"
+        );
     }
 }
 
@@ -81,11 +91,22 @@ fn amplitude_and_phase_are_those_of_the_independent_plant() {
     let folder = tempfile::tempdir().unwrap();
     let plan = small_plan(folder.path());
     let (still, moved) = (folder.path().join("still"), folder.path().join("moved"));
-    let exact = fs::read_to_string(&plan).unwrap().replace("resolution_um = 0.1\n", "");
+    let exact = fs::read_to_string(&plan)
+        .unwrap()
+        .replace("resolution_um = 0.1\n", "");
     fs::write(&plan, exact).unwrap();
     simulated(&plan, &still, &["--noise-um", "0"]);
-    let effect = ["--effect", "EZC~C:h2.amplitude=1.5um", "--effect", "EZC~C:h2.phase=60deg"];
-    simulated(&plan, &moved, &[&effect[..], &["--noise-um", "0", "--hide-effects"]].concat());
+    let effect = [
+        "--effect",
+        "EZC~C:h2.amplitude=1.5um",
+        "--effect",
+        "EZC~C:h2.phase=60deg",
+    ];
+    simulated(
+        &plan,
+        &moved,
+        &[&effect[..], &["--noise-um", "0", "--hide-effects"]].concat(),
+    );
     let (still, moved) = (session(&still), session(&moved));
     assert_eq!((still.effects.len(), moved.effects.len()), (1, 0));
     assert_eq!(moved.noise_mm, Some(0.0));
@@ -106,7 +127,10 @@ fn amplitude_and_phase_are_those_of_the_independent_plant() {
         // The plant's own axes: X, Y, Z, A, C.
         let position = [0.0, 0.0, height, 0.0, *c];
         let mut displacement = plant::machine::Displacement::default();
-        displacement.add(injected.component, 1.5e-3 * (2.0 * c + 60.0_f64.to_radians()).cos());
+        displacement.add(
+            injected.component,
+            1.5e-3 * (2.0 * c + 60.0_f64.to_radians()).cos(),
+        );
         let table = machine.workpiece_point(&position, &displacement, [0.0, 100.0, 0.0]);
         let tool = machine.tool_point(&position, &displacement, [0.0; 3]);
         let length = (table - tool).norm();
@@ -120,7 +144,10 @@ fn what_the_plan_says_stays_and_what_has_to_change_changes() {
     let plan = small_plan(folder.path());
     let out = folder.path().join("deep/er/out");
     let told = simulated(&plan, &out, &["--noise-um", "0.5"]);
-    assert!(told.contains("146 readings of 1 tests") && told.contains("noise 0.500 µm"), "{told}");
+    assert!(
+        told.contains("146 readings of 1 tests") && told.contains("noise 0.500 µm"),
+        "{told}"
+    );
     let text = fs::read_to_string(out.join("session.toml")).unwrap();
     for part in [
         "# test radius: pivot from the axis (Table 3.1)",
@@ -151,7 +178,11 @@ fn errors_come_from_a_file_and_the_command_line_has_the_last_word() {
         &folder.path().join("out"),
         &["--errors", text(&errors), "--error", "EB0C=-2arcsec"],
     );
-    let row = |id: &str| told.lines().find(|line| line.trim().starts_with(id)).map(str::to_string);
+    let row = |id: &str| {
+        told.lines()
+            .find(|line| line.trim().starts_with(id))
+            .map(str::to_string)
+    };
     assert!(row("EY0C").unwrap().contains("10.0000"), "{told}");
     assert!(row("bar[C 150]").unwrap().contains("0.4000"), "{told}");
     assert!(row("EB0C").unwrap().contains("-2.0000"), "{told}");
@@ -172,18 +203,27 @@ fn what_cannot_be_simulated_is_said_and_nothing_is_written() {
     let plan = small_plan(folder.path());
     let out = folder.path().join("out");
     for (more, message) in [
-        (&["--error", "EY0Q=1um"][..], "has no axis `Q`; its axes are C, A, Y, X, Z"),
+        (
+            &["--error", "EY0Q=1um"][..],
+            "has no axis `Q`; its axes are C, A, Y, X, Z",
+        ),
         (&["--error", "EY0A=1"], "`EY0A=1` has no unit"),
         (&["--error", "EY0A=onemm"], "is no number with a unit"),
         (&["--error", "EY0A"], "gives no value"),
-        (&["--error", "EY0A=1arcsec"], "`EY0A` is given in `arcsec`; it is measured in `um`"),
+        (
+            &["--error", "EY0A=1arcsec"],
+            "`EY0A` is given in `arcsec`; it is measured in `um`",
+        ),
         (&["--error", "e_y0a=1um", "--error", "EY0A=2um"], "is given twice"),
         (&["--error", "bra=1um"], "the session has no `bra`"),
         (
             &["--effect", "EZC~C:h3.amplitude=1um"],
             "coefficients of its effects are EZC~C:h2.cos, EZC~C:h2.sin",
         ),
-        (&["--effect", "EZC~C:h2.phase=1deg"], "without `EZC~C:h2.amplitude`"),
+        (
+            &["--effect", "EZC~C:h2.phase=1deg"],
+            "without `EZC~C:h2.amplitude`",
+        ),
         (&["--noise-um", "-1"], "not negative"),
     ] {
         let told = refused(&plan, &out, more);
@@ -191,7 +231,10 @@ fn what_cannot_be_simulated_is_said_and_nothing_is_written() {
         assert!(!out.exists());
     }
     let told = refused(&plan, folder.path(), &[]);
-    assert!(told.contains("there and not empty") && told.contains("--force"), "{told}");
+    assert!(
+        told.contains("there and not empty") && told.contains("--force"),
+        "{told}"
+    );
     let before = fs::read(&plan).unwrap();
     let told = refused(&plan, folder.path(), &["--force"]);
     assert!(told.contains("the plan itself lies there"), "{told}");

@@ -58,13 +58,16 @@ pub fn robot() -> Machine {
         ([0.0, 0.0, -1.0], [-1184.3, -163.941, 127.3]),
         ([0.0, -1.0, 0.0], [-1184.3, -163.941, 11.6]),
     ];
-    let axes = lines.iter().enumerate().map(|(index, (direction, origin_mm))| Axis {
-        name: format!("J{}", index + 1),
-        kind: AxisKind::Rotary,
-        direction: *direction,
-        origin_mm: *origin_mm,
-        travel: None,
-    });
+    let axes = lines
+        .iter()
+        .enumerate()
+        .map(|(index, (direction, origin_mm))| Axis {
+            name: format!("J{}", index + 1),
+            kind: AxisKind::Rotary,
+            direction: *direction,
+            origin_mm: *origin_mm,
+            travel: None,
+        });
     Machine {
         name: "six axes".into(),
         axes: axes.collect(),

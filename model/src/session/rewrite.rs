@@ -13,7 +13,10 @@ use crate::error::ModelError;
 pub fn with_machine_file(original: &str, file: &Path, machine: &str) -> Result<String, ModelError> {
     let source = Source::new(file, original);
     let span = match source.parse()?.take("machine") {
-        Some(value) => value.table("[machine]".into())?.take("file").map(|value| value.span),
+        Some(value) => value
+            .table("[machine]".into())?
+            .take("file")
+            .map(|value| value.span),
         None => None,
     };
     Ok(match span {
@@ -95,7 +98,8 @@ fn behind(text: &str, value: &Value<'_>, new: &str) -> String {
 mod tests {
     use super::*;
 
-    const SESSION: &str = "[machine]\nfile = \"../machine.toml\" # ours\n\n[instrument]\nkind = \"ballbar\"   # Renishaw\n";
+    const SESSION: &str =
+        "[machine]\nfile = \"../machine.toml\" # ours\n\n[instrument]\nkind = \"ballbar\"   # Renishaw\n";
 
     #[test]
     fn what_is_not_meant_stays() {
@@ -103,7 +107,10 @@ mod tests {
         let text = with_machine_file(SESSION, file, "machine.toml").unwrap();
         assert_eq!(text, SESSION.replace("../machine.toml", "machine.toml"));
         let text = with_noise(SESSION, file, 0.25).unwrap();
-        assert_eq!(text, SESSION.replace("# Renishaw\n", "# Renishaw\nnoise_um = 0.25\n"));
+        assert_eq!(
+            text,
+            SESSION.replace("# Renishaw\n", "# Renishaw\nnoise_um = 0.25\n")
+        );
         let text = with_noise(&text, file, 0.0).unwrap();
         assert!(text.ends_with("\nnoise_um = 0\n"), "{text}");
         let inline = with_noise("instrument = { kind = \"ballbar\" }\n", file, 1.5).unwrap();
