@@ -64,10 +64,10 @@ pub fn simulate(session: &Session, simulation: &Simulation) -> Result<Simulated,
         if given.iter().any(|(known, _): &(String, &Given)| *known == id) {
             return Err(IdentifyError::Request(format!("`{}` is given twice", value.id)));
         }
-        if let Some(name) = ErrorName::parse(&id).filter(|_| !id.contains('~')) {
-            if !open.unknowns.contains(&name) {
-                open.unknowns.push(name);
-            }
+        if let Some(name) = ErrorName::parse(&id)
+            && !open.unknowns.contains(&name)
+        {
+            open.unknowns.push(name);
         }
         given.push((id, value));
     }
