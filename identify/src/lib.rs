@@ -4,7 +4,7 @@
 //! - [`parameters`], [`problem`]: a session as a least-squares problem;
 //! - [`fit`]: identify; [`heldout`]: judge on readings that the fit did not see; [`noise`]: how much is noise;
 //! - [`trace`]: close the loop;
-//! - [`simulate`]: readings from a model;
+//! - [`simulate`]: readings from a model; [`quantity`]: values with their units as people write them;
 //! - [`results`]: what is reported, as it stands in JSON.
 
 pub mod drivers;
@@ -16,6 +16,7 @@ pub mod noise;
 pub mod outliers;
 pub mod parameters;
 pub mod problem;
+pub mod quantity;
 pub mod rank;
 pub mod results;
 pub mod simulate;
