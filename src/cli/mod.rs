@@ -1,5 +1,10 @@
 //! Arguments, progress, tables: what stands between a user and the library. No mathematics.
 
+/// Writes a line of the result to standard output. A reader that has seen enough (a closed pipe) ends the program, quietly.
+macro_rules! say {
+    ($($text:tt)*) => { $crate::cli::output::line(format_args!($($text)*)) };
+}
+
 mod failure;
 mod fit;
 mod folder;

@@ -176,18 +176,18 @@ pub fn trace<'a>(
     let looked_for = search.candidates.len();
     let scale_um = problem.noise.sigma_mm * 1e3;
     let rms_um = |sum: f64| (sum / columns.rows().max(1) as f64).sqrt() * scale_um;
-    let mut last_p_value = search_on(&mut search, &rms_um, progress);
+    let mut ended = search_on(&mut search, &rms_um, progress);
     progress(Progress::Judging);
     let mut judged = judge(&problem, &before_fit, &search, options, structure_before.as_ref())?;
     let unexplained = judged
         .structure
         .as_ref()
         .is_none_or(|structure| structure.p_value <= STRUCTURED);
-    if unexplained && last_p_value < 1.0 + f64::EPSILON && search.taken.len() < stop.most {
+    if unexplained && ended.is_some() && search.taken.len() < stop.most {
         // Nothing simpler is left: free curves.
         search.last_resort = true;
         let taken = search.taken.len();
-        last_p_value = search_on(&mut search, &rms_um, progress);
+        ended = search_on(&mut search, &rms_um, progress);
         if search.taken.len() != taken {
             judged = judge(&problem, &before_fit, &search, options, structure_before.as_ref())?;
         }
@@ -207,7 +207,8 @@ pub fn trace<'a>(
         start: &start,
         structure_before: structure_before.as_ref(),
         structure_after: structure_after.as_ref(),
-        last_p_value,
+        last_p_value: ended.unwrap_or(1.0),
+        stopped_early: ended.is_none() || search.taken.len() >= stop.most,
         candidates: looked_for,
         candidates_seen: seen,
     })?;
@@ -223,21 +224,21 @@ pub fn trace<'a>(
     })
 }
 
-/// Rounds until nothing earns its place any more, or the user has seen enough; the p-value of the best that was not taken.
+/// Rounds until nothing earns its place any more: the p-value of the best that was not taken. `None` if the user has seen enough.
 fn search_on(
     search: &mut Search<'_>,
     rms_um: &dyn Fn(f64) -> f64,
     progress: &(dyn Fn(Progress) -> bool + Sync),
-) -> f64 {
+) -> Option<f64> {
     loop {
         match search.round(sharpen::sharpen) {
-            Round::Done { p_value } => return p_value,
+            Round::Done { p_value } => return Some(p_value),
             Round::Added { candidate } => {
                 search.exchange();
                 let held_out = search.held_out.last().copied().unwrap_or(0.0);
                 let id = search.candidates[candidate].effect.id();
                 if !progress(Progress::Taken(search.taken.len(), id, rms_um(held_out))) {
-                    return 1.0;
+                    return None;
                 }
             }
         }
