@@ -52,9 +52,10 @@ pub struct Columns<'p, 'a> {
     pub fold_rows: Vec<std::ops::Range<usize>>,
     rows: usize,
     samples: std::sync::Mutex<HashMap<(usize, String), SharedSamples>>,
-    bases: std::sync::Mutex<HashMap<(usize, String), Arc<Vec<Vec<f64>>>>>,
+    bases: std::sync::Mutex<HashMap<(usize, String), SharedColumns>>,
 }
 
+type SharedColumns = Arc<Vec<Vec<f64>>>;
 type SharedSamples = Option<Arc<Vec<DriverSample<f64>>>>;
 
 impl<'p, 'a> Columns<'p, 'a> {

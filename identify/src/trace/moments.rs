@@ -294,10 +294,11 @@ fn products_by_fold(
     layouts: &[Layout],
     side: MatRef<'_, f64>,
 ) -> Vec<(Mat<f64>, Vec<Mat<f64>>)> {
+    type Part = (Mat<f64>, Vec<Mat<f64>>);
     let count: Vec<usize> = layouts.iter().map(|layout| layout.count).collect();
     let total: usize = count.iter().sum();
     let chunks = chunked(&count);
-    let parts: Vec<Vec<(Mat<f64>, Vec<Mat<f64>>)>> = chunks
+    let parts: Vec<Vec<Part>> = chunks
         .par_iter()
         .map(|chunk| {
             let chosen: Vec<&Layout> = layouts[chunk.clone()].iter().collect();

@@ -260,7 +260,7 @@ fn widen(shifts: &mut [f64], aliases: &[Alias], named: &[f64], start: &Start) {
     }
 }
 
-fn verdict(findings: &Findings<'_, '_>, effects: &mut Vec<EffectResult>) -> (String, Remainder) {
+fn verdict(findings: &Findings<'_, '_>, effects: &mut [EffectResult]) -> (String, Remainder) {
     let Some(after) = findings.structure_after else {
         let word = match (effects.is_empty(), findings.stopped_early) {
             (true, _) => "clean",
