@@ -169,7 +169,7 @@ impl<N> Station<N> {
 }
 
 /// A nominal point, displaced by three unknowns where they are carried.
-fn displaced<S: Scalar>(
+pub fn displaced<S: Scalar>(
     nominal: [S::Nominal; 3],
     first: usize,
     unknown: &impl Fn(usize) -> Option<S>,
