@@ -1,1 +1,27 @@
-//! x
+//! Equations of readings: the closed form that the model's one kinematic chain yields for symbols in the place of numbers.
+//!
+//! - [`symbol`]: the symbolic scalar, and the arena that holds its expressions;
+//! - [`variable`], [`subject`]: what a symbol may stand for, what an equation is of;
+//! - [`evaluate`], [`derivative`]: expressions at numbers, and their derivatives;
+//! - [`equation`]: the closed form of a reading, with its named vectors;
+//! - [`program`], [`print`]: as a sequence of steps, and in a language.
+
+pub mod derivative;
+pub mod equation;
+pub mod error;
+pub mod evaluate;
+mod fold;
+pub mod print;
+pub mod program;
+mod run;
+pub mod subject;
+pub mod symbol;
+pub mod variable;
+pub mod vectors;
+
+pub use equation::{Equation, Kind, Options, Order};
+pub use error::CodegenError;
+pub use print::Language;
+pub use subject::{Source, Subject, ToolPoint};
+pub use symbol::{Arena, Operand, Symbol};
+pub use variable::{Symbols, Variable};

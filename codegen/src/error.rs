@@ -1,0 +1,31 @@
+//! The error type of this crate.
+
+use crate::symbol::Unary;
+
+/// What can keep an equation from being written.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum CodegenError {
+    /// An exponential or a sign of an error: it has no derivative that the chain could carry.
+    #[error("{function:?} is taken of an error; only nominal quantities may go through it")]
+    FunctionOfError {
+        /// The function.
+        function: Unary,
+    },
+    /// An error of an axis that the machine lacks.
+    #[error("`{error}` is an error of axis `{axis}`, which `{machine}` does not have")]
+    NoSuchAxis {
+        /// The error.
+        error: String,
+        /// Its axis.
+        axis: String,
+        /// The structural code.
+        machine: String,
+    },
+    /// An unknown that the instrument lacks.
+    #[error("the instrument has no unknown {unknown}")]
+    NoSuchUnknown {
+        /// The unknown.
+        unknown: String,
+    },
+}
