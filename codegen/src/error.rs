@@ -28,4 +28,16 @@ pub enum CodegenError {
         /// The unknown.
         unknown: String,
     },
+    /// An expression that has no normal form.
+    #[error("{what} has no place in the polynomial normal form")]
+    NoPolynomial {
+        /// What stands in the way.
+        what: String,
+    },
+    /// A truncation that no printed form has.
+    #[error("order {order} in the errors is not offered; the orders are first, bilinear and exact")]
+    OrderTooHigh {
+        /// What was asked for.
+        order: u32,
+    },
 }

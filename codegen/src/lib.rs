@@ -3,6 +3,7 @@
 //! - [`symbol`]: the symbolic scalar, and the arena that holds its expressions;
 //! - [`variable`], [`subject`]: what a symbol may stand for, what an equation is of;
 //! - [`evaluate`], [`derivative`]: expressions at numbers, and their derivatives;
+//! - [`polynomial`], [`normal`]: the exact normal form, in which equality is decided;
 //! - [`equation`]: the closed form of a reading, with its named vectors;
 //! - [`program`], [`print`]: as a sequence of steps, and in a language.
 
@@ -11,6 +12,8 @@ pub mod equation;
 pub mod error;
 pub mod evaluate;
 mod fold;
+pub mod normal;
+pub mod polynomial;
 pub mod print;
 pub mod program;
 mod run;
@@ -21,6 +24,9 @@ pub mod vectors;
 
 pub use equation::{Equation, Kind, Options, Order};
 pub use error::CodegenError;
+pub use evaluate::Value;
+pub use normal::Ring;
+pub use polynomial::Polynomial;
 pub use print::Language;
 pub use subject::{Source, Subject, ToolPoint};
 pub use symbol::{Arena, Operand, Symbol};

@@ -1,19 +1,13 @@
 //! The chain over symbols against the chain over numbers.
 
 use abbe_codegen::{Equation, Language, Options, Variable};
-use abbe_model::chain::{AxisPosition, Machine};
+use abbe_model::chain::AxisPosition;
 use abbe_model::frames::Rotation;
 use abbe_model::instrument::{Station, ballbar::BallBar};
 use rand::RngExt;
 use rand::SeedableRng;
 
-use crate::support::{Chapter5, eight};
-
-fn hermle(rotation: Rotation) -> Machine {
-    let mut machine = Machine::from_code("w C A b Y X Z t").expect("a valid code");
-    machine.rotation = rotation;
-    machine
-}
+use crate::support::{Chapter5, eight, hermle};
 
 #[test]
 fn the_symbolic_chain_evaluates_to_the_chain_over_numbers() {

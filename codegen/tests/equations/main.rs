@@ -3,3 +3,5 @@
 mod support;
 
 mod chain;
+mod seed000;
+mod seed003;

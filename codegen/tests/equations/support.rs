@@ -2,9 +2,18 @@
 #![allow(dead_code)]
 
 use abbe_codegen::{Source, Subject};
+use abbe_model::chain::Machine;
 use abbe_model::component::ErrorName;
+use abbe_model::frames::Rotation;
 use abbe_model::instrument::{Station, ballbar::BallBar};
 use abbe_model::scalar::Nominal;
+
+/// The machine of seed 000.
+pub fn hermle(rotation: Rotation) -> Machine {
+    let mut machine = Machine::from_code("w C A b Y X Z t").expect("a valid code");
+    machine.rotation = rotation;
+    machine
+}
 
 /// The A and C tests of chapter 5 of seed 000, with the lengths as symbols.
 #[derive(Clone, Copy)]
