@@ -6,8 +6,13 @@ use abbe_model::component::ErrorName;
 use abbe_model::frames::Rotation;
 use abbe_model::instrument::Station;
 
+use crate::check::{Check, Deviation};
 use crate::error::CodegenError;
-use crate::program::{Input, Label, Naming, Program};
+use crate::first::FirstOrder;
+use crate::forms;
+use crate::normal::Ring;
+use crate::polynomial::Polynomial;
+use crate::program::{Input, Label, Naming, Program, Tree};
 use crate::run::Run;
 use crate::subject::{Source, Subject, ToolPoint};
 use crate::symbol::{Arena, Operand, Symbol};
@@ -52,7 +57,29 @@ pub enum Kind {
     Volumetric,
 }
 
-/// The closed form of one reading of one machine.
+/// What an equation says, in the order that was asked for.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Form {
+    /// The named vectors, and the outputs over them.
+    Exact,
+    /// The coordinate groups, collected by error: the bar vector of a length, the coordinates themselves otherwise.
+    Groups(Vec<Polynomial>, Vec<Tree>),
+    /// The value without errors and a coefficient for each error, with the layout of each.
+    First(FirstOrder, FirstLayout),
+}
+
+/// The first-order form as it is written.
+#[derive(Clone, Debug, PartialEq)]
+pub struct FirstLayout {
+    /// The coordinates without errors; of a length its square.
+    pub nominal: Vec<Tree>,
+    /// The coefficients, parameter by parameter, coordinate by coordinate.
+    pub coefficients: Vec<Vec<Tree>>,
+    /// For a fixed multiple of an earlier column: numerator and denominator of the factor.
+    pub factors: Vec<Option<(Tree, Tree)>>,
+}
+
+/// The closed form of one reading of one machine, confirmed against the chain with dual numbers.
 #[derive(Debug)]
 pub struct Equation {
     /// The machine, with the rotation form that the equation has.
@@ -67,15 +94,26 @@ pub struct Equation {
     pub parameters: Vec<Variable>,
     /// The coordinates of the reading as the chain has them.
     pub exact: Vec<Operand>,
+    /// The coordinates of the reading in the form that was asked for.
+    pub outputs: Vec<Operand>,
+    /// The form.
+    pub form: Form,
     /// The vectors on the way there.
     pub vectors: Vec<NamedVector>,
+    /// Errors and unknowns that the form does not contain.
+    pub absent: Vec<Variable>,
+    /// How well it agrees with the chain.
+    pub check: Check,
+    /// How far a truncated or small-angle form strays from the exact chain.
+    pub deviations: Vec<Deviation>,
 }
 
 impl Equation {
     /// The equation of a reading in the named errors; other errors are exact zeros.
     ///
     /// # Errors
-    /// If the machine lacks the axis of an error, or the instrument an unknown.
+    /// If the machine lacks the axis of an error or the instrument an unknown, if the form has no closed polynomial, or if the
+    /// check against the dual numbers fails.
     pub fn of(
         machine: &Machine,
         source: &impl Source,
@@ -85,15 +123,8 @@ impl Equation {
         let mut machine = machine.clone();
         machine.rotation = options.rotation.unwrap_or(machine.rotation);
         let arena = Arena::new();
-        let known = source.subject(&|name: &str| arena.length(name)).unknowns();
-        let mut parameters: Vec<Variable> = errors.iter().cloned().map(Variable::Error).collect();
-        for place in &options.unknowns {
-            let unknown = known.get(*place).ok_or_else(|| CodegenError::NoSuchUnknown {
-                unknown: format!("number {place}"),
-            })?;
-            parameters.push(Variable::Unknown(*unknown));
-        }
-        let (kind, exact, vectors) = {
+        let parameters = parameters(&arena, source, errors, options)?;
+        let (kind, exact, vectors, outputs, form) = {
             let run = Run::<Symbol<'_>>::new(
                 &machine,
                 source,
@@ -107,20 +138,61 @@ impl Equation {
                 Subject::Volumetric { .. } => Kind::Volumetric,
             };
             let exact: Vec<Operand> = run.read().into_iter().map(Symbol::operand).collect();
-            let vectors = vectors::of_subject(&run.subject, &machine, &run.state, &run.errors, &|slot| {
+            let mut vectors = vectors::of_subject(&run.subject, &machine, &run.state, &run.errors, &|slot| {
                 run.unknown(slot)
             });
-            (kind, exact, vectors)
+            let inputs = inputs(&arena, &machine, &parameters);
+            let (outputs, form) = match options.order {
+                Order::Exact => (exact.clone(), Form::Exact),
+                Order::Bilinear => forms::bilinear(&arena, &run, &exact, &mut vectors, &inputs)?,
+                Order::First => forms::first(&arena, &run, &exact, &mut vectors, &inputs, &parameters)?,
+            };
+            (kind, exact, vectors, outputs, form)
         };
-        Ok(Equation {
+        let mut equation = Equation {
             machine,
             options: options.clone(),
             kind,
             arena,
             parameters,
             exact,
+            outputs,
+            form,
             vectors,
-        })
+            absent: Vec::new(),
+            check: Check::default(),
+            deviations: Vec::new(),
+        };
+        equation.absent = equation.absent_parameters();
+        let value = equation.program(false);
+        equation.check = equation.confirm(source, &[&value, &equation.program(true)])?;
+        equation.deviations = equation.deviations(source, &value)?;
+        Ok(equation)
+    }
+
+    /// The parameters that the outputs do not contain. The normal form decides; where there is none (a root of errors), the
+    /// derivative does: an expression without a variable has none.
+    fn absent_parameters(&self) -> Vec<Variable> {
+        let mut ring = Ring::exact(&self.arena);
+        let wanted: Vec<Operand> = match (self.kind, self.vectors.last()) {
+            (Kind::Length, Some(bar)) => bar.components.to_vec(),
+            _ => self.outputs.clone(),
+        };
+        let forms: Result<Vec<Polynomial>, _> = wanted.iter().map(|w| ring.normal_form(*w)).collect();
+        let bar = |variable: &Variable| matches!(variable, Variable::Unknown(u) if u.thing == "bar" || u.thing == "gain");
+        match forms {
+            Ok(forms) => {
+                let absent = ring.absent(&forms, &self.parameters);
+                absent.into_iter().filter(|v| !bar(v)).cloned().collect()
+            }
+            Err(_) => {
+                let gradients = self.gradients();
+                let zero = Operand::constant(0.0);
+                let unseen = |place: &usize| gradients.iter().all(|row| row[*place] == zero);
+                let places = (0..self.parameters.len()).filter(unseen);
+                places.map(|place| self.parameters[place].clone()).collect()
+            }
+        }
     }
 
     /// The error vector of the tool in the table frame, over the whole workspace.
@@ -138,42 +210,23 @@ impl Equation {
     /// The arguments of its programs in their order: lengths, positions of moving axes from workpiece to tool (a rotary axis by sine and
     /// cosine), then errors and instrument unknowns as they were asked for.
     pub fn inputs(&self) -> Vec<Input> {
-        let variables = self.arena.variables();
-        let lengths = variables.iter().filter(|v| matches!(v, Variable::Length(_)));
-        let mut inputs: Vec<Input> = lengths.cloned().map(Input::Plain).collect();
-        for axis in &self.machine.axes {
-            let position = Variable::Position {
-                axis: axis.name.clone(),
-                kind: axis.kind,
-            };
-            if variables.contains(&position) {
-                match axis.kind {
-                    AxisKind::Linear => inputs.push(Input::Plain(position)),
-                    AxisKind::Rotary => {
-                        inputs.push(Input::Sine(position.clone()));
-                        inputs.push(Input::Cosine(position));
-                    }
-                }
-            }
-        }
-        inputs.extend(self.parameters.iter().cloned().map(Input::Plain));
-        inputs
+        inputs(&self.arena, &self.machine, &self.parameters)
     }
 
     /// The derivatives of each output by each parameter, output by output.
     pub fn gradients(&self) -> Vec<Vec<Operand>> {
         let parameters = self.parameter_operands();
         let gradient = |output: &Operand| self.arena.gradient(*output, &parameters);
-        self.exact.iter().map(gradient).collect()
+        self.outputs.iter().map(gradient).collect()
     }
 
     /// The steps that compute the reading and, with `gradient`, its derivatives by every parameter, output by output.
     pub fn program(&self, gradient: bool) -> Program {
-        let mut outputs = self.exact.clone();
+        let mut outputs = self.outputs.clone();
         let mut vectors = self.vectors.clone();
         if gradient {
             let parameters = self.parameter_operands();
-            for output in &self.exact {
+            for output in &self.outputs {
                 let adjoints = self.arena.adjoints(*output, &parameters);
                 outputs.extend(parameters.iter().map(|parameter| adjoints.of(*parameter)));
                 if self.kind == Kind::Length {
@@ -182,7 +235,7 @@ impl Equation {
             }
         }
         let mut labels = vectors::labels(&vectors);
-        if let (Kind::Length, Operand::Node(id)) = (self.kind, self.exact[0]) {
+        if let (Kind::Length, Operand::Node(id)) = (self.kind, self.outputs[0]) {
             labels.insert(id, Label::Scalar("length"));
         }
         self.arena
@@ -194,4 +247,45 @@ impl Equation {
         let operand = |variable: &Variable| self.arena.variable(variable.clone()).operand();
         self.parameters.iter().map(operand).collect()
     }
+}
+
+/// The errors and unknowns that were asked for.
+fn parameters(
+    arena: &Arena,
+    source: &impl Source,
+    errors: &[ErrorName],
+    options: &Options,
+) -> Result<Vec<Variable>, CodegenError> {
+    let known = source.subject(&|name: &str| arena.length(name)).unknowns();
+    let mut parameters: Vec<Variable> = errors.iter().cloned().map(Variable::Error).collect();
+    for place in &options.unknowns {
+        let unknown = known.get(*place).ok_or_else(|| CodegenError::NoSuchUnknown {
+            unknown: format!("number {place}"),
+        })?;
+        parameters.push(Variable::Unknown(*unknown));
+    }
+    Ok(parameters)
+}
+
+fn inputs(arena: &Arena, machine: &Machine, parameters: &[Variable]) -> Vec<Input> {
+    let variables = arena.variables();
+    let lengths = variables.iter().filter(|v| matches!(v, Variable::Length(_)));
+    let mut inputs: Vec<Input> = lengths.cloned().map(Input::Plain).collect();
+    for axis in &machine.axes {
+        let position = Variable::Position {
+            axis: axis.name.clone(),
+            kind: axis.kind,
+        };
+        if variables.contains(&position) {
+            match axis.kind {
+                AxisKind::Linear => inputs.push(Input::Plain(position)),
+                AxisKind::Rotary => {
+                    inputs.push(Input::Sine(position.clone()));
+                    inputs.push(Input::Cosine(position));
+                }
+            }
+        }
+    }
+    inputs.extend(parameters.iter().cloned().map(Input::Plain));
+    inputs
 }

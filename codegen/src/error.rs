@@ -40,4 +40,16 @@ pub enum CodegenError {
         /// What was asked for.
         order: u32,
     },
+    /// A program that the chain with dual numbers does not confirm; it is not written.
+    #[error(
+        "the equation is not written: over {points} points it differs from the chain with dual numbers by {value:.1e} (value) and {gradient:.1e} (derivatives), relative, where 1e-12 is allowed"
+    )]
+    Unconfirmed {
+        /// Points compared.
+        points: usize,
+        /// Largest relative difference of a value.
+        value: f64,
+        /// Largest relative difference of a derivative.
+        gradient: f64,
+    },
 }

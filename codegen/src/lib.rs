@@ -5,13 +5,18 @@
 //! - [`evaluate`], [`derivative`]: expressions at numbers, and their derivatives;
 //! - [`polynomial`], [`normal`]: the exact normal form, in which equality is decided;
 //! - [`equation`]: the closed form of a reading, with its named vectors;
+//! - [`first`]: its first order, as a table of sensitivities; [`check`]: what confirms it before it is written;
 //! - [`program`], [`print`]: as a sequence of steps, and in a language.
 
+pub mod check;
 pub mod derivative;
 pub mod equation;
 pub mod error;
 pub mod evaluate;
+pub mod first;
 mod fold;
+mod forms;
+mod layout;
 pub mod normal;
 pub mod polynomial;
 pub mod print;
@@ -22,7 +27,7 @@ pub mod symbol;
 pub mod variable;
 pub mod vectors;
 
-pub use equation::{Equation, Kind, Options, Order};
+pub use equation::{Equation, Form, Kind, Options, Order};
 pub use error::CodegenError;
 pub use evaluate::Value;
 pub use normal::Ring;

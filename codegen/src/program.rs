@@ -2,6 +2,7 @@
 
 use std::collections::HashMap;
 
+use crate::fold::{binary_value, unary_value};
 use crate::symbol::{Arena, Binary, Node, NodeId, Operand, Unary, operands};
 use crate::variable::Variable;
 
@@ -18,6 +19,18 @@ pub enum Tree {
     Unary(Unary, Box<Tree>),
     /// An operation on two operands.
     Binary(Binary, Box<Tree>, Box<Tree>),
+}
+
+impl Tree {
+    fn value(&self, inputs: &[f64], steps: &[f64]) -> f64 {
+        match self {
+            Tree::Number(value) => *value,
+            Tree::Input(place) => inputs[*place],
+            Tree::Step(place) => steps[*place],
+            Tree::Unary(function, a) => unary_value(*function, a.value(inputs, steps)),
+            Tree::Binary(op, a, b) => binary_value(*op, a.value(inputs, steps), b.value(inputs, steps)),
+        }
+    }
 }
 
 /// An argument of a program: a variable, or the sine or cosine of an axis position, which is taken once a data set.
@@ -225,6 +238,17 @@ impl Operations {
 }
 
 impl Program {
+    /// The outputs for the values of the inputs.
+    pub fn run(&self, inputs: &[f64]) -> Vec<f64> {
+        let mut steps = Vec::with_capacity(self.steps.len());
+        for step in &self.steps {
+            let value = step.value.value(inputs, &steps);
+            steps.push(value);
+        }
+        let value = |output: &Tree| output.value(inputs, &steps);
+        self.outputs.iter().map(value).collect()
+    }
+
     /// How many operations one run takes.
     pub fn operations(&self) -> Operations {
         let mut operations = Operations::default();

@@ -1,6 +1,7 @@
 //! One run of the chain, over symbols for the equation and over numbers for its check.
 
 use abbe_model::chain::{AxisPosition, BodyErrors, Machine};
+use abbe_model::instrument::{Station, ballbar};
 use abbe_model::scalar::{Nominal, Scalar};
 
 use crate::error::CodegenError;
@@ -83,5 +84,21 @@ impl<'m, S: Scalar> Run<'m, S> {
     pub(crate) fn read(&self) -> Vec<S> {
         self.subject
             .read(self.machine, &self.state, &self.errors, |slot| self.unknown(slot))
+    }
+
+    /// The reading of a ball bar from the distance between its balls, with the bar's own unknowns; the distance itself for any
+    /// other subject.
+    pub(crate) fn length_reading(&self, distance: S) -> S {
+        let Subject::Station(Station::BallBar(bar)) = &self.subject else {
+            return distance;
+        };
+        let length = match self.unknown(ballbar::BAR) {
+            Some(error) => distance - error,
+            None => distance,
+        };
+        match self.unknown(ballbar::GAIN) {
+            Some(gain) => length + gain * (distance - bar.bar),
+            None => length,
+        }
     }
 }

@@ -37,6 +37,14 @@ impl Source for Chapter5 {
         matches!(axis, "X" | "Y" | "Z").then(|| N::constant(0.0))
     }
 
+    fn range(&self, axis: &str) -> Option<[f64; 2]> {
+        match axis {
+            "A" => Some([-20.0_f64.to_radians(), 70.0_f64.to_radians()]),
+            "C" => None,
+            _ => None,
+        }
+    }
+
     fn length_mm(&self, name: &str) -> Option<f64> {
         match name {
             "R" => Some(100.0),
