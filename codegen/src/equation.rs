@@ -15,7 +15,7 @@ use crate::polynomial::Polynomial;
 use crate::program::{Input, Label, Naming, Program, Tree};
 use crate::run::Run;
 use crate::subject::{Source, Subject, ToolPoint};
-use crate::symbol::{Arena, Operand, Symbol};
+use crate::symbol::{Arena, Operand, Symbol, VariableId};
 use crate::variable::{Symbols, Variable};
 use crate::vectors::{self, NamedVector};
 
@@ -163,36 +163,37 @@ impl Equation {
             check: Check::default(),
             deviations: Vec::new(),
         };
-        equation.absent = equation.absent_parameters();
         let value = equation.program(false);
         equation.check = equation.confirm(source, &[&value, &equation.program(true)])?;
+        equation.absent = equation.absent_parameters()?;
         equation.deviations = equation.deviations(source, &value)?;
         Ok(equation)
     }
 
-    /// The parameters that the outputs do not contain. The normal form decides; where there is none (a root of errors), the
-    /// derivative does: an expression without a variable has none.
-    fn absent_parameters(&self) -> Vec<Variable> {
-        let mut ring = Ring::exact(&self.arena);
-        let wanted: Vec<Operand> = match (self.kind, self.vectors.last()) {
-            (Kind::Length, Some(bar)) => bar.components.to_vec(),
-            _ => self.outputs.clone(),
-        };
-        let forms: Result<Vec<Polynomial>, _> = wanted.iter().map(|w| ring.normal_form(*w)).collect();
-        let bar = |variable: &Variable| matches!(variable, Variable::Unknown(u) if u.thing == "bar" || u.thing == "gain");
-        match forms {
-            Ok(forms) => {
-                let absent = ring.absent(&forms, &self.parameters);
-                absent.into_iter().filter(|v| !bar(v)).cloned().collect()
-            }
-            Err(_) => {
-                let gradients = self.gradients();
-                let zero = Operand::constant(0.0);
-                let unseen = |place: &usize| gradients.iter().all(|row| row[*place] == zero);
-                let places = (0..self.parameters.len()).filter(unseen);
-                places.map(|place| self.parameters[place].clone()).collect()
-            }
+    /// The parameters that the outputs do not contain. A derivative that is not zero at some point proves that its parameter is
+    /// contained; where none was met, the normal form decides.
+    fn absent_parameters(&self) -> Result<Vec<Variable>, CodegenError> {
+        let rounding = 1e-9;
+        let derivatives = self.parameters.iter().zip(&self.check.largest_derivatives);
+        let unseen = derivatives.filter(|(_, largest)| **largest < rounding);
+        let unseen: Vec<Variable> = unseen.map(|(parameter, _)| parameter.clone()).collect();
+        let below: Vec<VariableId> = self.arena.variables_of(&self.outputs);
+        let in_graph =
+            |parameter: &Variable| below.iter().any(|id| self.arena.variable_at(*id) == *parameter);
+        let (doubtful, mut absent): (Vec<Variable>, Vec<Variable>) = unseen.into_iter().partition(in_graph);
+        if !doubtful.is_empty() {
+            let wanted = match (self.kind, self.vectors.last()) {
+                (Kind::Length, Some(bar)) => bar.components.to_vec(),
+                _ => self.outputs.clone(),
+            };
+            let mut ring = Ring::exact(&self.arena);
+            let forms = wanted
+                .iter()
+                .map(|w| ring.normal_form(*w))
+                .collect::<Result<Vec<_>, _>>()?;
+            absent.extend(ring.absent(&forms, &doubtful).into_iter().cloned());
         }
+        Ok(absent)
     }
 
     /// The error vector of the tool in the table frame, over the whole workspace.
@@ -236,7 +237,7 @@ impl Equation {
         }
         let mut labels = vectors::labels(&vectors);
         if let (Kind::Length, Operand::Node(id)) = (self.kind, self.outputs[0]) {
-            labels.insert(id, Label::Scalar("length"));
+            labels.insert(id, Label::Scalar("reading"));
         }
         self.arena
             .program(self.inputs(), &outputs, &labels, Naming::Shared)

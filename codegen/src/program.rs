@@ -121,7 +121,8 @@ impl Arena {
         let mut steps = Vec::new();
         let mut temporaries = 0;
         for id in nodes {
-            if builder.input(id).is_some() {
+            // An angle whose sine and cosine are the inputs is itself none, and is not computed either.
+            if builder.input(id).is_some() || matches!(self.node(id), Node::Variable(_)) {
                 continue;
             }
             let label = match labels.get(&id) {

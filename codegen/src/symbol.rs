@@ -190,6 +190,15 @@ impl Arena {
         Operand::Node(id)
     }
 
+    /// The variables that `outputs` are made of.
+    pub fn variables_of(&self, outputs: &[Operand]) -> Vec<VariableId> {
+        let variable = |id: NodeId| match self.node(id) {
+            Node::Variable(variable) => Some(variable),
+            Node::Unary(..) | Node::Binary(..) => None,
+        };
+        self.reachable(outputs).into_iter().filter_map(variable).collect()
+    }
+
     /// The nodes that `outputs` rest on, operands before what is made of them.
     pub(crate) fn reachable(&self, outputs: &[Operand]) -> Vec<NodeId> {
         let mut used = vec![false; self.len()];

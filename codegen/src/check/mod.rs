@@ -21,7 +21,7 @@ const TOLERANCE: f64 = 1e-12;
 const SIZES: [f64; 2] = [10.0, 0.1];
 
 /// How well a program agrees with the chain.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[derive(Clone, Debug, Default, PartialEq)]
 pub struct Check {
     /// Points compared, at errors of ±10 mm and ±0.1 rad.
     pub points: usize,
@@ -30,6 +30,8 @@ pub struct Check {
     /// Largest difference of a derivative, relative to the largest derivative by the same parameter (to 1 mm/mm
     /// or 1 mm/rad where that is less: a parameter that is not seen has rounding alone).
     pub gradient: f64,
+    /// Largest derivative by each parameter over the points, mm/mm and mm/rad.
+    pub largest_derivatives: Vec<f64>,
 }
 
 impl Check {
@@ -49,7 +51,7 @@ impl Equation {
         let mut check = Check::default();
         let count = self.parameters.len();
         let mut value_scale = f64::MIN_POSITIVE;
-        let mut scales = vec![1.0_f64; count];
+        let mut scales = vec![0.0_f64; count];
         let mut difference = 0.0_f64;
         let mut differences = vec![0.0_f64; count];
         let mut tries = 0;
@@ -97,7 +99,7 @@ impl Equation {
             check.points += 1;
         }
         check.value = difference / value_scale;
-        let relative = differences.iter().zip(&scales).map(|(d, s)| d / s);
+        let relative = differences.iter().zip(&scales).map(|(d, s)| d / s.max(1.0));
         check.gradient = relative.fold(0.0, f64::max);
         if check.points == 0 || check.largest() > TOLERANCE {
             return Err(CodegenError::Unconfirmed {
@@ -106,6 +108,7 @@ impl Equation {
                 gradient: check.gradient,
             });
         }
+        check.largest_derivatives = scales;
         Ok(check)
     }
 }

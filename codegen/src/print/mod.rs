@@ -3,8 +3,14 @@
 //! A new language is one file here: a [`dialect::Dialect`] says how names, numbers, products and functions are spelt, and the file
 //! lays out what stands around the expressions.
 
+mod c;
+mod code;
 pub mod dialect;
+mod matlab;
+mod python;
+mod rust;
 mod text;
+mod words;
 
 use crate::equation::Equation;
 use crate::error::CodegenError;
@@ -14,6 +20,41 @@ use crate::error::CodegenError;
 pub enum Language {
     /// Plain text, UTF-8.
     Text,
+    /// Rust without dependencies.
+    Rust,
+    /// C99.
+    C,
+    /// Python with NumPy.
+    Python,
+    /// MATLAB or Octave.
+    Matlab,
+}
+
+impl Language {
+    /// All of them.
+    pub const ALL: [Language; 5] = [
+        Language::Text,
+        Language::Rust,
+        Language::C,
+        Language::Python,
+        Language::Matlab,
+    ];
+
+    /// The word on the command line.
+    pub fn word(self) -> &'static str {
+        match self {
+            Language::Text => "text",
+            Language::Rust => "rust",
+            Language::C => "c",
+            Language::Python => "python",
+            Language::Matlab => "matlab",
+        }
+    }
+
+    /// The language of a word on the command line.
+    pub fn of_word(word: &str) -> Option<Language> {
+        Language::ALL.into_iter().find(|language| language.word() == word)
+    }
 }
 
 impl Equation {
@@ -22,8 +63,12 @@ impl Equation {
     /// # Errors
     /// If the form that was asked for cannot be written in that language.
     pub fn print(&self, language: Language) -> Result<String, CodegenError> {
-        match language {
-            Language::Text => Ok(text::print(self)),
-        }
+        Ok(match language {
+            Language::Text => text::print(self),
+            Language::Rust => rust::print(self),
+            Language::C => c::print(self),
+            Language::Python => python::print(self),
+            Language::Matlab => matlab::print(self),
+        })
     }
 }

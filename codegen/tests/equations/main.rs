@@ -3,5 +3,8 @@
 mod support;
 
 mod chain;
+mod compiled;
 mod seed000;
 mod seed003;
+mod tools;
+mod topologies;
