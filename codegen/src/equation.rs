@@ -63,7 +63,15 @@ pub enum Form {
     /// The named vectors, and the outputs over them.
     Exact,
     /// The coordinate groups, collected by error: the bar vector of a length, the coordinates themselves otherwise.
-    Groups(Vec<Polynomial>, Vec<Tree>),
+    Groups {
+        /// In normal form.
+        polynomials: Vec<Polynomial>,
+        /// As they are written.
+        layout: Vec<Tree>,
+        /// Whether nothing was left out: the chain itself has no more terms. Decided for up to twelve parameters, beyond which the
+        /// whole normal form is not built and the answer is no.
+        complete: bool,
+    },
     /// The value without errors and a coefficient for each error, with the layout of each.
     First(FirstOrder, FirstLayout),
 }
@@ -100,6 +108,8 @@ pub struct Equation {
     pub form: Form,
     /// The vectors on the way there.
     pub vectors: Vec<NamedVector>,
+    /// The stated length of the bar, where a bar is read.
+    pub stated_length: Option<Operand>,
     /// Errors and unknowns that the form does not contain.
     pub absent: Vec<Variable>,
     /// How well it agrees with the chain.
@@ -124,7 +134,7 @@ impl Equation {
         machine.rotation = options.rotation.unwrap_or(machine.rotation);
         let arena = Arena::new();
         let parameters = parameters(&arena, source, errors, options)?;
-        let (kind, exact, vectors, outputs, form) = {
+        let (kind, exact, vectors, outputs, form, stated_length) = {
             let run = Run::<Symbol<'_>>::new(
                 &machine,
                 source,
@@ -147,7 +157,11 @@ impl Equation {
                 Order::Bilinear => forms::bilinear(&arena, &run, &exact, &mut vectors, &inputs)?,
                 Order::First => forms::first(&arena, &run, &exact, &mut vectors, &inputs, &parameters)?,
             };
-            (kind, exact, vectors, outputs, form)
+            let stated = match &run.subject {
+                Subject::Station(Station::BallBar(bar)) => Some(bar.bar.operand()),
+                _ => None,
+            };
+            (kind, exact, vectors, outputs, form, stated)
         };
         let mut equation = Equation {
             machine,
@@ -159,6 +173,7 @@ impl Equation {
             outputs,
             form,
             vectors,
+            stated_length,
             absent: Vec::new(),
             check: Check::default(),
             deviations: Vec::new(),

@@ -185,5 +185,17 @@ fn fixed_factor(ring: &Ring<'_>, a: &[Polynomial], b: &[Polynomial]) -> Option<(
         && a.iter()
             .zip(&b)
             .all(|((_, x), (_, y))| ring.product(x, first_b) == ring.product(first_a, y));
-    proportional.then(|| (first_a.clone(), first_b.clone()))
+    proportional.then(|| match quotient(ring, first_a, first_b) {
+        Some(quotient) => (quotient, Polynomial::constant(1.0)),
+        None => (first_a.clone(), first_b.clone()),
+    })
+}
+
+/// `a/b` where it is a single product.
+fn quotient(ring: &Ring<'_>, a: &Polynomial, b: &Polynomial) -> Option<Polynomial> {
+    let ((a_first, a_factor), (b_first, b_factor)) = (a.terms().next()?, b.terms().next()?);
+    let monomial = a_first.divided_by(b_first)?;
+    let mut quotient = Polynomial::default();
+    quotient.insert(monomial, a_factor / b_factor);
+    (ring.product(&quotient, b) == *a).then_some(quotient)
 }

@@ -41,7 +41,6 @@ pub(crate) fn unary(arena: &Arena, op: Unary, a: Operand) -> Operand {
     let node = arena.node_of(a);
     match (op, node) {
         (Unary::Neg, Some(Node::Unary(Unary::Neg, x))) => x,
-        (Unary::Neg, Some(Node::Binary(Binary::Sub, x, y))) => binary(arena, Binary::Sub, y, x),
         (Unary::Neg, Some(Node::Binary(Binary::Mul, x, y))) if x.known().is_some() => {
             binary(arena, Binary::Mul, unary(arena, Unary::Neg, x), y)
         }

@@ -33,6 +33,15 @@ pub(crate) fn bilinear<'a>(
         .iter()
         .map(|group| ring.normal_form(*group))
         .collect::<Result<Vec<Polynomial>, _>>()?;
+    let parameters = inputs
+        .iter()
+        .filter(|input| matches!(input, Input::Plain(v) if v.is_small()));
+    let complete = parameters.count() <= 12 && {
+        let mut whole = Ring::exact(arena);
+        let forms: Result<Vec<Polynomial>, _> =
+            wanted.iter().map(|group| whole.normal_form(*group)).collect();
+        forms.is_ok_and(|forms| forms == groups)
+    };
     let layout = Layout { ring: &ring, inputs };
     let trees: Vec<Tree> = groups.iter().map(|group| layout.group(group)).collect();
     let operands = operands(arena, inputs);
@@ -47,7 +56,12 @@ pub(crate) fn bilinear<'a>(
         }
         None => symbols.into_iter().map(Symbol::operand).collect(),
     };
-    Ok((outputs, Form::Groups(groups, trees)))
+    let form = Form::Groups {
+        polynomials: groups,
+        layout: trees,
+        complete,
+    };
+    Ok((outputs, form))
 }
 
 /// The value without errors and a coefficient for each error.

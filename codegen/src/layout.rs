@@ -29,15 +29,19 @@ impl Layout<'_, '_> {
         keys.sort_by_key(|key| (key.degree(|_| true), (*key).clone()));
         let mut terms = Vec::new();
         for key in keys {
-            let coefficient = self.coefficient_terms(&collected[key]);
+            let coefficient = &collected[key];
             if key.powers().is_empty() {
-                terms.extend(coefficient);
+                terms.extend(self.coefficient_terms(coefficient));
                 continue;
             }
-            let errors = self.powers(key);
-            let (minus, factor) = as_factor(coefficient);
-            let mut factors: Vec<Tree> = factor.into_iter().collect();
-            factors.extend(errors);
+            let turns = coefficient.contains(|atom| matches!(atom, Atom::Sin(_) | Atom::Cos(_)));
+            let (minus, mut factors) = if turns {
+                let (minus, factor) = as_factor(self.coefficient_terms(coefficient));
+                (minus, factor.into_iter().collect())
+            } else {
+                self.length_factors(coefficient)
+            };
+            factors.extend(self.powers(key));
             terms.push((minus, product(factors)));
         }
         terms
@@ -48,36 +52,52 @@ impl Layout<'_, '_> {
         let turns = polynomial.collect(|atom| matches!(atom, Atom::Sin(_) | Atom::Cos(_)));
         let mut terms = Vec::new();
         for (turn, lengths) in &turns {
-            let lengths = self.length_terms(lengths);
             if turn.powers().is_empty() {
-                terms.extend(lengths);
+                terms.extend(self.length_terms(lengths));
                 continue;
             }
-            let (minus, factor) = as_factor(lengths);
-            let mut factors: Vec<Tree> = factor.into_iter().collect();
+            let (minus, mut factors) = self.length_factors(lengths);
             factors.extend(self.powers(turn));
             terms.push((minus, product(factors)));
         }
-        terms
+        positive_first(terms)
     }
 
+    /// Lengths as terms: several that share a factor are one, with the factor before the parentheses.
     fn length_terms(&self, polynomial: &Polynomial) -> Vec<Term> {
-        let term = |(monomial, coefficient): (&Monomial, &BigRational)| {
-            let size = coefficient.abs();
-            let mut factors = Vec::new();
-            if !size.is_one() || monomial.powers().is_empty() {
-                factors.push(Tree::Number(size.to_f64().unwrap_or(f64::NAN)));
-            }
-            factors.extend(self.powers(monomial));
-            (coefficient.is_negative(), product(factors))
-        };
-        let mut terms: Vec<Term> = polynomial.terms().map(term).collect();
-        // A sum that can start without a minus does.
-        if let Some(first) = terms.iter().position(|(minus, _)| !minus) {
-            let first = terms.remove(first);
-            terms.insert(0, first);
+        if polynomial.len() > 1 && !common(polynomial).powers().is_empty() {
+            let (minus, factors) = self.length_factors(polynomial);
+            return vec![(minus, product(factors))];
         }
-        terms
+        positive_first(polynomial.terms().map(|term| self.length_term(term)).collect())
+    }
+
+    /// Lengths as factors of a product: `R`, or `D` and `(H − Z_CA)`, the first term positive and the sign outside. None for 1.
+    fn length_factors(&self, polynomial: &Polynomial) -> (bool, Vec<Tree>) {
+        let shared = common(polynomial);
+        let rest = polynomial
+            .terms()
+            .filter_map(|(monomial, coefficient)| Some((monomial.divided_by(&shared)?, coefficient)));
+        let terms: Vec<Term> = rest.map(|(m, c)| self.length_term((&m, c))).collect();
+        let (minus, inner) = as_factor(terms);
+        let mut factors = Vec::new();
+        // A number stands before the letters.
+        if let Some(number @ Tree::Number(_)) = &inner {
+            factors.push(number.clone());
+        }
+        factors.extend(self.powers(&shared));
+        factors.extend(inner.filter(|inner| !matches!(inner, Tree::Number(_))));
+        (minus, factors)
+    }
+
+    fn length_term(&self, (monomial, coefficient): (&Monomial, &BigRational)) -> Term {
+        let size = coefficient.abs();
+        let mut factors = Vec::new();
+        if !size.is_one() || monomial.powers().is_empty() {
+            factors.push(Tree::Number(size.to_f64().unwrap_or(f64::NAN)));
+        }
+        factors.extend(self.powers(monomial));
+        (coefficient.is_negative(), product(factors))
     }
 
     fn powers(&self, monomial: &Monomial) -> Vec<Tree> {
@@ -136,6 +156,22 @@ pub(crate) fn sum(terms: Vec<Term>) -> Tree {
     terms.fold(first, |sum, (minus, term)| {
         binary(if minus { Binary::Sub } else { Binary::Add }, sum, term)
     })
+}
+
+/// What all terms have as a factor.
+fn common(polynomial: &Polynomial) -> Monomial {
+    let mut monomials = polynomial.terms().map(|(monomial, _)| monomial.clone());
+    let first = monomials.next().unwrap_or_default();
+    monomials.fold(first, |shared, monomial| shared.shared_with(&monomial))
+}
+
+/// A sum that can start without a minus does.
+fn positive_first(mut terms: Vec<Term>) -> Vec<Term> {
+    if let Some(first) = terms.iter().position(|(minus, _)| !minus) {
+        let first = terms.remove(first);
+        terms.insert(0, first);
+    }
+    terms
 }
 
 /// A sum as a factor: its sign where all or the first of its terms carry one, and the factor unless it is 1.

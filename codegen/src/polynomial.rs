@@ -51,6 +51,30 @@ impl Monomial {
         (Monomial(kept), Monomial(rest))
     }
 
+    /// The quotient, where every power of `other` is contained.
+    pub fn divided_by(&self, other: &Monomial) -> Option<Monomial> {
+        let mut quotient = self.clone();
+        for (atom, power) in &other.0 {
+            let place = quotient.0.iter().position(|(own, n)| own == atom && n >= power)?;
+            quotient.0[place].1 -= power;
+        }
+        quotient.0.retain(|(_, power)| *power > 0);
+        Some(quotient)
+    }
+
+    /// The powers that both contain.
+    pub fn shared_with(&self, other: &Monomial) -> Monomial {
+        let power = |atom: Atom| {
+            other
+                .0
+                .iter()
+                .find(|(own, _)| *own == atom)
+                .map_or(0, |(_, n)| *n)
+        };
+        let shared = self.0.iter().map(|(atom, n)| (*atom, power(*atom).min(*n)));
+        Monomial(shared.filter(|(_, n)| *n > 0).collect())
+    }
+
     /// The product, no rule applied.
     fn times(&self, other: &Monomial) -> Monomial {
         let mut product = Vec::with_capacity(self.0.len() + other.0.len());

@@ -187,6 +187,11 @@ impl Builder<'_> {
         match self.arena.node(id) {
             // Every variable is an input; the arena's caller lists them.
             Node::Variable(_) => Tree::Number(f64::NAN),
+            Node::Unary(Unary::Neg, a) => match self.tree(a) {
+                // −(x − y) is y − x where the difference is nobody else's.
+                Tree::Binary(Binary::Sub, x, y) => Tree::Binary(Binary::Sub, y, x),
+                a => Tree::Unary(Unary::Neg, Box::new(a)),
+            },
             Node::Unary(op, a) => Tree::Unary(op, Box::new(self.tree(a))),
             Node::Binary(op, a, b) => Tree::Binary(op, Box::new(self.tree(a)), Box::new(self.tree(b))),
         }

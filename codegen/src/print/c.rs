@@ -39,7 +39,7 @@ pub(crate) fn print(equation: &Equation) -> String {
     let value = Code::new(equation, false);
     let whole = Code::new(equation, equation.options.gradient);
     let mut file = String::from("/*\n");
-    for line in whole.header(0) {
+    for line in whole.header(0, ['[', ']']) {
         let _ = writeln!(file, "{}", format!(" * {line}").trim_end());
     }
     let _ = writeln!(

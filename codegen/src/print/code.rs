@@ -235,8 +235,10 @@ impl<'e> Code<'e> {
         outputs.map(|tree| dialect::write(tree, dialect)).collect()
     }
 
-    /// The header, a line each, without comment signs. `first` is the number of the first place of an argument.
-    pub(crate) fn header(&self, first: usize) -> Vec<String> {
+    /// The header, a line each, without comment signs. Places of arguments count from `first` and stand between `brackets`.
+    pub(crate) fn header(&self, first: usize, brackets: [char; 2]) -> Vec<String> {
+        let at =
+            |group: &str, number: usize| format!("{group}{}{}{}", brackets[0], number + first, brackets[1]);
         let equation = self.equation;
         let mut lines = words::title(equation);
         lines.push(String::new());
@@ -249,7 +251,7 @@ impl<'e> Code<'e> {
                     Input::Sine(variable) => ("1", format!("sine of the {}", variable.meaning())),
                     Input::Cosine(variable) => ("1", format!("cosine of the {}", variable.meaning())),
                 };
-                let argument = format!("{group}[{}]", number + first);
+                let argument = at(group, number);
                 lines.push(format!(
                     "  {argument:<12} {:<12} {unit:<4} {meaning}",
                     self.inputs[place]
@@ -262,8 +264,9 @@ impl<'e> Code<'e> {
             Kind::Volumetric => "the error vector x, y, z, mm",
         };
         lines.push(format!(
-            "Value: {what}. Gradient: by errors[{first}], errors[{}] and so on, mm/mm and mm/rad.",
-            first + 1
+            "Value: {what}. Gradient: by {}, {} and so on, mm/mm and mm/rad.",
+            at("errors", 0),
+            at("errors", 1)
         ));
         let operations = self.program.operations();
         let functions = match operations.functions {

@@ -54,6 +54,87 @@ pub fn write(tree: &Tree, dialect: &impl Dialect) -> String {
     bound(tree, dialect).0
 }
 
+/// The expression as a factor or a term after a minus: in parentheses where it is a sum.
+pub fn write_term(tree: &Tree, dialect: &impl Dialect) -> String {
+    let (text, binding) = bound(tree, dialect);
+    if binding < Binding::Product {
+        dialect.group(&text)
+    } else {
+        text
+    }
+}
+
+/// A sum on lines of at most `width` visible signs where it can be broken: before a plus or minus in no braces and in as few
+/// parentheses as the width allows. `visible` counts the signs of a piece. Every line but the first starts with its sign.
+pub fn lines(
+    terms: &[(bool, Tree)],
+    dialect: &impl Dialect,
+    width: usize,
+    visible: impl Fn(&str) -> usize,
+) -> Vec<String> {
+    let mut whole = String::new();
+    for (place, (minus, tree)) in terms.iter().enumerate() {
+        let sign = match (place, minus) {
+            (0, false) => String::new(),
+            (0, true) => dialect.minus().to_string(),
+            (_, false) => " + ".to_string(),
+            (_, true) => format!(" {} ", dialect.minus()),
+        };
+        // A sum that is a term of its own needs its parentheses only after a minus.
+        let text = if *minus {
+            write_term(tree, dialect)
+        } else {
+            write(tree, dialect)
+        };
+        whole.push_str(&sign);
+        whole.push_str(&text);
+    }
+    let mut pieces = split(&whole, dialect, 0);
+    for parentheses in 1..5 {
+        let fits = |piece: &String| visible(piece) <= width;
+        let finer = |piece: String| {
+            if fits(&piece) {
+                vec![piece]
+            } else {
+                split(&piece, dialect, parentheses)
+            }
+        };
+        pieces = pieces.into_iter().flat_map(finer).collect();
+    }
+    let mut lines: Vec<String> = Vec::new();
+    for piece in pieces {
+        match lines.last_mut() {
+            Some(line) if visible(line) + visible(&piece) <= width => line.push_str(&piece),
+            Some(_) => lines.push(piece.trim_start().to_string()),
+            None => lines.push(piece),
+        }
+    }
+    lines
+}
+
+/// The text before each plus and minus in at most `parentheses` parentheses and in no braces.
+fn split(text: &str, dialect: &impl Dialect, parentheses: i32) -> Vec<String> {
+    let signs = [" + ".to_string(), format!(" {} ", dialect.minus())];
+    let mut pieces = Vec::new();
+    let (mut start, mut braces, mut depth) = (0, 0, 0);
+    for (at, character) in text.char_indices() {
+        match character {
+            '{' => braces += 1,
+            '}' => braces -= 1,
+            '(' => depth += 1,
+            ')' => depth -= 1,
+            _ => {}
+        }
+        let sign = signs.iter().any(|sign| text[at..].starts_with(sign));
+        if sign && braces == 0 && depth <= parentheses && at > start {
+            pieces.push(text[start..at].to_string());
+            start = at;
+        }
+    }
+    pieces.push(text[start..].to_string());
+    pieces
+}
+
 fn bound(tree: &Tree, dialect: &impl Dialect) -> (String, Binding) {
     let at_least = |tree: &Tree, least: Binding| {
         let (text, binding) = bound(tree, dialect);

@@ -50,7 +50,7 @@ pub(crate) fn print(equation: &Equation) -> String {
     };
     let name = code.function();
     let mut file = format!("function {returned} = {name}(lengths, axes, errors)\n");
-    for line in code.header(1) {
+    for line in code.header(1, ['(', ')']) {
         let _ = writeln!(file, "{}", format!("% {line}").trim_end());
     }
     let _ = writeln!(

@@ -3,13 +3,16 @@
 //! A new language is one file here: a [`dialect::Dialect`] says how names, numbers, products and functions are spelt, and the file
 //! lays out what stands around the expressions.
 
+mod article;
 mod c;
 mod code;
 pub mod dialect;
+mod latex;
 mod matlab;
 mod python;
 mod rust;
 mod text;
+mod typst;
 mod words;
 
 use crate::equation::Equation;
@@ -20,6 +23,10 @@ use crate::error::CodegenError;
 pub enum Language {
     /// Plain text, UTF-8.
     Text,
+    /// LaTeX with `amsmath`.
+    Latex,
+    /// Typst.
+    Typst,
     /// Rust without dependencies.
     Rust,
     /// C99.
@@ -32,8 +39,10 @@ pub enum Language {
 
 impl Language {
     /// All of them.
-    pub const ALL: [Language; 5] = [
+    pub const ALL: [Language; 7] = [
         Language::Text,
+        Language::Latex,
+        Language::Typst,
         Language::Rust,
         Language::C,
         Language::Python,
@@ -44,6 +53,8 @@ impl Language {
     pub fn word(self) -> &'static str {
         match self {
             Language::Text => "text",
+            Language::Latex => "latex",
+            Language::Typst => "typst",
             Language::Rust => "rust",
             Language::C => "c",
             Language::Python => "python",
@@ -65,6 +76,8 @@ impl Equation {
     pub fn print(&self, language: Language) -> Result<String, CodegenError> {
         Ok(match language {
             Language::Text => text::print(self),
+            Language::Latex => latex::print(self),
+            Language::Typst => typst::print(self),
             Language::Rust => rust::print(self),
             Language::C => c::print(self),
             Language::Python => python::print(self),

@@ -40,7 +40,7 @@ pub(crate) fn print(equation: &Equation) -> String {
     let value = Code::new(equation, false);
     let whole = Code::new(equation, equation.options.gradient);
     let mut file = String::new();
-    for line in whole.header(0) {
+    for line in whole.header(0, ['[', ']']) {
         let _ = writeln!(file, "{}", format!("//! {line}").trim_end());
     }
     file.push('\n');
@@ -221,8 +221,12 @@ fn columns(file: &mut String, code: &Code<'_>, gradient: bool) {
         if gradient {
             let _ = writeln!(
                 file,
-                "        for (k, slope) in slopes{of}.iter().enumerate() {{\n            gradient[{} + k][i] = *slope;\n        }}",
-                output * errors
+                "        for (k, slope) in slopes{of}.iter().enumerate() {{\n            gradient[{}k][i] = *slope;\n        }}",
+                if output == 0 {
+                    String::new()
+                } else {
+                    format!("{} + ", output * errors)
+                }
             );
         }
     }

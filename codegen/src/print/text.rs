@@ -3,13 +3,17 @@
 use std::fmt::Write;
 
 use crate::equation::{Equation, Kind};
+use crate::print::article::{Article, Left, Remark, terms_of};
 use crate::print::dialect::{self, Dialect};
-use crate::program::{Input, Label, Naming, Program};
-use crate::symbol::{Operand, Unary};
+use crate::print::words;
+use crate::program::{Input, Label, Program};
+use crate::symbol::Unary;
 use crate::variable::{Symbols, Variable};
-use crate::vectors;
 
-/// Spells a program for a reader of plain text.
+/// Signs on a line.
+const WIDTH: usize = 100;
+
+/// Spells expressions for a reader of plain text.
 struct Text<'a> {
     program: &'a Program,
     symbols: Symbols,
@@ -27,6 +31,9 @@ impl Dialect for Text<'_> {
     }
     fn product(&self, a: &str, b: &str) -> String {
         format!("{a}·{b}")
+    }
+    fn quotient(&self, a: &str, b: &str) -> String {
+        format!("{a}/{b}")
     }
     fn call(&self, function: Unary, argument: &str) -> String {
         match function {
@@ -50,7 +57,7 @@ impl Dialect for Text<'_> {
 }
 
 /// `s_a` for the sine of θ_a, and so on.
-pub(crate) fn input(input: &Input, symbols: Symbols) -> String {
+fn input(input: &Input, symbols: Symbols) -> String {
     let turn = |letter: &str, variable: &Variable| match variable {
         Variable::Position { axis, .. } => format!("{letter}_{}", axis.to_lowercase()),
         other if letter == "s" => format!("sin({})", other.text(symbols)),
@@ -64,7 +71,7 @@ pub(crate) fn input(input: &Input, symbols: Symbols) -> String {
 }
 
 /// `p_A.x` for a coordinate of the point p in the frame of A.
-pub(crate) fn label(label: &Label) -> String {
+fn label(label: &Label) -> String {
     match label {
         Label::Vector {
             letter,
@@ -85,30 +92,71 @@ pub(crate) fn label(label: &Label) -> String {
     }
 }
 
+fn output(kind: Kind, place: usize) -> String {
+    match kind {
+        Kind::Length => "L".to_string(),
+        Kind::Coordinates => format!("m.{}", ["x", "y", "z"][place]),
+        Kind::Volumetric => format!("Δ.{}", ["x", "y", "z"][place]),
+    }
+}
+
 /// The whole equation.
 pub(crate) fn print(equation: &Equation) -> String {
-    let labels = vectors::labels(&equation.vectors);
-    let mut asked: Vec<Operand> = equation.exact.clone();
-    asked.extend(equation.vectors.iter().flat_map(|vector| vector.components));
-    let program = equation
-        .arena
-        .program(equation.inputs(), &asked, &labels, Naming::Labelled);
+    let article = Article::new(equation);
+    let symbols = equation.options.symbols;
     let spelling = Text {
-        program: &program,
-        symbols: equation.options.symbols,
+        program: &article.program,
+        symbols,
     };
-    let mut page = String::new();
-    for step in &program.steps {
-        let value = dialect::write(&step.value, &spelling);
-        let _ = writeln!(page, "{} = {value}", label(&step.label));
-    }
-    for (place, output) in program.outputs[..equation.exact.len()].iter().enumerate() {
-        let name = match equation.kind {
-            Kind::Length => "L".to_string(),
-            Kind::Coordinates => format!("m.{}", ["x", "y", "z"][place]),
-            Kind::Volumetric => format!("Δ.{}", ["x", "y", "z"][place]),
+    let mut page = words::title(equation).join("\n") + "\n";
+    for section in &article.sections {
+        let _ = writeln!(page, "\n{}", section.heading);
+        let left = |left: &Left| match left {
+            Left::Named(name) => label(name),
+            Left::Square(name) => format!("{}²", label(name)),
+            Left::Output(place) => output(equation.kind, *place),
+            Left::Slope(place, parameter) => {
+                format!("∂{}/∂{}", output(equation.kind, *place), parameter.text(symbols))
+            }
         };
-        let _ = writeln!(page, "{name} = {}", dialect::write(output, &spelling));
+        let lefts: Vec<String> = section.rows.iter().map(|row| left(&row.left)).collect();
+        let widest = lefts.iter().map(|left| left.chars().count()).max().unwrap_or(0);
+        for (row, left) in section.rows.iter().zip(&lefts) {
+            let relation = if row.approximate { "≈" } else { "=" };
+            let lines = dialect::lines(&terms_of(&row.right), &spelling, WIDTH, |piece| {
+                piece.chars().count()
+            });
+            let gap = " ".repeat(widest - left.chars().count());
+            let _ = write!(page, "  {left}{gap} {relation} ");
+            let _ = write!(
+                page,
+                "{}",
+                lines.join(&format!("\n  {}     ", " ".repeat(widest)))
+            );
+            match &row.remark {
+                None => page.push('\n'),
+                Some(Remark::NotSeen) => page.push_str("   (not seen)\n"),
+                Some(Remark::MultipleOf(other)) => {
+                    let _ = writeln!(page, "   (a fixed multiple of that of {})", other.text(symbols));
+                }
+            }
+        }
     }
+    page.push_str("\nsymbols\n");
+    for (symbol, meaning, unit) in &article.symbols {
+        let names = match symbol {
+            Input::Sine(variable) | Input::Cosine(variable) => format!(
+                "{}, {}",
+                input(&Input::Sine(variable.clone()), symbols),
+                input(&Input::Cosine(variable.clone()), symbols)
+            ),
+            Input::Plain(_) => input(symbol, symbols),
+        };
+        let gap = " ".repeat(10_usize.saturating_sub(names.chars().count()));
+        let _ = writeln!(page, "  {names}{gap} {unit:<4} {meaning}");
+    }
+    page.push('\n');
+    page.push_str(&words::notes(equation).join("\n"));
+    page.push('\n');
     page
 }

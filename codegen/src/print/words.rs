@@ -4,6 +4,7 @@ use abbe_model::frames::Rotation;
 
 use crate::equation::{Equation, Form, Kind, Order};
 use crate::first::Column;
+use crate::variable::Variable;
 
 /// What it is: two lines.
 pub(crate) fn title(equation: &Equation) -> Vec<String> {
@@ -16,6 +17,10 @@ pub(crate) fn title(equation: &Equation) -> Vec<String> {
         Order::Exact => "exact in the errors",
         Order::Bilinear => "up to products of two errors",
         Order::First => "first order in the errors",
+    };
+    let order = match &equation.form {
+        Form::Groups { complete: true, .. } => "up to products of two errors, which is all there is",
+        _ => order,
     };
     let rotation = match (equation.options.order, equation.machine.rotation) {
         (Order::First, _) => "",
@@ -33,38 +38,49 @@ pub(crate) fn title(equation: &Equation) -> Vec<String> {
     ]
 }
 
-/// What it was checked against, what it leaves out, what it does not contain.
+/// What it was checked against, what it leaves out, what it does not contain, in plain text.
 pub(crate) fn notes(equation: &Equation) -> Vec<String> {
     let symbols = equation.options.symbols;
+    notes_spelt(equation, &str::to_string, &|variable| variable.text(symbols))
+}
+
+/// The same, `escape` spelling the words and `name` the names.
+pub(crate) fn notes_spelt(
+    equation: &Equation,
+    escape: &dyn Fn(&str) -> String,
+    name: &dyn Fn(&Variable) -> String,
+) -> Vec<String> {
     let check = &equation.check;
     let of = match equation.options.order {
         Order::Exact => "the chain",
         Order::Bilinear => "the second-order series of the chain",
         Order::First => "the first-order series of the chain",
     };
-    let mut notes = vec![format!(
+    let mut notes = vec![escape(&format!(
         "Checked against {of} with dual numbers at {} points, errors to ±10 mm and ±0.1 rad: largest relative difference {:.0e} (value), {:.0e} (gradient).",
         check.points, check.value, check.gradient
-    )];
+    ))];
     for deviation in &equation.deviations {
-        notes.push(format!(
+        notes.push(escape(&format!(
             "Errors of {} µm and {}°, all signs: at most {} µm from the exact chain.",
             deviation.shift_um,
             deviation.tilt_deg,
             two_digits(deviation.largest_um)
-        ));
+        )));
     }
     if !equation.absent.is_empty() {
-        let names: Vec<String> = equation.absent.iter().map(|v| v.text(symbols)).collect();
+        let names: Vec<String> = equation.absent.iter().map(name).collect();
         notes.push(format!("Not contained: {}.", names.join(", ")));
     }
     if let Form::First(first, _) = &equation.form {
         for sensitivity in &first.sensitivities {
             if let Column::Multiple { of, .. } = &sensitivity.column {
                 notes.push(format!(
-                    "{} cannot be told from {}: a fixed multiple wherever the axes stand.",
-                    sensitivity.parameter.text(symbols),
-                    of.text(symbols)
+                    "{} {} {}{}",
+                    name(&sensitivity.parameter),
+                    escape("cannot be told from"),
+                    name(of),
+                    escape(": a fixed multiple wherever the axes stand.")
                 ));
             }
         }

@@ -1,6 +1,6 @@
 //! The chain over symbols against the chain over numbers.
 
-use abbe_codegen::{Equation, Language, Options, Variable};
+use abbe_codegen::{Equation, Options, Variable};
 use abbe_model::chain::AxisPosition;
 use abbe_model::frames::Rotation;
 use abbe_model::instrument::{Station, ballbar::BallBar};
@@ -83,22 +83,6 @@ fn the_symbolic_chain_evaluates_to_the_chain_over_numbers() {
             assert!((found - expected).abs() <= 1e-12 * expected, "{found} {expected}");
         }
     }
-}
-
-#[test]
-fn the_text_of_the_chapter_5_test() {
-    let options = Options::default();
-    let equation = Equation::of(
-        &hermle(Rotation::SmallAngle),
-        &Chapter5 { extended: true },
-        &eight(),
-        &options,
-    )
-    .expect("an equation");
-    let text = equation.print(Language::Text).expect("text");
-    insta::with_settings!({ snapshot_path => "../../../snapshots", prepend_module_to_snapshot => false }, {
-        insta::assert_snapshot!("codegen__chapter5_text", text);
-    });
 }
 
 #[test]

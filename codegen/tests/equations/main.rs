@@ -4,7 +4,9 @@ mod support;
 
 mod chain;
 mod compiled;
+mod forms;
 mod seed000;
 mod seed003;
 mod tools;
 mod topologies;
+mod typeset;
