@@ -1,1 +1,27 @@
-//! x
+//! Identification: from readings to errors with honest uncertainties, and from what is left over to the effect that the model lacks.
+//!
+//! - [`least_squares`], [`triangle`], [`rank`]: the numerical core, which knows no machine;
+//! - [`parameters`], [`problem`]: a session as a least-squares problem;
+//! - [`fit`]: identify; [`heldout`]: judge on readings that the fit did not see; [`noise`]: how much is noise;
+//! - [`trace`]: close the loop;
+//! - [`simulate`]: readings from a model;
+//! - [`results`]: what is reported, as it stands in JSON.
+
+pub mod drivers;
+pub mod error;
+pub mod fit;
+pub mod heldout;
+pub mod least_squares;
+pub mod noise;
+pub mod outliers;
+pub mod parameters;
+pub mod problem;
+pub mod rank;
+pub mod results;
+pub mod simulate;
+pub mod start;
+pub mod trace;
+pub mod triangle;
+pub mod unit;
+
+pub use error::IdentifyError;

@@ -13,6 +13,24 @@ pub struct Place {
     pub span: Option<std::ops::Range<usize>>,
 }
 
+impl Place {
+    /// A file as a whole.
+    pub fn file(file: &std::path::Path) -> Place {
+        Place {
+            file: file.to_path_buf(),
+            ..Place::default()
+        }
+    }
+
+    /// A line of a file.
+    pub fn line(file: &std::path::Path, line: usize) -> Place {
+        Place {
+            line,
+            ..Place::file(file)
+        }
+    }
+}
+
 impl std::fmt::Display for Place {
     fn fmt(&self, formatter: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         write!(formatter, "{}", self.file.display())?;
@@ -55,4 +73,39 @@ pub enum ModelError {
         /// What to do.
         help: Option<String>,
     },
+    /// A plan that the machine cannot carry out.
+    #[error("{message}")]
+    Plan {
+        /// Which test, and what keeps it from being carried out.
+        message: String,
+        /// What to do.
+        help: String,
+    },
+    /// A file that could not be written.
+    #[error("{}: cannot be written: {cause}", file.display())]
+    Output {
+        /// The file.
+        file: PathBuf,
+        /// What the system said.
+        cause: String,
+    },
+}
+
+impl ModelError {
+    /// Where the fault lies in the user's files, where it lies in one.
+    pub fn place(&self) -> Option<&Place> {
+        match self {
+            ModelError::Input { place, .. } => Some(place),
+            _ => None,
+        }
+    }
+
+    /// What to do about it, where more can be said than the message does.
+    pub fn help(&self) -> Option<&str> {
+        match self {
+            ModelError::Input { help, .. } => help.as_deref(),
+            ModelError::Plan { help, .. } => Some(help),
+            _ => None,
+        }
+    }
 }

@@ -12,9 +12,13 @@ pub mod axis;
 pub mod chain;
 pub mod code;
 pub mod component;
+pub mod effect;
 pub mod error;
 pub mod frames;
+pub mod gradient;
 pub mod instrument;
 pub mod scalar;
+pub mod sensitivity;
+pub mod session;
 
 pub use error::ModelError;

@@ -49,6 +49,13 @@ pub enum InstrumentKind {
 }
 
 impl InstrumentKind {
+    /// All kinds.
+    pub const ALL: [InstrumentKind; 3] = [
+        InstrumentKind::BallBar,
+        InstrumentKind::Tracker,
+        InstrumentKind::Socket,
+    ];
+
     /// The word that a session file uses.
     pub fn word(self) -> &'static str {
         match self {

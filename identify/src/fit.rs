@@ -1,0 +1,422 @@
+//! Identify: the unknowns of a session from its readings.
+//!
+//! The rank is decided on the linearisation at the nominal machine; Gauss–Newton then moves in the seen directions only, so that what cannot
+//! be seen stays at its nominal value and is reported as a combination, never as a number. Uncertainties follow from the law of propagation,
+//! `Cov = N (Nᵀ JᵀV⁻¹J N)⁻¹ Nᵀ` with `N` the seen directions (JCGM 100, 5.2; JCGM 102, 6.2).
+
+use std::collections::BTreeMap;
+
+use abbe_model::effect::Shape;
+use abbe_model::session::Session;
+use faer::Mat;
+use statrs::distribution::{ChiSquared, ContinuousCDF};
+
+use crate::error::IdentifyError;
+use crate::heldout::{HeldOut, held_out, rms_mm};
+use crate::least_squares::{LeastSquares, Scaling, Solution, minimise};
+use crate::noise::{Noise, NoiseSource, PureError};
+use crate::parameters::Role;
+use crate::problem::Problem;
+use crate::rank::Rank;
+use crate::results::{FitResult, ParameterResult, Rejected, Unobservable};
+use crate::triangle::Triangle;
+
+/// What a fit found, inside units.
+#[derive(Clone, Debug)]
+pub struct Fit {
+    /// Every unknown; those in unseen combinations hold the part that is seen.
+    pub beta: Vec<f64>,
+    /// What is seen and what is not.
+    pub rank: Rank,
+    /// Covariance of the unknowns (seen part), from the noise alone.
+    pub covariance: Mat<f64>,
+    /// The triangles of the folds at the solution.
+    pub triangles: Vec<Triangle>,
+    /// Residuals by test, mm.
+    pub residuals: Vec<Vec<f64>>,
+    /// On readings that were left out.
+    pub held_out: HeldOut,
+    /// `√(χ²/ν)` where it is significantly above 1, else 1.
+    pub birge_ratio: f64,
+}
+
+/// Guess of the noise from which iterations start where nothing is known: 1 µm.
+const FIRST_GUESS_MM: f64 = 1e-3;
+/// Probability below which χ² is taken to say that the residual holds more than noise.
+const BIRGE_SIGNIFICANCE: f64 = 1e-3;
+
+/// A session as a problem in the directions that are seen.
+struct SeenDirections<'p, 'a> {
+    problem: &'p Problem<'a>,
+    basis: &'p Mat<f64>,
+}
+
+impl SeenDirections<'_, '_> {
+    fn beta(&self, z: &[f64]) -> Vec<f64> {
+        (0..self.basis.nrows())
+            .map(|j| (0..z.len()).map(|k| self.basis[(j, k)] * z[k]).sum())
+            .collect()
+    }
+}
+
+impl LeastSquares for SeenDirections<'_, '_> {
+    fn unknowns(&self) -> usize {
+        self.basis.ncols()
+    }
+
+    fn linearise(&self, z: &[f64]) -> Result<Triangle, IdentifyError> {
+        let beta = self.beta(z);
+        let mut whole = self.problem.prior_triangle(&beta);
+        for triangle in self.problem.triangles(&beta)? {
+            whole.merge(&triangle);
+        }
+        Ok(in_directions(&whole, self.basis))
+    }
+
+    fn sum_of_squares(&self, z: &[f64]) -> f64 {
+        self.problem.sum_of_squares(&self.beta(z))
+    }
+}
+
+/// The triangle of `[J·N | r]` from that of `[J | r]`.
+pub fn in_directions(triangle: &Triangle, basis: &Mat<f64>) -> Triangle {
+    let (r, c, rest) = triangle.parts();
+    let (n, rank) = (basis.nrows(), basis.ncols());
+    let reduced = &r * basis;
+    let rows = Mat::from_fn(n + 1, rank + 1, |i, j| match (i == n, j == rank) {
+        (true, true) => rest.sqrt(),
+        (true, false) => 0.0,
+        (false, true) => c[i],
+        (false, false) => reduced[(i, j)],
+    });
+    let mut result = Triangle::new(rank);
+    result.absorb(rows.as_ref());
+    result
+}
+
+/// A session as a problem, with the noise that the session states, that its repeats show, or that its fit leaves over, and with its wild readings left
+/// out.
+///
+/// # Errors
+/// See [`Problem::new`]; also if the iterations do not end.
+pub fn prepare(session: &Session, seed: u64) -> Result<(Problem<'_>, Fit), IdentifyError> {
+    let stated = session.noise_mm.filter(|sigma| *sigma > 0.0);
+    let floor = session.resolution_mm.unwrap_or(0.0) / 12.0_f64.sqrt();
+    let first = match stated {
+        Some(sigma) => Noise::white(sigma, NoiseSource::Stated),
+        None => Noise::white(FIRST_GUESS_MM.max(floor), NoiseSource::Fit),
+    };
+    let mut problem = Problem::new(session, first, seed)?;
+    if stated.is_none() {
+        problem.noise = Noise::white(
+            nominal_residual_mm(&problem)?.max(floor).max(1e-9),
+            NoiseSource::Fit,
+        );
+    }
+    let mut fit = fit(&problem, None)?;
+    // Noise and wild readings follow from residuals, residuals from a fit; three rounds settle both.
+    for _ in 0..3 {
+        let rejected = crate::outliers::wild(&problem, &fit);
+        let unchanged = rejected == problem.rejected;
+        problem.rejected = rejected;
+        if stated.is_none() {
+            let noise = estimated_noise(&problem, &fit, floor);
+            let settled = (noise.sigma_mm / problem.noise.sigma_mm - 1.0).abs() < 1e-3;
+            problem.noise = noise;
+            if settled && unchanged {
+                break;
+            }
+        } else if unchanged {
+            break;
+        }
+        fit = self::fit(&problem, Some(&fit.beta))?;
+    }
+    Ok((problem, fit))
+}
+
+/// What the nominal machine leaves over, mm, once the set-ups are fitted to it (linearised): noise for a first decision on what is seen. The
+/// machine's errors stay out of it: among sockets, shrinking the machine to nothing would explain every reading.
+fn nominal_residual_mm(problem: &Problem<'_>) -> Result<f64, IdentifyError> {
+    let list = &problem.parameters.list;
+    let nominal = vec![0.0; list.len()];
+    let mut whole = Triangle::new(list.len());
+    for triangle in problem.triangles(&nominal)? {
+        whole.merge(&triangle);
+    }
+    let (r, c, rest) = whole.parts();
+    let setups: Vec<usize> = (0..list.len()).filter(|j| list[*j].role == Role::Setup).collect();
+    let rows = Mat::from_fn(list.len(), setups.len() + 1, |i, j| match setups.get(j) {
+        Some(setup) => r[(i, *setup)],
+        None => c[i],
+    });
+    let mut of_setups = Triangle::new(setups.len());
+    of_setups.absorb(rows.as_ref());
+    let count = (problem.readings() * problem.coordinates()) as f64;
+    let sum_of_squares = of_setups.parts().2 + rest;
+    Ok((sum_of_squares / count.max(1.0)).sqrt() * problem.noise.sigma_mm)
+}
+
+fn estimated_noise(problem: &Problem<'_>, fit: &Fit, floor: f64) -> Noise {
+    let pure = PureError::of(&problem.tests, &fit.residuals, |test, row| {
+        !problem.rejected[test][row]
+    });
+    if let Some(sigma) = pure.sigma_mm() {
+        return Noise::white(sigma.max(floor).max(f64::MIN_POSITIVE), NoiseSource::Repeats);
+    }
+    let count = (problem.readings() * problem.coordinates()) as f64;
+    let freedom = (count - fit.rank.seen.ncols() as f64).max(1.0);
+    let sigma = rms_mm(problem, &fit.residuals) * (count / freedom).sqrt();
+    Noise::white(sigma.max(floor).max(1e-9), NoiseSource::Fit)
+}
+
+/// Fits a problem, from the nominal machine or from an earlier fit's unknowns.
+///
+/// # Errors
+/// If there is nothing to fit, the model cannot be evaluated, or the iterations do not end.
+pub fn fit(problem: &Problem<'_>, start: Option<&[f64]>) -> Result<Fit, IdentifyError> {
+    let unknowns = problem.parameters.list.len();
+    let size: Vec<f64> = problem
+        .parameters
+        .list
+        .iter()
+        .map(|parameter| parameter.size)
+        .collect();
+    let nominal = vec![0.0; unknowns];
+    let mut whole = problem.prior_triangle(&nominal);
+    for triangle in problem.triangles(&nominal)? {
+        whole.merge(&triangle);
+    }
+    let rank = Rank::decide(whole.parts().0.as_ref(), &size)?;
+    let seen = SeenDirections {
+        problem,
+        basis: &rank.seen,
+    };
+    let solution = if rank.seen.ncols() == 0 {
+        Solution {
+            x: Vec::new(),
+            triangle: Triangle::new(0),
+            sum_of_squares: 0.0,
+            iterations: 0,
+        }
+    } else {
+        let scale = Scaling::Physical(vec![1.0; rank.seen.ncols()]);
+        let from = start.map_or_else(
+            || vec![0.0; rank.seen.ncols()],
+            |beta| rank.coordinates(beta, &size),
+        );
+        minimise(&seen, &from, &scale)?
+    };
+    let beta = if solution.x.is_empty() {
+        nominal
+    } else {
+        seen.beta(&solution.x)
+    };
+    finish(problem, beta, rank)
+}
+
+/// Everything that follows from the solution.
+fn finish(problem: &Problem<'_>, beta: Vec<f64>, rank: Rank) -> Result<Fit, IdentifyError> {
+    let triangles = problem.triangles(&beta)?;
+    let mut whole = problem.prior_triangle(&beta);
+    triangles.iter().for_each(|triangle| whole.merge(triangle));
+    let covariance = covariance(&whole, &rank.seen)?;
+    let residuals = problem.residuals(&beta);
+    let held_out = held_out(problem, &beta, &triangles, &rank.seen)?;
+    let zero = vec![0.0; beta.len()];
+    let chi_square: f64 = whole.sum_of_squares_after(&zero);
+    let free = (problem.readings() * problem.coordinates())
+        .saturating_sub(rank.seen.ncols())
+        .max(1) as f64;
+    let significance = ChiSquared::new(free).map(|law| law.sf(chi_square)).unwrap_or(1.0);
+    let birge_ratio = if significance < BIRGE_SIGNIFICANCE {
+        (chi_square / free).sqrt().max(1.0)
+    } else {
+        1.0
+    };
+    Ok(Fit {
+        beta,
+        rank,
+        covariance,
+        triangles,
+        residuals,
+        held_out,
+        birge_ratio,
+    })
+}
+
+/// `N (NᵀRᵀRN)⁻¹ Nᵀ`.
+fn covariance(triangle: &Triangle, basis: &Mat<f64>) -> Result<Mat<f64>, IdentifyError> {
+    let n = basis.nrows();
+    if basis.ncols() == 0 {
+        return Ok(Mat::zeros(n, n));
+    }
+    let (r, _, _) = triangle.parts();
+    let reduced = &r * basis;
+    let svd = reduced.svd().map_err(|_| IdentifyError::Decomposition)?;
+    let singular: Vec<f64> = svd.S().column_vector().iter().copied().collect();
+    let negligible = singular[0] * 1e-14;
+    let spread = basis * svd.V();
+    let scaled = Mat::from_fn(n, singular.len(), |i, k| {
+        if singular[k] > negligible {
+            spread[(i, k)] / singular[k]
+        } else {
+            0.0
+        }
+    });
+    Ok(&scaled * scaled.transpose())
+}
+
+/// The fit as it is reported.
+pub fn report(problem: &Problem<'_>, fit: &Fit) -> FitResult {
+    let three = problem.coordinates() == 3;
+    let rms = rms_mm(problem, &fit.residuals);
+    let held = fit.held_out.rms_mm;
+    let in_3d = |rms: f64| three.then(|| rms * 3.0_f64.sqrt() * 1e3);
+    let mut warnings = problem.session.warnings.clone();
+    if fit.birge_ratio > 1.0 {
+        warnings.push(format!(
+            "the residual exceeds the noise (χ² is {:.2} times its degrees of freedom); uncertainties are enlarged by {:.2}; `abbe trace` looks for the cause",
+            fit.birge_ratio.powi(2),
+            fit.birge_ratio
+        ));
+    }
+    FitResult {
+        noise_um: problem.noise.sigma_mm * 1e3,
+        noise_source: problem.noise.source.word().to_string(),
+        readings: problem.readings(),
+        rms_um: rms * 1e3,
+        heldout_rms_um: held * 1e3,
+        rms_3d_um: in_3d(rms),
+        heldout_rms_3d_um: in_3d(held),
+        heldout_by: problem.folds.kind.words().to_string(),
+        rank: fit.rank.seen.ncols(),
+        unknowns: fit.beta.len(),
+        birge_ratio: fit.birge_ratio,
+        parameters: parameters(problem, fit),
+        unobservable: unobservable(problem, &fit.rank),
+        rejected: rejected(problem, fit),
+        warnings,
+    }
+}
+
+/// The unknowns that are seen, in outside units; harmonics as amplitude and phase of `amplitude · cos(order · angle + phase)`.
+pub fn parameters(problem: &Problem<'_>, fit: &Fit) -> Vec<ParameterResult> {
+    let list = &problem.parameters.list;
+    let u_inside = |j: usize| fit.covariance[(j, j)].max(0.0).sqrt() * fit.birge_ratio;
+    let mut results = Vec::new();
+    let mut j = 0;
+    while j < list.len() {
+        let parameter = &list[j];
+        if let Role::Coefficient {
+            effect,
+            coefficient: 0,
+        } = parameter.role
+        {
+            let effect = &problem.parameters.effects[effect];
+            let pair = matches!(effect.shape, Shape::Harmonic { .. } | Shape::Periodic { .. });
+            if pair && fit.rank.is_seen(j) && fit.rank.is_seen(j + 1) {
+                results.extend(amplitude_and_phase(problem, fit, j, &effect.id()));
+                j += 2;
+                continue;
+            }
+        }
+        if fit.rank.is_seen(j) {
+            results.push(ParameterResult {
+                id: parameter.id.clone(),
+                value: fit.beta[j] * parameter.unit.per_inside,
+                u: u_inside(j) * parameter.unit.per_inside,
+                unit: parameter.unit.name.clone(),
+            });
+        }
+        j += 1;
+    }
+    results
+}
+
+fn amplitude_and_phase(problem: &Problem<'_>, fit: &Fit, j: usize, id: &str) -> [ParameterResult; 2] {
+    let (a, b) = (fit.beta[j], fit.beta[j + 1]);
+    let cov = |p: usize, q: usize| fit.covariance[(p, q)] * fit.birge_ratio.powi(2);
+    let amplitude = a.hypot(b);
+    let (ca, sa) = if amplitude > 0.0 {
+        (a / amplitude, b / amplitude)
+    } else {
+        (1.0, 0.0)
+    };
+    let along = ca * ca * cov(j, j) + 2.0 * ca * sa * cov(j, j + 1) + sa * sa * cov(j + 1, j + 1);
+    let across = sa * sa * cov(j, j) - 2.0 * ca * sa * cov(j, j + 1) + ca * ca * cov(j + 1, j + 1);
+    let unit = &problem.parameters.list[j].unit;
+    // Of a phase nothing more can be said than the standard deviation of a uniform one.
+    let any_phase = std::f64::consts::PI / 3.0_f64.sqrt();
+    let u_phase = if amplitude > 0.0 {
+        (across.max(0.0).sqrt() / amplitude).min(any_phase)
+    } else {
+        any_phase
+    };
+    [
+        ParameterResult {
+            id: format!("{id}.amplitude"),
+            value: amplitude * unit.per_inside,
+            u: along.max(0.0).sqrt() * unit.per_inside,
+            unit: unit.name.clone(),
+        },
+        ParameterResult {
+            id: format!("{id}.phase"),
+            value: (-b).atan2(a).to_degrees(),
+            u: u_phase.to_degrees(),
+            unit: "deg".to_string(),
+        },
+    ]
+}
+
+/// The unseen combinations, in outside units and in words.
+pub fn unobservable(problem: &Problem<'_>, rank: &Rank) -> Vec<Unobservable> {
+    let list = &problem.parameters.list;
+    rank.unseen
+        .iter()
+        .map(|row| {
+            let outside: Vec<(usize, f64)> = row
+                .iter()
+                .enumerate()
+                .filter(|(_, value)| **value != 0.0)
+                .map(|(j, value)| (j, value * list[j].size * list[j].unit.per_inside))
+                .collect();
+            let leading = outside.first().map_or(1.0, |(_, value)| *value);
+            let combination: BTreeMap<String, f64> = outside
+                .iter()
+                .map(|(j, value)| (list[*j].id.clone(), value / leading))
+                .collect();
+            let why = match outside.as_slice() {
+                [(j, _)] => format!("no reading of these tests changes with {}", list[*j].id),
+                [(first, _), rest @ ..] => {
+                    let others: Vec<&str> = rest.iter().map(|(j, _)| list[*j].id.as_str()).collect();
+                    format!(
+                        "{} cannot be told from {}: moved together in this proportion they change no reading",
+                        list[*first].id,
+                        others.join(", ")
+                    )
+                }
+                [] => String::new(),
+            };
+            Unobservable { combination, why }
+        })
+        .collect()
+}
+
+/// The readings that are left out, by name.
+pub fn rejected(problem: &Problem<'_>, fit: &Fit) -> Vec<Rejected> {
+    let coordinates = problem.coordinates();
+    let mut list = Vec::new();
+    for (number, test) in problem.tests.iter().enumerate() {
+        let Some(readings) = &test.readings else { continue };
+        for row in (0..readings.rows()).filter(|row| problem.rejected[number][*row]) {
+            let residual = &fit.residuals[number][row * coordinates..(row + 1) * coordinates];
+            list.push(Rejected {
+                test: test.name.clone(),
+                file: readings.file.display().to_string(),
+                line: readings.line.get(row).copied().unwrap_or(0),
+                residual_um: residual.iter().map(|v| v * v).sum::<f64>().sqrt() * 1e3,
+            });
+        }
+    }
+    list
+}

@@ -1,0 +1,168 @@
+//! Gauss–Newton with Levenberg's damping, on problems that hand over triangles.
+//!
+//! In scaled unknowns `y = x/d` the step solves `min ‖c − R·D·η‖² + λ‖η‖²` through the singular value decomposition of `R·D`; `λ` is zero as
+//! long as full steps lower the sum of squares, so that a linear problem is solved in one step (Marquardt, J. SIAM 11 (1963) 431;
+//! Moré, Lecture Notes in Mathematics 630 (1978) 105).
+
+use faer::Mat;
+
+use crate::error::IdentifyError;
+use crate::triangle::Triangle;
+
+/// A problem `min ‖r(x)‖²`.
+pub trait LeastSquares {
+    /// Number of unknowns.
+    fn unknowns(&self) -> usize;
+    /// The triangle of `[J | r]` at `x`, with `r = observed − model` and `J = ∂model/∂x`, both divided by the standard deviation.
+    ///
+    /// # Errors
+    /// If the model yields a number that is not finite.
+    fn linearise(&self, x: &[f64]) -> Result<Triangle, IdentifyError>;
+    /// `‖r(x)‖²`; not finite where the model cannot be evaluated.
+    fn sum_of_squares(&self, x: &[f64]) -> f64;
+}
+
+/// What the unknowns are divided by before they are compared.
+#[derive(Clone, Debug)]
+pub enum Scaling {
+    /// The physical size of each unknown: 1 mm, 0.01 rad. Null columns stay null.
+    Physical(Vec<f64>),
+    /// The reciprocal norm of each column, the largest seen (Moré): for unknowns whose size nobody knows.
+    Columns,
+}
+
+/// Where the iterations ended.
+#[derive(Clone, Debug)]
+pub struct Solution {
+    /// The unknowns.
+    pub x: Vec<f64>,
+    /// The triangle at the solution.
+    pub triangle: Triangle,
+    /// `‖r‖²`.
+    pub sum_of_squares: f64,
+    /// How many linearisations it took.
+    pub iterations: usize,
+}
+
+const MOST_ITERATIONS: usize = 200;
+const SMALLEST_RELATIVE_STEP: f64 = 1e-12;
+
+/// Minimises from a start value.
+///
+/// # Errors
+/// If the model cannot be evaluated at the start, or the iterations do not end.
+pub fn minimise(
+    problem: &impl LeastSquares,
+    start: &[f64],
+    scaling: &Scaling,
+) -> Result<Solution, IdentifyError> {
+    let n = problem.unknowns();
+    let mut x = start.to_vec();
+    let mut current = problem.sum_of_squares(&x);
+    let mut scale = match scaling {
+        Scaling::Physical(sizes) => sizes.clone(),
+        Scaling::Columns => vec![f64::INFINITY; n],
+    };
+    let mut damping = 0.0;
+    for iteration in 1..=MOST_ITERATIONS {
+        let triangle = problem.linearise(&x)?;
+        let (r, c, rest) = triangle.parts();
+        if !current.is_finite() {
+            current = c.iter().map(|v| v * v).sum::<f64>() + rest;
+        }
+        if let Scaling::Columns = scaling {
+            for j in 0..n {
+                let norm = (0..n).map(|i| r[(i, j)].powi(2)).sum::<f64>().sqrt();
+                if norm > 0.0 {
+                    scale[j] = scale[j].min(1.0 / norm);
+                } else if !scale[j].is_finite() {
+                    scale[j] = 1.0;
+                }
+            }
+        }
+        let scaled = Mat::from_fn(n, n, |i, j| r[(i, j)] * scale[j]);
+        let svd = scaled.svd().map_err(|_| IdentifyError::Decomposition)?;
+        let singular: Vec<f64> = svd.S().column_vector().iter().copied().collect();
+        let projected: Vec<f64> = (0..n)
+            .map(|k| (0..n).map(|i| svd.U()[(i, k)] * c[i]).sum::<f64>())
+            .collect();
+        let largest = singular.first().copied().unwrap_or(0.0);
+        let negligible = largest * 1e-14;
+        let step_with = |damping: f64| -> Vec<f64> {
+            let mut step = vec![0.0; n];
+            for k in 0..n {
+                if singular[k] <= negligible {
+                    continue;
+                }
+                let gain = singular[k] * projected[k] / (singular[k] * singular[k] + damping);
+                for j in 0..n {
+                    step[j] += svd.V()[(j, k)] * gain * scale[j];
+                }
+            }
+            step
+        };
+        // A step is taken if the sum of squares falls; near the end the fall drowns in rounding and the step's size decides.
+        let mut accepted = false;
+        let mut smallest = false;
+        for _ in 0..60 {
+            let step = step_with(damping);
+            let trial: Vec<f64> = x.iter().zip(&step).map(|(a, b)| a + b).collect();
+            let relative = step
+                .iter()
+                .zip(&scale)
+                .zip(&x)
+                .map(|((s, d), x)| {
+                    (s / (x.abs()
+                        + if let Scaling::Physical(_) = scaling {
+                            *d
+                        } else {
+                            0.0
+                        })
+                    .max(1e-300))
+                    .abs()
+                })
+                .fold(0.0, f64::max);
+            let sum = problem.sum_of_squares(&trial);
+            let close = relative < SMALLEST_RELATIVE_STEP * 100.0;
+            if sum.is_finite() && (sum < current || (close && sum <= current * (1.0 + 1e-9))) {
+                x = trial;
+                smallest =
+                    relative < SMALLEST_RELATIVE_STEP || current - sum <= 1e-15 * current && relative < 1e-7;
+                current = sum;
+                damping *= 0.1;
+                if damping < largest * largest * 1e-12 {
+                    damping = 0.0;
+                }
+                accepted = true;
+                break;
+            }
+            if relative < 1e-9 && damping == 0.0 {
+                // The full step is smaller than what rounding lets us judge: this is the minimum.
+                smallest = true;
+                accepted = true;
+                break;
+            }
+            damping = if damping == 0.0 {
+                largest * largest * 1e-6
+            } else {
+                damping * 10.0
+            };
+        }
+        if smallest || n == 0 {
+            let triangle = problem.linearise(&x)?;
+            return Ok(Solution {
+                x,
+                triangle,
+                sum_of_squares: current,
+                iterations: iteration,
+            });
+        }
+        if !accepted {
+            break;
+        }
+    }
+    Err(IdentifyError::NoConvergence {
+        iterations: MOST_ITERATIONS,
+        sum_of_squares: current,
+    })
+}

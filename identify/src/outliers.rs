@@ -1,0 +1,102 @@
+//! Wild readings: judged against their neighbours, or among independent poses against the bulk, and left out by name.
+//!
+//! Structure must not be called wild. Along a run a residual is therefore compared with the medians of its neighbours on either side, not with zero
+//! (Hampel's identifier: Davies & Gather, J. Am. Stat. Assoc. 88 (1993) 782). Poses have no neighbours; there a residual is wild when it is far
+//! out of all proportion to the bulk.
+
+use abbe_model::session::readings::Readings;
+
+use crate::fit::Fit;
+use crate::heldout::FoldKind;
+use crate::problem::Problem;
+
+/// Neighbours on either side that the median is taken of.
+const NEIGHBOURS: usize = 5;
+/// How many robust standard deviations make a reading wild along a run: expected once in 10⁷ Gaussian readings.
+const WILD_ALONG_RUN: f64 = 5.3;
+/// How many times the median length of the residual makes a pose wild: once in 10⁹ if the three coordinates are Gaussian, and far beyond what
+/// unmodelled structure, which is bounded, was seen to reach.
+const WILD_POSE: f64 = 5.0;
+
+/// Which readings of the problem are wild, by test and row.
+pub fn wild(problem: &Problem<'_>, fit: &Fit) -> Vec<Vec<bool>> {
+    let coordinates = problem.coordinates();
+    if problem.folds.kind == FoldKind::Poses {
+        let lengths: Vec<Vec<f64>> = fit
+            .residuals
+            .iter()
+            .map(|residual| {
+                residual
+                    .chunks_exact(coordinates)
+                    .map(|v| v.iter().map(|x| x * x).sum::<f64>().sqrt())
+                    .collect()
+            })
+            .collect();
+        let mut all: Vec<f64> = lengths.iter().flatten().copied().collect();
+        let limit = WILD_POSE * median(&mut all);
+        return lengths
+            .iter()
+            .map(|test| test.iter().map(|length| *length > limit).collect())
+            .collect();
+    }
+    problem
+        .tests
+        .iter()
+        .zip(&fit.residuals)
+        .map(|(test, residual)| match &test.readings {
+            Some(readings) => wild_along_runs(readings, residual, coordinates, problem.noise.sigma_mm),
+            None => Vec::new(),
+        })
+        .collect()
+}
+
+fn wild_along_runs(readings: &Readings, residual: &[f64], coordinates: usize, sigma_mm: f64) -> Vec<bool> {
+    let mut wild = vec![false; readings.rows()];
+    for run in readings.runs() {
+        if run.len() < 2 * NEIGHBOURS + 1 {
+            continue;
+        }
+        for coordinate in 0..coordinates {
+            let value = |row: usize| residual[row * coordinates + coordinate];
+            let mut deviations: Vec<f64> = Vec::with_capacity(run.len());
+            for row in run.clone() {
+                // Beside a step (backlash at a reversal) one of the two sides agrees; a wild reading agrees with neither.
+                let start = row.saturating_sub(NEIGHBOURS).max(run.start);
+                let end = (row + NEIGHBOURS + 1).min(run.end);
+                let from = |side: std::ops::Range<usize>| {
+                    let mut window: Vec<f64> = side.map(value).collect();
+                    if window.len() < 3 {
+                        None
+                    } else {
+                        Some(value(row) - median(&mut window))
+                    }
+                };
+                let deviation = match (from(start..row), from(row + 1..end)) {
+                    (Some(before), Some(after)) if before * after <= 0.0 => 0.0,
+                    (Some(before), Some(after)) if before.abs() < after.abs() => before,
+                    (_, Some(after)) => after,
+                    (Some(before), None) => before,
+                    (None, None) => 0.0,
+                };
+                deviations.push(deviation);
+            }
+            let mut sizes: Vec<f64> = deviations.iter().map(|d| d.abs()).collect();
+            // 1.4826: the standard deviation of a Gaussian in median absolute deviations.
+            let spread = (1.4826 * median(&mut sizes)).max(sigma_mm);
+            for (row, deviation) in run.clone().zip(&deviations) {
+                wild[row] |= deviation.abs() > WILD_ALONG_RUN * spread;
+            }
+        }
+    }
+    wild
+}
+
+/// The median; the order of the values is lost. 0 of nothing.
+pub fn median(values: &mut [f64]) -> f64 {
+    if values.is_empty() {
+        return 0.0;
+    }
+    let middle = values.len() / 2;
+    let (_, value, _) = values.select_nth_unstable_by(middle, f64::total_cmp);
+    *value
+}

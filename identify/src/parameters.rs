@@ -1,0 +1,268 @@
+//! The unknowns of a session, and which components of which readings each of them moves.
+
+use std::sync::Arc;
+
+use abbe_model::effect::{Component, Driver, Effect};
+use abbe_model::instrument::InsideUnit;
+use abbe_model::sensitivity::TestModel;
+use abbe_model::session::{Prior, Session, Test};
+
+use crate::drivers::{self, Origin};
+use crate::error::IdentifyError;
+use crate::unit::Unit;
+
+/// Where an unknown comes from.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Role {
+    /// A location error or a constant of an axis: a PIGE.
+    Error,
+    /// A set-up quantity of the instrument.
+    Setup,
+    /// A coefficient of an effect: which effect, which coefficient.
+    Coefficient {
+        /// Index among the effects.
+        effect: usize,
+        /// Index among its coefficients.
+        coefficient: usize,
+    },
+}
+
+/// One unknown.
+#[derive(Clone, Debug)]
+pub struct Parameter {
+    /// As it stands in results: `EY0A`, `bar[A100]`, `EZC~C:h2.cos`.
+    pub id: String,
+    /// Unit outside.
+    pub unit: Unit,
+    /// Physical size, inside units: 1 mm, 0.01 rad, or what moves the component by that much.
+    pub size: f64,
+    /// What is known before.
+    pub prior: Prior,
+    /// Where it comes from.
+    pub role: Role,
+}
+
+/// A parameter moves a slot of a test, by a constant or by a basis function row by row.
+#[derive(Clone, Debug)]
+pub struct Part {
+    /// Index of the parameter.
+    pub parameter: usize,
+    /// The slot.
+    pub slot: usize,
+    /// The basis function; `None` is 1.
+    pub basis: Option<Arc<Vec<f64>>>,
+}
+
+/// The unknowns of a session.
+#[derive(Clone, Debug, Default)]
+pub struct Parameters {
+    /// The unknowns, errors first, then set-up quantities, then coefficients of effects.
+    pub list: Vec<Parameter>,
+    /// For each test with readings, what moves what.
+    pub parts: Vec<Vec<Part>>,
+    /// The effects whose coefficients are among the unknowns.
+    pub effects: Vec<Effect>,
+}
+
+/// The physical size of a component.
+pub fn physical_size(unit: InsideUnit) -> f64 {
+    match unit {
+        InsideUnit::Millimetre => 1.0,
+        InsideUnit::Radian => 0.01,
+        InsideUnit::Ratio => 0.01,
+    }
+}
+
+impl Parameters {
+    /// The errors and set-up quantities that a session declares. `tests` are the tests with readings, `models` theirs.
+    ///
+    /// # Errors
+    /// If an error belongs to no axis of the machine or is declared twice.
+    pub fn declared(
+        session: &Session,
+        tests: &[&Test],
+        models: &[TestModel<'_>],
+    ) -> Result<Parameters, IdentifyError> {
+        let mut parameters = Parameters {
+            parts: vec![Vec::new(); tests.len()],
+            ..Parameters::default()
+        };
+        for name in &session.unknowns {
+            let id = name.to_string();
+            let Some(slot) = session.machine.error_slot(name) else {
+                return Err(IdentifyError::Request(format!(
+                    "`{id}` is to be identified, but the machine `{}` has no axis `{}`",
+                    session.machine.name, name.axis
+                )));
+            };
+            let unit = if name.freedom.is_angle() {
+                InsideUnit::Radian
+            } else {
+                InsideUnit::Millimetre
+            };
+            let index = parameters.push(Parameter {
+                id,
+                unit: Unit::of(unit),
+                size: physical_size(unit),
+                prior: Prior::Free,
+                role: Role::Error,
+            })?;
+            for (test, model) in models.iter().enumerate() {
+                if model.effective_slots().contains(&slot) {
+                    parameters.parts[test].push(Part {
+                        parameter: index,
+                        slot,
+                        basis: None,
+                    });
+                }
+            }
+        }
+        for (position, test) in tests.iter().enumerate() {
+            for (place, unknown) in session.instrument.unknowns().iter().enumerate() {
+                let prior = test.priors[place];
+                if prior == Prior::Known {
+                    continue;
+                }
+                let group = test.group(unknown.shared_by);
+                let dot = if unknown.coordinate.is_empty() { "" } else { "." };
+                let bracket = if group.is_empty() {
+                    String::new()
+                } else {
+                    format!("[{group}]")
+                };
+                let id = format!("{}{dot}{}{bracket}", unknown.thing, unknown.coordinate);
+                let index = match parameters.list.iter().position(|p| p.id == id) {
+                    Some(index) => {
+                        // Tests that share a thing state it once; the tightest statement holds.
+                        let shared = &mut parameters.list[index].prior;
+                        *shared = tighter(*shared, prior);
+                        index
+                    }
+                    None => parameters.push(Parameter {
+                        id,
+                        unit: Unit::of(unknown.unit),
+                        size: physical_size(unknown.unit),
+                        prior,
+                        role: Role::Setup,
+                    })?,
+                };
+                let slot = session.machine.error_slots() + place;
+                parameters.parts[position].push(Part {
+                    parameter: index,
+                    slot,
+                    basis: None,
+                });
+            }
+        }
+        Ok(parameters)
+    }
+
+    fn push(&mut self, parameter: Parameter) -> Result<usize, IdentifyError> {
+        if self.list.iter().any(|present| present.id == parameter.id) {
+            return Err(IdentifyError::RepeatedUnknown { id: parameter.id });
+        }
+        self.list.push(parameter);
+        Ok(self.list.len() - 1)
+    }
+
+    /// Adds the coefficients of an effect.
+    ///
+    /// # Errors
+    /// If the data lack the driver's column, the instrument lacks the component, or the effect is there already.
+    pub fn add_effect(
+        &mut self,
+        session: &Session,
+        tests: &[&Test],
+        models: &[TestModel<'_>],
+        origin: &Origin,
+        effect: &Effect,
+    ) -> Result<(), IdentifyError> {
+        let size = match drivers::component_unit(session, &effect.component) {
+            Some(unit) => physical_size(unit),
+            None if effect.component == Component::TriggerDelay => 0.1,
+            None => {
+                return Err(IdentifyError::NoSuchComponent {
+                    effect: effect.id(),
+                    component: effect.component.to_string(),
+                    instrument: session.instrument.word(),
+                });
+            }
+        };
+        let number = self.effects.len();
+        let first = self.list.len();
+        let mut greatest = vec![0.0_f64; effect.shape.coefficients()];
+        for (position, (test, model)) in tests.iter().zip(models).enumerate() {
+            if !effect.tests.is_empty() && !effect.tests.contains(&test.name) {
+                continue;
+            }
+            let Some(readings) = &test.readings else { continue };
+            let axis = drivers::component_axis(session, &effect.component);
+            let samples = drivers::samples(&session.machine, model, readings, origin, &effect.driver, axis)
+                .ok_or_else(|| IdentifyError::MissingDriver {
+                effect: effect.id(),
+                driver: effect.driver.to_string(),
+                test: test.name.clone(),
+                column: match effect.driver {
+                    Driver::Time => "time_s".to_string(),
+                    Driver::Temperature => "temperature_c".to_string(),
+                    ref other => other.to_string(),
+                },
+            })?;
+            let effective = model.effective_slots();
+            let columns: Vec<Arc<Vec<f64>>> = drivers::basis_columns(&effect.shape, &samples)
+                .into_iter()
+                .map(Arc::new)
+                .collect();
+            for (k, column) in columns.iter().enumerate() {
+                greatest[k] = column
+                    .iter()
+                    .fold(greatest[k], |most, value| most.max(value.abs()));
+            }
+            for (slot, factor) in drivers::component_slots(session, test, readings, &effect.component) {
+                if !effective.contains(&slot) {
+                    continue;
+                }
+                for (k, column) in columns.iter().enumerate() {
+                    let basis = match &factor {
+                        None => column.clone(),
+                        Some(factor) => Arc::new(column.iter().zip(factor).map(|(b, f)| b * f).collect()),
+                    };
+                    self.parts[position].push(Part {
+                        parameter: first + k,
+                        slot,
+                        basis: Some(basis),
+                    });
+                }
+            }
+        }
+        let unit = drivers::coefficient_unit(session, effect);
+        for (k, name) in effect.shape.coefficient_names().into_iter().enumerate() {
+            let dot = if name.is_empty() { "" } else { "." };
+            self.push(Parameter {
+                id: format!("{}{dot}{name}", effect.id()),
+                unit: unit.clone(),
+                size: if greatest[k] > 0.0 {
+                    size / greatest[k]
+                } else {
+                    size
+                },
+                prior: Prior::Free,
+                role: Role::Coefficient {
+                    effect: number,
+                    coefficient: k,
+                },
+            })?;
+        }
+        self.effects.push(effect.clone());
+        Ok(())
+    }
+}
+
+fn tighter(a: Prior, b: Prior) -> Prior {
+    match (a, b) {
+        (Prior::Known, _) | (_, Prior::Known) => Prior::Known,
+        (Prior::Gaussian(a), Prior::Gaussian(b)) => Prior::Gaussian(a.min(b)),
+        (Prior::Gaussian(u), Prior::Free) | (Prior::Free, Prior::Gaussian(u)) => Prior::Gaussian(u),
+        (Prior::Free, Prior::Free) => Prior::Free,
+    }
+}

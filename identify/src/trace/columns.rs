@@ -1,0 +1,345 @@
+//! Columns of candidates: sensitivity × basis, whitened as the readings are.
+//!
+//! The chain is evaluated once, for the sensitivities of every component; hundreds of candidates cost no further kinematics.
+
+use std::collections::HashMap;
+use std::sync::Arc;
+
+use abbe_model::effect::{DriverSample, Effect};
+use abbe_model::sensitivity::Sensitivities;
+use faer::{Mat, MatMut};
+use rayon::prelude::*;
+
+use crate::drivers;
+use crate::error::IdentifyError;
+use crate::problem::{Block, Problem};
+
+/// One candidate laid out over the tests.
+#[derive(Clone, Debug)]
+pub struct Layout {
+    /// Number of columns.
+    pub count: usize,
+    /// For each test, what moves: slot, factor of the component, and the basis functions.
+    parts: Vec<Vec<LayoutPart>>,
+}
+
+#[derive(Clone, Debug)]
+struct LayoutPart {
+    moves: Moves,
+    factor: Option<Arc<Vec<f64>>>,
+    basis: Arc<Vec<Vec<f64>>>,
+}
+
+/// What a part of a layout moves.
+#[derive(Clone, Copy, Debug)]
+enum Moves {
+    /// A component, through its sensitivity.
+    Slot(usize),
+    /// One coordinate of the reading itself.
+    Reading(usize),
+}
+
+/// The whitened rows of a problem, by fold, and what is needed to lay any effect over them.
+pub struct Columns<'p, 'a> {
+    problem: &'p Problem<'a>,
+    sensitivities: Vec<Sensitivities>,
+    /// Place of each slot among the sensitivities, by test.
+    place: Vec<HashMap<usize, usize>>,
+    blocks: Vec<Block>,
+    /// Where each whitened row goes, block after block, so that folds lie together.
+    target: Vec<usize>,
+    /// The rows of each fold.
+    pub fold_rows: Vec<std::ops::Range<usize>>,
+    rows: usize,
+    samples: std::sync::Mutex<HashMap<(usize, String), SharedSamples>>,
+    bases: std::sync::Mutex<HashMap<(usize, String), Arc<Vec<Vec<f64>>>>>,
+}
+
+type SharedSamples = Option<Arc<Vec<DriverSample<f64>>>>;
+
+impl<'p, 'a> Columns<'p, 'a> {
+    /// At the unknowns' values of a fit.
+    ///
+    /// # Errors
+    /// If the model cannot be evaluated.
+    pub fn new(problem: &'p Problem<'a>, beta: &[f64]) -> Result<Columns<'p, 'a>, IdentifyError> {
+        let values = problem.slot_values(beta);
+        let pieces: Vec<(usize, std::ops::Range<usize>)> = problem
+            .models
+            .iter()
+            .enumerate()
+            .flat_map(|(test, model)| {
+                let rows = model.rows();
+                (0..rows.div_ceil(512)).map(move |k| (test, k * 512..((k + 1) * 512).min(rows)))
+            })
+            .collect();
+        let parts: Vec<Sensitivities> = pieces
+            .par_iter()
+            .map(|(test, rows)| {
+                let model = &problem.models[*test];
+                model.sensitivities(&values[*test], &model.effective_slots(), rows.clone())
+            })
+            .collect();
+        let mut sensitivities: Vec<Sensitivities> = Vec::new();
+        for ((test, _), part) in pieces.iter().zip(parts) {
+            match sensitivities.get_mut(*test) {
+                Some(whole) => {
+                    whole.readings_mm.extend(part.readings_mm);
+                    for (column, more) in whole.derivatives.iter_mut().zip(part.derivatives) {
+                        column.extend(more);
+                    }
+                }
+                None => sensitivities.push(part),
+            }
+        }
+        let place = sensitivities
+            .iter()
+            .map(|s| {
+                s.slots
+                    .iter()
+                    .enumerate()
+                    .map(|(place, slot)| (*slot, place))
+                    .collect()
+            })
+            .collect();
+        let blocks = problem.blocks();
+        let mut fold_of = Vec::new();
+        for block in &blocks {
+            let rows = Mat::<f64>::zeros(block.rows.len() * problem.coordinates(), 0);
+            fold_of.extend(problem.whiten(&rows, block).1);
+        }
+        let mut next = 0;
+        let mut target = vec![0; fold_of.len()];
+        let mut fold_rows = Vec::new();
+        for fold in 0..problem.folds.count {
+            let start = next;
+            for (row, _) in fold_of.iter().enumerate().filter(|(_, f)| **f == fold) {
+                target[row] = next;
+                next += 1;
+            }
+            fold_rows.push(start..next);
+        }
+        Ok(Columns {
+            problem,
+            sensitivities,
+            place,
+            blocks,
+            rows: target.len(),
+            target,
+            fold_rows,
+            samples: Default::default(),
+            bases: Default::default(),
+        })
+    }
+
+    /// Number of whitened rows.
+    pub fn rows(&self) -> usize {
+        self.rows
+    }
+
+    /// Lays an effect over the tests; `None` where the data lack what it follows.
+    pub fn layout(&self, effect: &Effect) -> Option<Layout> {
+        self.lay(effect, true)
+    }
+
+    /// The same for an effect that is tried once: its basis functions are not kept.
+    pub fn layout_uncached(&self, effect: &Effect) -> Option<Layout> {
+        self.lay(effect, false)
+    }
+
+    fn lay(&self, effect: &Effect, keep: bool) -> Option<Layout> {
+        let session = self.problem.session;
+        let mut parts = Vec::new();
+        for (number, test) in self.problem.tests.iter().enumerate() {
+            let mut of_test = Vec::new();
+            if effect.tests.is_empty() || effect.tests.contains(&test.name) {
+                let readings = test.readings.as_ref()?;
+                let axis = drivers::component_axis(session, &effect.component);
+                let follows = match effect.driver {
+                    abbe_model::effect::Driver::Gravity => format!("gravity {axis:?}"),
+                    ref other => other.to_string(),
+                };
+                let samples = cached(&self.samples, (number, follows.clone()), || {
+                    drivers::samples(
+                        &session.machine,
+                        &self.problem.models[number],
+                        readings,
+                        &self.problem.origin,
+                        &effect.driver,
+                        axis,
+                    )
+                    .map(Arc::new)
+                })?;
+                let make = || Arc::new(drivers::basis_columns(&effect.shape, &samples));
+                let basis = if keep {
+                    cached(
+                        &self.bases,
+                        (number, format!("{follows} {:?}", effect.shape)),
+                        make,
+                    )
+                } else {
+                    make()
+                };
+                for (slot, factor) in drivers::component_slots(session, test, readings, &effect.component) {
+                    if self.place[number].contains_key(&slot) {
+                        of_test.push(LayoutPart {
+                            moves: Moves::Slot(slot),
+                            factor: factor.map(Arc::new),
+                            basis: basis.clone(),
+                        });
+                    }
+                }
+            }
+            parts.push(of_test);
+        }
+        Some(Layout {
+            count: effect.shape.coefficients(),
+            parts,
+        })
+    }
+
+    /// Lays a shape over one coordinate of the readings of one test, whatever component would cause it; `by_direction` turns its sign with the
+    /// direction of travel. `None` where the data lack what it follows.
+    pub fn reading_layout(
+        &self,
+        effect: &Effect,
+        test: usize,
+        coordinate: usize,
+        by_direction: bool,
+    ) -> Option<Layout> {
+        let session = self.problem.session;
+        let readings = self.problem.tests[test].readings.as_ref()?;
+        let samples = cached(&self.samples, (test, effect.driver.to_string()), || {
+            let model = &self.problem.models[test];
+            drivers::samples(
+                &session.machine,
+                model,
+                readings,
+                &self.problem.origin,
+                &effect.driver,
+                None,
+            )
+            .map(Arc::new)
+        })?;
+        let basis = Arc::new(drivers::basis_columns(&effect.shape, &samples));
+        let factor = by_direction.then(|| Arc::new(samples.iter().map(|sample| sample.direction).collect()));
+        let mut parts = vec![Vec::new(); self.problem.tests.len()];
+        parts[test].push(LayoutPart {
+            moves: Moves::Reading(coordinate),
+            factor,
+            basis,
+        });
+        Some(Layout {
+            count: effect.shape.coefficients(),
+            parts,
+        })
+    }
+
+    /// Fills columns with the whitened rows of layouts, one after another.
+    pub fn fill(&self, layouts: &[&Layout], mut columns: MatMut<'_, f64>) {
+        let coordinates = self.problem.coordinates();
+        let total: usize = layouts.iter().map(|layout| layout.count).sum();
+        let mut start = 0;
+        for block in &self.blocks {
+            let scalars = block.rows.len() * coordinates;
+            let first = block.rows.start;
+            let mut raw = Mat::<f64>::zeros(scalars, total);
+            let sensitivities = &self.sensitivities[block.test];
+            let mut column = 0;
+            for layout in layouts {
+                for part in &layout.parts[block.test] {
+                    let derivative = match part.moves {
+                        Moves::Slot(slot) => {
+                            let whole = &sensitivities.derivatives[self.place[block.test][&slot]];
+                            Some(&whole[first * coordinates..first * coordinates + scalars])
+                        }
+                        Moves::Reading(_) => None,
+                    };
+                    for k in 0..layout.count {
+                        let basis = &part.basis[k];
+                        for i in 0..scalars {
+                            let row = first + i / coordinates;
+                            let factor = part.factor.as_ref().map_or(1.0, |factor| factor[row]);
+                            let sensitivity = match (derivative, part.moves) {
+                                (Some(derivative), _) => derivative[i],
+                                (None, Moves::Reading(moved)) if i % coordinates != moved => continue,
+                                (None, _) => 1.0,
+                            };
+                            raw[(i, column + k)] += sensitivity * basis[row] * factor;
+                        }
+                    }
+                }
+                column += layout.count;
+            }
+            let (white, _) = self.problem.whiten(&raw, block);
+            for j in 0..total {
+                for i in 0..white.nrows() {
+                    columns[(self.target[start + i], j)] = white[(i, j)];
+                }
+            }
+            start += white.nrows();
+        }
+    }
+
+    /// Puts whitened rows of `[J | r]` at given values in the same order: rows × (unknowns + 1).
+    ///
+    /// # Errors
+    /// If the model cannot be evaluated.
+    pub fn model_rows(&self, beta: &[f64]) -> Result<Mat<f64>, IdentifyError> {
+        let values = self.problem.slot_values(beta);
+        let mut rows = Mat::zeros(self.rows, beta.len() + 1);
+        let mut start = 0;
+        for block in &self.blocks {
+            let raw = self.problem.rows(&values, block)?;
+            let (white, _) = self.problem.whiten(&raw, block);
+            for j in 0..white.ncols() {
+                for i in 0..white.nrows() {
+                    rows[(self.target[start + i], j)] = white[(i, j)];
+                }
+            }
+            start += white.nrows();
+        }
+        Ok(rows)
+    }
+
+    /// Places columns that were whitened block by block in the order of the folds.
+    pub fn placed(&self, values: &[f64]) -> Vec<f64> {
+        let mut placed = vec![0.0; self.rows];
+        for (value, target) in values.iter().zip(&self.target) {
+            placed[*target] = *value;
+        }
+        placed
+    }
+
+    /// The test, row and coordinate of each whitened row, in the order of the folds.
+    pub fn origin_of_rows(&self) -> Vec<(usize, usize, usize)> {
+        let coordinates = self.problem.coordinates();
+        let mut origins = vec![(0, 0, 0); self.rows];
+        let mut start = 0;
+        for block in &self.blocks {
+            let kept = self.problem.kept_rows(block);
+            for (k, i) in kept.iter().enumerate() {
+                let row = block.rows.start + i / coordinates;
+                origins[self.target[start + k]] = (block.test, row, i % coordinates);
+            }
+            start += kept.len();
+        }
+        origins
+    }
+}
+
+fn cached<K: std::hash::Hash + Eq, V: Clone>(
+    store: &std::sync::Mutex<HashMap<K, V>>,
+    key: K,
+    make: impl FnOnce() -> V,
+) -> V {
+    let found = store.lock().ok().and_then(|store| store.get(&key).cloned());
+    if let Some(value) = found {
+        return value;
+    }
+    let value = make();
+    if let Ok(mut store) = store.lock() {
+        store.insert(key, value.clone());
+    }
+    value
+}

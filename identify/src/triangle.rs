@@ -1,0 +1,98 @@
+//! Least squares as a stream: whatever the number of rows, what remains of them is one triangle.
+//!
+//! The augmented matrix `[J | r]` is reduced block by block by Householder QR (tall-skinny QR: Demmel, Grigori, Hoemmen, Langou, SIAM J. Sci.
+//! Comput. 34 (2012) A206), so that memory does not grow with the number of readings and two triangles of different readings merge into one.
+//! With `[J | r] = Q·[R c; 0 ρ]` the sum of squares at a step `δ` is `‖c − Rδ‖² + ρ²`.
+
+use faer::{Mat, MatRef};
+
+/// The triangle `[R c; 0 ρ]` of the rows absorbed so far.
+#[derive(Clone, Debug)]
+pub struct Triangle {
+    columns: usize,
+    factor: Mat<f64>,
+}
+
+/// Rows absorbed at once: enough for the QR to work in blocks, few enough to stay in cache.
+pub const BLOCK_ROWS: usize = 1024;
+
+impl Triangle {
+    /// Of no rows, for this many unknowns.
+    pub fn new(columns: usize) -> Self {
+        Triangle {
+            columns,
+            factor: Mat::zeros(0, columns + 1),
+        }
+    }
+
+    /// Number of unknowns.
+    pub fn columns(&self) -> usize {
+        self.columns
+    }
+
+    /// Adds rows: `block` is rows × (unknowns + 1), residuals in the last column.
+    pub fn absorb(&mut self, block: MatRef<'_, f64>) {
+        if block.nrows() == 0 {
+            return;
+        }
+        let kept = self.factor.nrows();
+        let width = self.columns + 1;
+        let stacked = Mat::from_fn(kept + block.nrows(), width, |i, j| {
+            if i < kept {
+                self.factor[(i, j)]
+            } else {
+                block[(i - kept, j)]
+            }
+        });
+        if stacked.nrows() <= width {
+            self.factor = stacked;
+            return;
+        }
+        let thin = stacked.qr();
+        let upper = thin.thin_R();
+        self.factor = Mat::from_fn(width, width, |i, j| if i <= j { upper[(i, j)] } else { 0.0 });
+    }
+
+    /// Adds the rows of another triangle.
+    pub fn merge(&mut self, other: &Triangle) {
+        self.absorb(other.factor.as_ref());
+    }
+
+    /// The same triangle with few rows made upper-triangular, so that `R`, `c`, `ρ` can be read off.
+    fn reduced(&self) -> Mat<f64> {
+        let width = self.columns + 1;
+        if self.factor.nrows() == width && (0..width).all(|i| (0..i).all(|j| self.factor[(i, j)] == 0.0)) {
+            return self.factor.clone();
+        }
+        let rows = self.factor.nrows().max(width);
+        let padded = Mat::from_fn(rows, width, |i, j| {
+            if i < self.factor.nrows() {
+                self.factor[(i, j)]
+            } else {
+                0.0
+            }
+        });
+        let decomposition = padded.qr();
+        let upper = decomposition.thin_R();
+        Mat::from_fn(width, width, |i, j| if i <= j { upper[(i, j)] } else { 0.0 })
+    }
+
+    /// `R` (unknowns × unknowns), `c`, and the sum of squares `ρ²` that no step can remove.
+    pub fn parts(&self) -> (Mat<f64>, Vec<f64>, f64) {
+        let reduced = self.reduced();
+        let n = self.columns;
+        let r = Mat::from_fn(n, n, |i, j| reduced[(i, j)]);
+        let c = (0..n).map(|i| reduced[(i, n)]).collect();
+        (r, c, reduced[(n, n)] * reduced[(n, n)])
+    }
+
+    /// The sum of squares of the rows after a step `δ`.
+    pub fn sum_of_squares_after(&self, step: &[f64]) -> f64 {
+        (0..self.factor.nrows())
+            .map(|i| {
+                let predicted: f64 = (0..self.columns).map(|j| self.factor[(i, j)] * step[j]).sum();
+                (self.factor[(i, self.columns)] - predicted).powi(2)
+            })
+            .sum()
+    }
+}

@@ -1,0 +1,144 @@
+//! Effects: `component × driver × shape`.
+//!
+//! A *component* is what moves (an error of an axis, a ball, the bar), a *driver* what it follows (an axis position, its direction,
+//! time, temperature, the gravity moment), a *shape* how. The chain sees only components, so the Jacobian column of an effect is the
+//! sensitivity to its component times the shape's basis function: `∂L/∂k = (∂L/∂component) · b_k(driver)`.
+//! A PIGE is `component × constant`.
+
+mod shape;
+
+pub use shape::{Shape, ShapeFault};
+
+use std::fmt;
+
+use crate::component::ErrorName;
+
+/// What moves.
+#[derive(Clone, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
+pub enum Component {
+    /// An error of an axis.
+    Axis(ErrorName),
+    /// One of the instrument's unknowns: `workpiece_ball.x`, `bar`.
+    Instrument {
+        /// The thing, as in [`crate::instrument::InstrumentUnknown::thing`].
+        thing: String,
+        /// Its coordinate, or empty.
+        coordinate: String,
+    },
+    /// A delay between the axes' positions and the reading, in seconds: every moving axis errs by its speed times the delay.
+    TriggerDelay,
+}
+
+impl Component {
+    /// Reads `EZC`, `e_x0c`, `workpiece_ball.x`, `bar`, `trigger`.
+    pub fn parse(text: &str) -> Option<Component> {
+        if text == "trigger" {
+            return Some(Component::TriggerDelay);
+        }
+        let (thing, coordinate) = text.split_once('.').unwrap_or((text, ""));
+        let known = crate::instrument::InstrumentKind::ALL
+            .iter()
+            .flat_map(|kind| kind.unknowns())
+            .any(|unknown| unknown.thing == thing && unknown.coordinate == coordinate);
+        if known {
+            return Some(Component::Instrument {
+                thing: thing.to_string(),
+                coordinate: coordinate.to_string(),
+            });
+        }
+        ErrorName::parse(text).map(Component::Axis)
+    }
+}
+
+impl fmt::Display for Component {
+    fn fmt(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Component::Axis(name) => name.fmt(formatter),
+            Component::Instrument { thing, coordinate } if coordinate.is_empty() => {
+                formatter.write_str(thing)
+            }
+            Component::Instrument { thing, coordinate } => write!(formatter, "{thing}.{coordinate}"),
+            Component::TriggerDelay => formatter.write_str("trigger"),
+        }
+    }
+}
+
+/// What a component follows.
+#[derive(Clone, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
+pub enum Driver {
+    /// Nothing: the driver of a constant.
+    None,
+    /// The position (and with it the direction and speed) of an axis.
+    Axis(String),
+    /// Time since the session's first reading, s.
+    Time,
+    /// A temperature column, °C above the session's mean.
+    Temperature,
+    /// The moment that a unit weight at the tool point exerts about the component's own axis, in m.
+    Gravity,
+}
+
+impl Driver {
+    /// Reads `none`, `time`, `temperature`, `gravity`; anything else is the name of an axis.
+    pub fn parse(text: &str) -> Driver {
+        match text {
+            "none" => Driver::None,
+            "time" => Driver::Time,
+            "temperature" => Driver::Temperature,
+            "gravity" => Driver::Gravity,
+            axis => Driver::Axis(axis.to_string()),
+        }
+    }
+}
+
+impl fmt::Display for Driver {
+    fn fmt(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
+        formatter.write_str(match self {
+            Driver::None => "none",
+            Driver::Axis(axis) => axis,
+            Driver::Time => "time",
+            Driver::Temperature => "temperature",
+            Driver::Gravity => "gravity",
+        })
+    }
+}
+
+/// Everything a driver tells about one reading, in the units of [`Driver`]: mm or rad for an axis.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct DriverSample<N> {
+    /// The value that the driver has.
+    pub value: N,
+    /// −1, 0 or 1: the direction in which it last moved.
+    pub direction: N,
+    /// Its rate, a second.
+    pub rate: N,
+    /// How far it has moved since it last turned round, in its own unit; 0 at the turn. Signless.
+    pub since_reversal: N,
+    /// Seconds since it last turned round.
+    pub since_reversal_s: N,
+}
+
+/// An effect: component × driver × shape.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Effect {
+    /// What moves.
+    pub component: Component,
+    /// What it follows.
+    pub driver: Driver,
+    /// How.
+    pub shape: Shape,
+    /// The tests it is confined to; empty for all.
+    pub tests: Vec<String>,
+}
+
+impl Effect {
+    /// The identifier used in results: `EZC~C:h2` (component, driver, shape).
+    pub fn id(&self) -> String {
+        let tests = if self.tests.is_empty() {
+            String::new()
+        } else {
+            format!("[{}]", self.tests.join("+"))
+        };
+        format!("{}~{}:{}{tests}", self.component, self.driver, self.shape.tag())
+    }
+}

@@ -1,0 +1,314 @@
+//! Shapes: how a component follows its driver.
+//!
+//! A shape is linear in its coefficients: `component = Σ c_k · b_k(driver; shape parameters)`. Shape parameters (a period, a time
+//! constant, a centre, a width, knots) are fixed numbers of the shape; the coefficients are what a fit finds.
+//!
+//! | shape | basis |
+//! |---|---|
+//! | constant | 1 |
+//! | polynomial(n) | (q/s), …, (q/s)ⁿ, s the scale of the driver |
+//! | harmonic(n) | cos nq, sin nq |
+//! | periodic(p) | cos 2πq/p, sin 2πq/p |
+//! | curve | periodic or clamped cubic B-splines on equal knots |
+//! | backlash | −½ · direction: the coefficient is the full lost motion |
+//! | lag | −rate: the coefficient is the delay in s |
+//! | reversal-spike | direction · exp(−distance since the turn / width) |
+//! | drift | t/h, hours |
+//! | warmup(τ) | 1 − exp(−t/τ) |
+//! | steps | one at and beyond each position |
+//! | local(centre, width) | (1 + cos(π(q − centre)/width))/2 within ±width, else 0 |
+
+use std::f64::consts::{PI, TAU};
+
+use super::DriverSample;
+
+/// How a component follows its driver. Positions, periods and widths are in the driver's inside unit: mm, rad, s, °C, m.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Shape {
+    /// Does not vary: a PIGE.
+    Constant,
+    /// Powers 1 … `degree` of the driver over `scale`.
+    Polynomial {
+        /// Highest power, at least 1.
+        degree: usize,
+        /// What the driver is divided by, so that coefficients are comparable: half the travel seen.
+        scale: f64,
+    },
+    /// The power `degree` alone, over `scale`.
+    Power {
+        /// The power, at least 1.
+        degree: usize,
+        /// What the driver is divided by.
+        scale: f64,
+    },
+    /// Cosine and sine of `order` times a rotary position.
+    Harmonic {
+        /// Cycles a turn.
+        order: f64,
+    },
+    /// Cosine and sine with a period of any length.
+    Periodic {
+        /// The period, in the driver's unit.
+        period: f64,
+    },
+    /// A free curve: cubic B-splines on equal knots from `from` to `to`.
+    Curve {
+        /// Where the curve begins.
+        from: f64,
+        /// Where it ends.
+        to: f64,
+        /// Number of intervals.
+        intervals: usize,
+        /// Whether the end joins the beginning.
+        closed: bool,
+    },
+    /// Lost motion on reversal; the coefficient is the full lost motion.
+    Backlash,
+    /// The component trails in proportion to the driver's rate; the coefficient is a delay in seconds.
+    Lag,
+    /// A peak after each reversal that dies away with the distance moved.
+    ReversalSpike {
+        /// Distance over which it falls to 1/e.
+        width: f64,
+    },
+    /// Linear in time, a coefficient an hour.
+    Drift,
+    /// Exponential approach; the coefficient is the final value.
+    Warmup {
+        /// Time constant, s.
+        tau_s: f64,
+    },
+    /// A step at each position: 0 below, 1 at and beyond.
+    Steps {
+        /// Where the steps are.
+        at: Vec<f64>,
+    },
+    /// A raised-cosine bump.
+    Local {
+        /// Its centre.
+        centre: f64,
+        /// Its half width.
+        width: f64,
+        /// The period at which it recurs: a full turn of a rotary axis, or none.
+        recurs: Option<f64>,
+    },
+}
+
+/// A shape whose numbers make no sense.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+#[error("{0}")]
+pub struct ShapeFault(pub String);
+
+const SECONDS_AN_HOUR: f64 = 3600.0;
+
+impl Shape {
+    /// The word that files and results use.
+    pub fn word(&self) -> &'static str {
+        match self {
+            Shape::Constant => "constant",
+            Shape::Polynomial { .. } | Shape::Power { .. } => "polynomial",
+            Shape::Harmonic { .. } => "harmonic",
+            Shape::Periodic { .. } => "periodic",
+            Shape::Curve { .. } => "curve",
+            Shape::Backlash => "backlash",
+            Shape::Lag => "lag",
+            Shape::ReversalSpike { .. } => "reversal-spike",
+            Shape::Drift => "drift",
+            Shape::Warmup { .. } => "warmup",
+            Shape::Steps { .. } => "steps",
+            Shape::Local { .. } => "local",
+        }
+    }
+
+    /// A short tag for identifiers: `h2`, `p3`, `backlash`.
+    pub fn tag(&self) -> String {
+        match self {
+            Shape::Polynomial { degree, .. } => format!("p{degree}"),
+            Shape::Power { degree, .. } => format!("power{degree}"),
+            Shape::Harmonic { order } => format!("h{order}"),
+            other => other.word().to_string(),
+        }
+    }
+
+    /// The order of a harmonic or the degree of a polynomial.
+    pub fn order(&self) -> Option<f64> {
+        match self {
+            Shape::Harmonic { order } => Some(*order),
+            Shape::Polynomial { degree, .. } | Shape::Power { degree, .. } => Some(*degree as f64),
+            _ => None,
+        }
+    }
+
+    /// How many coefficients the shape has.
+    pub fn coefficients(&self) -> usize {
+        match self {
+            Shape::Polynomial { degree, .. } => *degree,
+            Shape::Harmonic { .. } | Shape::Periodic { .. } => 2,
+            Shape::Curve {
+                intervals, closed, ..
+            } => {
+                if *closed {
+                    *intervals
+                } else {
+                    *intervals + 3
+                }
+            }
+            Shape::Steps { at } => at.len(),
+            _ => 1,
+        }
+    }
+
+    /// Names of the coefficients, for identifiers: `cos`, `sin`, `1`, …; empty for a shape with one.
+    pub fn coefficient_names(&self) -> Vec<String> {
+        match self {
+            Shape::Harmonic { .. } | Shape::Periodic { .. } => vec!["cos".into(), "sin".into()],
+            shape if shape.coefficients() == 1 => vec![String::new()],
+            shape => (1..=shape.coefficients()).map(|k| k.to_string()).collect(),
+        }
+    }
+
+    /// Whether the numbers make sense.
+    ///
+    /// # Errors
+    /// Says which number does not and what it has to be.
+    pub fn check(&self) -> Result<(), ShapeFault> {
+        let positive = |value: f64, what: &str| {
+            if value.is_finite() && value > 0.0 {
+                Ok(())
+            } else {
+                Err(ShapeFault(format!(
+                    "{what} is {value}; it has to be a positive number"
+                )))
+            }
+        };
+        match self {
+            Shape::Polynomial { degree, scale } | Shape::Power { degree, scale } => {
+                positive(*degree as f64, "the degree of a polynomial")?;
+                if *degree > 30 {
+                    return Err(ShapeFault(format!(
+                        "a polynomial of degree {degree} cannot be fitted; 30 is the most"
+                    )));
+                }
+                positive(*scale, "the scale of a polynomial")
+            }
+            Shape::Harmonic { order } => positive(*order, "the order of a harmonic"),
+            Shape::Periodic { period } => positive(*period, "a period"),
+            Shape::Curve {
+                from,
+                to,
+                intervals,
+                closed,
+            } => {
+                positive(to - from, "the length of a curve")?;
+                let least = if *closed { 4 } else { 1 };
+                if *intervals < least || *intervals > 500 {
+                    return Err(ShapeFault(format!(
+                        "a curve of {intervals} intervals; it takes {least} to 500"
+                    )));
+                }
+                Ok(())
+            }
+            Shape::ReversalSpike { width } => positive(*width, "the width of a reversal spike"),
+            Shape::Warmup { tau_s } => positive(*tau_s, "the time constant of a warm-up"),
+            Shape::Steps { at } if at.is_empty() => Err(ShapeFault("steps without a position".into())),
+            Shape::Steps { at } => match at.iter().find(|position| !position.is_finite()) {
+                Some(position) => Err(ShapeFault(format!("a step at {position}"))),
+                None => Ok(()),
+            },
+            Shape::Local { width, centre, .. } => {
+                if !centre.is_finite() {
+                    return Err(ShapeFault(format!("a local feature at {centre}")));
+                }
+                positive(*width, "the width of a local feature")
+            }
+            Shape::Constant | Shape::Backlash | Shape::Lag | Shape::Drift => Ok(()),
+        }
+    }
+
+    /// The basis functions at one reading, pushed onto `basis` in the order of the coefficients.
+    pub fn basis(&self, sample: &DriverSample<f64>, basis: &mut Vec<f64>) {
+        let q = sample.value;
+        match self {
+            Shape::Constant => basis.push(1.0),
+            Shape::Polynomial { degree, scale } => {
+                let mut power = 1.0;
+                for _ in 0..*degree {
+                    power *= q / scale;
+                    basis.push(power);
+                }
+            }
+            Shape::Power { degree, scale } => basis.push((q / scale).powi(*degree as i32)),
+            Shape::Harmonic { order } => {
+                let (sin, cos) = (order * q).sin_cos();
+                basis.extend([cos, sin]);
+            }
+            Shape::Periodic { period } => {
+                let (sin, cos) = (TAU * q / period).sin_cos();
+                basis.extend([cos, sin]);
+            }
+            Shape::Curve {
+                from,
+                to,
+                intervals,
+                closed,
+            } => b_splines(q, *from, *to, *intervals, *closed, basis),
+            Shape::Backlash => basis.push(-0.5 * sample.direction),
+            Shape::Lag => basis.push(-sample.rate),
+            Shape::ReversalSpike { width } => {
+                basis.push(sample.direction * (-sample.since_reversal / width).exp());
+            }
+            Shape::Drift => basis.push(q / SECONDS_AN_HOUR),
+            Shape::Warmup { tau_s } => basis.push(1.0 - (-q / tau_s).exp()),
+            Shape::Steps { at } => {
+                basis.extend(at.iter().map(|position| if q >= *position { 1.0 } else { 0.0 }));
+            }
+            Shape::Local {
+                centre,
+                width,
+                recurs,
+            } => {
+                let mut from_centre = q - centre;
+                if let Some(period) = recurs {
+                    from_centre -= period * (from_centre / period).round();
+                }
+                let within = from_centre / width;
+                basis.push(if within.abs() < 1.0 {
+                    0.5 * (1.0 + (PI * within).cos())
+                } else {
+                    0.0
+                });
+            }
+        }
+    }
+}
+
+/// Uniform cubic B-splines (de Boor, A Practical Guide to Splines, ch. IX): four of them are not zero at any place.
+fn b_splines(q: f64, from: f64, to: f64, intervals: usize, closed: bool, basis: &mut Vec<f64>) {
+    let start = basis.len();
+    let count = if closed { intervals } else { intervals + 3 };
+    basis.resize(start + count, 0.0);
+    let mut along = (q - from) / (to - from);
+    along = if closed {
+        along - along.floor()
+    } else {
+        along.clamp(0.0, 1.0)
+    };
+    let place = along * intervals as f64;
+    let interval = (place.floor() as usize).min(intervals - 1);
+    let u = place - interval as f64;
+    let v = 1.0 - u;
+    let four = [
+        v * v * v / 6.0,
+        (3.0 * u * u * u - 6.0 * u * u + 4.0) / 6.0,
+        (3.0 * v * v * v - 6.0 * v * v + 4.0) / 6.0,
+        u * u * u / 6.0,
+    ];
+    for (k, value) in four.into_iter().enumerate() {
+        let index = if closed {
+            (interval + k) % intervals
+        } else {
+            interval + k
+        };
+        basis[start + index] += value;
+    }
+}

@@ -1,0 +1,376 @@
+//! TOML files as the readers of this crate want them: every key and value knows where it stands, a table says which keys nobody asked
+//! for, and a wrong value says what it is and what was wanted.
+
+use std::ops::Range;
+use std::path::{Path, PathBuf};
+
+use toml::Spanned;
+use toml::de::{DeTable, DeValue};
+
+use super::spelling::known_names;
+use crate::error::{ModelError, Place};
+
+/// Most bytes of a machine or session file.
+const MOST_BYTES: u64 = 8 << 20;
+
+/// A file's text with its name.
+pub(crate) struct Source {
+    /// As the user named it.
+    pub file: PathBuf,
+    /// Its text, without a byte order mark.
+    pub text: String,
+    /// Bytes of the file before the text: those of a byte order mark.
+    pub skipped: usize,
+}
+
+impl Source {
+    /// Reads a text file; `what` says in messages what it is.
+    pub fn read(file: &Path, what: &str) -> Result<Source, ModelError> {
+        let fault = |message: String, help: &str| ModelError::Input {
+            place: Place::file(file),
+            message,
+            help: Some(help.to_string()),
+        };
+        let length = match std::fs::metadata(file) {
+            Ok(found) if found.is_dir() => {
+                return Err(fault(
+                    format!("this is a folder; {what} is a file"),
+                    "name the .toml file in it",
+                ));
+            }
+            Ok(found) => found.len(),
+            Err(cause) => {
+                let help = "check the name; a relative one starts from the file that mentions it, or from where \
+                            the command was called";
+                return Err(fault(format!("{what} cannot be read: {cause}"), help));
+            }
+        };
+        if length > MOST_BYTES {
+            return Err(fault(
+                format!("{what} of {length} bytes; {MOST_BYTES} is the most that is read"),
+                "readings belong in CSV files named by `data`",
+            ));
+        }
+        let bytes = std::fs::read(file).map_err(|cause| {
+            fault(
+                format!("{what} cannot be read: {cause}"),
+                "check that the file may be read",
+            )
+        })?;
+        let text = String::from_utf8(bytes).map_err(|cause| {
+            fault(
+                format!(
+                    "byte {} is not UTF-8, which TOML is written in",
+                    cause.utf8_error().valid_up_to() + 1
+                ),
+                "save the file as UTF-8",
+            )
+        })?;
+        Ok(Source::new(file, &text))
+    }
+
+    /// A text that stands in a file.
+    pub fn new(file: &Path, text: &str) -> Source {
+        let content = text.strip_prefix('\u{feff}').unwrap_or(text);
+        Source {
+            file: file.to_path_buf(),
+            text: content.to_string(),
+            skipped: text.len() - content.len(),
+        }
+    }
+
+    /// The whole file as a table.
+    pub fn parse(&self) -> Result<Table<'_>, ModelError> {
+        let root = DeTable::parse(&self.text).map_err(|fault| {
+            self.error(
+                fault.span().unwrap_or(0..0),
+                format!("not valid TOML: {}", fault.message()),
+                None,
+            )
+        })?;
+        Ok(Table::new(self, String::new(), 0..0, root.into_inner()))
+    }
+
+    /// The place of some bytes of the text.
+    pub fn place(&self, span: Range<usize>) -> Place {
+        let until = span.start.min(self.text.len());
+        Place {
+            file: self.file.clone(),
+            line: 1 + self.text.as_bytes()[..until]
+                .iter()
+                .filter(|byte| **byte == b'\n')
+                .count(),
+            span: Some(span.start + self.skipped..span.end + self.skipped),
+        }
+    }
+
+    /// An error at a place of this file.
+    pub fn error(&self, span: Range<usize>, message: impl Into<String>, help: Option<String>) -> ModelError {
+        ModelError::Input {
+            place: self.place(span),
+            message: message.into(),
+            help,
+        }
+    }
+}
+
+/// A table that is being read: keys are taken out of it one by one, and what is left was not asked for.
+pub(crate) struct Table<'a> {
+    /// The file.
+    pub source: &'a Source,
+    /// How messages name the table: `[instrument]`, `test "A100"`; empty for the file itself.
+    pub name: String,
+    /// Where it stands.
+    pub span: Range<usize>,
+    entries: Vec<Value<'a>>,
+    asked: Vec<&'static str>,
+}
+
+impl<'a> Table<'a> {
+    fn new(source: &'a Source, name: String, span: Range<usize>, table: DeTable<'a>) -> Self {
+        let mut entries: Vec<Value<'a>> = table
+            .into_iter()
+            .map(|(key, value)| Value {
+                source,
+                key_span: key.span(),
+                key: key.into_inner().into_owned(),
+                span: value.span(),
+                value: value.into_inner(),
+            })
+            .collect();
+        entries.sort_by_key(|entry| entry.key_span.start);
+        Table {
+            source,
+            name,
+            span,
+            entries,
+            asked: Vec::new(),
+        }
+    }
+
+    /// The value of a key, if it is there.
+    pub fn take(&mut self, key: &'static str) -> Option<Value<'a>> {
+        self.asked.push(key);
+        let index = self.entries.iter().position(|entry| entry.key == key)?;
+        Some(self.entries.remove(index))
+    }
+
+    /// The value of a key that has to be there; `wanted` says what it is.
+    pub fn need(&mut self, key: &'static str, wanted: &str) -> Result<Value<'a>, ModelError> {
+        match self.take(key) {
+            Some(value) => Ok(value),
+            None => Err(self.error(
+                format!("{} has no `{key}`", self.called()),
+                Some(format!("add `{key}`: {wanted}")),
+            )),
+        }
+    }
+
+    /// Every entry, in the order of the file: for tables whose keys are names.
+    pub fn take_all(&mut self) -> Vec<Value<'a>> {
+        std::mem::take(&mut self.entries)
+    }
+
+    /// An error unless every key was asked for.
+    pub fn finish(self) -> Result<(), ModelError> {
+        match self.entries.first() {
+            None => Ok(()),
+            Some(entry) => {
+                let mut known: Vec<&str> = self.asked.clone();
+                known.sort_unstable();
+                known.dedup();
+                let message = format!("{} knows no key `{}`", self.called(), entry.key);
+                Err(self.source.error(
+                    entry.key_span.clone(),
+                    message,
+                    Some(known_names(&entry.key, &known)),
+                ))
+            }
+        }
+    }
+
+    /// How a message calls the table.
+    pub fn called(&self) -> &str {
+        if self.name.is_empty() {
+            "the file"
+        } else {
+            &self.name
+        }
+    }
+
+    /// An error about the table as a whole.
+    pub fn error(&self, message: impl Into<String>, help: Option<String>) -> ModelError {
+        self.source.error(self.span.clone(), message, help)
+    }
+}
+
+/// A value with its key.
+pub(crate) struct Value<'a> {
+    /// The file.
+    pub source: &'a Source,
+    /// The key it belongs to.
+    pub key: String,
+    /// Where the key stands.
+    pub key_span: Range<usize>,
+    /// Where the value stands.
+    pub span: Range<usize>,
+    value: DeValue<'a>,
+}
+
+impl<'a> Value<'a> {
+    /// An error at the value.
+    pub fn error(&self, message: impl Into<String>, help: Option<String>) -> ModelError {
+        self.source.error(self.span.clone(), message, help)
+    }
+
+    /// An error that says what the value is and what it should be.
+    pub fn unlike(&self, wanted: &str) -> ModelError {
+        let found = match &self.value {
+            DeValue::String(text) => format!("the text \"{text}\""),
+            DeValue::Integer(_) | DeValue::Float(_) => "a number".to_string(),
+            DeValue::Boolean(truth) => truth.to_string(),
+            DeValue::Datetime(_) => "a date".to_string(),
+            DeValue::Array(items) => format!("a list of {}", items.len()),
+            DeValue::Table(_) => "a table".to_string(),
+        };
+        self.error(format!("`{}` is {found}; {wanted} is expected", self.key), None)
+    }
+
+    /// A text.
+    pub fn text(&self) -> Result<String, ModelError> {
+        match &self.value {
+            DeValue::String(text) => Ok(text.to_string()),
+            _ => Err(self.unlike("a text in quotes")),
+        }
+    }
+
+    /// The text, where it is one.
+    pub fn as_text(&self) -> Option<&str> {
+        self.value.as_str()
+    }
+
+    /// Whether it is a list.
+    pub fn is_list(&self) -> bool {
+        self.value.is_array()
+    }
+
+    /// true or false.
+    pub fn truth(&self) -> Result<bool, ModelError> {
+        self.value.as_bool().ok_or_else(|| self.unlike("true or false"))
+    }
+
+    /// A number, perhaps infinite, never NaN.
+    pub fn number_or_inf(&self, wanted: &str) -> Result<f64, ModelError> {
+        let number = match &self.value {
+            DeValue::Integer(integer) => {
+                i64::from_str_radix(&integer.as_str().replace('_', ""), integer.radix())
+                    .ok()
+                    .map(|integer| integer as f64)
+            }
+            DeValue::Float(float) => float.as_str().replace('_', "").parse().ok(),
+            _ => None,
+        };
+        match number {
+            Some(number) if f64::is_nan(number) => {
+                Err(self.error(format!("`{}` is NaN; {wanted} is expected", self.key), None))
+            }
+            Some(number) => Ok(number),
+            None => Err(self.unlike(wanted)),
+        }
+    }
+
+    /// A finite number.
+    pub fn number(&self) -> Result<f64, ModelError> {
+        let number = self.number_or_inf("a number")?;
+        if number.is_finite() {
+            Ok(number)
+        } else {
+            Err(self.error(format!("`{}` is infinite; a number is expected", self.key), None))
+        }
+    }
+
+    /// A finite number above zero.
+    pub fn positive(&self) -> Result<f64, ModelError> {
+        let number = self.number()?;
+        if number > 0.0 {
+            Ok(number)
+        } else {
+            Err(self.error(format!("`{}` is {number}; it has to be above 0", self.key), None))
+        }
+    }
+
+    /// A whole number of at least `least` and at most `most`.
+    pub fn count(&self, least: usize, most: usize) -> Result<usize, ModelError> {
+        let number = self.number()?;
+        if number.fract() == 0.0 && number >= least as f64 && number <= most as f64 {
+            Ok(number as usize)
+        } else {
+            Err(self.error(
+                format!(
+                    "`{}` is {number}; a whole number from {least} to {most} is expected",
+                    self.key
+                ),
+                None,
+            ))
+        }
+    }
+
+    /// The items of a list, each under the list's key.
+    pub fn list(self, wanted: &str) -> Result<Vec<Value<'a>>, ModelError> {
+        if !self.value.is_array() {
+            return Err(self.unlike(wanted));
+        }
+        let (source, key) = (self.source, self.key);
+        let DeValue::Array(items) = self.value else {
+            return Ok(Vec::new());
+        };
+        Ok(items
+            .into_iter()
+            .map(|item: Spanned<DeValue<'a>>| Value {
+                source,
+                key: key.clone(),
+                key_span: item.span(),
+                span: item.span(),
+                value: item.into_inner(),
+            })
+            .collect())
+    }
+
+    /// Exactly three items of a list.
+    pub fn three(self, wanted: &str) -> Result<[Value<'a>; 3], ModelError> {
+        let (source, key, span) = (self.source, self.key.clone(), self.span.clone());
+        let items = self.list(wanted)?;
+        let count = items.len();
+        items.try_into().map_err(|_| {
+            let message = format!("`{key}` is a list of {count}; {wanted} is expected");
+            source.error(span, message, None)
+        })
+    }
+
+    /// Three finite numbers.
+    pub fn vector(self) -> Result<[f64; 3], ModelError> {
+        let items = self.three("a list of three numbers")?;
+        let mut vector = [0.0; 3];
+        for (place, item) in vector.iter_mut().zip(&items) {
+            *place = item.number()?;
+        }
+        Ok(vector)
+    }
+
+    /// A table, called `name` in messages.
+    pub fn table(self, name: String) -> Result<Table<'a>, ModelError> {
+        if !self.value.is_table() {
+            return Err(self.unlike("a table"));
+        }
+        // A header `[name]` is what a message about the table should point at.
+        let span = if self.key_span.start < self.span.start {
+            self.key_span.clone()
+        } else {
+            self.span.clone()
+        };
+        match self.value {
+            DeValue::Table(table) => Ok(Table::new(self.source, name, span, table)),
+            _ => Ok(Table::new(self.source, name, span, DeTable::new())),
+        }
+    }
+}

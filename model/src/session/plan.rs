@@ -1,0 +1,353 @@
+//! From a movement to the states of the axes at each reading.
+
+use nalgebra::{DMatrix, DVector};
+
+use super::Test;
+use super::motion::{FollowOffset, Motion};
+use super::readings::Readings;
+use crate::axis::AxisKind;
+use crate::chain::{AxisPosition, BodyErrors, Machine};
+use crate::frames::Point;
+use crate::instrument::Station;
+use crate::instrument::ballbar::BallBar;
+
+/// Pause between two traversals, s.
+const BETWEEN_RUNS_S: f64 = 3.0;
+/// How far the balls may miss the path that was asked for, mm.
+const MISSED_MM: f64 = 1e-6;
+
+/// What went wrong and what to do.
+type Fault = (String, String);
+
+/// Positions, runs and times of a movement.
+pub(super) fn states(machine: &Machine, test: &Test, motion: &Motion) -> Result<Readings, Fault> {
+    match motion {
+        Motion::Sweep {
+            axis,
+            from,
+            to,
+            step,
+            speed,
+            runs,
+            both_directions,
+        } => {
+            let along = steps(*from, *to, *step);
+            traversals(machine, &along, *speed, *runs, *both_directions, |q| {
+                let mut at = test.at.clone();
+                at[*axis] = q;
+                Ok(at)
+            })
+        }
+        Motion::Circle {
+            first,
+            second,
+            radius,
+            centre,
+            from,
+            to,
+            step,
+            speed,
+            runs,
+            both_directions,
+        } => {
+            let zero = BallBar {
+                workpiece_ball: [0.0; 3],
+                spindle_ball: [0.0; 3],
+                bar: 0.0,
+            };
+            let bar = match &test.station {
+                Station::BallBar(bar) => bar,
+                _ => &zero,
+            };
+            let circle = Circle::new(machine, bar, &test.at, [*first, *second], *centre)?;
+            let along = steps(*from, *to, *step);
+            let turn = *speed / *radius;
+            traversals(machine, &along, turn, *runs, *both_directions, |angle| {
+                Ok(circle.state(*radius, angle))
+            })
+        }
+        Motion::Follow {
+            axis,
+            from,
+            to,
+            step,
+            speed,
+            runs,
+            both_directions,
+            offset,
+        } => {
+            let Station::BallBar(bar) = &test.station else {
+                return Err((
+                    format!("test \"{}\" follows without a ball bar", test.name),
+                    "a path of kind \"follow\" needs one".into(),
+                ));
+            };
+            let linear = linear_axes(machine);
+            let along = steps(*from, *to, *step);
+            traversals(machine, &along, *speed, *runs, *both_directions, |q| {
+                let mut at = test.at.clone();
+                at[*axis] = q;
+                let wanted = offset_vector(machine, bar, &at, *axis, *offset)?;
+                let (state, missed) = placed(machine, bar, &at, &linear, wanted);
+                if missed > MISSED_MM {
+                    return Err((
+                        format!(
+                            "test \"{}\": the linear axes cannot keep the balls where the path wants them; they miss \
+                             by {missed:.3} mm",
+                            test.name
+                        ),
+                        "a path of kind \"follow\" takes linear axes that span the space".into(),
+                    ));
+                }
+                Ok(state)
+            })
+        }
+        Motion::List => Ok(Readings::default()),
+    }
+}
+
+/// `from`, `from + step`, … up to `to`.
+fn steps(from: f64, to: f64, step: f64) -> Vec<f64> {
+    let ratio = (to - from).abs() / step;
+    let count = (ratio + 1e-6).floor() as usize;
+    let whole = (ratio - count as f64).abs() < 1e-6;
+    (0..=count)
+        .map(|k| {
+            if whole && k == count {
+                to
+            } else {
+                from + (to - from).signum() * step * k as f64
+            }
+        })
+        .collect()
+}
+
+/// Goes along a way `runs` times, and back each time where both directions are asked for.
+fn traversals(
+    machine: &Machine,
+    along: &[f64],
+    speed: f64,
+    runs: usize,
+    both_directions: bool,
+    state: impl Fn(f64) -> Result<Vec<f64>, Fault>,
+) -> Result<Readings, Fault> {
+    let states = along.iter().map(|&q| state(q)).collect::<Result<Vec<_>, _>>()?;
+    let mut readings = Readings {
+        positions: vec![Vec::new(); machine.axes.len()],
+        ..Readings::default()
+    };
+    let last = along.len() - 1;
+    let mut start_s = 0.0;
+    for run in 0..runs * if both_directions { 2 } else { 1 } {
+        let back = both_directions && run % 2 == 1;
+        for k in 0..along.len() {
+            let here = if back { last - k } else { k };
+            let origin = if back { last } else { 0 };
+            for (column, position) in readings.positions.iter_mut().zip(&states[here]) {
+                column.push(*position);
+            }
+            readings.run.push(run as i64 + 1);
+            readings
+                .time_s
+                .push(start_s + (along[here] - along[origin]).abs() / speed);
+            readings.line.push(readings.line.len() + 1);
+        }
+        start_s = readings.time_s.last().copied().unwrap_or(0.0) + BETWEEN_RUNS_S;
+    }
+    Ok(readings)
+}
+
+/// A circle of two linear axes.
+struct Circle {
+    at: Vec<f64>,
+    axes: [usize; 2],
+    /// Positions of the two axes at the centre.
+    centre: [f64; 2],
+    /// How far an axis goes for a millimetre of the path.
+    scale: [f64; 2],
+}
+
+impl Circle {
+    fn new(
+        machine: &Machine,
+        bar: &BallBar<f64>,
+        at: &[f64],
+        axes: [usize; 2],
+        centre: [f64; 3],
+    ) -> Result<Circle, Fault> {
+        let moves = axes.map(|axis| relative_move(machine, bar, at, axis));
+        let dot: f64 = (0..3).map(|i| moves[0][i] * moves[1][i]).sum();
+        if dot.abs() > 1e-9 {
+            let names = axes.map(|axis| machine.axes[axis].name.clone());
+            return Err((
+                format!(
+                    "axes `{}` and `{}` do not stand at right angles",
+                    names[0], names[1]
+                ),
+                "a circle takes two linear axes at right angles".into(),
+            ));
+        }
+        let (state, _) = placed(machine, bar, at, &axes, centre);
+        Ok(Circle {
+            at: state.clone(),
+            axes,
+            centre: axes.map(|axis| state[axis]),
+            scale: moves.map(|way| 1.0 / way.iter().map(|x| x * x).sum::<f64>().sqrt()),
+        })
+    }
+
+    fn state(&self, radius: f64, angle: f64) -> Vec<f64> {
+        let (sin, cos) = angle.sin_cos();
+        let mut state = self.at.clone();
+        state[self.axes[0]] = self.centre[0] + self.scale[0] * radius * cos;
+        state[self.axes[1]] = self.centre[1] + self.scale[1] * radius * sin;
+        state
+    }
+}
+
+/// The linear axes of a machine, by index.
+pub(super) fn linear_axes(machine: &Machine) -> Vec<usize> {
+    (0..machine.axes.len())
+        .filter(|&index| machine.axes[index].kind == AxisKind::Linear)
+        .collect()
+}
+
+/// Moves the `open` axes so that the spindle ball lies at `wanted` from the workpiece ball, nominally and as well as they can: the
+/// positions of all axes, and by how much they miss, mm. The balls' distance is affine in linear axes, so this is one linear solve.
+pub(super) fn placed(
+    machine: &Machine,
+    bar: &BallBar<f64>,
+    at: &[f64],
+    open: &[usize],
+    wanted: [f64; 3],
+) -> (Vec<f64>, f64) {
+    let apart = spindle_from_workpiece(machine, bar, at);
+    let rest = DVector::from_iterator(3, (0..3).map(|i| wanted[i] - apart[i]));
+    let moves: Vec<[f64; 3]> = open
+        .iter()
+        .map(|&axis| relative_move(machine, bar, at, axis))
+        .collect();
+    let matrix = DMatrix::from_fn(3, open.len(), |i, j| moves[j][i]);
+    let mut state = at.to_vec();
+    if open.is_empty() {
+        return (state, rest.norm());
+    }
+    // Directions of unit length: 1e-9 is far below any angle between axes and far above rounding.
+    let Ok(step) = matrix.clone().svd(true, true).solve(&rest, 1e-9) else {
+        return (state, rest.norm());
+    };
+    for (axis, change) in open.iter().zip(step.iter()) {
+        state[*axis] += change;
+    }
+    (state, (matrix * step - rest).norm())
+}
+
+/// Spindle ball less workpiece ball in R, nominal.
+fn spindle_from_workpiece(machine: &Machine, bar: &BallBar<f64>, at: &[f64]) -> [f64; 3] {
+    let state = positions(machine, at);
+    let none = vec![BodyErrors::<f64>::NONE; machine.axes.len()];
+    let (workpiece, spindle) = bar.balls::<f64>(machine, &state, &none, &|_| None);
+    spindle.minus(workpiece).0
+}
+
+/// How the spindle ball moves from the workpiece ball for a millimetre of a linear axis.
+fn relative_move(machine: &Machine, bar: &BallBar<f64>, at: &[f64], axis: usize) -> [f64; 3] {
+    let apart = |position: f64| {
+        let mut state = at.to_vec();
+        state[axis] = position;
+        spindle_from_workpiece(machine, bar, &state)
+    };
+    let (zero, one) = (apart(0.0), apart(1.0));
+    std::array::from_fn(|i| {
+        let step = one[i] - zero[i];
+        // Differences of positions carry their rounding; a direction along R's axes is meant to be exact.
+        if (step - step.round()).abs() < 1e-12 {
+            step.round()
+        } else {
+            step
+        }
+    })
+}
+
+fn positions(machine: &Machine, at: &[f64]) -> Vec<AxisPosition<f64>> {
+    machine
+        .axes
+        .iter()
+        .zip(at)
+        .map(|(axis, &position)| AxisPosition::new(axis.kind, position))
+        .collect()
+}
+
+/// From workpiece ball to spindle ball while the linear axes follow a rotary axis: as long as the bar, away from the axis, along the
+/// path of the carried ball, or along the axis.
+fn offset_vector(
+    machine: &Machine,
+    bar: &BallBar<f64>,
+    at: &[f64],
+    axis: usize,
+    offset: FollowOffset,
+) -> Result<[f64; 3], Fault> {
+    let state = positions(machine, at);
+    let none = vec![BodyErrors::<f64>::NONE; machine.axes.len()];
+    let (workpiece, spindle) = bar.balls::<f64>(machine, &state, &none, &|_| None);
+    let on_workpiece_side = axis < machine.workpiece_side;
+    // A turning head carries the spindle ball: the workpiece ball then lies on the far side of it.
+    let (carried, sign) = if on_workpiece_side {
+        (workpiece.0, 1.0)
+    } else {
+        (spindle.0, -1.0)
+    };
+    let (origin, along) = axis_line(machine, &state, axis);
+    let from: [f64; 3] = std::array::from_fn(|i| carried[i] - origin[i]);
+    let height: f64 = (0..3).map(|i| from[i] * along[i]).sum();
+    let radial: [f64; 3] = std::array::from_fn(|i| from[i] - height * along[i]);
+    let radius = radial.iter().map(|x| x * x).sum::<f64>().sqrt();
+    let unit = match offset {
+        FollowOffset::Axial => along,
+        _ if radius < 1e-6 => {
+            return Err((
+                format!(
+                    "the ball lies on axis `{}`: it goes round no circle",
+                    machine.axes[axis].name
+                ),
+                "a radial or tangential bar takes a ball away from the axis".into(),
+            ));
+        }
+        FollowOffset::Radial => radial.map(|x| x / radius),
+        FollowOffset::Tangential => crate::frames::cross(along, Point(radial.map(|x| x / radius))).0,
+    };
+    Ok(unit.map(|x| sign * bar.bar * x))
+}
+
+/// A point of an axis and its direction in R, as the axes between it and the bed carry it.
+fn axis_line(machine: &Machine, state: &[AxisPosition<f64>], axis: usize) -> ([f64; 3], [f64; 3]) {
+    let between = if axis < machine.workpiece_side {
+        axis + 1..machine.workpiece_side
+    } else {
+        machine.workpiece_side..axis
+    };
+    let mut carrying = machine.clone();
+    carrying.axes = machine.axes[between.clone()].to_vec();
+    carrying.workpiece_side = if axis < machine.workpiece_side {
+        between.len()
+    } else {
+        0
+    };
+    let none = vec![BodyErrors::<f64>::NONE; between.len()];
+    let in_r = |point: [f64; 3]| {
+        let point = Point(point);
+        if axis < machine.workpiece_side {
+            carrying
+                .workpiece_point::<f64>(&state[between.clone()], &none, point)
+                .0
+        } else {
+            carrying
+                .tool_point::<f64>(&state[between.clone()], &none, point)
+                .0
+        }
+    };
+    let line = &machine.axes[axis];
+    let origin = in_r(line.origin_mm);
+    let tip = in_r(std::array::from_fn(|i| line.origin_mm[i] + line.direction[i]));
+    (origin, std::array::from_fn(|i| tip[i] - origin[i]))
+}

@@ -1,0 +1,76 @@
+//! Whether a ball bar can lie between its balls where the session says that they are.
+
+use super::Test;
+use super::readings::Readings;
+use crate::chain::{BodyErrors, Machine};
+use crate::instrument::Station;
+
+/// A ball bar's sensor moves a millimetre or two; beyond this something else than an error of the machine is wrong, mm.
+const MOST_MM: f64 = 5.0;
+
+/// The calibrated length of a ball bar; 0 for other instruments.
+pub(crate) fn bar_mm(station: &Station<f64>) -> f64 {
+    match station {
+        Station::BallBar(bar) => bar.bar,
+        _ => 0.0,
+    }
+}
+
+/// That the nominal distance between the balls, by the median over the readings, is the length of the bar.
+pub(crate) fn check(machine: &Machine, test: &Test, readings: &Readings) -> Result<(), (String, String)> {
+    let Station::BallBar(bar) = &test.station else {
+        return Ok(());
+    };
+    let none = vec![BodyErrors::<f64>::NONE; machine.axes.len()];
+    let mut state = Vec::new();
+    let mut off: Vec<f64> = Vec::with_capacity(readings.rows());
+    for row in 0..readings.rows() {
+        readings.state(machine, row, &mut state);
+        off.push(bar.read::<f64>(machine, &state, &none, |_| None) - bar.bar);
+    }
+    let nominal = bar.bar + median(&mut off);
+    if (nominal - bar.bar).abs() <= MOST_MM {
+        return Ok(());
+    }
+    Err((
+        format!(
+            "test \"{}\": a bar of {:.4} mm cannot reach between its balls, which nominally lie {nominal:.3} mm apart \
+             (median of {} positions)",
+            test.name,
+            bar.bar,
+            off.len()
+        ),
+        "degrees taken for radians (or radians for degrees) look like this; so do a ball position, an axis position \
+         in `at` or an axis direction that is not as on the machine"
+            .into(),
+    ))
+}
+
+/// That the bar read about its own length.
+pub(crate) fn check_lengths(test: &Test, readings: &Readings) -> Result<(), (String, String)> {
+    let Station::BallBar(bar) = &test.station else {
+        return Ok(());
+    };
+    let mut off: Vec<f64> = readings.observed.iter().map(|length| length - bar.bar).collect();
+    let read = bar.bar + median(&mut off);
+    if (read - bar.bar).abs() <= MOST_MM {
+        return Ok(());
+    }
+    Err((
+        format!(
+            "test \"{}\": a bar of {:.4} mm read {read:.3} mm (median of {} readings)",
+            test.name,
+            bar.bar,
+            off.len()
+        ),
+        "is the column a deviation from `bar_mm` rather than a length, or in another unit than its name says?".into(),
+    ))
+}
+
+fn median(values: &mut [f64]) -> f64 {
+    if values.is_empty() {
+        return 0.0;
+    }
+    let middle = values.len() / 2;
+    *values.select_nth_unstable_by(middle, f64::total_cmp).1
+}

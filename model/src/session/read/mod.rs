@@ -1,0 +1,289 @@
+//! Machine and session files.
+
+mod effect;
+mod layout;
+mod machine;
+mod movement;
+pub(crate) mod quantity;
+mod setups;
+mod shape;
+mod station;
+mod test;
+mod unknowns;
+
+use std::path::{Path, PathBuf};
+
+pub use machine::machine;
+
+use super::document::{Source, Table, Value};
+use super::expression::Length;
+use super::table::{Format, Mapped};
+use super::{Session, Test};
+use crate::chain::Machine;
+use crate::error::{ModelError, Place};
+use crate::instrument::InstrumentKind;
+use quantity::MICROMETRE;
+
+/// How a session is read.
+#[derive(Clone, Debug)]
+pub struct ReadOptions {
+    /// Where the data files lie when they do not lie beside the session file.
+    pub data_directory: Option<PathBuf>,
+    /// Whether the data files are read; without, a session is only its plan.
+    pub read_data: bool,
+}
+
+impl Default for ReadOptions {
+    /// Data are read, from beside the session file.
+    fn default() -> Self {
+        ReadOptions {
+            data_directory: None,
+            read_data: true,
+        }
+    }
+}
+
+/// What the readers of tests and effects need of the session around them.
+struct Context<'a> {
+    /// The session file.
+    file: &'a Path,
+    machine: &'a Machine,
+    instrument: InstrumentKind,
+    constants: &'a [(String, f64)],
+    format: Format,
+    columns: Option<Vec<Mapped>>,
+    options: &'a ReadOptions,
+}
+
+impl Context<'_> {
+    /// A length: a number, or an expression over the constants.
+    fn length(&self, value: &Value<'_>) -> Result<(Length, f64), ModelError> {
+        let Some(text) = value.as_text() else {
+            let number = value.number_or_inf("a number or an expression in quotes")?;
+            if !number.is_finite() {
+                return Err(value.error(format!("`{}` is infinite; a length is expected", value.key), None));
+            }
+            return Ok((Length::Number(number), number));
+        };
+        let names: Vec<&str> = self.constants.iter().map(|(name, _)| name.as_str()).collect();
+        let length = Length::parse(text, &names).map_err(|fault| {
+            let help = "a length is a number or an expression over [constants] with + - * / ^2 sqrt( )";
+            value.error(
+                format!("`{}` = \"{text}\": {fault}", value.key),
+                Some(help.into()),
+            )
+        })?;
+        let number = length.evaluate(&|name: &str| {
+            let found = self.constants.iter().find(|(known, _)| known == name);
+            found.map_or(f64::NAN, |(_, value)| *value)
+        });
+        if !number.is_finite() {
+            let message = format!(
+                "`{}` = \"{text}\" comes to {number} with these constants",
+                value.key
+            );
+            return Err(value.error(
+                message,
+                Some("a root of a negative number, or a division by zero?".into()),
+            ));
+        }
+        Ok((length, number))
+    }
+
+    /// Three lengths.
+    fn point(&self, value: Value<'_>) -> Result<([Length; 3], [f64; 3]), ModelError> {
+        let items = value.three("a list of three lengths")?;
+        let mut lengths = [const { Length::Number(0.0) }; 3];
+        let mut numbers = [0.0; 3];
+        for (i, item) in items.iter().enumerate() {
+            (lengths[i], numbers[i]) = self.length(item)?;
+        }
+        Ok((lengths, numbers))
+    }
+}
+
+/// Reads a session file, its machine and, if asked for, its data.
+///
+/// # Errors
+/// Whatever keeps the session from being used: file, line, what was found and expected, and what to do.
+pub fn session(path: &Path, options: &ReadOptions) -> Result<Session, ModelError> {
+    let source = Source::read(path, "the session file")?;
+    let mut root = source.parse()?;
+    let machine = session_machine(path, &mut root)?;
+    let constants = constants(&mut root)?;
+    let instrument = Instrument::read(&mut root)?;
+    let unknowns = unknowns::unknowns(&machine, instrument.kind, &mut root)?;
+
+    let format = match root.take("format") {
+        Some(value) => layout::format(value.table("[format]".into())?)?,
+        None => Format::default(),
+    };
+    let columns = match root.take("columns") {
+        Some(value) => Some(layout::columns(value.table("[columns]".into())?)?),
+        None => None,
+    };
+    let context = Context {
+        file: path,
+        machine: &machine,
+        instrument: instrument.kind,
+        constants: &constants,
+        format,
+        columns,
+        options,
+    };
+    let mut warnings = Vec::new();
+    let (tests, declared) = tests(&context, &mut root, &mut warnings)?;
+    warnings.extend(setups::unlike(&tests));
+    let effects = match root.take("effect") {
+        Some(value) => value
+            .list("tables [[effect]]")?
+            .into_iter()
+            .map(|item| effect::effect(&context, &declared, item))
+            .collect::<Result<Vec<_>, _>>()?,
+        None => Vec::new(),
+    };
+    let socket_distances = setups::socket_distances(instrument.kind, &tests, &mut root, options.read_data)?;
+    root.finish()?;
+    Ok(Session {
+        file: path.to_path_buf(),
+        constants,
+        instrument: instrument.kind,
+        noise_mm: instrument.noise_mm,
+        resolution_mm: instrument.resolution_mm,
+        unknowns,
+        effects,
+        tests,
+        socket_distances,
+        warnings,
+        machine,
+    })
+}
+
+/// The machine: a file beside the session, or the tables themselves.
+fn session_machine(path: &Path, root: &mut Table<'_>) -> Result<Machine, ModelError> {
+    let value = root.need(
+        "machine",
+        "[machine] with `file = \"machine.toml\"`, or the machine's tables in it",
+    )?;
+    let mut table = value.table("[machine]".into())?;
+    let Some(file) = table.take("file") else {
+        return machine::from_table(table);
+    };
+    let named = file.text()?;
+    let found = path.parent().unwrap_or(Path::new("")).join(&named);
+    if !found.exists() {
+        let message = format!(
+            "the machine file `{named}` is not there; looked for {}",
+            found.display()
+        );
+        return Err(file.error(message, Some("its name is relative to the session file".into())));
+    }
+    table.finish()?;
+    machine(&found)
+}
+
+fn constants(root: &mut Table<'_>) -> Result<Vec<(String, f64)>, ModelError> {
+    let Some(value) = root.take("constants") else {
+        return Ok(Vec::new());
+    };
+    let mut constants = Vec::new();
+    for entry in value.table("[constants]".into())?.take_all() {
+        let name = entry.key.clone();
+        let mut letters = name.chars();
+        let valid = letters.next().is_some_and(|c| c.is_alphabetic() || c == '_')
+            && letters.all(|c| c.is_alphanumeric() || c == '_')
+            && name != "sqrt";
+        if !valid {
+            let help = "a letter, then letters, digits and `_`; `sqrt` is taken";
+            let message = format!("a constant cannot be called `{name}`");
+            return Err(entry
+                .source
+                .error(entry.key_span.clone(), message, Some(help.into())));
+        }
+        constants.push((name, entry.number()?));
+    }
+    Ok(constants)
+}
+
+struct Instrument {
+    kind: InstrumentKind,
+    noise_mm: Option<f64>,
+    resolution_mm: Option<f64>,
+}
+
+impl Instrument {
+    fn read(root: &mut Table<'_>) -> Result<Instrument, ModelError> {
+        let value = root.need("instrument", "[instrument] with `kind = \"ballbar\"`")?;
+        let mut table = value.table("[instrument]".into())?;
+        let value = table.need("kind", "\"ballbar\", \"tracker\" or \"socket\"")?;
+        let word = value.text()?;
+        let Some(kind) = InstrumentKind::ALL.into_iter().find(|kind| kind.word() == word) else {
+            if word == "probe" || word == "r-test" {
+                let help = "ballbar, tracker and socket are";
+                return Err(value.error(
+                    format!("the instrument \"{word}\" is not built yet"),
+                    Some(help.into()),
+                ));
+            }
+            return Err(value.unlike("\"ballbar\", \"tracker\" or \"socket\""));
+        };
+        let mut not_negative = |key: &'static str| -> Result<Option<f64>, ModelError> {
+            let Some(value) = table.take(key) else {
+                return Ok(None);
+            };
+            let number = value.number()?;
+            if number < 0.0 {
+                let message = format!("`{key}` is {number}; it cannot be negative");
+                return Err(value.error(message, None));
+            }
+            Ok(Some(number * MICROMETRE))
+        };
+        let noise_mm = not_negative("noise_um")?;
+        let resolution_mm = not_negative("resolution_um")?.filter(|step| *step > 0.0);
+        table.finish()?;
+        Ok(Instrument {
+            kind,
+            noise_mm,
+            resolution_mm,
+        })
+    }
+}
+
+/// A `[[test]]` by name, with the tests that came of it: one for each socket, else itself.
+struct Declared {
+    name: String,
+    parts: Vec<String>,
+}
+
+/// The tests, and the names that effects may use for them.
+fn tests(
+    context: &Context<'_>,
+    root: &mut Table<'_>,
+    warnings: &mut Vec<String>,
+) -> Result<(Vec<Test>, Vec<Declared>), ModelError> {
+    let items = match root.take("test") {
+        Some(value) => value.list("tables [[test]]")?,
+        None => Vec::new(),
+    };
+    let mut tests: Vec<Test> = Vec::new();
+    let mut declared: Vec<Declared> = Vec::new();
+    for item in items {
+        let called = format!("test {}", declared.len() + 1);
+        let mut table = item.table(called)?;
+        let name = test::name(&mut table, &declared)?;
+        let parts = test::tests(context, &name, table, warnings)?;
+        declared.push(Declared {
+            name,
+            parts: parts.iter().map(|test| test.name.clone()).collect(),
+        });
+        tests.extend(parts);
+    }
+    if tests.is_empty() {
+        return Err(ModelError::Input {
+            place: Place::file(context.file),
+            message: "a session without tests".into(),
+            help: Some("add at least one [[test]]".into()),
+        });
+    }
+    Ok((tests, declared))
+}

@@ -1,0 +1,299 @@
+//! `sweep` and `path`: how the axes move in a planned test.
+
+use super::{Context, quantity};
+use crate::axis::AxisKind;
+use crate::error::ModelError;
+use crate::instrument::Station;
+use crate::session::document::{Table, Value};
+use crate::session::motion::{FollowOffset, MOST_READINGS, Motion};
+
+/// Feed of a linear axis or a circle where none is stated, mm/s: 1000 mm/min.
+const DEFAULT_FEED_MM_S: f64 = 1000.0 / 60.0;
+/// Speed of a rotary axis where none is stated, rad/s: 120 °/min.
+const DEFAULT_TURN_RAD_S: f64 = 2.0 / 180.0 * std::f64::consts::PI;
+
+/// `sweep = { axis, from_…, to_…, step_…, feed_…, runs, both_directions }`.
+pub(super) fn sweep(
+    context: &Context<'_>,
+    value: Value<'_>,
+    station: &Station<f64>,
+) -> Result<Motion, ModelError> {
+    let mut table = value.table("`sweep`".into())?;
+    let (axis, kind) = moved_axis(context, &mut table)?;
+    let way = Way::read(&mut table, kind, true)?;
+    let speed = speed(context, &mut table, axis, station)?;
+    let (runs, both_directions) = repeats(&mut table, way.steps())?;
+    table.finish()?;
+    Ok(Motion::Sweep {
+        axis,
+        from: way.from,
+        to: way.to,
+        step: way.step,
+        speed,
+        runs,
+        both_directions,
+    })
+}
+
+/// `path = { kind = "circle" | "follow" | "list", … }`.
+pub(super) fn path(
+    context: &Context<'_>,
+    value: Value<'_>,
+    station: &Station<f64>,
+) -> Result<Motion, ModelError> {
+    let mut table = value.table("`path`".into())?;
+    let kind = table.need("kind", "\"circle\", \"follow\" or \"list\"")?;
+    match kind.text()?.as_str() {
+        "list" => {
+            table.finish()?;
+            Ok(Motion::List)
+        }
+        "circle" => circle(context, table),
+        "follow" => follow(context, table, station),
+        _ => Err(kind.unlike("\"circle\", \"follow\" or \"list\"")),
+    }
+}
+
+fn circle(context: &Context<'_>, mut table: Table<'_>) -> Result<Motion, ModelError> {
+    let plane = table.need("plane", "the two linear axes, as \"XY\"")?;
+    let text = plane.text()?;
+    let letters: Vec<String> = text.chars().map(String::from).collect();
+    let [first, second] = &letters[..] else {
+        return Err(plane.unlike("two linear axes, as \"XY\","));
+    };
+    let linear = |name: &str| -> Result<usize, ModelError> {
+        let Some(index) = quantity::axis_index(context.machine, name) else {
+            let (message, help) = quantity::no_axis(context.machine, name);
+            return Err(plane.error(message, Some(help)));
+        };
+        if context.machine.axes[index].kind != AxisKind::Linear {
+            return Err(plane.error(
+                format!("axis `{name}` is rotary; a circle moves two linear axes"),
+                None,
+            ));
+        }
+        Ok(index)
+    };
+    let (first, second) = (linear(first)?, linear(second)?);
+    if first == second {
+        return Err(plane.error(format!("`plane` = \"{text}\" names one axis twice"), None));
+    }
+    let radius_value = table.need("radius_mm", "the radius of the circle")?;
+    let (_, radius) = context.length(&radius_value)?;
+    if radius <= 0.0 {
+        return Err(radius_value.error(format!("`radius_mm` is {radius}; it has to be above 0"), None));
+    }
+    let centre = match table.take("centre_mm") {
+        Some(value) => context.point(value)?.1,
+        None => [0.0; 3],
+    };
+    let way = Way::read(&mut table, AxisKind::Rotary, false)?;
+    let speed = match table.take("feed_mm_min") {
+        Some(value) => value.positive()? / 60.0,
+        None => DEFAULT_FEED_MM_S,
+    };
+    let (runs, both_directions) = repeats(&mut table, way.steps())?;
+    table.finish()?;
+    Ok(Motion::Circle {
+        first,
+        second,
+        radius,
+        centre,
+        from: way.from,
+        to: way.to,
+        step: way.step,
+        speed,
+        runs,
+        both_directions,
+    })
+}
+
+fn follow(context: &Context<'_>, mut table: Table<'_>, station: &Station<f64>) -> Result<Motion, ModelError> {
+    if !matches!(station, Station::BallBar(_)) {
+        return Err(table.error(
+            "a path of kind \"follow\" needs a ball bar between its balls",
+            None,
+        ));
+    }
+    let (axis, kind) = moved_axis(context, &mut table)?;
+    if kind != AxisKind::Rotary {
+        let name = &context.machine.axes[axis].name;
+        return Err(table.error(
+            format!("axis `{name}` is linear; a path of kind \"follow\" turns a rotary axis"),
+            None,
+        ));
+    }
+    let offset = table.need("offset", "\"radial\", \"tangential\" or \"axial\"")?;
+    let offset = match offset.text()?.as_str() {
+        "radial" => FollowOffset::Radial,
+        "tangential" => FollowOffset::Tangential,
+        "axial" => FollowOffset::Axial,
+        _ => return Err(offset.unlike("\"radial\", \"tangential\" or \"axial\"")),
+    };
+    let way = Way::read(&mut table, kind, false)?;
+    let speed = speed(context, &mut table, axis, station)?;
+    let (runs, both_directions) = repeats(&mut table, way.steps())?;
+    table.finish()?;
+    Ok(Motion::Follow {
+        axis,
+        from: way.from,
+        to: way.to,
+        step: way.step,
+        speed,
+        runs,
+        both_directions,
+        offset,
+    })
+}
+
+fn moved_axis(context: &Context<'_>, table: &mut Table<'_>) -> Result<(usize, AxisKind), ModelError> {
+    let value = table.need("axis", "the axis that moves")?;
+    let name = value.text()?;
+    let Some(axis) = quantity::axis_index(context.machine, &name) else {
+        let (message, help) = quantity::no_axis(context.machine, &name);
+        return Err(value.error(message, Some(help)));
+    };
+    Ok((axis, context.machine.axes[axis].kind))
+}
+
+/// From, to and step of a movement, in the unit inside.
+struct Way {
+    from: f64,
+    to: f64,
+    step: f64,
+}
+
+impl Way {
+    /// Reads `from_…`, `to_…` and `step_…`; a full turn where the ends may be left out and are.
+    fn read(table: &mut Table<'_>, kind: AxisKind, ends_needed: bool) -> Result<Way, ModelError> {
+        let from = end(table, kind, ["from_mm", "from_deg"])?;
+        let to = end(table, kind, ["to_mm", "to_deg"])?;
+        let step = end(table, kind, ["step_mm", "step_deg"])?;
+        let unit = quantity::unit_word(kind);
+        let missing = |key: &str| {
+            let help = format!("add `{key}_{unit}`");
+            table.error(format!("{} has no `{key}_{unit}`", table.called()), Some(help))
+        };
+        let turn = kind == AxisKind::Rotary && !ends_needed;
+        let from = match from {
+            Some((from, _)) => from,
+            None if turn => 0.0,
+            None => return Err(missing("from")),
+        };
+        let to = match to {
+            Some((to, _)) => to,
+            None if turn => from + std::f64::consts::TAU,
+            None => return Err(missing("to")),
+        };
+        let Some((step, stepped)) = step else {
+            return Err(missing("step"));
+        };
+        if step <= 0.0 {
+            let message = format!(
+                "`{}` has to be above 0; the way back is `both_directions = true`",
+                stepped.key
+            );
+            return Err(stepped.error(message, None));
+        }
+        if from == to {
+            return Err(table.error(format!("{} ends where it begins", table.called()), None));
+        }
+        let way = Way { from, to, step };
+        if way.steps() > MOST_READINGS as f64 {
+            let message = format!("{:.0} steps; {MOST_READINGS} readings is the most", way.steps());
+            return Err(stepped.error(message, Some("take a larger step".into())));
+        }
+        if way.steps() < 1.0 {
+            return Err(stepped.error(format!("`{}` is longer than the way", stepped.key), None));
+        }
+        Ok(way)
+    }
+
+    fn steps(&self) -> f64 {
+        (self.to - self.from).abs() / self.step + 1e-6
+    }
+}
+
+/// A number that belongs to an axis, in mm or degrees as the axis is; the other unit is an error.
+fn end<'a>(
+    table: &mut Table<'a>,
+    kind: AxisKind,
+    [mm, deg]: [&'static str; 2],
+) -> Result<Option<(f64, Value<'a>)>, ModelError> {
+    let (right, wrong) = match kind {
+        AxisKind::Linear => (table.take(mm), table.take(deg)),
+        AxisKind::Rotary => (table.take(deg), table.take(mm)),
+    };
+    if let Some(wrong) = wrong {
+        let message = format!("`{}` for what moves in {}", wrong.key, quantity::unit_word(kind));
+        return Err(wrong.source.error(wrong.key_span.clone(), message, None));
+    }
+    match right {
+        Some(value) => Ok(Some((quantity::inside(kind, value.number()?), value))),
+        None => Ok(None),
+    }
+}
+
+/// The speed of an axis: degrees or millimetres a minute; `feed_mm_min` of a rotary axis is the path speed of the ball that it carries.
+fn speed(
+    context: &Context<'_>,
+    table: &mut Table<'_>,
+    axis: usize,
+    station: &Station<f64>,
+) -> Result<f64, ModelError> {
+    let (mm, deg) = (table.take("feed_mm_min"), table.take("feed_deg_min"));
+    match (context.machine.axes[axis].kind, mm, deg) {
+        (_, Some(_), Some(deg)) => Err(deg.error("both `feed_mm_min` and `feed_deg_min`", None)),
+        (AxisKind::Linear, Some(feed), None) => Ok(feed.positive()? / 60.0),
+        (AxisKind::Linear, None, None) => Ok(DEFAULT_FEED_MM_S),
+        (AxisKind::Linear, None, Some(deg)) => Err(deg.error("`feed_deg_min` for a linear axis", None)),
+        (AxisKind::Rotary, None, Some(deg)) => Ok(deg.positive()?.to_radians() / 60.0),
+        (AxisKind::Rotary, None, None) => Ok(DEFAULT_TURN_RAD_S),
+        (AxisKind::Rotary, Some(feed), None) => {
+            let feed_mm_s = feed.positive()? / 60.0;
+            let carried = match station {
+                Station::BallBar(bar) if axis < context.machine.workpiece_side => bar.workpiece_ball,
+                other => other.tool_point_mm(),
+            };
+            let radius = radius_about(&context.machine.axes[axis], carried);
+            if radius < 1e-3 {
+                let help = "give `feed_deg_min`";
+                return Err(feed.error(
+                    "`feed_mm_min` of a ball that lies on the axis it turns about",
+                    Some(help.into()),
+                ));
+            }
+            Ok(feed_mm_s / radius)
+        }
+    }
+}
+
+/// Distance of a point from an axis, all axes at zero.
+fn radius_about(axis: &crate::axis::Axis, point: [f64; 3]) -> f64 {
+    let from: [f64; 3] = std::array::from_fn(|i| point[i] - axis.origin_mm[i]);
+    let along: f64 = (0..3).map(|i| from[i] * axis.direction[i]).sum();
+    let square: f64 = from.iter().map(|x| x * x).sum::<f64>() - along * along;
+    square.max(0.0).sqrt()
+}
+
+/// `runs` and `both_directions`: once, there and back, unless said otherwise.
+fn repeats(table: &mut Table<'_>, steps: f64) -> Result<(usize, bool), ModelError> {
+    let both_directions = match table.take("both_directions") {
+        Some(value) => value.truth()?,
+        None => true,
+    };
+    let runs = match table.take("runs") {
+        Some(value) => {
+            let runs = value.count(1, MOST_READINGS)?;
+            if runs as f64 * (steps + 1.0) * 2.0 > MOST_READINGS as f64 {
+                return Err(value.error(
+                    format!("{runs} runs of {steps:.0} steps; {MOST_READINGS} readings is the most"),
+                    None,
+                ));
+            }
+            runs
+        }
+        None => 1,
+    };
+    Ok((runs, both_directions))
+}

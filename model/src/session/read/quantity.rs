@@ -1,0 +1,103 @@
+//! Quantities by the unit in their name, and axes by theirs.
+
+use crate::axis::AxisKind;
+use crate::chain::Machine;
+use crate::session::spelling::nearest;
+
+/// µm in mm.
+pub(crate) const MICROMETRE: f64 = 1e-3;
+
+/// `linear` or `rotary`.
+pub(crate) fn kind_word(kind: AxisKind) -> &'static str {
+    match kind {
+        AxisKind::Linear => "linear",
+        AxisKind::Rotary => "rotary",
+    }
+}
+
+/// `mm` or `deg`: the unit of an axis in files.
+pub(crate) fn unit_word(kind: AxisKind) -> &'static str {
+    match kind {
+        AxisKind::Linear => "mm",
+        AxisKind::Rotary => "deg",
+    }
+}
+
+/// A position in mm or degrees, in the unit inside.
+pub(crate) fn inside(kind: AxisKind, value: f64) -> f64 {
+    match kind {
+        AxisKind::Linear => value,
+        AxisKind::Rotary => value.to_radians(),
+    }
+}
+
+/// A position in the unit inside, in mm or degrees.
+pub(crate) fn outside(kind: AxisKind, value: f64) -> f64 {
+    match kind {
+        AxisKind::Linear => value,
+        AxisKind::Rotary => value.to_degrees(),
+    }
+}
+
+/// The axis of this name; by another case of the letters where that leaves no doubt.
+pub(crate) fn axis_index(machine: &Machine, name: &str) -> Option<usize> {
+    if let Some(index) = machine.axis_index(name) {
+        return Some(index);
+    }
+    let lower = name.to_lowercase();
+    let mut alike = (0..machine.axes.len()).filter(|&index| machine.axes[index].name.to_lowercase() == lower);
+    alike.next().filter(|_| alike.next().is_none())
+}
+
+/// That the machine has no such axis, with the one that may be meant.
+pub(crate) fn no_axis(machine: &Machine, name: &str) -> (String, String) {
+    let names: Vec<&str> = machine.axes.iter().map(|axis| axis.name.as_str()).collect();
+    let near = nearest(name, &names).map_or(String::new(), |near| format!("did you mean `{near}`? "));
+    (
+        format!("the machine \"{}\" has no axis `{name}`", machine.name),
+        format!("{near}its axes are {}", names.join(", ")),
+    )
+}
+
+/// What an axis position called `x_mm`, `a_deg`, `J1_rad` is: the axis, and what a number is multiplied by.
+pub(crate) fn axis_position(machine: &Machine, name: &str) -> Option<(usize, Unit)> {
+    let (axis, unit) = name.rsplit_once('_')?;
+    let axis = axis_index(machine, axis)?;
+    let unit = match (machine.axes[axis].kind, unit) {
+        (AxisKind::Linear, "mm") | (AxisKind::Rotary, "rad") => Unit::Times(1.0),
+        (AxisKind::Linear, "um") => Unit::Times(MICROMETRE),
+        (AxisKind::Linear, "m") => Unit::Times(1e3),
+        (AxisKind::Rotary, "deg") => Unit::Degrees,
+        _ => return None,
+    };
+    Some((axis, unit))
+}
+
+/// How a number in a file becomes one inside.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) enum Unit {
+    /// Multiplied.
+    Times(f64),
+    /// From degrees.
+    Degrees,
+}
+
+impl Unit {
+    /// The number inside.
+    pub fn inside(self, value: f64) -> f64 {
+        match self {
+            Unit::Times(factor) => value * factor,
+            Unit::Degrees => value.to_radians(),
+        }
+    }
+
+    /// A length's unit: `mm`, `um`, `m`.
+    pub fn of_length(unit: &str) -> Option<Unit> {
+        match unit {
+            "mm" => Some(Unit::Times(1.0)),
+            "um" => Some(Unit::Times(MICROMETRE)),
+            "m" => Some(Unit::Times(1e3)),
+            _ => None,
+        }
+    }
+}

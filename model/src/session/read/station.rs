@@ -1,0 +1,174 @@
+//! The instrument as a test sets it up: nominal geometry, and what is known of it.
+
+use super::Context;
+use super::quantity::MICROMETRE;
+use crate::error::ModelError;
+use crate::instrument::ballbar::BallBar;
+use crate::instrument::socket::Socket;
+use crate::instrument::tracker::Tracker;
+use crate::instrument::{InstrumentKind, Station};
+use crate::session::Prior;
+use crate::session::document::{Table, Value};
+use crate::session::expression::Length;
+
+/// A test's instrument.
+pub(super) struct SetUp {
+    pub station: Station<f64>,
+    pub geometry: Station<Length>,
+    pub priors: Vec<Prior>,
+    pub socket: Option<String>,
+}
+
+/// Keys of a test that only one instrument has.
+const OWN: [(InstrumentKind, &[&str]); 3] = [
+    (
+        InstrumentKind::BallBar,
+        &[
+            "bar_mm",
+            "bar_u_um",
+            "workpiece_ball_mm",
+            "workpiece_ball_u_um",
+            "spindle_ball_mm",
+            "spindle_ball_u_um",
+            "bar_setup",
+        ],
+    ),
+    (InstrumentKind::Tracker, &["target_mm", "target_u_um"]),
+    (InstrumentKind::Socket, &["ball_mm", "ball_u_um", "socket"]),
+];
+
+/// Takes the instrument's keys out of a test.
+pub(super) fn set_up(context: &Context<'_>, table: &mut Table<'_>) -> Result<SetUp, ModelError> {
+    for (kind, keys) in OWN {
+        if kind == context.instrument {
+            continue;
+        }
+        for key in keys {
+            if let Some(value) = table.take(key) {
+                let message = format!(
+                    "`{key}` belongs to a {}; this session's instrument is a {}",
+                    kind.word(),
+                    context.instrument.word()
+                );
+                return Err(value.source.error(value.key_span.clone(), message, None));
+            }
+        }
+    }
+    match context.instrument {
+        InstrumentKind::BallBar => ball_bar(context, table),
+        InstrumentKind::Tracker => tracker(context, table),
+        InstrumentKind::Socket => socket(context, table),
+    }
+}
+
+fn ball_bar(context: &Context<'_>, table: &mut Table<'_>) -> Result<SetUp, ModelError> {
+    let bar = table.need("bar_mm", "the calibrated length of the bar")?;
+    let (bar_as_written, bar_mm) = context.length(&bar)?;
+    if bar_mm <= 0.0 {
+        return Err(bar.error(format!("`bar_mm` is {bar_mm}; a bar has a length above 0"), None));
+    }
+    let workpiece = table.need(
+        "workpiece_ball_mm",
+        "the workpiece ball in the table frame, as [0, 100, 0]",
+    )?;
+    let spindle = table.need(
+        "spindle_ball_mm",
+        "the spindle ball in the tool frame, as [0, 0, 0]",
+    )?;
+    let (workpiece, workpiece_mm) = context.point(workpiece)?;
+    let (spindle, spindle_mm) = context.point(spindle)?;
+    let mut priors = priors(table.take("workpiece_ball_u_um"), 3)?;
+    priors.extend(self::priors(table.take("spindle_ball_u_um"), 3)?);
+    priors.extend(self::priors(table.take("bar_u_um"), 1)?);
+    priors.push(Prior::Known); // the sensor's gain
+    Ok(SetUp {
+        station: Station::BallBar(BallBar {
+            workpiece_ball: workpiece_mm,
+            spindle_ball: spindle_mm,
+            bar: bar_mm,
+        }),
+        geometry: Station::BallBar(BallBar {
+            workpiece_ball: workpiece,
+            spindle_ball: spindle,
+            bar: bar_as_written,
+        }),
+        priors,
+        socket: None,
+    })
+}
+
+fn tracker(context: &Context<'_>, table: &mut Table<'_>) -> Result<SetUp, ModelError> {
+    let target = table.need("target_mm", "the target in the tool frame")?;
+    let (target, target_mm) = context.point(target)?;
+    let mut priors = vec![Prior::Free; 6];
+    priors.extend(self::priors(table.take("target_u_um"), 3)?);
+    let identity = |zero: f64, one: f64| [[one, zero, zero], [zero, one, zero], [zero, zero, one]];
+    Ok(SetUp {
+        station: Station::Tracker(Tracker {
+            target: target_mm,
+            rotation: identity(0.0, 1.0),
+            origin: [0.0; 3],
+        }),
+        geometry: Station::Tracker(Tracker {
+            target,
+            rotation: identity(0.0, 1.0).map(|row| row.map(Length::Number)),
+            origin: [const { Length::Number(0.0) }; 3],
+        }),
+        priors,
+        socket: None,
+    })
+}
+
+fn socket(context: &Context<'_>, table: &mut Table<'_>) -> Result<SetUp, ModelError> {
+    let ball = table.need("ball_mm", "the ball in the tool frame")?;
+    let (ball, ball_mm) = context.point(ball)?;
+    let mut priors = vec![Prior::Free; 3];
+    priors.extend(self::priors(table.take("ball_u_um"), 3)?);
+    let socket = match table.take("socket") {
+        Some(value) => Some(value.text()?),
+        None => None,
+    };
+    Ok(SetUp {
+        station: Station::Socket(Socket {
+            ball: ball_mm,
+            socket: [0.0; 3],
+        }),
+        geometry: Station::Socket(Socket {
+            ball,
+            socket: [const { Length::Number(0.0) }; 3],
+        }),
+        priors,
+        socket,
+    })
+}
+
+/// `…_u_um`: a number for all coordinates or a list with one for each. Absent or 0 is known, `inf` is free.
+fn priors(value: Option<Value<'_>>, count: usize) -> Result<Vec<Prior>, ModelError> {
+    let Some(value) = value else {
+        return Ok(vec![Prior::Known; count]);
+    };
+    if !value.is_list() {
+        return Ok(vec![prior(&value)?; count]);
+    }
+    if count == 1 {
+        return Err(value.unlike("a number"));
+    }
+    let items = value.three("a number or a list of three")?;
+    items.iter().map(prior).collect()
+}
+
+fn prior(value: &Value<'_>) -> Result<Prior, ModelError> {
+    let u = value.number_or_inf("a number or `inf`")?;
+    if u < 0.0 {
+        let message = format!("`{}` is {u}; an uncertainty cannot be negative", value.key);
+        let help = "0 says exactly known, `inf` says not known at all";
+        return Err(value.error(message, Some(help.into())));
+    }
+    Ok(if u == 0.0 {
+        Prior::Known
+    } else if u.is_infinite() {
+        Prior::Free
+    } else {
+        Prior::Gaussian(u * MICROMETRE)
+    })
+}

@@ -1,0 +1,223 @@
+//! `[[test]]`: one test, or one for each socket that its data name.
+
+use std::path::{Path, PathBuf};
+
+use super::station::{self, SetUp};
+use super::{Context, Declared, layout, movement, quantity};
+use crate::error::ModelError;
+use crate::instrument::InstrumentKind;
+use crate::session::document::{Table, Value};
+use crate::session::motion::{self, Motion};
+use crate::session::readings::Readings;
+use crate::session::table::{self, Request};
+use crate::session::{Test, reach};
+
+/// The name of a test, unlike every other.
+pub(super) fn name(table: &mut Table<'_>, declared: &[Declared]) -> Result<String, ModelError> {
+    let value = table.need("name", "a name that no other test has")?;
+    let name = value.text()?;
+    if name.trim().is_empty() {
+        return Err(value.error("a test without a name", Some("give it one".into())));
+    }
+    if declared.iter().any(|test| test.name == name) {
+        let message = format!("two tests are called \"{name}\"");
+        let help = "results name parameters by test: give each its own name";
+        return Err(value.error(message, Some(help.into())));
+    }
+    table.name = format!("test \"{name}\"");
+    Ok(name)
+}
+
+/// Reads one `[[test]]` and its data.
+pub(super) fn tests(
+    context: &Context<'_>,
+    name: &str,
+    mut table: Table<'_>,
+    warnings: &mut Vec<String>,
+) -> Result<Vec<Test>, ModelError> {
+    let SetUp {
+        station,
+        geometry,
+        priors,
+        socket,
+    } = station::set_up(context, &mut table)?;
+    let mut group = |key: &'static str, default: &str| match table.take(key) {
+        Some(value) => value.text(),
+        None => Ok(default.to_string()),
+    };
+    let setup = group("setup", name)?;
+    // The ball at a robot's flange stays there from socket to socket; a ball in a spindle is mounted for each test.
+    let spindle_setup = match context.instrument {
+        InstrumentKind::Socket => group("spindle_setup", "tool")?,
+        _ => group("spindle_setup", name)?,
+    };
+    let bar_setup = match context.instrument {
+        InstrumentKind::BallBar => group("bar_setup", name)?,
+        _ => name.to_string(),
+    };
+    let (mut at, listed) = at(context, &mut table)?;
+    let format = match table.take("format") {
+        Some(value) => layout::format(value.table(format!("[test.format] of \"{name}\""))?)?,
+        None => context.format,
+    };
+    let columns = match table.take("columns") {
+        Some(value) => Some(layout::columns(
+            value.table(format!("[test.columns] of \"{name}\""))?,
+        )?),
+        None => context.columns.clone(),
+    };
+    let (sweep, path) = (table.take("sweep"), table.take("path"));
+    let motion = match (sweep, path) {
+        (Some(_), Some(path)) => {
+            let help = "a test moves one axis (`sweep`) or several together (`path`)";
+            return Err(path.source.error(
+                path.key_span.clone(),
+                format!("test \"{name}\" has both `sweep` and `path`"),
+                Some(help.into()),
+            ));
+        }
+        (Some(sweep), None) => Some(movement::sweep(context, sweep, &station)?),
+        (None, Some(path)) => Some(movement::path(context, path, &station)?),
+        (None, None) => None,
+    };
+    let data = table.take("data");
+    if data.is_none() && matches!(motion, None | Some(Motion::List)) {
+        let help = "add `data = \"….csv\"`, or how the axes are to move: `sweep = { … }` or `path = { … }`";
+        return Err(table.error(
+            format!("test \"{name}\" has neither data nor a movement"),
+            Some(help.into()),
+        ));
+    }
+    let span = table.span.clone();
+    let source = table.source;
+    table.finish()?;
+    motion::stand(context.machine, &station, motion.as_ref(), &listed, &mut at);
+
+    let mut test = Test {
+        name: name.to_string(),
+        station,
+        geometry,
+        priors,
+        setup,
+        spindle_setup,
+        bar_setup,
+        socket,
+        motion,
+        at,
+        readings: None,
+    };
+    let here = |(message, help): (String, String)| source.error(span.clone(), message, Some(help));
+    let Some(data) = data else {
+        let planned = motion::checked_plan(context.machine, &test).map_err(here)?;
+        reach::check(context.machine, &test, &planned).map_err(here)?;
+        return Ok(vec![test]);
+    };
+    if !context.options.read_data {
+        return Ok(vec![test]);
+    }
+    let file = data_file(context, &data)?;
+    let request = Request {
+        machine: context.machine,
+        instrument: context.instrument,
+        bar_mm: reach::bar_mm(&test.station),
+        format,
+        columns: columns.as_deref(),
+        at: &test.at,
+        at_listed: &listed,
+        moved: &motion::moved(test.motion.as_ref()),
+        socket: test.socket.as_deref(),
+    };
+    let mut tests = Vec::new();
+    for (socket, readings) in table::read(&file, &request)? {
+        check_readings(context, &test, &readings, warnings).map_err(here)?;
+        let Some(socket) = socket else {
+            test.readings = Some(readings);
+            return Ok(vec![test]);
+        };
+        if test.socket.is_some() {
+            return Err(here((
+                format!("test \"{name}\" names a socket, and so does a column of its data"),
+                "keep one of them".into(),
+            )));
+        }
+        tests.push(Test {
+            name: format!("{name}/{socket}"),
+            socket: Some(socket),
+            readings: Some(readings),
+            ..test.clone()
+        });
+    }
+    Ok(tests)
+}
+
+/// What measured readings say about the set-up that was declared.
+fn check_readings(
+    context: &Context<'_>,
+    test: &Test,
+    readings: &Readings,
+    warnings: &mut Vec<String>,
+) -> Result<(), (String, String)> {
+    reach::check(context.machine, test, readings)?;
+    reach::check_lengths(test, readings)?;
+    warnings.extend(
+        motion::beyond_travel(context.machine, readings)
+            .map(|beyond| format!("test \"{}\": {beyond}; the data are used as they are", test.name)),
+    );
+    Ok(())
+}
+
+/// `at = { x_mm = 0, … }`: where axes stand, and which of them are stated.
+fn at(context: &Context<'_>, table: &mut Table<'_>) -> Result<(Vec<f64>, Vec<bool>), ModelError> {
+    let machine = context.machine;
+    let mut at = vec![0.0; machine.axes.len()];
+    let mut listed = vec![false; machine.axes.len()];
+    let Some(value) = table.take("at") else {
+        return Ok((at, listed));
+    };
+    for entry in value.table("`at`".into())?.take_all() {
+        let Some((axis, unit)) = quantity::axis_position(machine, &entry.key) else {
+            let known: Vec<String> = machine
+                .axes
+                .iter()
+                .map(|axis| format!("{}_{}", axis.name.to_lowercase(), quantity::unit_word(axis.kind)))
+                .collect();
+            let message = format!("`at` knows no position `{}`", entry.key);
+            let help = format!("known: {}", known.join(", "));
+            return Err(entry.source.error(entry.key_span.clone(), message, Some(help)));
+        };
+        if listed[axis] {
+            let message = format!("`at` says twice where axis `{}` stands", machine.axes[axis].name);
+            return Err(entry.source.error(entry.key_span.clone(), message, None));
+        }
+        let (_, number) = context.length(&entry)?;
+        at[axis] = unit.inside(number);
+        listed[axis] = true;
+    }
+    Ok((at, listed))
+}
+
+/// The data file: where `--data` points, else beside the session file.
+fn data_file(context: &Context<'_>, data: &Value<'_>) -> Result<PathBuf, ModelError> {
+    let named = data.text()?;
+    let beside = context.file.parent().unwrap_or(Path::new("")).join(&named);
+    let elsewhere = context
+        .options
+        .data_directory
+        .as_ref()
+        .map(|folder| folder.join(&named));
+    if let Some(found) = elsewhere.iter().chain([&beside]).find(|file| file.exists()) {
+        return Ok(found.clone());
+    }
+    let (looked, help) = match &elsewhere {
+        Some(elsewhere) => (
+            format!("{} and {}", elsewhere.display(), beside.display()),
+            "check that `--data` names the folder that `data` starts from",
+        ),
+        None => (
+            beside.display().to_string(),
+            "name the folder with `--data DIR` if the data do not lie beside the session file",
+        ),
+    };
+    let message = format!("the data file `{named}` is not there; looked for {looked}");
+    Err(data.error(message, Some(help.into())))
+}

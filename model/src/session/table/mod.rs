@@ -1,0 +1,257 @@
+//! Tables of readings: CSV files of our own, and other people's through `[format]` and `[columns]`.
+//!
+//! A header line, then a row a reading; `#` begins a comment line; empty lines, a byte order mark and CRLF do no harm. What is wrong
+//! is told with file, line and column.
+
+mod columns;
+mod rows;
+
+use std::path::Path;
+
+pub(crate) use columns::{Mapped, Theirs};
+
+use columns::{Column, Role};
+use rows::Rows;
+
+use crate::chain::Machine;
+use crate::error::{ModelError, Place};
+use crate::instrument::InstrumentKind;
+use crate::session::readings::Readings;
+
+/// How a file writes its rows.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct Format {
+    /// Between cells.
+    pub separator: u8,
+    /// `.` or `,`.
+    pub decimal: u8,
+    /// Whether the first row names the columns.
+    pub header: bool,
+}
+
+impl Default for Format {
+    fn default() -> Self {
+        Format {
+            separator: b',',
+            decimal: b'.',
+            header: true,
+        }
+    }
+}
+
+/// What a test wants from its data file.
+pub(crate) struct Request<'a> {
+    /// The machine whose axes the columns name.
+    pub machine: &'a Machine,
+    /// What read.
+    pub instrument: InstrumentKind,
+    /// What a deviation is counted from, mm.
+    pub bar_mm: f64,
+    /// How the rows are written.
+    pub format: Format,
+    /// Foreign names, where declared.
+    pub columns: Option<&'a [Mapped]>,
+    /// Where axes stand that the data do not list, mm or rad.
+    pub at: &'a [f64],
+    /// Which of them the test states.
+    pub at_listed: &'a [bool],
+    /// Axes that move in the test as planned.
+    pub moved: &'a [usize],
+    /// The socket of all poses, where the test states one.
+    pub socket: Option<&'a str>,
+}
+
+/// Readings of one data file: one for each socket that it names, else one.
+pub(crate) type BySocket = Vec<(Option<String>, Readings)>;
+
+/// Reads a data file.
+///
+/// # Errors
+/// Anything that is not a finite number where one is expected, with file, line and column; missing or unknown columns; time that
+/// runs backwards; fewer than two readings.
+pub(crate) fn read(file: &Path, request: &Request<'_>) -> Result<BySocket, ModelError> {
+    let mut rows = Rows::open(file, request.format)?;
+    let empty = |what: &str| ModelError::Input {
+        place: Place::file(file),
+        message: format!("an empty data file: {what}"),
+        help: Some("check that the measurement was exported".into()),
+    };
+    let Some(first) = rows.next_row()? else {
+        return Err(empty("no header and no readings"));
+    };
+    let width = first.cells.len();
+    let header = request.format.header.then(|| first.cells.clone());
+    let columns = columns::columns(request, file, first.line, header.as_deref(), width)?;
+    let mut filled = Filled::new(request, file, columns);
+    if header.is_none() {
+        filled.push(&first)?;
+    }
+    while let Some(row) = rows.next_row()? {
+        if row.cells.len() != width {
+            return Err(wrong_width(file, &row, width, request.format));
+        }
+        filled.push(&row)?;
+    }
+    match filled.readings.line.len() {
+        0 => Err(empty("a header without readings")),
+        1 => Err(ModelError::Input {
+            place: Place::line(file, filled.readings.line[0]),
+            message: "one reading; nothing can be fitted to a single reading".into(),
+            help: Some("a test needs at least two readings, and as many as its unknowns in all".into()),
+        }),
+        _ => Ok(filled.by_socket()),
+    }
+}
+
+fn wrong_width(file: &Path, row: &rows::Row, width: usize, format: Format) -> ModelError {
+    let found = row.cells.len();
+    let cells = |n: usize| format!("{n} cell{}", if n == 1 { "" } else { "s" });
+    let help = if format.separator == b',' && found > width {
+        "a decimal comma in a file separated by commas cannot be told from a separator: export it with another \
+         separator and declare `[format] separator = \";\", decimal = \",\"`"
+    } else {
+        "complete the row or remove it"
+    };
+    ModelError::Input {
+        place: Place::line(file, row.line),
+        message: format!("a row of {} where the file has {width} columns", cells(found)),
+        help: Some(help.into()),
+    }
+}
+
+/// The columns as they fill.
+struct Filled<'a> {
+    request: &'a Request<'a>,
+    columns: Vec<Column>,
+    readings: Readings,
+    /// The socket of each row, as an index into `sockets`.
+    socket: Vec<usize>,
+    sockets: Vec<String>,
+}
+
+impl<'a> Filled<'a> {
+    fn new(request: &'a Request<'a>, file: &Path, columns: Vec<Column>) -> Self {
+        Filled {
+            request,
+            columns,
+            readings: Readings {
+                file: file.to_path_buf(),
+                positions: vec![Vec::new(); request.machine.axes.len()],
+                coordinates: request.instrument.coordinates(),
+                ..Readings::default()
+            },
+            socket: Vec::new(),
+            sockets: Vec::new(),
+        }
+    }
+
+    fn push(&mut self, row: &rows::Row) -> Result<(), ModelError> {
+        let readings = &mut self.readings;
+        let mut observed = [0.0; 3];
+        for (positions, &at) in readings.positions.iter_mut().zip(self.request.at) {
+            positions.push(at);
+        }
+        for column in &self.columns {
+            let cell = row.cells[column.index].as_str();
+            if column.role == Role::Socket {
+                let known = self.sockets.iter().position(|socket| socket == cell);
+                self.socket.push(known.unwrap_or(self.sockets.len()));
+                if known.is_none() {
+                    self.sockets.push(cell.to_string());
+                }
+                continue;
+            }
+            let fault = |message: String, help: &str| ModelError::Input {
+                place: Place {
+                    span: row.span(column.index),
+                    ..Place::line(&readings.file, row.line)
+                },
+                message: format!("column {} (`{}`): {message}", column.index + 1, column.name),
+                help: Some(help.to_string()),
+            };
+            let value = number(cell, self.request.format).map_err(|(message, help)| fault(message, help))?;
+            match column.role {
+                Role::Time => {
+                    if let Some(&before) = readings.time_s.last()
+                        && value < before
+                    {
+                        return Err(fault(
+                            format!("time runs backwards: {value} s after {before} s on the row before"),
+                            "sort the rows by time, or leave the time column out of [columns] if it means nothing",
+                        ));
+                    }
+                    readings.time_s.push(value);
+                }
+                Role::Run => {
+                    if value.fract() != 0.0 || value.abs() > 1e9 {
+                        return Err(fault(
+                            format!("`{cell}` numbers no run"),
+                            "runs are numbered by whole numbers, one for each traversal in one direction",
+                        ));
+                    }
+                    readings.run.push(value as i64);
+                }
+                Role::Temperature => readings.temperature_c.push(value),
+                Role::Axis(axis, unit) => {
+                    if let Some(place) = readings.positions[axis].last_mut() {
+                        *place = unit.inside(value);
+                    }
+                }
+                Role::Length(unit) => observed[0] = unit.inside(value),
+                Role::Deviation(unit) => observed[0] = self.request.bar_mm + unit.inside(value),
+                Role::Coordinate(i, unit) => observed[i] = unit.inside(value),
+                Role::Socket => {}
+            }
+        }
+        readings.line.push(row.line);
+        readings.observed.extend(&observed[..readings.coordinates]);
+        Ok(())
+    }
+
+    /// The readings, parted by socket where a column names it.
+    fn by_socket(self) -> BySocket {
+        if self.sockets.is_empty() {
+            return vec![(None, self.readings)];
+        }
+        let all = &self.readings;
+        self.sockets
+            .into_iter()
+            .enumerate()
+            .map(|(index, name)| {
+                let rows: Vec<usize> = (0..self.socket.len())
+                    .filter(|&row| self.socket[row] == index)
+                    .collect();
+                (Some(name), all.of_rows(&rows))
+            })
+            .collect()
+    }
+}
+
+/// A finite number in a cell, or what is wrong with it and what to do.
+fn number(cell: &str, format: Format) -> Result<f64, (String, &'static str)> {
+    const NUMBER: &str = "put a number there or remove the row";
+    if cell.is_empty() {
+        return Err(("an empty cell where a number is expected".into(), NUMBER));
+    }
+    let parsed = if format.decimal == b',' {
+        if cell.contains('.') {
+            return Err((
+                format!("`{cell}` has a decimal point where `decimal = \",\"` is declared"),
+                "declare what the file uses",
+            ));
+        }
+        cell.replace(',', ".").parse::<f64>()
+    } else {
+        cell.parse::<f64>()
+    };
+    match parsed {
+        Ok(value) if value.is_finite() => Ok(value),
+        Ok(value) if value.is_nan() => Err((format!("`{cell}` is not a number (NaN)"), NUMBER)),
+        Ok(_) => Err((format!("`{cell}` is infinite or too large"), NUMBER)),
+        Err(_) if cell.replacen(',', ".", 1).parse::<f64>().is_ok() => Err((
+            format!("`{cell}` has a decimal comma, which is not declared"),
+            "declare `[format] decimal = \",\"`",
+        )),
+        Err(_) => Err((format!("`{cell}` is not a number"), NUMBER)),
+    }
+}

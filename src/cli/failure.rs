@@ -1,0 +1,67 @@
+//! Errors as a user sees them: what, where, what to do; the line of the file shown where one is meant.
+
+use abbe::identify::IdentifyError;
+use abbe::model::ModelError;
+
+/// Why a command could not do its work.
+#[derive(Debug, thiserror::Error)]
+pub enum Failure {
+    /// Input.
+    #[error(transparent)]
+    Model(#[from] ModelError),
+    /// Identification.
+    #[error(transparent)]
+    Identify(IdentifyError),
+    /// A file that cannot be written.
+    #[error("{path}: cannot be written: {source}")]
+    Write {
+        /// The file.
+        path: String,
+        /// Why.
+        source: std::io::Error,
+    },
+    /// Anything else.
+    #[error("{0}")]
+    Other(String),
+}
+
+impl From<IdentifyError> for Failure {
+    fn from(error: IdentifyError) -> Self {
+        match error {
+            IdentifyError::Model(error) => Failure::Model(error),
+            other => Failure::Identify(other),
+        }
+    }
+}
+
+impl Failure {
+    /// Writes the message to standard error.
+    pub fn show(&self) {
+        if let Failure::Model(ModelError::Input { place, message, help }) = self
+            && let Some(span) = &place.span
+            && let Ok(source) = std::fs::read_to_string(&place.file)
+            && span.end <= source.len()
+        {
+            use ariadne::{Config, IndexType, Label, Report, ReportKind, Source};
+            let name = place.file.display().to_string();
+            let mut report = Report::build(ReportKind::Error, (name.clone(), span.clone()))
+                .with_config(
+                    Config::default()
+                        .with_index_type(IndexType::Byte)
+                        .with_color(false),
+                )
+                .with_message(format!("{place}: {message}"))
+                .with_label(Label::new((name.clone(), span.clone())).with_message("here"));
+            if let Some(help) = help {
+                report = report.with_help(help);
+            }
+            if report.finish().eprint((name, Source::from(source))).is_ok() {
+                return;
+            }
+        }
+        eprintln!("error: {self}");
+        if let Failure::Model(ModelError::Input { help: Some(help), .. }) = self {
+            eprintln!("  help: {help}");
+        }
+    }
+}

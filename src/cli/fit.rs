@@ -1,0 +1,108 @@
+//! `abbe fit`.
+
+use abbe::identify::results::{FitResult, ParameterResult, Unobservable};
+use clap::Args;
+
+use super::failure::Failure;
+use super::{CommonArguments, SessionArguments, output, read_session, table};
+
+/// `abbe fit SESSION`
+#[derive(Args)]
+pub struct FitArguments {
+    #[command(flatten)]
+    session: SessionArguments,
+    #[command(flatten)]
+    common: CommonArguments,
+}
+
+/// Runs `abbe fit`.
+pub fn run(arguments: &FitArguments) -> Result<(), Failure> {
+    let session = read_session(&arguments.session)?;
+    let (problem, fit) = abbe::identify::fit::prepare(&session, arguments.common.seed)?;
+    let result = abbe::identify::fit::report(&problem, &fit);
+    print(&result);
+    if let Some(path) = &arguments.common.json {
+        output::write_json(path, &result)?;
+    }
+    Ok(())
+}
+
+fn print(result: &FitResult) {
+    println!(
+        "{} readings, noise {} ({})",
+        result.readings,
+        table::micrometres(result.noise_um),
+        result.noise_source
+    );
+    println!(
+        "residual {}, held out {} (leaving out {})",
+        table::micrometres(result.rms_um),
+        table::micrometres(result.heldout_rms_um),
+        result.heldout_by
+    );
+    if let (Some(rms), Some(held)) = (result.rms_3d_um, result.heldout_rms_3d_um) {
+        println!(
+            "length of the 3-vector: residual {}, held out {}",
+            table::micrometres(rms),
+            table::micrometres(held)
+        );
+    }
+    println!(
+        "{} of {} unknowns or combinations of them are seen",
+        result.rank, result.unknowns
+    );
+    println!();
+    print_parameters(&result.parameters);
+    print_unobservable(&result.unobservable);
+    if !result.rejected.is_empty() {
+        println!("\nLeft out as wild:");
+        for reading in &result.rejected {
+            println!(
+                "  {} {}:{}  residual {}",
+                reading.test,
+                reading.file,
+                reading.line,
+                table::micrometres(reading.residual_um)
+            );
+        }
+    }
+    print_warnings(&result.warnings);
+}
+
+/// The table of identified parameters.
+pub fn print_parameters(parameters: &[ParameterResult]) {
+    let rows: Vec<Vec<String>> = parameters
+        .iter()
+        .map(|p| {
+            let (value, u) = table::value_and_u(p.value, p.u);
+            vec![p.id.clone(), value, u, p.unit.clone()]
+        })
+        .collect();
+    table::print(&["parameter", "value", "u (k=1)", "unit"], &rows);
+}
+
+/// What cannot be seen, in words.
+pub fn print_unobservable(unobservable: &[Unobservable]) {
+    if unobservable.is_empty() {
+        return;
+    }
+    println!("\nNot seen by these readings:");
+    for item in unobservable {
+        let terms: Vec<String> = item
+            .combination
+            .iter()
+            .map(|(id, value)| format!("{id} {value:.4}"))
+            .collect();
+        println!("  {}", item.why);
+        if terms.len() > 1 {
+            println!("    {}", terms.join(" : "));
+        }
+    }
+}
+
+/// Named warnings, on standard error.
+pub fn print_warnings(warnings: &[String]) {
+    for warning in warnings {
+        eprintln!("warning: {warning}");
+    }
+}

@@ -1,0 +1,87 @@
+//! Arguments, progress, tables: what stands between a user and the library. No mathematics.
+
+mod failure;
+mod fit;
+mod output;
+mod table;
+mod trace;
+
+use std::path::PathBuf;
+use std::process::ExitCode;
+
+use clap::{Args, Parser, Subcommand};
+
+use failure::Failure;
+
+/// Geometric errors of machine tools and other serial chains: what tests can see, how large errors are, and what a model still lacks.
+#[derive(Parser)]
+#[command(name = "abbe", version, max_term_width = 110, after_help = EXAMPLES)]
+struct Arguments {
+    #[command(subcommand)]
+    command: Command,
+}
+
+const EXAMPLES: &str = "Examples:
+  abbe trace sessions/hermle-c600u/measured.toml
+  abbe fit sessions/ur10/session.toml --data ../data --json fit.json";
+
+#[derive(Subcommand)]
+enum Command {
+    /// Identify errors from readings, with uncertainties.
+    #[command(after_help = "Example:\n  abbe fit sessions/hermle-c600u/measured.toml --json fit.json")]
+    Fit(fit::FitArguments),
+    /// Close the loop: trace what the fit leaves over to the effect that the model lacks.
+    #[command(
+        after_help = "Example:\n  abbe trace sessions/hermle-c600u/measured/session.toml --json trace.json --write next.toml"
+    )]
+    Trace(trace::TraceArguments),
+}
+
+/// What every command that reads a session takes.
+#[derive(Args, Clone)]
+pub struct SessionArguments {
+    /// The session file.
+    session: PathBuf,
+    /// Where the data files lie when they do not lie beside the session file.
+    #[arg(long, value_name = "DIR")]
+    data: Option<PathBuf>,
+}
+
+/// What every command takes.
+#[derive(Args, Clone)]
+pub struct CommonArguments {
+    /// Write the result as JSON.
+    #[arg(long, value_name = "FILE")]
+    json: Option<PathBuf>,
+    /// Say nothing but the result.
+    #[arg(short, long)]
+    quiet: bool,
+    /// Seed of everything that is drawn: folds, null draws, simulated noise.
+    #[arg(long, value_name = "N", default_value_t = 1)]
+    seed: u64,
+}
+
+/// Runs the command line; the exit status.
+pub fn run() -> ExitCode {
+    let arguments = Arguments::parse();
+    let outcome = match arguments.command {
+        Command::Fit(arguments) => fit::run(&arguments),
+        Command::Trace(arguments) => trace::run(&arguments),
+    };
+    match outcome {
+        Ok(()) => ExitCode::SUCCESS,
+        Err(failure) => {
+            failure.show();
+            ExitCode::from(1)
+        }
+    }
+}
+
+/// Reads the session that the arguments name.
+fn read_session(arguments: &SessionArguments) -> Result<abbe::model::session::Session, Failure> {
+    let options = abbe::model::session::read::ReadOptions {
+        data_directory: arguments.data.clone(),
+        read_data: true,
+    };
+    Ok(abbe::model::session::read::session(&arguments.session, &options)?)
+}

@@ -1,0 +1,31 @@
+//! Files that are written whole or not at all.
+
+use std::io::Write;
+use std::path::Path;
+
+use super::failure::Failure;
+
+/// Writes a file through a temporary one beside it, so that a reader finds the old file or the whole new one.
+pub fn write_whole(path: &Path, contents: &[u8]) -> Result<(), Failure> {
+    let fault = |source| Failure::Write {
+        path: path.display().to_string(),
+        source,
+    };
+    let folder = match path.parent() {
+        Some(folder) if !folder.as_os_str().is_empty() => folder,
+        _ => Path::new("."),
+    };
+    let mut file = tempfile::NamedTempFile::new_in(folder).map_err(fault)?;
+    file.write_all(contents).map_err(fault)?;
+    file.as_file().sync_all().map_err(fault)?;
+    file.persist(path).map_err(|error| fault(error.error))?;
+    Ok(())
+}
+
+/// Writes a result as JSON.
+pub fn write_json<T: serde::Serialize>(path: &Path, result: &T) -> Result<(), Failure> {
+    let mut text = serde_json::to_string_pretty(result)
+        .map_err(|error| Failure::Other(format!("the result cannot be written as JSON: {error}")))?;
+    text.push('\n');
+    write_whole(path, text.as_bytes())
+}

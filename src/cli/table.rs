@@ -1,0 +1,50 @@
+//! Tables for people: aligned, with only the digits that mean something.
+
+/// Prints rows under a header; the first column to the left, the others to the right.
+pub fn print(header: &[&str], rows: &[Vec<String>]) {
+    let mut width: Vec<usize> = header.iter().map(|cell| cell.chars().count()).collect();
+    for row in rows {
+        for (w, cell) in width.iter_mut().zip(row) {
+            *w = (*w).max(cell.chars().count());
+        }
+    }
+    let line = |cells: &[String]| {
+        let mut text = String::from("  ");
+        for (column, cell) in cells.iter().enumerate() {
+            let padding = " ".repeat(width[column].saturating_sub(cell.chars().count()));
+            if column == 0 {
+                text.push_str(cell);
+                text.push_str(&padding);
+            } else {
+                text.push_str("  ");
+                text.push_str(&padding);
+                text.push_str(cell);
+            }
+        }
+        println!("{}", text.trim_end());
+    };
+    line(&header.iter().map(|cell| cell.to_string()).collect::<Vec<_>>());
+    for row in rows {
+        line(row);
+    }
+}
+
+/// Decimal places that a value with this standard uncertainty deserves: two digits of the uncertainty (JCGM 100, 7.2.6).
+fn places(u: f64) -> usize {
+    if !u.is_finite() || u <= 0.0 {
+        return 4;
+    }
+    (1.0 - u.log10().floor()).clamp(0.0, 12.0) as usize
+}
+
+/// A value and its uncertainty, rounded alike.
+pub fn value_and_u(value: f64, u: f64) -> (String, String) {
+    let places = places(u);
+    (format!("{value:.places$}"), format!("{u:.places$}"))
+}
+
+/// A residual or a noise figure in µm.
+pub fn micrometres(value_um: f64) -> String {
+    let places = if value_um >= 100.0 { 1 } else { 3 };
+    format!("{value_um:.places$} µm")
+}

@@ -1,0 +1,371 @@
+//! The families of effects that each kind of session can show, drawn at random or listed.
+
+use super::component::{AxisName, Cartesian, Component, Freedom};
+use super::effect::{Decay, Driver, Injected, Profile, Shape};
+use super::kind::Kind;
+use rand::{Rng, RngExt};
+
+/// A family of effects.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
+pub enum Family {
+    /// An error motion at orders 1 to 8, 17 or 36 of a rotary axis.
+    Harmonic,
+    /// An error motion as power of the axis' own position; scale and bow of a linear axis.
+    Polynomial,
+    /// A periodic error whose period divides nothing.
+    Periodic,
+    /// Lost motion, in any component.
+    Backlash,
+    /// A servo that is late.
+    Lag,
+    /// An axis that sticks when it reverses.
+    ReversalSpike,
+    /// A bump.
+    Local,
+    /// Steps of a compensation table.
+    Steps,
+    /// A location error, a ball or the bar that drifts with time.
+    Drift,
+    /// The same, coming to rest.
+    Warmup,
+    /// A bar that grows with temperature.
+    Temperature,
+    /// Something that gives under the weight on the table.
+    Gravity,
+    /// A location error of C that depends on A.
+    CrossAxis,
+    /// Squareness of Y to X.
+    Squareness,
+    /// A ball was moved between two tests that share its mount.
+    Remount,
+    /// The sensor's gain.
+    SensorGain,
+    /// The sensor is read late.
+    TriggerDelay,
+}
+
+impl Family {
+    /// The families that a kind of session may show. Whether it sees a member well enough is the oracle's to say.
+    pub fn of(kind: Kind) -> Vec<Family> {
+        use Family::*;
+        let always = [
+            Polynomial,
+            Periodic,
+            Backlash,
+            ReversalSpike,
+            Local,
+            Steps,
+            Drift,
+            Warmup,
+            Temperature,
+            Remount,
+        ];
+        let special: &[Family] = match kind {
+            Kind::Rotary => &[Harmonic, Gravity, CrossAxis],
+            Kind::TiltedTable => &[Harmonic, Gravity, CrossAxis],
+            // With a mount for each test there is nothing to remount between tests that share one.
+            Kind::Chapter4 | Kind::Chapter6 => &[Harmonic, Gravity],
+            Kind::LinearCircles => &[Lag, Squareness],
+            Kind::SquarenessCircles => &[Lag],
+            Kind::EccentricCircles => &[Lag, Squareness, SensorGain, TriggerDelay],
+            Kind::Simultaneous => &[Harmonic, Lag, Squareness],
+        };
+        always
+            .into_iter()
+            .filter(|family| kind != Kind::Chapter6 || *family != Remount)
+            .chain(special.iter().copied())
+            .collect()
+    }
+}
+
+/// A random effect of a random family that this kind of session may show, at unit amplitude.
+pub fn random_effect(kind: Kind, random: &mut impl Rng) -> Injected {
+    let families = Family::of(kind);
+    let family = pick(&families, random);
+    random_member(family, kind, random)
+}
+
+/// A random member of a family, at unit amplitude.
+pub fn random_member(family: Family, kind: Kind, random: &mut impl Rng) -> Injected {
+    let axis = pick(&kind.moving_axes(), random);
+    let own = Driver::Axis(axis);
+    let motion = Component::Motion(pick(&Freedom::ALL, random), axis);
+    let thermal = pick(&thermal_components(kind), random);
+    let phase_deg = 360.0 * random.random::<f64>();
+    let effect = |component, driver, shape| Injected::new(component, driver, shape, 1.0);
+    match family {
+        Family::Harmonic => {
+            let rotary: Vec<AxisName> = kind
+                .moving_axes()
+                .into_iter()
+                .filter(|axis| axis.is_rotary())
+                .collect();
+            let axis = pick(&rotary, random);
+            let order = pick(&[1, 2, 3, 4, 5, 6, 7, 8, 17, 36], random);
+            let component = Component::Motion(pick(&Freedom::ALL, random), axis);
+            effect(
+                component,
+                Driver::Axis(axis),
+                Shape::Harmonic { order, phase_deg },
+            )
+        }
+        Family::Polynomial => effect(
+            motion,
+            own,
+            Shape::Polynomial {
+                degree: pick(&[1, 2, 3], random),
+            },
+        ),
+        Family::Periodic => {
+            let period = period(kind, axis) * (1.0 + random.random::<f64>());
+            effect(motion, own, Shape::Periodic { period, phase_deg })
+        }
+        Family::Backlash => effect(motion, own, Shape::Backlash),
+        Family::Lag => effect(Component::Motion(axis.own_freedom(), axis), own, Shape::Lag),
+        Family::ReversalSpike => {
+            let decay = if random.random() {
+                Decay::Time(0.3 + 0.7 * random.random::<f64>())
+            } else {
+                Decay::Way(2.0 + 6.0 * random.random::<f64>())
+            };
+            effect(motion, own, Shape::ReversalSpike { decay })
+        }
+        Family::Local => {
+            let [low, high] = range(kind, axis);
+            let centre = low + (high - low) * (0.15 + 0.7 * random.random::<f64>());
+            let width = (high - low) * (0.03 + 0.05 * random.random::<f64>());
+            let profile = pick(&[Profile::Gaussian, Profile::RaisedCosine], random);
+            effect(
+                motion,
+                own,
+                Shape::Local {
+                    centre,
+                    width,
+                    profile,
+                },
+            )
+        }
+        Family::Steps => {
+            let [low, high] = range(kind, axis);
+            let count = pick(&[3, 4, 5], random);
+            let at = (0..count)
+                .map(|k| {
+                    low + (high - low) * (f64::from(k) + 0.2 + 0.6 * random.random::<f64>())
+                        / f64::from(count)
+                })
+                .collect();
+            let heights = (0..count)
+                .map(|_| pick(&[-1.0, 1.0], random) * (0.5 + random.random::<f64>()))
+                .collect();
+            effect(motion, own, Shape::Steps { at, heights })
+        }
+        Family::Drift => effect(thermal, Driver::Time, Shape::Drift),
+        Family::Warmup => {
+            let tau_s = if kind.moving_axes()[0].is_rotary() {
+                300.0
+            } else {
+                60.0
+            };
+            effect(
+                thermal,
+                Driver::Time,
+                Shape::Warmup {
+                    tau_s: tau_s * (0.5 + random.random::<f64>()),
+                },
+            )
+        }
+        Family::Temperature => effect(
+            Component::Bar,
+            Driver::Temperature,
+            Shape::Polynomial { degree: 1 },
+        ),
+        Family::Gravity => {
+            let freedom = pick(
+                &[Freedom::Y, Freedom::Z, Freedom::A, Freedom::B, Freedom::C],
+                random,
+            );
+            let component = Component::Motion(freedom, AxisName::A);
+            effect(component, Driver::Gravity, Shape::Polynomial { degree: 1 })
+        }
+        Family::CrossAxis => {
+            let freedom = pick(&[Freedom::X, Freedom::Y, Freedom::A, Freedom::B], random);
+            let component = Component::Location(freedom, AxisName::C);
+            let shape = if random.random() {
+                Shape::Polynomial {
+                    degree: pick(&[1, 2], random),
+                }
+            } else {
+                Shape::Harmonic {
+                    order: pick(&[1, 2], random),
+                    phase_deg,
+                }
+            };
+            effect(component, Driver::Axis(AxisName::A), shape)
+        }
+        Family::Squareness => effect(
+            Component::Location(Freedom::C, AxisName::Y),
+            Driver::Nothing,
+            Shape::Constant,
+        ),
+        Family::Remount => {
+            let tests = kind.tests(10.0);
+            let shared: Vec<usize> = (0..tests.len() - 1)
+                .filter(|k| tests[*k].setup == tests[k + 1].setup)
+                .collect();
+            let after_test = pick(&shared, random);
+            let letter = Cartesian(pick(&[0, 1, 2], random));
+            let component = pick(
+                &[Component::WorkpieceBall(letter), Component::SpindleBall(letter)],
+                random,
+            );
+            effect(component, Driver::Time, Shape::Remount { after_test })
+        }
+        Family::SensorGain => effect(Component::Sensor, Driver::Nothing, Shape::Constant),
+        Family::TriggerDelay => effect(Component::Trigger, Driver::Nothing, Shape::Constant),
+    }
+}
+
+/// Something that no entry of a sensible library explains, at unit amplitude: a harmonic that comes and goes with time, a chirp
+/// along a turn (which only a free curve follows), or plateaus with other levels in every test.
+pub fn outside_library(kind: Kind, random: &mut impl Rng) -> Injected {
+    let axis = *kind.moving_axes().last().unwrap_or(&AxisName::C);
+    let freedom = if axis.is_rotary() {
+        Freedom::X
+    } else {
+        axis.own_freedom()
+    };
+    let component = Component::Motion(freedom, axis);
+    let [low, high] = range(kind, axis);
+    let shape = match random.random_range(0..3) {
+        0 if axis.is_rotary() => Shape::Modulated {
+            order: random.random_range(4..8),
+            period_s: 150.0 + 150.0 * random.random::<f64>(),
+        },
+        1 if axis.is_rotary() => Shape::Chirp {
+            cycles: 8.3 + 5.0 * random.random::<f64>(),
+        },
+        _ => Shape::Plateaus {
+            edges: (1..8)
+                .map(|k| low + (high - low) * (f64::from(k) + 0.4 * random.random::<f64>()) / 8.4)
+                .collect(),
+            levels: (0..8).map(|_| 2.0 * random.random::<f64>() - 1.0).collect(),
+            sharpness: 25.0 / (high - low),
+        },
+    };
+    Injected::new(component, Driver::Axis(axis), shape, 1.0)
+}
+
+/// Everything of the plant that a kind of session could take for `like`, at unit amplitude: all components of all moving axes with
+/// harmonics, polynomials, backlash and lag; location errors, balls and bar that drift, warm up, are remounted; constants; and where
+/// `like` has a shape with places or periods, that shape in every other component too.
+pub fn catalogue(kind: Kind, like: &Injected) -> Vec<Injected> {
+    let mut entries = Vec::new();
+    let mut shapes = vec![Shape::Backlash, Shape::Lag];
+    shapes.extend((1..=4).map(|degree| Shape::Polynomial { degree }));
+    let orders: Vec<u32> = (1..=12).chain([17, 36]).collect();
+    let has_places = !matches!(
+        like.shape,
+        Shape::Constant | Shape::Polynomial { .. } | Shape::Harmonic { .. } | Shape::Backlash | Shape::Lag
+    );
+    let driven_by_axis = matches!(like.driver, Driver::Axis(_));
+    if has_places && driven_by_axis {
+        shapes.push(like.shape.clone());
+    }
+    let mut add = |component, driver, shape: &Shape| {
+        entries.push(Injected::new(component, driver, shape.clone(), 1.0));
+    };
+    for axis in kind.moving_axes() {
+        for component in Freedom::ALL.map(|freedom| Component::Motion(freedom, axis)) {
+            shapes
+                .iter()
+                .for_each(|shape| add(component, Driver::Axis(axis), shape));
+            if axis.is_rotary() {
+                for order in &orders {
+                    add(
+                        component,
+                        Driver::Axis(axis),
+                        &Shape::Harmonic {
+                            order: *order,
+                            phase_deg: 0.0,
+                        },
+                    );
+                }
+            }
+        }
+    }
+    let mut slow = vec![Shape::Drift];
+    if has_places && like.driver == Driver::Time && like.shape != Shape::Drift {
+        slow.push(like.shape.clone());
+    } else {
+        slow.push(Shape::Warmup { tau_s: 300.0 });
+    }
+    for component in thermal_components(kind) {
+        slow.iter().for_each(|shape| add(component, Driver::Time, shape));
+        add(component, Driver::Temperature, &Shape::Polynomial { degree: 1 });
+        add(component, Driver::Nothing, &Shape::Constant);
+    }
+    for component in Freedom::ALL.map(|freedom| Component::Motion(freedom, AxisName::A)) {
+        add(component, Driver::Gravity, &Shape::Polynomial { degree: 1 });
+    }
+    for component in Freedom::ALL.map(|freedom| Component::Location(freedom, AxisName::C)) {
+        for degree in 1..=2 {
+            add(
+                component,
+                Driver::Axis(AxisName::A),
+                &Shape::Polynomial { degree },
+            );
+            add(
+                component,
+                Driver::Axis(AxisName::A),
+                &Shape::Harmonic {
+                    order: degree,
+                    phase_deg: 0.0,
+                },
+            );
+        }
+    }
+    for component in [Component::Sensor, Component::Trigger] {
+        add(component, Driver::Nothing, &Shape::Constant);
+    }
+    entries
+}
+
+/// What may drift: location errors of the moving axes (and squareness of Y), both balls, the bar.
+fn thermal_components(kind: Kind) -> Vec<Component> {
+    let mut components = vec![Component::Bar];
+    for i in 0..3 {
+        components.push(Component::WorkpieceBall(Cartesian(i)));
+        components.push(Component::SpindleBall(Cartesian(i)));
+    }
+    for axis in kind.moving_axes() {
+        if axis.is_rotary() {
+            components.extend(Freedom::ALL.map(|freedom| Component::Location(freedom, axis)));
+        }
+    }
+    if kind.moving_axes().contains(&AxisName::Y) {
+        components.push(Component::Location(Freedom::C, AxisName::Y));
+    }
+    components
+}
+
+/// The way of an axis, mm or degree.
+fn range(kind: Kind, axis: AxisName) -> [f64; 2] {
+    match (axis, kind) {
+        (AxisName::C, _) => [0.0, 360.0],
+        (AxisName::A, _) => [-20.0, 70.0],
+        _ => [-100.0, 100.0],
+    }
+}
+
+/// The shortest period of a periodic error, mm or degree, that 1,500 readings carry.
+fn period(kind: Kind, axis: AxisName) -> f64 {
+    match (axis, kind) {
+        (AxisName::A | AxisName::C, _) => 9.7,
+        (_, Kind::Simultaneous) => 47.0,
+        _ => 8.3,
+    }
+}
+
+fn pick<T: Clone>(from: &[T], random: &mut impl Rng) -> T {
+    from[random.random_range(0..from.len())].clone()
+}

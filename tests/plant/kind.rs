@@ -1,0 +1,256 @@
+//! The kinds of session: which tests, which errors are unknown.
+
+use super::component::{AxisName, Component, Freedom};
+use super::machine::Stated;
+use super::schedule::{Motion, Test, all_stand, with};
+use std::f64::consts::FRAC_PI_2;
+
+/// A kind of session on the Hermle C600U.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub enum Kind {
+    /// Chapter 5 of seed 000: A100, A150, C100, C150, one workpiece ball.
+    Rotary,
+    /// Chapter 4 of seed 000: the ball for the A tests at +Y, remounted at +X for the C tests. (In the thesis the first stands on the
+    /// A table; here it stands on the C table, which is at zero.)
+    Chapter4,
+    /// Chapter 6 of seed 000: A tests at X = ±550 mm, C tests at two heights, four mounts.
+    Chapter6,
+    /// Four tests of C with the table tilted to A = −20°, 0°, 30°, 60°: what A does to C.
+    TiltedTable,
+    /// Circles in XY at 1,000 and 3,000 mm/min, nothing unknown but the set-up.
+    LinearCircles,
+    /// The same with the squareness EC0Y unknown.
+    SquarenessCircles,
+    /// The same circles about a centre that is off by (0.5, 0.3) mm, as declared: shows the sensor's gain and delay.
+    EccentricCircles,
+    /// BK2 of ISO 10791-6: C turns, X and Y follow; radial, tangential, axial, and tangential three times as fast.
+    Simultaneous,
+}
+
+impl Kind {
+    /// All kinds.
+    pub const ALL: [Kind; 8] = [
+        Kind::Rotary,
+        Kind::Chapter4,
+        Kind::Chapter6,
+        Kind::TiltedTable,
+        Kind::LinearCircles,
+        Kind::SquarenessCircles,
+        Kind::EccentricCircles,
+        Kind::Simultaneous,
+    ];
+
+    /// The step for about that many readings in the whole session: degrees of A (C alone steps twice as far), or of the path angle
+    /// where linear axes move.
+    pub fn step_deg(self, readings: usize) -> f64 {
+        // How many quarters of 4 steps each a session has: 8 traversals of A and 8 of C at twice the step, 16 of C, 8 circles, 16 circles.
+        let turns = match self {
+            Kind::Rotary | Kind::Chapter4 | Kind::Chapter6 => 6.0,
+            Kind::TiltedTable | Kind::LinearCircles => 8.0,
+            Kind::SquarenessCircles | Kind::EccentricCircles => 8.0,
+            Kind::Simultaneous => 16.0,
+        };
+        // Whole steps in the 90° of the A tests, so that every range is a whole number of steps.
+        let steps_in_90_deg = (readings as f64 / turns / 4.0).round().max(1.0);
+        90.0 / steps_in_90_deg
+    }
+
+    /// The tests, with readings `step_deg` apart (see [`Kind::step_deg`]).
+    pub fn tests(self, step_deg: f64) -> Vec<Test> {
+        let offset_mm = (150.0_f64.powi(2) - 100.0_f64.powi(2)).sqrt();
+        let zero = all_stand();
+        let x = |mm| Motion::Stands(mm);
+        match self {
+            Kind::Rotary => vec![
+                tilt("A100", 100.0, [0.0, 100.0, 0.0], "P1", 0.0, step_deg),
+                tilt("A150", 150.0, [0.0, 100.0, 0.0], "P1", -offset_mm, step_deg),
+                table("C100", 100.0, [0.0, 100.0, 0.0], "P1", zero, step_deg),
+                table(
+                    "C150",
+                    150.0,
+                    [0.0, 100.0, 0.0],
+                    "P1",
+                    with(zero, AxisName::Z, x(offset_mm)),
+                    step_deg,
+                ),
+            ],
+            Kind::Chapter4 => vec![
+                tilt("A100", 100.0, [0.0, 100.0, 0.0], "P1", 0.0, step_deg),
+                tilt("A150", 150.0, [0.0, 100.0, 0.0], "P1", -offset_mm, step_deg),
+                table("C100", 100.0, [100.0, 0.0, 0.0], "P2", zero, step_deg),
+                table(
+                    "C150",
+                    150.0,
+                    [100.0, 0.0, 0.0],
+                    "P2",
+                    with(zero, AxisName::Z, x(offset_mm)),
+                    step_deg,
+                ),
+            ],
+            Kind::Chapter6 => vec![
+                tilt("A-plus", 100.0, [550.0, 100.0, 0.0], "P1", 550.0, step_deg),
+                tilt("A-minus", 100.0, [-550.0, 100.0, 0.0], "P2", -550.0, step_deg),
+                table("C0", 100.0, [100.0, 0.0, 0.0], "P3", zero, step_deg),
+                table(
+                    "C78",
+                    100.0,
+                    [100.0, 0.0, 78.0],
+                    "P4",
+                    with(zero, AxisName::Z, x(78.0)),
+                    step_deg,
+                ),
+            ],
+            Kind::TiltedTable => [-20.0_f64, 0.0, 30.0, 60.0]
+                .into_iter()
+                .map(|tilt_deg| {
+                    let tilted = with(zero, AxisName::A, Motion::Stands(tilt_deg.to_radians()));
+                    let at = with(tilted, AxisName::Z, x(offset_mm * tilt_deg.to_radians().cos()));
+                    let at = with(at, AxisName::Y, x(-offset_mm * tilt_deg.to_radians().sin()));
+                    table(
+                        &format!("C-at-A{tilt_deg}"),
+                        150.0,
+                        [0.0, 100.0, 0.0],
+                        "P1",
+                        at,
+                        step_deg,
+                    )
+                })
+                .collect(),
+            Kind::LinearCircles | Kind::SquarenessCircles | Kind::EccentricCircles => {
+                let centre = if self == Kind::EccentricCircles {
+                    [0.5, 0.3, 0.0]
+                } else {
+                    [0.0; 3]
+                };
+                [1000.0, 3000.0]
+                    .into_iter()
+                    .map(|feed_mm_min| Test {
+                        name: format!("XY-F{feed_mm_min}"),
+                        stated: stated(centre, 100.0),
+                        setup: "P1".to_string(),
+                        motions: circle(100.0, 0.0),
+                        range_deg: [0.0, 360.0],
+                        step_deg,
+                        speed_deg_s: (feed_mm_min / 60.0 / 100.0_f64).to_degrees(),
+                        traversals: 4,
+                    })
+                    .collect()
+            }
+            Kind::Simultaneous => {
+                let follow = |name: &str, radius_mm, phase_rad, z_mm, speed_deg_s| Test {
+                    name: name.to_string(),
+                    stated: stated([100.0, 0.0, 0.0], 100.0),
+                    setup: "P1".to_string(),
+                    motions: with(
+                        with(circle(radius_mm, phase_rad), AxisName::C, Motion::Turns),
+                        AxisName::Z,
+                        x(z_mm),
+                    ),
+                    range_deg: [0.0, 360.0],
+                    step_deg,
+                    speed_deg_s,
+                    traversals: 4,
+                };
+                let diagonal_mm = 100.0 * 2.0_f64.sqrt();
+                let eighth = 0.5 * FRAC_PI_2;
+                vec![
+                    follow("BK2-radial", 200.0, 0.0, 0.0, 4.0),
+                    follow("BK2-tangential", diagonal_mm, eighth, 0.0, 4.0),
+                    follow("BK2-axial", 100.0, 0.0, 100.0, 4.0),
+                    follow("BK2-tangential-fast", diagonal_mm, eighth, 0.0, 12.0),
+                ]
+            }
+        }
+    }
+
+    /// The errors that the session file calls unknown; `None` leaves them to the default of a ball bar on two rotary axes.
+    pub fn declared_unknowns(self) -> Option<Vec<Component>> {
+        match self {
+            Kind::LinearCircles | Kind::EccentricCircles => Some(Vec::new()),
+            Kind::SquarenessCircles => Some(vec![Component::Location(Freedom::C, AxisName::Y)]),
+            Kind::Simultaneous => Some(default_unknowns()[4..].to_vec()),
+            _ => None,
+        }
+    }
+
+    /// The errors that are unknown.
+    pub fn unknowns(self) -> Vec<Component> {
+        self.declared_unknowns().unwrap_or_else(default_unknowns)
+    }
+
+    /// The axes that move in some test.
+    pub fn moving_axes(self) -> Vec<AxisName> {
+        match self {
+            Kind::Rotary | Kind::Chapter4 | Kind::Chapter6 => vec![AxisName::A, AxisName::C],
+            Kind::TiltedTable => vec![AxisName::C],
+            Kind::LinearCircles | Kind::SquarenessCircles | Kind::EccentricCircles => {
+                vec![AxisName::X, AxisName::Y]
+            }
+            Kind::Simultaneous => vec![AxisName::X, AxisName::Y, AxisName::C],
+        }
+    }
+
+    /// How far off the workpiece ball may be in any coordinate, µm (one standard uncertainty).
+    pub fn workpiece_ball_u_um(self) -> f64 {
+        match self {
+            Kind::LinearCircles | Kind::SquarenessCircles | Kind::EccentricCircles => 5.0,
+            _ => 2.0,
+        }
+    }
+}
+
+/// One standard uncertainty of the spindle ball in any coordinate, µm.
+pub const SPINDLE_BALL_U_UM: f64 = 1.0;
+/// One standard uncertainty of the bar's length, µm.
+pub const BAR_U_UM: f64 = 0.5;
+
+fn default_unknowns() -> Vec<Component> {
+    use Freedom::{A, B, C, X, Y, Z};
+    let of = |axis, freedoms: [Freedom; 4]| freedoms.map(|freedom| Component::Location(freedom, axis));
+    [of(AxisName::A, [Y, Z, B, C]), of(AxisName::C, [X, Y, A, B])].concat()
+}
+
+fn stated(workpiece_ball_mm: [f64; 3], bar_mm: f64) -> Stated {
+    Stated {
+        workpiece_ball_mm,
+        spindle_ball_mm: [0.0; 3],
+        bar_mm,
+    }
+}
+
+fn circle(radius_mm: f64, phase_rad: f64) -> [Motion; 5] {
+    let circles = |phase_rad| Motion::Circles {
+        centre_mm: 0.0,
+        radius_mm,
+        phase_rad,
+    };
+    let motions = with(all_stand(), AxisName::X, circles(phase_rad));
+    with(motions, AxisName::Y, circles(phase_rad - FRAC_PI_2))
+}
+
+fn tilt(name: &str, bar_mm: f64, ball_mm: [f64; 3], setup: &str, x_mm: f64, step_deg: f64) -> Test {
+    let motions = with(all_stand(), AxisName::X, Motion::Stands(x_mm));
+    Test {
+        name: name.to_string(),
+        stated: stated(ball_mm, bar_mm),
+        setup: setup.to_string(),
+        motions: with(motions, AxisName::A, Motion::Turns),
+        range_deg: [-20.0, 70.0],
+        step_deg,
+        speed_deg_s: 2.0,
+        traversals: 4,
+    }
+}
+
+fn table(name: &str, bar_mm: f64, ball_mm: [f64; 3], setup: &str, at: [Motion; 5], step_deg: f64) -> Test {
+    Test {
+        name: name.to_string(),
+        stated: stated(ball_mm, bar_mm),
+        setup: setup.to_string(),
+        motions: with(at, AxisName::C, Motion::Turns),
+        range_deg: [0.0, 360.0],
+        step_deg: 2.0 * step_deg,
+        speed_deg_s: 2.0,
+        traversals: 4,
+    }
+}

@@ -1,0 +1,248 @@
+//! From a recipe to a session that somebody might have measured, and the answer that only an assertion opens.
+
+use super::component::Component;
+use super::effect::{Driver, Injected};
+use super::files;
+use super::kind::Kind;
+use super::noise::{Noise, RESOLUTION_UM, normal, traversal};
+use super::plan::Plan;
+use rand::{RngExt, SeedableRng};
+use rand_pcg::Pcg64Mcg;
+use std::path::Path;
+
+/// What to make.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Recipe {
+    /// Which kind of session.
+    pub kind: Kind,
+    /// Degrees between readings; see [`Kind::step_deg`].
+    pub step_deg: f64,
+    /// What is wrong with the machine and undeclared.
+    pub effects: Vec<Injected>,
+    /// The noise.
+    pub noise: Noise,
+    /// How many rows are missing, as a share of one.
+    pub dropped_share: f64,
+    /// Whether one mount of the spindle ball and one bar calibration serve all tests, as the session file then says.
+    pub shared_mounts: bool,
+    /// Whether the files have a temperature column. They always have one where an effect follows the temperature.
+    pub temperature_column: bool,
+    /// Seed of everything random.
+    pub seed: u64,
+}
+
+impl Recipe {
+    /// About 1,500 readings with white noise of 0.3 µm and no effect. The spindle ball stays where it is between the tests of
+    /// [`Kind::TiltedTable`]; in the others every test has its own mount and bar calibration, as in the samples.
+    pub fn new(kind: Kind, seed: u64) -> Recipe {
+        Recipe {
+            kind,
+            step_deg: kind.step_deg(1500),
+            effects: Vec::new(),
+            noise: Noise::White { sigma_um: 0.3 },
+            dropped_share: 0.0,
+            shared_mounts: kind == Kind::TiltedTable,
+            temperature_column: false,
+            seed,
+        }
+    }
+
+    /// With one more effect.
+    pub fn with(mut self, effect: Injected) -> Recipe {
+        self.effects.push(effect);
+        self
+    }
+
+    /// With other noise.
+    pub fn noise(self, noise: Noise) -> Recipe {
+        Recipe { noise, ..self }
+    }
+
+    /// With about that many readings.
+    pub fn readings(self, readings: usize) -> Recipe {
+        Recipe {
+            step_deg: self.kind.step_deg(readings),
+            ..self
+        }
+    }
+
+    /// The plan of the session; the same for every seed, noise and effect.
+    pub fn plan(&self) -> Plan {
+        Plan::new(self.kind, self.step_deg, self.shared_mounts)
+    }
+
+    /// Draws unknowns and noise and takes the readings.
+    pub fn draw(&self) -> Draw {
+        self.draw_on(&self.plan())
+    }
+
+    /// The same on a plan made before with [`Recipe::plan`].
+    pub fn draw_on(&self, plan: &Plan) -> Draw {
+        let mut random = Pcg64Mcg::seed_from_u64(self.seed);
+        let values: Vec<f64> = plan
+            .unknowns
+            .iter()
+            .map(|unknown| {
+                let sigma = match (unknown.prior_u_um, unknown.component) {
+                    (Some(u_um), _) => u_um,
+                    (None, component) if component.unit() == "arcsec" => PIGE_SIGMA_ARCSEC,
+                    (None, _) => PIGE_SIGMA_UM,
+                };
+                sigma * normal(&mut random)
+            })
+            .collect();
+        let mut rows = Vec::with_capacity(plan.instants.len());
+        let runs = plan.instants.chunk_by(|a, b| (a.test, a.run) == (b.test, b.run));
+        for run in runs {
+            let first = rows.len();
+            for (i, (noise_um, wild)) in traversal(self.noise, run.len(), &mut random)
+                .into_iter()
+                .enumerate()
+            {
+                let dropped = random.random::<f64>() < self.dropped_share;
+                let true_mm = plan.reading_mm(&run[i], &values, &self.effects);
+                let reading_um = (true_mm * 1e3 + noise_um) / RESOLUTION_UM;
+                rows.push(Row {
+                    instant: first + i,
+                    length_mm: reading_um.round() * RESOLUTION_UM * 1e-3,
+                    wild,
+                    dropped,
+                });
+            }
+        }
+        rows.retain(|row| !row.dropped);
+        let truth = Truth {
+            unknowns: plan
+                .unknowns
+                .iter()
+                .zip(&values)
+                .map(|(unknown, value)| Known {
+                    id: unknown.id.clone(),
+                    component: unknown.component,
+                    value: *value,
+                    is_setup: unknown.prior_u_um.is_some(),
+                })
+                .collect(),
+            effects: self.effects.clone(),
+            noise: self.noise,
+            wild_rows: rows
+                .iter()
+                .filter(|row| row.wild)
+                .map(|row| row.instant)
+                .collect(),
+        };
+        let follows_temperature = self
+            .effects
+            .iter()
+            .any(|effect| effect.driver == Driver::Temperature);
+        let files = files::session_files(plan, &rows, self.temperature_column || follows_temperature);
+        Draw { files, rows, truth }
+    }
+}
+
+/// Spread of the location errors, µm.
+pub const PIGE_SIGMA_UM: f64 = 20.0;
+/// Spread of the orientation errors, arcsec.
+pub const PIGE_SIGMA_ARCSEC: f64 = 8.0;
+
+/// One reading as taken.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Row {
+    /// Its place in [`Plan::instants`].
+    pub instant: usize,
+    /// The reading, mm, at the sensor's resolution.
+    pub length_mm: f64,
+    /// Whether it was made wild.
+    pub wild: bool,
+    dropped: bool,
+}
+
+impl Row {
+    /// A reading that somebody else took.
+    pub fn taken(instant: usize, length_mm: f64) -> Row {
+        Row {
+            instant,
+            length_mm,
+            wild: false,
+            dropped: false,
+        }
+    }
+}
+
+/// The true value of an unknown.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Known {
+    /// `EY0A`, `workpiece_ball[P1].x`.
+    pub id: String,
+    /// What was out of place.
+    pub component: Component,
+    /// By how much, in µm or arcsec.
+    pub value: f64,
+    /// Whether it is a set-up offset rather than an error of the machine.
+    pub is_setup: bool,
+}
+
+/// The answer.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Truth {
+    /// PIGEs and set-up offsets in the order of [`Plan::unknowns`].
+    pub unknowns: Vec<Known>,
+    /// What was injected.
+    pub effects: Vec<Injected>,
+    /// What the sensor added.
+    pub noise: Noise,
+    /// Places in [`Plan::instants`] of the readings that were made wild.
+    pub wild_rows: Vec<usize>,
+}
+
+impl Truth {
+    /// The true value of an unknown in µm or arcsec.
+    pub fn value(&self, id: &str) -> Option<f64> {
+        self.unknowns
+            .iter()
+            .find(|known| known.id == id)
+            .map(|known| known.value)
+    }
+
+    /// The errors of the machine: name, value, unit (`um` or `arcsec`).
+    pub fn piges(&self) -> impl Iterator<Item = (&str, f64, &'static str)> {
+        self.unknowns
+            .iter()
+            .filter(|known| !known.is_setup)
+            .map(|known| (known.id.as_str(), known.value, known.component.unit()))
+    }
+}
+
+/// A session as measured, with its answer.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Draw {
+    /// Names and texts of `session.toml`, `machine.toml` and the data files.
+    pub files: Vec<(String, String)>,
+    /// The readings, in the order of the data files.
+    pub rows: Vec<Row>,
+    /// What nobody but an assertion may look at.
+    pub truth: Truth,
+}
+
+impl Draw {
+    /// Writes the session's folder, without the answer.
+    ///
+    /// # Errors
+    /// If the folder or a file cannot be written.
+    pub fn write(&self, folder: &Path) -> std::io::Result<()> {
+        std::fs::create_dir_all(folder)?;
+        self.files
+            .iter()
+            .try_for_each(|(name, text)| std::fs::write(folder.join(name), text))
+    }
+
+    /// Writes the answer to `NAME.json` in another folder.
+    ///
+    /// # Errors
+    /// If the folder or the file cannot be written.
+    pub fn write_truth(&self, folder: &Path, name: &str) -> std::io::Result<()> {
+        std::fs::create_dir_all(folder)?;
+        let text = format!("{:#}\n", files::truth_json(&self.truth));
+        std::fs::write(folder.join(format!("{name}.json")), text)
+    }
+}
