@@ -1,7 +1,7 @@
 //! Equations of readings: the closed form that the model's one kinematic chain yields for symbols in the place of numbers.
 //!
 //! - [`symbol`]: the symbolic scalar, and the arena that holds its expressions;
-//! - [`variable`], [`subject`]: what a symbol may stand for, what an equation is of;
+//! - [`variable`], [`subject`], [`session`]: what a symbol may stand for, what an equation is of;
 //! - [`evaluate`], [`derivative`]: expressions at numbers, and their derivatives;
 //! - [`polynomial`], [`normal`]: the exact normal form, in which equality is decided;
 //! - [`equation`]: the closed form of a reading, with its named vectors;
@@ -22,6 +22,7 @@ pub mod polynomial;
 pub mod print;
 pub mod program;
 mod run;
+pub mod session;
 pub mod subject;
 pub mod symbol;
 pub mod variable;
@@ -33,6 +34,7 @@ pub use evaluate::Value;
 pub use normal::Ring;
 pub use polynomial::Polynomial;
 pub use print::Language;
+pub use session::SessionTest;
 pub use subject::{Source, Subject, ToolPoint};
 pub use symbol::{Arena, Operand, Symbol};
 pub use variable::{Symbols, Variable};

@@ -1,5 +1,6 @@
 //! Integration tests of the crate, one binary.
 
+mod sessions;
 mod support;
 
 mod chain;
