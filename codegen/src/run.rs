@@ -15,6 +15,9 @@ pub(crate) struct Run<'m, S: Scalar> {
     pub(crate) state: Vec<AxisPosition<S::Nominal>>,
     pub(crate) errors: Vec<BodyErrors<S>>,
     unknowns: Vec<(usize, S)>,
+    /// The parameter in each error slot, and slots of instrument unknowns with theirs.
+    slots: Vec<Option<usize>>,
+    unknown_slots: Vec<(usize, usize)>,
 }
 
 impl<'m, S: Scalar> Run<'m, S> {
@@ -42,7 +45,7 @@ impl<'m, S: Scalar> Run<'m, S> {
             })
             .collect();
         let mut slots = vec![None; machine.error_slots()];
-        let mut unknowns = Vec::new();
+        let mut unknown_slots = Vec::new();
         for (place, parameter) in parameters.iter().enumerate() {
             match parameter {
                 Variable::Error(name) => {
@@ -51,27 +54,40 @@ impl<'m, S: Scalar> Run<'m, S> {
                         axis: name.axis.clone(),
                         machine: machine.code(),
                     })?;
-                    slots[slot] = Some(small(place));
+                    slots[slot] = Some(place);
                 }
                 Variable::Unknown(unknown) => {
                     let slot = subject.unknowns().iter().position(|known| known == unknown);
                     let slot = slot.ok_or_else(|| CodegenError::NoSuchUnknown {
                         unknown: parameter.meaning(),
                     })?;
-                    unknowns.push((slot, small(place)));
+                    unknown_slots.push((slot, place));
                 }
                 Variable::Length(_) | Variable::Position { .. } => {}
             }
         }
-        let zero = S::nominal(S::Nominal::constant(0.0));
-        let errors = machine.body_errors(|slot| slots[slot].is_some(), |slot| slots[slot].unwrap_or(zero));
-        Ok(Run {
+        let mut run = Run {
             machine,
             subject,
             state,
-            errors,
-            unknowns,
-        })
+            errors: Vec::new(),
+            unknowns: Vec::new(),
+            slots,
+            unknown_slots,
+        };
+        run.seed(small);
+        Ok(run)
+    }
+
+    /// Other values for the parameters, everything nominal as it is.
+    pub(crate) fn seed(&mut self, small: &impl Fn(usize) -> S) {
+        let zero = S::nominal(S::Nominal::constant(0.0));
+        self.errors = self.machine.body_errors(
+            |slot| self.slots[slot].is_some(),
+            |slot| self.slots[slot].map_or(zero, small),
+        );
+        let unknown = |(slot, place): &(usize, usize)| (*slot, small(*place));
+        self.unknowns = self.unknown_slots.iter().map(unknown).collect();
     }
 
     /// The instrument's unknown in a slot, if it is carried.

@@ -41,10 +41,18 @@ impl Equation {
             let mut draws = Draws::new(5);
             let mut largest = 0.0_f64;
             for _ in 0..60 {
-                let nominal = self.draw_nominal(source, &mut draws, 0.0, false);
+                let point = Point {
+                    nominal: self.draw_nominal(source, &mut draws, 0.0, false),
+                    small: vec![0.0; count],
+                };
+                let at = |variable: Variable| point.nominal(&variable);
+                let mut run = Run::<f64>::new(&exact, source, &self.parameters, &at, &|_| 0.0)?;
+                // The parameters are the last of the inputs, in their order.
+                let mut inputs = point.inputs(program, &self.parameters);
+                let first = inputs.len() - count;
                 for pattern in 0..(1u64 << count.min(8)) {
                     let pattern = if count <= 8 { pattern } else { draws.bits() };
-                    let small = self.parameters.iter().enumerate().map(|(place, parameter)| {
+                    for (place, parameter) in self.parameters.iter().enumerate() {
                         let sign = if pattern >> (place % 64) & 1 == 0 {
                             1.0
                         } else {
@@ -55,15 +63,10 @@ impl Equation {
                         } else {
                             shift_um * 1e-3
                         };
-                        sign * size
-                    });
-                    let point = Point {
-                        small: small.collect(),
-                        nominal: nominal.clone(),
-                    };
-                    let at = |variable: Variable| point.nominal(&variable);
-                    let run = Run::<f64>::new(&exact, source, &self.parameters, &at, &|i| point.small[i])?;
-                    let found = program.run(&point.inputs(program, &self.parameters));
+                        inputs[first + place] = sign * size;
+                    }
+                    run.seed(&|place| inputs[first + place]);
+                    let found = program.run(&inputs);
                     for (found, expected) in found.iter().zip(run.read()) {
                         largest = largest.max(worst(*found, expected) * 1e3);
                     }
