@@ -6,9 +6,12 @@ use std::path::Path;
 use std::process::Command;
 
 use abbe_codegen::{Equation, Language, Options};
+use abbe_model::chain::Machine;
+use abbe_model::component::ErrorName;
 use abbe_model::frames::Rotation;
-use rand::SeedableRng;
+use rand::{RngExt, SeedableRng};
 
+use crate::operators::Batch;
 use crate::tools;
 use crate::topologies::{AnyBar, CODES, Case, What, all_errors, cases, disagreement, machine, short};
 
@@ -50,6 +53,41 @@ fn all(language: Language) -> Vec<Printed> {
                 cases: cases(what, &machine, &errors, CASES, &mut random),
             });
         }
+    }
+    printed.extend(operators(language, &mut random));
+    printed
+}
+
+/// Compound operands under every operator: three coordinates that shift with three errors.
+fn operators(language: Language, random: &mut impl rand::Rng) -> Vec<Printed> {
+    let machine = Machine::from_code("w b X t").expect("a code");
+    let errors: Vec<ErrorName> = ["EXX", "EYX", "EZX"]
+        .iter()
+        .filter_map(|name| ErrorName::parse(name))
+        .collect();
+    let options = Options {
+        gradient: true,
+        ..Options::default()
+    };
+    let mut printed = Vec::new();
+    for batch in Batch::all() {
+        let equation = Equation::of(&machine, &batch, &errors, &options).expect("an equation");
+        let cases = (0..CASES).map(|_| {
+            let lengths: [f64; 4] = std::array::from_fn(|_| random.random_range(50.0..150.0));
+            let (x, small) = (random.random_range(-100.0..100.0), [0.5, -2.0, 7.0]);
+            let ball = batch.coordinates(lengths);
+            Case {
+                arguments: [lengths.to_vec(), vec![x], small.to_vec()],
+                values: vec![ball[0] + small[0] + x, ball[1] + small[1], ball[2] + small[2]],
+                gradient: vec![1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0],
+            }
+        });
+        printed.push(Printed {
+            name: format!("operators_{}", batch.0),
+            function: "coordinates",
+            text: equation.print(language).expect("code"),
+            cases: cases.collect(),
+        });
     }
     printed
 }

@@ -6,6 +6,7 @@ mod support;
 mod chain;
 mod compiled;
 mod forms;
+mod operators;
 mod seed000;
 mod seed003;
 mod tools;
