@@ -32,8 +32,10 @@ fn operand<N: Nominal>(kind: usize, a: N, b: N) -> N {
 }
 
 fn expression<N: Nominal>(number: usize, [a, b, c, d]: [N; 4]) -> N {
-    let left = operand(number % OPERANDS, a, b);
-    let right = operand(number / OPERANDS % OPERANDS, c, d);
+    // Operands of its own for each expression: a shared one would get a name and stand alone.
+    let own = |x: N, step: f64| x + N::constant(step * (number + 1) as f64);
+    let left = operand(number % OPERANDS, own(a, 0.01), own(b, 0.02));
+    let right = operand(number / OPERANDS % OPERANDS, own(c, 0.03), own(d, 0.04));
     match number / OPERANDS / OPERANDS {
         0 => left + right,
         1 => left - right,
