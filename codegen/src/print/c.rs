@@ -120,6 +120,8 @@ fn kernel(file: &mut String, code: &Code<'_>, gradient: bool) {
         file.push_str("    (void)axes;\n");
     }
     declare(file, code, "    ", &[0, 2]);
+    // So many columns are more than gcc tests for overlap; the pragma tells it that there is none.
+    file.push_str("#if defined(__GNUC__) && !defined(__clang__)\n#pragma GCC ivdep\n#endif\n");
     file.push_str("    for (size_t i = 0; i < n; ++i) {\n");
     for place in code.groups[1].clone() {
         if code.uses(place) {

@@ -138,3 +138,24 @@ fn main() {{
     assert_eq!(ran, counted.arithmetic());
     assert!(ran <= 70, "{ran}");
 }
+
+/// The code that the benches run is what the printers write. `ABBE_WRITE_BENCHES=1` writes it anew.
+#[test]
+fn the_benches_run_what_is_printed() {
+    let options = Options {
+        gradient: true,
+        ..Options::default()
+    };
+    let equation = chapter5(&options);
+    for (language, name) in [(Language::Rust, "emitted.rs"), (Language::C, "emitted.c")] {
+        let printed = equation.print(language).expect("code");
+        let path = std::path::Path::new(env!("CARGO_MANIFEST_DIR"))
+            .join("benches")
+            .join(name);
+        if std::env::var("ABBE_WRITE_BENCHES").is_ok() {
+            tools::write(&path, &printed);
+        }
+        let kept = std::fs::read_to_string(&path).unwrap_or_default();
+        assert_eq!(without_rounding(&kept), without_rounding(&printed), "{name}");
+    }
+}
