@@ -73,6 +73,14 @@ pub enum ModelError {
         /// What to do.
         help: Option<String>,
     },
+    /// A plan that the machine cannot carry out.
+    #[error("{message}")]
+    Plan {
+        /// Which test, and what keeps it from being carried out.
+        message: String,
+        /// What to do.
+        help: String,
+    },
     /// A file that could not be written.
     #[error("{}: cannot be written: {cause}", file.display())]
     Output {
@@ -96,6 +104,7 @@ impl ModelError {
     pub fn help(&self) -> Option<&str> {
         match self {
             ModelError::Input { help, .. } => help.as_deref(),
+            ModelError::Plan { help, .. } => Some(help),
             _ => None,
         }
     }

@@ -3,8 +3,11 @@
 use std::path::{Path, PathBuf};
 
 use abbe_model::chain::BodyErrors;
+use abbe_model::frames::Point;
+use abbe_model::instrument::Station;
 use abbe_model::session::read::{self, ReadOptions};
 use abbe_model::session::{Prior, Session};
+use nalgebra::{DMatrix, DVector};
 
 fn workspace() -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("..")
@@ -111,28 +114,57 @@ fn the_kuka_session_reads_and_its_sockets_nearly_close() {
         .map(|test| test.readings.as_ref().unwrap().rows())
         .sum();
     assert_eq!(poses, 180);
+    let (ball, rms_mm) = fitted_ball(&session);
+    assert!(
+        (rms_mm - 0.55).abs() < 0.01,
+        "with ball and sockets fitted the closure is {rms_mm:.3} mm"
+    );
+    let Station::Socket(station) = &session.tests[0].station else {
+        panic!("the KUKA session is one of sockets");
+    };
+    let off = (0..3)
+        .map(|i| (station.ball[i] - ball[i]).powi(2))
+        .sum::<f64>()
+        .sqrt();
+    assert!(
+        off < 1.0,
+        "the session's ball {:?} lies {off:.3} mm from {ball:?}",
+        station.ball
+    );
+}
+
+/// The ball in the tool frame and the root mean square closure, both after a fit of ball and sockets with nominal joints.
+fn fitted_ball(session: &Session) -> ([f64; 3], f64) {
     let none = vec![BodyErrors::<f64>::NONE; session.machine.axes.len()];
-    let mut squares = 0.0;
-    for test in &session.tests {
+    let unknowns = 3 + 3 * session.tests.len();
+    let (mut rows, mut right) = (Vec::new(), Vec::new());
+    for (place, test) in session.tests.iter().enumerate() {
         let readings = test.readings.as_ref().unwrap();
         let mut state = Vec::new();
-        let points: Vec<[f64; 3]> = (0..readings.rows())
-            .map(|row| {
-                readings.state(&session.machine, row, &mut state);
-                let reading = test
-                    .station
-                    .read::<f64>(&session.machine, &state, &none, |_| None);
-                [0, 1, 2].map(|i| reading.coordinates()[i])
-            })
-            .collect();
-        for i in 0..3 {
-            let mean = points.iter().map(|point| point[i]).sum::<f64>() / points.len() as f64;
-            squares += points.iter().map(|point| (point[i] - mean).powi(2)).sum::<f64>();
+        for row in 0..readings.rows() {
+            readings.state(&session.machine, row, &mut state);
+            let ball = |point| session.machine.tool_point::<f64>(&state, &none, Point(point)).0;
+            let origin = ball([0.0; 3]);
+            let along = [
+                ball([1.0, 0.0, 0.0]),
+                ball([0.0, 1.0, 0.0]),
+                ball([0.0, 0.0, 1.0]),
+            ];
+            for i in 0..3 {
+                let mut equation = vec![0.0; unknowns];
+                for j in 0..3 {
+                    equation[j] = along[j][i] - origin[i];
+                }
+                equation[3 + 3 * place + i] = -1.0;
+                rows.extend(equation);
+                right.push(-origin[i]);
+            }
         }
     }
-    let rms_mm = (squares / 180.0).sqrt();
-    assert!(
-        rms_mm < 0.6,
-        "the ball strays by {rms_mm:.3} mm about its sockets"
-    );
+    let matrix = DMatrix::from_row_slice(right.len(), unknowns, &rows);
+    let right = DVector::from_vec(right);
+    let solution = matrix.clone().svd(true, true).solve(&right, 1e-9).unwrap();
+    let poses = right.len() as f64 / 3.0;
+    let rms_mm = ((matrix * &solution - right).norm_squared() / poses).sqrt();
+    ([0, 1, 2].map(|i| solution[i]), rms_mm)
 }

@@ -7,6 +7,7 @@ use std::path::{Path, PathBuf};
 use toml::Spanned;
 use toml::de::{DeTable, DeValue};
 
+use super::spelling::known_names;
 use crate::error::{ModelError, Place};
 
 /// Most bytes of a machine or session file.
@@ -18,6 +19,8 @@ pub(crate) struct Source {
     pub file: PathBuf,
     /// Its text, without a byte order mark.
     pub text: String,
+    /// Bytes of the file before the text: those of a byte order mark.
+    pub skipped: usize,
 }
 
 impl Source {
@@ -63,14 +66,17 @@ impl Source {
                 "save the file as UTF-8",
             )
         })?;
-        let text = match text.strip_prefix('\u{feff}') {
-            Some(rest) => rest.to_string(),
-            None => text,
-        };
-        Ok(Source {
+        Ok(Source::new(file, &text))
+    }
+
+    /// A text that stands in a file.
+    pub fn new(file: &Path, text: &str) -> Source {
+        let content = text.strip_prefix('\u{feff}').unwrap_or(text);
+        Source {
             file: file.to_path_buf(),
-            text,
-        })
+            text: content.to_string(),
+            skipped: text.len() - content.len(),
+        }
     }
 
     /// The whole file as a table.
@@ -85,23 +91,23 @@ impl Source {
         Ok(Table::new(self, String::new(), 0..0, root.into_inner()))
     }
 
-    /// Line of a byte, from 1.
-    pub fn line(&self, byte: usize) -> usize {
-        let until = byte.min(self.text.len());
-        1 + self.text.as_bytes()[..until]
-            .iter()
-            .filter(|b| **b == b'\n')
-            .count()
+    /// The place of some bytes of the text.
+    pub fn place(&self, span: Range<usize>) -> Place {
+        let until = span.start.min(self.text.len());
+        Place {
+            file: self.file.clone(),
+            line: 1 + self.text.as_bytes()[..until]
+                .iter()
+                .filter(|byte| **byte == b'\n')
+                .count(),
+            span: Some(span.start + self.skipped..span.end + self.skipped),
+        }
     }
 
     /// An error at a place of this file.
     pub fn error(&self, span: Range<usize>, message: impl Into<String>, help: Option<String>) -> ModelError {
         ModelError::Input {
-            place: Place {
-                file: self.file.clone(),
-                line: self.line(span.start),
-                span: Some(span),
-            },
+            place: self.place(span),
             message: message.into(),
             help,
         }
@@ -367,44 +373,4 @@ impl<'a> Value<'a> {
             _ => Ok(Table::new(self.source, name, span, DeTable::new())),
         }
     }
-}
-
-/// The nearest of the known names where one is near, and all of them.
-pub(crate) fn known_names(found: &str, known: &[&str]) -> String {
-    let all = if known.is_empty() {
-        "no key is known here".to_string()
-    } else {
-        format!("known: {}", known.join(", "))
-    };
-    match nearest(found, known) {
-        Some(near) => format!("did you mean `{near}`? ({all})"),
-        None => all,
-    }
-}
-
-/// The known name that is nearest to a misspelt one, if any is near.
-pub(crate) fn nearest<'k>(found: &str, known: &[&'k str]) -> Option<&'k str> {
-    let lower = found.to_lowercase();
-    known
-        .iter()
-        .map(|name| (distance(&lower, &name.to_lowercase()), *name))
-        .filter(|(distance, name)| *distance <= 1 + name.len().min(lower.len()) / 4)
-        .min_by_key(|(distance, _)| *distance)
-        .map(|(_, name)| name)
-}
-
-/// Levenshtein's distance, over the first 64 characters.
-fn distance(a: &str, b: &str) -> usize {
-    let (a, b): (Vec<char>, Vec<char>) = (a.chars().take(64).collect(), b.chars().take(64).collect());
-    let mut row: Vec<usize> = (0..=b.len()).collect();
-    for (i, from) in a.iter().enumerate() {
-        let mut diagonal = row[0];
-        row[0] = i + 1;
-        for (j, to) in b.iter().enumerate() {
-            let replaced = diagonal + usize::from(from != to);
-            diagonal = row[j + 1];
-            row[j + 1] = replaced.min(diagonal + 1).min(row[j] + 1);
-        }
-    }
-    row[b.len()]
 }

@@ -9,7 +9,9 @@ mod plan;
 mod reach;
 pub mod read;
 pub mod readings;
+mod spelling;
 mod table;
+pub mod write;
 
 use std::path::PathBuf;
 

@@ -1,11 +1,9 @@
 //! How the axes move in a planned test.
 
-use std::path::Path;
-
 use super::readings::Readings;
 use super::{Session, Test, plan};
 use crate::chain::Machine;
-use crate::error::{ModelError, Place};
+use crate::error::ModelError;
 use crate::instrument::Station;
 use crate::session::read::quantity;
 
@@ -99,11 +97,7 @@ pub enum FollowOffset {
 /// # Errors
 /// If an axis would leave its travel, the balls cannot be kept where the path wants them, or there is no plan.
 pub fn planned(machine: &Machine, test: &Test) -> Result<Readings, ModelError> {
-    checked_plan(machine, test).map_err(|(message, help)| ModelError::Input {
-        place: Place::file(Path::new("plan")),
-        message,
-        help: Some(help),
-    })
+    checked_plan(machine, test).map_err(|(message, help)| ModelError::Plan { message, help })
 }
 
 /// The plan of every test of a session, one after the other in time.
@@ -116,12 +110,7 @@ pub fn planned_session(session: &Session) -> Result<Vec<Readings>, ModelError> {
         .tests
         .iter()
         .map(|test| {
-            let mut readings =
-                checked_plan(&session.machine, test).map_err(|(message, help)| ModelError::Input {
-                    place: Place::file(&session.file),
-                    message,
-                    help: Some(help),
-                })?;
+            let mut readings = planned(&session.machine, test)?;
             for time in &mut readings.time_s {
                 *time += start_s;
             }

@@ -76,7 +76,7 @@ impl Readings {
     pub fn runs(&self) -> Vec<std::ops::Range<usize>> {
         let rows = self.rows();
         if self.run.is_empty() {
-            return if rows == 0 { Vec::new() } else { vec![0..rows] };
+            return std::iter::once(0..rows).filter(|run| !run.is_empty()).collect();
         }
         let mut runs = Vec::new();
         let mut start = 0;

@@ -1,6 +1,6 @@
 //! `[format]` and `[columns]`: how other people's files are written.
 
-use crate::error::{ModelError, Place};
+use crate::error::ModelError;
 use crate::session::document::{Table, Value};
 use crate::session::table::{Format, Mapped, Theirs};
 
@@ -8,7 +8,7 @@ use crate::session::table::{Format, Mapped, Theirs};
 pub(super) fn format(mut table: Table<'_>) -> Result<Format, ModelError> {
     let mut format = Format::default();
     if let Some(value) = table.take("separator") {
-        format.separator = one_of(&value, &[b',', b';', b'\t', b' ', b'|', b':'])?;
+        format.separator = one_of(&value, b",;\t|:")?;
     }
     let decimal = table.take("decimal");
     if let Some(value) = &decimal {
@@ -53,11 +53,7 @@ pub(super) fn columns(mut table: Table<'_>) -> Result<Vec<Mapped>, ModelError> {
         columns.push(Mapped {
             ours: entry.key.clone(),
             theirs,
-            place: Place {
-                file: entry.source.file.clone(),
-                line: entry.source.line(entry.key_span.start),
-                span: Some(entry.key_span.start..entry.span.end),
-            },
+            place: entry.source.place(entry.key_span.start..entry.span.end),
         });
     }
     Ok(columns)

@@ -8,7 +8,8 @@ use crate::chain::Machine;
 use crate::code::StructuralCode;
 use crate::error::ModelError;
 use crate::frames::Rotation;
-use crate::session::document::{Source, Table, known_names};
+use crate::session::document::{Source, Table};
+use crate::session::spelling::known_names;
 
 /// Reads a machine file.
 ///

@@ -5,8 +5,11 @@ mod layout;
 mod machine;
 mod movement;
 pub(crate) mod quantity;
+mod setups;
+mod shape;
 mod station;
 mod test;
+mod unknowns;
 
 use std::path::{Path, PathBuf};
 
@@ -15,10 +18,8 @@ pub use machine::machine;
 use super::document::{Source, Table, Value};
 use super::expression::Length;
 use super::table::{Format, Mapped};
-use super::{Session, SocketDistance, Test};
-use crate::axis::AxisKind;
+use super::{Session, Test};
 use crate::chain::Machine;
-use crate::component::{ErrorKind, ErrorName, Freedom};
 use crate::error::{ModelError, Place};
 use crate::instrument::InstrumentKind;
 use quantity::MICROMETRE;
@@ -111,7 +112,7 @@ pub fn session(path: &Path, options: &ReadOptions) -> Result<Session, ModelError
     let machine = session_machine(path, &mut root)?;
     let constants = constants(&mut root)?;
     let instrument = Instrument::read(&mut root)?;
-    let unknowns = unknowns(&machine, instrument.kind, &mut root)?;
+    let unknowns = unknowns::unknowns(&machine, instrument.kind, &mut root)?;
 
     let format = match root.take("format") {
         Some(value) => layout::format(value.table("[format]".into())?)?,
@@ -132,6 +133,7 @@ pub fn session(path: &Path, options: &ReadOptions) -> Result<Session, ModelError
     };
     let mut warnings = Vec::new();
     let (tests, declared) = tests(&context, &mut root, &mut warnings)?;
+    warnings.extend(setups::unlike(&tests));
     let effects = match root.take("effect") {
         Some(value) => value
             .list("tables [[effect]]")?
@@ -140,7 +142,7 @@ pub fn session(path: &Path, options: &ReadOptions) -> Result<Session, ModelError
             .collect::<Result<Vec<_>, _>>()?,
         None => Vec::new(),
     };
-    let socket_distances = socket_distances(instrument.kind, &tests, &mut root, options.read_data)?;
+    let socket_distances = setups::socket_distances(instrument.kind, &tests, &mut root, options.read_data)?;
     root.finish()?;
     Ok(Session {
         file: path.to_path_buf(),
@@ -247,80 +249,6 @@ impl Instrument {
     }
 }
 
-/// The errors to be identified: those stated, or what the instrument is there for.
-fn unknowns(
-    machine: &Machine,
-    kind: InstrumentKind,
-    root: &mut Table<'_>,
-) -> Result<Vec<ErrorName>, ModelError> {
-    let stated = match root.take("unknowns") {
-        None => None,
-        Some(value) => {
-            let mut table = value.table("[unknowns]".into())?;
-            let errors = table.take("errors");
-            table.finish()?;
-            errors
-        }
-    };
-    let Some(value) = stated else {
-        return Ok(match kind {
-            InstrumentKind::BallBar => default_unknowns(machine),
-            InstrumentKind::Tracker | InstrumentKind::Socket => Vec::new(),
-        });
-    };
-    let mut unknowns: Vec<ErrorName> = Vec::new();
-    for item in value.list("a list of error names")? {
-        let name = error_name(machine, &item)?;
-        if unknowns.contains(&name) {
-            return Err(item.error(format!("`{name}` stands twice among the unknowns"), None));
-        }
-        unknowns.push(name);
-    }
-    Ok(unknowns)
-}
-
-/// An error of the machine by its name.
-fn error_name(machine: &Machine, item: &Value<'_>) -> Result<ErrorName, ModelError> {
-    let text = item.text()?;
-    let Some(mut name) = ErrorName::parse(&text) else {
-        let help = "ISO 230-1 names such as \"EY0A\" (location) and \"EYA\" (motion), or `e_y0a`, `θ_z0c`";
-        return Err(item.error(format!("\"{text}\" is no error's name"), Some(help.into())));
-    };
-    match quantity::axis_index(machine, &name.axis) {
-        Some(index) => name.axis.clone_from(&machine.axes[index].name),
-        None => {
-            let (message, help) = quantity::no_axis(machine, &name.axis);
-            return Err(item.error(format!("\"{text}\": {message}"), Some(help)));
-        }
-    }
-    Ok(name)
-}
-
-/// The position and orientation errors of every rotary axis, in alphabetical order of the axes: its location errors without the two
-/// that its own movement hides.
-fn default_unknowns(machine: &Machine) -> Vec<ErrorName> {
-    let mut rotary: Vec<_> = machine
-        .axes
-        .iter()
-        .filter(|axis| axis.kind == AxisKind::Rotary)
-        .collect();
-    rotary.sort_by(|a, b| a.name.cmp(&b.name));
-    rotary
-        .into_iter()
-        .flat_map(|axis| {
-            let own = axis.own_freedom().index() % 3;
-            Freedom::ALL
-                .into_iter()
-                .filter(move |freedom| freedom.index() % 3 != own)
-                .map(|freedom| ErrorName {
-                    kind: ErrorKind::Location,
-                    freedom,
-                    axis: axis.name.clone(),
-                })
-        })
-        .collect()
-}
-
 /// A `[[test]]` by name, with the tests that came of it: one for each socket, else itself.
 struct Declared {
     name: String,
@@ -358,68 +286,4 @@ fn tests(
         });
     }
     Ok((tests, declared))
-}
-
-fn socket_distances(
-    kind: InstrumentKind,
-    tests: &[Test],
-    root: &mut Table<'_>,
-    read: bool,
-) -> Result<Vec<SocketDistance>, ModelError> {
-    let Some(value) = root.take("socket_distance") else {
-        return Ok(Vec::new());
-    };
-    if kind != InstrumentKind::Socket {
-        let message = format!(
-            "[[socket_distance]] in a session whose instrument is a {}",
-            kind.word()
-        );
-        return Err(value.source.error(value.key_span.clone(), message, None));
-    }
-    let mut distances = Vec::new();
-    for item in value.list("tables [[socket_distance]]")? {
-        let mut table = item.table("[[socket_distance]]".into())?;
-        let between = table.need("between", "the two sockets, as [\"0\", \"1\"]")?;
-        let (source, span) = (between.source, between.span.clone());
-        let mut names = Vec::new();
-        for name in between.list("a list of two sockets")? {
-            let socket = name.text()?;
-            // Sockets that a column names are known once the data are read.
-            if read
-                && !tests
-                    .iter()
-                    .any(|test| test.socket.as_deref() == Some(socket.as_str()))
-            {
-                let mut known: Vec<&str> = tests.iter().filter_map(|test| test.socket.as_deref()).collect();
-                known.dedup();
-                let help = format!("sockets here: {}", known.join(", "));
-                return Err(name.error(format!("no test has the socket \"{socket}\""), Some(help)));
-            }
-            names.push(socket);
-        }
-        let Ok(between) = <[String; 2]>::try_from(names) else {
-            return Err(source.error(span, "`between` takes two sockets", None));
-        };
-        if between[0] == between[1] {
-            return Err(source.error(span, "`between` takes two different sockets", None));
-        }
-        let distance_mm = table.need("mm", "the distance in mm")?.positive()?;
-        let u_mm = match table.take("u_um") {
-            Some(value) => {
-                let u = value.number()?;
-                if u < 0.0 {
-                    return Err(value.error(format!("`u_um` is {u}; it cannot be negative"), None));
-                }
-                u * MICROMETRE
-            }
-            None => 0.0,
-        };
-        table.finish()?;
-        distances.push(SocketDistance {
-            between,
-            distance_mm,
-            u_mm,
-        });
-    }
-    Ok(distances)
 }

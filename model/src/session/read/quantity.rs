@@ -2,7 +2,7 @@
 
 use crate::axis::AxisKind;
 use crate::chain::Machine;
-use crate::session::document::nearest;
+use crate::session::spelling::nearest;
 
 /// µm in mm.
 pub(crate) const MICROMETRE: f64 = 1e-3;

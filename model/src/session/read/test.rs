@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 
 use super::station::{self, SetUp};
 use super::{Context, Declared, layout, movement, quantity};
-use crate::error::{ModelError, Place};
+use crate::error::ModelError;
 use crate::instrument::InstrumentKind;
 use crate::session::document::{Table, Value};
 use crate::session::motion::{self, Motion};
@@ -218,13 +218,6 @@ fn data_file(context: &Context<'_>, data: &Value<'_>) -> Result<PathBuf, ModelEr
             "name the folder with `--data DIR` if the data do not lie beside the session file",
         ),
     };
-    Err(ModelError::Input {
-        place: Place {
-            file: context.file.to_path_buf(),
-            line: data.source.line(data.span.start),
-            span: Some(data.span.clone()),
-        },
-        message: format!("the data file `{named}` is not there; looked for {looked}"),
-        help: Some(help.into()),
-    })
+    let message = format!("the data file `{named}` is not there; looked for {looked}");
+    Err(data.error(message, Some(help.into())))
 }

@@ -5,8 +5,8 @@ use std::path::Path;
 use super::Request;
 use crate::error::{ModelError, Place};
 use crate::instrument::InstrumentKind;
-use crate::session::document::nearest;
 use crate::session::read::quantity::{self, Unit};
+use crate::session::spelling::nearest;
 
 /// A line of `[columns]`: ours = theirs.
 #[derive(Clone, Debug)]

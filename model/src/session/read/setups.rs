@@ -1,0 +1,124 @@
+//! What tests share: things mounted once, and sockets at known distances.
+
+use super::quantity::MICROMETRE;
+use crate::error::ModelError;
+use crate::instrument::{InstrumentKind, InstrumentUnknown, SharedBy, Station};
+use crate::session::document::Table;
+use crate::session::{Prior, SocketDistance, Test};
+
+/// Tests that share a mounted thing and describe it differently.
+pub(super) fn unlike(tests: &[Test]) -> Vec<String> {
+    let mut warnings = Vec::new();
+    for (index, test) in tests.iter().enumerate() {
+        let unknowns = test.station.kind().unknowns();
+        for group in unlike_groups(unknowns) {
+            let Some(first) = tests[..index]
+                .iter()
+                .find(|other| other.group(group) == test.group(group))
+            else {
+                continue;
+            };
+            let own = |test: &Test| -> (Vec<Prior>, [f64; 3]) {
+                let priors = unknowns.iter().zip(&test.priors);
+                let priors = priors.filter(|(unknown, _)| unknown.shared_by == group);
+                (
+                    priors.map(|(_, prior)| *prior).collect(),
+                    nominal(&test.station, group),
+                )
+            };
+            if own(first) != own(test) {
+                warnings.push(format!(
+                    "tests \"{}\" and \"{}\" share the set-up \"{}\" and describe it differently; it is mounted once and \
+                     lies in one place",
+                    first.name,
+                    test.name,
+                    test.group(group)
+                ));
+            }
+        }
+    }
+    warnings
+}
+
+/// What the unknowns of an instrument are shared by, of the things that a user mounts.
+fn unlike_groups(unknowns: &[InstrumentUnknown]) -> Vec<SharedBy> {
+    [SharedBy::Setup, SharedBy::SpindleSetup, SharedBy::BarSetup]
+        .into_iter()
+        .filter(|group| unknowns.iter().any(|unknown| unknown.shared_by == *group))
+        .collect()
+}
+
+/// Where the thing that a group shares nominally lies.
+fn nominal(station: &Station<f64>, group: SharedBy) -> [f64; 3] {
+    match (station, group) {
+        (Station::BallBar(bar), SharedBy::Setup) => bar.workpiece_ball,
+        (Station::BallBar(bar), SharedBy::BarSetup) => [bar.bar, 0.0, 0.0],
+        (Station::Tracker(_), SharedBy::Setup) => [0.0; 3],
+        (station, _) => station.tool_point_mm(),
+    }
+}
+
+/// `[[socket_distance]] between = ["0", "1"], mm = 50.0, u_um = 100`; without `u_um` the distance is exact.
+pub(super) fn socket_distances(
+    kind: InstrumentKind,
+    tests: &[Test],
+    root: &mut Table<'_>,
+    read: bool,
+) -> Result<Vec<SocketDistance>, ModelError> {
+    let Some(value) = root.take("socket_distance") else {
+        return Ok(Vec::new());
+    };
+    if kind != InstrumentKind::Socket {
+        let message = format!(
+            "[[socket_distance]] in a session whose instrument is a {}",
+            kind.word()
+        );
+        return Err(value.source.error(value.key_span.clone(), message, None));
+    }
+    let mut distances = Vec::new();
+    for item in value.list("tables [[socket_distance]]")? {
+        let mut table = item.table("[[socket_distance]]".into())?;
+        let between = table.need("between", "the two sockets, as [\"0\", \"1\"]")?;
+        let (source, span) = (between.source, between.span.clone());
+        let mut names = Vec::new();
+        for name in between.list("a list of two sockets")? {
+            let socket = name.text()?;
+            // Sockets that a column names are known once the data are read.
+            if read
+                && !tests
+                    .iter()
+                    .any(|test| test.socket.as_deref() == Some(socket.as_str()))
+            {
+                let mut known: Vec<&str> = tests.iter().filter_map(|test| test.socket.as_deref()).collect();
+                known.dedup();
+                let help = format!("sockets here: {}", known.join(", "));
+                return Err(name.error(format!("no test has the socket \"{socket}\""), Some(help)));
+            }
+            names.push(socket);
+        }
+        let Ok(between) = <[String; 2]>::try_from(names) else {
+            return Err(source.error(span, "`between` takes two sockets", None));
+        };
+        if between[0] == between[1] {
+            return Err(source.error(span, "`between` takes two different sockets", None));
+        }
+        let distance_mm = table.need("mm", "the distance in mm")?.positive()?;
+        let u_mm = match table.take("u_um") {
+            Some(value) => {
+                let u = value.number()?;
+                if u < 0.0 {
+                    return Err(value.error(format!("`u_um` is {u}; it cannot be negative"), None));
+                }
+                u * MICROMETRE
+            }
+            None => 0.0,
+        };
+        table.finish()?;
+        distances.push(SocketDistance {
+            between,
+            distance_mm,
+            u_mm,
+        });
+    }
+    Ok(distances)
+}

@@ -1,0 +1,298 @@
+//! The shape of an effect and its numbers.
+//!
+//! Numbers that belong to the driver carry its unit: `_mm` where it is a linear axis, `_deg` (or `_rad`) a rotary one, `_s` time,
+//! `_c` temperature, `_m` the gravity moment of a unit weight.
+
+use std::f64::consts::{PI, TAU};
+
+use super::Context;
+use crate::axis::AxisKind;
+use crate::effect::{Driver, Shape};
+use crate::error::ModelError;
+use crate::session::document::{Table, Value};
+use crate::session::spelling::known_names;
+
+/// Intervals of a curve that does not state them.
+const CURVE_INTERVALS: usize = 12;
+
+/// The words for shapes.
+const SHAPES: [&str; 13] = [
+    "constant",
+    "polynomial",
+    "power",
+    "harmonic",
+    "periodic",
+    "curve",
+    "backlash",
+    "lag",
+    "reversal-spike",
+    "drift",
+    "warmup",
+    "steps",
+    "local",
+];
+
+/// The unit of a driver's numbers in files.
+#[derive(Clone, Copy, PartialEq)]
+pub(super) enum DriverUnit {
+    Millimetre,
+    Angle,
+    Second,
+    Celsius,
+    Metre,
+}
+
+impl DriverUnit {
+    /// The unit of this driver.
+    pub fn of(context: &Context<'_>, driver: &Driver) -> DriverUnit {
+        match driver {
+            Driver::Axis(name) => match context
+                .machine
+                .axis_index(name)
+                .map(|i| context.machine.axes[i].kind)
+            {
+                Some(AxisKind::Rotary) => DriverUnit::Angle,
+                _ => DriverUnit::Millimetre,
+            },
+            Driver::Time => DriverUnit::Second,
+            Driver::Temperature => DriverUnit::Celsius,
+            Driver::Gravity | Driver::None => DriverUnit::Metre,
+        }
+    }
+
+    /// What a polynomial divides its driver by unless it says: 100 mm, half a turn, an hour, 1 °C, 1 m.
+    fn scale(self) -> f64 {
+        match self {
+            DriverUnit::Millimetre => 100.0,
+            DriverUnit::Angle => PI,
+            DriverUnit::Second => 3600.0,
+            DriverUnit::Celsius | DriverUnit::Metre => 1.0,
+        }
+    }
+
+    /// The suffix to recommend.
+    fn suffix(self) -> &'static str {
+        match self {
+            DriverUnit::Millimetre => "mm",
+            DriverUnit::Angle => "deg",
+            DriverUnit::Second => "s",
+            DriverUnit::Celsius => "c",
+            DriverUnit::Metre => "m",
+        }
+    }
+
+    /// What a suffix means for this driver: `Some(true)` degrees, `Some(false)` the unit inside, `None` another driver's.
+    fn degrees(self, suffix: &str) -> Option<bool> {
+        match (self, suffix) {
+            (DriverUnit::Angle, "deg") => Some(true),
+            (DriverUnit::Angle, "rad") => Some(false),
+            (unit, suffix) if unit.suffix() == suffix => Some(false),
+            _ => None,
+        }
+    }
+}
+
+/// A key with the suffixes of every unit.
+type Suffixed = [&'static str; 6];
+const PERIOD: Suffixed = [
+    "period_mm",
+    "period_deg",
+    "period_rad",
+    "period_s",
+    "period_c",
+    "period_m",
+];
+const CENTRE: Suffixed = [
+    "centre_mm",
+    "centre_deg",
+    "centre_rad",
+    "centre_s",
+    "centre_c",
+    "centre_m",
+];
+const WIDTH: Suffixed = [
+    "width_mm",
+    "width_deg",
+    "width_rad",
+    "width_s",
+    "width_c",
+    "width_m",
+];
+const FROM: Suffixed = ["from_mm", "from_deg", "from_rad", "from_s", "from_c", "from_m"];
+const TO: Suffixed = ["to_mm", "to_deg", "to_rad", "to_s", "to_c", "to_m"];
+const AT: Suffixed = ["at_mm", "at_deg", "at_rad", "at_s", "at_c", "at_m"];
+const SCALE: Suffixed = [
+    "scale_mm",
+    "scale_deg",
+    "scale_rad",
+    "scale_s",
+    "scale_c",
+    "scale_m",
+];
+
+/// Takes the one of a key's forms that is there; whether it is in degrees.
+fn suffixed<'a>(
+    table: &mut Table<'a>,
+    keys: Suffixed,
+    unit: DriverUnit,
+) -> Result<Option<(Value<'a>, bool)>, ModelError> {
+    let mut found = None;
+    for key in keys {
+        let Some(value) = table.take(key) else { continue };
+        let suffix = key.rsplit('_').next().unwrap_or("");
+        let Some(degrees) = unit.degrees(suffix) else {
+            let stem = key.trim_end_matches(suffix);
+            let message = format!("`{key}` for a driver in {}", unit.suffix());
+            let help = format!("it takes `{stem}{}`", unit.suffix());
+            return Err(value.source.error(value.key_span.clone(), message, Some(help)));
+        };
+        if found.is_some() {
+            return Err(value.error(format!("`{key}` beside the same in another unit"), None));
+        }
+        found = Some((value, degrees));
+    }
+    Ok(found)
+}
+
+fn converted(value: &Value<'_>, degrees: bool) -> Result<f64, ModelError> {
+    let number = value.number()?;
+    Ok(if degrees { number.to_radians() } else { number })
+}
+
+fn optional(table: &mut Table<'_>, keys: Suffixed, unit: DriverUnit) -> Result<Option<f64>, ModelError> {
+    match suffixed(table, keys, unit)? {
+        Some((value, degrees)) => Ok(Some(converted(&value, degrees)?)),
+        None => Ok(None),
+    }
+}
+
+fn needed(
+    table: &mut Table<'_>,
+    word: &Value<'_>,
+    keys: Suffixed,
+    unit: DriverUnit,
+    shape: &str,
+) -> Result<f64, ModelError> {
+    let suffix = unit.suffix();
+    let stem = keys[0].trim_end_matches("mm");
+    optional(table, keys, unit)?.ok_or_else(|| {
+        let message = format!("the shape \"{shape}\" needs `{stem}{suffix}`");
+        word.error(message, Some(format!("add `{stem}{suffix} = …`")))
+    })
+}
+
+fn order<'a>(table: &mut Table<'a>, value: &Value<'_>, word: &str) -> Result<Value<'a>, ModelError> {
+    table.take("order").ok_or_else(|| {
+        let message = format!("the shape \"{word}\" needs `order`");
+        value.error(message, Some("add `order = 1`".into()))
+    })
+}
+
+/// Reads the shape that `word` names from the other keys of its table.
+pub(super) fn shape(
+    table: &mut Table<'_>,
+    value: &Value<'_>,
+    word: &str,
+    unit: DriverUnit,
+) -> Result<Shape, ModelError> {
+    match word {
+        "constant" => Ok(Shape::Constant),
+        "polynomial" | "power" => {
+            let degree = order(table, value, word)?.count(1, 30)?;
+            let scale = optional(table, SCALE, unit)?.unwrap_or(unit.scale());
+            Ok(if word == "power" {
+                Shape::Power { degree, scale }
+            } else {
+                Shape::Polynomial { degree, scale }
+            })
+        }
+        "harmonic" => Ok(Shape::Harmonic {
+            order: order(table, value, word)?.positive()?,
+        }),
+        "periodic" => Ok(Shape::Periodic {
+            period: needed(table, value, PERIOD, unit, word)?,
+        }),
+        "curve" => curve(table, value, word, unit),
+        "backlash" => Ok(Shape::Backlash),
+        "lag" => Ok(Shape::Lag),
+        "reversal-spike" => Ok(Shape::ReversalSpike {
+            width: needed(table, value, WIDTH, unit, word)?,
+        }),
+        "drift" => Ok(Shape::Drift),
+        "warmup" => {
+            let tau = table.take("tau_s").ok_or_else(|| {
+                let help = "add `tau_s`, the time constant in seconds";
+                value.error("the shape \"warmup\" needs `tau_s`", Some(help.into()))
+            })?;
+            Ok(Shape::Warmup {
+                tau_s: tau.positive()?,
+            })
+        }
+        "steps" => {
+            let Some((list, degrees)) = suffixed(table, AT, unit)? else {
+                let message = format!("the shape \"steps\" needs `at_{}`", unit.suffix());
+                return Err(value.error(message, Some(format!("add `at_{} = [ … ]`", unit.suffix()))));
+            };
+            let items = list.list("a list of positions")?;
+            let at = items
+                .iter()
+                .map(|item| converted(item, degrees))
+                .collect::<Result<_, _>>()?;
+            Ok(Shape::Steps { at })
+        }
+        "local" => {
+            let centre = needed(table, value, CENTRE, unit, word)?;
+            let width = needed(table, value, WIDTH, unit, word)?;
+            let recurs = match table.take("recurs") {
+                Some(recurs) => recurs.truth()?,
+                None => true,
+            };
+            Ok(Shape::Local {
+                centre,
+                width,
+                recurs: (recurs && unit == DriverUnit::Angle).then_some(TAU),
+            })
+        }
+        other => {
+            let message = format!("\"{other}\" is no shape");
+            Err(value.error(message, Some(known_names(other, &SHAPES))))
+        }
+    }
+}
+
+/// A curve runs over the full turn of a rotary axis and closes unless it says otherwise; elsewhere its ends are needed.
+fn curve(
+    table: &mut Table<'_>,
+    value: &Value<'_>,
+    word: &str,
+    unit: DriverUnit,
+) -> Result<Shape, ModelError> {
+    let stated = table.take("closed");
+    let mut closed = match &stated {
+        Some(closed) => closed.truth()?,
+        None => unit == DriverUnit::Angle,
+    };
+    let (from, to) = if unit == DriverUnit::Angle {
+        let from = optional(table, FROM, unit)?;
+        let to = optional(table, TO, unit)?;
+        // Ends of its own make it an open curve unless it says that it closes.
+        closed &= stated.is_some() || (from.is_none() && to.is_none());
+        let from = from.unwrap_or(0.0);
+        (from, to.unwrap_or(from + TAU))
+    } else {
+        (
+            needed(table, value, FROM, unit, word)?,
+            needed(table, value, TO, unit, word)?,
+        )
+    };
+    let intervals = match table.take("intervals") {
+        Some(intervals) => intervals.count(1, 500)?,
+        None => CURVE_INTERVALS,
+    };
+    Ok(Shape::Curve {
+        from,
+        to,
+        intervals,
+        closed,
+    })
+}

@@ -1,0 +1,305 @@
+//! Writing what the readers read: tables of readings, and sessions with more effects declared.
+
+use std::fmt::Write as _;
+use std::io::Write as _;
+use std::path::{Path, PathBuf};
+
+use super::document::Source;
+use super::read::quantity;
+use super::readings::Readings;
+use crate::chain::Machine;
+use crate::effect::{Driver, Effect, Shape};
+use crate::error::ModelError;
+use crate::instrument::InstrumentKind;
+
+/// Writes readings as a CSV file with our column names: whole or not at all.
+///
+/// Numbers have up to twelve decimals of mm, degree or s: what a file rounds away is far below any reading.
+///
+/// # Errors
+/// If the file cannot be written; then what was there before still is.
+pub fn readings(
+    path: &Path,
+    machine: &Machine,
+    instrument: InstrumentKind,
+    readings: &Readings,
+) -> Result<(), ModelError> {
+    whole_file(path, &csv(machine, instrument, readings))
+}
+
+/// The text of [`readings`].
+fn csv(machine: &Machine, instrument: InstrumentKind, readings: &Readings) -> String {
+    let mut header = Vec::new();
+    if !readings.time_s.is_empty() {
+        header.push("time_s".to_string());
+    }
+    if !readings.run.is_empty() {
+        header.push("run".into());
+    }
+    for axis in &machine.axes {
+        header.push(format!(
+            "{}_{}",
+            axis.name.to_lowercase(),
+            quantity::unit_word(axis.kind)
+        ));
+    }
+    if !readings.temperature_c.is_empty() {
+        header.push("temperature_c".into());
+    }
+    match instrument {
+        InstrumentKind::BallBar => header.push("length_mm".into()),
+        InstrumentKind::Tracker => header.extend(["px_mm", "py_mm", "pz_mm"].map(String::from)),
+        // A pose of a socket is the axes' positions and nothing else.
+        InstrumentKind::Socket => {}
+    }
+    let mut text = header.join(",");
+    text.push('\n');
+    for row in 0..readings.rows() {
+        let mut cells = Vec::with_capacity(header.len());
+        if let Some(time) = readings.time_s.get(row) {
+            cells.push(decimal(*time));
+        }
+        if let Some(run) = readings.run.get(row) {
+            cells.push(run.to_string());
+        }
+        for (axis, column) in machine.axes.iter().zip(&readings.positions) {
+            cells.push(decimal(quantity::outside(axis.kind, column[row])));
+        }
+        if let Some(temperature) = readings.temperature_c.get(row) {
+            cells.push(decimal(*temperature));
+        }
+        if instrument != InstrumentKind::Socket {
+            let start = row * readings.coordinates;
+            for k in start..start + readings.coordinates {
+                cells.push(readings.observed.get(k).map_or(String::new(), |mm| decimal(*mm)));
+            }
+        }
+        text.push_str(&cells.join(","));
+        text.push('\n');
+    }
+    text
+}
+
+/// A number with as many decimals as it has, twelve at most.
+fn decimal(value: f64) -> String {
+    let text = format!("{value:.12}");
+    let text = text.trim_end_matches('0').trim_end_matches('.');
+    if text == "-0" { "0".into() } else { text.into() }
+}
+
+/// Writes a file whole or not at all: beside its place, then renamed into it.
+///
+/// # Errors
+/// If it cannot be written; then what was there before still is.
+pub fn whole_file(path: &Path, text: &str) -> Result<(), ModelError> {
+    let fault = |cause: std::io::Error| ModelError::Output {
+        file: path.to_path_buf(),
+        cause: cause.to_string(),
+    };
+    let mut name = path.file_name().unwrap_or_default().to_os_string();
+    name.push(format!(".{}.part", std::process::id()));
+    let part: PathBuf = path.with_file_name(name);
+    let written = std::fs::File::create(&part).and_then(|mut file| {
+        file.write_all(text.as_bytes())?;
+        file.sync_all()
+    });
+    let renamed = written.and_then(|()| std::fs::rename(&part, path));
+    renamed.map_err(|cause| {
+        // What is left of the attempt is of no use; that it cannot be removed is no second fault.
+        let _ = std::fs::remove_file(&part);
+        fault(cause)
+    })
+}
+
+/// A session's text with more effects declared at its end; what was there stays, comments and all.
+///
+/// ```
+/// use abbe_model::chain::Machine;
+/// use abbe_model::effect::{Component, Driver, Effect, Shape};
+/// use abbe_model::session::write;
+///
+/// let machine = Machine::from_code("wCAbYXZt")?;
+/// let effect = Effect {
+///     component: Component::parse("EZC").unwrap(),
+///     driver: Driver::parse("C"),
+///     shape: Shape::Harmonic { order: 2.0 },
+///     tests: Vec::new(),
+/// };
+/// let text = write::with_effects("# a session\n", &[effect], &machine);
+/// assert_eq!(
+///     text,
+///     "# a session\n\n[[effect]]\ncomponent = \"EZC\"\ndriver = \"C\"\nshape = \"harmonic\"\norder = 2\n"
+/// );
+/// # Ok::<(), abbe_model::ModelError>(())
+/// ```
+pub fn with_effects(original: &str, effects: &[Effect], machine: &Machine) -> String {
+    let mut text = original.to_string();
+    if !text.is_empty() && !text.ends_with('\n') {
+        text.push('\n');
+    }
+    for effect in effects {
+        text.push('\n');
+        text.push_str(&effect_table(effect, machine));
+    }
+    text
+}
+
+/// One `[[effect]]`.
+fn effect_table(effect: &Effect, machine: &Machine) -> String {
+    let mut text = String::from("[[effect]]\n");
+    let mut line = |key: &str, value: String| {
+        // Writing to a String does not fail.
+        let _ = writeln!(text, "{key} = {value}");
+    };
+    line("component", quoted(&effect.component.to_string()));
+    line("driver", quoted(&effect.driver.to_string()));
+    let word = match &effect.shape {
+        Shape::Power { .. } => "power",
+        other => other.word(),
+    };
+    line("shape", quoted(word));
+    let unit = unit(&effect.driver, machine);
+    let mut quantity = |stem: &str, value: f64| {
+        let (suffix, number) = in_unit(unit, value);
+        line(&format!("{stem}_{suffix}"), number);
+    };
+    match &effect.shape {
+        Shape::Constant | Shape::Backlash | Shape::Lag | Shape::Drift => {}
+        Shape::Polynomial { degree, scale } | Shape::Power { degree, scale } => {
+            quantity("scale", *scale);
+            line("order", degree.to_string());
+        }
+        Shape::Harmonic { order } => line("order", order.to_string()),
+        Shape::Periodic { period } => quantity("period", *period),
+        Shape::Curve {
+            from,
+            to,
+            intervals,
+            closed,
+        } => {
+            quantity("from", *from);
+            quantity("to", *to);
+            line("intervals", intervals.to_string());
+            line("closed", closed.to_string());
+        }
+        Shape::ReversalSpike { width } => quantity("width", *width),
+        Shape::Warmup { tau_s } => line("tau_s", tau_s.to_string()),
+        Shape::Steps { at } => {
+            // All positions in one unit: degrees where every one of them comes back the same.
+            let all: Vec<(&str, String)> = at.iter().map(|position| in_unit(unit, *position)).collect();
+            let fallback = all.iter().any(|(suffix, _)| *suffix == "rad");
+            let suffix = if fallback {
+                "rad"
+            } else {
+                all.first().map_or(unit, |(suffix, _)| *suffix)
+            };
+            let numbers: Vec<String> = at
+                .iter()
+                .zip(all)
+                .map(|(position, (_, number))| if fallback { position.to_string() } else { number })
+                .collect();
+            line(&format!("at_{suffix}"), format!("[{}]", numbers.join(", ")));
+        }
+        Shape::Local {
+            centre,
+            width,
+            recurs,
+        } => {
+            quantity("centre", *centre);
+            quantity("width", *width);
+            if recurs.is_none() && unit == "deg" {
+                line("recurs", "false".into());
+            }
+        }
+    }
+    if !effect.tests.is_empty() {
+        let names: Vec<String> = effect.tests.iter().map(|name| quoted(name)).collect();
+        line("tests", format!("[{}]", names.join(", ")));
+    }
+    text
+}
+
+/// The suffix of a driver's unit in files.
+fn unit(driver: &Driver, machine: &Machine) -> &'static str {
+    match driver {
+        Driver::Axis(name) => match machine.axis_index(name).map(|index| machine.axes[index].kind) {
+            Some(kind) => quantity::unit_word(kind),
+            None => "mm",
+        },
+        Driver::Time => "s",
+        Driver::Temperature => "c",
+        Driver::Gravity | Driver::None => "m",
+    }
+}
+
+/// A number in a driver's unit, such that it reads back to the same bits: round degrees where they do, else radians.
+fn in_unit(unit: &'static str, value: f64) -> (&'static str, String) {
+    if unit != "deg" {
+        return (unit, value.to_string());
+    }
+    let degrees = value.to_degrees();
+    let round = (degrees * 1e9).round() / 1e9;
+    for candidate in [round, degrees, degrees.next_up(), degrees.next_down()] {
+        if candidate.to_radians() == value {
+            return ("deg", candidate.to_string());
+        }
+    }
+    ("rad", value.to_string())
+}
+
+/// A TOML string: JSON's escapes are TOML's.
+fn quoted(text: &str) -> String {
+    let mut quoted = String::from("\"");
+    for c in text.chars() {
+        match c {
+            '"' => quoted.push_str("\\\""),
+            '\\' => quoted.push_str("\\\\"),
+            c if c.is_control() => {
+                let _ = write!(quoted, "\\u{:04X}", c as u32);
+            }
+            c => quoted.push(c),
+        }
+    }
+    quoted.push('"');
+    quoted
+}
+
+/// A plan's text with a data file for each test named, the rest as it was: what a simulation leaves behind. A test that names a data
+/// file already gets the new one.
+///
+/// # Errors
+/// If the text is no session, or names its tests in inline tables.
+pub fn with_data(original: &str, file: &Path, data: &[(String, String)]) -> Result<String, ModelError> {
+    let source = Source::new(file, original);
+    // What is to be put where: replaced bytes and the text in their place.
+    let mut edits: Vec<(std::ops::Range<usize>, String)> = Vec::new();
+    if let Some(tests) = source.parse()?.take("test") {
+        for item in tests.list("tables [[test]]")? {
+            let mut table = item.table("[[test]]".into())?;
+            let name = table.need("name", "a name")?;
+            let text = name.text()?;
+            let Some((_, data)) = data.iter().find(|(test, _)| *test == text) else {
+                continue;
+            };
+            match table.take("data") {
+                Some(old) => edits.push((old.span.clone(), quoted(data))),
+                None => {
+                    let rest = &source.text[name.span.end..];
+                    let end = name.span.end + rest.find('\n').unwrap_or(rest.len());
+                    let between = source.text[name.span.end..end].trim_start();
+                    if !(between.is_empty() || between.starts_with('#')) {
+                        let help = "write each test as its own [[test]]";
+                        return Err(name.error("a test in an inline table", Some(help.into())));
+                    }
+                    edits.push((end..end, format!("\ndata = {}", quoted(data))));
+                }
+            }
+        }
+    }
+    edits.sort_by_key(|(range, _)| range.start);
+    let mut text = source.text.clone();
+    for (range, new) in edits.into_iter().rev() {
+        text.replace_range(range, &new);
+    }
+    Ok(text)
+}

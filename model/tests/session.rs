@@ -1,0 +1,318 @@
+//! Sessions as plans, and sessions written and read back.
+
+use std::fs;
+use std::path::{Path, PathBuf};
+
+use abbe_model::chain::BodyErrors;
+use abbe_model::effect::{Component, Driver, Effect, Shape};
+use abbe_model::session::motion;
+use abbe_model::session::read::{self, ReadOptions};
+use abbe_model::session::readings::Readings;
+use abbe_model::session::{Session, Test, write};
+
+fn ready(name: &str) -> PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR"))
+        .join("../sessions")
+        .join(name)
+}
+
+fn plan(name: &str) -> Session {
+    read::session(&ready(name), &ReadOptions::default()).unwrap()
+}
+
+/// The nominal reading of each row, mm.
+fn nominal(session: &Session, test: &Test, readings: &Readings) -> Vec<f64> {
+    let none = vec![BodyErrors::<f64>::NONE; session.machine.axes.len()];
+    let mut state = Vec::new();
+    (0..readings.rows())
+        .map(|row| {
+            readings.state(&session.machine, row, &mut state);
+            test.station
+                .read::<f64>(&session.machine, &state, &none, |_| None)
+                .coordinates()[0]
+        })
+        .collect()
+}
+
+/// A session with one test, its machine inside it.
+fn one_test(test: &str) -> Result<Session, abbe_model::ModelError> {
+    let folder = tempfile::tempdir().unwrap();
+    let text = format!(
+        "[machine]\nchain = \"w C A b Y X Z t\"\n[machine.axis.C]\n[machine.axis.A]\n[machine.axis.X]\n\
+         travel_mm = [-200, 200]\n[machine.axis.Y]\n[machine.axis.Z]\n\n[instrument]\nkind = \"ballbar\"\n\n[[test]]\n\
+         name = \"T\"\nspindle_ball_mm = [0, 0, 0]\n{test}\n"
+    );
+    let path = folder.path().join("session.toml");
+    fs::write(&path, text).unwrap();
+    read::session(&path, &ReadOptions::default())
+}
+
+#[test]
+fn the_three_methods_are_plans_in_which_the_bar_fits() {
+    for chapter in ["chapter4.toml", "chapter5.toml", "chapter6.toml"] {
+        let session = plan(&format!("hermle-c600u/{chapter}"));
+        assert_eq!(session.tests.len(), 4, "{chapter}");
+        assert_eq!(session.unknowns.len(), 8, "{chapter}");
+        assert!(session.warnings.is_empty());
+        for (test, readings) in session
+            .tests
+            .iter()
+            .zip(motion::planned_session(&session).unwrap())
+        {
+            for length in nominal(&session, test, &readings) {
+                let bar = if test.name.ends_with("150") {
+                    149.9946
+                } else {
+                    99.9881
+                };
+                assert!((length - bar).abs() < 0.012, "{chapter} {}: {length}", test.name);
+            }
+        }
+    }
+}
+
+#[test]
+fn runs_go_there_and_back_and_time_runs_on() {
+    let session = plan("hermle-c600u/chapter5.toml");
+    let readings = motion::planned(&session.machine, &session.tests[0]).unwrap();
+    assert_eq!(readings.rows(), 4 * 361);
+    assert_eq!(readings.runs().len(), 4);
+    assert_eq!(readings.run.last(), Some(&4));
+    let a = &readings.positions[session.machine.axis_index("A").unwrap()];
+    assert_eq!(a[0], (-20.0_f64).to_radians());
+    assert_eq!(a[360], 70.0_f64.to_radians());
+    assert_eq!(a[361], 70.0_f64.to_radians());
+    assert!(readings.time_s.windows(2).all(|pair| pair[1] > pair[0]));
+    // 500 mm/min at 100 mm: 5 rad/min.
+    let turn = 90.0_f64.to_radians();
+    assert!((readings.time_s[360] - turn / 5.0 * 60.0).abs() < 1e-9);
+    let all = motion::planned_session(&session).unwrap();
+    assert!(all[1].time_s[0] > *all[0].time_s.last().unwrap());
+}
+
+#[test]
+fn a_circle_goes_round_the_workpiece_ball_wherever_it_stands() {
+    let test = "bar_mm = 100\nworkpiece_ball_mm = [10, 20, 30]\n\
+                path = { kind = \"circle\", plane = \"XY\", radius_mm = 100, step_deg = 0.5, feed_mm_min = 1000 }";
+    let session = one_test(test).unwrap();
+    let readings = motion::planned(&session.machine, &session.tests[0]).unwrap();
+    assert_eq!(readings.rows(), 2 * 721);
+    for length in nominal(&session, &session.tests[0], &readings) {
+        assert!((length - 100.0).abs() < 1e-10, "{length}");
+    }
+    let position = |name: &str| readings.positions[session.machine.axis_index(name).unwrap()][0];
+    assert_eq!([position("X"), position("Y"), position("Z")], [110.0, 20.0, 30.0]);
+}
+
+#[test]
+fn linear_axes_follow_a_rotary_one_at_the_length_of_the_bar() {
+    for axis in ["A", "C"] {
+        for offset in ["radial", "tangential", "axial"] {
+            let test = format!(
+                "bar_mm = 100\nworkpiece_ball_mm = [0, 50, 40]\npath = {{ kind = \"follow\", axis = \"{axis}\", \
+                 offset = \"{offset}\", from_deg = 0, to_deg = 90, step_deg = 1 }}"
+            );
+            let session = one_test(&test).unwrap();
+            let readings = motion::planned(&session.machine, &session.tests[0]).unwrap();
+            for length in nominal(&session, &session.tests[0], &readings) {
+                assert!((length - 100.0).abs() < 1e-9, "{axis} {offset}: {length}");
+            }
+        }
+    }
+}
+
+#[test]
+fn a_plan_beyond_the_travel_is_refused() {
+    let test = "bar_mm = 100\nworkpiece_ball_mm = [150, 0, 0]\n\
+                path = { kind = \"circle\", plane = \"XY\", radius_mm = 100, step_deg = 1 }";
+    let message = one_test(test).unwrap_err().to_string();
+    assert!(
+        message.contains("axis `X` goes to 250.000 mm; its travel is -200 to 200 mm"),
+        "{message}"
+    );
+}
+
+#[test]
+fn effects_written_read_back_the_same() {
+    let effect = |component: &str, driver: &str, shape: Shape| Effect {
+        component: Component::parse(component).unwrap(),
+        driver: Driver::parse(driver),
+        shape,
+        tests: Vec::new(),
+    };
+    let mut effects = vec![
+        effect("EX0C", "time", Shape::Drift),
+        effect("EZC", "C", Shape::Harmonic { order: 2.0 }),
+        effect("EZC", "C", Shape::Harmonic { order: 0.5 }),
+        effect(
+            "EXX",
+            "X",
+            Shape::Polynomial {
+                degree: 3,
+                scale: 250.0,
+            },
+        ),
+        effect(
+            "ECC",
+            "C",
+            Shape::Power {
+                degree: 2,
+                scale: 1.0,
+            },
+        ),
+        effect("EXX", "X", Shape::Periodic { period: 10.0 }),
+        effect("EXC", "C", Shape::Periodic { period: 0.1 }),
+        effect("EYY", "Y", Shape::Backlash),
+        effect("EYY", "Y", Shape::Lag),
+        effect("EYY", "Y", Shape::ReversalSpike { width: 1.5 }),
+        effect("bar", "time", Shape::Warmup { tau_s: 1234.5 }),
+        effect(
+            "workpiece_ball.z",
+            "temperature",
+            Shape::Polynomial {
+                degree: 1,
+                scale: 1.0,
+            },
+        ),
+        effect(
+            "EAA",
+            "gravity",
+            Shape::Polynomial {
+                degree: 1,
+                scale: 1.0,
+            },
+        ),
+        effect(
+            "EXX",
+            "X",
+            Shape::Steps {
+                at: vec![-50.0, 0.1, 50.0],
+            },
+        ),
+        effect(
+            "ECC",
+            "C",
+            Shape::Steps {
+                at: vec![0.3, 1.0, 2.0_f64.to_radians()],
+            },
+        ),
+        effect("EZC", "C", Shape::Constant),
+        effect("trigger", "time", Shape::Constant),
+    ];
+    for degrees in 0..400 {
+        let centre = f64::from(degrees) * 0.7;
+        effects.push(effect(
+            "EZC",
+            "C",
+            Shape::Local {
+                centre: if degrees % 2 == 0 {
+                    centre.to_radians()
+                } else {
+                    centre.sqrt()
+                },
+                width: 12.0_f64.to_radians(),
+                recurs: (degrees % 3 > 0).then_some(std::f64::consts::TAU),
+            },
+        ));
+    }
+    for closed in [true, false] {
+        effects.push(effect(
+            "EZA",
+            "A",
+            Shape::Curve {
+                from: -20.0_f64.to_radians(),
+                to: 70.0_f64.to_radians(),
+                intervals: 9,
+                closed,
+            },
+        ));
+    }
+    effects[1].tests = vec!["C100".into(), "C150".into()];
+
+    let path = ready("hermle-c600u/chapter5.toml");
+    let original = fs::read_to_string(&path).unwrap();
+    let session = plan("hermle-c600u/chapter5.toml");
+    let text = write::with_effects(&original, &effects, &session.machine);
+    assert!(text.starts_with(&original));
+    let folder = tempfile::tempdir().unwrap();
+    fs::copy(
+        ready("hermle-c600u/machine.toml"),
+        folder.path().join("machine.toml"),
+    )
+    .unwrap();
+    let written = folder.path().join("session.toml");
+    write::whole_file(&written, &text).unwrap();
+    let read = read::session(&written, &ReadOptions::default()).unwrap();
+    assert_eq!(read.effects.len(), effects.len());
+    for (read, effect) in read.effects.iter().zip(&effects) {
+        assert_eq!(read, effect);
+    }
+}
+
+#[test]
+fn a_plan_becomes_a_measured_session() {
+    let session = plan("hermle-c600u/chapter5.toml");
+    let original = fs::read_to_string(ready("hermle-c600u/chapter5.toml")).unwrap();
+    let folder = tempfile::tempdir().unwrap();
+    let mut data = Vec::new();
+    let plans = motion::planned_session(&session).unwrap();
+    let mut measured = Vec::new();
+    for (test, mut readings) in session.tests.iter().zip(plans) {
+        readings.observed = nominal(&session, test, &readings);
+        let name = format!("{}.csv", test.name);
+        let kind = test.station.kind();
+        write::readings(&folder.path().join(&name), &session.machine, kind, &readings).unwrap();
+        data.push((test.name.clone(), name));
+        measured.push(readings);
+    }
+    let written = folder.path().join("session.toml");
+    let text = write::with_data(&original, &written, &data).unwrap();
+    assert_eq!(text.lines().count(), original.lines().count() + 4);
+    // Once more over the result: the names of the files are replaced, not added.
+    assert_eq!(write::with_data(&text, &written, &data).unwrap(), text);
+    fs::write(&written, text).unwrap();
+    fs::copy(
+        ready("hermle-c600u/machine.toml"),
+        folder.path().join("machine.toml"),
+    )
+    .unwrap();
+    let read = read::session(&written, &ReadOptions::default()).unwrap();
+    for (test, before) in read.tests.iter().zip(&measured) {
+        let after = test.readings.as_ref().unwrap();
+        assert_eq!(after.run, before.run);
+        let close = |a: &[f64], b: &[f64]| a.iter().zip(b).all(|(a, b)| (a - b).abs() < 1e-11);
+        assert!(close(&after.observed, &before.observed));
+        assert!(close(&after.time_s, &before.time_s));
+        for (a, b) in after.positions.iter().zip(&before.positions) {
+            assert!(close(a, b));
+        }
+    }
+    // Nothing but what was asked for is left in the folder.
+    assert_eq!(fs::read_dir(folder.path()).unwrap().count(), 6);
+}
+
+#[test]
+fn sockets_named_by_a_column_become_tests() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("session.toml");
+    let text = "[machine]\nchain = \"w b J1 t\"\n[machine.axis.J1]\nkind = \"rotary\"\ndirection = [0, 0, 2]\n\n\
+                [instrument]\nkind = \"socket\"\n\n[[test]]\nname = \"T\"\ndata = \"T.csv\"\nball_mm = [100, 0, 0]\n\
+                ball_u_um = inf\n\n[[socket_distance]]\nbetween = [\"a\", \"b\"]\nmm = 50\nu_um = 100\n\n\
+                [[effect]]\ncomponent = \"ECJ1\"\nshape = \"harmonic\"\norder = 1\ntests = [\"T\"]\n";
+    fs::write(&path, text).unwrap();
+    fs::write(
+        folder.path().join("T.csv"),
+        "socket,J1_rad\na,0\nb,0.5\na,0.001\n",
+    )
+    .unwrap();
+    let session = read::session(&path, &ReadOptions::default()).unwrap();
+    let names: Vec<&str> = session.tests.iter().map(|test| test.name.as_str()).collect();
+    assert_eq!(names, ["T/a", "T/b"]);
+    assert_eq!(session.effects[0].tests, ["T/a", "T/b"]);
+    let readings = session.tests[0].readings.as_ref().unwrap();
+    assert_eq!(readings.positions[0], [0.0, 0.001]);
+    assert_eq!(readings.line, [2, 4]);
+    assert_eq!(readings.observed, [0.0; 6]);
+    assert_eq!(session.machine.axes[0].direction, [0.0, 0.0, 1.0]);
+    assert_eq!(session.tests[0].spindle_setup, session.tests[1].spindle_setup);
+}
