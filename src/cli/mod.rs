@@ -3,6 +3,7 @@
 mod failure;
 mod fit;
 mod output;
+mod plan;
 mod table;
 
 use std::path::PathBuf;
@@ -29,6 +30,9 @@ enum Command {
     /// Identify errors from readings, with uncertainties.
     #[command(after_help = "Example:\n  abbe fit sessions/hermle-c600u/measured.toml --json fit.json")]
     Fit(fit::FitArguments),
+    /// What can these tests see, before anybody measures?
+    #[command(after_help = plan::EXAMPLES)]
+    Plan(plan::PlanArguments),
 }
 
 /// What every command that reads a session takes.
@@ -60,6 +64,7 @@ pub fn run() -> ExitCode {
     let arguments = Arguments::parse();
     let outcome = match arguments.command {
         Command::Fit(arguments) => fit::run(&arguments),
+        Command::Plan(arguments) => plan::run(&arguments),
     };
     match outcome {
         Ok(()) => ExitCode::SUCCESS,
