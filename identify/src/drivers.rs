@@ -24,7 +24,9 @@ impl Origin {
     /// Of a session.
     pub fn of(session: &Session) -> Origin {
         let readings = || session.tests.iter().filter_map(|test| test.readings.as_ref());
-        let first = readings().flat_map(|r| r.time_s.first().copied()).fold(f64::INFINITY, f64::min);
+        let first = readings()
+            .flat_map(|r| r.time_s.first().copied())
+            .fold(f64::INFINITY, f64::min);
         let (sum, count) = readings()
             .flat_map(|r| r.temperature_c.iter())
             .fold((0.0, 0_usize), |(sum, count), value| (sum + value, count + 1));
@@ -45,17 +47,32 @@ pub fn samples(
     driver: &Driver,
     component_axis: Option<usize>,
 ) -> Option<Vec<DriverSample<f64>>> {
-    let plain = |value: f64, rate: f64| DriverSample { value, rate, direction: 1.0, ..DriverSample::default() };
+    let plain = |value: f64, rate: f64| DriverSample {
+        value,
+        rate,
+        direction: 1.0,
+        ..DriverSample::default()
+    };
     match driver {
         Driver::None => Some(vec![plain(0.0, 0.0); model.rows()]),
         Driver::Axis(name) => {
             let axis = machine.axis_index(name)?;
             Some(readings.axis_samples(axis, machine.axes[axis].kind))
         }
-        Driver::Time => (!readings.time_s.is_empty())
-            .then(|| readings.time_s.iter().map(|t| plain(t - origin.time_s, 1.0)).collect()),
-        Driver::Temperature => (!readings.temperature_c.is_empty())
-            .then(|| readings.temperature_c.iter().map(|t| plain(t - origin.temperature_c, 0.0)).collect()),
+        Driver::Time => (!readings.time_s.is_empty()).then(|| {
+            readings
+                .time_s
+                .iter()
+                .map(|t| plain(t - origin.time_s, 1.0))
+                .collect()
+        }),
+        Driver::Temperature => (!readings.temperature_c.is_empty()).then(|| {
+            readings
+                .temperature_c
+                .iter()
+                .map(|t| plain(t - origin.temperature_c, 0.0))
+                .collect()
+        }),
         Driver::Gravity => {
             let axis = component_axis?;
             let point = model.station().tool_point_mm();
@@ -89,7 +106,11 @@ pub fn component_slots(
 ) -> Vec<(usize, Option<Vec<f64>>)> {
     let machine = &session.machine;
     match component {
-        Component::Axis(name) => machine.error_slot(name).map(|slot| (slot, None)).into_iter().collect(),
+        Component::Axis(name) => machine
+            .error_slot(name)
+            .map(|slot| (slot, None))
+            .into_iter()
+            .collect(),
         Component::Instrument { thing, coordinate } => test
             .station
             .kind()
@@ -102,13 +123,21 @@ pub fn component_slots(
         Component::TriggerDelay => {
             let mut slots = Vec::new();
             for (index, axis) in machine.axes.iter().enumerate() {
-                let rates: Vec<f64> =
-                    readings.axis_samples(index, axis.kind).iter().map(|sample| sample.rate).collect();
+                let rates: Vec<f64> = readings
+                    .axis_samples(index, axis.kind)
+                    .iter()
+                    .map(|sample| sample.rate)
+                    .collect();
                 if rates.iter().all(|rate| *rate == 0.0) {
                     continue;
                 }
                 let turns = usize::from(axis.kind == AxisKind::Rotary) * 3;
-                for (i, along) in axis.direction.into_iter().enumerate().filter(|(_, along)| *along != 0.0) {
+                for (i, along) in axis
+                    .direction
+                    .into_iter()
+                    .enumerate()
+                    .filter(|(_, along)| *along != 0.0)
+                {
                     let name = ErrorName {
                         kind: abbe_model::component::ErrorKind::Motion,
                         freedom: Freedom::ALL[i + turns],
@@ -145,7 +174,10 @@ pub fn component_unit(session: &Session, component: &Component) -> Option<Inside
 /// The unit in which the coefficients of an effect are reported.
 pub fn coefficient_unit(session: &Session, effect: &Effect) -> Unit {
     let Some(inside) = component_unit(session, &effect.component) else {
-        return Unit { name: "ms".to_string(), per_inside: 1e3 };
+        return Unit {
+            name: "ms".to_string(),
+            per_inside: 1e3,
+        };
     };
     let same_kind = match &effect.driver {
         Driver::Axis(name) => session.machine.axis_index(name).is_some_and(|axis| {

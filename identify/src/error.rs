@@ -8,10 +8,14 @@ pub enum IdentifyError {
     #[error(transparent)]
     Model(#[from] abbe_model::ModelError),
     /// A session without readings.
-    #[error("the session has no readings: no test names a `data` file; `abbe simulate` makes readings, `abbe plan` needs none")]
+    #[error(
+        "the session has no readings: no test names a `data` file; `abbe simulate` makes readings, `abbe plan` needs none"
+    )]
     NoReadings,
     /// Nothing to identify.
-    #[error("the session has nothing to identify: `[unknowns] errors` is empty, no effect is declared and every set-up is known exactly")]
+    #[error(
+        "the session has nothing to identify: `[unknowns] errors` is empty, no effect is declared and every set-up is known exactly"
+    )]
     NoUnknowns,
     /// A declared effect that needs a column the data lack.
     #[error("effect `{effect}` follows {driver}, but the data of test `{test}` have no column `{column}`")]
@@ -42,7 +46,9 @@ pub enum IdentifyError {
         id: String,
     },
     /// The model yields a number that is not finite.
-    #[error("test `{test}`, reading {row}: the model yields {value}; two balls in one place or a coordinate that is not finite does this")]
+    #[error(
+        "test `{test}`, reading {row}: the model yields {value}; two balls in one place or a coordinate that is not finite does this"
+    )]
     NotFinite {
         /// The test.
         test: String,
@@ -52,7 +58,9 @@ pub enum IdentifyError {
         value: f64,
     },
     /// Iterations that do not end.
-    #[error("no convergence after {iterations} iterations (the sum of squares stands at {sum_of_squares:e}); the start is too far off or the readings do not belong to this machine")]
+    #[error(
+        "no convergence after {iterations} iterations (the sum of squares stands at {sum_of_squares:e}); the start is too far off or the readings do not belong to this machine"
+    )]
     NoConvergence {
         /// How many were made.
         iterations: usize,

@@ -53,7 +53,9 @@ struct SeenDirections<'p, 'a> {
 
 impl SeenDirections<'_, '_> {
     fn beta(&self, z: &[f64]) -> Vec<f64> {
-        (0..self.basis.nrows()).map(|j| (0..z.len()).map(|k| self.basis[(j, k)] * z[k]).sum()).collect()
+        (0..self.basis.nrows())
+            .map(|j| (0..z.len()).map(|k| self.basis[(j, k)] * z[k]).sum())
+            .collect()
     }
 }
 
@@ -105,24 +107,56 @@ pub fn prepare(session: &Session, seed: u64) -> Result<(Problem<'_>, Fit), Ident
         None => Noise::white(FIRST_GUESS_MM.max(floor), NoiseSource::Fit),
     };
     let mut problem = Problem::new(session, first, seed)?;
-    let mut fit = fit(&problem)?;
+    if stated.is_none() {
+        problem.noise = Noise::white(nominal_residual_mm(&problem)?.max(floor).max(1e-9), NoiseSource::Fit);
+    }
+    let mut fit = fit(&problem, None)?;
     // Noise and wild readings follow from residuals, residuals from a fit; three rounds settle both.
     for _ in 0..3 {
         let rejected = crate::outliers::wild(&problem, &fit);
         let unchanged = rejected == problem.rejected;
         problem.rejected = rejected;
         if stated.is_none() {
-            problem.noise = estimated_noise(&problem, &fit, floor);
+            let noise = estimated_noise(&problem, &fit, floor);
+            let settled = (noise.sigma_mm / problem.noise.sigma_mm - 1.0).abs() < 1e-3;
+            problem.noise = noise;
+            if settled && unchanged {
+                break;
+            }
         } else if unchanged {
             break;
         }
-        fit = self::fit(&problem)?;
+        fit = self::fit(&problem, Some(&fit.beta))?;
     }
     Ok((problem, fit))
 }
 
+/// What the nominal machine leaves over, mm, once the set-ups are fitted to it (linearised): noise for a first decision on what is seen. The
+/// machine's errors stay out of it: among sockets, shrinking the machine to nothing would explain every reading.
+fn nominal_residual_mm(problem: &Problem<'_>) -> Result<f64, IdentifyError> {
+    let list = &problem.parameters.list;
+    let nominal = vec![0.0; list.len()];
+    let mut whole = Triangle::new(list.len());
+    for triangle in problem.triangles(&nominal)? {
+        whole.merge(&triangle);
+    }
+    let (r, c, rest) = whole.parts();
+    let setups: Vec<usize> = (0..list.len()).filter(|j| list[*j].role == Role::Setup).collect();
+    let rows = Mat::from_fn(list.len(), setups.len() + 1, |i, j| match setups.get(j) {
+        Some(setup) => r[(i, *setup)],
+        None => c[i],
+    });
+    let mut of_setups = Triangle::new(setups.len());
+    of_setups.absorb(rows.as_ref());
+    let count = (problem.readings() * problem.coordinates()) as f64;
+    let sum_of_squares = of_setups.parts().2 + rest;
+    Ok((sum_of_squares / count.max(1.0)).sqrt() * problem.noise.sigma_mm)
+}
+
 fn estimated_noise(problem: &Problem<'_>, fit: &Fit, floor: f64) -> Noise {
-    let pure = PureError::of(&problem.tests, &fit.residuals, |test, row| !problem.rejected[test][row]);
+    let pure = PureError::of(&problem.tests, &fit.residuals, |test, row| {
+        !problem.rejected[test][row]
+    });
     if let Some(sigma) = pure.sigma_mm() {
         return Noise::white(sigma.max(floor).max(f64::MIN_POSITIVE), NoiseSource::Repeats);
     }
@@ -132,27 +166,48 @@ fn estimated_noise(problem: &Problem<'_>, fit: &Fit, floor: f64) -> Noise {
     Noise::white(sigma.max(floor).max(1e-9), NoiseSource::Fit)
 }
 
-/// Fits a problem from the nominal machine.
+/// Fits a problem, from the nominal machine or from an earlier fit's unknowns.
 ///
 /// # Errors
 /// If there is nothing to fit, the model cannot be evaluated, or the iterations do not end.
-pub fn fit(problem: &Problem<'_>) -> Result<Fit, IdentifyError> {
+pub fn fit(problem: &Problem<'_>, start: Option<&[f64]>) -> Result<Fit, IdentifyError> {
     let unknowns = problem.parameters.list.len();
-    let size: Vec<f64> = problem.parameters.list.iter().map(|parameter| parameter.size).collect();
+    let size: Vec<f64> = problem
+        .parameters
+        .list
+        .iter()
+        .map(|parameter| parameter.size)
+        .collect();
     let nominal = vec![0.0; unknowns];
     let mut whole = problem.prior_triangle(&nominal);
     for triangle in problem.triangles(&nominal)? {
         whole.merge(&triangle);
     }
     let rank = Rank::decide(whole.parts().0.as_ref(), &size)?;
-    let seen = SeenDirections { problem, basis: &rank.seen };
+    let seen = SeenDirections {
+        problem,
+        basis: &rank.seen,
+    };
     let solution = if rank.seen.ncols() == 0 {
-        Solution { x: Vec::new(), triangle: Triangle::new(0), sum_of_squares: 0.0, iterations: 0 }
+        Solution {
+            x: Vec::new(),
+            triangle: Triangle::new(0),
+            sum_of_squares: 0.0,
+            iterations: 0,
+        }
     } else {
         let scale = Scaling::Physical(vec![1.0; rank.seen.ncols()]);
-        minimise(&seen, &vec![0.0; rank.seen.ncols()], &scale)?
+        let from = start.map_or_else(
+            || vec![0.0; rank.seen.ncols()],
+            |beta| rank.coordinates(beta, &size),
+        );
+        minimise(&seen, &from, &scale)?
     };
-    let beta = if solution.x.is_empty() { nominal } else { seen.beta(&solution.x) };
+    let beta = if solution.x.is_empty() {
+        nominal
+    } else {
+        seen.beta(&solution.x)
+    };
     finish(problem, beta, rank)
 }
 
@@ -166,11 +221,24 @@ fn finish(problem: &Problem<'_>, beta: Vec<f64>, rank: Rank) -> Result<Fit, Iden
     let held_out = held_out(problem, &beta, &triangles, &rank.seen)?;
     let zero = vec![0.0; beta.len()];
     let chi_square: f64 = whole.sum_of_squares_after(&zero);
-    let free = (problem.readings() * problem.coordinates()).saturating_sub(rank.seen.ncols()).max(1) as f64;
+    let free = (problem.readings() * problem.coordinates())
+        .saturating_sub(rank.seen.ncols())
+        .max(1) as f64;
     let significance = ChiSquared::new(free).map(|law| law.sf(chi_square)).unwrap_or(1.0);
-    let birge_ratio =
-        if significance < BIRGE_SIGNIFICANCE { (chi_square / free).sqrt().max(1.0) } else { 1.0 };
-    Ok(Fit { beta, rank, covariance, triangles, residuals, held_out, birge_ratio })
+    let birge_ratio = if significance < BIRGE_SIGNIFICANCE {
+        (chi_square / free).sqrt().max(1.0)
+    } else {
+        1.0
+    };
+    Ok(Fit {
+        beta,
+        rank,
+        covariance,
+        triangles,
+        residuals,
+        held_out,
+        birge_ratio,
+    })
 }
 
 /// `N (NᵀRᵀRN)⁻¹ Nᵀ`.
@@ -186,7 +254,11 @@ pub(crate) fn covariance(triangle: &Triangle, basis: &Mat<f64>) -> Result<Mat<f6
     let negligible = singular[0] * 1e-14;
     let spread = basis * svd.V();
     let scaled = Mat::from_fn(n, singular.len(), |i, k| {
-        if singular[k] > negligible { spread[(i, k)] / singular[k] } else { 0.0 }
+        if singular[k] > negligible {
+            spread[(i, k)] / singular[k]
+        } else {
+            0.0
+        }
     });
     Ok(&scaled * scaled.transpose())
 }
@@ -232,7 +304,11 @@ pub fn parameters(problem: &Problem<'_>, fit: &Fit) -> Vec<ParameterResult> {
     let mut j = 0;
     while j < list.len() {
         let parameter = &list[j];
-        if let Role::Coefficient { effect, coefficient: 0 } = parameter.role {
+        if let Role::Coefficient {
+            effect,
+            coefficient: 0,
+        } = parameter.role
+        {
             let effect = &problem.parameters.effects[effect];
             let pair = matches!(effect.shape, Shape::Harmonic { .. } | Shape::Periodic { .. });
             if pair && fit.rank.is_seen(j) && fit.rank.is_seen(j + 1) {
@@ -258,13 +334,21 @@ fn amplitude_and_phase(problem: &Problem<'_>, fit: &Fit, j: usize, id: &str) -> 
     let (a, b) = (fit.beta[j], fit.beta[j + 1]);
     let cov = |p: usize, q: usize| fit.covariance[(p, q)] * fit.birge_ratio.powi(2);
     let amplitude = a.hypot(b);
-    let (ca, sa) = if amplitude > 0.0 { (a / amplitude, b / amplitude) } else { (1.0, 0.0) };
+    let (ca, sa) = if amplitude > 0.0 {
+        (a / amplitude, b / amplitude)
+    } else {
+        (1.0, 0.0)
+    };
     let along = ca * ca * cov(j, j) + 2.0 * ca * sa * cov(j, j + 1) + sa * sa * cov(j + 1, j + 1);
     let across = sa * sa * cov(j, j) - 2.0 * ca * sa * cov(j, j + 1) + ca * ca * cov(j + 1, j + 1);
     let unit = &problem.parameters.list[j].unit;
     // Of a phase nothing more can be said than the standard deviation of a uniform one.
     let any_phase = std::f64::consts::PI / 3.0_f64.sqrt();
-    let u_phase = if amplitude > 0.0 { (across.max(0.0).sqrt() / amplitude).min(any_phase) } else { any_phase };
+    let u_phase = if amplitude > 0.0 {
+        (across.max(0.0).sqrt() / amplitude).min(any_phase)
+    } else {
+        any_phase
+    };
     [
         ParameterResult {
             id: format!("{id}.amplitude"),
@@ -294,8 +378,10 @@ pub fn unobservable(problem: &Problem<'_>, rank: &Rank) -> Vec<Unobservable> {
                 .map(|(j, value)| (j, value * list[j].size * list[j].unit.per_inside))
                 .collect();
             let leading = outside.first().map_or(1.0, |(_, value)| *value);
-            let combination: BTreeMap<String, f64> =
-                outside.iter().map(|(j, value)| (list[*j].id.clone(), value / leading)).collect();
+            let combination: BTreeMap<String, f64> = outside
+                .iter()
+                .map(|(j, value)| (list[*j].id.clone(), value / leading))
+                .collect();
             let why = match outside.as_slice() {
                 [(j, _)] => format!("no reading of these tests changes with {}", list[*j].id),
                 [(first, _), rest @ ..] => {

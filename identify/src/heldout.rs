@@ -53,8 +53,10 @@ impl Folds {
     /// The folds of a session.
     pub fn of(session: &Session, tests: &[&Test], seed: u64) -> Folds {
         let readings: Vec<_> = tests.iter().filter_map(|test| test.readings.as_ref()).collect();
-        let poses = matches!(session.instrument, InstrumentKind::Tracker | InstrumentKind::Socket)
-            && readings.iter().all(|r| r.run.is_empty());
+        let poses = matches!(
+            session.instrument,
+            InstrumentKind::Tracker | InstrumentKind::Socket
+        ) && readings.iter().all(|r| r.run.is_empty());
         if poses {
             let total: usize = readings.iter().map(|r| r.rows()).sum();
             let folds = FOLDS_OF_POSES.min(total.max(1));
@@ -73,10 +75,17 @@ impl Folds {
                     rows
                 })
                 .collect();
-            return Folds { kind: FoldKind::Poses, count: folds, of_row };
+            return Folds {
+                kind: FoldKind::Poses,
+                count: folds,
+                of_row,
+            };
         }
-        let kind =
-            if readings.iter().all(|r| r.runs().len() > 1) { FoldKind::Runs } else { FoldKind::Blocks };
+        let kind = if readings.iter().all(|r| r.runs().len() > 1) {
+            FoldKind::Runs
+        } else {
+            FoldKind::Blocks
+        };
         let mut count = 0;
         let of_row = readings
             .iter()
@@ -86,7 +95,9 @@ impl Folds {
                     FoldKind::Runs => r.runs(),
                     _ => {
                         let blocks = BLOCKS_A_TEST.min(r.rows().max(1));
-                        (0..blocks).map(|k| k * r.rows() / blocks..(k + 1) * r.rows() / blocks).collect()
+                        (0..blocks)
+                            .map(|k| k * r.rows() / blocks..(k + 1) * r.rows() / blocks)
+                            .collect()
                     }
                 };
                 for part in parts {
@@ -151,8 +162,11 @@ pub fn held_out(
         .collect::<Result<Vec<_>, _>>()?;
     let values = problem.slot_values(beta);
     let unknowns = beta.len();
-    let mut residuals: Vec<Vec<f64>> =
-        problem.models.iter().map(|model| vec![0.0; model.rows() * problem.coordinates()]).collect();
+    let mut residuals: Vec<Vec<f64>> = problem
+        .models
+        .iter()
+        .map(|model| vec![0.0; model.rows() * problem.coordinates()])
+        .collect();
     for block in problem.blocks() {
         let rows = problem.rows(&values, &block)?;
         for i in 0..rows.nrows() {
@@ -162,7 +176,10 @@ pub fn held_out(
             residuals[block.test][scalar] = rows[(i, unknowns)] - predicted;
         }
     }
-    Ok(HeldOut { rms_mm: rms_mm(problem, &residuals), residuals })
+    Ok(HeldOut {
+        rms_mm: rms_mm(problem, &residuals),
+        residuals,
+    })
 }
 
 /// From the fit of all readings to that of the readings in `rest`: the least solution in absolute terms, so that what the remaining readings do
@@ -173,8 +190,9 @@ fn step_without(rest: &Triangle, beta: &[f64], basis: &Mat<f64>) -> Result<Vec<f
     if rank == 0 {
         return Ok(vec![0.0; n]);
     }
-    let absolute: Vec<f64> =
-        (0..n).map(|i| c[i] + (i..n).map(|j| r[(i, j)] * beta[j]).sum::<f64>()).collect();
+    let absolute: Vec<f64> = (0..n)
+        .map(|i| c[i] + (i..n).map(|j| r[(i, j)] * beta[j]).sum::<f64>())
+        .collect();
     let reduced = &r * basis;
     let svd = reduced.svd().map_err(|_| IdentifyError::Decomposition)?;
     let singular: Vec<f64> = svd.S().column_vector().iter().copied().collect();

@@ -83,8 +83,9 @@ pub fn minimise(
         let scaled = Mat::from_fn(n, n, |i, j| r[(i, j)] * scale[j]);
         let svd = scaled.svd().map_err(|_| IdentifyError::Decomposition)?;
         let singular: Vec<f64> = svd.S().column_vector().iter().copied().collect();
-        let projected: Vec<f64> =
-            (0..n).map(|k| (0..n).map(|i| svd.U()[(i, k)] * c[i]).sum::<f64>()).collect();
+        let projected: Vec<f64> = (0..n)
+            .map(|k| (0..n).map(|i| svd.U()[(i, k)] * c[i]).sum::<f64>())
+            .collect();
         let largest = singular.first().copied().unwrap_or(0.0);
         let negligible = largest * 1e-14;
         let step_with = |damping: f64| -> Vec<f64> {
@@ -110,13 +111,23 @@ pub fn minimise(
                 .iter()
                 .zip(&scale)
                 .zip(&x)
-                .map(|((s, d), x)| (s / (x.abs() + if let Scaling::Physical(_) = scaling { *d } else { 0.0 }).max(1e-300)).abs())
+                .map(|((s, d), x)| {
+                    (s / (x.abs()
+                        + if let Scaling::Physical(_) = scaling {
+                            *d
+                        } else {
+                            0.0
+                        })
+                    .max(1e-300))
+                    .abs()
+                })
                 .fold(0.0, f64::max);
             let sum = problem.sum_of_squares(&trial);
             let close = relative < SMALLEST_RELATIVE_STEP * 100.0;
             if sum.is_finite() && (sum < current || (close && sum <= current * (1.0 + 1e-9))) {
                 x = trial;
-                smallest = relative < SMALLEST_RELATIVE_STEP || current - sum <= 1e-15 * current && relative < 1e-7;
+                smallest =
+                    relative < SMALLEST_RELATIVE_STEP || current - sum <= 1e-15 * current && relative < 1e-7;
                 current = sum;
                 damping *= 0.1;
                 if damping < largest * largest * 1e-12 {
@@ -131,15 +142,27 @@ pub fn minimise(
                 accepted = true;
                 break;
             }
-            damping = if damping == 0.0 { largest * largest * 1e-6 } else { damping * 10.0 };
+            damping = if damping == 0.0 {
+                largest * largest * 1e-6
+            } else {
+                damping * 10.0
+            };
         }
         if smallest || n == 0 {
             let triangle = problem.linearise(&x)?;
-            return Ok(Solution { x, triangle, sum_of_squares: current, iterations: iteration });
+            return Ok(Solution {
+                x,
+                triangle,
+                sum_of_squares: current,
+                iterations: iteration,
+            });
         }
         if !accepted {
             break;
         }
     }
-    Err(IdentifyError::NoConvergence { iterations: MOST_ITERATIONS, sum_of_squares: current })
+    Err(IdentifyError::NoConvergence {
+        iterations: MOST_ITERATIONS,
+        sum_of_squares: current,
+    })
 }

@@ -44,7 +44,11 @@ impl NoiseSource {
 impl Noise {
     /// White noise.
     pub fn white(sigma_mm: f64, source: NoiseSource) -> Noise {
-        Noise { sigma_mm, memory: Vec::new(), source }
+        Noise {
+            sigma_mm,
+            memory: Vec::new(),
+            source,
+        }
     }
 
     /// Standard deviation of what a reading adds to the readings before it, mm: the innovation.
@@ -124,8 +128,66 @@ impl PureError {
             .iter()
             .flatten()
             .flatten()
-            .fold((0.0, 0_usize), |(sum, count), value| (sum + value * value, count + 1));
+            .fold((0.0, 0_usize), |(sum, count), value| {
+                (sum + value * value, count + 1)
+            });
         (self.freedom >= 10).then(|| (sum / count as f64).sqrt())
+    }
+}
+
+impl PureError {
+    /// Autoregressive coefficients of the deviations along runs, by Yule–Walker, of the least order up to three whose successor adds nothing; empty
+    /// where the deviations are as good as white. `None` without enough repeats to tell.
+    pub fn memory(&self, tests: &[&Test], kept: impl Fn(usize, usize) -> bool) -> Option<Vec<f64>> {
+        const MOST: usize = 3;
+        let mut covariance = [0.0; MOST + 1];
+        let mut pairs = [0_usize; MOST + 1];
+        for (number, test) in tests.iter().enumerate() {
+            let readings = test.readings.as_ref()?;
+            if readings.coordinates != 1 {
+                return None;
+            }
+            for run in readings.runs() {
+                for lag in 0..=MOST {
+                    for row in run.start + lag..run.end {
+                        let both = self.deviations[number][row].zip(self.deviations[number][row - lag]);
+                        if let Some((now, before)) = both
+                            && kept(number, row)
+                            && kept(number, row - lag)
+                        {
+                            covariance[lag] += now * before;
+                            pairs[lag] += 1;
+                        }
+                    }
+                }
+            }
+        }
+        if pairs[MOST] < 100 || covariance[0] <= 0.0 {
+            return None;
+        }
+        let variance = covariance[0] / pairs[0] as f64;
+        let correlation: Vec<f64> =
+            (0..=MOST).map(|lag| covariance[lag] / pairs[lag] as f64 / variance).collect();
+        // Two repeats hold the same deviation twice; half the pairs are independent.
+        let insignificant = 3.0 / (0.5 * pairs[0] as f64).sqrt();
+        // Durbin–Levinson: the last coefficient of each order is its partial autocorrelation.
+        let mut coefficients: Vec<f64> = Vec::new();
+        let mut accepted = Vec::new();
+        let mut left = 1.0;
+        for order in 1..=MOST {
+            let predicted: f64 = coefficients.iter().enumerate().map(|(k, a)| a * correlation[order - 1 - k]).sum();
+            let partial = ((correlation[order] - predicted) / left).clamp(-0.99, 0.99);
+            let previous = coefficients.clone();
+            for k in 0..previous.len() {
+                coefficients[k] = previous[k] - partial * previous[previous.len() - 1 - k];
+            }
+            coefficients.push(partial);
+            left *= 1.0 - partial * partial;
+            if partial.abs() > insignificant {
+                accepted = coefficients.clone();
+            }
+        }
+        Some(accepted)
     }
 }
 

@@ -26,12 +26,18 @@ pub fn wild(problem: &Problem<'_>, fit: &Fit) -> Vec<Vec<bool>> {
             .residuals
             .iter()
             .map(|residual| {
-                residual.chunks_exact(coordinates).map(|v| v.iter().map(|x| x * x).sum::<f64>().sqrt()).collect()
+                residual
+                    .chunks_exact(coordinates)
+                    .map(|v| v.iter().map(|x| x * x).sum::<f64>().sqrt())
+                    .collect()
             })
             .collect();
         let mut all: Vec<f64> = lengths.iter().flatten().copied().collect();
         let limit = WILD_POSE * median(&mut all);
-        return lengths.iter().map(|test| test.iter().map(|length| *length > limit).collect()).collect();
+        return lengths
+            .iter()
+            .map(|test| test.iter().map(|length| *length > limit).collect())
+            .collect();
     }
     problem
         .tests
@@ -59,7 +65,11 @@ fn wild_along_runs(readings: &Readings, residual: &[f64], coordinates: usize, si
                 let end = (row + NEIGHBOURS + 1).min(run.end);
                 let from = |side: std::ops::Range<usize>| {
                     let mut window: Vec<f64> = side.map(value).collect();
-                    if window.len() < 3 { None } else { Some(value(row) - median(&mut window)) }
+                    if window.len() < 3 {
+                        None
+                    } else {
+                        Some(value(row) - median(&mut window))
+                    }
                 };
                 let deviation = match (from(start..row), from(row + 1..end)) {
                     (Some(before), Some(after)) if before * after <= 0.0 => 0.0,

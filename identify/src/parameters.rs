@@ -83,7 +83,10 @@ impl Parameters {
         tests: &[&Test],
         models: &[TestModel<'_>],
     ) -> Result<Parameters, IdentifyError> {
-        let mut parameters = Parameters { parts: vec![Vec::new(); tests.len()], ..Parameters::default() };
+        let mut parameters = Parameters {
+            parts: vec![Vec::new(); tests.len()],
+            ..Parameters::default()
+        };
         for name in &session.unknowns {
             let id = name.to_string();
             let Some(slot) = session.machine.error_slot(name) else {
@@ -92,7 +95,11 @@ impl Parameters {
                     session.machine.name, name.axis
                 )));
             };
-            let unit = if name.freedom.is_angle() { InsideUnit::Radian } else { InsideUnit::Millimetre };
+            let unit = if name.freedom.is_angle() {
+                InsideUnit::Radian
+            } else {
+                InsideUnit::Millimetre
+            };
             let index = parameters.push(Parameter {
                 id,
                 unit: Unit::of(unit),
@@ -102,7 +109,11 @@ impl Parameters {
             })?;
             for (test, model) in models.iter().enumerate() {
                 if model.effective_slots().contains(&slot) {
-                    parameters.parts[test].push(Part { parameter: index, slot, basis: None });
+                    parameters.parts[test].push(Part {
+                        parameter: index,
+                        slot,
+                        basis: None,
+                    });
                 }
             }
         }
@@ -114,7 +125,11 @@ impl Parameters {
                 }
                 let group = test.group(unknown.shared_by);
                 let dot = if unknown.coordinate.is_empty() { "" } else { "." };
-                let bracket = if group.is_empty() { String::new() } else { format!("[{group}]") };
+                let bracket = if group.is_empty() {
+                    String::new()
+                } else {
+                    format!("[{group}]")
+                };
                 let id = format!("{}{dot}{}{bracket}", unknown.thing, unknown.coordinate);
                 let index = match parameters.list.iter().position(|p| p.id == id) {
                     Some(index) => {
@@ -132,7 +147,11 @@ impl Parameters {
                     })?,
                 };
                 let slot = session.machine.error_slots() + place;
-                parameters.parts[position].push(Part { parameter: index, slot, basis: None });
+                parameters.parts[position].push(Part {
+                    parameter: index,
+                    slot,
+                    basis: None,
+                });
             }
         }
         Ok(parameters)
@@ -178,24 +197,26 @@ impl Parameters {
             }
             let Some(readings) = &test.readings else { continue };
             let axis = drivers::component_axis(session, &effect.component);
-            let samples =
-                drivers::samples(&session.machine, model, readings, origin, &effect.driver, axis).ok_or_else(
-                    || IdentifyError::MissingDriver {
-                        effect: effect.id(),
-                        driver: effect.driver.to_string(),
-                        test: test.name.clone(),
-                        column: match effect.driver {
-                            Driver::Time => "time_s".to_string(),
-                            Driver::Temperature => "temperature_c".to_string(),
-                            ref other => other.to_string(),
-                        },
-                    },
-                )?;
+            let samples = drivers::samples(&session.machine, model, readings, origin, &effect.driver, axis)
+                .ok_or_else(|| IdentifyError::MissingDriver {
+                effect: effect.id(),
+                driver: effect.driver.to_string(),
+                test: test.name.clone(),
+                column: match effect.driver {
+                    Driver::Time => "time_s".to_string(),
+                    Driver::Temperature => "temperature_c".to_string(),
+                    ref other => other.to_string(),
+                },
+            })?;
             let effective = model.effective_slots();
-            let columns: Vec<Arc<Vec<f64>>> =
-                drivers::basis_columns(&effect.shape, &samples).into_iter().map(Arc::new).collect();
+            let columns: Vec<Arc<Vec<f64>>> = drivers::basis_columns(&effect.shape, &samples)
+                .into_iter()
+                .map(Arc::new)
+                .collect();
             for (k, column) in columns.iter().enumerate() {
-                greatest[k] = column.iter().fold(greatest[k], |most, value| most.max(value.abs()));
+                greatest[k] = column
+                    .iter()
+                    .fold(greatest[k], |most, value| most.max(value.abs()));
             }
             for (slot, factor) in drivers::component_slots(session, test, readings, &effect.component) {
                 if !effective.contains(&slot) {
@@ -206,7 +227,11 @@ impl Parameters {
                         None => column.clone(),
                         Some(factor) => Arc::new(column.iter().zip(factor).map(|(b, f)| b * f).collect()),
                     };
-                    self.parts[position].push(Part { parameter: first + k, slot, basis: Some(basis) });
+                    self.parts[position].push(Part {
+                        parameter: first + k,
+                        slot,
+                        basis: Some(basis),
+                    });
                 }
             }
         }
@@ -216,9 +241,16 @@ impl Parameters {
             self.push(Parameter {
                 id: format!("{}{dot}{name}", effect.id()),
                 unit: unit.clone(),
-                size: if greatest[k] > 0.0 { size / greatest[k] } else { size },
+                size: if greatest[k] > 0.0 {
+                    size / greatest[k]
+                } else {
+                    size
+                },
                 prior: Prior::Free,
-                role: Role::Coefficient { effect: number, coefficient: k },
+                role: Role::Coefficient {
+                    effect: number,
+                    coefficient: k,
+                },
             })?;
         }
         self.effects.push(effect.clone());

@@ -58,7 +58,11 @@ impl<'a> Problem<'a> {
     /// # Errors
     /// If there are no readings, or an effect cannot be evaluated.
     pub fn new(session: &'a Session, noise: Noise, seed: u64) -> Result<Problem<'a>, IdentifyError> {
-        let tests: Vec<&Test> = session.tests.iter().filter(|test| test.readings.is_some()).collect();
+        let tests: Vec<&Test> = session
+            .tests
+            .iter()
+            .filter(|test| test.readings.is_some())
+            .collect();
         if tests.is_empty() {
             return Err(IdentifyError::NoReadings);
         }
@@ -98,7 +102,8 @@ impl<'a> Problem<'a> {
     /// # Errors
     /// See [`Parameters::add_effect`].
     pub fn add_effect(&mut self, effect: &Effect) -> Result<(), IdentifyError> {
-        self.parameters.add_effect(self.session, &self.tests, &self.models, &self.origin, effect)?;
+        self.parameters
+            .add_effect(self.session, &self.tests, &self.models, &self.origin, effect)?;
         self.update_slots();
         Ok(())
     }
@@ -119,7 +124,11 @@ impl<'a> Problem<'a> {
 
     /// Number of readings that count.
     pub fn readings(&self) -> usize {
-        self.rejected.iter().flatten().filter(|rejected| !**rejected).count()
+        self.rejected
+            .iter()
+            .flatten()
+            .filter(|rejected| !**rejected)
+            .count()
     }
 
     /// Number of scalar coordinates a reading.
@@ -142,7 +151,10 @@ impl<'a> Problem<'a> {
                 let mut start = run.start;
                 while start < run.end {
                     let end = (start + most).min(run.end);
-                    blocks.push(Block { test, rows: start..end });
+                    blocks.push(Block {
+                        test,
+                        rows: start..end,
+                    });
                     start = end;
                 }
             }
@@ -174,7 +186,10 @@ impl<'a> Problem<'a> {
                                 }
                             };
                             let column = &mut values.varying[place].1;
-                            column.iter_mut().zip(basis.iter()).for_each(|(sum, b)| *sum += coefficient * b);
+                            column
+                                .iter_mut()
+                                .zip(basis.iter())
+                                .for_each(|(sum, b)| *sum += coefficient * b);
                         }
                     }
                 }
@@ -188,8 +203,14 @@ impl<'a> Problem<'a> {
         let _ = values;
         let coordinates = self.coordinates();
         let scalars = block.rows.start * coordinates..block.rows.end * coordinates;
-        let Some(readings) = &self.tests[block.test].readings else { return Vec::new() };
-        readings.observed[scalars].iter().zip(readings_mm).map(|(observed, model)| observed - model).collect()
+        let Some(readings) = &self.tests[block.test].readings else {
+            return Vec::new();
+        };
+        readings.observed[scalars]
+            .iter()
+            .zip(readings_mm)
+            .map(|(observed, model)| observed - model)
+            .collect()
     }
 
     /// Rows of `[J | r]` of a block in mm, not whitened, rejected rows included: (rows × coordinates) × (unknowns + 1).
@@ -212,13 +233,18 @@ impl<'a> Problem<'a> {
         let unknowns = self.parameters.list.len();
         let mut rows = Mat::zeros(residual.len(), unknowns + 1);
         for part in &self.parameters.parts[block.test] {
-            let Ok(place) = slots.binary_search(&part.slot) else { continue };
+            let Ok(place) = slots.binary_search(&part.slot) else {
+                continue;
+            };
             let derivative = &sensitivities.derivatives[place];
             let column = rows.col_mut(part.parameter);
             let entries = column.try_as_col_major_mut().map(|column| column.as_slice_mut());
             let Some(entries) = entries else { continue };
             match &part.basis {
-                None => entries.iter_mut().zip(derivative).for_each(|(entry, d)| *entry += d),
+                None => entries
+                    .iter_mut()
+                    .zip(derivative)
+                    .for_each(|(entry, d)| *entry += d),
                 Some(basis) => {
                     for (i, (entry, d)) in entries.iter_mut().zip(derivative).enumerate() {
                         *entry += d * basis[block.rows.start + i / coordinates];
@@ -259,10 +285,17 @@ impl<'a> Problem<'a> {
             if i / coordinates < memory.len() {
                 return rows[(i, j)] * marginal;
             }
-            let past: f64 = memory.iter().enumerate().map(|(lag, a)| a * rows[(i - (lag + 1) * coordinates, j)]).sum();
+            let past: f64 = memory
+                .iter()
+                .enumerate()
+                .map(|(lag, a)| a * rows[(i - (lag + 1) * coordinates, j)])
+                .sum();
             (rows[(i, j)] - past) * innovation
         });
-        let folds = kept.iter().map(|i| fold_of[block.rows.start + i / coordinates]).collect();
+        let folds = kept
+            .iter()
+            .map(|i| fold_of[block.rows.start + i / coordinates])
+            .collect();
         (white, folds)
     }
 
@@ -316,7 +349,9 @@ impl<'a> Problem<'a> {
         for distance in &self.session.socket_distances {
             let ends: Vec<Option<([usize; 3], [f64; 3])>> =
                 distance.between.iter().map(|name| self.socket(name)).collect();
-            let [Some((a, nominal_a)), Some((b, nominal_b))] = ends[..] else { continue };
+            let [Some((a, nominal_a)), Some((b, nominal_b))] = ends[..] else {
+                continue;
+            };
             let place = |k: usize, unknown: usize, nominal: f64| {
                 let mut seed = nalgebra::SVector::<f64, 6>::zeros();
                 seed[k] = 1.0;
@@ -326,7 +361,9 @@ impl<'a> Problem<'a> {
                 .map(|i| (place(i, a[i], nominal_a[i]) - place(i + 3, b[i], nominal_b[i])).powi(2))
                 .fold(num_dual::DualSVec64::<6>::from(0.0), |sum, term| sum + term);
             let length = square.sqrt();
-            let gradient = length.eps.unwrap_generic(nalgebra::Const::<6>, nalgebra::Const::<1>);
+            let gradient = length
+                .eps
+                .unwrap_generic(nalgebra::Const::<6>, nalgebra::Const::<1>);
             let mut row = vec![0.0; unknowns + 1];
             for i in 0..3 {
                 row[a[i]] += gradient[i] / distance.u_mm;
@@ -342,12 +379,21 @@ impl<'a> Problem<'a> {
 
     /// The unknowns of a socket and where it stands nominally.
     fn socket(&self, name: &str) -> Option<([usize; 3], [f64; 3])> {
-        let test = self.tests.iter().position(|test| test.socket.as_deref() == Some(name))?;
-        let Station::Socket(station) = self.models[test].station() else { return None };
+        let test = self
+            .tests
+            .iter()
+            .position(|test| test.socket.as_deref() == Some(name))?;
+        let Station::Socket(station) = self.models[test].station() else {
+            return None;
+        };
         let mut unknowns = [0; 3];
         for (unknown, coordinate) in unknowns.iter_mut().zip(["x", "y", "z"]) {
             let id = format!("socket.{coordinate}[{name}]");
-            *unknown = self.parameters.list.iter().position(|parameter| parameter.id == id)?;
+            *unknown = self
+                .parameters
+                .list
+                .iter()
+                .position(|parameter| parameter.id == id)?;
         }
         Some((unknowns, station.socket))
     }
@@ -359,7 +405,10 @@ impl<'a> Problem<'a> {
             .par_iter()
             .enumerate()
             .map(|(test, model)| {
-                let block = Block { test, rows: 0..model.rows() };
+                let block = Block {
+                    test,
+                    rows: 0..model.rows(),
+                };
                 let readings = model.readings_mm(&values[test]);
                 self.residual_block(&values, &block, &readings)
             })
@@ -374,7 +423,8 @@ impl<'a> Problem<'a> {
             .blocks()
             .iter()
             .map(|block| {
-                let residual = &residuals[block.test][block.rows.start * coordinates..block.rows.end * coordinates];
+                let residual =
+                    &residuals[block.test][block.rows.start * coordinates..block.rows.end * coordinates];
                 let column = Mat::from_fn(residual.len(), 1, |i, _| residual[i]);
                 let (white, _) = self.whiten(&column, block);
                 (0..white.nrows()).map(|i| white[(i, 0)].powi(2)).sum::<f64>()

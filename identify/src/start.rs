@@ -22,7 +22,9 @@ pub fn stations(session: &Session, tests: &[&Test]) -> Vec<Station<f64>> {
         if groups[..index].contains(&groups[index]) && !matches!(stations[index], Station::BallBar(_)) {
             continue;
         }
-        let members: Vec<usize> = (0..tests.len()).filter(|other| groups[*other] == groups[index]).collect();
+        let members: Vec<usize> = (0..tests.len())
+            .filter(|other| groups[*other] == groups[index])
+            .collect();
         match &stations[index] {
             Station::BallBar(_) => {}
             Station::Tracker(_) => {
@@ -84,8 +86,11 @@ fn rigid_motion(from: &[Vector3<f64>], to: &[Vector3<f64>]) -> (Matrix3<f64>, Ve
     let count = from.len() as f64;
     let centre_from = from.iter().sum::<Vector3<f64>>() / count;
     let centre_to = to.iter().sum::<Vector3<f64>>() / count;
-    let covariance: Matrix3<f64> =
-        from.iter().zip(to).map(|(a, b)| (b - centre_to) * (a - centre_from).transpose()).sum();
+    let covariance: Matrix3<f64> = from
+        .iter()
+        .zip(to)
+        .map(|(a, b)| (b - centre_to) * (a - centre_from).transpose())
+        .sum();
     let svd = covariance.svd(true, true);
     let (Some(u), Some(v_t)) = (svd.u, svd.v_t) else {
         return (Matrix3::identity(), centre_to - centre_from);

@@ -19,7 +19,10 @@ pub const BLOCK_ROWS: usize = 1024;
 impl Triangle {
     /// Of no rows, for this many unknowns.
     pub fn new(columns: usize) -> Self {
-        Triangle { columns, factor: Mat::zeros(0, columns + 1) }
+        Triangle {
+            columns,
+            factor: Mat::zeros(0, columns + 1),
+        }
     }
 
     /// Number of unknowns.
@@ -35,7 +38,11 @@ impl Triangle {
         let kept = self.factor.nrows();
         let width = self.columns + 1;
         let stacked = Mat::from_fn(kept + block.nrows(), width, |i, j| {
-            if i < kept { self.factor[(i, j)] } else { block[(i - kept, j)] }
+            if i < kept {
+                self.factor[(i, j)]
+            } else {
+                block[(i - kept, j)]
+            }
         });
         if stacked.nrows() <= width {
             self.factor = stacked;
@@ -58,8 +65,13 @@ impl Triangle {
             return self.factor.clone();
         }
         let rows = self.factor.nrows().max(width);
-        let padded =
-            Mat::from_fn(rows, width, |i, j| if i < self.factor.nrows() { self.factor[(i, j)] } else { 0.0 });
+        let padded = Mat::from_fn(rows, width, |i, j| {
+            if i < self.factor.nrows() {
+                self.factor[(i, j)]
+            } else {
+                0.0
+            }
+        });
         let decomposition = padded.qr();
         let upper = decomposition.thin_R();
         Mat::from_fn(width, width, |i, j| if i <= j { upper[(i, j)] } else { 0.0 })

@@ -23,15 +23,24 @@ impl Unit {
             InsideUnit::Radian => ("arcsec", ARCSEC),
             InsideUnit::Ratio => ("um/m", 1e6),
         };
-        Unit { name: name.to_string(), per_inside }
+        Unit {
+            name: name.to_string(),
+            per_inside,
+        }
     }
 
     /// The unit of an effect's coefficient. `same_kind`: component and driver are both lengths or both angles.
     pub fn of_coefficient(component: InsideUnit, driver: &Driver, shape: &Shape, same_kind: bool) -> Unit {
         let plain = Unit::of(component);
-        let per = |what: &str| Unit { name: format!("{}/{what}", plain.name), per_inside: plain.per_inside };
+        let per = |what: &str| Unit {
+            name: format!("{}/{what}", plain.name),
+            per_inside: plain.per_inside,
+        };
         match (shape, driver) {
-            (Shape::Lag, _) if same_kind => Unit { name: "ms".to_string(), per_inside: 1e3 },
+            (Shape::Lag, _) if same_kind => Unit {
+                name: "ms".to_string(),
+                per_inside: 1e3,
+            },
             (Shape::Lag, Driver::Axis(_)) if component == InsideUnit::Radian => per("(mm/s)"),
             (Shape::Lag, _) => per("(rad/s)"),
             (Shape::Drift, _) => per("h"),

@@ -259,6 +259,7 @@ impl Machine {
 }
 
 /// A point on the moved side of an axis, seen from its other side.
+#[inline]
 fn push<S: Scalar>(
     axis: &Axis,
     position: &AxisPosition<S::Nominal>,

@@ -11,29 +11,34 @@ pub struct Point<S>(pub [S; 3]);
 
 impl<S: Scalar> Point<S> {
     /// A nominal point, with derivatives of zero.
+    #[inline(always)]
     pub fn nominal(coordinates: [S::Nominal; 3]) -> Self {
         Point(coordinates.map(S::nominal))
     }
 
     /// `self + other`.
+    #[inline(always)]
     pub fn plus(self, other: Self) -> Self {
         let ([a, b, c], [x, y, z]) = (self.0, other.0);
         Point([a + x, b + y, c + z])
     }
 
     /// `self − other`.
+    #[inline(always)]
     pub fn minus(self, other: Self) -> Self {
         let ([a, b, c], [x, y, z]) = (self.0, other.0);
         Point([a - x, b - y, c - z])
     }
 
     /// `self + offset` with a nominal offset.
+    #[inline(always)]
     pub fn shifted(self, offset: [S::Nominal; 3]) -> Self {
         let ([a, b, c], [x, y, z]) = (self.0, offset);
         Point([a + x, b + y, c + z])
     }
 
     /// The Euclidean norm. Its derivative at zero is not finite.
+    #[inline(always)]
     pub fn norm(self) -> S {
         let [a, b, c] = self.0;
         (a * a + b * b + c * c).sqrt()
@@ -125,11 +130,13 @@ impl<S: Scalar> SmallMotion<S> {
     }
 
     /// `Trans · Rx · Ry · Rz · point`.
+    #[inline(always)]
     pub fn push(&self, point: Point<S>) -> Point<S> {
         self.rotate(point).plus(self.translation)
     }
 
     /// `Rx · Ry · Rz · direction`, without the translation.
+    #[inline(always)]
     pub fn rotate(&self, direction: Point<S>) -> Point<S> {
         match &self.form {
             SmallTurns::Exact([a, b, c]) => {
@@ -142,11 +149,13 @@ impl<S: Scalar> SmallMotion<S> {
     }
 
     /// `Rzᵀ · Ryᵀ · Rxᵀ · (point − translation)`: what takes a point back. For small angles `(I − [θ]×)·(point − translation)`.
+    #[inline(always)]
     pub fn pull(&self, point: Point<S>) -> Point<S> {
         self.rotate_back(point.minus(self.translation))
     }
 
     /// The inverse of [`SmallMotion::rotate`].
+    #[inline(always)]
     pub fn rotate_back(&self, direction: Point<S>) -> Point<S> {
         let back = |turn: &Turn<S>| Turn {
             sin: -turn.sin,
@@ -164,12 +173,14 @@ impl<S: Scalar> SmallMotion<S> {
 }
 
 /// `a × b`.
+#[inline(always)]
 pub fn cross<S: Scalar>(a: [S; 3], b: Point<S>) -> Point<S> {
     let ([a, b, c], [x, y, z]) = (a, b.0);
     Point([b * z - c * y, c * x - a * z, a * y - b * x])
 }
 
 /// `ω × d` with a nominal direction, zeros of `d` left out.
+#[inline(always)]
 pub fn cross_nominal<S: Scalar>(omega: [S; 3], direction: [f64; 3]) -> Point<S> {
     let term = |plus: (S, f64), minus: (S, f64)| {
         let scaled = |(s, d): (S, f64)| (d != 0.0).then(|| s * S::Nominal::constant(d));
@@ -185,6 +196,7 @@ pub fn cross_nominal<S: Scalar>(omega: [S; 3], direction: [f64; 3]) -> Point<S> 
 }
 
 /// A turn about a coordinate axis by an error angle.
+#[inline(always)]
 pub fn turn_about<S: Scalar>(axis: Coordinate, turn: Turn<S>, point: Point<S>) -> Point<S> {
     let (first, second) = axis.others();
     let (u, v) = (point.0[first], point.0[second]);
@@ -195,6 +207,7 @@ pub fn turn_about<S: Scalar>(axis: Coordinate, turn: Turn<S>, point: Point<S>) -
 }
 
 /// A turn about a coordinate axis by a nominal angle.
+#[inline(always)]
 pub fn turn_about_nominal<S: Scalar>(axis: Coordinate, turn: Turn<S::Nominal>, point: Point<S>) -> Point<S> {
     let (first, second) = axis.others();
     let (u, v) = (point.0[first], point.0[second]);

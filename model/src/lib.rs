@@ -15,6 +15,7 @@ pub mod component;
 pub mod effect;
 pub mod error;
 pub mod frames;
+pub mod gradient;
 pub mod instrument;
 pub mod scalar;
 pub mod sensitivity;

@@ -3,18 +3,17 @@
 //! A *slot* is a component that the chain can see: the machine's errors ([`crate::chain::ERRORS_PER_AXIS`] an axis), then the instrument's own
 //! unknowns. Slots are seeded in packs; a slot that is neither seeded nor different from zero is left out of the chain altogether.
 
-use num_dual::{Derivative, DualSVec64};
-
 use crate::axis::AxisKind;
 use crate::chain::{AxisPosition, BodyErrors, Machine};
+use crate::gradient::Gradient;
 use crate::instrument::Station;
 use crate::scalar::Scalar;
 use crate::session::readings::Readings;
 
 /// Slots seeded at once.
-const PACK: usize = 6;
+const PACK: usize = 8;
 
-type PackDual = DualSVec64<PACK>;
+type PackDual = Gradient<PACK>;
 
 /// What the components are, reading by reading.
 #[derive(Clone, Debug, Default)]
@@ -28,7 +27,10 @@ pub struct SlotValues {
 impl SlotValues {
     /// All zero, for a test with this many slots.
     pub fn zero(slots: usize) -> Self {
-        SlotValues { constant: vec![0.0; slots], varying: Vec::new() }
+        SlotValues {
+            constant: vec![0.0; slots],
+            varying: Vec::new(),
+        }
     }
 
     fn at(&self, slot: usize, row: usize) -> f64 {
@@ -75,7 +77,12 @@ impl<'a> TestModel<'a> {
                 states.push(AxisPosition::new(axis.kind, column[row]));
             }
         }
-        TestModel { machine, station, states, rows }
+        TestModel {
+            machine,
+            station,
+            states,
+            rows,
+        }
     }
 
     /// The instrument as set up.
@@ -117,32 +124,48 @@ impl<'a> TestModel<'a> {
         &self.states[row * axes..(row + 1) * axes]
     }
 
-    /// The reading at a row, from slots for which `carried` holds.
+    /// The instrument's unknowns at a row, from slots for which `carried` holds.
+    fn unknowns<S: Scalar<Nominal = f64>>(
+        &self,
+        carried: impl Fn(usize) -> bool,
+        slot: impl Fn(usize) -> S,
+    ) -> Vec<Option<S>> {
+        let range = self.machine.error_slots()..self.slots();
+        range.map(|index| carried(index).then(|| slot(index))).collect()
+    }
+
+    /// The reading at a row.
     fn read<S: Scalar<Nominal = f64>>(
         &self,
         row: usize,
         bodies: &[BodyErrors<S>],
-        carried: impl Fn(usize) -> bool,
-        slot: impl Fn(usize) -> S,
+        unknowns: &[Option<S>],
     ) -> crate::instrument::Reading<S> {
-        let first = self.machine.error_slots();
-        self.station.read(self.machine, self.state(row), bodies, |unknown| {
-            carried(first + unknown).then(|| slot(first + unknown))
-        })
+        self.station
+            .read(self.machine, self.state(row), bodies, |unknown| unknowns[unknown])
     }
 
     /// The readings, mm: rows × coordinates.
     pub fn readings_mm(&self, values: &SlotValues) -> Vec<f64> {
         let carried = |slot: usize| !values.is_zero(slot);
-        let machine_varies = (0..self.machine.error_slots()).any(|slot| values.varies(slot));
+        let errors = self.machine.error_slots();
+        let machine_varies = (0..errors).any(|slot| values.varies(slot));
+        let instrument_varies = (errors..self.slots()).any(|slot| values.varies(slot));
         let bodies_at = |row: usize| self.machine.body_errors(carried, |slot| values.at(slot, row));
-        let mut bodies = if self.rows > 0 { bodies_at(0) } else { Vec::new() };
+        let unknowns_at = |row: usize| self.unknowns(carried, |slot| values.at(slot, row));
+        if self.rows == 0 {
+            return Vec::new();
+        }
+        let (mut bodies, mut unknowns) = (bodies_at(0), unknowns_at(0));
         let mut readings = Vec::with_capacity(self.rows * self.coordinates());
         for row in 0..self.rows {
             if machine_varies && row > 0 {
                 bodies = bodies_at(row);
             }
-            let reading = self.read(row, &bodies, carried, |slot| values.at(slot, row));
+            if instrument_varies && row > 0 {
+                unknowns = unknowns_at(row);
+            }
+            let reading = self.read(row, &bodies, &unknowns);
             readings.extend_from_slice(reading.coordinates());
         }
         readings
@@ -161,36 +184,43 @@ impl<'a> TestModel<'a> {
             readings_mm: Vec::with_capacity(scalars),
             derivatives: vec![Vec::with_capacity(scalars); slots.len()],
         };
-        let packs: Vec<&[usize]> = if slots.is_empty() { vec![&[]] } else { slots.chunks(PACK).collect() };
+        if rows.is_empty() {
+            return result;
+        }
+        let errors = self.machine.error_slots();
+        let machine_varies = (0..errors).any(|slot| values.varies(slot));
+        let instrument_varies = (errors..self.slots()).any(|slot| values.varies(slot));
+        let packs: Vec<&[usize]> = if slots.is_empty() {
+            vec![&[]]
+        } else {
+            slots.chunks(PACK).collect()
+        };
         for (pack_index, pack) in packs.iter().enumerate() {
             let carried = |slot: usize| pack.contains(&slot) || !values.is_zero(slot);
-            let machine_varies = (0..self.machine.error_slots()).any(|slot| values.varies(slot));
             let seeded = |slot: usize, row: usize| -> PackDual {
                 let value = values.at(slot, row);
                 match pack.iter().position(|seed| *seed == slot) {
-                    Some(place) => {
-                        let mut seed = nalgebra::SVector::<f64, PACK>::zeros();
-                        seed[place] = 1.0;
-                        PackDual::new(value, Derivative::some(seed))
-                    }
-                    None => PackDual::from_re(value),
+                    Some(place) => PackDual::seed(value, place),
+                    None => PackDual::constant(value),
                 }
             };
             let bodies_at = |row: usize| self.machine.body_errors(carried, |slot| seeded(slot, row));
-            let mut bodies = if rows.is_empty() { Vec::new() } else { bodies_at(rows.start) };
+            let unknowns_at = |row: usize| self.unknowns(carried, |slot| seeded(slot, row));
+            let (mut bodies, mut unknowns) = (bodies_at(rows.start), unknowns_at(rows.start));
             for row in rows.clone() {
                 if machine_varies && row > rows.start {
                     bodies = bodies_at(row);
                 }
-                let reading = self.read(row, &bodies, carried, |slot| seeded(slot, row));
+                if instrument_varies && row > rows.start {
+                    unknowns = unknowns_at(row);
+                }
+                let reading = self.read(row, &bodies, &unknowns);
                 for value in reading.coordinates() {
                     if pack_index == 0 {
-                        result.readings_mm.push(value.re);
+                        result.readings_mm.push(value.value);
                     }
-                    let gradient =
-                        value.eps.unwrap_generic(nalgebra::Const::<PACK>, nalgebra::Const::<1>);
                     for place in 0..pack.len() {
-                        result.derivatives[pack_index * PACK + place].push(gradient[place]);
+                        result.derivatives[pack_index * PACK + place].push(value.by[place]);
                     }
                 }
             }

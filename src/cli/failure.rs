@@ -45,7 +45,11 @@ impl Failure {
             use ariadne::{Config, IndexType, Label, Report, ReportKind, Source};
             let name = place.file.display().to_string();
             let mut report = Report::build(ReportKind::Error, (name.clone(), span.clone()))
-                .with_config(Config::default().with_index_type(IndexType::Byte).with_color(false))
+                .with_config(
+                    Config::default()
+                        .with_index_type(IndexType::Byte)
+                        .with_color(false),
+                )
                 .with_message(format!("{place}: {message}"))
                 .with_label(Label::new((name.clone(), span.clone())).with_message("here"));
             if let Some(help) = help {

@@ -28,7 +28,12 @@ pub fn run(arguments: &FitArguments) -> Result<(), Failure> {
 }
 
 fn print(result: &FitResult) {
-    println!("{} readings, noise {} ({})", result.readings, table::micrometres(result.noise_um), result.noise_source);
+    println!(
+        "{} readings, noise {} ({})",
+        result.readings,
+        table::micrometres(result.noise_um),
+        result.noise_source
+    );
     println!(
         "residual {}, held out {} (leaving out {})",
         table::micrometres(result.rms_um),
@@ -36,16 +41,29 @@ fn print(result: &FitResult) {
         result.heldout_by
     );
     if let (Some(rms), Some(held)) = (result.rms_3d_um, result.heldout_rms_3d_um) {
-        println!("length of the 3-vector: residual {}, held out {}", table::micrometres(rms), table::micrometres(held));
+        println!(
+            "length of the 3-vector: residual {}, held out {}",
+            table::micrometres(rms),
+            table::micrometres(held)
+        );
     }
-    println!("{} of {} unknowns or combinations of them are seen", result.rank, result.unknowns);
+    println!(
+        "{} of {} unknowns or combinations of them are seen",
+        result.rank, result.unknowns
+    );
     println!();
     print_parameters(&result.parameters);
     print_unobservable(&result.unobservable);
     if !result.rejected.is_empty() {
         println!("\nLeft out as wild:");
         for reading in &result.rejected {
-            println!("  {} {}:{}  residual {}", reading.test, reading.file, reading.line, table::micrometres(reading.residual_um));
+            println!(
+                "  {} {}:{}  residual {}",
+                reading.test,
+                reading.file,
+                reading.line,
+                table::micrometres(reading.residual_um)
+            );
         }
     }
     print_warnings(&result.warnings);
@@ -70,7 +88,11 @@ pub fn print_unobservable(unobservable: &[Unobservable]) {
     }
     println!("\nNot seen by these readings:");
     for item in unobservable {
-        let terms: Vec<String> = item.combination.iter().map(|(id, value)| format!("{id} {value:.4}")).collect();
+        let terms: Vec<String> = item
+            .combination
+            .iter()
+            .map(|(id, value)| format!("{id} {value:.4}"))
+            .collect();
         println!("  {}", item.why);
         if terms.len() > 1 {
             println!("    {}", terms.join(" : "));

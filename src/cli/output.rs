@@ -7,7 +7,10 @@ use super::failure::Failure;
 
 /// Writes a file through a temporary one beside it, so that a reader finds the old file or the whole new one.
 pub fn write_whole(path: &Path, contents: &[u8]) -> Result<(), Failure> {
-    let fault = |source| Failure::Write { path: path.display().to_string(), source };
+    let fault = |source| Failure::Write {
+        path: path.display().to_string(),
+        source,
+    };
     let folder = match path.parent() {
         Some(folder) if !folder.as_os_str().is_empty() => folder,
         _ => Path::new("."),

@@ -85,7 +85,13 @@ impl<'p, 'a> Columns<'p, 'a> {
         }
         let place = sensitivities
             .iter()
-            .map(|s| s.slots.iter().enumerate().map(|(place, slot)| (*slot, place)).collect())
+            .map(|s| {
+                s.slots
+                    .iter()
+                    .enumerate()
+                    .map(|(place, slot)| (*slot, place))
+                    .collect()
+            })
             .collect();
         let blocks = problem.blocks();
         let mut fold_of = Vec::new();
@@ -146,18 +152,27 @@ impl<'p, 'a> Columns<'p, 'a> {
                     )
                     .map(Arc::new)
                 })?;
-                let basis = cached(&self.bases, (number, format!("{follows} {:?}", effect.shape)), || {
-                    Arc::new(drivers::basis_columns(&effect.shape, &samples))
-                });
+                let basis = cached(
+                    &self.bases,
+                    (number, format!("{follows} {:?}", effect.shape)),
+                    || Arc::new(drivers::basis_columns(&effect.shape, &samples)),
+                );
                 for (slot, factor) in drivers::component_slots(session, test, readings, &effect.component) {
                     if self.place[number].contains_key(&slot) {
-                        of_test.push(LayoutPart { slot, factor: factor.map(Arc::new), basis: basis.clone() });
+                        of_test.push(LayoutPart {
+                            slot,
+                            factor: factor.map(Arc::new),
+                            basis: basis.clone(),
+                        });
                     }
                 }
             }
             parts.push(of_test);
         }
-        Some(Layout { count: effect.shape.coefficients(), parts })
+        Some(Layout {
+            count: effect.shape.coefficients(),
+            parts,
+        })
     }
 
     /// Fills columns with the whitened rows of layouts, one after another.

@@ -113,14 +113,28 @@ pub fn candidates(problem: &Problem<'_>) -> Result<Vec<Candidate>, IdentifyError
         for component in components(problem, &sampling, family.components) {
             for driver in drivers(problem, &sampling, family.driver, &component) {
                 for (shape, tests, extra) in shapes(problem, &sampling, family, &component, &driver) {
-                    let effect = Effect { component: component.clone(), driver: driver.clone(), shape, tests };
+                    let effect = Effect {
+                        component: component.clone(),
+                        driver: driver.clone(),
+                        shape,
+                        tests,
+                    };
                     let cost = family.simplicity + extra;
-                    candidates.push(Candidate { effect, family: number, cost });
+                    candidates.push(Candidate {
+                        effect,
+                        family: number,
+                        cost,
+                    });
                 }
             }
         }
     }
-    let declared: Vec<String> = problem.parameters.list.iter().map(|parameter| parameter.id.clone()).collect();
+    let declared: Vec<String> = problem
+        .parameters
+        .list
+        .iter()
+        .map(|parameter| parameter.id.clone())
+        .collect();
     candidates.retain(|candidate| {
         let id = candidate.effect.id();
         let constant = candidate.effect.shape == Shape::Constant;
@@ -133,10 +147,20 @@ pub fn candidates(problem: &Problem<'_>) -> Result<Vec<Candidate>, IdentifyError
 
 /// Whether a set-up quantity is free already, so that freeing it is no effect.
 fn is_free_setup(problem: &Problem<'_>, effect: &Effect) -> bool {
-    let Component::Instrument { thing, coordinate } = &effect.component else { return false };
-    let Some(test) = problem.tests.iter().find(|test| effect.tests.contains(&test.name)) else { return false };
+    let Component::Instrument { thing, coordinate } = &effect.component else {
+        return false;
+    };
+    let Some(test) = problem
+        .tests
+        .iter()
+        .find(|test| effect.tests.contains(&test.name))
+    else {
+        return false;
+    };
     let unknowns = problem.session.instrument.unknowns();
-    let place = unknowns.iter().position(|u| u.thing == thing && u.coordinate == coordinate);
+    let place = unknowns
+        .iter()
+        .position(|u| u.thing == thing && u.coordinate == coordinate);
     place.is_some_and(|place| test.priors[place] == abbe_model::session::Prior::Free)
 }
 
@@ -166,15 +190,22 @@ impl Sampling {
                 let kind = problem.session.machine.axes[axis].kind;
                 let samples = readings.axis_samples(axis, kind);
                 let directions = |range: std::ops::Range<usize>| {
-                    samples[range].iter().map(|s| s.direction as i32).filter(|d| *d != 0).collect::<std::collections::BTreeSet<_>>()
+                    samples[range]
+                        .iter()
+                        .map(|s| s.direction as i32)
+                        .filter(|d| *d != 0)
+                        .collect::<std::collections::BTreeSet<_>>()
                 };
                 sampling.both_directions[axis] |= directions(0..samples.len()).len() > 1;
                 for run in readings.runs() {
                     sampling.reverses_inside_runs[axis] |= directions(run).len() > 1;
                 }
                 if !readings.run.is_empty() && column.len() > 1 {
-                    let mut steps: Vec<f64> =
-                        column.windows(2).map(|pair| (pair[1] - pair[0]).abs()).filter(|step| *step > 1e-9).collect();
+                    let mut steps: Vec<f64> = column
+                        .windows(2)
+                        .map(|pair| (pair[1] - pair[0]).abs())
+                        .filter(|step| *step > 1e-9)
+                        .collect();
                     sampling.step[axis] = sampling.step[axis].max(crate::outliers::median(&mut steps));
                 }
             }
@@ -195,7 +226,11 @@ impl Sampling {
 fn components(problem: &Problem<'_>, sampling: &Sampling, choice: Components) -> Vec<Component> {
     let machine = &problem.session.machine;
     let error = |axis: usize, kind: ErrorKind, freedom: Freedom| {
-        Component::Axis(ErrorName { kind, freedom, axis: machine.axes[axis].name.clone() })
+        Component::Axis(ErrorName {
+            kind,
+            freedom,
+            axis: machine.axes[axis].name.clone(),
+        })
     };
     let moving = || (0..machine.axes.len()).filter(|axis| sampling.moves[*axis]);
     let things = |names: &[&str]| -> Vec<Component> {
@@ -212,12 +247,12 @@ fn components(problem: &Problem<'_>, sampling: &Sampling, choice: Components) ->
             .collect()
     };
     match choice {
-        Components::Motion => {
-            moving().flat_map(|axis| Freedom::ALL.map(|freedom| error(axis, ErrorKind::Motion, freedom))).collect()
-        }
-        Components::OwnMotion => {
-            moving().map(|axis| error(axis, ErrorKind::Motion, machine.axes[axis].own_freedom())).collect()
-        }
+        Components::Motion => moving()
+            .flat_map(|axis| Freedom::ALL.map(|freedom| error(axis, ErrorKind::Motion, freedom)))
+            .collect(),
+        Components::OwnMotion => moving()
+            .map(|axis| error(axis, ErrorKind::Motion, machine.axes[axis].own_freedom()))
+            .collect(),
         Components::LinearMotion => moving()
             .filter(|axis| machine.axes[*axis].kind == AxisKind::Linear)
             .flat_map(|axis| {
@@ -232,7 +267,13 @@ fn components(problem: &Problem<'_>, sampling: &Sampling, choice: Components) ->
                 Freedom::ALL
                     .into_iter()
                     // An axis is a line: it has no location along itself, and its zero is no error of the line.
-                    .filter(move |f| if rotary { *f != own && *f != along } else { f.is_angle() && f.index() != own.index() + 3 })
+                    .filter(move |f| {
+                        if rotary {
+                            *f != own && *f != along
+                        } else {
+                            f.is_angle() && f.index() != own.index() + 3
+                        }
+                    })
                     .map(move |freedom| error(axis, ErrorKind::Location, freedom))
             })
             .collect(),
@@ -249,7 +290,12 @@ fn components(problem: &Problem<'_>, sampling: &Sampling, choice: Components) ->
     }
 }
 
-fn drivers(problem: &Problem<'_>, sampling: &Sampling, choice: DriverChoice, component: &Component) -> Vec<Driver> {
+fn drivers(
+    problem: &Problem<'_>,
+    sampling: &Sampling,
+    choice: DriverChoice,
+    component: &Component,
+) -> Vec<Driver> {
     let machine = &problem.session.machine;
     let own = crate::drivers::component_axis(problem.session, component);
     let own_of_kind = |kind: Option<AxisKind>| -> Vec<Driver> {
@@ -267,8 +313,20 @@ fn drivers(problem: &Problem<'_>, sampling: &Sampling, choice: DriverChoice, com
             .filter(|axis| sampling.moves[*axis] && Some(*axis) != own)
             .map(|axis| Driver::Axis(machine.axes[axis].name.clone()))
             .collect(),
-        DriverChoice::Time => if sampling.has_time { vec![Driver::Time] } else { Vec::new() },
-        DriverChoice::Temperature => if sampling.has_temperature { vec![Driver::Temperature] } else { Vec::new() },
+        DriverChoice::Time => {
+            if sampling.has_time {
+                vec![Driver::Time]
+            } else {
+                Vec::new()
+            }
+        }
+        DriverChoice::Temperature => {
+            if sampling.has_temperature {
+                vec![Driver::Temperature]
+            } else {
+                Vec::new()
+            }
+        }
         DriverChoice::Gravity => {
             let turns = own.is_some_and(|axis| machine.axes[axis].kind == AxisKind::Rotary);
             if turns { vec![Driver::Gravity] } else { Vec::new() }
@@ -295,19 +353,40 @@ fn shapes(
     let step = axis.map_or(0.0, |axis| sampling.step[axis]);
     match family.shape.as_str() {
         "constant" => vec![all(Shape::Constant, 0.0)],
-        "constant-per-mount" => mounts(problem, component).into_iter().map(|tests| (Shape::Constant, tests, 0.0)).collect(),
+        "constant-per-mount" => mounts(problem, component)
+            .into_iter()
+            .map(|tests| (Shape::Constant, tests, 0.0))
+            .collect(),
         "harmonic" => {
-            let most = if poses { HIGHEST_ORDER_OF_POSES } else if step > 0.0 {
+            let most = if poses {
+                HIGHEST_ORDER_OF_POSES
+            } else if step > 0.0 {
                 // Four readings a cycle.
                 ((TAU / (4.0 * step)) as usize).clamp(1, HIGHEST_ORDER)
-            } else { 0 };
-            (1..=most).map(|order| all(Shape::Harmonic { order: order as f64 }, harmonic_cost(order))).collect()
+            } else {
+                0
+            };
+            (1..=most)
+                .map(|order| all(Shape::Harmonic { order: order as f64 }, harmonic_cost(order)))
+                .collect()
         }
         "harmonic-low" => {
             if rotary {
-                (1..=2).map(|order| all(Shape::Harmonic { order: order as f64 }, harmonic_cost(order))).collect()
+                (1..=2)
+                    .map(|order| all(Shape::Harmonic { order: order as f64 }, harmonic_cost(order)))
+                    .collect()
             } else {
-                (1..=2).map(|degree| all(Shape::Power { degree, scale: half(span) }, 0.2 * degree as f64)).collect()
+                (1..=2)
+                    .map(|degree| {
+                        all(
+                            Shape::Power {
+                                degree,
+                                scale: half(span),
+                            },
+                            0.2 * degree as f64,
+                        )
+                    })
+                    .collect()
             }
         }
         "power" => family
@@ -318,24 +397,55 @@ fn shapes(
                     Driver::Axis(_) => half(span),
                     _ => 1.0,
                 };
-                all(Shape::Power { degree: *degree, scale }, 0.2 * *degree as f64)
+                all(
+                    Shape::Power {
+                        degree: *degree,
+                        scale,
+                    },
+                    0.2 * *degree as f64,
+                )
             })
             .collect(),
         "periodic" => {
             // Frequencies half a cycle over the travel apart, up to four readings a cycle, from one cycle on.
-            if step <= 0.0 || poses { return Vec::new() }
+            if step <= 0.0 || poses {
+                return Vec::new();
+            }
             let most = ((2.0 * span / (4.0 * step)) as usize).min(240);
-            (2..=most).map(|half_cycles| all(Shape::Periodic { period: 2.0 * span / half_cycles as f64 }, 0.5)).collect()
+            (2..=most)
+                .map(|half_cycles| {
+                    all(
+                        Shape::Periodic {
+                            period: 2.0 * span / half_cycles as f64,
+                        },
+                        0.5,
+                    )
+                })
+                .collect()
         }
         "backlash" => {
             let seen = axis.is_some_and(|axis| sampling.both_directions[axis]);
-            if seen && !poses { vec![all(Shape::Backlash, 0.0)] } else { Vec::new() }
+            if seen && !poses {
+                vec![all(Shape::Backlash, 0.0)]
+            } else {
+                Vec::new()
+            }
         }
-        "lag" => if sampling.has_time && !poses { vec![all(Shape::Lag, 0.0)] } else { Vec::new() },
+        "lag" => {
+            if sampling.has_time && !poses {
+                vec![all(Shape::Lag, 0.0)]
+            } else {
+                Vec::new()
+            }
+        }
         "reversal-spike" => {
             let seen = axis.is_some_and(|axis| sampling.reverses_inside_runs[axis]);
-            if !seen || poses { return Vec::new() }
-            [0.002, 0.005, 0.01, 0.02, 0.05].map(|share| all(Shape::ReversalSpike { width: share * span }, 0.0)).to_vec()
+            if !seen || poses {
+                return Vec::new();
+            }
+            [0.002, 0.005, 0.01, 0.02, 0.05]
+                .map(|share| all(Shape::ReversalSpike { width: share * span }, 0.0))
+                .to_vec()
         }
         "drift" => vec![all(Shape::Drift, 0.0)],
         "warmup" => family
@@ -345,12 +455,25 @@ fn shapes(
             .map(|tau| all(Shape::Warmup { tau_s: *tau }, 0.0))
             .collect(),
         "steps" => {
-            if poses || step <= 0.0 { return Vec::new() }
+            if poses || step <= 0.0 {
+                return Vec::new();
+            }
             let axis = axis.unwrap_or(0);
-            (1..40).map(|k| all(Shape::Steps { at: vec![sampling.low[axis] + span * k as f64 / 40.0] }, 0.0)).collect()
+            (1..40)
+                .map(|k| {
+                    all(
+                        Shape::Steps {
+                            at: vec![sampling.low[axis] + span * k as f64 / 40.0],
+                        },
+                        0.0,
+                    )
+                })
+                .collect()
         }
         "local" => {
-            if poses { return Vec::new() }
+            if poses {
+                return Vec::new();
+            }
             let Some(axis) = axis else { return Vec::new() };
             let turn = rotary && span > 0.99 * TAU;
             let recurs = turn.then_some(TAU);
@@ -360,17 +483,42 @@ fn shapes(
                 let count = (1.0 / share) as usize;
                 for k in 0..count {
                     let centre = sampling.low[axis] + span * (k as f64 + 0.5) / count as f64;
-                    grid.push(all(Shape::Local { centre, width, recurs }, 0.0));
+                    grid.push(all(
+                        Shape::Local {
+                            centre,
+                            width,
+                            recurs,
+                        },
+                        0.0,
+                    ));
                 }
             }
             grid
         }
         "curve" => {
             let Some(axis) = axis else { return Vec::new() };
-            if poses && !rotary { return Vec::new() }
+            if poses && !rotary {
+                return Vec::new();
+            }
             let turn = rotary && span > 0.99 * TAU;
-            let (from, to) = if turn { (sampling.low[axis], sampling.low[axis] + TAU) } else { (sampling.low[axis], sampling.high[axis]) };
-            [8, 16].map(|intervals| all(Shape::Curve { from, to, intervals, closed: turn }, 0.0)).to_vec()
+            let (from, to) = if turn {
+                (sampling.low[axis], sampling.low[axis] + TAU)
+            } else {
+                (sampling.low[axis], sampling.high[axis])
+            };
+            [8, 16]
+                .map(|intervals| {
+                    all(
+                        Shape::Curve {
+                            from,
+                            to,
+                            intervals,
+                            closed: turn,
+                        },
+                        0.0,
+                    )
+                })
+                .to_vec()
         }
         _ => Vec::new(),
     }
@@ -387,7 +535,9 @@ fn harmonic_cost(order: usize) -> f64 {
 
 /// The groups of tests that share a mount of a component's thing, where there is more than one group.
 fn mounts(problem: &Problem<'_>, component: &Component) -> Vec<Vec<String>> {
-    let Component::Instrument { thing, .. } = component else { return Vec::new() };
+    let Component::Instrument { thing, .. } = component else {
+        return Vec::new();
+    };
     let shared_by = problem
         .session
         .instrument

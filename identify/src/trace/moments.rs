@@ -9,12 +9,13 @@
 //!
 //! `X` begins with an orthonormal basis of what the fit has (priors included), so that the normal equations lose nothing.
 
+use std::ops::Range;
+
 use faer::linalg::matmul::matmul;
 use faer::{Accum, Mat, MatRef, Par};
 use rayon::prelude::*;
 
 use super::columns::{Columns, Layout};
-use crate::error::IdentifyError;
 
 /// Candidates whose columns are made together.
 const CHUNK_COLUMNS: usize = 48;
@@ -50,6 +51,7 @@ pub struct Moments {
     pub count: Vec<usize>,
     /// Base columns, rows × base, kept to extend.
     base_columns: Mat<f64>,
+    residual: Vec<f64>,
     null: Mat<f64>,
 }
 
@@ -61,16 +63,13 @@ fn transposed_product(a: MatRef<'_, f64>, b: MatRef<'_, f64>) -> Mat<f64> {
 
 impl Moments {
     /// From the orthonormal model columns (rows × rank), the residual and null draws (rows × draws).
-    ///
-    /// # Errors
-    /// None at present; the signature leaves room for columns that cannot be made.
     pub fn new(
         columns: &Columns<'_, '_>,
         layouts: &[Layout],
         model: Mat<f64>,
         residual: &[f64],
         null: Mat<f64>,
-    ) -> Result<Moments, IdentifyError> {
+    ) -> Moments {
         let mut first = Vec::with_capacity(layouts.len());
         let mut total = 0;
         for layout in layouts {
@@ -78,81 +77,32 @@ impl Moments {
             total += layout.count;
         }
         let count: Vec<usize> = layouts.iter().map(|layout| layout.count).collect();
-        // Model, residual, and null draws side by side: one product with each chunk of candidates.
-        let (rank, draws, rows) = (model.ncols(), null.ncols(), columns.rows());
-        let side = Mat::from_fn(rows, rank + 1 + draws, |i, j| {
-            if j < rank {
-                model[(i, j)]
-            } else if j == rank {
-                residual[i]
-            } else {
-                null[(i, j - rank - 1)]
-            }
-        });
-        let chunks = chunked(&count);
-        let products: Vec<_> = chunks
-            .par_iter()
-            .map(|chunk| {
-                let chosen: Vec<&Layout> = layouts[chunk.clone()].iter().collect();
-                let width: usize = chosen.iter().map(|layout| layout.count).sum();
-                let mut block = Mat::zeros(rows, width);
-                columns.fill(&chosen, block.as_mut());
-                columns
-                    .fold_rows
-                    .iter()
-                    .map(|range| {
-                        let part = block.as_ref().subrows(range.start, range.len());
-                        let cross =
-                            transposed_product(side.as_ref().subrows(range.start, range.len()), part);
-                        let mut start = 0;
-                        let own: Vec<Mat<f64>> = chosen
-                            .iter()
-                            .map(|layout| {
-                                let of = part.subcols(start, layout.count);
-                                start += layout.count;
-                                transposed_product(of, of)
-                            })
-                            .collect();
-                        (cross, own)
-                    })
-                    .collect::<Vec<_>>()
-            })
-            .collect();
+        let (rank, draws) = (model.ncols(), null.ncols());
+        let side = beside(&model, residual, &null);
+        let products = products_by_fold(columns, layouts, side.as_ref());
         let mut null_cross = Mat::zeros(draws, total);
         let mut folds = Vec::new();
         for (fold, range) in columns.fold_rows.iter().enumerate() {
             let part = side.as_ref().subrows(range.start, range.len());
             let base_part = part.subcols(0, rank + 1);
             let gram = transposed_product(base_part, base_part);
-            let mut cross = Mat::zeros(rank, total);
-            let mut cross_y = vec![0.0; total];
-            let mut own = Vec::with_capacity(layouts.len());
-            let mut column = 0;
-            for product in &products {
-                let (block, of_candidates) = &product[fold];
-                for j in 0..block.ncols() {
-                    for i in 0..rank {
-                        cross[(i, column + j)] = block[(i, j)];
-                    }
-                    cross_y[column + j] = block[(rank, j)];
-                    for d in 0..draws {
-                        null_cross[(d, column + j)] += block[(rank + 1 + d, j)];
-                    }
+            let (product, own) = &products[fold];
+            for j in 0..total {
+                for d in 0..draws {
+                    null_cross[(d, j)] += product[(rank + 1 + d, j)];
                 }
-                column += block.ncols();
-                own.extend(of_candidates.iter().cloned());
             }
             folds.push(FoldMoments {
                 base: Mat::from_fn(rank, rank, |i, j| gram[(i, j)]),
                 base_y: (0..rank).map(|i| gram[(i, rank)]).collect(),
                 yy: gram[(rank, rank)],
-                cross,
-                cross_y,
-                own,
+                cross: product.subrows(0, rank).to_owned(),
+                cross_y: (0..total).map(|j| product[(rank, j)]).collect(),
+                own: own.clone(),
             });
         }
         let null_base = transposed_product(model.as_ref(), null.as_ref());
-        Ok(Moments { folds, null_cross, null_base, first, count, base_columns: model, null })
+        Moments { folds, null_cross, null_base, first, count, base_columns: model, residual: residual.to_vec(), null }
     }
 
     /// Number of base columns so far.
@@ -160,20 +110,28 @@ impl Moments {
         self.base_columns.ncols()
     }
 
-    /// Adds the columns of a candidate to the base; returns their places there.
+    /// Adds the columns of candidates to the base, each of unit length; returns their places there.
     pub fn materialise(
         &mut self,
         columns: &Columns<'_, '_>,
         layouts: &[Layout],
-        candidate: usize,
-    ) -> std::ops::Range<usize> {
-        let layout = &layouts[candidate];
-        let rows = columns.rows();
-        let old = self.base();
-        let mut fresh = Mat::zeros(rows, layout.count);
-        columns.fill(&[layout], fresh.as_mut());
-        // Unit length, so that the normal equations stay well scaled.
-        for j in 0..layout.count {
+        candidates: &[usize],
+    ) -> Vec<Range<usize>> {
+        let chosen: Vec<&Layout> = candidates.iter().map(|candidate| &layouts[*candidate]).collect();
+        let added: usize = chosen.iter().map(|layout| layout.count).sum();
+        let (rows, old) = (columns.rows(), self.base());
+        let mut places = Vec::new();
+        let mut next = old;
+        for layout in &chosen {
+            places.push(next..next + layout.count);
+            next += layout.count;
+        }
+        if added == 0 {
+            return places;
+        }
+        let mut fresh = Mat::zeros(rows, added);
+        columns.fill(&chosen, fresh.as_mut());
+        for j in 0..added {
             let norm = fresh.col(j).norm_l2();
             if norm > 0.0 {
                 for i in 0..rows {
@@ -181,72 +139,69 @@ impl Moments {
                 }
             }
         }
-        let mut base = Mat::zeros(rows, old + layout.count);
+        let mut base = Mat::zeros(rows, old + added);
         for j in 0..old {
             base.col_mut(j).copy_from(self.base_columns.col(j));
         }
-        for j in 0..layout.count {
+        for j in 0..added {
             base.col_mut(old + j).copy_from(fresh.col(j));
         }
-        let chunks = chunked(&self.count);
-        let products: Vec<Vec<Mat<f64>>> = chunks
-            .par_iter()
-            .map(|chunk| {
-                let chosen: Vec<&Layout> = layouts[chunk.clone()].iter().collect();
-                let width: usize = chosen.iter().map(|layout| layout.count).sum();
-                let mut block = Mat::zeros(rows, width);
-                columns.fill(&chosen, block.as_mut());
-                columns
-                    .fold_rows
-                    .iter()
-                    .map(|range| {
-                        transposed_product(
-                            fresh.as_ref().subrows(range.start, range.len()),
-                            block.as_ref().subrows(range.start, range.len()),
-                        )
-                    })
-                    .collect()
-            })
-            .collect();
+        self.base_columns = base;
+        let products = products_by_fold(columns, layouts, fresh.as_ref());
         let null_fresh = transposed_product(fresh.as_ref(), self.null.as_ref());
         self.null_base = stacked(&self.null_base, &null_fresh);
         for (fold, range) in columns.fold_rows.iter().enumerate() {
             let moments = &mut self.folds[fold];
             let fresh_part = fresh.as_ref().subrows(range.start, range.len());
-            let gram = transposed_product(base.as_ref().subrows(range.start, range.len()), fresh_part);
-            let width = old + layout.count;
+            let base_part = self.base_columns.as_ref().subrows(range.start, range.len());
+            let gram = transposed_product(base_part, fresh_part);
             let before = &moments.base;
-            moments.base = Mat::from_fn(width, width, |i, j| match (i < old, j < old) {
+            moments.base = Mat::from_fn(next, next, |i, j| match (i < old, j < old) {
                 (true, true) => before[(i, j)],
                 (_, false) => gram[(i, j - old)],
                 (false, true) => gram[(j, i - old)],
             });
-            let mut added = Mat::zeros(layout.count, moments.cross.ncols());
-            let mut column = 0;
-            for product in &products {
-                let block = &product[fold];
-                for j in 0..block.ncols() {
-                    for i in 0..layout.count {
-                        added[(i, column + j)] = block[(i, j)];
-                    }
+            moments.cross = stacked(&moments.cross, &products[fold].0);
+            for j in 0..added {
+                let sum = (range.start..range.end).map(|i| fresh[(i, j)] * self.residual[i]).sum();
+                moments.base_y.push(sum);
+            }
+        }
+        places
+    }
+
+    /// Adds a candidate to those that are scored.
+    pub fn append(&mut self, columns: &Columns<'_, '_>, layout: &Layout) {
+        let side = self.side();
+        let rank = self.base();
+        let products = products_by_fold(columns, std::slice::from_ref(layout), side.as_ref());
+        let draws = self.null.ncols();
+        let total = self.null_cross.ncols();
+        self.first.push(total);
+        self.count.push(layout.count);
+        let mut of_null = Mat::<f64>::zeros(draws, layout.count);
+        for (fold, (product, own)) in products.into_iter().enumerate() {
+            let moments = &mut self.folds[fold];
+            moments.cross = Mat::from_fn(rank, total + layout.count, |i, j| {
+                if j < total { moments.cross[(i, j)] } else { product[(i, j - total)] }
+            });
+            moments.cross_y.extend((0..layout.count).map(|k| product[(rank, k)]));
+            moments.own.extend(own);
+            for d in 0..draws {
+                for k in 0..layout.count {
+                    of_null[(d, k)] += product[(rank + 1 + d, k)];
                 }
-                column += block.ncols();
-            }
-            moments.cross = stacked(&moments.cross, &added);
-        }
-        // Residual with fresh columns, by fold, from the candidate's own products rescaled.
-        for (fold, range) in columns.fold_rows.iter().enumerate() {
-            let own_first = self.first[candidate];
-            for k in 0..layout.count {
-                let fresh_norm = fresh.col(k).subrows(range.start, range.len()).norm_l2();
-                let own_norm = self.folds[fold].own[candidate][(k, k)].max(0.0).sqrt();
-                let ratio = if own_norm > 0.0 { fresh_norm / own_norm } else { 0.0 };
-                let value = self.folds[fold].cross_y[own_first + k] * ratio;
-                self.folds[fold].base_y.push(value);
             }
         }
-        self.base_columns = base;
-        old..old + layout.count
+        let before = &self.null_cross;
+        self.null_cross = Mat::from_fn(draws, total + layout.count, |d, j| {
+            if j < total { before[(d, j)] } else { of_null[(d, j - total)] }
+        });
+    }
+
+    /// Model, residual and null draws side by side: one product with each chunk of candidates.
+    fn side(&self) -> Mat<f64> {
+        beside(&self.base_columns, &self.residual, &self.null)
     }
 
     /// The base columns, rows × base, in the order of the folds.
@@ -257,8 +212,82 @@ impl Moments {
 
 fn stacked(above: &Mat<f64>, below: &Mat<f64>) -> Mat<f64> {
     Mat::from_fn(above.nrows() + below.nrows(), above.ncols(), |i, j| {
-        if i < above.nrows() { above[(i, j)] } else { below[(i - above.nrows(), j)] }
+        if i < above.nrows() {
+            above[(i, j)]
+        } else {
+            below[(i - above.nrows(), j)]
+        }
     })
+}
+
+fn beside(model: &Mat<f64>, residual: &[f64], null: &Mat<f64>) -> Mat<f64> {
+    let (rank, rows) = (model.ncols(), residual.len());
+    let mut side = Mat::zeros(rows, rank + 1 + null.ncols());
+    for j in 0..rank {
+        side.col_mut(j).copy_from(model.col(j));
+    }
+    for (i, value) in residual.iter().enumerate() {
+        side[(i, rank)] = *value;
+    }
+    for j in 0..null.ncols() {
+        side.col_mut(rank + 1 + j).copy_from(null.col(j));
+    }
+    side
+}
+
+/// For each fold: `sideᵀ · candidates`, and each candidate's product with itself. Candidates are made chunk by chunk, so that memory does not grow
+/// with their number.
+fn products_by_fold(
+    columns: &Columns<'_, '_>,
+    layouts: &[Layout],
+    side: MatRef<'_, f64>,
+) -> Vec<(Mat<f64>, Vec<Mat<f64>>)> {
+    let count: Vec<usize> = layouts.iter().map(|layout| layout.count).collect();
+    let total: usize = count.iter().sum();
+    let chunks = chunked(&count);
+    let parts: Vec<Vec<(Mat<f64>, Vec<Mat<f64>>)>> = chunks
+        .par_iter()
+        .map(|chunk| {
+            let chosen: Vec<&Layout> = layouts[chunk.clone()].iter().collect();
+            let width: usize = chosen.iter().map(|layout| layout.count).sum();
+            let mut block = Mat::zeros(columns.rows(), width);
+            columns.fill(&chosen, block.as_mut());
+            columns
+                .fold_rows
+                .iter()
+                .map(|range| {
+                    let part = block.as_ref().subrows(range.start, range.len());
+                    let product = transposed_product(side.subrows(range.start, range.len()), part);
+                    let mut start = 0;
+                    let own = chosen
+                        .iter()
+                        .map(|layout| {
+                            let of = part.subcols(start, layout.count);
+                            start += layout.count;
+                            transposed_product(of, of)
+                        })
+                        .collect();
+                    (product, own)
+                })
+                .collect()
+        })
+        .collect();
+    (0..columns.fold_rows.len())
+        .map(|fold| {
+            let mut whole = Mat::zeros(side.ncols(), total);
+            let mut own = Vec::with_capacity(layouts.len());
+            let mut column = 0;
+            for part in &parts {
+                let (product, of_candidates) = &part[fold];
+                for j in 0..product.ncols() {
+                    whole.col_mut(column + j).copy_from(product.col(j));
+                }
+                column += product.ncols();
+                own.extend(of_candidates.iter().cloned());
+            }
+            (whole, own)
+        })
+        .collect()
 }
 
 /// Consecutive candidates whose columns together make a chunk.

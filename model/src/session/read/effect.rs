@@ -94,10 +94,8 @@ fn driver(
     let Some(value) = table.take("driver") else {
         return match component {
             _ if matches!(shape, "drift" | "warmup") => Ok(Driver::Time),
-            Component::Axis(name) if name.kind == ErrorKind::Motion || shape == "constant" => {
-                Ok(Driver::Axis(name.axis.clone()))
-            }
-            _ if shape == "constant" => Ok(Driver::Time),
+            _ if shape == "constant" => Ok(Driver::None),
+            Component::Axis(name) if name.kind == ErrorKind::Motion => Ok(Driver::Axis(name.axis.clone())),
             _ => {
                 let help = "add `driver`: an axis, \"time\", \"temperature\" or \"gravity\"";
                 Err(table.error("[[effect]] has no `driver`", Some(help.into())))
@@ -137,6 +135,11 @@ fn driver(
 
 /// Whether a shape can follow this driver.
 fn suits(context: &Context<'_>, word: &Value<'_>, shape: &Shape, driver: &Driver) -> Result<(), ModelError> {
+    if (*driver == Driver::None) != (*shape == Shape::Constant) {
+        let message = format!("the shape \"{}\" cannot follow \"{driver}\"", shape.word());
+        let help = "a constant follows \"none\" (leave `driver` out); every other shape needs a driver";
+        return Err(word.error(message, Some(help.to_string())));
+    }
     let axis = match driver {
         Driver::Axis(name) => context
             .machine

@@ -1,0 +1,145 @@
+//! Readings without structure, to repeat the search on.
+//!
+//! Along runs, the null is drawn from the pure error: whitened deviations of repeats from their mean, in blocks that keep what memory whitening
+//! has left, each block with a sign of its own. Poses have no repeats to speak of; there the residual itself is drawn, each pose with a sign of its own
+//! (the wild bootstrap), which keeps the size of every pose and destroys every dependence on position.
+
+use faer::Mat;
+use rand::{RngExt, SeedableRng};
+use rand_distr::StandardNormal;
+use rand_pcg::Pcg64;
+
+use super::columns::Columns;
+use crate::heldout::FoldKind;
+use crate::noise::PureError;
+use crate::outliers::median;
+use crate::problem::Problem;
+
+/// Readings in a block.
+const BLOCK: usize = 20;
+/// The fewest deviations that are worth drawing from; below, Gaussian noise is drawn.
+const LEAST_POOL: usize = 200;
+/// Readings on either side over which a residual without repeats is smoothed to take out structure.
+const SMOOTHING: usize = 7;
+
+/// Draws (whitened rows in the order of the folds × draws).
+pub fn draws(
+    problem: &Problem<'_>,
+    columns: &Columns<'_, '_>,
+    residuals: &[Vec<f64>],
+    whitened: &[f64],
+    count: usize,
+    seed: u64,
+) -> Mat<f64> {
+    let rows = columns.rows();
+    let mut generator = Pcg64::seed_from_u64(seed ^ 0x6e75_6c6c);
+    if problem.folds.kind == FoldKind::Poses {
+        let origins = columns.origin_of_rows();
+        let mut draws = Mat::zeros(rows, count);
+        for draw in 0..count {
+            let mut signs: std::collections::HashMap<(usize, usize), f64> = std::collections::HashMap::new();
+            for (i, (test, row, _)) in origins.iter().enumerate() {
+                let sign = *signs
+                    .entry((*test, *row))
+                    .or_insert_with(|| if generator.random::<bool>() { 1.0 } else { -1.0 });
+                draws[(i, draw)] = sign * whitened[i];
+            }
+        }
+        return draws;
+    }
+    let pool = pool(problem, residuals);
+    let total: usize = pool.iter().map(Vec::len).sum();
+    let mut draws = Mat::zeros(rows, count);
+    for draw in 0..count {
+        let mut values = Vec::with_capacity(rows);
+        while values.len() < rows {
+            if total < LEAST_POOL {
+                values.push(generator.sample(StandardNormal));
+                continue;
+            }
+            // A stretch is chosen with the chance of its length, a place in it evenly.
+            let mut place = generator.random_range(0..total);
+            let stretch = pool.iter().find(|stretch| {
+                if place < stretch.len() {
+                    true
+                } else {
+                    place -= stretch.len();
+                    false
+                }
+            });
+            let Some(stretch) = stretch else { continue };
+            let sign = if generator.random::<bool>() { 1.0 } else { -1.0 };
+            let end = (place + BLOCK).min(stretch.len());
+            values.extend(stretch[place..end].iter().map(|value| sign * value));
+        }
+        values.truncate(rows);
+        for (i, value) in columns.placed(&values).into_iter().enumerate() {
+            draws[(i, draw)] = value;
+        }
+    }
+    draws
+}
+
+/// Whitened deviations without structure, in stretches that whitening kept together, of unit variance.
+fn pool(problem: &Problem<'_>, residuals: &[Vec<f64>]) -> Vec<Vec<f64>> {
+    let pure = PureError::of(&problem.tests, residuals, |test, row| !problem.rejected[test][row]);
+    let repeats = pure.freedom >= LEAST_POOL;
+    let coordinates = problem.coordinates();
+    let mut stretches = Vec::new();
+    for block in problem.blocks() {
+        let scalars = block.rows.start * coordinates..block.rows.end * coordinates;
+        let deviations: Vec<Option<f64>> = if repeats {
+            pure.deviations[block.test][scalars].to_vec()
+        } else {
+            without_smooth(&residuals[block.test][scalars], coordinates)
+        };
+        let memory = problem.noise.memory.len() * coordinates;
+        let mut stretch = Vec::new();
+        for i in memory..deviations.len() {
+            let row = block.rows.start + i / coordinates;
+            let past: Option<f64> = problem
+                .noise
+                .memory
+                .iter()
+                .enumerate()
+                .map(|(lag, a)| deviations[i - (lag + 1) * coordinates].map(|value| a * value))
+                .sum();
+            match (deviations[i], past) {
+                (Some(now), Some(past)) if !problem.rejected[block.test][row] => {
+                    stretch.push((now - past) / problem.noise.innovation_mm());
+                }
+                _ => {
+                    if !stretch.is_empty() {
+                        stretches.push(std::mem::take(&mut stretch));
+                    }
+                }
+            }
+        }
+        if !stretch.is_empty() {
+            stretches.push(stretch);
+        }
+    }
+    let (sum, count) =
+        stretches.iter().flatten().fold((0.0, 0_usize), |(sum, count), value| (sum + value * value, count + 1));
+    if count > 0 && sum > 0.0 {
+        // The noise may be stated smaller or larger than it is; whitened readings are what the search sees, so their scatter counts.
+        let scale = if repeats { 1.0 } else { (count as f64 / sum).sqrt() };
+        stretches.iter_mut().flatten().for_each(|value| *value *= scale);
+    }
+    stretches
+}
+
+/// A residual less its running median, rescaled for the readings that the median uses.
+fn without_smooth(residual: &[f64], coordinates: usize) -> Vec<Option<f64>> {
+    let rows = residual.len() / coordinates;
+    let mut rough = vec![None; residual.len()];
+    for row in 0..rows {
+        let (start, end) = (row.saturating_sub(SMOOTHING), (row + SMOOTHING + 1).min(rows));
+        for coordinate in 0..coordinates {
+            let mut window: Vec<f64> = (start..end).map(|r| residual[r * coordinates + coordinate]).collect();
+            let level = median(&mut window);
+            rough[row * coordinates + coordinate] = Some(residual[row * coordinates + coordinate] - level);
+        }
+    }
+    rough
+}

@@ -1,0 +1,323 @@
+//! The search: project out what the model has, score every candidate, add the best, refit all together, let what has lost its place go, exchange
+//! what something else explains better, until the best that is left is no better than the best on readings without structure.
+//!
+//! It runs on all readings, and beside that once for each fold on the readings outside that fold alone, so that the error on held-out readings
+//! is that of a search that never saw them.
+
+use std::collections::BTreeSet;
+
+use super::columns::{Columns, Layout};
+use super::library::Candidate;
+use super::moments::Moments;
+use super::score::{Gain, PriorMoments, Trained, ln_chi_square_tail};
+
+/// When the search stops.
+#[derive(Clone, Copy, Debug)]
+pub struct Stop {
+    /// Probability that the search claims anything on readings without structure.
+    pub significance: f64,
+    /// The most effects.
+    pub most: usize,
+    /// Whether residual variance, not noise, is what gains are measured in: for poses, whose structure never ends.
+    pub in_residual_variance: bool,
+}
+
+/// An effect that the search has taken up.
+#[derive(Clone, Debug)]
+pub struct Taken {
+    /// Index of the candidate.
+    pub candidate: usize,
+    /// Its columns in the base.
+    pub places: std::ops::Range<usize>,
+    /// Probability that the search finds as good on readings without structure.
+    pub p_value: f64,
+}
+
+/// Where the search stands.
+pub struct Search<'s> {
+    /// The columns.
+    pub columns: &'s Columns<'s, 's>,
+    /// What is looked for.
+    pub candidates: Vec<Candidate>,
+    /// The candidates laid over the tests.
+    pub layouts: Vec<Layout>,
+    /// All products.
+    pub moments: Moments,
+    /// What is known beforehand.
+    pub prior: PriorMoments,
+    /// Number of base columns that the fitted model has.
+    pub rank: usize,
+    /// What has been taken up.
+    pub taken: Vec<Taken>,
+    /// What each fold's own search has taken up: candidates.
+    pub of_fold: Vec<Vec<usize>>,
+    /// Where the columns of every candidate that was ever taken up stand in the base.
+    materialised: Vec<(usize, std::ops::Range<usize>)>,
+    /// Sum of squares of held-out whitened residuals, before and after each addition.
+    pub held_out: Vec<f64>,
+    /// The best score on readings without structure that is exceeded with the probability of the stop, by round.
+    pub thresholds: Vec<f64>,
+    stop: Stop,
+}
+
+/// What a round came to.
+pub enum Round {
+    /// An effect was added.
+    Added {
+        /// Its candidate.
+        candidate: usize,
+    },
+    /// Nothing that is left earns its place; the best that there was, and its p-value.
+    Done {
+        /// The p-value of the best that was not taken.
+        p_value: f64,
+    },
+}
+
+impl<'s> Search<'s> {
+    /// Before the first round.
+    pub fn new(
+        columns: &'s Columns<'s, 's>,
+        candidates: Vec<Candidate>,
+        layouts: Vec<Layout>,
+        moments: Moments,
+        prior: PriorMoments,
+        stop: Stop,
+    ) -> Search<'s> {
+        let rank = moments.base();
+        let folds = columns.fold_rows.len();
+        let mut search = Search {
+            columns,
+            candidates,
+            layouts,
+            moments,
+            prior,
+            rank,
+            taken: Vec::new(),
+            of_fold: vec![Vec::new(); folds],
+            materialised: Vec::new(),
+            held_out: Vec::new(),
+            thresholds: Vec::new(),
+            stop,
+        };
+        let before = search.held_out_now();
+        search.held_out.push(before);
+        search
+    }
+
+    fn all_folds(&self) -> Vec<usize> {
+        (0..self.columns.fold_rows.len()).collect()
+    }
+
+    fn places(&self, candidate: usize) -> std::ops::Range<usize> {
+        self.materialised.iter().find(|(c, _)| *c == candidate).map_or(0..0, |(_, places)| places.clone())
+    }
+
+    fn base_with(&self, candidates: &[usize]) -> Vec<usize> {
+        (0..self.rank).chain(candidates.iter().flat_map(|candidate| self.places(*candidate))).collect()
+    }
+
+    /// The model with what has been taken, less one of it, on all readings.
+    pub fn model_without(&self, left_out: Option<usize>) -> Trained<'_> {
+        let chosen: Vec<usize> = self
+            .taken
+            .iter()
+            .enumerate()
+            .filter(|(k, _)| Some(*k) != left_out)
+            .map(|(_, taken)| taken.candidate)
+            .collect();
+        Trained::new(&self.moments, &self.prior, self.base_with(&chosen), self.all_folds())
+    }
+
+    /// The variance that gains are measured in.
+    fn variance(&self, model: &Trained<'_>) -> f64 {
+        if !self.stop.in_residual_variance {
+            return 1.0;
+        }
+        let sum: f64 = model.folds.iter().map(|fold| model.sum_of_squares_on(*fold)).sum();
+        let rows: usize = model.folds.iter().map(|fold| self.columns.fold_rows[*fold].len()).sum();
+        let freedom = rows.saturating_sub(model.base.len()).max(1) as f64;
+        (sum / freedom).max(f64::MIN_POSITIVE)
+    }
+
+    /// The variance of the null draws, in the same sense.
+    fn null_variance(&self) -> f64 {
+        if !self.stop.in_residual_variance {
+            return 1.0;
+        }
+        let model = Trained::new(&self.moments, &self.prior, (0..self.rank).collect(), self.all_folds());
+        self.variance(&model)
+    }
+
+    /// `−ln P` of a gain, less the candidate's cost.
+    pub fn score(&self, candidate: usize, gain: &Gain, variance: f64) -> f64 {
+        if gain.freedom == 0 {
+            return f64::NEG_INFINITY;
+        }
+        -ln_chi_square_tail(gain.gain / variance, gain.freedom) - self.candidates[candidate].cost
+    }
+
+    fn best_of(&self, model: &Trained<'_>, taken: &[usize]) -> Option<(usize, f64)> {
+        let variance = self.variance(model);
+        let gains = model.gains();
+        let mut best: Option<(usize, f64)> = None;
+        for (candidate, gain) in gains.iter().enumerate() {
+            if taken.contains(&candidate) {
+                continue;
+            }
+            let score = self.score(candidate, gain, variance);
+            if best.is_none_or(|(_, most)| score > most) {
+                best = Some((candidate, score));
+            }
+        }
+        best.filter(|(_, score)| score.is_finite())
+    }
+
+    /// The simplest of the candidates that the readings cannot tell from the best one.
+    fn named_first(&self, model: &Trained<'_>, best: usize) -> usize {
+        let variance = self.variance(model);
+        let of_best = model.gain(best);
+        let evidence = |gain: &Gain| -ln_chi_square_tail(gain.gain / variance, gain.freedom);
+        let least = evidence(&of_best) - super::alias::INDISTINGUISHABLE;
+        let taken: Vec<usize> = self.taken.iter().map(|t| t.candidate).collect();
+        let mut first = best;
+        let mut first_gain = of_best.clone();
+        for (candidate, gain) in model.gains().iter().enumerate() {
+            if taken.contains(&candidate) || gain.freedom == 0 || evidence(gain) < least {
+                continue;
+            }
+            let cost = self.candidates[candidate].cost;
+            let present = self.candidates[first].cost;
+            if cost < present || (cost == present && gain.gain > first_gain.gain * (1.0 + 1e-9)) {
+                first = candidate;
+                first_gain = gain.clone();
+            }
+        }
+        first
+    }
+
+    /// One round. `refine` may put a sharper candidate in place of one whose shape has a number to be tuned; it returns the index to take.
+    pub fn round(&mut self, mut refine: impl FnMut(&mut Search<'s>, usize) -> usize) -> Round {
+        let taken: Vec<usize> = self.taken.iter().map(|t| t.candidate).collect();
+        let (winner, score, null) = {
+            let model = self.model_without(None);
+            let Some((best, score)) = self.best_of(&model, &taken) else { return Round::Done { p_value: 1.0 } };
+            let costs: Vec<f64> = self.candidates.iter().map(|candidate| candidate.cost).collect();
+            let null = model.null_best(&costs, self.null_variance());
+            (self.named_first(&model, best), score, null)
+        };
+        let above = null.iter().filter(|best| **best >= score).count();
+        let p_value = (above + 1) as f64 / (null.len() + 1) as f64;
+        let mut sorted = null;
+        sorted.sort_by(f64::total_cmp);
+        let rank = ((1.0 - self.stop.significance) * sorted.len() as f64).ceil() as usize;
+        let threshold = sorted.get(rank.min(sorted.len().saturating_sub(1))).copied().unwrap_or(0.0);
+        self.thresholds.push(threshold);
+        if p_value > self.stop.significance || self.taken.len() >= self.stop.most {
+            return Round::Done { p_value };
+        }
+        let candidate = refine(self, winner);
+        // Each fold searches for itself, by the same rule.
+        let picks: Vec<Option<usize>> = self
+            .all_folds()
+            .into_iter()
+            .map(|fold| {
+                let model = self.model_of_fold(fold);
+                self.best_of(&model, &self.of_fold[fold])
+                    .filter(|(_, score)| *score >= threshold)
+                    .map(|(best, _)| best)
+            })
+            .collect();
+        let mut wanted: BTreeSet<usize> = picks.iter().flatten().copied().collect();
+        wanted.insert(candidate);
+        let fresh: Vec<usize> =
+            wanted.into_iter().filter(|c| !self.materialised.iter().any(|(present, _)| present == c)).collect();
+        let places = self.moments.materialise(self.columns, &self.layouts, &fresh);
+        self.materialised.extend(fresh.into_iter().zip(places));
+        for (fold, pick) in picks.into_iter().enumerate() {
+            self.of_fold[fold].extend(pick);
+        }
+        let places = self.places(candidate);
+        self.taken.push(Taken { candidate, places, p_value });
+        let held_out = self.held_out_now();
+        // For poses p-values say little; there an effect has to earn its place on the readings that were held out.
+        if self.stop.in_residual_variance && held_out >= self.held_out.last().copied().unwrap_or(f64::INFINITY) {
+            self.taken.pop();
+            return Round::Done { p_value };
+        }
+        self.held_out.push(held_out);
+        self.let_go(threshold);
+        Round::Added { candidate }
+    }
+
+    /// Drops what the later effects have made superfluous.
+    fn let_go(&mut self, threshold: f64) {
+        while self.taken.len() > 1 {
+            let mut weakest: Option<(usize, f64)> = None;
+            for k in 0..self.taken.len() - 1 {
+                let model = self.model_without(Some(k));
+                let candidate = self.taken[k].candidate;
+                let score = self.score(candidate, &model.gain(candidate), self.variance(&model));
+                if weakest.is_none_or(|(_, least)| score < least) {
+                    weakest = Some((k, score));
+                }
+            }
+            match weakest {
+                Some((k, score)) if score < threshold => {
+                    self.taken.remove(k);
+                }
+                _ => return,
+            }
+        }
+    }
+
+    /// Exchanges an effect for a candidate that explains clearly better what it stands for. Returns whether anything changed.
+    pub fn exchange(&mut self) -> bool {
+        let mut changed = false;
+        for k in 0..self.taken.len() {
+            let (better, current) = {
+                let model = self.model_without(Some(k));
+                let others: Vec<usize> =
+                    self.taken.iter().enumerate().filter(|(j, _)| *j != k).map(|(_, t)| t.candidate).collect();
+                let present = self.taken[k].candidate;
+                let score = self.score(present, &model.gain(present), self.variance(&model));
+                match self.best_of(&model, &others) {
+                    Some((best, most)) if best != present && most > score + super::alias::INDISTINGUISHABLE => {
+                        (Some(self.named_first(&model, best)), present)
+                    }
+                    _ => (None, present),
+                }
+            };
+            let Some(better) = better else { continue };
+            if better == current || self.taken.iter().any(|t| t.candidate == better) {
+                continue;
+            }
+            if !self.materialised.iter().any(|(present, _)| *present == better) {
+                let places = self.moments.materialise(self.columns, &self.layouts, &[better]);
+                self.materialised.extend([better].into_iter().zip(places));
+            }
+            self.taken[k] =
+                Taken { candidate: better, places: self.places(better), p_value: self.taken[k].p_value };
+            changed = true;
+        }
+        changed
+    }
+
+    /// The model that a fold's own search has built, trained on the other folds.
+    pub fn model_of_fold(&self, fold: usize) -> Trained<'_> {
+        let others: Vec<usize> = self.all_folds().into_iter().filter(|other| *other != fold).collect();
+        Trained::new(&self.moments, &self.prior, self.base_with(&self.of_fold[fold]), others)
+    }
+
+    fn held_out_now(&self) -> f64 {
+        self.all_folds().into_iter().map(|fold| self.model_of_fold(fold).sum_of_squares_on(fold)).sum()
+    }
+
+    /// Adds a candidate to those that are looked for.
+    pub fn append(&mut self, candidate: Candidate, layout: Layout) -> usize {
+        self.moments.append(self.columns, &layout);
+        self.candidates.push(candidate);
+        self.layouts.push(layout);
+        self.candidates.len() - 1
+    }
+}
