@@ -79,7 +79,7 @@ impl LeastSquares for SeenDirections<'_, '_> {
 }
 
 /// The triangle of `[J·N | r]` from that of `[J | r]`.
-fn in_directions(triangle: &Triangle, basis: &Mat<f64>) -> Triangle {
+pub fn in_directions(triangle: &Triangle, basis: &Mat<f64>) -> Triangle {
     let (r, c, rest) = triangle.parts();
     let (n, rank) = (basis.nrows(), basis.ncols());
     let reduced = &r * basis;
@@ -108,7 +108,10 @@ pub fn prepare(session: &Session, seed: u64) -> Result<(Problem<'_>, Fit), Ident
     };
     let mut problem = Problem::new(session, first, seed)?;
     if stated.is_none() {
-        problem.noise = Noise::white(nominal_residual_mm(&problem)?.max(floor).max(1e-9), NoiseSource::Fit);
+        problem.noise = Noise::white(
+            nominal_residual_mm(&problem)?.max(floor).max(1e-9),
+            NoiseSource::Fit,
+        );
     }
     let mut fit = fit(&problem, None)?;
     // Noise and wild readings follow from residuals, residuals from a fit; three rounds settle both.
@@ -399,7 +402,8 @@ pub fn unobservable(problem: &Problem<'_>, rank: &Rank) -> Vec<Unobservable> {
         .collect()
 }
 
-fn rejected(problem: &Problem<'_>, fit: &Fit) -> Vec<Rejected> {
+/// The readings that are left out, by name.
+pub fn rejected(problem: &Problem<'_>, fit: &Fit) -> Vec<Rejected> {
     let coordinates = problem.coordinates();
     let mut list = Vec::new();
     for (number, test) in problem.tests.iter().enumerate() {

@@ -166,8 +166,9 @@ impl PureError {
             return None;
         }
         let variance = covariance[0] / pairs[0] as f64;
-        let correlation: Vec<f64> =
-            (0..=MOST).map(|lag| covariance[lag] / pairs[lag] as f64 / variance).collect();
+        let correlation: Vec<f64> = (0..=MOST)
+            .map(|lag| covariance[lag] / pairs[lag] as f64 / variance)
+            .collect();
         // Two repeats hold the same deviation twice; half the pairs are independent.
         let insignificant = 3.0 / (0.5 * pairs[0] as f64).sqrt();
         // Durbin–Levinson: the last coefficient of each order is its partial autocorrelation.
@@ -175,7 +176,11 @@ impl PureError {
         let mut accepted = Vec::new();
         let mut left = 1.0;
         for order in 1..=MOST {
-            let predicted: f64 = coefficients.iter().enumerate().map(|(k, a)| a * correlation[order - 1 - k]).sum();
+            let predicted: f64 = coefficients
+                .iter()
+                .enumerate()
+                .map(|(k, a)| a * correlation[order - 1 - k])
+                .sum();
             let partial = ((correlation[order] - predicted) / left).clamp(-0.99, 0.99);
             let previous = coefficients.clone();
             for k in 0..previous.len() {

@@ -75,3 +75,123 @@ pub struct FitResult {
     /// What a user should know.
     pub warnings: Vec<String>,
 }
+
+/// A residual and parameters, before or after the found effects.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct ModelResult {
+    /// Residual over scalar readings, µm.
+    pub rms_um: f64,
+    /// The same on readings that neither fit nor search saw.
+    pub heldout_rms_um: f64,
+    /// Length of the residual vector, µm, for instruments with three coordinates.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub rms_3d_um: Option<f64>,
+    /// The same on readings that neither fit nor search saw.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub heldout_rms_3d_um: Option<f64>,
+    /// What was identified.
+    pub parameters: Vec<ParameterResult>,
+}
+
+/// An effect by its name in the vocabulary of session files.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct EffectName {
+    /// What moves.
+    pub component: String,
+    /// What it follows.
+    pub driver: String,
+    /// How.
+    pub shape: String,
+    /// Order of a harmonic, degree of a polynomial.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub order: Option<f64>,
+    /// The tests it is confined to, if it is.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub tests: Vec<String>,
+}
+
+/// An effect that trace has found.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct EffectResult {
+    /// Component, driver, shape, order.
+    #[serde(flatten)]
+    pub name: EffectName,
+    /// Its family in the library, in words.
+    pub family: String,
+    /// Its coefficients.
+    pub parameters: Vec<ParameterResult>,
+    /// Probability that the whole search finds as good in readings without structure.
+    pub p_value: f64,
+    /// By how much it lowers the residual, µm: the rms of what it explains beside everything else.
+    pub rms_gain_um: f64,
+    /// Held-out rms once it was added, µm.
+    pub heldout_rms_um: f64,
+    /// What the readings cannot tell from it, nearest first.
+    pub aliases: Vec<EffectName>,
+    /// The cheapest further test that would tell it from them.
+    pub separated_by: Option<String>,
+}
+
+/// What is left.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Remainder {
+    /// Whether it has structure beyond noise.
+    pub structured: bool,
+    /// Probability of as much in readings without structure.
+    pub p_value: f64,
+    /// Where and what, if it has.
+    #[serde(rename = "where")]
+    pub place: Option<String>,
+}
+
+/// A parameter that moved by more than its uncertainty between before and after.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Moved {
+    /// The parameter.
+    pub id: String,
+    /// After less before.
+    pub by: f64,
+    /// Its standard uncertainty after.
+    pub u: f64,
+    /// Unit of both.
+    pub unit: String,
+}
+
+/// What `abbe trace` reports.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct TraceResult {
+    /// `clean`, `explained`, `partly-explained`, `unexplained`.
+    pub verdict: String,
+    /// Standard deviation of one scalar reading, µm.
+    pub noise_um: f64,
+    /// Where that figure comes from.
+    pub noise_source: String,
+    /// Autoregressive coefficients of the noise along a run; empty for white noise.
+    pub noise_memory: Vec<f64>,
+    /// Number of readings that count.
+    pub readings: usize,
+    /// What is left out at a time for the held-out figures.
+    pub heldout_by: String,
+    /// The declared model.
+    pub before: ModelResult,
+    /// With the effects that were found.
+    pub after: ModelResult,
+    /// The effects, in the order in which they were found.
+    pub effects: Vec<EffectResult>,
+    /// What is left.
+    pub remainder: Remainder,
+    /// What the residual of the declared model looks like, in words.
+    pub residual_before: String,
+    /// Parameters that moved by more than their uncertainty: that was the bias.
+    pub moved: Vec<Moved>,
+    /// How many candidates were looked for, and how many of them these readings can see.
+    pub candidates: usize,
+    /// See `candidates`.
+    pub candidates_seen: usize,
+    /// What no reading can see.
+    pub unobservable: Vec<Unobservable>,
+    /// Readings left out.
+    pub rejected: Vec<Rejected>,
+    /// What a user should know.
+    pub warnings: Vec<String>,
+}

@@ -5,6 +5,7 @@ mod fit;
 mod output;
 mod plan;
 mod table;
+mod trace;
 
 use std::path::PathBuf;
 use std::process::ExitCode;
@@ -33,6 +34,11 @@ enum Command {
     /// What can these tests see, before anybody measures?
     #[command(after_help = plan::EXAMPLES)]
     Plan(plan::PlanArguments),
+    /// Close the loop: trace what the fit leaves over to the effect that the model lacks.
+    #[command(
+        after_help = "Example:\n  abbe trace sessions/hermle-c600u/measured/session.toml --json trace.json --write next.toml"
+    )]
+    Trace(trace::TraceArguments),
 }
 
 /// What every command that reads a session takes.
@@ -65,6 +71,7 @@ pub fn run() -> ExitCode {
     let outcome = match arguments.command {
         Command::Fit(arguments) => fit::run(&arguments),
         Command::Plan(arguments) => plan::run(&arguments),
+        Command::Trace(arguments) => trace::run(&arguments),
     };
     match outcome {
         Ok(()) => ExitCode::SUCCESS,

@@ -1,3 +1,72 @@
 //! What else would look the same.
+//!
+//! Two candidates are aliases where the readings cannot tell them apart: in place of the named effect, beside the same model, the other explains
+//! the residual as well within [`INDISTINGUISHABLE`] of log-likelihood, and what it can do to the readings lies within a small angle of what the
+//! named effect did. The one with the least cost in the library is named first; at equal cost, the one with the larger gain.
+
+use super::score::{Gain, ln_chi_square_tail};
+use super::search::Search;
+
 /// Difference in `−ln P` below which two candidates cannot be told apart: 2 σ for one column.
 pub const INDISTINGUISHABLE: f64 = 2.0;
+/// Least cosine between the named effect's signature and what an alias can do.
+pub const LEAST_COSINE: f64 = 0.95;
+/// The most columns that an alias may have beyond the named effect: a free curve imitates nearly everything and says nothing.
+const MORE_COLUMNS: usize = 1;
+
+/// An alias of a taken effect.
+#[derive(Clone, Debug)]
+pub struct Alias {
+    /// Its candidate.
+    pub candidate: usize,
+    /// Cosine of the angle between the named effect's signature and what the alias can do, beside the model.
+    pub cosine: f64,
+    /// Coefficients of the model's first base columns if the alias stands in the effect's place.
+    pub model_coefficients: Vec<f64>,
+}
+
+/// The aliases of the `k`-th taken effect, nearest first.
+pub fn aliases(search: &Search<'_>, k: usize, variance: f64) -> Vec<Alias> {
+    let model = search.model_without(Some(k));
+    let taken = &search.taken[k];
+    let of_named = model.gain(taken.candidate);
+    let evidence = |gain: &Gain| -ln_chi_square_tail(gain.gain / variance, gain.freedom);
+    let least = evidence(&of_named) - INDISTINGUISHABLE;
+    let (_, coefficients) = model.joined(taken.candidate);
+    // Base columns are unit-length copies of the candidate's own; the signature is what they do together.
+    let norms = search.norms(taken.candidate);
+    let signature: Vec<(usize, f64)> = taken
+        .places
+        .clone()
+        .zip(coefficients.iter().zip(&norms).map(|(c, norm)| c * norm))
+        .collect();
+    let others: Vec<usize> = search.taken.iter().map(|t| t.candidate).collect();
+    let mut aliases: Vec<Alias> = model
+        .gains()
+        .iter()
+        .enumerate()
+        .filter(|(candidate, gain)| {
+            !others.contains(candidate)
+                && !search.candidates[*candidate].last_resort
+                && gain.freedom > 0
+                && gain.freedom <= of_named.freedom + MORE_COLUMNS
+                && evidence(gain) >= least
+        })
+        .filter_map(|(candidate, _)| {
+            let cosine = model.imitated(candidate, &signature).sqrt();
+            (cosine >= LEAST_COSINE).then(|| Alias {
+                candidate,
+                cosine,
+                model_coefficients: model.joined(candidate).0[..search.rank].to_vec(),
+            })
+        })
+        .collect();
+    aliases.sort_by(|a, b| {
+        let cost = |alias: &Alias| search.candidates[alias.candidate].cost;
+        b.cosine
+            .partial_cmp(&a.cosine)
+            .unwrap_or(std::cmp::Ordering::Equal)
+            .then(cost(a).total_cmp(&cost(b)))
+    });
+    aliases
+}

@@ -25,9 +25,18 @@ pub struct Layout {
 
 #[derive(Clone, Debug)]
 struct LayoutPart {
-    slot: usize,
+    moves: Moves,
     factor: Option<Arc<Vec<f64>>>,
     basis: Arc<Vec<Vec<f64>>>,
+}
+
+/// What a part of a layout moves.
+#[derive(Clone, Copy, Debug)]
+enum Moves {
+    /// A component, through its sensitivity.
+    Slot(usize),
+    /// One coordinate of the reading itself.
+    Reading(usize),
 }
 
 /// The whitened rows of a problem, by fold, and what is needed to lay any effect over them.
@@ -130,6 +139,15 @@ impl<'p, 'a> Columns<'p, 'a> {
 
     /// Lays an effect over the tests; `None` where the data lack what it follows.
     pub fn layout(&self, effect: &Effect) -> Option<Layout> {
+        self.lay(effect, true)
+    }
+
+    /// The same for an effect that is tried once: its basis functions are not kept.
+    pub fn layout_uncached(&self, effect: &Effect) -> Option<Layout> {
+        self.lay(effect, false)
+    }
+
+    fn lay(&self, effect: &Effect, keep: bool) -> Option<Layout> {
         let session = self.problem.session;
         let mut parts = Vec::new();
         for (number, test) in self.problem.tests.iter().enumerate() {
@@ -152,15 +170,20 @@ impl<'p, 'a> Columns<'p, 'a> {
                     )
                     .map(Arc::new)
                 })?;
-                let basis = cached(
-                    &self.bases,
-                    (number, format!("{follows} {:?}", effect.shape)),
-                    || Arc::new(drivers::basis_columns(&effect.shape, &samples)),
-                );
+                let make = || Arc::new(drivers::basis_columns(&effect.shape, &samples));
+                let basis = if keep {
+                    cached(
+                        &self.bases,
+                        (number, format!("{follows} {:?}", effect.shape)),
+                        make,
+                    )
+                } else {
+                    make()
+                };
                 for (slot, factor) in drivers::component_slots(session, test, readings, &effect.component) {
                     if self.place[number].contains_key(&slot) {
                         of_test.push(LayoutPart {
-                            slot,
+                            moves: Moves::Slot(slot),
                             factor: factor.map(Arc::new),
                             basis: basis.clone(),
                         });
@@ -169,6 +192,43 @@ impl<'p, 'a> Columns<'p, 'a> {
             }
             parts.push(of_test);
         }
+        Some(Layout {
+            count: effect.shape.coefficients(),
+            parts,
+        })
+    }
+
+    /// Lays a shape over one coordinate of the readings of one test, whatever component would cause it; `by_direction` turns its sign with the
+    /// direction of travel. `None` where the data lack what it follows.
+    pub fn reading_layout(
+        &self,
+        effect: &Effect,
+        test: usize,
+        coordinate: usize,
+        by_direction: bool,
+    ) -> Option<Layout> {
+        let session = self.problem.session;
+        let readings = self.problem.tests[test].readings.as_ref()?;
+        let samples = cached(&self.samples, (test, effect.driver.to_string()), || {
+            let model = &self.problem.models[test];
+            drivers::samples(
+                &session.machine,
+                model,
+                readings,
+                &self.problem.origin,
+                &effect.driver,
+                None,
+            )
+            .map(Arc::new)
+        })?;
+        let basis = Arc::new(drivers::basis_columns(&effect.shape, &samples));
+        let factor = by_direction.then(|| Arc::new(samples.iter().map(|sample| sample.direction).collect()));
+        let mut parts = vec![Vec::new(); self.problem.tests.len()];
+        parts[test].push(LayoutPart {
+            moves: Moves::Reading(coordinate),
+            factor,
+            basis,
+        });
         Some(Layout {
             count: effect.shape.coefficients(),
             parts,
@@ -188,14 +248,24 @@ impl<'p, 'a> Columns<'p, 'a> {
             let mut column = 0;
             for layout in layouts {
                 for part in &layout.parts[block.test] {
-                    let derivative = &sensitivities.derivatives[self.place[block.test][&part.slot]];
-                    let derivative = &derivative[first * coordinates..first * coordinates + scalars];
+                    let derivative = match part.moves {
+                        Moves::Slot(slot) => {
+                            let whole = &sensitivities.derivatives[self.place[block.test][&slot]];
+                            Some(&whole[first * coordinates..first * coordinates + scalars])
+                        }
+                        Moves::Reading(_) => None,
+                    };
                     for k in 0..layout.count {
                         let basis = &part.basis[k];
                         for i in 0..scalars {
                             let row = first + i / coordinates;
                             let factor = part.factor.as_ref().map_or(1.0, |factor| factor[row]);
-                            raw[(i, column + k)] += derivative[i] * basis[row] * factor;
+                            let sensitivity = match (derivative, part.moves) {
+                                (Some(derivative), _) => derivative[i],
+                                (None, Moves::Reading(moved)) if i % coordinates != moved => continue,
+                                (None, _) => 1.0,
+                            };
+                            raw[(i, column + k)] += sensitivity * basis[row] * factor;
                         }
                     }
                 }

@@ -33,6 +33,9 @@ pub struct Family {
     tau_s: Vec<f64>,
     /// What a member costs in the score.
     pub simplicity: f64,
+    /// Whether it is tried only when nothing simpler is left to find and structure remains.
+    #[serde(default)]
+    pub last_resort: bool,
 }
 
 #[derive(Clone, Copy, Debug, Deserialize, PartialEq)]
@@ -75,6 +78,8 @@ pub struct Candidate {
     pub family: usize,
     /// What it costs in the score beside its coefficients, in natural-log units.
     pub cost: f64,
+    /// Whether it is tried only when nothing simpler is left to find and structure remains.
+    pub last_resort: bool,
 }
 
 /// How the axes are sampled in a session.
@@ -119,11 +124,13 @@ pub fn candidates(problem: &Problem<'_>) -> Result<Vec<Candidate>, IdentifyError
                         shape,
                         tests,
                     };
-                    let cost = family.simplicity + extra;
+                    let cost = family.simplicity + extra + tilt_cost(problem, &component);
+                    let last_resort = family.last_resort;
                     candidates.push(Candidate {
                         effect,
                         family: number,
                         cost,
+                        last_resort,
                     });
                 }
             }
@@ -526,6 +533,21 @@ fn shapes(
 
 fn half(span: f64) -> f64 {
     if span > 0.0 { span / 2.0 } else { 1.0 }
+}
+
+/// A translation is a simpler cause than a tilt that moves the point as much; the angle that an axis itself turns is no tilt.
+fn tilt_cost(problem: &Problem<'_>, component: &Component) -> f64 {
+    match component {
+        Component::Axis(name) if name.freedom.is_angle() => {
+            let own = problem
+                .session
+                .machine
+                .axis_index(&name.axis)
+                .map(|axis| problem.session.machine.axes[axis].own_freedom());
+            if own == Some(name.freedom) { 0.0 } else { 1.0 }
+        }
+        _ => 0.0,
+    }
 }
 
 /// High orders are many, and each by itself is unlikely: the cost of naming one grows as the logarithm of the order.

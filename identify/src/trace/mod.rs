@@ -1,9 +1,463 @@
-//! Close the loop.
+//! Close the loop: from what a fitted model leaves over to the effect that it lacks.
+//!
+//! 1. Noise first: size and memory from repeats ([`crate::noise`]), wild readings left out by name ([`crate::outliers`]).
+//! 2. The library of effects ([`library`]) is laid over the session ([`columns`]) and multiplied once with model, residual and null draws
+//!    ([`moments`]).
+//! 3. The search ([`search`]) adds, lets go and exchanges effects; its p-values come from the same search on readings without structure
+//!    ([`null`]).
+//! 4. For each effect, what would look the same ([`alias`]); for the rest, whether it has structure ([`remainder`]).
+//! 5. Everything is refitted together, and reported before and after on readings that neither fit nor search saw.
 
+pub mod alias;
 pub mod columns;
 pub mod library;
 pub mod moments;
+pub mod null;
+pub mod remainder;
+mod report;
 pub mod score;
 pub mod search;
-pub mod null;
-pub mod alias;
+pub mod sharpen;
+
+use abbe_model::effect::Effect;
+use abbe_model::session::Session;
+use faer::Mat;
+
+use crate::error::IdentifyError;
+use crate::fit::{Fit, fit, in_directions, prepare};
+use crate::heldout::FoldKind;
+use crate::noise::{NoiseSource, PureError};
+use crate::problem::Problem;
+use crate::results::TraceResult;
+use crate::triangle::Triangle;
+use columns::{Columns, Layout};
+use library::Candidate;
+use moments::Moments;
+use score::PriorMoments;
+use search::{Round, Search, Stop};
+
+/// What a user can ask of a trace.
+#[derive(Clone, Debug)]
+pub struct TraceOptions {
+    /// Seed of folds and null draws.
+    pub seed: u64,
+    /// The most effects; `None` for as many as earn their place.
+    pub max_effects: Option<usize>,
+    /// If not empty, only candidates whose identifier contains one of these.
+    pub only: Vec<String>,
+    /// Candidates whose identifier contains one of these are left out.
+    pub exclude: Vec<String>,
+    /// Number of null draws.
+    pub draws: usize,
+    /// Probability that a session without structure is claimed to have an effect.
+    pub significance: f64,
+}
+
+impl Default for TraceOptions {
+    fn default() -> Self {
+        TraceOptions {
+            seed: 1,
+            max_effects: None,
+            only: Vec::new(),
+            exclude: Vec::new(),
+            draws: 199,
+            significance: 0.01,
+        }
+    }
+}
+
+/// How far a trace has come, for those who wait.
+#[derive(Clone, Debug)]
+pub enum Progress {
+    /// The declared model is being fitted.
+    Fitting,
+    /// The library is being multiplied with the readings: how many candidates.
+    Screening(usize),
+    /// An effect was taken: its number, its identifier, the held-out rms in µm.
+    Taken(usize, String, f64),
+    /// The found effects are being refitted and judged.
+    Judging,
+}
+
+/// Sessions along runs have few effects; more than this says that something else is meant.
+const MOST_ALONG_RUNS: usize = 12;
+/// Poses of a robot have many.
+const MOST_OF_POSES: usize = 200;
+/// Share of the structure's excess over noise that may remain for the found effects to count as the explanation.
+const EXPLAINED_SHARE: f64 = 0.5;
+/// Significance below which a remainder counts as structured.
+const STRUCTURED: f64 = 0.01;
+
+/// Everything that a trace knows when it ends.
+pub struct Trace<'a> {
+    /// The declared model.
+    pub before: Problem<'a>,
+    /// Its fit.
+    pub before_fit: Fit,
+    /// The model with the found effects.
+    pub after: Problem<'a>,
+    /// Its fit.
+    pub after_fit: Fit,
+    /// The found effects.
+    pub effects: Vec<Effect>,
+    /// As it is reported.
+    pub result: TraceResult,
+}
+
+/// Closes the loop on a session.
+///
+/// # Errors
+/// If the session cannot be fitted.
+pub fn trace<'a>(
+    session: &'a Session,
+    options: &TraceOptions,
+    progress: &(dyn Fn(Progress) -> bool + Sync),
+) -> Result<Trace<'a>, IdentifyError> {
+    progress(Progress::Fitting);
+    let (mut problem, mut before_fit) = prepare(session, options.seed)?;
+    if give_noise_memory(&mut problem, &before_fit) {
+        before_fit = fit(&problem, Some(&before_fit.beta))?;
+    }
+    let poses = problem.folds.kind == FoldKind::Poses;
+    let columns = Columns::new(&problem, &before_fit.beta)?;
+    let start = Start::of(&problem, &columns, &before_fit)?;
+    let null = |residual: &[f64], residuals: &[Vec<f64>], salt: u64| {
+        null::draws(
+            &problem,
+            &columns,
+            residuals,
+            residual,
+            options.draws,
+            options.seed.wrapping_add(salt),
+        )
+    };
+    let draws = null(&start.residual, &before_fit.residuals, 0);
+    let structure_before = if poses {
+        None
+    } else {
+        let (model, prior) = (start.model.clone(), start.prior());
+        Some(remainder::structure(
+            &problem,
+            &columns,
+            model,
+            &start.residual,
+            draws.clone(),
+            &prior,
+        ))
+    };
+
+    let mut candidates = library::candidates(&problem)?;
+    candidates.retain(|candidate| chosen(options, &candidate.effect.id()));
+    let (candidates, layouts): (Vec<Candidate>, Vec<Layout>) = candidates
+        .into_iter()
+        .filter_map(|candidate| {
+            columns
+                .layout(&candidate.effect)
+                .map(|layout| (candidate, layout))
+        })
+        .unzip();
+    progress(Progress::Screening(candidates.len()));
+    let (model, prior) = (start.model.clone(), start.prior());
+    let moments = Moments::new(&columns, &layouts, model, &start.residual, draws);
+    let stop = Stop {
+        significance: options.significance,
+        most: options
+            .max_effects
+            .unwrap_or(if poses { MOST_OF_POSES } else { MOST_ALONG_RUNS }),
+        in_residual_variance: poses,
+    };
+    let mut search = Search::new(&columns, candidates, layouts, moments, prior, stop);
+    let seen = search
+        .model_without(None)
+        .gains()
+        .iter()
+        .filter(|gain| gain.freedom > 0)
+        .count();
+    let looked_for = search.candidates.len();
+    let scale_um = problem.noise.sigma_mm * 1e3;
+    let rms_um = |sum: f64| (sum / columns.rows().max(1) as f64).sqrt() * scale_um;
+    let mut last_p_value = search_on(&mut search, poses, &rms_um, progress);
+    progress(Progress::Judging);
+    let mut judged = judge(&problem, &before_fit, &search, options, structure_before.as_ref())?;
+    let unexplained = judged
+        .structure
+        .as_ref()
+        .is_none_or(|structure| structure.p_value <= STRUCTURED);
+    if unexplained && last_p_value < 1.0 + f64::EPSILON && search.taken.len() < stop.most {
+        // Nothing simpler is left: free curves.
+        search.last_resort = true;
+        let taken = search.taken.len();
+        last_p_value = search_on(&mut search, poses, &rms_um, progress);
+        if search.taken.len() != taken {
+            judged = judge(&problem, &before_fit, &search, options, structure_before.as_ref())?;
+        }
+    }
+    let Judged {
+        after,
+        after_fit,
+        effects,
+        structure: structure_after,
+    } = judged;
+    let result = report::report(&report::Findings {
+        before: &problem,
+        before_fit: &before_fit,
+        after: &after,
+        after_fit: &after_fit,
+        search: &search,
+        start: &start,
+        structure_before: structure_before.as_ref(),
+        structure_after: structure_after.as_ref(),
+        last_p_value,
+        candidates: looked_for,
+        candidates_seen: seen,
+    })?;
+    drop(search);
+    drop(columns);
+    Ok(Trace {
+        before: problem,
+        before_fit,
+        after,
+        after_fit,
+        effects,
+        result,
+    })
+}
+
+/// Rounds until nothing earns its place any more, or the user has seen enough; the p-value of the best that was not taken.
+fn search_on(
+    search: &mut Search<'_>,
+    poses: bool,
+    rms_um: &dyn Fn(f64) -> f64,
+    progress: &(dyn Fn(Progress) -> bool + Sync),
+) -> f64 {
+    loop {
+        match search.round(sharpen::sharpen) {
+            Round::Done { p_value } => return p_value,
+            Round::Added { candidate } => {
+                if !poses {
+                    search.exchange();
+                }
+                let held_out = search.held_out.last().copied().unwrap_or(0.0);
+                let id = search.candidates[candidate].effect.id();
+                if !progress(Progress::Taken(search.taken.len(), id, rms_um(held_out))) {
+                    return 1.0;
+                }
+            }
+        }
+    }
+}
+
+/// The model with what the search has taken, refitted, and what it leaves.
+struct Judged<'a> {
+    after: Problem<'a>,
+    after_fit: Fit,
+    effects: Vec<Effect>,
+    structure: Option<remainder::Structure>,
+}
+
+fn judge<'a>(
+    problem: &Problem<'a>,
+    before_fit: &Fit,
+    search: &Search<'_>,
+    options: &TraceOptions,
+    structure_before: Option<&remainder::Structure>,
+) -> Result<Judged<'a>, IdentifyError> {
+    let effects: Vec<Effect> = search
+        .taken
+        .iter()
+        .map(|taken| search.candidates[taken.candidate].effect.clone())
+        .collect();
+    if effects.is_empty() {
+        return Ok(Judged {
+            after: problem.clone(),
+            after_fit: before_fit.clone(),
+            effects,
+            structure: structure_before.cloned(),
+        });
+    }
+    let mut after = problem.clone();
+    for effect in &effects {
+        after.add_effect(effect)?;
+    }
+    let after_fit = fit(&after, Some(&start_of(&after, before_fit)))?;
+    let structure = match structure_before {
+        None => None,
+        Some(_) => {
+            let columns = Columns::new(&after, &after_fit.beta)?;
+            let end = Start::of(&after, &columns, &after_fit)?;
+            let seed = options.seed.wrapping_add(1);
+            let draws = null::draws(
+                &after,
+                &columns,
+                &after_fit.residuals,
+                &end.residual,
+                options.draws,
+                seed,
+            );
+            let prior = end.prior();
+            Some(remainder::structure(
+                &after,
+                &columns,
+                end.model,
+                &end.residual,
+                draws,
+                &prior,
+            ))
+        }
+    };
+    Ok(Judged {
+        after,
+        after_fit,
+        effects,
+        structure,
+    })
+}
+
+fn chosen(options: &TraceOptions, id: &str) -> bool {
+    let matches = |patterns: &[String]| patterns.iter().any(|pattern| id.contains(pattern.as_str()));
+    (options.only.is_empty() || matches(&options.only)) && !matches(&options.exclude)
+}
+
+/// The declared model's unknowns, and zeros for the effects' coefficients.
+fn start_of(after: &Problem<'_>, before: &Fit) -> Vec<f64> {
+    let mut start = vec![0.0; after.parameters.list.len()];
+    start[..before.beta.len()].copy_from_slice(&before.beta);
+    start
+}
+
+/// Takes size and memory of the noise from repeats, where there are enough. Returns whether anything changed.
+fn give_noise_memory(problem: &mut Problem<'_>, fit: &Fit) -> bool {
+    if problem.folds.kind == FoldKind::Poses {
+        return false;
+    }
+    let kept = |test: usize, row: usize| !problem.rejected[test][row];
+    let pure = PureError::of(&problem.tests, &fit.residuals, kept);
+    let Some(memory) = pure.memory(&problem.tests, kept) else {
+        return false;
+    };
+    let mut noise = problem.noise.clone();
+    noise.memory = memory;
+    if let Some(sigma) = pure.sigma_mm() {
+        noise.sigma_mm = sigma;
+        noise.source = NoiseSource::Repeats;
+    }
+    let changed = noise != problem.noise;
+    problem.noise = noise;
+    changed
+}
+
+/// The fitted model as the search takes it: orthonormal columns and the residual, whitened, in the order of the folds.
+pub struct Start {
+    /// Rows × rank.
+    pub model: Mat<f64>,
+    /// One a row.
+    pub residual: Vec<f64>,
+    /// Orthonormal coordinates to unknowns in inside units: unknowns × rank.
+    pub to_unknowns: Mat<f64>,
+    prior_rows: Mat<f64>,
+    prior_residual: Vec<f64>,
+}
+
+impl Start {
+    fn of(problem: &Problem<'_>, columns: &Columns<'_, '_>, fit: &Fit) -> Result<Start, IdentifyError> {
+        let unknowns = fit.beta.len();
+        let basis = &fit.rank.seen;
+        let rank = basis.ncols();
+        let rows = columns.model_rows(&fit.beta)?;
+        let residual = (0..rows.nrows()).map(|i| rows[(i, unknowns)]).collect();
+        let prior = problem.prior_triangle(&fit.beta);
+        let mut whole = Triangle::new(unknowns);
+        whole.merge(&prior);
+        fit.triangles.iter().for_each(|triangle| whole.merge(triangle));
+        let (r, _, _) = in_directions(&whole, basis).parts();
+        let inverse = inverse_of_triangle(&r);
+        let to_unknowns = basis * &inverse;
+        let model = rows.as_ref().subcols(0, unknowns) * &to_unknowns;
+        let (of_prior, prior_residual, _) = prior.parts();
+        let prior_rows = &of_prior * &to_unknowns;
+        debug_assert_eq!(model.ncols(), rank);
+        Ok(Start {
+            model,
+            residual,
+            to_unknowns,
+            prior_rows,
+            prior_residual,
+        })
+    }
+
+    fn prior(&self) -> PriorMoments {
+        let rank = self.to_unknowns.ncols();
+        PriorMoments {
+            base: self.prior_rows.transpose() * &self.prior_rows,
+            base_y: (0..rank)
+                .map(|k| {
+                    let with = |i: usize| self.prior_rows[(i, k)] * self.prior_residual[i];
+                    (0..self.prior_rows.nrows()).map(with).sum()
+                })
+                .collect(),
+        }
+    }
+}
+
+/// The inverse of an upper triangle by back substitution.
+fn inverse_of_triangle(r: &Mat<f64>) -> Mat<f64> {
+    let n = r.nrows();
+    let mut inverse = Mat::zeros(n, n);
+    for column in 0..n {
+        for i in (0..=column).rev() {
+            let unit = if i == column { 1.0 } else { 0.0 };
+            let sum: f64 = (i + 1..=column).map(|k| r[(i, k)] * inverse[(k, column)]).sum();
+            inverse[(i, column)] = if r[(i, i)] != 0.0 {
+                (unit - sum) / r[(i, i)]
+            } else {
+                0.0
+            };
+        }
+    }
+    inverse
+}
+
+/// An entry of the library as laid out for a session.
+#[derive(Clone, Debug)]
+pub struct ListEntry {
+    /// Its identifier.
+    pub id: String,
+    /// Index of its family.
+    pub family: usize,
+    /// Whether the session's readings can see it beside the declared unknowns.
+    pub seen: bool,
+}
+
+/// The library as laid out for a session, with which entries its readings can see.
+///
+/// # Errors
+/// If the session cannot be fitted.
+pub fn list(session: &Session, options: &TraceOptions) -> Result<Vec<ListEntry>, IdentifyError> {
+    let (problem, fit) = prepare(session, options.seed)?;
+    let columns = Columns::new(&problem, &fit.beta)?;
+    let start = Start::of(&problem, &columns, &fit)?;
+    let prior = start.prior();
+    let (candidates, layouts): (Vec<Candidate>, Vec<Layout>) = library::candidates(&problem)?
+        .into_iter()
+        .filter(|candidate| chosen(options, &candidate.effect.id()))
+        .filter_map(|candidate| {
+            columns
+                .layout(&candidate.effect)
+                .map(|layout| (candidate, layout))
+        })
+        .unzip();
+    let none = Mat::zeros(columns.rows(), 0);
+    let moments = Moments::new(&columns, &layouts, start.model, &start.residual, none);
+    let rank = moments.base();
+    let folds = (0..columns.fold_rows.len()).collect();
+    let trained = score::Trained::new(&moments, &prior, (0..rank).collect(), folds);
+    Ok(candidates
+        .into_iter()
+        .zip(trained.gains())
+        .map(|(candidate, gain)| ListEntry {
+            id: candidate.effect.id(),
+            family: candidate.family,
+            seen: gain.freedom > 0,
+        })
+        .collect())
+}

@@ -102,7 +102,16 @@ impl Moments {
             });
         }
         let null_base = transposed_product(model.as_ref(), null.as_ref());
-        Moments { folds, null_cross, null_base, first, count, base_columns: model, residual: residual.to_vec(), null }
+        Moments {
+            folds,
+            null_cross,
+            null_base,
+            first,
+            count,
+            base_columns: model,
+            residual: residual.to_vec(),
+            null,
+        }
     }
 
     /// Number of base columns so far.
@@ -163,7 +172,9 @@ impl Moments {
             });
             moments.cross = stacked(&moments.cross, &products[fold].0);
             for j in 0..added {
-                let sum = (range.start..range.end).map(|i| fresh[(i, j)] * self.residual[i]).sum();
+                let sum = (range.start..range.end)
+                    .map(|i| fresh[(i, j)] * self.residual[i])
+                    .sum();
                 moments.base_y.push(sum);
             }
         }
@@ -183,9 +194,15 @@ impl Moments {
         for (fold, (product, own)) in products.into_iter().enumerate() {
             let moments = &mut self.folds[fold];
             moments.cross = Mat::from_fn(rank, total + layout.count, |i, j| {
-                if j < total { moments.cross[(i, j)] } else { product[(i, j - total)] }
+                if j < total {
+                    moments.cross[(i, j)]
+                } else {
+                    product[(i, j - total)]
+                }
             });
-            moments.cross_y.extend((0..layout.count).map(|k| product[(rank, k)]));
+            moments
+                .cross_y
+                .extend((0..layout.count).map(|k| product[(rank, k)]));
             moments.own.extend(own);
             for d in 0..draws {
                 for k in 0..layout.count {
@@ -195,8 +212,43 @@ impl Moments {
         }
         let before = &self.null_cross;
         self.null_cross = Mat::from_fn(draws, total + layout.count, |d, j| {
-            if j < total { before[(d, j)] } else { of_null[(d, j - total)] }
+            if j < total {
+                before[(d, j)]
+            } else {
+                of_null[(d, j - total)]
+            }
         });
+    }
+
+    /// What a layout would gain on all readings beside a model trained on all readings.
+    pub fn gain_of(
+        &self,
+        columns: &Columns<'_, '_>,
+        layout: &Layout,
+        model: &super::score::Trained<'_>,
+    ) -> f64 {
+        let (base, inverse, base_y) = (&model.base, &model.inverse, &model.base_y);
+        let mut fresh = Mat::zeros(columns.rows(), layout.count);
+        columns.fill(&[layout], fresh.as_mut());
+        let cross_all = transposed_product(self.base_columns.as_ref(), fresh.as_ref());
+        let cross = Mat::from_fn(base.len(), layout.count, |i, k| cross_all[(base[i], k)]);
+        let own = transposed_product(fresh.as_ref(), fresh.as_ref());
+        let solved = inverse * &cross;
+        let d = Mat::from_fn(layout.count, layout.count, |k, l| {
+            own[(k, l)]
+                - (0..base.len())
+                    .map(|i| cross[(i, k)] * solved[(i, l)])
+                    .sum::<f64>()
+        });
+        let g: Vec<f64> = (0..layout.count)
+            .map(|k| {
+                let with_y: f64 = (0..columns.rows())
+                    .map(|i| fresh[(i, k)] * self.residual[i])
+                    .sum();
+                with_y - (0..base.len()).map(|i| solved[(i, k)] * base_y[i]).sum::<f64>()
+            })
+            .collect();
+        super::score::quadratic_gain(&d, &own, &g)
     }
 
     /// Model, residual and null draws side by side: one product with each chunk of candidates.

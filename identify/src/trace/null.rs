@@ -82,7 +82,9 @@ pub fn draws(
 
 /// Whitened deviations without structure, in stretches that whitening kept together, of unit variance.
 fn pool(problem: &Problem<'_>, residuals: &[Vec<f64>]) -> Vec<Vec<f64>> {
-    let pure = PureError::of(&problem.tests, residuals, |test, row| !problem.rejected[test][row]);
+    let pure = PureError::of(&problem.tests, residuals, |test, row| {
+        !problem.rejected[test][row]
+    });
     let repeats = pure.freedom >= LEAST_POOL;
     let coordinates = problem.coordinates();
     let mut stretches = Vec::new();
@@ -119,8 +121,12 @@ fn pool(problem: &Problem<'_>, residuals: &[Vec<f64>]) -> Vec<Vec<f64>> {
             stretches.push(stretch);
         }
     }
-    let (sum, count) =
-        stretches.iter().flatten().fold((0.0, 0_usize), |(sum, count), value| (sum + value * value, count + 1));
+    let (sum, count) = stretches
+        .iter()
+        .flatten()
+        .fold((0.0, 0_usize), |(sum, count), value| {
+            (sum + value * value, count + 1)
+        });
     if count > 0 && sum > 0.0 {
         // The noise may be stated smaller or larger than it is; whitened readings are what the search sees, so their scatter counts.
         let scale = if repeats { 1.0 } else { (count as f64 / sum).sqrt() };
@@ -136,7 +142,9 @@ fn without_smooth(residual: &[f64], coordinates: usize) -> Vec<Option<f64>> {
     for row in 0..rows {
         let (start, end) = (row.saturating_sub(SMOOTHING), (row + SMOOTHING + 1).min(rows));
         for coordinate in 0..coordinates {
-            let mut window: Vec<f64> = (start..end).map(|r| residual[r * coordinates + coordinate]).collect();
+            let mut window: Vec<f64> = (start..end)
+                .map(|r| residual[r * coordinates + coordinate])
+                .collect();
             let level = median(&mut window);
             rough[row * coordinates + coordinate] = Some(residual[row * coordinates + coordinate] - level);
         }

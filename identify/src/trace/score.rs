@@ -53,13 +53,13 @@ pub struct Trained<'m> {
     /// The folds it is trained on.
     pub folds: Vec<usize>,
     /// `(XᵀX)⁻¹`.
-    inverse: Mat<f64>,
+    pub inverse: Mat<f64>,
     /// `(XᵀX)⁻¹ Xᵀ C`.
     solved: Mat<f64>,
     /// `Xᵀ C`.
     cross: Mat<f64>,
     /// `Xᵀ y`.
-    base_y: Vec<f64>,
+    pub base_y: Vec<f64>,
     /// Coefficients of the base columns: `(XᵀX)⁻¹ Xᵀ y`.
     pub coefficients: Vec<f64>,
 }
@@ -85,14 +85,23 @@ pub struct Gain {
 
 impl<'m> Trained<'m> {
     /// Trains a model.
-    pub fn new(moments: &'m Moments, prior: &PriorMoments, base: Vec<usize>, folds: Vec<usize>) -> Trained<'m> {
+    pub fn new(
+        moments: &'m Moments,
+        prior: &PriorMoments,
+        base: Vec<usize>,
+        folds: Vec<usize>,
+    ) -> Trained<'m> {
         let m = base.len();
         let of_prior = prior.base.nrows();
         let mut gram = Mat::<f64>::zeros(m, m);
         let mut base_y = vec![0.0; m];
         for (i, bi) in base.iter().enumerate() {
             for (j, bj) in base.iter().enumerate() {
-                let mut sum = if *bi < of_prior && *bj < of_prior { prior.base[(*bi, *bj)] } else { 0.0 };
+                let mut sum = if *bi < of_prior && *bj < of_prior {
+                    prior.base[(*bi, *bj)]
+                } else {
+                    0.0
+                };
                 for fold in &folds {
                     sum += moments.folds[*fold].base[(*bi, *bj)];
                 }
@@ -103,7 +112,10 @@ impl<'m> Trained<'m> {
                 base_y[i] += moments.folds[*fold].base_y[*bi];
             }
         }
-        let total = moments.first.last().map_or(0, |first| first + moments.count.last().copied().unwrap_or(0));
+        let total = moments
+            .first
+            .last()
+            .map_or(0, |first| first + moments.count.last().copied().unwrap_or(0));
         let mut cross = Mat::<f64>::zeros(m, total);
         for j in 0..total {
             for (i, bi) in base.iter().enumerate() {
@@ -116,9 +128,19 @@ impl<'m> Trained<'m> {
         }
         let inverse = pseudo_inverse(&gram);
         let solved = &inverse * &cross;
-        let coefficients =
-            (0..m).map(|i| (0..m).map(|j| inverse[(i, j)] * base_y[j]).sum()).collect();
-        Trained { moments, base, folds, inverse, solved, cross, base_y, coefficients }
+        let coefficients = (0..m)
+            .map(|i| (0..m).map(|j| inverse[(i, j)] * base_y[j]).sum())
+            .collect();
+        Trained {
+            moments,
+            base,
+            folds,
+            inverse,
+            solved,
+            cross,
+            base_y,
+            coefficients,
+        }
     }
 
     /// `D` and `g` of a candidate.
@@ -141,7 +163,9 @@ impl<'m> Trained<'m> {
                     .sum();
                 d[(k, l)] -= sum;
             }
-            g[k] -= (0..self.base.len()).map(|i| self.solved[(i, first + k)] * self.base_y[i]).sum::<f64>();
+            g[k] -= (0..self.base.len())
+                .map(|i| self.solved[(i, first + k)] * self.base_y[i])
+                .sum::<f64>();
         }
         (d, g, own)
     }
@@ -150,12 +174,19 @@ impl<'m> Trained<'m> {
     pub fn gain(&self, candidate: usize) -> Gain {
         let (d, g, own) = self.projected(candidate);
         let inverse = Visible::of(&d, &own);
-        Gain { gain: inverse.quadratic(&g), freedom: inverse.freedom, visible: inverse.share }
+        Gain {
+            gain: inverse.quadratic(&g),
+            freedom: inverse.freedom,
+            visible: inverse.share,
+        }
     }
 
     /// What every candidate would gain.
     pub fn gains(&self) -> Vec<Gain> {
-        (0..self.moments.count.len()).into_par_iter().map(|candidate| self.gain(candidate)).collect()
+        (0..self.moments.count.len())
+            .into_par_iter()
+            .map(|candidate| self.gain(candidate))
+            .collect()
     }
 
     /// The best score that each null draw gives to any candidate: `cost` and the inflation of the variance as in the real search.
@@ -168,7 +199,7 @@ impl<'m> Trained<'m> {
             .par_chunks(64)
             .map(|chunk| {
                 let mut best = vec![f64::NEG_INFINITY; draws];
-                for &candidate in chunk {
+                for &candidate in chunk.iter().filter(|candidate| costs[**candidate].is_finite()) {
                     let (d, _, own) = self.projected(candidate);
                     let inverse = Visible::of(&d, &own);
                     if inverse.freedom == 0 {
@@ -222,18 +253,27 @@ impl<'m> Trained<'m> {
             }
         }
         for k in 0..count {
-            g[k] -= (0..self.base.len()).map(|i| self.solved[(i, first + k)] * gram_with[i]).sum::<f64>();
+            g[k] -= (0..self.base.len())
+                .map(|i| self.solved[(i, first + k)] * gram_with[i])
+                .sum::<f64>();
         }
         let inverse = Visible::of(&d, &own);
         let projected = length - self.model_share(&gram_with);
-        if projected <= 0.0 { 0.0 } else { (inverse.quadratic(&g) / projected).clamp(0.0, 1.0) }
+        if projected <= 0.0 {
+            0.0
+        } else {
+            (inverse.quadratic(&g) / projected).clamp(0.0, 1.0)
+        }
     }
 
     /// `gᵀ (XᵀX)⁻¹ g`.
     fn model_share(&self, gram_with: &[f64]) -> f64 {
         let m = self.base.len();
         let quadratic = |i: usize, j: usize| gram_with[i] * self.inverse[(i, j)] * gram_with[j];
-        (0..m).flat_map(|i| (0..m).map(move |j| (i, j))).map(|(i, j)| quadratic(i, j)).sum()
+        (0..m)
+            .flat_map(|i| (0..m).map(move |j| (i, j)))
+            .map(|(i, j)| quadratic(i, j))
+            .sum()
     }
 
     /// Coefficients of the model's base columns and of a candidate's columns if the candidate joins.
@@ -243,8 +283,11 @@ impl<'m> Trained<'m> {
         let first = self.moments.first[candidate];
         let of_model = (0..self.base.len())
             .map(|i| {
-                let shift: f64 =
-                    of_candidate.iter().enumerate().map(|(k, c)| self.solved[(i, first + k)] * c).sum();
+                let shift: f64 = of_candidate
+                    .iter()
+                    .enumerate()
+                    .map(|(k, c)| self.solved[(i, first + k)] * c)
+                    .sum();
                 self.coefficients[i] - shift
             })
             .collect();
@@ -265,6 +308,11 @@ impl<'m> Trained<'m> {
     }
 }
 
+/// `gᵀ D⁻¹ g` on the directions that are seen.
+pub fn quadratic_gain(d: &Mat<f64>, own: &Mat<f64>, g: &[f64]) -> f64 {
+    Visible::of(d, own).quadratic(g)
+}
+
 /// The inverse of a candidate's projected product on the directions that are seen.
 struct Visible {
     vectors: Mat<f64>,
@@ -277,17 +325,40 @@ struct Visible {
 impl Visible {
     fn of(d: &Mat<f64>, own: &Mat<f64>) -> Visible {
         let n = d.nrows();
-        let scale: Vec<f64> =
-            (0..n).map(|k| if own[(k, k)] > 0.0 { 1.0 / own[(k, k)].sqrt() } else { 0.0 }).collect();
+        let scale: Vec<f64> = (0..n)
+            .map(|k| {
+                if own[(k, k)] > 0.0 {
+                    1.0 / own[(k, k)].sqrt()
+                } else {
+                    0.0
+                }
+            })
+            .collect();
         let scaled = Mat::from_fn(n, n, |i, j| d[(i, j)] * scale[i] * scale[j]);
-        let share = if n == 0 { 0.0 } else { (0..n).map(|i| scaled[(i, i)]).fold(0.0, f64::max) };
+        let share = if n == 0 {
+            0.0
+        } else {
+            (0..n).map(|i| scaled[(i, i)]).fold(0.0, f64::max)
+        };
         if n == 1 {
             let seen = scaled[(0, 0)] > LEAST_VISIBLE;
             let values = vec![if seen { 1.0 / scaled[(0, 0)] } else { 0.0 }];
-            return Visible { vectors: Mat::identity(1, 1), values, scale, freedom: usize::from(seen), share };
+            return Visible {
+                vectors: Mat::identity(1, 1),
+                values,
+                scale,
+                freedom: usize::from(seen),
+                share,
+            };
         }
         let Ok(eigen) = scaled.self_adjoint_eigen(faer::Side::Lower) else {
-            return Visible { vectors: Mat::identity(n, n), values: vec![0.0; n], scale, freedom: 0, share };
+            return Visible {
+                vectors: Mat::identity(n, n),
+                values: vec![0.0; n],
+                scale,
+                freedom: 0,
+                share,
+            };
         };
         let values: Vec<f64> = eigen
             .S()
@@ -296,7 +367,13 @@ impl Visible {
             .map(|value| if *value > LEAST_VISIBLE { 1.0 / value } else { 0.0 })
             .collect();
         let freedom = values.iter().filter(|value| **value > 0.0).count();
-        Visible { vectors: eigen.U().to_owned(), values, scale, freedom, share }
+        Visible {
+            vectors: eigen.U().to_owned(),
+            values,
+            scale,
+            freedom,
+            share,
+        }
     }
 
     fn quadratic(&self, g: &[f64]) -> f64 {
@@ -332,6 +409,12 @@ fn pseudo_inverse(gram: &Mat<f64>) -> Mat<f64> {
     let values: Vec<f64> = eigen.S().column_vector().iter().copied().collect();
     let largest = values.iter().fold(0.0_f64, |a, b| a.max(*b));
     let u = eigen.U();
-    let scaled = Mat::from_fn(n, n, |i, k| if values[k] > largest * 1e-12 { u[(i, k)] / values[k] } else { 0.0 });
+    let scaled = Mat::from_fn(n, n, |i, k| {
+        if values[k] > largest * 1e-12 {
+            u[(i, k)] / values[k]
+        } else {
+            0.0
+        }
+    });
     &scaled * u.transpose()
 }

@@ -57,6 +57,8 @@ pub struct Search<'s> {
     pub held_out: Vec<f64>,
     /// The best score on readings without structure that is exceeded with the probability of the stop, by round.
     pub thresholds: Vec<f64>,
+    /// Whether candidates of last resort are tried.
+    pub last_resort: bool,
     stop: Stop,
 }
 
@@ -98,6 +100,7 @@ impl<'s> Search<'s> {
             materialised: Vec::new(),
             held_out: Vec::new(),
             thresholds: Vec::new(),
+            last_resort: false,
             stop,
         };
         let before = search.held_out_now();
@@ -105,16 +108,25 @@ impl<'s> Search<'s> {
         search
     }
 
+    fn is_held_back(&self, candidate: usize) -> bool {
+        self.candidates[candidate].last_resort && !self.last_resort
+    }
+
     fn all_folds(&self) -> Vec<usize> {
         (0..self.columns.fold_rows.len()).collect()
     }
 
     fn places(&self, candidate: usize) -> std::ops::Range<usize> {
-        self.materialised.iter().find(|(c, _)| *c == candidate).map_or(0..0, |(_, places)| places.clone())
+        self.materialised
+            .iter()
+            .find(|(c, _)| *c == candidate)
+            .map_or(0..0, |(_, places)| places.clone())
     }
 
     fn base_with(&self, candidates: &[usize]) -> Vec<usize> {
-        (0..self.rank).chain(candidates.iter().flat_map(|candidate| self.places(*candidate))).collect()
+        (0..self.rank)
+            .chain(candidates.iter().flat_map(|candidate| self.places(*candidate)))
+            .collect()
     }
 
     /// The model with what has been taken, less one of it, on all readings.
@@ -126,7 +138,12 @@ impl<'s> Search<'s> {
             .filter(|(k, _)| Some(*k) != left_out)
             .map(|(_, taken)| taken.candidate)
             .collect();
-        Trained::new(&self.moments, &self.prior, self.base_with(&chosen), self.all_folds())
+        Trained::new(
+            &self.moments,
+            &self.prior,
+            self.base_with(&chosen),
+            self.all_folds(),
+        )
     }
 
     /// The variance that gains are measured in.
@@ -134,8 +151,16 @@ impl<'s> Search<'s> {
         if !self.stop.in_residual_variance {
             return 1.0;
         }
-        let sum: f64 = model.folds.iter().map(|fold| model.sum_of_squares_on(*fold)).sum();
-        let rows: usize = model.folds.iter().map(|fold| self.columns.fold_rows[*fold].len()).sum();
+        let sum: f64 = model
+            .folds
+            .iter()
+            .map(|fold| model.sum_of_squares_on(*fold))
+            .sum();
+        let rows: usize = model
+            .folds
+            .iter()
+            .map(|fold| self.columns.fold_rows[*fold].len())
+            .sum();
         let freedom = rows.saturating_sub(model.base.len()).max(1) as f64;
         (sum / freedom).max(f64::MIN_POSITIVE)
     }
@@ -145,7 +170,12 @@ impl<'s> Search<'s> {
         if !self.stop.in_residual_variance {
             return 1.0;
         }
-        let model = Trained::new(&self.moments, &self.prior, (0..self.rank).collect(), self.all_folds());
+        let model = Trained::new(
+            &self.moments,
+            &self.prior,
+            (0..self.rank).collect(),
+            self.all_folds(),
+        );
         self.variance(&model)
     }
 
@@ -162,7 +192,7 @@ impl<'s> Search<'s> {
         let gains = model.gains();
         let mut best: Option<(usize, f64)> = None;
         for (candidate, gain) in gains.iter().enumerate() {
-            if taken.contains(&candidate) {
+            if taken.contains(&candidate) || self.is_held_back(candidate) {
                 continue;
             }
             let score = self.score(candidate, gain, variance);
@@ -183,7 +213,8 @@ impl<'s> Search<'s> {
         let mut first = best;
         let mut first_gain = of_best.clone();
         for (candidate, gain) in model.gains().iter().enumerate() {
-            if taken.contains(&candidate) || gain.freedom == 0 || evidence(gain) < least {
+            let passed_over = taken.contains(&candidate) || self.is_held_back(candidate);
+            if passed_over || gain.freedom == 0 || evidence(gain) < least {
                 continue;
             }
             let cost = self.candidates[candidate].cost;
@@ -201,8 +232,18 @@ impl<'s> Search<'s> {
         let taken: Vec<usize> = self.taken.iter().map(|t| t.candidate).collect();
         let (winner, score, null) = {
             let model = self.model_without(None);
-            let Some((best, score)) = self.best_of(&model, &taken) else { return Round::Done { p_value: 1.0 } };
-            let costs: Vec<f64> = self.candidates.iter().map(|candidate| candidate.cost).collect();
+            let Some((best, score)) = self.best_of(&model, &taken) else {
+                return Round::Done { p_value: 1.0 };
+            };
+            let costs: Vec<f64> = (0..self.candidates.len())
+                .map(|c| {
+                    if self.is_held_back(c) {
+                        f64::INFINITY
+                    } else {
+                        self.candidates[c].cost
+                    }
+                })
+                .collect();
             let null = model.null_best(&costs, self.null_variance());
             (self.named_first(&model, best), score, null)
         };
@@ -211,7 +252,10 @@ impl<'s> Search<'s> {
         let mut sorted = null;
         sorted.sort_by(f64::total_cmp);
         let rank = ((1.0 - self.stop.significance) * sorted.len() as f64).ceil() as usize;
-        let threshold = sorted.get(rank.min(sorted.len().saturating_sub(1))).copied().unwrap_or(0.0);
+        let threshold = sorted
+            .get(rank.min(sorted.len().saturating_sub(1)))
+            .copied()
+            .unwrap_or(0.0);
         self.thresholds.push(threshold);
         if p_value > self.stop.significance || self.taken.len() >= self.stop.most {
             return Round::Done { p_value };
@@ -230,18 +274,26 @@ impl<'s> Search<'s> {
             .collect();
         let mut wanted: BTreeSet<usize> = picks.iter().flatten().copied().collect();
         wanted.insert(candidate);
-        let fresh: Vec<usize> =
-            wanted.into_iter().filter(|c| !self.materialised.iter().any(|(present, _)| present == c)).collect();
+        let fresh: Vec<usize> = wanted
+            .into_iter()
+            .filter(|c| !self.materialised.iter().any(|(present, _)| present == c))
+            .collect();
         let places = self.moments.materialise(self.columns, &self.layouts, &fresh);
         self.materialised.extend(fresh.into_iter().zip(places));
         for (fold, pick) in picks.into_iter().enumerate() {
             self.of_fold[fold].extend(pick);
         }
         let places = self.places(candidate);
-        self.taken.push(Taken { candidate, places, p_value });
+        self.taken.push(Taken {
+            candidate,
+            places,
+            p_value,
+        });
         let held_out = self.held_out_now();
         // For poses p-values say little; there an effect has to earn its place on the readings that were held out.
-        if self.stop.in_residual_variance && held_out >= self.held_out.last().copied().unwrap_or(f64::INFINITY) {
+        if self.stop.in_residual_variance
+            && held_out >= self.held_out.last().copied().unwrap_or(f64::INFINITY)
+        {
             self.taken.pop();
             return Round::Done { p_value };
         }
@@ -277,12 +329,19 @@ impl<'s> Search<'s> {
         for k in 0..self.taken.len() {
             let (better, current) = {
                 let model = self.model_without(Some(k));
-                let others: Vec<usize> =
-                    self.taken.iter().enumerate().filter(|(j, _)| *j != k).map(|(_, t)| t.candidate).collect();
+                let others: Vec<usize> = self
+                    .taken
+                    .iter()
+                    .enumerate()
+                    .filter(|(j, _)| *j != k)
+                    .map(|(_, t)| t.candidate)
+                    .collect();
                 let present = self.taken[k].candidate;
                 let score = self.score(present, &model.gain(present), self.variance(&model));
                 match self.best_of(&model, &others) {
-                    Some((best, most)) if best != present && most > score + super::alias::INDISTINGUISHABLE => {
+                    Some((best, most))
+                        if best != present && most > score + super::alias::INDISTINGUISHABLE =>
+                    {
                         (Some(self.named_first(&model, best)), present)
                     }
                     _ => (None, present),
@@ -296,8 +355,11 @@ impl<'s> Search<'s> {
                 let places = self.moments.materialise(self.columns, &self.layouts, &[better]);
                 self.materialised.extend([better].into_iter().zip(places));
             }
-            self.taken[k] =
-                Taken { candidate: better, places: self.places(better), p_value: self.taken[k].p_value };
+            self.taken[k] = Taken {
+                candidate: better,
+                places: self.places(better),
+                p_value: self.taken[k].p_value,
+            };
             changed = true;
         }
         changed
@@ -305,12 +367,46 @@ impl<'s> Search<'s> {
 
     /// The model that a fold's own search has built, trained on the other folds.
     pub fn model_of_fold(&self, fold: usize) -> Trained<'_> {
-        let others: Vec<usize> = self.all_folds().into_iter().filter(|other| *other != fold).collect();
-        Trained::new(&self.moments, &self.prior, self.base_with(&self.of_fold[fold]), others)
+        let others: Vec<usize> = self
+            .all_folds()
+            .into_iter()
+            .filter(|other| *other != fold)
+            .collect();
+        Trained::new(
+            &self.moments,
+            &self.prior,
+            self.base_with(&self.of_fold[fold]),
+            others,
+        )
     }
 
     fn held_out_now(&self) -> f64 {
-        self.all_folds().into_iter().map(|fold| self.model_of_fold(fold).sum_of_squares_on(fold)).sum()
+        self.all_folds()
+            .into_iter()
+            .map(|fold| self.model_of_fold(fold).sum_of_squares_on(fold))
+            .sum()
+    }
+
+    /// What any effect would gain beside all that has been taken; `None` where the data lack what it follows.
+    pub fn gain_of(&self, effect: &abbe_model::effect::Effect) -> Option<f64> {
+        let layout = self.columns.layout_uncached(effect)?;
+        let model = self.model_without(None);
+        Some(self.moments.gain_of(self.columns, &layout, &model))
+    }
+
+    /// The lengths of a candidate's columns over all readings.
+    pub fn norms(&self, candidate: usize) -> Vec<f64> {
+        (0..self.moments.count[candidate])
+            .map(|k| {
+                self.moments
+                    .folds
+                    .iter()
+                    .map(|fold| fold.own[candidate][(k, k)])
+                    .sum::<f64>()
+                    .max(0.0)
+                    .sqrt()
+            })
+            .collect()
     }
 
     /// Adds a candidate to those that are looked for.

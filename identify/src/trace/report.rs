@@ -1,0 +1,237 @@
+//! From a finished search to what is reported.
+
+use abbe_model::effect::Effect;
+
+use super::alias::{self, Alias};
+use super::remainder::Structure;
+use super::search::Search;
+use super::{EXPLAINED_SHARE, STRUCTURED, Start, library};
+use crate::error::IdentifyError;
+use crate::fit::{self, Fit};
+use crate::heldout::rms_mm;
+use crate::parameters::Role;
+use crate::problem::Problem;
+use crate::results::{EffectName, EffectResult, ModelResult, Moved, ParameterResult, Remainder, TraceResult};
+
+/// What a search has come to.
+pub(super) struct Findings<'f, 'a> {
+    pub before: &'f Problem<'a>,
+    pub before_fit: &'f Fit,
+    pub after: &'f Problem<'a>,
+    pub after_fit: &'f Fit,
+    pub search: &'f Search<'f>,
+    pub start: &'f Start,
+    pub structure_before: Option<&'f Structure>,
+    pub structure_after: Option<&'f Structure>,
+    pub last_p_value: f64,
+    pub candidates: usize,
+    pub candidates_seen: usize,
+}
+
+/// An effect's name as it stands in results.
+pub fn effect_name(effect: &Effect) -> EffectName {
+    EffectName {
+        component: effect.component.to_string(),
+        driver: effect.driver.to_string(),
+        shape: effect.shape.word().to_string(),
+        order: effect.shape.order(),
+        tests: effect.tests.clone(),
+    }
+}
+
+pub(super) fn report(findings: &Findings<'_, '_>) -> Result<TraceResult, IdentifyError> {
+    let Findings {
+        before,
+        before_fit,
+        after,
+        after_fit,
+        search,
+        ..
+    } = findings;
+    let whitened_rows = search.columns.rows().max(1) as f64;
+    let in_residual_variance = findings.structure_after.is_none();
+    let held_out_um = |sum: f64, scale: f64| (sum / whitened_rows).sqrt() * scale;
+    // Whitened sums of squares are turned into µm by the declared model's own figures.
+    let first = search.held_out.first().copied().unwrap_or(1.0);
+    let before_result = model_result(before, before_fit, before_fit.held_out.rms_mm);
+    let scale = before_result.heldout_rms_um / held_out_um(first, 1.0).max(f64::MIN_POSITIVE);
+    let last = search.held_out.last().copied().unwrap_or(first);
+    let mut after_result = model_result(after, after_fit, held_out_um(last, scale) * 1e-3);
+
+    let families = library::families()?;
+    let mut effects = Vec::new();
+    let mut alias_shifts = vec![0.0_f64; before_fit.beta.len()];
+    let variance = if in_residual_variance {
+        let sum: f64 = after_fit
+            .residuals
+            .iter()
+            .flatten()
+            .map(|v| (v / after.noise.sigma_mm).powi(2))
+            .sum();
+        (sum / whitened_rows).max(1.0)
+    } else {
+        1.0
+    };
+    for (k, taken) in search.taken.iter().enumerate() {
+        let candidate = &search.candidates[taken.candidate];
+        let model = search.model_without(Some(k));
+        let aliases = alias::aliases(search, k, variance);
+        let named = model.joined(taken.candidate).0;
+        widen(&mut alias_shifts, &aliases, &named, findings.start);
+        let gain = model.gain(taken.candidate).gain;
+        effects.push(EffectResult {
+            name: effect_name(&candidate.effect),
+            family: families
+                .get(candidate.family)
+                .map(|family| family.name.clone())
+                .unwrap_or_default(),
+            parameters: parameters_of(after, after_fit, k + before.parameters.effects.len()),
+            p_value: taken.p_value,
+            rms_gain_um: (gain / whitened_rows).sqrt() * before.noise.sigma_mm * 1e3,
+            heldout_rms_um: held_out_um(search.held_out.get(k + 1).copied().unwrap_or(last), scale),
+            aliases: aliases
+                .iter()
+                .map(|a| effect_name(&search.candidates[a.candidate].effect))
+                .collect(),
+            separated_by: None,
+        });
+    }
+    for parameter in &mut after_result.parameters {
+        let place = after.parameters.list.iter().position(|p| p.id == parameter.id);
+        if let Some(shift) = place.and_then(|j| alias_shifts.get(j).copied()) {
+            let unit = place.map_or(1.0, |j| after.parameters.list[j].unit.per_inside);
+            parameter.u = parameter.u.hypot(shift * unit);
+        }
+    }
+    let (verdict, remainder) = verdict(findings, &mut effects);
+    let moved = moved(&before_result.parameters, &after_result.parameters);
+    let mut warnings = before.session.warnings.clone();
+    if search
+        .taken
+        .iter()
+        .any(|taken| taken.p_value > 0.5 / 200.0 && taken.p_value < 0.0051)
+    {
+        // The floor of the null: the p-value is an upper bound.
+        warnings.retain(|warning| !warning.is_empty());
+    }
+    Ok(TraceResult {
+        verdict,
+        noise_um: before.noise.sigma_mm * 1e3,
+        noise_source: before.noise.source.word().to_string(),
+        noise_memory: before.noise.memory.clone(),
+        readings: before.readings(),
+        heldout_by: before.folds.kind.words().to_string(),
+        before: before_result,
+        after: after_result,
+        effects,
+        remainder,
+        residual_before: match findings.structure_before {
+            Some(structure) if structure.p_value <= STRUCTURED => structure.words.clone(),
+            Some(_) => "no structure beyond noise".to_string(),
+            None => "independent poses: structure is looked for effect by effect".to_string(),
+        },
+        moved,
+        candidates: findings.candidates,
+        candidates_seen: findings.candidates_seen,
+        unobservable: fit::unobservable(after, &after_fit.rank),
+        rejected: fit::rejected(after, after_fit),
+        warnings,
+    })
+}
+
+fn model_result(problem: &Problem<'_>, fit: &Fit, held_out_mm: f64) -> ModelResult {
+    let three = problem.coordinates() == 3;
+    let rms = rms_mm(problem, &fit.residuals) * 1e3;
+    let held = held_out_mm * 1e3;
+    let in_3d = |rms: f64| three.then(|| rms * 3.0_f64.sqrt());
+    ModelResult {
+        rms_um: rms,
+        heldout_rms_um: held,
+        rms_3d_um: in_3d(rms),
+        heldout_rms_3d_um: in_3d(held),
+        parameters: fit::parameters(problem, fit),
+    }
+}
+
+/// The parameters of the `number`-th effect.
+fn parameters_of(problem: &Problem<'_>, fit: &Fit, number: usize) -> Vec<ParameterResult> {
+    let Some(effect) = problem.parameters.effects.get(number) else {
+        return Vec::new();
+    };
+    let id = effect.id();
+    let has = problem
+        .parameters
+        .list
+        .iter()
+        .any(|p| matches!(p.role, Role::Coefficient { effect, .. } if effect == number));
+    if !has {
+        return Vec::new();
+    }
+    fit::parameters(problem, fit)
+        .into_iter()
+        .filter(|p| p.id == id || p.id.strip_prefix(&id).is_some_and(|rest| rest.starts_with('.')))
+        .collect()
+}
+
+/// How far the unknowns would move if an alias stood in an effect's place: the largest move of each, inside units.
+fn widen(shifts: &mut [f64], aliases: &[Alias], named: &[f64], start: &Start) {
+    let rank = start.to_unknowns.ncols();
+    let mut largest = vec![0.0_f64; shifts.len()];
+    for alias in aliases {
+        for (j, most) in largest.iter_mut().enumerate() {
+            let move_of: f64 = (0..rank)
+                .map(|k| start.to_unknowns[(j, k)] * (alias.model_coefficients[k] - named[k]))
+                .sum();
+            *most = most.max(move_of.abs());
+        }
+    }
+    for (shift, most) in shifts.iter_mut().zip(largest) {
+        *shift = shift.hypot(most);
+    }
+}
+
+fn verdict(findings: &Findings<'_, '_>, effects: &mut Vec<EffectResult>) -> (String, Remainder) {
+    let Some(after) = findings.structure_after else {
+        let word = if effects.is_empty() { "clean" } else { "explained" };
+        let remainder = Remainder {
+            structured: false,
+            p_value: findings.last_p_value,
+            place: None,
+        };
+        return (word.to_string(), remainder);
+    };
+    let structured = after.p_value <= STRUCTURED;
+    let remainder = Remainder {
+        structured,
+        p_value: after.p_value,
+        place: structured.then(|| after.words.clone()),
+    };
+    let before = findings
+        .structure_before
+        .map_or(0.0, |structure| structure.excess);
+    let share = if before > 0.0 { after.excess / before } else { 0.0 };
+    let word = match (effects.is_empty(), structured) {
+        (true, false) => "clean",
+        (true, true) => "unexplained",
+        (false, false) => "explained",
+        (false, true) if share < EXPLAINED_SHARE => "partly-explained",
+        (false, true) => "unexplained",
+    };
+    (word.to_string(), remainder)
+}
+
+/// Parameters that moved by more than their uncertainty.
+fn moved(before: &[ParameterResult], after: &[ParameterResult]) -> Vec<Moved> {
+    before
+        .iter()
+        .filter_map(|b| {
+            let a = after.iter().find(|a| a.id == b.id)?;
+            ((a.value - b.value).abs() > a.u).then(|| Moved {
+                id: a.id.clone(),
+                by: a.value - b.value,
+                u: a.u,
+                unit: a.unit.clone(),
+            })
+        })
+        .collect()
+}

@@ -1,0 +1,204 @@
+//! `abbe trace`.
+
+use std::sync::Mutex;
+use std::time::Duration;
+
+use abbe::identify::results::{EffectName, ModelResult, TraceResult};
+use abbe::identify::trace::{Progress, TraceOptions, library};
+use clap::Args;
+use indicatif::{ProgressBar, ProgressStyle};
+
+use super::failure::Failure;
+use super::{CommonArguments, SessionArguments, fit, output, read_session, table};
+
+/// `abbe trace SESSION`
+#[derive(Args)]
+pub struct TraceArguments {
+    #[command(flatten)]
+    session: SessionArguments,
+    #[command(flatten)]
+    common: CommonArguments,
+    /// The most effects to take up; as many as earn their place if not given.
+    #[arg(long, value_name = "N")]
+    max_effects: Option<usize>,
+    /// Look only for effects whose identifier contains this (`EZC`, `~time`, `:h2`); may be repeated.
+    #[arg(long, value_name = "TEXT")]
+    only: Vec<String>,
+    /// Do not look for effects whose identifier contains this; may be repeated.
+    #[arg(long, value_name = "TEXT")]
+    exclude: Vec<String>,
+    /// List the library for this session, with what its readings can see, and stop.
+    #[arg(long)]
+    list: bool,
+    /// Write the session that declares the found effects.
+    #[arg(long, value_name = "FILE")]
+    write: Option<std::path::PathBuf>,
+}
+
+/// Runs `abbe trace`.
+pub fn run(arguments: &TraceArguments) -> Result<(), Failure> {
+    let session = read_session(&arguments.session)?;
+    let options = TraceOptions {
+        seed: arguments.common.seed,
+        max_effects: arguments.max_effects,
+        only: arguments.only.clone(),
+        exclude: arguments.exclude.clone(),
+        ..TraceOptions::default()
+    };
+    if arguments.list {
+        return list(&session, &options);
+    }
+    let bar = progress_bar(arguments.common.quiet);
+    let shown = Mutex::new(());
+    let report = |progress: Progress| {
+        let _one_at_a_time = shown.lock();
+        match progress {
+            Progress::Fitting => bar.set_message("fitting the declared model"),
+            Progress::Screening(candidates) => bar.set_message(format!("screening {candidates} candidates")),
+            Progress::Taken(number, id, rms_um) => {
+                bar.set_message(format!("{number} effects, held out {rms_um:.2} µm: {id}"));
+                if !arguments.common.quiet {
+                    bar.suspend(|| eprintln!("  + {id:<28} held out {rms_um:.3} µm"));
+                }
+            }
+            Progress::Judging => bar.set_message("refitting and judging"),
+        }
+        true
+    };
+    let trace = abbe::identify::trace::trace(&session, &options, &report)?;
+    bar.finish_and_clear();
+    print(&trace.result);
+    if let Some(path) = &arguments.common.json {
+        output::write_json(path, &trace.result)?;
+    }
+    if let Some(path) = &arguments.write {
+        let text = std::fs::read_to_string(&arguments.session.session)
+            .map_err(|error| Failure::Other(format!("{}: {error}", arguments.session.session.display())))?;
+        let next = abbe::model::session::write::with_effects(&text, &trace.effects, &session.machine);
+        output::write_whole(path, next.as_bytes())?;
+    }
+    Ok(())
+}
+
+fn progress_bar(quiet: bool) -> ProgressBar {
+    if quiet {
+        return ProgressBar::hidden();
+    }
+    let bar = ProgressBar::new_spinner();
+    if let Ok(style) = ProgressStyle::with_template("{spinner} {elapsed} {msg}") {
+        bar.set_style(style);
+    }
+    bar.enable_steady_tick(Duration::from_millis(200));
+    bar
+}
+
+fn list(session: &abbe::model::session::Session, options: &TraceOptions) -> Result<(), Failure> {
+    let families = library::families()?;
+    let entries = abbe::identify::trace::list(session, options)?;
+    for (number, family) in families.iter().enumerate() {
+        let of_family: Vec<_> = entries.iter().filter(|entry| entry.family == number).collect();
+        let seen = of_family.iter().filter(|entry| entry.seen).count();
+        println!("{}: {} candidates, {seen} seen", family.name, of_family.len());
+        for entry in of_family {
+            println!(
+                "  {} {}",
+                if entry.seen { "seen    " } else { "not seen" },
+                entry.id
+            );
+        }
+    }
+    Ok(())
+}
+
+fn print(result: &TraceResult) {
+    println!("Verdict: {}", result.verdict);
+    println!(
+        "{} readings, noise {} ({}); {} of {} candidates can be seen",
+        result.readings,
+        table::micrometres(result.noise_um),
+        result.noise_source,
+        result.candidates_seen,
+        result.candidates
+    );
+    println!("The declared model leaves: {}", result.residual_before);
+    println!();
+    let row = |name: &str, model: &ModelResult| {
+        let mut cells = vec![
+            name.to_string(),
+            format!("{:.3}", model.rms_um),
+            format!("{:.3}", model.heldout_rms_um),
+        ];
+        if let (Some(rms), Some(held)) = (model.rms_3d_um, model.heldout_rms_3d_um) {
+            cells.extend([format!("{rms:.1}"), format!("{held:.1}")]);
+        }
+        cells
+    };
+    let mut header = vec!["residual, µm", "rms", "held out"];
+    if result.before.rms_3d_um.is_some() {
+        header.extend(["3-vector", "held out"]);
+    }
+    table::print(
+        &header,
+        &[row("before", &result.before), row("after", &result.after)],
+    );
+    println!("held out: leaving out {}", result.heldout_by);
+    for (number, effect) in result.effects.iter().enumerate() {
+        println!("\n{}. {}  ({})", number + 1, name(&effect.name), effect.family);
+        for p in &effect.parameters {
+            let (value, u) = table::value_and_u(p.value, p.u);
+            println!("   {}  {value} ± {u} {}", p.id, p.unit);
+        }
+        println!(
+            "   explains {} rms; p ≤ {:.3}",
+            table::micrometres(effect.rms_gain_um),
+            effect.p_value
+        );
+        if !effect.aliases.is_empty() {
+            let names: Vec<String> = effect.aliases.iter().take(8).map(name).collect();
+            let more = effect.aliases.len().saturating_sub(8);
+            let more = if more > 0 {
+                format!(" and {more} more")
+            } else {
+                String::new()
+            };
+            println!("   the readings cannot tell it from {}{more}", names.join("; "));
+        }
+        if let Some(test) = &effect.separated_by {
+            println!("   told apart by {test}");
+        }
+    }
+    if result.remainder.structured {
+        println!(
+            "\nStructure remains (p ≤ {:.3}): {}",
+            result.remainder.p_value,
+            result.remainder.place.as_deref().unwrap_or("")
+        );
+    }
+    if !result.after.parameters.is_empty() {
+        println!();
+        fit::print_parameters(&result.after.parameters);
+    }
+    if !result.moved.is_empty() {
+        println!("\nMoved by more than their uncertainty when the effects were added (the bias before):");
+        for moved in &result.moved {
+            let (by, u) = table::value_and_u(moved.by, moved.u);
+            println!("  {}  by {by} {} (u {u})", moved.id, moved.unit);
+        }
+    }
+    fit::print_warnings(&result.warnings);
+}
+
+fn name(effect: &EffectName) -> String {
+    let order = effect
+        .order
+        .map_or(String::new(), |order| format!(" order {order}"));
+    let tests = if effect.tests.is_empty() {
+        String::new()
+    } else {
+        format!(" in {}", effect.tests.join(", "))
+    };
+    format!(
+        "{} over {}: {}{order}{tests}",
+        effect.component, effect.driver, effect.shape
+    )
+}
