@@ -39,11 +39,7 @@ const WORTH_SAYING: f64 = 1.5;
 /// # Errors
 /// If a test has neither data nor a movement, a movement leaves the travel, or the model cannot be evaluated.
 pub fn analyse(session: &Session, options: &PlanOptions) -> Result<PlanAnalysis, IdentifyError> {
-    let noise = match options.noise_mm {
-        Some(sigma) => Noise::white(sigma, NoiseSource::Stated),
-        None => states::noise_of(session)?,
-    };
-    let complete = states::complete(session, options.planned_only)?;
+    let (complete, noise) = prepared(session, options)?;
     let problem = states::problem_by_test(&complete, noise)?;
     let mut analysis = analyse_problem(&problem)?;
     if options.noise_mm.is_none() && session.noise_mm.is_none() {
@@ -56,6 +52,18 @@ pub fn analyse(session: &Session, options: &PlanOptions) -> Result<PlanAnalysis,
         analysis.effects = Some(effects::effects(&problem)?);
     }
     Ok(analysis)
+}
+
+/// The complete session (see [`states::complete`]) and the noise that a plan is judged with.
+///
+/// # Errors
+/// If a test has neither data nor a movement, or a movement leaves the travel.
+pub fn prepared(session: &Session, options: &PlanOptions) -> Result<(Session, Noise), IdentifyError> {
+    let noise = match options.noise_mm {
+        Some(sigma) => Noise::white(sigma, NoiseSource::Stated),
+        None => states::noise_of(session)?,
+    };
+    Ok((states::complete(session, options.planned_only)?, noise))
 }
 
 /// Analyses a problem whose folds are its tests (see [`states::problem_by_test`]), without effects.

@@ -5,6 +5,7 @@
 //!
 //! - [`analyse`]: uncertainties, budgets, blind spots, indices, and what each test contributes;
 //! - [`effects`]: what undeclared effects would do;
+//! - [`menu`], [`improve`], [`information`]: the next test; [`range`]: how far a sweep can shrink;
 //! - [`states`], [`linear`], [`sensitivity`], [`budget`], [`blind`], [`indices`]: the parts of it;
 //! - [`results`]: what is reported, as it stands in JSON.
 
@@ -13,10 +14,14 @@ pub mod blind;
 pub mod budget;
 pub mod detect;
 pub mod effects;
+pub mod improve;
 pub mod indices;
+pub mod information;
 pub mod linear;
+pub mod menu;
+pub mod range;
 pub mod results;
 pub mod sensitivity;
 pub mod states;
 
-pub use analysis::{PlanOptions, analyse, analyse_problem};
+pub use analysis::{PlanOptions, analyse, analyse_problem, prepared};

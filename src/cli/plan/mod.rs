@@ -1,5 +1,6 @@
 //! `abbe plan`.
 
+mod improve;
 mod tables;
 
 use abbe::identify::plan::{self, PlanOptions};
@@ -28,12 +29,19 @@ pub struct PlanArguments {
     /// Leave out what undeclared effects would do.
     #[arg(long)]
     no_effects: bool,
+    #[command(flatten)]
+    improve: improve::ImproveArguments,
+    /// How far each sweep can shrink before an uncertainty doubles.
+    #[arg(long)]
+    range: bool,
 }
 
 /// Help of the command.
 pub const EXAMPLES: &str = "Examples:
   abbe plan sessions/hermle-c600u/chapter5.toml
-  abbe plan sessions/hermle-c600u/chapter5.toml --setup-um 1 --no-effects --json plan.json";
+  abbe plan sessions/hermle-c600u/chapter5.toml --setup-um 1 --no-effects --json plan.json
+  abbe plan sessions/hermle-c600u/chapter5.toml --improve 2 --bars-mm 50,100,150,300
+  abbe plan sessions/hermle-c600u/chapter5.toml --separate EZC~C:h2,EAC~C:h1";
 
 /// Runs `abbe plan`.
 pub fn run(arguments: &PlanArguments) -> Result<(), Failure> {
@@ -50,10 +58,46 @@ pub fn run(arguments: &PlanArguments) -> Result<(), Failure> {
         planned_only: arguments.planned,
         effects: !arguments.no_effects,
     };
+    if arguments.improve.asked() || arguments.range {
+        return next_test(arguments, &session, &options);
+    }
     let analysis = plan::analyse(&session, &options)?;
     tables::print(&analysis);
     if let Some(path) = &arguments.common.json {
         output::write_json(path, &analysis)?;
+    }
+    Ok(())
+}
+
+/// What `--improve`, `--separate` and `--range` ask for.
+#[derive(serde::Serialize)]
+struct NextTest {
+    #[serde(skip_serializing_if = "Option::is_none")]
+    improvement: Option<plan::improve::Improvement>,
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    ranges: Vec<plan::range::Shrinkage>,
+}
+
+fn next_test(arguments: &PlanArguments, session: &Session, options: &PlanOptions) -> Result<(), Failure> {
+    let (complete, noise) = plan::prepared(session, options)?;
+    let problem = plan::states::problem_by_test(&complete, noise)?;
+    let improvement = if arguments.improve.asked() {
+        let improvement = arguments.improve.run(&problem)?;
+        improve::print(&improvement);
+        Some(improvement)
+    } else {
+        None
+    };
+    let ranges = if arguments.range {
+        plan::range::shrinkages(&problem)?
+    } else {
+        Vec::new()
+    };
+    if arguments.range {
+        improve::print_ranges(&ranges);
+    }
+    if let Some(path) = &arguments.common.json {
+        output::write_json(path, &NextTest { improvement, ranges })?;
     }
     Ok(())
 }
