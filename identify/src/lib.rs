@@ -5,7 +5,7 @@
 //! - [`fit`]: identify; [`heldout`]: judge on readings that the fit did not see; [`noise`]: how much is noise;
 //! - [`trace`]: close the loop;
 //! - [`plan`]: what tests can see before anybody measures;
-//! - [`simulate`]: readings from a model;
+//! - [`simulate`]: readings from a model; [`quantity`]: values with their units as people write them;
 //! - [`results`]: what is reported, as it stands in JSON.
 
 pub mod drivers;
@@ -18,6 +18,7 @@ pub mod outliers;
 pub mod parameters;
 pub mod plan;
 pub mod problem;
+pub mod quantity;
 pub mod rank;
 pub mod results;
 pub mod simulate;

@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use abbe_model::effect::{Component, Driver, Effect};
 use abbe_model::instrument::InsideUnit;
-use abbe_model::sensitivity::TestModel;
+use abbe_model::sensitivity::{SlotValues, TestModel};
 use abbe_model::session::{Prior, Session, Test};
 
 use crate::drivers::{self, Origin};
@@ -255,6 +255,41 @@ impl Parameters {
         }
         self.effects.push(effect.clone());
         Ok(())
+    }
+
+    /// The components of every test at the unknowns' values (inside units).
+    pub fn slot_values(&self, models: &[TestModel<'_>], beta: &[f64]) -> Vec<SlotValues> {
+        self.parts
+            .iter()
+            .zip(models)
+            .map(|(parts, model)| {
+                let mut values = SlotValues::zero(model.slots());
+                for part in parts {
+                    let coefficient = beta[part.parameter];
+                    if coefficient == 0.0 {
+                        continue;
+                    }
+                    match &part.basis {
+                        None => values.constant[part.slot] += coefficient,
+                        Some(basis) => {
+                            let place = match values.varying.iter().position(|(slot, _)| *slot == part.slot) {
+                                Some(place) => place,
+                                None => {
+                                    values.varying.push((part.slot, vec![0.0; model.rows()]));
+                                    values.varying.len() - 1
+                                }
+                            };
+                            let column = &mut values.varying[place].1;
+                            column
+                                .iter_mut()
+                                .zip(basis.iter())
+                                .for_each(|(sum, b)| *sum += coefficient * b);
+                        }
+                    }
+                }
+                values
+            })
+            .collect()
     }
 }
 

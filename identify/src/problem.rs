@@ -164,38 +164,7 @@ impl<'a> Problem<'a> {
 
     /// The components of every test at the unknowns' values (inside units).
     pub fn slot_values(&self, beta: &[f64]) -> Vec<SlotValues> {
-        self.parameters
-            .parts
-            .iter()
-            .zip(&self.models)
-            .map(|(parts, model)| {
-                let mut values = SlotValues::zero(model.slots());
-                for part in parts {
-                    let coefficient = beta[part.parameter];
-                    if coefficient == 0.0 {
-                        continue;
-                    }
-                    match &part.basis {
-                        None => values.constant[part.slot] += coefficient,
-                        Some(basis) => {
-                            let place = match values.varying.iter().position(|(slot, _)| *slot == part.slot) {
-                                Some(place) => place,
-                                None => {
-                                    values.varying.push((part.slot, vec![0.0; model.rows()]));
-                                    values.varying.len() - 1
-                                }
-                            };
-                            let column = &mut values.varying[place].1;
-                            column
-                                .iter_mut()
-                                .zip(basis.iter())
-                                .for_each(|(sum, b)| *sum += coefficient * b);
-                        }
-                    }
-                }
-                values
-            })
-            .collect()
+        self.parameters.slot_values(&self.models, beta)
     }
 
     /// Residuals observed − model of a block, mm, a reading's coordinates together.

@@ -1,1 +1,304 @@
-//! x
+//! Readings from a model: the states of a plan, errors and effects with given values, noise, and the rounding of the sensor.
+//!
+//! `reading = round((L(state; errors, set-up, effects) + σ·ν) / r) · r`, with ν standard normal and `L` the one chain in `f64`.
+//! Values are given by the names that results use, so that what a fit prints can be simulated again.
+
+use abbe_model::component::ErrorName;
+use abbe_model::effect::Shape;
+use abbe_model::instrument::InstrumentKind;
+use abbe_model::sensitivity::TestModel;
+use abbe_model::session::readings::Readings;
+use abbe_model::session::{Prior, Session, Test, motion};
+use rand_distr::{Distribution, StandardNormal};
+use rand_pcg::Pcg64;
+
+use crate::drivers::Origin;
+use crate::error::IdentifyError;
+use crate::parameters::{Parameters, Role};
+use crate::quantity::Given;
+
+/// What to draw.
+#[derive(Clone, Debug, Default)]
+pub struct Simulation {
+    /// Values of errors, set-up quantities and coefficients of declared effects; everything else is zero.
+    pub given: Vec<Given>,
+    /// Standard deviation of a reading, mm; `None` takes the session's, or none where it states none.
+    pub noise_mm: Option<f64>,
+    /// Whether set-up quantities that are not given are drawn from their priors.
+    pub draw_setups: bool,
+    /// Seed of noise and set-ups.
+    pub seed: u64,
+}
+
+/// What was drawn.
+#[derive(Clone, Debug)]
+pub struct Simulated {
+    /// The readings of each test, in the order of the session.
+    pub readings: Vec<Readings>,
+    /// Every value that is not zero: name, value, unit.
+    pub truth: Vec<(String, f64, String)>,
+    /// Standard deviation of the noise, mm.
+    pub noise_mm: f64,
+    /// What a user should know.
+    pub warnings: Vec<String>,
+}
+
+/// Stream of the generator from which set-ups are drawn; test `k` has stream `k + 1`.
+const SETUP_STREAM: u128 = 0;
+
+/// Draws the readings of every test of a session.
+///
+/// # Errors
+/// If the plan cannot be carried out, a name or a unit does not fit the session, or the model yields a number that is not finite.
+pub fn simulate(session: &Session, simulation: &Simulation) -> Result<Simulated, IdentifyError> {
+    if session.instrument == InstrumentKind::Socket {
+        return Err(IdentifyError::Request(
+            "a socket session has no readings to draw: its poses are its data".into(),
+        ));
+    }
+    let planned = motion::planned_session(session)?;
+    let mut given = Vec::with_capacity(simulation.given.len());
+    let mut open = opened(session, planned);
+    for value in &simulation.given {
+        let id = own_name(&open, &value.id)?;
+        if given.iter().any(|(known, _): &(String, &Given)| *known == id) {
+            return Err(IdentifyError::Request(format!("`{}` is given twice", value.id)));
+        }
+        if let Some(name) = ErrorName::parse(&id)
+            && !open.unknowns.contains(&name)
+        {
+            open.unknowns.push(name);
+        }
+        given.push((id, value));
+    }
+
+    let tests: Vec<&Test> = open.tests.iter().collect();
+    let models: Vec<TestModel<'_>> = tests
+        .iter()
+        .filter_map(|test| {
+            let states = test.readings.as_ref()?;
+            Some(TestModel::new(&open.machine, test.station.clone(), states))
+        })
+        .collect();
+    let mut parameters = Parameters::declared(&open, &tests, &models)?;
+    let origin = Origin::of(&open);
+    for effect in &session.effects {
+        parameters.add_effect(&open, &tests, &models, &origin, effect)?;
+    }
+
+    let mut beta = vec![0.0; parameters.list.len()];
+    if simulation.draw_setups {
+        let stated: Vec<&Test> = session.tests.iter().collect();
+        let stated = Parameters::declared(session, &stated, &models)?;
+        let mut random = Pcg64::new(u128::from(simulation.seed), SETUP_STREAM);
+        for parameter in &stated.list {
+            let (Role::Setup, Prior::Gaussian(u)) = (parameter.role, parameter.prior) else {
+                continue;
+            };
+            let normal: f64 = StandardNormal.sample(&mut random);
+            if let Some(place) = parameters.list.iter().position(|other| other.id == parameter.id) {
+                beta[place] = u * normal;
+            }
+        }
+    }
+    place(&parameters, &given, &mut beta)?;
+
+    let warnings = warnings(&parameters, &beta);
+    let noise_mm = simulation.noise_mm.or(session.noise_mm).unwrap_or(0.0);
+    let values = parameters.slot_values(&models, &beta);
+    let mut readings = Vec::with_capacity(tests.len());
+    for (index, (model, values)) in models.iter().zip(&values).enumerate() {
+        let mut observed = model.readings_mm(values);
+        if let Some(bad) = observed.iter().position(|value| !value.is_finite()) {
+            return Err(IdentifyError::NotFinite {
+                test: tests[index].name.clone(),
+                row: bad / model.coordinates() + 1,
+                value: observed[bad],
+            });
+        }
+        let mut random = Pcg64::new(u128::from(simulation.seed), index as u128 + 1);
+        for value in &mut observed {
+            let normal: f64 = StandardNormal.sample(&mut random);
+            *value += noise_mm * normal;
+            if let Some(step) = session.resolution_mm {
+                *value = rounded(*value, step);
+            }
+        }
+        let states = tests[index].readings.clone().unwrap_or_default();
+        readings.push(Readings { observed, ..states });
+    }
+    let truth = parameters
+        .list
+        .iter()
+        .zip(&beta)
+        .filter(|(_, value)| **value != 0.0)
+        .map(|(parameter, value)| {
+            let unit = &parameter.unit;
+            (parameter.id.clone(), value * unit.per_inside, unit.name.clone())
+        })
+        .collect();
+    Ok(Simulated {
+        readings,
+        truth,
+        noise_mm,
+        warnings,
+    })
+}
+
+/// To the nearest multiple of a step, such that a step of 1e-4 mm leaves four decimals: dividing by the whole reciprocal keeps them short.
+fn rounded(value: f64, step: f64) -> f64 {
+    let per_unit = 1.0 / step;
+    let whole = per_unit.round();
+    if (per_unit - whole).abs() < 1e-9 * whole {
+        (value * whole).round() / whole
+    } else {
+        (value / step).round() * step
+    }
+}
+
+/// The session with its planned states as readings and every set-up quantity free, so that each has a name and a slot.
+fn opened(session: &Session, planned: Vec<Readings>) -> Session {
+    let mut open = session.clone();
+    for (test, states) in open.tests.iter_mut().zip(planned) {
+        test.readings = Some(states);
+        for prior in &mut test.priors {
+            if *prior == Prior::Known {
+                *prior = Prior::Free;
+            }
+        }
+    }
+    open
+}
+
+/// The name as results have it: errors of axes by ISO 230-1, whatever name they were given by.
+fn own_name(session: &Session, id: &str) -> Result<String, IdentifyError> {
+    let Some(mut name) = ErrorName::parse(id) else {
+        return Ok(id.to_string());
+    };
+    let machine = &session.machine;
+    let lower = name.axis.to_lowercase();
+    let axis = machine.axis_index(&name.axis).or_else(|| {
+        machine
+            .axes
+            .iter()
+            .position(|axis| axis.name.to_lowercase() == lower)
+    });
+    let Some(axis) = axis else {
+        let axes: Vec<&str> = machine.axes.iter().map(|axis| axis.name.as_str()).collect();
+        return Err(IdentifyError::Request(format!(
+            "`{id}`: the machine \"{}\" has no axis `{}`; its axes are {}",
+            machine.name,
+            name.axis,
+            axes.join(", ")
+        )));
+    };
+    name.axis.clone_from(&machine.axes[axis].name);
+    Ok(name.to_string())
+}
+
+/// Puts the given values among the unknowns. Amplitude and phase of a harmonic become cosine and sine,
+/// `A·cos(nq + φ) = A cos φ · cos nq − A sin φ · sin nq`.
+fn place(parameters: &Parameters, given: &[(String, &Given)], beta: &mut [f64]) -> Result<(), IdentifyError> {
+    let find = |id: &str| parameters.list.iter().position(|parameter| parameter.id == id);
+    let mut taken = vec![false; given.len()];
+    for effect in &parameters.effects {
+        if !matches!(effect.shape, Shape::Harmonic { .. } | Shape::Periodic { .. }) {
+            continue;
+        }
+        let id = effect.id();
+        let part = |name: &str| {
+            given
+                .iter()
+                .position(|(known, _)| *known == format!("{id}.{name}"))
+        };
+        let (amplitude, phase) = (part("amplitude"), part("phase"));
+        let Some(amplitude) = amplitude else {
+            if phase.is_some() {
+                return Err(IdentifyError::Request(format!(
+                    "`{id}.phase` is given without `{id}.amplitude`"
+                )));
+            }
+            continue;
+        };
+        if part("cos").is_some() || part("sin").is_some() {
+            return Err(IdentifyError::Request(format!(
+                "`{id}` is given by amplitude and by cosine or sine; give one or the other"
+            )));
+        }
+        let Some(cosine) = find(&format!("{id}.cos")) else {
+            continue;
+        };
+        taken[amplitude] = true;
+        let size = given[amplitude].1.inside(&parameters.list[cosine].unit)?;
+        let angle = match phase {
+            Some(phase) => {
+                taken[phase] = true;
+                given[phase].1.in_unit("rad")?
+            }
+            None => 0.0,
+        };
+        beta[cosine] = size * angle.cos();
+        beta[cosine + 1] = -size * angle.sin();
+    }
+    for ((id, value), taken) in given.iter().zip(taken) {
+        if taken {
+            continue;
+        }
+        let Some(index) = find(id) else {
+            return Err(unknown(parameters, &value.id));
+        };
+        beta[index] = value.inside(&parameters.list[index].unit)?;
+    }
+    Ok(())
+}
+
+/// That the session has no such quantity, with what it has.
+fn unknown(parameters: &Parameters, id: &str) -> IdentifyError {
+    let of = |coefficients: bool| {
+        let chosen = parameters.list.iter().filter(|parameter| match parameter.role {
+            Role::Coefficient { .. } => coefficients,
+            Role::Setup => !coefficients,
+            Role::Error => false,
+        });
+        chosen.map(|parameter| parameter.id.as_str()).collect::<Vec<_>>()
+    };
+    let known = if id.contains('~') {
+        match of(true) {
+            none if none.is_empty() => "it declares no [[effect]]".to_string(),
+            names => format!("coefficients of its effects are {}", names.join(", ")),
+        }
+    } else {
+        format!(
+            "errors are named as in EY0A; set-up quantities are {}",
+            of(false).join(", ")
+        )
+    };
+    IdentifyError::Request(format!("the session has no `{id}`; {known}"))
+}
+
+/// Values that move no reading, and declared effects that were given none.
+fn warnings(parameters: &Parameters, beta: &[f64]) -> Vec<String> {
+    let mut warnings = Vec::new();
+    for (index, (parameter, value)) in parameters.list.iter().zip(beta).enumerate() {
+        let moves = parameters
+            .parts
+            .iter()
+            .flatten()
+            .any(|part| part.parameter == index);
+        if *value != 0.0 && !moves {
+            warnings.push(format!("`{}` moves no reading of these tests", parameter.id));
+        }
+    }
+    for (number, effect) in parameters.effects.iter().enumerate() {
+        let own = parameters.list.iter().zip(beta).filter(
+            |(parameter, _)| matches!(parameter.role, Role::Coefficient { effect, .. } if effect == number),
+        );
+        if own.into_iter().all(|(_, value)| *value == 0.0) {
+            warnings.push(format!(
+                "the declared effect `{}` was given no value: it is zero in these readings",
+                effect.id()
+            ));
+        }
+    }
+    warnings
+}

@@ -60,6 +60,7 @@ impl<const N: usize> Sub for Gradient<N> {
     }
 }
 
+#[allow(clippy::suspicious_arithmetic_impl)] // the rule of derivatives
 impl<const N: usize> Mul for Gradient<N> {
     type Output = Self;
     #[inline(always)]
@@ -72,6 +73,7 @@ impl<const N: usize> Mul for Gradient<N> {
     }
 }
 
+#[allow(clippy::suspicious_arithmetic_impl)] // the rule of derivatives
 impl<const N: usize> Div for Gradient<N> {
     type Output = Self;
     #[inline(always)]

@@ -2,8 +2,11 @@
 
 mod failure;
 mod fit;
+mod folder;
+mod new;
 mod output;
 mod plan;
+mod simulate;
 mod table;
 mod trace;
 
@@ -23,17 +26,25 @@ struct Arguments {
 }
 
 const EXAMPLES: &str = "Examples:
-  abbe trace sessions/hermle-c600u/measured.toml
+  abbe trace sessions/hermle-c600u/measured/session.toml
   abbe fit sessions/ur10/session.toml --data ../data --json fit.json";
 
 #[derive(Subcommand)]
 enum Command {
     /// Identify errors from readings, with uncertainties.
-    #[command(after_help = "Example:\n  abbe fit sessions/hermle-c600u/measured.toml --json fit.json")]
+    #[command(
+        after_help = "Example:\n  abbe fit sessions/hermle-c600u/measured/session.toml --json fit.json"
+    )]
     Fit(fit::FitArguments),
     /// What can these tests see, before anybody measures?
     #[command(after_help = plan::EXAMPLES)]
     Plan(plan::PlanArguments),
+    /// Start from a ready session.
+    #[command(after_help = new::HELP)]
+    New(new::NewArguments),
+    /// Draw readings from a plan with given errors.
+    #[command(after_help = simulate::HELP)]
+    Simulate(Box<simulate::SimulateArguments>),
     /// Close the loop: trace what the fit leaves over to the effect that the model lacks.
     #[command(
         after_help = "Example:\n  abbe trace sessions/hermle-c600u/measured/session.toml --json trace.json --write next.toml"
@@ -71,6 +82,8 @@ pub fn run() -> ExitCode {
     let outcome = match arguments.command {
         Command::Fit(arguments) => fit::run(&arguments),
         Command::Plan(arguments) => plan::run(&arguments),
+        Command::New(arguments) => new::run(&arguments),
+        Command::Simulate(arguments) => simulate::run(&arguments),
         Command::Trace(arguments) => trace::run(&arguments),
     };
     match outcome {

@@ -225,6 +225,11 @@ impl Sampling {
         sampling
     }
 
+    /// Whether rows are independent poses: no axis is swept.
+    fn is_poses(&self) -> bool {
+        self.step.iter().all(|step| *step == 0.0)
+    }
+
     fn span(&self, axis: usize) -> f64 {
         self.high[axis] - self.low[axis]
     }
@@ -316,6 +321,8 @@ fn drivers(
         DriverChoice::Own => own_of_kind(None),
         DriverChoice::OwnRotary => own_of_kind(Some(AxisKind::Rotary)),
         DriverChoice::OwnLinear => own_of_kind(Some(AxisKind::Linear)),
+        // Among independent poses every axis moves at once and any pair could be blamed; what a body gives there, the moment tells.
+        DriverChoice::Other if sampling.is_poses() => Vec::new(),
         DriverChoice::Other => (0..machine.axes.len())
             .filter(|axis| sampling.moves[*axis] && Some(*axis) != own)
             .map(|axis| Driver::Axis(machine.axes[axis].name.clone()))
@@ -356,7 +363,7 @@ fn shapes(
     };
     let rotary = axis.is_some_and(|axis| problem.session.machine.axes[axis].kind == AxisKind::Rotary);
     let span = axis.map_or(1.0, |axis| sampling.span(axis));
-    let poses = sampling.step.iter().all(|step| *step == 0.0);
+    let poses = sampling.is_poses();
     let step = axis.map_or(0.0, |axis| sampling.step[axis]);
     match family.shape.as_str() {
         "constant" => vec![all(Shape::Constant, 0.0)],

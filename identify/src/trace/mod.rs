@@ -176,7 +176,7 @@ pub fn trace<'a>(
     let looked_for = search.candidates.len();
     let scale_um = problem.noise.sigma_mm * 1e3;
     let rms_um = |sum: f64| (sum / columns.rows().max(1) as f64).sqrt() * scale_um;
-    let mut last_p_value = search_on(&mut search, poses, &rms_um, progress);
+    let mut last_p_value = search_on(&mut search, &rms_um, progress);
     progress(Progress::Judging);
     let mut judged = judge(&problem, &before_fit, &search, options, structure_before.as_ref())?;
     let unexplained = judged
@@ -187,7 +187,7 @@ pub fn trace<'a>(
         // Nothing simpler is left: free curves.
         search.last_resort = true;
         let taken = search.taken.len();
-        last_p_value = search_on(&mut search, poses, &rms_um, progress);
+        last_p_value = search_on(&mut search, &rms_um, progress);
         if search.taken.len() != taken {
             judged = judge(&problem, &before_fit, &search, options, structure_before.as_ref())?;
         }
@@ -226,7 +226,6 @@ pub fn trace<'a>(
 /// Rounds until nothing earns its place any more, or the user has seen enough; the p-value of the best that was not taken.
 fn search_on(
     search: &mut Search<'_>,
-    poses: bool,
     rms_um: &dyn Fn(f64) -> f64,
     progress: &(dyn Fn(Progress) -> bool + Sync),
 ) -> f64 {
@@ -234,9 +233,7 @@ fn search_on(
         match search.round(sharpen::sharpen) {
             Round::Done { p_value } => return p_value,
             Round::Added { candidate } => {
-                if !poses {
-                    search.exchange();
-                }
+                search.exchange();
                 let held_out = search.held_out.last().copied().unwrap_or(0.0);
                 let id = search.candidates[candidate].effect.id();
                 if !progress(Progress::Taken(search.taken.len(), id, rms_um(held_out))) {

@@ -204,12 +204,11 @@ impl<'s> Search<'s> {
     }
 
     /// The simplest of the candidates that the readings cannot tell from the best one.
-    fn named_first(&self, model: &Trained<'_>, best: usize) -> usize {
+    fn named_first(&self, model: &Trained<'_>, best: usize, taken: &[usize]) -> usize {
         let variance = self.variance(model);
         let of_best = model.gain(best);
         let evidence = |gain: &Gain| -ln_chi_square_tail(gain.gain / variance, gain.freedom);
         let least = evidence(&of_best) - super::alias::INDISTINGUISHABLE;
-        let taken: Vec<usize> = self.taken.iter().map(|t| t.candidate).collect();
         let mut first = best;
         let mut first_gain = of_best.clone();
         for (candidate, gain) in model.gains().iter().enumerate() {
@@ -245,7 +244,7 @@ impl<'s> Search<'s> {
                 })
                 .collect();
             let null = model.null_best(&costs, self.null_variance());
-            (self.named_first(&model, best), score, null)
+            (self.named_first(&model, best, &taken), score, null)
         };
         let above = null.iter().filter(|best| **best >= score).count();
         let p_value = (above + 1) as f64 / (null.len() + 1) as f64;
@@ -274,12 +273,7 @@ impl<'s> Search<'s> {
             .collect();
         let mut wanted: BTreeSet<usize> = picks.iter().flatten().copied().collect();
         wanted.insert(candidate);
-        let fresh: Vec<usize> = wanted
-            .into_iter()
-            .filter(|c| !self.materialised.iter().any(|(present, _)| present == c))
-            .collect();
-        let places = self.moments.materialise(self.columns, &self.layouts, &fresh);
-        self.materialised.extend(fresh.into_iter().zip(places));
+        self.materialise(&wanted.into_iter().collect::<Vec<_>>());
         for (fold, pick) in picks.into_iter().enumerate() {
             self.of_fold[fold].extend(pick);
         }
@@ -323,55 +317,80 @@ impl<'s> Search<'s> {
         }
     }
 
-    /// Exchanges an effect for a candidate that explains clearly better what it stands for. Returns whether anything changed.
-    pub fn exchange(&mut self) -> bool {
-        let mut changed = false;
-        for k in 0..self.taken.len() {
-            let (better, current) = {
-                let model = self.model_without(Some(k));
-                let others: Vec<usize> = self
-                    .taken
-                    .iter()
-                    .enumerate()
-                    .filter(|(j, _)| *j != k)
-                    .map(|(_, t)| t.candidate)
-                    .collect();
-                let present = self.taken[k].candidate;
-                let score = self.score(present, &model.gain(present), self.variance(&model));
-                match self.best_of(&model, &others) {
-                    Some((best, most))
-                        if best != present && most > score + super::alias::INDISTINGUISHABLE =>
-                    {
-                        (Some(self.named_first(&model, best)), present)
-                    }
-                    _ => (None, present),
-                }
-            };
-            let Some(better) = better else { continue };
-            if better == current || self.taken.iter().any(|t| t.candidate == better) {
-                continue;
+    /// Exchanges effects for candidates that explain clearly better what they stand for, in the search on all readings and in that of each fold.
+    pub fn exchange(&mut self) {
+        let mut of_all: Vec<usize> = self.taken.iter().map(|taken| taken.candidate).collect();
+        self.exchange_in(&mut of_all, &self.all_folds());
+        for (k, candidate) in of_all.into_iter().enumerate() {
+            if self.taken[k].candidate != candidate {
+                let places = self.places(candidate);
+                self.taken[k] = Taken {
+                    candidate,
+                    places,
+                    p_value: self.taken[k].p_value,
+                };
             }
-            if !self.materialised.iter().any(|(present, _)| *present == better) {
-                let places = self.moments.materialise(self.columns, &self.layouts, &[better]);
-                self.materialised.extend([better].into_iter().zip(places));
-            }
-            self.taken[k] = Taken {
-                candidate: better,
-                places: self.places(better),
-                p_value: self.taken[k].p_value,
-            };
-            changed = true;
         }
-        changed
+        for fold in self.all_folds() {
+            let mut chosen = std::mem::take(&mut self.of_fold[fold]);
+            self.exchange_in(&mut chosen, &self.others(fold));
+            self.of_fold[fold] = chosen;
+        }
+        let held_out = self.held_out_now();
+        if let Some(last) = self.held_out.last_mut() {
+            *last = held_out;
+        }
+    }
+
+    /// One sweep of exchanges over what a search on some of the folds has chosen. A change has to be worth more than what cannot be told apart, so
+    /// that the sweeps end.
+    fn exchange_in(&mut self, chosen: &mut [usize], folds: &[usize]) {
+        for k in 0..chosen.len() {
+            let others: Vec<usize> = chosen
+                .iter()
+                .enumerate()
+                .filter(|(j, _)| *j != k)
+                .map(|(_, candidate)| *candidate)
+                .collect();
+            let better = {
+                let base = self.base_with(&others);
+                let model = Trained::new(&self.moments, &self.prior, base, folds.to_vec());
+                let score = self.score(chosen[k], &model.gain(chosen[k]), self.variance(&model));
+                self.best_of(&model, &others)
+                    .filter(|(best, most)| {
+                        *best != chosen[k] && *most > score + super::alias::INDISTINGUISHABLE
+                    })
+                    .map(|(best, _)| self.named_first(&model, best, &others))
+            };
+            let Some(better) = better.filter(|better| *better != chosen[k]) else {
+                continue;
+            };
+            self.materialise(&[better]);
+            chosen[k] = better;
+        }
+    }
+
+    /// Puts the columns of candidates into the base, where they are not there yet.
+    fn materialise(&mut self, candidates: &[usize]) {
+        let fresh: Vec<usize> = candidates
+            .iter()
+            .copied()
+            .filter(|c| !self.materialised.iter().any(|(present, _)| present == c))
+            .collect();
+        let places = self.moments.materialise(self.columns, &self.layouts, &fresh);
+        self.materialised.extend(fresh.into_iter().zip(places));
+    }
+
+    fn others(&self, fold: usize) -> Vec<usize> {
+        self.all_folds()
+            .into_iter()
+            .filter(|other| *other != fold)
+            .collect()
     }
 
     /// The model that a fold's own search has built, trained on the other folds.
     pub fn model_of_fold(&self, fold: usize) -> Trained<'_> {
-        let others: Vec<usize> = self
-            .all_folds()
-            .into_iter()
-            .filter(|other| *other != fold)
-            .collect();
+        let others = self.others(fold);
         Trained::new(
             &self.moments,
             &self.prior,

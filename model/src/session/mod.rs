@@ -10,6 +10,7 @@ mod plan;
 mod reach;
 pub mod read;
 pub mod readings;
+pub mod rewrite;
 mod spelling;
 mod table;
 pub mod write;

@@ -24,11 +24,11 @@ pub fn readings(
     instrument: InstrumentKind,
     readings: &Readings,
 ) -> Result<(), ModelError> {
-    whole_file(path, &csv(machine, instrument, readings))
+    whole_file(path, &readings_text(machine, instrument, readings))
 }
 
 /// The text of [`readings`].
-fn csv(machine: &Machine, instrument: InstrumentKind, readings: &Readings) -> String {
+pub fn readings_text(machine: &Machine, instrument: InstrumentKind, readings: &Readings) -> String {
     let mut header = Vec::new();
     if !readings.time_s.is_empty() {
         header.push("time_s".to_string());

@@ -159,6 +159,22 @@ pub fn session(path: &Path, options: &ReadOptions) -> Result<Session, ModelError
     })
 }
 
+/// The machine file that a session names, or `None` where it holds the machine itself.
+///
+/// # Errors
+/// If the session file cannot be read.
+pub fn machine_file(session: &Path) -> Result<Option<PathBuf>, ModelError> {
+    let source = Source::read(session, "the session file")?;
+    let mut root = source.parse()?;
+    let Some(value) = root.take("machine") else {
+        return Ok(None);
+    };
+    match value.table("[machine]".into())?.take("file") {
+        Some(file) => Ok(Some(session.parent().unwrap_or(Path::new("")).join(file.text()?))),
+        None => Ok(None),
+    }
+}
+
 /// The machine: a file beside the session, or the tables themselves.
 fn session_machine(path: &Path, root: &mut Table<'_>) -> Result<Machine, ModelError> {
     let value = root.need(

@@ -1,0 +1,180 @@
+//! Values as people give them on a command line or in a file of errors: `EY0A=35.3um`, `"bar[A100]" = "-0.4 um"`.
+
+use crate::error::IdentifyError;
+use crate::unit::{ARCSEC, Unit};
+
+/// A value for one unknown, with its unit.
+///
+/// ```
+/// use abbe_identify::quantity::Given;
+///
+/// let given = Given::parse("EB0A = -1.3arcsec")?;
+/// assert_eq!((given.id.as_str(), given.value, given.unit.as_str()), ("EB0A", -1.3, "arcsec"));
+/// # Ok::<(), abbe_identify::IdentifyError>(())
+/// ```
+#[derive(Clone, Debug, PartialEq)]
+pub struct Given {
+    /// The unknown as it stands in results, or by its literature name: `EY0A`, `e_y0a`, `bar[A100]`, `EZC~C:h2.amplitude`.
+    pub id: String,
+    /// The number, in `unit`.
+    pub value: f64,
+    /// `um`, `arcsec`, `deg`, …
+    pub unit: String,
+}
+
+/// Units of one quantity, with how many of the first make one of each.
+const LENGTHS: [(&str, f64); 5] = [("um", 1.0), ("µm", 1.0), ("μm", 1.0), ("nm", 1e-3), ("mm", 1e3)];
+const ANGLES: [(&str, f64); 6] = [
+    ("arcsec", 1.0),
+    ("arcmin", 60.0),
+    ("deg", 3600.0),
+    ("urad", ARCSEC * 1e-6),
+    ("mrad", ARCSEC * 1e-3),
+    ("rad", ARCSEC),
+];
+const TIMES: [(&str, f64); 3] = [("ms", 1.0), ("us", 1e-3), ("s", 1e3)];
+const RATIOS: [(&str, f64); 4] = [("um/m", 1.0), ("ppm", 1.0), ("percent", 1e4), ("%", 1e4)];
+
+impl Given {
+    /// Reads `ID=VALUEUNIT`, spaces allowed.
+    ///
+    /// # Errors
+    /// If there is no `=`, no finite number or no unit.
+    pub fn parse(text: &str) -> Result<Given, IdentifyError> {
+        let Some((id, quantity)) = text.rsplit_once('=') else {
+            return Err(IdentifyError::Request(format!(
+                "`{text}` gives no value; write name, number and unit as in `EY0A=35.3um`"
+            )));
+        };
+        Given::of(id.trim(), quantity)
+    }
+
+    /// From a name and a number with its unit, `35.3 um`.
+    ///
+    /// # Errors
+    /// If the text does not start with a finite number, or has no unit.
+    pub fn of(id: &str, quantity: &str) -> Result<Given, IdentifyError> {
+        let quantity = quantity.trim();
+        // The longest start that is a number: `1e3um` is a thousand, and the `e` of no unit is taken for an exponent.
+        let number = (1..=quantity.len())
+            .rev()
+            .filter(|end| quantity.is_char_boundary(*end))
+            .find_map(|end| {
+                let value: f64 = quantity[..end].trim_end().parse().ok()?;
+                Some((value, quantity[end..].trim()))
+            });
+        match number {
+            Some((value, unit)) if value.is_finite() && (!unit.is_empty() || value == 0.0) => Ok(Given {
+                id: id.to_string(),
+                value,
+                unit: unit.to_string(),
+            }),
+            Some((value, "")) if value.is_finite() => Err(IdentifyError::Request(format!(
+                "`{id}={quantity}` has no unit; write it behind the number, as in `{id}={quantity}um` or `{id}={quantity}arcsec`"
+            ))),
+            _ => Err(IdentifyError::Request(format!(
+                "`{id}={quantity}`: \"{quantity}\" is no number with a unit; write it as in `EY0A=35.3um`"
+            ))),
+        }
+    }
+
+    /// The value in the unit inside, for an unknown that is reported in `unit`.
+    ///
+    /// # Errors
+    /// If the two units measure different things.
+    pub fn inside(&self, unit: &Unit) -> Result<f64, IdentifyError> {
+        self.in_unit(&unit.name).map(|value| value / unit.per_inside)
+    }
+
+    /// The value in another unit.
+    ///
+    /// # Errors
+    /// If the two units measure different things.
+    pub fn in_unit(&self, wanted: &str) -> Result<f64, IdentifyError> {
+        if self.value == 0.0 || self.unit == wanted {
+            return Ok(self.value);
+        }
+        let factor = factor(&self.unit, wanted).or_else(|| {
+            // `mm/h` where `um/h` is wanted.
+            let (above, below) = self.unit.split_once('/')?;
+            let (wanted_above, wanted_below) = wanted.split_once('/')?;
+            (below == wanted_below).then(|| factor(above, wanted_above))?
+        });
+        match factor {
+            Some(factor) => Ok(self.value * factor),
+            None => Err(IdentifyError::Request(format!(
+                "`{}` is given in `{}`; it is measured in `{wanted}`",
+                self.id, self.unit
+            ))),
+        }
+    }
+}
+
+/// How many of the second unit make one of the first.
+fn factor(from: &str, to: &str) -> Option<f64> {
+    [&LENGTHS[..], &ANGLES[..], &TIMES[..], &RATIOS[..]]
+        .into_iter()
+        .find_map(|units| {
+            let of = |name: &str| {
+                units
+                    .iter()
+                    .find(|(unit, _)| *unit == name)
+                    .map(|(_, size)| *size)
+            };
+            Some(of(from)? / of(to)?)
+        })
+}
+
+/// The pairs of a file of values, `EY0A = "35.3 um"`, in its order.
+///
+/// # Errors
+/// If the text is not TOML or a value is not text.
+pub fn pairs(text: &str) -> Result<Vec<(String, String)>, String> {
+    let table = toml::de::DeTable::parse(text).map_err(|fault| fault.to_string())?;
+    let mut entries: Vec<_> = table.into_inner().into_iter().collect();
+    entries.sort_by_key(|(key, _)| key.span().start);
+    entries
+        .into_iter()
+        .map(|(key, value)| match value.get_ref().as_str() {
+            Some(quantity) => Ok((key.get_ref().to_string(), quantity.to_string())),
+            None => Err(format!(
+                "`{key}` is no text; write number and unit in quotes, as in `{key} = \"35.3 um\"`",
+                key = key.get_ref()
+            )),
+        })
+        .collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn numbers_units_and_exponents() {
+        let cases = [
+            ("EY0A=35.3um", 35.3, "um"),
+            ("EY0A=-2e-3 mm", -2e-3, "mm"),
+            ("EXC~time:drift=1um/h", 1.0, "um/h"),
+            ("gain=0", 0.0, ""),
+        ];
+        for (text, value, unit) in cases {
+            let given = Given::parse(text).unwrap();
+            assert_eq!((given.value, given.unit.as_str()), (value, unit), "{text}");
+        }
+        for bad in ["EY0A", "EY0A=um", "EY0A=1", "EY0A=", "EY0A=NaNum", "EY0A=infum"] {
+            assert!(Given::parse(bad).is_err(), "{bad}");
+        }
+    }
+
+    #[test]
+    fn units_of_one_quantity_convert() {
+        let value = |text: &str, unit: &str| Given::parse(text).unwrap().in_unit(unit);
+        assert_eq!(value("x=1mm", "um").unwrap(), 1000.0);
+        assert_eq!(value("x=1deg", "arcsec").unwrap(), 3600.0);
+        assert_eq!(value("x=2mm/h", "um/h").unwrap(), 2000.0);
+        assert_eq!(value("x=1%", "um/m").unwrap(), 10_000.0);
+        assert_eq!(value("x=3s", "ms").unwrap(), 3000.0);
+        assert!(value("x=1um", "arcsec").is_err());
+        assert!(value("x=1um/h", "um/K").is_err());
+    }
+}

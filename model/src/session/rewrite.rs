@@ -1,0 +1,119 @@
+//! A session's text with a few things changed and the rest, comments and all, as it was: what a simulation leaves behind.
+
+use std::ops::Range;
+use std::path::Path;
+
+use super::document::{Source, Value};
+use crate::error::ModelError;
+
+/// The text with its machine read from another file; a text that holds the machine itself stays as it is.
+///
+/// # Errors
+/// If the text is no session.
+pub fn with_machine_file(original: &str, file: &Path, machine: &str) -> Result<String, ModelError> {
+    let source = Source::new(file, original);
+    let span = match source.parse()?.take("machine") {
+        Some(value) => value
+            .table("[machine]".into())?
+            .take("file")
+            .map(|value| value.span),
+        None => None,
+    };
+    Ok(match span {
+        Some(span) => replaced(&source.text, span, &format!("\"{machine}\"")),
+        None => source.text,
+    })
+}
+
+/// The text with `noise_um` of its instrument set.
+///
+/// # Errors
+/// If the text is no session.
+pub fn with_noise(original: &str, file: &Path, noise_um: f64) -> Result<String, ModelError> {
+    let source = Source::new(file, original);
+    let Some(instrument) = source.parse()?.take("instrument") else {
+        return Ok(source.text);
+    };
+    let mut table = instrument.table("[instrument]".into())?;
+    let (noise, kind) = (table.take("noise_um"), table.take("kind"));
+    let text = match (noise, kind) {
+        (Some(noise), _) => replaced(&source.text, noise.span, &noise_um.to_string()),
+        (None, Some(kind)) => behind(&source.text, &kind, &format!("noise_um = {noise_um}")),
+        (None, None) => source.text.clone(),
+    };
+    Ok(text)
+}
+
+/// The text without the tables of these names: `[name]`, `[[name]]` and what lies in them.
+///
+/// ```
+/// use abbe_model::session::rewrite::without_tables;
+///
+/// let text = "[columns]\nJ1_rad = \"j1\"\n\n[[test]]\nname = \"A\"\n\n[[effect]]\nshape = \"lag\"\n";
+/// assert_eq!(without_tables(text, &["columns", "effect"]), "[[test]]\nname = \"A\"\n\n");
+/// ```
+pub fn without_tables(original: &str, names: &[&str]) -> String {
+    let mut kept = String::with_capacity(original.len());
+    let mut dropping = false;
+    for line in original.split_inclusive('\n') {
+        if let Some(header) = line.trim_start().strip_prefix('[') {
+            let header = header.trim_start_matches('[').trim_start();
+            let name: String = header
+                .chars()
+                .take_while(|c| c.is_alphanumeric() || matches!(c, '_' | '-' | '.'))
+                .collect();
+            let closes = header[name.len()..].trim_start().starts_with(']');
+            if closes {
+                dropping = names
+                    .iter()
+                    .any(|dropped| name == *dropped || name.starts_with(&format!("{dropped}.")));
+            }
+        }
+        if !dropping {
+            kept.push_str(line);
+        }
+    }
+    kept
+}
+
+fn replaced(text: &str, span: Range<usize>, new: &str) -> String {
+    let mut text = text.to_string();
+    text.replace_range(span, new);
+    text
+}
+
+/// A new key behind a value: on its own line, or after a comma inside an inline table.
+fn behind(text: &str, value: &Value<'_>, new: &str) -> String {
+    let end = value.span.end;
+    let line_end = end + text[end..].find('\n').unwrap_or(text.len() - end);
+    let rest = text[end..line_end].trim_start();
+    if rest.is_empty() || rest.starts_with('#') {
+        replaced(text, line_end..line_end, &format!("\n{new}"))
+    } else {
+        replaced(text, end..end, &format!(", {new}"))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const SESSION: &str =
+        "[machine]\nfile = \"../machine.toml\" # ours\n\n[instrument]\nkind = \"ballbar\"   # Renishaw\n";
+
+    #[test]
+    fn what_is_not_meant_stays() {
+        let file = Path::new("session.toml");
+        let text = with_machine_file(SESSION, file, "machine.toml").unwrap();
+        assert_eq!(text, SESSION.replace("../machine.toml", "machine.toml"));
+        let text = with_noise(SESSION, file, 0.25).unwrap();
+        assert_eq!(
+            text,
+            SESSION.replace("# Renishaw\n", "# Renishaw\nnoise_um = 0.25\n")
+        );
+        let text = with_noise(&text, file, 0.0).unwrap();
+        assert!(text.ends_with("\nnoise_um = 0\n"), "{text}");
+        let inline = with_noise("instrument = { kind = \"ballbar\" }\n", file, 1.5).unwrap();
+        assert_eq!(inline, "instrument = { kind = \"ballbar\", noise_um = 1.5 }\n");
+    }
+}

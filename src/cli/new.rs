@@ -1,0 +1,102 @@
+//! `abbe new`: ready sessions to start from.
+
+use std::path::PathBuf;
+
+use clap::Args;
+
+use super::failure::Failure;
+use super::folder;
+
+/// Examples of `abbe new`.
+pub const HELP: &str = "Examples:
+  abbe new --list
+  abbe new mymachine --template hermle-c600u";
+
+/// `abbe new DIR --template NAME`
+#[derive(Args)]
+pub struct NewArguments {
+    /// The folder to make.
+    #[arg(required_unless_present = "list")]
+    folder: Option<PathBuf>,
+    /// Which session to start from.
+    #[arg(long, value_name = "NAME", required_unless_present = "list")]
+    template: Option<String>,
+    /// Say which there are.
+    #[arg(long)]
+    list: bool,
+    /// Replace files in a folder that is there.
+    #[arg(long)]
+    force: bool,
+}
+
+/// A session that the program carries with it.
+struct Template {
+    name: &'static str,
+    about: &'static str,
+    /// Name in the folder, contents.
+    files: &'static [(&'static str, &'static str)],
+}
+
+/// Files of a folder of `sessions/`, as they are there.
+macro_rules! files {
+    ($folder:literal: $($file:literal),+ $(,)?) => {
+        &[$(($file, include_str!(concat!("../../sessions/", $folder, "/", $file)))),+]
+    };
+}
+
+const TEMPLATES: &[Template] = &[
+    Template {
+        name: "hermle-c600u",
+        about: "five-axis machine with a tilting rotary table; three ball-bar methods as plans",
+        files: files!("hermle-c600u": "machine.toml", "chapter4.toml", "chapter5.toml", "chapter6.toml"),
+    },
+    Template {
+        name: "hermle-c600u-measured",
+        about: "the same machine measured, simulated readings with an effect to trace",
+        files: files!(
+            "hermle-c600u/measured": "machine.toml", "A100.csv", "A150.csv", "C100.csv", "C150.csv", "session.toml"
+        ),
+    },
+    Template {
+        name: "kuka-iiwa14",
+        about: "seven-axis robot whose ball sits in sockets (public data set, to be fetched)",
+        files: files!("kuka-iiwa14": "machine.toml", "session.toml"),
+    },
+    Template {
+        name: "ur10",
+        about: "six-axis robot before a laser tracker (public data set, to be fetched)",
+        files: files!("ur10": "machine.toml", "session.toml"),
+    },
+];
+
+/// Runs `abbe new`.
+pub fn run(arguments: &NewArguments) -> Result<(), Failure> {
+    let (Some(folder), Some(name), false) = (&arguments.folder, &arguments.template, arguments.list) else {
+        let width = TEMPLATES
+            .iter()
+            .map(|template| template.name.len())
+            .max()
+            .unwrap_or(0);
+        for template in TEMPLATES {
+            println!("  {:width$}  {}", template.name, template.about);
+        }
+        return Ok(());
+    };
+    let Some(template) = TEMPLATES.iter().find(|template| template.name == name) else {
+        let names: Vec<&str> = TEMPLATES.iter().map(|template| template.name).collect();
+        return Err(Failure::Other(format!(
+            "there is no template `{name}`; there are {}",
+            names.join(", ")
+        )));
+    };
+    let files: Vec<folder::NewFile> = template
+        .files
+        .iter()
+        .map(|(name, text)| (name.to_string(), text.to_string()))
+        .collect();
+    folder::write(folder, &files, arguments.force, |_| Ok(()))?;
+    for (name, _) in files {
+        println!("{}", folder.join(name).display());
+    }
+    Ok(())
+}

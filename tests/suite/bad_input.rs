@@ -1,0 +1,266 @@
+//! Input that cannot be used, at the command line: exit status 1, and a message that names the place, what was found and what to do.
+
+use std::fs;
+
+use super::{abbe, text};
+
+const MACHINE: &str = "chain = \"w C A b Y X Z t\"\n\n[axis.C]\n\n[axis.A]\n\n[axis.X]\n[axis.Y]\n[axis.Z]\n";
+
+const SESSION: &str = r#"[machine]
+file = "machine.toml"
+
+[instrument]
+kind = "ballbar"
+noise_um = 0.3
+
+[[test]]
+name = "C100"
+data = "C100.csv"
+bar_mm = 100.0
+workpiece_ball_mm = [0, 100, 0]
+spindle_ball_mm = [0, 0, 0]
+"#;
+
+const DATA: &str =
+    "time_s,run,c_deg,length_mm\n0,1,0,99.9990\n1,1,90,100.0010\n2,1,180,100.0000\n3,1,270,99.9995\n";
+
+/// What `abbe fit` says about a session of three files that it cannot use.
+#[track_caller]
+fn told(machine: &str, session: &str, data: Option<&str>) -> String {
+    let folder = tempfile::tempdir().unwrap();
+    let write = |name: &str, text: &str| fs::write(folder.path().join(name), text).unwrap();
+    write("machine.toml", machine);
+    write("session.toml", session);
+    if let Some(data) = data {
+        write("C100.csv", data);
+    }
+    let output = abbe(&["fit", text(&folder.path().join("session.toml"))]);
+    let told = String::from_utf8(output.stderr).unwrap();
+    assert_eq!(output.status.code(), Some(1), "{told}");
+    assert!(output.stdout.is_empty(), "a result beside an error");
+    told
+}
+
+#[track_caller]
+fn holds(told: &str, parts: &[&str]) {
+    for part in parts {
+        assert!(told.contains(part), "`{part}` is not in\n{told}");
+    }
+}
+
+#[track_caller]
+fn with_session(from: &str, to: &str, parts: &[&str]) {
+    assert!(SESSION.contains(from), "{from}");
+    holds(&told(MACHINE, &SESSION.replacen(from, to, 1), Some(DATA)), parts);
+}
+
+#[track_caller]
+fn with_machine(from: &str, to: &str, parts: &[&str]) {
+    assert!(MACHINE.contains(from), "{from}");
+    holds(&told(&MACHINE.replacen(from, to, 1), SESSION, Some(DATA)), parts);
+}
+
+#[track_caller]
+fn with_data(from: &str, to: &str, parts: &[&str]) {
+    assert!(DATA.contains(from), "{from}");
+    holds(&told(MACHINE, SESSION, Some(&DATA.replace(from, to))), parts);
+}
+
+#[test]
+fn the_session_itself_is_good() {
+    let folder = tempfile::tempdir().unwrap();
+    for (name, text) in [
+        ("machine.toml", MACHINE),
+        ("session.toml", SESSION),
+        ("C100.csv", DATA),
+    ] {
+        fs::write(folder.path().join(name), text).unwrap();
+    }
+    let output = abbe(&["fit", text(&folder.path().join("session.toml"))]);
+    assert!(
+        output.status.success(),
+        "{}",
+        String::from_utf8_lossy(&output.stderr)
+    );
+}
+
+#[test]
+fn an_unknown_key() {
+    with_session(
+        "noise_um",
+        "nois_um",
+        &[
+            "session.toml:6",
+            "knows no key `nois_um`",
+            "did you mean `noise_um`?",
+        ],
+    );
+}
+
+#[test]
+fn an_unknown_column() {
+    with_data(
+        "c_deg",
+        "c_degree",
+        &["C100.csv:1", "`c_degree`", "did you mean `c_deg`?"],
+    );
+}
+
+#[test]
+fn a_missing_data_file() {
+    holds(
+        &told(MACHINE, SESSION, None),
+        &["session.toml:10", "C100.csv", "--data"],
+    );
+}
+
+#[test]
+fn text_in_a_numeric_cell() {
+    with_data("100.0010", "abc", &["C100.csv:3", "abc", "length_mm"]);
+}
+
+#[test]
+fn a_decimal_comma_undeclared() {
+    let comma = "time_s;run;c_deg;length_mm\n0;1;0;99,9990\n1;1;90;100,0010\n";
+    let session = SESSION.replace(
+        "data = \"C100.csv\"",
+        "data = \"C100.csv\"\nformat = { separator = \";\" }",
+    );
+    holds(
+        &told(MACHINE, &session, Some(comma)),
+        &["C100.csv:2", "99,9990", "decimal = \",\""],
+    );
+}
+
+#[test]
+fn a_time_that_runs_backwards() {
+    with_data("2,1,180", "0.5,1,180", &["C100.csv:4", "time_s", "backwards"]);
+}
+
+#[test]
+fn not_a_number() {
+    with_data("100.0000", "NaN", &["C100.csv:4", "NaN"]);
+}
+
+#[test]
+fn an_empty_data_file() {
+    holds(&told(MACHINE, SESSION, Some("")), &["C100.csv", "empty"]);
+    let header = DATA.lines().next().unwrap();
+    holds(
+        &told(MACHINE, SESSION, Some(header)),
+        &["C100.csv", "a header without readings"],
+    );
+}
+
+#[test]
+fn one_reading() {
+    let one: Vec<&str> = DATA.lines().take(2).collect();
+    holds(
+        &told(MACHINE, SESSION, Some(&one.join("\n"))),
+        &["C100.csv", "one reading"],
+    );
+}
+
+#[test]
+fn duplicate_test_names() {
+    let test = &SESSION[SESSION.find("[[test]]").unwrap()..];
+    holds(
+        &told(MACHINE, &format!("{SESSION}\n{test}"), Some(DATA)),
+        &["session.toml:16", "C100"],
+    );
+}
+
+#[test]
+fn a_chain_without_its_bed() {
+    with_machine(
+        "w C A b Y X Z t",
+        "w C A Y X Z t",
+        &["machine.toml:1", "0 beds `b`", "w C A b Y X Z t"],
+    );
+}
+
+#[test]
+fn an_axis_without_a_table_and_a_table_without_an_axis() {
+    with_machine("[axis.A]\n", "", &["machine.toml", "[axis.A]"]);
+    with_machine("[axis.A]\n", "[axis.A]\n[axis.B]\n", &["machine.toml:6", "`B`"]);
+}
+
+#[test]
+fn an_effect_on_an_axis_that_the_machine_lacks() {
+    let effect =
+        "[[effect]]\ncomponent = \"EZB\"\ndriver = \"C\"\nshape = \"harmonic\"\norder = 2\n\n[[test]]";
+    with_session(
+        "[[test]]",
+        effect,
+        &["session.toml:9", "has no axis `B`", "its axes are C, A, Y, X, Z"],
+    );
+}
+
+#[test]
+fn a_bar_that_cannot_reach() {
+    with_session(
+        "[0, 100, 0]",
+        "[0, 100, 60]",
+        &[
+            "session.toml:8",
+            "a bar of 100.0000 mm cannot reach",
+            "116.619 mm apart",
+            "degrees taken for radians",
+        ],
+    );
+    // Degrees in a column of radians: the balls stay together at 0 only.
+    let session = SESSION.replace("spindle_ball_mm = [0, 0, 0]", "spindle_ball_mm = [0, 100, 100]");
+    let data = "a_rad,length_mm\n0,100.0\n30,100.0\n60,100.0\n";
+    holds(
+        &told(MACHINE, &session, Some(data)),
+        &["cannot reach", "degrees taken for radians"],
+    );
+}
+
+#[test]
+fn a_wrong_command_line_is_status_2() {
+    for arguments in [
+        &["fit"][..],
+        &["fit", "a.toml", "--sed", "1"],
+        &["fot", "a.toml"],
+        &["simulate", "a.toml"],
+        &["simulate", "a.toml", "--out", "b", "--seed", "one"],
+        &["new"],
+        &["new", "a"],
+        &[],
+    ] {
+        let output = abbe(arguments);
+        assert_eq!(output.status.code(), Some(2), "{arguments:?}");
+        assert!(!output.stderr.is_empty());
+    }
+}
+
+#[test]
+fn help_has_examples_and_status_0() {
+    for arguments in [
+        &["--help"][..],
+        &["fit", "--help"],
+        &["simulate", "--help"],
+        &["new", "--help"],
+    ] {
+        let output = abbe(arguments);
+        assert!(output.status.success());
+        assert!(
+            String::from_utf8(output.stdout).unwrap().contains("Example"),
+            "{arguments:?}"
+        );
+    }
+}
+
+#[test]
+fn files_that_are_none() {
+    for path in ["nowhere/session.toml", "."] {
+        let output = abbe(&["fit", path]);
+        assert_eq!(output.status.code(), Some(1));
+        assert!(
+            String::from_utf8(output.stderr)
+                .unwrap()
+                .contains("the session file")
+        );
+    }
+}

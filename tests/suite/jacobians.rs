@@ -1,0 +1,152 @@
+//! Derivatives by dual numbers against central differences, over every topology, and against the closed form of the first order.
+
+use abbe::model::axis::AxisKind;
+use abbe::model::chain::{ERRORS_PER_AXIS, Machine};
+use abbe::model::component::ErrorName;
+use abbe::model::instrument::Station;
+use abbe::model::instrument::ballbar::BallBar;
+use abbe::model::instrument::tracker::Tracker;
+use abbe::model::sensitivity::{SlotValues, TestModel};
+use abbe::model::session::readings::Readings;
+use rand::{Rng, SeedableRng};
+use rand_pcg::Pcg64;
+
+use super::topologies::{self, uniform};
+
+fn ball_bar(workpiece_ball: [f64; 3], spindle_ball: [f64; 3]) -> Station<f64> {
+    Station::BallBar(BallBar {
+        workpiece_ball,
+        spindle_ball,
+        bar: 100.0,
+    })
+}
+
+fn tracker(target: [f64; 3]) -> Station<f64> {
+    Station::Tracker(Tracker {
+        target,
+        rotation: [[0.0, 1.0, 0.0], [-1.0, 0.0, 0.0], [0.0, 0.0, 1.0]],
+        origin: [1000.0, -500.0, 300.0],
+    })
+}
+
+/// States anywhere in reach.
+fn states(machine: &Machine, rows: usize, random: &mut impl Rng) -> Readings {
+    let positions = machine.axes.iter().map(|axis| {
+        let most = match axis.kind {
+            AxisKind::Linear => 250.0,
+            AxisKind::Rotary => std::f64::consts::PI,
+        };
+        (0..rows).map(|_| uniform(random, most)).collect()
+    });
+    Readings {
+        positions: positions.collect(),
+        ..Readings::default()
+    }
+}
+
+/// A tenth of a millimetre and a tenth of a degree: large enough that second derivatives count.
+fn errors(slots: usize, machine: &Machine, random: &mut impl Rng) -> SlotValues {
+    let mut values = SlotValues::zero(slots);
+    for (slot, value) in values.constant.iter_mut().enumerate() {
+        *value = uniform(random, if is_angle(machine, slot) { 2e-3 } else { 0.1 });
+    }
+    values
+}
+
+/// Whether a slot of a machine or of its tracker is an angle; a ball bar's gain is varied as one.
+fn is_angle(machine: &Machine, slot: usize) -> bool {
+    let errors = machine.error_slots();
+    if slot < errors {
+        slot % ERRORS_PER_AXIS % 6 >= 3
+    } else {
+        (errors + 3..errors + 6).contains(&slot)
+    }
+}
+
+/// The worst relative difference between the derivatives by dual numbers and by central differences.
+fn worst(machine: &Machine, station: Station<f64>, random: &mut impl Rng) -> f64 {
+    let readings = states(machine, 6, random);
+    let model = TestModel::new(machine, station, &readings);
+    let slots: Vec<usize> = (0..model.slots()).collect();
+    let values = errors(model.slots(), machine, random);
+    let dual = model.sensitivities(&values, &slots, 0..model.rows());
+    assert_eq!(dual.readings_mm.len(), model.rows() * model.coordinates());
+    for (dual, plain) in dual.readings_mm.iter().zip(model.readings_mm(&values)) {
+        assert!((dual - plain).abs() <= 1e-12 * plain.abs(), "{dual} {plain}");
+    }
+    let mut worst = 0.0_f64;
+    for slot in slots {
+        let (step, least) = if is_angle(machine, slot) {
+            (1e-4, 1.0)
+        } else {
+            (1e-2, 1e-2)
+        };
+        let at = |value: f64| {
+            let mut moved = values.clone();
+            moved.constant[slot] += value;
+            model.readings_mm(&moved)
+        };
+        for ((above, below), derivative) in at(step).iter().zip(&at(-step)).zip(&dual.derivatives[slot]) {
+            let difference = (above - below) / (2.0 * step);
+            let relative = (derivative - difference).abs() / difference.abs().max(least);
+            worst = worst.max(relative);
+        }
+    }
+    worst
+}
+
+#[test]
+fn dual_numbers_agree_with_central_differences_on_every_topology() {
+    let mut random = Pcg64::seed_from_u64(1);
+    let mut all = 0.0_f64;
+    for _ in 0..4 {
+        for machine in topologies::all(&mut random) {
+            let mut point = || [(); 3].map(|()| uniform(&mut random, 300.0));
+            let (table, tool) = (point(), point());
+            for station in [ball_bar(table, tool), tracker(tool)] {
+                let kind = station.kind();
+                let worst = worst(&machine, station, &mut random);
+                assert!(worst < 1e-6, "{} with a {}: {worst:e}", machine.name, kind.word());
+                all = all.max(worst);
+            }
+        }
+    }
+    println!("worst relative difference {all:.1e}");
+}
+
+#[test]
+fn the_first_order_of_the_bar_is_the_closed_form() {
+    let machine = Machine::from_code("[wCAbYXZt]").unwrap();
+    let mut random = Pcg64::seed_from_u64(2);
+    let slot = |name: &str| machine.error_slot(&ErrorName::parse(name).unwrap()).unwrap();
+    let names = [
+        "e_y0a", "θ_z0a", "e_z0a", "θ_y0a", "e_x0c", "e_y0c", "θ_y0c", "θ_x0c",
+    ];
+    let slots = names.map(slot);
+    for _ in 0..50 {
+        let [r, h, d] = [(); 3].map(|()| uniform(&mut random, 150.0));
+        let mut readings = states(&machine, 20, &mut random);
+        for axis in ["X", "Y", "Z"] {
+            readings.positions[machine.axis_index(axis).unwrap()].fill(0.0);
+        }
+        let station = ball_bar([0.0, r, h], [-d, 0.0, 0.0]);
+        let model = TestModel::new(&machine, station, &readings);
+        let found = model.sensitivities(&SlotValues::zero(model.slots()), &slots, 0..model.rows());
+        for row in 0..model.rows() {
+            let (sc, cc) = readings.positions[machine.axis_index("C").unwrap()][row].sin_cos();
+            let (sa, ca) = readings.positions[machine.axis_index("A").unwrap()][row].sin_cos();
+            let length = (r * r + d * d + h * h - 2.0 * r * d * sc).sqrt();
+            assert!((found.readings_mm[row] - length).abs() < 1e-10 * length.max(1.0));
+            let (y, z) = (r * cc * ca - h * sa, r * cc * sa + h * ca);
+            let closed = [y, -d * y, z, d * z, d - r * sc, r * cc, d * h, 0.0].map(|term| term / length);
+            for ((name, closed), derivatives) in names.iter().zip(closed).zip(&found.derivatives) {
+                let difference = (derivatives[row] - closed).abs();
+                assert!(
+                    difference < 1e-10 * closed.abs().max(1.0),
+                    "{name}: {} {closed}",
+                    derivatives[row]
+                );
+            }
+        }
+    }
+}

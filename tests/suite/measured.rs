@@ -1,0 +1,84 @@
+//! The measured session that the README starts from. The plant makes it, not `abbe simulate`: what traces its effect shares no code with what made it.
+//!
+//! `ABBE_WRITE_SESSIONS=1 cargo test --profile checked measured` writes it anew.
+
+use abbe::model::session::read::{self, ReadOptions};
+
+use crate::plant::{AxisName, Component, Draw, Driver, Freedom, Injected, Kind, Recipe, Shape};
+
+const FOLDER: &str = "hermle-c600u/measured";
+
+const ABOUT: &str = "\
+# A simulated session as somebody might have measured it: the method of chapter 5 with bars of 100 and 150 mm, two runs in both
+# directions, noise of 0.3 um. The machine does something that this file does not declare; `abbe trace` says what.
+
+";
+
+/// An axial wobble of C, twice a turn: 1.5 µm · cos(2 C + 60°).
+fn wobble() -> Injected {
+    let shape = Shape::Harmonic {
+        order: 2,
+        phase_deg: 60.0,
+    };
+    Injected::new(
+        Component::Motion(Freedom::Z, AxisName::C),
+        Driver::Axis(AxisName::C),
+        shape,
+        1.5,
+    )
+}
+
+/// The session with its answer.
+fn draw() -> Draw {
+    let mut draw = Recipe::new(Kind::Rotary, 5).with(wobble()).readings(2400).draw();
+    for (name, text) in &mut draw.files {
+        if name == "session.toml" {
+            text.insert_str(0, ABOUT);
+        }
+    }
+    draw
+}
+
+#[test]
+fn the_bundled_session_is_what_the_plant_measures() {
+    let folder = super::ready(FOLDER);
+    let draw = draw();
+    if std::env::var_os("ABBE_WRITE_SESSIONS").is_some() {
+        draw.write(&folder).unwrap();
+    }
+    let mut names: Vec<String> = std::fs::read_dir(&folder)
+        .unwrap()
+        .map(|entry| entry.unwrap().file_name().into_string().unwrap())
+        .collect();
+    names.sort();
+    let mut expected: Vec<&String> = draw.files.iter().map(|(name, _)| name).collect();
+    expected.sort();
+    assert_eq!(names.iter().collect::<Vec<_>>(), expected);
+    for (name, text) in &draw.files {
+        let found = std::fs::read_to_string(folder.join(name)).unwrap();
+        // Not `assert_eq!`: nobody reads two thousand lines.
+        assert!(found == *text, "{name} is not what the plant measures");
+    }
+}
+
+#[test]
+fn it_reads_and_declares_no_effect() {
+    let session = read::session(
+        &super::ready(FOLDER).join("session.toml"),
+        &ReadOptions::default(),
+    )
+    .unwrap();
+    assert!(session.effects.is_empty() && session.warnings.is_empty());
+    let rows: usize = session
+        .tests
+        .iter()
+        .map(|test| test.readings.as_ref().unwrap().rows())
+        .sum();
+    assert!((1500..3000).contains(&rows), "{rows}");
+    assert!(
+        session
+            .tests
+            .iter()
+            .all(|test| test.readings.as_ref().unwrap().runs().len() == 4)
+    );
+}

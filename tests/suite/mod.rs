@@ -1,0 +1,39 @@
+//! What the program promises, one file a promise.
+
+mod bad_input;
+mod codes;
+mod data;
+mod jacobians;
+mod measured;
+mod new;
+mod nist;
+mod recovery;
+mod robots;
+mod simulate;
+mod topologies;
+
+use std::path::{Path, PathBuf};
+use std::process::{Command, Output};
+
+/// The workspace.
+pub fn workspace() -> PathBuf {
+    PathBuf::from(env!("CARGO_MANIFEST_DIR"))
+}
+
+/// A ready session of the workspace.
+pub fn ready(name: &str) -> PathBuf {
+    workspace().join("sessions").join(name)
+}
+
+/// Runs the command `abbe`.
+pub fn abbe(arguments: &[&str]) -> Output {
+    Command::new(env!("CARGO_BIN_EXE_abbe"))
+        .args(arguments)
+        .output()
+        .expect("the command starts")
+}
+
+/// A path as an argument.
+pub fn text(path: &Path) -> &str {
+    path.to_str().expect("a path of plain letters")
+}
