@@ -10,6 +10,7 @@ mod fit;
 mod folder;
 mod new;
 mod output;
+mod plan;
 mod simulate;
 mod table;
 mod trace;
@@ -40,6 +41,9 @@ enum Command {
         after_help = "Example:\n  abbe fit sessions/hermle-c600u/measured/session.toml --json fit.json"
     )]
     Fit(fit::FitArguments),
+    /// What can these tests see, before anybody measures?
+    #[command(after_help = plan::EXAMPLES)]
+    Plan(plan::PlanArguments),
     /// Start from a ready session.
     #[command(after_help = new::HELP)]
     New(new::NewArguments),
@@ -82,6 +86,7 @@ pub fn run() -> ExitCode {
     let arguments = Arguments::parse();
     let outcome = match arguments.command {
         Command::Fit(arguments) => fit::run(&arguments),
+        Command::Plan(arguments) => plan::run(&arguments),
         Command::New(arguments) => new::run(&arguments),
         Command::Simulate(arguments) => simulate::run(&arguments),
         Command::Trace(arguments) => trace::run(&arguments),

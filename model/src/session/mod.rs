@@ -5,6 +5,7 @@
 mod document;
 pub mod expression;
 pub mod motion;
+pub mod placing;
 mod plan;
 mod reach;
 pub mod read;
