@@ -143,11 +143,10 @@ pub fn candidates(problem: &Problem<'_>) -> Result<Vec<Candidate>, IdentifyError
         .map(|parameter| parameter.id.clone())
         .collect();
     candidates.retain(|candidate| {
-        let id = candidate.effect.id();
         let constant = candidate.effect.shape == Shape::Constant;
         let same_error = constant && declared.contains(&candidate.effect.component.to_string());
         let free = constant && is_free_setup(problem, &candidate.effect);
-        !same_error && !free && !problem.parameters.effects.iter().any(|effect| effect.id() == id)
+        !same_error && !free && !problem.parameters.effects.contains(&candidate.effect)
     });
     Ok(candidates)
 }

@@ -155,10 +155,9 @@ fn model_result(problem: &Problem<'_>, fit: &Fit, held_out_mm: f64) -> ModelResu
 
 /// The parameters of the `number`-th effect.
 fn parameters_of(problem: &Problem<'_>, fit: &Fit, number: usize) -> Vec<ParameterResult> {
-    let Some(effect) = problem.parameters.effects.get(number) else {
+    let Some(id) = problem.parameters.effect_ids.get(number) else {
         return Vec::new();
     };
-    let id = effect.id();
     let has = problem
         .parameters
         .list
@@ -169,7 +168,7 @@ fn parameters_of(problem: &Problem<'_>, fit: &Fit, number: usize) -> Vec<Paramet
     }
     fit::parameters(problem, fit)
         .into_iter()
-        .filter(|p| p.id == id || p.id.strip_prefix(&id).is_some_and(|rest| rest.starts_with('.')))
+        .filter(|p| p.id == *id || p.id.strip_prefix(id.as_str()).is_some_and(|rest| rest.starts_with('.')))
         .collect()
 }
 
