@@ -83,6 +83,9 @@ pub enum Progress {
 const MOST_ALONG_RUNS: usize = 12;
 /// Poses of a robot have many.
 const MOST_OF_POSES: usize = 200;
+/// Up to this many effects exchanges are tried after each addition, beyond it after each eighth.
+const EXCHANGED_EACH_ROUND: usize = 14;
+const EXCHANGED_EACH: usize = 8;
 /// Share of the structure's excess over noise that may remain for the found effects to count as the explanation.
 const EXPLAINED_SHARE: f64 = 0.5;
 /// Significance below which a remainder counts as structured.
@@ -234,7 +237,11 @@ fn search_on(
         match search.round(sharpen::sharpen) {
             Round::Done { p_value } => return Some(p_value),
             Round::Added { candidate } => {
-                search.exchange();
+                // Every exchange costs a model an effect; among many effects the gain is small and a sweep now and then will do.
+                let taken = search.taken.len();
+                if taken <= EXCHANGED_EACH_ROUND || taken.is_multiple_of(EXCHANGED_EACH) {
+                    search.exchange();
+                }
                 let held_out = search.held_out.last().copied().unwrap_or(0.0);
                 let id = search.candidates[candidate].effect.id();
                 if !progress(Progress::Taken(search.taken.len(), id, rms_um(held_out))) {

@@ -168,7 +168,12 @@ fn parameters_of(problem: &Problem<'_>, fit: &Fit, number: usize) -> Vec<Paramet
     }
     fit::parameters(problem, fit)
         .into_iter()
-        .filter(|p| p.id == *id || p.id.strip_prefix(id.as_str()).is_some_and(|rest| rest.starts_with('.')))
+        .filter(|p| {
+            p.id == *id
+                || p.id
+                    .strip_prefix(id.as_str())
+                    .is_some_and(|rest| rest.starts_with('.'))
+        })
         .collect()
 }
 
