@@ -245,7 +245,7 @@ fn finish(problem: &Problem<'_>, beta: Vec<f64>, rank: Rank) -> Result<Fit, Iden
 }
 
 /// `N (NᵀRᵀRN)⁻¹ Nᵀ`.
-fn covariance(triangle: &Triangle, basis: &Mat<f64>) -> Result<Mat<f64>, IdentifyError> {
+pub(crate) fn covariance(triangle: &Triangle, basis: &Mat<f64>) -> Result<Mat<f64>, IdentifyError> {
     let n = basis.nrows();
     if basis.ncols() == 0 {
         return Ok(Mat::zeros(n, n));

@@ -4,6 +4,7 @@
 //! - [`parameters`], [`problem`]: a session as a least-squares problem;
 //! - [`fit`]: identify; [`heldout`]: judge on readings that the fit did not see; [`noise`]: how much is noise;
 //! - [`trace`]: close the loop;
+//! - [`plan`]: what tests can see before anybody measures;
 //! - [`simulate`]: readings from a model; [`quantity`]: values with their units as people write them;
 //! - [`results`]: what is reported, as it stands in JSON.
 
@@ -15,6 +16,7 @@ pub mod least_squares;
 pub mod noise;
 pub mod outliers;
 pub mod parameters;
+pub mod plan;
 pub mod problem;
 pub mod quantity;
 pub mod rank;

@@ -195,7 +195,11 @@ impl Parameters {
         if self.effects.contains(effect) {
             return Err(IdentifyError::RepeatedUnknown { id: effect.id() });
         }
-        let alike = self.effects.iter().filter(|other| other.id() == effect.id()).count();
+        let alike = self
+            .effects
+            .iter()
+            .filter(|other| other.id() == effect.id())
+            .count();
         let id = match alike {
             0 => effect.id(),
             _ => format!("{}#{}", effect.id(), alike + 1),

@@ -12,7 +12,10 @@ pub fn in_plants_words(name: &EffectName) -> Named {
         component: name.component.clone(),
         driver: name.driver.clone(),
         shape: name.shape.clone(),
-        order: name.order.filter(|order| order.fract() == 0.0).map(|order| order as u32),
+        order: name
+            .order
+            .filter(|order| order.fract() == 0.0)
+            .map(|order| order as u32),
     }
 }
 
@@ -67,7 +70,11 @@ pub fn pulls(outcome: &Outcome, model: &ModelResult) -> Pulls {
 /// A name in few letters.
 pub fn short(name: &EffectName) -> String {
     let order = name.order.map(|order| format!("{order}")).unwrap_or_default();
-    let tests = if name.tests.is_empty() { String::new() } else { format!("[{}]", name.tests.join("+")) };
+    let tests = if name.tests.is_empty() {
+        String::new()
+    } else {
+        format!("[{}]", name.tests.join("+"))
+    };
     format!("{}~{}:{}{order}{tests}", name.component, name.driver, name.shape)
 }
 
@@ -101,7 +108,13 @@ pub fn tell(outcome: &Outcome, mark: &str) -> String {
         .iter()
         .map(|effect| {
             let aliases: Vec<String> = effect.aliases.iter().take(6).map(short).collect();
-            format!("{} (p {:.3}, {} aliases: {})", short(&effect.name), effect.p_value, effect.aliases.len(), aliases.join(" "))
+            format!(
+                "{} (p {:.3}, {} aliases: {})",
+                short(&effect.name),
+                effect.p_value,
+                effect.aliases.len(),
+                aliases.join(" ")
+            )
         })
         .collect();
     let result = &outcome.result;

@@ -16,7 +16,10 @@ fn both_of_a_pair_are_found() {
     let (mut both, mut one, mut more) = (Rate::default(), Rate::default(), Rate::default());
     for outcome in &outcomes {
         let truths = &outcome.draw.truth.effects;
-        let hits = truths.iter().filter(|truth| found(&outcome.result.effects, truth).is_some()).count();
+        let hits = truths
+            .iter()
+            .filter(|truth| found(&outcome.result.effects, truth).is_some())
+            .count();
         both.count(hits == 2);
         one.count(hits >= 1);
         more.count(outcome.result.effects.len() > 2);
@@ -24,6 +27,8 @@ fn both_of_a_pair_are_found() {
             println!("{}", tell(outcome, ["NONE", "ONE", "ok"][hits]));
         }
     }
-    println!("| pairs at 5 times | |\n|---|---|\n| both found | {both} |\n| at least one | {one} |\n| more than two claimed | {more} |");
+    println!(
+        "| pairs at 5 times | |\n|---|---|\n| both found | {both} |\n| at least one | {one} |\n| more than two claimed | {more} |"
+    );
     assert!(both.is_consistent_with_at_least(0.90), "{both}");
 }

@@ -36,12 +36,16 @@ impl Rate {
     /// Whether so few would be no surprise if the rate were `rate`.
     pub fn is_consistent_with_at_least(self, rate: f64) -> bool {
         // P(at most so many) = I_{1−rate}(n − k, k + 1).
-        self.hits == self.of || beta_reg((self.of - self.hits) as f64, self.hits as f64 + 1.0, 1.0 - rate) > CHANCE
+        self.hits == self.of
+            || beta_reg((self.of - self.hits) as f64, self.hits as f64 + 1.0, 1.0 - rate) > CHANCE
     }
 
     /// Whether so many would be no surprise if the rate were `rate`.
     pub fn is_consistent_with_at_most(self, rate: f64) -> bool {
-        let misses = Rate { hits: self.of - self.hits, of: self.of };
+        let misses = Rate {
+            hits: self.of - self.hits,
+            of: self.of,
+        };
         misses.is_consistent_with_at_least(1.0 - rate)
     }
 }
@@ -49,7 +53,11 @@ impl Rate {
 impl std::fmt::Display for Rate {
     fn fmt(&self, formatter: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         let (share, error) = (100.0 * self.share(), 100.0 * self.standard_error());
-        write!(formatter, "{} of {} = {share:.1} ± {error:.1} %", self.hits, self.of)
+        write!(
+            formatter,
+            "{} of {} = {share:.1} ± {error:.1} %",
+            self.hits, self.of
+        )
     }
 }
 

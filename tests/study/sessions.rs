@@ -16,8 +16,14 @@ use crate::plant::{Draw, Injected, Kind, Noise, Oracle, Recipe};
 /// The noises of a study.
 pub const NOISES: [Noise; 3] = [
     Noise::White { sigma_um: 0.3 },
-    Noise::Serial { sigma_um: 0.3, coefficient: 0.8 },
-    Noise::Wild { sigma_um: 0.3, share: 0.01 },
+    Noise::Serial {
+        sigma_um: 0.3,
+        coefficient: 0.8,
+    },
+    Noise::Wild {
+        sigma_um: 0.3,
+        share: 0.01,
+    },
 ];
 
 /// Standard deviations of trace's own level of significance, 1 % two-sided.
@@ -96,10 +102,21 @@ pub fn run(
         .map(|number| {
             let (kind, noise, effects) = make(number);
             let oracle = oracle(kind, noise);
-            let recipe = Recipe { effects, ..Recipe::new(kind, 7000 + number as u64) }.noise(noise);
+            let recipe = Recipe {
+                effects,
+                ..Recipe::new(kind, 7000 + number as u64)
+            }
+            .noise(noise);
             let draw = recipe.draw_on(&oracle.plan);
             let (result, seconds) = traced(&draw);
-            Outcome { number, kind, noise, draw, result, seconds }
+            Outcome {
+                number,
+                kind,
+                noise,
+                draw,
+                result,
+                seconds,
+            }
         })
         .collect()
 }
@@ -109,7 +126,8 @@ fn traced(draw: &Draw) -> (TraceResult, f64) {
     let folder = tempfile::tempdir().unwrap();
     draw.write(folder.path()).unwrap();
     if let Some(number) = number("ABBE_STUDY_KEEP") {
-        draw.write(&std::env::temp_dir().join(format!("abbe-study-{number}"))).unwrap();
+        draw.write(&std::env::temp_dir().join(format!("abbe-study-{number}")))
+            .unwrap();
     }
     let start = Instant::now();
     let read = session(&folder.path().join("session.toml"), &ReadOptions::default()).unwrap();

@@ -45,7 +45,8 @@ fn tally(outcomes: &[Outcome]) -> Tally {
                 println!("STRANGE in {:?}: {strangers:?}", named(truth));
             }
         }
-        let best = oracle(outcome.kind, outcome.noise).heldout_rms_um(&outcome.draw, &outcome.draw.truth.effects);
+        let best =
+            oracle(outcome.kind, outcome.noise).heldout_rms_um(&outcome.draw, &outcome.draw.truth.effects);
         tally.held_out.push(outcome.result.after.heldout_rms_um / best);
         tally.before.0.extend(pulls(outcome, &outcome.result.before).0);
         tally.after.0.extend(pulls(outcome, &outcome.result.after).0);
@@ -58,7 +59,12 @@ fn tally(outcomes: &[Outcome]) -> Tally {
                 (false, _) => "WRONG",
             };
             let off = outcome.result.after.heldout_rms_um / best - 1.0;
-            println!("{} held out {:+.1} % of the oracle's; pulls {:.1?}", tell(outcome, mark), 100.0 * off, pulls(outcome, &outcome.result.after).0);
+            println!(
+                "{} held out {:+.1} % of the oracle's; pulls {:.1?}",
+                tell(outcome, mark),
+                100.0 * off,
+                pulls(outcome, &outcome.result.after).0
+            );
         }
     }
     tally
@@ -68,7 +74,9 @@ fn print(factor: f64, tally: &Tally) {
     let mut held_out = tally.held_out.clone();
     held_out.sort_by(f64::total_cmp);
     let mut near = Rate::default();
-    held_out.iter().for_each(|ratio| near.count((ratio - 1.0).abs() <= 0.05));
+    held_out
+        .iter()
+        .for_each(|ratio| near.count((ratio - 1.0).abs() <= 0.05));
     println!("| single effect at {factor} times | |\n|---|---|");
     println!("| truth named or in its alias set | {} |", tally.found);
     println!("| the same and nothing else claimed | {} |", tally.alone);
@@ -76,9 +84,18 @@ fn print(factor: f64, tally: &Tally) {
     println!("| more than one effect claimed | {} |", tally.more);
     println!("| alias sets with a stranger | {} |", tally.strange);
     println!("| held-out rms within 5 % of the oracle's | {near} |");
-    println!("| held-out rms over the oracle's, median and 95 % | {:.3}, {:.3} |", held_out[held_out.len() / 2], held_out[held_out.len() * 95 / 100]);
+    println!(
+        "| held-out rms over the oracle's, median and 95 % | {:.3}, {:.3} |",
+        held_out[held_out.len() / 2],
+        held_out[held_out.len() * 95 / 100]
+    );
     for (word, pulls) in [("before", &tally.before), ("after", &tally.after)] {
-        println!("| pulls of the machine's errors {word}: rms, beyond 3 | {:.2}, {:.1} % of {} |", pulls.rms(), 100.0 * pulls.beyond(3.0), pulls.0.len());
+        println!(
+            "| pulls of the machine's errors {word}: rms, beyond 3 | {:.2}, {:.1} % of {} |",
+            pulls.rms(),
+            100.0 * pulls.beyond(3.0),
+            pulls.0.len()
+        );
     }
     println!("| slowest session | {:.1} s |", tally.seconds);
 }

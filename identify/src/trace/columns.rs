@@ -64,9 +64,10 @@ pub struct Columns<'p, 'a> {
     pub fold_rows: Vec<std::ops::Range<usize>>,
     rows: usize,
     samples: std::sync::Mutex<HashMap<(usize, String), SharedSamples>>,
-    bases: std::sync::Mutex<HashMap<(usize, String), Arc<Vec<Vec<f64>>>>>,
+    bases: std::sync::Mutex<HashMap<(usize, String), SharedColumns>>,
 }
 
+type SharedColumns = Arc<Vec<Vec<f64>>>;
 type SharedSamples = Option<Arc<Vec<DriverSample<f64>>>>;
 
 impl<'p, 'a> Columns<'p, 'a> {
@@ -224,13 +225,14 @@ impl<'p, 'a> Columns<'p, 'a> {
     }
 
     /// Lays a shape over one coordinate of the readings of one test, whatever component would cause it; `by_direction` turns its sign with the
-    /// direction of travel. `None` where the data lack what it follows.
+    /// direction of travel, `rows` confines it. `None` where the data lack what it follows.
     pub fn reading_layout(
         &self,
         effect: &Effect,
         test: usize,
         coordinate: usize,
         by_direction: bool,
+        rows: Option<&std::ops::Range<usize>>,
     ) -> Option<Layout> {
         let session = self.problem.session;
         let readings = self.problem.tests[test].readings.as_ref()?;
@@ -247,7 +249,12 @@ impl<'p, 'a> Columns<'p, 'a> {
             .map(Arc::new)
         })?;
         let basis = Arc::new(drivers::basis_columns(&effect.shape, &samples));
-        let factor = by_direction.then(|| Arc::new(samples.iter().map(|sample| sample.direction).collect()));
+        let factor = (by_direction || rows.is_some()).then(|| {
+            let turned = |sample: &DriverSample<f64>| if by_direction { sample.direction } else { 1.0 };
+            let inside = |row: usize| rows.is_none_or(|rows| rows.contains(&row));
+            let factor = |(row, sample)| if inside(row) { turned(sample) } else { 0.0 };
+            Arc::new(samples.iter().enumerate().map(factor).collect())
+        });
         let mut parts = vec![Vec::new(); self.problem.tests.len()];
         parts[test].push(LayoutPart {
             moves: Moves::Reading(coordinate),

@@ -84,6 +84,9 @@ pub enum Progress {
 const MOST_ALONG_RUNS: usize = 12;
 /// Poses of a robot have many.
 const MOST_OF_POSES: usize = 200;
+/// Up to this many effects exchanges are tried after each addition, beyond it after each eighth.
+const EXCHANGED_EACH_ROUND: usize = 14;
+const EXCHANGED_EACH: usize = 8;
 /// Share of the structure's excess over noise that may remain for the found effects to count as the explanation.
 const EXPLAINED_SHARE: f64 = 0.5;
 /// Significance below which a remainder counts as structured.
@@ -169,15 +172,17 @@ fn trace_with<'a>(
 
     let mut candidates = library::candidates(&problem)?;
     candidates.retain(|candidate| chosen(options, &candidate.effect.id()));
-    let (candidates, layouts): (Vec<Candidate>, Vec<Layout>) = candidates
+    let (reserve, candidates): (Vec<_>, Vec<_>) = candidates
         .into_iter()
         .filter_map(|candidate| {
             columns
                 .layout(&candidate.effect)
                 .map(|layout| (candidate, layout))
         })
-        .unzip();
-    progress(Progress::Screening(candidates.len()));
+        .partition(|(candidate, _)| candidate.last_resort);
+    let (candidates, layouts): (Vec<Candidate>, Vec<Layout>) = candidates.into_iter().unzip();
+    let looked_for = candidates.len() + reserve.len();
+    progress(Progress::Screening(looked_for));
     let (model, prior) = (start.model.clone(), start.prior());
     let moments = Moments::new(&columns, &layouts, model, &start.residual, draws);
     let stop = Stop {
@@ -195,21 +200,22 @@ fn trace_with<'a>(
         .iter()
         .filter(|gain| gain.freedom > 0)
         .count();
-    let looked_for = search.candidates.len();
+    search.reserve = reserve;
     let scale_um = problem.noise.sigma_mm * 1e3;
     let rms_um = |sum: f64| (sum / columns.rows().max(1) as f64).sqrt() * scale_um;
-    let mut last_p_value = search_on(&mut search, &rms_um, progress);
+    let mut ended = search_on(&mut search, &rms_um, progress);
     progress(Progress::Judging);
     let mut judged = judge(&problem, &before_fit, &search, options, structure_before.as_ref())?;
     let unexplained = judged
         .structure
         .as_ref()
         .is_none_or(|structure| structure.p_value <= STRUCTURED);
-    if unexplained && last_p_value < 1.0 + f64::EPSILON && search.taken.len() < stop.most {
+    if unexplained && ended.is_some() && search.taken.len() < stop.most {
         // Nothing simpler is left: free curves.
+        search.bring_reserve();
         search.last_resort = true;
         let taken = search.taken.len();
-        last_p_value = search_on(&mut search, &rms_um, progress);
+        ended = search_on(&mut search, &rms_um, progress);
         if search.taken.len() != taken {
             judged = judge(&problem, &before_fit, &search, options, structure_before.as_ref())?;
         }
@@ -229,7 +235,8 @@ fn trace_with<'a>(
         start: &start,
         structure_before: structure_before.as_ref(),
         structure_after: structure_after.as_ref(),
-        last_p_value,
+        last_p_value: ended.unwrap_or(1.0),
+        stopped_early: ended.is_none() || search.taken.len() >= stop.most,
         candidates: looked_for,
         candidates_seen: seen,
     })?;
@@ -245,21 +252,26 @@ fn trace_with<'a>(
     })
 }
 
-/// Rounds until nothing earns its place any more, or the user has seen enough; the p-value of the best that was not taken.
+/// Rounds until nothing earns its place any more: the p-value of the best that was not taken. `None` if the user has seen enough.
 fn search_on(
     search: &mut Search<'_>,
     rms_um: &dyn Fn(f64) -> f64,
     progress: &(dyn Fn(Progress) -> bool + Sync),
-) -> f64 {
+) -> Option<f64> {
     loop {
         match search.round() {
-            Round::Done { p_value } => return p_value,
+            Round::Done { p_value } => return Some(p_value),
             Round::Added { candidate } => {
-                search.exchange();
+                // Every exchange costs a model an effect; among many effects the gain is small and a sweep now and then will do.
+                let taken = search.taken.len();
+                if taken <= EXCHANGED_EACH_ROUND || taken.is_multiple_of(EXCHANGED_EACH) {
+                    search.exchange();
+                }
+                search.merge();
                 let held_out = search.held_out.last().copied().unwrap_or(0.0);
                 let id = search.candidates[candidate].effect.id();
                 if !progress(Progress::Taken(search.taken.len(), id, rms_um(held_out))) {
-                    return 1.0;
+                    return None;
                 }
             }
         }
@@ -356,9 +368,9 @@ fn give_noise_memory(problem: &mut Problem<'_>, residuals: &[Vec<f64>]) -> bool 
         return false;
     };
     let mut noise = problem.noise.clone();
-    noise.memory = memory;
+    noise.memory = memory.coefficients;
     if let Some(sigma) = pure.sigma_mm() {
-        noise.sigma_mm = sigma;
+        noise.sigma_mm = sigma * memory.inflation;
         noise.source = NoiseSource::Repeats;
     }
     let present = &problem.noise;

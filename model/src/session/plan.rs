@@ -269,7 +269,7 @@ fn relative_move(machine: &Machine, bar: &BallBar<f64>, at: &[f64], axis: usize)
     })
 }
 
-fn positions(machine: &Machine, at: &[f64]) -> Vec<AxisPosition<f64>> {
+pub(super) fn positions(machine: &Machine, at: &[f64]) -> Vec<AxisPosition<f64>> {
     machine
         .axes
         .iter()
@@ -320,7 +320,7 @@ fn offset_vector(
 }
 
 /// A point of an axis and its direction in R, as the axes between it and the bed carry it.
-fn axis_line(machine: &Machine, state: &[AxisPosition<f64>], axis: usize) -> ([f64; 3], [f64; 3]) {
+pub(super) fn axis_line(machine: &Machine, state: &[AxisPosition<f64>], axis: usize) -> ([f64; 3], [f64; 3]) {
     let between = if axis < machine.workpiece_side {
         axis + 1..machine.workpiece_side
     } else {

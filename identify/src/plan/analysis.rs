@@ -1,0 +1,214 @@
+//! The analysis of a plan: everything that can be said before anybody measures.
+
+use abbe_model::session::Session;
+
+use super::linear::{Linearisation, is_wanted};
+use super::results::{Correlation, ErrorAnalysis, PlanAnalysis, TestSummary, WithoutTest};
+use super::{blind, budget, effects, indices, sensitivity, states};
+use crate::error::IdentifyError;
+use crate::noise::{Noise, NoiseSource};
+use crate::problem::Problem;
+
+/// How a plan is analysed.
+#[derive(Clone, Debug)]
+pub struct PlanOptions {
+    /// Standard deviation of a reading, mm, in place of the session's.
+    pub noise_mm: Option<f64>,
+    /// Pass over data where a test has a movement of its own.
+    pub planned_only: bool,
+    /// Whether undeclared effects of the library are looked at.
+    pub effects: bool,
+}
+
+impl Default for PlanOptions {
+    /// The session's noise, its data where there are any, and effects.
+    fn default() -> Self {
+        PlanOptions {
+            noise_mm: None,
+            planned_only: false,
+            effects: true,
+        }
+    }
+}
+
+/// A variance that grows less than this without a test is not worth a word.
+const WORTH_SAYING: f64 = 1.5;
+
+/// Analyses a plan, or the states of a measured session.
+///
+/// # Errors
+/// If a test has neither data nor a movement, a movement leaves the travel, or the model cannot be evaluated.
+pub fn analyse(session: &Session, options: &PlanOptions) -> Result<PlanAnalysis, IdentifyError> {
+    let (complete, noise) = prepared(session, options)?;
+    let problem = states::problem_by_test(&complete, noise)?;
+    let mut analysis = analyse_problem(&problem)?;
+    if options.noise_mm.is_none() && session.noise_mm.is_none() {
+        analysis.warnings.push(format!(
+            "the session states no `noise_um`; {:.2} µm is taken",
+            problem.noise.sigma_mm * 1e3
+        ));
+    }
+    if options.effects {
+        analysis.effects = Some(effects::effects(&problem)?);
+    }
+    Ok(analysis)
+}
+
+/// The complete session (see [`states::complete`]) and the noise that a plan is judged with.
+///
+/// # Errors
+/// If a test has neither data nor a movement, or a movement leaves the travel.
+pub fn prepared(session: &Session, options: &PlanOptions) -> Result<(Session, Noise), IdentifyError> {
+    let noise = match options.noise_mm {
+        Some(sigma) => Noise::white(sigma, NoiseSource::Stated),
+        None => states::noise_of(session)?,
+    };
+    Ok((states::complete(session, options.planned_only)?, noise))
+}
+
+/// Analyses a problem whose folds are its tests (see [`states::problem_by_test`]), without effects.
+///
+/// # Errors
+/// If the model cannot be evaluated.
+pub fn analyse_problem(problem: &Problem<'_>) -> Result<PlanAnalysis, IdentifyError> {
+    let list = &problem.parameters.list;
+    let nominal = vec![0.0; list.len()];
+    let linear = Linearisation::of(problem, &nominal)?;
+    let wanted: Vec<usize> = (0..list.len()).filter(|j| is_wanted(&list[*j])).collect();
+    let found = sensitivity::sensitivities(problem, &nominal, &linear.covariance)?;
+    let others_known = budget::others_known(&linear, &wanted);
+    let errors = wanted
+        .iter()
+        .zip(others_known)
+        .map(|(&j, others_known)| {
+            let unit = &list[j].unit;
+            let u = linear.u(j);
+            ErrorAnalysis {
+                id: list[j].id.clone(),
+                unit: unit.name.clone(),
+                u: u.map(|u| u * unit.per_inside),
+                sensitivity: sensitivity::reported(problem, &found, j),
+                budget: u.map_or(Vec::new(), |_| budget::budget(problem, &linear, j)),
+                u_others_known: u.map(|u| others_known.min(u) * unit.per_inside),
+                shared_with: u.map_or(Vec::new(), |_| budget::shared_with(problem, &linear, j)),
+                curves: sensitivity::curves(problem, &found, j),
+            }
+        })
+        .collect();
+    let mut setups: Vec<&str> = problem.tests.iter().map(|test| mounted(test)).collect();
+    setups.sort_unstable();
+    setups.dedup();
+    let tests: Vec<TestSummary> = problem.tests.iter().map(|test| summary(test)).collect();
+    Ok(PlanAnalysis {
+        noise_um: problem.noise.sigma_mm * 1e3,
+        readings: problem.readings(),
+        rank: linear.rank.seen.ncols(),
+        unknowns: list.len(),
+        setups: setups.len(),
+        moving_min: tests.iter().map(|test| test.moving_min).sum(),
+        tests,
+        errors,
+        blind: blind::blind(problem, &linear.rank),
+        held_by_setup: blind::held_by_setup(problem, &linear)?,
+        nearly_blind: blind::nearly_blind(problem, &linear, &wanted)?,
+        correlation: correlation(problem, &linear, &wanted),
+        indices: indices::indices(
+            &linear,
+            &wanted,
+            problem.readings() * problem.coordinates(),
+            found.g_efficiency,
+        )?,
+        without: without(problem, &linear, &wanted)?,
+        effects: None,
+        warnings: problem.session.warnings.clone(),
+    })
+}
+
+/// What is mounted for a test: the workpiece ball or tracker, or the socket.
+fn mounted(test: &abbe_model::session::Test) -> &str {
+    test.socket.as_deref().unwrap_or(&test.setup)
+}
+
+fn summary(test: &abbe_model::session::Test) -> TestSummary {
+    let readings = test.readings.as_ref();
+    let time = readings.map_or(&[][..], |readings| readings.time_s.as_slice());
+    TestSummary {
+        name: test.name.clone(),
+        readings: readings.map_or(0, |readings| readings.rows()),
+        moving_min: time
+            .first()
+            .zip(time.last())
+            .map(|(first, last)| (last - first) / 60.0),
+        setup: mounted(test).to_string(),
+    }
+}
+
+fn correlation(problem: &Problem<'_>, linear: &Linearisation, wanted: &[usize]) -> Correlation {
+    let both_seen = |i: usize, j: usize| linear.rank.is_seen(i) && linear.rank.is_seen(j);
+    Correlation {
+        ids: wanted
+            .iter()
+            .map(|j| problem.parameters.list[*j].id.clone())
+            .collect(),
+        matrix: wanted
+            .iter()
+            .map(|&i| {
+                let entry = |j: usize| both_seen(i, j).then(|| budget::correlation(&linear.covariance, i, j));
+                wanted.iter().map(|&j| entry(j)).collect()
+            })
+            .collect(),
+    }
+}
+
+/// Leaves out one test after another.
+fn without(
+    problem: &Problem<'_>,
+    linear: &Linearisation,
+    wanted: &[usize],
+) -> Result<Vec<WithoutTest>, IdentifyError> {
+    let list = &problem.parameters.list;
+    if problem.tests.len() < 2 {
+        return Ok(Vec::new());
+    }
+    (0..problem.tests.len())
+        .map(|test| {
+            let (rank, covariance) = linear.without(&[test])?;
+            let variance_inflation: Vec<(String, Option<f64>)> = wanted
+                .iter()
+                .filter(|j| linear.rank.is_seen(**j))
+                .map(|&j| {
+                    let grown = covariance[(j, j)] / linear.covariance[(j, j)];
+                    (list[j].id.clone(), rank.is_seen(j).then_some(grown))
+                })
+                .collect();
+            let all: Vec<&str> = variance_inflation
+                .iter()
+                .filter(|(_, f)| f.is_none())
+                .map(|(id, _)| id.as_str())
+                .collect();
+            let much: Vec<String> = variance_inflation
+                .iter()
+                .filter_map(|(id, f)| {
+                    f.filter(|f| *f >= WORTH_SAYING)
+                        .map(|f| format!("{id} {f:.1} times"))
+                })
+                .collect();
+            let name = &problem.tests[test].name;
+            let mut words = Vec::new();
+            if !all.is_empty() {
+                words.push(format!("{name} contributes all of {}", all.join(", ")));
+            }
+            if !much.is_empty() {
+                words.push(format!("without {name} the variance grows: {}", much.join(", ")));
+            }
+            if words.is_empty() {
+                words.push(format!("without {name} no variance grows by half"));
+            }
+            Ok(WithoutTest {
+                test: name.clone(),
+                variance_inflation,
+                why: words.join("; "),
+            })
+        })
+        .collect()
+}

@@ -1,0 +1,283 @@
+//! Blind spots by name: what no reading sees, what only the set-up's priors hold, and what is told apart badly.
+
+use faer::Mat;
+
+use super::linear::{Linearisation, is_wanted, marginal};
+use super::results::{HeldBySetup, NearDependency};
+use crate::error::IdentifyError;
+use crate::parameters::{Parameter, Role};
+use crate::problem::Problem;
+use crate::rank::Rank;
+use crate::results::Unobservable;
+
+/// Coefficients below this, relative to the largest, are rounding.
+const NEGLIGIBLE: f64 = 1e-5;
+/// Condition index from which a dependency is named: moderate from 10, strong from 30 (Belsley, Kuh & Welsch, Regression Diagnostics,
+/// 1980, ch. 3).
+const NAMED_FROM: f64 = 10.0;
+/// Share of the largest coefficient below which an unknown is left out of a near dependency.
+const LEAST_PART: f64 = 0.1;
+
+/// An unknown in words: `spindle_ball.z[A150]` is the z of the spindle ball in A150.
+pub fn called(parameter: &Parameter) -> String {
+    if parameter.role != Role::Setup {
+        return parameter.id.clone();
+    }
+    let (thing, group) = parameter.id.split_once('[').unwrap_or((&parameter.id, ""));
+    let (thing, coordinate) = thing.split_once('.').unwrap_or((thing, ""));
+    let thing = thing.replace('_', " ");
+    let of = if coordinate.is_empty() {
+        String::new()
+    } else {
+        format!("{coordinate} of ")
+    };
+    match group.strip_suffix(']') {
+        Some(group) => format!("{of}the {thing} [{group}]"),
+        None => format!("{of}the {thing}"),
+    }
+}
+
+/// `1 : −0.7`, two digits.
+fn proportion(combination: &[(String, f64)]) -> String {
+    combination
+        .iter()
+        .map(|(_, value)| short(*value))
+        .collect::<Vec<_>>()
+        .join(" : ")
+}
+
+fn short(value: f64) -> String {
+    let text = if value.abs() >= 10.0 {
+        format!("{value:.1}")
+    } else {
+        format!("{value:.2}")
+    };
+    let text = text.trim_end_matches('0').trim_end_matches('.');
+    text.replace('-', "−")
+}
+
+/// Combinations that no reading sees, priors included.
+pub fn blind(problem: &Problem<'_>, rank: &Rank) -> Vec<Unobservable> {
+    let list = &problem.parameters.list;
+    rank.unseen
+        .iter()
+        .map(|row| {
+            let combination = outside(problem, row);
+            let why = match combination.as_slice() {
+                [] => String::new(),
+                [(id, _)] => format!("no reading of these tests changes with {}", named(list, id)),
+                [(first, _), rest @ ..] => {
+                    let others: Vec<String> = rest.iter().map(|(id, _)| named(list, id)).collect();
+                    format!(
+                        "{} cannot be told from {}: {}",
+                        named(list, first),
+                        others.join(", "),
+                        proportion(&combination)
+                    )
+                }
+            };
+            Unobservable {
+                combination: combination.into_iter().collect(),
+                why,
+            }
+        })
+        .collect()
+}
+
+fn named(list: &[Parameter], id: &str) -> String {
+    list.iter()
+        .find(|parameter| parameter.id == id)
+        .map_or(id.to_string(), called)
+}
+
+/// A row over scaled unknowns in outside units, its first entry 1.
+fn outside(problem: &Problem<'_>, row: &[f64]) -> Vec<(String, f64)> {
+    let list = &problem.parameters.list;
+    let largest = row.iter().fold(0.0_f64, |most, value| most.max(value.abs()));
+    let entries: Vec<(String, f64)> = row
+        .iter()
+        .zip(list)
+        .filter(|(value, _)| value.abs() > NEGLIGIBLE * largest)
+        .map(|(value, parameter)| {
+            (
+                parameter.id.clone(),
+                value * parameter.size * parameter.unit.per_inside,
+            )
+        })
+        .collect();
+    let leading = entries.first().map_or(1.0, |(_, value)| *value);
+    entries
+        .into_iter()
+        .map(|(id, value)| (id, value / leading))
+        .collect()
+}
+
+/// Errors that the readings alone cannot tell from set-up quantities, one sparse combination each: the null space of the readings
+/// without priors, reduced with errors as pivots, so that each combination holds one error and set-up quantities.
+///
+/// # Errors
+/// If the decomposition fails.
+pub fn held_by_setup(
+    problem: &Problem<'_>,
+    linear: &Linearisation,
+) -> Result<Vec<HeldBySetup>, IdentifyError> {
+    let list = &problem.parameters.list;
+    let alone = Rank::decide(linear.readings_only().parts().0.as_ref(), &linear.size)?;
+    let mut rows = alone.unseen;
+    let mut pivots: Vec<(usize, usize)> = Vec::new();
+    for error in (0..list.len()).filter(|j| is_wanted(&list[*j])) {
+        let free = (0..rows.len()).filter(|i| pivots.iter().all(|(row, _)| row != i));
+        let Some(row) = free.max_by(|a, b| rows[*a][error].abs().total_cmp(&rows[*b][error].abs())) else {
+            break;
+        };
+        if rows[row][error].abs() < NEGLIGIBLE {
+            continue;
+        }
+        let pivot = rows[row][error];
+        rows[row].iter_mut().for_each(|value| *value /= pivot);
+        let pivot_row = rows[row].clone();
+        for (i, other) in rows.iter_mut().enumerate().filter(|(i, _)| *i != row) {
+            let factor = other[error];
+            let _ = i;
+            subtract(other, factor, &pivot_row);
+        }
+        pivots.push((row, error));
+    }
+    let setups: Vec<Vec<f64>> = (0..rows.len())
+        .filter(|i| pivots.iter().all(|(row, _)| row != i))
+        .map(|i| rows[i].clone())
+        .collect();
+    let mut held = Vec::new();
+    for (row, error) in pivots {
+        // What is not seen even with the priors is blind, and named there.
+        let sparse = sparser(rows[row].clone(), &setups);
+        let setup_only =
+            (0..list.len()).all(|j| j == error || !is_wanted(&list[j]) || sparse[j].abs() < NEGLIGIBLE);
+        if !linear.rank.is_seen(error) || !setup_only {
+            continue;
+        }
+        let mut combination = outside(problem, &sparse);
+        combination.sort_by(|a, b| {
+            let first = |id: &str| id != list[error].id;
+            first(&a.0)
+                .cmp(&first(&b.0))
+                .then(b.1.abs().total_cmp(&a.1.abs()))
+        });
+        let others: Vec<String> = combination[1..].iter().map(|(id, _)| named(list, id)).collect();
+        let why = if others.is_empty() {
+            continue;
+        } else {
+            format!(
+                "{} cannot be told from {}: {}",
+                list[error].id,
+                others.join(", "),
+                proportion(&combination)
+            )
+        };
+        held.push(HeldBySetup {
+            error: list[error].id.clone(),
+            combination,
+            why,
+        });
+    }
+    Ok(held)
+}
+
+fn subtract(row: &mut [f64], factor: f64, other: &[f64]) {
+    if factor != 0.0 {
+        row.iter_mut()
+            .zip(other)
+            .for_each(|(value, o)| *value -= factor * o);
+    }
+}
+
+/// A row less multiples of others such that fewer entries remain, as long as that succeeds.
+fn sparser(mut row: Vec<f64>, others: &[Vec<f64>]) -> Vec<f64> {
+    let support = |row: &[f64]| row.iter().filter(|value| value.abs() > NEGLIGIBLE).count();
+    loop {
+        let before = support(&row);
+        let mut best: Option<(usize, Vec<f64>)> = None;
+        for other in others {
+            for column in (0..row.len()).filter(|c| row[*c].abs() > NEGLIGIBLE && other[*c].abs() > 1e-3) {
+                let mut trial = row.clone();
+                subtract(&mut trial, row[column] / other[column], other);
+                let count = support(&trial);
+                if count < best.as_ref().map_or(before, |(count, _)| *count) {
+                    best = Some((count, trial));
+                }
+            }
+        }
+        match best {
+            Some((_, trial)) => row = trial,
+            None => return row,
+        }
+    }
+}
+
+/// Combinations of errors that are seen, but badly: small singular values of the information on the errors with columns of unit length.
+///
+/// # Errors
+/// If the decomposition fails.
+pub fn nearly_blind(
+    problem: &Problem<'_>,
+    linear: &Linearisation,
+    wanted: &[usize],
+) -> Result<Vec<NearDependency>, IdentifyError> {
+    let list = &problem.parameters.list;
+    let seen: Vec<usize> = wanted
+        .iter()
+        .copied()
+        .filter(|j| linear.rank.is_seen(*j))
+        .collect();
+    let r = marginal(linear.whole.parts().0.as_ref(), &seen, &linear.size);
+    let n = seen.len();
+    let norm: Vec<f64> = (0..n)
+        .map(|j| {
+            (0..n)
+                .map(|i| r[(i, j)].powi(2))
+                .sum::<f64>()
+                .sqrt()
+                .max(f64::MIN_POSITIVE)
+        })
+        .collect();
+    let unit = Mat::from_fn(n, n, |i, j| r[(i, j)] / norm[j]);
+    let svd = unit.svd().map_err(|_| IdentifyError::Decomposition)?;
+    let singular: Vec<f64> = svd.S().column_vector().iter().copied().collect();
+    let mut found = Vec::new();
+    for k in 0..n {
+        let condition_index = singular[0] / singular[k];
+        if condition_index < NAMED_FROM {
+            continue;
+        }
+        // A move along the direction, in outside units.
+        let parts: Vec<(usize, f64)> = (0..n).map(|j| (j, svd.V()[(j, k)])).collect();
+        let largest = parts.iter().fold(0.0_f64, |most, (_, v)| most.max(v.abs()));
+        let chosen: Vec<(usize, f64)> = parts
+            .into_iter()
+            .filter(|(_, v)| v.abs() >= LEAST_PART * largest)
+            .collect();
+        if chosen.len() < 2 {
+            continue;
+        }
+        let raw = chosen.iter().map(|(j, v)| {
+            let parameter = &list[seen[*j]];
+            (parameter.id.clone(), v / norm[*j] * parameter.unit.per_inside)
+        });
+        let raw: Vec<(String, f64)> = raw.collect();
+        let leading = raw[0].1;
+        let combination: Vec<(String, f64)> = raw.into_iter().map(|(id, v)| (id, v / leading)).collect();
+        let others: Vec<&str> = combination[1..].iter().map(|(id, _)| id.as_str()).collect();
+        let why = format!(
+            "{} is told from {} badly (condition index {condition_index:.0}): {}",
+            combination[0].0,
+            others.join(", "),
+            proportion(&combination)
+        );
+        found.push(NearDependency {
+            condition_index,
+            combination,
+            why,
+        });
+    }
+    Ok(found)
+}

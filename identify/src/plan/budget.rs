@@ -1,0 +1,89 @@
+//! Where an uncertainty comes from.
+//!
+//! With the least-squares estimator `β̂ = Cov·(JᵀV⁻¹y + Σ e_s m_s/u_s²)` — `y` the readings, `m_s` what is known beforehand of set-up quantity `s` —
+//! the law of propagation (JCGM 100, 5.1.2) splits the covariance without remainder:
+//!
+//! ```text
+//! Cov = Cov·JᵀV⁻¹J·Cov  +  Σ_s (Cov e_s)(Cov e_s)ᵀ/u_s²
+//!       noise               set-up quantity s
+//! ```
+//!
+//! Other errors have no spread of their own. What they cost is correlation: if error `j` were known, the variance of error `i` would fall by
+//! the share `ρ_ij²`; if all others were, to the reciprocal of `i`'s own entry in the information on the errors.
+
+use faer::Mat;
+
+use super::linear::{Linearisation, is_wanted, marginal, prior_u};
+use super::results::{Contribution, SharedWith};
+use crate::problem::Problem;
+
+/// Shares of the variance below this are not listed.
+const LEAST_SHARE: f64 = 1e-4;
+/// Correlations below this are not listed.
+const LEAST_CORRELATION: f64 = 0.1;
+
+/// The parts of an error's uncertainty, the largest first.
+pub fn budget(problem: &Problem<'_>, linear: &Linearisation, error: usize) -> Vec<Contribution> {
+    let list = &problem.parameters.list;
+    let covariance = &linear.covariance;
+    let variance = covariance[(error, error)];
+    let scale = list[error].unit.per_inside;
+    let mut left = variance;
+    let mut parts = Vec::new();
+    for (s, parameter) in list.iter().enumerate() {
+        let Some(u) = prior_u(parameter) else { continue };
+        let part = (covariance[(error, s)] / u).powi(2);
+        left -= part;
+        parts.push(Contribution {
+            from: parameter.id.clone(),
+            u: part.sqrt() * scale,
+            share: part / variance,
+        });
+    }
+    // Distances between sockets are known beforehand too; what remains after the set-up priors is theirs and the noise's.
+    let noise = left.max(0.0);
+    parts.push(Contribution {
+        from: "noise".to_string(),
+        u: noise.sqrt() * scale,
+        share: noise / variance,
+    });
+    parts.retain(|part| part.share >= LEAST_SHARE);
+    parts.sort_by(|a, b| b.share.total_cmp(&a.share));
+    parts
+}
+
+/// The other errors that share an error's variance, the most correlated first.
+pub fn shared_with(problem: &Problem<'_>, linear: &Linearisation, error: usize) -> Vec<SharedWith> {
+    let mut shared: Vec<SharedWith> = problem
+        .parameters
+        .list
+        .iter()
+        .enumerate()
+        .filter(|(other, parameter)| *other != error && is_wanted(parameter) && linear.rank.is_seen(*other))
+        .map(|(other, parameter)| SharedWith {
+            id: parameter.id.clone(),
+            correlation: correlation(&linear.covariance, error, other),
+        })
+        .filter(|shared| shared.correlation.abs() >= LEAST_CORRELATION)
+        .collect();
+    shared.sort_by(|a, b| b.correlation.abs().total_cmp(&a.correlation.abs()));
+    shared
+}
+
+/// Correlation of two unknowns.
+pub fn correlation(covariance: &Mat<f64>, i: usize, j: usize) -> f64 {
+    let product = covariance[(i, i)] * covariance[(j, j)];
+    if product > 0.0 {
+        covariance[(i, j)] / product.sqrt()
+    } else {
+        0.0
+    }
+}
+
+/// The standard uncertainty of each wanted error if all other wanted errors were known, inside units.
+pub fn others_known(linear: &Linearisation, wanted: &[usize]) -> Vec<f64> {
+    let r = marginal(linear.whole.parts().0.as_ref(), wanted, &linear.size);
+    (0..wanted.len())
+        .map(|j| 1.0 / (0..=j).map(|i| r[(i, j)].powi(2)).sum::<f64>().sqrt())
+        .collect()
+}

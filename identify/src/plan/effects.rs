@@ -1,0 +1,285 @@
+//! What effects that the session does not declare would do: be seen, or hide and bias the errors.
+//!
+//! With `X` the whitened columns of the unknowns, `Cov` their covariance and `C` those of an effect,
+//!
+//! ```text
+//! S = CᵀC − CᵀX·Cov·XᵀC      information on the effect beside the unknowns: what is left of it in the residual
+//! B = Cov·XᵀC                what an undeclared effect adds to the unknowns, a unit of each coefficient
+//! ```
+//!
+//! An effect of several coefficients (cosine and sine) is judged at its worst phase.
+
+use std::collections::{BTreeMap, HashMap};
+
+use abbe_model::effect::{Component, Shape};
+use faer::{Mat, MatRef};
+use nalgebra::DMatrix;
+use rayon::prelude::*;
+
+use super::detect::{POWER, SIGNIFICANCE, corrected, noncentrality};
+use super::linear::{Linearisation, is_wanted};
+use super::results::{Bias, EffectDetectability, EffectsAnalysis};
+use crate::drivers;
+use crate::error::IdentifyError;
+use crate::parameters::physical_size;
+use crate::problem::Problem;
+use crate::trace::columns::{Columns, Layout};
+use crate::trace::library::{self, Candidate};
+use crate::unit::Unit;
+
+/// Share of the signal below which an effect counts as hidden.
+const HIDDEN_BELOW: f64 = 0.01;
+/// Harmonics up to this order are looked at one by one; of the higher ones those of [`HIGH_ORDERS`].
+const LOW_ORDERS: f64 = 12.0;
+/// Higher orders that stand for those between them.
+const HIGH_ORDERS: [f64; 8] = [16.0, 20.0, 30.0, 40.0, 60.0, 80.0, 100.0, 120.0];
+/// Coefficients of one effect beyond which it is left out: a free curve holds the constants and slopes that the unknowns hold too, so that
+/// its worst member is always hidden.
+const MOST_COEFFICIENTS: usize = 2;
+/// Columns made together.
+const CHUNK: usize = 48;
+/// Biases listed for an effect.
+const BIASES: usize = 4;
+/// Biases below this, in outside units a unit, are not listed.
+const LEAST_BIAS: f64 = 1e-3;
+
+/// What the effects of the library would do to a plan.
+///
+/// # Errors
+/// If the model or the library cannot be evaluated.
+pub fn effects(problem: &Problem<'_>) -> Result<EffectsAnalysis, IdentifyError> {
+    let nominal = vec![0.0; problem.parameters.list.len()];
+    let linear = Linearisation::of(problem, &nominal)?;
+    let columns = Columns::new(problem, &nominal)?;
+    let model = columns.model_rows(&nominal)?;
+    let families = library::families()?;
+    let all = library::candidates(problem)?;
+    let searched = all.len();
+    let (candidates, layouts): (Vec<Candidate>, Vec<Layout>) = all
+        .into_iter()
+        .filter(|candidate| is_looked_at(&candidate.effect.shape))
+        .filter_map(|candidate| {
+            columns
+                .layout(&candidate.effect)
+                .map(|layout| (candidate, layout))
+        })
+        .unzip();
+    let significance_corrected = corrected(searched);
+    let thresholds: Vec<[f64; 2]> = (0..=MOST_COEFFICIENTS)
+        .map(|k| {
+            [
+                noncentrality(k.max(1), SIGNIFICANCE),
+                noncentrality(k.max(1), significance_corrected),
+            ]
+        })
+        .collect();
+    let chunks = chunked(&layouts);
+    let judged: Vec<Vec<EffectDetectability>> = chunks
+        .into_par_iter()
+        .map(|chunk| {
+            let chosen: Vec<&Layout> = layouts[chunk.clone()].iter().collect();
+            let width: usize = chosen.iter().map(|layout| layout.count).sum();
+            let mut block = Mat::zeros(columns.rows(), width);
+            columns.fill(&chosen, block.as_mut());
+            let cross = model.as_ref().subcols(0, nominal.len()).transpose() * &block;
+            let moved = &linear.covariance * &cross;
+            let mut start = 0;
+            chunk
+                .map(|index| {
+                    let count = layouts[index].count;
+                    let range = start..start + count;
+                    start = range.end;
+                    let of = |matrix: &Mat<f64>| matrix.as_ref().subcols(range.start, count).to_owned();
+                    let name = &families[candidates[index].family].name;
+                    let products = Products {
+                        own: of(&block),
+                        cross: of(&cross),
+                        moved: of(&moved),
+                    };
+                    judge(problem, &candidates[index], name, &products, &thresholds[count])
+                })
+                .collect()
+        })
+        .collect();
+    Ok(EffectsAnalysis {
+        significance: SIGNIFICANCE,
+        power: POWER,
+        effects_searched: searched,
+        significance_corrected,
+        effects: grouped(judged.into_iter().flatten(), &candidates),
+    })
+}
+
+fn is_looked_at(shape: &Shape) -> bool {
+    if shape.coefficients() > MOST_COEFFICIENTS {
+        return false;
+    }
+    match shape {
+        Shape::Harmonic { order } => *order <= LOW_ORDERS || HIGH_ORDERS.contains(order),
+        _ => true,
+    }
+}
+
+struct Products {
+    own: Mat<f64>,
+    cross: Mat<f64>,
+    moved: Mat<f64>,
+}
+
+fn judge(
+    problem: &Problem<'_>,
+    candidate: &Candidate,
+    family: &str,
+    products: &Products,
+    threshold: &[f64; 2],
+) -> EffectDetectability {
+    let session = problem.session;
+    let effect = &candidate.effect;
+    let unit = drivers::coefficient_unit(session, effect);
+    let size = match drivers::component_unit(session, &effect.component) {
+        Some(inside) => physical_size(inside),
+        None => 0.1,
+    };
+    let own = gram(products.own.as_ref(), products.own.as_ref());
+    let left = &own - gram(products.cross.as_ref(), products.moved.as_ref());
+    let symmetric = 0.5 * (&left + left.transpose());
+    let eigen = symmetric.symmetric_eigen();
+    let worst = eigen.eigenvalues.imin();
+    let direction = eigen.eigenvectors.column(worst).into_owned();
+    let whole = (direction.transpose() * &own * &direction)[(0, 0)];
+    let weakest = eigen.eigenvalues[worst].max(0.0);
+    let strongest = eigen.eigenvalues.max().max(0.0);
+    let surviving_share = if whole > 0.0 {
+        (weakest / whole).clamp(0.0, 1.0)
+    } else {
+        0.0
+    };
+    let amplitude = |threshold: f64| {
+        let amplitude = (threshold / weakest).sqrt();
+        (amplitude <= size).then_some(amplitude * unit.per_inside)
+    };
+    let detectable = amplitude(threshold[0]);
+    let largest_own = own.clone().symmetric_eigen().eigenvalues.max();
+    let hidden = surviving_share < HIDDEN_BELOW || detectable.is_none();
+    let verdict = if largest_own * size * size < 1.0 {
+        "none"
+    } else if !hidden {
+        "seen"
+    } else if strongest > HIDDEN_BELOW * largest_own {
+        "hidden at one phase"
+    } else {
+        "hidden"
+    };
+    EffectDetectability {
+        id: effect.id(),
+        family: family.to_string(),
+        unit: unit.name.clone(),
+        detectable,
+        detectable_searched: amplitude(threshold[1]),
+        surviving_share,
+        verdict: verdict.to_string(),
+        biases: biases(problem, &products.moved, &unit),
+    }
+}
+
+/// `AᵀB`.
+fn gram(a: MatRef<'_, f64>, b: MatRef<'_, f64>) -> DMatrix<f64> {
+    let product = a.transpose() * b;
+    DMatrix::from_fn(product.nrows(), product.ncols(), |i, j| product[(i, j)])
+}
+
+fn biases(problem: &Problem<'_>, moved: &Mat<f64>, unit: &Unit) -> Vec<Bias> {
+    let mut biases: Vec<Bias> = problem
+        .parameters
+        .list
+        .iter()
+        .enumerate()
+        .filter(|(_, parameter)| is_wanted(parameter))
+        .map(|(j, parameter)| {
+            let worst = (0..moved.ncols())
+                .map(|k| moved[(j, k)].powi(2))
+                .sum::<f64>()
+                .sqrt();
+            Bias {
+                id: parameter.id.clone(),
+                per_unit: worst * parameter.unit.per_inside / unit.per_inside,
+                unit: format!("{}/({})", parameter.unit.name, unit.name),
+            }
+        })
+        .filter(|bias| bias.per_unit >= LEAST_BIAS)
+        .collect();
+    biases.sort_by(|a, b| b.per_unit.total_cmp(&a.per_unit));
+    biases.truncate(BIASES);
+    biases
+}
+
+/// One entry for an effect, or for all members of a grid (periods, centres, time constants, high orders): the member that is hardest to see.
+fn grouped(
+    judged: impl Iterator<Item = EffectDetectability>,
+    candidates: &[Candidate],
+) -> Vec<EffectDetectability> {
+    let mut order: Vec<String> = Vec::new();
+    let mut groups: HashMap<String, EffectDetectability> = HashMap::new();
+    for (entry, candidate) in judged.zip(candidates) {
+        let effect = &candidate.effect;
+        let key = match &effect.shape {
+            Shape::Harmonic { order } if *order > LOW_ORDERS => {
+                format!("{}~{}:h>{LOW_ORDERS}", effect.component, effect.driver)
+            }
+            _ => effect.id(),
+        };
+        match groups.get_mut(&key) {
+            Some(present) => {
+                let harder = |entry: &EffectDetectability| entry.detectable_searched.unwrap_or(f64::INFINITY);
+                if harder(&entry) > harder(present) {
+                    *present = EffectDetectability { id: key, ..entry };
+                }
+            }
+            None => {
+                order.push(key.clone());
+                groups.insert(key.clone(), EffectDetectability { id: key, ..entry });
+            }
+        }
+    }
+    order.into_iter().filter_map(|key| groups.remove(&key)).collect()
+}
+
+fn chunked(layouts: &[Layout]) -> Vec<std::ops::Range<usize>> {
+    let mut chunks = Vec::new();
+    let (mut start, mut width) = (0, 0);
+    for (index, layout) in layouts.iter().enumerate() {
+        if width > 0 && width + layout.count > CHUNK {
+            chunks.push(start..index);
+            (start, width) = (index, 0);
+        }
+        width += layout.count;
+    }
+    if start < layouts.len() {
+        chunks.push(start..layouts.len());
+    }
+    chunks
+}
+
+/// The hidden effects that bias each error most, by error: what a clean residual does not exclude.
+pub fn hidden_by_error(analysis: &EffectsAnalysis) -> BTreeMap<String, Vec<(String, f64, String)>> {
+    let mut by_error: BTreeMap<String, Vec<(String, f64, String)>> = BTreeMap::new();
+    for effect in analysis
+        .effects
+        .iter()
+        .filter(|effect| effect.verdict.starts_with("hidden"))
+    {
+        for bias in &effect.biases {
+            let entry = (effect.id.clone(), bias.per_unit, bias.unit.clone());
+            by_error.entry(bias.id.clone()).or_default().push(entry);
+        }
+    }
+    by_error
+        .values_mut()
+        .for_each(|list| list.sort_by(|a, b| b.1.total_cmp(&a.1)));
+    by_error
+}
+
+/// Whether a component belongs to the instrument rather than to the machine.
+pub fn is_instrument(component: &Component) -> bool {
+    matches!(component, Component::Instrument { .. } | Component::TriggerDelay)
+}

@@ -1,0 +1,94 @@
+//! Scalar figures of merit: observability indices O1 to O5, condition number, D-, A-, E- and G-efficiency.
+//!
+//! They are those of the information on the errors once the set-up quantities are unknown within their priors, `RᵀR`, in standard deviations
+//! a physical size (1 mm, 0.01 rad): with `σ1 ≥ … ≥ σm` the singular values of `R`.
+//!
+//! An efficiency compares with errors that do not disturb one another: with `C = D⁻¹ᐟ²RᵀRD⁻¹ᐟ²`, `D` its diagonal (so that the size of an
+//! error does not matter), `D = det(C)^(1/m)`, `A = m/tr(C⁻¹)`, `E = λ_min(C)`; all are 1 for uncorrelated errors (Atkinson, Donev & Tobias,
+//! Optimum Experimental Designs, 2007, ch. 10). `G` is the mean leverage of a reading over the greatest.
+
+use faer::{Mat, MatRef};
+
+use super::linear::{Linearisation, marginal};
+use super::results::Indices;
+use crate::error::IdentifyError;
+use crate::rank::LEAST_SEEN;
+
+/// The figures of a plan.
+///
+/// # Errors
+/// If the decomposition fails.
+pub fn indices(
+    linear: &Linearisation,
+    wanted: &[usize],
+    readings: usize,
+    g_efficiency: f64,
+) -> Result<Indices, IdentifyError> {
+    let r = marginal(linear.whole.parts().0.as_ref(), wanted, &linear.size);
+    let size: Vec<f64> = wanted.iter().map(|j| linear.size[*j]).collect();
+    let scaled = Mat::from_fn(r.nrows(), r.ncols(), |i, j| r[(i, j)] * size[j]);
+    let sigma: Vec<f64> = singular_values(scaled.as_ref())?
+        .into_iter()
+        .filter(|s| *s >= LEAST_SEEN)
+        .collect();
+    let m = sigma.len();
+    let (Some(first), Some(last)) = (sigma.first().copied(), sigma.last().copied()) else {
+        return Ok(Indices {
+            seen: 0,
+            errors: wanted.len(),
+            condition_number: f64::INFINITY,
+            o1: 0.0,
+            o2: 0.0,
+            o3: 0.0,
+            o4: 0.0,
+            o5: 0.0,
+            d_efficiency: 0.0,
+            a_efficiency: 0.0,
+            e_efficiency: 0.0,
+            g_efficiency: 0.0,
+        });
+    };
+    let mean_log = sigma.iter().map(|s| s.ln()).sum::<f64>() / m as f64;
+    // Columns of unit length; an error that nothing sees has no column.
+    let seen: Vec<usize> = (0..wanted.len())
+        .filter(|j| {
+            (0..r.nrows())
+                .map(|i| scaled[(i, *j)].powi(2))
+                .sum::<f64>()
+                .sqrt()
+                >= LEAST_SEEN
+        })
+        .collect();
+    let unit = Mat::from_fn(r.nrows(), seen.len(), |i, k| {
+        let norm = (0..r.nrows())
+            .map(|i| r[(i, seen[k])].powi(2))
+            .sum::<f64>()
+            .sqrt();
+        r[(i, seen[k])] / norm
+    });
+    let lambda: Vec<f64> = singular_values(unit.as_ref())?
+        .iter()
+        .map(|s| s * s)
+        .take(m)
+        .collect();
+    let count = lambda.len() as f64;
+    Ok(Indices {
+        seen: m,
+        errors: wanted.len(),
+        condition_number: first / last,
+        o1: mean_log.exp() / (readings.max(1) as f64).sqrt(),
+        o2: last / first,
+        o3: last,
+        o4: last * last / first,
+        o5: 1.0 / sigma.iter().map(|s| 1.0 / s).sum::<f64>(),
+        d_efficiency: (lambda.iter().map(|l| l.ln()).sum::<f64>() / count).exp(),
+        a_efficiency: count / lambda.iter().map(|l| 1.0 / l).sum::<f64>(),
+        e_efficiency: lambda.last().copied().unwrap_or(0.0),
+        g_efficiency,
+    })
+}
+
+fn singular_values(matrix: MatRef<'_, f64>) -> Result<Vec<f64>, IdentifyError> {
+    let svd = matrix.thin_svd().map_err(|_| IdentifyError::Decomposition)?;
+    Ok(svd.S().column_vector().iter().copied().collect())
+}

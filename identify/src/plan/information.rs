@@ -1,0 +1,165 @@
+//! Information as a number of named unknowns share it, so that a test can be added or taken away without a fit.
+//!
+//! Of every test what remains is a square root of its information on the unknowns that it shares with others; its own (a ball mounted for it
+//! alone, its bar) are eliminated first, within what is known of them. Two such roots are added by one orthogonal reduction.
+
+use std::collections::HashMap;
+
+use abbe_model::session::Prior;
+use faer::{Mat, MatRef};
+
+use super::linear::{Linearisation, marginal};
+use crate::error::IdentifyError;
+use crate::problem::Problem;
+use crate::triangle::Triangle;
+
+/// The unknowns that tests share, in the order of the columns; what is asked about stands last.
+#[derive(Clone, Debug)]
+pub struct Shared {
+    /// Their identifiers.
+    pub ids: Vec<String>,
+    /// Physical sizes, inside units.
+    pub size: Vec<f64>,
+    /// Outside units in an inside unit.
+    pub per_inside: Vec<f64>,
+    /// How many of the last columns are asked about.
+    pub asked: usize,
+}
+
+/// A square root of information: `RᵀR`, upper triangular.
+pub type Root = Mat<f64>;
+
+impl Shared {
+    /// Unknowns of a problem by index, the first `kept` for their own sake not, the `asked` ones last.
+    pub fn of(problem: &Problem<'_>, kept: &[usize], asked: &[usize]) -> Shared {
+        let list = &problem.parameters.list;
+        let order: Vec<usize> = kept.iter().chain(asked).copied().collect();
+        Shared {
+            ids: order.iter().map(|j| list[*j].id.clone()).collect(),
+            size: order.iter().map(|j| list[*j].size).collect(),
+            per_inside: order.iter().map(|j| list[*j].unit.per_inside).collect(),
+            asked: asked.len(),
+        }
+    }
+
+    /// The root of a whole plan, priors included. What is asked about and not seen is held at its physical size, so that a blind spot is
+    /// a very large uncertainty and not a special case.
+    ///
+    /// # Errors
+    /// If an unknown is not the problem's.
+    pub fn root_of(&self, problem: &Problem<'_>, linear: &Linearisation) -> Result<Root, IdentifyError> {
+        let list = &problem.parameters.list;
+        let place: HashMap<&str, usize> = list
+            .iter()
+            .enumerate()
+            .map(|(j, parameter)| (parameter.id.as_str(), j))
+            .collect();
+        let columns = self
+            .ids
+            .iter()
+            .map(|id| place.get(id.as_str()).copied())
+            .collect::<Option<Vec<usize>>>()
+            .ok_or_else(|| IdentifyError::Request("an unknown is not one of this plan".to_string()))?;
+        let root = marginal(linear.whole.parts().0.as_ref(), &columns, &linear.size);
+        Ok(self.held(&root))
+    }
+
+    /// Every unknown held at its physical size besides.
+    fn held(&self, root: &Root) -> Root {
+        let k = self.ids.len();
+        let held = Mat::from_fn(k, k, |i, j| if i == j { 1.0 / self.size[i] } else { 0.0 });
+        sum(root.as_ref(), held.as_ref())
+    }
+
+    /// The root of the readings of a problem with one test; its unknowns that are not shared are eliminated within their priors.
+    ///
+    /// # Errors
+    /// If the model cannot be evaluated.
+    pub fn root_of_test(&self, problem: &Problem<'_>) -> Result<Root, IdentifyError> {
+        let list = &problem.parameters.list;
+        let nominal = vec![0.0; list.len()];
+        let mut triangle = Triangle::new(list.len());
+        problem
+            .triangles(&nominal)?
+            .iter()
+            .for_each(|part| triangle.merge(part));
+        let r = triangle.parts().0;
+        let column_of = |id: &str| self.ids.iter().position(|shared| shared == id);
+        let place: Vec<Option<usize>> = list.iter().map(|parameter| column_of(&parameter.id)).collect();
+        let own: Vec<usize> = (0..list.len()).filter(|j| place[*j].is_none()).collect();
+        let (m, k) = (own.len(), self.ids.len());
+        let mut stacked = Mat::zeros((list.len() + m).max(m + k), m + k);
+        for (j, column) in place.iter().enumerate() {
+            let target = match column {
+                Some(column) => m + column,
+                None => own.iter().position(|own| *own == j).unwrap_or(0),
+            };
+            for i in 0..list.len() {
+                stacked[(i, target)] = r[(i, j)];
+            }
+        }
+        for (place, j) in own.iter().enumerate() {
+            let u = match list[*j].prior {
+                Prior::Gaussian(u) => u,
+                _ => list[*j].size,
+            };
+            stacked[(list.len() + place, place)] = 1.0 / u;
+        }
+        let decomposition = stacked.qr();
+        let upper = decomposition.thin_R();
+        Ok(Mat::from_fn(k, k, |i, j| {
+            if i <= j { upper[(m + i, m + j)] } else { 0.0 }
+        }))
+    }
+
+    /// The root on what is asked about, the others being unknown too.
+    pub fn asked_block<'r>(&self, root: &'r Root) -> MatRef<'r, f64> {
+        let first = self.ids.len() - self.asked;
+        root.as_ref().submatrix(first, first, self.asked, self.asked)
+    }
+
+    /// Standard uncertainties of what is asked about, outside units.
+    pub fn uncertainties(&self, root: &Root) -> Vec<f64> {
+        let block = self.asked_block(root);
+        let inverse = inverted(block);
+        let first = self.ids.len() - self.asked;
+        (0..self.asked)
+            .map(|i| {
+                let row = (i..self.asked)
+                    .map(|j| inverse[(i, j)].powi(2))
+                    .sum::<f64>()
+                    .sqrt();
+                row * self.per_inside[first + i]
+            })
+            .collect()
+    }
+}
+
+/// The root of two pieces of information together.
+pub fn sum(a: MatRef<'_, f64>, b: MatRef<'_, f64>) -> Root {
+    let k = a.ncols();
+    let stacked = Mat::from_fn(a.nrows() + b.nrows(), k, |i, j| {
+        if i < a.nrows() {
+            a[(i, j)]
+        } else {
+            b[(i - a.nrows(), j)]
+        }
+    });
+    let decomposition = stacked.qr();
+    let upper = decomposition.thin_R();
+    Mat::from_fn(k, k, |i, j| if i <= j { upper[(i, j)] } else { 0.0 })
+}
+
+/// The inverse of an upper triangle; a pivot of nothing yields infinity.
+fn inverted(r: MatRef<'_, f64>) -> Mat<f64> {
+    let n = r.ncols();
+    let mut inverse = Mat::zeros(n, n);
+    for j in 0..n {
+        inverse[(j, j)] = 1.0 / r[(j, j)];
+        for i in (0..j).rev() {
+            let sum: f64 = (i + 1..=j).map(|l| r[(i, l)] * inverse[(l, j)]).sum();
+            inverse[(i, j)] = -sum / r[(i, i)];
+        }
+    }
+    inverse
+}

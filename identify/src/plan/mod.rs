@@ -1,0 +1,27 @@
+//! Plan: what tests can see before anybody measures, and which test to make next.
+//!
+//! A plan has no data; it is given nominal readings at its planned states and becomes the same least-squares problem as a measured session, so
+//! that there is one Jacobian in the house.
+//!
+//! - [`analyse`]: uncertainties, budgets, blind spots, indices, and what each test contributes;
+//! - [`effects`]: what undeclared effects would do;
+//! - [`menu`], [`improve`], [`information`]: the next test; [`range`]: how far a sweep can shrink;
+//! - [`states`], [`linear`], [`sensitivity`], [`budget`], [`blind`], [`indices`]: the parts of it;
+//! - [`results`]: what is reported, as it stands in JSON.
+
+mod analysis;
+pub mod blind;
+pub mod budget;
+pub mod detect;
+pub mod effects;
+pub mod improve;
+pub mod indices;
+pub mod information;
+pub mod linear;
+pub mod menu;
+pub mod range;
+pub mod results;
+pub mod sensitivity;
+pub mod states;
+
+pub use analysis::{PlanOptions, analyse, analyse_problem, prepared};

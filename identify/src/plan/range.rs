@@ -1,0 +1,150 @@
+//! How far a sweep can shrink, about its middle, before an uncertainty doubles.
+
+use faer::Mat;
+use serde::Serialize;
+
+use super::linear::{Linearisation, is_wanted, merged};
+use crate::error::IdentifyError;
+use crate::fit;
+use crate::problem::Problem;
+use crate::rank::Rank;
+
+/// What a sweep could spare.
+#[derive(Clone, Debug, Serialize)]
+pub struct Shrinkage {
+    /// The test.
+    pub test: String,
+    /// The axis that sweeps.
+    pub axis: String,
+    /// Range as planned, deg or mm.
+    pub range: [f64; 2],
+    /// Unit of the ranges.
+    pub unit: String,
+    /// The least range at which no uncertainty has doubled; absent where the test can be left out altogether.
+    pub least: Option<[f64; 2]>,
+    /// The error whose uncertainty doubles first.
+    pub first_to_double: Option<String>,
+}
+
+/// Bisections of the range: to a thousandth.
+const BISECTIONS: usize = 10;
+
+/// Of every test in which one axis does most of the moving.
+///
+/// # Errors
+/// If the model cannot be evaluated.
+pub fn shrinkages(problem: &Problem<'_>) -> Result<Vec<Shrinkage>, IdentifyError> {
+    let nominal = vec![0.0; problem.parameters.list.len()];
+    let linear = Linearisation::of(problem, &nominal)?;
+    let wanted: Vec<usize> = (0..problem.parameters.list.len())
+        .filter(|j| is_wanted(&problem.parameters.list[*j]) && linear.rank.is_seen(*j))
+        .collect();
+    let mut found = Vec::new();
+    for test in 0..problem.tests.len() {
+        let Some((axis, low, high)) = swept(problem, test) else {
+            continue;
+        };
+        let rest = merged(
+            linear.prior.clone(),
+            linear
+                .tests
+                .iter()
+                .enumerate()
+                .filter(|(other, _)| *other != test)
+                .map(|(_, triangle)| triangle),
+        );
+        let rows = whitened(problem, test, axis)?;
+        // The worst ratio of uncertainties at a share of the range, and whose it is.
+        let worst = |share: f64| -> Result<(f64, usize), IdentifyError> {
+            let (middle, half) = (0.5 * (low + high), 0.5 * share * (high - low) + 1e-9);
+            let mut whole = rest.clone();
+            for (positions, white) in rows.iter().filter(|_| share > 0.0) {
+                let kept: Vec<usize> = (0..positions.len())
+                    .filter(|i| (positions[*i] - middle).abs() <= half)
+                    .collect();
+                whole.absorb(Mat::from_fn(kept.len(), white.ncols(), |i, j| white[(kept[i], j)]).as_ref());
+            }
+            let rank = Rank::decide(whole.parts().0.as_ref(), &linear.size)?;
+            let covariance = fit::covariance(&whole, &rank.seen)?;
+            let ratios = wanted.iter().map(|&j| {
+                let ratio = (covariance[(j, j)] / linear.covariance[(j, j)]).sqrt();
+                (if rank.is_seen(j) { ratio } else { f64::INFINITY }, j)
+            });
+            Ok(ratios.fold((0.0, 0), |most, next| if next.0 > most.0 { next } else { most }))
+        };
+        let kind = problem.session.machine.axes[axis].kind;
+        let (outside, unit) = match kind {
+            abbe_model::axis::AxisKind::Rotary => (1.0_f64.to_degrees(), "deg"),
+            abbe_model::axis::AxisKind::Linear => (1.0, "mm"),
+        };
+        let none = worst(0.0)?;
+        let mut shrinkage = Shrinkage {
+            test: problem.tests[test].name.clone(),
+            axis: problem.session.machine.axes[axis].name.clone(),
+            range: [low * outside, high * outside],
+            unit: unit.to_string(),
+            least: None,
+            first_to_double: None,
+        };
+        if none.0 >= 2.0 {
+            let (mut enough, mut too_little, mut who) = (1.0, 0.0, none.1);
+            for _ in 0..BISECTIONS {
+                let share = 0.5 * (enough + too_little);
+                let (ratio, j) = worst(share)?;
+                if ratio < 2.0 {
+                    enough = share;
+                } else {
+                    (too_little, who) = (share, j);
+                }
+            }
+            let (middle, half) = (0.5 * (low + high), 0.5 * enough * (high - low));
+            shrinkage.least = Some([(middle - half) * outside, (middle + half) * outside]);
+            shrinkage.first_to_double = Some(problem.parameters.list[who].id.clone());
+        }
+        found.push(shrinkage);
+    }
+    Ok(found)
+}
+
+/// The axis that alone moves in a test, and how far.
+fn swept(problem: &Problem<'_>, test: usize) -> Option<(usize, f64, f64)> {
+    let readings = problem.tests[test].readings.as_ref()?;
+    let mut moving = readings
+        .positions
+        .iter()
+        .enumerate()
+        .filter_map(|(axis, positions)| {
+            let low = positions.iter().copied().fold(f64::INFINITY, f64::min);
+            let high = positions.iter().copied().fold(f64::NEG_INFINITY, f64::max);
+            (high - low > 1e-6).then_some((axis, low, high))
+        });
+    let only = moving.next()?;
+    moving.next().is_none().then_some(only)
+}
+
+/// The whitened rows of a test, block by block, each with the position of an axis.
+fn whitened(
+    problem: &Problem<'_>,
+    test: usize,
+    axis: usize,
+) -> Result<Vec<(Vec<f64>, Mat<f64>)>, IdentifyError> {
+    let values = problem.slot_values(&vec![0.0; problem.parameters.list.len()]);
+    let Some(readings) = &problem.tests[test].readings else {
+        return Ok(Vec::new());
+    };
+    problem
+        .blocks()
+        .iter()
+        .filter(|block| block.test == test)
+        .map(|block| {
+            let (white, _) = problem.whiten(&problem.rows(&values, block)?, block);
+            let row = |i: &usize| block.rows.start + i / problem.coordinates();
+            let positions = problem
+                .kept_rows(block)
+                .iter()
+                .map(|i| readings.positions[axis][row(i)])
+                .collect();
+            Ok((positions, white))
+        })
+        .collect()
+}

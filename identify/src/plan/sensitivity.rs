@@ -1,0 +1,173 @@
+//! What the readings do when one unknown moves: largest, root mean square, along each test; and the leverage of every reading.
+
+use faer::Mat;
+use rayon::prelude::*;
+
+use super::results::{Curve, Sensitivity};
+use crate::error::IdentifyError;
+use crate::problem::{Block, Problem};
+
+/// Points of a curve at most.
+const CURVE_POINTS: usize = 60;
+
+/// Sensitivities of every unknown, inside units (mm of reading a mm or rad), and the leverages of readings.
+pub struct Sensitivities {
+    /// By unknown: the largest with its sign, the test where, and the root mean square.
+    pub summary: Vec<(f64, usize, f64)>,
+    /// By unknown and test: along the first run.
+    pub curves: Vec<Vec<Vec<f64>>>,
+    /// Mean over greatest leverage: `xᵀ Cov x` of a whitened row `x` is by how much the fit follows that reading.
+    pub g_efficiency: f64,
+}
+
+struct OfBlock {
+    test: usize,
+    largest: Vec<f64>,
+    squares: Vec<f64>,
+    curve: Vec<Vec<f64>>,
+    leverage_sum: f64,
+    leverage_most: f64,
+    rows: usize,
+}
+
+/// One pass over the rows of a problem.
+///
+/// # Errors
+/// If the model cannot be evaluated.
+pub fn sensitivities(
+    problem: &Problem<'_>,
+    beta: &[f64],
+    covariance: &Mat<f64>,
+) -> Result<Sensitivities, IdentifyError> {
+    let values = problem.slot_values(beta);
+    let unknowns = beta.len();
+    let parts: Vec<OfBlock> = problem
+        .blocks()
+        .par_iter()
+        .map(|block| {
+            let rows = problem.rows(&values, block)?;
+            Ok(of_block(problem, block, &rows, unknowns, covariance))
+        })
+        .collect::<Result<_, IdentifyError>>()?;
+    let tests = problem.tests.len();
+    let mut summary = vec![(0.0_f64, 0_usize, 0.0_f64); unknowns];
+    let mut curves = vec![vec![Vec::new(); tests]; unknowns];
+    let (mut sum, mut most, mut rows) = (0.0, 0.0_f64, 0);
+    for part in parts {
+        for j in 0..unknowns {
+            if part.largest[j].abs() > summary[j].0.abs() {
+                (summary[j].0, summary[j].1) = (part.largest[j], part.test);
+            }
+            summary[j].2 += part.squares[j];
+            curves[j][part.test].extend_from_slice(&part.curve[j]);
+        }
+        sum += part.leverage_sum;
+        most = most.max(part.leverage_most);
+        rows += part.rows;
+    }
+    for (_, _, rms) in &mut summary {
+        *rms = (*rms / rows.max(1) as f64).sqrt();
+    }
+    let g_efficiency = if most > 0.0 {
+        sum / rows.max(1) as f64 / most
+    } else {
+        0.0
+    };
+    Ok(Sensitivities {
+        summary,
+        curves,
+        g_efficiency,
+    })
+}
+
+fn of_block(
+    problem: &Problem<'_>,
+    block: &Block,
+    rows: &Mat<f64>,
+    unknowns: usize,
+    covariance: &Mat<f64>,
+) -> OfBlock {
+    let coordinates = problem.coordinates();
+    let first_run = problem.tests[block.test]
+        .readings
+        .as_ref()
+        .filter(|readings| !readings.run.is_empty())
+        .and_then(|readings| readings.runs().first().cloned())
+        .unwrap_or(0..0);
+    let every = first_run.len().div_ceil(CURVE_POINTS).max(1);
+    let picked: Vec<usize> = (0..block.rows.len())
+        .filter(|i| {
+            let row = block.rows.start + i;
+            first_run.contains(&row) && (row - first_run.start).is_multiple_of(every)
+        })
+        .collect();
+    let mut largest = vec![0.0_f64; unknowns];
+    let mut squares = vec![0.0; unknowns];
+    let mut curve = vec![Vec::with_capacity(picked.len()); unknowns];
+    for j in 0..unknowns {
+        for i in 0..rows.nrows() {
+            let value = rows[(i, j)];
+            if value.abs() > largest[j].abs() {
+                largest[j] = value;
+            }
+            squares[j] += value * value;
+        }
+        for i in &picked {
+            curve[j].push(if coordinates == 1 {
+                rows[(*i, j)]
+            } else {
+                (0..coordinates)
+                    .map(|c| rows[(i * coordinates + c, j)].powi(2))
+                    .sum::<f64>()
+                    .sqrt()
+            });
+        }
+    }
+    let (white, _) = problem.whiten(rows, block);
+    let spread = white.as_ref().subcols(0, unknowns) * covariance;
+    let leverages = (0..white.nrows())
+        .map(|i| (0..unknowns).map(|j| spread[(i, j)] * white[(i, j)]).sum::<f64>())
+        .collect::<Vec<f64>>();
+    OfBlock {
+        test: block.test,
+        largest,
+        squares,
+        curve,
+        leverage_sum: leverages.iter().sum(),
+        leverage_most: leverages.iter().copied().fold(0.0, f64::max),
+        rows: rows.nrows(),
+    }
+}
+
+/// The summary of an unknown in outside units: µm of reading a unit of it.
+pub fn reported(problem: &Problem<'_>, found: &Sensitivities, unknown: usize) -> Sensitivity {
+    let (largest, test, rms) = found.summary[unknown];
+    let scale = outside(problem, unknown);
+    Sensitivity {
+        largest: largest * scale,
+        largest_in: problem.tests[test].name.clone(),
+        rms: rms * scale,
+    }
+}
+
+/// The curves of an unknown in outside units; tests that do not change with it are left out.
+pub fn curves(problem: &Problem<'_>, found: &Sensitivities, unknown: usize) -> Vec<Curve> {
+    let scale = outside(problem, unknown);
+    found.curves[unknown]
+        .iter()
+        .enumerate()
+        .filter(|(_, values)| values.iter().any(|value| value.abs() > NOTHING))
+        .map(|(test, values)| Curve {
+            test: problem.tests[test].name.clone(),
+            values: values.iter().map(|value| value * scale).collect(),
+        })
+        .collect()
+}
+
+/// Sensitivities below this are rounding, mm a mm or rad.
+const NOTHING: f64 = 1e-9;
+
+/// From mm of reading an inside unit to µm a unit outside.
+fn outside(problem: &Problem<'_>, unknown: usize) -> f64 {
+    1e3 / problem.parameters.list[unknown].unit.per_inside
+}

@@ -1,0 +1,90 @@
+//! A plan as a session with readings: the states that it goes to, each with the reading of a machine without errors.
+
+use abbe_model::sensitivity::{SlotValues, TestModel};
+use abbe_model::session::readings::Readings;
+use abbe_model::session::{Session, Test, motion};
+
+use crate::error::IdentifyError;
+use crate::heldout::{FoldKind, Folds};
+use crate::noise::{Noise, NoiseSource};
+use crate::problem::Problem;
+
+/// Pause between two tests where nothing else is known, s.
+const BETWEEN_TESTS_S: f64 = 120.0;
+
+/// A session in which every test has readings: the data where there are any, else the planned states with nominal readings. With
+/// `planned_only` the data are passed over wherever the test has a movement of its own.
+///
+/// # Errors
+/// If a test has neither data nor a movement, or a movement leaves the travel.
+pub fn complete(session: &Session, planned_only: bool) -> Result<Session, IdentifyError> {
+    let mut complete = session.clone();
+    let mut clock_s = 0.0;
+    for test in &mut complete.tests {
+        let moves = !matches!(test.motion, None | Some(motion::Motion::List));
+        if test.readings.is_none() || (planned_only && moves) {
+            let mut readings = planned(session, test)?;
+            readings.time_s.iter_mut().for_each(|time| *time += clock_s);
+            test.readings = Some(readings);
+        }
+        let end = test
+            .readings
+            .as_ref()
+            .and_then(|readings| readings.time_s.last().copied());
+        clock_s = end.map_or(clock_s, |end| end + BETWEEN_TESTS_S);
+    }
+    Ok(complete)
+}
+
+/// The planned states of one test with the readings of a machine without errors.
+///
+/// # Errors
+/// If the movement leaves the travel or there is none.
+pub fn planned(session: &Session, test: &Test) -> Result<Readings, IdentifyError> {
+    let mut readings = motion::planned(&session.machine, test)?;
+    readings.coordinates = test.station.kind().coordinates();
+    let model = TestModel::new(&session.machine, test.station.clone(), &readings);
+    readings.observed = model.readings_mm(&SlotValues::zero(model.slots()));
+    Ok(readings)
+}
+
+/// The least-squares problem of a complete session, its folds the tests, so that every test has a triangle of its own.
+///
+/// # Errors
+/// See [`Problem::new`].
+pub fn problem_by_test(session: &Session, noise: Noise) -> Result<Problem<'_>, IdentifyError> {
+    let mut problem = Problem::new(session, noise, 0)?;
+    fold_by_test(&mut problem);
+    Ok(problem)
+}
+
+/// Makes the folds of a problem its tests.
+pub fn fold_by_test(problem: &mut Problem<'_>) {
+    problem.folds = Folds {
+        kind: FoldKind::Runs,
+        count: problem.models.len(),
+        of_row: problem
+            .models
+            .iter()
+            .enumerate()
+            .map(|(test, model)| vec![test; model.rows()])
+            .collect(),
+    };
+}
+
+/// Noise of a reading where neither the session nor its data tell: 1 µm, the accuracy that makers of ball bars state.
+pub const ASSUMED_NOISE_MM: f64 = 1e-3;
+
+/// The noise that a plan is judged with: what the session states, what its data show, or [`ASSUMED_NOISE_MM`].
+///
+/// # Errors
+/// If there are data and they cannot be fitted.
+pub fn noise_of(session: &Session) -> Result<Noise, IdentifyError> {
+    if let Some(sigma) = session.noise_mm.filter(|sigma| *sigma > 0.0) {
+        return Ok(Noise::white(sigma, NoiseSource::Stated));
+    }
+    if session.tests.iter().all(|test| test.readings.is_some()) {
+        return Ok(crate::fit::prepare(session, 1)?.0.noise);
+    }
+    Ok(Noise::white(ASSUMED_NOISE_MM, NoiseSource::Stated))
+}

@@ -1,0 +1,237 @@
+//! `abbe plan --improve`, `--separate`, `--range`.
+
+use abbe::identify::IdentifyError;
+use abbe::identify::plan::improve::{Goal, ImproveOptions, Improvement, improve};
+use abbe::identify::plan::menu::Menu;
+use abbe::identify::plan::range::Shrinkage;
+use abbe::identify::problem::Problem;
+use abbe::identify::trace::library;
+use clap::Args;
+
+use super::tables::three_digits;
+use crate::cli::failure::Failure;
+use crate::cli::table;
+
+/// What a next test is sought with.
+#[derive(Args)]
+pub struct ImproveArguments {
+    /// Propose this many tests that most lower the worst uncertainty.
+    #[arg(long, value_name = "TESTS", num_args = 0..=1, default_missing_value = "1", conflicts_with = "separate")]
+    improve: Option<usize>,
+    /// Propose a test that tells two effects apart, by their identifiers: EZC~C:h2,EAC~C:h1.
+    #[arg(long, value_name = "A,B")]
+    separate: Option<String>,
+    /// Bars of the kit.
+    #[arg(long, value_name = "MM,…", value_delimiter = ',')]
+    bars_mm: Option<Vec<f64>>,
+    /// Distances of the ball from the axis that it is mounted about.
+    #[arg(long, value_name = "MM,…", value_delimiter = ',')]
+    radii_mm: Option<Vec<f64>>,
+    /// Heights of the ball along that axis.
+    #[arg(long, value_name = "MM,…", value_delimiter = ',')]
+    heights_mm: Option<Vec<f64>>,
+    /// Leave out tests in which linear axes follow: their errors are then no part of the question.
+    #[arg(long)]
+    no_follow: bool,
+    /// Travel of the bar's sensor either way.
+    #[arg(long, value_name = "MM", default_value_t = 1.0)]
+    reach_mm: f64,
+    /// Every test has a spindle ball mounted for it alone.
+    #[arg(long)]
+    remount_spindle_ball: bool,
+    /// Time that mounting a ball takes; stating it weighs gains by the minute.
+    #[arg(long, value_name = "MIN")]
+    setup_min: Option<f64>,
+    /// Time that preparing a test takes; stating it weighs gains by the minute.
+    #[arg(long, value_name = "MIN")]
+    test_min: Option<f64>,
+}
+
+impl ImproveArguments {
+    /// Whether a next test is asked for.
+    pub fn asked(&self) -> bool {
+        self.improve.is_some() || self.separate.is_some()
+    }
+
+    fn menu(&self) -> Result<Menu, Failure> {
+        let mut menu = Menu {
+            reach_mm: self.reach_mm,
+            ..Menu::default()
+        };
+        let checked = |flag: &str, list: &[f64], least: f64| match list
+            .iter()
+            .find(|value| !value.is_finite() || **value < least)
+        {
+            Some(value) => Err(Failure::Other(format!(
+                "`{flag}`: {value} mm is no length that can be tried"
+            ))),
+            None => Ok(list.to_vec()),
+        };
+        if let Some(bars) = &self.bars_mm {
+            menu.bars_mm = checked("--bars-mm", bars, 1.0)?;
+        }
+        if let Some(radii) = &self.radii_mm {
+            menu.radii_mm = checked("--radii-mm", radii, 1.0)?;
+        }
+        if let Some(heights) = &self.heights_mm {
+            menu.heights_mm = checked("--heights-mm", heights, 0.0)?;
+        }
+        menu.follow = !self.no_follow;
+        menu.keep_spindle_ball = !self.remount_spindle_ball;
+        menu.setup_min = self.setup_min.unwrap_or(menu.setup_min);
+        menu.test_min = self.test_min.unwrap_or(menu.test_min);
+        Ok(menu)
+    }
+
+    /// Proposes tests.
+    pub fn run(&self, problem: &Problem<'_>) -> Result<Improvement, Failure> {
+        let menu = self.menu()?;
+        let by_minute = self.setup_min.is_some() || self.test_min.is_some();
+        if let Some(pair) = &self.separate {
+            let Some((a, b)) = pair.split_once(',').filter(|(a, b)| a.trim() != b.trim()) else {
+                return Err(Failure::Other(format!(
+                    "`--separate {pair}`: it takes two effects with a comma between them, as EZC~C:h2,EAC~C:h1"
+                )));
+            };
+            let mut both = problem.clone();
+            for id in [a, b] {
+                add(&mut both, id.trim())?;
+            }
+            let goal = Goal::Separation {
+                effect: a.trim().to_string(),
+                coefficients: Vec::new(),
+            };
+            return Ok(improve(
+                &both,
+                &menu,
+                &ImproveOptions {
+                    goal,
+                    tests: 1,
+                    by_minute,
+                },
+            )?);
+        }
+        let tests = self.improve.unwrap_or(1);
+        let options = ImproveOptions {
+            goal: Goal::WorstUncertainty,
+            tests,
+            by_minute,
+        };
+        Ok(improve(problem, &menu, &options)?)
+    }
+}
+
+/// Adds an effect of the library by its identifier.
+fn add(problem: &mut Problem<'_>, id: &str) -> Result<(), IdentifyError> {
+    if problem.parameters.effects.iter().any(|effect| effect.id() == id) {
+        return Ok(());
+    }
+    let candidates = library::candidates(problem)?;
+    let Some(candidate) = candidates.iter().find(|candidate| candidate.effect.id() == id) else {
+        let stem = id.split(':').next().unwrap_or(id);
+        let mut alike: Vec<String> = candidates
+            .iter()
+            .map(|c| c.effect.id())
+            .filter(|other| other.starts_with(stem))
+            .collect();
+        alike.dedup();
+        alike.truncate(6);
+        let hint = if alike.is_empty() {
+            "identifiers are component~driver:shape, as EZC~C:h2".to_string()
+        } else {
+            format!("there are {}", alike.join(", "))
+        };
+        return Err(IdentifyError::Request(format!(
+            "`{id}` is no effect of the library for this plan; {hint}"
+        )));
+    };
+    problem.add_effect(&candidate.effect)
+}
+
+/// Prints what is proposed.
+pub fn print(found: &Improvement) {
+    println!(
+        "{} entries on the menu; {} now: {}",
+        found.menu_entries,
+        found.figure,
+        three_digits(found.before)
+    );
+    if found.steps.is_empty() {
+        println!("none on the menu improves it");
+        return;
+    }
+    for (number, step) in found.steps.iter().enumerate() {
+        println!("\n{}. {}", number + 1, step.test);
+        println!(
+            "   {} → {}, {:.1} min{}",
+            found.figure,
+            three_digits(step.after),
+            step.minutes,
+            if step.new_setup { " with the set-up" } else { "" }
+        );
+        println!(
+            "   workpiece ball {}, spindle ball {}, bar {} mm",
+            point(step.workpiece_ball_mm),
+            point(step.spindle_ball_mm),
+            step.bar_mm
+        );
+        if !step.opens.is_empty() {
+            println!("   opens the blind spots {}", step.opens.join(", "));
+        }
+    }
+    println!();
+    let mut header = vec!["error".to_string(), "now".to_string()];
+    header.extend((1..=found.steps.len()).map(|number| format!("with {number}")));
+    let rows: Vec<Vec<String>> = found
+        .uncertainties_before
+        .iter()
+        .enumerate()
+        .map(|(k, (id, before))| {
+            let mut row = vec![id.clone(), three_digits(*before)];
+            row.extend(
+                found
+                    .steps
+                    .iter()
+                    .map(|step| three_digits(step.uncertainties[k].1)),
+            );
+            row
+        })
+        .collect();
+    table::print(&header.iter().map(String::as_str).collect::<Vec<_>>(), &rows);
+    for exchange in &found.exchanged {
+        println!("exchanged: {exchange}");
+    }
+    println!("\nBest by themselves:");
+    for other in &found.alternatives {
+        println!(
+            "  {}  {} ({:.1} min)",
+            three_digits(other.after),
+            other.test,
+            other.minutes
+        );
+    }
+}
+
+fn point(mm: [f64; 3]) -> String {
+    let cells: Vec<String> = mm.iter().map(|x| format!("{x:.1}")).collect();
+    format!("({}) mm", cells.join(", "))
+}
+
+/// Prints how far sweeps can shrink.
+pub fn print_ranges(ranges: &[Shrinkage]) {
+    println!("\nHow far each sweep can shrink about its middle before an uncertainty doubles:");
+    let rows: Vec<Vec<String>> = ranges
+        .iter()
+        .map(|range| {
+            let span = |[low, high]: [f64; 2]| format!("{low:.0} … {high:.0} {}", range.unit);
+            vec![
+                range.test.clone(),
+                range.axis.clone(),
+                span(range.range),
+                range.least.map_or("can be left out".into(), span),
+                range.first_to_double.clone().unwrap_or("—".into()),
+            ]
+        })
+        .collect();
+    table::print(&["test", "axis", "planned", "least", "doubles first"], &rows);
+}

@@ -1,0 +1,325 @@
+//! What a plan's analysis looks like on a screen.
+
+use abbe::identify::plan::results::{EffectDetectability, EffectsAnalysis, ErrorAnalysis, PlanAnalysis};
+
+use crate::cli::fit::print_warnings;
+use crate::cli::table;
+
+/// Tests side by side in the table of small plots.
+const PLOTS_ABREAST: usize = 4;
+/// Width of a small plot.
+const PLOT_WIDTH: usize = 18;
+/// Contributions listed on the screen; JSON has them all.
+const CONTRIBUTIONS: usize = 3;
+/// Effects listed on the screen in each table.
+const EFFECTS: usize = 16;
+
+/// Prints everything.
+pub fn print(analysis: &PlanAnalysis) {
+    header(analysis);
+    errors(&analysis.errors);
+    budget(&analysis.errors);
+    plots(analysis);
+    blind_spots(analysis);
+    correlation(analysis);
+    indices(analysis);
+    tests(analysis);
+    if let Some(found) = &analysis.effects {
+        effects(found);
+    }
+    print_warnings(&analysis.warnings);
+}
+
+fn header(analysis: &PlanAnalysis) {
+    let moving = analysis
+        .moving_min
+        .map_or(String::new(), |min| format!(", {min:.1} min of movement"));
+    println!(
+        "{} readings in {} tests, {} set-ups{moving}, noise {}",
+        analysis.readings,
+        analysis.tests.len(),
+        analysis.setups,
+        table::micrometres(analysis.noise_um)
+    );
+    println!(
+        "{} of {} unknowns or combinations of them are seen",
+        analysis.rank, analysis.unknowns
+    );
+}
+
+/// A number with three digits.
+pub fn three_digits(value: f64) -> String {
+    if !value.is_finite() {
+        return "∞".to_string();
+    }
+    let places = (2.0 - value.abs().max(1e-9).log10().floor()).clamp(0.0, 5.0) as usize;
+    format!("{value:.places$}")
+}
+
+fn optional(value: Option<f64>) -> String {
+    value.map_or("—".to_string(), three_digits)
+}
+
+fn errors(errors: &[ErrorAnalysis]) {
+    println!("\nPredicted standard uncertainty, and µm of reading a unit of the error:");
+    let rows: Vec<Vec<String>> = errors
+        .iter()
+        .map(|error| {
+            let part = |noise: bool| {
+                let parts = error.budget.iter().filter(|part| (part.from == "noise") == noise);
+                error
+                    .u
+                    .map(|_| parts.map(|part| part.u.powi(2)).sum::<f64>().sqrt())
+            };
+            vec![
+                error.id.clone(),
+                error.u.map_or("not seen".to_string(), three_digits),
+                error.unit.clone(),
+                optional(part(true)),
+                optional(part(false)),
+                optional(error.u_others_known),
+                three_digits(error.sensitivity.largest),
+                three_digits(error.sensitivity.rms),
+                if error.sensitivity.largest == 0.0 {
+                    "—".into()
+                } else {
+                    error.sensitivity.largest_in.clone()
+                },
+            ]
+        })
+        .collect();
+    let header = [
+        "error",
+        "u (k=1)",
+        "unit",
+        "of noise",
+        "of set-up",
+        "others known",
+        "largest",
+        "rms",
+        "largest in",
+    ];
+    table::print(&header, &rows);
+}
+
+fn budget(errors: &[ErrorAnalysis]) {
+    println!(
+        "\nWhere the uncertainty comes from (share of the variance), and what it is shared with (correlation):"
+    );
+    let rows: Vec<Vec<String>> = errors
+        .iter()
+        .filter(|error| error.u.is_some())
+        .map(|error| {
+            let parts: Vec<String> = error
+                .budget
+                .iter()
+                .take(CONTRIBUTIONS)
+                .map(|part| format!("{} {:.0} %", part.from, part.share * 100.0))
+                .collect();
+            let shared: Vec<String> = error
+                .shared_with
+                .iter()
+                .take(2)
+                .map(|other| format!("{} {:+.2}", other.id, other.correlation))
+                .collect();
+            vec![error.id.clone(), parts.join(", "), shared.join(", ")]
+        })
+        .collect();
+    table::print(&["error", "from", "shared with"], &rows);
+}
+
+fn plots(analysis: &PlanAnalysis) {
+    let names: Vec<&str> = analysis.tests.iter().map(|test| test.name.as_str()).collect();
+    if analysis.errors.iter().all(|error| error.curves.is_empty()) {
+        return;
+    }
+    println!(
+        "\nSensitivity along the first run of each test, each row to its own scale, zero in the middle:"
+    );
+    for abreast in names.chunks(PLOTS_ABREAST) {
+        let mut header = vec!["error"];
+        header.extend(abreast);
+        let rows: Vec<Vec<String>> = analysis
+            .errors
+            .iter()
+            .map(|error| {
+                let values = error.curves.iter().flat_map(|curve| &curve.values);
+                let most = values.fold(0.0_f64, |most, value| most.max(value.abs()));
+                let mut row = vec![error.id.clone()];
+                for name in abreast {
+                    let curve = error.curves.iter().find(|curve| curve.test == *name);
+                    row.push(curve.map_or("·".into(), |curve| small_plot(&curve.values, most)));
+                }
+                row
+            })
+            .collect();
+        table::print(&header, &rows);
+    }
+}
+
+/// A row of eight-step bars, from `−most` to `most`.
+pub fn small_plot(values: &[f64], most: f64) -> String {
+    const BARS: [char; 8] = ['▁', '▂', '▃', '▄', '▅', '▆', '▇', '█'];
+    let width = PLOT_WIDTH.min(values.len());
+    (0..width)
+        .map(|k| {
+            let value = values[k * (values.len() - 1) / (width - 1).max(1)];
+            let level = if most > 0.0 {
+                (value / most + 1.0) / 2.0
+            } else {
+                0.5
+            };
+            BARS[((level * 7.0).round() as usize).min(7)]
+        })
+        .collect()
+}
+
+fn blind_spots(analysis: &PlanAnalysis) {
+    let list = |title: &str, lines: Vec<&String>| {
+        if !lines.is_empty() {
+            println!("\n{title}");
+            lines.into_iter().for_each(|line| println!("  {line}"));
+        }
+    };
+    list(
+        "Blind spots:",
+        analysis.blind.iter().map(|item| &item.why).collect(),
+    );
+    list(
+        "Held by what is known of the set-up, not by readings:",
+        analysis.held_by_setup.iter().map(|item| &item.why).collect(),
+    );
+    list(
+        "Nearly blind:",
+        analysis.nearly_blind.iter().map(|item| &item.why).collect(),
+    );
+}
+
+fn correlation(analysis: &PlanAnalysis) {
+    let ids = &analysis.correlation.ids;
+    if ids.len() > 16 {
+        println!("\nThe correlation matrix of {} errors is in the JSON.", ids.len());
+        return;
+    }
+    println!("\nCorrelation:");
+    let mut header = vec![""];
+    header.extend(ids.iter().map(String::as_str));
+    let rows: Vec<Vec<String>> = ids
+        .iter()
+        .zip(&analysis.correlation.matrix)
+        .enumerate()
+        .map(|(i, (id, row))| {
+            let mut cells = vec![id.clone()];
+            cells.extend(
+                row.iter()
+                    .take(i + 1)
+                    .map(|value| value.map_or("—".into(), |rho| format!("{rho:+.2}"))),
+            );
+            cells.resize(ids.len() + 1, String::new());
+            cells
+        })
+        .collect();
+    table::print(&header, &rows);
+}
+
+fn indices(analysis: &PlanAnalysis) {
+    let indices = &analysis.indices;
+    println!(
+        "\nInformation on {} of {} errors, set-ups unknown within what is known of them:",
+        indices.seen, indices.errors
+    );
+    println!(
+        "  condition number {}; O1 {}  O2 {}  O3 {}  O4 {}  O5 {}",
+        three_digits(indices.condition_number),
+        three_digits(indices.o1),
+        three_digits(indices.o2),
+        three_digits(indices.o3),
+        three_digits(indices.o4),
+        three_digits(indices.o5)
+    );
+    println!(
+        "  efficiency D {}  A {}  E {}  G {}",
+        three_digits(indices.d_efficiency),
+        three_digits(indices.a_efficiency),
+        three_digits(indices.e_efficiency),
+        three_digits(indices.g_efficiency)
+    );
+}
+
+fn tests(analysis: &PlanAnalysis) {
+    if analysis.without.is_empty() {
+        return;
+    }
+    println!("\nWhat each test contributes:");
+    analysis
+        .without
+        .iter()
+        .for_each(|item| println!("  {}", item.why));
+}
+
+fn effects(found: &EffectsAnalysis) {
+    let by_verdict = |verdict: fn(&str) -> bool| -> Vec<&EffectDetectability> {
+        found
+            .effects
+            .iter()
+            .filter(|effect| verdict(&effect.verdict))
+            .collect()
+    };
+    let hidden = by_verdict(|verdict| verdict.starts_with("hidden"));
+    let seen = by_verdict(|verdict| verdict == "seen");
+    let none = by_verdict(|verdict| verdict == "none").len();
+    println!(
+        "\nUndeclared effects ({} in the library for this plan; {none} of those listed move no reading).",
+        found.effects_searched
+    );
+    println!(
+        "Smallest amplitude found with {:.0} % power at {:.0} % significance, of one look and of the whole search (Šidák, which is on the safe \
+         side):",
+        found.power * 100.0,
+        found.significance * 100.0
+    );
+    effect_table(&seen);
+    println!(
+        "\nHidden ({}): under 1 % of the signal survives the fit; a clean residual does not exclude these:",
+        hidden.len()
+    );
+    effect_table(&hidden);
+}
+
+/// A table of effects; of those with the same component and driver the hardest to see and, of hidden ones, those that bias most.
+fn effect_table(effects: &[&EffectDetectability]) {
+    let mut chosen: Vec<&EffectDetectability> = effects.to_vec();
+    let strongest = |effect: &EffectDetectability| effect.biases.first().map_or(0.0, |bias| bias.per_unit);
+    chosen.sort_by(|a, b| strongest(b).total_cmp(&strongest(a)));
+    let rows: Vec<Vec<String>> = chosen
+        .iter()
+        .take(EFFECTS)
+        .map(|effect| {
+            let biases: Vec<String> = effect
+                .biases
+                .iter()
+                .take(2)
+                .map(|bias| format!("{} {} {}", bias.id, three_digits(bias.per_unit), bias.unit))
+                .collect();
+            vec![
+                effect.id.clone(),
+                optional(effect.detectable),
+                optional(effect.detectable_searched),
+                effect.unit.clone(),
+                format!("{:.3}", effect.surviving_share),
+                if biases.is_empty() {
+                    "none".into()
+                } else {
+                    biases.join(", ")
+                },
+            ]
+        })
+        .collect();
+    table::print(
+        &["effect", "one look", "search", "unit", "survives", "biases"],
+        &rows,
+    );
+    if chosen.len() > EFFECTS {
+        println!("  … {} more in the JSON", chosen.len() - EFFECTS);
+    }
+}
