@@ -97,8 +97,10 @@ pub fn run(
     numbers: std::ops::Range<usize>,
     make: impl Fn(usize) -> (Kind, Noise, Vec<Injected>) + Sync,
 ) -> Vec<Outcome> {
+    let only = number("ABBE_STUDY_ONLY");
     numbers
         .into_par_iter()
+        .filter(|session| only.is_none_or(|only| only == *session))
         .map(|number| {
             let (kind, noise, effects) = make(number);
             let oracle = oracle(kind, noise);
@@ -108,7 +110,7 @@ pub fn run(
             }
             .noise(noise);
             let draw = recipe.draw_on(&oracle.plan);
-            let (result, seconds) = traced(&draw);
+            let (result, seconds) = traced(&draw, number);
             Outcome {
                 number,
                 kind,
@@ -122,12 +124,12 @@ pub fn run(
 }
 
 /// Trace on the files of a draw and on nothing else.
-fn traced(draw: &Draw) -> (TraceResult, f64) {
+fn traced(draw: &Draw, session_number: usize) -> (TraceResult, f64) {
     let folder = tempfile::tempdir().unwrap();
     draw.write(folder.path()).unwrap();
-    if let Some(number) = number("ABBE_STUDY_KEEP") {
-        draw.write(&std::env::temp_dir().join(format!("abbe-study-{number}")))
-            .unwrap();
+    if number("ABBE_STUDY_KEEP") == Some(session_number) {
+        let kept = std::env::temp_dir().join(format!("abbe-study-{session_number}"));
+        draw.write(&kept).unwrap();
     }
     let start = Instant::now();
     let read = session(&folder.path().join("session.toml"), &ReadOptions::default()).unwrap();
