@@ -36,10 +36,10 @@ fn kernels(criterion: &mut Criterion) {
     group.throughput(Throughput::Elements(N as u64));
     group.bench_function("by hand, one at a time", |bencher| {
         bencher.iter(|| {
-            for i in 0..N {
+            for row in &rows {
                 black_box(hand::reading(
                     black_box(&LENGTHS),
-                    black_box(at(i)),
+                    black_box(row),
                     black_box(&ERRORS),
                 ));
             }

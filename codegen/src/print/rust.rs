@@ -114,10 +114,21 @@ fn single(file: &mut String, code: &Code<'_>, gradient: bool) {
             .collect();
         let _ = writeln!(file, "    let [{}] = *{group};", names.join(", "));
     }
-    for line in code.lines(&dialect, |name, value| format!("    let {name} = {value};")) {
+    let mut lines = code.lines(&dialect, |name, value| format!("    let {name} = {value};"));
+    let results = code.results(&dialect);
+    // A last step that is all that is returned needs no name.
+    if let (false, [only], Some(last)) = (gradient, results.as_slice(), lines.last())
+        && let Some(value) = last.strip_prefix(&format!("    let {only} = "))
+    {
+        let value = value.trim_end_matches(';').to_string();
+        lines.pop();
+        lines.push(format!("    {value}\n}}\n"));
+        let _ = writeln!(file, "{}", lines.join("\n"));
+        return;
+    }
+    for line in lines {
         let _ = writeln!(file, "{line}");
     }
-    let results = code.results(&dialect);
     let (values, slopes) = results.split_at(code.outputs());
     let value = gathered(values);
     if gradient {
