@@ -6,7 +6,7 @@ use std::hint::black_box;
 
 use criterion::{Criterion, Throughput, criterion_group, criterion_main};
 
-#[allow(clippy::all)]
+#[allow(clippy::all, dead_code)]
 #[rustfmt::skip]
 mod emitted;
 mod hand;
