@@ -10,6 +10,7 @@
 
 pub mod alias;
 pub mod columns;
+pub mod compose;
 pub mod library;
 pub mod moments;
 pub mod null;
@@ -34,7 +35,7 @@ use columns::{Columns, Layout};
 use library::Candidate;
 use moments::Moments;
 use score::PriorMoments;
-use search::{Round, Search, Stop};
+use search::{Plain, Round, Search, Stop};
 
 /// What a user can ask of a trace.
 #[derive(Clone, Debug)]
@@ -118,9 +119,29 @@ pub fn trace<'a>(
 ) -> Result<Trace<'a>, IdentifyError> {
     progress(Progress::Fitting);
     let (mut problem, mut before_fit) = prepare(session, options.seed)?;
-    if give_noise_memory(&mut problem, &before_fit) {
+    if give_noise_memory(&mut problem, &before_fit.residuals) {
         before_fit = fit(&problem, Some(&before_fit.beta))?;
     }
+    let residuals = before_fit.residuals.clone();
+    let first = trace_with(problem, before_fit, &residuals, options, progress)?;
+    // What moved between runs was taken for noise as long as the model lacked it.
+    let mut problem = first.before.clone();
+    if first.effects.is_empty() || !give_noise_memory(&mut problem, &first.after_fit.residuals) {
+        return Ok(first);
+    }
+    let before_fit = fit(&problem, Some(&first.before_fit.beta))?;
+    let residuals = first.after_fit.residuals;
+    trace_with(problem, before_fit, &residuals, options, progress)
+}
+
+/// Closes the loop with a given noise; `pure` are the residuals whose repeats show it.
+fn trace_with<'a>(
+    problem: Problem<'a>,
+    before_fit: Fit,
+    pure: &[Vec<f64>],
+    options: &TraceOptions,
+    progress: &(dyn Fn(Progress) -> bool + Sync),
+) -> Result<Trace<'a>, IdentifyError> {
     let poses = problem.folds.kind == FoldKind::Poses;
     let columns = Columns::new(&problem, &before_fit.beta)?;
     let start = Start::of(&problem, &columns, &before_fit)?;
@@ -134,7 +155,7 @@ pub fn trace<'a>(
             options.seed.wrapping_add(salt),
         )
     };
-    let draws = null(&start.residual, &before_fit.residuals, 0);
+    let draws = null(&start.residual, pure, 0);
     let structure_before = if poses {
         None
     } else {
@@ -169,7 +190,8 @@ pub fn trace<'a>(
             .unwrap_or(if poses { MOST_OF_POSES } else { MOST_ALONG_RUNS }),
         in_residual_variance: poses,
     };
-    let mut search = Search::new(&columns, candidates, layouts, moments, prior, stop);
+    let plain = start.plain(&columns, &before_fit.beta, problem.noise.sigma_mm)?;
+    let mut search = Search::new(&columns, candidates, layouts, moments, prior, plain, stop);
     let seen = search
         .model_without(None)
         .gains()
@@ -234,7 +256,7 @@ fn search_on(
     progress: &(dyn Fn(Progress) -> bool + Sync),
 ) -> Option<f64> {
     loop {
-        match search.round(sharpen::sharpen) {
+        match search.round() {
             Round::Done { p_value } => return Some(p_value),
             Round::Added { candidate } => {
                 // Every exchange costs a model an effect; among many effects the gain is small and a sweep now and then will do.
@@ -330,13 +352,14 @@ fn start_of(after: &Problem<'_>, before: &Fit) -> Vec<f64> {
     start
 }
 
-/// Takes size and memory of the noise from repeats, where there are enough. Returns whether anything changed.
-fn give_noise_memory(problem: &mut Problem<'_>, fit: &Fit) -> bool {
+/// Takes size and memory of the noise from repeats, where there are enough. Returns whether that changed them by more than estimates of the noise
+/// scatter anyway.
+fn give_noise_memory(problem: &mut Problem<'_>, residuals: &[Vec<f64>]) -> bool {
     if problem.folds.kind == FoldKind::Poses {
         return false;
     }
     let kept = |test: usize, row: usize| !problem.rejected[test][row];
-    let pure = PureError::of(&problem.tests, &fit.residuals, kept);
+    let pure = PureError::of(&problem.tests, residuals, kept);
     let Some(memory) = pure.memory(&problem.tests, kept) else {
         return false;
     };
@@ -346,9 +369,18 @@ fn give_noise_memory(problem: &mut Problem<'_>, fit: &Fit) -> bool {
         noise.sigma_mm = sigma;
         noise.source = NoiseSource::Repeats;
     }
-    let changed = noise != problem.noise;
+    let present = &problem.noise;
+    let same_memory = noise.memory.len() == present.memory.len()
+        && noise
+            .memory
+            .iter()
+            .zip(&present.memory)
+            .all(|(a, b)| (a - b).abs() < 0.02);
+    if same_memory && (noise.sigma_mm / present.sigma_mm - 1.0).abs() < 0.02 {
+        return false;
+    }
     problem.noise = noise;
-    changed
+    true
 }
 
 /// The fitted model as the search takes it: orthonormal columns and the residual, whitened, in the order of the folds.
@@ -387,6 +419,20 @@ impl Start {
             to_unknowns,
             prior_rows,
             prior_residual,
+        })
+    }
+
+    fn plain(&self, columns: &Columns<'_, '_>, beta: &[f64], sigma_mm: f64) -> Result<Plain, IdentifyError> {
+        let rows = columns.plain_model_rows(beta)?;
+        let unknowns = beta.len();
+        let base = rows.as_ref().subcols(0, unknowns) * &self.to_unknowns;
+        Ok(Plain {
+            base: Mat::from_fn(base.nrows(), base.ncols(), |i, j| base[(i, j)] / sigma_mm),
+            residual: (0..rows.nrows())
+                .map(|i| rows[(i, unknowns)] / sigma_mm)
+                .collect(),
+            folds: columns.plain_folds(),
+            sigma_mm,
         })
     }
 

@@ -181,37 +181,39 @@ impl Moments {
         places
     }
 
-    /// Adds a candidate to those that are scored.
-    pub fn append(&mut self, columns: &Columns<'_, '_>, layout: &Layout) {
+    /// Adds candidates to those that are scored.
+    pub fn append(&mut self, columns: &Columns<'_, '_>, layouts: &[Layout]) {
         let side = self.side();
         let rank = self.base();
-        let products = products_by_fold(columns, std::slice::from_ref(layout), side.as_ref());
+        let products = products_by_fold(columns, layouts, side.as_ref());
         let draws = self.null.ncols();
         let total = self.null_cross.ncols();
-        self.first.push(total);
-        self.count.push(layout.count);
-        let mut of_null = Mat::<f64>::zeros(draws, layout.count);
+        let mut added = 0;
+        for layout in layouts {
+            self.first.push(total + added);
+            self.count.push(layout.count);
+            added += layout.count;
+        }
+        let mut of_null = Mat::<f64>::zeros(draws, added);
         for (fold, (product, own)) in products.into_iter().enumerate() {
             let moments = &mut self.folds[fold];
-            moments.cross = Mat::from_fn(rank, total + layout.count, |i, j| {
+            moments.cross = Mat::from_fn(rank, total + added, |i, j| {
                 if j < total {
                     moments.cross[(i, j)]
                 } else {
                     product[(i, j - total)]
                 }
             });
-            moments
-                .cross_y
-                .extend((0..layout.count).map(|k| product[(rank, k)]));
+            moments.cross_y.extend((0..added).map(|k| product[(rank, k)]));
             moments.own.extend(own);
             for d in 0..draws {
-                for k in 0..layout.count {
+                for k in 0..added {
                     of_null[(d, k)] += product[(rank + 1 + d, k)];
                 }
             }
         }
         let before = &self.null_cross;
-        self.null_cross = Mat::from_fn(draws, total + layout.count, |d, j| {
+        self.null_cross = Mat::from_fn(draws, total + added, |d, j| {
             if j < total {
                 before[(d, j)]
             } else {

@@ -143,8 +143,8 @@ impl<'m> Trained<'m> {
         }
     }
 
-    /// `D` and `g` of a candidate.
-    fn projected(&self, candidate: usize) -> (Mat<f64>, Vec<f64>, Mat<f64>) {
+    /// `D` and `g` of a candidate, and its product with itself.
+    pub fn projected(&self, candidate: usize) -> (Mat<f64>, Vec<f64>, Mat<f64>) {
         let (first, count) = (self.moments.first[candidate], self.moments.count[candidate]);
         let mut own = Mat::<f64>::zeros(count, count);
         let mut g = vec![0.0; count];
