@@ -6,7 +6,7 @@ use std::collections::HashMap;
 use std::sync::Arc;
 
 use abbe_model::effect::{DriverSample, Effect};
-use abbe_model::instrument::InsideUnit;
+use abbe_model::instrument::{InsideUnit, InstrumentKind};
 use abbe_model::sensitivity::Sensitivities;
 use faer::{Mat, MatMut};
 use rayon::prelude::*;
@@ -161,11 +161,14 @@ impl<'p, 'a> Columns<'p, 'a> {
         self.rows
     }
 
-    /// The greatest coefficient that an effect may plausibly have, in inside units.
+    /// The greatest coefficient that an effect may plausibly have, in inside units: 0.1 mm and 1 mrad on a machine tool, ten times as much on the
+    /// robots and long chains that trackers and sockets measure.
     pub fn plausible(&self, effect: &Effect, layout: &Layout) -> f64 {
+        let machine_tool = self.problem.session.instrument == InstrumentKind::BallBar;
+        let scale = if machine_tool { 1.0 } else { 10.0 };
         let most = match drivers::component_unit(self.problem.session, &effect.component) {
-            Some(InsideUnit::Millimetre) => 0.1,
-            Some(InsideUnit::Radian) => 1e-3,
+            Some(InsideUnit::Millimetre) => 0.1 * scale,
+            Some(InsideUnit::Radian) => 1e-3 * scale,
             Some(InsideUnit::Ratio) => 0.1,
             // The factor of a delay is the speed; a tenth of a second is long.
             None => return 0.1,
@@ -236,13 +239,14 @@ impl<'p, 'a> Columns<'p, 'a> {
     }
 
     /// Lays a shape over one coordinate of the readings of one test, whatever component would cause it; `by_direction` turns its sign with the
-    /// direction of travel. `None` where the data lack what it follows.
+    /// direction of travel, `rows` confines it. `None` where the data lack what it follows.
     pub fn reading_layout(
         &self,
         effect: &Effect,
         test: usize,
         coordinate: usize,
         by_direction: bool,
+        rows: Option<&std::ops::Range<usize>>,
     ) -> Option<Layout> {
         let session = self.problem.session;
         let readings = self.problem.tests[test].readings.as_ref()?;
@@ -259,7 +263,12 @@ impl<'p, 'a> Columns<'p, 'a> {
             .map(Arc::new)
         })?;
         let basis = Arc::new(drivers::basis_columns(&effect.shape, &samples));
-        let factor = by_direction.then(|| Arc::new(samples.iter().map(|sample| sample.direction).collect()));
+        let factor = (by_direction || rows.is_some()).then(|| {
+            let turned = |sample: &DriverSample<f64>| if by_direction { sample.direction } else { 1.0 };
+            let inside = |row: usize| rows.is_none_or(|rows| rows.contains(&row));
+            let factor = |(row, sample)| if inside(row) { turned(sample) } else { 0.0 };
+            Arc::new(samples.iter().enumerate().map(factor).collect())
+        });
         let mut parts = vec![Vec::new(); self.problem.tests.len()];
         parts[test].push(LayoutPart {
             moves: Moves::Reading(coordinate),

@@ -556,7 +556,12 @@ fn shapes(
             } else {
                 (sampling.low[axis], sampling.high[axis])
             };
-            [8, 16]
+            // At least one reading and a half an interval.
+            [8, 16, 32, 64]
+                .into_iter()
+                .filter(|intervals| {
+                    poses && *intervals <= 16 || step > 0.0 && 1.5 * step * *intervals as f64 <= span
+                })
                 .map(|intervals| {
                     all(
                         Shape::Curve {
@@ -568,7 +573,7 @@ fn shapes(
                         0.0,
                     )
                 })
-                .to_vec()
+                .collect()
         }
         _ => Vec::new(),
     }

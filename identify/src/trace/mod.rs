@@ -172,15 +172,17 @@ fn trace_with<'a>(
 
     let mut candidates = library::candidates(&problem)?;
     candidates.retain(|candidate| chosen(options, &candidate.effect.id()));
-    let (candidates, layouts): (Vec<Candidate>, Vec<Layout>) = candidates
+    let (reserve, candidates): (Vec<_>, Vec<_>) = candidates
         .into_iter()
         .filter_map(|candidate| {
             columns
                 .layout(&candidate.effect)
                 .map(|layout| (candidate, layout))
         })
-        .unzip();
-    progress(Progress::Screening(candidates.len()));
+        .partition(|(candidate, _)| candidate.last_resort);
+    let (candidates, layouts): (Vec<Candidate>, Vec<Layout>) = candidates.into_iter().unzip();
+    let looked_for = candidates.len() + reserve.len();
+    progress(Progress::Screening(looked_for));
     let (model, prior) = (start.model.clone(), start.prior());
     let moments = Moments::new(&columns, &layouts, model, &start.residual, draws);
     let stop = Stop {
@@ -198,7 +200,7 @@ fn trace_with<'a>(
         .iter()
         .filter(|gain| gain.freedom > 0)
         .count();
-    let looked_for = search.candidates.len();
+    search.reserve = reserve;
     let scale_um = problem.noise.sigma_mm * 1e3;
     let rms_um = |sum: f64| (sum / columns.rows().max(1) as f64).sqrt() * scale_um;
     let mut ended = search_on(&mut search, &rms_um, progress);
@@ -210,6 +212,7 @@ fn trace_with<'a>(
         .is_none_or(|structure| structure.p_value <= STRUCTURED);
     if unexplained && ended.is_some() && search.taken.len() < stop.most {
         // Nothing simpler is left: free curves.
+        search.bring_reserve();
         search.last_resort = true;
         let taken = search.taken.len();
         ended = search_on(&mut search, &rms_um, progress);
@@ -264,6 +267,7 @@ fn search_on(
                 if taken <= EXCHANGED_EACH_ROUND || taken.is_multiple_of(EXCHANGED_EACH) {
                     search.exchange();
                 }
+                search.merge();
                 let held_out = search.held_out.last().copied().unwrap_or(0.0);
                 let id = search.candidates[candidate].effect.id();
                 if !progress(Progress::Taken(search.taken.len(), id, rms_um(held_out))) {
@@ -364,9 +368,9 @@ fn give_noise_memory(problem: &mut Problem<'_>, residuals: &[Vec<f64>]) -> bool 
         return false;
     };
     let mut noise = problem.noise.clone();
-    noise.memory = memory;
+    noise.memory = memory.coefficients;
     if let Some(sigma) = pure.sigma_mm() {
-        noise.sigma_mm = sigma;
+        noise.sigma_mm = sigma * memory.inflation;
         noise.source = NoiseSource::Repeats;
     }
     let present = &problem.noise;

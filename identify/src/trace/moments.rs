@@ -37,10 +37,42 @@ pub struct FoldMoments {
     pub own: Vec<Mat<f64>>,
 }
 
+impl FoldMoments {
+    /// Over several folds together.
+    fn sum(folds: &[FoldMoments]) -> FoldMoments {
+        let Some((first, rest)) = folds.split_first() else {
+            return FoldMoments {
+                base: Mat::zeros(0, 0),
+                base_y: Vec::new(),
+                yy: 0.0,
+                cross: Mat::zeros(0, 0),
+                cross_y: Vec::new(),
+                own: Vec::new(),
+            };
+        };
+        let mut sum = first.clone();
+        let add = |to: &mut [f64], more: &[f64]| to.iter_mut().zip(more).for_each(|(to, more)| *to += more);
+        for fold in rest {
+            sum.base += &fold.base;
+            sum.cross += &fold.cross;
+            sum.yy += fold.yy;
+            add(&mut sum.base_y, &fold.base_y);
+            add(&mut sum.cross_y, &fold.cross_y);
+            sum.own
+                .iter_mut()
+                .zip(&fold.own)
+                .for_each(|(to, more)| *to += more);
+        }
+        sum
+    }
+}
+
 /// All products.
 pub struct Moments {
     /// By fold.
     pub folds: Vec<FoldMoments>,
+    /// Over all folds.
+    pub whole: FoldMoments,
     /// Null draws with candidates: draws × all candidate columns.
     pub null_cross: Mat<f64>,
     /// Base with null draws (readings part): base × draws.
@@ -102,8 +134,10 @@ impl Moments {
             });
         }
         let null_base = transposed_product(model.as_ref(), null.as_ref());
+        let whole = FoldMoments::sum(&folds);
         Moments {
             folds,
+            whole,
             null_cross,
             null_base,
             first,
@@ -178,6 +212,7 @@ impl Moments {
                 moments.base_y.push(sum);
             }
         }
+        self.whole = FoldMoments::sum(&self.folds);
         places
     }
 
@@ -212,6 +247,7 @@ impl Moments {
                 }
             }
         }
+        self.whole = FoldMoments::sum(&self.folds);
         let before = &self.null_cross;
         self.null_cross = Mat::from_fn(draws, total + added, |d, j| {
             if j < total {

@@ -6,6 +6,7 @@
 
 use std::collections::BTreeSet;
 
+use abbe_model::effect::Driver;
 use faer::Mat;
 use rayon::prelude::*;
 
@@ -64,6 +65,8 @@ pub struct Search<'s> {
     pub thresholds: Vec<f64>,
     /// Whether candidates of last resort are tried.
     pub last_resort: bool,
+    /// Candidates of last resort that are not laid over the readings yet.
+    pub reserve: Vec<(Candidate, Layout)>,
     plain: Plain,
     /// Entries of the library that would not stand out however large they plausibly were.
     unseen: Vec<bool>,
@@ -126,6 +129,7 @@ impl<'s> Search<'s> {
             held_out: Vec::new(),
             thresholds: Vec::new(),
             last_resort: false,
+            reserve: Vec::new(),
             plain,
             unseen: Vec::new(),
             stop,
@@ -247,21 +251,139 @@ impl<'s> Search<'s> {
             .collect()
     }
 
-    /// Adds what comes near the best, with the best numbers that it can have beside a model.
-    fn sharpen(&mut self, left_out: Option<usize>) {
+    /// Adds what comes near the best, with the best numbers that it can have beside a model of some candidates.
+    fn sharpen(&mut self, beside: &[usize]) {
         let fresh = {
-            let model = self.model_without(left_out);
+            let model = self.model_of(beside, &self.all_folds());
             sharpen::sharpened(self, &model, &self.composed(&model))
         };
-        let (candidates, layouts): (Vec<Candidate>, Vec<Layout>) = fresh
+        let fresh = fresh
             .into_iter()
             .filter_map(|candidate| Some((candidate.clone(), self.columns.layout(&candidate.effect)?)))
-            .unzip();
-        if !candidates.is_empty() {
-            self.moments.append(self.columns, &layouts);
-            self.candidates.extend(candidates);
-            self.layouts.extend(layouts);
+            .collect();
+        self.append(fresh);
+    }
+
+    fn append(&mut self, fresh: Vec<(Candidate, Layout)>) {
+        if fresh.is_empty() {
+            return;
         }
+        let (candidates, layouts): (Vec<Candidate>, Vec<Layout>) = fresh.into_iter().unzip();
+        self.moments.append(self.columns, &layouts);
+        self.candidates.extend(candidates);
+        self.layouts.extend(layouts);
+    }
+
+    /// Lays the candidates of last resort over the readings.
+    pub fn bring_reserve(&mut self) {
+        let reserve = std::mem::take(&mut self.reserve);
+        self.append(reserve);
+    }
+
+    fn model_of(&self, chosen: &[usize], folds: &[usize]) -> Trained<'_> {
+        Trained::new(&self.moments, &self.prior, self.base_with(chosen), folds.to_vec())
+    }
+
+    /// Puts several effects that follow one axis down to one, where that one says as much in fewer words: what they explain together is compared, each
+    /// effect being charged its cost and the number of entries of the library that it was chosen from. From three on, a free curve may be that one.
+    pub fn merge(&mut self) {
+        if self.stop.in_residual_variance {
+            return;
+        }
+        let mut drivers: Vec<Driver> = Vec::new();
+        for taken in &self.taken {
+            let driver = &self.candidates[taken.candidate].effect.driver;
+            if matches!(driver, Driver::Axis(_)) && !drivers.contains(driver) {
+                drivers.push(driver.clone());
+            }
+        }
+        let mut merged = false;
+        for driver in drivers {
+            let chosen: Vec<usize> = self.taken.iter().map(|taken| taken.candidate).collect();
+            let (group, rest) = self.following(&driver, &chosen);
+            if group.len() < 2 {
+                continue;
+            }
+            self.sharpen(&rest);
+            if group.len() > 2 {
+                self.bring_reserve();
+            }
+            let curves = group.len() > 2;
+            let pool: Vec<usize> = (0..self.candidates.len())
+                .filter(|c| !self.is_held_back(*c) || curves && self.candidates[*c].last_resort)
+                .filter(|c| !rest.contains(c))
+                .collect();
+            let Some(one) = self.in_fewer_words(&group, &rest, &pool, &self.all_folds()) else {
+                continue;
+            };
+            self.materialise(&[one]);
+            let of_group = |taken: &Taken| group.contains(&taken.candidate);
+            let p_value = self
+                .taken
+                .iter()
+                .filter(|t| of_group(t))
+                .map(|t| t.p_value)
+                .fold(1.0, f64::min);
+            let places = self.places(one);
+            self.taken.retain(|taken| !group.contains(&taken.candidate));
+            self.taken.push(Taken {
+                candidate: one,
+                places,
+                p_value,
+            });
+            for fold in self.all_folds() {
+                let (group, rest) = self.following(&driver, &self.of_fold[fold]);
+                if !group.is_empty()
+                    && self
+                        .in_fewer_words(&group, &rest, &[one], &self.others(fold))
+                        .is_some()
+                {
+                    self.of_fold[fold] = rest;
+                    self.of_fold[fold].push(one);
+                }
+            }
+            merged = true;
+        }
+        if merged {
+            let held_out = self.held_out_now();
+            if let Some(last) = self.held_out.last_mut() {
+                *last = held_out;
+            }
+        }
+    }
+
+    /// Which of the chosen follow a driver, and which do not.
+    fn following(&self, driver: &Driver, chosen: &[usize]) -> (Vec<usize>, Vec<usize>) {
+        chosen
+            .iter()
+            .partition(|candidate| self.candidates[**candidate].effect.driver == *driver)
+    }
+
+    /// The one of a pool that says more than a group, if there is one.
+    fn in_fewer_words(
+        &self,
+        group: &[usize],
+        rest: &[usize],
+        pool: &[usize],
+        folds: &[usize],
+    ) -> Option<usize> {
+        let without = self.model_of(rest, folds);
+        let variance = self.variance(&without);
+        let all: Vec<usize> = rest.iter().chain(group).copied().collect();
+        let of_group = Gain {
+            gain: self.model_of(&all, folds).explained() - without.explained(),
+            freedom: group.iter().map(|c| self.moments.count[*c]).sum(),
+            visible: 1.0,
+        };
+        let choice = (self.unseen.iter().filter(|unseen| !**unseen).count().max(1) as f64).ln();
+        let words: f64 = group.iter().map(|c| self.candidates[*c].cost + choice).sum();
+        let of_group = self.evidence(&of_group, variance) - words;
+        pool.par_iter()
+            .filter(|c| !group.contains(c))
+            .map(|c| (*c, self.score(*c, &without.gain(*c), variance) - choice))
+            .filter(|(_, one)| *one > of_group)
+            .max_by(|a, b| a.1.total_cmp(&b.1))
+            .map(|(c, _)| c)
     }
 
     fn best_of(&self, model: &Trained<'_>, taken: &[usize]) -> Option<(usize, f64)> {
@@ -340,7 +462,7 @@ impl<'s> Search<'s> {
         if p_value > self.stop.significance || self.taken.len() >= self.stop.most {
             return Round::Done { p_value };
         }
-        self.sharpen(None);
+        self.sharpen(&taken);
         let candidate = {
             let model = self.model_without(None);
             let Some((best, _)) = self.best_of(&model, &taken) else {
@@ -408,7 +530,12 @@ impl<'s> Search<'s> {
     /// Exchanges effects for candidates that explain clearly better what they stand for, in the search on all readings and in that of each fold.
     pub fn exchange(&mut self) {
         if self.taken.len() > 1 && !self.stop.in_residual_variance {
-            (0..self.taken.len()).for_each(|k| self.sharpen(Some(k)));
+            let chosen: Vec<usize> = self.taken.iter().map(|taken| taken.candidate).collect();
+            for k in 0..chosen.len() {
+                let mut others = chosen.clone();
+                others.remove(k);
+                self.sharpen(&others);
+            }
         }
         let mut of_all: Vec<usize> = self.taken.iter().map(|taken| taken.candidate).collect();
         self.exchange_in(&mut of_all, &self.all_folds());

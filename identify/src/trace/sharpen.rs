@@ -9,7 +9,7 @@ use abbe_model::effect::{Effect, Shape};
 
 use super::compose::Composed;
 use super::library::Candidate;
-use super::score::Trained;
+use super::score::{Gain, Trained};
 use super::search::Search;
 
 const STEPS: usize = 12;
@@ -58,18 +58,24 @@ pub fn sharpened(search: &Search<'_>, model: &Trained<'_>, composed: &[Composed]
             })
         })
         .collect();
-    fresh.extend(
-        composed
-            .iter()
-            .filter(|c| c.evidence >= best - BEHIND || c.score() >= 0.7 * best)
-            .map(|c| {
-                let effect = moved_steps(search, model, &c.candidate);
-                Candidate {
-                    effect,
-                    ..c.candidate.clone()
-                }
-            }),
-    );
+    let mut nearest: Vec<&Composed> = composed.iter().filter(|c| c.evidence >= NEAR * best).collect();
+    nearest.sort_by(|a, b| b.evidence.total_cmp(&a.evidence));
+    nearest.truncate(MOST);
+    for composed in nearest {
+        let (effect, gain) = moved_steps(search, model, &composed.candidate);
+        let gain = Gain {
+            gain,
+            freedom: effect.shape.coefficients(),
+            visible: 1.0,
+        };
+        let evidence = search.evidence(&gain, variance);
+        if evidence >= best - BEHIND || evidence - composed.candidate.cost >= NEAR * best {
+            fresh.push(Candidate {
+                effect,
+                ..composed.candidate.clone()
+            });
+        }
+    }
     fresh.retain(|candidate| {
         !search
             .candidates
@@ -119,18 +125,18 @@ fn sharpen(search: &Search<'_>, model: &Trained<'_>, original: &Candidate, befor
     (best > before * (1.0 + 1e-6)).then_some(effect)
 }
 
-/// Moves each step by parts of the grid to where all together gain most.
-fn moved_steps(search: &Search<'_>, model: &Trained<'_>, candidate: &Candidate) -> Effect {
+/// Moves each step by parts of the grid to where all together gain most; what that is.
+fn moved_steps(search: &Search<'_>, model: &Trained<'_>, candidate: &Candidate) -> (Effect, f64) {
     let original = &candidate.effect;
+    let mut best = search.gain_beside(model, original).unwrap_or(0.0);
     let Shape::Steps { at } = &original.shape else {
-        return original.clone();
+        return (original.clone(), best);
     };
     let mut places = at.clone();
     let with = |places: &[f64]| Effect {
         shape: Shape::Steps { at: places.to_vec() },
         ..original.clone()
     };
-    let mut best = search.gain_beside(model, original).unwrap_or(0.0);
     for _ in 0..2 {
         for k in 0..places.len() {
             let middle = places[k];
@@ -146,7 +152,7 @@ fn moved_steps(search: &Search<'_>, model: &Trained<'_>, candidate: &Candidate) 
         }
     }
     places.sort_by(f64::total_cmp);
-    with(&places)
+    (with(&places), best)
 }
 
 /// The numbers of a shape with the interval around each that the grid leaves open.

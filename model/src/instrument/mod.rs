@@ -183,6 +183,17 @@ impl<N> Station<N> {
         }
     }
 
+    /// The point of the table frame that the instrument holds, mm, if it holds one.
+    pub fn table_point_mm(&self) -> Option<[N; 3]>
+    where
+        N: Copy,
+    {
+        match self {
+            Station::BallBar(bar) => Some(bar.workpiece_ball),
+            Station::Tracker(_) | Station::Socket(_) => None,
+        }
+    }
+
     /// The point of the tool frame that the instrument holds, mm.
     pub fn tool_point_mm(&self) -> [N; 3]
     where
