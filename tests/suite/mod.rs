@@ -8,6 +8,8 @@ mod measured;
 mod new;
 mod nist;
 mod plan_help;
+mod plan_methods;
+mod plan_next;
 mod plan_rank;
 mod plan_uncertainty;
 mod recovery;

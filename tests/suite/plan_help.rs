@@ -44,8 +44,12 @@ pub fn noise_um(um: f64) -> Noise {
 /// A plan linearised.
 pub fn linearised(session: &Session) -> (Vec<String>, Linearisation) {
     let complete = states::complete(session, true).unwrap();
-    let problem = states::problem_by_test(&complete, noise_um(session.noise_mm.unwrap_or(3e-4) * 1e3)).unwrap();
+    let problem =
+        states::problem_by_test(&complete, noise_um(session.noise_mm.unwrap_or(3e-4) * 1e3)).unwrap();
     let list = &problem.parameters.list;
     let linear = Linearisation::of(&problem, &vec![0.0; list.len()]).unwrap();
-    (list.iter().map(|parameter| parameter.id.clone()).collect(), linear)
+    (
+        list.iter().map(|parameter| parameter.id.clone()).collect(),
+        linear,
+    )
 }

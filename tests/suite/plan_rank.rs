@@ -5,7 +5,11 @@ use super::plan_help::{linearised, machine, session};
 const D: f64 = 111.803;
 
 fn head(errors: &str) -> String {
-    let unknowns = if errors.is_empty() { String::new() } else { format!("[unknowns]\nerrors = [{errors}]\n") };
+    let unknowns = if errors.is_empty() {
+        String::new()
+    } else {
+        format!("[unknowns]\nerrors = [{errors}]\n")
+    };
     let machine = machine("w C A b Y X Z t", None);
     format!("{machine}\n[instrument]\nkind = \"ballbar\"\nnoise_um = 0.3\n{unknowns}")
 }
@@ -24,10 +28,19 @@ fn known(name: &str, axis: &str, ball: [f64; 3], spindle: [f64; 3]) -> String {
 fn rank(height: f64, spindles: &[(&str, [f64; 3])]) -> (usize, Vec<String>) {
     let mut text = head("");
     for (number, (axis, spindle)) in spindles.iter().enumerate() {
-        text.push_str(&known(&format!("{axis}{number}"), axis, [0.0, 100.0, height], *spindle));
+        text.push_str(&known(
+            &format!("{axis}{number}"),
+            axis,
+            [0.0, 100.0, height],
+            *spindle,
+        ));
     }
     let (ids, linear) = linearised(&session(&text));
-    let unseen = ids.iter().enumerate().filter(|(j, _)| !linear.rank.is_seen(*j)).map(|(_, id)| id.clone());
+    let unseen = ids
+        .iter()
+        .enumerate()
+        .filter(|(j, _)| !linear.rank.is_seen(*j))
+        .map(|(_, id)| id.clone());
     (linear.rank.seen.ncols(), unseen.collect())
 }
 
@@ -37,7 +50,10 @@ fn the_eight_errors_have_rank_six_seven_and_eight() {
     let four = [("A", [0.0; 3]), ("A", side), ("C", [0.0; 3]), ("C", side)];
     let (flat, unseen) = rank(0.0, &four);
     assert_eq!(flat, 6, "{unseen:?}");
-    assert!(unseen.contains(&"EA0C".to_string()) && unseen.contains(&"EB0C".to_string()), "{unseen:?}");
+    assert!(
+        unseen.contains(&"EA0C".to_string()) && unseen.contains(&"EB0C".to_string()),
+        "{unseen:?}"
+    );
     let (high, unseen) = rank(50.0, &four);
     assert_eq!((high, unseen), (7, vec!["EA0C".to_string()]));
     let mut five = four.to_vec();
@@ -64,7 +80,12 @@ fn seen_by_itself(orders: std::ops::RangeInclusive<usize>) -> (usize, usize, Vec
         }
     }
     let (ids, linear) = linearised(&session(&text));
-    let seen = ids.iter().enumerate().filter(|(j, _)| linear.rank.is_seen(*j)).map(|(_, id)| id.clone()).collect();
+    let seen = ids
+        .iter()
+        .enumerate()
+        .filter(|(j, _)| linear.rank.is_seen(*j))
+        .map(|(_, id)| id.clone())
+        .collect();
     (linear.rank.seen.ncols(), ids.len(), seen)
 }
 

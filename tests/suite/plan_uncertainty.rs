@@ -35,7 +35,11 @@ fn plan(code: &str) -> Session {
             carried[along] = height;
             other[along] = height + beside;
             let bar = 100.0_f64.hypot(beside);
-            let (workpiece, spindle) = if at < bed { (carried, other) } else { (other, carried) };
+            let (workpiece, spindle) = if at < bed {
+                (carried, other)
+            } else {
+                (other, carried)
+            };
             text.push_str(&format!(
                 "[[test]]\nname = \"{letter}{height}\"\nbar_mm = {bar}\nworkpiece_ball_mm = {workpiece:?}\nspindle_ball_mm = {spindle:?}\n\
                  workpiece_ball_u_um = [2, 2, 2]\nspindle_ball_u_um = [1, 1, 1]\nspindle_setup = \"S{letter}\"\nsetup = \"W{letter}{}\"\nbar_u_um = 0.5\n\
@@ -51,7 +55,11 @@ fn plan(code: &str) -> Session {
 fn linear_step(problem: &Problem<'_>, basis: &Mat<f64>) -> Vec<f64> {
     let nominal = vec![0.0; problem.parameters.list.len()];
     let mut whole = problem.prior_triangle(&nominal);
-    problem.triangles(&nominal).unwrap().iter().for_each(|triangle| whole.merge(triangle));
+    problem
+        .triangles(&nominal)
+        .unwrap()
+        .iter()
+        .for_each(|triangle| whole.merge(triangle));
     let (r, c, _) = whole.parts();
     let reduced = &r * basis;
     let c = Mat::from_fn(c.len(), 1, |i, _| c[i]);
@@ -72,11 +80,23 @@ fn squares(code: &str, first_seed: usize, whole_fit: bool) -> Vec<(String, f64)>
             .map(|name| {
                 let normal: f64 = StandardNormal.sample(&mut random);
                 let unit = if name.freedom.is_angle() { "arcsec" } else { "um" };
-                Given { id: name.to_string(), value: ERRORS_UM * normal, unit: unit.to_string() }
+                Given {
+                    id: name.to_string(),
+                    value: ERRORS_UM * normal,
+                    unit: unit.to_string(),
+                }
             })
             .collect();
-        let drawn =
-            simulate(&plan, &Simulation { given, noise_mm: None, draw_setups: true, seed: (first_seed + number) as u64 }).unwrap();
+        let drawn = simulate(
+            &plan,
+            &Simulation {
+                given,
+                noise_mm: None,
+                draw_setups: true,
+                seed: (first_seed + number) as u64,
+            },
+        )
+        .unwrap();
         let mut measured = plan.clone();
         for (test, readings) in measured.tests.iter_mut().zip(drawn.readings) {
             test.readings = Some(readings);
@@ -90,7 +110,13 @@ fn squares(code: &str, first_seed: usize, whole_fit: bool) -> Vec<(String, f64)>
         };
         let truth = |id: &str| {
             let named = drawn.truth.iter().find(|(name, _, _)| name == id);
-            named.map_or(0.0, |(_, value, unit)| if unit == "arcsec" { value / ARCSEC } else { value * 1e-3 })
+            named.map_or(0.0, |(_, value, unit)| {
+                if unit == "arcsec" {
+                    value / ARCSEC
+                } else {
+                    value * 1e-3
+                }
+            })
         };
         seen.iter()
             .map(|&j| ((found[j] - truth(&ids[j])).powi(2)) / linear.covariance[(j, j)])
@@ -100,7 +126,10 @@ fn squares(code: &str, first_seed: usize, whole_fit: bool) -> Vec<(String, f64)>
         || vec![0.0; seen.len()],
         |a, b| a.iter().zip(&b).map(|(a, b)| a + b).collect(),
     );
-    seen.iter().zip(sums).map(|(j, sum)| (ids[*j].clone(), sum)).collect()
+    seen.iter()
+        .zip(sums)
+        .map(|(j, sum)| (ids[*j].clone(), sum))
+        .collect()
 }
 
 /// That every sum is χ² with `FITS` degrees of freedom: over some 400 of them 4.5 standard deviations are exceeded once in 400 suites.
@@ -108,11 +137,20 @@ fn check(code: &str, sums: &[(String, f64)]) {
     let spread = (2.0 * FITS as f64).sqrt();
     let errors = sums.iter().filter(|(id, _)| id.starts_with('E')).count();
     let ratio = |sum: f64| (sum / FITS as f64).sqrt();
-    let low = sums.iter().map(|(_, sum)| ratio(*sum)).fold(f64::INFINITY, f64::min);
+    let low = sums
+        .iter()
+        .map(|(_, sum)| ratio(*sum))
+        .fold(f64::INFINITY, f64::min);
     let high = sums.iter().map(|(_, sum)| ratio(*sum)).fold(0.0, f64::max);
-    println!("{code}: {errors} errors and {} set-up quantities, found/predicted {low:.3} to {high:.3}", sums.len() - errors);
+    println!(
+        "{code}: {errors} errors and {} set-up quantities, found/predicted {low:.3} to {high:.3}",
+        sums.len() - errors
+    );
     for (id, sum) in sums {
-        assert!((sum - FITS as f64).abs() < 4.5 * spread, "{code} {id}: χ² {sum:.0} over {FITS}");
+        assert!(
+            (sum - FITS as f64).abs() < 4.5 * spread,
+            "{code} {id}: χ² {sum:.0} over {FITS}"
+        );
     }
     // With one axis in the head and one in the table only their lines' distance and angle are seen: two pairs of errors are one each.
     let divided = code.starts_with("[wC") && !code.starts_with("[wCA") && !code.starts_with("[wCB");

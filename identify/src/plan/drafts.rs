@@ -241,10 +241,8 @@ impl Base<'_> {
             }
         }
         name.push_str(words);
-        if self.place.new {
-            name.push_str(&format!(", {ball} mounted anew"));
-        } else {
-            name.push_str(&format!(", ball as in set-up {}", self.place.setup));
+        if !self.place.new {
+            name.push_str(&format!(" ({ball} as in {})", self.place.setup));
         }
         let geometry = Station::BallBar(BallBar {
             workpiece_ball: station.workpiece_ball.map(Length::Number),

@@ -47,10 +47,24 @@ impl Default for Menu {
             standing_deg: vec![0.0, 90.0, -90.0, 180.0],
             follow: true,
             keep_spindle_ball: true,
-            reach_mm: 1.0,
+            reach_mm: super::BAR_TRAVEL_MM,
             setup_min: 5.0,
             test_min: 1.0,
             thin: 1,
+        }
+    }
+}
+
+impl Menu {
+    /// A short menu, every fourth position: to name a test beside a result, not to choose the last per cent.
+    pub fn short() -> Menu {
+        Menu {
+            radii_mm: vec![50.0, 100.0, 150.0],
+            heights_mm: vec![0.0, 100.0],
+            standing_deg: vec![0.0],
+            keep_spindle_ball: false,
+            thin: 4,
+            ..Menu::default()
         }
     }
 }

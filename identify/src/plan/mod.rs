@@ -29,5 +29,5 @@ pub mod separate;
 pub mod states;
 mod sweep;
 
-pub use analysis::{PlanOptions, analyse, analyse_problem, prepared};
+pub use analysis::{BAR_TRAVEL_MM, PlanOptions, analyse, analyse_problem, prepared};
 pub use separate::{Separated, separation};

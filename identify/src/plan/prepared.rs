@@ -3,11 +3,12 @@
 use rayon::prelude::*;
 
 use super::information::{Root, Shared, sum};
-use super::linear::Linearisation;
+use super::linear::{Linearisation, merged};
 use super::menu::{Entry, Menu};
 use crate::error::IdentifyError;
 use crate::parameters::{Parameter, Role};
 use crate::problem::Problem;
+use crate::triangle::Triangle;
 
 /// A menu made ready: the information of every entry on the shared unknowns.
 pub struct Prepared {
@@ -90,41 +91,46 @@ fn may_be_shared(problem: &Problem<'_>, parameter: &Parameter) -> bool {
         || !parameter.id.contains('[')
 }
 
-/// The information of an entry, with its own spindle ball and, where the menu allows it, with the one that is left mounted.
+/// The information of an entry, with a spindle ball mounted for it and, where the menu allows it, with the one that is left mounted. The
+/// readings are the same.
 fn ready(
     problem: &Problem<'_>,
     shared: &Shared,
     entry: Entry,
     menu: &Menu,
 ) -> Result<Vec<Ready>, IdentifyError> {
-    let mut variants = vec![entry];
-    let last = problem.tests.last().filter(|_| menu.keep_spindle_ball);
-    if let Some(last) = last
-        && last.station.tool_point_mm() == variants[0].test.station.tool_point_mm()
-    {
-        let mut left = variants[0].clone();
-        left.test.spindle_setup = last.spindle_setup.clone();
-        left.name
-            .push_str(&format!(", spindle ball left as in {}", last.name));
-        variants.push(left);
+    let mut session = problem.session.clone();
+    session.tests = vec![entry.test.clone()];
+    session.effects = Vec::new();
+    session.socket_distances = Vec::new();
+    let mut noise = problem.noise.clone();
+    noise.sigma_mm /= (menu.thin.max(1) as f64).sqrt();
+    let mut alone = Problem::new(&session, noise, 0)?;
+    alone.origin = problem.origin;
+    for effect in &problem.parameters.effects {
+        alone.add_effect(effect)?;
     }
-    let weight = (menu.thin.max(1) as f64).sqrt();
-    variants
-        .into_iter()
-        .map(|entry| {
-            let mut session = problem.session.clone();
-            session.tests = vec![entry.test.clone()];
-            session.effects = Vec::new();
-            session.socket_distances = Vec::new();
-            let mut noise = problem.noise.clone();
-            noise.sigma_mm /= weight;
-            let mut alone = Problem::new(&session, noise, 0)?;
-            alone.origin = problem.origin;
-            for effect in &problem.parameters.effects {
-                alone.add_effect(effect)?;
-            }
-            let root = shared.root_of_test(&alone)?;
-            Ok(Ready { entry, root })
-        })
-        .collect()
+    let nominal = vec![0.0; alone.parameters.list.len()];
+    let triangle = merged(Triangle::new(nominal.len()), alone.triangles(&nominal)?.iter());
+    let r = triangle.parts().0;
+    let mut ready = Vec::new();
+    let last = problem.tests.last().filter(|last| {
+        menu.keep_spindle_ball && last.station.tool_point_mm() == entry.test.station.tool_point_mm()
+    });
+    if let Some(last) = last {
+        let [own, left] = [&entry.test.spindle_setup, &last.spindle_setup].map(|setup| format!("[{setup}]"));
+        let root = shared.root_of_test(&alone, r.as_ref(), |id| match id.strip_suffix(&own) {
+            Some(stem) if id.starts_with("spindle_ball.") => format!("{stem}{left}"),
+            _ => id.to_string(),
+        });
+        let mut entry = entry.clone();
+        entry.test.spindle_setup = last.spindle_setup.clone();
+        entry
+            .name
+            .push_str(&format!(", spindle ball left as in {}", last.name));
+        ready.push(Ready { entry, root });
+    }
+    let root = shared.root_of_test(&alone, r.as_ref(), str::to_string);
+    ready.insert(0, Ready { entry, root });
+    Ok(ready)
 }
