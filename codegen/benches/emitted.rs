@@ -37,16 +37,7 @@ pub const ERRORS: usize = 8;
 pub fn bar_length(lengths: &[f64; LENGTHS], axes: &[f64; AXES], errors: &[f64; ERRORS]) -> f64 {
     let [d, r, h, z_ca] = *lengths;
     let [sin_c, cos_c, sin_a, cos_a] = *axes;
-    let [
-        e_y0a,
-        e_z0a,
-        theta_y0a,
-        theta_z0a,
-        e_x0c,
-        e_y0c,
-        theta_x0c,
-        theta_y0c,
-    ] = *errors;
+    let [e_y0a, e_z0a, theta_y0a, theta_z0a, e_x0c, e_y0c, theta_x0c, theta_y0c] = *errors;
     let pt_a_z = h - z_ca;
     let t1 = r * sin_c;
     let pt_a_y = r * cos_c;
@@ -59,28 +50,18 @@ pub fn bar_length(lengths: &[f64; LENGTHS], axes: &[f64; AXES], errors: &[f64; E
     let p_r_y = pt_r_y + theta_z0a * p_a_x + e_y0a;
     let p_r_z = pt_r_z - theta_y0a * p_a_x + e_z0a;
     let b_x = p_r_x + d;
-    let reading = elementary::sqrt(b_x * b_x + p_r_y * p_r_y + p_r_z * p_r_z);
-    reading
+    elementary::sqrt(b_x * b_x + p_r_y * p_r_y + p_r_z * p_r_z)
 }
 
 /// Values of columns of readings: a slice for each axis input, for each output.
 ///
 /// # Panics
 /// If a column has another length than `value[0]`.
-pub fn bar_length_columns(
-    lengths: &[f64; LENGTHS],
-    axes: &[&[f64]; AXES],
-    errors: &[f64; ERRORS],
-    value: &mut [&mut [f64]; 1],
-) {
-    const LANES: usize = 8;
+pub fn bar_length_columns(lengths: &[f64; LENGTHS], axes: &[&[f64]; AXES], errors: &[f64; ERRORS], value: &mut [&mut [f64]; 1]) {
+    const LANES: usize = 4;
     let n = value[0].len();
     for column in axes {
-        assert_eq!(
-            column.len(),
-            n,
-            "a column of axis positions is not as long as the values"
-        );
+        assert_eq!(column.len(), n, "a column of axis positions is not as long as the values");
     }
     let mut at = 0;
     while at + LANES <= n {
@@ -107,23 +88,10 @@ pub fn bar_length_columns(
 /// Value and gradient of one reading.
 #[inline(always)]
 #[must_use]
-pub fn bar_length_gradient(
-    lengths: &[f64; LENGTHS],
-    axes: &[f64; AXES],
-    errors: &[f64; ERRORS],
-) -> (f64, [f64; ERRORS]) {
+pub fn bar_length_gradient(lengths: &[f64; LENGTHS], axes: &[f64; AXES], errors: &[f64; ERRORS]) -> (f64, [f64; ERRORS]) {
     let [d, r, h, z_ca] = *lengths;
     let [sin_c, cos_c, sin_a, cos_a] = *axes;
-    let [
-        e_y0a,
-        e_z0a,
-        theta_y0a,
-        theta_z0a,
-        e_x0c,
-        e_y0c,
-        theta_x0c,
-        theta_y0c,
-    ] = *errors;
+    let [e_y0a, e_z0a, theta_y0a, theta_z0a, e_x0c, e_y0c, theta_x0c, theta_y0c] = *errors;
     let pt_a_z = h - z_ca;
     let t1 = r * sin_c;
     let pt_a_y = r * cos_c;
@@ -163,21 +131,11 @@ pub fn bar_length_gradient(
 ///
 /// # Panics
 /// If a column has another length than `value[0]`.
-pub fn bar_length_gradient_columns(
-    lengths: &[f64; LENGTHS],
-    axes: &[&[f64]; AXES],
-    errors: &[f64; ERRORS],
-    value: &mut [&mut [f64]; 1],
-    gradient: &mut [&mut [f64]; 8],
-) {
-    const LANES: usize = 8;
+pub fn bar_length_gradient_columns(lengths: &[f64; LENGTHS], axes: &[&[f64]; AXES], errors: &[f64; ERRORS], value: &mut [&mut [f64]; 1], gradient: &mut [&mut [f64]; 8]) {
+    const LANES: usize = 4;
     let n = value[0].len();
     for column in axes {
-        assert_eq!(
-            column.len(),
-            n,
-            "a column of axis positions is not as long as the values"
-        );
+        assert_eq!(column.len(), n, "a column of axis positions is not as long as the values");
     }
     let mut at = 0;
     while at + LANES <= n {
@@ -188,8 +146,7 @@ pub fn bar_length_gradient_columns(
             block.copy_from_slice(&column[at..at + LANES]);
         }
         for lane in 0..LANES {
-            let (values, slopes) =
-                bar_length_gradient(lengths, &[x[0][lane], x[1][lane], x[2][lane], x[3][lane]], errors);
+            let (values, slopes) = bar_length_gradient(lengths, &[x[0][lane], x[1][lane], x[2][lane], x[3][lane]], errors);
             v[0][lane] = values;
             g[0][lane] = slopes[0];
             g[1][lane] = slopes[1];
@@ -209,8 +166,7 @@ pub fn bar_length_gradient_columns(
         at += LANES;
     }
     for i in at..n {
-        let (values, slopes) =
-            bar_length_gradient(lengths, &[axes[0][i], axes[1][i], axes[2][i], axes[3][i]], errors);
+        let (values, slopes) = bar_length_gradient(lengths, &[axes[0][i], axes[1][i], axes[2][i], axes[3][i]], errors);
         value[0][i] = values;
         for (k, slope) in slopes.iter().enumerate() {
             gradient[k][i] = *slope;

@@ -3,7 +3,7 @@
 
 /// One reading. `[sin_c, cos_c, sin_a, cos_a]`; errors e_y0a, e_z0a, θ_y0a, θ_z0a, e_x0c, e_y0c, θ_x0c, θ_y0c.
 #[inline(always)]
-pub fn reading([d, r, h, z_ca]: &[f64; 4], [sc, cc, sa, ca]: [f64; 4], e: &[f64; 8]) -> (f64, [f64; 8]) {
+pub fn reading([d, r, h, z_ca]: &[f64; 4], [sc, cc, sa, ca]: &[f64; 4], e: &[f64; 8]) -> (f64, [f64; 8]) {
     let [ey, ez, ty, tz, fx, fy, gx, gy] = *e;
     let z = h - z_ca;
     let (rs, y) = (r * sc, r * cc);
@@ -71,7 +71,7 @@ fn columns_of(
     let (g0, g1, g2, g3) = (&mut g0[..n], &mut g1[..n], &mut g2[..n], &mut g3[..n]);
     let (g4, g5, g6, g7) = (&mut g4[..n], &mut g5[..n], &mut g6[..n], &mut g7[..n]);
     for i in 0..n {
-        let (length, g) = reading(lengths, [sc[i], cc[i], sa[i], ca[i]], errors);
+        let (length, g) = reading(lengths, &[sc[i], cc[i], sa[i], ca[i]], errors);
         value[i] = length;
         g0[i] = g[0];
         g1[i] = g[1];

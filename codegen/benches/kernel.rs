@@ -6,7 +6,7 @@ use std::hint::black_box;
 
 use criterion::{Criterion, Throughput, criterion_group, criterion_main};
 
-#[allow(clippy::all)]
+#[allow(clippy::all, dead_code)]
 #[rustfmt::skip]
 mod emitted;
 mod hand;
@@ -29,15 +29,17 @@ fn axes() -> [Vec<f64>; 4] {
 
 fn kernels(criterion: &mut Criterion) {
     let axes = axes();
-    let at = |i: usize| [axes[0][i], axes[1][i], axes[2][i], axes[3][i]];
+    let rows: Vec<[f64; 4]> = (0..N)
+        .map(|i| [axes[0][i], axes[1][i], axes[2][i], axes[3][i]])
+        .collect();
     let mut group = criterion.benchmark_group("value and eight derivatives");
     group.throughput(Throughput::Elements(N as u64));
     group.bench_function("by hand, one at a time", |bencher| {
         bencher.iter(|| {
-            for i in 0..N {
+            for row in &rows {
                 black_box(hand::reading(
                     black_box(&LENGTHS),
-                    black_box(at(i)),
+                    black_box(row),
                     black_box(&ERRORS),
                 ));
             }
@@ -45,10 +47,10 @@ fn kernels(criterion: &mut Criterion) {
     });
     group.bench_function("printed, one at a time", |bencher| {
         bencher.iter(|| {
-            for i in 0..N {
+            for row in &rows {
                 black_box(emitted::bar_length_gradient(
                     black_box(&LENGTHS),
-                    &black_box(at(i)),
+                    black_box(row),
                     black_box(&ERRORS),
                 ));
             }

@@ -280,6 +280,10 @@ fn parameters(
         })?;
         parameters.push(Variable::Unknown(*unknown));
     }
+    // Named here, they keep the order in which they were asked for wherever terms are sorted.
+    for parameter in &parameters {
+        arena.variable(parameter.clone());
+    }
     Ok(parameters)
 }
 

@@ -6,7 +6,7 @@
 //! - [`polynomial`], [`normal`]: the exact normal form, in which equality is decided;
 //! - [`equation`]: the closed form of a reading, with its named vectors;
 //! - [`first`]: its first order, as a table of sensitivities; [`check`]: what confirms it before it is written;
-//! - [`program`], [`print`]: as a sequence of steps, and in a language.
+//! - [`program`], [`mod@print`]: as a sequence of steps, and in a language.
 
 pub mod check;
 pub mod derivative;

@@ -231,8 +231,17 @@ fn autoregression(covariance: &[f64; MOST + 1], insignificant: f64) -> Vec<f64> 
 
 /// Autocorrelations of a process, and what is seen of them once a straight line is taken out of runs of these lengths (and how many readings are in
 /// runs of each).
-fn with_lines_out(coefficients: &[f64], lengths: &BTreeMap<usize, usize>) -> ([f64; MOST + 1], [f64; MOST + 1]) {
-    let longest = lengths.keys().copied().filter(|n| *n <= LONG).max().unwrap_or(0).max(MOST + 1);
+fn with_lines_out(
+    coefficients: &[f64],
+    lengths: &BTreeMap<usize, usize>,
+) -> ([f64; MOST + 1], [f64; MOST + 1]) {
+    let longest = lengths
+        .keys()
+        .copied()
+        .filter(|n| *n <= LONG)
+        .max()
+        .unwrap_or(0)
+        .max(MOST + 1);
     // Impulse response, long enough for any memory that is not a drift.
     let mut response = vec![0.0; longest + 2000];
     response[0] = 1.0;
@@ -246,7 +255,14 @@ fn with_lines_out(coefficients: &[f64], lengths: &BTreeMap<usize, usize>) -> ([f
     }
     let power: f64 = response.iter().map(|r| r * r).sum();
     let correlation: Vec<f64> = (0..longest)
-        .map(|lag| response[lag..].iter().zip(&response).map(|(a, b)| a * b).sum::<f64>() / power)
+        .map(|lag| {
+            response[lag..]
+                .iter()
+                .zip(&response)
+                .map(|(a, b)| a * b)
+                .sum::<f64>()
+                / power
+        })
         .collect();
     let process = std::array::from_fn(|lag| correlation[lag]);
     let mut shown = [0.0; MOST + 1];

@@ -7,10 +7,16 @@ mod jacobians;
 mod measured;
 mod new;
 mod nist;
+mod plan_help;
+mod plan_methods;
+mod plan_next;
+mod plan_rank;
+mod plan_uncertainty;
 mod recovery;
 mod robots;
 mod simulate;
 mod topologies;
+mod trace;
 
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output};

@@ -114,10 +114,21 @@ fn single(file: &mut String, code: &Code<'_>, gradient: bool) {
             .collect();
         let _ = writeln!(file, "    let [{}] = *{group};", names.join(", "));
     }
-    for line in code.lines(&dialect, |name, value| format!("    let {name} = {value};")) {
+    let mut lines = code.lines(&dialect, |name, value| format!("    let {name} = {value};"));
+    let results = code.results(&dialect);
+    // A last step that is all that is returned needs no name.
+    if let (false, [only], Some(last)) = (gradient, results.as_slice(), lines.last())
+        && let Some(value) = last.strip_prefix(&format!("    let {only} = "))
+    {
+        let value = value.trim_end_matches(';').to_string();
+        lines.pop();
+        lines.push(format!("    {value}\n}}\n"));
+        let _ = writeln!(file, "{}", lines.join("\n"));
+        return;
+    }
+    for line in lines {
         let _ = writeln!(file, "{line}");
     }
-    let results = code.results(&dialect);
     let (values, slopes) = results.split_at(code.outputs());
     let value = gathered(values);
     if gradient {
@@ -137,7 +148,8 @@ fn single(file: &mut String, code: &Code<'_>, gradient: bool) {
     file.push_str("}\n\n");
 }
 
-/// Readings eight at a time: the arrays of a block cannot overlap, so that the loop over its lanes is vectorised.
+/// Readings four at a time: the arrays of a block cannot overlap, so that the loop over its lanes is vectorised, and they are small
+/// enough to stay in registers.
 fn columns(file: &mut String, code: &Code<'_>, gradient: bool) {
     let name = function(code, gradient);
     let (outputs, errors) = (code.outputs(), code.errors());
@@ -152,7 +164,7 @@ fn columns(file: &mut String, code: &Code<'_>, gradient: bool) {
         "/// Values{and} of columns of readings: a slice for each axis input, for each output{}.\n\
          ///\n/// # Panics\n/// If a column has another length than `value[0]`.\n\
          pub fn {name}_columns(lengths: &[f64; LENGTHS], axes: &[&[f64]; AXES], errors: &[f64; ERRORS], value: &mut [&mut [f64]; {outputs}]{slopes}) {{\n    \
-         const LANES: usize = 8;\n    \
+         const LANES: usize = 4;\n    \
          let n = value[0].len();\n    \
          for column in axes {{\n        assert_eq!(column.len(), n, \"a column of axis positions is not as long as the values\");\n    }}\n",
         if gradient {

@@ -12,7 +12,7 @@ use crate::symbol::Unary;
 use crate::variable::{Symbols, Variable};
 
 /// Visible signs on a line.
-const WIDTH: usize = 80;
+const WIDTH: usize = 72;
 
 struct Typst<'a> {
     program: &'a Program,

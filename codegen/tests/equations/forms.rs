@@ -159,3 +159,38 @@ fn the_benches_run_what_is_printed() {
         assert_eq!(without_rounding(&kept), without_rounding(&printed), "{name}");
     }
 }
+
+/// The printed Rust needs nothing of `std` but the functions in its last module.
+#[test]
+fn the_printed_rust_builds_without_std() {
+    let rustc = std::env::var("RUSTC").unwrap_or_else(|_| "rustc".to_string());
+    let Some(rustc) = tools::find("forms::without_std", &[&rustc], &["--version"]) else {
+        return;
+    };
+    let options = Options {
+        gradient: true,
+        rotation: Some(Rotation::Exact),
+        ..Options::default()
+    };
+    let printed = chapter5(&options).print(Language::Rust).expect("code");
+    let end = printed.find("/// What `core` lacks").expect("the last module");
+    let stub = |name: &str| format!("pub fn {name}(x: f64) -> f64 {{ x }} ");
+    let stubs: String = ["sqrt", "sin", "cos"].map(stub).concat();
+    let text = format!(
+        "#![no_std]\n#![deny(warnings)]\n{}mod elementary {{ {stubs} }}\n",
+        &printed[..end]
+    );
+    let folder = tools::folder("no-std");
+    tools::write(&folder.join("lib.rs"), &text);
+    let arguments = [
+        "--edition",
+        "2024",
+        "--crate-type",
+        "lib",
+        "--emit",
+        "metadata",
+        "lib.rs",
+    ];
+    tools::run(Command::new(rustc).current_dir(&folder).args(arguments));
+    let _ = std::fs::remove_dir_all(&folder);
+}

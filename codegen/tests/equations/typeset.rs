@@ -89,3 +89,24 @@ fn latex() {
     );
     let _ = std::fs::remove_dir_all(&folder);
 }
+
+/// Typst by the typst compiler, which PyPI has ready-built (the crate itself takes a quarter of an hour of processor time).
+#[test]
+fn typst() {
+    let own = std::env::var("ABBE_PYTHON").unwrap_or_default();
+    let probe = ["-c", "import typst; typst.compile_with_warnings"];
+    let candidates = [own.as_str(), "python3", "/usr/bin/python3"];
+    let Some(python) = tools::find("typeset::typst", &candidates, &probe) else {
+        return;
+    };
+    let folder = tools::folder("typst");
+    let mut document = String::from("#set page(paper: \"a3\", flipped: true, margin: 18mm)\n");
+    for fragment in fragments(Language::Typst) {
+        let _ = writeln!(document, "{fragment}\n#pagebreak()");
+    }
+    tools::write(&folder.join("all.typ"), &document);
+    let script = "import typst\n_, warnings = typst.compile_with_warnings('all.typ', output='all.pdf')\nfor w in warnings: print(w.message)";
+    let complaints = tools::run(Command::new(python).current_dir(&folder).args(["-c", script]));
+    assert!(complaints.trim().is_empty(), "{complaints}");
+    let _ = std::fs::remove_dir_all(&folder);
+}

@@ -1,5 +1,7 @@
 //! The analysis of a plan: everything that can be said before anybody measures.
 
+use abbe_model::instrument::Station;
+use abbe_model::sensitivity::SlotValues;
 use abbe_model::session::Session;
 
 use super::linear::{Linearisation, is_wanted};
@@ -31,6 +33,8 @@ impl Default for PlanOptions {
     }
 }
 
+/// Travel of a ball bar's sensor either way.
+pub const BAR_TRAVEL_MM: f64 = 1.0;
 /// A variance that grows less than this without a test is not worth a word.
 const WORTH_SAYING: f64 = 1.5;
 
@@ -98,7 +102,18 @@ pub fn analyse_problem(problem: &Problem<'_>) -> Result<PlanAnalysis, IdentifyEr
     let mut setups: Vec<&str> = problem.tests.iter().map(|test| mounted(test)).collect();
     setups.sort_unstable();
     setups.dedup();
-    let tests: Vec<TestSummary> = problem.tests.iter().map(|test| summary(test)).collect();
+    let tests: Vec<TestSummary> = (0..problem.tests.len())
+        .map(|test| summary(problem, test))
+        .collect();
+    let mut warnings = problem.session.warnings.clone();
+    for test in &tests {
+        if let Some(reach_mm) = test.reach_mm.filter(|reach_mm| *reach_mm > BAR_TRAVEL_MM) {
+            warnings.push(format!(
+                "{}: the balls come {reach_mm:.2} mm nearer or farther than the bar is long; its sensor travels {BAR_TRAVEL_MM} mm either way",
+                test.name
+            ));
+        }
+    }
     Ok(PlanAnalysis {
         noise_um: problem.noise.sigma_mm * 1e3,
         readings: problem.readings(),
@@ -120,7 +135,7 @@ pub fn analyse_problem(problem: &Problem<'_>) -> Result<PlanAnalysis, IdentifyEr
         )?,
         without: without(problem, &linear, &wanted)?,
         effects: None,
-        warnings: problem.session.warnings.clone(),
+        warnings,
     })
 }
 
@@ -129,7 +144,8 @@ fn mounted(test: &abbe_model::session::Test) -> &str {
     test.socket.as_deref().unwrap_or(&test.setup)
 }
 
-fn summary(test: &abbe_model::session::Test) -> TestSummary {
+fn summary(problem: &Problem<'_>, number: usize) -> TestSummary {
+    let (test, model) = (problem.tests[number], &problem.models[number]);
     let readings = test.readings.as_ref();
     let time = readings.map_or(&[][..], |readings| readings.time_s.as_slice());
     TestSummary {
@@ -139,6 +155,17 @@ fn summary(test: &abbe_model::session::Test) -> TestSummary {
             .first()
             .zip(time.last())
             .map(|(first, last)| (last - first) / 60.0),
+        reach_mm: match model.station() {
+            Station::BallBar(bar) => {
+                let nominal = model.readings_mm(&SlotValues::zero(model.slots()));
+                Some(
+                    nominal
+                        .iter()
+                        .fold(0.0, |most: f64, reading| most.max((reading - bar.bar).abs())),
+                )
+            }
+            _ => None,
+        },
         setup: mounted(test).to_string(),
     }
 }

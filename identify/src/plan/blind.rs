@@ -122,7 +122,7 @@ pub fn held_by_setup(
     linear: &Linearisation,
 ) -> Result<Vec<HeldBySetup>, IdentifyError> {
     let list = &problem.parameters.list;
-    let alone = Rank::decide(linear.readings_only().parts().0.as_ref(), &linear.size)?;
+    let alone = Rank::decide(linear.readings.parts().0.as_ref(), &linear.size)?;
     let mut rows = alone.unseen;
     let mut pivots: Vec<(usize, usize)> = Vec::new();
     for error in (0..list.len()).filter(|j| is_wanted(&list[*j])) {

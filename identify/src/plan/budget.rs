@@ -28,28 +28,39 @@ pub fn budget(problem: &Problem<'_>, linear: &Linearisation, error: usize) -> Ve
     let covariance = &linear.covariance;
     let variance = covariance[(error, error)];
     let scale = list[error].unit.per_inside;
-    let mut left = variance;
     let mut parts = Vec::new();
     for (s, parameter) in list.iter().enumerate() {
         let Some(u) = prior_u(parameter) else { continue };
         let part = (covariance[(error, s)] / u).powi(2);
-        left -= part;
         parts.push(Contribution {
             from: parameter.id.clone(),
             u: part.sqrt() * scale,
             share: part / variance,
         });
     }
-    // Distances between sockets are known beforehand too; what remains after the set-up priors is theirs and the noise's.
-    let noise = left.max(0.0);
+    let noise = noise_variance(linear, error);
     parts.push(Contribution {
         from: "noise".to_string(),
         u: noise.sqrt() * scale,
         share: noise / variance,
     });
-    parts.retain(|part| part.share >= LEAST_SHARE);
+    parts.retain(|part| part.share >= LEAST_SHARE || part.from == "noise");
     parts.sort_by(|a, b| b.share.total_cmp(&a.share));
     parts
+}
+
+/// `‖R·Cov·e‖²`, `R` the triangle of the readings alone.
+fn noise_variance(linear: &Linearisation, error: usize) -> f64 {
+    let (r, _, _) = linear.readings.parts();
+    let n = r.ncols();
+    (0..n)
+        .map(|i| {
+            (i..n)
+                .map(|j| r[(i, j)] * linear.covariance[(j, error)])
+                .sum::<f64>()
+                .powi(2)
+        })
+        .sum()
 }
 
 /// The other errors that share an error's variance, the most correlated first.

@@ -11,7 +11,7 @@
 
 use std::collections::{BTreeMap, HashMap};
 
-use abbe_model::effect::{Component, Shape};
+use abbe_model::effect::Shape;
 use faer::{Mat, MatRef};
 use nalgebra::DMatrix;
 use rayon::prelude::*;
@@ -196,19 +196,19 @@ fn biases(problem: &Problem<'_>, moved: &Mat<f64>, unit: &Unit) -> Vec<Bias> {
         .enumerate()
         .filter(|(_, parameter)| is_wanted(parameter))
         .map(|(j, parameter)| {
-            let worst = (0..moved.ncols())
-                .map(|k| moved[(j, k)].powi(2))
-                .sum::<f64>()
-                .sqrt();
+            let worst = match moved.ncols() {
+                1 => moved[(j, 0)],
+                count => (0..count).map(|k| moved[(j, k)].powi(2)).sum::<f64>().sqrt(),
+            };
             Bias {
                 id: parameter.id.clone(),
                 per_unit: worst * parameter.unit.per_inside / unit.per_inside,
                 unit: format!("{}/({})", parameter.unit.name, unit.name),
             }
         })
-        .filter(|bias| bias.per_unit >= LEAST_BIAS)
+        .filter(|bias| bias.per_unit.abs() >= LEAST_BIAS)
         .collect();
-    biases.sort_by(|a, b| b.per_unit.total_cmp(&a.per_unit));
+    biases.sort_by(|a, b| b.per_unit.abs().total_cmp(&a.per_unit.abs()));
     biases.truncate(BIASES);
     biases
 }
@@ -275,11 +275,6 @@ pub fn hidden_by_error(analysis: &EffectsAnalysis) -> BTreeMap<String, Vec<(Stri
     }
     by_error
         .values_mut()
-        .for_each(|list| list.sort_by(|a, b| b.1.total_cmp(&a.1)));
+        .for_each(|list| list.sort_by(|a, b| b.1.abs().total_cmp(&a.1.abs())));
     by_error
-}
-
-/// Whether a component belongs to the instrument rather than to the machine.
-pub fn is_instrument(component: &Component) -> bool {
-    matches!(component, Component::Instrument { .. } | Component::TriggerDelay)
 }

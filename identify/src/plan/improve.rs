@@ -3,32 +3,14 @@
 //! Greedy: the entry after which the goal stands best, again and again. Exchange: each proposed test is taken away in turn and the best entry for
 //! its place looked for, until no place changes (Fedorov's algorithm: Atkinson, Donev & Tobias, Optimum Experimental Designs, 2007, ch. 12).
 
-use abbe_model::effect::Effect;
-use faer::Mat;
-use rayon::prelude::*;
 use serde::Serialize;
 
-use super::information::{Root, Shared, sum};
-use super::linear::{Linearisation, is_wanted};
-use super::menu::{Entry, Menu};
+use super::goal::{Goal, asked, figure, reported};
+use super::information::{Root, Shared};
+use super::menu::Menu;
+use super::prepared::Prepared;
 use crate::error::IdentifyError;
-use crate::parameters::{Parameter, Role};
 use crate::problem::Problem;
-
-/// What a next test is for.
-#[derive(Clone, Debug)]
-pub enum Goal {
-    /// The least worst standard uncertainty of the errors, 1 µm weighing as much as 1″.
-    WorstUncertainty,
-    /// The greatest distance in standard deviations between an effect of these coefficients (inside units; none: of one outside unit, at
-    /// the worst phase) and the best that everything else, the other effect included, can make of it.
-    Separation {
-        /// The effect that is there.
-        effect: String,
-        /// Its coefficients.
-        coefficients: Vec<f64>,
-    },
-}
 
 /// How proposals are sought.
 #[derive(Clone, Debug)]
@@ -103,126 +85,6 @@ const ALTERNATIVES: usize = 5;
 /// Rounds of exchange at most.
 const ROUNDS: usize = 10;
 
-/// A menu made ready: the information of every entry on the shared unknowns.
-pub struct Prepared {
-    /// The shared unknowns.
-    pub shared: Shared,
-    /// The plan's own information.
-    pub base: Root,
-    /// The entries.
-    pub entries: Vec<Ready>,
-}
-
-/// An entry with its information.
-pub struct Ready {
-    /// The entry; its name says what is left mounted.
-    pub entry: Entry,
-    /// Its information.
-    pub root: Root,
-}
-
-impl Prepared {
-    /// The menu of a problem whose folds are its tests, at the unknowns' values `beta`. `asked` are the unknowns that the goal is about.
-    ///
-    /// # Errors
-    /// If the model cannot be evaluated.
-    pub fn new(
-        problem: &Problem<'_>,
-        beta: &[f64],
-        entries: Vec<Entry>,
-        menu: &Menu,
-        asked: &[usize],
-    ) -> Result<Prepared, IdentifyError> {
-        let list = &problem.parameters.list;
-        let kept: Vec<usize> = (0..list.len())
-            .filter(|j| !asked.contains(j) && may_be_shared(problem, &list[*j]))
-            .collect();
-        let shared = Shared::of(problem, &kept, asked);
-        let linear = Linearisation::of(problem, beta)?;
-        let base = shared.root_of(problem, &linear)?;
-        let ready: Vec<Vec<Ready>> = entries
-            .into_par_iter()
-            .map(|entry| ready(problem, &shared, entry, menu))
-            .collect::<Result<_, IdentifyError>>()?;
-        Ok(Prepared {
-            shared,
-            base,
-            entries: ready.into_iter().flatten().collect(),
-        })
-    }
-
-    /// The plan with some entries added.
-    pub fn with(&self, entries: &[usize]) -> Root {
-        entries.iter().fold(self.base.clone(), |root, entry| {
-            sum(root.as_ref(), self.entries[*entry].root.as_ref())
-        })
-    }
-
-    /// The entry after which a figure (the smaller the better) stands best, and the figures of all.
-    pub fn best(&self, root: &Root, figure: &(impl Fn(&Root) -> f64 + Sync)) -> Option<(usize, Vec<f64>)> {
-        let figures: Vec<f64> = self
-            .entries
-            .par_iter()
-            .map(|ready| figure(&sum(root.as_ref(), ready.root.as_ref())))
-            .collect();
-        let best = (0..figures.len()).min_by(|a, b| figures[*a].total_cmp(&figures[*b]))?;
-        Some((best, figures))
-    }
-}
-
-/// Whether a new test can share an unknown: errors and effects, a mounted workpiece ball, the spindle ball of the last test, the sensor.
-fn may_be_shared(problem: &Problem<'_>, parameter: &Parameter) -> bool {
-    if parameter.role != Role::Setup {
-        return true;
-    }
-    let last = problem
-        .tests
-        .last()
-        .map_or("", |test| test.spindle_setup.as_str());
-    parameter.id.starts_with("workpiece_ball.")
-        || (parameter.id.starts_with("spindle_ball.") && parameter.id.ends_with(&format!("[{last}]")))
-        || !parameter.id.contains('[')
-}
-
-/// The information of an entry, with its own spindle ball and, where the menu allows it, with the one that is left mounted.
-fn ready(
-    problem: &Problem<'_>,
-    shared: &Shared,
-    entry: Entry,
-    menu: &Menu,
-) -> Result<Vec<Ready>, IdentifyError> {
-    let mut variants = vec![entry];
-    let last = problem.tests.last().filter(|_| menu.keep_spindle_ball);
-    if let Some(last) = last
-        && last.station.tool_point_mm() == variants[0].test.station.tool_point_mm()
-    {
-        let mut left = variants[0].clone();
-        left.test.spindle_setup = last.spindle_setup.clone();
-        left.name
-            .push_str(&format!(", spindle ball left as in {}", last.name));
-        variants.push(left);
-    }
-    let weight = (menu.thin.max(1) as f64).sqrt();
-    variants
-        .into_iter()
-        .map(|entry| {
-            let mut session = problem.session.clone();
-            session.tests = vec![entry.test.clone()];
-            session.effects = Vec::new();
-            session.socket_distances = Vec::new();
-            let mut noise = problem.noise.clone();
-            noise.sigma_mm /= weight;
-            let mut alone = Problem::new(&session, noise, 0)?;
-            alone.origin = problem.origin;
-            for effect in &problem.parameters.effects {
-                alone.add_effect(effect)?;
-            }
-            let root = shared.root_of_test(&alone)?;
-            Ok(Ready { entry, root })
-        })
-        .collect()
-}
-
 /// Proposes tests for a problem whose folds are its tests.
 ///
 /// # Errors
@@ -285,63 +147,6 @@ pub fn improve(
         exchanged,
         alternatives,
     })
-}
-
-/// The unknowns that a goal is about.
-fn asked(problem: &Problem<'_>, goal: &Goal) -> Vec<usize> {
-    let list = &problem.parameters.list;
-    let is_asked = |parameter: &Parameter| match (goal, parameter.role) {
-        (Goal::WorstUncertainty, _) => is_wanted(parameter),
-        (Goal::Separation { effect, .. }, Role::Coefficient { effect: index, .. }) => {
-            problem.parameters.effects[index].id() == *effect
-        }
-        _ => false,
-    };
-    (0..list.len()).filter(|j| is_asked(&list[*j])).collect()
-}
-
-/// The figure of a goal, the smaller the better.
-pub fn figure(shared: &Shared, root: &Root, goal: &Goal) -> f64 {
-    match goal {
-        Goal::WorstUncertainty => shared.uncertainties(root).into_iter().fold(0.0, f64::max),
-        Goal::Separation { coefficients, .. } => -separation(shared, root, coefficients),
-    }
-}
-
-/// How many standard deviations what is asked about, with these coefficients, stands from the best that all others can make of it; without
-/// coefficients that of one outside unit at the worst phase.
-pub fn separation(shared: &Shared, root: &Root, coefficients: &[f64]) -> f64 {
-    let block = shared.asked_block(root);
-    let first = shared.ids.len() - shared.asked;
-    if coefficients.len() == shared.asked {
-        return (0..shared.asked)
-            .map(|i| {
-                (i..shared.asked)
-                    .map(|j| block[(i, j)] * coefficients[j])
-                    .sum::<f64>()
-                    .powi(2)
-            })
-            .sum::<f64>()
-            .sqrt();
-    }
-    let one = 1.0 / shared.per_inside[first];
-    let square = Mat::from_fn(shared.asked, shared.asked, |i, j| block[(i, j)] * one);
-    match square.svd() {
-        Ok(svd) => svd
-            .S()
-            .column_vector()
-            .iter()
-            .copied()
-            .fold(f64::INFINITY, f64::min),
-        Err(_) => 0.0,
-    }
-}
-
-fn reported(figure: f64, goal: &Goal) -> f64 {
-    match goal {
-        Goal::WorstUncertainty => figure,
-        Goal::Separation { .. } => -figure,
-    }
 }
 
 fn is_no_gain(before: f64, after: f64) -> bool {
@@ -455,77 +260,4 @@ fn named_uncertainties(shared: &Shared, root: &Root) -> Vec<(String, f64)> {
         .cloned()
         .zip(shared.uncertainties(root))
         .collect()
-}
-
-/// A test that separates an effect from one that looks like it.
-#[derive(Clone, Debug, PartialEq, Serialize)]
-pub struct Separated {
-    /// In words: `C150 with the workpiece ball at radius 50 mm`.
-    pub test: String,
-    /// Separation by the readings that there are, standard deviations.
-    pub before: f64,
-    /// Separation with the test added.
-    pub after: f64,
-    /// What it takes, min.
-    pub minutes: f64,
-}
-
-/// For a found effect and one that looks like it, the entry of a menu that separates them best; `None` where none on the menu adds to what
-/// the readings tell. `coefficients` are those of the found effect, inside units.
-///
-/// # Errors
-/// If an effect cannot be laid over the session, or there is no menu for its instrument.
-pub fn separate(
-    problem: &Problem<'_>,
-    beta: &[f64],
-    found: &Effect,
-    coefficients: &[f64],
-    alias: &Effect,
-    menu: &Menu,
-) -> Result<Option<Separated>, IdentifyError> {
-    let mut both = problem.clone();
-    super::states::fold_by_test(&mut both);
-    let mut values = beta.to_vec();
-    for effect in [found, alias] {
-        if !both
-            .parameters
-            .effects
-            .iter()
-            .any(|present| present.id() == effect.id())
-        {
-            both.add_effect(effect)?;
-            values.resize(both.parameters.list.len(), 0.0);
-        }
-    }
-    let goal = Goal::Separation {
-        effect: found.id(),
-        coefficients: coefficients.to_vec(),
-    };
-    let entries = super::menu::entries(both.session, menu)?;
-    let asked = asked(&both, &goal);
-    let prepared = Prepared::new(&both, &values, entries, menu, &asked)?;
-    let figure = |root: &Root| figure(&prepared.shared, root, &goal);
-    let before = -figure(&prepared.base);
-    let Some((best, figures)) = prepared.best(&prepared.base, &figure) else {
-        return Ok(None);
-    };
-    let after = -figures[best];
-    // Among entries that separate all but as well, the quickest.
-    let quickest = (0..figures.len())
-        .filter(|entry| -figures[*entry] >= 0.9 * after)
-        .min_by(|a, b| {
-            prepared.entries[*a]
-                .entry
-                .minutes
-                .total_cmp(&prepared.entries[*b].entry.minutes)
-        })
-        .unwrap_or(best);
-    let entry = &prepared.entries[quickest].entry;
-    let separated = Separated {
-        test: entry.name.clone(),
-        before,
-        after: -figures[quickest],
-        minutes: entry.minutes,
-    };
-    Ok((after > before * (1.0 + LEAST_GAIN)).then_some(separated))
 }

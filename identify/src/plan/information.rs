@@ -11,7 +11,6 @@ use faer::{Mat, MatRef};
 use super::linear::{Linearisation, marginal};
 use crate::error::IdentifyError;
 use crate::problem::Problem;
-use crate::triangle::Triangle;
 
 /// The unknowns that tests share, in the order of the columns; what is asked about stands last.
 #[derive(Clone, Debug)]
@@ -71,20 +70,19 @@ impl Shared {
         sum(root.as_ref(), held.as_ref())
     }
 
-    /// The root of the readings of a problem with one test; its unknowns that are not shared are eliminated within their priors.
-    ///
-    /// # Errors
-    /// If the model cannot be evaluated.
-    pub fn root_of_test(&self, problem: &Problem<'_>) -> Result<Root, IdentifyError> {
+    /// The root of the readings of a problem with one test, from their triangle `r`; its unknowns that are not shared are eliminated within
+    /// their priors. `as_shared` gives an unknown the name that the shared ones have for it.
+    pub fn root_of_test(
+        &self,
+        problem: &Problem<'_>,
+        r: MatRef<'_, f64>,
+        as_shared: impl Fn(&str) -> String,
+    ) -> Root {
         let list = &problem.parameters.list;
-        let nominal = vec![0.0; list.len()];
-        let mut triangle = Triangle::new(list.len());
-        problem
-            .triangles(&nominal)?
-            .iter()
-            .for_each(|part| triangle.merge(part));
-        let r = triangle.parts().0;
-        let column_of = |id: &str| self.ids.iter().position(|shared| shared == id);
+        let column_of = |id: &str| {
+            let name = as_shared(id);
+            self.ids.iter().position(|shared| *shared == name)
+        };
         let place: Vec<Option<usize>> = list.iter().map(|parameter| column_of(&parameter.id)).collect();
         let own: Vec<usize> = (0..list.len()).filter(|j| place[*j].is_none()).collect();
         let (m, k) = (own.len(), self.ids.len());
@@ -107,9 +105,7 @@ impl Shared {
         }
         let decomposition = stacked.qr();
         let upper = decomposition.thin_R();
-        Ok(Mat::from_fn(k, k, |i, j| {
-            if i <= j { upper[(m + i, m + j)] } else { 0.0 }
-        }))
+        Mat::from_fn(k, k, |i, j| if i <= j { upper[(m + i, m + j)] } else { 0.0 })
     }
 
     /// The root on what is asked about, the others being unknown too.

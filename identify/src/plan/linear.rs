@@ -20,6 +20,8 @@ pub struct Linearisation {
     pub tests: Vec<Triangle>,
     /// What is known before.
     pub prior: Triangle,
+    /// All readings, without what is known before.
+    pub readings: Triangle,
     /// Everything together.
     pub whole: Triangle,
     /// What is seen and what is not.
@@ -44,12 +46,14 @@ impl Linearisation {
             .iter()
             .map(|parameter| parameter.size)
             .collect();
-        let whole = merged(prior.clone(), tests.iter());
+        let readings = merged(Triangle::new(size.len()), tests.iter());
+        let whole = merged(prior.clone(), std::iter::once(&readings));
         let rank = Rank::decide(whole.parts().0.as_ref(), &size)?;
         let covariance = fit::covariance(&whole, &rank.seen)?;
         Ok(Linearisation {
             tests,
             prior,
+            readings,
             whole,
             rank,
             covariance,
@@ -79,11 +83,6 @@ impl Linearisation {
         let rank = Rank::decide(whole.parts().0.as_ref(), &self.size)?;
         let covariance = fit::covariance(&whole, &rank.seen)?;
         Ok((rank, covariance))
-    }
-
-    /// All readings without what is known before.
-    pub fn readings_only(&self) -> Triangle {
-        merged(Triangle::new(self.size.len()), self.tests.iter())
     }
 }
 

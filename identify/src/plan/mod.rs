@@ -5,7 +5,7 @@
 //!
 //! - [`analyse`]: uncertainties, budgets, blind spots, indices, and what each test contributes;
 //! - [`effects`]: what undeclared effects would do;
-//! - [`menu`], [`improve`], [`information`]: the next test; [`range`]: how far a sweep can shrink;
+//! - [`menu`], [`prepared`], [`information`], [`goal`], [`improve`], [`separate`]: the next test; [`range`]: how far a sweep can shrink;
 //! - [`states`], [`linear`], [`sensitivity`], [`budget`], [`blind`], [`indices`]: the parts of it;
 //! - [`results`]: what is reported, as it stands in JSON.
 
@@ -13,15 +13,21 @@ mod analysis;
 pub mod blind;
 pub mod budget;
 pub mod detect;
+mod drafts;
 pub mod effects;
+pub mod goal;
 pub mod improve;
 pub mod indices;
 pub mod information;
 pub mod linear;
 pub mod menu;
+pub mod prepared;
 pub mod range;
 pub mod results;
 pub mod sensitivity;
+pub mod separate;
 pub mod states;
+mod sweep;
 
-pub use analysis::{PlanOptions, analyse, analyse_problem, prepared};
+pub use analysis::{BAR_TRAVEL_MM, PlanOptions, analyse, analyse_problem, prepared};
+pub use separate::{Separated, separation};

@@ -51,6 +51,9 @@ pub struct TestSummary {
     pub readings: usize,
     /// How long the axes move, min.
     pub moving_min: Option<f64>,
+    /// Farthest that the nominal distance of the balls is from the bar's length, mm; absent for other instruments.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub reach_mm: Option<f64>,
     /// Which mounted workpiece ball it uses.
     pub setup: String,
 }
@@ -228,7 +231,7 @@ pub struct EffectDetectability {
 pub struct Bias {
     /// The error.
     pub id: String,
-    /// Units of the error a unit of the effect, at the worst phase.
+    /// Units of the error a unit of the effect; of cosine and sine at the worst phase, without a sign.
     pub per_unit: f64,
     /// The unit: `um/um`, `arcsec/um`, …
     pub unit: String,

@@ -6,7 +6,7 @@ use std::collections::HashMap;
 use std::sync::Arc;
 
 use abbe_model::effect::{DriverSample, Effect};
-use abbe_model::instrument::InsideUnit;
+use abbe_model::instrument::{InsideUnit, InstrumentKind};
 use abbe_model::sensitivity::Sensitivities;
 use faer::{Mat, MatMut};
 use rayon::prelude::*;
@@ -28,9 +28,20 @@ impl Layout {
     /// The greatest absolute value of its basis functions.
     pub fn greatest(&self) -> f64 {
         let parts = self.parts.iter().flatten();
-        let factors = |part: &LayoutPart| part.factor.as_ref().map_or(1.0, |f| f.iter().fold(0.0_f64, |a, b| a.max(b.abs())));
+        let factors = |part: &LayoutPart| {
+            part.factor
+                .as_ref()
+                .map_or(1.0, |f| f.iter().fold(0.0_f64, |a, b| a.max(b.abs())))
+        };
         parts
-            .map(|part| factors(part) * part.basis.iter().flat_map(|basis| basis.iter()).fold(0.0_f64, |a, b| a.max(b.abs())))
+            .map(|part| {
+                factors(part)
+                    * part
+                        .basis
+                        .iter()
+                        .flat_map(|basis| basis.iter())
+                        .fold(0.0_f64, |a, b| a.max(b.abs()))
+            })
             .fold(0.0, f64::max)
     }
 }
@@ -150,11 +161,14 @@ impl<'p, 'a> Columns<'p, 'a> {
         self.rows
     }
 
-    /// The greatest coefficient that an effect may plausibly have, in inside units.
+    /// The greatest coefficient that an effect may plausibly have, in inside units: 0.1 mm and 1 mrad on a machine tool, ten times as much on the
+    /// robots and long chains that trackers and sockets measure.
     pub fn plausible(&self, effect: &Effect, layout: &Layout) -> f64 {
+        let machine_tool = self.problem.session.instrument == InstrumentKind::BallBar;
+        let scale = if machine_tool { 1.0 } else { 10.0 };
         let most = match drivers::component_unit(self.problem.session, &effect.component) {
-            Some(InsideUnit::Millimetre) => 0.1,
-            Some(InsideUnit::Radian) => 1e-3,
+            Some(InsideUnit::Millimetre) => 0.1 * scale,
+            Some(InsideUnit::Radian) => 1e-3 * scale,
             Some(InsideUnit::Ratio) => 0.1,
             // The factor of a delay is the speed; a tenth of a second is long.
             None => return 0.1,
@@ -323,7 +337,9 @@ impl<'p, 'a> Columns<'p, 'a> {
     /// The fold of each row of [`Columns::plain_rows`].
     pub fn plain_folds(&self) -> Vec<usize> {
         let coordinates = self.problem.coordinates();
-        let fold = |block: &Block, i: usize| self.problem.folds.of_row[block.test][block.rows.start + i / coordinates];
+        let fold = |block: &Block, i: usize| {
+            self.problem.folds.of_row[block.test][block.rows.start + i / coordinates]
+        };
         self.blocks
             .iter()
             .flat_map(|block| self.counting(block).into_iter().map(move |i| fold(block, i)))
@@ -341,7 +357,10 @@ impl<'p, 'a> Columns<'p, 'a> {
 
     fn plain(&self, blocks: Vec<Mat<f64>>) -> Mat<f64> {
         let counting: Vec<Vec<usize>> = self.blocks.iter().map(|block| self.counting(block)).collect();
-        let mut rows = Mat::zeros(counting.iter().map(Vec::len).sum(), blocks.first().map_or(0, Mat::ncols));
+        let mut rows = Mat::zeros(
+            counting.iter().map(Vec::len).sum(),
+            blocks.first().map_or(0, Mat::ncols),
+        );
         let mut start = 0;
         for (block, counting) in blocks.iter().zip(&counting) {
             for (k, i) in counting.iter().enumerate() {

@@ -42,11 +42,17 @@ pub fn composed(
         return None;
     };
     let (d, g, own) = model.projected(number);
-    let subset = Subset { d: &d, g: &g, own: &own };
+    let subset = Subset {
+        d: &d,
+        g: &g,
+        own: &own,
+    };
     let mut chosen: Vec<usize> = Vec::new();
     let mut best: Option<Composed> = None;
     while chosen.len() < MOST_PLACES {
-        let Some((place, _)) = subset.best_addition(&chosen) else { break };
+        let Some((place, _)) = subset.best_addition(&chosen) else {
+            break;
+        };
         chosen.push(place);
         let gain = subset.splice(&mut chosen);
         let n = chosen.len();
@@ -108,7 +114,8 @@ impl Subset<'_> {
         };
         let mut best: Option<(usize, f64)> = None;
         for j in (0..m).filter(|j| !chosen.contains(j)) {
-            let with = |column: usize| -> f64 { (0..n).map(|i| self.d[(chosen[i], j)] * solved[(i, column)]).sum() };
+            let with =
+                |column: usize| -> f64 { (0..n).map(|i| self.d[(chosen[i], j)] * solved[(i, column)]).sum() };
             let left = self.d[(j, j)] - with(j);
             // A place that is all but a sum of the others adds rounding, not evidence.
             if left <= LEAST_VISIBLE.sqrt() * self.own[(j, j)] {
@@ -170,8 +177,14 @@ mod tests {
         let column = |k: usize, i: usize| f64::from(u8::from(i >= places[k]));
         let y = |i: usize| 1.5 * column(1, i) - column(3, i) + 0.1 * ((i * i) % 7) as f64;
         let d = Mat::from_fn(5, 5, |k, l| (0..40).map(|i| column(k, i) * column(l, i)).sum());
-        let g: Vec<f64> = (0..5).map(|k| (0..40).map(|i| column(k, i) * y(i)).sum()).collect();
-        let subset = Subset { d: &d, g: &g, own: &d };
+        let g: Vec<f64> = (0..5)
+            .map(|k| (0..40).map(|i| column(k, i) * y(i)).sum())
+            .collect();
+        let subset = Subset {
+            d: &d,
+            g: &g,
+            own: &d,
+        };
         let mut chosen = vec![0, 2];
         let gain = subset.splice(&mut chosen);
         let mut best = 0.0_f64;

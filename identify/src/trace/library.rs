@@ -486,7 +486,8 @@ fn shapes(
         }
         "reversal-spike" => {
             // A run that begins where the one before it ended begins with a reversal.
-            let seen = axis.is_some_and(|axis| sampling.reverses_inside_runs[axis] || sampling.both_directions[axis]);
+            let seen = axis
+                .is_some_and(|axis| sampling.reverses_inside_runs[axis] || sampling.both_directions[axis]);
             if !seen || poses {
                 return Vec::new();
             }
@@ -506,9 +507,17 @@ fn shapes(
                 return Vec::new();
             }
             let axis = axis.unwrap_or(0);
-            let places = (1..PLACES_OF_STEPS).map(|k| sampling.low[axis] + span * k as f64 / PLACES_OF_STEPS as f64);
-            let singles = places.clone().map(|place| all(Shape::Steps { at: vec![place] }, 0.0));
-            let dictionary = all(Shape::Steps { at: places.clone().collect() }, 0.0);
+            let places =
+                (1..PLACES_OF_STEPS).map(|k| sampling.low[axis] + span * k as f64 / PLACES_OF_STEPS as f64);
+            let singles = places
+                .clone()
+                .map(|place| all(Shape::Steps { at: vec![place] }, 0.0));
+            let dictionary = all(
+                Shape::Steps {
+                    at: places.clone().collect(),
+                },
+                0.0,
+            );
             singles.chain([dictionary]).collect()
         }
         "local" => {
@@ -550,7 +559,9 @@ fn shapes(
             // At least one reading and a half an interval.
             [8, 16, 32, 64]
                 .into_iter()
-                .filter(|intervals| poses && *intervals <= 16 || step > 0.0 && 1.5 * step * *intervals as f64 <= span)
+                .filter(|intervals| {
+                    poses && *intervals <= 16 || step > 0.0 && 1.5 * step * *intervals as f64 <= span
+                })
                 .map(|intervals| {
                     all(
                         Shape::Curve {

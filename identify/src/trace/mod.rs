@@ -432,7 +432,9 @@ impl Start {
         let base = rows.as_ref().subcols(0, unknowns) * &self.to_unknowns;
         Ok(Plain {
             base: Mat::from_fn(base.nrows(), base.ncols(), |i, j| base[(i, j)] / sigma_mm),
-            residual: (0..rows.nrows()).map(|i| rows[(i, unknowns)] / sigma_mm).collect(),
+            residual: (0..rows.nrows())
+                .map(|i| rows[(i, unknowns)] / sigma_mm)
+                .collect(),
             folds: columns.plain_folds(),
             sigma_mm,
         })

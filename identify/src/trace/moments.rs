@@ -58,7 +58,10 @@ impl FoldMoments {
             sum.yy += fold.yy;
             add(&mut sum.base_y, &fold.base_y);
             add(&mut sum.cross_y, &fold.cross_y);
-            sum.own.iter_mut().zip(&fold.own).for_each(|(to, more)| *to += more);
+            sum.own
+                .iter_mut()
+                .zip(&fold.own)
+                .for_each(|(to, more)| *to += more);
         }
         sum
     }

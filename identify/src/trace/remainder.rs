@@ -34,7 +34,11 @@ fn detectors(problem: &Problem<'_>, columns: &Columns<'_, '_>) -> Vec<Detector> 
     let mut detectors = Vec::new();
     for (number, test) in problem.tests.iter().enumerate() {
         let Some(readings) = &test.readings else { continue };
-        let mut add = |driver: &Driver, shape: Shape, by_direction: bool, rows: Option<&Range<usize>>, words: String| {
+        let mut add = |driver: &Driver,
+                       shape: Shape,
+                       by_direction: bool,
+                       rows: Option<&Range<usize>>,
+                       words: String| {
             let effect = Effect {
                 component: Component::TriggerDelay,
                 driver: driver.clone(),
@@ -42,7 +46,8 @@ fn detectors(problem: &Problem<'_>, columns: &Columns<'_, '_>) -> Vec<Detector> 
                 tests: vec![test.name.clone()],
             };
             for coordinate in 0..readings.coordinates {
-                if let Some(layout) = columns.reading_layout(&effect, number, coordinate, by_direction, rows) {
+                if let Some(layout) = columns.reading_layout(&effect, number, coordinate, by_direction, rows)
+                {
                     let named = if readings.coordinates == 3 {
                         format!("{words} in {}", ["x", "y", "z"][coordinate])
                     } else {
@@ -85,7 +90,11 @@ fn detectors(problem: &Problem<'_>, columns: &Columns<'_, '_>) -> Vec<Detector> 
             for half_cycles in 2..=if runs.len() > 1 { 40 } else { 0 } {
                 let period = 2.0 * (high - low) / half_cycles as f64;
                 for (k, run) in runs.iter().enumerate() {
-                    let words = format!("a wave over {name}, {half_cycles} half cycles over its way, in run {} of {}", k + 1, test.name);
+                    let words = format!(
+                        "a wave over {name}, {half_cycles} half cycles over its way, in run {} of {}",
+                        k + 1,
+                        test.name
+                    );
                     add(&driver, Shape::Periodic { period }, false, Some(run), words);
                 }
             }

@@ -120,7 +120,9 @@ impl<'m> Trained<'m> {
         folds: Vec<usize>,
     ) -> Trained<'m> {
         let m = base.len();
-        let left_out: Vec<usize> = (0..moments.folds.len()).filter(|fold| !folds.contains(fold)).collect();
+        let left_out: Vec<usize> = (0..moments.folds.len())
+            .filter(|fold| !folds.contains(fold))
+            .collect();
         let parts: Vec<(&FoldMoments, f64)> = if left_out.len() < folds.len() {
             std::iter::once((&moments.whole, 1.0))
                 .chain(left_out.iter().map(|fold| (&moments.folds[*fold], -1.0)))
@@ -228,7 +230,11 @@ impl<'m> Trained<'m> {
 
     /// How much the model lowers the sum of squares, priors included.
     pub fn explained(&self) -> f64 {
-        self.base_y.iter().zip(&self.coefficients).map(|(y, c)| y * c).sum()
+        self.base_y
+            .iter()
+            .zip(&self.coefficients)
+            .map(|(y, c)| y * c)
+            .sum()
     }
 
     /// What a candidate would gain.

@@ -6,16 +6,16 @@
 
 use std::collections::BTreeSet;
 
-use faer::Mat;
 use abbe_model::effect::Driver;
+use faer::Mat;
 use rayon::prelude::*;
 
 use super::columns::{Columns, Layout};
 use super::compose::{self, Composed};
 use super::library::Candidate;
 use super::moments::Moments;
-use super::sharpen;
 use super::score::{Gain, PriorMoments, Trained, ln_chi_square_tail};
+use super::sharpen;
 
 /// When the search stops.
 #[derive(Clone, Copy, Debug)]
@@ -245,7 +245,9 @@ impl<'s> Search<'s> {
         (0..self.candidates.len())
             .into_par_iter()
             .filter(|candidate| self.candidates[*candidate].dictionary)
-            .filter_map(|candidate| compose::composed(model, candidate, &self.candidates[candidate], variance))
+            .filter_map(|candidate| {
+                compose::composed(model, candidate, &self.candidates[candidate], variance)
+            })
             .collect()
     }
 
@@ -316,7 +318,12 @@ impl<'s> Search<'s> {
             };
             self.materialise(&[one]);
             let of_group = |taken: &Taken| group.contains(&taken.candidate);
-            let p_value = self.taken.iter().filter(|t| of_group(t)).map(|t| t.p_value).fold(1.0, f64::min);
+            let p_value = self
+                .taken
+                .iter()
+                .filter(|t| of_group(t))
+                .map(|t| t.p_value)
+                .fold(1.0, f64::min);
             let places = self.places(one);
             self.taken.retain(|taken| !group.contains(&taken.candidate));
             self.taken.push(Taken {
@@ -326,7 +333,11 @@ impl<'s> Search<'s> {
             });
             for fold in self.all_folds() {
                 let (group, rest) = self.following(&driver, &self.of_fold[fold]);
-                if !group.is_empty() && self.in_fewer_words(&group, &rest, &[one], &self.others(fold)).is_some() {
+                if !group.is_empty()
+                    && self
+                        .in_fewer_words(&group, &rest, &[one], &self.others(fold))
+                        .is_some()
+                {
                     self.of_fold[fold] = rest;
                     self.of_fold[fold].push(one);
                 }
@@ -349,7 +360,13 @@ impl<'s> Search<'s> {
     }
 
     /// The one of a pool that says more than a group, if there is one.
-    fn in_fewer_words(&self, group: &[usize], rest: &[usize], pool: &[usize], folds: &[usize]) -> Option<usize> {
+    fn in_fewer_words(
+        &self,
+        group: &[usize],
+        rest: &[usize],
+        pool: &[usize],
+        folds: &[usize],
+    ) -> Option<usize> {
         let without = self.model_of(rest, folds);
         let variance = self.variance(&without);
         let all: Vec<usize> = rest.iter().chain(group).copied().collect();
@@ -416,7 +433,11 @@ impl<'s> Search<'s> {
             let Some((_, score)) = self.best_of(&model, &taken) else {
                 return Round::Done { p_value: 1.0 };
             };
-            let score = self.composed(&model).iter().map(Composed::score).fold(score, f64::max);
+            let score = self
+                .composed(&model)
+                .iter()
+                .map(Composed::score)
+                .fold(score, f64::max);
             let costs: Vec<f64> = (0..self.candidates.len())
                 .map(|c| {
                     if self.is_held_back(c) {
@@ -582,10 +603,12 @@ impl<'s> Search<'s> {
         let rows = self.columns.plain_rows(&chosen);
         let norms: Vec<f64> = fresh.iter().flat_map(|c| self.norms(*c)).collect();
         let (before, old) = (&self.plain.base, self.plain.base.ncols());
-        self.plain.base = Mat::from_fn(rows.nrows(), old + rows.ncols(), |i, j| match j.checked_sub(old) {
-            None => before[(i, j)],
-            Some(k) if norms[k] > 0.0 => rows[(i, k)] / (norms[k] * self.plain.sigma_mm),
-            Some(_) => 0.0,
+        self.plain.base = Mat::from_fn(rows.nrows(), old + rows.ncols(), |i, j| {
+            match j.checked_sub(old) {
+                None => before[(i, j)],
+                Some(k) if norms[k] > 0.0 => rows[(i, k)] / (norms[k] * self.plain.sigma_mm),
+                Some(_) => 0.0,
+            }
         });
         self.materialised.extend(fresh.into_iter().zip(places));
     }

@@ -76,7 +76,12 @@ pub fn sharpened(search: &Search<'_>, model: &Trained<'_>, composed: &[Composed]
             });
         }
     }
-    fresh.retain(|candidate| !search.candidates.iter().any(|present| present.effect == candidate.effect));
+    fresh.retain(|candidate| {
+        !search
+            .candidates
+            .iter()
+            .any(|present| present.effect == candidate.effect)
+    });
     fresh
 }
 

@@ -1,7 +1,8 @@
 //! `abbe plan --improve`, `--separate`, `--range`.
 
 use abbe::identify::IdentifyError;
-use abbe::identify::plan::improve::{Goal, ImproveOptions, Improvement, improve};
+use abbe::identify::plan::goal::Goal;
+use abbe::identify::plan::improve::{ImproveOptions, Improvement, improve};
 use abbe::identify::plan::menu::Menu;
 use abbe::identify::plan::range::Shrinkage;
 use abbe::identify::problem::Problem;

@@ -289,7 +289,8 @@ fn effects(found: &EffectsAnalysis) {
 /// A table of effects; of those with the same component and driver the hardest to see and, of hidden ones, those that bias most.
 fn effect_table(effects: &[&EffectDetectability]) {
     let mut chosen: Vec<&EffectDetectability> = effects.to_vec();
-    let strongest = |effect: &EffectDetectability| effect.biases.first().map_or(0.0, |bias| bias.per_unit);
+    let strongest =
+        |effect: &EffectDetectability| effect.biases.first().map_or(0.0, |bias| bias.per_unit.abs());
     chosen.sort_by(|a, b| strongest(b).total_cmp(&strongest(a)));
     let rows: Vec<Vec<String>> = chosen
         .iter()

@@ -1,0 +1,89 @@
+//! How an axis is swept in the tests that there are, so that a new test sweeps it alike.
+
+use abbe_model::session::Session;
+use abbe_model::session::motion::Motion;
+
+/// How an axis is swept in the tests that there are.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Sweep {
+    /// rad.
+    pub from: f64,
+    /// rad.
+    pub to: f64,
+    /// rad.
+    pub step: f64,
+    /// rad/s.
+    pub speed: f64,
+    /// There and back each.
+    pub runs: usize,
+}
+
+/// How an axis is swept: as the session does it, else as far as its travel goes, within half a turn either way.
+pub(super) fn sweep_of(session: &Session, axis: usize) -> Sweep {
+    let planned = session.tests.iter().find_map(|test| match &test.motion {
+        Some(Motion::Sweep {
+            axis: swept,
+            from,
+            to,
+            step,
+            speed,
+            runs,
+            ..
+        }) if *swept == axis => Some(Sweep {
+            from: *from,
+            to: *to,
+            step: *step,
+            speed: *speed,
+            runs: *runs,
+        }),
+        _ => None,
+    });
+    planned
+        .or_else(|| sweep_of_data(session, axis))
+        .unwrap_or_else(|| {
+            let turn = std::f64::consts::PI;
+            let [low, high] = session.machine.axes[axis].travel.unwrap_or([-turn, turn]);
+            Sweep {
+                from: low.max(-turn),
+                to: high.min(turn),
+                step: 0.5_f64.to_radians(),
+                speed: 5.0_f64.to_radians(),
+                runs: 2,
+            }
+        })
+}
+
+/// How an axis was swept in the data.
+fn sweep_of_data(session: &Session, axis: usize) -> Option<Sweep> {
+    session
+        .tests
+        .iter()
+        .filter_map(|test| test.readings.as_ref())
+        .find_map(|readings| {
+            let positions = readings.positions.get(axis)?;
+            let first = readings.runs().first()?.clone();
+            let run = &positions[first.clone()];
+            let (from, to) = (run.first().copied()?, run.last().copied()?);
+            if readings.run.is_empty() || (to - from).abs() < 0.1 || run.len() < 3 {
+                return None;
+            }
+            let step = (to - from).abs() / (run.len() - 1) as f64;
+            let elapsed = readings
+                .time_s
+                .get(first.end - 1)
+                .zip(readings.time_s.get(first.start));
+            let speed = elapsed.map_or(0.0, |(end, start)| (to - from).abs() / (end - start));
+            let speed = if speed.is_finite() && speed > 0.0 {
+                speed
+            } else {
+                5.0_f64.to_radians()
+            };
+            Some(Sweep {
+                from,
+                to,
+                step,
+                speed,
+                runs: readings.runs().len().div_ceil(2),
+            })
+        })
+}
