@@ -73,6 +73,9 @@ pub struct Search<'s> {
     stop: Stop,
 }
 
+/// The most effects whose places and periods are looked at again whenever one is added.
+const MOST_SHARPENED: usize = 4;
+
 /// By how many standard deviations an effect as large as is plausible has to change the readings, all together and beyond what the model absorbs, to be
 /// looked for.
 const LEAST_PLAUSIBLE_SIGMA: f64 = 3.0;
@@ -367,11 +370,15 @@ impl<'s> Search<'s> {
         pool: &[usize],
         folds: &[usize],
     ) -> Option<usize> {
-        let without = self.model_of(rest, folds);
+        let without = if pool.len() > 1 {
+            self.model_of(rest, folds)
+        } else {
+            Trained::lean(&self.moments, &self.prior, self.base_with(rest), folds.to_vec())
+        };
         let variance = self.variance(&without);
         let all: Vec<usize> = rest.iter().chain(group).copied().collect();
         let of_group = Gain {
-            gain: self.model_of(&all, folds).explained() - without.explained(),
+            gain: Trained::lean(&self.moments, &self.prior, self.base_with(&all), folds.to_vec()).explained() - without.explained(),
             freedom: group.iter().map(|c| self.moments.count[*c]).sum(),
             visible: 1.0,
         };
@@ -529,7 +536,7 @@ impl<'s> Search<'s> {
 
     /// Exchanges effects for candidates that explain clearly better what they stand for, in the search on all readings and in that of each fold.
     pub fn exchange(&mut self) {
-        if self.taken.len() > 1 && !self.stop.in_residual_variance {
+        if (2..=MOST_SHARPENED).contains(&self.taken.len()) && !self.stop.in_residual_variance {
             let chosen: Vec<usize> = self.taken.iter().map(|taken| taken.candidate).collect();
             for k in 0..chosen.len() {
                 let mut others = chosen.clone();
@@ -538,7 +545,7 @@ impl<'s> Search<'s> {
             }
         }
         let mut of_all: Vec<usize> = self.taken.iter().map(|taken| taken.candidate).collect();
-        self.exchange_in(&mut of_all, &self.all_folds());
+        self.exchange_in(&mut of_all, &self.all_folds(), None);
         for (k, candidate) in of_all.into_iter().enumerate() {
             if self.taken[k].candidate != candidate {
                 let places = self.places(candidate);
@@ -549,9 +556,12 @@ impl<'s> Search<'s> {
                 };
             }
         }
+        // Along runs, what any of the searches has taken up before is enough to choose from.
+        let known: Vec<usize> = self.materialised.iter().map(|(candidate, _)| *candidate).collect();
+        let pool = (!self.stop.in_residual_variance).then_some(known.as_slice());
         for fold in self.all_folds() {
             let mut chosen = std::mem::take(&mut self.of_fold[fold]);
-            self.exchange_in(&mut chosen, &self.others(fold));
+            self.exchange_in(&mut chosen, &self.others(fold), pool);
             self.of_fold[fold] = chosen;
         }
         let held_out = self.held_out_now();
@@ -562,7 +572,7 @@ impl<'s> Search<'s> {
 
     /// One sweep of exchanges over what a search on some of the folds has chosen. A change has to be worth more than what cannot be told apart, so
     /// that the sweeps end.
-    fn exchange_in(&mut self, chosen: &mut [usize], folds: &[usize]) {
+    fn exchange_in(&mut self, chosen: &mut [usize], folds: &[usize], pool: Option<&[usize]>) {
         for k in 0..chosen.len() {
             let others: Vec<usize> = chosen
                 .iter()
@@ -572,13 +582,28 @@ impl<'s> Search<'s> {
                 .collect();
             let better = {
                 let base = self.base_with(&others);
-                let model = Trained::new(&self.moments, &self.prior, base, folds.to_vec());
-                let score = self.score(chosen[k], &model.gain(chosen[k]), self.variance(&model));
-                self.best_of(&model, &others)
-                    .filter(|(best, most)| {
-                        *best != chosen[k] && *most > score + super::alias::INDISTINGUISHABLE
-                    })
-                    .map(|(best, _)| self.named_first(&model, best, &others))
+                let model = match pool {
+                    None => Trained::new(&self.moments, &self.prior, base, folds.to_vec()),
+                    Some(_) => Trained::lean(&self.moments, &self.prior, base, folds.to_vec()),
+                };
+                let variance = self.variance(&model);
+                let score = self.score(chosen[k], &model.gain(chosen[k]), variance);
+                let clearly = |(best, most): &(usize, f64)| {
+                    *best != chosen[k] && *most > score + super::alias::INDISTINGUISHABLE
+                };
+                match pool {
+                    None => self
+                        .best_of(&model, &others)
+                        .filter(clearly)
+                        .map(|(best, _)| self.named_first(&model, best, &others)),
+                    Some(pool) => pool
+                        .iter()
+                        .filter(|c| !others.contains(c))
+                        .map(|c| (*c, self.score(*c, &model.gain(*c), variance)))
+                        .max_by(|a, b| a.1.total_cmp(&b.1))
+                        .filter(clearly)
+                        .map(|(best, _)| best),
+                }
             };
             let Some(better) = better.filter(|better| *better != chosen[k]) else {
                 continue;
@@ -623,19 +648,21 @@ impl<'s> Search<'s> {
     /// The model that a fold's own search has built, trained on the other folds.
     pub fn model_of_fold(&self, fold: usize) -> Trained<'_> {
         let others = self.others(fold);
-        Trained::new(
-            &self.moments,
-            &self.prior,
-            self.base_with(&self.of_fold[fold]),
-            others,
-        )
+        let base = self.base_with(&self.of_fold[fold]);
+        Trained::new(&self.moments, &self.prior, base, others)
+    }
+
+    /// The same, for its coefficients alone.
+    fn lean_model_of_fold(&self, fold: usize) -> Trained<'_> {
+        let base = self.base_with(&self.of_fold[fold]);
+        Trained::lean(&self.moments, &self.prior, base, self.others(fold))
     }
 
     fn held_out_now(&self) -> f64 {
         let models: Vec<Trained<'_>> = self
             .all_folds()
             .into_par_iter()
-            .map(|fold| self.model_of_fold(fold))
+            .map(|fold| self.lean_model_of_fold(fold))
             .collect();
         let predicted = |model: &Trained<'_>, row: usize| -> f64 {
             let along = model.base.iter().zip(&model.coefficients);
