@@ -270,7 +270,7 @@ fn with_lines_out(
     for (&n, &readings) in lengths {
         let weight = readings as f64;
         total += weight;
-        if n > LONG || n < MOST + 3 {
+        if !(MOST + 3..=LONG).contains(&n) {
             (0..=MOST).for_each(|lag| shown[lag] += weight * process[lag]);
             continue;
         }
