@@ -12,8 +12,8 @@ use statrs::function::gamma::ln_gamma;
 use super::library::Candidate;
 use super::score::{LEAST_VISIBLE, Trained, ln_chi_square_tail};
 
-/// The most places of one effect.
-const MOST_PLACES: usize = 8;
+/// The most places of one effect: what takes more is a curve.
+const MOST_PLACES: usize = 6;
 
 /// An effect composed of places.
 #[derive(Clone, Debug)]

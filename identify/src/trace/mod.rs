@@ -145,17 +145,11 @@ fn trace_with<'a>(
     let poses = problem.folds.kind == FoldKind::Poses;
     let columns = Columns::new(&problem, &before_fit.beta)?;
     let start = Start::of(&problem, &columns, &before_fit)?;
-    let null = |residual: &[f64], residuals: &[Vec<f64>], salt: u64| {
-        null::draws(
-            &problem,
-            &columns,
-            residuals,
-            residual,
-            options.draws,
-            options.seed.wrapping_add(salt),
-        )
+    let null = |block: usize| {
+        let (count, seed) = (options.draws, options.seed);
+        null::draws(&problem, &columns, pure, &start.residual, count, block, seed)
     };
-    let draws = null(&start.residual, pure, 0);
+    let draws = null(null::BLOCK);
     let structure_before = if poses {
         None
     } else {
@@ -165,7 +159,7 @@ fn trace_with<'a>(
             &columns,
             model,
             &start.residual,
-            draws.clone(),
+            null(null::SINGLE),
             &prior,
         ))
     };
@@ -220,6 +214,9 @@ fn trace_with<'a>(
             judged = judge(&problem, &before_fit, &search, options, structure_before.as_ref())?;
         }
     }
+    if !poses && search.disown() {
+        judged = judge(&problem, &before_fit, &search, options, structure_before.as_ref())?;
+    }
     let Judged {
         after,
         after_fit,
@@ -258,7 +255,13 @@ fn search_on(
     rms_um: &dyn Fn(f64) -> f64,
     progress: &(dyn Fn(Progress) -> bool + Sync),
 ) -> Option<f64> {
+    // Effects that are put down to one make room for others; that must end.
+    let mut rounds = 0;
     loop {
+        rounds += 1;
+        if rounds > search.most_rounds() {
+            return Some(1.0);
+        }
         match search.round() {
             Round::Done { p_value } => return Some(p_value),
             Round::Added { candidate } => {
@@ -323,6 +326,7 @@ fn judge<'a>(
                 &after_fit.residuals,
                 &end.residual,
                 options.draws,
+                null::SINGLE,
                 seed,
             );
             let prior = end.prior();

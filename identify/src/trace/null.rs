@@ -15,20 +15,23 @@ use crate::noise::PureError;
 use crate::outliers::median;
 use crate::problem::Problem;
 
-/// Readings in a block.
-const BLOCK: usize = 20;
+/// Readings in a block for the search: structure that comes and goes stays in, and is not claimed as an effect.
+pub const BLOCK: usize = 20;
+/// Readings in a block for what is left: noise of the found memory and nothing else, so that what comes and goes shows.
+pub const SINGLE: usize = 1;
 /// The fewest deviations that are worth drawing from; below, Gaussian noise is drawn.
 const LEAST_POOL: usize = 200;
 /// Readings on either side over which a residual without repeats is smoothed to take out structure.
 const SMOOTHING: usize = 7;
 
-/// Draws (whitened rows in the order of the folds × draws).
+/// Draws (whitened rows in the order of the folds × draws), of blocks of that many readings.
 pub fn draws(
     problem: &Problem<'_>,
     columns: &Columns<'_, '_>,
     residuals: &[Vec<f64>],
     whitened: &[f64],
     count: usize,
+    block: usize,
     seed: u64,
 ) -> Mat<f64> {
     let rows = columns.rows();
@@ -69,7 +72,7 @@ pub fn draws(
             });
             let Some(stretch) = stretch else { continue };
             let sign = if generator.random::<bool>() { 1.0 } else { -1.0 };
-            let end = (place + BLOCK).min(stretch.len());
+            let end = (place + block).min(stretch.len());
             values.extend(stretch[place..end].iter().map(|value| sign * value));
         }
         values.truncate(rows);

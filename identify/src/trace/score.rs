@@ -216,9 +216,7 @@ impl<'m> Trained<'m> {
         let mut d = own.clone();
         for k in 0..count {
             for l in 0..count {
-                let sum: f64 = (0..self.base.len())
-                    .map(|i| cross[(i, k)] * solved[(i, l)])
-                    .sum();
+                let sum: f64 = (0..self.base.len()).map(|i| cross[(i, k)] * solved[(i, l)]).sum();
                 d[(k, l)] -= sum;
             }
             g[k] -= (0..self.base.len())
@@ -277,8 +275,7 @@ impl<'m> Trained<'m> {
                     for draw in 0..draws {
                         let g: Vec<f64> = (0..count)
                             .map(|k| {
-                                let modelled: f64 =
-                                    (0..m).map(|i| solved[(i, k)] * h[(i, draw)]).sum();
+                                let modelled: f64 = (0..m).map(|i| solved[(i, k)] * h[(i, draw)]).sum();
                                 self.moments.null_cross[(draw, first + k)] - modelled
                             })
                             .collect();

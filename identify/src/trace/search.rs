@@ -6,7 +6,7 @@
 
 use std::collections::BTreeSet;
 
-use abbe_model::effect::Driver;
+use abbe_model::effect::{Driver, Shape};
 use faer::Mat;
 use rayon::prelude::*;
 
@@ -288,7 +288,8 @@ impl<'s> Search<'s> {
     }
 
     /// Puts several effects that follow one axis down to one, where that one says as much in fewer words: what they explain together is compared, each
-    /// effect being charged its cost and the number of entries of the library that it was chosen from. From three on, a free curve may be that one.
+    /// effect being charged its cost and the number of entries of the library that it was chosen from. From three effects or places on, a free curve may
+    /// be that one.
     pub fn merge(&mut self) {
         if self.stop.in_residual_variance {
             return;
@@ -304,14 +305,17 @@ impl<'s> Search<'s> {
         for driver in drivers {
             let chosen: Vec<usize> = self.taken.iter().map(|taken| taken.candidate).collect();
             let (group, rest) = self.following(&driver, &chosen);
-            if group.len() < 2 {
+            let columns: usize = group.iter().map(|c| self.moments.count[*c]).sum();
+            let curves = group.len() > 2 || columns > 2 && self.is_composed(&group);
+            if group.len() < 2 && !curves {
                 continue;
             }
-            self.sharpen(&rest);
-            if group.len() > 2 {
+            if group.len() > 1 {
+                self.sharpen(&rest);
+            }
+            if curves {
                 self.bring_reserve();
             }
-            let curves = group.len() > 2;
             let pool: Vec<usize> = (0..self.candidates.len())
                 .filter(|c| !self.is_held_back(*c) || curves && self.candidates[*c].last_resort)
                 .filter(|c| !rest.contains(c))
@@ -355,6 +359,105 @@ impl<'s> Search<'s> {
         }
     }
 
+    fn is_composed(&self, group: &[usize]) -> bool {
+        let composed =
+            |c: &usize| matches!(&self.candidates[*c].effect.shape, Shape::Steps { at } if at.len() > 2);
+        group.iter().any(composed)
+    }
+
+    /// Enough for every effect that may be taken up, and some that were put down to one.
+    pub fn most_rounds(&self) -> usize {
+        self.stop.most.saturating_add(self.stop.most / 2).max(1)
+    }
+
+    /// Gives back effects that follow one axis where they are no explanation: where curves over that axis, another in every test and in no component's name,
+    /// say as much in fewer words. Returns whether any were.
+    pub fn disown(&mut self) -> bool {
+        let chosen: Vec<usize> = self.taken.iter().map(|taken| taken.candidate).collect();
+        let mut drivers: Vec<Driver> = Vec::new();
+        for candidate in &chosen {
+            let driver = &self.candidates[*candidate].effect.driver;
+            if matches!(driver, Driver::Axis(_)) && !drivers.contains(driver) {
+                drivers.push(driver.clone());
+            }
+        }
+        let mut any = false;
+        for driver in drivers {
+            let chosen: Vec<usize> = self.taken.iter().map(|taken| taken.candidate).collect();
+            let (group, rest) = self.following(&driver, &chosen);
+            let curve = |c: &usize| matches!(self.candidates[*c].effect.shape, Shape::Curve { .. });
+            if group.len() < 2 && !self.is_composed(&group) || group.iter().all(curve) {
+                continue;
+            }
+            let words = self.words_of(&group);
+            let of_group = self.evidence_of(&group, &rest, &self.all_folds()) - words;
+            for intervals in [8, 16, 32] {
+                let layouts = self.columns.curves_of_tests(&driver, intervals);
+                let first = self.candidates.len();
+                let pattern = &self.candidates[group[0]];
+                let nameless: Vec<(Candidate, Layout)> = layouts
+                    .into_iter()
+                    .map(|layout| {
+                        let candidate = Candidate {
+                            dictionary: true,
+                            ..pattern.clone()
+                        };
+                        (candidate, layout)
+                    })
+                    .collect();
+                if nameless.is_empty() {
+                    continue;
+                }
+                self.append(nameless);
+                let curves: Vec<usize> = (first..self.candidates.len()).collect();
+                self.materialise(&curves);
+                // One choice: the axis and how fine.
+                let of_curves = self.evidence_of(&curves, &rest, &self.all_folds()) - self.choice();
+                if of_curves > of_group {
+                    self.taken.retain(|taken| !group.contains(&taken.candidate));
+                    for fold in self.all_folds() {
+                        self.of_fold[fold] = self.following(&driver, &self.of_fold[fold]).1;
+                    }
+                    any = true;
+                    break;
+                }
+            }
+        }
+        if any {
+            let held_out = self.held_out_now();
+            self.held_out.truncate(self.taken.len());
+            self.held_out.push(held_out);
+        }
+        any
+    }
+
+    /// What it costs to have chosen one entry of the library.
+    fn choice(&self) -> f64 {
+        (self.unseen.iter().filter(|unseen| !**unseen).count().max(1) as f64).ln()
+    }
+
+    fn words_of(&self, group: &[usize]) -> f64 {
+        group
+            .iter()
+            .map(|c| self.candidates[*c].cost + self.choice())
+            .sum()
+    }
+
+    /// `−ln P` of what candidates gain together.
+    fn evidence_of(&self, group: &[usize], rest: &[usize], folds: &[usize]) -> f64 {
+        let lean = |chosen: &[usize]| {
+            Trained::lean(&self.moments, &self.prior, self.base_with(chosen), folds.to_vec())
+        };
+        let without = lean(rest);
+        let all: Vec<usize> = rest.iter().chain(group).copied().collect();
+        let gain = Gain {
+            gain: lean(&all).explained() - without.explained(),
+            freedom: group.iter().map(|c| self.moments.count[*c]).sum(),
+            visible: 1.0,
+        };
+        self.evidence(&gain, self.variance(&without))
+    }
+
     /// Which of the chosen follow a driver, and which do not.
     fn following(&self, driver: &Driver, chosen: &[usize]) -> (Vec<usize>, Vec<usize>) {
         chosen
@@ -376,15 +479,8 @@ impl<'s> Search<'s> {
             Trained::lean(&self.moments, &self.prior, self.base_with(rest), folds.to_vec())
         };
         let variance = self.variance(&without);
-        let all: Vec<usize> = rest.iter().chain(group).copied().collect();
-        let of_group = Gain {
-            gain: Trained::lean(&self.moments, &self.prior, self.base_with(&all), folds.to_vec()).explained() - without.explained(),
-            freedom: group.iter().map(|c| self.moments.count[*c]).sum(),
-            visible: 1.0,
-        };
-        let choice = (self.unseen.iter().filter(|unseen| !**unseen).count().max(1) as f64).ln();
-        let words: f64 = group.iter().map(|c| self.candidates[*c].cost + choice).sum();
-        let of_group = self.evidence(&of_group, variance) - words;
+        let choice = self.choice();
+        let of_group = self.evidence_of(group, rest, folds) - self.words_of(group);
         pool.par_iter()
             .filter(|c| !group.contains(c))
             .map(|c| (*c, self.score(*c, &without.gain(*c), variance) - choice))
@@ -557,7 +653,11 @@ impl<'s> Search<'s> {
             }
         }
         // Along runs, what any of the searches has taken up before is enough to choose from.
-        let known: Vec<usize> = self.materialised.iter().map(|(candidate, _)| *candidate).collect();
+        let known: Vec<usize> = self
+            .materialised
+            .iter()
+            .map(|(candidate, _)| *candidate)
+            .collect();
         let pool = (!self.stop.in_residual_variance).then_some(known.as_slice());
         for fold in self.all_folds() {
             let mut chosen = std::mem::take(&mut self.of_fold[fold]);
