@@ -214,7 +214,11 @@ fn trace_with<'a>(
             judged = judge(&problem, &before_fit, &search, options, structure_before.as_ref())?;
         }
     }
-    if !poses && search.disown() {
+    let structured = |judged: &Judged<'_>| {
+        let structure = judged.structure.as_ref();
+        structure.is_some_and(|structure| structure.p_value <= STRUCTURED)
+    };
+    if !poses && search.disown(structured(&judged)) {
         judged = judge(&problem, &before_fit, &search, options, structure_before.as_ref())?;
     }
     let Judged {

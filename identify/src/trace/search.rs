@@ -371,8 +371,8 @@ impl<'s> Search<'s> {
     }
 
     /// Gives back effects that follow one axis where they are no explanation: where curves over that axis, another in every test and in no component's name,
-    /// say as much in fewer words. Returns whether any were.
-    pub fn disown(&mut self) -> bool {
+    /// say as much in fewer words. One simple effect is asked only where structure remains beside it. Returns whether any were.
+    pub fn disown(&mut self, structured: bool) -> bool {
         let chosen: Vec<usize> = self.taken.iter().map(|taken| taken.candidate).collect();
         let mut drivers: Vec<Driver> = Vec::new();
         for candidate in &chosen {
@@ -386,7 +386,8 @@ impl<'s> Search<'s> {
             let chosen: Vec<usize> = self.taken.iter().map(|taken| taken.candidate).collect();
             let (group, rest) = self.following(&driver, &chosen);
             let curve = |c: &usize| matches!(self.candidates[*c].effect.shape, Shape::Curve { .. });
-            if group.len() < 2 && !self.is_composed(&group) || group.iter().all(curve) {
+            let few = group.len() < 2 && !self.is_composed(&group) && !structured;
+            if few || group.iter().all(curve) {
                 continue;
             }
             let words = self.words_of(&group);
