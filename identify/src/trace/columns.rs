@@ -20,6 +20,8 @@ use crate::problem::{Block, Problem};
 pub struct Layout {
     /// Number of columns.
     pub count: usize,
+    /// How many numbers of its shape are chosen to fit: each may gain what a column may.
+    pub numbers: usize,
     /// For each test, what moves: slot, factor of the component, and the basis functions.
     parts: Vec<Vec<LayoutPart>>,
 }
@@ -234,6 +236,7 @@ impl<'p, 'a> Columns<'p, 'a> {
         }
         Some(Layout {
             count: effect.shape.coefficients(),
+            numbers: effect.shape.numbers(),
             parts,
         })
     }
@@ -277,6 +280,7 @@ impl<'p, 'a> Columns<'p, 'a> {
         });
         Some(Layout {
             count: effect.shape.coefficients(),
+            numbers: 0,
             parts,
         })
     }

@@ -18,9 +18,9 @@ const MOST_PLACES: usize = 6;
 /// An effect composed of places.
 #[derive(Clone, Debug)]
 pub struct Composed {
-    /// As a candidate; its cost holds the price of the choice.
+    /// As a candidate, with the price of the choice.
     pub candidate: Candidate,
-    /// `−ln P` of its gain.
+    /// `−ln P` of its gain, less that price.
     pub evidence: f64,
 }
 
@@ -59,9 +59,9 @@ pub fn composed(
         if n < 2 {
             continue;
         }
-        let cost = dictionary.cost + ln_choices(at.len(), n);
-        let evidence = -ln_chi_square_tail(gain / variance, n);
-        if best.as_ref().is_none_or(|best| evidence - cost > best.score()) {
+        let price = ln_choices(at.len(), n);
+        let evidence = -ln_chi_square_tail(gain / variance, n) - price;
+        if best.as_ref().is_none_or(|best| evidence - dictionary.cost > best.score()) {
             let mut places: Vec<f64> = chosen.iter().map(|k| at[*k]).collect();
             places.sort_by(f64::total_cmp);
             let effect = Effect {
@@ -70,7 +70,7 @@ pub fn composed(
             };
             let candidate = Candidate {
                 effect,
-                cost,
+                price,
                 dictionary: false,
                 ..dictionary.clone()
             };

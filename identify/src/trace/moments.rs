@@ -81,6 +81,8 @@ pub struct Moments {
     pub first: Vec<usize>,
     /// Number of columns of each candidate.
     pub count: Vec<usize>,
+    /// How many numbers of its shape are chosen to fit.
+    pub numbers: Vec<usize>,
     /// Base columns, rows × base, kept to extend.
     base_columns: Mat<f64>,
     residual: Vec<f64>,
@@ -142,6 +144,7 @@ impl Moments {
             null_base,
             first,
             count,
+            numbers: layouts.iter().map(|layout| layout.numbers).collect(),
             base_columns: model,
             residual: residual.to_vec(),
             null,
@@ -227,6 +230,7 @@ impl Moments {
         for layout in layouts {
             self.first.push(total + added);
             self.count.push(layout.count);
+            self.numbers.push(layout.numbers);
             added += layout.count;
         }
         let mut of_null = Mat::<f64>::zeros(draws, added);

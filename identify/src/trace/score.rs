@@ -87,7 +87,7 @@ pub struct PriorMoments {
 pub struct Gain {
     /// Fall of the sum of squares.
     pub gain: f64,
-    /// Directions that it adds.
+    /// Directions that it adds, and numbers of its shape that were chosen.
     pub freedom: usize,
     /// The share of its own length that the model does not have already.
     pub visible: f64,
@@ -235,13 +235,19 @@ impl<'m> Trained<'m> {
             .sum()
     }
 
+    /// What the gain of a candidate is judged by: its directions that are seen, and the numbers of its shape. Without the latter whatever may be tuned would
+    /// be preferred to what may not.
+    fn freedom(&self, candidate: usize, seen: usize) -> usize {
+        if seen == 0 { 0 } else { seen + self.moments.numbers[candidate] }
+    }
+
     /// What a candidate would gain.
     pub fn gain(&self, candidate: usize) -> Gain {
         let (d, g, own) = self.projected(candidate);
         let inverse = Visible::of(&d, &own);
         Gain {
             gain: inverse.quadratic(&g),
-            freedom: inverse.freedom,
+            freedom: self.freedom(candidate, inverse.freedom),
             visible: inverse.share,
         }
     }
@@ -267,7 +273,8 @@ impl<'m> Trained<'m> {
                 for &candidate in chunk.iter().filter(|candidate| costs[**candidate].is_finite()) {
                     let (d, _, own) = self.projected(candidate);
                     let inverse = Visible::of(&d, &own);
-                    if inverse.freedom == 0 {
+                    let freedom = self.freedom(candidate, inverse.freedom);
+                    if freedom == 0 {
                         continue;
                     }
                     let (first, count) = (self.moments.first[candidate], self.moments.count[candidate]);
@@ -281,10 +288,10 @@ impl<'m> Trained<'m> {
                             .collect();
                         let gain = inverse.quadratic(&g) / variance;
                         // The tail is worth computing only where it can be the best.
-                        if most_evidence(gain, inverse.freedom) - costs[candidate] <= best[draw] {
+                        if most_evidence(gain, freedom) - costs[candidate] <= best[draw] {
                             continue;
                         }
-                        let score = -ln_chi_square_tail(gain, inverse.freedom) - costs[candidate];
+                        let score = -ln_chi_square_tail(gain, freedom) - costs[candidate];
                         best[draw] = best[draw].max(score);
                     }
                 }

@@ -237,9 +237,14 @@ impl<'s> Search<'s> {
         -ln_chi_square_tail(gain.gain / variance, gain.freedom)
     }
 
-    /// `−ln P` of a gain, less the candidate's cost.
+    /// The evidence for a candidate: `−ln P` of its gain, less the price of its places.
+    pub fn evidence_for(&self, candidate: usize, gain: &Gain, variance: f64) -> f64 {
+        self.evidence(gain, variance) - self.candidates[candidate].price
+    }
+
+    /// The same, less the candidate's cost.
     pub fn score(&self, candidate: usize, gain: &Gain, variance: f64) -> f64 {
-        self.evidence(gain, variance) - self.candidates[candidate].cost
+        self.evidence_for(candidate, gain, variance) - self.candidates[candidate].cost
     }
 
     /// What can be composed of the library's dictionaries beside a model.
@@ -440,7 +445,7 @@ impl<'s> Search<'s> {
     fn words_of(&self, group: &[usize]) -> f64 {
         group
             .iter()
-            .map(|c| self.candidates[*c].cost + self.choice())
+            .map(|c| self.candidates[*c].length() + self.choice())
             .sum()
     }
 
@@ -453,7 +458,7 @@ impl<'s> Search<'s> {
         let all: Vec<usize> = rest.iter().chain(group).copied().collect();
         let gain = Gain {
             gain: lean(&all).explained() - without.explained(),
-            freedom: group.iter().map(|c| self.moments.count[*c]).sum(),
+            freedom: group.iter().map(|c| self.moments.count[*c] + self.moments.numbers[*c]).sum(),
             visible: 1.0,
         };
         self.evidence(&gain, self.variance(&without))
@@ -510,18 +515,17 @@ impl<'s> Search<'s> {
     fn named_first(&self, model: &Trained<'_>, best: usize, taken: &[usize]) -> usize {
         let variance = self.variance(model);
         let of_best = model.gain(best);
-        let evidence = |gain: &Gain| -ln_chi_square_tail(gain.gain / variance, gain.freedom);
-        let least = evidence(&of_best) - super::alias::INDISTINGUISHABLE;
+        let least = self.evidence_for(best, &of_best, variance) - super::alias::INDISTINGUISHABLE;
         let mut first = best;
         let mut first_gain = of_best.clone();
         for (candidate, gain) in model.gains().iter().enumerate() {
             let passed_over = taken.contains(&candidate) || self.is_held_back(candidate);
-            if passed_over || gain.freedom == 0 || evidence(gain) < least {
+            if passed_over || gain.freedom == 0 || self.evidence_for(candidate, gain, variance) < least {
                 continue;
             }
-            let cost = self.candidates[candidate].cost;
-            let present = self.candidates[first].cost;
-            if cost < present || (cost == present && gain.gain > first_gain.gain * (1.0 + 1e-9)) {
+            let length = self.candidates[candidate].length();
+            let present = self.candidates[first].length();
+            if length < present || (length == present && gain.gain > first_gain.gain * (1.0 + 1e-9)) {
                 first = candidate;
                 first_gain = gain.clone();
             }
@@ -547,7 +551,7 @@ impl<'s> Search<'s> {
                     if self.is_held_back(c) {
                         f64::INFINITY
                     } else {
-                        self.candidates[c].cost
+                        self.candidates[c].length()
                     }
                 })
                 .collect();

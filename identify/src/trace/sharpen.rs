@@ -65,7 +65,7 @@ pub fn sharpened(search: &Search<'_>, model: &Trained<'_>, composed: &[Composed]
         let (effect, gain) = moved_steps(search, model, &composed.candidate);
         let gain = Gain {
             gain,
-            freedom: effect.shape.coefficients(),
+            freedom: effect.shape.coefficients() + effect.shape.numbers(),
             visible: 1.0,
         };
         let evidence = search.evidence(&gain, variance);
