@@ -1,8 +1,8 @@
 //! How much of a reading is noise: its size and its memory.
 //!
 //! Readings at the same test, direction and position in repeated runs differ by noise alone (pure error: Box, Hunter & Hunter, Statistics for
-//! Experimenters, ch. 10). What they differ by from their mean, rescaled by `√(R/(R−1))`, needs no model of the structure. A straight line a run is
-//! taken out first, since slow drift is structure and would be taken for noise.
+//! Experimenters, ch. 10). What they differ by from their mean, rescaled by `√(R/(R−1))`, needs no model of the structure. A parabola a run is
+//! taken out first, since slow drift and warming up are structure and would be taken for noise.
 
 use std::collections::BTreeMap;
 
@@ -88,7 +88,7 @@ impl PureError {
             let mut deviation = vec![None; residual.len()];
             if let Some(readings) = &test.readings {
                 let coordinates = readings.coordinates;
-                let level = without_run_lines(readings, residual, |row| kept(number, row));
+                let level = without_trends(readings, residual, |row| kept(number, row));
                 let mut groups: BTreeMap<Vec<i64>, Vec<usize>> = BTreeMap::new();
                 let directions = directions(readings);
                 for row in (0..readings.rows()).filter(|row| kept(number, *row)) {
@@ -139,8 +139,8 @@ impl PureError {
     /// How the deviations remember each other along runs: autoregressive coefficients by Yule–Walker, of the least order up to three whose successor
     /// adds nothing. `None` without enough repeats to tell.
     ///
-    /// The line that was taken out of every run took slow noise with it: with 0.8 between neighbours and a hundred readings a run, half of what is
-    /// slow. Covariances are therefore corrected until noise of the found memory, treated alike, would show those that were seen (indirect inference:
+    /// The parabola that was taken out of every run took slow noise with it: with 0.8 between neighbours and a hundred readings a run, more than half of
+    /// what is slow. Covariances are therefore corrected until noise of the found memory, treated alike, would show those that were seen (indirect inference:
     /// Gouriéroux, Monfort & Renault, J. Appl. Econometrics 8 (1993) S85).
     pub fn memory(&self, tests: &[&Test], kept: impl Fn(usize, usize) -> bool) -> Option<Memory> {
         let mut covariance = [0.0; MOST + 1];
@@ -176,7 +176,7 @@ impl PureError {
         let mut coefficients = autoregression(&seen, insignificant);
         let mut variance = seen[0];
         for _ in 0..CORRECTIONS {
-            let (process, shown) = with_lines_out(&coefficients, &lengths);
+            let (process, shown) = with_trends_out(&coefficients, &lengths);
             variance = seen[0] / shown[0];
             let corrected = std::array::from_fn(|lag| seen[lag] + variance * (process[lag] - shown[lag]));
             coefficients = autoregression(&corrected, insignificant);
@@ -191,7 +191,7 @@ impl PureError {
 /// The highest order of a memory.
 const MOST: usize = 3;
 const CORRECTIONS: usize = 8;
-/// Runs longer than this lose next to nothing with a line.
+/// Runs longer than this lose next to nothing with a parabola.
 const LONG: usize = 600;
 
 /// How readings remember each other along runs.
@@ -199,7 +199,7 @@ const LONG: usize = 600;
 pub struct Memory {
     /// Autoregressive coefficients; empty where readings are as good as white.
     pub coefficients: Vec<f64>,
-    /// By how much the noise is larger than its deviations from lines show.
+    /// By how much the noise is larger than its deviations from parabolas show.
     pub inflation: f64,
 }
 
@@ -229,9 +229,9 @@ fn autoregression(covariance: &[f64; MOST + 1], insignificant: f64) -> Vec<f64> 
     accepted
 }
 
-/// Autocorrelations of a process, and what is seen of them once a straight line is taken out of runs of these lengths (and how many readings are in
+/// Autocorrelations of a process, and what is seen of them once a parabola is taken out of runs of these lengths (and how many readings are in
 /// runs of each).
-fn with_lines_out(
+fn with_trends_out(
     coefficients: &[f64],
     lengths: &BTreeMap<usize, usize>,
 ) -> ([f64; MOST + 1], [f64; MOST + 1]) {
@@ -274,35 +274,26 @@ fn with_lines_out(
             (0..=MOST).for_each(|lag| shown[lag] += weight * process[lag]);
             continue;
         }
-        // Orthonormal constant and slope; d = e − Q Qᵀe, so Cov d = Γ − Q(QᵀΓ) − (ΓQ)Qᵀ + Q(QᵀΓQ)Qᵀ.
-        let middle = (n as f64 - 1.0) / 2.0;
-        let slope = (0..n).map(|t| (t as f64 - middle).powi(2)).sum::<f64>().sqrt();
-        let q = |t: usize| [1.0 / (n as f64).sqrt(), (t as f64 - middle) / slope];
-        let gq: Vec<[f64; 2]> = (0..n)
+        // d = e − Q Qᵀe with orthonormal polynomials Q, so Cov d = Γ − Q(QᵀΓ) − (ΓQ)Qᵀ + Q(QᵀΓQ)Qᵀ.
+        let times: Vec<f64> = (0..n).map(|t| t as f64).collect();
+        let q = polynomials(&times);
+        let gq: Vec<[f64; TERMS]> = (0..n)
             .map(|t| {
-                (0..n).fold([0.0; 2], |sum, s| {
-                    let c = correlation[t.abs_diff(s)];
-                    [sum[0] + c * q(s)[0], sum[1] + c * q(s)[1]]
-                })
+                let along = |i: usize| (0..n).map(|s| correlation[t.abs_diff(s)] * q[s][i]).sum();
+                std::array::from_fn(along)
             })
             .collect();
-        let mut qgq = [[0.0; 2]; 2];
-        for t in 0..n {
-            for i in 0..2 {
-                for j in 0..2 {
-                    qgq[i][j] += q(t)[i] * gq[t][j];
-                }
-            }
-        }
+        let qgq: [[f64; TERMS]; TERMS] =
+            std::array::from_fn(|i| std::array::from_fn(|j| (0..n).map(|t| q[t][i] * gq[t][j]).sum()));
         for lag in 0..=MOST {
             let sum: f64 = (lag..n)
                 .map(|t| {
                     let s = t - lag;
                     let mut value = correlation[lag];
-                    for i in 0..2 {
-                        value -= q(t)[i] * gq[s][i] + gq[t][i] * q(s)[i];
-                        for j in 0..2 {
-                            value += q(t)[i] * qgq[i][j] * q(s)[j];
+                    for i in 0..TERMS {
+                        value -= q[t][i] * gq[s][i] + gq[t][i] * q[s][i];
+                        for j in 0..TERMS {
+                            value += q[t][i] * qgq[i][j] * q[s][j];
                         }
                     }
                     value
@@ -326,8 +317,35 @@ fn directions(readings: &abbe_model::session::readings::Readings) -> Vec<i64> {
     code
 }
 
-/// Residuals less a straight line a run (and coordinate).
-fn without_run_lines(
+/// Coefficients of the trend that is taken out of a run: constant, slope, curvature.
+const TERMS: usize = 3;
+
+/// Polynomials in time that are orthonormal over given times (Gram–Schmidt, twice); those that the times are too few for are zero.
+fn polynomials(times: &[f64]) -> Vec<[f64; TERMS]> {
+    let n = times.len() as f64;
+    let middle = times.iter().sum::<f64>() / n;
+    let half = times
+        .iter()
+        .map(|t| (t - middle).abs())
+        .fold(f64::MIN_POSITIVE, f64::max);
+    let mut q: Vec<[f64; TERMS]> = times
+        .iter()
+        .map(|t| std::array::from_fn(|power| ((t - middle) / half).powi(power as i32)))
+        .collect();
+    for i in 0..TERMS {
+        for j in (0..i).chain(0..i) {
+            let along: f64 = q.iter().map(|row| row[i] * row[j]).sum();
+            q.iter_mut().for_each(|row| row[i] -= along * row[j]);
+        }
+        let length = q.iter().map(|row| row[i] * row[i]).sum::<f64>().sqrt();
+        let scale = if length > 1e-9 { 1.0 / length } else { 0.0 };
+        q.iter_mut().for_each(|row| row[i] *= scale);
+    }
+    q
+}
+
+/// Residuals less a parabola a run (and coordinate).
+fn without_trends(
     readings: &abbe_model::session::readings::Readings,
     residual: &[f64],
     kept: impl Fn(usize) -> bool,
@@ -338,24 +356,22 @@ fn without_run_lines(
         return level;
     }
     for run in readings.runs() {
+        let rows: Vec<usize> = run.filter(|row| kept(*row)).collect();
+        if rows.len() <= TERMS {
+            continue;
+        }
+        let times: Vec<f64> = rows.iter().map(|row| *row as f64).collect();
+        let q = polynomials(&times);
         for coordinate in 0..coordinates {
-            let (mut n, mut st, mut sx, mut stt, mut stx) = (0.0, 0.0, 0.0, 0.0, 0.0);
-            for row in run.clone().filter(|row| kept(*row)) {
-                let (t, x) = ((row - run.start) as f64, residual[row * coordinates + coordinate]);
-                n += 1.0;
-                st += t;
-                sx += x;
-                stt += t * t;
-                stx += t * x;
-            }
-            let determinant = n * stt - st * st;
-            if n < 3.0 || determinant <= 0.0 {
-                continue;
-            }
-            let slope = (n * stx - st * sx) / determinant;
-            let intercept = (sx - slope * st) / n;
-            for row in run.clone() {
-                level[row * coordinates + coordinate] -= intercept + slope * (row - run.start) as f64;
+            let at = |row: usize| row * coordinates + coordinate;
+            let along: [f64; TERMS] = std::array::from_fn(|i| {
+                rows.iter()
+                    .zip(&q)
+                    .map(|(row, q)| residual[at(*row)] * q[i])
+                    .sum()
+            });
+            for (row, q) in rows.iter().zip(&q) {
+                level[at(*row)] -= along.iter().zip(q).map(|(a, q)| a * q).sum::<f64>();
             }
         }
     }

@@ -33,7 +33,7 @@ fn tally(outcomes: &[Outcome]) -> Tally {
     for outcome in outcomes {
         let truth = &outcome.draw.truth.effects[0];
         let effects = &outcome.result.effects;
-        let hit = found(effects, truth);
+        let hit = found(outcome, truth);
         tally.found.count(hit.is_some());
         tally.alone.count(hit.is_some() && effects.len() == 1);
         tally.more.count(effects.len() > 1);

@@ -61,7 +61,10 @@ pub fn composed(
         }
         let price = ln_choices(at.len(), n);
         let evidence = -ln_chi_square_tail(gain / variance, n) - price;
-        if best.as_ref().is_none_or(|best| evidence - dictionary.cost > best.score()) {
+        if best
+            .as_ref()
+            .is_none_or(|best| evidence - dictionary.cost > best.score())
+        {
             let mut places: Vec<f64> = chosen.iter().map(|k| at[*k]).collect();
             places.sort_by(f64::total_cmp);
             let effect = Effect {

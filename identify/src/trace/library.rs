@@ -637,5 +637,15 @@ fn mounts(problem: &Problem<'_>, component: &Component) -> Vec<Vec<String>> {
             mounts.push(alone);
         }
     }
+    // And from a test on.
+    for first in 1..problem.tests.len() {
+        let mount = problem.tests[first].group(shared_by);
+        let of_mount = |test: &&&abbe_model::session::Test| test.group(shared_by) == mount;
+        let later = problem.tests[first..].iter().filter(of_mount);
+        let later: Vec<String> = later.map(|test| test.name.clone()).collect();
+        if problem.tests[first - 1].group(shared_by) == mount && !mounts.contains(&later) {
+            mounts.push(later);
+        }
+    }
     mounts
 }

@@ -11,6 +11,8 @@
 pub mod alias;
 pub mod columns;
 pub mod compose;
+mod exchange;
+pub mod further;
 pub mod library;
 pub mod moments;
 pub mod null;
@@ -104,6 +106,8 @@ pub struct Trace<'a> {
     pub after_fit: Fit,
     /// The found effects.
     pub effects: Vec<Effect>,
+    /// For each of them what the readings cannot tell from it, nearest first.
+    pub look_alikes: Vec<Vec<Effect>>,
     /// As it is reported.
     pub result: TraceResult,
 }
@@ -227,7 +231,7 @@ fn trace_with<'a>(
         effects,
         structure: structure_after,
     } = judged;
-    let result = report::report(&report::Findings {
+    let (result, look_alikes) = report::report(&report::Findings {
         before: &problem,
         before_fit: &before_fit,
         after: &after,
@@ -249,6 +253,7 @@ fn trace_with<'a>(
         after,
         after_fit,
         effects,
+        look_alikes,
         result,
     })
 }
@@ -267,6 +272,7 @@ fn search_on(
             return Some(1.0);
         }
         match search.round() {
+            Round::Done { .. } if search.retune() => {}
             Round::Done { p_value } => return Some(p_value),
             Round::Added { candidate } => {
                 // Every exchange costs a model an effect; among many effects the gain is small and a sweep now and then will do.

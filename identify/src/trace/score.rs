@@ -238,7 +238,11 @@ impl<'m> Trained<'m> {
     /// What the gain of a candidate is judged by: its directions that are seen, and the numbers of its shape. Without the latter whatever may be tuned would
     /// be preferred to what may not.
     fn freedom(&self, candidate: usize, seen: usize) -> usize {
-        if seen == 0 { 0 } else { seen + self.moments.numbers[candidate] }
+        if seen == 0 {
+            0
+        } else {
+            seen + self.moments.numbers[candidate]
+        }
     }
 
     /// What a candidate would gain.

@@ -58,7 +58,7 @@ pub struct Search<'s> {
     /// What each fold's own search has taken up: candidates.
     pub of_fold: Vec<Vec<usize>>,
     /// Where the columns of every candidate that was ever taken up stand in the base.
-    materialised: Vec<(usize, std::ops::Range<usize>)>,
+    pub(super) materialised: Vec<(usize, std::ops::Range<usize>)>,
     /// Sum of squares of held-out residuals over the variance of the noise, before and after each addition.
     pub held_out: Vec<f64>,
     /// The best score on readings without structure that is exceeded with the probability of the stop, by round.
@@ -67,14 +67,14 @@ pub struct Search<'s> {
     pub last_resort: bool,
     /// Candidates of last resort that are not laid over the readings yet.
     pub reserve: Vec<(Candidate, Layout)>,
-    plain: Plain,
+    pub(super) plain: Plain,
     /// Entries of the library that would not stand out however large they plausibly were.
-    unseen: Vec<bool>,
-    stop: Stop,
+    pub(super) unseen: Vec<bool>,
+    pub(super) stop: Stop,
 }
 
 /// The most effects whose places and periods are looked at again whenever one is added.
-const MOST_SHARPENED: usize = 4;
+pub(super) const MOST_SHARPENED: usize = 4;
 
 /// By how many standard deviations an effect as large as is plausible has to change the readings, all together and beyond what the model absorbs, to be
 /// looked for.
@@ -162,18 +162,18 @@ impl<'s> Search<'s> {
         unseen || candidate.dictionary || candidate.last_resort && !self.last_resort
     }
 
-    fn all_folds(&self) -> Vec<usize> {
+    pub(super) fn all_folds(&self) -> Vec<usize> {
         (0..self.columns.fold_rows.len()).collect()
     }
 
-    fn places(&self, candidate: usize) -> std::ops::Range<usize> {
+    pub(super) fn places(&self, candidate: usize) -> std::ops::Range<usize> {
         self.materialised
             .iter()
             .find(|(c, _)| *c == candidate)
             .map_or(0..0, |(_, places)| places.clone())
     }
 
-    fn base_with(&self, candidates: &[usize]) -> Vec<usize> {
+    pub(super) fn base_with(&self, candidates: &[usize]) -> Vec<usize> {
         (0..self.rank)
             .chain(candidates.iter().flat_map(|candidate| self.places(*candidate)))
             .collect()
@@ -260,7 +260,7 @@ impl<'s> Search<'s> {
     }
 
     /// Adds what comes near the best, with the best numbers that it can have beside a model of some candidates.
-    fn sharpen(&mut self, beside: &[usize]) {
+    pub(super) fn sharpen(&mut self, beside: &[usize]) {
         let fresh = {
             let model = self.model_of(beside, &self.all_folds());
             sharpen::sharpened(self, &model, &self.composed(&model))
@@ -272,7 +272,7 @@ impl<'s> Search<'s> {
         self.append(fresh);
     }
 
-    fn append(&mut self, fresh: Vec<(Candidate, Layout)>) {
+    pub(super) fn append(&mut self, fresh: Vec<(Candidate, Layout)>) {
         if fresh.is_empty() {
             return;
         }
@@ -288,7 +288,7 @@ impl<'s> Search<'s> {
         self.append(reserve);
     }
 
-    fn model_of(&self, chosen: &[usize], folds: &[usize]) -> Trained<'_> {
+    pub(super) fn model_of(&self, chosen: &[usize], folds: &[usize]) -> Trained<'_> {
         Trained::new(&self.moments, &self.prior, self.base_with(chosen), folds.to_vec())
     }
 
@@ -309,52 +309,13 @@ impl<'s> Search<'s> {
         let mut merged = false;
         for driver in drivers {
             let chosen: Vec<usize> = self.taken.iter().map(|taken| taken.candidate).collect();
-            let (group, rest) = self.following(&driver, &chosen);
-            let columns: usize = group.iter().map(|c| self.moments.count[*c]).sum();
-            let curves = group.len() > 2 || columns > 2 && self.is_composed(&group);
-            if group.len() < 2 && !curves {
-                continue;
+            let whole = self.following(&driver, &chosen).0;
+            let mut groups = vec![whole.clone()];
+            if whole.len() > 2 {
+                let without = |left_out: &usize| whole.iter().copied().filter(|c| c != left_out).collect();
+                groups.extend(whole.iter().map(without));
             }
-            if group.len() > 1 {
-                self.sharpen(&rest);
-            }
-            if curves {
-                self.bring_reserve();
-            }
-            let pool: Vec<usize> = (0..self.candidates.len())
-                .filter(|c| !self.is_held_back(*c) || curves && self.candidates[*c].last_resort)
-                .filter(|c| !rest.contains(c))
-                .collect();
-            let Some(one) = self.in_fewer_words(&group, &rest, &pool, &self.all_folds()) else {
-                continue;
-            };
-            self.materialise(&[one]);
-            let of_group = |taken: &Taken| group.contains(&taken.candidate);
-            let p_value = self
-                .taken
-                .iter()
-                .filter(|t| of_group(t))
-                .map(|t| t.p_value)
-                .fold(1.0, f64::min);
-            let places = self.places(one);
-            self.taken.retain(|taken| !group.contains(&taken.candidate));
-            self.taken.push(Taken {
-                candidate: one,
-                places,
-                p_value,
-            });
-            for fold in self.all_folds() {
-                let (group, rest) = self.following(&driver, &self.of_fold[fold]);
-                if !group.is_empty()
-                    && self
-                        .in_fewer_words(&group, &rest, &[one], &self.others(fold))
-                        .is_some()
-                {
-                    self.of_fold[fold] = rest;
-                    self.of_fold[fold].push(one);
-                }
-            }
-            merged = true;
+            merged |= groups.into_iter().any(|group| self.merge_group(&driver, &group));
         }
         if merged {
             let held_out = self.held_out_now();
@@ -364,7 +325,50 @@ impl<'s> Search<'s> {
         }
     }
 
-    fn is_composed(&self, group: &[usize]) -> bool {
+    /// Puts a group of effects down to one, if one says as much in fewer words. Returns whether it did.
+    fn merge_group(&mut self, driver: &Driver, group: &[usize]) -> bool {
+        let columns: usize = group.iter().map(|c| self.moments.count[*c]).sum();
+        let curves = group.len() > 2 || columns > 2 && self.is_composed(group);
+        if group.len() < 2 && !curves {
+            return false;
+        }
+        let chosen = self.taken.iter().map(|taken| taken.candidate);
+        let rest: Vec<usize> = chosen.filter(|c| !group.contains(c)).collect();
+        if group.len() > 1 {
+            self.sharpen(&rest);
+        }
+        if curves {
+            self.bring_reserve();
+        }
+        let pool: Vec<usize> = (0..self.candidates.len())
+            .filter(|c| !self.is_held_back(*c) || curves && self.candidates[*c].last_resort)
+            .filter(|c| !rest.contains(c))
+            .collect();
+        let Some(one) = self.in_fewer_words(group, &rest, &pool, &self.all_folds()) else {
+            return false;
+        };
+        self.materialise(&[one]);
+        let of_group = self.taken.iter().filter(|taken| group.contains(&taken.candidate));
+        let p_value = of_group.map(|taken| taken.p_value).fold(1.0, f64::min);
+        let places = self.places(one);
+        self.taken.retain(|taken| !group.contains(&taken.candidate));
+        self.taken.push(Taken {
+            candidate: one,
+            places,
+            p_value,
+        });
+        for fold in self.all_folds() {
+            let (group, rest) = self.following(driver, &self.of_fold[fold]);
+            let others = self.others(fold);
+            if !group.is_empty() && self.in_fewer_words(&group, &rest, &[one], &others).is_some() {
+                self.of_fold[fold] = rest;
+                self.of_fold[fold].push(one);
+            }
+        }
+        true
+    }
+
+    pub(super) fn is_composed(&self, group: &[usize]) -> bool {
         let composed =
             |c: &usize| matches!(&self.candidates[*c].effect.shape, Shape::Steps { at } if at.len() > 2);
         group.iter().any(composed)
@@ -438,11 +442,11 @@ impl<'s> Search<'s> {
     }
 
     /// What it costs to have chosen one entry of the library.
-    fn choice(&self) -> f64 {
+    pub(super) fn choice(&self) -> f64 {
         (self.unseen.iter().filter(|unseen| !**unseen).count().max(1) as f64).ln()
     }
 
-    fn words_of(&self, group: &[usize]) -> f64 {
+    pub(super) fn words_of(&self, group: &[usize]) -> f64 {
         group
             .iter()
             .map(|c| self.candidates[*c].length() + self.choice())
@@ -450,7 +454,7 @@ impl<'s> Search<'s> {
     }
 
     /// `−ln P` of what candidates gain together.
-    fn evidence_of(&self, group: &[usize], rest: &[usize], folds: &[usize]) -> f64 {
+    pub(super) fn evidence_of(&self, group: &[usize], rest: &[usize], folds: &[usize]) -> f64 {
         let lean = |chosen: &[usize]| {
             Trained::lean(&self.moments, &self.prior, self.base_with(chosen), folds.to_vec())
         };
@@ -458,7 +462,10 @@ impl<'s> Search<'s> {
         let all: Vec<usize> = rest.iter().chain(group).copied().collect();
         let gain = Gain {
             gain: lean(&all).explained() - without.explained(),
-            freedom: group.iter().map(|c| self.moments.count[*c] + self.moments.numbers[*c]).sum(),
+            freedom: group
+                .iter()
+                .map(|c| self.moments.count[*c] + self.moments.numbers[*c])
+                .sum(),
             visible: 1.0,
         };
         self.evidence(&gain, self.variance(&without))
@@ -495,7 +502,7 @@ impl<'s> Search<'s> {
             .map(|(c, _)| c)
     }
 
-    fn best_of(&self, model: &Trained<'_>, taken: &[usize]) -> Option<(usize, f64)> {
+    pub(super) fn best_of(&self, model: &Trained<'_>, taken: &[usize]) -> Option<(usize, f64)> {
         let variance = self.variance(model);
         let gains = model.gains();
         let mut best: Option<(usize, f64)> = None;
@@ -512,7 +519,7 @@ impl<'s> Search<'s> {
     }
 
     /// The simplest of the candidates that the readings cannot tell from the best one.
-    fn named_first(&self, model: &Trained<'_>, best: usize, taken: &[usize]) -> usize {
+    pub(super) fn named_first(&self, model: &Trained<'_>, best: usize, taken: &[usize]) -> usize {
         let variance = self.variance(model);
         let of_best = model.gain(best);
         let least = self.evidence_for(best, &of_best, variance) - super::alias::INDISTINGUISHABLE;
@@ -635,91 +642,8 @@ impl<'s> Search<'s> {
         }
     }
 
-    /// Exchanges effects for candidates that explain clearly better what they stand for, in the search on all readings and in that of each fold.
-    pub fn exchange(&mut self) {
-        if (2..=MOST_SHARPENED).contains(&self.taken.len()) && !self.stop.in_residual_variance {
-            let chosen: Vec<usize> = self.taken.iter().map(|taken| taken.candidate).collect();
-            for k in 0..chosen.len() {
-                let mut others = chosen.clone();
-                others.remove(k);
-                self.sharpen(&others);
-            }
-        }
-        let mut of_all: Vec<usize> = self.taken.iter().map(|taken| taken.candidate).collect();
-        self.exchange_in(&mut of_all, &self.all_folds(), None);
-        for (k, candidate) in of_all.into_iter().enumerate() {
-            if self.taken[k].candidate != candidate {
-                let places = self.places(candidate);
-                self.taken[k] = Taken {
-                    candidate,
-                    places,
-                    p_value: self.taken[k].p_value,
-                };
-            }
-        }
-        // Along runs, what any of the searches has taken up before is enough to choose from.
-        let known: Vec<usize> = self
-            .materialised
-            .iter()
-            .map(|(candidate, _)| *candidate)
-            .collect();
-        let pool = (!self.stop.in_residual_variance).then_some(known.as_slice());
-        for fold in self.all_folds() {
-            let mut chosen = std::mem::take(&mut self.of_fold[fold]);
-            self.exchange_in(&mut chosen, &self.others(fold), pool);
-            self.of_fold[fold] = chosen;
-        }
-        let held_out = self.held_out_now();
-        if let Some(last) = self.held_out.last_mut() {
-            *last = held_out;
-        }
-    }
-
-    /// One sweep of exchanges over what a search on some of the folds has chosen. A change has to be worth more than what cannot be told apart, so
-    /// that the sweeps end.
-    fn exchange_in(&mut self, chosen: &mut [usize], folds: &[usize], pool: Option<&[usize]>) {
-        for k in 0..chosen.len() {
-            let others: Vec<usize> = chosen
-                .iter()
-                .enumerate()
-                .filter(|(j, _)| *j != k)
-                .map(|(_, candidate)| *candidate)
-                .collect();
-            let better = {
-                let base = self.base_with(&others);
-                let model = match pool {
-                    None => Trained::new(&self.moments, &self.prior, base, folds.to_vec()),
-                    Some(_) => Trained::lean(&self.moments, &self.prior, base, folds.to_vec()),
-                };
-                let variance = self.variance(&model);
-                let score = self.score(chosen[k], &model.gain(chosen[k]), variance);
-                let clearly = |(best, most): &(usize, f64)| {
-                    *best != chosen[k] && *most > score + super::alias::INDISTINGUISHABLE
-                };
-                match pool {
-                    None => self
-                        .best_of(&model, &others)
-                        .filter(clearly)
-                        .map(|(best, _)| self.named_first(&model, best, &others)),
-                    Some(pool) => pool
-                        .iter()
-                        .filter(|c| !others.contains(c))
-                        .map(|c| (*c, self.score(*c, &model.gain(*c), variance)))
-                        .max_by(|a, b| a.1.total_cmp(&b.1))
-                        .filter(clearly)
-                        .map(|(best, _)| best),
-                }
-            };
-            let Some(better) = better.filter(|better| *better != chosen[k]) else {
-                continue;
-            };
-            self.materialise(&[better]);
-            chosen[k] = better;
-        }
-    }
-
     /// Puts the columns of candidates into the base, where they are not there yet.
-    fn materialise(&mut self, candidates: &[usize]) {
+    pub(super) fn materialise(&mut self, candidates: &[usize]) {
         let fresh: Vec<usize> = candidates
             .iter()
             .copied()
@@ -743,7 +667,7 @@ impl<'s> Search<'s> {
         self.materialised.extend(fresh.into_iter().zip(places));
     }
 
-    fn others(&self, fold: usize) -> Vec<usize> {
+    pub(super) fn others(&self, fold: usize) -> Vec<usize> {
         self.all_folds()
             .into_iter()
             .filter(|other| *other != fold)
@@ -763,7 +687,7 @@ impl<'s> Search<'s> {
         Trained::lean(&self.moments, &self.prior, base, self.others(fold))
     }
 
-    fn held_out_now(&self) -> f64 {
+    pub(super) fn held_out_now(&self) -> f64 {
         let models: Vec<Trained<'_>> = self
             .all_folds()
             .into_par_iter()
