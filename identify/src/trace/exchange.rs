@@ -16,7 +16,11 @@ use super::search::{MOST_SHARPENED, Search, Taken};
 use super::sharpen;
 
 /// How many are tried beside an effect that is fitted anew.
-const MOST_TRIED: usize = 8;
+const MOST_TRIED: usize = 6;
+/// The most effects that are fitted anew beside others.
+const MOST_ANEW: usize = 3;
+/// Relative difference of scores below which two candidates do the same.
+const SAME: f64 = 1e-6;
 
 impl Search<'_> {
     /// Exchanges effects for candidates that explain clearly better what they stand for, in the search on all readings and in that of each fold.
@@ -106,7 +110,7 @@ impl Search<'_> {
     /// best of these sets if it says clearly more than the present one. Returns whether it did.
     pub fn retune(&mut self) -> bool {
         let chosen: Vec<usize> = self.taken.iter().map(|taken| taken.candidate).collect();
-        if self.stop.in_residual_variance || !(1..=MOST_SHARPENED).contains(&chosen.len()) {
+        if self.stop.in_residual_variance || !(1..=MOST_ANEW).contains(&chosen.len()) {
             return false;
         }
         let folds = self.all_folds();
@@ -183,10 +187,14 @@ impl Search<'_> {
     }
 
     fn is_flexible(&self, candidate: usize) -> bool {
-        self.moments.numbers[candidate] > 0 || self.is_composed(&[candidate])
+        self.moments.numbers[candidate] > 0 || self.has_places(candidate)
     }
 
-    /// The best beside some effects, each component, driver and shape once.
+    fn has_places(&self, candidate: usize) -> bool {
+        matches!(self.candidates[candidate].effect.shape, Shape::Steps { .. })
+    }
+
+    /// The best beside some effects, each component, driver and shape once, and what does the very same to the readings once.
     fn next_best(&self, base: &[usize], but: &[usize]) -> Vec<usize> {
         let model = self.model_of(base, &self.all_folds());
         let variance = self.variance(&model);
@@ -199,6 +207,9 @@ impl Search<'_> {
         scored.sort_by(|a, b| b.1.total_cmp(&a.1).then(a.0.cmp(&b.0)));
         let mut seen: HashSet<String> = but.iter().map(|c| self.candidates[*c].effect.id()).collect();
         scored.retain(|(c, _)| seen.insert(self.candidates[*c].effect.id()));
+        scored.dedup_by(|a, b| {
+            (a.1 - b.1).abs() < SAME * b.1.abs() && gains[a.0].freedom == gains[b.0].freedom
+        });
         scored.into_iter().take(MOST_TRIED).map(|(c, _)| c).collect()
     }
 
@@ -212,7 +223,7 @@ impl Search<'_> {
                 self.all_folds(),
             );
             let original = &self.candidates[flexible];
-            if self.is_composed(&[flexible]) {
+            if self.has_places(flexible) {
                 let id = original.effect.id();
                 let dictionary = self.candidates.iter().position(|candidate| {
                     candidate.dictionary
