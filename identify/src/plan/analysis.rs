@@ -47,10 +47,14 @@ pub fn analyse(session: &Session, options: &PlanOptions) -> Result<PlanAnalysis,
     let problem = states::problem_by_test(&complete, noise)?;
     let mut analysis = analyse_problem(&problem)?;
     if options.noise_mm.is_none() && session.noise_mm.is_none() {
-        analysis.warnings.push(format!(
-            "the session states no `noise_um`; {:.2} µm is taken",
-            problem.noise.sigma_mm * 1e3
-        ));
+        let found = if problem.noise.source == NoiseSource::Stated {
+            "is assumed"
+        } else {
+            "is what its data show"
+        };
+        let sigma_um = problem.noise.sigma_mm * 1e3;
+        let warning = format!("the session states no `noise_um`; {sigma_um:.2} µm {found}");
+        analysis.warnings.push(warning);
     }
     if options.effects {
         analysis.effects = Some(effects::effects(&problem)?);

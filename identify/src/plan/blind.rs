@@ -46,14 +46,11 @@ fn proportion(combination: &[(String, f64)]) -> String {
         .join(" : ")
 }
 
+/// Two decimals, or two digits of a small number.
 fn short(value: f64) -> String {
-    let text = if value.abs() >= 10.0 {
-        format!("{value:.1}")
-    } else {
-        format!("{value:.2}")
-    };
-    let text = text.trim_end_matches('0').trim_end_matches('.');
-    text.replace('-', "−")
+    let places = (1.0 - value.abs().max(1e-9).log10().floor()).clamp(1.0, 9.0) as usize;
+    let text = format!("{value:.*}", places.max(if value.abs() < 10.0 { 2 } else { 1 }));
+    text.trim_end_matches('0').trim_end_matches('.').replace('-', "−")
 }
 
 /// Combinations that no reading sees, priors included.

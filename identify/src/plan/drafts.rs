@@ -44,23 +44,27 @@ pub(super) fn drafts(session: &Session, menu: &Menu, last: &Test) -> Vec<Draft> 
         let on_table = axis < machine.workpiece_side;
         for place in places(session, menu, &rotary, on_table) {
             for at in standings(session, menu, &rotary, axis, sweep.from) {
-                let base = Base {
-                    session,
-                    last,
-                    axis,
-                    sweep,
-                    on_table,
-                    place: &place,
-                    at: &at,
-                };
-                drafts.extend(
-                    menu.bars_mm
-                        .iter()
-                        .flat_map(|nominal| base.on_axis(menu, *nominal)),
-                );
-                let upright = at.iter().enumerate().all(|(k, q)| k == axis || *q == 0.0);
-                if let Some(nominal) = following_bar(menu).filter(|_| menu.follow && upright) {
-                    drafts.extend(base.following(menu, nominal));
+                for &feed in &menu.feeds {
+                    let (place, at) = (&place, at.as_slice());
+                    let base = Base {
+                        session,
+                        last,
+                        axis,
+                        sweep,
+                        feed,
+                        on_table,
+                        place,
+                        at,
+                    };
+                    drafts.extend(
+                        menu.bars_mm
+                            .iter()
+                            .flat_map(|nominal| base.on_axis(menu, *nominal)),
+                    );
+                    let upright = at.iter().enumerate().all(|(k, q)| k == axis || *q == 0.0);
+                    if let Some(nominal) = following_bar(menu).filter(|_| menu.follow && upright) {
+                        drafts.extend(base.following(menu, nominal));
+                    }
                 }
             }
         }
@@ -179,6 +183,8 @@ struct Base<'b> {
     last: &'b Test,
     axis: usize,
     sweep: Sweep,
+    /// Times the speed of the sweep.
+    feed: f64,
     on_table: bool,
     place: &'b Place,
     at: &'b [f64],
@@ -241,6 +247,9 @@ impl Base<'_> {
             }
         }
         name.push_str(words);
+        if self.feed != 1.0 {
+            name.push_str(&format!(", at {} times the feed", self.feed));
+        }
         if !self.place.new {
             name.push_str(&format!(" ({ball} as in {})", self.place.setup));
         }
@@ -325,7 +334,7 @@ impl Base<'_> {
                     from: self.sweep.from,
                     to: self.sweep.to,
                     step: self.sweep.step * menu.thin.max(1) as f64,
-                    speed: self.sweep.speed,
+                    speed: self.sweep.speed * self.feed,
                     runs: self.sweep.runs,
                     both_directions: true,
                 };
@@ -373,7 +382,7 @@ impl Base<'_> {
                     from: self.sweep.from,
                     to: self.sweep.to,
                     step: self.sweep.step * menu.thin.max(1) as f64,
-                    speed: self.sweep.speed,
+                    speed: self.sweep.speed * self.feed,
                     runs: self.sweep.runs,
                     both_directions: true,
                     offset,

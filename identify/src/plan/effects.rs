@@ -203,7 +203,7 @@ fn biases(problem: &Problem<'_>, moved: &Mat<f64>, unit: &Unit) -> Vec<Bias> {
             Bias {
                 id: parameter.id.clone(),
                 per_unit: worst * parameter.unit.per_inside / unit.per_inside,
-                unit: format!("{}/({})", parameter.unit.name, unit.name),
+                unit: per(&parameter.unit.name, &unit.name),
             }
         })
         .filter(|bias| bias.per_unit.abs() >= LEAST_BIAS)
@@ -277,4 +277,13 @@ pub fn hidden_by_error(analysis: &EffectsAnalysis) -> BTreeMap<String, Vec<(Stri
         .values_mut()
         .for_each(|list| list.sort_by(|a, b| b.1.abs().total_cmp(&a.1.abs())));
     by_error
+}
+
+/// `um/arcsec`, `um/(um/h)`.
+fn per(above: &str, below: &str) -> String {
+    if below.contains('/') {
+        format!("{above}/({below})")
+    } else {
+        format!("{above}/{below}")
+    }
 }

@@ -12,6 +12,7 @@
 mod analysis;
 pub mod blind;
 pub mod budget;
+pub mod clearance;
 pub mod detect;
 mod drafts;
 pub mod effects;

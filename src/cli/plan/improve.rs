@@ -98,6 +98,7 @@ impl ImproveArguments {
             for id in [a, b] {
                 add(&mut both, id.trim())?;
             }
+            let menu = menu.for_effects(&both.parameters.effects);
             let goal = Goal::Separation {
                 effect: a.trim().to_string(),
                 coefficients: Vec::new(),

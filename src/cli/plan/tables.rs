@@ -52,6 +52,9 @@ pub fn three_digits(value: f64) -> String {
     if !value.is_finite() {
         return "∞".to_string();
     }
+    if value == 0.0 {
+        return "0".to_string();
+    }
     let places = (2.0 - value.abs().max(1e-9).log10().floor()).clamp(0.0, 5.0) as usize;
     format!("{value:.places$}")
 }
