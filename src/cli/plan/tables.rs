@@ -106,29 +106,32 @@ fn errors(errors: &[ErrorAnalysis]) {
 }
 
 fn budget(errors: &[ErrorAnalysis]) {
-    println!(
-        "\nWhere the uncertainty comes from (share of the variance), and what it is shared with (correlation):"
-    );
-    let rows: Vec<Vec<String>> = errors
+    println!("\nWhere the uncertainty comes from (share of the variance), and with what it is correlated:");
+    let width = errors
         .iter()
-        .filter(|error| error.u.is_some())
-        .map(|error| {
-            let parts: Vec<String> = error
-                .budget
-                .iter()
-                .take(CONTRIBUTIONS)
-                .map(|part| format!("{} {:.0} %", part.from, part.share * 100.0))
-                .collect();
-            let shared: Vec<String> = error
-                .shared_with
-                .iter()
-                .take(2)
-                .map(|other| format!("{} {:+.2}", other.id, other.correlation))
-                .collect();
-            vec![error.id.clone(), parts.join(", "), shared.join(", ")]
-        })
-        .collect();
-    table::print(&["error", "from", "shared with"], &rows);
+        .map(|error| error.id.chars().count())
+        .max()
+        .unwrap_or(0);
+    for error in errors.iter().filter(|error| error.u.is_some()) {
+        let parts: Vec<String> = error
+            .budget
+            .iter()
+            .take(CONTRIBUTIONS)
+            .map(|part| format!("{} {:.0} %", part.from, part.share * 100.0))
+            .collect();
+        let shared: Vec<String> = error
+            .shared_with
+            .iter()
+            .take(2)
+            .map(|other| format!("{} {:+.2}", other.id, other.correlation))
+            .collect();
+        let with = if shared.is_empty() {
+            String::new()
+        } else {
+            format!("; with {}", shared.join(", "))
+        };
+        println!("  {:width$}  {}{with}", error.id, parts.join(", "));
+    }
 }
 
 fn plots(analysis: &PlanAnalysis) {
