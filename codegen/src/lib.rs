@@ -1,1 +1,40 @@
-//! x
+//! Equations of readings: the closed form that the model's one kinematic chain yields for symbols in the place of numbers.
+//!
+//! - [`symbol`]: the symbolic scalar, and the arena that holds its expressions;
+//! - [`variable`], [`subject`], [`session`]: what a symbol may stand for, what an equation is of;
+//! - [`evaluate`], [`derivative`]: expressions at numbers, and their derivatives;
+//! - [`polynomial`], [`normal`]: the exact normal form, in which equality is decided;
+//! - [`equation`]: the closed form of a reading, with its named vectors;
+//! - [`first`]: its first order, as a table of sensitivities; [`check`]: what confirms it before it is written;
+//! - [`program`], [`mod@print`]: as a sequence of steps, and in a language.
+
+pub mod check;
+pub mod derivative;
+pub mod equation;
+pub mod error;
+pub mod evaluate;
+pub mod first;
+mod fold;
+mod forms;
+mod layout;
+pub mod normal;
+pub mod polynomial;
+pub mod print;
+pub mod program;
+mod run;
+pub mod session;
+pub mod subject;
+pub mod symbol;
+pub mod variable;
+pub mod vectors;
+
+pub use equation::{Equation, Form, Kind, Options, Order};
+pub use error::CodegenError;
+pub use evaluate::Value;
+pub use normal::Ring;
+pub use polynomial::Polynomial;
+pub use print::Language;
+pub use session::SessionTest;
+pub use subject::{Source, Subject, ToolPoint};
+pub use symbol::{Arena, Operand, Symbol};
+pub use variable::{Symbols, Variable};

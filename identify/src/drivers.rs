@@ -38,7 +38,7 @@ impl Origin {
 }
 
 /// What a driver does in a test, row by row; `None` where the data have no such column. `component_axis` is the axis whose moment the gravity
-/// driver takes.
+/// driver takes: that of a weight at the point of the instrument that the axis carries.
 pub fn samples(
     machine: &Machine,
     model: &TestModel<'_>,
@@ -75,7 +75,12 @@ pub fn samples(
         }),
         Driver::Gravity => {
             let axis = component_axis?;
-            let point = model.station().tool_point_mm();
+            let station = model.station();
+            let point = if axis < machine.workpiece_side {
+                station.table_point_mm()?
+            } else {
+                station.tool_point_mm()
+            };
             let moment = |row| machine.gravity_moment_mm(axis, model.state(row), point) / 1000.0;
             Some((0..model.rows()).map(|row| plain(moment(row), 0.0)).collect())
         }

@@ -312,10 +312,11 @@ pub fn parameters(problem: &Problem<'_>, fit: &Fit) -> Vec<ParameterResult> {
             coefficient: 0,
         } = parameter.role
         {
+            let id = &problem.parameters.effect_ids[effect];
             let effect = &problem.parameters.effects[effect];
             let pair = matches!(effect.shape, Shape::Harmonic { .. } | Shape::Periodic { .. });
             if pair && fit.rank.is_seen(j) && fit.rank.is_seen(j + 1) {
-                results.extend(amplitude_and_phase(problem, fit, j, &effect.id()));
+                results.extend(amplitude_and_phase(problem, fit, j, id));
                 j += 2;
                 continue;
             }

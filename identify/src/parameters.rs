@@ -62,6 +62,8 @@ pub struct Parameters {
     pub parts: Vec<Vec<Part>>,
     /// The effects whose coefficients are among the unknowns.
     pub effects: Vec<Effect>,
+    /// Their identifiers: [`Effect::id`], numbered from the second of those that differ only in the numbers of their shapes.
+    pub effect_ids: Vec<String>,
 }
 
 /// The physical size of a component.
@@ -190,6 +192,18 @@ impl Parameters {
         };
         let number = self.effects.len();
         let first = self.list.len();
+        if self.effects.contains(effect) {
+            return Err(IdentifyError::RepeatedUnknown { id: effect.id() });
+        }
+        let alike = self
+            .effects
+            .iter()
+            .filter(|other| other.id() == effect.id())
+            .count();
+        let id = match alike {
+            0 => effect.id(),
+            _ => format!("{}#{}", effect.id(), alike + 1),
+        };
         let mut greatest = vec![0.0_f64; effect.shape.coefficients()];
         for (position, (test, model)) in tests.iter().zip(models).enumerate() {
             if !effect.tests.is_empty() && !effect.tests.contains(&test.name) {
@@ -239,7 +253,7 @@ impl Parameters {
         for (k, name) in effect.shape.coefficient_names().into_iter().enumerate() {
             let dot = if name.is_empty() { "" } else { "." };
             self.push(Parameter {
-                id: format!("{}{dot}{name}", effect.id()),
+                id: format!("{id}{dot}{name}"),
                 unit: unit.clone(),
                 size: if greatest[k] > 0.0 {
                     size / greatest[k]
@@ -254,6 +268,7 @@ impl Parameters {
             })?;
         }
         self.effects.push(effect.clone());
+        self.effect_ids.push(id);
         Ok(())
     }
 

@@ -110,6 +110,17 @@ pub struct EffectName {
     pub tests: Vec<String>,
 }
 
+/// A point of a free curve. What location errors can absorb of a curve is not in it.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct CurvePoint {
+    /// Where on the driver.
+    pub at: f64,
+    /// The component's value there.
+    pub value: f64,
+    /// Its standard uncertainty.
+    pub u: f64,
+}
+
 /// An effect that trace has found.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct EffectResult {
@@ -120,6 +131,15 @@ pub struct EffectResult {
     pub family: String,
     /// Its coefficients.
     pub parameters: Vec<ParameterResult>,
+    /// For a free curve: its points with their band.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub curve: Vec<CurvePoint>,
+    /// Unit of the places of a curve.
+    #[serde(skip_serializing_if = "String::is_empty")]
+    pub curve_at_unit: String,
+    /// Unit of the values of a curve.
+    #[serde(skip_serializing_if = "String::is_empty")]
+    pub curve_unit: String,
     /// Probability that the whole search finds as good in readings without structure.
     pub p_value: f64,
     /// By how much it lowers the residual, µm: the rms of what it explains beside everything else.

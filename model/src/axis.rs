@@ -75,7 +75,7 @@ impl Axis {
 
     /// `Rot(d, q) · point`, for a point given from the axis' origin.
     #[inline(always)]
-    pub(crate) fn rotate<S: Scalar>(&self, turn: Turn<S::Nominal>, point: Point<S>) -> Point<S> {
+    pub fn rotate<S: Scalar>(&self, turn: Turn<S::Nominal>, point: Point<S>) -> Point<S> {
         if let Some((coordinate, sign)) = self.principal() {
             let sin = if sign > 0.0 { turn.sin } else { -turn.sin };
             return turn_about_nominal(coordinate, Turn { sin, cos: turn.cos }, point);

@@ -204,9 +204,7 @@ impl Machine {
         errors: &[BodyErrors<S>],
         point: Point<S>,
     ) -> Point<S> {
-        (0..self.workpiece_side).fold(point, |point, index| {
-            push(&self.axes[index], &state[index], &errors[index], point)
-        })
+        (0..self.workpiece_side).fold(point, |point, index| self.push(index, state, errors, point))
     }
 
     /// A point of the tool frame in R: `P_s`.
@@ -218,9 +216,31 @@ impl Machine {
     ) -> Point<S> {
         (self.workpiece_side..self.axes.len())
             .rev()
-            .fold(point, |point, index| {
-                push(&self.axes[index], &state[index], &errors[index], point)
-            })
+            .fold(point, |point, index| self.push(index, state, errors, point))
+    }
+
+    /// A point of R in the table frame: what [`Machine::workpiece_point`] undoes. With small-angle errors the inverse of
+    /// `I + [θ]×` is `I − [θ]×`, right to first order.
+    pub fn table_point<S: Scalar>(
+        &self,
+        state: &[AxisPosition<S::Nominal>],
+        errors: &[BodyErrors<S>],
+        point: Point<S>,
+    ) -> Point<S> {
+        (0..self.workpiece_side).rev().fold(point, |point, index| {
+            pull(&self.axes[index], &state[index], &errors[index], point)
+        })
+    }
+
+    /// A point on the moved side of axis `index`, seen from its other side: one step of the chain.
+    pub fn push<S: Scalar>(
+        &self,
+        index: usize,
+        state: &[AxisPosition<S::Nominal>],
+        errors: &[BodyErrors<S>],
+        point: Point<S>,
+    ) -> Point<S> {
+        push(&self.axes[index], &state[index], &errors[index], point)
     }
 
     /// The moment about axis `index` that a unit weight at `point_mm` of the tool frame (of the table frame for an axis on the
@@ -285,12 +305,7 @@ fn push<S: Scalar>(
     }
     if axis.kind == AxisKind::Linear {
         for i in 0..3 {
-            if axis.direction[i] != 0.0 {
-                let along = if axis.direction[i] == 1.0 {
-                    position.value
-                } else {
-                    position.value * S::Nominal::constant(axis.direction[i])
-                };
+            if let Some(along) = travel::<S>(axis, position, i) {
                 point.0[i] = point.0[i] + along;
             }
         }
@@ -305,5 +320,60 @@ fn push<S: Scalar>(
         point
     } else {
         point.shifted(from_origin)
+    }
+}
+
+/// A point on the bed's side of an axis, seen from the moved side: the inverse of [`push`].
+fn pull<S: Scalar>(
+    axis: &Axis,
+    position: &AxisPosition<S::Nominal>,
+    errors: &BodyErrors<S>,
+    point: Point<S>,
+) -> Point<S> {
+    let at_origin = axis.origin_mm == [0.0; 3];
+    let mut point = if at_origin {
+        point
+    } else {
+        point.shifted(axis.origin_mm.map(|o| S::Nominal::constant(-o)))
+    };
+    if axis.kind == AxisKind::Linear {
+        for i in 0..3 {
+            if let Some(along) = travel::<S>(axis, position, i) {
+                point.0[i] = point.0[i] - along;
+            }
+        }
+        if let Some(squareness) = errors.squareness {
+            let tilt = cross_nominal::<S>(squareness, axis.direction);
+            for i in 0..3 {
+                point.0[i] = point.0[i] - tilt.0[i] * position.value;
+            }
+        }
+    }
+    if let Some(location) = &errors.location {
+        point = location.pull(point);
+    }
+    if let Some(motion) = &errors.motion {
+        point = motion.pull(point);
+    }
+    if axis.kind == AxisKind::Rotary {
+        let back = Turn {
+            sin: -position.turn.sin,
+            cos: position.turn.cos,
+        };
+        point = axis.rotate(back, point);
+    }
+    if at_origin {
+        point
+    } else {
+        point.shifted(axis.origin_mm.map(S::Nominal::constant))
+    }
+}
+
+/// How far a linear axis carries a point along coordinate `i`; `None` where its direction has no part there.
+fn travel<S: Scalar>(axis: &Axis, position: &AxisPosition<S::Nominal>, i: usize) -> Option<S::Nominal> {
+    match axis.direction[i] {
+        0.0 => None,
+        1.0 => Some(position.value),
+        along => Some(position.value * S::Nominal::constant(along)),
     }
 }

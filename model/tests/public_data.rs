@@ -27,11 +27,11 @@ fn at_hand(test: &str, path: PathBuf) -> Option<PathBuf> {
         return Some(path);
     }
     assert!(
-        std::env::var_os("ABBE_DATA").is_none(),
-        "ABBE_DATA is set and {} is not there",
+        std::env::var("CI").as_deref() != Ok("true"),
+        "{test}: {} is not there, and CI needs it",
         path.display()
     );
-    eprintln!("skipped: {test} ({} is not there)", path.display());
+    println!("skipped: {test} (no data folder)");
     None
 }
 

@@ -196,8 +196,8 @@ fn effects_written_read_back_the_same() {
                 at: vec![0.3, 1.0, 2.0_f64.to_radians()],
             },
         ),
-        effect("EZC", "C", Shape::Constant),
-        effect("trigger", "time", Shape::Constant),
+        effect("EZC", "none", Shape::Constant),
+        effect("trigger", "none", Shape::Constant),
     ];
     for degrees in 0..400 {
         let centre = f64::from(degrees) * 0.7;

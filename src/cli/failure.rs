@@ -12,6 +12,9 @@ pub enum Failure {
     /// Identification.
     #[error(transparent)]
     Identify(IdentifyError),
+    /// An equation.
+    #[error(transparent)]
+    Codegen(#[from] abbe::codegen::CodegenError),
     /// A file that cannot be written.
     #[error("{path}: cannot be written: {source}")]
     Write {

@@ -28,36 +28,37 @@ pub fn run(arguments: &FitArguments) -> Result<(), Failure> {
 }
 
 fn print(result: &FitResult) {
-    println!(
+    say!(
         "{} readings, noise {} ({})",
         result.readings,
         table::micrometres(result.noise_um),
         result.noise_source
     );
-    println!(
+    say!(
         "residual {}, held out {} (leaving out {})",
         table::micrometres(result.rms_um),
         table::micrometres(result.heldout_rms_um),
         result.heldout_by
     );
     if let (Some(rms), Some(held)) = (result.rms_3d_um, result.heldout_rms_3d_um) {
-        println!(
+        say!(
             "length of the 3-vector: residual {}, held out {}",
             table::micrometres(rms),
             table::micrometres(held)
         );
     }
-    println!(
+    say!(
         "{} of {} unknowns or combinations of them are seen",
-        result.rank, result.unknowns
+        result.rank,
+        result.unknowns
     );
-    println!();
+    say!("");
     print_parameters(&result.parameters);
     print_unobservable(&result.unobservable);
     if !result.rejected.is_empty() {
-        println!("\nLeft out as wild:");
+        say!("\nLeft out as wild:");
         for reading in &result.rejected {
-            println!(
+            say!(
                 "  {} {}:{}  residual {}",
                 reading.test,
                 reading.file,
@@ -86,16 +87,16 @@ pub fn print_unobservable(unobservable: &[Unobservable]) {
     if unobservable.is_empty() {
         return;
     }
-    println!("\nNot seen by these readings:");
+    say!("\nNot seen by these readings:");
     for item in unobservable {
         let terms: Vec<String> = item
             .combination
             .iter()
             .map(|(id, value)| format!("{id} {value:.4}"))
             .collect();
-        println!("  {}", item.why);
+        say!("  {}", item.why);
         if terms.len() > 1 {
-            println!("    {}", terms.join(" : "));
+            say!("    {}", terms.join(" : "));
         }
     }
 }

@@ -1,5 +1,11 @@
 //! Arguments, progress, tables: what stands between a user and the library. No mathematics.
 
+/// Writes a line of the result to standard output. A reader that has seen enough (a closed pipe) ends the program, quietly.
+macro_rules! say {
+    ($($text:tt)*) => { $crate::cli::output::line(format_args!($($text)*)) };
+}
+
+mod equation;
 mod failure;
 mod fit;
 mod folder;
@@ -31,6 +37,16 @@ const EXAMPLES: &str = "Examples:
 
 #[derive(Subcommand)]
 enum Command {
+    /// Print the closed form of a test's reading.
+    #[command(
+        after_help = "Example:\n  abbe equation sessions/hermle-c600u/chapter5.toml --test A150 --as latex --rotation small-angle"
+    )]
+    Equation(equation::EquationArguments),
+    /// Print the error vector of the tool in the workpiece frame.
+    #[command(
+        after_help = "Example:\n  abbe volumetric sessions/hermle-c600u/machine.toml --order first --errors EX0C,EY0C,EXX"
+    )]
+    Volumetric(equation::VolumetricArguments),
     /// Identify errors from readings, with uncertainties.
     #[command(
         after_help = "Example:\n  abbe fit sessions/hermle-c600u/measured/session.toml --json fit.json"
@@ -80,6 +96,8 @@ pub struct CommonArguments {
 pub fn run() -> ExitCode {
     let arguments = Arguments::parse();
     let outcome = match arguments.command {
+        Command::Equation(arguments) => equation::run(&arguments),
+        Command::Volumetric(arguments) => equation::run_volumetric(&arguments),
         Command::Fit(arguments) => fit::run(&arguments),
         Command::Plan(arguments) => plan::run(&arguments),
         Command::New(arguments) => new::run(&arguments),

@@ -78,7 +78,7 @@ pub fn run(arguments: &NewArguments) -> Result<(), Failure> {
             .max()
             .unwrap_or(0);
         for template in TEMPLATES {
-            println!("  {:width$}  {}", template.name, template.about);
+            say!("  {:width$}  {}", template.name, template.about);
         }
         return Ok(());
     };
@@ -96,7 +96,7 @@ pub fn run(arguments: &NewArguments) -> Result<(), Failure> {
         .collect();
     folder::write(folder, &files, arguments.force, |_| Ok(()))?;
     for (name, _) in files {
-        println!("{}", folder.join(name).display());
+        say!("{}", folder.join(name).display());
     }
     Ok(())
 }

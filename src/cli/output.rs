@@ -26,6 +26,14 @@ pub fn write_whole(path: &Path, contents: &[u8]) -> Result<(), Failure> {
     Ok(())
 }
 
+/// Writes a line to standard output; the end of the program where nobody reads on.
+pub fn line(text: std::fmt::Arguments<'_>) {
+    let mut out = std::io::stdout().lock();
+    if writeln!(out, "{text}").is_err() {
+        std::process::exit(0);
+    }
+}
+
 /// Writes a result as JSON.
 pub fn write_json<T: serde::Serialize>(path: &Path, result: &T) -> Result<(), Failure> {
     let mut text = serde_json::to_string_pretty(result)

@@ -211,7 +211,7 @@ fn report(session: &Session, simulated: &Simulated, arguments: &SimulateArgument
             .collect(),
         warnings: simulated.warnings.clone(),
     };
-    println!(
+    say!(
         "{}: {} readings of {} tests, noise {}, seed {}",
         report.session,
         report.readings,
@@ -231,9 +231,9 @@ fn report(session: &Session, simulated: &Simulated, arguments: &SimulateArgument
         })
         .collect();
     if rows.is_empty() {
-        println!("no error: the nominal machine");
+        say!("no error: the nominal machine");
     } else {
-        println!();
+        say!("");
         table::print(&["given", "value", "unit"], &rows);
     }
     fit::print_warnings(&report.warnings);

@@ -21,7 +21,7 @@ pub fn print(header: &[&str], rows: &[Vec<String>]) {
                 text.push_str(cell);
             }
         }
-        println!("{}", text.trim_end());
+        say!("{}", text.trim_end());
     };
     line(&header.iter().map(|cell| cell.to_string()).collect::<Vec<_>>());
     for row in rows {

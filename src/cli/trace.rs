@@ -1,6 +1,7 @@
 //! `abbe trace`.
 
-use std::sync::Mutex;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::{Arc, Mutex};
 use std::time::Duration;
 
 use abbe::identify::results::{EffectName, ModelResult, TraceResult};
@@ -49,6 +50,12 @@ pub fn run(arguments: &TraceArguments) -> Result<(), Failure> {
         return list(&session, &options);
     }
     let bar = progress_bar(arguments.common.quiet);
+    // Ctrl-C ends the search, not the program: what was found so far is judged and reported.
+    let interrupted = Arc::new(AtomicBool::new(false));
+    let flag = interrupted.clone();
+    if ctrlc::set_handler(move || flag.store(true, Ordering::Relaxed)).is_err() {
+        eprintln!("warning: Ctrl-C will end the program without a result");
+    }
     let shown = Mutex::new(());
     let report = |progress: Progress| {
         let _one_at_a_time = shown.lock();
@@ -63,7 +70,7 @@ pub fn run(arguments: &TraceArguments) -> Result<(), Failure> {
             }
             Progress::Judging => bar.set_message("refitting and judging"),
         }
-        true
+        !interrupted.load(Ordering::Relaxed)
     };
     let trace = abbe::identify::trace::trace(&session, &options, &report)?;
     bar.finish_and_clear();
@@ -98,9 +105,9 @@ fn list(session: &abbe::model::session::Session, options: &TraceOptions) -> Resu
     for (number, family) in families.iter().enumerate() {
         let of_family: Vec<_> = entries.iter().filter(|entry| entry.family == number).collect();
         let seen = of_family.iter().filter(|entry| entry.seen).count();
-        println!("{}: {} candidates, {seen} seen", family.name, of_family.len());
+        say!("{}: {} candidates, {seen} seen", family.name, of_family.len());
         for entry in of_family {
-            println!(
+            say!(
                 "  {} {}",
                 if entry.seen { "seen    " } else { "not seen" },
                 entry.id
@@ -111,8 +118,8 @@ fn list(session: &abbe::model::session::Session, options: &TraceOptions) -> Resu
 }
 
 fn print(result: &TraceResult) {
-    println!("Verdict: {}", result.verdict);
-    println!(
+    say!("Verdict: {}", result.verdict);
+    say!(
         "{} readings, noise {} ({}); {} of {} candidates can be seen",
         result.readings,
         table::micrometres(result.noise_um),
@@ -120,8 +127,8 @@ fn print(result: &TraceResult) {
         result.candidates_seen,
         result.candidates
     );
-    println!("The declared model leaves: {}", result.residual_before);
-    println!();
+    say!("The declared model leaves: {}", result.residual_before);
+    say!("");
     let row = |name: &str, model: &ModelResult| {
         let mut cells = vec![
             name.to_string(),
@@ -141,14 +148,14 @@ fn print(result: &TraceResult) {
         &header,
         &[row("before", &result.before), row("after", &result.after)],
     );
-    println!("held out: leaving out {}", result.heldout_by);
+    say!("held out: leaving out {}", result.heldout_by);
     for (number, effect) in result.effects.iter().enumerate() {
-        println!("\n{}. {}  ({})", number + 1, name(&effect.name), effect.family);
+        say!("\n{}. {}  ({})", number + 1, name(&effect.name), effect.family);
         for p in &effect.parameters {
             let (value, u) = table::value_and_u(p.value, p.u);
-            println!("   {}  {value} ± {u} {}", p.id, p.unit);
+            say!("   {}  {value} ± {u} {}", p.id, p.unit);
         }
-        println!(
+        say!(
             "   explains {} rms; p ≤ {:.3}",
             table::micrometres(effect.rms_gain_um),
             effect.p_value
@@ -161,28 +168,28 @@ fn print(result: &TraceResult) {
             } else {
                 String::new()
             };
-            println!("   the readings cannot tell it from {}{more}", names.join("; "));
+            say!("   the readings cannot tell it from {}{more}", names.join("; "));
         }
         if let Some(test) = &effect.separated_by {
-            println!("   told apart by {test}");
+            say!("   told apart by {test}");
         }
     }
     if result.remainder.structured {
-        println!(
+        say!(
             "\nStructure remains (p ≤ {:.3}): {}",
             result.remainder.p_value,
             result.remainder.place.as_deref().unwrap_or("")
         );
     }
     if !result.after.parameters.is_empty() {
-        println!();
+        say!("");
         fit::print_parameters(&result.after.parameters);
     }
     if !result.moved.is_empty() {
-        println!("\nMoved by more than their uncertainty when the effects were added (the bias before):");
+        say!("\nMoved by more than their uncertainty when the effects were added (the bias before):");
         for moved in &result.moved {
             let (by, u) = table::value_and_u(moved.by, moved.u);
-            println!("  {}  by {by} {} (u {u})", moved.id, moved.unit);
+            say!("  {}  by {by} {} (u {u})", moved.id, moved.unit);
         }
     }
     fit::print_warnings(&result.warnings);

@@ -17,6 +17,7 @@ mod recovery;
 mod robots;
 mod simulate;
 mod topologies;
+mod trace;
 
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output};

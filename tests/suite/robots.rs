@@ -9,7 +9,7 @@ use super::data::data;
 use super::ready;
 
 /// The session on public data, or `None` where they are not there.
-fn session(test: &str, name: &str, path: &str) -> Option<Session> {
+pub fn session_on_public_data(test: &str, name: &str, path: &str) -> Option<Session> {
     let found = data(test, path)?;
     let depth = path.split('/').count();
     let folder = found.ancestors().nth(depth)?.to_path_buf();
@@ -28,7 +28,7 @@ fn fitted(session: &Session) -> FitResult {
 #[test]
 fn ur10_with_pose_and_target_only() {
     let name = "ur10_with_pose_and_target_only";
-    let Some(mut session) = session(name, "ur10/session.toml", "landgraf_ur10") else {
+    let Some(mut session) = session_on_public_data(name, "ur10/session.toml", "landgraf_ur10") else {
         return;
     };
     session.unknowns.clear();
@@ -42,7 +42,7 @@ fn ur10_with_pose_and_target_only() {
 #[test]
 fn ur10_with_every_location_error() {
     let name = "ur10_with_every_location_error";
-    let Some(session) = session(name, "ur10/session.toml", "landgraf_ur10") else {
+    let Some(session) = session_on_public_data(name, "ur10/session.toml", "landgraf_ur10") else {
         return;
     };
     let result = fitted(&session);
@@ -70,7 +70,7 @@ fn ur10_with_every_location_error() {
 #[test]
 fn kuka_closes_and_names_the_two_badly_seated_poses() {
     let name = "kuka_closes_and_names_the_two_badly_seated_poses";
-    let Some(session) = session(name, "kuka-iiwa14/session.toml", "mukca") else {
+    let Some(session) = session_on_public_data(name, "kuka-iiwa14/session.toml", "mukca") else {
         return;
     };
     let result = fitted(&session);
@@ -83,7 +83,7 @@ fn kuka_closes_and_names_the_two_badly_seated_poses() {
 #[test]
 fn kuka_with_ball_and_sockets_only() {
     let name = "kuka_with_ball_and_sockets_only";
-    let Some(mut session) = session(name, "kuka-iiwa14/session.toml", "mukca") else {
+    let Some(mut session) = session_on_public_data(name, "kuka-iiwa14/session.toml", "mukca") else {
         return;
     };
     session.unknowns.clear();

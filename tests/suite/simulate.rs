@@ -230,11 +230,15 @@ fn what_cannot_be_simulated_is_said_and_nothing_is_written() {
         assert!(told.contains(message), "{told}");
         assert!(!out.exists());
     }
-    let told = refused(&plan, folder.path(), &[]);
+    fs::create_dir(&out).unwrap();
+    fs::write(out.join("notes.txt"), "mine").unwrap();
+    let told = refused(&plan, &out, &[]);
     assert!(
         told.contains("there and not empty") && told.contains("--force"),
         "{told}"
     );
+    assert_eq!(fs::read_dir(&out).unwrap().count(), 1);
+    fs::remove_dir_all(&out).unwrap();
     let before = fs::read(&plan).unwrap();
     let told = refused(&plan, folder.path(), &["--force"]);
     assert!(told.contains("the plan itself lies there"), "{told}");

@@ -275,6 +275,7 @@ impl Base<'_> {
             bar_setup: unique,
             socket: None,
             motion: Some(motion),
+            at_written: vec![None; at.len()],
             at,
             readings: None,
         };

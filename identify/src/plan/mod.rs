@@ -5,7 +5,7 @@
 //!
 //! - [`analyse`]: uncertainties, budgets, blind spots, indices, and what each test contributes;
 //! - [`effects`]: what undeclared effects would do;
-//! - [`menu`], [`prepared`], [`information`], [`goal`], [`improve`], [`separate`]: the next test; [`range`]: how far a sweep can shrink;
+//! - [`menu`], [`mod@prepared`], [`information`], [`goal`], [`mod@improve`], [`mod@separate`]: the next test; [`mod@range`]: how far a sweep can shrink;
 //! - [`states`], [`linear`], [`sensitivity`], [`budget`], [`blind`], [`indices`]: the parts of it;
 //! - [`results`]: what is reported, as it stands in JSON.
 

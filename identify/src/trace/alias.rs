@@ -1,18 +1,16 @@
 //! What else would look the same.
 //!
 //! Two candidates are aliases where the readings cannot tell them apart: in place of the named effect, beside the same model, the other explains
-//! the residual as well within [`INDISTINGUISHABLE`] of log-likelihood, and what it can do to the readings lies within a small angle of what the
-//! named effect did. The one with the least cost in the library is named first; at equal cost, the one with the larger gain.
+//! the residual as well within [`INDISTINGUISHABLE`] of log-likelihood, and it does at least half of what the named effect did to the readings. The one with the least cost in the library is named first; at equal cost, the one with the larger gain.
 
 use super::score::{Gain, ln_chi_square_tail};
 use super::search::Search;
 
 /// Difference in `−ln P` below which two candidates cannot be told apart: 2 σ for one column.
 pub const INDISTINGUISHABLE: f64 = 2.0;
-/// Least cosine between the named effect's signature and what an alias can do.
-pub const LEAST_COSINE: f64 = 0.95;
-/// The most columns that an alias may have beyond the named effect: a free curve imitates nearly everything and says nothing.
-const MORE_COLUMNS: usize = 1;
+/// Least cosine between the named effect's signature and what an alias can do: at least half of it. What is nearer than the evidence can tell is an
+/// alias however small the angle; what explains as much of something else is none.
+pub const LEAST_COSINE: f64 = std::f64::consts::FRAC_1_SQRT_2;
 
 /// An alias of a taken effect.
 #[derive(Clone, Debug)]
@@ -48,8 +46,8 @@ pub fn aliases(search: &Search<'_>, k: usize, variance: f64) -> Vec<Alias> {
         .filter(|(candidate, gain)| {
             !others.contains(candidate)
                 && !search.candidates[*candidate].last_resort
+                && !search.is_held_back(*candidate)
                 && gain.freedom > 0
-                && gain.freedom <= of_named.freedom + MORE_COLUMNS
                 && evidence(gain) >= least
         })
         .filter_map(|(candidate, _)| {
@@ -68,5 +66,9 @@ pub fn aliases(search: &Search<'_>, k: usize, variance: f64) -> Vec<Alias> {
             .unwrap_or(std::cmp::Ordering::Equal)
             .then(cost(a).total_cmp(&cost(b)))
     });
+    // Of one name the nearest member stands for all; those that bear the winner's own name are the winner.
+    let named = search.candidates[taken.candidate].effect.id();
+    let mut seen = std::collections::HashSet::from([named]);
+    aliases.retain(|alias| seen.insert(search.candidates[alias.candidate].effect.id()));
     aliases
 }

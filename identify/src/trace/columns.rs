@@ -6,6 +6,7 @@ use std::collections::HashMap;
 use std::sync::Arc;
 
 use abbe_model::effect::{DriverSample, Effect};
+use abbe_model::instrument::{InsideUnit, InstrumentKind};
 use abbe_model::sensitivity::Sensitivities;
 use faer::{Mat, MatMut};
 use rayon::prelude::*;
@@ -21,6 +22,28 @@ pub struct Layout {
     pub count: usize,
     /// For each test, what moves: slot, factor of the component, and the basis functions.
     parts: Vec<Vec<LayoutPart>>,
+}
+
+impl Layout {
+    /// The greatest absolute value of its basis functions.
+    pub fn greatest(&self) -> f64 {
+        let parts = self.parts.iter().flatten();
+        let factors = |part: &LayoutPart| {
+            part.factor
+                .as_ref()
+                .map_or(1.0, |f| f.iter().fold(0.0_f64, |a, b| a.max(b.abs())))
+        };
+        parts
+            .map(|part| {
+                factors(part)
+                    * part
+                        .basis
+                        .iter()
+                        .flat_map(|basis| basis.iter())
+                        .fold(0.0_f64, |a, b| a.max(b.abs()))
+            })
+            .fold(0.0, f64::max)
+    }
 }
 
 #[derive(Clone, Debug)]
@@ -52,9 +75,10 @@ pub struct Columns<'p, 'a> {
     pub fold_rows: Vec<std::ops::Range<usize>>,
     rows: usize,
     samples: std::sync::Mutex<HashMap<(usize, String), SharedSamples>>,
-    bases: std::sync::Mutex<HashMap<(usize, String), Arc<Vec<Vec<f64>>>>>,
+    bases: std::sync::Mutex<HashMap<(usize, String), SharedColumns>>,
 }
 
+type SharedColumns = Arc<Vec<Vec<f64>>>;
 type SharedSamples = Option<Arc<Vec<DriverSample<f64>>>>;
 
 impl<'p, 'a> Columns<'p, 'a> {
@@ -137,6 +161,22 @@ impl<'p, 'a> Columns<'p, 'a> {
         self.rows
     }
 
+    /// The greatest coefficient that an effect may plausibly have, in inside units: 0.1 mm and 1 mrad on a machine tool, ten times as much on the
+    /// robots and long chains that trackers and sockets measure.
+    pub fn plausible(&self, effect: &Effect, layout: &Layout) -> f64 {
+        let machine_tool = self.problem.session.instrument == InstrumentKind::BallBar;
+        let scale = if machine_tool { 1.0 } else { 10.0 };
+        let most = match drivers::component_unit(self.problem.session, &effect.component) {
+            Some(InsideUnit::Millimetre) => 0.1 * scale,
+            Some(InsideUnit::Radian) => 1e-3 * scale,
+            Some(InsideUnit::Ratio) => 0.1,
+            // The factor of a delay is the speed; a tenth of a second is long.
+            None => return 0.1,
+        };
+        let greatest = layout.greatest();
+        if greatest > 0.0 { most / greatest } else { 0.0 }
+    }
+
     /// Lays an effect over the tests; `None` where the data lack what it follows.
     pub fn layout(&self, effect: &Effect) -> Option<Layout> {
         self.lay(effect, true)
@@ -199,13 +239,14 @@ impl<'p, 'a> Columns<'p, 'a> {
     }
 
     /// Lays a shape over one coordinate of the readings of one test, whatever component would cause it; `by_direction` turns its sign with the
-    /// direction of travel. `None` where the data lack what it follows.
+    /// direction of travel, `rows` confines it. `None` where the data lack what it follows.
     pub fn reading_layout(
         &self,
         effect: &Effect,
         test: usize,
         coordinate: usize,
         by_direction: bool,
+        rows: Option<&std::ops::Range<usize>>,
     ) -> Option<Layout> {
         let session = self.problem.session;
         let readings = self.problem.tests[test].readings.as_ref()?;
@@ -222,7 +263,12 @@ impl<'p, 'a> Columns<'p, 'a> {
             .map(Arc::new)
         })?;
         let basis = Arc::new(drivers::basis_columns(&effect.shape, &samples));
-        let factor = by_direction.then(|| Arc::new(samples.iter().map(|sample| sample.direction).collect()));
+        let factor = (by_direction || rows.is_some()).then(|| {
+            let turned = |sample: &DriverSample<f64>| if by_direction { sample.direction } else { 1.0 };
+            let inside = |row: usize| rows.is_none_or(|rows| rows.contains(&row));
+            let factor = |(row, sample)| if inside(row) { turned(sample) } else { 0.0 };
+            Arc::new(samples.iter().enumerate().map(factor).collect())
+        });
         let mut parts = vec![Vec::new(); self.problem.tests.len()];
         parts[test].push(LayoutPart {
             moves: Moves::Reading(coordinate),
@@ -235,42 +281,104 @@ impl<'p, 'a> Columns<'p, 'a> {
         })
     }
 
+    /// The rows of layouts in one block, in mm, not whitened.
+    fn block_rows(&self, layouts: &[&Layout], block: &Block) -> Mat<f64> {
+        let coordinates = self.problem.coordinates();
+        let total: usize = layouts.iter().map(|layout| layout.count).sum();
+        let scalars = block.rows.len() * coordinates;
+        let first = block.rows.start;
+        let mut raw = Mat::<f64>::zeros(scalars, total);
+        let sensitivities = &self.sensitivities[block.test];
+        let mut column = 0;
+        for layout in layouts {
+            for part in &layout.parts[block.test] {
+                let derivative = match part.moves {
+                    Moves::Slot(slot) => {
+                        let whole = &sensitivities.derivatives[self.place[block.test][&slot]];
+                        Some(&whole[first * coordinates..first * coordinates + scalars])
+                    }
+                    Moves::Reading(_) => None,
+                };
+                for k in 0..layout.count {
+                    let basis = &part.basis[k];
+                    for i in 0..scalars {
+                        let row = first + i / coordinates;
+                        let factor = part.factor.as_ref().map_or(1.0, |factor| factor[row]);
+                        let sensitivity = match (derivative, part.moves) {
+                            (Some(derivative), _) => derivative[i],
+                            (None, Moves::Reading(moved)) if i % coordinates != moved => continue,
+                            (None, _) => 1.0,
+                        };
+                        raw[(i, column + k)] += sensitivity * basis[row] * factor;
+                    }
+                }
+            }
+            column += layout.count;
+        }
+        raw
+    }
+
+    /// The rows of layouts that count, in mm, not whitened, block after block.
+    pub fn plain_rows(&self, layouts: &[&Layout]) -> Mat<f64> {
+        let blocks = self.blocks.iter().map(|block| self.block_rows(layouts, block));
+        self.plain(blocks.collect())
+    }
+
+    /// `[J | r]` at given values, likewise.
+    ///
+    /// # Errors
+    /// If the model cannot be evaluated.
+    pub fn plain_model_rows(&self, beta: &[f64]) -> Result<Mat<f64>, IdentifyError> {
+        let values = self.problem.slot_values(beta);
+        let blocks = self.blocks.iter().map(|block| self.problem.rows(&values, block));
+        Ok(self.plain(blocks.collect::<Result<_, _>>()?))
+    }
+
+    /// The fold of each row of [`Columns::plain_rows`].
+    pub fn plain_folds(&self) -> Vec<usize> {
+        let coordinates = self.problem.coordinates();
+        let fold = |block: &Block, i: usize| {
+            self.problem.folds.of_row[block.test][block.rows.start + i / coordinates]
+        };
+        self.blocks
+            .iter()
+            .flat_map(|block| self.counting(block).into_iter().map(move |i| fold(block, i)))
+            .collect()
+    }
+
+    /// The scalar rows of a block whose readings count.
+    fn counting(&self, block: &Block) -> Vec<usize> {
+        let coordinates = self.problem.coordinates();
+        let rejected = &self.problem.rejected[block.test];
+        (0..block.rows.len() * coordinates)
+            .filter(|i| !rejected[block.rows.start + i / coordinates])
+            .collect()
+    }
+
+    fn plain(&self, blocks: Vec<Mat<f64>>) -> Mat<f64> {
+        let counting: Vec<Vec<usize>> = self.blocks.iter().map(|block| self.counting(block)).collect();
+        let mut rows = Mat::zeros(
+            counting.iter().map(Vec::len).sum(),
+            blocks.first().map_or(0, Mat::ncols),
+        );
+        let mut start = 0;
+        for (block, counting) in blocks.iter().zip(&counting) {
+            for (k, i) in counting.iter().enumerate() {
+                for j in 0..block.ncols() {
+                    rows[(start + k, j)] = block[(*i, j)];
+                }
+            }
+            start += counting.len();
+        }
+        rows
+    }
+
     /// Fills columns with the whitened rows of layouts, one after another.
     pub fn fill(&self, layouts: &[&Layout], mut columns: MatMut<'_, f64>) {
-        let coordinates = self.problem.coordinates();
         let total: usize = layouts.iter().map(|layout| layout.count).sum();
         let mut start = 0;
         for block in &self.blocks {
-            let scalars = block.rows.len() * coordinates;
-            let first = block.rows.start;
-            let mut raw = Mat::<f64>::zeros(scalars, total);
-            let sensitivities = &self.sensitivities[block.test];
-            let mut column = 0;
-            for layout in layouts {
-                for part in &layout.parts[block.test] {
-                    let derivative = match part.moves {
-                        Moves::Slot(slot) => {
-                            let whole = &sensitivities.derivatives[self.place[block.test][&slot]];
-                            Some(&whole[first * coordinates..first * coordinates + scalars])
-                        }
-                        Moves::Reading(_) => None,
-                    };
-                    for k in 0..layout.count {
-                        let basis = &part.basis[k];
-                        for i in 0..scalars {
-                            let row = first + i / coordinates;
-                            let factor = part.factor.as_ref().map_or(1.0, |factor| factor[row]);
-                            let sensitivity = match (derivative, part.moves) {
-                                (Some(derivative), _) => derivative[i],
-                                (None, Moves::Reading(moved)) if i % coordinates != moved => continue,
-                                (None, _) => 1.0,
-                            };
-                            raw[(i, column + k)] += sensitivity * basis[row] * factor;
-                        }
-                    }
-                }
-                column += layout.count;
-            }
+            let raw = self.block_rows(layouts, block);
             let (white, _) = self.problem.whiten(&raw, block);
             for j in 0..total {
                 for i in 0..white.nrows() {

@@ -18,6 +18,9 @@ const HIGHEST_ORDER: usize = 120;
 /// The highest harmonic for poses, which sample an axis at random: an independent search found nothing real above it.
 const HIGHEST_ORDER_OF_POSES: usize = 40;
 
+/// Intervals of the travel between the places where steps are looked for.
+const PLACES_OF_STEPS: usize = 40;
+
 /// A family of effects, as it stands in the library.
 #[derive(Clone, Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
@@ -44,6 +47,7 @@ enum Components {
     Motion,
     OwnMotion,
     LinearMotion,
+    AnyMotion,
     Location,
     Balls,
     Bar,
@@ -80,6 +84,10 @@ pub struct Candidate {
     pub cost: f64,
     /// Whether it is tried only when nothing simpler is left to find and structure remains.
     pub last_resort: bool,
+    /// Whether it holds the places that an effect may be composed of ([`super::compose`]) and is no effect itself.
+    pub dictionary: bool,
+    /// How far apart the entries of the library are in the number of the shape that is the first to be tuned, in the driver's unit; 0 without one.
+    pub grid: f64,
 }
 
 /// How the axes are sampled in a session.
@@ -126,11 +134,29 @@ pub fn candidates(problem: &Problem<'_>) -> Result<Vec<Candidate>, IdentifyError
                     };
                     let cost = family.simplicity + extra + tilt_cost(problem, &component);
                     let last_resort = family.last_resort;
+                    let span = match &driver {
+                        Driver::Axis(name) => problem
+                            .session
+                            .machine
+                            .axis_index(name)
+                            .map_or(0.0, |axis| sampling.span(axis)),
+                        _ => 0.0,
+                    };
+                    let grid = match &effect.shape {
+                        // Frequencies lie half a cycle over the travel apart.
+                        Shape::Periodic { period } => 0.5 * period * period / span,
+                        Shape::Steps { .. } => span / PLACES_OF_STEPS as f64,
+                        Shape::Local { width, .. } => *width,
+                        _ => 0.0,
+                    };
+                    let dictionary = matches!(&effect.shape, Shape::Steps { at } if at.len() > 1);
                     candidates.push(Candidate {
                         effect,
                         family: number,
                         cost,
                         last_resort,
+                        dictionary,
+                        grid,
                     });
                 }
             }
@@ -143,11 +169,10 @@ pub fn candidates(problem: &Problem<'_>) -> Result<Vec<Candidate>, IdentifyError
         .map(|parameter| parameter.id.clone())
         .collect();
     candidates.retain(|candidate| {
-        let id = candidate.effect.id();
         let constant = candidate.effect.shape == Shape::Constant;
         let same_error = constant && declared.contains(&candidate.effect.component.to_string());
         let free = constant && is_free_setup(problem, &candidate.effect);
-        !same_error && !free && !problem.parameters.effects.iter().any(|effect| effect.id() == id)
+        !same_error && !free && !problem.parameters.effects.contains(&candidate.effect)
     });
     Ok(candidates)
 }
@@ -270,6 +295,10 @@ fn components(problem: &Problem<'_>, sampling: &Sampling, choice: Components) ->
             .flat_map(|axis| {
                 [Freedom::X, Freedom::Y, Freedom::Z].map(|freedom| error(axis, ErrorKind::Motion, freedom))
             })
+            .collect(),
+        Components::AnyMotion => (0..machine.axes.len())
+            .filter(|axis| machine.axes[*axis].kind == AxisKind::Rotary)
+            .flat_map(|axis| Freedom::ALL.map(|freedom| error(axis, ErrorKind::Motion, freedom)))
             .collect(),
         Components::Location => (0..machine.axes.len())
             .flat_map(|axis| {
@@ -426,7 +455,10 @@ fn shapes(
                 return Vec::new();
             }
             let most = ((2.0 * span / (4.0 * step)) as usize).min(240);
+            // Over a full turn whole cycles are harmonics.
+            let turn = rotary && (span / TAU - (span / TAU).round()).abs() < 0.01;
             (2..=most)
+                .filter(|half_cycles| !turn || half_cycles % 2 == 1)
                 .map(|half_cycles| {
                     all(
                         Shape::Periodic {
@@ -453,7 +485,9 @@ fn shapes(
             }
         }
         "reversal-spike" => {
-            let seen = axis.is_some_and(|axis| sampling.reverses_inside_runs[axis]);
+            // A run that begins where the one before it ended begins with a reversal.
+            let seen = axis
+                .is_some_and(|axis| sampling.reverses_inside_runs[axis] || sampling.both_directions[axis]);
             if !seen || poses {
                 return Vec::new();
             }
@@ -473,16 +507,18 @@ fn shapes(
                 return Vec::new();
             }
             let axis = axis.unwrap_or(0);
-            (1..40)
-                .map(|k| {
-                    all(
-                        Shape::Steps {
-                            at: vec![sampling.low[axis] + span * k as f64 / 40.0],
-                        },
-                        0.0,
-                    )
-                })
-                .collect()
+            let places =
+                (1..PLACES_OF_STEPS).map(|k| sampling.low[axis] + span * k as f64 / PLACES_OF_STEPS as f64);
+            let singles = places
+                .clone()
+                .map(|place| all(Shape::Steps { at: vec![place] }, 0.0));
+            let dictionary = all(
+                Shape::Steps {
+                    at: places.clone().collect(),
+                },
+                0.0,
+            );
+            singles.chain([dictionary]).collect()
         }
         "local" => {
             if poses {
@@ -520,7 +556,12 @@ fn shapes(
             } else {
                 (sampling.low[axis], sampling.high[axis])
             };
-            [8, 16]
+            // At least one reading and a half an interval.
+            [8, 16, 32, 64]
+                .into_iter()
+                .filter(|intervals| {
+                    poses && *intervals <= 16 || step > 0.0 && 1.5 * step * *intervals as f64 <= span
+                })
                 .map(|intervals| {
                     all(
                         Shape::Curve {
@@ -532,7 +573,7 @@ fn shapes(
                         0.0,
                     )
                 })
-                .to_vec()
+                .collect()
         }
         _ => Vec::new(),
     }

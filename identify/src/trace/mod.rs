@@ -10,6 +10,7 @@
 
 pub mod alias;
 pub mod columns;
+pub mod compose;
 pub mod library;
 pub mod moments;
 pub mod null;
@@ -34,7 +35,7 @@ use columns::{Columns, Layout};
 use library::Candidate;
 use moments::Moments;
 use score::PriorMoments;
-use search::{Round, Search, Stop};
+use search::{Plain, Round, Search, Stop};
 
 /// What a user can ask of a trace.
 #[derive(Clone, Debug)]
@@ -83,6 +84,9 @@ pub enum Progress {
 const MOST_ALONG_RUNS: usize = 12;
 /// Poses of a robot have many.
 const MOST_OF_POSES: usize = 200;
+/// Up to this many effects exchanges are tried after each addition, beyond it after each eighth.
+const EXCHANGED_EACH_ROUND: usize = 14;
+const EXCHANGED_EACH: usize = 8;
 /// Share of the structure's excess over noise that may remain for the found effects to count as the explanation.
 const EXPLAINED_SHARE: f64 = 0.5;
 /// Significance below which a remainder counts as structured.
@@ -115,9 +119,29 @@ pub fn trace<'a>(
 ) -> Result<Trace<'a>, IdentifyError> {
     progress(Progress::Fitting);
     let (mut problem, mut before_fit) = prepare(session, options.seed)?;
-    if give_noise_memory(&mut problem, &before_fit) {
+    if give_noise_memory(&mut problem, &before_fit.residuals) {
         before_fit = fit(&problem, Some(&before_fit.beta))?;
     }
+    let residuals = before_fit.residuals.clone();
+    let first = trace_with(problem, before_fit, &residuals, options, progress)?;
+    // What moved between runs was taken for noise as long as the model lacked it.
+    let mut problem = first.before.clone();
+    if first.effects.is_empty() || !give_noise_memory(&mut problem, &first.after_fit.residuals) {
+        return Ok(first);
+    }
+    let before_fit = fit(&problem, Some(&first.before_fit.beta))?;
+    let residuals = first.after_fit.residuals;
+    trace_with(problem, before_fit, &residuals, options, progress)
+}
+
+/// Closes the loop with a given noise; `pure` are the residuals whose repeats show it.
+fn trace_with<'a>(
+    problem: Problem<'a>,
+    before_fit: Fit,
+    pure: &[Vec<f64>],
+    options: &TraceOptions,
+    progress: &(dyn Fn(Progress) -> bool + Sync),
+) -> Result<Trace<'a>, IdentifyError> {
     let poses = problem.folds.kind == FoldKind::Poses;
     let columns = Columns::new(&problem, &before_fit.beta)?;
     let start = Start::of(&problem, &columns, &before_fit)?;
@@ -131,7 +155,7 @@ pub fn trace<'a>(
             options.seed.wrapping_add(salt),
         )
     };
-    let draws = null(&start.residual, &before_fit.residuals, 0);
+    let draws = null(&start.residual, pure, 0);
     let structure_before = if poses {
         None
     } else {
@@ -148,15 +172,17 @@ pub fn trace<'a>(
 
     let mut candidates = library::candidates(&problem)?;
     candidates.retain(|candidate| chosen(options, &candidate.effect.id()));
-    let (candidates, layouts): (Vec<Candidate>, Vec<Layout>) = candidates
+    let (reserve, candidates): (Vec<_>, Vec<_>) = candidates
         .into_iter()
         .filter_map(|candidate| {
             columns
                 .layout(&candidate.effect)
                 .map(|layout| (candidate, layout))
         })
-        .unzip();
-    progress(Progress::Screening(candidates.len()));
+        .partition(|(candidate, _)| candidate.last_resort);
+    let (candidates, layouts): (Vec<Candidate>, Vec<Layout>) = candidates.into_iter().unzip();
+    let looked_for = candidates.len() + reserve.len();
+    progress(Progress::Screening(looked_for));
     let (model, prior) = (start.model.clone(), start.prior());
     let moments = Moments::new(&columns, &layouts, model, &start.residual, draws);
     let stop = Stop {
@@ -166,28 +192,30 @@ pub fn trace<'a>(
             .unwrap_or(if poses { MOST_OF_POSES } else { MOST_ALONG_RUNS }),
         in_residual_variance: poses,
     };
-    let mut search = Search::new(&columns, candidates, layouts, moments, prior, stop);
+    let plain = start.plain(&columns, &before_fit.beta, problem.noise.sigma_mm)?;
+    let mut search = Search::new(&columns, candidates, layouts, moments, prior, plain, stop);
     let seen = search
         .model_without(None)
         .gains()
         .iter()
         .filter(|gain| gain.freedom > 0)
         .count();
-    let looked_for = search.candidates.len();
+    search.reserve = reserve;
     let scale_um = problem.noise.sigma_mm * 1e3;
     let rms_um = |sum: f64| (sum / columns.rows().max(1) as f64).sqrt() * scale_um;
-    let mut last_p_value = search_on(&mut search, &rms_um, progress);
+    let mut ended = search_on(&mut search, &rms_um, progress);
     progress(Progress::Judging);
     let mut judged = judge(&problem, &before_fit, &search, options, structure_before.as_ref())?;
     let unexplained = judged
         .structure
         .as_ref()
         .is_none_or(|structure| structure.p_value <= STRUCTURED);
-    if unexplained && last_p_value < 1.0 + f64::EPSILON && search.taken.len() < stop.most {
+    if unexplained && ended.is_some() && search.taken.len() < stop.most {
         // Nothing simpler is left: free curves.
+        search.bring_reserve();
         search.last_resort = true;
         let taken = search.taken.len();
-        last_p_value = search_on(&mut search, &rms_um, progress);
+        ended = search_on(&mut search, &rms_um, progress);
         if search.taken.len() != taken {
             judged = judge(&problem, &before_fit, &search, options, structure_before.as_ref())?;
         }
@@ -207,7 +235,8 @@ pub fn trace<'a>(
         start: &start,
         structure_before: structure_before.as_ref(),
         structure_after: structure_after.as_ref(),
-        last_p_value,
+        last_p_value: ended.unwrap_or(1.0),
+        stopped_early: ended.is_none() || search.taken.len() >= stop.most,
         candidates: looked_for,
         candidates_seen: seen,
     })?;
@@ -223,21 +252,26 @@ pub fn trace<'a>(
     })
 }
 
-/// Rounds until nothing earns its place any more, or the user has seen enough; the p-value of the best that was not taken.
+/// Rounds until nothing earns its place any more: the p-value of the best that was not taken. `None` if the user has seen enough.
 fn search_on(
     search: &mut Search<'_>,
     rms_um: &dyn Fn(f64) -> f64,
     progress: &(dyn Fn(Progress) -> bool + Sync),
-) -> f64 {
+) -> Option<f64> {
     loop {
-        match search.round(sharpen::sharpen) {
-            Round::Done { p_value } => return p_value,
+        match search.round() {
+            Round::Done { p_value } => return Some(p_value),
             Round::Added { candidate } => {
-                search.exchange();
+                // Every exchange costs a model an effect; among many effects the gain is small and a sweep now and then will do.
+                let taken = search.taken.len();
+                if taken <= EXCHANGED_EACH_ROUND || taken.is_multiple_of(EXCHANGED_EACH) {
+                    search.exchange();
+                }
+                search.merge();
                 let held_out = search.held_out.last().copied().unwrap_or(0.0);
                 let id = search.candidates[candidate].effect.id();
                 if !progress(Progress::Taken(search.taken.len(), id, rms_um(held_out))) {
-                    return 1.0;
+                    return None;
                 }
             }
         }
@@ -322,25 +356,35 @@ fn start_of(after: &Problem<'_>, before: &Fit) -> Vec<f64> {
     start
 }
 
-/// Takes size and memory of the noise from repeats, where there are enough. Returns whether anything changed.
-fn give_noise_memory(problem: &mut Problem<'_>, fit: &Fit) -> bool {
+/// Takes size and memory of the noise from repeats, where there are enough. Returns whether that changed them by more than estimates of the noise
+/// scatter anyway.
+fn give_noise_memory(problem: &mut Problem<'_>, residuals: &[Vec<f64>]) -> bool {
     if problem.folds.kind == FoldKind::Poses {
         return false;
     }
     let kept = |test: usize, row: usize| !problem.rejected[test][row];
-    let pure = PureError::of(&problem.tests, &fit.residuals, kept);
+    let pure = PureError::of(&problem.tests, residuals, kept);
     let Some(memory) = pure.memory(&problem.tests, kept) else {
         return false;
     };
     let mut noise = problem.noise.clone();
-    noise.memory = memory;
+    noise.memory = memory.coefficients;
     if let Some(sigma) = pure.sigma_mm() {
-        noise.sigma_mm = sigma;
+        noise.sigma_mm = sigma * memory.inflation;
         noise.source = NoiseSource::Repeats;
     }
-    let changed = noise != problem.noise;
+    let present = &problem.noise;
+    let same_memory = noise.memory.len() == present.memory.len()
+        && noise
+            .memory
+            .iter()
+            .zip(&present.memory)
+            .all(|(a, b)| (a - b).abs() < 0.02);
+    if same_memory && (noise.sigma_mm / present.sigma_mm - 1.0).abs() < 0.02 {
+        return false;
+    }
     problem.noise = noise;
-    changed
+    true
 }
 
 /// The fitted model as the search takes it: orthonormal columns and the residual, whitened, in the order of the folds.
@@ -379,6 +423,20 @@ impl Start {
             to_unknowns,
             prior_rows,
             prior_residual,
+        })
+    }
+
+    fn plain(&self, columns: &Columns<'_, '_>, beta: &[f64], sigma_mm: f64) -> Result<Plain, IdentifyError> {
+        let rows = columns.plain_model_rows(beta)?;
+        let unknowns = beta.len();
+        let base = rows.as_ref().subcols(0, unknowns) * &self.to_unknowns;
+        Ok(Plain {
+            base: Mat::from_fn(base.nrows(), base.ncols(), |i, j| base[(i, j)] / sigma_mm),
+            residual: (0..rows.nrows())
+                .map(|i| rows[(i, unknowns)] / sigma_mm)
+                .collect(),
+            folds: columns.plain_folds(),
+            sigma_mm,
         })
     }
 

@@ -37,10 +37,42 @@ pub struct FoldMoments {
     pub own: Vec<Mat<f64>>,
 }
 
+impl FoldMoments {
+    /// Over several folds together.
+    fn sum(folds: &[FoldMoments]) -> FoldMoments {
+        let Some((first, rest)) = folds.split_first() else {
+            return FoldMoments {
+                base: Mat::zeros(0, 0),
+                base_y: Vec::new(),
+                yy: 0.0,
+                cross: Mat::zeros(0, 0),
+                cross_y: Vec::new(),
+                own: Vec::new(),
+            };
+        };
+        let mut sum = first.clone();
+        let add = |to: &mut [f64], more: &[f64]| to.iter_mut().zip(more).for_each(|(to, more)| *to += more);
+        for fold in rest {
+            sum.base += &fold.base;
+            sum.cross += &fold.cross;
+            sum.yy += fold.yy;
+            add(&mut sum.base_y, &fold.base_y);
+            add(&mut sum.cross_y, &fold.cross_y);
+            sum.own
+                .iter_mut()
+                .zip(&fold.own)
+                .for_each(|(to, more)| *to += more);
+        }
+        sum
+    }
+}
+
 /// All products.
 pub struct Moments {
     /// By fold.
     pub folds: Vec<FoldMoments>,
+    /// Over all folds.
+    pub whole: FoldMoments,
     /// Null draws with candidates: draws × all candidate columns.
     pub null_cross: Mat<f64>,
     /// Base with null draws (readings part): base × draws.
@@ -102,8 +134,10 @@ impl Moments {
             });
         }
         let null_base = transposed_product(model.as_ref(), null.as_ref());
+        let whole = FoldMoments::sum(&folds);
         Moments {
             folds,
+            whole,
             null_cross,
             null_base,
             first,
@@ -178,40 +212,44 @@ impl Moments {
                 moments.base_y.push(sum);
             }
         }
+        self.whole = FoldMoments::sum(&self.folds);
         places
     }
 
-    /// Adds a candidate to those that are scored.
-    pub fn append(&mut self, columns: &Columns<'_, '_>, layout: &Layout) {
+    /// Adds candidates to those that are scored.
+    pub fn append(&mut self, columns: &Columns<'_, '_>, layouts: &[Layout]) {
         let side = self.side();
         let rank = self.base();
-        let products = products_by_fold(columns, std::slice::from_ref(layout), side.as_ref());
+        let products = products_by_fold(columns, layouts, side.as_ref());
         let draws = self.null.ncols();
         let total = self.null_cross.ncols();
-        self.first.push(total);
-        self.count.push(layout.count);
-        let mut of_null = Mat::<f64>::zeros(draws, layout.count);
+        let mut added = 0;
+        for layout in layouts {
+            self.first.push(total + added);
+            self.count.push(layout.count);
+            added += layout.count;
+        }
+        let mut of_null = Mat::<f64>::zeros(draws, added);
         for (fold, (product, own)) in products.into_iter().enumerate() {
             let moments = &mut self.folds[fold];
-            moments.cross = Mat::from_fn(rank, total + layout.count, |i, j| {
+            moments.cross = Mat::from_fn(rank, total + added, |i, j| {
                 if j < total {
                     moments.cross[(i, j)]
                 } else {
                     product[(i, j - total)]
                 }
             });
-            moments
-                .cross_y
-                .extend((0..layout.count).map(|k| product[(rank, k)]));
+            moments.cross_y.extend((0..added).map(|k| product[(rank, k)]));
             moments.own.extend(own);
             for d in 0..draws {
-                for k in 0..layout.count {
+                for k in 0..added {
                     of_null[(d, k)] += product[(rank + 1 + d, k)];
                 }
             }
         }
+        self.whole = FoldMoments::sum(&self.folds);
         let before = &self.null_cross;
-        self.null_cross = Mat::from_fn(draws, total + layout.count, |d, j| {
+        self.null_cross = Mat::from_fn(draws, total + added, |d, j| {
             if j < total {
                 before[(d, j)]
             } else {
@@ -294,10 +332,11 @@ fn products_by_fold(
     layouts: &[Layout],
     side: MatRef<'_, f64>,
 ) -> Vec<(Mat<f64>, Vec<Mat<f64>>)> {
+    type Part = (Mat<f64>, Vec<Mat<f64>>);
     let count: Vec<usize> = layouts.iter().map(|layout| layout.count).collect();
     let total: usize = count.iter().sum();
     let chunks = chunked(&count);
-    let parts: Vec<Vec<(Mat<f64>, Vec<Mat<f64>>)>> = chunks
+    let parts: Vec<Vec<Part>> = chunks
         .par_iter()
         .map(|chunk| {
             let chosen: Vec<&Layout> = layouts[chunk.clone()].iter().collect();

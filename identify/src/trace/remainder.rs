@@ -3,6 +3,8 @@
 //! The detectors look at readings, not at components: a period over an axis' position in one test, a curve that differs by direction, a slope over
 //! time, a level of one run. They are tested against the same null as the search.
 
+use std::ops::Range;
+
 use abbe_model::effect::{Component, Driver, Effect, Shape};
 
 use super::columns::{Columns, Layout};
@@ -32,7 +34,11 @@ fn detectors(problem: &Problem<'_>, columns: &Columns<'_, '_>) -> Vec<Detector> 
     let mut detectors = Vec::new();
     for (number, test) in problem.tests.iter().enumerate() {
         let Some(readings) = &test.readings else { continue };
-        let mut add = |driver: &Driver, shape: Shape, by_direction: bool, words: String| {
+        let mut add = |driver: &Driver,
+                       shape: Shape,
+                       by_direction: bool,
+                       rows: Option<&Range<usize>>,
+                       words: String| {
             let effect = Effect {
                 component: Component::TriggerDelay,
                 driver: driver.clone(),
@@ -40,7 +46,8 @@ fn detectors(problem: &Problem<'_>, columns: &Columns<'_, '_>) -> Vec<Detector> 
                 tests: vec![test.name.clone()],
             };
             for coordinate in 0..readings.coordinates {
-                if let Some(layout) = columns.reading_layout(&effect, number, coordinate, by_direction) {
+                if let Some(layout) = columns.reading_layout(&effect, number, coordinate, by_direction, rows)
+                {
                     let named = if readings.coordinates == 3 {
                         format!("{words} in {}", ["x", "y", "z"][coordinate])
                     } else {
@@ -67,14 +74,28 @@ fn detectors(problem: &Problem<'_>, columns: &Columns<'_, '_>) -> Vec<Detector> 
                     format!("{period:.2} mm")
                 };
                 let words = format!("a wave over {name} with a period of {length} in {}", test.name);
-                add(&driver, Shape::Periodic { period }, false, words.clone());
+                add(&driver, Shape::Periodic { period }, false, None, words.clone());
                 if half_cycles <= 16 {
                     add(
                         &driver,
                         Shape::Periodic { period },
                         true,
+                        None,
                         format!("{words}, opposite in the two directions"),
                     );
+                }
+            }
+            // What comes and goes with time is in no mean over runs.
+            let runs = readings.runs();
+            for half_cycles in 2..=if runs.len() > 1 { 40 } else { 0 } {
+                let period = 2.0 * (high - low) / half_cycles as f64;
+                for (k, run) in runs.iter().enumerate() {
+                    let words = format!(
+                        "a wave over {name}, {half_cycles} half cycles over its way, in run {} of {}",
+                        k + 1,
+                        test.name
+                    );
+                    add(&driver, Shape::Periodic { period }, false, Some(run), words);
                 }
             }
             for intervals in [6, 12, 24] {
@@ -88,6 +109,7 @@ fn detectors(problem: &Problem<'_>, columns: &Columns<'_, '_>) -> Vec<Detector> 
                     &driver,
                     shape,
                     false,
+                    None,
                     format!("a curve over {name} in {}", test.name),
                 );
             }
@@ -109,6 +131,7 @@ fn detectors(problem: &Problem<'_>, columns: &Columns<'_, '_>) -> Vec<Detector> 
                         &driver,
                         shape,
                         false,
+                        None,
                         format!("a feature at {name} = {place} in {}", test.name),
                     );
                 }
@@ -117,6 +140,7 @@ fn detectors(problem: &Problem<'_>, columns: &Columns<'_, '_>) -> Vec<Detector> 
                 &driver,
                 Shape::Backlash,
                 false,
+                None,
                 format!("a difference between the directions of {name} in {}", test.name),
             );
         }
@@ -127,6 +151,7 @@ fn detectors(problem: &Problem<'_>, columns: &Columns<'_, '_>) -> Vec<Detector> 
                 &Driver::Time,
                 Shape::Drift,
                 false,
+                None,
                 format!("a drift over time in {}", test.name),
             );
             if last > first {
@@ -140,6 +165,7 @@ fn detectors(problem: &Problem<'_>, columns: &Columns<'_, '_>) -> Vec<Detector> 
                     &Driver::Time,
                     shape,
                     false,
+                    None,
                     format!("a slow change over time in {}", test.name),
                 );
             }

@@ -1,6 +1,7 @@
 //! From a finished search to what is reported.
 
-use abbe_model::effect::Effect;
+use abbe_model::axis::AxisKind;
+use abbe_model::effect::{Driver, DriverSample, Effect, Shape};
 
 use super::alias::{self, Alias};
 use super::remainder::Structure;
@@ -11,7 +12,9 @@ use crate::fit::{self, Fit};
 use crate::heldout::rms_mm;
 use crate::parameters::Role;
 use crate::problem::Problem;
-use crate::results::{EffectName, EffectResult, ModelResult, Moved, ParameterResult, Remainder, TraceResult};
+use crate::results::{
+    CurvePoint, EffectName, EffectResult, ModelResult, Moved, ParameterResult, Remainder, TraceResult,
+};
 
 /// What a search has come to.
 pub(super) struct Findings<'f, 'a> {
@@ -24,6 +27,8 @@ pub(super) struct Findings<'f, 'a> {
     pub structure_before: Option<&'f Structure>,
     pub structure_after: Option<&'f Structure>,
     pub last_p_value: f64,
+    /// Whether the search was ended by its cap or by the user, not by the evidence.
+    pub stopped_early: bool,
     pub candidates: usize,
     pub candidates_seen: usize,
 }
@@ -86,6 +91,9 @@ pub(super) fn report(findings: &Findings<'_, '_>) -> Result<TraceResult, Identif
                 .map(|family| family.name.clone())
                 .unwrap_or_default(),
             parameters: parameters_of(after, after_fit, k + before.parameters.effects.len()),
+            curve: curve_of(after, after_fit, k + before.parameters.effects.len()),
+            curve_at_unit: curve_units(after, &candidate.effect).0,
+            curve_unit: curve_units(after, &candidate.effect).1,
             p_value: taken.p_value,
             rms_gain_um: (gain / whitened_rows).sqrt() * before.noise.sigma_mm * 1e3,
             heldout_rms_um: held_out_um(search.held_out.get(k + 1).copied().unwrap_or(last), scale),
@@ -105,15 +113,7 @@ pub(super) fn report(findings: &Findings<'_, '_>) -> Result<TraceResult, Identif
     }
     let (verdict, remainder) = verdict(findings, &mut effects);
     let moved = moved(&before_result.parameters, &after_result.parameters);
-    let mut warnings = before.session.warnings.clone();
-    if search
-        .taken
-        .iter()
-        .any(|taken| taken.p_value > 0.5 / 200.0 && taken.p_value < 0.0051)
-    {
-        // The floor of the null: the p-value is an upper bound.
-        warnings.retain(|warning| !warning.is_empty());
-    }
+    let warnings = before.session.warnings.clone();
     Ok(TraceResult {
         verdict,
         noise_um: before.noise.sigma_mm * 1e3,
@@ -155,10 +155,9 @@ fn model_result(problem: &Problem<'_>, fit: &Fit, held_out_mm: f64) -> ModelResu
 
 /// The parameters of the `number`-th effect.
 fn parameters_of(problem: &Problem<'_>, fit: &Fit, number: usize) -> Vec<ParameterResult> {
-    let Some(effect) = problem.parameters.effects.get(number) else {
+    let Some(id) = problem.parameters.effect_ids.get(number) else {
         return Vec::new();
     };
-    let id = effect.id();
     let has = problem
         .parameters
         .list
@@ -169,8 +168,83 @@ fn parameters_of(problem: &Problem<'_>, fit: &Fit, number: usize) -> Vec<Paramet
     }
     fit::parameters(problem, fit)
         .into_iter()
-        .filter(|p| p.id == id || p.id.strip_prefix(&id).is_some_and(|rest| rest.starts_with('.')))
+        .filter(|p| {
+            p.id == *id
+                || p.id
+                    .strip_prefix(id.as_str())
+                    .is_some_and(|rest| rest.starts_with('.'))
+        })
         .collect()
+}
+
+/// Points at which a curve is reported.
+const CURVE_POINTS: usize = 73;
+
+/// The points of a free curve with their band; empty for other shapes.
+fn curve_of(problem: &Problem<'_>, fit: &Fit, number: usize) -> Vec<CurvePoint> {
+    let Some(effect) = problem.parameters.effects.get(number) else {
+        return Vec::new();
+    };
+    let Shape::Curve { from, to, .. } = effect.shape else {
+        return Vec::new();
+    };
+    let places: Vec<usize> = (0..problem.parameters.list.len())
+        .filter(|j| matches!(problem.parameters.list[*j].role, Role::Coefficient { effect, .. } if effect == number))
+        .collect();
+    let Some(first) = places.first() else {
+        return Vec::new();
+    };
+    let outside = problem.parameters.list[*first].unit.per_inside;
+    let at_outside = if curve_units(problem, effect).0 == "deg" {
+        1.0_f64.to_degrees()
+    } else {
+        1.0
+    };
+    (0..CURVE_POINTS)
+        .map(|k| {
+            let q = from + (to - from) * k as f64 / (CURVE_POINTS - 1) as f64;
+            let mut basis = Vec::new();
+            effect.shape.basis(
+                &DriverSample {
+                    value: q,
+                    ..DriverSample::default()
+                },
+                &mut basis,
+            );
+            let value: f64 = basis.iter().zip(&places).map(|(b, j)| b * fit.beta[*j]).sum();
+            let variance: f64 = basis
+                .iter()
+                .zip(&places)
+                .flat_map(|(b, j)| basis.iter().zip(&places).map(move |(c, l)| (b, j, c, l)))
+                .map(|(b, j, c, l)| b * c * fit.covariance[(*j, *l)])
+                .sum();
+            CurvePoint {
+                at: q * at_outside,
+                value: value * outside,
+                u: variance.max(0.0).sqrt() * outside,
+            }
+        })
+        .collect()
+}
+
+/// Units of a curve's places and values; empty for other shapes.
+fn curve_units(problem: &Problem<'_>, effect: &Effect) -> (String, String) {
+    if !matches!(effect.shape, Shape::Curve { .. }) {
+        return (String::new(), String::new());
+    }
+    let rotary = match &effect.driver {
+        Driver::Axis(name) => problem
+            .session
+            .machine
+            .axis_index(name)
+            .is_some_and(|axis| problem.session.machine.axes[axis].kind == AxisKind::Rotary),
+        _ => false,
+    };
+    let at = if rotary { "deg" } else { "mm" };
+    (
+        at.to_string(),
+        crate::drivers::coefficient_unit(problem.session, effect).name,
+    )
 }
 
 /// How far the unknowns would move if an alias stood in an effect's place: the largest move of each, inside units.
@@ -190,9 +264,13 @@ fn widen(shifts: &mut [f64], aliases: &[Alias], named: &[f64], start: &Start) {
     }
 }
 
-fn verdict(findings: &Findings<'_, '_>, effects: &mut Vec<EffectResult>) -> (String, Remainder) {
+fn verdict(findings: &Findings<'_, '_>, effects: &mut [EffectResult]) -> (String, Remainder) {
     let Some(after) = findings.structure_after else {
-        let word = if effects.is_empty() { "clean" } else { "explained" };
+        let word = match (effects.is_empty(), findings.stopped_early) {
+            (true, _) => "clean",
+            (false, false) => "explained",
+            (false, true) => "partly-explained",
+        };
         let remainder = Remainder {
             structured: false,
             p_value: findings.last_p_value,

@@ -7,7 +7,7 @@ use faer::Mat;
 use rayon::prelude::*;
 use statrs::function::gamma::{gamma_ur, ln_gamma};
 
-use super::moments::Moments;
+use super::moments::{FoldMoments, Moments};
 
 /// Share of a candidate's own length that has to remain beside the model for it to count as seen.
 pub const LEAST_VISIBLE: f64 = 1e-7;
@@ -58,6 +58,8 @@ pub struct Trained<'m> {
     solved: Mat<f64>,
     /// `Xᵀ C`.
     cross: Mat<f64>,
+    /// The products that are summed: which, and with what sign. Nearly all folds are all of them less a few.
+    parts: Vec<(&'m FoldMoments, f64)>,
     /// `Xᵀ y`.
     pub base_y: Vec<f64>,
     /// Coefficients of the base columns: `(XᵀX)⁻¹ Xᵀ y`.
@@ -92,6 +94,16 @@ impl<'m> Trained<'m> {
         folds: Vec<usize>,
     ) -> Trained<'m> {
         let m = base.len();
+        let left_out: Vec<usize> = (0..moments.folds.len())
+            .filter(|fold| !folds.contains(fold))
+            .collect();
+        let parts: Vec<(&FoldMoments, f64)> = if left_out.len() < folds.len() {
+            std::iter::once((&moments.whole, 1.0))
+                .chain(left_out.iter().map(|fold| (&moments.folds[*fold], -1.0)))
+                .collect()
+        } else {
+            folds.iter().map(|fold| (&moments.folds[*fold], 1.0)).collect()
+        };
         let of_prior = prior.base.nrows();
         let mut gram = Mat::<f64>::zeros(m, m);
         let mut base_y = vec![0.0; m];
@@ -102,14 +114,14 @@ impl<'m> Trained<'m> {
                 } else {
                     0.0
                 };
-                for fold in &folds {
-                    sum += moments.folds[*fold].base[(*bi, *bj)];
+                for (part, sign) in &parts {
+                    sum += sign * part.base[(*bi, *bj)];
                 }
                 gram[(i, j)] = sum;
             }
             base_y[i] = if *bi < of_prior { prior.base_y[*bi] } else { 0.0 };
-            for fold in &folds {
-                base_y[i] += moments.folds[*fold].base_y[*bi];
+            for (part, sign) in &parts {
+                base_y[i] += sign * part.base_y[*bi];
             }
         }
         let total = moments
@@ -120,8 +132,8 @@ impl<'m> Trained<'m> {
         for j in 0..total {
             for (i, bi) in base.iter().enumerate() {
                 let mut sum = 0.0;
-                for fold in &folds {
-                    sum += moments.folds[*fold].cross[(*bi, j)];
+                for (part, sign) in &parts {
+                    sum += sign * part.cross[(*bi, j)];
                 }
                 cross[(i, j)] = sum;
             }
@@ -138,21 +150,30 @@ impl<'m> Trained<'m> {
             inverse,
             solved,
             cross,
+            parts,
             base_y,
             coefficients,
         }
     }
 
-    /// `D` and `g` of a candidate.
-    fn projected(&self, candidate: usize) -> (Mat<f64>, Vec<f64>, Mat<f64>) {
+    /// `D` and `g` of a candidate, and its product with itself.
+    pub fn projected(&self, candidate: usize) -> (Mat<f64>, Vec<f64>, Mat<f64>) {
         let (first, count) = (self.moments.first[candidate], self.moments.count[candidate]);
         let mut own = Mat::<f64>::zeros(count, count);
         let mut g = vec![0.0; count];
-        for fold in &self.folds {
-            let fold = &self.moments.folds[*fold];
-            own += &fold.own[candidate];
+        for (part, sign) in &self.parts {
+            own += faer::Scale(*sign) * &part.own[candidate];
             for k in 0..count {
-                g[k] += fold.cross_y[first + k];
+                g[k] += sign * part.cross_y[first + k];
+            }
+        }
+        // What is left of a difference by rounding is nothing.
+        let whole = &self.moments.whole.own[candidate];
+        for k in 0..count {
+            if own[(k, k)] <= 1e-12 * whole[(k, k)] {
+                own.row_mut(k).fill(0.0);
+                own.col_mut(k).fill(0.0);
+                g[k] = 0.0;
             }
         }
         let mut d = own.clone();
@@ -168,6 +189,15 @@ impl<'m> Trained<'m> {
                 .sum::<f64>();
         }
         (d, g, own)
+    }
+
+    /// How much the model lowers the sum of squares, priors included.
+    pub fn explained(&self) -> f64 {
+        self.base_y
+            .iter()
+            .zip(&self.coefficients)
+            .map(|(y, c)| y * c)
+            .sum()
     }
 
     /// What a candidate would gain.
@@ -238,17 +268,16 @@ impl<'m> Trained<'m> {
         let mut g = vec![0.0; count];
         let mut gram_with = vec![0.0; self.base.len()];
         let mut length = 0.0;
-        for fold in &self.folds {
-            let fold = &self.moments.folds[*fold];
+        for (part, sign) in &self.parts {
             for (a, ca) in signature {
                 for k in 0..count {
-                    g[k] += ca * fold.cross[(*a, first + k)];
+                    g[k] += sign * ca * part.cross[(*a, first + k)];
                 }
                 for (i, bi) in self.base.iter().enumerate() {
-                    gram_with[i] += ca * fold.base[(*a, *bi)];
+                    gram_with[i] += sign * ca * part.base[(*a, *bi)];
                 }
                 for (b, cb) in signature {
-                    length += ca * cb * fold.base[(*a, *b)];
+                    length += sign * ca * cb * part.base[(*a, *b)];
                 }
             }
         }

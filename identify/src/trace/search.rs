@@ -6,10 +6,16 @@
 
 use std::collections::BTreeSet;
 
+use abbe_model::effect::Driver;
+use faer::Mat;
+use rayon::prelude::*;
+
 use super::columns::{Columns, Layout};
+use super::compose::{self, Composed};
 use super::library::Candidate;
 use super::moments::Moments;
 use super::score::{Gain, PriorMoments, Trained, ln_chi_square_tail};
+use super::sharpen;
 
 /// When the search stops.
 #[derive(Clone, Copy, Debug)]
@@ -53,13 +59,34 @@ pub struct Search<'s> {
     pub of_fold: Vec<Vec<usize>>,
     /// Where the columns of every candidate that was ever taken up stand in the base.
     materialised: Vec<(usize, std::ops::Range<usize>)>,
-    /// Sum of squares of held-out whitened residuals, before and after each addition.
+    /// Sum of squares of held-out residuals over the variance of the noise, before and after each addition.
     pub held_out: Vec<f64>,
     /// The best score on readings without structure that is exceeded with the probability of the stop, by round.
     pub thresholds: Vec<f64>,
     /// Whether candidates of last resort are tried.
     pub last_resort: bool,
+    /// Candidates of last resort that are not laid over the readings yet.
+    pub reserve: Vec<(Candidate, Layout)>,
+    plain: Plain,
+    /// Entries of the library that would not stand out however large they plausibly were.
+    unseen: Vec<bool>,
     stop: Stop,
+}
+
+/// By how many standard deviations an effect as large as is plausible has to change the readings, all together and beyond what the model absorbs, to be
+/// looked for.
+const LEAST_PLAUSIBLE_SIGMA: f64 = 3.0;
+
+/// Readings as they are, not whitened: what held-out errors are of. In units of the noise.
+pub struct Plain {
+    /// The base: rows × columns, extended as candidates are taken up.
+    pub base: Mat<f64>,
+    /// The residual.
+    pub residual: Vec<f64>,
+    /// The fold of each row.
+    pub folds: Vec<usize>,
+    /// Standard deviation of a reading, mm.
+    pub sigma_mm: f64,
 }
 
 /// What a round came to.
@@ -84,6 +111,7 @@ impl<'s> Search<'s> {
         layouts: Vec<Layout>,
         moments: Moments,
         prior: PriorMoments,
+        plain: Plain,
         stop: Stop,
     ) -> Search<'s> {
         let rank = moments.base();
@@ -101,15 +129,34 @@ impl<'s> Search<'s> {
             held_out: Vec::new(),
             thresholds: Vec::new(),
             last_resort: false,
+            reserve: Vec::new(),
+            plain,
+            unseen: Vec::new(),
             stop,
+        };
+        search.unseen = {
+            let model = search.model_without(None);
+            (0..search.candidates.len())
+                .into_par_iter()
+                .map(|candidate| {
+                    let (d, _, _) = model.projected(candidate);
+                    let effect = &search.candidates[candidate].effect;
+                    let plausible = columns.plausible(effect, &search.layouts[candidate]);
+                    let largest = (0..d.nrows()).map(|k| d[(k, k)]).fold(0.0, f64::max);
+                    plausible * largest.max(0.0).sqrt() < LEAST_PLAUSIBLE_SIGMA
+                })
+                .collect()
         };
         let before = search.held_out_now();
         search.held_out.push(before);
         search
     }
 
-    fn is_held_back(&self, candidate: usize) -> bool {
-        self.candidates[candidate].last_resort && !self.last_resort
+    /// Whether a candidate is not to be taken up now.
+    pub fn is_held_back(&self, candidate: usize) -> bool {
+        let unseen = self.unseen.get(candidate).is_some_and(|unseen| *unseen);
+        let candidate = &self.candidates[candidate];
+        unseen || candidate.dictionary || candidate.last_resort && !self.last_resort
     }
 
     fn all_folds(&self) -> Vec<usize> {
@@ -147,7 +194,7 @@ impl<'s> Search<'s> {
     }
 
     /// The variance that gains are measured in.
-    fn variance(&self, model: &Trained<'_>) -> f64 {
+    pub fn variance(&self, model: &Trained<'_>) -> f64 {
         if !self.stop.in_residual_variance {
             return 1.0;
         }
@@ -179,12 +226,164 @@ impl<'s> Search<'s> {
         self.variance(&model)
     }
 
-    /// `−ln P` of a gain, less the candidate's cost.
-    pub fn score(&self, candidate: usize, gain: &Gain, variance: f64) -> f64 {
+    /// `−ln P` of a gain.
+    pub fn evidence(&self, gain: &Gain, variance: f64) -> f64 {
         if gain.freedom == 0 {
             return f64::NEG_INFINITY;
         }
-        -ln_chi_square_tail(gain.gain / variance, gain.freedom) - self.candidates[candidate].cost
+        -ln_chi_square_tail(gain.gain / variance, gain.freedom)
+    }
+
+    /// `−ln P` of a gain, less the candidate's cost.
+    pub fn score(&self, candidate: usize, gain: &Gain, variance: f64) -> f64 {
+        self.evidence(gain, variance) - self.candidates[candidate].cost
+    }
+
+    /// What can be composed of the library's dictionaries beside a model.
+    pub fn composed(&self, model: &Trained<'_>) -> Vec<Composed> {
+        let variance = self.variance(model);
+        (0..self.candidates.len())
+            .into_par_iter()
+            .filter(|candidate| self.candidates[*candidate].dictionary)
+            .filter_map(|candidate| {
+                compose::composed(model, candidate, &self.candidates[candidate], variance)
+            })
+            .collect()
+    }
+
+    /// Adds what comes near the best, with the best numbers that it can have beside a model of some candidates.
+    fn sharpen(&mut self, beside: &[usize]) {
+        let fresh = {
+            let model = self.model_of(beside, &self.all_folds());
+            sharpen::sharpened(self, &model, &self.composed(&model))
+        };
+        let fresh = fresh
+            .into_iter()
+            .filter_map(|candidate| Some((candidate.clone(), self.columns.layout(&candidate.effect)?)))
+            .collect();
+        self.append(fresh);
+    }
+
+    fn append(&mut self, fresh: Vec<(Candidate, Layout)>) {
+        if fresh.is_empty() {
+            return;
+        }
+        let (candidates, layouts): (Vec<Candidate>, Vec<Layout>) = fresh.into_iter().unzip();
+        self.moments.append(self.columns, &layouts);
+        self.candidates.extend(candidates);
+        self.layouts.extend(layouts);
+    }
+
+    /// Lays the candidates of last resort over the readings.
+    pub fn bring_reserve(&mut self) {
+        let reserve = std::mem::take(&mut self.reserve);
+        self.append(reserve);
+    }
+
+    fn model_of(&self, chosen: &[usize], folds: &[usize]) -> Trained<'_> {
+        Trained::new(&self.moments, &self.prior, self.base_with(chosen), folds.to_vec())
+    }
+
+    /// Puts several effects that follow one axis down to one, where that one says as much in fewer words: what they explain together is compared, each
+    /// effect being charged its cost and the number of entries of the library that it was chosen from. From three on, a free curve may be that one.
+    pub fn merge(&mut self) {
+        if self.stop.in_residual_variance {
+            return;
+        }
+        let mut drivers: Vec<Driver> = Vec::new();
+        for taken in &self.taken {
+            let driver = &self.candidates[taken.candidate].effect.driver;
+            if matches!(driver, Driver::Axis(_)) && !drivers.contains(driver) {
+                drivers.push(driver.clone());
+            }
+        }
+        let mut merged = false;
+        for driver in drivers {
+            let chosen: Vec<usize> = self.taken.iter().map(|taken| taken.candidate).collect();
+            let (group, rest) = self.following(&driver, &chosen);
+            if group.len() < 2 {
+                continue;
+            }
+            self.sharpen(&rest);
+            if group.len() > 2 {
+                self.bring_reserve();
+            }
+            let curves = group.len() > 2;
+            let pool: Vec<usize> = (0..self.candidates.len())
+                .filter(|c| !self.is_held_back(*c) || curves && self.candidates[*c].last_resort)
+                .filter(|c| !rest.contains(c))
+                .collect();
+            let Some(one) = self.in_fewer_words(&group, &rest, &pool, &self.all_folds()) else {
+                continue;
+            };
+            self.materialise(&[one]);
+            let of_group = |taken: &Taken| group.contains(&taken.candidate);
+            let p_value = self
+                .taken
+                .iter()
+                .filter(|t| of_group(t))
+                .map(|t| t.p_value)
+                .fold(1.0, f64::min);
+            let places = self.places(one);
+            self.taken.retain(|taken| !group.contains(&taken.candidate));
+            self.taken.push(Taken {
+                candidate: one,
+                places,
+                p_value,
+            });
+            for fold in self.all_folds() {
+                let (group, rest) = self.following(&driver, &self.of_fold[fold]);
+                if !group.is_empty()
+                    && self
+                        .in_fewer_words(&group, &rest, &[one], &self.others(fold))
+                        .is_some()
+                {
+                    self.of_fold[fold] = rest;
+                    self.of_fold[fold].push(one);
+                }
+            }
+            merged = true;
+        }
+        if merged {
+            let held_out = self.held_out_now();
+            if let Some(last) = self.held_out.last_mut() {
+                *last = held_out;
+            }
+        }
+    }
+
+    /// Which of the chosen follow a driver, and which do not.
+    fn following(&self, driver: &Driver, chosen: &[usize]) -> (Vec<usize>, Vec<usize>) {
+        chosen
+            .iter()
+            .partition(|candidate| self.candidates[**candidate].effect.driver == *driver)
+    }
+
+    /// The one of a pool that says more than a group, if there is one.
+    fn in_fewer_words(
+        &self,
+        group: &[usize],
+        rest: &[usize],
+        pool: &[usize],
+        folds: &[usize],
+    ) -> Option<usize> {
+        let without = self.model_of(rest, folds);
+        let variance = self.variance(&without);
+        let all: Vec<usize> = rest.iter().chain(group).copied().collect();
+        let of_group = Gain {
+            gain: self.model_of(&all, folds).explained() - without.explained(),
+            freedom: group.iter().map(|c| self.moments.count[*c]).sum(),
+            visible: 1.0,
+        };
+        let choice = (self.unseen.iter().filter(|unseen| !**unseen).count().max(1) as f64).ln();
+        let words: f64 = group.iter().map(|c| self.candidates[*c].cost + choice).sum();
+        let of_group = self.evidence(&of_group, variance) - words;
+        pool.par_iter()
+            .filter(|c| !group.contains(c))
+            .map(|c| (*c, self.score(*c, &without.gain(*c), variance) - choice))
+            .filter(|(_, one)| *one > of_group)
+            .max_by(|a, b| a.1.total_cmp(&b.1))
+            .map(|(c, _)| c)
     }
 
     fn best_of(&self, model: &Trained<'_>, taken: &[usize]) -> Option<(usize, f64)> {
@@ -226,14 +425,19 @@ impl<'s> Search<'s> {
         first
     }
 
-    /// One round. `refine` may put a sharper candidate in place of one whose shape has a number to be tuned; it returns the index to take.
-    pub fn round(&mut self, mut refine: impl FnMut(&mut Search<'s>, usize) -> usize) -> Round {
+    /// One round.
+    pub fn round(&mut self) -> Round {
         let taken: Vec<usize> = self.taken.iter().map(|t| t.candidate).collect();
-        let (winner, score, null) = {
+        let (score, null) = {
             let model = self.model_without(None);
-            let Some((best, score)) = self.best_of(&model, &taken) else {
+            let Some((_, score)) = self.best_of(&model, &taken) else {
                 return Round::Done { p_value: 1.0 };
             };
+            let score = self
+                .composed(&model)
+                .iter()
+                .map(Composed::score)
+                .fold(score, f64::max);
             let costs: Vec<f64> = (0..self.candidates.len())
                 .map(|c| {
                     if self.is_held_back(c) {
@@ -243,8 +447,7 @@ impl<'s> Search<'s> {
                     }
                 })
                 .collect();
-            let null = model.null_best(&costs, self.null_variance());
-            (self.named_first(&model, best, &taken), score, null)
+            (score, model.null_best(&costs, self.null_variance()))
         };
         let above = null.iter().filter(|best| **best >= score).count();
         let p_value = (above + 1) as f64 / (null.len() + 1) as f64;
@@ -259,7 +462,14 @@ impl<'s> Search<'s> {
         if p_value > self.stop.significance || self.taken.len() >= self.stop.most {
             return Round::Done { p_value };
         }
-        let candidate = refine(self, winner);
+        self.sharpen(&taken);
+        let candidate = {
+            let model = self.model_without(None);
+            let Some((best, _)) = self.best_of(&model, &taken) else {
+                return Round::Done { p_value };
+            };
+            self.named_first(&model, best, &taken)
+        };
         // Each fold searches for itself, by the same rule.
         let picks: Vec<Option<usize>> = self
             .all_folds()
@@ -319,6 +529,14 @@ impl<'s> Search<'s> {
 
     /// Exchanges effects for candidates that explain clearly better what they stand for, in the search on all readings and in that of each fold.
     pub fn exchange(&mut self) {
+        if self.taken.len() > 1 && !self.stop.in_residual_variance {
+            let chosen: Vec<usize> = self.taken.iter().map(|taken| taken.candidate).collect();
+            for k in 0..chosen.len() {
+                let mut others = chosen.clone();
+                others.remove(k);
+                self.sharpen(&others);
+            }
+        }
         let mut of_all: Vec<usize> = self.taken.iter().map(|taken| taken.candidate).collect();
         self.exchange_in(&mut of_all, &self.all_folds());
         for (k, candidate) in of_all.into_iter().enumerate() {
@@ -377,7 +595,21 @@ impl<'s> Search<'s> {
             .copied()
             .filter(|c| !self.materialised.iter().any(|(present, _)| present == c))
             .collect();
+        if fresh.is_empty() {
+            return;
+        }
         let places = self.moments.materialise(self.columns, &self.layouts, &fresh);
+        let chosen: Vec<&Layout> = fresh.iter().map(|c| &self.layouts[*c]).collect();
+        let rows = self.columns.plain_rows(&chosen);
+        let norms: Vec<f64> = fresh.iter().flat_map(|c| self.norms(*c)).collect();
+        let (before, old) = (&self.plain.base, self.plain.base.ncols());
+        self.plain.base = Mat::from_fn(rows.nrows(), old + rows.ncols(), |i, j| {
+            match j.checked_sub(old) {
+                None => before[(i, j)],
+                Some(k) if norms[k] > 0.0 => rows[(i, k)] / (norms[k] * self.plain.sigma_mm),
+                Some(_) => 0.0,
+            }
+        });
         self.materialised.extend(fresh.into_iter().zip(places));
     }
 
@@ -400,17 +632,27 @@ impl<'s> Search<'s> {
     }
 
     fn held_out_now(&self) -> f64 {
-        self.all_folds()
-            .into_iter()
-            .map(|fold| self.model_of_fold(fold).sum_of_squares_on(fold))
+        let models: Vec<Trained<'_>> = self
+            .all_folds()
+            .into_par_iter()
+            .map(|fold| self.model_of_fold(fold))
+            .collect();
+        let predicted = |model: &Trained<'_>, row: usize| -> f64 {
+            let along = model.base.iter().zip(&model.coefficients);
+            along.map(|(column, c)| self.plain.base[(row, *column)] * c).sum()
+        };
+        self.plain
+            .folds
+            .iter()
+            .enumerate()
+            .map(|(row, fold)| (self.plain.residual[row] - predicted(&models[*fold], row)).powi(2))
             .sum()
     }
 
-    /// What any effect would gain beside all that has been taken; `None` where the data lack what it follows.
-    pub fn gain_of(&self, effect: &abbe_model::effect::Effect) -> Option<f64> {
+    /// What any effect would gain beside a model on all readings; `None` where the data lack what it follows.
+    pub fn gain_beside(&self, model: &Trained<'_>, effect: &abbe_model::effect::Effect) -> Option<f64> {
         let layout = self.columns.layout_uncached(effect)?;
-        let model = self.model_without(None);
-        Some(self.moments.gain_of(self.columns, &layout, &model))
+        Some(self.moments.gain_of(self.columns, &layout, model))
     }
 
     /// The lengths of a candidate's columns over all readings.
@@ -426,13 +668,5 @@ impl<'s> Search<'s> {
                     .sqrt()
             })
             .collect()
-    }
-
-    /// Adds a candidate to those that are looked for.
-    pub fn append(&mut self, candidate: Candidate, layout: Layout) -> usize {
-        self.moments.append(self.columns, &layout);
-        self.candidates.push(candidate);
-        self.layouts.push(layout);
-        self.candidates.len() - 1
     }
 }

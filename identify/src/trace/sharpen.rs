@@ -1,44 +1,118 @@
 //! Shapes with a number in them (a period, a time constant, a place, a width): the library holds a grid, here the grid is left.
+//!
+//! It is left before candidates are compared with each other: between grid points one component may do better than another that at its own best
+//! explains more. So every component that comes near the best is given its own best numbers first.
+
+use std::collections::HashMap;
 
 use abbe_model::effect::{Effect, Shape};
 
+use super::compose::Composed;
 use super::library::Candidate;
+use super::score::{Gain, Trained};
 use super::search::Search;
 
-const STEPS: usize = 24;
+const STEPS: usize = 12;
+/// The share of the best evidence that a candidate has to have on the grid to be sharpened: a bump between two grid points loses a third.
+const NEAR: f64 = 0.5;
+/// The most candidates that are sharpened at a time.
+const MOST: usize = 10;
+/// What a composed effect may lack of the best evidence and still be told as what it might be.
+const BEHIND: f64 = 4.0;
 
-/// Looks around a candidate for the number of its shape that gains most; adds the sharper candidate and returns its index, or the
-/// candidate's own where nothing is gained. Line search by golden section (Kiefer, Proc. Am. Math. Soc. 4 (1953) 502).
-pub fn sharpen(search: &mut Search<'_>, candidate: usize) -> usize {
-    let original = search.candidates[candidate].clone();
+/// Candidates with the best numbers that they can have beside a model, of those that come near the best; with what has been composed.
+pub fn sharpened(search: &Search<'_>, model: &Trained<'_>, composed: &[Composed]) -> Vec<Candidate> {
+    let variance = search.variance(model);
+    let gains = model.gains();
+    let mut nearest: HashMap<String, (usize, f64)> = HashMap::new();
+    let mut best = 0.0_f64;
+    for (candidate, gain) in gains.iter().enumerate() {
+        if gain.freedom == 0 || search.is_held_back(candidate) {
+            continue;
+        }
+        let evidence = search.evidence(gain, variance);
+        best = best.max(evidence);
+        let effect = &search.candidates[candidate].effect;
+        if brackets(&search.candidates[candidate]).is_none() {
+            continue;
+        }
+        let place = nearest.entry(effect.id()).or_insert((candidate, evidence));
+        if evidence > place.1 {
+            *place = (candidate, evidence);
+        }
+    }
+    let mut near: Vec<(usize, f64)> = nearest
+        .into_values()
+        .filter(|(_, evidence)| *evidence >= NEAR * best)
+        .collect();
+    near.sort_by(|a, b| b.1.total_cmp(&a.1).then(a.0.cmp(&b.0)));
+    near.truncate(MOST);
+    let mut fresh: Vec<Candidate> = near
+        .into_iter()
+        .filter_map(|(candidate, _)| {
+            let original = &search.candidates[candidate];
+            let effect = sharpen(search, model, original, gains[candidate].gain)?;
+            Some(Candidate {
+                effect,
+                ..original.clone()
+            })
+        })
+        .collect();
+    let mut nearest: Vec<&Composed> = composed.iter().filter(|c| c.evidence >= NEAR * best).collect();
+    nearest.sort_by(|a, b| b.evidence.total_cmp(&a.evidence));
+    nearest.truncate(MOST);
+    for composed in nearest {
+        let (effect, gain) = moved_steps(search, model, &composed.candidate);
+        let gain = Gain {
+            gain,
+            freedom: effect.shape.coefficients(),
+            visible: 1.0,
+        };
+        let evidence = search.evidence(&gain, variance);
+        if evidence >= best - BEHIND || evidence - composed.candidate.cost >= NEAR * best {
+            fresh.push(Candidate {
+                effect,
+                ..composed.candidate.clone()
+            });
+        }
+    }
+    fresh.retain(|candidate| {
+        !search
+            .candidates
+            .iter()
+            .any(|present| present.effect == candidate.effect)
+    });
+    fresh
+}
+
+/// Looks around an effect for the numbers of its shape that gain most; `None` where nothing is gained. Line search by golden section (Kiefer, Proc. Am. Math.
+/// Soc. 4 (1953) 502).
+fn sharpen(search: &Search<'_>, model: &Trained<'_>, original: &Candidate, before: f64) -> Option<Effect> {
     let mut effect = original.effect.clone();
-    let Some(brackets) = brackets(&effect.shape) else {
-        return candidate;
-    };
-    let mut best = search.gain_of(&effect).unwrap_or(0.0);
-    let before = best;
+    let brackets = brackets(original)?;
+    let mut best = before;
     for _ in 0..2 {
         for (which, low, high) in &brackets {
             let value_at = |share: f64| low + (high - low) * share;
-            let gain_at = |search: &Search<'_>, share: f64| {
+            let gain_at = |share: f64| {
                 let trial = with_number(&effect, *which, value_at(share));
-                (search.gain_of(&trial).unwrap_or(0.0), trial)
+                (search.gain_beside(model, &trial).unwrap_or(0.0), trial)
             };
             let golden = 0.5 * (5.0_f64.sqrt() - 1.0);
             let (mut a, mut b) = (0.0, 1.0);
             let (mut c, mut d) = (b - golden * (b - a), a + golden * (b - a));
-            let (mut at_c, mut at_d) = (gain_at(search, c), gain_at(search, d));
-            for _ in 0..STEPS / 2 {
+            let (mut at_c, mut at_d) = (gain_at(c), gain_at(d));
+            for _ in 0..STEPS {
                 if at_c.0 > at_d.0 {
                     (b, d) = (d, c);
                     at_d = at_c;
                     c = b - golden * (b - a);
-                    at_c = gain_at(search, c);
+                    at_c = gain_at(c);
                 } else {
                     (a, c) = (c, d);
                     at_c = at_d;
                     d = a + golden * (b - a);
-                    at_d = gain_at(search, d);
+                    at_d = gain_at(d);
                 }
             }
             let (gain, trial) = if at_c.0 > at_d.0 { at_c } else { at_d };
@@ -48,20 +122,46 @@ pub fn sharpen(search: &mut Search<'_>, candidate: usize) -> usize {
             }
         }
     }
-    if best <= before * (1.0 + 1e-6) {
-        return candidate;
-    }
-    let Some(layout) = search.columns.layout(&effect) else {
-        return candidate;
+    (best > before * (1.0 + 1e-6)).then_some(effect)
+}
+
+/// Moves each step by parts of the grid to where all together gain most; what that is.
+fn moved_steps(search: &Search<'_>, model: &Trained<'_>, candidate: &Candidate) -> (Effect, f64) {
+    let original = &candidate.effect;
+    let mut best = search.gain_beside(model, original).unwrap_or(0.0);
+    let Shape::Steps { at } = &original.shape else {
+        return (original.clone(), best);
     };
-    search.append(Candidate { effect, ..original }, layout)
+    let mut places = at.clone();
+    let with = |places: &[f64]| Effect {
+        shape: Shape::Steps { at: places.to_vec() },
+        ..original.clone()
+    };
+    for _ in 0..2 {
+        for k in 0..places.len() {
+            let middle = places[k];
+            for part in -3..=3 {
+                let mut trial = places.clone();
+                trial[k] = middle + candidate.grid * f64::from(part) / 4.0;
+                let gain = search.gain_beside(model, &with(&trial)).unwrap_or(0.0);
+                if gain > best * (1.0 + 1e-9) {
+                    best = gain;
+                    places = trial;
+                }
+            }
+        }
+    }
+    places.sort_by(f64::total_cmp);
+    (with(&places), best)
 }
 
 /// The numbers of a shape with the interval around each that the grid leaves open.
-fn brackets(shape: &Shape) -> Option<Vec<(usize, f64, f64)>> {
-    match shape {
-        // The grid of periods is even in frequency, half a cycle over the travel apart.
-        Shape::Periodic { period } => Some(vec![(0, period * 0.94, period * 1.06)]),
+fn brackets(candidate: &Candidate) -> Option<Vec<(usize, f64, f64)>> {
+    match &candidate.effect.shape {
+        Shape::Periodic { period } => {
+            let near = candidate.grid / period;
+            Some(vec![(0, period / (1.0 + near), period / (1.0 - near.min(0.5)))])
+        }
         Shape::Warmup { tau_s } => Some(vec![(0, tau_s * 0.5, tau_s * 2.0)]),
         Shape::ReversalSpike { width } => Some(vec![(0, width * 0.4, width * 2.5)]),
         Shape::Local { centre, width, .. } => Some(vec![

@@ -134,6 +134,27 @@ pub enum Station<N> {
 }
 
 impl<N> Station<N> {
+    /// The same set-up with every nominal coordinate replaced: expressions by numbers, or by symbols.
+    pub fn map<M>(&self, to: impl Fn(&N) -> M) -> Station<M> {
+        let point = |point: &[N; 3]| point.each_ref().map(&to);
+        match self {
+            Station::BallBar(bar) => Station::BallBar(ballbar::BallBar {
+                workpiece_ball: point(&bar.workpiece_ball),
+                spindle_ball: point(&bar.spindle_ball),
+                bar: to(&bar.bar),
+            }),
+            Station::Tracker(tracker) => Station::Tracker(tracker::Tracker {
+                target: point(&tracker.target),
+                rotation: tracker.rotation.each_ref().map(point),
+                origin: point(&tracker.origin),
+            }),
+            Station::Socket(socket) => Station::Socket(socket::Socket {
+                ball: point(&socket.ball),
+                socket: point(&socket.socket),
+            }),
+        }
+    }
+
     /// What kind it is.
     pub fn kind(&self) -> InstrumentKind {
         match self {
@@ -162,6 +183,17 @@ impl<N> Station<N> {
         }
     }
 
+    /// The point of the table frame that the instrument holds, mm, if it holds one.
+    pub fn table_point_mm(&self) -> Option<[N; 3]>
+    where
+        N: Copy,
+    {
+        match self {
+            Station::BallBar(bar) => Some(bar.workpiece_ball),
+            Station::Tracker(_) | Station::Socket(_) => None,
+        }
+    }
+
     /// The point of the tool frame that the instrument holds, mm.
     pub fn tool_point_mm(&self) -> [N; 3]
     where
@@ -176,7 +208,7 @@ impl<N> Station<N> {
 }
 
 /// A nominal point, displaced by three unknowns where they are carried.
-fn displaced<S: Scalar>(
+pub fn displaced<S: Scalar>(
     nominal: [S::Nominal; 3],
     first: usize,
     unknown: &impl Fn(usize) -> Option<S>,

@@ -73,6 +73,8 @@ pub struct Test {
     pub motion: Option<motion::Motion>,
     /// Axis positions that neither the data nor the motion list, by axis of the machine, mm or rad.
     pub at: Vec<f64>,
+    /// The same as written, for linear axes that the file states in mm: what an equation keeps in symbols.
+    pub at_written: Vec<Option<expression::Length>>,
     /// What was read.
     pub readings: Option<Readings>,
 }

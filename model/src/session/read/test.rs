@@ -4,9 +4,11 @@ use std::path::{Path, PathBuf};
 
 use super::station::{self, SetUp};
 use super::{Context, Declared, layout, movement, quantity};
+use crate::axis::AxisKind;
 use crate::error::ModelError;
 use crate::instrument::InstrumentKind;
 use crate::session::document::{Table, Value};
+use crate::session::expression::Length;
 use crate::session::motion::{self, Motion};
 use crate::session::readings::Readings;
 use crate::session::table::{self, Request};
@@ -55,7 +57,11 @@ pub(super) fn tests(
         InstrumentKind::BallBar => group("bar_setup", name)?,
         _ => name.to_string(),
     };
-    let (mut at, listed) = at(context, &mut table)?;
+    let Standing {
+        mut at,
+        written: at_written,
+        listed,
+    } = at(context, &mut table)?;
     let format = match table.take("format") {
         Some(value) => layout::format(value.table(format!("[test.format] of \"{name}\""))?)?,
         None => context.format,
@@ -104,6 +110,7 @@ pub(super) fn tests(
         socket,
         motion,
         at,
+        at_written,
         readings: None,
     };
     let here = |(message, help): (String, String)| source.error(span.clone(), message, Some(help));
@@ -166,13 +173,26 @@ fn check_readings(
     Ok(())
 }
 
-/// `at = { x_mm = 0, … }`: where axes stand, and which of them are stated.
-fn at(context: &Context<'_>, table: &mut Table<'_>) -> Result<(Vec<f64>, Vec<bool>), ModelError> {
+/// Where the axes of a test stand, axis by axis.
+struct Standing {
+    at: Vec<f64>,
+    /// As written, for linear axes stated in mm.
+    written: Vec<Option<Length>>,
+    /// Whether the test states it.
+    listed: Vec<bool>,
+}
+
+/// `at = { x_mm = 0, … }`.
+fn at(context: &Context<'_>, table: &mut Table<'_>) -> Result<Standing, ModelError> {
     let machine = context.machine;
-    let mut at = vec![0.0; machine.axes.len()];
-    let mut listed = vec![false; machine.axes.len()];
+    let axes = machine.axes.len();
+    let mut standing = Standing {
+        at: vec![0.0; axes],
+        written: vec![None; axes],
+        listed: vec![false; axes],
+    };
     let Some(value) = table.take("at") else {
-        return Ok((at, listed));
+        return Ok(standing);
     };
     for entry in value.table("`at`".into())?.take_all() {
         let Some((axis, unit)) = quantity::axis_position(machine, &entry.key) else {
@@ -185,15 +205,17 @@ fn at(context: &Context<'_>, table: &mut Table<'_>) -> Result<(Vec<f64>, Vec<boo
             let help = format!("known: {}", known.join(", "));
             return Err(entry.source.error(entry.key_span.clone(), message, Some(help)));
         };
-        if listed[axis] {
+        if standing.listed[axis] {
             let message = format!("`at` says twice where axis `{}` stands", machine.axes[axis].name);
             return Err(entry.source.error(entry.key_span.clone(), message, None));
         }
-        let (_, number) = context.length(&entry)?;
-        at[axis] = unit.inside(number);
-        listed[axis] = true;
+        let (written, number) = context.length(&entry)?;
+        standing.at[axis] = unit.inside(number);
+        let in_mm = machine.axes[axis].kind == AxisKind::Linear && unit == quantity::Unit::Times(1.0);
+        standing.written[axis] = in_mm.then_some(written);
+        standing.listed[axis] = true;
     }
-    Ok((at, listed))
+    Ok(standing)
 }
 
 /// The data file: where `--data` points, else beside the session file.

@@ -1,0 +1,96 @@
+//! The printed Rust against a kernel written by hand: value and eight derivatives of the chapter 5 test, one reading at a time and in
+//! columns of 1,000 (they stay in the cache). `emitted.rs` is what the printer writes; a test compares it with the printer.
+#![allow(missing_docs)]
+
+use std::hint::black_box;
+
+use criterion::{Criterion, Throughput, criterion_group, criterion_main};
+
+#[allow(clippy::all, dead_code)]
+#[rustfmt::skip]
+mod emitted;
+mod hand;
+
+const N: usize = 1_000;
+const LENGTHS: [f64; 4] = [111.803, 100.0, 75.0, 60.0];
+const ERRORS: [f64; 8] = [0.01, -0.02, 1e-4, 2e-4, 0.015, -0.01, -1e-4, 3e-4];
+
+/// Sines and cosines of C and A.
+fn axes() -> [Vec<f64>; 4] {
+    let angle = |i: usize, speed: f64| i as f64 * speed;
+    let column = |f: &dyn Fn(usize) -> f64| (0..N).map(f).collect::<Vec<f64>>();
+    [
+        column(&|i| angle(i, 0.006).sin()),
+        column(&|i| angle(i, 0.006).cos()),
+        column(&|i| angle(i, 0.0015).sin()),
+        column(&|i| angle(i, 0.0015).cos()),
+    ]
+}
+
+fn kernels(criterion: &mut Criterion) {
+    let axes = axes();
+    let rows: Vec<[f64; 4]> = (0..N)
+        .map(|i| [axes[0][i], axes[1][i], axes[2][i], axes[3][i]])
+        .collect();
+    let mut group = criterion.benchmark_group("value and eight derivatives");
+    group.throughput(Throughput::Elements(N as u64));
+    group.bench_function("by hand, one at a time", |bencher| {
+        bencher.iter(|| {
+            for row in &rows {
+                black_box(hand::reading(
+                    black_box(&LENGTHS),
+                    black_box(row),
+                    black_box(&ERRORS),
+                ));
+            }
+        });
+    });
+    group.bench_function("printed, one at a time", |bencher| {
+        bencher.iter(|| {
+            for row in &rows {
+                black_box(emitted::bar_length_gradient(
+                    black_box(&LENGTHS),
+                    black_box(row),
+                    black_box(&ERRORS),
+                ));
+            }
+        });
+    });
+    let columns = [&axes[0][..], &axes[1], &axes[2], &axes[3]];
+    group.bench_function("by hand, columns", |bencher| {
+        let mut value = vec![0.0; N];
+        let mut gradient: [Vec<f64>; 8] = std::array::from_fn(|_| vec![0.0; N]);
+        bencher.iter(|| {
+            let slopes = gradient.each_mut().map(Vec::as_mut_slice);
+            hand::columns(
+                black_box(&LENGTHS),
+                black_box(columns),
+                black_box(&ERRORS),
+                &mut value,
+                slopes,
+            );
+            black_box(&mut value);
+            black_box(&mut gradient);
+        });
+    });
+    group.bench_function("printed, columns", |bencher| {
+        let mut value = vec![0.0; N];
+        let mut gradient: [Vec<f64>; 8] = std::array::from_fn(|_| vec![0.0; N]);
+        bencher.iter(|| {
+            let mut slopes = gradient.each_mut().map(Vec::as_mut_slice);
+            emitted::bar_length_gradient_columns(
+                black_box(&LENGTHS),
+                black_box(&columns),
+                black_box(&ERRORS),
+                &mut [&mut value],
+                &mut slopes,
+            );
+            black_box(&mut value);
+            black_box(&mut gradient);
+        });
+    });
+    group.finish();
+}
+
+criterion_group!(benches, kernels);
+criterion_main!(benches);

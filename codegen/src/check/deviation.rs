@@ -1,0 +1,83 @@
+//! What a truncated or small-angle form leaves out, measured.
+
+use abbe_model::frames::Rotation;
+
+use crate::check::points::{Draws, Point};
+use crate::check::worst;
+use crate::equation::{Equation, Order};
+use crate::error::CodegenError;
+use crate::program::Program;
+use crate::run::Run;
+use crate::subject::Source;
+use crate::variable::Variable;
+
+/// How far a form strays from the chain with exact rotations, at errors of a stated size.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Deviation {
+    /// Every translation, µm.
+    pub shift_um: f64,
+    /// Every angle, degrees.
+    pub tilt_deg: f64,
+    /// The largest deviation that was found over signs and positions, µm.
+    pub largest_um: f64,
+}
+
+impl Equation {
+    /// How far the form strays from the chain with exact rotations: errors of 10 µm and 0.01°, then ten times those, all signs (256
+    /// draws of them for more than eight errors), 60 positions. Empty for a form that is exact.
+    pub(crate) fn deviations(
+        &self,
+        source: &impl Source,
+        program: &Program,
+    ) -> Result<Vec<Deviation>, CodegenError> {
+        if self.options.order == Order::Exact && self.machine.rotation == Rotation::Exact {
+            return Ok(Vec::new());
+        }
+        let mut exact = self.machine.clone();
+        exact.rotation = Rotation::Exact;
+        let count = self.parameters.len();
+        let mut deviations = Vec::new();
+        for (shift_um, tilt_deg) in [(10.0, 0.01), (100.0, 0.1_f64)] {
+            let mut draws = Draws::new(5);
+            let mut largest = 0.0_f64;
+            for _ in 0..60 {
+                let point = Point {
+                    nominal: self.draw_nominal(source, &mut draws, 0.0, false),
+                    small: vec![0.0; count],
+                };
+                let at = |variable: Variable| point.nominal(&variable);
+                let mut run = Run::<f64>::new(&exact, source, &self.parameters, &at, &|_| 0.0)?;
+                // The parameters are the last of the inputs, in their order.
+                let mut inputs = point.inputs(program, &self.parameters);
+                let first = inputs.len() - count;
+                for pattern in 0..(1u64 << count.min(8)) {
+                    let pattern = if count <= 8 { pattern } else { draws.bits() };
+                    for (place, parameter) in self.parameters.iter().enumerate() {
+                        let sign = if pattern >> (place % 64) & 1 == 0 {
+                            1.0
+                        } else {
+                            -1.0
+                        };
+                        let size = if parameter.is_angle() {
+                            tilt_deg.to_radians()
+                        } else {
+                            shift_um * 1e-3
+                        };
+                        inputs[first + place] = sign * size;
+                    }
+                    run.seed(&|place| inputs[first + place]);
+                    let found = program.run(&inputs);
+                    for (found, expected) in found.iter().zip(run.read()) {
+                        largest = largest.max(worst(*found, expected) * 1e3);
+                    }
+                }
+            }
+            deviations.push(Deviation {
+                shift_um,
+                tilt_deg,
+                largest_um: largest,
+            });
+        }
+        Ok(deviations)
+    }
+}

@@ -1,0 +1,124 @@
+//! What a program computes against what the chain computes with dual numbers. Nothing is written that this does not confirm.
+
+mod deviation;
+mod points;
+mod reference;
+
+pub use deviation::Deviation;
+
+use crate::check::points::{Draws, Point};
+use crate::equation::Equation;
+use crate::error::CodegenError;
+use crate::program::Program;
+use crate::subject::Source;
+use crate::variable::Variable;
+
+/// Points that every program is checked at.
+const POINTS: usize = 40;
+/// Largest relative difference that passes.
+const TOLERANCE: f64 = 1e-12;
+/// Errors of the points: mm and rad, far larger than any machine's, so that a wrong term of any order shows.
+const SIZES: [f64; 2] = [10.0, 0.1];
+
+/// How well a program agrees with the chain.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Check {
+    /// Points compared, at errors of ±10 mm and ±0.1 rad.
+    pub points: usize,
+    /// Largest difference of a value, relative to the largest value.
+    pub value: f64,
+    /// Largest difference of a derivative, relative to the largest derivative by the same parameter (to 1 mm/mm
+    /// or 1 mm/rad where that is less: a parameter that is not seen has rounding alone).
+    pub gradient: f64,
+    /// Largest derivative by each parameter over the points, mm/mm and mm/rad.
+    pub largest_derivatives: Vec<f64>,
+}
+
+impl Check {
+    /// The larger of the two.
+    pub fn largest(&self) -> f64 {
+        self.value.max(self.gradient)
+    }
+}
+
+impl Equation {
+    /// Runs programs (without derivatives, or with) at points of large errors against the chain with dual numbers.
+    ///
+    /// # Errors
+    /// If they disagree: then nothing may be written.
+    pub(crate) fn confirm(&self, source: &impl Source, programs: &[&Program]) -> Result<Check, CodegenError> {
+        let mut draws = Draws::new(4);
+        let mut check = Check::default();
+        let count = self.parameters.len();
+        let mut value_scale = f64::MIN_POSITIVE;
+        let mut scales = vec![0.0_f64; count];
+        let mut difference = 0.0_f64;
+        let mut differences = vec![0.0_f64; count];
+        let mut tries = 0;
+        while check.points < POINTS && tries < 10 * POINTS {
+            tries += 1;
+            let nominal = self.draw_nominal(source, &mut draws, 0.01, true);
+            let size = |variable: &Variable| SIZES[usize::from(variable.is_angle())];
+            let small = self.parameters.iter().map(|p| draws.between(-size(p), size(p)));
+            let point = Point {
+                small: small.collect(),
+                nominal,
+            };
+            let (values, gradient) = self.expected(source, &point)?;
+            // A set-up that cannot be, such as the root of a negative length, is no point to compare at.
+            if !values
+                .iter()
+                .chain(gradient.iter().flatten())
+                .all(|x| x.is_finite())
+            {
+                continue;
+            }
+            let largest = values
+                .iter()
+                .fold(0.0_f64, |largest, value| largest.max(value.abs()));
+            value_scale = value_scale.max(largest);
+            for row in &gradient {
+                for k in 0..count {
+                    scales[k] = scales[k].max(row[k].abs());
+                }
+            }
+            for program in programs {
+                let found = program.run(&point.inputs(program, &self.parameters));
+                let (found_values, found_slopes) = found.split_at(values.len());
+                for (found, expected) in found_values.iter().zip(&values) {
+                    difference = difference.max(worst(*found, *expected));
+                }
+                // A program without derivatives has none to compare.
+                for (place, (found, expected)) in
+                    found_slopes.iter().zip(gradient.iter().flatten()).enumerate()
+                {
+                    let k = place % count;
+                    differences[k] = differences[k].max(worst(*found, *expected));
+                }
+            }
+            check.points += 1;
+        }
+        check.value = difference / value_scale;
+        let relative = differences.iter().zip(&scales).map(|(d, s)| d / s.max(1.0));
+        check.gradient = relative.fold(0.0, f64::max);
+        if check.points == 0 || check.largest() > TOLERANCE {
+            return Err(CodegenError::Unconfirmed {
+                points: check.points,
+                value: check.value,
+                gradient: check.gradient,
+            });
+        }
+        check.largest_derivatives = scales;
+        Ok(check)
+    }
+}
+
+/// The absolute difference; infinite where one of the two is no number.
+fn worst(found: f64, expected: f64) -> f64 {
+    let difference = (found - expected).abs();
+    if difference.is_nan() {
+        f64::INFINITY
+    } else {
+        difference
+    }
+}

@@ -1,0 +1,163 @@
+//! What a form's value and derivatives must be: the chain over dual numbers.
+
+use abbe_model::instrument::Station;
+use num_dual::{Derivative, Dual64, DualNum, DualSVec64, HyperDual64};
+
+use crate::check::points::Point;
+use crate::equation::{Equation, Kind, Order};
+use crate::error::CodegenError;
+use crate::run::Run;
+use crate::subject::{Source, Subject};
+use crate::variable::Variable;
+
+/// Parameters seeded at once.
+const PACK: usize = 8;
+type Pack = DualSVec64<PACK>;
+
+/// Outputs, and each output's derivatives by every parameter.
+pub(crate) type ValueAndGradient = (Vec<f64>, Vec<Vec<f64>>);
+
+impl Equation {
+    /// The reading, and the coordinate groups that it is made of.
+    fn run<S>(
+        &self,
+        source: &impl Source,
+        point: &Point,
+        small: impl Fn(usize) -> S,
+    ) -> Result<(Vec<S>, Vec<S>), CodegenError>
+    where
+        S: DualNum<Primitive = f64> + Copy,
+    {
+        let nominal = |variable: Variable| point.nominal(&variable);
+        let run = Run::<S>::new(&self.machine, source, &self.parameters, &nominal, &small)?;
+        let groups = match &run.subject {
+            Subject::Station(Station::BallBar(bar)) => {
+                let unknown = |slot: usize| run.unknown(slot);
+                let (p, q) = bar.balls(&self.machine, &run.state, &run.errors, &unknown);
+                p.minus(q).0.to_vec()
+            }
+            _ => run.read(),
+        };
+        Ok((run.read(), groups))
+    }
+
+    /// What the outputs of a program must be.
+    pub(crate) fn expected(
+        &self,
+        source: &impl Source,
+        point: &Point,
+    ) -> Result<ValueAndGradient, CodegenError> {
+        match self.options.order {
+            Order::Exact => self.by_duals(source, point, &point.small),
+            Order::First => {
+                let zero = vec![0.0; self.parameters.len()];
+                let (mut values, gradient) = self.by_duals(source, point, &zero)?;
+                for (value, row) in values.iter_mut().zip(&gradient) {
+                    let linear = row.iter().zip(&point.small).map(|(slope, e)| slope * e);
+                    *value += linear.sum::<f64>();
+                }
+                Ok((values, gradient))
+            }
+            Order::Bilinear => self.expected_bilinear(source, point),
+        }
+    }
+
+    /// The reading and its derivatives at the given parameters.
+    fn by_duals(
+        &self,
+        source: &impl Source,
+        point: &Point,
+        at: &[f64],
+    ) -> Result<ValueAndGradient, CodegenError> {
+        let values = self.run(source, point, |i| at[i])?.0;
+        let mut gradient = vec![vec![0.0; at.len()]; values.len()];
+        for start in (0..at.len()).step_by(PACK) {
+            let seeded = |i: usize| {
+                let mut seed = nalgebra::SVector::<f64, PACK>::zeros();
+                if (start..start + PACK).contains(&i) {
+                    seed[i - start] = 1.0;
+                }
+                Pack::new(at[i], Derivative::some(seed))
+            };
+            let read = self.run(source, point, seeded)?.0;
+            for (row, value) in gradient.iter_mut().zip(read) {
+                let slopes = value
+                    .eps
+                    .unwrap_generic(nalgebra::Const::<PACK>, nalgebra::Const::<1>);
+                let end = at.len().min(start + PACK);
+                for k in start..end {
+                    row[k] = slopes[k - start];
+                }
+            }
+        }
+        Ok((values, gradient))
+    }
+
+    /// The Taylor series of the coordinate groups to second order, by hyper-dual numbers, and its derivatives.
+    fn expected_bilinear(
+        &self,
+        source: &impl Source,
+        point: &Point,
+    ) -> Result<ValueAndGradient, CodegenError> {
+        let count = self.parameters.len();
+        let mut base = Vec::new();
+        let mut slopes: Vec<Vec<f64>> = Vec::new();
+        let mut curves: Vec<(usize, usize, Vec<f64>)> = Vec::new();
+        for k in 0..count {
+            for l in k..count {
+                let seed = |i: usize| {
+                    let part = |j: usize| if i == j { 1.0 } else { 0.0 };
+                    HyperDual64::new(0.0, part(k), part(l), 0.0)
+                };
+                let groups = self.run(source, point, seed)?.1;
+                if l == k {
+                    slopes.push(groups.iter().map(|group| group.eps1).collect());
+                }
+                base = groups.iter().map(|group| group.re).collect();
+                let half = if k == l { 0.5 } else { 1.0 };
+                curves.push((k, l, groups.iter().map(|group| half * group.eps1eps2).collect()));
+            }
+        }
+        if count == 0 {
+            base = self.run(source, point, |_| 0.0)?.1;
+        }
+        let mut values = Vec::new();
+        let mut gradient: Vec<Vec<f64>> = Vec::new();
+        for direction in 0..count.max(1) {
+            let e = |i: usize| Dual64::new(point.small[i], if i == direction { 1.0 } else { 0.0 });
+            let group = |j: usize| {
+                let linear = (0..count).fold(Dual64::from(base[j]), |sum, i| sum + e(i) * slopes[i][j]);
+                let curve = |sum, (k, l, by): &(usize, usize, Vec<f64>)| sum + e(*k) * e(*l) * by[j];
+                curves.iter().fold(linear, curve)
+            };
+            let groups: Vec<Dual64> = (0..base.len()).map(group).collect();
+            let read = self.reading_of_groups(source, point, &groups, &e)?;
+            values = read.iter().map(|value| value.re).collect();
+            gradient.resize(read.len(), vec![0.0; count]);
+            for (row, value) in gradient.iter_mut().zip(read) {
+                if direction < count {
+                    row[direction] = value.eps;
+                }
+            }
+        }
+        Ok((values, gradient))
+    }
+
+    /// The reading from its coordinate groups: themselves, or the length with the bar's own unknowns.
+    fn reading_of_groups(
+        &self,
+        source: &impl Source,
+        point: &Point,
+        groups: &[Dual64],
+        small: &impl Fn(usize) -> Dual64,
+    ) -> Result<Vec<Dual64>, CodegenError> {
+        if self.kind != Kind::Length {
+            return Ok(groups.to_vec());
+        }
+        let nominal = |variable: Variable| point.nominal(&variable);
+        let run = Run::<Dual64>::new(&self.machine, source, &self.parameters, &nominal, small)?;
+        let [x, y, z] = [groups[0], groups[1], groups[2]];
+        let norm = (x * x + y * y + z * z).sqrt();
+        Ok(vec![run.length_reading(norm)])
+    }
+}

@@ -1,0 +1,311 @@
+//! An equation: what the chain yields for symbols, with everything that a printer or a reader needs beside it.
+
+use abbe_model::axis::AxisKind;
+use abbe_model::chain::Machine;
+use abbe_model::component::ErrorName;
+use abbe_model::frames::Rotation;
+use abbe_model::instrument::Station;
+
+use crate::check::{Check, Deviation};
+use crate::error::CodegenError;
+use crate::first::FirstOrder;
+use crate::forms;
+use crate::normal::Ring;
+use crate::polynomial::Polynomial;
+use crate::program::{Input, Label, Naming, Program, Tree};
+use crate::run::Run;
+use crate::subject::{Source, Subject, ToolPoint};
+use crate::symbol::{Arena, Operand, Symbol, VariableId};
+use crate::variable::{Symbols, Variable};
+use crate::vectors::{self, NamedVector};
+
+/// How far an equation goes in the errors.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Order {
+    /// As the chain has it.
+    #[default]
+    Exact,
+    /// Coordinates up to products of two errors (squares too, where the rotations are exact); a length is still their norm.
+    Bilinear,
+    /// The value without errors and a coefficient for each error.
+    First,
+}
+
+/// What form an equation takes.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Options {
+    /// How far it goes in the errors.
+    pub order: Order,
+    /// How error angles rotate; `None` for the machine's own way.
+    pub rotation: Option<Rotation>,
+    /// Which names errors go by.
+    pub symbols: Symbols,
+    /// Whether code comes with derivatives by every error.
+    pub gradient: bool,
+    /// The instrument's own unknowns that are carried, by their places in its list.
+    pub unknowns: Vec<usize>,
+}
+
+/// What an equation is of.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Kind {
+    /// The length of a ball bar.
+    Length,
+    /// Three coordinates that an instrument reads.
+    Coordinates,
+    /// The error vector of the tool in the table frame.
+    Volumetric,
+}
+
+/// What an equation says, in the order that was asked for.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Form {
+    /// The named vectors, and the outputs over them.
+    Exact,
+    /// The coordinate groups, collected by error: the bar vector of a length, the coordinates themselves otherwise.
+    Groups {
+        /// In normal form.
+        polynomials: Vec<Polynomial>,
+        /// As they are written.
+        layout: Vec<Tree>,
+        /// Whether nothing was left out: the chain itself has no more terms. Decided for up to twelve parameters, beyond which the
+        /// whole normal form is not built and the answer is no.
+        complete: bool,
+    },
+    /// The value without errors and a coefficient for each error, with the layout of each.
+    First(FirstOrder, FirstLayout),
+}
+
+/// The first-order form as it is written.
+#[derive(Clone, Debug, PartialEq)]
+pub struct FirstLayout {
+    /// The coordinates without errors; of a length its square.
+    pub nominal: Vec<Tree>,
+    /// The coefficients, parameter by parameter, coordinate by coordinate.
+    pub coefficients: Vec<Vec<Tree>>,
+    /// For a fixed multiple of an earlier column: numerator and denominator of the factor.
+    pub factors: Vec<Option<(Tree, Tree)>>,
+}
+
+/// The closed form of one reading of one machine, confirmed against the chain with dual numbers.
+#[derive(Debug)]
+pub struct Equation {
+    /// The machine, with the rotation form that the equation has.
+    pub machine: Machine,
+    /// What form it takes.
+    pub options: Options,
+    /// What it is of.
+    pub kind: Kind,
+    /// Where its expressions live.
+    pub arena: Arena,
+    /// The errors and instrument unknowns that it is written in.
+    pub parameters: Vec<Variable>,
+    /// The coordinates of the reading as the chain has them.
+    pub exact: Vec<Operand>,
+    /// The coordinates of the reading in the form that was asked for.
+    pub outputs: Vec<Operand>,
+    /// The form.
+    pub form: Form,
+    /// The vectors on the way there.
+    pub vectors: Vec<NamedVector>,
+    /// The stated length of the bar, where a bar is read.
+    pub stated_length: Option<Operand>,
+    /// Errors and unknowns that the form does not contain.
+    pub absent: Vec<Variable>,
+    /// How well it agrees with the chain.
+    pub check: Check,
+    /// How far a truncated or small-angle form strays from the exact chain.
+    pub deviations: Vec<Deviation>,
+}
+
+impl Equation {
+    /// The equation of a reading in the named errors; other errors are exact zeros.
+    ///
+    /// # Errors
+    /// If the machine lacks the axis of an error or the instrument an unknown, if the form has no closed polynomial, or if the
+    /// check against the dual numbers fails.
+    pub fn of(
+        machine: &Machine,
+        source: &impl Source,
+        errors: &[ErrorName],
+        options: &Options,
+    ) -> Result<Equation, CodegenError> {
+        let mut machine = machine.clone();
+        machine.rotation = options.rotation.unwrap_or(machine.rotation);
+        let arena = Arena::new();
+        let parameters = parameters(&arena, source, errors, options)?;
+        let (kind, exact, vectors, outputs, form, stated_length) = {
+            let run = Run::<Symbol<'_>>::new(
+                &machine,
+                source,
+                &parameters,
+                &|variable| arena.variable(variable),
+                &|place| arena.variable(parameters[place].clone()),
+            )?;
+            let kind = match run.subject {
+                Subject::Station(Station::BallBar(_)) => Kind::Length,
+                Subject::Station(_) => Kind::Coordinates,
+                Subject::Volumetric { .. } => Kind::Volumetric,
+            };
+            let exact: Vec<Operand> = run.read().into_iter().map(Symbol::operand).collect();
+            let mut vectors = vectors::of_subject(&run.subject, &machine, &run.state, &run.errors, &|slot| {
+                run.unknown(slot)
+            });
+            let inputs = inputs(&arena, &machine, &parameters);
+            let (outputs, form) = match options.order {
+                Order::Exact => (exact.clone(), Form::Exact),
+                Order::Bilinear => forms::bilinear(&arena, &run, &exact, &mut vectors, &inputs)?,
+                Order::First => forms::first(&arena, &run, &exact, &mut vectors, &inputs, &parameters)?,
+            };
+            let stated = match &run.subject {
+                Subject::Station(Station::BallBar(bar)) => Some(bar.bar.operand()),
+                _ => None,
+            };
+            (kind, exact, vectors, outputs, form, stated)
+        };
+        let mut equation = Equation {
+            machine,
+            options: options.clone(),
+            kind,
+            arena,
+            parameters,
+            exact,
+            outputs,
+            form,
+            vectors,
+            stated_length,
+            absent: Vec::new(),
+            check: Check::default(),
+            deviations: Vec::new(),
+        };
+        let value = equation.program(false);
+        equation.check = equation.confirm(source, &[&value, &equation.program(true)])?;
+        equation.absent = equation.absent_parameters()?;
+        equation.deviations = equation.deviations(source, &value)?;
+        Ok(equation)
+    }
+
+    /// The parameters that the outputs do not contain. A derivative that is not zero at some point proves that its parameter is
+    /// contained; where none was met, the normal form decides.
+    fn absent_parameters(&self) -> Result<Vec<Variable>, CodegenError> {
+        let rounding = 1e-9;
+        let derivatives = self.parameters.iter().zip(&self.check.largest_derivatives);
+        let unseen = derivatives.filter(|(_, largest)| **largest < rounding);
+        let unseen: Vec<Variable> = unseen.map(|(parameter, _)| parameter.clone()).collect();
+        let below: Vec<VariableId> = self.arena.variables_of(&self.outputs);
+        let in_graph =
+            |parameter: &Variable| below.iter().any(|id| self.arena.variable_at(*id) == *parameter);
+        let (doubtful, mut absent): (Vec<Variable>, Vec<Variable>) = unseen.into_iter().partition(in_graph);
+        if !doubtful.is_empty() {
+            let wanted = match (self.kind, self.vectors.last()) {
+                (Kind::Length, Some(bar)) => bar.components.to_vec(),
+                _ => self.outputs.clone(),
+            };
+            let mut ring = Ring::exact(&self.arena);
+            let forms = wanted
+                .iter()
+                .map(|w| ring.normal_form(*w))
+                .collect::<Result<Vec<_>, _>>()?;
+            absent.extend(ring.absent(&forms, &doubtful).into_iter().cloned());
+        }
+        Ok(absent)
+    }
+
+    /// The error vector of the tool in the table frame, over the whole workspace.
+    ///
+    /// # Errors
+    /// If the machine lacks the axis of an error.
+    pub fn volumetric(
+        machine: &Machine,
+        errors: &[ErrorName],
+        options: &Options,
+    ) -> Result<Equation, CodegenError> {
+        Equation::of(machine, &ToolPoint, errors, options)
+    }
+
+    /// The arguments of its programs in their order: lengths, positions of moving axes from workpiece to tool (a rotary axis by sine and
+    /// cosine), then errors and instrument unknowns as they were asked for.
+    pub fn inputs(&self) -> Vec<Input> {
+        inputs(&self.arena, &self.machine, &self.parameters)
+    }
+
+    /// The derivatives of each output by each parameter, output by output.
+    pub fn gradients(&self) -> Vec<Vec<Operand>> {
+        let parameters = self.parameter_operands();
+        let gradient = |output: &Operand| self.arena.gradient(*output, &parameters);
+        self.outputs.iter().map(gradient).collect()
+    }
+
+    /// The steps that compute the reading and, with `gradient`, its derivatives by every parameter, output by output.
+    pub fn program(&self, gradient: bool) -> Program {
+        let mut outputs = self.outputs.clone();
+        let mut vectors = self.vectors.clone();
+        if gradient {
+            let parameters = self.parameter_operands();
+            for output in &self.outputs {
+                let adjoints = self.arena.adjoints(*output, &parameters);
+                outputs.extend(parameters.iter().map(|parameter| adjoints.of(*parameter)));
+                if self.kind == Kind::Length {
+                    vectors.extend(vectors::adjoint_vectors(&self.vectors, &adjoints));
+                }
+            }
+        }
+        let mut labels = vectors::labels(&vectors);
+        if let (Kind::Length, Operand::Node(id)) = (self.kind, self.outputs[0]) {
+            labels.insert(id, Label::Scalar("reading"));
+        }
+        self.arena
+            .program(self.inputs(), &outputs, &labels, Naming::Shared)
+    }
+
+    /// The operands of the parameters.
+    pub fn parameter_operands(&self) -> Vec<Operand> {
+        let operand = |variable: &Variable| self.arena.variable(variable.clone()).operand();
+        self.parameters.iter().map(operand).collect()
+    }
+}
+
+/// The errors and unknowns that were asked for.
+fn parameters(
+    arena: &Arena,
+    source: &impl Source,
+    errors: &[ErrorName],
+    options: &Options,
+) -> Result<Vec<Variable>, CodegenError> {
+    let known = source.subject(&|name: &str| arena.length(name)).unknowns();
+    let mut parameters: Vec<Variable> = errors.iter().cloned().map(Variable::Error).collect();
+    for place in &options.unknowns {
+        let unknown = known.get(*place).ok_or_else(|| CodegenError::NoSuchUnknown {
+            unknown: format!("number {place}"),
+        })?;
+        parameters.push(Variable::Unknown(*unknown));
+    }
+    // Named here, they keep the order in which they were asked for wherever terms are sorted.
+    for parameter in &parameters {
+        arena.variable(parameter.clone());
+    }
+    Ok(parameters)
+}
+
+fn inputs(arena: &Arena, machine: &Machine, parameters: &[Variable]) -> Vec<Input> {
+    let variables = arena.variables();
+    let lengths = variables.iter().filter(|v| matches!(v, Variable::Length(_)));
+    let mut inputs: Vec<Input> = lengths.cloned().map(Input::Plain).collect();
+    for axis in &machine.axes {
+        let position = Variable::Position {
+            axis: axis.name.clone(),
+            kind: axis.kind,
+        };
+        if variables.contains(&position) {
+            match axis.kind {
+                AxisKind::Linear => inputs.push(Input::Plain(position)),
+                AxisKind::Rotary => {
+                    inputs.push(Input::Sine(position.clone()));
+                    inputs.push(Input::Cosine(position));
+                }
+            }
+        }
+    }
+    inputs.extend(parameters.iter().cloned().map(Input::Plain));
+    inputs
+}

@@ -1,0 +1,111 @@
+//! Expressions at numbers: `f64`, dual numbers, a counting scalar, or symbols again.
+
+use abbe_model::scalar::{Nominal, Scalar};
+
+use crate::error::CodegenError;
+use crate::symbol::{Arena, Binary, Node, NodeId, Operand, Unary};
+use crate::variable::Variable;
+
+/// The value of a variable: nominal, or an error that derivatives are taken by.
+#[derive(Clone, Copy, Debug)]
+pub enum Value<S: Scalar> {
+    /// Never differentiated.
+    Nominal(S::Nominal),
+    /// An error.
+    Error(S),
+}
+
+impl<S: Scalar> Value<S> {
+    /// As an error, whatever it is.
+    pub fn scalar(self) -> S {
+        match self {
+            Value::Nominal(value) => S::nominal(value),
+            Value::Error(value) => value,
+        }
+    }
+
+    fn unary(self, op: Unary) -> Option<Self> {
+        Some(match self {
+            Value::Nominal(a) => Value::Nominal(match op {
+                Unary::Neg => -a,
+                Unary::Sin => Nominal::sin_cos(a).0,
+                Unary::Cos => Nominal::sin_cos(a).1,
+                Unary::Sqrt => Nominal::sqrt(a),
+                Unary::Exp => a.exp(),
+                Unary::Signum => a.signum(),
+            }),
+            Value::Error(a) => Value::Error(match op {
+                Unary::Neg => -a,
+                Unary::Sin => Scalar::sin_cos(a).0,
+                Unary::Cos => Scalar::sin_cos(a).1,
+                Unary::Sqrt => Scalar::sqrt(a),
+                Unary::Exp | Unary::Signum => return None,
+            }),
+        })
+    }
+
+    fn binary(self, op: Binary, other: Self) -> Self {
+        match (self, other) {
+            (Value::Nominal(a), Value::Nominal(b)) => Value::Nominal(match op {
+                Binary::Add => a + b,
+                Binary::Sub => a - b,
+                Binary::Mul => a * b,
+                Binary::Div => a / b,
+            }),
+            (a, b) => {
+                let (a, b) = (a.scalar(), b.scalar());
+                Value::Error(match op {
+                    Binary::Add => a + b,
+                    Binary::Sub => a - b,
+                    Binary::Mul => a * b,
+                    Binary::Div => a / b,
+                })
+            }
+        }
+    }
+}
+
+impl Arena {
+    /// The values of `outputs`, every node computed once.
+    ///
+    /// # Errors
+    /// If an exponential or a sign is taken of an error; the chain does neither.
+    pub fn evaluate<S: Scalar>(
+        &self,
+        outputs: &[Operand],
+        variable: impl Fn(&Variable) -> Value<S>,
+    ) -> Result<Vec<S>, CodegenError> {
+        let mut values: Vec<Option<Value<S>>> = vec![None; self.len()];
+        let constant = |value: f64| Value::<S>::Nominal(S::Nominal::constant(value));
+        let look_up = |values: &[Option<Value<S>>], operand: Operand| match operand {
+            Operand::Constant(value) => constant(value.value()),
+            Operand::Node(NodeId(id)) => values[id as usize].unwrap_or_else(|| constant(f64::NAN)),
+        };
+        for id in self.reachable(outputs) {
+            let value = match self.node(id) {
+                Node::Variable(place) => variable(&self.variable_at(place)),
+                Node::Unary(op, a) => look_up(&values, a)
+                    .unary(op)
+                    .ok_or(CodegenError::FunctionOfError { function: op })?,
+                Node::Binary(op, a, b) => look_up(&values, a).binary(op, look_up(&values, b)),
+            };
+            values[id.0 as usize] = Some(value);
+        }
+        Ok(outputs
+            .iter()
+            .map(|output| look_up(&values, *output).scalar())
+            .collect())
+    }
+
+    /// The values of `outputs` at plain numbers.
+    ///
+    /// # Errors
+    /// None that plain numbers can cause.
+    pub fn evaluate_f64(
+        &self,
+        outputs: &[Operand],
+        variable: impl Fn(&Variable) -> f64,
+    ) -> Result<Vec<f64>, CodegenError> {
+        self.evaluate(outputs, |v| Value::Nominal(variable(v)))
+    }
+}

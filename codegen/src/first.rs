@@ -1,0 +1,201 @@
+//! First order: the reading without errors, and a coefficient for each error.
+//!
+//! For a ball bar with the nominal vector `b₀`, its length `L₀ = ‖b₀‖` and `∂b/∂eᵢ = bᵢ`:
+//!
+//! ```text
+//! L ≈ L₀ + Σ (b₀·bᵢ / L₀) eᵢ
+//! ```
+
+use crate::error::CodegenError;
+use crate::normal::Ring;
+use crate::polynomial::{Monomial, Polynomial};
+use crate::symbol::Operand;
+use crate::variable::Variable;
+
+/// The first-order form of a reading.
+#[derive(Clone, Debug, PartialEq)]
+pub struct FirstOrder {
+    /// The coordinates without errors; for a length its square `L₀²`.
+    pub nominal: Vec<Polynomial>,
+    /// One for each parameter.
+    pub sensitivities: Vec<Sensitivity>,
+}
+
+/// How the coordinates of a reading answer to one parameter.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Sensitivity {
+    /// The error or instrument unknown.
+    pub parameter: Variable,
+    /// The coefficient in each coordinate, or the numerator over L₀ of one.
+    pub coefficients: Vec<Polynomial>,
+    /// Whether the coefficient is divided by L₀.
+    pub over_length: bool,
+    /// What the column is worth.
+    pub column: Column,
+}
+
+/// What a reading's column of sensitivities is worth.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Column {
+    /// It is not zero, and no multiple of an earlier one.
+    Distinct,
+    /// Identically zero: the reading does not see the parameter.
+    Zero,
+    /// A fixed multiple of an earlier column, wherever the axes stand: the readings cannot tell the two apart.
+    Multiple {
+        /// The earlier parameter.
+        of: Variable,
+        /// The factor, where it is a number or a single product: numerator and denominator.
+        factor: (Polynomial, Polynomial),
+    },
+}
+
+impl FirstOrder {
+    /// Of a bar vector in a ring of first order; `bar` and `gain` are the unknowns of that name and the bar's nominal length.
+    pub(crate) fn of_length(
+        ring: &mut Ring<'_>,
+        vector: [Operand; 3],
+        stated: Operand,
+        parameters: &[Variable],
+    ) -> Result<Self, CodegenError> {
+        let [x, y, z] = vector.map(|component| ring.normal_form(component));
+        let vector = [x?, y?, z?];
+        let nominal = vector.each_ref().map(|component| without_errors(ring, component));
+        let square = dot(ring, &nominal, &nominal);
+        let length = ring.root(square.clone());
+        let stated = ring.normal_form(stated)?;
+        let mut sensitivities = Vec::new();
+        for parameter in parameters {
+            let (coefficient, over_length) = match parameter {
+                Variable::Unknown(unknown) if unknown.thing == "bar" => (Polynomial::constant(-1.0), false),
+                Variable::Unknown(unknown) if unknown.thing == "gain" => (&length - &stated, false),
+                _ => {
+                    let slope = vector
+                        .each_ref()
+                        .map(|component| coefficient_of(ring, component, parameter));
+                    (dot(ring, &nominal, &slope), true)
+                }
+            };
+            sensitivities.push(Sensitivity {
+                parameter: parameter.clone(),
+                coefficients: vec![coefficient],
+                over_length,
+                column: Column::Distinct,
+            });
+        }
+        let mut form = FirstOrder {
+            nominal: vec![square],
+            sensitivities,
+        };
+        form.mark(ring);
+        Ok(form)
+    }
+
+    /// Of coordinates in a ring of first order.
+    pub(crate) fn of_coordinates(
+        ring: &mut Ring<'_>,
+        coordinates: &[Operand],
+        parameters: &[Variable],
+    ) -> Result<Self, CodegenError> {
+        let forms = coordinates
+            .iter()
+            .map(|coordinate| ring.normal_form(*coordinate))
+            .collect::<Result<Vec<_>, _>>()?;
+        let sensitivities = parameters
+            .iter()
+            .map(|parameter| Sensitivity {
+                parameter: parameter.clone(),
+                coefficients: forms
+                    .iter()
+                    .map(|form| coefficient_of(ring, form, parameter))
+                    .collect(),
+                over_length: false,
+                column: Column::Distinct,
+            })
+            .collect();
+        let mut form = FirstOrder {
+            nominal: forms.iter().map(|form| without_errors(ring, form)).collect(),
+            sensitivities,
+        };
+        form.mark(ring);
+        Ok(form)
+    }
+
+    /// Marks zero columns and fixed multiples of earlier ones.
+    fn mark(&mut self, ring: &Ring<'_>) {
+        // A constant L₀ is a fixed factor like any other.
+        let fixed = self.nominal.len() == 1 && !self.nominal[0].contains(|atom| ring.moves(atom));
+        for place in 0..self.sensitivities.len() {
+            let (earlier, rest) = self.sensitivities.split_at_mut(place);
+            let this = &mut rest[0];
+            if this.coefficients.iter().all(Polynomial::is_zero) {
+                this.column = Column::Zero;
+                continue;
+            }
+            let candidates = earlier.iter().filter(|other| {
+                other.column == Column::Distinct && (fixed || other.over_length == this.over_length)
+            });
+            for other in candidates {
+                if let Some(factor) = fixed_factor(ring, &this.coefficients, &other.coefficients) {
+                    this.column = Column::Multiple {
+                        of: other.parameter.clone(),
+                        factor,
+                    };
+                    break;
+                }
+            }
+        }
+    }
+}
+
+/// The part without errors.
+fn without_errors(ring: &Ring<'_>, form: &Polynomial) -> Polynomial {
+    form.filtered(|monomial| monomial.degree(|atom| ring.is_small(atom)) == 0)
+}
+
+/// The coefficient of a parameter in a form of first order.
+fn coefficient_of(ring: &Ring<'_>, form: &Polynomial, parameter: &Variable) -> Polynomial {
+    let Some(atom) = ring.atom_of(parameter) else {
+        return Polynomial::default();
+    };
+    let mut collected = form.collect(|other| other == atom);
+    collected.remove(&Monomial(vec![(atom, 1)])).unwrap_or_default()
+}
+
+fn dot(ring: &Ring<'_>, a: &[Polynomial; 3], b: &[Polynomial; 3]) -> Polynomial {
+    let products = (0..3).map(|i| ring.product(&a[i], &b[i]));
+    products.fold(Polynomial::default(), |sum, product| &sum + &product)
+}
+
+/// `a/b` where it is the same wherever the axes stand: all minors of the coefficients by motion vanish.
+fn fixed_factor(ring: &Ring<'_>, a: &[Polynomial], b: &[Polynomial]) -> Option<(Polynomial, Polynomial)> {
+    let by_motion = |column: &[Polynomial]| {
+        let mut parts = Vec::new();
+        for (coordinate, polynomial) in column.iter().enumerate() {
+            for (motion, lengths) in polynomial.collect(|atom| ring.moves(atom)) {
+                parts.push(((coordinate, motion), lengths));
+            }
+        }
+        parts
+    };
+    let (a, b) = (by_motion(a), by_motion(b));
+    let same = a.len() == b.len() && a.iter().zip(&b).all(|(a, b)| a.0 == b.0);
+    let (first_a, first_b) = (&a.first()?.1, &b.first()?.1);
+    let proportional = same
+        && a.iter()
+            .zip(&b)
+            .all(|((_, x), (_, y))| ring.product(x, first_b) == ring.product(first_a, y));
+    proportional.then(|| match quotient(ring, first_a, first_b) {
+        Some(quotient) => (quotient, Polynomial::constant(1.0)),
+        None => (first_a.clone(), first_b.clone()),
+    })
+}
+
+/// `a/b` where it is a single product.
+fn quotient(ring: &Ring<'_>, a: &Polynomial, b: &Polynomial) -> Option<Polynomial> {
+    let ((a_first, a_factor), (b_first, b_factor)) = (a.terms().next()?, b.terms().next()?);
+    let monomial = a_first.divided_by(b_first)?;
+    let mut quotient = Polynomial::default();
+    quotient.insert(monomial, a_factor / b_factor);
+    (ring.product(&quotient, b) == *a).then_some(quotient)
+}

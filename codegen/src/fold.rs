@@ -1,0 +1,176 @@
+//! What is simplified while an expression is built: only what a floating-point evaluation cannot tell apart.
+//!
+//! Constants are computed, 0, 1 and −1 drop out, and a minus sign moves outwards until a difference takes it up. Signs and powers
+//! of two move without rounding, so a folded expression evaluates to the same bits as the unfolded one (but for the sign of zero).
+
+use crate::symbol::{Arena, Binary, Node, Operand, Unary};
+
+/// A function of a constant.
+pub(crate) fn unary_value(op: Unary, value: f64) -> f64 {
+    match op {
+        Unary::Neg => -value,
+        Unary::Sin => value.sin(),
+        Unary::Cos => value.cos(),
+        Unary::Sqrt => value.sqrt(),
+        Unary::Exp => value.exp(),
+        Unary::Signum => {
+            if value == 0.0 {
+                0.0
+            } else {
+                value.signum()
+            }
+        }
+    }
+}
+
+/// An operation on two constants.
+pub(crate) fn binary_value(op: Binary, a: f64, b: f64) -> f64 {
+    match op {
+        Binary::Add => a + b,
+        Binary::Sub => a - b,
+        Binary::Mul => a * b,
+        Binary::Div => a / b,
+    }
+}
+
+/// A function of an operand.
+pub(crate) fn unary(arena: &Arena, op: Unary, a: Operand) -> Operand {
+    if let Some(value) = a.known() {
+        return Operand::constant(unary_value(op, value));
+    }
+    let node = arena.node_of(a);
+    match (op, node) {
+        (Unary::Neg, Some(Node::Unary(Unary::Neg, x))) => x,
+        (Unary::Neg, Some(Node::Binary(Binary::Mul, x, y))) if x.known().is_some() => {
+            binary(arena, Binary::Mul, unary(arena, Unary::Neg, x), y)
+        }
+        (Unary::Sin | Unary::Signum, Some(Node::Unary(Unary::Neg, x))) => {
+            unary(arena, Unary::Neg, unary(arena, op, x))
+        }
+        (Unary::Cos, Some(Node::Unary(Unary::Neg, x))) => unary(arena, Unary::Cos, x),
+        _ => arena.intern(Node::Unary(op, a)),
+    }
+}
+
+/// An operation on two operands.
+pub(crate) fn binary(arena: &Arena, op: Binary, a: Operand, b: Operand) -> Operand {
+    if let (Some(a), Some(b)) = (a.known(), b.known()) {
+        return Operand::constant(binary_value(op, a, b));
+    }
+    match op {
+        Binary::Add => add(arena, a, b),
+        Binary::Sub => sub(arena, a, b),
+        Binary::Mul => mul(arena, a, b),
+        Binary::Div => div(arena, a, b),
+    }
+}
+
+fn add(arena: &Arena, a: Operand, b: Operand) -> Operand {
+    if a.known() == Some(0.0) {
+        return b;
+    }
+    if b.known() == Some(0.0) {
+        return a;
+    }
+    if let Some(b) = without_minus(arena, b) {
+        return sub(arena, a, b);
+    }
+    if let Some(a) = without_minus(arena, a) {
+        return sub(arena, b, a);
+    }
+    arena.intern(Node::Binary(Binary::Add, a, b))
+}
+
+fn sub(arena: &Arena, a: Operand, b: Operand) -> Operand {
+    if b.known() == Some(0.0) {
+        return a;
+    }
+    if a == b {
+        return Operand::constant(0.0);
+    }
+    if a.known() == Some(0.0) {
+        return unary(arena, Unary::Neg, b);
+    }
+    if let Some(b) = without_minus(arena, b) {
+        return binary(arena, Binary::Add, a, b);
+    }
+    if let Some(a) = without_minus(arena, a) {
+        let sum = binary(arena, Binary::Add, a, b);
+        return unary(arena, Unary::Neg, sum);
+    }
+    arena.intern(Node::Binary(Binary::Sub, a, b))
+}
+
+fn mul(arena: &Arena, a: Operand, b: Operand) -> Operand {
+    let (a, b) = if b.known().is_some() { (b, a) } else { (a, b) };
+    match a.known() {
+        Some(0.0) => return Operand::constant(0.0),
+        Some(1.0) => return b,
+        Some(-1.0) => return unary(arena, Unary::Neg, b),
+        Some(outer) => {
+            // c₁·(c₂·x) and c₁·(c₂/x), where the product of the constants is exact.
+            if let Some(Node::Binary(op @ (Binary::Mul | Binary::Div), inner, x)) = arena.node_of(b)
+                && let Some(inner) = inner.known()
+                && (is_power_of_two(outer) || is_power_of_two(inner))
+            {
+                return binary(arena, op, Operand::constant(outer * inner), x);
+            }
+        }
+        None => {}
+    }
+    if a.known().is_none()
+        && let Some(a) = without_minus(arena, a)
+    {
+        let product = binary(arena, Binary::Mul, a, b);
+        return unary(arena, Unary::Neg, product);
+    }
+    if let Some(b) = without_minus(arena, b) {
+        let product = binary(arena, Binary::Mul, a, b);
+        return unary(arena, Unary::Neg, product);
+    }
+    arena.intern(Node::Binary(Binary::Mul, a, b))
+}
+
+fn div(arena: &Arena, a: Operand, b: Operand) -> Operand {
+    if a.known() == Some(0.0) {
+        return a;
+    }
+    if let Some(b) = b.known()
+        && is_power_of_two(b)
+    {
+        return binary(arena, Binary::Mul, Operand::constant(1.0 / b), a);
+    }
+    if a == b {
+        return Operand::constant(1.0);
+    }
+    if let Some(a) = without_minus(arena, a) {
+        let quotient = binary(arena, Binary::Div, a, b);
+        return unary(arena, Unary::Neg, quotient);
+    }
+    if let Some(b) = without_minus(arena, b) {
+        let quotient = binary(arena, Binary::Div, a, b);
+        return unary(arena, Unary::Neg, quotient);
+    }
+    arena.intern(Node::Binary(Binary::Div, a, b))
+}
+
+/// `x` where the operand is `−x` in so many words: a negation, a negative constant, a product with one.
+fn without_minus(arena: &Arena, operand: Operand) -> Option<Operand> {
+    if let Some(value) = operand.known() {
+        return (value < 0.0).then(|| Operand::constant(-value));
+    }
+    match arena.node_of(operand)? {
+        Node::Unary(Unary::Neg, x) => Some(x),
+        Node::Binary(Binary::Mul, c, x) => {
+            let c = c.known().filter(|c| *c < 0.0)?;
+            Some(binary(arena, Binary::Mul, Operand::constant(-c), x))
+        }
+        _ => None,
+    }
+}
+
+/// Whether a product with `value` only shifts the exponent (±2ⁿ, within the normal range).
+fn is_power_of_two(value: f64) -> bool {
+    let fraction = value.to_bits() & ((1 << 52) - 1);
+    value.is_normal() && fraction == 0
+}

@@ -1,0 +1,154 @@
+//! The truncated forms: built from the normal form, laid out for a reader, and put back into the arena for a compiler.
+
+use abbe_model::instrument::Station;
+use abbe_model::scalar::Nominal;
+
+use crate::equation::{FirstLayout, Form};
+use crate::error::CodegenError;
+use crate::first::{Column, FirstOrder};
+use crate::layout::{Layout, product, sum};
+use crate::normal::Ring;
+use crate::polynomial::Polynomial;
+use crate::program::{Input, Tree};
+use crate::run::Run;
+use crate::subject::Subject;
+use crate::symbol::{Arena, Binary, Operand, Symbol, Unary};
+use crate::variable::Variable;
+use crate::vectors::NamedVector;
+
+type Formed = (Vec<Operand>, Form);
+
+/// Coordinates up to second order in the errors, a length still their norm.
+pub(crate) fn bilinear<'a>(
+    arena: &'a Arena,
+    run: &Run<'_, Symbol<'a>>,
+    exact: &[Operand],
+    vectors: &mut Vec<NamedVector>,
+    inputs: &[Input],
+) -> Result<Formed, CodegenError> {
+    let mut ring = Ring::truncated(arena, 2)?;
+    let bar = bar_vector(run, vectors);
+    let wanted = bar.as_ref().map_or(exact, |bar| bar.components.as_slice());
+    let groups = wanted
+        .iter()
+        .map(|group| ring.normal_form(*group))
+        .collect::<Result<Vec<Polynomial>, _>>()?;
+    let parameters = inputs
+        .iter()
+        .filter(|input| matches!(input, Input::Plain(v) if v.is_small()));
+    let complete = parameters.count() <= 12 && {
+        let mut whole = Ring::exact(arena);
+        let forms: Result<Vec<Polynomial>, _> =
+            wanted.iter().map(|group| whole.normal_form(*group)).collect();
+        forms.is_ok_and(|forms| forms == groups)
+    };
+    let layout = Layout { ring: &ring, inputs };
+    let trees: Vec<Tree> = groups.iter().map(|group| layout.group(group)).collect();
+    let operands = operands(arena, inputs);
+    let symbols: Vec<Symbol<'a>> = trees.iter().map(|tree| tree.symbol(arena, &operands)).collect();
+    vectors.clear();
+    let outputs = match bar {
+        Some(mut bar) => {
+            let [x, y, z] = [symbols[0], symbols[1], symbols[2]];
+            bar.components = [x, y, z].map(Symbol::operand);
+            vectors.push(bar);
+            vec![run.length_reading((x * x + y * y + z * z).sqrt()).operand()]
+        }
+        None => symbols.into_iter().map(Symbol::operand).collect(),
+    };
+    let form = Form::Groups {
+        polynomials: groups,
+        layout: trees,
+        complete,
+    };
+    Ok((outputs, form))
+}
+
+/// The value without errors and a coefficient for each error.
+pub(crate) fn first<'a>(
+    arena: &'a Arena,
+    run: &Run<'_, Symbol<'a>>,
+    exact: &[Operand],
+    vectors: &mut Vec<NamedVector>,
+    inputs: &[Input],
+    parameters: &[Variable],
+) -> Result<Formed, CodegenError> {
+    let mut ring = Ring::truncated(arena, 1)?;
+    let bar = bar_vector(run, vectors);
+    let form = match (&bar, &run.subject) {
+        (Some(bar), Subject::Station(Station::BallBar(station))) => {
+            FirstOrder::of_length(&mut ring, bar.components, station.bar.operand(), parameters)?
+        }
+        _ => FirstOrder::of_coordinates(&mut ring, exact, parameters)?,
+    };
+    let layout = Layout { ring: &ring, inputs };
+    let lay_out = |polynomials: &[Polynomial]| polynomials.iter().map(|p| layout.group(p)).collect();
+    let written = FirstLayout {
+        nominal: lay_out(&form.nominal),
+        coefficients: form
+            .sensitivities
+            .iter()
+            .map(|s| lay_out(&s.coefficients))
+            .collect(),
+        factors: form
+            .sensitivities
+            .iter()
+            .map(|s| match &s.column {
+                Column::Multiple { factor: (a, b), .. } => Some((layout.group(a), layout.group(b))),
+                Column::Distinct | Column::Zero => None,
+            })
+            .collect(),
+    };
+    vectors.clear();
+    let operands = operands(arena, inputs);
+    let place = |parameter: &Variable| {
+        let wanted = Input::Plain(parameter.clone());
+        inputs.iter().position(|input| *input == wanted)
+    };
+    let terms = |coordinate: usize, over_length: bool| {
+        let mut terms = Vec::new();
+        for (sensitivity, coefficients) in form.sensitivities.iter().zip(&written.coefficients) {
+            let coefficient = &coefficients[coordinate];
+            let seen = *coefficient != Tree::Number(0.0) && sensitivity.over_length == over_length;
+            if let (true, Some(place)) = (seen, place(&sensitivity.parameter)) {
+                terms.push((false, product(vec![coefficient.clone(), Tree::Input(place)])));
+            }
+        }
+        sum(terms)
+    };
+    let binary = |op, a: Tree, b: Tree| Tree::Binary(op, Box::new(a), Box::new(b));
+    let output = |(coordinate, nominal): (usize, &Tree)| {
+        let whole = if bar.is_some() {
+            let length = Tree::Unary(Unary::Sqrt, Box::new(nominal.clone()));
+            let slope = binary(Binary::Div, terms(coordinate, true), length.clone());
+            let whole = binary(Binary::Add, length, slope);
+            binary(Binary::Add, whole, terms(coordinate, false))
+        } else {
+            binary(Binary::Add, nominal.clone(), terms(coordinate, false))
+        };
+        whole.symbol(arena, &operands).operand()
+    };
+    let outputs = written.nominal.iter().enumerate().map(output).collect();
+    Ok((outputs, Form::First(form, written)))
+}
+
+/// The vector whose norm is read, where a length is read.
+fn bar_vector(run: &Run<'_, Symbol<'_>>, vectors: &[NamedVector]) -> Option<NamedVector> {
+    match run.subject {
+        Subject::Station(Station::BallBar(_)) => vectors.last().cloned(),
+        _ => None,
+    }
+}
+
+/// The operands that a program's inputs are.
+fn operands(arena: &Arena, inputs: &[Input]) -> Vec<Operand> {
+    let operand = |input: &Input| {
+        let symbol = match input {
+            Input::Plain(variable) => arena.variable(variable.clone()),
+            Input::Sine(variable) => Nominal::sin_cos(arena.variable(variable.clone())).0,
+            Input::Cosine(variable) => Nominal::sin_cos(arena.variable(variable.clone())).1,
+        };
+        symbol.operand()
+    };
+    inputs.iter().map(operand).collect()
+}

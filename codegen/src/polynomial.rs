@@ -1,0 +1,232 @@
+//! The exact normal form: polynomials over errors, lengths, sines and cosines, with rational coefficients.
+//!
+//! Two rules make it unique: `sin² = 1 − cos²` for every angle, and `r² = a` for the root `r = √a` of an expression without errors.
+//! A monomial so holds each sine and each root at most once, and two expressions are equal exactly when they have the same
+//! terms; nothing is sampled. Coefficients are ratios of integers, and every `f64` is one.
+
+use std::collections::BTreeMap;
+use std::ops::{Add, Mul, Neg, Sub};
+
+use num_rational::BigRational;
+
+use crate::symbol::VariableId;
+
+/// What polynomials are in.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
+pub enum Atom {
+    /// A length, a position, an error.
+    Variable(VariableId),
+    /// A root, by its place in the [`crate::normal::Ring`].
+    Root(usize),
+    /// The sine of a variable.
+    Sin(VariableId),
+    /// The cosine of a variable.
+    Cos(VariableId),
+}
+
+/// A product of powers of atoms, in the order of the atoms.
+#[derive(Clone, Debug, Default, PartialEq, Eq, Hash, PartialOrd, Ord)]
+pub struct Monomial(pub(crate) Vec<(Atom, u32)>);
+
+impl Monomial {
+    /// The product of no atoms.
+    pub fn one() -> Self {
+        Monomial::default()
+    }
+
+    /// Atoms and their powers.
+    pub fn powers(&self) -> &[(Atom, u32)] {
+        &self.0
+    }
+
+    /// The sum of the powers of those atoms for which `counts` holds.
+    pub fn degree(&self, counts: impl Fn(Atom) -> bool) -> u32 {
+        let counted = self.0.iter().filter(|(atom, _)| counts(*atom));
+        counted.map(|(_, power)| power).sum()
+    }
+
+    /// The part of the atoms for which `keep` holds, and the rest.
+    pub fn split(&self, keep: impl Fn(Atom) -> bool) -> (Monomial, Monomial) {
+        let (kept, rest) = self.0.iter().partition(|(atom, _)| keep(*atom));
+        (Monomial(kept), Monomial(rest))
+    }
+
+    /// The quotient, where every power of `other` is contained.
+    pub fn divided_by(&self, other: &Monomial) -> Option<Monomial> {
+        let mut quotient = self.clone();
+        for (atom, power) in &other.0 {
+            let place = quotient.0.iter().position(|(own, n)| own == atom && n >= power)?;
+            quotient.0[place].1 -= power;
+        }
+        quotient.0.retain(|(_, power)| *power > 0);
+        Some(quotient)
+    }
+
+    /// The powers that both contain.
+    pub fn shared_with(&self, other: &Monomial) -> Monomial {
+        let power = |atom: Atom| {
+            other
+                .0
+                .iter()
+                .find(|(own, _)| *own == atom)
+                .map_or(0, |(_, n)| *n)
+        };
+        let shared = self.0.iter().map(|(atom, n)| (*atom, power(*atom).min(*n)));
+        Monomial(shared.filter(|(_, n)| *n > 0).collect())
+    }
+
+    /// The product, no rule applied.
+    fn times(&self, other: &Monomial) -> Monomial {
+        let mut product = Vec::with_capacity(self.0.len() + other.0.len());
+        let (mut a, mut b) = (self.0.as_slice(), other.0.as_slice());
+        while let (Some(&(x, n)), Some(&(y, m))) = (a.first(), b.first()) {
+            if x <= y {
+                a = &a[1..];
+            }
+            if y <= x {
+                b = &b[1..];
+            }
+            product.push(match x.cmp(&y) {
+                std::cmp::Ordering::Less => (x, n),
+                std::cmp::Ordering::Greater => (y, m),
+                std::cmp::Ordering::Equal => (x, n + m),
+            });
+        }
+        product.extend_from_slice(a);
+        product.extend_from_slice(b);
+        Monomial(product)
+    }
+}
+
+/// A polynomial in normal form, or on the way there: terms that are not zero, each monomial once.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct Polynomial(pub(crate) BTreeMap<Monomial, BigRational>);
+
+/// The rational number that an `f64` is; zero for one that is not finite.
+fn exactly(value: f64) -> BigRational {
+    BigRational::from_float(value).unwrap_or_else(|| BigRational::from_integer(0.into()))
+}
+
+impl Polynomial {
+    /// A constant.
+    pub fn constant(value: f64) -> Self {
+        let mut polynomial = Polynomial::default();
+        polynomial.insert(Monomial::one(), exactly(value));
+        polynomial
+    }
+
+    /// An atom.
+    pub fn atom(atom: Atom) -> Self {
+        let mut polynomial = Polynomial::default();
+        polynomial.insert(Monomial(vec![(atom, 1)]), exactly(1.0));
+        polynomial
+    }
+
+    /// Whether it is zero: decided, since the normal form of zero has no term.
+    pub fn is_zero(&self) -> bool {
+        self.0.is_empty()
+    }
+
+    /// Terms: monomials and their coefficients.
+    pub fn terms(&self) -> impl Iterator<Item = (&Monomial, &BigRational)> {
+        self.0.iter()
+    }
+
+    /// How many terms there are.
+    pub fn len(&self) -> usize {
+        self.0.len()
+    }
+
+    /// Whether there is no term.
+    pub fn is_empty(&self) -> bool {
+        self.0.is_empty()
+    }
+
+    /// Whether some term holds an atom for which `wanted` holds.
+    pub fn contains(&self, wanted: impl Fn(Atom) -> bool) -> bool {
+        let mut atoms = self.0.keys().flat_map(|monomial| monomial.0.iter());
+        atoms.any(|(atom, _)| wanted(*atom))
+    }
+
+    /// Collected by what is made of the atoms for which `by` holds: each such monomial with its coefficient.
+    pub fn collect(&self, by: impl Fn(Atom) -> bool) -> BTreeMap<Monomial, Polynomial> {
+        let mut collected: BTreeMap<Monomial, Polynomial> = BTreeMap::new();
+        for (monomial, coefficient) in &self.0 {
+            let (key, rest) = monomial.split(&by);
+            let part = collected.entry(key).or_default();
+            part.insert(rest, coefficient.clone());
+        }
+        collected
+    }
+
+    /// The terms of a monomial that satisfies `keep`.
+    pub fn filtered(&self, keep: impl Fn(&Monomial) -> bool) -> Polynomial {
+        let kept = self.0.iter().filter(|(monomial, _)| keep(monomial));
+        Polynomial(kept.map(|(m, c)| (m.clone(), c.clone())).collect())
+    }
+
+    pub(crate) fn insert(&mut self, monomial: Monomial, coefficient: BigRational) {
+        let zero = exactly(0.0);
+        let sum = self.0.entry(monomial.clone()).or_insert_with(|| zero.clone());
+        *sum += coefficient;
+        if *sum == zero {
+            self.0.remove(&monomial);
+        }
+    }
+
+    /// The product before the rules for sines and roots, without terms for which `drop` holds.
+    pub(crate) fn product(&self, other: &Polynomial, drop: impl Fn(&Monomial) -> bool) -> Polynomial {
+        let mut product = Polynomial::default();
+        for (a, c) in &self.0 {
+            for (b, d) in &other.0 {
+                let monomial = a.times(b);
+                if !drop(&monomial) {
+                    product.insert(monomial, c * d);
+                }
+            }
+        }
+        product
+    }
+
+    /// Each coefficient times `factor`.
+    pub fn scaled(&self, factor: &BigRational) -> Polynomial {
+        let mut scaled = Polynomial::default();
+        for (monomial, coefficient) in &self.0 {
+            scaled.insert(monomial.clone(), coefficient * factor);
+        }
+        scaled
+    }
+}
+
+impl Add<&Polynomial> for &Polynomial {
+    type Output = Polynomial;
+    fn add(self, other: &Polynomial) -> Polynomial {
+        let mut sum = self.clone();
+        for (monomial, coefficient) in &other.0 {
+            sum.insert(monomial.clone(), coefficient.clone());
+        }
+        sum
+    }
+}
+
+impl Neg for &Polynomial {
+    type Output = Polynomial;
+    fn neg(self) -> Polynomial {
+        Polynomial(self.0.iter().map(|(m, c)| (m.clone(), -c)).collect())
+    }
+}
+
+impl Sub<&Polynomial> for &Polynomial {
+    type Output = Polynomial;
+    fn sub(self, other: &Polynomial) -> Polynomial {
+        self + &-other
+    }
+}
+
+impl Mul<&Polynomial> for &Polynomial {
+    type Output = Polynomial;
+    /// The product of polynomials without sines and roots; [`crate::normal::Ring::product`] applies their rules.
+    fn mul(self, other: &Polynomial) -> Polynomial {
+        self.product(other, |_| false)
+    }
+}

@@ -1,0 +1,423 @@
+//! What a reader is given, before any language spells it: named vectors, coordinate groups or coefficients, symbols, notes.
+
+use std::collections::HashMap;
+
+use crate::equation::{Equation, FirstLayout, Form, Kind, Order};
+use crate::first::{Column, FirstOrder};
+use crate::layout::{product, sum};
+use crate::program::{Input, Label, Naming, Program, Step, Tree};
+use crate::symbol::{Binary, Operand, Unary};
+use crate::variable::Variable;
+use crate::vectors;
+
+/// The left-hand side of a row.
+#[derive(Clone, Debug, PartialEq)]
+pub(crate) enum Left {
+    /// A named quantity.
+    Named(Label),
+    /// Its square.
+    Square(Label),
+    /// A coordinate of the reading, or the length.
+    Output(usize),
+    /// The derivative of an output by a parameter.
+    Slope(usize, Variable),
+}
+
+/// One equation.
+#[derive(Clone, Debug)]
+pub(crate) struct Row {
+    pub(crate) left: Left,
+    /// `≈` in the place of `=`.
+    pub(crate) approximate: bool,
+    pub(crate) right: Tree,
+    /// A word on it, such as "not seen".
+    pub(crate) remark: Option<Remark>,
+}
+
+/// A word on a coefficient.
+#[derive(Clone, Debug, PartialEq)]
+pub(crate) enum Remark {
+    /// Identically zero.
+    NotSeen,
+    /// A fixed multiple of another parameter's.
+    MultipleOf(Variable),
+}
+
+/// Equations that belong together.
+#[derive(Clone, Debug)]
+pub(crate) struct Section {
+    pub(crate) heading: String,
+    pub(crate) rows: Vec<Row>,
+}
+
+/// The whole.
+pub(crate) struct Article {
+    /// Inputs and names that the rows' expressions refer to.
+    pub(crate) program: Program,
+    pub(crate) sections: Vec<Section>,
+    /// Inputs with unit and meaning: for a rotary axis its angle, once, with the letters of its sine and cosine.
+    pub(crate) symbols: Vec<(Input, String, &'static str)>,
+}
+
+impl Article {
+    pub(crate) fn new(equation: &Equation) -> Self {
+        let (program, sections) = match &equation.form {
+            Form::Exact => exact(equation),
+            Form::Groups { layout, complete, .. } => groups(equation, layout, *complete),
+            Form::First(first, layout) => first_order(equation, first, layout),
+        };
+        let symbols = program
+            .inputs
+            .iter()
+            .filter(|input| !matches!(input, Input::Cosine(_)))
+            .map(|input| match input {
+                Input::Plain(variable) => (input.clone(), variable.meaning(), variable.unit()),
+                Input::Sine(variable) | Input::Cosine(variable) => (
+                    input.clone(),
+                    format!("sine and cosine of the {}", variable.meaning()),
+                    "1",
+                ),
+            })
+            .collect();
+        Article {
+            program,
+            sections,
+            symbols,
+        }
+    }
+}
+
+fn row(left: Left, right: Tree) -> Row {
+    Row {
+        left,
+        approximate: false,
+        right,
+        remark: None,
+    }
+}
+
+/// The named vectors, then the outputs.
+fn exact(equation: &Equation) -> (Program, Vec<Section>) {
+    let labels = vectors::labels(&equation.vectors);
+    let mut asked: Vec<Operand> = equation.outputs.clone();
+    asked.extend(equation.vectors.iter().flat_map(|vector| vector.components));
+    let program = equation
+        .arena
+        .program(equation.inputs(), &asked, &labels, Naming::Labelled);
+    let mut sections = Vec::new();
+    let components = program.outputs[equation.outputs.len()..].chunks(3);
+    for (vector, trees) in equation.vectors.iter().zip(components) {
+        let rows = (0..3).map(|coordinate| {
+            let label = vector.label(coordinate);
+            let own = program.steps.iter().find(|step| step.label == label);
+            // A coordinate that is an input, a constant or another name is written as that.
+            let right = own.map_or_else(|| trees[coordinate].clone(), |step| step.value.clone());
+            row(Left::Named(label), right)
+        });
+        sections.push(Section {
+            heading: vector.meaning.clone(),
+            rows: rows.collect(),
+        });
+    }
+    let outputs = program.outputs[..equation.outputs.len()].iter();
+    let mut rows: Vec<Row> = outputs
+        .enumerate()
+        .map(|(place, tree)| row(Left::Output(place), tree.clone()))
+        .collect();
+    let mut program = program;
+    if let (Kind::Length, Some(bar)) = (equation.kind, equation.vectors.last()) {
+        // The norm of the bar by the names of its own coordinates, whichever of them are aliases.
+        let start = program.steps.len();
+        let aliases = (0..3).map(|coordinate| Step {
+            label: bar.label(coordinate),
+            value: Tree::Number(0.0),
+        });
+        program.steps.extend(aliases);
+        let length = with_bar_unknowns(equation, norm_of_steps(start));
+        rows = vec![row(Left::Output(0), length)];
+    }
+    sections.push(Section {
+        heading: what_is_read(equation).to_string(),
+        rows,
+    });
+    (program, sections)
+}
+
+fn what_is_read(equation: &Equation) -> &'static str {
+    match equation.kind {
+        Kind::Length => "length of the bar",
+        Kind::Coordinates => "coordinates read",
+        Kind::Volumetric => "error vector of the tool in the table frame",
+    }
+}
+
+/// A program that only names: its steps are the coordinates of the bar vector or nothing.
+fn naming(equation: &Equation, labels: Vec<Label>) -> Program {
+    let step = |label| Step {
+        label,
+        value: Tree::Number(0.0),
+    };
+    Program {
+        inputs: equation.inputs(),
+        steps: labels.into_iter().map(step).collect(),
+        outputs: Vec::new(),
+    }
+}
+
+fn binary(op: Binary, a: Tree, b: Tree) -> Tree {
+    Tree::Binary(op, Box::new(a), Box::new(b))
+}
+
+/// `√(x² + y² + z²)` of three steps.
+fn norm_of_steps(start: usize) -> Tree {
+    let square = |place| (false, binary(Binary::Mul, Tree::Step(place), Tree::Step(place)));
+    Tree::Unary(
+        Unary::Sqrt,
+        Box::new(sum((start..start + 3).map(square).collect())),
+    )
+}
+
+/// The coordinate groups, and the length over them.
+fn groups(equation: &Equation, trees: &[Tree], complete: bool) -> (Program, Vec<Section>) {
+    if equation.kind != Kind::Length {
+        let rows = trees.iter().enumerate().map(|(place, tree)| Row {
+            approximate: !complete,
+            ..row(Left::Output(place), tree.clone())
+        });
+        let section = Section {
+            heading: what_is_read(equation).to_string(),
+            rows: rows.collect(),
+        };
+        return (naming(equation, Vec::new()), vec![section]);
+    }
+    let bar = &equation.vectors[0];
+    let labels: Vec<Label> = (0..3).map(|coordinate| bar.label(coordinate)).collect();
+    let program = naming(equation, labels.clone());
+    let rows = labels
+        .into_iter()
+        .zip(trees)
+        .map(|(label, tree)| row(Left::Named(label), tree.clone()));
+    let length = with_bar_unknowns(equation, norm_of_steps(0));
+    let sections = vec![
+        Section {
+            heading: bar.meaning.clone(),
+            rows: rows.collect(),
+        },
+        Section {
+            heading: what_is_read(equation).to_string(),
+            rows: vec![Row {
+                approximate: !complete,
+                ..row(Left::Output(0), length)
+            }],
+        },
+    ];
+    (program, sections)
+}
+
+/// `d − δ_bar + δ_gain·(d − bar)`, as far as these unknowns are carried.
+fn with_bar_unknowns(equation: &Equation, distance: Tree) -> Tree {
+    let inputs = equation.inputs();
+    let place = |thing: &str| {
+        inputs
+            .iter()
+            .position(|input| matches!(input, Input::Plain(Variable::Unknown(u)) if u.thing == thing))
+    };
+    let mut terms = vec![(false, distance.clone())];
+    if let Some(bar) = place("bar") {
+        terms.push((true, Tree::Input(bar)));
+    }
+    if let (Some(gain), Some(stated)) = (place("gain"), equation.stated_length) {
+        let none = HashMap::new();
+        let stated = equation
+            .arena
+            .program(inputs.clone(), &[stated], &none, Naming::Labelled);
+        let difference = sum(vec![(false, distance), (true, stated.outputs[0].clone())]);
+        terms.push((false, product(vec![Tree::Input(gain), difference])));
+    }
+    sum(terms)
+}
+
+const L_0: Label = Label::Scalar("L_0");
+const S: Label = Label::Scalar("S");
+
+/// The value without errors, the sum, and the table of coefficients.
+fn first_order(equation: &Equation, first: &FirstOrder, layout: &FirstLayout) -> (Program, Vec<Section>) {
+    let is_length = equation.kind == Kind::Length;
+    let program = naming(equation, if is_length { vec![L_0, S] } else { Vec::new() });
+    let (l_0, s) = (Tree::Step(0), Tree::Step(1));
+    let mut sum_rows = Vec::new();
+    if is_length {
+        sum_rows.push(row(Left::Square(L_0), layout.nominal[0].clone()));
+        sum_rows.push(row(Left::Named(S), sum(terms(equation, first, layout, 0, true))));
+        let slope = binary(Binary::Div, s, l_0.clone());
+        let mut all = vec![(false, l_0.clone()), (false, slope)];
+        all.extend(terms(equation, first, layout, 0, false));
+        sum_rows.push(Row {
+            approximate: true,
+            ..row(Left::Output(0), sum(all))
+        });
+    } else {
+        for (place, nominal) in layout.nominal.iter().enumerate() {
+            let mut all = Vec::new();
+            if *nominal != Tree::Number(0.0) {
+                all.push((false, nominal.clone()));
+            }
+            all.extend(terms(equation, first, layout, place, false));
+            sum_rows.push(Row {
+                approximate: true,
+                ..row(Left::Output(place), sum(all))
+            });
+        }
+    }
+    let mut table = Vec::new();
+    for (sensitivity, coefficients) in first.sensitivities.iter().zip(&layout.coefficients) {
+        let remark = match &sensitivity.column {
+            Column::Distinct => None,
+            Column::Zero => Some(Remark::NotSeen),
+            Column::Multiple { of, .. } => Some(Remark::MultipleOf(of.clone())),
+        };
+        let zero = |tree: &Tree| *tree == Tree::Number(0.0);
+        let all_zero = coefficients.iter().all(zero);
+        for (place, coefficient) in coefficients.iter().enumerate() {
+            // A vector's zero coordinates are left out; of a column that is zero altogether one stands for all.
+            if zero(coefficient) && !is_length && !(all_zero && place == 0) {
+                continue;
+            }
+            let right = if sensitivity.over_length && !zero(coefficient) {
+                over(coefficient.clone(), l_0.clone())
+            } else {
+                coefficient.clone()
+            };
+            table.push(Row {
+                remark: remark.clone(),
+                ..row(Left::Slope(place, sensitivity.parameter.clone()), right)
+            });
+        }
+    }
+    let sections = vec![
+        Section {
+            heading: format!("{}, {}", what_is_read(equation), order_words(Order::First)),
+            rows: sum_rows,
+        },
+        Section {
+            heading: "coefficients by parameter".to_string(),
+            rows: table,
+        },
+    ];
+    (program, sections)
+}
+
+/// `a/b`, or `(1/b)·a` where the numerator is too long to be kept on one line.
+fn over(numerator: Tree, denominator: Tree) -> Tree {
+    if terms_of(&numerator).len() > 4 {
+        product(vec![
+            binary(Binary::Div, Tree::Number(1.0), denominator),
+            numerator,
+        ])
+    } else {
+        binary(Binary::Div, numerator, denominator)
+    }
+}
+
+fn order_words(order: Order) -> &'static str {
+    match order {
+        Order::Exact => "exact",
+        Order::Bilinear => "up to products of two errors",
+        Order::First => "first order",
+    }
+}
+
+/// `Σ cᵢ·(eᵢ + Σ fₖ·eₖ)` over the distinct columns, with their fixed multiples in the parentheses.
+fn terms(
+    equation: &Equation,
+    first: &FirstOrder,
+    layout: &FirstLayout,
+    coordinate: usize,
+    over_length: bool,
+) -> Vec<(bool, Tree)> {
+    let inputs = equation.inputs();
+    let input = |parameter: &Variable| {
+        let wanted = Input::Plain(parameter.clone());
+        inputs.iter().position(|input| *input == wanted).map(Tree::Input)
+    };
+    let mut terms = Vec::new();
+    for (place, sensitivity) in first.sensitivities.iter().enumerate() {
+        let coefficient = &layout.coefficients[place][coordinate];
+        // A multiple of a column that is divided by L₀ where it is not, or the other way round, stands by itself.
+        let stands = match &sensitivity.column {
+            Column::Distinct => true,
+            Column::Zero => false,
+            Column::Multiple { of, .. } => first
+                .sensitivities
+                .iter()
+                .any(|base| base.parameter == *of && base.over_length != sensitivity.over_length),
+        };
+        let shown = stands && sensitivity.over_length == over_length && *coefficient != Tree::Number(0.0);
+        let (true, Some(own)) = (shown, input(&sensitivity.parameter)) else {
+            continue;
+        };
+        let mut errors = vec![(false, own)];
+        for (other, factor) in first.sensitivities.iter().zip(&layout.factors) {
+            let Column::Multiple { of, .. } = &other.column else {
+                continue;
+            };
+            let (Some((numerator, denominator)), Some(error)) = (factor, input(&other.parameter)) else {
+                continue;
+            };
+            if *of != sensitivity.parameter || other.over_length != over_length {
+                continue;
+            }
+            let (minus, numerator) = without_minus(numerator);
+            let scale = if *denominator == Tree::Number(1.0) {
+                numerator
+            } else {
+                binary(Binary::Div, numerator, denominator.clone())
+            };
+            let term = if scale == Tree::Number(1.0) {
+                error
+            } else {
+                product(vec![scale, error])
+            };
+            errors.push((minus, term));
+        }
+        let errors = sum(errors);
+        let (minus, coefficient) = without_minus(coefficient);
+        terms.push(if coefficient == Tree::Number(1.0) {
+            match errors {
+                single @ Tree::Input(_) => (minus, single),
+                several if !minus => (false, several),
+                several => (minus, product(vec![several])),
+            }
+        } else {
+            (minus, product(vec![coefficient, errors]))
+        });
+    }
+    terms
+}
+
+/// A leading minus, taken off a product or a name.
+fn without_minus(tree: &Tree) -> (bool, Tree) {
+    match tree {
+        Tree::Unary(Unary::Neg, inner) => (true, (**inner).clone()),
+        Tree::Number(value) if *value < 0.0 => (true, Tree::Number(-value)),
+        other => (false, other.clone()),
+    }
+}
+
+/// The terms of a sum with their signs: true for minus.
+pub(crate) fn terms_of(tree: &Tree) -> Vec<(bool, Tree)> {
+    fn flatten(tree: &Tree, minus: bool, terms: &mut Vec<(bool, Tree)>) {
+        match tree {
+            Tree::Binary(op @ (Binary::Add | Binary::Sub), a, b) => {
+                flatten(a, minus, terms);
+                flatten(b, minus != (*op == Binary::Sub), terms);
+            }
+            Tree::Unary(Unary::Neg, a) => flatten(a, !minus, terms),
+            Tree::Number(value) if *value < 0.0 => terms.push((!minus, Tree::Number(-value))),
+            other => terms.push((minus, other.clone())),
+        }
+    }
+    let mut terms = Vec::new();
+    flatten(tree, false, &mut terms);
+    terms
+}

@@ -1,0 +1,165 @@
+//! C99, for one reading and for columns of readings in one block that vectorises.
+
+use std::fmt::Write;
+
+use crate::equation::Equation;
+use crate::print::code::{Code, GROUPS};
+use crate::print::dialect::Dialect;
+use crate::symbol::Unary;
+
+struct C<'c, 'e>(&'c Code<'e>);
+
+impl Dialect for C<'_, '_> {
+    fn number(&self, value: f64) -> String {
+        format!("{value:?}")
+    }
+    fn input(&self, place: usize) -> String {
+        self.0.inputs[place].clone()
+    }
+    fn step(&self, place: usize) -> String {
+        self.0.steps[place].clone()
+    }
+    fn product(&self, a: &str, b: &str) -> String {
+        format!("{a} * {b}")
+    }
+    fn call(&self, function: Unary, argument: &str) -> String {
+        match function {
+            Unary::Neg => format!("-({argument})"),
+            Unary::Sin => format!("sin({argument})"),
+            Unary::Cos => format!("cos({argument})"),
+            Unary::Sqrt => format!("sqrt({argument})"),
+            Unary::Exp => format!("exp({argument})"),
+            Unary::Signum => format!("(double)((({argument}) > 0.0) - (({argument}) < 0.0))"),
+        }
+    }
+}
+
+/// The file.
+pub(crate) fn print(equation: &Equation) -> String {
+    let value = Code::new(equation, false);
+    let whole = Code::new(equation, equation.options.gradient);
+    let mut file = String::from("/*\n");
+    for line in whole.header(0, ['[', ']']) {
+        let _ = writeln!(file, "{}", format!(" * {line}").trim_end());
+    }
+    let _ = writeln!(
+        file,
+        " * Columns: n readings; axes[a * n + i] and the results value[j * n + i]{} of reading i.\n \
+         * Compile with -O3 -fno-math-errno, or the square root keeps the loop over readings from being vectorised.\n */\n\
+         #include <math.h>\n#include <stddef.h>\n",
+        if equation.options.gradient {
+            format!(", gradient[(j * {} + k) * n + i]", whole.errors())
+        } else {
+            String::new()
+        }
+    );
+    kernel(&mut file, &value, false);
+    if equation.options.gradient {
+        kernel(&mut file, &whole, true);
+    }
+    file.truncate(file.trim_end().len());
+    file.push('\n');
+    file
+}
+
+fn kernel(file: &mut String, code: &Code<'_>, gradient: bool) {
+    let dialect = C(code);
+    let suffix = if gradient { "_gradient" } else { "" };
+    let name = format!("{}{suffix}", code.function());
+    let slopes = if gradient { ", double *gradient" } else { "" };
+    let what = if gradient { "Value and gradient" } else { "Value" };
+    let one = format!(
+        "void {name}(const double *lengths, const double *axes, const double *errors, double *value{slopes})"
+    );
+    let _ = writeln!(file, "/* {what} of one reading. */\n{one};\n\n{one}\n{{");
+    declare(file, code, "    ", &[0, 1, 2]);
+    for line in code.lines(&dialect, |name, value| {
+        format!("    const double {name} = {value};")
+    }) {
+        let _ = writeln!(file, "{line}");
+    }
+    let results = code.results(&dialect);
+    let (values, derivatives) = results.split_at(code.outputs());
+    for (place, value) in values.iter().enumerate() {
+        let _ = writeln!(file, "    value[{place}] = {value};");
+    }
+    for (place, slope) in derivatives.iter().enumerate() {
+        let _ = writeln!(file, "    gradient[{place}] = {slope};");
+    }
+    file.push_str("}\n\n");
+
+    let slopes = if gradient {
+        ", double *restrict gradient"
+    } else {
+        ""
+    };
+    let many = format!(
+        "void {name}_columns(size_t n, const double *restrict lengths, const double *restrict axes, const double *restrict errors, double *restrict value{slopes})"
+    );
+    let _ = writeln!(file, "/* {what} of n readings. */\n{many};\n\n{many}\n{{");
+    // Each column is a pointer of its own, so that the compiler sees that no two of them overlap.
+    for (number, place) in code.groups[1].clone().enumerate() {
+        if code.uses(place) {
+            let _ = writeln!(
+                file,
+                "    const double *restrict column_{} = axes + {number} * n;",
+                code.inputs[place]
+            );
+        }
+    }
+    for place in 0..code.outputs() {
+        let _ = writeln!(file, "    double *restrict value_{place} = value + {place} * n;");
+    }
+    for place in 0..derivatives.len() {
+        let _ = writeln!(
+            file,
+            "    double *restrict gradient_{place} = gradient + {place} * n;"
+        );
+    }
+    if !code.groups[1].clone().any(|place| code.uses(place)) {
+        file.push_str("    (void)axes;\n");
+    }
+    declare(file, code, "    ", &[0, 2]);
+    // So many columns are more than gcc tests for overlap; the pragma tells it that there is none.
+    file.push_str("#if defined(__GNUC__) && !defined(__clang__)\n#pragma GCC ivdep\n#endif\n");
+    file.push_str("    for (size_t i = 0; i < n; ++i) {\n");
+    for place in code.groups[1].clone() {
+        if code.uses(place) {
+            let input = &code.inputs[place];
+            let _ = writeln!(file, "        const double {input} = column_{input}[i];");
+        }
+    }
+    for line in code.lines(&dialect, |name, value| {
+        format!("        const double {name} = {value};")
+    }) {
+        let _ = writeln!(file, "{line}");
+    }
+    for (place, value) in values.iter().enumerate() {
+        let _ = writeln!(file, "        value_{place}[i] = {value};");
+    }
+    for (place, slope) in derivatives.iter().enumerate() {
+        let _ = writeln!(file, "        gradient_{place}[i] = {slope};");
+    }
+    file.push_str("    }\n}\n\n");
+}
+
+/// The used arguments of the given groups by name; a group without any is marked as unused.
+fn declare(file: &mut String, code: &Code<'_>, indent: &str, groups: &[usize]) {
+    for group in groups {
+        let mut used = false;
+        for (number, place) in code.groups[*group].clone().enumerate() {
+            if code.uses(place) {
+                used = true;
+                let name = &code.inputs[place];
+                let _ = writeln!(
+                    file,
+                    "{indent}const double {name} = {}[{number}];",
+                    GROUPS[*group]
+                );
+            }
+        }
+        if !used {
+            let _ = writeln!(file, "{indent}(void){};", GROUPS[*group]);
+        }
+    }
+}

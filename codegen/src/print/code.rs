@@ -1,0 +1,313 @@
+//! What the languages for compilers and interpreters share: names of arguments and steps, and the header.
+
+use std::collections::HashSet;
+use std::ops::Range;
+
+use crate::equation::{Equation, Kind};
+use crate::print::dialect::{self, Dialect};
+use crate::print::words;
+use crate::program::{Input, Label, Program, Tree};
+use crate::variable::{Variable, identifier};
+
+/// Words that are no names in Rust, C, Python or MATLAB, or that the printed code uses itself.
+const TAKEN: &[&str] = &[
+    "as",
+    "and",
+    "assert",
+    "auto",
+    "await",
+    "axes",
+    "box",
+    "break",
+    "case",
+    "catch",
+    "char",
+    "class",
+    "const",
+    "continue",
+    "cos",
+    "crate",
+    "def",
+    "default",
+    "del",
+    "do",
+    "double",
+    "elif",
+    "else",
+    "elseif",
+    "end",
+    "enum",
+    "errors",
+    "except",
+    "exp",
+    "extern",
+    "false",
+    "finally",
+    "float",
+    "fn",
+    "for",
+    "from",
+    "function",
+    "gen",
+    "global",
+    "goto",
+    "gradient",
+    "i",
+    "if",
+    "impl",
+    "import",
+    "in",
+    "inline",
+    "int",
+    "is",
+    "j",
+    "k",
+    "lambda",
+    "lengths",
+    "let",
+    "long",
+    "loop",
+    "match",
+    "mod",
+    "move",
+    "mut",
+    "n",
+    "nonlocal",
+    "not",
+    "np",
+    "or",
+    "otherwise",
+    "parfor",
+    "pass",
+    "persistent",
+    "pi",
+    "pub",
+    "raise",
+    "ref",
+    "register",
+    "restrict",
+    "return",
+    "self",
+    "short",
+    "sign",
+    "signed",
+    "sin",
+    "sizeof",
+    "sqrt",
+    "static",
+    "struct",
+    "super",
+    "switch",
+    "trait",
+    "true",
+    "try",
+    "type",
+    "typedef",
+    "union",
+    "unsafe",
+    "unsigned",
+    "use",
+    "value",
+    "void",
+    "volatile",
+    "where",
+    "while",
+    "with",
+    "yield",
+    "lane",
+    "at",
+    "y0",
+    "y1",
+    "j0",
+    "j1",
+    "yn",
+    "jn",
+    "gamma",
+    "main",
+    "log",
+];
+
+/// A program with names for everything in it.
+pub(crate) struct Code<'e> {
+    pub(crate) equation: &'e Equation,
+    /// The reading, and with it its derivatives where they were asked for.
+    pub(crate) program: Program,
+    pub(crate) inputs: Vec<String>,
+    pub(crate) steps: Vec<String>,
+    /// Places of the lengths, of the axes and of the errors among the inputs.
+    pub(crate) groups: [Range<usize>; 3],
+}
+
+/// What the three groups of arguments are called.
+pub(crate) const GROUPS: [&str; 3] = ["lengths", "axes", "errors"];
+
+impl<'e> Code<'e> {
+    pub(crate) fn new(equation: &'e Equation, gradient: bool) -> Self {
+        let program = equation.program(gradient);
+        let mut taken: HashSet<String> = TAKEN.iter().map(|word| (*word).to_string()).collect();
+        let mut name = |wanted: String| {
+            let mut free = wanted.clone();
+            let mut number = 2;
+            while !taken.insert(free.clone()) {
+                free = format!("{wanted}_{number}");
+                number += 1;
+            }
+            free
+        };
+        let symbols = equation.options.symbols;
+        let turn = |variable: &Variable| match variable {
+            Variable::Position { axis, .. } => identifier(axis),
+            other => other.identifier(symbols),
+        };
+        let inputs: Vec<String> = program
+            .inputs
+            .iter()
+            .map(|input| {
+                name(match input {
+                    Input::Plain(variable) => variable.identifier(symbols),
+                    Input::Sine(variable) => format!("sin_{}", turn(variable)),
+                    Input::Cosine(variable) => format!("cos_{}", turn(variable)),
+                })
+            })
+            .collect();
+        let steps = program
+            .steps
+            .iter()
+            .map(|step| name(step_name(&step.label)))
+            .collect();
+        let count = |wanted: &dyn Fn(&Input) -> bool| program.inputs.iter().filter(|i| wanted(i)).count();
+        let lengths = count(&|input| matches!(input, Input::Plain(Variable::Length(_))));
+        let small = count(&|input| matches!(input, Input::Plain(variable) if variable.is_small()));
+        let all = program.inputs.len();
+        Code {
+            equation,
+            groups: [0..lengths, lengths..all - small, all - small..all],
+            program,
+            inputs,
+            steps,
+        }
+    }
+
+    /// Scalar outputs of one reading.
+    pub(crate) fn outputs(&self) -> usize {
+        self.equation.outputs.len()
+    }
+
+    /// Errors and unknowns.
+    pub(crate) fn errors(&self) -> usize {
+        self.equation.parameters.len()
+    }
+
+    /// What the function is called.
+    pub(crate) fn function(&self) -> &'static str {
+        match self.equation.kind {
+            Kind::Length => "bar_length",
+            Kind::Coordinates => "coordinates",
+            Kind::Volumetric => "volumetric_error",
+        }
+    }
+
+    /// Whether an input is used by the program.
+    pub(crate) fn uses(&self, place: usize) -> bool {
+        fn within(tree: &Tree, place: usize) -> bool {
+            match tree {
+                Tree::Input(input) => *input == place,
+                Tree::Number(_) | Tree::Step(_) => false,
+                Tree::Unary(_, a) => within(a, place),
+                Tree::Binary(_, a, b) => within(a, place) || within(b, place),
+            }
+        }
+        let steps = self.program.steps.iter().map(|step| &step.value);
+        steps.chain(&self.program.outputs).any(|tree| within(tree, place))
+    }
+
+    /// The steps, one text each, by a language's way to write an assignment.
+    pub(crate) fn lines(&self, dialect: &impl Dialect, assign: impl Fn(&str, &str) -> String) -> Vec<String> {
+        let steps = self.steps.iter().zip(&self.program.steps);
+        steps
+            .map(|(name, step)| assign(name, &dialect::write(&step.value, dialect)))
+            .collect()
+    }
+
+    /// The outputs: values, then derivatives output by output.
+    pub(crate) fn results(&self, dialect: &impl Dialect) -> Vec<String> {
+        let outputs = self.program.outputs.iter();
+        outputs.map(|tree| dialect::write(tree, dialect)).collect()
+    }
+
+    /// The header, a line each, without comment signs. Places of arguments count from `first` and stand between `brackets`.
+    pub(crate) fn header(&self, first: usize, brackets: [char; 2]) -> Vec<String> {
+        let at =
+            |group: &str, number: usize| format!("{group}{}{}{}", brackets[0], number + first, brackets[1]);
+        let equation = self.equation;
+        let mut lines = words::title(equation);
+        lines.push(String::new());
+        lines.push("Arguments in order:".to_string());
+        for (group, places) in GROUPS.iter().zip(&self.groups) {
+            for (number, place) in places.clone().enumerate() {
+                let input = &self.program.inputs[place];
+                let (unit, meaning) = match input {
+                    Input::Plain(variable) => (variable.unit(), variable.meaning()),
+                    Input::Sine(variable) => ("1", format!("sine of the {}", variable.meaning())),
+                    Input::Cosine(variable) => ("1", format!("cosine of the {}", variable.meaning())),
+                };
+                let argument = at(group, number);
+                lines.push(format!(
+                    "  {argument:<12} {:<12} {unit:<4} {meaning}",
+                    self.inputs[place]
+                ));
+            }
+        }
+        let what = match equation.kind {
+            Kind::Length => "the length read, mm",
+            Kind::Coordinates => "the three coordinates read, mm",
+            Kind::Volumetric => "the error vector x, y, z, mm",
+        };
+        lines.push(format!(
+            "Value: {what}. Gradient: by {}, {} and so on, mm/mm and mm/rad.",
+            at("errors", 0),
+            at("errors", 1)
+        ));
+        let operations = self.program.operations();
+        let functions = match operations.functions {
+            0 => String::new(),
+            some => format!(", and {some} sines and cosines of errors"),
+        };
+        let with = if self.program.outputs.len() > self.outputs() {
+            "Value and gradient"
+        } else {
+            "Value"
+        };
+        lines.push(format!(
+            "{with}: {} operations a reading ({} + and −, {} ·, {} /, {} √{functions}).",
+            operations.arithmetic(),
+            operations.sums,
+            operations.products,
+            operations.quotients,
+            operations.roots,
+        ));
+        lines.extend(words::notes(equation));
+        lines
+    }
+}
+
+fn step_name(label: &Label) -> String {
+    match label {
+        Label::Vector {
+            letter,
+            frame,
+            prime,
+            coordinate,
+        } => {
+            let turned = if *prime { "t" } else { "" };
+            let frame = if frame.is_empty() {
+                String::new()
+            } else {
+                format!("_{}", identifier(frame))
+            };
+            format!("{letter}{turned}{frame}_{}", ["x", "y", "z"][*coordinate])
+        }
+        Label::Scalar(name) => (*name).to_string(),
+        Label::Temporary(number) => format!("t{number}"),
+    }
+}

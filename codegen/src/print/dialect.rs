@@ -1,0 +1,199 @@
+//! Expressions on one line, in any language: where the parentheses go.
+
+use crate::program::Tree;
+use crate::symbol::{Binary, Unary};
+
+/// How a language spells what expressions are made of.
+pub trait Dialect {
+    /// A number that is not negative.
+    fn number(&self, value: f64) -> String;
+    /// The name of an input.
+    fn input(&self, place: usize) -> String;
+    /// The name of a step.
+    fn step(&self, place: usize) -> String;
+    /// A product of two factors that already carry the parentheses they need.
+    fn product(&self, a: &str, b: &str) -> String;
+    /// A quotient, and whether it stands by itself (as a built-up fraction does) so that its parts need no parentheses.
+    fn quotient(&self, a: &str, b: &str) -> String {
+        format!("{a} / {b}")
+    }
+    /// Whether [`Dialect::quotient`] sets a built-up fraction.
+    fn fractions(&self) -> bool {
+        false
+    }
+    /// A function of an expression without parentheses.
+    fn call(&self, function: Unary, argument: &str) -> String;
+    /// An expression in parentheses.
+    fn group(&self, inside: &str) -> String {
+        format!("({inside})")
+    }
+    /// The sign for minus.
+    fn minus(&self) -> &str {
+        "-"
+    }
+    /// The square of a factor, where the language writes one; otherwise it is multiplied out.
+    fn square(&self, _factor: &str) -> Option<String> {
+        None
+    }
+    /// Whether `a + (b + c)` must keep its parentheses: true for a compiler, which would round otherwise, false for a reader.
+    fn keeps_order(&self) -> bool {
+        true
+    }
+}
+
+/// How tightly an expression binds.
+#[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+enum Binding {
+    Sum,
+    Product,
+    Atom,
+}
+
+/// The expression on one line.
+pub fn write(tree: &Tree, dialect: &impl Dialect) -> String {
+    bound(tree, dialect).0
+}
+
+/// The expression as a factor or a term after a minus: in parentheses where it is a sum.
+pub fn write_term(tree: &Tree, dialect: &impl Dialect) -> String {
+    let (text, binding) = bound(tree, dialect);
+    if binding < Binding::Product {
+        dialect.group(&text)
+    } else {
+        text
+    }
+}
+
+/// A sum on lines of at most `width` visible signs where it can be broken: before a plus or minus in no braces and in as few
+/// parentheses as the width allows. `visible` counts the signs of a piece. Every line but the first starts with its sign.
+pub fn lines(
+    terms: &[(bool, Tree)],
+    dialect: &impl Dialect,
+    width: usize,
+    visible: impl Fn(&str) -> usize,
+) -> Vec<String> {
+    let mut whole = String::new();
+    for (place, (minus, tree)) in terms.iter().enumerate() {
+        let sign = match (place, minus) {
+            (0, false) => String::new(),
+            (0, true) => dialect.minus().to_string(),
+            (_, false) => " + ".to_string(),
+            (_, true) => format!(" {} ", dialect.minus()),
+        };
+        // A sum that is a term of its own needs its parentheses only after a minus.
+        let text = if *minus {
+            write_term(tree, dialect)
+        } else {
+            write(tree, dialect)
+        };
+        whole.push_str(&sign);
+        whole.push_str(&text);
+    }
+    let mut pieces = split(&whole, dialect, 0);
+    for parentheses in 1..5 {
+        let fits = |piece: &String| visible(piece) <= width;
+        let finer = |piece: String| {
+            if fits(&piece) {
+                vec![piece]
+            } else {
+                split(&piece, dialect, parentheses)
+            }
+        };
+        pieces = pieces.into_iter().flat_map(finer).collect();
+    }
+    let mut lines: Vec<String> = Vec::new();
+    for piece in pieces {
+        match lines.last_mut() {
+            Some(line) if visible(line) + visible(&piece) <= width => line.push_str(&piece),
+            Some(_) => lines.push(piece.trim_start().to_string()),
+            None => lines.push(piece),
+        }
+    }
+    lines
+}
+
+/// The text before each plus and minus in at most `parentheses` parentheses and in no braces.
+fn split(text: &str, dialect: &impl Dialect, parentheses: i32) -> Vec<String> {
+    let signs = [" + ".to_string(), format!(" {} ", dialect.minus())];
+    let mut pieces = Vec::new();
+    let (mut start, mut braces, mut depth) = (0, 0, 0);
+    for (at, character) in text.char_indices() {
+        match character {
+            '{' => braces += 1,
+            '}' => braces -= 1,
+            '(' => depth += 1,
+            ')' => depth -= 1,
+            _ => {}
+        }
+        let sign = signs.iter().any(|sign| text[at..].starts_with(sign));
+        if sign && braces == 0 && depth <= parentheses && at > start {
+            pieces.push(text[start..at].to_string());
+            start = at;
+        }
+    }
+    pieces.push(text[start..].to_string());
+    pieces
+}
+
+fn bound(tree: &Tree, dialect: &impl Dialect) -> (String, Binding) {
+    let at_least = |tree: &Tree, least: Binding| {
+        let (text, binding) = bound(tree, dialect);
+        if binding < least {
+            dialect.group(&text)
+        } else {
+            text
+        }
+    };
+    match tree {
+        Tree::Number(value) if *value < 0.0 => (
+            format!("{}{}", dialect.minus(), dialect.number(-value)),
+            Binding::Sum,
+        ),
+        Tree::Number(value) => (dialect.number(*value), Binding::Atom),
+        Tree::Input(place) => (dialect.input(*place), Binding::Atom),
+        Tree::Step(place) => (dialect.step(*place), Binding::Atom),
+        Tree::Unary(Unary::Neg, a) => (
+            format!("{}{}", dialect.minus(), at_least(a, Binding::Product)),
+            Binding::Sum,
+        ),
+        Tree::Unary(function, a) => (dialect.call(*function, &write(a, dialect)), Binding::Atom),
+        Tree::Binary(op, a, b) => match op {
+            Binary::Add | Binary::Sub => {
+                let keep = dialect.keeps_order() || *op == Binary::Sub;
+                // A leading minus in the second operand needs its parentheses in every language.
+                let (right, binding) = bound(b, dialect);
+                let starts_with_minus = right.starts_with(dialect.minus());
+                let right = if binding == Binding::Sum && (keep || starts_with_minus) {
+                    dialect.group(&right)
+                } else {
+                    right
+                };
+                let left = at_least(a, Binding::Sum);
+                let sign = if *op == Binary::Add { "+" } else { dialect.minus() };
+                (format!("{left} {sign} {right}"), Binding::Sum)
+            }
+            Binary::Mul => {
+                if a == b
+                    && let Some(square) = dialect.square(&at_least(a, Binding::Atom))
+                {
+                    return (square, Binding::Product);
+                }
+                let left = at_least(a, Binding::Product);
+                let right = if dialect.keeps_order() {
+                    at_least(b, Binding::Atom)
+                } else {
+                    at_least(b, Binding::Product)
+                };
+                (dialect.product(&left, &right), Binding::Product)
+            }
+            Binary::Div if dialect.fractions() => (
+                dialect.quotient(&write(a, dialect), &write(b, dialect)),
+                Binding::Atom,
+            ),
+            Binary::Div => (
+                dialect.quotient(&at_least(a, Binding::Product), &at_least(b, Binding::Atom)),
+                Binding::Product,
+            ),
+        },
+    }
+}

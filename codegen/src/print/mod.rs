@@ -1,0 +1,87 @@
+//! Printers: one file for each language.
+//!
+//! A new language is one file here: a [`dialect::Dialect`] says how names, numbers, products and functions are spelt, and the file
+//! lays out what stands around the expressions.
+
+mod article;
+mod c;
+mod code;
+pub mod dialect;
+mod latex;
+mod matlab;
+mod python;
+mod rust;
+mod text;
+mod typst;
+mod words;
+
+use crate::equation::Equation;
+use crate::error::CodegenError;
+
+/// A language that equations are printed in.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub enum Language {
+    /// Plain text, UTF-8.
+    Text,
+    /// LaTeX with `amsmath`.
+    Latex,
+    /// Typst.
+    Typst,
+    /// Rust without dependencies.
+    Rust,
+    /// C99.
+    C,
+    /// Python with NumPy.
+    Python,
+    /// MATLAB or Octave.
+    Matlab,
+}
+
+impl Language {
+    /// All of them.
+    pub const ALL: [Language; 7] = [
+        Language::Text,
+        Language::Latex,
+        Language::Typst,
+        Language::Rust,
+        Language::C,
+        Language::Python,
+        Language::Matlab,
+    ];
+
+    /// The word on the command line.
+    pub fn word(self) -> &'static str {
+        match self {
+            Language::Text => "text",
+            Language::Latex => "latex",
+            Language::Typst => "typst",
+            Language::Rust => "rust",
+            Language::C => "c",
+            Language::Python => "python",
+            Language::Matlab => "matlab",
+        }
+    }
+
+    /// The language of a word on the command line.
+    pub fn of_word(word: &str) -> Option<Language> {
+        Language::ALL.into_iter().find(|language| language.word() == word)
+    }
+}
+
+impl Equation {
+    /// The equation in a language.
+    ///
+    /// # Errors
+    /// If the form that was asked for cannot be written in that language.
+    pub fn print(&self, language: Language) -> Result<String, CodegenError> {
+        Ok(match language {
+            Language::Text => text::print(self),
+            Language::Latex => latex::print(self),
+            Language::Typst => typst::print(self),
+            Language::Rust => rust::print(self),
+            Language::C => c::print(self),
+            Language::Python => python::print(self),
+            Language::Matlab => matlab::print(self),
+        })
+    }
+}

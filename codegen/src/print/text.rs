@@ -1,0 +1,162 @@
+//! Plain text, UTF-8.
+
+use std::fmt::Write;
+
+use crate::equation::{Equation, Kind};
+use crate::print::article::{Article, Left, Remark, terms_of};
+use crate::print::dialect::{self, Dialect};
+use crate::print::words;
+use crate::program::{Input, Label, Program};
+use crate::symbol::Unary;
+use crate::variable::{Symbols, Variable};
+
+/// Signs on a line.
+const WIDTH: usize = 100;
+
+/// Spells expressions for a reader of plain text.
+struct Text<'a> {
+    program: &'a Program,
+    symbols: Symbols,
+}
+
+impl Dialect for Text<'_> {
+    fn number(&self, value: f64) -> String {
+        format!("{value}")
+    }
+    fn input(&self, place: usize) -> String {
+        input(&self.program.inputs[place], self.symbols)
+    }
+    fn step(&self, place: usize) -> String {
+        label(&self.program.steps[place].label)
+    }
+    fn product(&self, a: &str, b: &str) -> String {
+        format!("{a}·{b}")
+    }
+    fn quotient(&self, a: &str, b: &str) -> String {
+        format!("{a}/{b}")
+    }
+    fn call(&self, function: Unary, argument: &str) -> String {
+        match function {
+            Unary::Sqrt => format!("√({argument})"),
+            Unary::Sin => format!("sin({argument})"),
+            Unary::Cos => format!("cos({argument})"),
+            Unary::Exp => format!("exp({argument})"),
+            Unary::Signum => format!("sign({argument})"),
+            Unary::Neg => format!("−({argument})"),
+        }
+    }
+    fn minus(&self) -> &str {
+        "−"
+    }
+    fn square(&self, factor: &str) -> Option<String> {
+        Some(format!("{factor}²"))
+    }
+    fn keeps_order(&self) -> bool {
+        false
+    }
+}
+
+/// `s_a` for the sine of θ_a, and so on.
+fn input(input: &Input, symbols: Symbols) -> String {
+    let turn = |letter: &str, variable: &Variable| match variable {
+        Variable::Position { axis, .. } => format!("{letter}_{}", axis.to_lowercase()),
+        other if letter == "s" => format!("sin({})", other.text(symbols)),
+        other => format!("cos({})", other.text(symbols)),
+    };
+    match input {
+        Input::Plain(variable) => variable.text(symbols),
+        Input::Sine(variable) => turn("s", variable),
+        Input::Cosine(variable) => turn("c", variable),
+    }
+}
+
+/// `p_A.x` for a coordinate of the point p in the frame of A.
+fn label(label: &Label) -> String {
+    match label {
+        Label::Vector {
+            letter,
+            frame,
+            prime,
+            coordinate,
+        } => {
+            let frame = if frame.is_empty() {
+                String::new()
+            } else {
+                format!("_{frame}")
+            };
+            let prime = if *prime { "′" } else { "" };
+            format!("{letter}{prime}{frame}.{}", ["x", "y", "z"][*coordinate])
+        }
+        Label::Scalar(name) => (*name).to_string(),
+        Label::Temporary(number) => format!("t{number}"),
+    }
+}
+
+fn output(kind: Kind, place: usize) -> String {
+    match kind {
+        Kind::Length => "L".to_string(),
+        Kind::Coordinates => format!("m.{}", ["x", "y", "z"][place]),
+        Kind::Volumetric => format!("Δ.{}", ["x", "y", "z"][place]),
+    }
+}
+
+/// The whole equation.
+pub(crate) fn print(equation: &Equation) -> String {
+    let article = Article::new(equation);
+    let symbols = equation.options.symbols;
+    let spelling = Text {
+        program: &article.program,
+        symbols,
+    };
+    let mut page = words::title(equation).join("\n") + "\n";
+    for section in &article.sections {
+        let _ = writeln!(page, "\n{}", section.heading);
+        let left = |left: &Left| match left {
+            Left::Named(name) => label(name),
+            Left::Square(name) => format!("{}²", label(name)),
+            Left::Output(place) => output(equation.kind, *place),
+            Left::Slope(place, parameter) => {
+                format!("∂{}/∂{}", output(equation.kind, *place), parameter.text(symbols))
+            }
+        };
+        let lefts: Vec<String> = section.rows.iter().map(|row| left(&row.left)).collect();
+        let widest = lefts.iter().map(|left| left.chars().count()).max().unwrap_or(0);
+        for (row, left) in section.rows.iter().zip(&lefts) {
+            let relation = if row.approximate { "≈" } else { "=" };
+            let lines = dialect::lines(&terms_of(&row.right), &spelling, WIDTH, |piece| {
+                piece.chars().count()
+            });
+            let gap = " ".repeat(widest - left.chars().count());
+            let _ = write!(page, "  {left}{gap} {relation} ");
+            let _ = write!(
+                page,
+                "{}",
+                lines.join(&format!("\n  {}     ", " ".repeat(widest)))
+            );
+            match &row.remark {
+                None => page.push('\n'),
+                Some(Remark::NotSeen) => page.push_str("   (not seen)\n"),
+                Some(Remark::MultipleOf(other)) => {
+                    let _ = writeln!(page, "   (a fixed multiple of that of {})", other.text(symbols));
+                }
+            }
+        }
+    }
+    page.push_str("\nsymbols\n");
+    for (symbol, meaning, unit) in &article.symbols {
+        let names = match symbol {
+            Input::Sine(variable) | Input::Cosine(variable) => format!(
+                "{}, {}",
+                input(&Input::Sine(variable.clone()), symbols),
+                input(&Input::Cosine(variable.clone()), symbols)
+            ),
+            Input::Plain(_) => input(symbol, symbols),
+        };
+        let gap = " ".repeat(10_usize.saturating_sub(names.chars().count()));
+        let _ = writeln!(page, "  {names}{gap} {unit:<4} {meaning}");
+    }
+    page.push('\n');
+    page.push_str(&words::notes(equation).join("\n"));
+    page.push('\n');
+    page
+}

@@ -1,0 +1,80 @@
+//! A test of a session as the source of an equation: its geometry as written, its axes as they move.
+
+use abbe_model::error::ModelError;
+use abbe_model::scalar::Nominal;
+use abbe_model::session::readings::Readings;
+use abbe_model::session::{Session, Test, motion};
+
+use crate::subject::{Source, Subject};
+
+/// A test of a session. Named lengths stay symbols, so do the positions of axes that move; the others stand where the test
+/// says.
+#[derive(Clone, Debug)]
+pub struct SessionTest<'s> {
+    session: &'s Session,
+    test: &'s Test,
+    /// Least and greatest position of each axis of the machine.
+    ranges: Vec<[f64; 2]>,
+}
+
+impl<'s> SessionTest<'s> {
+    /// A test, with the positions of its readings or, for a plan, of its movement.
+    ///
+    /// # Errors
+    /// If a planned movement cannot be made.
+    pub fn new(session: &'s Session, test: &'s Test) -> Result<Self, ModelError> {
+        let planned;
+        let readings: &Readings = match &test.readings {
+            Some(readings) => readings,
+            None => {
+                planned = motion::planned(&session.machine, test)?;
+                &planned
+            }
+        };
+        let range = |column: &Vec<f64>| {
+            let least = column.iter().copied().fold(f64::INFINITY, f64::min);
+            let greatest = column.iter().copied().fold(f64::NEG_INFINITY, f64::max);
+            [least, greatest]
+        };
+        let ranges = readings.positions.iter().map(range).collect();
+        Ok(SessionTest {
+            session,
+            test,
+            ranges,
+        })
+    }
+}
+
+impl Source for SessionTest<'_> {
+    fn subject<N: Nominal>(&self, length: &impl Fn(&str) -> N) -> Subject<N> {
+        Subject::Station(self.test.geometry.map(|written| written.evaluate(length)))
+    }
+
+    fn held<N: Nominal>(&self, axis: &str, length: &impl Fn(&str) -> N) -> Option<N> {
+        let index = self.session.machine.axis_index(axis)?;
+        let [least, greatest] = *self.ranges.get(index)?;
+        if greatest > least {
+            return None;
+        }
+        let written = self.test.at_written.get(index).and_then(Option::as_ref);
+        let stands = if least.is_finite() {
+            least
+        } else {
+            self.test.at[index]
+        };
+        Some(written.map_or_else(|| N::constant(stands), |written| written.evaluate(length)))
+    }
+
+    fn length_mm(&self, name: &str) -> Option<f64> {
+        let constant = self.session.constants.iter().find(|(known, _)| known == name);
+        constant.map(|(_, value)| *value)
+    }
+
+    fn range(&self, axis: &str) -> Option<[f64; 2]> {
+        let index = self.session.machine.axis_index(axis)?;
+        self.ranges
+            .get(index)
+            .copied()
+            .filter(|[least, greatest]| greatest > least)
+    }
+}

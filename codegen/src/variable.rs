@@ -1,0 +1,151 @@
+//! What a symbol may stand for, and how it is written.
+
+use abbe_model::axis::AxisKind;
+use abbe_model::component::{ErrorKind, ErrorName};
+use abbe_model::instrument::{InsideUnit, InstrumentUnknown};
+
+/// A quantity that an expression is written in.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Variable {
+    /// A named length of the session, mm: `R`, `Z_CA`.
+    Length(String),
+    /// The position of an axis, mm or rad.
+    Position {
+        /// The axis.
+        axis: String,
+        /// Whether it slides or turns.
+        kind: AxisKind,
+    },
+    /// An error of the machine, mm or rad.
+    Error(ErrorName),
+    /// An unknown of the instrument itself, mm, rad or a ratio.
+    Unknown(InstrumentUnknown),
+}
+
+/// Which names errors go by in print.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Symbols {
+    /// The short names of the literature: `e_y0a`, `θ_z0c`.
+    #[default]
+    Literature,
+    /// The names of ISO 230-1: `EY0A`, `EC0C`.
+    Iso,
+}
+
+impl Variable {
+    /// Whether it is small and expressions are truncated in it: an error or an unknown of the instrument.
+    pub fn is_small(&self) -> bool {
+        matches!(self, Variable::Error(_) | Variable::Unknown(_))
+    }
+
+    /// Whether it is an angle.
+    pub fn is_angle(&self) -> bool {
+        match self {
+            Variable::Length(_) => false,
+            Variable::Position { kind, .. } => *kind == AxisKind::Rotary,
+            Variable::Error(name) => name.freedom.is_angle(),
+            Variable::Unknown(unknown) => unknown.unit == InsideUnit::Radian,
+        }
+    }
+
+    /// The unit that its values are in.
+    pub fn unit(&self) -> &'static str {
+        match self {
+            Variable::Unknown(unknown) if unknown.unit == InsideUnit::Ratio => "1",
+            _ if self.is_angle() => "rad",
+            _ => "mm",
+        }
+    }
+
+    /// In words.
+    pub fn meaning(&self) -> String {
+        match self {
+            Variable::Length(_) => "length of the set-up".to_string(),
+            Variable::Position { axis, kind } => match kind {
+                AxisKind::Linear => format!("position of axis {axis}"),
+                AxisKind::Rotary => format!("angle of axis {axis}"),
+            },
+            Variable::Error(name) => {
+                let coordinate = ["X", "Y", "Z"][name.freedom.index() % 3];
+                let what = match (name.kind, name.freedom.is_angle()) {
+                    (ErrorKind::Location, false) => format!("location of {} in {coordinate}", name.axis),
+                    (ErrorKind::Location, true) => format!("orientation of {} about {coordinate}", name.axis),
+                    (ErrorKind::Motion, false) => format!("error motion of {} in {coordinate}", name.axis),
+                    (ErrorKind::Motion, true) => format!("error motion of {} about {coordinate}", name.axis),
+                };
+                format!("{what} ({name})")
+            }
+            Variable::Unknown(unknown) => {
+                let thing = unknown.thing.replace('_', " ");
+                match unknown.coordinate {
+                    "" => format!("error of the {thing}"),
+                    coordinate => format!("error of the {thing} in {coordinate}"),
+                }
+            }
+        }
+    }
+
+    /// In plain text: `R`, `θ_a`, `e_y0a`.
+    pub fn text(&self, symbols: Symbols) -> String {
+        match self {
+            Variable::Length(name) => name.clone(),
+            Variable::Position { axis, kind } => match kind {
+                AxisKind::Linear => axis.to_lowercase(),
+                AxisKind::Rotary => format!("θ_{}", axis.to_lowercase()),
+            },
+            Variable::Error(name) => match symbols {
+                Symbols::Literature => name.literature(),
+                Symbols::Iso => name.to_string(),
+            },
+            Variable::Unknown(unknown) => match unknown.coordinate {
+                "" => format!("δ_{}", unknown.thing),
+                coordinate => format!("δ_{}_{coordinate}", unknown.thing),
+            },
+        }
+    }
+
+    /// Letter and subscript for typeset print: `("e", "y0a")`, `("θ", "a")`, `("R", "")`.
+    pub fn letter_and_subscript(&self, symbols: Symbols) -> (String, String) {
+        let split = |text: String| match text.split_once('_') {
+            Some((letter, subscript)) => (letter.to_string(), subscript.replace('_', " ")),
+            None => (text, String::new()),
+        };
+        match self {
+            Variable::Error(name) if symbols == Symbols::Iso => {
+                ("E".to_string(), name.to_string()[1..].to_string())
+            }
+            _ => split(self.text(symbols)),
+        }
+    }
+
+    /// In program text: ASCII, lower case.
+    pub fn identifier(&self, symbols: Symbols) -> String {
+        let text = match self {
+            Variable::Position { axis, kind } => match kind {
+                AxisKind::Linear => format!("pos_{}", axis.to_lowercase()),
+                AxisKind::Rotary => format!("angle_{}", axis.to_lowercase()),
+            },
+            Variable::Unknown(_) => self.text(symbols).replace('δ', "delta"),
+            _ => self.text(symbols).replace('θ', "theta"),
+        };
+        identifier(&text)
+    }
+}
+
+/// `text` with everything but ASCII letters, digits and underscores replaced, in lower case.
+pub fn identifier(text: &str) -> String {
+    let mut clean: String = text
+        .chars()
+        .map(|c| {
+            if c.is_ascii_alphanumeric() {
+                c.to_ascii_lowercase()
+            } else {
+                '_'
+            }
+        })
+        .collect();
+    if !clean.starts_with(|c: char| c.is_ascii_alphabetic()) {
+        clean.insert(0, 'v');
+    }
+    clean
+}

@@ -1,0 +1,213 @@
+//! The points of a chain by name: the ball in the frame of each axis that it is pushed through, and the bar between the balls.
+//!
+//! Nothing is recorded while the chain runs: equal expressions are one node, so pushing the point once more, step by step, finds
+//! the nodes that the reading is made of.
+
+use std::collections::HashMap;
+
+use abbe_model::axis::AxisKind;
+use abbe_model::chain::{AxisPosition, BodyErrors, Machine};
+use abbe_model::frames::Point;
+use abbe_model::instrument::{Station, displaced};
+use abbe_model::scalar::Nominal;
+
+use crate::derivative::Adjoints;
+use crate::program::Label;
+use crate::subject::Subject;
+use crate::symbol::{NodeId, Operand, Symbol};
+
+/// A vector with a name, such as the workpiece ball in the frame of axis A.
+#[derive(Clone, Debug, PartialEq)]
+pub struct NamedVector {
+    /// `p` for a point on the workpiece side, `q` on the tool side, `b` for the bar, `u` for its unit vector.
+    pub letter: &'static str,
+    /// The frame it is given in: an axis, or `R`; empty where it needs none.
+    pub frame: String,
+    /// Turned by the axis, the axis' own errors still to be applied.
+    pub prime: bool,
+    /// The coordinates.
+    pub components: [Operand; 3],
+    /// In words.
+    pub meaning: String,
+}
+
+impl NamedVector {
+    /// The label of one coordinate.
+    pub fn label(&self, coordinate: usize) -> Label {
+        Label::Vector {
+            letter: self.letter,
+            frame: self.frame.clone(),
+            prime: self.prime,
+            coordinate,
+        }
+    }
+}
+
+/// What a ball or point is called.
+struct Body {
+    letter: &'static str,
+    meaning: &'static str,
+}
+
+/// The named vectors of a subject, from the ball outwards.
+pub(crate) fn of_subject<'a>(
+    subject: &Subject<Symbol<'a>>,
+    machine: &Machine,
+    state: &[AxisPosition<Symbol<'a>>],
+    errors: &[BodyErrors<Symbol<'a>>],
+    unknown: &impl Fn(usize) -> Option<Symbol<'a>>,
+) -> Vec<NamedVector> {
+    let workpiece = Body {
+        letter: "p",
+        meaning: "workpiece ball",
+    };
+    let tool = |meaning| Body { letter: "q", meaning };
+    match subject {
+        Subject::Station(Station::BallBar(bar)) => {
+            let p = displaced(bar.workpiece_ball, 0, unknown);
+            let q = displaced(bar.spindle_ball, 3, unknown);
+            let mut vectors = on_workpiece_side(workpiece, machine, state, errors, p);
+            vectors.extend(on_tool_side(tool("spindle ball"), machine, state, errors, q));
+            let (p, q) = bar.balls(machine, state, errors, unknown);
+            vectors.push(NamedVector {
+                letter: "b",
+                frame: String::new(),
+                prime: false,
+                components: p.minus(q).0.map(Symbol::operand),
+                meaning: "bar, from the spindle ball to the workpiece ball, in R".to_string(),
+            });
+            vectors
+        }
+        Subject::Station(Station::Tracker(tracker)) => {
+            let q = displaced(tracker.target, 6, unknown);
+            on_tool_side(tool("target"), machine, state, errors, q)
+        }
+        Subject::Station(Station::Socket(socket)) => {
+            let q = displaced(socket.ball, 3, unknown);
+            on_tool_side(tool("ball"), machine, state, errors, q)
+        }
+        #[allow(unreachable_patterns)]
+        Subject::Station(_) => Vec::new(),
+        Subject::Volumetric { tool: point } => {
+            on_tool_side(tool("tool point"), machine, state, errors, Point::nominal(*point))
+        }
+    }
+}
+
+fn on_workpiece_side<'a>(
+    body: Body,
+    machine: &Machine,
+    state: &[AxisPosition<Symbol<'a>>],
+    errors: &[BodyErrors<Symbol<'a>>],
+    point: Point<Symbol<'a>>,
+) -> Vec<NamedVector> {
+    let steps = (0..machine.workpiece_side).map(|index| {
+        let outside = index + 1;
+        (index, (outside < machine.workpiece_side).then_some(outside))
+    });
+    along(body, machine, state, errors, point, steps)
+}
+
+fn on_tool_side<'a>(
+    body: Body,
+    machine: &Machine,
+    state: &[AxisPosition<Symbol<'a>>],
+    errors: &[BodyErrors<Symbol<'a>>],
+    point: Point<Symbol<'a>>,
+) -> Vec<NamedVector> {
+    let steps = (machine.workpiece_side..machine.axes.len()).rev().map(|index| {
+        let outside = index.checked_sub(1).filter(|o| *o >= machine.workpiece_side);
+        (index, outside)
+    });
+    along(body, machine, state, errors, point, steps)
+}
+
+/// The point after each step; `steps` gives the axis pushed through and the axis in whose frame the point then is.
+fn along<'a>(
+    body: Body,
+    machine: &Machine,
+    state: &[AxisPosition<Symbol<'a>>],
+    errors: &[BodyErrors<Symbol<'a>>],
+    point: Point<Symbol<'a>>,
+    steps: impl Iterator<Item = (usize, Option<usize>)>,
+) -> Vec<NamedVector> {
+    let mut vectors: Vec<NamedVector> = Vec::new();
+    let start = point.0.map(Symbol::operand);
+    let mut point = point;
+    for (index, outside) in steps {
+        let axis = &machine.axes[index];
+        let (frame, place) = match outside {
+            Some(outside) => {
+                let name = machine.axes[outside].name.clone();
+                (name.clone(), format!("the frame of axis {name}"))
+            }
+            None => ("R".to_string(), "R".to_string()),
+        };
+        let mut vector = |point: Point<Symbol<'a>>, prime: bool, meaning: String| {
+            let components = point.0.map(Symbol::operand);
+            let known = vectors.iter().any(|known| known.components == components);
+            let new = components.iter().any(|c| matches!(c, Operand::Node(_)));
+            if new && !known && components != start {
+                vectors.push(NamedVector {
+                    letter: body.letter,
+                    frame: frame.clone(),
+                    prime,
+                    components,
+                    meaning,
+                });
+            }
+        };
+        let pushed = machine.push(index, state, errors, point);
+        if axis.kind == AxisKind::Rotary {
+            let origin = axis.origin_mm.map(|o| Symbol::constant(-o));
+            let turned = axis.rotate(state[index].turn, point.shifted(origin));
+            if turned != pushed {
+                let meaning = format!("{} in {place}, {} without its errors", body.meaning, axis.name);
+                vector(turned, true, meaning);
+            }
+        }
+        vector(pushed, false, format!("{} in {place}", body.meaning));
+        point = pushed;
+    }
+    vectors
+}
+
+/// The unit vector of the bar, carried back into each frame: the adjoints of the named points, by name.
+pub(crate) fn adjoint_vectors(vectors: &[NamedVector], adjoints: &Adjoints) -> Vec<NamedVector> {
+    vectors
+        .iter()
+        .rev()
+        .filter(|vector| vector.letter == "b" || vector.letter == "p")
+        .map(|vector| {
+            let components = vector.components.map(|component| adjoints.of(component));
+            let meaning = match vector.letter {
+                "b" => "unit vector of the bar".to_string(),
+                _ => format!(
+                    "unit vector of the bar carried back to {}{}",
+                    vector.frame,
+                    if vector.prime { "′" } else { "" }
+                ),
+            };
+            NamedVector {
+                letter: "u",
+                frame: vector.frame.clone(),
+                prime: vector.prime,
+                components,
+                meaning,
+            }
+        })
+        .collect()
+}
+
+/// The nodes that the vectors' coordinates are, each under the first name that it is given.
+pub(crate) fn labels(vectors: &[NamedVector]) -> HashMap<NodeId, Label> {
+    let mut labels = HashMap::new();
+    for vector in vectors {
+        for (coordinate, component) in vector.components.iter().enumerate() {
+            if let Operand::Node(id) = component {
+                labels.entry(*id).or_insert_with(|| vector.label(coordinate));
+            }
+        }
+    }
+    labels
+}

@@ -1,0 +1,196 @@
+//! Every form of one test, as a reviewer reads it in the snapshots, and small facts about the printed code.
+
+use std::process::Command;
+
+use abbe_codegen::{Equation, Language, Options, Order, Symbols};
+use abbe_model::frames::Rotation;
+
+use crate::support::{Chapter5, eight, hermle};
+use crate::tools;
+
+fn chapter5(options: &Options) -> Equation {
+    let machine = hermle(Rotation::SmallAngle);
+    Equation::of(&machine, &Chapter5 { extended: true }, &eight(), options).expect("an equation")
+}
+
+/// One snapshot of each language and form. Numbers of the check differ in their last digit from one machine to another.
+fn snapshot(name: &str, text: &str) {
+    let mut settings = insta::Settings::clone_current();
+    settings.set_snapshot_path("../../../snapshots");
+    settings.set_prepend_module_to_snapshot(false);
+    settings.set_omit_expression(true);
+    settings.bind(|| insta::assert_snapshot!(format!("codegen__{name}"), without_rounding(text)));
+}
+
+/// `2e-16` and the like as `…`.
+fn without_rounding(text: &str) -> String {
+    let word = |word: &str| {
+        let digits = |part: &str| !part.is_empty() && part.chars().all(|c| c.is_ascii_digit());
+        match word.replace("0e0", "0e-0").split_once("e-") {
+            Some((mantissa, exponent)) if digits(mantissa) && digits(exponent) => "…".to_string(),
+            _ => word.to_string(),
+        }
+    };
+    let line = |line: &str| line.split(' ').map(word).collect::<Vec<_>>().join(" ");
+    text.lines().map(line).collect::<Vec<_>>().join("\n")
+}
+
+#[test]
+fn code_of_the_chapter_5_test() {
+    let options = Options {
+        gradient: true,
+        ..Options::default()
+    };
+    let equation = chapter5(&options);
+    for language in [Language::Rust, Language::C, Language::Python, Language::Matlab] {
+        let text = equation.print(language).expect("code");
+        snapshot(&format!("chapter5_{}", language.word()), &text);
+    }
+}
+
+#[test]
+fn readable_forms_of_the_chapter_5_test() {
+    for language in [Language::Text, Language::Latex, Language::Typst] {
+        for (order, word) in [
+            (Order::Exact, "exact"),
+            (Order::Bilinear, "bilinear"),
+            (Order::First, "first"),
+        ] {
+            let symbols = if order == Order::First {
+                Symbols::Iso
+            } else {
+                Symbols::Literature
+            };
+            let options = Options {
+                order,
+                symbols,
+                ..Options::default()
+            };
+            let text = chapter5(&options).print(language).expect("an article");
+            snapshot(&format!("chapter5_{}_{word}", language.word()), &text);
+        }
+    }
+}
+
+/// Value and gradient of the chapter 5 test take at most 70 operations: the printed Rust is run over a scalar that counts.
+#[test]
+fn operations_counted_by_running_the_printed_code() {
+    let rustc = std::env::var("RUSTC").unwrap_or_else(|_| "rustc".to_string());
+    let Some(rustc) = tools::find("forms::operations", &[&rustc], &["--version"]) else {
+        return;
+    };
+    let options = Options {
+        gradient: true,
+        ..Options::default()
+    };
+    let equation = chapter5(&options);
+    let counted = equation.program(true).operations();
+    let printed = equation.print(Language::Rust).expect("code");
+    // The kernel of one reading alone, over the counting scalar in the place of f64.
+    let from = printed
+        .find("/// Value and gradient of one reading.")
+        .expect("the kernel");
+    let to = printed
+        .find("/// Values and gradients of columns")
+        .expect("the columns");
+    let kernel = printed[from..to].replace("f64", "Counted");
+    let constants: String = printed
+        .lines()
+        .filter(|line| line.starts_with("pub const"))
+        .collect::<Vec<_>>()
+        .join("\n");
+    let main = format!(
+        "use std::cell::Cell; use std::ops::*;
+thread_local! {{ static COUNT: Cell<usize> = const {{ Cell::new(0) }}; }}
+#[derive(Clone, Copy)] pub struct Counted(f64);
+fn one(x: f64) -> Counted {{ COUNT.with(|c| c.set(c.get() + 1)); Counted(x) }}
+impl Add for Counted {{ type Output = Counted; fn add(self, o: Counted) -> Counted {{ one(self.0 + o.0) }} }}
+impl Sub for Counted {{ type Output = Counted; fn sub(self, o: Counted) -> Counted {{ one(self.0 - o.0) }} }}
+impl Mul for Counted {{ type Output = Counted; fn mul(self, o: Counted) -> Counted {{ one(self.0 * o.0) }} }}
+impl Div for Counted {{ type Output = Counted; fn div(self, o: Counted) -> Counted {{ one(self.0 / o.0) }} }}
+impl Mul<Counted> for f64 {{ type Output = Counted; fn mul(self, o: Counted) -> Counted {{ one(self * o.0) }} }}
+impl Div<Counted> for f64 {{ type Output = Counted; fn div(self, o: Counted) -> Counted {{ one(self / o.0) }} }}
+impl Neg for Counted {{ type Output = Counted; fn neg(self) -> Counted {{ one(-self.0) }} }}
+mod elementary {{ use super::*; pub fn sqrt(x: Counted) -> Counted {{ one(x.0.sqrt()) }} }}
+{constants}
+{kernel}
+fn main() {{
+    let c = |x: f64| Counted(x);
+    let _ = bar_length_gradient(&[c(100.0), c(75.0), c(75.0), c(111.8)], &[c(0.1), c(0.99), c(0.2), c(0.98)], &[c(0.01); 8]);
+    println!(\"{{}}\", COUNT.with(|c| c.get()));
+}}"
+    );
+    let folder = tools::folder("counted");
+    tools::write(&folder.join("main.rs"), &main);
+    let binary = folder.join("run");
+    tools::run(
+        Command::new(rustc)
+            .current_dir(&folder)
+            .args(["--edition", "2024", "-A", "dead_code", "main.rs", "-o"])
+            .arg(&binary),
+    );
+    let ran: usize = tools::run(&mut Command::new(&binary))
+        .trim()
+        .parse()
+        .expect("a number");
+    let _ = std::fs::remove_dir_all(&folder);
+    println!("{ran} operations");
+    assert_eq!(ran, counted.arithmetic());
+    assert!(ran <= 70, "{ran}");
+}
+
+/// The code that the benches run is what the printers write. `ABBE_WRITE_BENCHES=1` writes it anew.
+#[test]
+fn the_benches_run_what_is_printed() {
+    let options = Options {
+        gradient: true,
+        ..Options::default()
+    };
+    let equation = chapter5(&options);
+    for (language, name) in [(Language::Rust, "emitted.rs"), (Language::C, "emitted.c")] {
+        let printed = equation.print(language).expect("code");
+        let path = std::path::Path::new(env!("CARGO_MANIFEST_DIR"))
+            .join("benches")
+            .join(name);
+        if std::env::var("ABBE_WRITE_BENCHES").is_ok() {
+            tools::write(&path, &printed);
+        }
+        let kept = std::fs::read_to_string(&path).unwrap_or_default();
+        assert_eq!(without_rounding(&kept), without_rounding(&printed), "{name}");
+    }
+}
+
+/// The printed Rust needs nothing of `std` but the functions in its last module.
+#[test]
+fn the_printed_rust_builds_without_std() {
+    let rustc = std::env::var("RUSTC").unwrap_or_else(|_| "rustc".to_string());
+    let Some(rustc) = tools::find("forms::without_std", &[&rustc], &["--version"]) else {
+        return;
+    };
+    let options = Options {
+        gradient: true,
+        rotation: Some(Rotation::Exact),
+        ..Options::default()
+    };
+    let printed = chapter5(&options).print(Language::Rust).expect("code");
+    let end = printed.find("/// What `core` lacks").expect("the last module");
+    let stub = |name: &str| format!("pub fn {name}(x: f64) -> f64 {{ x }} ");
+    let stubs: String = ["sqrt", "sin", "cos"].map(stub).concat();
+    let text = format!(
+        "#![no_std]\n#![deny(warnings)]\n{}mod elementary {{ {stubs} }}\n",
+        &printed[..end]
+    );
+    let folder = tools::folder("no-std");
+    tools::write(&folder.join("lib.rs"), &text);
+    let arguments = [
+        "--edition",
+        "2024",
+        "--crate-type",
+        "lib",
+        "--emit",
+        "metadata",
+        "lib.rs",
+    ];
+    tools::run(Command::new(rustc).current_dir(&folder).args(arguments));
+    let _ = std::fs::remove_dir_all(&folder);
+}

@@ -1,0 +1,14 @@
+//! Integration tests of the crate, one binary.
+
+mod sessions;
+mod support;
+
+mod chain;
+mod compiled;
+mod forms;
+mod operators;
+mod seed000;
+mod seed003;
+mod tools;
+mod topologies;
+mod typeset;

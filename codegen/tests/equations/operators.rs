@@ -1,0 +1,78 @@
+//! Every operator with compound operands on either side, as the nominal coordinates of a ball: the printed code must put its
+//! parentheses where the meaning asks for them.
+
+use abbe_codegen::{Source, Subject};
+use abbe_model::instrument::{Station, socket::Socket};
+use abbe_model::scalar::Nominal;
+
+/// Operands: sums, differences, products, quotients, negations, functions.
+const OPERANDS: usize = 10;
+/// Operators between two operands.
+const OPERATORS: usize = 4;
+/// Expressions in a coordinate.
+const TERMS: usize = 12;
+
+/// All pairs of operands under all operators.
+pub const EXPRESSIONS: usize = OPERANDS * OPERANDS * OPERATORS;
+
+fn operand<N: Nominal>(kind: usize, a: N, b: N) -> N {
+    let hundred = N::constant(100.0);
+    match kind {
+        0 => a + b,
+        1 => a - b,
+        2 => a * b,
+        3 => a / b,
+        4 => -a,
+        5 => -(a - b),
+        6 => (a * a + b * b).sqrt(),
+        7 => (a / hundred).sin_cos().0 * (b - a).sin_cos().1,
+        8 => -((a - b) / hundred).exp(),
+        _ => (a - b).signum() * b,
+    }
+}
+
+fn expression<N: Nominal>(number: usize, [a, b, c, d]: [N; 4]) -> N {
+    // Operands of its own for each expression: a shared one would get a name and stand alone.
+    let own = |x: N, step: f64| x + N::constant(step * (number + 1) as f64);
+    let left = operand(number % OPERANDS, own(a, 0.01), own(b, 0.02));
+    let right = operand(number / OPERANDS % OPERANDS, own(c, 0.03), own(d, 0.04));
+    match number / OPERANDS / OPERANDS {
+        0 => left + right,
+        1 => left - right,
+        2 => left * right,
+        _ => left / right,
+    }
+}
+
+/// One batch of expressions: three coordinates with so many terms each.
+#[derive(Clone, Copy)]
+pub struct Batch(pub usize);
+
+impl Batch {
+    /// Batches that hold all expressions.
+    pub fn all() -> impl Iterator<Item = Batch> {
+        (0..EXPRESSIONS.div_ceil(3 * TERMS)).map(Batch)
+    }
+
+    /// The three coordinates.
+    pub fn coordinates<N: Nominal>(self, lengths: [N; 4]) -> [N; 3] {
+        std::array::from_fn(|coordinate| {
+            let first = (self.0 * 3 + coordinate) * TERMS;
+            let numbers = first..(first + TERMS).min(EXPRESSIONS);
+            // A factor of its own for each, so that no two errors can cancel.
+            let term = |number: usize| {
+                expression(number, lengths) * (lengths[number % 4] + N::constant(number as f64))
+            };
+            numbers.map(term).fold(N::constant(0.25), |sum, term| sum + term)
+        })
+    }
+}
+
+impl Source for Batch {
+    fn subject<N: Nominal>(&self, length: &impl Fn(&str) -> N) -> Subject<N> {
+        Subject::Station(Station::Socket(Socket {
+            ball: self.coordinates(["P", "Q", "U", "V"].map(length)),
+            socket: [N::constant(0.0); 3],
+        }))
+    }
+}

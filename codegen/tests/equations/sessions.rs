@@ -1,0 +1,55 @@
+//! Equations of the sessions that come with the program.
+
+use std::path::PathBuf;
+
+use abbe_codegen::{Equation, Kind, Language, Options, Order, SessionTest};
+use abbe_model::session::read;
+
+fn file(name: &str) -> PathBuf {
+    PathBuf::from(env!("CARGO_MANIFEST_DIR"))
+        .join("../sessions")
+        .join(name)
+}
+
+#[test]
+fn every_test_of_the_bundled_plans() {
+    for chapter in ["chapter4", "chapter5", "chapter6"] {
+        let path = file(&format!("hermle-c600u/{chapter}.toml"));
+        let session = read::session(&path, &read::ReadOptions::default()).expect("a session");
+        for test in &session.tests {
+            let source = SessionTest::new(&session, test).expect("a plan");
+            for order in [Order::Exact, Order::Bilinear, Order::First] {
+                let options = Options {
+                    order,
+                    ..Options::default()
+                };
+                let equation = Equation::of(&session.machine, &source, &session.unknowns, &options);
+                let equation = equation.expect("an equation");
+                assert_eq!(equation.kind, Kind::Length);
+                for language in Language::ALL {
+                    assert!(!equation.print(language).expect("a page").is_empty());
+                }
+            }
+        }
+    }
+}
+
+/// The distance that follows from the bar's length stands in the equation as that expression.
+#[test]
+fn lengths_that_follow_from_the_bar_stay_expressions() {
+    let path = file("hermle-c600u/chapter5.toml");
+    let session = read::session(&path, &read::ReadOptions::default()).expect("a session");
+    let test = session
+        .tests
+        .iter()
+        .find(|test| test.name == "A150")
+        .expect("the test");
+    let source = SessionTest::new(&session, test).expect("a plan");
+    let equation = Equation::of(&session.machine, &source, &session.unknowns, &Options::default());
+    let text = equation
+        .expect("an equation")
+        .print(Language::Text)
+        .expect("text");
+    assert!(text.contains("√(R_e² − R²)"), "{text}");
+    assert!(!text.contains("111.8"), "{text}");
+}

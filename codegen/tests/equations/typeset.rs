@@ -1,0 +1,112 @@
+//! LaTeX through a real engine, without a warning.
+
+use std::fmt::Write;
+use std::process::Command;
+
+use abbe_codegen::{Equation, Language, Options, Order, Symbols};
+use abbe_model::component::{ErrorKind, ErrorName};
+use abbe_model::frames::Rotation;
+
+use crate::support::{Chapter5, eight, hermle};
+use crate::tools;
+use crate::topologies::{AnyBar, CODES, all_errors, machine};
+
+/// Every form of the chapter 5 test, and for every topology the exact length, its first order, and the first order of the
+/// volumetric error.
+fn fragments(language: Language) -> Vec<String> {
+    let mut fragments = Vec::new();
+    let mut add = |equation: Equation| fragments.push(equation.print(language).expect("a fragment"));
+    for rotation in [Rotation::Exact, Rotation::SmallAngle] {
+        for order in [Order::Exact, Order::Bilinear, Order::First] {
+            for symbols in [Symbols::Literature, Symbols::Iso] {
+                let options = Options {
+                    order,
+                    symbols,
+                    rotation: Some(rotation),
+                    unknowns: (0..8).collect(),
+                    ..Options::default()
+                };
+                let bar = Chapter5 { extended: true };
+                add(Equation::of(&hermle(rotation), &bar, &eight(), &options).expect("an equation"));
+            }
+        }
+    }
+    for code in CODES {
+        let machine = machine(code);
+        let errors = all_errors(&machine);
+        let motions: Vec<ErrorName> = errors
+            .iter()
+            .filter(|name| name.kind == ErrorKind::Motion)
+            .cloned()
+            .collect();
+        add(Equation::of(&machine, &AnyBar, &errors, &Options::default()).expect("an equation"));
+        let first = Options {
+            order: Order::First,
+            ..Options::default()
+        };
+        add(Equation::of(&machine, &AnyBar, &errors, &first).expect("an equation"));
+        add(Equation::volumetric(&machine, &motions, &first).expect("an equation"));
+    }
+    fragments
+}
+
+#[test]
+fn latex() {
+    let candidates = ["pdflatex"];
+    let Some(engine) = tools::find("typeset::latex", &candidates, &["--version"]) else {
+        return;
+    };
+    let folder = tools::folder("latex");
+    let mut document = String::from(
+        "\\documentclass{article}\n\\usepackage{amsmath}\n\\usepackage[a4paper,margin=18mm]{geometry}\n\\begin{document}\n",
+    );
+    for fragment in fragments(Language::Latex) {
+        let _ = writeln!(document, "{fragment}\n\\clearpage");
+    }
+    document.push_str("\\end{document}\n");
+    tools::write(&folder.join("all.tex"), &document);
+    let arguments = ["-interaction=nonstopmode", "-halt-on-error", "all.tex"];
+    let output = Command::new(engine)
+        .current_dir(&folder)
+        .args(arguments)
+        .output()
+        .expect("the engine starts");
+    let log = String::from_utf8_lossy(&std::fs::read(folder.join("all.log")).expect("a log")).into_owned();
+    assert!(
+        output.status.success(),
+        "{}",
+        &log[log.len().saturating_sub(3000)..]
+    );
+    let complaints: Vec<&str> = log
+        .lines()
+        .filter(|line| line.contains("Warning") || line.contains("Overfull"))
+        .collect();
+    assert!(
+        complaints.is_empty(),
+        "{} complaints, {:?}",
+        complaints.len(),
+        &complaints[..complaints.len().min(20)]
+    );
+    let _ = std::fs::remove_dir_all(&folder);
+}
+
+/// Typst by the typst compiler, which PyPI has ready-built (the crate itself takes a quarter of an hour of processor time).
+#[test]
+fn typst() {
+    let own = std::env::var("ABBE_PYTHON").unwrap_or_default();
+    let probe = ["-c", "import typst; typst.compile_with_warnings"];
+    let candidates = [own.as_str(), "python3", "/usr/bin/python3"];
+    let Some(python) = tools::find("typeset::typst", &candidates, &probe) else {
+        return;
+    };
+    let folder = tools::folder("typst");
+    let mut document = String::from("#set page(paper: \"a3\", flipped: true, margin: 18mm)\n");
+    for fragment in fragments(Language::Typst) {
+        let _ = writeln!(document, "{fragment}\n#pagebreak()");
+    }
+    tools::write(&folder.join("all.typ"), &document);
+    let script = "import typst\n_, warnings = typst.compile_with_warnings('all.typ', output='all.pdf')\nfor w in warnings: print(w.message)";
+    let complaints = tools::run(Command::new(python).current_dir(&folder).args(["-c", script]));
+    assert!(complaints.trim().is_empty(), "{complaints}");
+    let _ = std::fs::remove_dir_all(&folder);
+}

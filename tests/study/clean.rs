@@ -1,0 +1,27 @@
+//! Sessions without an effect: nothing must be claimed.
+
+use super::judging::tell;
+use super::rates::Rate;
+use super::sessions::{NOISES, run, sessions, told};
+use crate::plant::Kind;
+
+#[test]
+fn nothing_is_claimed_where_nothing_is() {
+    let count = sessions();
+    println!("| noise | an effect claimed | verdict not clean |\n|---|---|---|");
+    for (k, noise) in NOISES.into_iter().enumerate() {
+        let outcomes = run(k * count..(k + 1) * count, |number| {
+            (Kind::ALL[number % Kind::ALL.len()], noise, Vec::new())
+        });
+        let (mut claimed, mut not_clean) = (Rate::default(), Rate::default());
+        for outcome in &outcomes {
+            claimed.count(!outcome.result.effects.is_empty());
+            not_clean.count(outcome.result.verdict != "clean");
+            if told() && outcome.result.verdict != "clean" {
+                println!("{}", tell(outcome, "CLAIM"));
+            }
+        }
+        println!("| {noise:?} | {claimed} | {not_clean} |");
+        assert!(claimed.is_consistent_with_at_most(0.02), "{noise:?}: {claimed}");
+    }
+}

@@ -1,0 +1,137 @@
+//! A result against the answer.
+
+use abbe::identify::results::{EffectName, EffectResult, ModelResult};
+
+use super::rates::Pulls;
+use super::sessions::{Outcome, oracle};
+use crate::plant::{Injected, Named, Shape, from_name, named};
+
+/// A found effect's name in the plant's words.
+pub fn in_plants_words(name: &EffectName) -> Named {
+    Named {
+        component: name.component.clone(),
+        driver: name.driver.clone(),
+        shape: name.shape.clone(),
+        order: name
+            .order
+            .filter(|order| order.fract() == 0.0)
+            .map(|order| order as u32),
+    }
+}
+
+/// Whether a name is that of the injected effect.
+pub fn is(name: &EffectName, truth: &Injected) -> bool {
+    let found = in_plants_words(name);
+    let expected = named(truth);
+    match truth.shape {
+        // A ball that was moved after a test: its place in the tests before or after is a constant of those tests.
+        Shape::Remount { .. } => {
+            found.component == expected.component && found.shape == "constant" && !name.tests.is_empty()
+        }
+        _ => found == expected,
+    }
+}
+
+/// The found effect that is the truth, or has it among what looks the same.
+pub fn found<'r>(effects: &'r [EffectResult], truth: &Injected) -> Option<&'r EffectResult> {
+    effects
+        .iter()
+        .find(|effect| is(&effect.name, truth) || effect.aliases.iter().any(|alias| is(alias, truth)))
+}
+
+/// The members of an alias set (the named effect included) that the plant knows and that are neither in the truth's true class nor within 2 σ
+/// of it.
+pub fn strangers(outcome: &Outcome, effect: &EffectResult, truth: &Injected) -> Vec<Named> {
+    let oracle = oracle(outcome.kind, outcome.noise);
+    let mut strangers: Vec<Named> = std::iter::once(&effect.name)
+        .chain(&effect.aliases)
+        .filter(|name| !is(name, truth))
+        .filter_map(|name| {
+            let name = in_plants_words(name);
+            let other = from_name(&name, truth)?;
+            let share = oracle.explained_share(truth, &other);
+            let behind = oracle.strength_sigma(truth) * (1.0 - share * share).max(0.0).sqrt();
+            (share < 0.95 && behind > 2.0).then_some(name)
+        })
+        .collect();
+    strangers.dedup();
+    strangers
+}
+
+/// Pulls of the machine's errors: (value − truth) / u.
+pub fn pulls(outcome: &Outcome, model: &ModelResult) -> Pulls {
+    let pulls = outcome.draw.truth.piges().filter_map(|(id, value, _)| {
+        let parameter = model.parameters.iter().find(|parameter| parameter.id == id)?;
+        Some((parameter.value - value) / parameter.u)
+    });
+    Pulls(pulls.collect())
+}
+
+/// A name in few letters.
+pub fn short(name: &EffectName) -> String {
+    let order = name.order.map(|order| format!("{order}")).unwrap_or_default();
+    let tests = if name.tests.is_empty() {
+        String::new()
+    } else {
+        format!("[{}]", name.tests.join("+"))
+    };
+    format!("{}~{}:{}{order}{tests}", name.component, name.driver, name.shape)
+}
+
+/// One session in a line.
+pub fn tell(outcome: &Outcome, mark: &str) -> String {
+    let oracle = oracle(outcome.kind, outcome.noise);
+    let noise = match outcome.noise {
+        crate::plant::Noise::White { .. } => "white",
+        crate::plant::Noise::Serial { .. } => "serial",
+        crate::plant::Noise::Wild { .. } => "wild",
+    };
+    let truth: Vec<String> = outcome
+        .draw
+        .truth
+        .effects
+        .iter()
+        .map(|effect| {
+            format!(
+                "{}~{:?}:{:?} x{:.2} ({:.1} sigma)",
+                effect.component,
+                effect.driver,
+                effect.shape,
+                effect.amplitude,
+                oracle.strength_sigma(effect)
+            )
+        })
+        .collect();
+    let found: Vec<String> = outcome
+        .result
+        .effects
+        .iter()
+        .map(|effect| {
+            let aliases: Vec<String> = effect.aliases.iter().take(6).map(short).collect();
+            format!(
+                "{} (p {:.3}, {} aliases: {})",
+                short(&effect.name),
+                effect.p_value,
+                effect.aliases.len(),
+                aliases.join(" ")
+            )
+        })
+        .collect();
+    let result = &outcome.result;
+    format!(
+        "{mark:<5} #{} {:?} {noise} {}\n        {} noise {:.3} memory {:?} rejected {} held out {:.3} -> {:.3}, remainder p {:.3} {:?}, {:.2} s\n        {}",
+        outcome.number,
+        outcome.kind,
+        truth.join(" + "),
+        result.verdict,
+        result.noise_um,
+        result.noise_memory,
+        result.rejected.len(),
+        result.before.heldout_rms_um,
+        result.after.heldout_rms_um,
+        result.remainder.p_value,
+        result.remainder.place,
+        outcome.seconds,
+        found.join("\n        ")
+    )
+}

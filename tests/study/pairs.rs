@@ -1,0 +1,34 @@
+//! Two undeclared effects, each at 5 times the smallest amplitude that an oracle would call significant.
+
+use super::judging::{found, tell};
+use super::rates::Rate;
+use super::sessions::{at_multiple, case, oracle, random, run, sessions, told};
+
+#[test]
+fn both_of_a_pair_are_found() {
+    let outcomes = run(0..sessions(), |number| {
+        let (kind, noise) = case(number);
+        let oracle = oracle(kind, noise);
+        let pair = oracle.random_pair(1.0, &mut random(11, number));
+        let pair = pair.map(|effect| at_multiple(&oracle, &effect, 5.0));
+        (kind, noise, pair.to_vec())
+    });
+    let (mut both, mut one, mut more) = (Rate::default(), Rate::default(), Rate::default());
+    for outcome in &outcomes {
+        let truths = &outcome.draw.truth.effects;
+        let hits = truths
+            .iter()
+            .filter(|truth| found(&outcome.result.effects, truth).is_some())
+            .count();
+        both.count(hits == 2);
+        one.count(hits >= 1);
+        more.count(outcome.result.effects.len() > 2);
+        if told() {
+            println!("{}", tell(outcome, ["NONE", "ONE", "ok"][hits]));
+        }
+    }
+    println!(
+        "| pairs at 5 times | |\n|---|---|\n| both found | {both} |\n| at least one | {one} |\n| more than two claimed | {more} |"
+    );
+    assert!(both.is_consistent_with_at_least(0.90), "{both}");
+}

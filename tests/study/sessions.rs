@@ -1,0 +1,136 @@
+//! Sessions from the plant, and trace run on their files.
+
+use std::collections::HashMap;
+use std::sync::{Arc, Mutex, OnceLock};
+use std::time::Instant;
+
+use abbe::identify::results::TraceResult;
+use abbe::identify::trace::{TraceOptions, trace};
+use abbe::model::session::read::{ReadOptions, session};
+use rand::SeedableRng;
+use rand_pcg::Pcg64Mcg;
+use rayon::prelude::*;
+
+use crate::plant::{Draw, Injected, Kind, Noise, Oracle, Recipe};
+
+/// The noises of a study.
+pub const NOISES: [Noise; 3] = [
+    Noise::White { sigma_um: 0.3 },
+    Noise::Serial {
+        sigma_um: 0.3,
+        coefficient: 0.8,
+    },
+    Noise::Wild {
+        sigma_um: 0.3,
+        share: 0.01,
+    },
+];
+
+/// Standard deviations of trace's own level of significance, 1 % two-sided.
+pub const LEVEL: f64 = 2.5758;
+
+/// Sessions a kind in a study: `ABBE_STUDY`, or few.
+pub fn sessions() -> usize {
+    number("ABBE_STUDY").unwrap_or(16)
+}
+
+/// Whether every session is to be told.
+pub fn told() -> bool {
+    number("ABBE_STUDY_TOLD").is_some()
+}
+
+fn number(name: &str) -> Option<usize> {
+    std::env::var(name).ok().and_then(|text| text.parse().ok())
+}
+
+/// One session of a study: kinds of session and of noise in turn.
+pub fn case(number: usize) -> (Kind, Noise) {
+    let kinds = Kind::ALL.len();
+    (Kind::ALL[number % kinds], NOISES[number / kinds % NOISES.len()])
+}
+
+/// Random choices of one session, apart from its noise.
+pub fn random(study: u64, number: usize) -> Pcg64Mcg {
+    Pcg64Mcg::seed_from_u64(study * 1_000_003 + number as u64)
+}
+
+/// The oracle of a kind of session and noise, made once.
+pub fn oracle(kind: Kind, noise: Noise) -> Arc<Oracle> {
+    type Shared = Mutex<HashMap<String, Arc<OnceLock<Arc<Oracle>>>>>;
+    static ORACLES: OnceLock<Shared> = OnceLock::new();
+    let key = format!("{kind:?} {noise:?}");
+    let place = ORACLES
+        .get_or_init(Shared::default)
+        .lock()
+        .unwrap()
+        .entry(key)
+        .or_default()
+        .clone();
+    place
+        .get_or_init(|| Arc::new(Oracle::new(&Recipe::new(kind, 0).noise(noise))))
+        .clone()
+}
+
+/// The effect at a multiple of the smallest amplitude that its oracle would call significant at trace's own level.
+pub fn at_multiple(oracle: &Oracle, effect: &Injected, factor: f64) -> Injected {
+    effect.with_amplitude(factor * oracle.smallest_significant_amplitude(effect, LEVEL))
+}
+
+/// A session as trace saw it.
+pub struct Outcome {
+    /// Its number in the study.
+    pub number: usize,
+    /// Its kind.
+    pub kind: Kind,
+    /// Its noise.
+    pub noise: Noise,
+    /// The readings, with the answer.
+    pub draw: Draw,
+    /// What trace reports.
+    pub result: TraceResult,
+    /// How long it took.
+    pub seconds: f64,
+}
+
+/// Runs a study: for each number the kind, the noise and the effects; one session after the other, each on all cores.
+pub fn run(
+    numbers: std::ops::Range<usize>,
+    make: impl Fn(usize) -> (Kind, Noise, Vec<Injected>) + Sync,
+) -> Vec<Outcome> {
+    numbers
+        .into_par_iter()
+        .map(|number| {
+            let (kind, noise, effects) = make(number);
+            let oracle = oracle(kind, noise);
+            let recipe = Recipe {
+                effects,
+                ..Recipe::new(kind, 7000 + number as u64)
+            }
+            .noise(noise);
+            let draw = recipe.draw_on(&oracle.plan);
+            let (result, seconds) = traced(&draw);
+            Outcome {
+                number,
+                kind,
+                noise,
+                draw,
+                result,
+                seconds,
+            }
+        })
+        .collect()
+}
+
+/// Trace on the files of a draw and on nothing else.
+fn traced(draw: &Draw) -> (TraceResult, f64) {
+    let folder = tempfile::tempdir().unwrap();
+    draw.write(folder.path()).unwrap();
+    if let Some(number) = number("ABBE_STUDY_KEEP") {
+        draw.write(&std::env::temp_dir().join(format!("abbe-study-{number}")))
+            .unwrap();
+    }
+    let start = Instant::now();
+    let read = session(&folder.path().join("session.toml"), &ReadOptions::default()).unwrap();
+    let found = trace(&read, &TraceOptions::default(), &|_| true).unwrap();
+    (found.result, start.elapsed().as_secs_f64())
+}

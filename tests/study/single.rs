@@ -1,0 +1,115 @@
+//! One undeclared effect at 5 and at 2 times the smallest amplitude that an oracle would call significant.
+
+use super::judging::{found, is, pulls, strangers, tell};
+use super::rates::{Pulls, Rate};
+use super::sessions::{Outcome, at_multiple, case, oracle, random, run, sessions, told};
+use crate::plant::named;
+
+fn study(factor: f64) -> Vec<Outcome> {
+    run(0..sessions(), |number| {
+        let (kind, noise) = case(number);
+        let oracle = oracle(kind, noise);
+        let effect = oracle.random_seeable(1.0, &mut random(factor as u64, number));
+        let effect = at_multiple(&oracle, &effect, factor);
+        (kind, noise, vec![effect])
+    })
+}
+
+#[derive(Default)]
+struct Tally {
+    found: Rate,
+    named_first: Rate,
+    more: Rate,
+    strange: Rate,
+    alone: Rate,
+    held_out: Vec<f64>,
+    before: Pulls,
+    after: Pulls,
+    seconds: f64,
+}
+
+fn tally(outcomes: &[Outcome]) -> Tally {
+    let mut tally = Tally::default();
+    for outcome in outcomes {
+        let truth = &outcome.draw.truth.effects[0];
+        let effects = &outcome.result.effects;
+        let hit = found(effects, truth);
+        tally.found.count(hit.is_some());
+        tally.alone.count(hit.is_some() && effects.len() == 1);
+        tally.more.count(effects.len() > 1);
+        if let Some(effect) = hit {
+            tally.named_first.count(is(&effect.name, truth));
+            let strangers = strangers(outcome, effect, truth);
+            tally.strange.count(!strangers.is_empty());
+            if told() && !strangers.is_empty() {
+                println!("STRANGE in {:?}: {strangers:?}", named(truth));
+            }
+        }
+        let best =
+            oracle(outcome.kind, outcome.noise).heldout_rms_um(&outcome.draw, &outcome.draw.truth.effects);
+        tally.held_out.push(outcome.result.after.heldout_rms_um / best);
+        tally.before.0.extend(pulls(outcome, &outcome.result.before).0);
+        tally.after.0.extend(pulls(outcome, &outcome.result.after).0);
+        tally.seconds = tally.seconds.max(outcome.seconds);
+        if told() {
+            let mark = match (hit.is_some(), effects.len()) {
+                (true, 1) => "ok",
+                (true, _) => "MORE",
+                (false, 0) => "NONE",
+                (false, _) => "WRONG",
+            };
+            let off = outcome.result.after.heldout_rms_um / best - 1.0;
+            println!(
+                "{} held out {:+.1} % of the oracle's; pulls {:.1?}",
+                tell(outcome, mark),
+                100.0 * off,
+                pulls(outcome, &outcome.result.after).0
+            );
+        }
+    }
+    tally
+}
+
+fn print(factor: f64, tally: &Tally) {
+    let mut held_out = tally.held_out.clone();
+    held_out.sort_by(f64::total_cmp);
+    let mut near = Rate::default();
+    held_out
+        .iter()
+        .for_each(|ratio| near.count((ratio - 1.0).abs() <= 0.05));
+    println!("| single effect at {factor} times | |\n|---|---|");
+    println!("| truth named or in its alias set | {} |", tally.found);
+    println!("| the same and nothing else claimed | {} |", tally.alone);
+    println!("| truth named first | {} |", tally.named_first);
+    println!("| more than one effect claimed | {} |", tally.more);
+    println!("| alias sets with a stranger | {} |", tally.strange);
+    println!("| held-out rms within 5 % of the oracle's | {near} |");
+    println!(
+        "| held-out rms over the oracle's, median and 95 % | {:.3}, {:.3} |",
+        held_out[held_out.len() / 2],
+        held_out[held_out.len() * 95 / 100]
+    );
+    for (word, pulls) in [("before", &tally.before), ("after", &tally.after)] {
+        println!(
+            "| pulls of the machine's errors {word}: rms, beyond 3 | {:.2}, {:.1} % of {} |",
+            pulls.rms(),
+            100.0 * pulls.beyond(3.0),
+            pulls.0.len()
+        );
+    }
+    println!("| slowest session | {:.1} s |", tally.seconds);
+}
+
+#[test]
+fn an_effect_at_five_times_the_smallest_is_found() {
+    let tally = tally(&study(5.0));
+    print(5.0, &tally);
+    assert!(tally.found.is_consistent_with_at_least(0.95), "{}", tally.found);
+}
+
+#[test]
+fn an_effect_at_twice_the_smallest_is_mostly_found() {
+    let tally = tally(&study(2.0));
+    print(2.0, &tally);
+    assert!(tally.found.is_consistent_with_at_least(0.60), "{}", tally.found);
+}

@@ -1,0 +1,183 @@
+//! The loop, closed: on sessions of an independent simulator and on real robots. The program gets the readings; what is in them stands in
+//! other files, or was found by others.
+
+use abbe::identify::results::{EffectName, TraceResult};
+use abbe::identify::trace::{TraceOptions, trace};
+use abbe::model::session::Session;
+use abbe::model::session::read::{self, ReadOptions};
+
+use super::data::data;
+use super::robots::session_on_public_data;
+use super::{abbe, ready, text};
+
+fn traced(session: &Session, options: &TraceOptions) -> TraceResult {
+    trace(session, options, &|_| true).unwrap().result
+}
+
+/// A session of the samples that lie beside the public data.
+fn sample(test: &str, name: &str) -> Option<Session> {
+    let folder = data(test, ".")?.join("../sample").join(name);
+    Some(read::session(&folder.join("session.toml"), &ReadOptions::default()).unwrap())
+}
+
+fn is(effect: &EffectName, component: &str, shape: &str, order: Option<f64>) -> bool {
+    effect.component == component && effect.shape == shape && effect.order == order
+}
+
+/// Whether an effect is named, or stands among the aliases of a named one.
+fn named_or_alias(result: &TraceResult, wanted: &dyn Fn(&EffectName) -> bool) -> bool {
+    result
+        .effects
+        .iter()
+        .any(|effect| wanted(&effect.name) || effect.aliases.iter().any(wanted))
+}
+
+#[test]
+fn a_clean_session_is_called_clean() {
+    let Some(session) = sample("a_clean_session_is_called_clean", "rotary-clean") else {
+        return;
+    };
+    let result = traced(&session, &TraceOptions::default());
+    assert_eq!(result.verdict, "clean");
+    assert!(result.effects.is_empty() && !result.remainder.structured);
+    assert_eq!(result.before.parameters, result.after.parameters);
+}
+
+#[test]
+fn an_axial_wobble_is_found_or_stands_among_what_looks_the_same() {
+    let name = "an_axial_wobble_is_found_or_stands_among_what_looks_the_same";
+    let Some(session) = sample(name, "rotary-axial-h3") else {
+        return;
+    };
+    let result = traced(&session, &TraceOptions::default());
+    assert_eq!(result.verdict, "explained");
+    assert_eq!(result.effects.len(), 1);
+    assert!(named_or_alias(&result, &|effect| is(
+        effect,
+        "EZC",
+        "harmonic",
+        Some(3.0)
+    )));
+    // One ball radius cannot tell it from a tilt of one order less (EFFECTS, METHOD).
+    assert!(named_or_alias(&result, &|effect| is(
+        effect,
+        "EAC",
+        "harmonic",
+        Some(2.0)
+    )));
+    assert!(result.after.heldout_rms_um < 0.32 && result.before.heldout_rms_um > 0.6);
+}
+
+#[test]
+fn lost_motion_is_found_with_its_size() {
+    let Some(session) = sample("lost_motion_is_found_with_its_size", "circle-backlash-y") else {
+        return;
+    };
+    let result = traced(&session, &TraceOptions::default());
+    assert_eq!(result.verdict, "explained");
+    assert_eq!(result.effects.len(), 1);
+    assert!(is(&result.effects[0].name, "EYY", "backlash", None));
+    let lost = &result.effects[0].parameters[0];
+    // 4 µm were put in.
+    assert!((lost.value - 4.0).abs() < 4.0 * lost.u, "{lost:?}");
+}
+
+#[test]
+fn the_bundled_session_is_explained_at_the_command_line() {
+    let folder = tempfile::tempdir().unwrap();
+    let (json, next) = (folder.path().join("trace.json"), folder.path().join("next.toml"));
+    let session = ready("hermle-c600u/measured/session.toml");
+    let outcome = abbe(&[
+        "trace",
+        text(&session),
+        "-q",
+        "--json",
+        text(&json),
+        "--write",
+        text(&next),
+    ]);
+    assert!(
+        outcome.status.success(),
+        "{}",
+        String::from_utf8_lossy(&outcome.stderr)
+    );
+    assert!(String::from_utf8_lossy(&outcome.stdout).starts_with("Verdict: explained"));
+    let result: serde_json::Value = serde_json::from_str(&std::fs::read_to_string(&json).unwrap()).unwrap();
+    for field in ["verdict", "noise_um", "before", "after", "effects", "remainder"] {
+        assert!(!result[field].is_null(), "no field {field}");
+    }
+    for field in [
+        "component",
+        "driver",
+        "shape",
+        "order",
+        "parameters",
+        "p_value",
+        "rms_gain_um",
+        "aliases",
+    ] {
+        assert!(
+            !result["effects"][0][field].is_null(),
+            "no field {field} in an effect"
+        );
+    }
+    let written = std::fs::read_to_string(&next).unwrap();
+    assert!(
+        written.contains("[[effect]]") && written.contains("EZC"),
+        "{written}"
+    );
+}
+
+#[test]
+fn ur10_shows_the_seventeenth_harmonic_of_its_second_joint_first() {
+    let name = "ur10_shows_the_seventeenth_harmonic_of_its_second_joint_first";
+    let Some(session) = session_on_public_data(name, "ur10/session.toml", "landgraf_ur10") else {
+        return;
+    };
+    let options = TraceOptions {
+        max_effects: Some(8),
+        draws: 99,
+        ..TraceOptions::default()
+    };
+    let result = traced(&session, &options);
+    let first = &result.effects[0].name;
+    assert_eq!(
+        (first.component.as_str(), first.shape.as_str()),
+        ("EBJ2", "harmonic"),
+        "{first:?}"
+    );
+    assert!((first.order.unwrap() - 17.0).abs() <= 1.0, "{first:?}");
+    let held_out = result.after.heldout_rms_3d_um.unwrap() * 1e-3;
+    println!(
+        "UR10 with {} effects: {held_out:.4} mm held out",
+        result.effects.len()
+    );
+    assert!(held_out <= 0.25, "{held_out}");
+}
+
+#[test]
+fn kuka_gives_under_gravity_and_has_no_harmonics() {
+    let name = "kuka_gives_under_gravity_and_has_no_harmonics";
+    let Some(session) = session_on_public_data(name, "kuka-iiwa14/session.toml", "mukca") else {
+        return;
+    };
+    let result = traced(&session, &TraceOptions::default());
+    assert!(
+        result
+            .effects
+            .iter()
+            .any(|effect| effect.name.driver == "gravity")
+    );
+    assert!(
+        result
+            .effects
+            .iter()
+            .all(|effect| effect.name.shape != "harmonic")
+    );
+    let held_out = result.after.heldout_rms_3d_um.unwrap() * 1e-3;
+    println!(
+        "KUKA with {} effects: {held_out:.4} mm held out",
+        result.effects.len()
+    );
+    assert!(held_out <= 0.185, "{held_out}");
+}
