@@ -2,11 +2,14 @@
 
 use super::judging::tell;
 use super::rates::Rate;
-use super::sessions::{NOISES, run, sessions, told};
+use super::sessions::{NOISES, run, sessions, skipped, told};
 use crate::plant::Kind;
 
 #[test]
 fn nothing_is_claimed_where_nothing_is() {
+    if skipped("nothing_is_claimed_where_nothing_is") {
+        return;
+    }
     let count = sessions();
     println!("| noise | an effect claimed | verdict not clean |\n|---|---|---|");
     for (k, noise) in NOISES.into_iter().enumerate() {

@@ -29,9 +29,18 @@ pub const NOISES: [Noise; 3] = [
 /// Standard deviations of trace's own level of significance, 1 % two-sided.
 pub const LEVEL: f64 = 2.5758;
 
-/// Sessions a kind in a study: `ABBE_STUDY`, or few.
+/// Sessions a kind in a study, as `ABBE_STUDY` says; without it no study is made.
 pub fn sessions() -> usize {
-    number("ABBE_STUDY").unwrap_or(16)
+    number("ABBE_STUDY").unwrap_or(0)
+}
+
+/// Whether a study is not asked for; says so.
+pub fn skipped(study: &str) -> bool {
+    let skipped = sessions() == 0;
+    if skipped {
+        println!("skipped: {study} (ABBE_STUDY gives the number of sessions)");
+    }
+    skipped
 }
 
 /// Whether every session is to be told.

@@ -2,7 +2,7 @@
 
 use super::judging::{found, is, pulls, strangers, tell};
 use super::rates::{Pulls, Rate};
-use super::sessions::{Outcome, at_multiple, case, oracle, random, run, sessions, told};
+use super::sessions::{Outcome, at_multiple, case, oracle, random, run, sessions, skipped, told};
 use crate::plant::named;
 
 fn study(factor: f64) -> Vec<Outcome> {
@@ -102,6 +102,9 @@ fn print(factor: f64, tally: &Tally) {
 
 #[test]
 fn an_effect_at_five_times_the_smallest_is_found() {
+    if skipped("an_effect_at_five_times_the_smallest_is_found") {
+        return;
+    }
     let tally = tally(&study(5.0));
     print(5.0, &tally);
     assert!(tally.found.is_consistent_with_at_least(0.95), "{}", tally.found);
@@ -109,6 +112,9 @@ fn an_effect_at_five_times_the_smallest_is_found() {
 
 #[test]
 fn an_effect_at_twice_the_smallest_is_mostly_found() {
+    if skipped("an_effect_at_twice_the_smallest_is_mostly_found") {
+        return;
+    }
     let tally = tally(&study(2.0));
     print(2.0, &tally);
     assert!(tally.found.is_consistent_with_at_least(0.60), "{}", tally.found);
