@@ -94,10 +94,7 @@ fn what_cannot_be_asked_is_said_and_fails() {
             "takes two effects",
         ),
         (vec!["plan", &session, "--noise-um", "0"], "positive"),
-        (
-            vec!["plan", &session, "--improve", "--bars-mm", "0"],
-            "no length",
-        ),
+        (vec!["plan", &session, "--improve", "--bars-mm", "0"], "no length"),
         (
             vec!["plan", &session, "--improve", "--bars-mm", "20"],
             "nothing on the menu",

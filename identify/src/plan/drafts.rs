@@ -12,6 +12,8 @@ use super::sweep::{Sweep, sweep_of};
 
 /// Least radius about a swept axis that a test is made at, mm: nearer, the bar hardly moves.
 const LEAST_RADIUS_MM: f64 = 10.0;
+/// Shortest bar with which linear axes follow, mm: the shortest of the kits, less what calibration may take off. Nearer, the cups touch.
+const LEAST_FOLLOWING_MM: f64 = 49.0;
 /// A ball nearer than this to one that is mounted already is that one, mm.
 const SAME_PLACE_MM: f64 = 0.5;
 
@@ -73,9 +75,14 @@ pub(super) fn drafts(session: &Session, menu: &Menu, last: &Test) -> Vec<Draft> 
 }
 
 /// The bar for tests in which linear axes follow, where its length changes nothing but how far the balls are apart: the shortest that keeps
-/// them 100 mm apart, else the longest.
+/// them 100 mm apart, else the longest that keeps their cups apart.
 fn following_bar(menu: &Menu) -> Option<f64> {
-    let bars = || menu.bars_mm.iter().copied();
+    let bars = || {
+        menu.bars_mm
+            .iter()
+            .copied()
+            .filter(|bar| *bar >= LEAST_FOLLOWING_MM)
+    };
     bars()
         .filter(|bar| *bar >= 99.0)
         .min_by(f64::total_cmp)

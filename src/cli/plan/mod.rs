@@ -24,6 +24,9 @@ pub struct PlanArguments {
     /// Standard uncertainty of every set-up length, in place of the session's.
     #[arg(long, value_name = "UM")]
     setup_um: Option<f64>,
+    /// One spindle ball stays mounted for all tests, whatever the session says.
+    #[arg(long)]
+    one_spindle_ball: bool,
     /// Take the planned movements even where there are data.
     #[arg(long)]
     planned: bool,
@@ -53,6 +56,12 @@ pub fn run(arguments: &PlanArguments) -> Result<(), Failure> {
     let mut session = read_session(&arguments.session)?;
     if let Some(u_um) = arguments.setup_um {
         set_priors(&mut session, positive("--setup-um", u_um)?);
+    }
+    if arguments.one_spindle_ball {
+        session
+            .tests
+            .iter_mut()
+            .for_each(|test| test.spindle_setup = "all tests".to_string());
     }
     let noise_mm = arguments
         .noise_um
