@@ -37,7 +37,7 @@ fn the_screen_and_the_json_say_the_same() {
     }
     assert!(screen.contains("A150 contributes all of EB0A, EC0A"));
     assert!(
-        screen.contains("EC0A cannot be told from y of the spindle ball in A150: 1 : −0.54"),
+        screen.contains("EC0A cannot be told from y of the spindle ball in A150: 1 arcsec : −0.54 um"),
         "{screen}"
     );
     assert!(
@@ -100,6 +100,9 @@ fn what_cannot_be_asked_is_said_and_fails() {
             "nothing on the menu",
         ),
         (vec!["plan", &session, "--clearance-mm", "1,2"], "six lengths"),
+        (vec!["plan", &session, "--improve", "--ranges", "1.5"], "no share"),
+        (vec!["plan", &session, "--improve", "--feeds", "0"], "no multiple"),
+        (vec!["plan", &session, "--improve", "--setup-min=-1"], "0 or more"),
     ] {
         let output = abbe(&arguments);
         let message = String::from_utf8_lossy(&output.stderr).to_string();

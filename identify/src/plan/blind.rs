@@ -15,6 +15,8 @@ const NEGLIGIBLE: f64 = 1e-5;
 /// Condition index from which a dependency is named: moderate from 10, strong from 30 (Belsley, Kuh & Welsch, Regression Diagnostics,
 /// 1980, ch. 3).
 const NAMED_FROM: f64 = 10.0;
+/// Things that a combination names in words.
+const MOST_NAMED: usize = 5;
 /// The verb of a combination that no reading sees.
 const CANNOT: &str = "cannot be told from";
 /// Share of the largest coefficient below which an unknown is left out of a near dependency.
@@ -41,12 +43,24 @@ fn called<'i>(list: &[Parameter], id: &'i str) -> (String, Option<&'i str>) {
     )
 }
 
-/// A combination in words: what cannot be told from what, and in which proportion; one thing in several tests is named once.
+/// A combination in words: what cannot be told from what, and in which proportion, with units where they differ. One thing in several tests is
+/// named once, and of a long combination only the first.
 fn in_words(list: &[Parameter], combination: &[(String, f64)], verb: &str) -> String {
+    let unit_of = |id: &str| {
+        list.iter()
+            .find(|parameter| parameter.id == id)
+            .map_or("", |parameter| parameter.unit.name.as_str())
+    };
+    let first_unit = combination.first().map_or("", |(id, _)| unit_of(id));
+    let mixed = combination.iter().any(|(id, _)| unit_of(id) != first_unit);
     let mut things: Vec<(String, Vec<&str>, String)> = Vec::new();
     for (id, value) in combination {
         let (thing, group) = called(list, id);
-        let value = short(*value);
+        let value = if mixed {
+            format!("{} {}", short(*value), unit_of(id))
+        } else {
+            short(*value)
+        };
         match things
             .iter_mut()
             .find(|(other, groups, v)| *other == thing && *v == value && !groups.is_empty())
@@ -55,6 +69,12 @@ fn in_words(list: &[Parameter], combination: &[(String, f64)], verb: &str) -> St
             None => things.push((thing, group.into_iter().collect(), value)),
         }
     }
+    // One more than is named is named too: it takes no more room than to say so.
+    let unnamed = match things.len() {
+        count if count > MOST_NAMED + 1 => count - MOST_NAMED,
+        _ => 0,
+    };
+    things.truncate(things.len() - unnamed);
     let mut words = things.iter().map(|(thing, groups, _)| match groups.as_slice() {
         [] => thing.clone(),
         [one] => format!("{thing} in {one}"),
@@ -63,7 +83,11 @@ fn in_words(list: &[Parameter], combination: &[(String, f64)], verb: &str) -> St
     let proportion: Vec<&str> = things.iter().map(|(_, _, value)| value.as_str()).collect();
     let first = words.next().unwrap_or_default();
     let others: Vec<String> = words.collect();
-    format!("{first} {verb} {}: {}", others.join(", "), proportion.join(" : "))
+    let (others, proportion) = (others.join(", "), proportion.join(" : "));
+    match unnamed {
+        0 => format!("{first} {verb} {others}: {proportion}"),
+        _ => format!("{first} {verb} {others} and {unnamed} more together: {proportion} : …"),
+    }
 }
 
 /// Two decimals, or two digits of a small number.

@@ -1,8 +1,8 @@
 //! The menu of ball-bar tests from which a next one is proposed: what may be varied, and which of it the machine can do.
 //!
 //! An entry sweeps one rotary axis while the other ball stands on that axis (at the foot of the circle or beside it, as the bar's length
-//! demands), or lets the linear axes keep the bar radial, tangential or axial. Both directions and the whole range are always taken: less
-//! never sees more. What an axis' travel forbids, or a bar cannot reach, is not on the menu.
+//! demands), or lets the linear axes keep the bar radial, tangential or axial. A part of the range, or one direction, never sees more than
+//! the whole: they are tried where gain is judged by the minute. What an axis' travel forbids, or a bar cannot reach, is not on the menu.
 
 use abbe_model::effect::{Component, Driver, Effect, Shape};
 use abbe_model::instrument::Station;
@@ -26,6 +26,10 @@ pub struct Menu {
     pub standing_deg: Vec<f64>,
     /// Feeds, as multiples of that of the session's tests; more than one where something depends on it (see [`Menu::for_effects`]).
     pub feeds: Vec<f64>,
+    /// Shares of the swept range, about its middle.
+    pub ranges: Vec<f64>,
+    /// Whether each run comes back: `true` both ways, `false` one way.
+    pub both_directions: Vec<bool>,
     /// Whether linear axes may follow.
     pub follow: bool,
     /// Whether a test may leave the spindle ball mounted from the last test before it.
@@ -49,6 +53,8 @@ impl Default for Menu {
             heights_mm: vec![0.0, 50.0, 100.0, 200.0],
             standing_deg: vec![0.0, 90.0, -90.0, 180.0],
             feeds: vec![1.0],
+            ranges: vec![1.0],
+            both_directions: vec![true],
             follow: true,
             keep_spindle_ball: true,
             reach_mm: super::BAR_TRAVEL_MM,
