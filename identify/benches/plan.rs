@@ -28,16 +28,17 @@ fn large_plan() -> Session {
         machine.canonicalize().expect("the ready machine")
     );
     for number in 0..10 {
-        let height = 10 * number;
         let setup = number % 2;
-        let bar = 100.0_f64.hypot(60.0);
+        let height = 50 * setup;
+        let above = 60 + 4 * number;
+        let bar = 100.0_f64.hypot(f64::from(above));
         let _ = write!(
             text,
             "[[test]]\nname = \"T{number}\"\nbar_mm = {bar}\nworkpiece_ball_mm = [0, 100, {height}]\n\
-             spindle_ball_mm = [0, 0, {}]\nsetup = \"P{setup}\"\nspindle_setup = \"S{setup}\"\n\
+             spindle_ball_mm = [0, 0, 0]\nat = {{ z_mm = {} }}\nsetup = \"P{setup}\"\nspindle_setup = \"S{setup}\"\n\
              workpiece_ball_u_um = [2, 2, 2]\nspindle_ball_u_um = [1, 1, 1]\nbar_u_um = 0.5\n\
              sweep = {{ axis = \"C\", from_deg = 0, to_deg = 359.28, step_deg = 0.72, runs = 1, both_directions = true }}\n",
-            height + 60,
+            height + above,
         );
     }
     for component in ["EXC", "EYC", "EZC", "ECC"] {
@@ -66,13 +67,16 @@ fn plans(criterion: &mut Criterion) {
     );
     let mut group = criterion.benchmark_group("plan");
     group.sample_size(10).measurement_time(Duration::from_secs(10));
-    group.bench_function("analyse/10x1000x62", |bench| {
-        bench.iter(|| analyse(black_box(&large), &options).expect("an analysis"));
-    });
+    for effects in [false, true] {
+        options.effects = effects;
+        let words = if effects { "with" } else { "without" };
+        group.bench_function(format!("analyse/10x1000x62 {words} effects"), |bench| {
+            bench.iter(|| analyse(black_box(&large), &options).expect("an analysis"));
+        });
+    }
 
     let chapter5 =
         read(&sessions().join("chapter5.toml"), &ReadOptions::default()).expect("the ready session");
-    options.effects = true;
     group.bench_function("analyse/chapter5 with effects", |bench| {
         bench.iter(|| analyse(black_box(&chapter5), &options).expect("an analysis"));
     });
