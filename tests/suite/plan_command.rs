@@ -100,7 +100,10 @@ fn what_cannot_be_asked_is_said_and_fails() {
             "nothing on the menu",
         ),
         (vec!["plan", &session, "--clearance-mm", "1,2"], "six lengths"),
-        (vec!["plan", &session, "--improve", "--ranges", "1.5"], "no share"),
+        (
+            vec!["plan", &session, "--improve", "--sweep-shares", "1.5"],
+            "no share",
+        ),
         (vec!["plan", &session, "--improve", "--feeds", "0"], "no multiple"),
         (vec!["plan", &session, "--improve", "--setup-min=-1"], "0 or more"),
     ] {
@@ -124,4 +127,28 @@ fn sweeps_can_shrink_until_an_uncertainty_doubles() {
         let least = range["least"][1].as_f64().unwrap() - range["least"][0].as_f64().unwrap();
         assert!(least > 0.0 && least < planned, "{range}");
     }
+}
+
+#[test]
+fn a_test_beyond_the_travel_of_the_sensor_is_warned_of() {
+    let folder = tempfile::tempdir().unwrap();
+    let machine = ready("hermle-c600u/machine.toml");
+    std::fs::copy(machine, folder.path().join("machine.toml")).unwrap();
+    let text = std::fs::read_to_string(chapter_5()).unwrap();
+    // Two millimetres farther along a bar that lies askew by 48° are 1.5 mm of its length.
+    let farther = text.replace("\"-sqrt(R_e^2 - R^2)\"", "\"-sqrt(R_e^2 - R^2) - 2\"");
+    assert_ne!(text, farther);
+    let file = folder.path().join("session.toml");
+    std::fs::write(&file, farther).unwrap();
+    let warnings = |more: &[&str]| {
+        let mut arguments = vec!["plan", super::text(&file), "--no-effects"];
+        arguments.extend(more);
+        String::from_utf8(abbe(&arguments).stderr).unwrap()
+    };
+    assert!(
+        warnings(&[]).contains("A150: the balls come 1.5"),
+        "{}",
+        warnings(&[])
+    );
+    assert!(!warnings(&["--reach-mm", "2"]).contains("A150"));
 }

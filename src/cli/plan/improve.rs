@@ -45,7 +45,7 @@ pub struct ImproveArguments {
     #[arg(long, value_name = "TIMES,…", value_delimiter = ',')]
     feeds: Option<Vec<f64>>,
     /// Shares of a sweep's range to try, about its middle [default: 1; by the minute 1,0.5].
-    #[arg(long, value_name = "SHARE,…", value_delimiter = ',')]
+    #[arg(long = "sweep-shares", value_name = "SHARE,…", value_delimiter = ',')]
     ranges: Option<Vec<f64>>,
     /// Directions to try [default: both; by the minute both,one].
     #[arg(long, value_name = "WAYS,…", value_delimiter = ',')]
@@ -53,7 +53,7 @@ pub struct ImproveArguments {
     /// Leave out tests in which linear axes follow: their errors are then no part of the question.
     #[arg(long)]
     no_follow: bool,
-    /// Travel of the bar's sensor either way.
+    /// Travel of the bar's sensor either way: what a test may not exceed.
     #[arg(long, value_name = "MM", default_value_t = 1.0)]
     reach_mm: f64,
     /// Every test has a spindle ball mounted for it alone.
@@ -73,6 +73,11 @@ impl ImproveArguments {
         self.improve.is_some() || self.separate.is_some()
     }
 
+    /// Travel of the bar's sensor either way, mm.
+    pub fn reach_mm(&self) -> Result<f64, Failure> {
+        not_negative("--reach-mm", self.reach_mm)
+    }
+
     /// Whether gain is weighed against time.
     fn by_minute(&self) -> bool {
         self.setup_min.is_some() || self.test_min.is_some()
@@ -80,7 +85,7 @@ impl ImproveArguments {
 
     fn menu(&self) -> Result<Menu, Failure> {
         let mut menu = Menu {
-            reach_mm: self.reach_mm,
+            reach_mm: self.reach_mm()?,
             ..Menu::default()
         };
         let checked = |flag: &str, list: &[f64], least: f64| match list
@@ -121,26 +126,19 @@ impl ImproveArguments {
             menu.feeds = shares("--feeds", feeds, f64::MAX)?;
         }
         if let Some(ranges) = &self.ranges {
-            menu.ranges = shares("--ranges", ranges, 1.0)?;
+            menu.ranges = shares("--sweep-shares", ranges, 1.0)?;
         }
         if let Some(directions) = &self.directions {
             menu.both_directions = directions.iter().map(|ways| *ways == Directions::Both).collect();
         }
         menu.follow = !self.no_follow;
         menu.keep_spindle_ball = !self.remount_spindle_ball;
-        for (flag, value) in [
-            ("--reach-mm", Some(self.reach_mm)),
-            ("--setup-min", self.setup_min),
-            ("--test-min", self.test_min),
-        ] {
-            if let Some(value) = value.filter(|value| !value.is_finite() || *value < 0.0) {
-                return Err(Failure::Other(format!(
-                    "`{flag} {value}`: it has to be 0 or more"
-                )));
-            }
-        }
-        menu.setup_min = self.setup_min.unwrap_or(menu.setup_min);
-        menu.test_min = self.test_min.unwrap_or(menu.test_min);
+        let stated = |flag: &str, value: Option<f64>, usual: f64| match value {
+            Some(value) => not_negative(flag, value),
+            None => Ok(usual),
+        };
+        menu.setup_min = stated("--setup-min", self.setup_min, menu.setup_min)?;
+        menu.test_min = stated("--test-min", self.test_min, menu.test_min)?;
         Ok(menu)
     }
 
@@ -180,6 +178,17 @@ impl ImproveArguments {
             by_minute,
         };
         Ok(improve(problem, &menu, &options)?)
+    }
+}
+
+/// A number that may be 0.
+fn not_negative(flag: &str, value: f64) -> Result<f64, Failure> {
+    if value.is_finite() && value >= 0.0 {
+        Ok(value)
+    } else {
+        Err(Failure::Other(format!(
+            "`{flag} {value}`: it has to be 0 or more"
+        )))
     }
 }
 

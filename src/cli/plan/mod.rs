@@ -71,6 +71,7 @@ pub fn run(arguments: &PlanArguments) -> Result<(), Failure> {
         noise_mm,
         planned_only: arguments.planned,
         effects: !arguments.no_effects,
+        reach_mm: arguments.improve.reach_mm()?,
     };
     if arguments.improve.asked() || arguments.range {
         return next_test(arguments, &session, &options);
