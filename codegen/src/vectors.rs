@@ -182,11 +182,7 @@ pub(crate) fn adjoint_vectors(vectors: &[NamedVector], adjoints: &Adjoints) -> V
             let components = vector.components.map(|component| adjoints.of(component));
             let meaning = match vector.letter {
                 "b" => "unit vector of the bar".to_string(),
-                _ => format!(
-                    "unit vector of the bar carried back to {}{}",
-                    vector.frame,
-                    if vector.prime { "′" } else { "" }
-                ),
+                _ => format!("the same carried back: derivatives by the {}", vector.meaning),
             };
             NamedVector {
                 letter: "u",
