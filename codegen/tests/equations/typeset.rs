@@ -25,7 +25,6 @@ fn fragments(language: Language) -> Vec<String> {
                     rotation: Some(rotation),
                     unknowns: (0..8).collect(),
                     gradient: order != Order::Bilinear,
-                    ..Options::default()
                 };
                 let bar = Chapter5 { extended: true };
                 add(Equation::of(&hermle(rotation), &bar, &eight(), &options).expect("an equation"));
