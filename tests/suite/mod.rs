@@ -3,6 +3,7 @@
 mod bad_input;
 mod codes;
 mod data;
+mod equation_command;
 mod jacobians;
 mod measured;
 mod new;
