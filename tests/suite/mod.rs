@@ -8,6 +8,7 @@ mod jacobians;
 mod measured;
 mod new;
 mod nist;
+mod plan_command;
 mod plan_help;
 mod plan_methods;
 mod plan_next;
