@@ -40,7 +40,7 @@ pub struct Options {
     pub rotation: Option<Rotation>,
     /// Which names errors go by.
     pub symbols: Symbols,
-    /// Whether code comes with derivatives by every error.
+    /// Whether it comes with derivatives by every error.
     pub gradient: bool,
     /// The instrument's own unknowns that are carried, by their places in its list.
     pub unknowns: Vec<usize>,
@@ -114,7 +114,9 @@ pub struct Equation {
     pub absent: Vec<Variable>,
     /// How well it agrees with the chain.
     pub check: Check,
-    /// How far a truncated or small-angle form strays from the exact chain.
+    /// Between which values the lengths and the positions of moving axes lie, mm or rad: the session's range.
+    pub range: Vec<(Variable, [f64; 2])>,
+    /// How far a truncated or small-angle form strays from the exact chain over that range.
     pub deviations: Vec<Deviation>,
 }
 
@@ -176,12 +178,14 @@ impl Equation {
             stated_length,
             absent: Vec::new(),
             check: Check::default(),
+            range: Vec::new(),
             deviations: Vec::new(),
         };
         let value = equation.program(false);
         equation.check = equation.confirm(source, &[&value, &equation.program(true)])?;
         equation.absent = equation.absent_parameters()?;
-        equation.deviations = equation.deviations(source, &value)?;
+        equation.range = equation.range(source);
+        equation.deviations = equation.deviations(source, &equation.range, &value)?;
         Ok(equation)
     }
 
@@ -236,6 +240,14 @@ impl Equation {
         self.outputs.iter().map(gradient).collect()
     }
 
+    /// The second derivatives of each output by each pair of parameters: output, row, column. For curvature terms of an error budget,
+    /// and for solvers that take Newton steps; printed code carries the first derivatives only.
+    pub fn second_derivatives(&self) -> Vec<Vec<Vec<Operand>>> {
+        let parameters = self.parameter_operands();
+        let second = |output: &Operand| self.arena.second_derivatives(*output, &parameters);
+        self.outputs.iter().map(second).collect()
+    }
+
     /// The steps that compute the reading and, with `gradient`, its derivatives by every parameter, output by output.
     pub fn program(&self, gradient: bool) -> Program {
         let mut outputs = self.outputs.clone();
@@ -281,7 +293,12 @@ fn parameters(
         parameters.push(Variable::Unknown(*unknown));
     }
     // Named here, they keep the order in which they were asked for wherever terms are sorted.
-    for parameter in &parameters {
+    for (place, parameter) in parameters.iter().enumerate() {
+        if parameters[..place].contains(parameter) {
+            return Err(CodegenError::Twice {
+                name: parameter.name(),
+            });
+        }
         arena.variable(parameter.clone());
     }
     Ok(parameters)

@@ -28,6 +28,20 @@ pub enum CodegenError {
         /// The unknown.
         unknown: String,
     },
+    /// An error or unknown that was asked for more than once.
+    #[error("`{name}` is named twice; name it once")]
+    Twice {
+        /// The error or unknown.
+        name: String,
+    },
+    /// Derivatives that are not written out for a reader.
+    #[error(
+        "the derivatives of {what} are written as code only: as rust, c, python or matlab; at the machine without errors they are the coefficients of first order"
+    )]
+    GradientForReaders {
+        /// What they are of.
+        what: &'static str,
+    },
     /// An expression that has no normal form.
     #[error("{what} has no place in the polynomial normal form")]
     NoPolynomial {

@@ -45,7 +45,7 @@ pub enum Column {
     Multiple {
         /// The earlier parameter.
         of: Variable,
-        /// The factor, where it is a number or a single product: numerator and denominator.
+        /// The factor: numerator and denominator, which is 1 where the one divides the other.
         factor: (Polynomial, Polynomial),
     },
 }
@@ -191,11 +191,14 @@ fn fixed_factor(ring: &Ring<'_>, a: &[Polynomial], b: &[Polynomial]) -> Option<(
     })
 }
 
-/// `a/b` where it is a single product.
+/// `a/b` where it is a polynomial: each term of `a` by the first of `b`, as far as they divide, and the product proves it.
 fn quotient(ring: &Ring<'_>, a: &Polynomial, b: &Polynomial) -> Option<Polynomial> {
-    let ((a_first, a_factor), (b_first, b_factor)) = (a.terms().next()?, b.terms().next()?);
-    let monomial = a_first.divided_by(b_first)?;
+    let (b_first, b_factor) = b.terms().next()?;
     let mut quotient = Polynomial::default();
-    quotient.insert(monomial, a_factor / b_factor);
+    for (monomial, factor) in a.terms() {
+        if let Some(monomial) = monomial.divided_by(b_first) {
+            quotient.insert(monomial, factor / b_factor);
+        }
+    }
     (ring.product(&quotient, b) == *a).then_some(quotient)
 }

@@ -115,6 +115,16 @@ fn mul(arena: &Arena, a: Operand, b: Operand) -> Operand {
             {
                 return binary(arena, op, Operand::constant(outer * inner), x);
             }
+            // c₁·(x·(c₂/y)), as the square root of a sum of squares leaves it.
+            if let Some(Node::Binary(Binary::Mul, x, y)) = arena.node_of(b)
+                && let Some(Node::Binary(Binary::Div, inner, _)) = arena.node_of(y)
+                && inner.known().is_some()
+                && x.known().is_none()
+                && is_power_of_two(outer)
+            {
+                let y = binary(arena, Binary::Mul, a, y);
+                return binary(arena, Binary::Mul, x, y);
+            }
         }
         None => {}
     }

@@ -22,6 +22,16 @@ pub enum Tree {
 }
 
 impl Tree {
+    /// Whether an input stands in it.
+    pub(crate) fn holds(&self, input: usize) -> bool {
+        match self {
+            Tree::Input(place) => *place == input,
+            Tree::Number(_) | Tree::Step(_) => false,
+            Tree::Unary(_, a) => a.holds(input),
+            Tree::Binary(_, a, b) => a.holds(input) || b.holds(input),
+        }
+    }
+
     fn value(&self, inputs: &[f64], steps: &[f64]) -> f64 {
         match self {
             Tree::Number(value) => *value,

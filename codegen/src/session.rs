@@ -2,8 +2,8 @@
 
 use abbe_model::error::ModelError;
 use abbe_model::scalar::Nominal;
-use abbe_model::session::readings::Readings;
-use abbe_model::session::{Session, Test, motion};
+use abbe_model::session::motion::{self, Motion};
+use abbe_model::session::{Session, Test};
 
 use crate::subject::{Source, Subject};
 
@@ -13,30 +13,34 @@ use crate::subject::{Source, Subject};
 pub struct SessionTest<'s> {
     session: &'s Session,
     test: &'s Test,
-    /// Least and greatest position of each axis of the machine.
-    ranges: Vec<[f64; 2]>,
+    /// Least and greatest position of each axis of the machine; none of one that moves nobody knows how far.
+    ranges: Vec<Option<[f64; 2]>>,
 }
 
 impl<'s> SessionTest<'s> {
-    /// A test, with the positions of its readings or, for a plan, of its movement.
+    /// A test, with the positions of its readings or, for a plan, of its movement. Of a test that has neither, every axis moves that the
+    /// test does not hold at a position other than zero.
     ///
     /// # Errors
     /// If a planned movement cannot be made.
     pub fn new(session: &'s Session, test: &'s Test) -> Result<Self, ModelError> {
-        let planned;
-        let readings: &Readings = match &test.readings {
-            Some(readings) => readings,
-            None => {
-                planned = motion::planned(&session.machine, test)?;
-                &planned
-            }
-        };
         let range = |column: &Vec<f64>| {
             let least = column.iter().copied().fold(f64::INFINITY, f64::min);
             let greatest = column.iter().copied().fold(f64::NEG_INFINITY, f64::max);
-            [least, greatest]
+            Some([least, greatest])
         };
-        let ranges = readings.positions.iter().map(range).collect();
+        let ranges = match (&test.readings, &test.motion) {
+            (Some(readings), _) => readings.positions.iter().map(range).collect(),
+            (None, None | Some(Motion::List)) => {
+                let held = test.at_written.iter().zip(&test.at);
+                let held = held.map(|(written, at)| (written.is_some() || *at != 0.0).then_some([*at; 2]));
+                held.collect()
+            }
+            (None, Some(_)) => {
+                let planned = motion::planned(&session.machine, test)?;
+                planned.positions.iter().map(range).collect()
+            }
+        };
         Ok(SessionTest {
             session,
             test,
@@ -52,7 +56,7 @@ impl Source for SessionTest<'_> {
 
     fn held<N: Nominal>(&self, axis: &str, length: &impl Fn(&str) -> N) -> Option<N> {
         let index = self.session.machine.axis_index(axis)?;
-        let [least, greatest] = *self.ranges.get(index)?;
+        let [least, greatest] = (*self.ranges.get(index)?)?;
         if greatest > least {
             return None;
         }
@@ -75,6 +79,7 @@ impl Source for SessionTest<'_> {
         self.ranges
             .get(index)
             .copied()
+            .flatten()
             .filter(|[least, greatest]| greatest > least)
     }
 }

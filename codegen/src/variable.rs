@@ -85,6 +85,17 @@ impl Variable {
         }
     }
 
+    /// As it is asked for: `EY0A`, `workpiece_ball.x`, `bar`.
+    pub fn name(&self) -> String {
+        match self {
+            Variable::Length(name) => name.clone(),
+            Variable::Position { axis, .. } => axis.clone(),
+            Variable::Error(name) => name.to_string(),
+            Variable::Unknown(unknown) if unknown.coordinate.is_empty() => unknown.thing.to_string(),
+            Variable::Unknown(unknown) => format!("{}.{}", unknown.thing, unknown.coordinate),
+        }
+    }
+
     /// In plain text: `R`, `θ_a`, `e_y0a`.
     pub fn text(&self, symbols: Symbols) -> String {
         match self {

@@ -162,7 +162,15 @@ fn along<'a>(
             let origin = axis.origin_mm.map(|o| Symbol::constant(-o));
             let turned = axis.rotate(state[index].turn, point.shifted(origin));
             if turned != pushed {
-                let meaning = format!("{} in {place}, {} without its errors", body.meaning, axis.name);
+                // It is counted from where the axis lies; only then do its errors shift and tilt it.
+                let from = match axis.origin_mm {
+                    [0.0, 0.0, 0.0] => String::new(),
+                    _ => format!(", from the origin of {}", axis.name),
+                };
+                let meaning = format!(
+                    "{} in {place}{from}, {} without its errors",
+                    body.meaning, axis.name
+                );
                 vector(turned, true, meaning);
             }
         }
@@ -182,11 +190,7 @@ pub(crate) fn adjoint_vectors(vectors: &[NamedVector], adjoints: &Adjoints) -> V
             let components = vector.components.map(|component| adjoints.of(component));
             let meaning = match vector.letter {
                 "b" => "unit vector of the bar".to_string(),
-                _ => format!(
-                    "unit vector of the bar carried back to {}{}",
-                    vector.frame,
-                    if vector.prime { "′" } else { "" }
-                ),
+                _ => format!("the same carried back: derivatives by the {}", vector.meaning),
             };
             NamedVector {
                 letter: "u",

@@ -2,9 +2,15 @@
 
 use std::path::PathBuf;
 
-use abbe::codegen::{Equation, Language, Options, Order, SessionTest, Symbols};
+use abbe::codegen::{Equation, Language, Options, Order, SessionTest, Symbols, Variable};
+use abbe::model::axis::AxisKind;
+use abbe::model::chain::Machine;
 use abbe::model::component::{ErrorKind, ErrorName, Freedom};
+use abbe::model::effect::Component;
 use abbe::model::frames::Rotation;
+use abbe::model::instrument::InstrumentUnknown;
+use abbe::model::session::Session;
+use abbe::model::session::read::{self, ReadOptions};
 use clap::{Args, ValueEnum};
 
 use super::failure::Failure;
@@ -61,22 +67,23 @@ struct FormArguments {
     /// The language.
     #[arg(long = "as", value_enum, default_value = "text")]
     language: As,
-    /// How far it goes in the errors.
+    /// How far it goes in the errors: all terms, products of two, or a coefficient for each.
     #[arg(long, value_enum, default_value = "exact")]
     order: OrderWord,
     /// How error angles rotate; the machine's own way if not given.
     #[arg(long, value_enum)]
     rotation: Option<RotationWord>,
-    /// Errors to keep, by name and separated by commas.
+    /// What to keep, by name and separated by commas; what is not named is zero. Errors as EX0C or e_x0c, of a session also unknowns of the
+    /// instrument, as bar or workpiece_ball.x. Without it a session's unknown errors, of a machine all.
     #[arg(long, value_delimiter = ',', value_name = "NAMES")]
     errors: Vec<String>,
-    /// Which names errors go by.
+    /// Which names errors go by in print: e_y0a, or EY0A of ISO 230-1.
     #[arg(long, value_enum, default_value = "literature")]
     symbols: SymbolsWord,
-    /// Add the derivatives by every error to code.
+    /// Add the derivatives by everything that is kept: to code of any form, in text, LaTeX and Typst to the exact length of a bar.
     #[arg(long)]
     gradient: bool,
-    /// Write to a file.
+    /// Write to a file, whole or not at all.
     #[arg(long, value_name = "FILE")]
     out: Option<PathBuf>,
 }
@@ -84,9 +91,9 @@ struct FormArguments {
 /// `abbe equation SESSION --test T`
 #[derive(Args)]
 pub struct EquationArguments {
-    /// The session file; its readings are not needed.
-    session: PathBuf,
-    /// The test.
+    #[command(flatten)]
+    session: super::SessionArguments,
+    /// The test, by its name in the session. Its readings, if there are any, only say which axes move and how far.
     #[arg(long, value_name = "NAME")]
     test: String,
     #[command(flatten)]
@@ -102,8 +109,50 @@ pub struct VolumetricArguments {
     form: FormArguments,
 }
 
+/// What an equation is written in.
+#[derive(Default)]
+struct Kept {
+    errors: Vec<ErrorName>,
+    /// Places in the instrument's list of unknowns.
+    unknowns: Vec<usize>,
+}
+
+impl Kept {
+    /// Reads names of errors and of the instrument's unknowns.
+    fn parse(names: &[String], known: &[InstrumentUnknown]) -> Result<Kept, Failure> {
+        let mut kept = Kept::default();
+        for name in names {
+            match Component::parse(name) {
+                Some(Component::Axis(error)) => kept.errors.push(error),
+                Some(Component::Instrument { thing, coordinate }) => {
+                    let place = known
+                        .iter()
+                        .position(|u| u.thing == thing && u.coordinate == coordinate);
+                    let unknown = |u: &InstrumentUnknown| Variable::Unknown(*u).name();
+                    kept.unknowns.push(place.ok_or_else(|| {
+                        let has = match known {
+                            [] => "an error vector has none of an instrument".to_string(),
+                            known => format!(
+                                "this one has {}",
+                                known.iter().map(unknown).collect::<Vec<_>>().join(", ")
+                            ),
+                        };
+                        Failure::Other(format!("`{name}` is an unknown of another instrument; {has}"))
+                    })?);
+                }
+                Some(Component::TriggerDelay) | None => {
+                    return Err(Failure::Other(format!(
+                        "`{name}` is no error that an equation can keep; errors go by ISO 230-1 names, as EX0C or EZC, or by those of the literature, as e_x0c"
+                    )));
+                }
+            }
+        }
+        Ok(kept)
+    }
+}
+
 impl FormArguments {
-    fn options(&self) -> Options {
+    fn options(&self, unknowns: Vec<usize>) -> Options {
         Options {
             order: match self.order {
                 OrderWord::Exact => Order::Exact,
@@ -119,21 +168,8 @@ impl FormArguments {
                 SymbolsWord::Iso => Symbols::Iso,
             },
             gradient: self.gradient,
-            unknowns: Vec::new(),
+            unknowns,
         }
-    }
-
-    /// The errors that were asked for, or those given.
-    fn errors(&self, otherwise: Vec<ErrorName>) -> Result<Vec<ErrorName>, Failure> {
-        if self.errors.is_empty() {
-            return Ok(otherwise);
-        }
-        let read = |text: &String| {
-            let help =
-                "errors go by ISO 230-1 names, as EX0C or EZC, or by those of the literature, as e_x0c";
-            ErrorName::parse(text).ok_or_else(|| Failure::Other(format!("`{text}` is no error; {help}")))
-        };
-        self.errors.iter().map(read).collect()
     }
 
     fn write(&self, equation: &Equation) -> Result<(), Failure> {
@@ -148,13 +184,31 @@ impl FormArguments {
     }
 }
 
-/// Runs `abbe equation`.
-pub fn run(arguments: &EquationArguments) -> Result<(), Failure> {
-    let options = abbe::model::session::read::ReadOptions {
+/// The session with its readings; without them where they cannot be read, which is said.
+fn read(arguments: &super::SessionArguments) -> Result<Session, Failure> {
+    let fault = match super::read_session(arguments) {
+        Ok(session) => return Ok(session),
+        Err(fault) => fault,
+    };
+    let plan_only = ReadOptions {
         data_directory: None,
         read_data: false,
     };
-    let session = abbe::model::session::read::session(&arguments.session, &options)?;
+    match read::session(&arguments.session, &plan_only) {
+        Ok(session) => {
+            eprintln!("note: {fault}");
+            eprintln!(
+                "note: the equation does without readings; of a test without a planned movement every axis that it does not hold is taken to move"
+            );
+            Ok(session)
+        }
+        Err(_) => Err(fault),
+    }
+}
+
+/// Runs `abbe equation`.
+pub fn run(arguments: &EquationArguments) -> Result<(), Failure> {
+    let session = read(&arguments.session)?;
     let Some(test) = session.tests.iter().find(|test| test.name == arguments.test) else {
         let names: Vec<&str> = session.tests.iter().map(|test| test.name.as_str()).collect();
         let names = names.join(", ");
@@ -164,35 +218,48 @@ pub fn run(arguments: &EquationArguments) -> Result<(), Failure> {
         )));
     };
     let source = SessionTest::new(&session, test)?;
-    let errors = arguments.form.errors(session.unknowns.clone())?;
-    let equation = Equation::of(&session.machine, &source, &errors, &arguments.form.options())?;
-    arguments.form.write(&equation)
+    let form = &arguments.form;
+    let mut kept = Kept::parse(&form.errors, session.instrument.unknowns())?;
+    if form.errors.is_empty() {
+        kept.errors.clone_from(&session.unknowns);
+    }
+    let equation = Equation::of(
+        &session.machine,
+        &source,
+        &kept.errors,
+        &form.options(kept.unknowns),
+    )?;
+    form.write(&equation)
 }
 
 /// Runs `abbe volumetric`.
 pub fn run_volumetric(arguments: &VolumetricArguments) -> Result<(), Failure> {
-    let machine = abbe::model::session::read::machine(&arguments.machine)?;
-    // Every error motion and location error that the chain applies.
-    let all = machine
-        .axes
-        .iter()
-        .flat_map(|axis| {
-            let rotary = axis.kind == abbe::model::axis::AxisKind::Rotary;
-            [ErrorKind::Location, ErrorKind::Motion]
-                .into_iter()
-                .flat_map(move |kind| {
-                    Freedom::ALL
-                        .into_iter()
-                        .filter(move |freedom| kind == ErrorKind::Motion || rotary || freedom.is_angle())
-                        .map(move |freedom| ErrorName {
-                            kind,
-                            freedom,
-                            axis: axis.name.clone(),
-                        })
-                })
-        })
-        .collect();
-    let errors = arguments.form.errors(all)?;
-    let equation = Equation::volumetric(&machine, &errors, &arguments.form.options())?;
-    arguments.form.write(&equation)
+    let machine = read::machine(&arguments.machine)?;
+    let form = &arguments.form;
+    let mut kept = Kept::parse(&form.errors, &[])?;
+    if form.errors.is_empty() {
+        kept.errors = errors_of(&machine);
+    }
+    let equation = Equation::volumetric(&machine, &kept.errors, &form.options(Vec::new()))?;
+    form.write(&equation)
+}
+
+/// Every location error and error motion that the chain applies.
+fn errors_of(machine: &Machine) -> Vec<ErrorName> {
+    let mut errors = Vec::new();
+    for axis in &machine.axes {
+        for kind in [ErrorKind::Location, ErrorKind::Motion] {
+            for freedom in Freedom::ALL {
+                // Where a linear axis lies is no error.
+                if kind == ErrorKind::Motion || axis.kind == AxisKind::Rotary || freedom.is_angle() {
+                    errors.push(ErrorName {
+                        kind,
+                        freedom,
+                        axis: axis.name.clone(),
+                    });
+                }
+            }
+        }
+    }
+    errors
 }

@@ -15,6 +15,13 @@ pub fn write_whole(path: &Path, contents: &[u8]) -> Result<(), Failure> {
         Some(folder) if !folder.as_os_str().is_empty() => folder,
         _ => Path::new("."),
     };
+    if !folder.is_dir() {
+        return Err(Failure::Other(format!(
+            "{}: cannot be written: there is no folder {}; make it first, or name another",
+            path.display(),
+            folder.display()
+        )));
+    }
     let mut builder = tempfile::Builder::new();
     // As any other new file: what the user's mask lets through.
     #[cfg(unix)]

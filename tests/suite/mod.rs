@@ -3,10 +3,12 @@
 mod bad_input;
 mod codes;
 mod data;
+mod equation_command;
 mod jacobians;
 mod measured;
 mod new;
 mod nist;
+mod plan_command;
 mod plan_help;
 mod plan_methods;
 mod plan_next;

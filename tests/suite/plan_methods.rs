@@ -179,3 +179,41 @@ fn a_straightness_of_x_that_repeats_biases_both_chapters_alike() {
         );
     }
 }
+
+#[test]
+fn the_table_in_the_docs_is_what_is_computed() {
+    let docs = std::fs::read_to_string(super::workspace().join("docs/plan.md")).unwrap();
+    for (column, chapter) in [4, 5, 6].into_iter().enumerate() {
+        let plan = analysis(chapter, 1.0, false);
+        let mut one = method(chapter, 1.0);
+        one.tests
+            .iter_mut()
+            .for_each(|test| test.spindle_setup = "one".to_string());
+        let one = analyse(
+            &one,
+            &PlanOptions {
+                effects: false,
+                ..PlanOptions::default()
+            },
+        )
+        .unwrap();
+        for error in &plan.errors {
+            let start = format!("| `{}` |", error.id);
+            let row = docs.lines().find(|line| line.starts_with(&start)).unwrap();
+            let cells: Vec<&str> = row.split('|').map(str::trim).collect();
+            let printed = |k: usize| cells[3 + 4 * column + k].parse::<f64>().unwrap();
+            let noise = error.budget.iter().find(|part| part.from == "noise").unwrap().u;
+            for (k, value) in [noise, error.u.unwrap(), u(&one, &error.id)]
+                .into_iter()
+                .enumerate()
+            {
+                assert!(
+                    (printed(k) - value).abs() <= 0.006 * value,
+                    "{chapter} {}: {} for {value}",
+                    error.id,
+                    printed(k)
+                );
+            }
+        }
+    }
+}

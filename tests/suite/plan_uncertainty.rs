@@ -168,3 +168,29 @@ fn predicted_uncertainties_are_those_of_simulated_fits() {
 fn predicted_uncertainties_are_those_of_whole_fits() {
     check("[wCAbYXZt]", &squares("[wCAbYXZt]", 50_000, true));
 }
+
+#[test]
+fn with_an_axis_in_head_and_table_two_pairs_are_one_each() {
+    for code in ["[wCXYbZAt]", "[wCXYbZBt]", "[wCXbYZAt]"] {
+        let (ids, linear) = linearised(&plan(code));
+        let pairs: Vec<Vec<&str>> = linear
+            .rank
+            .unseen
+            .iter()
+            .map(|row| {
+                (0..ids.len())
+                    .filter(|j| row[*j] != 0.0)
+                    .map(|j| ids[j].as_str())
+                    .collect()
+            })
+            .collect();
+        println!("{code}: {pairs:?}");
+        assert_eq!(pairs.len(), 2, "{code}");
+        assert!(
+            pairs
+                .iter()
+                .all(|pair| pair.len() == 2 && pair.iter().all(|id| id.starts_with('E'))),
+            "{code}: {pairs:?}"
+        );
+    }
+}

@@ -24,10 +24,12 @@ pub struct Deviation {
 
 impl Equation {
     /// How far the form strays from the chain with exact rotations: errors of 10 µm and 0.01°, then ten times those, all signs (256
-    /// draws of them for more than eight errors), 60 positions. Empty for a form that is exact.
+    /// draws of them for more than eight errors), 60 positions between the ends of the range, at which every fourth coordinate stands. Empty
+    /// for a form that is exact.
     pub(crate) fn deviations(
         &self,
         source: &impl Source,
+        range: &[(Variable, [f64; 2])],
         program: &Program,
     ) -> Result<Vec<Deviation>, CodegenError> {
         if self.options.order == Order::Exact && self.machine.rotation == Rotation::Exact {
@@ -41,8 +43,12 @@ impl Equation {
             let mut draws = Draws::new(5);
             let mut largest = 0.0_f64;
             for _ in 0..60 {
+                let nominal = range.iter().map(|(variable, [low, high])| {
+                    let along = draws.between(-1.0 / 6.0, 7.0 / 6.0).clamp(0.0, 1.0);
+                    (variable.clone(), low + (high - low) * along)
+                });
                 let point = Point {
-                    nominal: self.draw_nominal(source, &mut draws, 0.0, false),
+                    nominal: nominal.collect(),
                     small: vec![0.0; count],
                 };
                 let at = |variable: Variable| point.nominal(&variable);

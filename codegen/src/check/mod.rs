@@ -57,7 +57,7 @@ impl Equation {
         let mut tries = 0;
         while check.points < POINTS && tries < 10 * POINTS {
             tries += 1;
-            let nominal = self.draw_nominal(source, &mut draws, 0.01, true);
+            let nominal = self.draw_anywhere(source, &mut draws);
             let size = |variable: &Variable| SIZES[usize::from(variable.is_angle())];
             let small = self.parameters.iter().map(|p| draws.between(-size(p), size(p)));
             let point = Point {

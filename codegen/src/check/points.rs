@@ -27,6 +27,9 @@ impl Draws {
     }
 }
 
+/// A length that nobody states, mm.
+const UNSTATED_MM: f64 = 100.0;
+
 /// Values of lengths and positions, and of the parameters.
 pub(crate) struct Point {
     pub(crate) nominal: Vec<(Variable, f64)>,
@@ -54,38 +57,51 @@ impl Point {
 }
 
 impl Equation {
-    /// The variables that no derivative is taken by: lengths near what the source states, positions over the stated range or, with
-    /// `anywhere`, over every position there is.
-    pub(crate) fn draw_nominal(
-        &self,
-        source: &impl Source,
-        draws: &mut Draws,
-        spread: f64,
-        anywhere: bool,
-    ) -> Vec<(Variable, f64)> {
-        let mut values = Vec::new();
-        for variable in self.arena.variables() {
+    /// The variables that no derivative is taken by, anywhere: lengths near what the source states, positions over every one there is.
+    pub(crate) fn draw_anywhere(&self, source: &impl Source, draws: &mut Draws) -> Vec<(Variable, f64)> {
+        let draw = |variable: Variable| {
             let value = match &variable {
                 Variable::Length(name) => match source.length_mm(name) {
-                    Some(value) => value * (1.0 + draws.between(-spread, spread)),
-                    None => 100.0 * (1.0 + draws.between(-50.0 * spread, 50.0 * spread)),
+                    Some(value) => value * (1.0 + draws.between(-0.01, 0.01)),
+                    None => UNSTATED_MM * (1.0 + draws.between(-0.5, 0.5)),
                 },
-                Variable::Position { axis, .. } => {
-                    let stated = self.machine.axis_index(axis);
-                    let travel = stated.and_then(|index| self.machine.axes[index].travel);
-                    let whole = if variable.is_angle() {
-                        [-std::f64::consts::PI, std::f64::consts::PI]
-                    } else {
-                        [-200.0, 200.0]
-                    };
-                    let stated = source.range(axis).or(travel).filter(|_| !anywhere);
-                    let [low, high] = stated.unwrap_or(whole);
+                position => {
+                    let [low, high] = whole_range(position);
                     draws.between(low, high)
                 }
-                Variable::Error(_) | Variable::Unknown(_) => continue,
             };
-            values.push((variable, value));
-        }
-        values
+            (variable, value)
+        };
+        let nominal = self.arena.variables().into_iter().filter(|v| !v.is_small());
+        nominal.map(draw).collect()
+    }
+
+    /// The same over the session's range: lengths as stated, positions of axes between the ends of their movement (as the source or else
+    /// the machine states it), mm or rad.
+    pub(crate) fn range(&self, source: &impl Source) -> Vec<(Variable, [f64; 2])> {
+        let range = |variable: Variable| {
+            let ends = match &variable {
+                Variable::Length(name) => [source.length_mm(name).unwrap_or(UNSTATED_MM); 2],
+                Variable::Position { axis, .. } => {
+                    let index = self.machine.axis_index(axis);
+                    let travel = index.and_then(|index| self.machine.axes[index].travel);
+                    let stated = source.range(axis).or(travel);
+                    stated.unwrap_or_else(|| whole_range(&variable))
+                }
+                Variable::Error(_) | Variable::Unknown(_) => [0.0; 2],
+            };
+            (variable, ends)
+        };
+        let nominal = self.arena.variables().into_iter().filter(|v| !v.is_small());
+        nominal.map(range).collect()
+    }
+}
+
+/// Of a position whose range nobody states, mm or rad.
+fn whole_range(position: &Variable) -> [f64; 2] {
+    if position.is_angle() {
+        [-std::f64::consts::PI, std::f64::consts::PI]
+    } else {
+        [-200.0, 200.0]
     }
 }

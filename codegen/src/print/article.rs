@@ -5,10 +5,10 @@ use std::collections::HashMap;
 use crate::equation::{Equation, FirstLayout, Form, Kind, Order};
 use crate::first::{Column, FirstOrder};
 use crate::layout::{product, sum};
+use crate::print::{exact, words};
 use crate::program::{Input, Label, Naming, Program, Step, Tree};
-use crate::symbol::{Binary, Operand, Unary};
+use crate::symbol::{Binary, Unary};
 use crate::variable::Variable;
-use crate::vectors;
 
 /// The left-hand side of a row.
 #[derive(Clone, Debug, PartialEq)]
@@ -62,16 +62,24 @@ pub(crate) struct Article {
 impl Article {
     pub(crate) fn new(equation: &Equation) -> Self {
         let (program, sections) = match &equation.form {
-            Form::Exact => exact(equation),
+            Form::Exact => exact::sections(equation),
             Form::Groups { layout, complete, .. } => groups(equation, layout, *complete),
             Form::First(first, layout) => first_order(equation, first, layout),
         };
-        let symbols = program
-            .inputs
-            .iter()
-            .filter(|input| !matches!(input, Input::Cosine(_)))
-            .map(|input| match input {
-                Input::Plain(variable) => (input.clone(), variable.meaning(), variable.unit()),
+        let told = |place: usize, input: &Input| match input {
+            // A length or position that the form is free of is not explained.
+            Input::Plain(variable) if variable.is_small() => true,
+            Input::Plain(_) => uses(&sections, place),
+            Input::Sine(_) => uses(&sections, place) || uses(&sections, place + 1),
+            Input::Cosine(_) => false,
+        };
+        let inputs = program.inputs.iter().enumerate();
+        let symbols = inputs
+            .filter(|(place, input)| told(*place, input))
+            .map(|(_, input)| match input {
+                Input::Plain(variable) => {
+                    (input.clone(), words::meaning(equation, variable), variable.unit())
+                }
                 Input::Sine(variable) | Input::Cosine(variable) => (
                     input.clone(),
                     format!("sine and cosine of the {}", variable.meaning()),
@@ -87,7 +95,13 @@ impl Article {
     }
 }
 
-fn row(left: Left, right: Tree) -> Row {
+/// Whether an input stands in any of the rows.
+fn uses(sections: &[Section], place: usize) -> bool {
+    let rows = sections.iter().flat_map(|section| &section.rows);
+    rows.into_iter().any(|row| row.right.holds(place))
+}
+
+pub(crate) fn row(left: Left, right: Tree) -> Row {
     Row {
         left,
         approximate: false,
@@ -96,54 +110,7 @@ fn row(left: Left, right: Tree) -> Row {
     }
 }
 
-/// The named vectors, then the outputs.
-fn exact(equation: &Equation) -> (Program, Vec<Section>) {
-    let labels = vectors::labels(&equation.vectors);
-    let mut asked: Vec<Operand> = equation.outputs.clone();
-    asked.extend(equation.vectors.iter().flat_map(|vector| vector.components));
-    let program = equation
-        .arena
-        .program(equation.inputs(), &asked, &labels, Naming::Labelled);
-    let mut sections = Vec::new();
-    let components = program.outputs[equation.outputs.len()..].chunks(3);
-    for (vector, trees) in equation.vectors.iter().zip(components) {
-        let rows = (0..3).map(|coordinate| {
-            let label = vector.label(coordinate);
-            let own = program.steps.iter().find(|step| step.label == label);
-            // A coordinate that is an input, a constant or another name is written as that.
-            let right = own.map_or_else(|| trees[coordinate].clone(), |step| step.value.clone());
-            row(Left::Named(label), right)
-        });
-        sections.push(Section {
-            heading: vector.meaning.clone(),
-            rows: rows.collect(),
-        });
-    }
-    let outputs = program.outputs[..equation.outputs.len()].iter();
-    let mut rows: Vec<Row> = outputs
-        .enumerate()
-        .map(|(place, tree)| row(Left::Output(place), tree.clone()))
-        .collect();
-    let mut program = program;
-    if let (Kind::Length, Some(bar)) = (equation.kind, equation.vectors.last()) {
-        // The norm of the bar by the names of its own coordinates, whichever of them are aliases.
-        let start = program.steps.len();
-        let aliases = (0..3).map(|coordinate| Step {
-            label: bar.label(coordinate),
-            value: Tree::Number(0.0),
-        });
-        program.steps.extend(aliases);
-        let length = with_bar_unknowns(equation, norm_of_steps(start));
-        rows = vec![row(Left::Output(0), length)];
-    }
-    sections.push(Section {
-        heading: what_is_read(equation).to_string(),
-        rows,
-    });
-    (program, sections)
-}
-
-fn what_is_read(equation: &Equation) -> &'static str {
+pub(crate) fn what_is_read(equation: &Equation) -> &'static str {
     match equation.kind {
         Kind::Length => "length of the bar",
         Kind::Coordinates => "coordinates read",
@@ -169,7 +136,7 @@ fn binary(op: Binary, a: Tree, b: Tree) -> Tree {
 }
 
 /// `√(x² + y² + z²)` of three steps.
-fn norm_of_steps(start: usize) -> Tree {
+pub(crate) fn norm_of_steps(start: usize) -> Tree {
     let square = |place| (false, binary(Binary::Mul, Tree::Step(place), Tree::Step(place)));
     Tree::Unary(
         Unary::Sqrt,
@@ -215,7 +182,7 @@ fn groups(equation: &Equation, trees: &[Tree], complete: bool) -> (Program, Vec<
 }
 
 /// `d − δ_bar + δ_gain·(d − bar)`, as far as these unknowns are carried.
-fn with_bar_unknowns(equation: &Equation, distance: Tree) -> Tree {
+pub(crate) fn with_bar_unknowns(equation: &Equation, distance: Tree) -> Tree {
     let inputs = equation.inputs();
     let place = |thing: &str| {
         inputs
@@ -315,7 +282,12 @@ fn over(numerator: Tree, denominator: Tree) -> Tree {
             numerator,
         ])
     } else {
-        binary(Binary::Div, numerator, denominator)
+        match without_minus(&numerator) {
+            (true, numerator) => {
+                Tree::Unary(Unary::Neg, Box::new(binary(Binary::Div, numerator, denominator)))
+            }
+            (false, numerator) => binary(Binary::Div, numerator, denominator),
+        }
     }
 }
 
@@ -343,14 +315,16 @@ fn terms(
     let mut terms = Vec::new();
     for (place, sensitivity) in first.sensitivities.iter().enumerate() {
         let coefficient = &layout.coefficients[place][coordinate];
-        // A multiple of a column that is divided by L₀ where it is not, or the other way round, stands by itself.
+        // A multiple of a column that is divided by L₀ where it is not, or the other way round, stands by itself; so does one whose
+        // factor is a fraction, which is no shorter.
         let stands = match &sensitivity.column {
             Column::Distinct => true,
             Column::Zero => false,
-            Column::Multiple { of, .. } => first
-                .sensitivities
-                .iter()
-                .any(|base| base.parameter == *of && base.over_length != sensitivity.over_length),
+            Column::Multiple { of, .. } => {
+                let mut bases = first.sensitivities.iter();
+                is_fraction(&layout.factors[place])
+                    || bases.any(|base| base.parameter == *of && base.over_length != sensitivity.over_length)
+            }
         };
         let shown = stands && sensitivity.over_length == over_length && *coefficient != Tree::Number(0.0);
         let (true, Some(own)) = (shown, input(&sensitivity.parameter)) else {
@@ -361,18 +335,13 @@ fn terms(
             let Column::Multiple { of, .. } = &other.column else {
                 continue;
             };
-            let (Some((numerator, denominator)), Some(error)) = (factor, input(&other.parameter)) else {
+            let (Some((numerator, _)), Some(error)) = (factor, input(&other.parameter)) else {
                 continue;
             };
-            if *of != sensitivity.parameter || other.over_length != over_length {
+            if *of != sensitivity.parameter || other.over_length != over_length || is_fraction(factor) {
                 continue;
             }
-            let (minus, numerator) = without_minus(numerator);
-            let scale = if *denominator == Tree::Number(1.0) {
-                numerator
-            } else {
-                binary(Binary::Div, numerator, denominator.clone())
-            };
+            let (minus, scale) = without_minus(numerator);
             let term = if scale == Tree::Number(1.0) {
                 error
             } else {
@@ -393,6 +362,11 @@ fn terms(
         });
     }
     terms
+}
+
+/// Whether the factor of a multiple has a denominator.
+fn is_fraction(factor: &Option<(Tree, Tree)>) -> bool {
+    matches!(factor, Some((_, denominator)) if *denominator != Tree::Number(1.0))
 }
 
 /// A leading minus, taken off a product or a name.

@@ -42,10 +42,15 @@ pub(crate) fn print(equation: &Equation) -> String {
     for line in whole.header(0, ['[', ']']) {
         let _ = writeln!(file, "{}", format!(" * {line}").trim_end());
     }
+    let advice = match whole.program.operations().roots {
+        0 => "",
+        _ => {
+            " * Compile with -O3 -fno-math-errno, or the square root keeps the loop over readings from being vectorised.\n"
+        }
+    };
     let _ = writeln!(
         file,
-        " * Columns: n readings; axes[a * n + i] and the results value[j * n + i]{} of reading i.\n \
-         * Compile with -O3 -fno-math-errno, or the square root keeps the loop over readings from being vectorised.\n */\n\
+        " * Columns: n readings; axes[a * n + i] and the results value[j * n + i]{} of reading i.\n{advice} */\n\
          #include <math.h>\n#include <stddef.h>\n",
         if equation.options.gradient {
             format!(", gradient[(j * {} + k) * n + i]", whole.errors())

@@ -6,7 +6,7 @@ use std::ops::Range;
 use crate::equation::{Equation, Kind};
 use crate::print::dialect::{self, Dialect};
 use crate::print::words;
-use crate::program::{Input, Label, Program, Tree};
+use crate::program::{Input, Label, Program};
 use crate::variable::{Variable, identifier};
 
 /// Words that are no names in Rust, C, Python or MATLAB, or that the printed code uses itself.
@@ -209,16 +209,8 @@ impl<'e> Code<'e> {
 
     /// Whether an input is used by the program.
     pub(crate) fn uses(&self, place: usize) -> bool {
-        fn within(tree: &Tree, place: usize) -> bool {
-            match tree {
-                Tree::Input(input) => *input == place,
-                Tree::Number(_) | Tree::Step(_) => false,
-                Tree::Unary(_, a) => within(a, place),
-                Tree::Binary(_, a, b) => within(a, place) || within(b, place),
-            }
-        }
         let steps = self.program.steps.iter().map(|step| &step.value);
-        steps.chain(&self.program.outputs).any(|tree| within(tree, place))
+        steps.chain(&self.program.outputs).any(|tree| tree.holds(place))
     }
 
     /// The steps, one text each, by a language's way to write an assignment.
@@ -247,7 +239,7 @@ impl<'e> Code<'e> {
             for (number, place) in places.clone().enumerate() {
                 let input = &self.program.inputs[place];
                 let (unit, meaning) = match input {
-                    Input::Plain(variable) => (variable.unit(), variable.meaning()),
+                    Input::Plain(variable) => (variable.unit(), words::meaning(equation, variable)),
                     Input::Sine(variable) => ("1", format!("sine of the {}", variable.meaning())),
                     Input::Cosine(variable) => ("1", format!("cosine of the {}", variable.meaning())),
                 };

@@ -197,3 +197,8 @@ fn bound(tree: &Tree, dialect: &impl Dialect) -> (String, Binding) {
         },
     }
 }
+
+/// A number without the last digits, which are rounding: 0.6 where nominal lengths give 0.5999999999999996.
+pub(crate) fn for_readers(value: f64) -> f64 {
+    format!("{value:.11e}").parse().unwrap_or(value)
+}

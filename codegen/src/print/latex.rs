@@ -22,6 +22,7 @@ struct Latex<'a> {
 
 impl Dialect for Latex<'_> {
     fn number(&self, value: f64) -> String {
+        let value = dialect::for_readers(value);
         let plain = format!("{value}");
         if plain.len() <= 12 {
             return plain;

@@ -7,6 +7,7 @@ mod article;
 mod c;
 mod code;
 pub mod dialect;
+mod exact;
 mod latex;
 mod matlab;
 mod python;
@@ -15,7 +16,7 @@ mod text;
 mod typst;
 mod words;
 
-use crate::equation::Equation;
+use crate::equation::{Equation, Kind, Order};
 use crate::error::CodegenError;
 
 /// A language that equations are printed in.
@@ -74,6 +75,27 @@ impl Equation {
     /// # Errors
     /// If the form that was asked for cannot be written in that language.
     pub fn print(&self, language: Language) -> Result<String, CodegenError> {
+        let for_readers = matches!(language, Language::Text | Language::Latex | Language::Typst);
+        if for_readers && self.options.gradient {
+            match (self.kind, self.options.order) {
+                (Kind::Length, Order::Exact) | (_, Order::First) => {}
+                (Kind::Length, Order::Bilinear) => {
+                    return Err(CodegenError::GradientForReaders {
+                        what: "a bilinear form",
+                    });
+                }
+                (Kind::Coordinates, _) => {
+                    return Err(CodegenError::GradientForReaders {
+                        what: "three coordinates",
+                    });
+                }
+                (Kind::Volumetric, _) => {
+                    return Err(CodegenError::GradientForReaders {
+                        what: "the error vector",
+                    });
+                }
+            }
+        }
         Ok(match language {
             Language::Text => text::print(self),
             Language::Latex => latex::print(self),

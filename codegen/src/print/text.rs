@@ -21,7 +21,7 @@ struct Text<'a> {
 
 impl Dialect for Text<'_> {
     fn number(&self, value: f64) -> String {
-        format!("{value}")
+        format!("{}", dialect::for_readers(value))
     }
     fn input(&self, place: usize) -> String {
         input(&self.program.inputs[place], self.symbols)

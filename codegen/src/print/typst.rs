@@ -21,7 +21,7 @@ struct Typst<'a> {
 
 impl Dialect for Typst<'_> {
     fn number(&self, value: f64) -> String {
-        format!("{value}")
+        format!("{}", dialect::for_readers(value))
     }
     fn input(&self, place: usize) -> String {
         input(&self.program.inputs[place], self.symbols)

@@ -60,12 +60,19 @@ pub(crate) fn notes_spelt(
         "Checked against {of} with dual numbers at {} points, errors to ±10 mm and ±0.1 rad: largest relative difference {:.0e} (value), {:.0e} (gradient).",
         check.points, check.value, check.gradient
     ))];
-    for deviation in &equation.deviations {
+    if !equation.deviations.is_empty() {
+        let found = equation.deviations.iter().map(|deviation| {
+            format!(
+                "{} µm at errors of ±{} µm and ±{}°",
+                two_digits(deviation.largest_um),
+                deviation.shift_um,
+                deviation.tilt_deg,
+            )
+        });
+        let found = found.collect::<Vec<_>>().join(", ");
+        let over = range(equation);
         notes.push(escape(&format!(
-            "Errors of {} µm and {}°, all signs: at most {} µm from the exact chain.",
-            deviation.shift_um,
-            deviation.tilt_deg,
-            two_digits(deviation.largest_um)
+            "Largest deviation from the exact chain{over}: {found}."
         )));
     }
     if !equation.absent.is_empty() {
@@ -88,15 +95,57 @@ pub(crate) fn notes_spelt(
     notes
 }
 
-/// A positive number with two digits that count, without an exponent where it is of ordinary size.
+/// Where a truncation was judged: the ranges of the moving axes, and lengths that the session does not state.
+fn range(equation: &Equation) -> String {
+    let degrees = |angle: f64| two_places(angle.to_degrees());
+    let axes = equation
+        .range
+        .iter()
+        .filter_map(|(variable, [low, high])| match variable {
+            Variable::Position { axis, .. } if variable.is_angle() => {
+                Some(format!("{axis} {}° to {}°", degrees(*low), degrees(*high)))
+            }
+            Variable::Position { axis, .. } => Some(format!(
+                "{axis} {} mm to {} mm",
+                two_places(*low),
+                two_places(*high)
+            )),
+            Variable::Length(name) if equation.kind == Kind::Volumetric => {
+                Some(format!("{name} {} mm", two_places(*low)))
+            }
+            _ => None,
+        });
+    let axes: Vec<String> = axes.collect();
+    if axes.is_empty() {
+        String::new()
+    } else {
+        format!(" over {}", axes.join(", "))
+    }
+}
+
+/// A number rounded to two decimals, without those that say nothing.
+fn two_places(value: f64) -> String {
+    let rounded = (value * 100.0).round() / 100.0;
+    format!("{}", rounded + 0.0).replace('-', "−")
+}
+
+/// A positive number with two digits that count; what is less than a millionth is rounding.
 fn two_digits(value: f64) -> String {
-    if value == 0.0 {
-        return "0".to_string();
+    if value < 1e-6 {
+        return "less than 0.000001".to_string();
     }
     let exponent = value.abs().log10().floor();
-    if exponent < -6.0 {
-        return format!("{value:.1e}");
-    }
     let decimals = (1.0 - exponent).max(0.0) as usize;
     format!("{value:.decimals$}")
+}
+
+/// What a variable stands for: in the error vector of the tool its lengths are the coordinates of a point.
+pub(crate) fn meaning(equation: &Equation, variable: &Variable) -> String {
+    match variable {
+        Variable::Length(name) if equation.kind == Kind::Volumetric => {
+            let coordinate = name.split('_').next().unwrap_or_default();
+            format!("{coordinate} of the tool point in the tool frame")
+        }
+        other => other.meaning(),
+    }
 }

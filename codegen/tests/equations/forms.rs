@@ -72,6 +72,16 @@ fn readable_forms_of_the_chapter_5_test() {
     }
 }
 
+#[test]
+fn derivatives_of_the_chapter_5_test() {
+    let options = Options {
+        gradient: true,
+        ..Options::default()
+    };
+    let text = chapter5(&options).print(Language::Text).expect("an article");
+    snapshot("chapter5_text_derivatives", &text);
+}
+
 /// Value and gradient of the chapter 5 test take at most 70 operations: the printed Rust is run over a scalar that counts.
 #[test]
 fn operations_counted_by_running_the_printed_code() {

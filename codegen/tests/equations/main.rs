@@ -7,6 +7,7 @@ mod chain;
 mod compiled;
 mod forms;
 mod operators;
+mod second;
 mod seed000;
 mod seed003;
 mod tools;

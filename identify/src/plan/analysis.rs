@@ -20,15 +20,18 @@ pub struct PlanOptions {
     pub planned_only: bool,
     /// Whether undeclared effects of the library are looked at.
     pub effects: bool,
+    /// Travel of the bar's sensor either way, mm, beyond which a test is warned of.
+    pub reach_mm: f64,
 }
 
 impl Default for PlanOptions {
-    /// The session's noise, its data where there are any, and effects.
+    /// The session's noise, its data where there are any, effects, and the sensor's usual travel.
     fn default() -> Self {
         PlanOptions {
             noise_mm: None,
             planned_only: false,
             effects: true,
+            reach_mm: BAR_TRAVEL_MM,
         }
     }
 }
@@ -45,12 +48,16 @@ const WORTH_SAYING: f64 = 1.5;
 pub fn analyse(session: &Session, options: &PlanOptions) -> Result<PlanAnalysis, IdentifyError> {
     let (complete, noise) = prepared(session, options)?;
     let problem = states::problem_by_test(&complete, noise)?;
-    let mut analysis = analyse_problem(&problem)?;
+    let mut analysis = analyse_problem(&problem, options.reach_mm)?;
     if options.noise_mm.is_none() && session.noise_mm.is_none() {
-        analysis.warnings.push(format!(
-            "the session states no `noise_um`; {:.2} µm is taken",
-            problem.noise.sigma_mm * 1e3
-        ));
+        let found = if problem.noise.source == NoiseSource::Stated {
+            "is assumed"
+        } else {
+            "is what its data show"
+        };
+        let sigma_um = problem.noise.sigma_mm * 1e3;
+        let warning = format!("the session states no `noise_um`; {sigma_um:.2} µm {found}");
+        analysis.warnings.push(warning);
     }
     if options.effects {
         analysis.effects = Some(effects::effects(&problem)?);
@@ -70,11 +77,12 @@ pub fn prepared(session: &Session, options: &PlanOptions) -> Result<(Session, No
     Ok((states::complete(session, options.planned_only)?, noise))
 }
 
-/// Analyses a problem whose folds are its tests (see [`states::problem_by_test`]), without effects.
+/// Analyses a problem whose folds are its tests (see [`states::problem_by_test`]), without effects; tests whose readings differ from the
+/// bar by more than `travel_mm` are warned of.
 ///
 /// # Errors
 /// If the model cannot be evaluated.
-pub fn analyse_problem(problem: &Problem<'_>) -> Result<PlanAnalysis, IdentifyError> {
+pub fn analyse_problem(problem: &Problem<'_>, travel_mm: f64) -> Result<PlanAnalysis, IdentifyError> {
     let list = &problem.parameters.list;
     let nominal = vec![0.0; list.len()];
     let linear = Linearisation::of(problem, &nominal)?;
@@ -107,9 +115,9 @@ pub fn analyse_problem(problem: &Problem<'_>) -> Result<PlanAnalysis, IdentifyEr
         .collect();
     let mut warnings = problem.session.warnings.clone();
     for test in &tests {
-        if let Some(reach_mm) = test.reach_mm.filter(|reach_mm| *reach_mm > BAR_TRAVEL_MM) {
+        if let Some(reach_mm) = test.reach_mm.filter(|reach_mm| *reach_mm > travel_mm) {
             warnings.push(format!(
-                "{}: the balls come {reach_mm:.2} mm nearer or farther than the bar is long; its sensor travels {BAR_TRAVEL_MM} mm either way",
+                "{}: the balls come {reach_mm:.2} mm nearer or farther than the bar is long; its sensor travels {travel_mm} mm either way",
                 test.name
             ));
         }

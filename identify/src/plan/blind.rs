@@ -15,45 +15,86 @@ const NEGLIGIBLE: f64 = 1e-5;
 /// Condition index from which a dependency is named: moderate from 10, strong from 30 (Belsley, Kuh & Welsch, Regression Diagnostics,
 /// 1980, ch. 3).
 const NAMED_FROM: f64 = 10.0;
+/// Things that a combination names in words.
+const MOST_NAMED: usize = 5;
+/// The verb of a combination that no reading sees.
+const CANNOT: &str = "cannot be told from";
 /// Share of the largest coefficient below which an unknown is left out of a near dependency.
 const LEAST_PART: f64 = 0.1;
 
-/// An unknown in words: `spindle_ball.z[A150]` is the z of the spindle ball in A150.
-pub fn called(parameter: &Parameter) -> String {
-    if parameter.role != Role::Setup {
-        return parameter.id.clone();
+/// A thing and the group that it belongs to, in words: `spindle_ball.z[A150]` is `z of the spindle ball` in `A150`.
+fn called<'i>(list: &[Parameter], id: &'i str) -> (String, Option<&'i str>) {
+    let setup = list
+        .iter()
+        .any(|parameter| parameter.id == id && parameter.role == Role::Setup);
+    if !setup {
+        return (id.to_string(), None);
     }
-    let (thing, group) = parameter.id.split_once('[').unwrap_or((&parameter.id, ""));
+    let (thing, group) = id.split_once('[').unwrap_or((id, ""));
     let (thing, coordinate) = thing.split_once('.').unwrap_or((thing, ""));
-    let thing = thing.replace('_', " ");
     let of = if coordinate.is_empty() {
         String::new()
     } else {
         format!("{coordinate} of ")
     };
-    match group.strip_suffix(']') {
-        Some(group) => format!("{of}the {thing} [{group}]"),
-        None => format!("{of}the {thing}"),
+    (
+        format!("{of}the {}", thing.replace('_', " ")),
+        group.strip_suffix(']'),
+    )
+}
+
+/// A combination in words: what cannot be told from what, and in which proportion, with units where they differ. One thing in several tests is
+/// named once, and of a long combination only the first.
+fn in_words(list: &[Parameter], combination: &[(String, f64)], verb: &str) -> String {
+    let unit_of = |id: &str| {
+        list.iter()
+            .find(|parameter| parameter.id == id)
+            .map_or("", |parameter| parameter.unit.name.as_str())
+    };
+    let first_unit = combination.first().map_or("", |(id, _)| unit_of(id));
+    let mixed = combination.iter().any(|(id, _)| unit_of(id) != first_unit);
+    let mut things: Vec<(String, Vec<&str>, String)> = Vec::new();
+    for (id, value) in combination {
+        let (thing, group) = called(list, id);
+        let value = if mixed {
+            format!("{} {}", short(*value), unit_of(id))
+        } else {
+            short(*value)
+        };
+        match things
+            .iter_mut()
+            .find(|(other, groups, v)| *other == thing && *v == value && !groups.is_empty())
+        {
+            Some((_, groups, _)) => groups.extend(group),
+            None => things.push((thing, group.into_iter().collect(), value)),
+        }
+    }
+    // One more than is named is named too: it takes no more room than to say so.
+    let unnamed = match things.len() {
+        count if count > MOST_NAMED + 1 => count - MOST_NAMED,
+        _ => 0,
+    };
+    things.truncate(things.len() - unnamed);
+    let mut words = things.iter().map(|(thing, groups, _)| match groups.as_slice() {
+        [] => thing.clone(),
+        [one] => format!("{thing} in {one}"),
+        [first @ .., last] => format!("{thing} in {} and {last}", first.join(", ")),
+    });
+    let proportion: Vec<&str> = things.iter().map(|(_, _, value)| value.as_str()).collect();
+    let first = words.next().unwrap_or_default();
+    let others: Vec<String> = words.collect();
+    let (others, proportion) = (others.join(", "), proportion.join(" : "));
+    match unnamed {
+        0 => format!("{first} {verb} {others}: {proportion}"),
+        _ => format!("{first} {verb} {others} and {unnamed} more together: {proportion} : …"),
     }
 }
 
-/// `1 : −0.7`, two digits.
-fn proportion(combination: &[(String, f64)]) -> String {
-    combination
-        .iter()
-        .map(|(_, value)| short(*value))
-        .collect::<Vec<_>>()
-        .join(" : ")
-}
-
+/// Two decimals, or two digits of a small number.
 fn short(value: f64) -> String {
-    let text = if value.abs() >= 10.0 {
-        format!("{value:.1}")
-    } else {
-        format!("{value:.2}")
-    };
-    let text = text.trim_end_matches('0').trim_end_matches('.');
-    text.replace('-', "−")
+    let places = (1.0 - value.abs().max(1e-9).log10().floor()).clamp(1.0, 9.0) as usize;
+    let text = format!("{value:.*}", places.max(if value.abs() < 10.0 { 2 } else { 1 }));
+    text.trim_end_matches('0').trim_end_matches('.').replace('-', "−")
 }
 
 /// Combinations that no reading sees, priors included.
@@ -64,17 +105,12 @@ pub fn blind(problem: &Problem<'_>, rank: &Rank) -> Vec<Unobservable> {
         .map(|row| {
             let combination = outside(problem, row);
             let why = match combination.as_slice() {
-                [] => String::new(),
-                [(id, _)] => format!("no reading of these tests changes with {}", named(list, id)),
-                [(first, _), rest @ ..] => {
-                    let others: Vec<String> = rest.iter().map(|(id, _)| named(list, id)).collect();
-                    format!(
-                        "{} cannot be told from {}: {}",
-                        named(list, first),
-                        others.join(", "),
-                        proportion(&combination)
-                    )
+                [(id, _)] => {
+                    let (thing, group) = called(list, id);
+                    let place = group.map_or(String::new(), |group| format!(" in {group}"));
+                    format!("no reading of these tests changes with {thing}{place}")
                 }
+                _ => in_words(list, &combination, CANNOT),
             };
             Unobservable {
                 combination: combination.into_iter().collect(),
@@ -82,12 +118,6 @@ pub fn blind(problem: &Problem<'_>, rank: &Rank) -> Vec<Unobservable> {
             }
         })
         .collect()
-}
-
-fn named(list: &[Parameter], id: &str) -> String {
-    list.iter()
-        .find(|parameter| parameter.id == id)
-        .map_or(id.to_string(), called)
 }
 
 /// A row over scaled unknowns in outside units, its first entry 1.
@@ -157,23 +187,14 @@ pub fn held_by_setup(
             continue;
         }
         let mut combination = outside(problem, &sparse);
-        combination.sort_by(|a, b| {
-            let first = |id: &str| id != list[error].id;
-            first(&a.0)
-                .cmp(&first(&b.0))
-                .then(b.1.abs().total_cmp(&a.1.abs()))
-        });
-        let others: Vec<String> = combination[1..].iter().map(|(id, _)| named(list, id)).collect();
-        let why = if others.is_empty() {
+        // The error first, then what it hides behind, in the order of the unknowns.
+        combination.sort_by_key(|(id, _)| *id != list[error].id);
+        let leading = combination[0].1;
+        combination.iter_mut().for_each(|(_, value)| *value /= leading);
+        if combination.len() < 2 {
             continue;
-        } else {
-            format!(
-                "{} cannot be told from {}: {}",
-                list[error].id,
-                others.join(", "),
-                proportion(&combination)
-            )
-        };
+        }
+        let why = in_words(list, &combination, CANNOT);
         held.push(HeldBySetup {
             error: list[error].id.clone(),
             combination,
@@ -266,12 +287,10 @@ pub fn nearly_blind(
         let raw: Vec<(String, f64)> = raw.collect();
         let leading = raw[0].1;
         let combination: Vec<(String, f64)> = raw.into_iter().map(|(id, v)| (id, v / leading)).collect();
-        let others: Vec<&str> = combination[1..].iter().map(|(id, _)| id.as_str()).collect();
-        let why = format!(
-            "{} is told from {} badly (condition index {condition_index:.0}): {}",
-            combination[0].0,
-            others.join(", "),
-            proportion(&combination)
+        let why = in_words(
+            list,
+            &combination,
+            &format!("is badly told (condition index {condition_index:.0}) from"),
         );
         found.push(NearDependency {
             condition_index,

@@ -8,12 +8,13 @@ use abbe_model::session::motion::{FollowOffset, Motion};
 use abbe_model::session::{Prior, Session, Test, placing};
 
 use super::menu::Menu;
+use super::places::{Place, dot, norm, places, standings};
 use super::sweep::{Sweep, sweep_of};
 
 /// Least radius about a swept axis that a test is made at, mm: nearer, the bar hardly moves.
 const LEAST_RADIUS_MM: f64 = 10.0;
-/// A ball nearer than this to one that is mounted already is that one, mm.
-const SAME_PLACE_MM: f64 = 0.5;
+/// Shortest bar with which linear axes follow, mm: the shortest of the kits, less what calibration may take off. Nearer, the cups touch.
+const LEAST_FOLLOWING_MM: f64 = 49.0;
 
 /// An entry before its states are planned.
 pub(super) struct Draft {
@@ -25,13 +26,6 @@ pub(super) struct Draft {
     pub new_setup: bool,
 }
 
-/// A place of the carried ball: where, and under which set-up.
-struct Place {
-    ball: [f64; 3],
-    setup: String,
-    new: bool,
-}
-
 /// Everything that the menu's choices come to, before travel and reach are checked.
 pub(super) fn drafts(session: &Session, menu: &Menu, last: &Test) -> Vec<Draft> {
     let machine = &session.machine;
@@ -40,27 +34,41 @@ pub(super) fn drafts(session: &Session, menu: &Menu, last: &Test) -> Vec<Draft> 
         .collect();
     let mut drafts = Vec::new();
     for &axis in &rotary {
-        let sweep = sweep_of(session, axis);
+        let whole = sweep_of(session, axis);
+        let sweeps: Vec<Sweep> = menu
+            .ranges
+            .iter()
+            .flat_map(|share| menu.both_directions.iter().map(|both| whole.part(*share, *both)))
+            .collect();
         let on_table = axis < machine.workpiece_side;
         for place in places(session, menu, &rotary, on_table) {
-            for at in standings(session, menu, &rotary, axis, sweep.from) {
-                let base = Base {
-                    session,
-                    last,
-                    axis,
-                    sweep,
-                    on_table,
-                    place: &place,
-                    at: &at,
-                };
-                drafts.extend(
-                    menu.bars_mm
-                        .iter()
-                        .flat_map(|nominal| base.on_axis(menu, *nominal)),
-                );
-                let upright = at.iter().enumerate().all(|(k, q)| k == axis || *q == 0.0);
-                if let Some(nominal) = following_bar(menu).filter(|_| menu.follow && upright) {
-                    drafts.extend(base.following(menu, nominal));
+            for at in standings(session, menu, &rotary, axis) {
+                for (sweep, &feed) in sweeps
+                    .iter()
+                    .flat_map(|sweep| menu.feeds.iter().map(|feed| (*sweep, feed)))
+                {
+                    let place = &place;
+                    let mut at = at.clone();
+                    at[axis] = sweep.from;
+                    let base = Base {
+                        session,
+                        last,
+                        axis,
+                        sweep,
+                        feed,
+                        on_table,
+                        place,
+                        at: &at,
+                    };
+                    drafts.extend(
+                        menu.bars_mm
+                            .iter()
+                            .flat_map(|nominal| base.on_axis(menu, *nominal)),
+                    );
+                    let upright = at.iter().enumerate().all(|(k, q)| k == axis || *q == 0.0);
+                    if let Some(nominal) = following_bar(menu).filter(|_| menu.follow && upright) {
+                        drafts.extend(base.following(menu, nominal));
+                    }
                 }
             }
         }
@@ -69,109 +77,18 @@ pub(super) fn drafts(session: &Session, menu: &Menu, last: &Test) -> Vec<Draft> 
 }
 
 /// The bar for tests in which linear axes follow, where its length changes nothing but how far the balls are apart: the shortest that keeps
-/// them 100 mm apart, else the longest.
+/// them 100 mm apart, else the longest that keeps their cups apart.
 fn following_bar(menu: &Menu) -> Option<f64> {
-    let bars = || menu.bars_mm.iter().copied();
+    let bars = || {
+        menu.bars_mm
+            .iter()
+            .copied()
+            .filter(|bar| *bar >= LEAST_FOLLOWING_MM)
+    };
     bars()
         .filter(|bar| *bar >= 99.0)
         .min_by(f64::total_cmp)
         .or_else(|| bars().max_by(f64::total_cmp))
-}
-
-/// Where the carried ball may be: as it is mounted in the session, or anew about each rotary axis of its side.
-fn places(session: &Session, menu: &Menu, rotary: &[usize], on_table: bool) -> Vec<Place> {
-    let machine = &session.machine;
-    let mut places: Vec<Place> = Vec::new();
-    for test in &session.tests {
-        let Station::BallBar(bar) = &test.station else {
-            continue;
-        };
-        let (ball, setup) = if on_table {
-            (bar.workpiece_ball, test.setup.clone())
-        } else {
-            (bar.spindle_ball, test.spindle_setup.clone())
-        };
-        if on_table && !places.iter().any(|place| place.setup == setup) {
-            places.push(Place {
-                ball,
-                setup,
-                new: false,
-            });
-        }
-    }
-    for &about in rotary
-        .iter()
-        .filter(|axis| (**axis < machine.workpiece_side) == on_table)
-    {
-        let axis = &machine.axes[about];
-        let across = across(axis.direction);
-        let carries_table = on_table && about == 0;
-        for &radius in &menu.radii_mm {
-            for &height in &menu.heights_mm {
-                let both = if carries_table || height == 0.0 {
-                    &[1.0][..]
-                } else {
-                    &[1.0, -1.0][..]
-                };
-                for sign in both {
-                    let up = if axis.direction[2] < 0.0 { -1.0 } else { 1.0 };
-                    let ball: [f64; 3] = std::array::from_fn(|i| {
-                        axis.origin_mm[i] + up * sign * height * axis.direction[i] + radius * across[i]
-                    });
-                    let taken = places
-                        .iter()
-                        .any(|place| distance(place.ball, ball) < SAME_PLACE_MM);
-                    if !taken {
-                        places.push(Place {
-                            ball,
-                            setup: String::new(),
-                            new: true,
-                        });
-                    }
-                }
-            }
-        }
-    }
-    places
-}
-
-/// A unit vector square to an axis: R's Y where it can be, else Z.
-fn across(direction: [f64; 3]) -> [f64; 3] {
-    let start = if direction[1].abs() < 0.5 {
-        [0.0, 1.0, 0.0]
-    } else {
-        [0.0, 0.0, 1.0]
-    };
-    let along: f64 = (0..3).map(|i| start[i] * direction[i]).sum();
-    let rest: [f64; 3] = std::array::from_fn(|i| start[i] - along * direction[i]);
-    let length = norm(rest);
-    rest.map(|x| x / length)
-}
-
-/// The other rotary axes' positions; the swept one stands where its sweep begins.
-fn standings(session: &Session, menu: &Menu, rotary: &[usize], swept: usize, from: f64) -> Vec<Vec<f64>> {
-    let machine = &session.machine;
-    let mut zero = vec![0.0; machine.axes.len()];
-    zero[swept] = from;
-    let mut all = vec![zero];
-    for &other in rotary.iter().filter(|axis| **axis != swept) {
-        let mut more = Vec::new();
-        for at in &all {
-            for degrees in &menu.standing_deg {
-                let position = degrees.to_radians();
-                let [low, high] = machine.axes[other]
-                    .travel
-                    .unwrap_or([f64::NEG_INFINITY, f64::INFINITY]);
-                if position >= low - 1e-9 && position <= high + 1e-9 {
-                    let mut at = at.clone();
-                    at[other] = position;
-                    more.push(at);
-                }
-            }
-        }
-        all = more;
-    }
-    all
 }
 
 struct Base<'b> {
@@ -179,6 +96,8 @@ struct Base<'b> {
     last: &'b Test,
     axis: usize,
     sweep: Sweep,
+    /// Times the speed of the sweep.
+    feed: f64,
     on_table: bool,
     place: &'b Place,
     at: &'b [f64],
@@ -241,6 +160,18 @@ impl Base<'_> {
             }
         }
         name.push_str(words);
+        if self.sweep.is_part || !self.sweep.both_directions {
+            let [from, to] = [self.sweep.from, self.sweep.to].map(f64::to_degrees);
+            let ways = if self.sweep.both_directions {
+                "both ways"
+            } else {
+                "one way"
+            };
+            name.push_str(&format!(", swept {from:.0} … {to:.0}° {ways}").replace('-', "−"));
+        }
+        if self.feed != 1.0 {
+            name.push_str(&format!(", at {} times the feed", self.feed));
+        }
         if !self.place.new {
             name.push_str(&format!(" ({ball} as in {})", self.place.setup));
         }
@@ -326,9 +257,9 @@ impl Base<'_> {
                     from: self.sweep.from,
                     to: self.sweep.to,
                     step: self.sweep.step * menu.thin.max(1) as f64,
-                    speed: self.sweep.speed,
+                    speed: self.sweep.speed * self.feed,
                     runs: self.sweep.runs,
-                    both_directions: true,
+                    both_directions: self.sweep.both_directions,
                 };
                 let words = if beside == 0.0 {
                     String::new()
@@ -374,9 +305,9 @@ impl Base<'_> {
                     from: self.sweep.from,
                     to: self.sweep.to,
                     step: self.sweep.step * menu.thin.max(1) as f64,
-                    speed: self.sweep.speed,
+                    speed: self.sweep.speed * self.feed,
                     runs: self.sweep.runs,
-                    both_directions: true,
+                    both_directions: self.sweep.both_directions,
                     offset,
                 };
                 let words = format!(", linear axes following with the bar {word}");
@@ -384,16 +315,4 @@ impl Base<'_> {
             })
             .collect()
     }
-}
-
-fn dot(a: [f64; 3], b: [f64; 3]) -> f64 {
-    (0..3).map(|i| a[i] * b[i]).sum()
-}
-
-fn norm(a: [f64; 3]) -> f64 {
-    dot(a, a).sqrt()
-}
-
-fn distance(a: [f64; 3], b: [f64; 3]) -> f64 {
-    norm(std::array::from_fn(|i| a[i] - b[i]))
 }

@@ -11,7 +11,7 @@
 
 use std::collections::{BTreeMap, HashMap};
 
-use abbe_model::effect::Shape;
+use abbe_model::effect::{Effect, Shape};
 use faer::{Mat, MatRef};
 use nalgebra::DMatrix;
 use rayon::prelude::*;
@@ -33,6 +33,10 @@ const HIDDEN_BELOW: f64 = 0.01;
 const LOW_ORDERS: f64 = 12.0;
 /// Higher orders that stand for those between them.
 const HIGH_ORDERS: [f64; 8] = [16.0, 20.0, 30.0, 40.0, 60.0, 80.0, 100.0, 120.0];
+/// Longest periods of a component and driver, each of which is looked at: the longer, the harder it is to tell from the unknowns.
+const LONG_PERIODS: usize = 24;
+/// Of the shorter ones, one in so many.
+const EVERY_SHORT_PERIOD: usize = 8;
 /// Coefficients of one effect beyond which it is left out: a free curve holds the constants and slopes that the unknowns hold too, so that
 /// its worst member is always hidden.
 const MOST_COEFFICIENTS: usize = 2;
@@ -55,9 +59,10 @@ pub fn effects(problem: &Problem<'_>) -> Result<EffectsAnalysis, IdentifyError> 
     let families = library::families()?;
     let all = library::candidates(problem)?;
     let searched = all.len();
+    let mut periods: HashMap<String, usize> = HashMap::new();
     let (candidates, layouts): (Vec<Candidate>, Vec<Layout>) = all
         .into_iter()
-        .filter(|candidate| is_looked_at(&candidate.effect.shape))
+        .filter(|candidate| is_looked_at(&candidate.effect, &mut periods))
         .filter_map(|candidate| {
             columns
                 .layout(&candidate.effect)
@@ -89,12 +94,11 @@ pub fn effects(problem: &Problem<'_>) -> Result<EffectsAnalysis, IdentifyError> 
                     let count = layouts[index].count;
                     let range = start..start + count;
                     start = range.end;
-                    let of = |matrix: &Mat<f64>| matrix.as_ref().subcols(range.start, count).to_owned();
                     let name = &families[candidates[index].family].name;
                     let products = Products {
-                        own: of(&block),
-                        cross: of(&cross),
-                        moved: of(&moved),
+                        own: block.subcols(range.start, count),
+                        cross: cross.subcols(range.start, count),
+                        moved: moved.subcols(range.start, count),
                     };
                     judge(problem, &candidates[index], name, &products, &thresholds[count])
                 })
@@ -110,27 +114,35 @@ pub fn effects(problem: &Problem<'_>) -> Result<EffectsAnalysis, IdentifyError> 
     })
 }
 
-fn is_looked_at(shape: &Shape) -> bool {
-    if shape.coefficients() > MOST_COEFFICIENTS {
+/// Whether an effect is judged; `periods` counts those of one component and driver, the longest first.
+fn is_looked_at(effect: &Effect, periods: &mut HashMap<String, usize>) -> bool {
+    if effect.shape.coefficients() > MOST_COEFFICIENTS {
         return false;
     }
-    match shape {
+    match &effect.shape {
         Shape::Harmonic { order } => *order <= LOW_ORDERS || HIGH_ORDERS.contains(order),
+        Shape::Periodic { .. } => {
+            let count = periods
+                .entry(format!("{}~{}", effect.component, effect.driver))
+                .or_default();
+            *count += 1;
+            *count <= LONG_PERIODS || count.is_multiple_of(EVERY_SHORT_PERIOD)
+        }
         _ => true,
     }
 }
 
-struct Products {
-    own: Mat<f64>,
-    cross: Mat<f64>,
-    moved: Mat<f64>,
+struct Products<'m> {
+    own: MatRef<'m, f64>,
+    cross: MatRef<'m, f64>,
+    moved: MatRef<'m, f64>,
 }
 
 fn judge(
     problem: &Problem<'_>,
     candidate: &Candidate,
     family: &str,
-    products: &Products,
+    products: &Products<'_>,
     threshold: &[f64; 2],
 ) -> EffectDetectability {
     let session = problem.session;
@@ -140,8 +152,8 @@ fn judge(
         Some(inside) => physical_size(inside),
         None => 0.1,
     };
-    let own = gram(products.own.as_ref(), products.own.as_ref());
-    let left = &own - gram(products.cross.as_ref(), products.moved.as_ref());
+    let own = gram(products.own, products.own);
+    let left = &own - gram(products.cross, products.moved);
     let symmetric = 0.5 * (&left + left.transpose());
     let eigen = symmetric.symmetric_eigen();
     let worst = eigen.eigenvalues.imin();
@@ -178,7 +190,7 @@ fn judge(
         detectable_searched: amplitude(threshold[1]),
         surviving_share,
         verdict: verdict.to_string(),
-        biases: biases(problem, &products.moved, &unit),
+        biases: biases(problem, products.moved, &unit),
     }
 }
 
@@ -188,7 +200,7 @@ fn gram(a: MatRef<'_, f64>, b: MatRef<'_, f64>) -> DMatrix<f64> {
     DMatrix::from_fn(product.nrows(), product.ncols(), |i, j| product[(i, j)])
 }
 
-fn biases(problem: &Problem<'_>, moved: &Mat<f64>, unit: &Unit) -> Vec<Bias> {
+fn biases(problem: &Problem<'_>, moved: MatRef<'_, f64>, unit: &Unit) -> Vec<Bias> {
     let mut biases: Vec<Bias> = problem
         .parameters
         .list
@@ -203,7 +215,7 @@ fn biases(problem: &Problem<'_>, moved: &Mat<f64>, unit: &Unit) -> Vec<Bias> {
             Bias {
                 id: parameter.id.clone(),
                 per_unit: worst * parameter.unit.per_inside / unit.per_inside,
-                unit: format!("{}/({})", parameter.unit.name, unit.name),
+                unit: per(&parameter.unit.name, &unit.name),
             }
         })
         .filter(|bias| bias.per_unit.abs() >= LEAST_BIAS)
@@ -277,4 +289,13 @@ pub fn hidden_by_error(analysis: &EffectsAnalysis) -> BTreeMap<String, Vec<(Stri
         .values_mut()
         .for_each(|list| list.sort_by(|a, b| b.1.abs().total_cmp(&a.1.abs())));
     by_error
+}
+
+/// `um/arcsec`, `um/(um/h)`.
+fn per(above: &str, below: &str) -> String {
+    if below.contains('/') {
+        format!("{above}/({below})")
+    } else {
+        format!("{above}/{below}")
+    }
 }

@@ -38,7 +38,7 @@ pub struct Improvement {
     pub steps: Vec<Step>,
     /// What the exchange changed, in words.
     pub exchanged: Vec<String>,
-    /// The best by themselves.
+    /// The best by themselves, in the order in which they were judged: by the figure, or by its gain a minute.
     pub alternatives: Vec<Alternative>,
 }
 
@@ -119,7 +119,11 @@ pub fn improve(
             best
         };
         if place == 0 {
-            alternatives = listed(&prepared, &figures, &options.goal);
+            let score = |entry: usize| match options.by_minute {
+                true => -gain_a_minute(&prepared, now, &figures, entry),
+                false => figures[entry],
+            };
+            alternatives = listed(&prepared, &figures, &options.goal, score);
         }
         if is_no_gain(now, figures[best]) {
             break;
@@ -153,23 +157,32 @@ fn is_no_gain(before: f64, after: f64) -> bool {
     before - after <= LEAST_GAIN * before.abs()
 }
 
-/// The entry that lowers the logarithm of the figure most a minute.
-fn best_a_minute(prepared: &Prepared, now: f64, figures: &[f64]) -> Option<usize> {
+/// By how much an entry lowers the logarithm of the figure a minute.
+fn gain_a_minute(prepared: &Prepared, now: f64, figures: &[f64], entry: usize) -> f64 {
     // A separation is negative here: the ratio is turned round.
-    let gain = |entry: usize| {
-        let ratio = if now > 0.0 {
-            now / figures[entry]
-        } else {
-            figures[entry].abs() / now.abs().max(1e-12)
-        };
-        ratio.max(1e-12).ln() / prepared.entries[entry].entry.minutes.max(1e-3)
+    let ratio = if now > 0.0 {
+        now / figures[entry]
+    } else {
+        figures[entry].abs() / now.abs().max(1e-12)
     };
+    ratio.max(1e-12).ln() / prepared.entries[entry].entry.minutes.max(1e-3)
+}
+
+/// The entry that gains most a minute.
+fn best_a_minute(prepared: &Prepared, now: f64, figures: &[f64]) -> Option<usize> {
+    let gain = |entry: usize| gain_a_minute(prepared, now, figures, entry);
     (0..figures.len()).max_by(|a, b| gain(*a).total_cmp(&gain(*b)))
 }
 
-fn listed(prepared: &Prepared, figures: &[f64], goal: &Goal) -> Vec<Alternative> {
+/// The entries with the least scores.
+fn listed(
+    prepared: &Prepared,
+    figures: &[f64],
+    goal: &Goal,
+    score: impl Fn(usize) -> f64,
+) -> Vec<Alternative> {
     let mut order: Vec<usize> = (0..figures.len()).collect();
-    order.sort_by(|a, b| figures[*a].total_cmp(&figures[*b]));
+    order.sort_by(|a, b| score(*a).total_cmp(&score(*b)));
     let of = |entry: usize| Alternative {
         test: prepared.entries[entry].entry.name.clone(),
         after: reported(figures[entry], goal),

@@ -12,7 +12,6 @@ use faer::{Mat, MatRef};
 use super::linear::{Linearisation, marginal};
 use super::results::Indices;
 use crate::error::IdentifyError;
-use crate::rank::LEAST_SEEN;
 
 /// The figures of a plan.
 ///
@@ -24,57 +23,34 @@ pub fn indices(
     readings: usize,
     g_efficiency: f64,
 ) -> Result<Indices, IdentifyError> {
-    let r = marginal(linear.whole.parts().0.as_ref(), wanted, &linear.size);
-    let size: Vec<f64> = wanted.iter().map(|j| linear.size[*j]).collect();
-    let scaled = Mat::from_fn(r.nrows(), r.ncols(), |i, j| r[(i, j)] * size[j]);
-    let sigma: Vec<f64> = singular_values(scaled.as_ref())?
-        .into_iter()
-        .filter(|s| *s >= LEAST_SEEN)
-        .collect();
-    let m = sigma.len();
-    let (Some(first), Some(last)) = (sigma.first().copied(), sigma.last().copied()) else {
-        return Ok(Indices {
-            seen: 0,
-            errors: wanted.len(),
-            condition_number: f64::INFINITY,
-            o1: 0.0,
-            o2: 0.0,
-            o3: 0.0,
-            o4: 0.0,
-            o5: 0.0,
-            d_efficiency: 0.0,
-            a_efficiency: 0.0,
-            e_efficiency: 0.0,
-            g_efficiency: 0.0,
-        });
-    };
-    let mean_log = sigma.iter().map(|s| s.ln()).sum::<f64>() / m as f64;
-    // Columns of unit length; an error that nothing sees has no column.
-    let seen: Vec<usize> = (0..wanted.len())
-        .filter(|j| {
-            (0..r.nrows())
-                .map(|i| scaled[(i, *j)].powi(2))
-                .sum::<f64>()
-                .sqrt()
-                >= LEAST_SEEN
-        })
-        .collect();
-    let unit = Mat::from_fn(r.nrows(), seen.len(), |i, k| {
-        let norm = (0..r.nrows())
-            .map(|i| r[(i, seen[k])].powi(2))
-            .sum::<f64>()
-            .sqrt();
-        r[(i, seen[k])] / norm
-    });
-    let lambda: Vec<f64> = singular_values(unit.as_ref())?
+    let errors = wanted.len();
+    let seen: Vec<usize> = wanted
         .iter()
-        .map(|s| s * s)
-        .take(m)
+        .copied()
+        .filter(|j| linear.rank.is_seen(*j))
         .collect();
-    let count = lambda.len() as f64;
+    let m = seen.len();
+    if m == 0 {
+        return Ok(Indices {
+            errors,
+            condition_number: f64::INFINITY,
+            ..Indices::default()
+        });
+    }
+    let r = marginal(linear.whole.parts().0.as_ref(), &seen, &linear.size);
+    let scaled = Mat::from_fn(m, m, |i, j| r[(i, j)] * linear.size[seen[j]]);
+    let sigma = singular_values(scaled.as_ref())?;
+    let (first, last) = (sigma[0], sigma[m - 1]);
+    let mean_log = sigma.iter().map(|s| s.ln()).sum::<f64>() / m as f64;
+    let norm: Vec<f64> = (0..m)
+        .map(|j| (0..m).map(|i| r[(i, j)].powi(2)).sum::<f64>().sqrt())
+        .collect();
+    let unit = Mat::from_fn(m, m, |i, j| r[(i, j)] / norm[j]);
+    let lambda: Vec<f64> = singular_values(unit.as_ref())?.iter().map(|s| s * s).collect();
+    let count = m as f64;
     Ok(Indices {
         seen: m,
-        errors: wanted.len(),
+        errors,
         condition_number: first / last,
         o1: mean_log.exp() / (readings.max(1) as f64).sqrt(),
         o2: last / first,

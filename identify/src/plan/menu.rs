@@ -1,9 +1,10 @@
 //! The menu of ball-bar tests from which a next one is proposed: what may be varied, and which of it the machine can do.
 //!
 //! An entry sweeps one rotary axis while the other ball stands on that axis (at the foot of the circle or beside it, as the bar's length
-//! demands), or lets the linear axes keep the bar radial, tangential or axial. Both directions and the whole range are always taken: less
-//! never sees more. What an axis' travel forbids, or a bar cannot reach, is not on the menu.
+//! demands), or lets the linear axes keep the bar radial, tangential or axial. A part of the range, or one direction, never sees more than
+//! the whole: they are tried where gain is judged by the minute. What an axis' travel forbids, or a bar cannot reach, is not on the menu.
 
+use abbe_model::effect::{Component, Driver, Effect, Shape};
 use abbe_model::instrument::Station;
 use abbe_model::session::{Session, Test};
 use rayon::prelude::*;
@@ -23,6 +24,12 @@ pub struct Menu {
     pub heights_mm: Vec<f64>,
     /// Where the other rotary axis stands.
     pub standing_deg: Vec<f64>,
+    /// Feeds, as multiples of that of the session's tests; more than one where something depends on it (see [`Menu::for_effects`]).
+    pub feeds: Vec<f64>,
+    /// Shares of the swept range, about its middle.
+    pub ranges: Vec<f64>,
+    /// Whether each run comes back: `true` both ways, `false` one way.
+    pub both_directions: Vec<bool>,
     /// Whether linear axes may follow.
     pub follow: bool,
     /// Whether a test may leave the spindle ball mounted from the last test before it.
@@ -45,6 +52,9 @@ impl Default for Menu {
             radii_mm: vec![50.0, 75.0, 100.0, 150.0],
             heights_mm: vec![0.0, 50.0, 100.0, 200.0],
             standing_deg: vec![0.0, 90.0, -90.0, 180.0],
+            feeds: vec![1.0],
+            ranges: vec![1.0],
+            both_directions: vec![true],
             follow: true,
             keep_spindle_ball: true,
             reach_mm: super::BAR_TRAVEL_MM,
@@ -56,6 +66,19 @@ impl Default for Menu {
 }
 
 impl Menu {
+    /// The same menu with a second feed, if one of the effects depends on speed or time.
+    pub fn for_effects<'e>(mut self, effects: impl IntoIterator<Item = &'e Effect>) -> Menu {
+        let depends = |effect: &Effect| {
+            effect.shape == Shape::Lag
+                || effect.driver == Driver::Time
+                || effect.component == Component::TriggerDelay
+        };
+        if self.feeds.len() == 1 && effects.into_iter().any(depends) {
+            self.feeds.push(SECOND_FEED);
+        }
+        self
+    }
+
     /// A short menu, every fourth position: to name a test beside a result, not to choose the last per cent.
     pub fn short() -> Menu {
         Menu {
@@ -68,6 +91,9 @@ impl Menu {
         }
     }
 }
+
+/// The second feed, as a multiple of the first.
+const SECOND_FEED: f64 = 3.0;
 
 /// A test that can be made.
 #[derive(Clone, Debug)]

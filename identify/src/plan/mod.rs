@@ -12,6 +12,7 @@
 mod analysis;
 pub mod blind;
 pub mod budget;
+pub mod clearance;
 pub mod detect;
 mod drafts;
 pub mod effects;
@@ -21,6 +22,7 @@ pub mod indices;
 pub mod information;
 pub mod linear;
 pub mod menu;
+mod places;
 pub mod prepared;
 pub mod range;
 pub mod results;

@@ -26,6 +26,9 @@ pub struct Shrinkage {
     pub first_to_double: Option<String>,
 }
 
+/// The position of an axis at each whitened row, and the rows.
+type PlacedRows = (Vec<f64>, Mat<f64>);
+
 /// Bisections of the range: to a thousandth.
 const BISECTIONS: usize = 10;
 
@@ -123,11 +126,7 @@ fn swept(problem: &Problem<'_>, test: usize) -> Option<(usize, f64, f64)> {
 }
 
 /// The whitened rows of a test, block by block, each with the position of an axis.
-fn whitened(
-    problem: &Problem<'_>,
-    test: usize,
-    axis: usize,
-) -> Result<Vec<(Vec<f64>, Mat<f64>)>, IdentifyError> {
+fn whitened(problem: &Problem<'_>, test: usize, axis: usize) -> Result<Vec<PlacedRows>, IdentifyError> {
     let values = problem.slot_values(&vec![0.0; problem.parameters.list.len()]);
     let Some(readings) = &problem.tests[test].readings else {
         return Ok(Vec::new());

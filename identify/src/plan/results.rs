@@ -151,9 +151,9 @@ pub struct Correlation {
 }
 
 /// Figures of merit of the information on the errors, set-up quantities being unknown within their priors.
-#[derive(Clone, Debug, Serialize)]
+#[derive(Clone, Debug, Default, Serialize)]
 pub struct Indices {
-    /// Errors that are seen.
+    /// Errors that are seen by themselves.
     pub seen: usize,
     /// Errors in all. Where fewer are seen, the figures are of those that are.
     pub errors: usize,

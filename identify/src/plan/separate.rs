@@ -60,6 +60,7 @@ pub fn separation(
         effect: found.id(),
         coefficients: coefficients.to_vec(),
     };
+    let menu = &menu.clone().for_effects([found, alias]);
     let entries = super::menu::entries(both.session, menu)?;
     let asked = asked(&both, &goal);
     let prepared = Prepared::new(&both, &values, entries, menu, &asked)?;

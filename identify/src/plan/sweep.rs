@@ -14,8 +14,26 @@ pub(super) struct Sweep {
     pub step: f64,
     /// rad/s.
     pub speed: f64,
-    /// There and back each.
+    /// There, and back where it goes both ways.
     pub runs: usize,
+    /// Whether each run comes back.
+    pub both_directions: bool,
+    /// Whether it is less than the whole.
+    pub is_part: bool,
+}
+
+impl Sweep {
+    /// A share of the range about its middle.
+    pub fn part(self, share: f64, both_directions: bool) -> Sweep {
+        let (middle, half) = (0.5 * (self.from + self.to), 0.5 * share * (self.to - self.from));
+        Sweep {
+            from: middle - half,
+            to: middle + half,
+            both_directions,
+            is_part: share < 1.0,
+            ..self
+        }
+    }
 }
 
 /// How an axis is swept: as the session does it, else as far as its travel goes, within half a turn either way.
@@ -35,6 +53,8 @@ pub(super) fn sweep_of(session: &Session, axis: usize) -> Sweep {
             step: *step,
             speed: *speed,
             runs: *runs,
+            both_directions: true,
+            is_part: false,
         }),
         _ => None,
     });
@@ -49,6 +69,8 @@ pub(super) fn sweep_of(session: &Session, axis: usize) -> Sweep {
                 step: 0.5_f64.to_radians(),
                 speed: 5.0_f64.to_radians(),
                 runs: 2,
+                both_directions: true,
+                is_part: false,
             }
         })
 }
@@ -84,6 +106,8 @@ fn sweep_of_data(session: &Session, axis: usize) -> Option<Sweep> {
                 step,
                 speed,
                 runs: readings.runs().len().div_ceil(2),
+                both_directions: true,
+                is_part: false,
             })
         })
 }

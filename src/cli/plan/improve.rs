@@ -7,11 +7,21 @@ use abbe::identify::plan::menu::Menu;
 use abbe::identify::plan::range::Shrinkage;
 use abbe::identify::problem::Problem;
 use abbe::identify::trace::library;
-use clap::Args;
+use clap::{Args, ValueEnum};
 
 use super::tables::three_digits;
 use crate::cli::failure::Failure;
 use crate::cli::table;
+
+/// The share of a range that is tried besides the whole where gain is judged by the minute.
+const HALF: f64 = 0.5;
+
+/// Whether a sweep comes back.
+#[derive(Clone, Copy, PartialEq, ValueEnum)]
+enum Directions {
+    Both,
+    One,
+}
 
 /// What a next test is sought with.
 #[derive(Args)]
@@ -31,10 +41,19 @@ pub struct ImproveArguments {
     /// Heights of the ball along that axis.
     #[arg(long, value_name = "MM,…", value_delimiter = ',')]
     heights_mm: Option<Vec<f64>>,
+    /// Feeds to try, as multiples of the session's; by default a second one where an effect depends on speed or time.
+    #[arg(long, value_name = "TIMES,…", value_delimiter = ',')]
+    feeds: Option<Vec<f64>>,
+    /// Shares of a sweep's range to try, about its middle [default: 1; by the minute 1,0.5].
+    #[arg(long = "sweep-shares", value_name = "SHARE,…", value_delimiter = ',')]
+    ranges: Option<Vec<f64>>,
+    /// Directions to try [default: both; by the minute both,one].
+    #[arg(long, value_name = "WAYS,…", value_delimiter = ',')]
+    directions: Option<Vec<Directions>>,
     /// Leave out tests in which linear axes follow: their errors are then no part of the question.
     #[arg(long)]
     no_follow: bool,
-    /// Travel of the bar's sensor either way.
+    /// Travel of the bar's sensor either way: what a test may not exceed.
     #[arg(long, value_name = "MM", default_value_t = 1.0)]
     reach_mm: f64,
     /// Every test has a spindle ball mounted for it alone.
@@ -54,9 +73,19 @@ impl ImproveArguments {
         self.improve.is_some() || self.separate.is_some()
     }
 
+    /// Travel of the bar's sensor either way, mm.
+    pub fn reach_mm(&self) -> Result<f64, Failure> {
+        not_negative("--reach-mm", self.reach_mm)
+    }
+
+    /// Whether gain is weighed against time.
+    fn by_minute(&self) -> bool {
+        self.setup_min.is_some() || self.test_min.is_some()
+    }
+
     fn menu(&self) -> Result<Menu, Failure> {
         let mut menu = Menu {
-            reach_mm: self.reach_mm,
+            reach_mm: self.reach_mm()?,
             ..Menu::default()
         };
         let checked = |flag: &str, list: &[f64], least: f64| match list
@@ -77,17 +106,46 @@ impl ImproveArguments {
         if let Some(heights) = &self.heights_mm {
             menu.heights_mm = checked("--heights-mm", heights, 0.0)?;
         }
+        if self.by_minute() {
+            menu.ranges.push(HALF);
+            menu.both_directions.push(false);
+        }
+        let shares = |flag: &str, list: &[f64], most: f64| match list
+            .iter()
+            .find(|value| !(**value > 0.0 && **value <= most))
+        {
+            Some(value) if most == 1.0 => Err(Failure::Other(format!(
+                "`{flag}`: {value} is no share of a range; it lies above 0 and at most at 1"
+            ))),
+            Some(value) => Err(Failure::Other(format!(
+                "`{flag}`: {value} is no multiple of a feed; it has to be a positive number"
+            ))),
+            None => Ok(list.to_vec()),
+        };
+        if let Some(feeds) = &self.feeds {
+            menu.feeds = shares("--feeds", feeds, f64::MAX)?;
+        }
+        if let Some(ranges) = &self.ranges {
+            menu.ranges = shares("--sweep-shares", ranges, 1.0)?;
+        }
+        if let Some(directions) = &self.directions {
+            menu.both_directions = directions.iter().map(|ways| *ways == Directions::Both).collect();
+        }
         menu.follow = !self.no_follow;
         menu.keep_spindle_ball = !self.remount_spindle_ball;
-        menu.setup_min = self.setup_min.unwrap_or(menu.setup_min);
-        menu.test_min = self.test_min.unwrap_or(menu.test_min);
+        let stated = |flag: &str, value: Option<f64>, usual: f64| match value {
+            Some(value) => not_negative(flag, value),
+            None => Ok(usual),
+        };
+        menu.setup_min = stated("--setup-min", self.setup_min, menu.setup_min)?;
+        menu.test_min = stated("--test-min", self.test_min, menu.test_min)?;
         Ok(menu)
     }
 
     /// Proposes tests.
     pub fn run(&self, problem: &Problem<'_>) -> Result<Improvement, Failure> {
         let menu = self.menu()?;
-        let by_minute = self.setup_min.is_some() || self.test_min.is_some();
+        let by_minute = self.by_minute();
         if let Some(pair) = &self.separate {
             let Some((a, b)) = pair.split_once(',').filter(|(a, b)| a.trim() != b.trim()) else {
                 return Err(Failure::Other(format!(
@@ -98,6 +156,7 @@ impl ImproveArguments {
             for id in [a, b] {
                 add(&mut both, id.trim())?;
             }
+            let menu = menu.for_effects(&both.parameters.effects);
             let goal = Goal::Separation {
                 effect: a.trim().to_string(),
                 coefficients: Vec::new(),
@@ -119,6 +178,17 @@ impl ImproveArguments {
             by_minute,
         };
         Ok(improve(problem, &menu, &options)?)
+    }
+}
+
+/// A number that may be 0.
+fn not_negative(flag: &str, value: f64) -> Result<f64, Failure> {
+    if value.is_finite() && value >= 0.0 {
+        Ok(value)
+    } else {
+        Err(Failure::Other(format!(
+            "`{flag} {value}`: it has to be 0 or more"
+        )))
     }
 }
 
@@ -151,36 +221,36 @@ fn add(problem: &mut Problem<'_>, id: &str) -> Result<(), IdentifyError> {
 
 /// Prints what is proposed.
 pub fn print(found: &Improvement) {
-    println!(
+    say!(
         "{} entries on the menu; {} now: {}",
         found.menu_entries,
         found.figure,
         three_digits(found.before)
     );
     if found.steps.is_empty() {
-        println!("none on the menu improves it");
+        say!("none on the menu improves it");
         return;
     }
     for (number, step) in found.steps.iter().enumerate() {
-        println!("\n{}. {}", number + 1, step.test);
-        println!(
+        say!("\n{}. {}", number + 1, step.test);
+        say!(
             "   {} → {}, {:.1} min{}",
             found.figure,
             three_digits(step.after),
             step.minutes,
             if step.new_setup { " with the set-up" } else { "" }
         );
-        println!(
+        say!(
             "   workpiece ball {}, spindle ball {}, bar {} mm",
             point(step.workpiece_ball_mm),
             point(step.spindle_ball_mm),
             step.bar_mm
         );
         if !step.opens.is_empty() {
-            println!("   opens the blind spots {}", step.opens.join(", "));
+            say!("   opens the blind spots {}", step.opens.join(", "));
         }
     }
-    println!();
+    say!("");
     let mut header = vec!["error".to_string(), "now".to_string()];
     header.extend((1..=found.steps.len()).map(|number| format!("with {number}")));
     let rows: Vec<Vec<String>> = found
@@ -200,11 +270,11 @@ pub fn print(found: &Improvement) {
         .collect();
     table::print(&header.iter().map(String::as_str).collect::<Vec<_>>(), &rows);
     for exchange in &found.exchanged {
-        println!("exchanged: {exchange}");
+        say!("exchanged: {exchange}");
     }
-    println!("\nBest by themselves:");
+    say!("\nBest by themselves:");
     for other in &found.alternatives {
-        println!(
+        say!(
             "  {}  {} ({:.1} min)",
             three_digits(other.after),
             other.test,
@@ -220,7 +290,7 @@ fn point(mm: [f64; 3]) -> String {
 
 /// Prints how far sweeps can shrink.
 pub fn print_ranges(ranges: &[Shrinkage]) {
-    println!("\nHow far each sweep can shrink about its middle before an uncertainty doubles:");
+    say!("\nHow far each sweep can shrink about its middle before an uncertainty doubles:");
     let rows: Vec<Vec<String>> = ranges
         .iter()
         .map(|range| {

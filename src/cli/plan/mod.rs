@@ -3,6 +3,7 @@
 mod improve;
 mod tables;
 
+use abbe::identify::plan::clearance::Clearance;
 use abbe::identify::plan::{self, PlanOptions};
 use abbe::model::session::{Prior, Session};
 use clap::Args;
@@ -23,9 +24,16 @@ pub struct PlanArguments {
     /// Standard uncertainty of every set-up length, in place of the session's.
     #[arg(long, value_name = "UM")]
     setup_um: Option<f64>,
+    /// One spindle ball stays mounted for all tests, whatever the session says.
+    #[arg(long)]
+    one_spindle_ball: bool,
     /// Take the planned movements even where there are data.
     #[arg(long)]
     planned: bool,
+    /// Check that spindle and table stay clear when the table stands on end: diameters of spindle and table, height and width of the device,
+    /// shaft from jig to ball, jig.
+    #[arg(long, value_name = "DS,DT,H,W,L,T")]
+    clearance_mm: Option<String>,
     /// Leave out what undeclared effects would do.
     #[arg(long)]
     no_effects: bool,
@@ -49,6 +57,12 @@ pub fn run(arguments: &PlanArguments) -> Result<(), Failure> {
     if let Some(u_um) = arguments.setup_um {
         set_priors(&mut session, positive("--setup-um", u_um)?);
     }
+    if arguments.one_spindle_ball {
+        session
+            .tests
+            .iter_mut()
+            .for_each(|test| test.spindle_setup = "all tests".to_string());
+    }
     let noise_mm = arguments
         .noise_um
         .map(|um| positive("--noise-um", um))
@@ -57,11 +71,15 @@ pub fn run(arguments: &PlanArguments) -> Result<(), Failure> {
         noise_mm,
         planned_only: arguments.planned,
         effects: !arguments.no_effects,
+        reach_mm: arguments.improve.reach_mm()?,
     };
     if arguments.improve.asked() || arguments.range {
         return next_test(arguments, &session, &options);
     }
-    let analysis = plan::analyse(&session, &options)?;
+    let mut analysis = plan::analyse(&session, &options)?;
+    if let Some(sizes) = &arguments.clearance_mm {
+        analysis.warnings.extend(clearance(sizes)?);
+    }
     tables::print(&analysis);
     if let Some(path) = &arguments.common.json {
         output::write_json(path, &analysis)?;
@@ -100,6 +118,50 @@ fn next_test(arguments: &PlanArguments, session: &Session, options: &PlanOptions
         output::write_json(path, &NextTest { improvement, ranges })?;
     }
     Ok(())
+}
+
+/// What would touch, with the device on the table and in the spindle.
+fn clearance(sizes: &str) -> Result<Vec<String>, Failure> {
+    let numbers: Vec<f64> = sizes
+        .split(',')
+        .filter_map(|size| size.trim().parse().ok())
+        .collect();
+    let valid = |size: &f64| size.is_finite() && *size > 0.0;
+    let &[
+        spindle_mm,
+        table_mm,
+        device_height_mm,
+        device_width_mm,
+        shaft_mm,
+        jig_mm,
+    ] = numbers.as_slice()
+    else {
+        return Err(Failure::Other(format!(
+            "`--clearance-mm {sizes}`: it takes six lengths: diameters of spindle and table, height and width of the device, shaft, jig"
+        )));
+    };
+    if !numbers.iter().all(valid) {
+        return Err(Failure::Other(format!(
+            "`--clearance-mm {sizes}`: every length has to be positive"
+        )));
+    }
+    let faults =
+        [(true, "device on the table"), (false, "device in the spindle")].map(|(device_on_table, words)| {
+            let clearance = Clearance {
+                spindle_mm,
+                table_mm,
+                device_height_mm,
+                device_width_mm,
+                shaft_mm,
+                jig_mm,
+                device_on_table,
+            };
+            clearance
+                .faults()
+                .into_iter()
+                .map(move |fault| format!("{words}: {fault}"))
+        });
+    Ok(faults.into_iter().flatten().collect())
 }
 
 /// A length in µm that has to be positive, in mm.

@@ -1,5 +1,6 @@
 //! What a plan's analysis looks like on a screen.
 
+use abbe::identify::plan::effects::hidden_by_error;
 use abbe::identify::plan::results::{EffectDetectability, EffectsAnalysis, ErrorAnalysis, PlanAnalysis};
 
 use crate::cli::fit::print_warnings;
@@ -13,6 +14,8 @@ const PLOT_WIDTH: usize = 18;
 const CONTRIBUTIONS: usize = 3;
 /// Effects listed on the screen in each table.
 const EFFECTS: usize = 16;
+/// Hidden effects named beside each error.
+const CULPRITS: usize = 3;
 
 /// Prints everything.
 pub fn print(analysis: &PlanAnalysis) {
@@ -34,23 +37,33 @@ fn header(analysis: &PlanAnalysis) {
     let moving = analysis
         .moving_min
         .map_or(String::new(), |min| format!(", {min:.1} min of movement"));
-    println!(
-        "{} readings in {} tests, {} set-ups{moving}, noise {}",
+    say!(
+        "{} readings in {}, {}{moving}, noise {}",
         analysis.readings,
-        analysis.tests.len(),
-        analysis.setups,
+        counted(analysis.tests.len(), "test"),
+        counted(analysis.setups, "set-up"),
         table::micrometres(analysis.noise_um)
     );
-    println!(
+    say!(
         "{} of {} unknowns or combinations of them are seen",
-        analysis.rank, analysis.unknowns
+        analysis.rank,
+        analysis.unknowns
     );
+}
+
+/// `1 test`, `4 tests`.
+fn counted(count: usize, thing: &str) -> String {
+    let plural = if count == 1 { "" } else { "s" };
+    format!("{count} {thing}{plural}")
 }
 
 /// A number with three digits.
 pub fn three_digits(value: f64) -> String {
     if !value.is_finite() {
         return "∞".to_string();
+    }
+    if value == 0.0 {
+        return "0".to_string();
     }
     let places = (2.0 - value.abs().max(1e-9).log10().floor()).clamp(0.0, 5.0) as usize;
     format!("{value:.places$}")
@@ -61,7 +74,10 @@ fn optional(value: Option<f64>) -> String {
 }
 
 fn errors(errors: &[ErrorAnalysis]) {
-    println!("\nPredicted standard uncertainty, and µm of reading a unit of the error:");
+    say!(
+        "\nPredicted standard uncertainty, what noise and set-up contribute, and what it would be if all other errors were known;\n\
+         sensitivity of a reading, µm a unit of the error (largest, rms, the test in which it is largest):"
+    );
     let rows: Vec<Vec<String>> = errors
         .iter()
         .map(|error| {
@@ -103,29 +119,32 @@ fn errors(errors: &[ErrorAnalysis]) {
 }
 
 fn budget(errors: &[ErrorAnalysis]) {
-    println!(
-        "\nWhere the uncertainty comes from (share of the variance), and what it is shared with (correlation):"
-    );
-    let rows: Vec<Vec<String>> = errors
+    say!("\nWhere the uncertainty comes from (share of the variance), and with what it is correlated:");
+    let width = errors
         .iter()
-        .filter(|error| error.u.is_some())
-        .map(|error| {
-            let parts: Vec<String> = error
-                .budget
-                .iter()
-                .take(CONTRIBUTIONS)
-                .map(|part| format!("{} {:.0} %", part.from, part.share * 100.0))
-                .collect();
-            let shared: Vec<String> = error
-                .shared_with
-                .iter()
-                .take(2)
-                .map(|other| format!("{} {:+.2}", other.id, other.correlation))
-                .collect();
-            vec![error.id.clone(), parts.join(", "), shared.join(", ")]
-        })
-        .collect();
-    table::print(&["error", "from", "shared with"], &rows);
+        .map(|error| error.id.chars().count())
+        .max()
+        .unwrap_or(0);
+    for error in errors.iter().filter(|error| error.u.is_some()) {
+        let parts: Vec<String> = error
+            .budget
+            .iter()
+            .take(CONTRIBUTIONS)
+            .map(|part| format!("{} {:.0} %", part.from, part.share * 100.0))
+            .collect();
+        let shared: Vec<String> = error
+            .shared_with
+            .iter()
+            .take(2)
+            .map(|other| format!("{} {:+.2}", other.id, other.correlation))
+            .collect();
+        let with = if shared.is_empty() {
+            String::new()
+        } else {
+            format!("; with {}", shared.join(", "))
+        };
+        say!("  {:width$}  {}{with}", error.id, parts.join(", "));
+    }
 }
 
 fn plots(analysis: &PlanAnalysis) {
@@ -133,9 +152,7 @@ fn plots(analysis: &PlanAnalysis) {
     if analysis.errors.iter().all(|error| error.curves.is_empty()) {
         return;
     }
-    println!(
-        "\nSensitivity along the first run of each test, each row to its own scale, zero in the middle:"
-    );
+    say!("\nSensitivity along the first run of each test, each row to its own scale, zero in the middle:");
     for abreast in names.chunks(PLOTS_ABREAST) {
         let mut header = vec!["error"];
         header.extend(abreast);
@@ -177,8 +194,8 @@ pub fn small_plot(values: &[f64], most: f64) -> String {
 fn blind_spots(analysis: &PlanAnalysis) {
     let list = |title: &str, lines: Vec<&String>| {
         if !lines.is_empty() {
-            println!("\n{title}");
-            lines.into_iter().for_each(|line| println!("  {line}"));
+            say!("\n{title}");
+            lines.into_iter().for_each(|line| say!("  {line}"));
         }
     };
     list(
@@ -198,10 +215,10 @@ fn blind_spots(analysis: &PlanAnalysis) {
 fn correlation(analysis: &PlanAnalysis) {
     let ids = &analysis.correlation.ids;
     if ids.len() > 16 {
-        println!("\nThe correlation matrix of {} errors is in the JSON.", ids.len());
+        say!("\nThe correlation matrix of {} errors is in the JSON.", ids.len());
         return;
     }
-    println!("\nCorrelation:");
+    say!("\nCorrelation:");
     let mut header = vec![""];
     header.extend(ids.iter().map(String::as_str));
     let rows: Vec<Vec<String>> = ids
@@ -224,11 +241,12 @@ fn correlation(analysis: &PlanAnalysis) {
 
 fn indices(analysis: &PlanAnalysis) {
     let indices = &analysis.indices;
-    println!(
+    say!(
         "\nInformation on {} of {} errors, set-ups unknown within what is known of them:",
-        indices.seen, indices.errors
+        indices.seen,
+        indices.errors
     );
-    println!(
+    say!(
         "  condition number {}; O1 {}  O2 {}  O3 {}  O4 {}  O5 {}",
         three_digits(indices.condition_number),
         three_digits(indices.o1),
@@ -237,7 +255,7 @@ fn indices(analysis: &PlanAnalysis) {
         three_digits(indices.o4),
         three_digits(indices.o5)
     );
-    println!(
+    say!(
         "  efficiency D {}  A {}  E {}  G {}",
         three_digits(indices.d_efficiency),
         three_digits(indices.a_efficiency),
@@ -250,11 +268,8 @@ fn tests(analysis: &PlanAnalysis) {
     if analysis.without.is_empty() {
         return;
     }
-    println!("\nWhat each test contributes:");
-    analysis
-        .without
-        .iter()
-        .for_each(|item| println!("  {}", item.why));
+    say!("\nWhat each test contributes:");
+    analysis.without.iter().for_each(|item| say!("  {}", item.why));
 }
 
 fn effects(found: &EffectsAnalysis) {
@@ -268,34 +283,67 @@ fn effects(found: &EffectsAnalysis) {
     let hidden = by_verdict(|verdict| verdict.starts_with("hidden"));
     let seen = by_verdict(|verdict| verdict == "seen");
     let none = by_verdict(|verdict| verdict == "none").len();
-    println!(
-        "\nUndeclared effects ({} in the library for this plan; {none} of those listed move no reading).",
-        found.effects_searched
-    );
-    println!(
-        "Smallest amplitude found with {:.0} % power at {:.0} % significance, of one look and of the whole search (Šidák, which is on the safe \
-         side):",
-        found.power * 100.0,
-        found.significance * 100.0
-    );
-    effect_table(&seen);
-    println!(
-        "\nHidden ({}): under 1 % of the signal survives the fit; a clean residual does not exclude these:",
+    say!(
+        "\nUndeclared effects: of {} looked at, {} would be seen, {} would hide and {none} move no reading of these tests.",
+        found.effects.len(),
+        seen.len(),
         hidden.len()
     );
+    say!(
+        "\nSeen: smallest amplitude found with {:.0} % power at {:.0} % significance, of one look and of a search of the whole library of {}\n\
+         (Šidák, which is on the safe side); share of the signal that the fit leaves over; what it adds to the errors until it is found;\n\
+         how many alike, of the same component and driver, are not listed:",
+        found.power * 100.0,
+        found.significance * 100.0,
+        found.effects_searched
+    );
+    effect_table(&seen);
+    say!(
+        "\nHidden: under 1 % of the signal survives the fit. A clean residual does not exclude these, and they bias:"
+    );
     effect_table(&hidden);
+    say!("\nWhat may hide in each error, the strongest first:");
+    let by_error = hidden_by_error(found);
+    let width = by_error.keys().map(|id| id.chars().count()).max().unwrap_or(0);
+    for (error, culprits) in &by_error {
+        let words: Vec<String> = culprits
+            .iter()
+            .take(CULPRITS)
+            .map(|(id, per_unit, unit)| format!("{id} {} {unit}", three_digits(*per_unit)))
+            .collect();
+        let more = match culprits.len().saturating_sub(CULPRITS) {
+            0 => String::new(),
+            more => format!(", {more} more"),
+        };
+        say!("  {error:width$}  {}{more}", words.join(", "));
+    }
 }
 
-/// A table of effects; of those with the same component and driver the hardest to see and, of hidden ones, those that bias most.
+/// What an effect acts on and what it follows: `EZC~C` of `EZC~C:h2`.
+fn stem(id: &str) -> &str {
+    id.split_once(':').map_or(id, |(stem, _)| stem)
+}
+
+/// A table of effects: of those with the same component and driver the one that biases most, the others counted.
 fn effect_table(effects: &[&EffectDetectability]) {
-    let mut chosen: Vec<&EffectDetectability> = effects.to_vec();
     let strongest =
         |effect: &EffectDetectability| effect.biases.first().map_or(0.0, |bias| bias.per_unit.abs());
-    chosen.sort_by(|a, b| strongest(b).total_cmp(&strongest(a)));
+    let mut sorted: Vec<&EffectDetectability> = effects.to_vec();
+    sorted.sort_by(|a, b| strongest(b).total_cmp(&strongest(a)));
+    let mut chosen: Vec<(&EffectDetectability, usize)> = Vec::new();
+    for effect in sorted {
+        match chosen
+            .iter_mut()
+            .find(|(first, _)| stem(&first.id) == stem(&effect.id))
+        {
+            Some((_, alike)) => *alike += 1,
+            None => chosen.push((effect, 0)),
+        }
+    }
     let rows: Vec<Vec<String>> = chosen
         .iter()
         .take(EFFECTS)
-        .map(|effect| {
+        .map(|(effect, alike)| {
             let biases: Vec<String> = effect
                 .biases
                 .iter()
@@ -307,20 +355,32 @@ fn effect_table(effects: &[&EffectDetectability]) {
                 optional(effect.detectable),
                 optional(effect.detectable_searched),
                 effect.unit.clone(),
-                format!("{:.3}", effect.surviving_share),
+                survives(effect.surviving_share),
                 if biases.is_empty() {
                     "none".into()
                 } else {
                     biases.join(", ")
                 },
+                alike.to_string(),
             ]
         })
         .collect();
     table::print(
-        &["effect", "one look", "search", "unit", "survives", "biases"],
+        &[
+            "effect", "one look", "search", "unit", "survives", "biases", "alike",
+        ],
         &rows,
     );
     if chosen.len() > EFFECTS {
-        println!("  … {} more in the JSON", chosen.len() - EFFECTS);
+        say!("  … {} more in the JSON", chosen.len() - EFFECTS);
+    }
+}
+
+/// A share in per cent.
+fn survives(share: f64) -> String {
+    if share < 1e-4 {
+        "< 0.01 %".to_string()
+    } else {
+        format!("{} %", three_digits(share * 100.0))
     }
 }

@@ -1,0 +1,150 @@
+//! The exact form for a reader: the named vectors, the outputs over them and, where they are asked for, the derivatives of a length:
+//!
+//! ```text
+//! u = b/L, carried back through the chain frame by frame;   ∂L/∂e = a product with the vectors of the frame that e is an error of
+//! ```
+
+use crate::equation::{Equation, Kind};
+use crate::print::article::{Left, Row, Section, norm_of_steps, row, what_is_read, with_bar_unknowns};
+use crate::program::{Label, Naming, Program, Step, Tree};
+use crate::symbol::{Binary, Operand, Symbol};
+use crate::vectors::{self, NamedVector};
+
+/// What the program and the sections are made of: the vectors on the way to the outputs, and those on the way back.
+pub(crate) fn sections(equation: &Equation) -> (Program, Vec<Section>) {
+    let forth = &equation.vectors;
+    let mut labels = vectors::labels(forth);
+    let mut back: Vec<NamedVector> = Vec::new();
+    let mut slopes: Vec<Operand> = Vec::new();
+    if let (Kind::Length, true, Some(Operand::Node(distance))) =
+        (equation.kind, equation.options.gradient, distance(equation))
+    {
+        let name = if Operand::Node(distance) == equation.outputs[0] {
+            "L"
+        } else {
+            "d"
+        };
+        labels.insert(distance, Label::Scalar(name));
+        let parameters = equation.parameter_operands();
+        let adjoints = equation.arena.adjoints(equation.outputs[0], &parameters);
+        let unit = adjoints.of(Operand::Node(distance)) == Operand::constant(1.0);
+        for mut vector in vectors::adjoint_vectors(forth, &adjoints) {
+            if vector.frame.is_empty() && !unit {
+                vector.meaning =
+                    "derivatives by the bar: its unit vector times what the sensor makes of it".to_string();
+            }
+            // Where the chain only shifts, the vector that is carried back stays the same and keeps its name.
+            let new =
+                |component: &Operand| matches!(component, Operand::Node(id) if !labels.contains_key(id));
+            if vector.components.iter().any(new) {
+                for (node, label) in vectors::labels(std::slice::from_ref(&vector)) {
+                    labels.entry(node).or_insert(label);
+                }
+                back.push(vector);
+            }
+        }
+        slopes = parameters
+            .iter()
+            .map(|parameter| adjoints.of(*parameter))
+            .collect();
+    }
+    let mut asked: Vec<Operand> = equation.outputs.clone();
+    asked.extend(forth.iter().chain(&back).flat_map(|vector| vector.components));
+    asked.extend(&slopes);
+    let mut program = equation
+        .arena
+        .program(equation.inputs(), &asked, &labels, Naming::Labelled);
+    let (outputs, rest) = program.outputs.split_at(equation.outputs.len());
+    let (vectors, slopes) = rest.split_at(rest.len() - slopes.len());
+    let mut vectors = forth
+        .iter()
+        .chain(&back)
+        .zip(vectors.chunks(3))
+        .map(|(vector, trees)| {
+            let rows = (0..3).map(|coordinate| component(&program, vector, trees, coordinate));
+            Section {
+                heading: vector.meaning.clone(),
+                rows: rows.collect(),
+            }
+        });
+    let mut sections: Vec<Section> = vectors.by_ref().take(forth.len()).collect();
+    let outputs = outputs.iter().enumerate();
+    let mut read = Section {
+        heading: what_is_read(equation).to_string(),
+        rows: outputs
+            .map(|(place, tree)| row(Left::Output(place), tree.clone()))
+            .collect(),
+    };
+    let back: Vec<Section> = vectors.collect();
+    let slopes = equation.parameters.iter().zip(slopes);
+    let slopes: Vec<Row> = slopes
+        .map(|(parameter, tree)| row(Left::Slope(0, parameter.clone()), tree.clone()))
+        .collect();
+    if let (Kind::Length, Some(bar)) = (equation.kind, forth.last()) {
+        // The norm of the bar by the names of its own coordinates, whichever of them are aliases.
+        let start = program.steps.len();
+        let aliases = (0..3).map(|coordinate| Step {
+            label: bar.label(coordinate),
+            value: Tree::Number(0.0),
+        });
+        program.steps.extend(aliases);
+        let norm = norm_of_steps(start);
+        let named = program
+            .steps
+            .iter()
+            .position(|step| step.label == Label::Scalar("d"));
+        read.rows = match named {
+            Some(place) => vec![
+                row(Left::Named(Label::Scalar("d")), norm),
+                row(Left::Output(0), with_bar_unknowns(equation, Tree::Step(place))),
+            ],
+            None => vec![row(Left::Output(0), with_bar_unknowns(equation, norm))],
+        };
+    }
+    sections.push(read);
+    sections.extend(back);
+    if !slopes.is_empty() {
+        sections.push(Section {
+            heading: "derivatives".to_string(),
+            rows: slopes,
+        });
+    }
+    (program, sections)
+}
+
+/// A coordinate of a named vector. One that is an input, a constant or another name is written as that.
+fn component(program: &Program, vector: &NamedVector, trees: &[Tree], coordinate: usize) -> Row {
+    let label = vector.label(coordinate);
+    let own = program.steps.iter().find(|step| step.label == label);
+    let right = own.map_or_else(|| trees[coordinate].clone(), |step| step.value.clone());
+    row(Left::Named(label), as_quotient(right))
+}
+
+/// `x/y` for `(1/y)·x`, which is what a compiler is given to share.
+fn as_quotient(tree: Tree) -> Tree {
+    let over = |x: &Tree, y: &Tree| Tree::Binary(Binary::Div, Box::new(x.clone()), Box::new(y.clone()));
+    let one_over = |tree: &Tree| match tree {
+        Tree::Binary(Binary::Div, one, y) if **one == Tree::Number(1.0) => Some((**y).clone()),
+        _ => None,
+    };
+    let Tree::Binary(Binary::Mul, a, b) = &tree else {
+        return tree;
+    };
+    match (one_over(a), one_over(b), &**a) {
+        (Some(y), _, _) => over(b, &y),
+        (None, Some(y), _) => over(a, &y),
+        // (a·(1/y))·x
+        (None, None, Tree::Binary(Binary::Mul, factor, a)) => match one_over(a) {
+            Some(y) => over(&Tree::Binary(Binary::Mul, factor.clone(), b.clone()), &y),
+            None => tree,
+        },
+        (None, None, _) => tree,
+    }
+}
+
+/// The distance between the balls, before the bar's own unknowns.
+fn distance(equation: &Equation) -> Option<Operand> {
+    let bar = equation.vectors.last()?;
+    let [x, y, z] = bar.components.map(|component| equation.arena.symbol(component));
+    Some(Symbol::sqrt(x * x + y * y + z * z).operand())
+}

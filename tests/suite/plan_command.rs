@@ -1,0 +1,154 @@
+//! `abbe plan` as a user meets it.
+
+use serde_json::Value;
+
+use super::{abbe, ready, text};
+
+fn chapter_5() -> String {
+    text(&ready("hermle-c600u/chapter5.toml")).to_string()
+}
+
+fn json(arguments: &[&str]) -> Value {
+    let folder = tempfile::tempdir().unwrap();
+    let file = folder.path().join("plan.json");
+    let mut all = vec!["plan"];
+    all.extend(arguments);
+    all.extend(["--json", text(&file)]);
+    let output = abbe(&all);
+    assert!(
+        output.status.success(),
+        "{}",
+        String::from_utf8_lossy(&output.stderr)
+    );
+    serde_json::from_str(&std::fs::read_to_string(file).unwrap()).unwrap()
+}
+
+#[test]
+fn the_screen_and_the_json_say_the_same() {
+    let session = chapter_5();
+    let plan = json(&[&session]);
+    assert_eq!(plan["errors"].as_array().unwrap().len(), 8);
+    assert_eq!(plan["rank"], plan["unknowns"]);
+    let screen = abbe(&["plan", &session]);
+    let screen = String::from_utf8(screen.stdout).unwrap();
+    for error in plan["errors"].as_array().unwrap() {
+        assert!(error["u"].as_f64().unwrap() > 0.0);
+        assert!(screen.contains(error["id"].as_str().unwrap()));
+    }
+    assert!(screen.contains("A150 contributes all of EB0A, EC0A"));
+    assert!(
+        screen.contains("EC0A cannot be told from y of the spindle ball in A150: 1 arcsec : −0.54 um"),
+        "{screen}"
+    );
+    assert!(
+        screen.lines().all(|line| line.chars().count() < 170),
+        "a line too long for a screen"
+    );
+    // Twice the same.
+    assert_eq!(
+        screen,
+        String::from_utf8(abbe(&["plan", &session]).stdout).unwrap()
+    );
+}
+
+#[test]
+fn the_effects_say_what_a_clean_residual_does_not_exclude() {
+    let plan = json(&[&chapter_5()]);
+    let effects = plan["effects"]["effects"].as_array().unwrap();
+    let verdict = |id: &str| {
+        effects
+            .iter()
+            .find(|effect| effect["id"] == id)
+            .map(|effect| effect["verdict"].clone())
+    };
+    // One height and one radius: the wobble of C at order 1 is the axial motion at order 2.
+    assert_eq!(verdict("EZC~C:h3").unwrap(), "seen");
+    assert_eq!(verdict("EZC~C:h1").unwrap(), "hidden");
+    // The spindle ball lies on the C axis: the C tests do not see it turn, the A tests see it at C = 0 as a constant.
+    assert_eq!(verdict("ECC~C:h2").unwrap(), "hidden");
+    let bound = |id: &str| {
+        effects.iter().find(|effect| effect["id"] == id).unwrap()["detectable"]
+            .as_f64()
+            .unwrap()
+    };
+    assert!(bound("EZC~C:h3") < 0.1, "{}", bound("EZC~C:h3"));
+    for effect in effects.iter().filter(|effect| effect["detectable"].is_f64()) {
+        let searched = effect["detectable_searched"].as_f64();
+        assert!(
+            searched.is_none_or(|searched| searched > effect["detectable"].as_f64().unwrap()),
+            "{effect}"
+        );
+    }
+}
+
+#[test]
+fn what_cannot_be_asked_is_said_and_fails() {
+    let session = chapter_5();
+    for (arguments, words) in [
+        (
+            vec!["plan", &session, "--separate", "EZC~C:q2,EAC~C:h1"],
+            "there are EZC~C:h1",
+        ),
+        (
+            vec!["plan", &session, "--separate", "EZC~C:h2"],
+            "takes two effects",
+        ),
+        (vec!["plan", &session, "--noise-um", "0"], "positive"),
+        (vec!["plan", &session, "--improve", "--bars-mm", "0"], "no length"),
+        (
+            vec!["plan", &session, "--improve", "--bars-mm", "20"],
+            "nothing on the menu",
+        ),
+        (vec!["plan", &session, "--clearance-mm", "1,2"], "six lengths"),
+        (
+            vec!["plan", &session, "--improve", "--sweep-shares", "1.5"],
+            "no share",
+        ),
+        (vec!["plan", &session, "--improve", "--feeds", "0"], "no multiple"),
+        (vec!["plan", &session, "--improve", "--setup-min=-1"], "0 or more"),
+    ] {
+        let output = abbe(&arguments);
+        let message = String::from_utf8_lossy(&output.stderr).to_string();
+        assert!(
+            matches!(output.status.code(), Some(1 | 2)),
+            "{arguments:?}: {message}"
+        );
+        assert!(message.contains(words), "{arguments:?}: {message}");
+    }
+}
+
+#[test]
+fn sweeps_can_shrink_until_an_uncertainty_doubles() {
+    let plan = json(&[&chapter_5(), "--range"]);
+    let ranges = plan["ranges"].as_array().unwrap();
+    assert_eq!(ranges.len(), 4);
+    for range in ranges {
+        let planned = range["range"][1].as_f64().unwrap() - range["range"][0].as_f64().unwrap();
+        let least = range["least"][1].as_f64().unwrap() - range["least"][0].as_f64().unwrap();
+        assert!(least > 0.0 && least < planned, "{range}");
+    }
+}
+
+#[test]
+fn a_test_beyond_the_travel_of_the_sensor_is_warned_of() {
+    let folder = tempfile::tempdir().unwrap();
+    let machine = ready("hermle-c600u/machine.toml");
+    std::fs::copy(machine, folder.path().join("machine.toml")).unwrap();
+    let text = std::fs::read_to_string(chapter_5()).unwrap();
+    // Two millimetres farther along a bar that lies askew by 48° are 1.5 mm of its length.
+    let farther = text.replace("\"-sqrt(R_e^2 - R^2)\"", "\"-sqrt(R_e^2 - R^2) - 2\"");
+    assert_ne!(text, farther);
+    let file = folder.path().join("session.toml");
+    std::fs::write(&file, farther).unwrap();
+    let warnings = |more: &[&str]| {
+        let mut arguments = vec!["plan", super::text(&file), "--no-effects"];
+        arguments.extend(more);
+        String::from_utf8(abbe(&arguments).stderr).unwrap()
+    };
+    assert!(
+        warnings(&[]).contains("A150: the balls come 1.5"),
+        "{}",
+        warnings(&[])
+    );
+    assert!(!warnings(&["--reach-mm", "2"]).contains("A150"));
+}
