@@ -15,6 +15,8 @@ pub struct Noise {
     pub sigma_mm: f64,
     /// Autoregressive coefficients along a run; empty for white noise.
     pub memory: Vec<f64>,
+    /// Standard uncertainty of the sum of these coefficients: how slow noise is, which decides how large it is where it is slow.
+    pub memory_u: f64,
     /// Where the size comes from.
     pub source: NoiseSource,
 }
@@ -47,6 +49,7 @@ impl Noise {
         Noise {
             sigma_mm,
             memory: Vec::new(),
+            memory_u: 0.0,
             source,
         }
     }
@@ -173,19 +176,38 @@ impl PureError {
         let seen: [f64; MOST + 1] = std::array::from_fn(|lag| covariance[lag] / pairs[lag] as f64);
         // Two repeats hold the same deviation twice; half the pairs are independent.
         let insignificant = 3.0 / (0.5 * pairs[0] as f64).sqrt();
-        let mut coefficients = autoregression(&seen, insignificant);
-        let mut variance = seen[0];
-        for _ in 0..CORRECTIONS {
-            let (process, shown) = with_trends_out(&coefficients, &lengths);
-            variance = seen[0] / shown[0];
-            let corrected = std::array::from_fn(|lag| seen[lag] + variance * (process[lag] - shown[lag]));
-            coefficients = autoregression(&corrected, insignificant);
-        }
+        let (coefficients, variance) = without_trends_taken(&seen, insignificant, &lengths);
+        // Bartlett's standard error of the correlation between neighbours, carried through the correction.
+        let neighbours = seen[1] / seen[0];
+        let u = ((1.0 - neighbours * neighbours).max(0.0) / self.freedom.max(1) as f64).sqrt();
+        let mut slower = seen;
+        slower[1..].iter_mut().for_each(|value| *value += u * seen[0]);
+        let (of_slower, _) = without_trends_taken(&slower, insignificant, &lengths);
+        let total = |coefficients: &[f64]| coefficients.iter().sum::<f64>();
+        let sum_u = (total(&of_slower) - total(&coefficients)).abs();
         Some(Memory {
+            sum_u: if coefficients.is_empty() { 0.0 } else { sum_u },
             coefficients,
             inflation: (variance / seen[0]).sqrt(),
         })
     }
+}
+
+/// Coefficients and variance of the noise whose deviations from trends have these autocovariances.
+fn without_trends_taken(
+    seen: &[f64; MOST + 1],
+    insignificant: f64,
+    lengths: &BTreeMap<usize, usize>,
+) -> (Vec<f64>, f64) {
+    let mut coefficients = autoregression(seen, insignificant);
+    let mut variance = seen[0];
+    for _ in 0..CORRECTIONS {
+        let (process, shown) = with_trends_out(&coefficients, lengths);
+        variance = seen[0] / shown[0];
+        let corrected = std::array::from_fn(|lag| seen[lag] + variance * (process[lag] - shown[lag]));
+        coefficients = autoregression(&corrected, insignificant);
+    }
+    (coefficients, variance)
 }
 
 /// The highest order of a memory.
@@ -199,6 +221,8 @@ const LONG: usize = 600;
 pub struct Memory {
     /// Autoregressive coefficients; empty where readings are as good as white.
     pub coefficients: Vec<f64>,
+    /// Standard uncertainty of their sum.
+    pub sum_u: f64,
     /// By how much the noise is larger than its deviations from parabolas show.
     pub inflation: f64,
 }

@@ -57,7 +57,15 @@ pub fn strangers(outcome: &Outcome, effect: &EffectResult, truth: &Injected) -> 
         .chain(&effect.aliases)
         .filter(|name| !is(name, truth))
         .filter_map(|name| {
-            let name = in_plants_words(name);
+            let remounted = matches!(truth.shape, Shape::Remount { .. }) && !name.tests.is_empty();
+            let name = match remounted {
+                // A ball that was moved between tests is a constant of those tests to the program, a step in time to the plant.
+                true => Named {
+                    component: name.component.clone(),
+                    ..named(truth)
+                },
+                false => in_plants_words(name),
+            };
             let other = from_name(&name, truth)?;
             let share = with_any_time_constant(&other)
                 .iter()

@@ -1,7 +1,7 @@
 //! What else would look the same.
 //!
 //! Two candidates are aliases where the readings cannot tell them apart: in place of the named effect, beside the same model, the other explains
-//! the residual as well within [`INDISTINGUISHABLE`] of log-likelihood, whether or not the numbers that were chosen in its shape are held against it, and it does at least half of what the named effect did to the readings. The one with the least cost in the library is named first; at equal cost, the one with the larger gain.
+//! the residual as well within [`INDISTINGUISHABLE`] of log-likelihood, whether or not the numbers and places that were chosen in its shape are held against it, and it does at least half of what the named effect did to the readings. The one with the least cost in the library is named first; at equal cost, the one with the larger gain.
 
 use super::search::Search;
 
@@ -28,6 +28,7 @@ pub fn aliases(search: &Search<'_>, k: usize, variance: f64) -> Vec<Alias> {
     let taken = &search.taken[k];
     let of_named = model.gain(taken.candidate);
     let least = search.evidence_for(taken.candidate, &of_named, variance) - INDISTINGUISHABLE;
+    let least_unpriced = search.evidence(&of_named, variance) - INDISTINGUISHABLE;
     let least_gain = of_named.gain / variance - 2.0 * INDISTINGUISHABLE;
     let columns = |candidate: usize| search.moments.count[candidate];
     let no_more_columns = |candidate: usize| columns(candidate) <= columns(taken.candidate);
@@ -50,6 +51,7 @@ pub fn aliases(search: &Search<'_>, k: usize, variance: f64) -> Vec<Alias> {
                 && !search.is_held_back(*candidate)
                 && gain.freedom > 0
                 && (search.evidence_for(*candidate, gain, variance) >= least
+                    || search.evidence(gain, variance) >= least_unpriced
                     || no_more_columns(*candidate) && gain.gain / variance >= least_gain)
         })
         .filter_map(|(candidate, _)| {

@@ -383,6 +383,7 @@ fn give_noise_memory(problem: &mut Problem<'_>, residuals: &[Vec<f64>]) -> bool 
     };
     let mut noise = problem.noise.clone();
     noise.memory = memory.coefficients;
+    noise.memory_u = memory.sum_u;
     if let Some(sigma) = pure.sigma_mm() {
         noise.sigma_mm = sigma * memory.inflation;
         noise.source = NoiseSource::Repeats;

@@ -185,29 +185,30 @@ impl Moments {
                 }
             }
         }
-        let mut base = Mat::zeros(rows, old + added);
-        for j in 0..old {
-            base.col_mut(j).copy_from(self.base_columns.col(j));
-        }
-        for j in 0..added {
-            base.col_mut(old + j).copy_from(fresh.col(j));
-        }
-        self.base_columns = base;
+        self.base_columns
+            .resize_with(rows, next, |i, j| fresh[(i, j - old)]);
         let products = products_by_fold(columns, layouts, fresh.as_ref());
         let null_fresh = transposed_product(fresh.as_ref(), self.null.as_ref());
-        self.null_base = stacked(&self.null_base, &null_fresh);
+        let draws = self.null.ncols();
+        self.null_base
+            .resize_with(next, draws, |i, d| null_fresh[(i - old, d)]);
+        let total = self.null_cross.ncols();
         for (fold, range) in columns.fold_rows.iter().enumerate() {
             let moments = &mut self.folds[fold];
             let fresh_part = fresh.as_ref().subrows(range.start, range.len());
             let base_part = self.base_columns.as_ref().subrows(range.start, range.len());
             let gram = transposed_product(base_part, fresh_part);
-            let before = &moments.base;
-            moments.base = Mat::from_fn(next, next, |i, j| match (i < old, j < old) {
-                (true, true) => before[(i, j)],
-                (_, false) => gram[(i, j - old)],
-                (false, true) => gram[(j, i - old)],
+            moments.base.resize_with(next, next, |i, j| {
+                if j < old {
+                    gram[(j, i - old)]
+                } else {
+                    gram[(i, j - old)]
+                }
             });
-            moments.cross = stacked(&moments.cross, &products[fold].0);
+            let product = &products[fold].0;
+            moments
+                .cross
+                .resize_with(next, total, |i, j| product[(i - old, j)]);
             for j in 0..added {
                 let sum = (range.start..range.end)
                     .map(|i| fresh[(i, j)] * self.residual[i])
@@ -215,7 +216,7 @@ impl Moments {
                 moments.base_y.push(sum);
             }
         }
-        self.whole = FoldMoments::sum(&self.folds);
+        self.sum_up(next, total);
         places
     }
 
@@ -236,13 +237,9 @@ impl Moments {
         let mut of_null = Mat::<f64>::zeros(draws, added);
         for (fold, (product, own)) in products.into_iter().enumerate() {
             let moments = &mut self.folds[fold];
-            moments.cross = Mat::from_fn(rank, total + added, |i, j| {
-                if j < total {
-                    moments.cross[(i, j)]
-                } else {
-                    product[(i, j - total)]
-                }
-            });
+            moments
+                .cross
+                .resize_with(rank, total + added, |i, j| product[(i, j - total)]);
             moments.cross_y.extend((0..added).map(|k| product[(rank, k)]));
             moments.own.extend(own);
             for d in 0..draws {
@@ -251,15 +248,31 @@ impl Moments {
                 }
             }
         }
-        self.whole = FoldMoments::sum(&self.folds);
-        let before = &self.null_cross;
-        self.null_cross = Mat::from_fn(draws, total + added, |d, j| {
-            if j < total {
-                before[(d, j)]
-            } else {
-                of_null[(d, j - total)]
-            }
+        self.sum_up(rank, total + added);
+        self.null_cross
+            .resize_with(draws, total + added, |d, j| of_null[(d, j - total)]);
+    }
+
+    /// Extends the products over all folds to what each fold has now: so many base columns and candidate columns.
+    fn sum_up(&mut self, base: usize, total: usize) {
+        let (folds, whole) = (&self.folds, &mut self.whole);
+        whole.base.resize_with(base, base, |i, j| {
+            folds.iter().map(|fold| fold.base[(i, j)]).sum()
         });
+        whole.cross.resize_with(base, total, |i, j| {
+            folds.iter().map(|fold| fold.cross[(i, j)]).sum()
+        });
+        for i in whole.base_y.len()..base {
+            whole.base_y.push(folds.iter().map(|fold| fold.base_y[i]).sum());
+        }
+        for j in whole.cross_y.len()..total {
+            whole.cross_y.push(folds.iter().map(|fold| fold.cross_y[j]).sum());
+        }
+        for candidate in whole.own.len()..self.count.len() {
+            let mut own = Mat::zeros(self.count[candidate], self.count[candidate]);
+            folds.iter().for_each(|fold| own += &fold.own[candidate]);
+            whole.own.push(own);
+        }
     }
 
     /// What a layout would gain on all readings beside a model trained on all readings.
@@ -302,16 +315,6 @@ impl Moments {
     pub fn base_columns(&self) -> MatRef<'_, f64> {
         self.base_columns.as_ref()
     }
-}
-
-fn stacked(above: &Mat<f64>, below: &Mat<f64>) -> Mat<f64> {
-    Mat::from_fn(above.nrows() + below.nrows(), above.ncols(), |i, j| {
-        if i < above.nrows() {
-            above[(i, j)]
-        } else {
-            below[(i - above.nrows(), j)]
-        }
-    })
 }
 
 fn beside(model: &Mat<f64>, residual: &[f64], null: &Mat<f64>) -> Mat<f64> {
