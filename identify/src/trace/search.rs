@@ -277,9 +277,9 @@ impl<'s> Search<'s> {
             return;
         }
         let (candidates, layouts): (Vec<Candidate>, Vec<Layout>) = fresh.into_iter().unzip();
-        self.moments.append(self.columns, &layouts);
         self.candidates.extend(candidates);
         self.layouts.extend(layouts);
+        self.moments.append(self.columns, &self.layouts);
     }
 
     /// Lays the candidates of last resort over the readings.
