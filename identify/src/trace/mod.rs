@@ -377,7 +377,7 @@ fn give_noise_memory(problem: &mut Problem<'_>, residuals: &[Vec<f64>]) -> bool 
         return false;
     }
     let kept = |test: usize, row: usize| !problem.rejected[test][row];
-    let pure = PureError::of(&problem.tests, residuals, kept);
+    let pure = PureError::of(&problem.tests, residuals, kept).without_waves(&problem.tests, kept);
     let Some(memory) = pure.memory(&problem.tests, kept) else {
         return false;
     };

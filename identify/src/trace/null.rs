@@ -110,9 +110,8 @@ fn slowed(values: &mut [f64], noise: &Noise, generator: &mut Pcg64) {
 
 /// Whitened deviations without structure, in stretches that whitening kept together, of unit variance.
 fn pool(problem: &Problem<'_>, residuals: &[Vec<f64>]) -> Vec<Vec<f64>> {
-    let pure = PureError::of(&problem.tests, residuals, |test, row| {
-        !problem.rejected[test][row]
-    });
+    let kept = |test: usize, row: usize| !problem.rejected[test][row];
+    let pure = PureError::of(&problem.tests, residuals, kept).without_waves(&problem.tests, kept);
     let repeats = pure.freedom >= LEAST_POOL;
     let coordinates = problem.coordinates();
     let mut stretches = Vec::new();
