@@ -1,12 +1,13 @@
 //! How much of a reading is noise: its size and its memory.
 //!
 //! Readings at the same test, direction and position in repeated runs differ by noise alone (pure error: Box, Hunter & Hunter, Statistics for
-//! Experimenters, ch. 10). What they differ by from their mean, rescaled by `√(R/(R−1))`, needs no model of the structure. A straight line a run is
-//! taken out first, since slow drift is structure and would be taken for noise.
+//! Experimenters, ch. 10). What they differ by from their mean, rescaled by `√(R/(R−1))`, needs no model of the structure. A parabola a run is
+//! taken out first, since slow drift and warming up are structure and would be taken for noise.
 
 use std::collections::BTreeMap;
 
 use abbe_model::session::Test;
+use statrs::function::gamma::gamma_ur;
 
 /// The noise of one scalar reading.
 #[derive(Clone, Debug, PartialEq)]
@@ -15,6 +16,8 @@ pub struct Noise {
     pub sigma_mm: f64,
     /// Autoregressive coefficients along a run; empty for white noise.
     pub memory: Vec<f64>,
+    /// Standard uncertainty of the sum of these coefficients: how slow noise is, which decides how large it is where it is slow.
+    pub memory_u: f64,
     /// Where the size comes from.
     pub source: NoiseSource,
 }
@@ -47,6 +50,7 @@ impl Noise {
         Noise {
             sigma_mm,
             memory: Vec::new(),
+            memory_u: 0.0,
             source,
         }
     }
@@ -88,7 +92,7 @@ impl PureError {
             let mut deviation = vec![None; residual.len()];
             if let Some(readings) = &test.readings {
                 let coordinates = readings.coordinates;
-                let level = without_run_lines(readings, residual, |row| kept(number, row));
+                let level = without_trends(readings, residual, |row| kept(number, row));
                 let mut groups: BTreeMap<Vec<i64>, Vec<usize>> = BTreeMap::new();
                 let directions = directions(readings);
                 for row in (0..readings.rows()).filter(|row| kept(number, *row)) {
@@ -135,12 +139,121 @@ impl PureError {
     }
 }
 
+/// Half cycles along a run of the waves that are looked for in deviations.
+const WAVES: std::ops::RangeInclusive<usize> = 2..=40;
+/// The most waves that are taken out.
+const MOST_WAVES: usize = 6;
+/// Probability that anything is taken out of noise that is as smooth as its memory says.
+const WAVE_BY_CHANCE: f64 = 1e-4;
+/// The fewest readings of a run whose waves are looked at.
+const LEAST_RUN: usize = 24;
+
+impl PureError {
+    /// The same less waves along runs that no memory explains: what comes and goes from run to run is structure, and would be taken for noise. A wave is taken
+    /// out where the periodogram of the whitened deviations, summed over runs, stands out.
+    pub fn without_waves(mut self, tests: &[&Test], kept: impl Fn(usize, usize) -> bool) -> PureError {
+        for _ in 0..MOST_WAVES {
+            let Some(half_cycles) = self.wave(tests, &kept) else {
+                break;
+            };
+            for (number, test) in tests.iter().enumerate() {
+                let Some(readings) = &test.readings else { continue };
+                for run in readings.runs().into_iter().filter(|run| run.len() >= LEAST_RUN) {
+                    take_out(&mut self.deviations[number][run], half_cycles);
+                }
+            }
+        }
+        self
+    }
+
+    /// The half cycles of the wave that stands out most, if any does.
+    fn wave(&self, tests: &[&Test], kept: &impl Fn(usize, usize) -> bool) -> Option<usize> {
+        let memory = self.memory(tests, kept)?;
+        let mut whitened: Vec<Vec<f64>> = Vec::new();
+        for (number, test) in tests.iter().enumerate() {
+            for run in test
+                .readings
+                .as_ref()?
+                .runs()
+                .into_iter()
+                .filter(|run| run.len() >= LEAST_RUN)
+            {
+                let deviation = |row: usize| self.deviations[number][row].unwrap_or(0.0);
+                let past = |row: usize| -> f64 {
+                    let lags = memory.coefficients.iter().enumerate();
+                    lags.filter(|(lag, _)| row > run.start + lag)
+                        .map(|(lag, a)| a * deviation(row - lag - 1))
+                        .sum()
+                };
+                whitened.push(run.clone().map(|row| deviation(row) - past(row)).collect());
+            }
+        }
+        let count: usize = whitened.iter().map(Vec::len).sum();
+        let power: f64 = whitened.iter().flatten().map(|value| value * value).sum();
+        if count == 0 || power <= 0.0 {
+            return None;
+        }
+        let variance = power / count as f64;
+        // Repeats hold the same deviation more than once: so many of these runs are independent.
+        let seen = self.deviations.iter().flatten().flatten().count().max(1);
+        let independent = self.freedom as f64 / seen as f64;
+        let ordinate = |run: &Vec<f64>, half_cycles: usize| {
+            let step = std::f64::consts::PI * half_cycles as f64 / run.len() as f64;
+            let (c, s) = run.iter().enumerate().fold((0.0, 0.0), |(c, s), (t, value)| {
+                let (sin, cos) = (step * t as f64).sin_cos();
+                (c + value * cos, s + value * sin)
+            });
+            (c * c + s * s) / (run.len() as f64 * variance)
+        };
+        let runs = whitened.len() as f64 * independent;
+        let looks = WAVES.count() as f64;
+        WAVES
+            .map(|half_cycles| {
+                let sum: f64 = whitened.iter().map(|run| ordinate(run, half_cycles)).sum();
+                (half_cycles, sum * independent)
+            })
+            .max_by(|a, b| a.1.total_cmp(&b.1))
+            .filter(|(_, sum)| gamma_ur(runs, *sum) < WAVE_BY_CHANCE / looks)
+            .map(|(half_cycles, _)| half_cycles)
+    }
+}
+
+/// Takes a wave of so many half cycles out of the deviations of a run, by least squares.
+fn take_out(run: &mut [Option<f64>], half_cycles: usize) {
+    let step = std::f64::consts::PI * half_cycles as f64 / run.len() as f64;
+    let (mut cc, mut cs, mut ss, mut cy, mut sy) = (0.0, 0.0, 0.0, 0.0, 0.0);
+    for (t, value) in run.iter().enumerate() {
+        if let Some(value) = value {
+            let (s, c) = (step * t as f64).sin_cos();
+            cc += c * c;
+            cs += c * s;
+            ss += s * s;
+            cy += c * value;
+            sy += s * value;
+        }
+    }
+    let determinant = cc * ss - cs * cs;
+    if determinant <= 1e-6 * cc * ss {
+        return;
+    }
+    let (a, b) = (
+        (ss * cy - cs * sy) / determinant,
+        (cc * sy - cs * cy) / determinant,
+    );
+    for (t, value) in run.iter_mut().enumerate() {
+        let (s, c) = (step * t as f64).sin_cos();
+        if let Some(value) = value {
+            *value -= a * c + b * s;
+        }
+    }
+}
+
 impl PureError {
     /// How the deviations remember each other along runs: autoregressive coefficients by Yule–Walker, of the least order up to three whose successor
     /// adds nothing. `None` without enough repeats to tell.
     ///
-    /// The line that was taken out of every run took slow noise with it: with 0.8 between neighbours and a hundred readings a run, half of what is
-    /// slow. Covariances are therefore corrected until noise of the found memory, treated alike, would show those that were seen (indirect inference:
+    /// The parabola that was taken out of every run took slow noise with it: with 0.8 between neighbours and a hundred readings a run, more than half of
+    /// what is slow. Covariances are therefore corrected until noise of the found memory, treated alike, would show those that were seen (indirect inference:
     /// Gouriéroux, Monfort & Renault, J. Appl. Econometrics 8 (1993) S85).
     pub fn memory(&self, tests: &[&Test], kept: impl Fn(usize, usize) -> bool) -> Option<Memory> {
         let mut covariance = [0.0; MOST + 1];
@@ -173,25 +286,44 @@ impl PureError {
         let seen: [f64; MOST + 1] = std::array::from_fn(|lag| covariance[lag] / pairs[lag] as f64);
         // Two repeats hold the same deviation twice; half the pairs are independent.
         let insignificant = 3.0 / (0.5 * pairs[0] as f64).sqrt();
-        let mut coefficients = autoregression(&seen, insignificant);
-        let mut variance = seen[0];
-        for _ in 0..CORRECTIONS {
-            let (process, shown) = with_lines_out(&coefficients, &lengths);
-            variance = seen[0] / shown[0];
-            let corrected = std::array::from_fn(|lag| seen[lag] + variance * (process[lag] - shown[lag]));
-            coefficients = autoregression(&corrected, insignificant);
-        }
+        let (coefficients, variance) = without_trends_taken(&seen, insignificant, &lengths);
+        // Bartlett's standard error of the correlation between neighbours, carried through the correction.
+        let neighbours = seen[1] / seen[0];
+        let u = ((1.0 - neighbours * neighbours).max(0.0) / self.freedom.max(1) as f64).sqrt();
+        let mut slower = seen;
+        slower[1..].iter_mut().for_each(|value| *value += u * seen[0]);
+        let (of_slower, _) = without_trends_taken(&slower, insignificant, &lengths);
+        let total = |coefficients: &[f64]| coefficients.iter().sum::<f64>();
+        let sum_u = (total(&of_slower) - total(&coefficients)).abs();
         Some(Memory {
+            sum_u: if coefficients.is_empty() { 0.0 } else { sum_u },
             coefficients,
             inflation: (variance / seen[0]).sqrt(),
         })
     }
 }
 
+/// Coefficients and variance of the noise whose deviations from trends have these autocovariances.
+fn without_trends_taken(
+    seen: &[f64; MOST + 1],
+    insignificant: f64,
+    lengths: &BTreeMap<usize, usize>,
+) -> (Vec<f64>, f64) {
+    let mut coefficients = autoregression(seen, insignificant);
+    let mut variance = seen[0];
+    for _ in 0..CORRECTIONS {
+        let (process, shown) = with_trends_out(&coefficients, lengths);
+        variance = seen[0] / shown[0];
+        let corrected = std::array::from_fn(|lag| seen[lag] + variance * (process[lag] - shown[lag]));
+        coefficients = autoregression(&corrected, insignificant);
+    }
+    (coefficients, variance)
+}
+
 /// The highest order of a memory.
 const MOST: usize = 3;
 const CORRECTIONS: usize = 8;
-/// Runs longer than this lose next to nothing with a line.
+/// Runs longer than this lose next to nothing with a parabola.
 const LONG: usize = 600;
 
 /// How readings remember each other along runs.
@@ -199,7 +331,9 @@ const LONG: usize = 600;
 pub struct Memory {
     /// Autoregressive coefficients; empty where readings are as good as white.
     pub coefficients: Vec<f64>,
-    /// By how much the noise is larger than its deviations from lines show.
+    /// Standard uncertainty of their sum.
+    pub sum_u: f64,
+    /// By how much the noise is larger than its deviations from parabolas show.
     pub inflation: f64,
 }
 
@@ -229,9 +363,9 @@ fn autoregression(covariance: &[f64; MOST + 1], insignificant: f64) -> Vec<f64> 
     accepted
 }
 
-/// Autocorrelations of a process, and what is seen of them once a straight line is taken out of runs of these lengths (and how many readings are in
+/// Autocorrelations of a process, and what is seen of them once a parabola is taken out of runs of these lengths (and how many readings are in
 /// runs of each).
-fn with_lines_out(
+fn with_trends_out(
     coefficients: &[f64],
     lengths: &BTreeMap<usize, usize>,
 ) -> ([f64; MOST + 1], [f64; MOST + 1]) {
@@ -274,35 +408,26 @@ fn with_lines_out(
             (0..=MOST).for_each(|lag| shown[lag] += weight * process[lag]);
             continue;
         }
-        // Orthonormal constant and slope; d = e − Q Qᵀe, so Cov d = Γ − Q(QᵀΓ) − (ΓQ)Qᵀ + Q(QᵀΓQ)Qᵀ.
-        let middle = (n as f64 - 1.0) / 2.0;
-        let slope = (0..n).map(|t| (t as f64 - middle).powi(2)).sum::<f64>().sqrt();
-        let q = |t: usize| [1.0 / (n as f64).sqrt(), (t as f64 - middle) / slope];
-        let gq: Vec<[f64; 2]> = (0..n)
+        // d = e − Q Qᵀe with orthonormal polynomials Q, so Cov d = Γ − Q(QᵀΓ) − (ΓQ)Qᵀ + Q(QᵀΓQ)Qᵀ.
+        let times: Vec<f64> = (0..n).map(|t| t as f64).collect();
+        let q = polynomials(&times);
+        let gq: Vec<[f64; TERMS]> = (0..n)
             .map(|t| {
-                (0..n).fold([0.0; 2], |sum, s| {
-                    let c = correlation[t.abs_diff(s)];
-                    [sum[0] + c * q(s)[0], sum[1] + c * q(s)[1]]
-                })
+                let along = |i: usize| (0..n).map(|s| correlation[t.abs_diff(s)] * q[s][i]).sum();
+                std::array::from_fn(along)
             })
             .collect();
-        let mut qgq = [[0.0; 2]; 2];
-        for t in 0..n {
-            for i in 0..2 {
-                for j in 0..2 {
-                    qgq[i][j] += q(t)[i] * gq[t][j];
-                }
-            }
-        }
+        let qgq: [[f64; TERMS]; TERMS] =
+            std::array::from_fn(|i| std::array::from_fn(|j| (0..n).map(|t| q[t][i] * gq[t][j]).sum()));
         for lag in 0..=MOST {
             let sum: f64 = (lag..n)
                 .map(|t| {
                     let s = t - lag;
                     let mut value = correlation[lag];
-                    for i in 0..2 {
-                        value -= q(t)[i] * gq[s][i] + gq[t][i] * q(s)[i];
-                        for j in 0..2 {
-                            value += q(t)[i] * qgq[i][j] * q(s)[j];
+                    for i in 0..TERMS {
+                        value -= q[t][i] * gq[s][i] + gq[t][i] * q[s][i];
+                        for j in 0..TERMS {
+                            value += q[t][i] * qgq[i][j] * q[s][j];
                         }
                     }
                     value
@@ -326,8 +451,35 @@ fn directions(readings: &abbe_model::session::readings::Readings) -> Vec<i64> {
     code
 }
 
-/// Residuals less a straight line a run (and coordinate).
-fn without_run_lines(
+/// Coefficients of the trend that is taken out of a run: constant, slope, curvature.
+const TERMS: usize = 3;
+
+/// Polynomials in time that are orthonormal over given times (Gram–Schmidt, twice); those that the times are too few for are zero.
+fn polynomials(times: &[f64]) -> Vec<[f64; TERMS]> {
+    let n = times.len() as f64;
+    let middle = times.iter().sum::<f64>() / n;
+    let half = times
+        .iter()
+        .map(|t| (t - middle).abs())
+        .fold(f64::MIN_POSITIVE, f64::max);
+    let mut q: Vec<[f64; TERMS]> = times
+        .iter()
+        .map(|t| std::array::from_fn(|power| ((t - middle) / half).powi(power as i32)))
+        .collect();
+    for i in 0..TERMS {
+        for j in (0..i).chain(0..i) {
+            let along: f64 = q.iter().map(|row| row[i] * row[j]).sum();
+            q.iter_mut().for_each(|row| row[i] -= along * row[j]);
+        }
+        let length = q.iter().map(|row| row[i] * row[i]).sum::<f64>().sqrt();
+        let scale = if length > 1e-9 { 1.0 / length } else { 0.0 };
+        q.iter_mut().for_each(|row| row[i] *= scale);
+    }
+    q
+}
+
+/// Residuals less a parabola a run (and coordinate).
+fn without_trends(
     readings: &abbe_model::session::readings::Readings,
     residual: &[f64],
     kept: impl Fn(usize) -> bool,
@@ -338,24 +490,22 @@ fn without_run_lines(
         return level;
     }
     for run in readings.runs() {
+        let rows: Vec<usize> = run.filter(|row| kept(*row)).collect();
+        if rows.len() <= TERMS {
+            continue;
+        }
+        let times: Vec<f64> = rows.iter().map(|row| *row as f64).collect();
+        let q = polynomials(&times);
         for coordinate in 0..coordinates {
-            let (mut n, mut st, mut sx, mut stt, mut stx) = (0.0, 0.0, 0.0, 0.0, 0.0);
-            for row in run.clone().filter(|row| kept(*row)) {
-                let (t, x) = ((row - run.start) as f64, residual[row * coordinates + coordinate]);
-                n += 1.0;
-                st += t;
-                sx += x;
-                stt += t * t;
-                stx += t * x;
-            }
-            let determinant = n * stt - st * st;
-            if n < 3.0 || determinant <= 0.0 {
-                continue;
-            }
-            let slope = (n * stx - st * sx) / determinant;
-            let intercept = (sx - slope * st) / n;
-            for row in run.clone() {
-                level[row * coordinates + coordinate] -= intercept + slope * (row - run.start) as f64;
+            let at = |row: usize| row * coordinates + coordinate;
+            let along: [f64; TERMS] = std::array::from_fn(|i| {
+                rows.iter()
+                    .zip(&q)
+                    .map(|(row, q)| residual[at(*row)] * q[i])
+                    .sum()
+            });
+            for (row, q) in rows.iter().zip(&q) {
+                level[at(*row)] -= along.iter().zip(q).map(|(a, q)| a * q).sum::<f64>();
             }
         }
     }

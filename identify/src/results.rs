@@ -148,8 +148,24 @@ pub struct EffectResult {
     pub heldout_rms_um: f64,
     /// What the readings cannot tell from it, nearest first.
     pub aliases: Vec<EffectName>,
-    /// The cheapest further test that would tell it from them.
+    /// The cheapest further test that would tell it from the first of them that any test on the menu tells it from.
     pub separated_by: Option<String>,
+    /// How well that test tells them apart.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub separation: Option<SeparationResult>,
+}
+
+/// How well a further test tells a found effect from what looks like it.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct SeparationResult {
+    /// From what.
+    pub from: EffectName,
+    /// By the readings that there are, standard deviations.
+    pub before_sigma: f64,
+    /// With the test, standard deviations.
+    pub after_sigma: f64,
+    /// What the test takes, min.
+    pub minutes: f64,
 }
 
 /// What is left.

@@ -4,7 +4,9 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Mutex};
 use std::time::Duration;
 
+use abbe::identify::plan::menu::Menu;
 use abbe::identify::results::{EffectName, ModelResult, TraceResult};
+use abbe::identify::trace::further::tell_apart;
 use abbe::identify::trace::{Progress, TraceOptions, library};
 use clap::Args;
 use indicatif::{ProgressBar, ProgressStyle};
@@ -72,7 +74,8 @@ pub fn run(arguments: &TraceArguments) -> Result<(), Failure> {
         }
         !interrupted.load(Ordering::Relaxed)
     };
-    let trace = abbe::identify::trace::trace(&session, &options, &report)?;
+    let mut trace = abbe::identify::trace::trace(&session, &options, &report)?;
+    tell_apart(&mut trace, &Menu::short())?;
     bar.finish_and_clear();
     print(&trace.result);
     if let Some(path) = &arguments.common.json {
@@ -171,7 +174,16 @@ fn print(result: &TraceResult) {
             say!("   the readings cannot tell it from {}{more}", names.join("; "));
         }
         if let Some(test) = &effect.separated_by {
-            say!("   told apart by {test}");
+            match &effect.separation {
+                Some(from) => say!(
+                    "   {test} would tell it from {}: by {:.1} standard deviations instead of {:.1}, in {:.0} min",
+                    name(&from.from),
+                    from.after_sigma,
+                    from.before_sigma,
+                    from.minutes
+                ),
+                None => say!("   told apart by {test}"),
+            }
         }
     }
     if result.remainder.structured {

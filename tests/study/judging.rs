@@ -32,11 +32,21 @@ pub fn is(name: &EffectName, truth: &Injected) -> bool {
     }
 }
 
-/// The found effect that is the truth, or has it among what looks the same.
-pub fn found<'r>(effects: &'r [EffectResult], truth: &Injected) -> Option<&'r EffectResult> {
+/// The found effect that is the truth, or has it among what looks the same. A period that divides a turn, to within what a turn resolves, is that harmonic.
+pub fn found<'r>(outcome: &'r Outcome, truth: &Injected) -> Option<&'r EffectResult> {
+    let oracle = oracle(outcome.kind, outcome.noise);
+    let is_truth = |name: &EffectName| {
+        is(name, truth)
+            || name.shape == "harmonic"
+                && name.component == truth.component.to_string()
+                && matches!(truth.shape, Shape::Periodic { .. })
+                && from_name(&in_plants_words(name), truth)
+                    .is_some_and(|other| oracle.explained_share(truth, &other) > 0.99)
+    };
+    let effects = &outcome.result.effects;
     effects
         .iter()
-        .find(|effect| is(&effect.name, truth) || effect.aliases.iter().any(|alias| is(alias, truth)))
+        .find(|effect| is_truth(&effect.name) || effect.aliases.iter().any(is_truth))
 }
 
 /// The members of an alias set (the named effect included) that the plant knows and that are neither in the truth's true class nor within 2 σ
@@ -47,15 +57,39 @@ pub fn strangers(outcome: &Outcome, effect: &EffectResult, truth: &Injected) -> 
         .chain(&effect.aliases)
         .filter(|name| !is(name, truth))
         .filter_map(|name| {
-            let name = in_plants_words(name);
+            let remounted = matches!(truth.shape, Shape::Remount { .. }) && !name.tests.is_empty();
+            let name = match remounted {
+                // A ball that was moved between tests is a constant of those tests to the program, a step in time to the plant.
+                true => Named {
+                    component: name.component.clone(),
+                    ..named(truth)
+                },
+                false => in_plants_words(name),
+            };
             let other = from_name(&name, truth)?;
-            let share = oracle.explained_share(truth, &other);
+            let share = with_any_time_constant(&other)
+                .iter()
+                .map(|other| oracle.explained_share(truth, other))
+                .fold(0.0, f64::max);
             let behind = oracle.strength_sigma(truth) * (1.0 - share * share).max(0.0).sqrt();
             (share < 0.95 && behind > 2.0).then_some(name)
         })
         .collect();
     strangers.dedup();
     strangers
+}
+
+/// A name does not say the time constant of a warm-up.
+fn with_any_time_constant(effect: &Injected) -> Vec<Injected> {
+    match effect.shape {
+        Shape::Warmup { .. } => [30.0, 60.0, 120.0, 240.0, 480.0, 960.0, 1920.0, 3840.0]
+            .map(|tau_s| Injected {
+                shape: Shape::Warmup { tau_s },
+                ..effect.clone()
+            })
+            .to_vec(),
+        _ => vec![effect.clone()],
+    }
 }
 
 /// Pulls of the machine's errors: (value − truth) / u.

@@ -21,7 +21,7 @@ fn both_of_a_pair_are_found() {
         let truths = &outcome.draw.truth.effects;
         let hits = truths
             .iter()
-            .filter(|truth| found(&outcome.result.effects, truth).is_some())
+            .filter(|truth| found(outcome, truth).is_some())
             .count();
         both.count(hits == 2);
         one.count(hits >= 1);

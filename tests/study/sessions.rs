@@ -29,16 +29,19 @@ pub const NOISES: [Noise; 3] = [
 /// Standard deviations of trace's own level of significance, 1 % two-sided.
 pub const LEVEL: f64 = 2.5758;
 
-/// Sessions a kind in a study, as `ABBE_STUDY` says; without it no study is made.
+/// Sessions a kind where `ABBE_STUDY` says nothing else: enough to notice what has broken, too few for figures.
+const FEW: usize = 8;
+
+/// Sessions a kind in a study, as `ABBE_STUDY` says; 0 leaves studies out.
 pub fn sessions() -> usize {
-    number("ABBE_STUDY").unwrap_or(0)
+    number("ABBE_STUDY").unwrap_or(FEW)
 }
 
-/// Whether a study is not asked for; says so.
+/// Whether studies are left out; says so.
 pub fn skipped(study: &str) -> bool {
     let skipped = sessions() == 0;
     if skipped {
-        println!("skipped: {study} (ABBE_STUDY gives the number of sessions)");
+        println!("skipped: {study} (ABBE_STUDY is 0)");
     }
     skipped
 }
@@ -106,8 +109,10 @@ pub fn run(
     numbers: std::ops::Range<usize>,
     make: impl Fn(usize) -> (Kind, Noise, Vec<Injected>) + Sync,
 ) -> Vec<Outcome> {
+    let only = number("ABBE_STUDY_ONLY");
     numbers
         .into_par_iter()
+        .filter(|session| only.is_none_or(|only| only == *session))
         .map(|number| {
             let (kind, noise, effects) = make(number);
             let oracle = oracle(kind, noise);
@@ -117,7 +122,7 @@ pub fn run(
             }
             .noise(noise);
             let draw = recipe.draw_on(&oracle.plan);
-            let (result, seconds) = traced(&draw);
+            let (result, seconds) = traced(&draw, number);
             Outcome {
                 number,
                 kind,
@@ -131,12 +136,12 @@ pub fn run(
 }
 
 /// Trace on the files of a draw and on nothing else.
-fn traced(draw: &Draw) -> (TraceResult, f64) {
+fn traced(draw: &Draw, session_number: usize) -> (TraceResult, f64) {
     let folder = tempfile::tempdir().unwrap();
     draw.write(folder.path()).unwrap();
-    if let Some(number) = number("ABBE_STUDY_KEEP") {
-        draw.write(&std::env::temp_dir().join(format!("abbe-study-{number}")))
-            .unwrap();
+    if number("ABBE_STUDY_KEEP") == Some(session_number) {
+        let kept = std::env::temp_dir().join(format!("abbe-study-{session_number}"));
+        draw.write(&kept).unwrap();
     }
     let start = Instant::now();
     let read = session(&folder.path().join("session.toml"), &ReadOptions::default()).unwrap();

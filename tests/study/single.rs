@@ -18,6 +18,7 @@ fn study(factor: f64) -> Vec<Outcome> {
 #[derive(Default)]
 struct Tally {
     found: Rate,
+    near: Rate,
     named_first: Rate,
     more: Rate,
     strange: Rate,
@@ -33,7 +34,7 @@ fn tally(outcomes: &[Outcome]) -> Tally {
     for outcome in outcomes {
         let truth = &outcome.draw.truth.effects[0];
         let effects = &outcome.result.effects;
-        let hit = found(effects, truth);
+        let hit = found(outcome, truth);
         tally.found.count(hit.is_some());
         tally.alone.count(hit.is_some() && effects.len() == 1);
         tally.more.count(effects.len() > 1);
@@ -47,7 +48,9 @@ fn tally(outcomes: &[Outcome]) -> Tally {
         }
         let best =
             oracle(outcome.kind, outcome.noise).heldout_rms_um(&outcome.draw, &outcome.draw.truth.effects);
-        tally.held_out.push(outcome.result.after.heldout_rms_um / best);
+        let ratio = outcome.result.after.heldout_rms_um / best;
+        tally.held_out.push(ratio);
+        tally.near.count((ratio - 1.0).abs() <= 0.05);
         tally.before.0.extend(pulls(outcome, &outcome.result.before).0);
         tally.after.0.extend(pulls(outcome, &outcome.result.after).0);
         tally.seconds = tally.seconds.max(outcome.seconds);
@@ -73,17 +76,13 @@ fn tally(outcomes: &[Outcome]) -> Tally {
 fn print(factor: f64, tally: &Tally) {
     let mut held_out = tally.held_out.clone();
     held_out.sort_by(f64::total_cmp);
-    let mut near = Rate::default();
-    held_out
-        .iter()
-        .for_each(|ratio| near.count((ratio - 1.0).abs() <= 0.05));
     println!("| single effect at {factor} times | |\n|---|---|");
     println!("| truth named or in its alias set | {} |", tally.found);
     println!("| the same and nothing else claimed | {} |", tally.alone);
     println!("| truth named first | {} |", tally.named_first);
     println!("| more than one effect claimed | {} |", tally.more);
     println!("| alias sets with a stranger | {} |", tally.strange);
-    println!("| held-out rms within 5 % of the oracle's | {near} |");
+    println!("| held-out rms within 5 % of the oracle's | {} |", tally.near);
     println!(
         "| held-out rms over the oracle's, median and 95 % | {:.3}, {:.3} |",
         held_out[held_out.len() / 2],
@@ -108,6 +107,14 @@ fn an_effect_at_five_times_the_smallest_is_found() {
     let tally = tally(&study(5.0));
     print(5.0, &tally);
     assert!(tally.found.is_consistent_with_at_least(0.95), "{}", tally.found);
+    assert!(tally.near.is_consistent_with_at_least(0.90), "{}", tally.near);
+    // Four standard errors of a root mean square beyond its bound.
+    let (rms, count) = (tally.after.rms(), tally.after.0.len() as f64);
+    assert!(
+        rms < 1.2 * (1.0 + 4.0 / (2.0 * count).sqrt()),
+        "pulls {rms} of {count}"
+    );
+    assert!(tally.before.rms() > rms, "no bias before: {}", tally.before.rms());
 }
 
 #[test]

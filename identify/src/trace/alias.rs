@@ -1,9 +1,8 @@
 //! What else would look the same.
 //!
 //! Two candidates are aliases where the readings cannot tell them apart: in place of the named effect, beside the same model, the other explains
-//! the residual as well within [`INDISTINGUISHABLE`] of log-likelihood, and it does at least half of what the named effect did to the readings. The one with the least cost in the library is named first; at equal cost, the one with the larger gain.
+//! the residual as well within [`INDISTINGUISHABLE`] of log-likelihood, whether or not the numbers and places that were chosen in its shape are held against it, and it does at least half of what the named effect did to the readings. The one with the least cost in the library is named first; at equal cost, the one with the larger gain.
 
-use super::score::{Gain, ln_chi_square_tail};
 use super::search::Search;
 
 /// Difference in `−ln P` below which two candidates cannot be told apart: 2 σ for one column.
@@ -28,8 +27,11 @@ pub fn aliases(search: &Search<'_>, k: usize, variance: f64) -> Vec<Alias> {
     let model = search.model_without(Some(k));
     let taken = &search.taken[k];
     let of_named = model.gain(taken.candidate);
-    let evidence = |gain: &Gain| -ln_chi_square_tail(gain.gain / variance, gain.freedom);
-    let least = evidence(&of_named) - INDISTINGUISHABLE;
+    let least = search.evidence_for(taken.candidate, &of_named, variance) - INDISTINGUISHABLE;
+    let least_unpriced = search.evidence(&of_named, variance) - INDISTINGUISHABLE;
+    let least_gain = of_named.gain / variance - 2.0 * INDISTINGUISHABLE;
+    let columns = |candidate: usize| search.moments.count[candidate];
+    let no_more_columns = |candidate: usize| columns(candidate) <= columns(taken.candidate);
     let (_, coefficients) = model.joined(taken.candidate);
     // Base columns are unit-length copies of the candidate's own; the signature is what they do together.
     let norms = search.norms(taken.candidate);
@@ -48,7 +50,9 @@ pub fn aliases(search: &Search<'_>, k: usize, variance: f64) -> Vec<Alias> {
                 && !search.candidates[*candidate].last_resort
                 && !search.is_held_back(*candidate)
                 && gain.freedom > 0
-                && evidence(gain) >= least
+                && (search.evidence_for(*candidate, gain, variance) >= least
+                    || search.evidence(gain, variance) >= least_unpriced
+                    || no_more_columns(*candidate) && gain.gain / variance >= least_gain)
         })
         .filter_map(|(candidate, _)| {
             let cosine = model.imitated(candidate, &signature).sqrt();
@@ -60,11 +64,11 @@ pub fn aliases(search: &Search<'_>, k: usize, variance: f64) -> Vec<Alias> {
         })
         .collect();
     aliases.sort_by(|a, b| {
-        let cost = |alias: &Alias| search.candidates[alias.candidate].cost;
+        let length = |alias: &Alias| search.candidates[alias.candidate].length();
         b.cosine
             .partial_cmp(&a.cosine)
             .unwrap_or(std::cmp::Ordering::Equal)
-            .then(cost(a).total_cmp(&cost(b)))
+            .then(length(a).total_cmp(&length(b)))
     });
     // Of one name the nearest member stands for all; those that bear the winner's own name are the winner.
     let named = search.candidates[taken.candidate].effect.id();

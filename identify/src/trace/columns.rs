@@ -5,7 +5,7 @@
 use std::collections::HashMap;
 use std::sync::Arc;
 
-use abbe_model::effect::{DriverSample, Effect};
+use abbe_model::effect::{Component, Driver, DriverSample, Effect, Shape};
 use abbe_model::instrument::{InsideUnit, InstrumentKind};
 use abbe_model::sensitivity::Sensitivities;
 use faer::{Mat, MatMut};
@@ -20,6 +20,8 @@ use crate::problem::{Block, Problem};
 pub struct Layout {
     /// Number of columns.
     pub count: usize,
+    /// How many numbers of its shape are chosen to fit: each may gain what a column may.
+    pub numbers: usize,
     /// For each test, what moves: slot, factor of the component, and the basis functions.
     parts: Vec<Vec<LayoutPart>>,
 }
@@ -234,6 +236,7 @@ impl<'p, 'a> Columns<'p, 'a> {
         }
         Some(Layout {
             count: effect.shape.coefficients(),
+            numbers: effect.shape.numbers(),
             parts,
         })
     }
@@ -277,6 +280,7 @@ impl<'p, 'a> Columns<'p, 'a> {
         });
         Some(Layout {
             count: effect.shape.coefficients(),
+            numbers: 0,
             parts,
         })
     }
@@ -371,6 +375,43 @@ impl<'p, 'a> Columns<'p, 'a> {
             start += counting.len();
         }
         rows
+    }
+
+    /// A free curve over an axis in each test in which it moves, in the readings themselves, whatever component would cause it; none where the readings are
+    /// too few for that many intervals.
+    pub fn curves_of_tests(&self, driver: &Driver, intervals: usize) -> Vec<Layout> {
+        let Driver::Axis(name) = driver else {
+            return Vec::new();
+        };
+        let Some(axis) = self.problem.session.machine.axis_index(name) else {
+            return Vec::new();
+        };
+        let mut layouts = Vec::new();
+        for (number, test) in self.problem.tests.iter().enumerate() {
+            let Some(readings) = &test.readings else { continue };
+            let column = &readings.positions[axis];
+            let low = column.iter().copied().fold(f64::INFINITY, f64::min);
+            let high = column.iter().copied().fold(f64::NEG_INFINITY, f64::max);
+            let longest = readings.runs().iter().map(|run| run.len()).max().unwrap_or(0);
+            if high - low < 1e-6 || 2 * longest < 3 * intervals {
+                continue;
+            }
+            let effect = Effect {
+                component: Component::TriggerDelay,
+                driver: driver.clone(),
+                shape: Shape::Curve {
+                    from: low,
+                    to: high,
+                    intervals,
+                    closed: false,
+                },
+                tests: vec![test.name.clone()],
+            };
+            for coordinate in 0..self.problem.coordinates() {
+                layouts.extend(self.reading_layout(&effect, number, coordinate, false, None));
+            }
+        }
+        layouts
     }
 
     /// Fills columns with the whitened rows of layouts, one after another.

@@ -12,15 +12,15 @@ use statrs::function::gamma::ln_gamma;
 use super::library::Candidate;
 use super::score::{LEAST_VISIBLE, Trained, ln_chi_square_tail};
 
-/// The most places of one effect.
-const MOST_PLACES: usize = 8;
+/// The most places of one effect: what takes more is a curve.
+const MOST_PLACES: usize = 6;
 
 /// An effect composed of places.
 #[derive(Clone, Debug)]
 pub struct Composed {
-    /// As a candidate; its cost holds the price of the choice.
+    /// As a candidate, with the price of the choice.
     pub candidate: Candidate,
-    /// `−ln P` of its gain.
+    /// `−ln P` of its gain, less that price.
     pub evidence: f64,
 }
 
@@ -59,9 +59,12 @@ pub fn composed(
         if n < 2 {
             continue;
         }
-        let cost = dictionary.cost + ln_choices(at.len(), n);
-        let evidence = -ln_chi_square_tail(gain / variance, n);
-        if best.as_ref().is_none_or(|best| evidence - cost > best.score()) {
+        let price = ln_choices(at.len(), n);
+        let evidence = -ln_chi_square_tail(gain / variance, n) - price;
+        if best
+            .as_ref()
+            .is_none_or(|best| evidence - dictionary.cost > best.score())
+        {
             let mut places: Vec<f64> = chosen.iter().map(|k| at[*k]).collect();
             places.sort_by(f64::total_cmp);
             let effect = Effect {
@@ -70,7 +73,7 @@ pub fn composed(
             };
             let candidate = Candidate {
                 effect,
-                cost,
+                price,
                 dictionary: false,
                 ..dictionary.clone()
             };

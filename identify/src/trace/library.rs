@@ -17,6 +17,8 @@ const LIBRARY: &str = include_str!("library.toml");
 const HIGHEST_ORDER: usize = 120;
 /// The highest harmonic for poses, which sample an axis at random: an independent search found nothing real above it.
 const HIGHEST_ORDER_OF_POSES: usize = 40;
+/// Readings in a cycle of the shortest wave that is looked for; two would just carry it.
+const READINGS_A_CYCLE: f64 = 2.4;
 
 /// Intervals of the travel between the places where steps are looked for.
 const PLACES_OF_STEPS: usize = 40;
@@ -46,9 +48,9 @@ pub struct Family {
 enum Components {
     Motion,
     OwnMotion,
-    LinearMotion,
     AnyMotion,
     Location,
+    Body,
     Balls,
     Bar,
     Gain,
@@ -82,12 +84,21 @@ pub struct Candidate {
     pub family: usize,
     /// What it costs in the score beside its coefficients, in natural-log units.
     pub cost: f64,
+    /// What the choice of its places takes from its evidence, where it is composed of several; 0 for an entry of the library.
+    pub price: f64,
     /// Whether it is tried only when nothing simpler is left to find and structure remains.
     pub last_resort: bool,
     /// Whether it holds the places that an effect may be composed of ([`super::compose`]) and is no effect itself.
     pub dictionary: bool,
     /// How far apart the entries of the library are in the number of the shape that is the first to be tuned, in the driver's unit; 0 without one.
     pub grid: f64,
+}
+
+impl Candidate {
+    /// How long it takes to say what it is: the simplest is the shortest.
+    pub fn length(&self) -> f64 {
+        self.cost + self.price
+    }
 }
 
 /// How the axes are sampled in a session.
@@ -154,6 +165,7 @@ pub fn candidates(problem: &Problem<'_>) -> Result<Vec<Candidate>, IdentifyError
                         effect,
                         family: number,
                         cost,
+                        price: 0.0,
                         last_resort,
                         dictionary,
                         grid,
@@ -290,27 +302,22 @@ fn components(problem: &Problem<'_>, sampling: &Sampling, choice: Components) ->
         Components::OwnMotion => moving()
             .map(|axis| error(axis, ErrorKind::Motion, machine.axes[axis].own_freedom()))
             .collect(),
-        Components::LinearMotion => moving()
-            .filter(|axis| machine.axes[*axis].kind == AxisKind::Linear)
-            .flat_map(|axis| {
-                [Freedom::X, Freedom::Y, Freedom::Z].map(|freedom| error(axis, ErrorKind::Motion, freedom))
-            })
-            .collect(),
         Components::AnyMotion => (0..machine.axes.len())
             .filter(|axis| machine.axes[*axis].kind == AxisKind::Rotary)
             .flat_map(|axis| Freedom::ALL.map(|freedom| error(axis, ErrorKind::Motion, freedom)))
             .collect(),
-        Components::Location => (0..machine.axes.len())
+        Components::Location | Components::Body => (0..machine.axes.len())
             .flat_map(|axis| {
                 let own = machine.axes[axis].own_freedom();
                 let rotary = machine.axes[axis].kind == AxisKind::Rotary;
                 let along = Freedom::ALL[own.index() % 3];
+                let body = choice == Components::Body;
                 Freedom::ALL
                     .into_iter()
-                    // An axis is a line: it has no location along itself, and its zero is no error of the line.
+                    // An axis is a line: it has no location along itself, and its zero is no error of the line. What it carries may well move there.
                     .filter(move |f| {
                         if rotary {
-                            *f != own && *f != along
+                            body || *f != own && *f != along
                         } else {
                             f.is_angle() && f.index() != own.index() + 3
                         }
@@ -404,8 +411,7 @@ fn shapes(
             let most = if poses {
                 HIGHEST_ORDER_OF_POSES
             } else if step > 0.0 {
-                // Four readings a cycle.
-                ((TAU / (4.0 * step)) as usize).clamp(1, HIGHEST_ORDER)
+                ((TAU / (READINGS_A_CYCLE * step)) as usize).clamp(1, HIGHEST_ORDER)
             } else {
                 0
             };
@@ -450,11 +456,11 @@ fn shapes(
             })
             .collect(),
         "periodic" => {
-            // Frequencies half a cycle over the travel apart, up to four readings a cycle, from one cycle on.
+            // Frequencies half a cycle over the travel apart, from one cycle on.
             if step <= 0.0 || poses {
                 return Vec::new();
             }
-            let most = ((2.0 * span / (4.0 * step)) as usize).min(240);
+            let most = ((2.0 * span / (READINGS_A_CYCLE * step)) as usize).min(240);
             // Over a full turn whole cycles are harmonics.
             let turn = rotary && (span / TAU - (span / TAU).round()).abs() < 0.01;
             (2..=most)
@@ -629,6 +635,16 @@ fn mounts(problem: &Problem<'_>, component: &Component) -> Vec<Vec<String>> {
         let alone = vec![test.name.clone()];
         if !mounts.contains(&alone) {
             mounts.push(alone);
+        }
+    }
+    // And from a test on.
+    for first in 1..problem.tests.len() {
+        let mount = problem.tests[first].group(shared_by);
+        let of_mount = |test: &&&abbe_model::session::Test| test.group(shared_by) == mount;
+        let later = problem.tests[first..].iter().filter(of_mount);
+        let later: Vec<String> = later.map(|test| test.name.clone()).collect();
+        if problem.tests[first - 1].group(shared_by) == mount && !mounts.contains(&later) {
+            mounts.push(later);
         }
     }
     mounts

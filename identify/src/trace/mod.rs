@@ -11,6 +11,8 @@
 pub mod alias;
 pub mod columns;
 pub mod compose;
+mod exchange;
+pub mod further;
 pub mod library;
 pub mod moments;
 pub mod null;
@@ -104,6 +106,8 @@ pub struct Trace<'a> {
     pub after_fit: Fit,
     /// The found effects.
     pub effects: Vec<Effect>,
+    /// For each of them what the readings cannot tell from it, nearest first.
+    pub look_alikes: Vec<Vec<Effect>>,
     /// As it is reported.
     pub result: TraceResult,
 }
@@ -145,17 +149,11 @@ fn trace_with<'a>(
     let poses = problem.folds.kind == FoldKind::Poses;
     let columns = Columns::new(&problem, &before_fit.beta)?;
     let start = Start::of(&problem, &columns, &before_fit)?;
-    let null = |residual: &[f64], residuals: &[Vec<f64>], salt: u64| {
-        null::draws(
-            &problem,
-            &columns,
-            residuals,
-            residual,
-            options.draws,
-            options.seed.wrapping_add(salt),
-        )
+    let null = |block: usize| {
+        let (count, seed) = (options.draws, options.seed);
+        null::draws(&problem, &columns, pure, &start.residual, count, block, seed)
     };
-    let draws = null(&start.residual, pure, 0);
+    let draws = null(null::BLOCK);
     let structure_before = if poses {
         None
     } else {
@@ -165,7 +163,7 @@ fn trace_with<'a>(
             &columns,
             model,
             &start.residual,
-            draws.clone(),
+            null(null::SINGLE),
             &prior,
         ))
     };
@@ -220,13 +218,20 @@ fn trace_with<'a>(
             judged = judge(&problem, &before_fit, &search, options, structure_before.as_ref())?;
         }
     }
+    let structured = |judged: &Judged<'_>| {
+        let structure = judged.structure.as_ref();
+        structure.is_some_and(|structure| structure.p_value <= STRUCTURED)
+    };
+    if !poses && search.disown(structured(&judged)) {
+        judged = judge(&problem, &before_fit, &search, options, structure_before.as_ref())?;
+    }
     let Judged {
         after,
         after_fit,
         effects,
         structure: structure_after,
     } = judged;
-    let result = report::report(&report::Findings {
+    let (result, look_alikes) = report::report(&report::Findings {
         before: &problem,
         before_fit: &before_fit,
         after: &after,
@@ -248,6 +253,7 @@ fn trace_with<'a>(
         after,
         after_fit,
         effects,
+        look_alikes,
         result,
     })
 }
@@ -258,8 +264,15 @@ fn search_on(
     rms_um: &dyn Fn(f64) -> f64,
     progress: &(dyn Fn(Progress) -> bool + Sync),
 ) -> Option<f64> {
+    // Effects that are put down to one make room for others; that must end.
+    let mut rounds = 0;
     loop {
+        rounds += 1;
+        if rounds > search.most_rounds() {
+            return Some(1.0);
+        }
         match search.round() {
+            Round::Done { .. } if search.retune() => {}
             Round::Done { p_value } => return Some(p_value),
             Round::Added { candidate } => {
                 // Every exchange costs a model an effect; among many effects the gain is small and a sweep now and then will do.
@@ -323,6 +336,7 @@ fn judge<'a>(
                 &after_fit.residuals,
                 &end.residual,
                 options.draws,
+                null::SINGLE,
                 seed,
             );
             let prior = end.prior();
@@ -363,12 +377,13 @@ fn give_noise_memory(problem: &mut Problem<'_>, residuals: &[Vec<f64>]) -> bool 
         return false;
     }
     let kept = |test: usize, row: usize| !problem.rejected[test][row];
-    let pure = PureError::of(&problem.tests, residuals, kept);
+    let pure = PureError::of(&problem.tests, residuals, kept).without_waves(&problem.tests, kept);
     let Some(memory) = pure.memory(&problem.tests, kept) else {
         return false;
     };
     let mut noise = problem.noise.clone();
     noise.memory = memory.coefficients;
+    noise.memory_u = memory.sum_u;
     if let Some(sigma) = pure.sigma_mm() {
         noise.sigma_mm = sigma * memory.inflation;
         noise.source = NoiseSource::Repeats;

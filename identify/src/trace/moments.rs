@@ -17,6 +17,8 @@ use rayon::prelude::*;
 
 use super::columns::{Columns, Layout};
 
+/// The most entries of columns that are kept: 320 MB.
+const MOST_KEPT: usize = 40_000_000;
 /// Candidates whose columns are made together.
 const CHUNK_COLUMNS: usize = 48;
 
@@ -81,6 +83,9 @@ pub struct Moments {
     pub first: Vec<usize>,
     /// Number of columns of each candidate.
     pub count: Vec<usize>,
+    /// How many numbers of its shape are chosen to fit.
+    pub numbers: Vec<usize>,
+    blocks: Vec<Block>,
     /// Base columns, rows × base, kept to extend.
     base_columns: Mat<f64>,
     residual: Vec<f64>,
@@ -111,14 +116,16 @@ impl Moments {
         let count: Vec<usize> = layouts.iter().map(|layout| layout.count).collect();
         let (rank, draws) = (model.ncols(), null.ncols());
         let side = beside(&model, residual, &null);
-        let products = products_by_fold(columns, layouts, side.as_ref());
+        let blocks = laid(columns, layouts, 0..layouts.len(), &[]);
+        let products = products_by_fold(columns, layouts, &blocks, side.as_ref());
+        let mut own = own_by_fold(columns, layouts, &blocks);
         let mut null_cross = Mat::zeros(draws, total);
         let mut folds = Vec::new();
         for (fold, range) in columns.fold_rows.iter().enumerate() {
             let part = side.as_ref().subrows(range.start, range.len());
             let base_part = part.subcols(0, rank + 1);
             let gram = transposed_product(base_part, base_part);
-            let (product, own) = &products[fold];
+            let product = &products[fold];
             for j in 0..total {
                 for d in 0..draws {
                     null_cross[(d, j)] += product[(rank + 1 + d, j)];
@@ -130,7 +137,7 @@ impl Moments {
                 yy: gram[(rank, rank)],
                 cross: product.subrows(0, rank).to_owned(),
                 cross_y: (0..total).map(|j| product[(rank, j)]).collect(),
-                own: own.clone(),
+                own: std::mem::take(&mut own[fold]),
             });
         }
         let null_base = transposed_product(model.as_ref(), null.as_ref());
@@ -142,6 +149,8 @@ impl Moments {
             null_base,
             first,
             count,
+            numbers: layouts.iter().map(|layout| layout.numbers).collect(),
+            blocks,
             base_columns: model,
             residual: residual.to_vec(),
             null,
@@ -182,29 +191,30 @@ impl Moments {
                 }
             }
         }
-        let mut base = Mat::zeros(rows, old + added);
-        for j in 0..old {
-            base.col_mut(j).copy_from(self.base_columns.col(j));
-        }
-        for j in 0..added {
-            base.col_mut(old + j).copy_from(fresh.col(j));
-        }
-        self.base_columns = base;
-        let products = products_by_fold(columns, layouts, fresh.as_ref());
+        self.base_columns
+            .resize_with(rows, next, |i, j| fresh[(i, j - old)]);
+        let products = products_by_fold(columns, layouts, &self.blocks, fresh.as_ref());
         let null_fresh = transposed_product(fresh.as_ref(), self.null.as_ref());
-        self.null_base = stacked(&self.null_base, &null_fresh);
+        let draws = self.null.ncols();
+        self.null_base
+            .resize_with(next, draws, |i, d| null_fresh[(i - old, d)]);
+        let total = self.null_cross.ncols();
         for (fold, range) in columns.fold_rows.iter().enumerate() {
             let moments = &mut self.folds[fold];
             let fresh_part = fresh.as_ref().subrows(range.start, range.len());
             let base_part = self.base_columns.as_ref().subrows(range.start, range.len());
             let gram = transposed_product(base_part, fresh_part);
-            let before = &moments.base;
-            moments.base = Mat::from_fn(next, next, |i, j| match (i < old, j < old) {
-                (true, true) => before[(i, j)],
-                (_, false) => gram[(i, j - old)],
-                (false, true) => gram[(j, i - old)],
+            moments.base.resize_with(next, next, |i, j| {
+                if j < old {
+                    gram[(j, i - old)]
+                } else {
+                    gram[(i, j - old)]
+                }
             });
-            moments.cross = stacked(&moments.cross, &products[fold].0);
+            let product = &products[fold];
+            moments
+                .cross
+                .resize_with(next, total, |i, j| product[(i - old, j)]);
             for j in 0..added {
                 let sum = (range.start..range.end)
                     .map(|i| fresh[(i, j)] * self.residual[i])
@@ -212,33 +222,33 @@ impl Moments {
                 moments.base_y.push(sum);
             }
         }
-        self.whole = FoldMoments::sum(&self.folds);
+        self.sum_up(next, total);
         places
     }
 
-    /// Adds candidates to those that are scored.
+    /// Adds the last of the candidates to those that are scored: those that are not yet.
     pub fn append(&mut self, columns: &Columns<'_, '_>, layouts: &[Layout]) {
         let side = self.side();
         let rank = self.base();
-        let products = products_by_fold(columns, layouts, side.as_ref());
+        let fresh = laid(columns, layouts, self.count.len()..layouts.len(), &self.blocks);
+        let products = products_by_fold(columns, layouts, &fresh, side.as_ref());
+        let own = own_by_fold(columns, layouts, &fresh);
         let draws = self.null.ncols();
         let total = self.null_cross.ncols();
         let mut added = 0;
-        for layout in layouts {
+        for layout in &layouts[self.count.len()..] {
             self.first.push(total + added);
             self.count.push(layout.count);
+            self.numbers.push(layout.numbers);
             added += layout.count;
         }
+        self.blocks.extend(fresh);
         let mut of_null = Mat::<f64>::zeros(draws, added);
-        for (fold, (product, own)) in products.into_iter().enumerate() {
+        for (fold, (product, own)) in products.into_iter().zip(own).enumerate() {
             let moments = &mut self.folds[fold];
-            moments.cross = Mat::from_fn(rank, total + added, |i, j| {
-                if j < total {
-                    moments.cross[(i, j)]
-                } else {
-                    product[(i, j - total)]
-                }
-            });
+            moments
+                .cross
+                .resize_with(rank, total + added, |i, j| product[(i, j - total)]);
             moments.cross_y.extend((0..added).map(|k| product[(rank, k)]));
             moments.own.extend(own);
             for d in 0..draws {
@@ -247,15 +257,31 @@ impl Moments {
                 }
             }
         }
-        self.whole = FoldMoments::sum(&self.folds);
-        let before = &self.null_cross;
-        self.null_cross = Mat::from_fn(draws, total + added, |d, j| {
-            if j < total {
-                before[(d, j)]
-            } else {
-                of_null[(d, j - total)]
-            }
+        self.sum_up(rank, total + added);
+        self.null_cross
+            .resize_with(draws, total + added, |d, j| of_null[(d, j - total)]);
+    }
+
+    /// Extends the products over all folds to what each fold has now: so many base columns and candidate columns.
+    fn sum_up(&mut self, base: usize, total: usize) {
+        let (folds, whole) = (&self.folds, &mut self.whole);
+        whole.base.resize_with(base, base, |i, j| {
+            folds.iter().map(|fold| fold.base[(i, j)]).sum()
         });
+        whole.cross.resize_with(base, total, |i, j| {
+            folds.iter().map(|fold| fold.cross[(i, j)]).sum()
+        });
+        for i in whole.base_y.len()..base {
+            whole.base_y.push(folds.iter().map(|fold| fold.base_y[i]).sum());
+        }
+        for j in whole.cross_y.len()..total {
+            whole.cross_y.push(folds.iter().map(|fold| fold.cross_y[j]).sum());
+        }
+        for candidate in whole.own.len()..self.count.len() {
+            let mut own = Mat::zeros(self.count[candidate], self.count[candidate]);
+            folds.iter().for_each(|fold| own += &fold.own[candidate]);
+            whole.own.push(own);
+        }
     }
 
     /// What a layout would gain on all readings beside a model trained on all readings.
@@ -300,16 +326,6 @@ impl Moments {
     }
 }
 
-fn stacked(above: &Mat<f64>, below: &Mat<f64>) -> Mat<f64> {
-    Mat::from_fn(above.nrows() + below.nrows(), above.ncols(), |i, j| {
-        if i < above.nrows() {
-            above[(i, j)]
-        } else {
-            below[(i - above.nrows(), j)]
-        }
-    })
-}
-
 fn beside(model: &Mat<f64>, residual: &[f64], null: &Mat<f64>) -> Mat<f64> {
     let (rank, rows) = (model.ncols(), residual.len());
     let mut side = Mat::zeros(rows, rank + 1 + null.ncols());
@@ -325,60 +341,116 @@ fn beside(model: &Mat<f64>, residual: &[f64], null: &Mat<f64>) -> Mat<f64> {
     side
 }
 
-/// For each fold: `sideᵀ · candidates`, and each candidate's product with itself. Candidates are made chunk by chunk, so that memory does not grow
-/// with their number.
+/// Consecutive candidates with their columns, where these are kept.
+struct Block {
+    candidates: Range<usize>,
+    kept: Option<Mat<f64>>,
+}
+
+/// Lays candidates out block by block; columns are kept as long as they find room beside those that are kept already.
+fn laid(
+    columns: &Columns<'_, '_>,
+    layouts: &[Layout],
+    candidates: Range<usize>,
+    present: &[Block],
+) -> Vec<Block> {
+    let count: Vec<usize> = layouts[candidates.clone()]
+        .iter()
+        .map(|layout| layout.count)
+        .collect();
+    let mut kept: usize = present
+        .iter()
+        .filter_map(|block| block.kept.as_ref())
+        .map(|kept| kept.nrows() * kept.ncols())
+        .sum();
+    let blocks: Vec<(Range<usize>, bool)> = chunked(&count)
+        .into_iter()
+        .map(|chunk| {
+            let entries = columns.rows() * count[chunk.clone()].iter().sum::<usize>();
+            let room = kept + entries <= MOST_KEPT;
+            kept += if room { entries } else { 0 };
+            (candidates.start + chunk.start..candidates.start + chunk.end, room)
+        })
+        .collect();
+    blocks
+        .into_par_iter()
+        .map(|(candidates, room)| Block {
+            kept: room.then(|| filled(columns, &layouts[candidates.clone()])),
+            candidates,
+        })
+        .collect()
+}
+
+fn filled(columns: &Columns<'_, '_>, layouts: &[Layout]) -> Mat<f64> {
+    let chosen: Vec<&Layout> = layouts.iter().collect();
+    let width: usize = chosen.iter().map(|layout| layout.count).sum();
+    let mut block = Mat::zeros(columns.rows(), width);
+    columns.fill(&chosen, block.as_mut());
+    block
+}
+
+/// What is made of the columns of each block in each fold, block by block.
+fn by_block<T: Send>(
+    columns: &Columns<'_, '_>,
+    layouts: &[Layout],
+    blocks: &[Block],
+    make: impl Fn(&[Layout], &Range<usize>, MatRef<'_, f64>) -> T + Sync,
+) -> Vec<Vec<T>> {
+    blocks
+        .par_iter()
+        .map(|block| {
+            let layouts = &layouts[block.candidates.clone()];
+            let fresh = block.kept.is_none().then(|| filled(columns, layouts));
+            let Some(all) = block.kept.as_ref().or(fresh.as_ref()) else {
+                return Vec::new();
+            };
+            let of_fold =
+                |range: &Range<usize>| make(layouts, range, all.as_ref().subrows(range.start, range.len()));
+            columns.fold_rows.iter().map(of_fold).collect()
+        })
+        .collect()
+}
+
+/// For each fold `sideᵀ · candidates`.
 fn products_by_fold(
     columns: &Columns<'_, '_>,
     layouts: &[Layout],
+    blocks: &[Block],
     side: MatRef<'_, f64>,
-) -> Vec<(Mat<f64>, Vec<Mat<f64>>)> {
-    type Part = (Mat<f64>, Vec<Mat<f64>>);
-    let count: Vec<usize> = layouts.iter().map(|layout| layout.count).collect();
-    let total: usize = count.iter().sum();
-    let chunks = chunked(&count);
-    let parts: Vec<Vec<Part>> = chunks
-        .par_iter()
-        .map(|chunk| {
-            let chosen: Vec<&Layout> = layouts[chunk.clone()].iter().collect();
-            let width: usize = chosen.iter().map(|layout| layout.count).sum();
-            let mut block = Mat::zeros(columns.rows(), width);
-            columns.fill(&chosen, block.as_mut());
-            columns
-                .fold_rows
-                .iter()
-                .map(|range| {
-                    let part = block.as_ref().subrows(range.start, range.len());
-                    let product = transposed_product(side.subrows(range.start, range.len()), part);
-                    let mut start = 0;
-                    let own = chosen
-                        .iter()
-                        .map(|layout| {
-                            let of = part.subcols(start, layout.count);
-                            start += layout.count;
-                            transposed_product(of, of)
-                        })
-                        .collect();
-                    (product, own)
-                })
-                .collect()
-        })
-        .collect();
+) -> Vec<Mat<f64>> {
+    let parts = by_block(columns, layouts, blocks, |_, range, part| {
+        transposed_product(side.subrows(range.start, range.len()), part)
+    });
     (0..columns.fold_rows.len())
         .map(|fold| {
+            let total = parts.iter().map(|part| part[fold].ncols()).sum();
             let mut whole = Mat::zeros(side.ncols(), total);
-            let mut own = Vec::with_capacity(layouts.len());
             let mut column = 0;
             for part in &parts {
-                let (product, of_candidates) = &part[fold];
+                let product = &part[fold];
                 for j in 0..product.ncols() {
                     whole.col_mut(column + j).copy_from(product.col(j));
                 }
                 column += product.ncols();
-                own.extend(of_candidates.iter().cloned());
             }
-            (whole, own)
+            whole
         })
         .collect()
+}
+
+/// For each fold each candidate's product with itself.
+fn own_by_fold(columns: &Columns<'_, '_>, layouts: &[Layout], blocks: &[Block]) -> Vec<Vec<Mat<f64>>> {
+    let parts = by_block(columns, layouts, blocks, |layouts, _, part| {
+        let mut start = 0;
+        let own = |layout: &Layout| {
+            let of = part.subcols(start, layout.count);
+            start += layout.count;
+            transposed_product(of, of)
+        };
+        layouts.iter().map(own).collect::<Vec<_>>()
+    });
+    let fold = |fold: usize| parts.iter().flat_map(|part| part[fold].iter().cloned()).collect();
+    (0..columns.fold_rows.len()).map(fold).collect()
 }
 
 /// Consecutive candidates whose columns together make a chunk.

@@ -11,24 +11,29 @@ use rand_pcg::Pcg64;
 
 use super::columns::Columns;
 use crate::heldout::FoldKind;
-use crate::noise::PureError;
+use crate::noise::{Noise, PureError};
 use crate::outliers::median;
 use crate::problem::Problem;
 
-/// Readings in a block.
-const BLOCK: usize = 20;
+/// Readings in a block for the search: structure that comes and goes stays in, and is not claimed as an effect.
+pub const BLOCK: usize = 20;
+/// Readings in a block for what is left: noise of the found memory and nothing else, so that what comes and goes shows.
+pub const SINGLE: usize = 1;
+/// The largest sum of the coefficients of a draw's memory.
+const SLOWEST: f64 = 0.98;
 /// The fewest deviations that are worth drawing from; below, Gaussian noise is drawn.
 const LEAST_POOL: usize = 200;
 /// Readings on either side over which a residual without repeats is smoothed to take out structure.
 const SMOOTHING: usize = 7;
 
-/// Draws (whitened rows in the order of the folds × draws).
+/// Draws (whitened rows in the order of the folds × draws), of blocks of that many readings.
 pub fn draws(
     problem: &Problem<'_>,
     columns: &Columns<'_, '_>,
     residuals: &[Vec<f64>],
     whitened: &[f64],
     count: usize,
+    block: usize,
     seed: u64,
 ) -> Mat<f64> {
     let rows = columns.rows();
@@ -69,10 +74,11 @@ pub fn draws(
             });
             let Some(stretch) = stretch else { continue };
             let sign = if generator.random::<bool>() { 1.0 } else { -1.0 };
-            let end = (place + BLOCK).min(stretch.len());
+            let end = (place + block).min(stretch.len());
             values.extend(stretch[place..end].iter().map(|value| sign * value));
         }
         values.truncate(rows);
+        slowed(&mut values, &problem.noise, &mut generator);
         for (i, value) in columns.placed(&values).into_iter().enumerate() {
             draws[(i, draw)] = value;
         }
@@ -80,11 +86,32 @@ pub fn draws(
     draws
 }
 
+/// What is whitened with a memory that is not quite its own stays slow, or becomes hasty. The memory of each draw differs from the one that was found by
+/// as much as that may be wrong: with `A` the polynomial of the found one and `A*` that of the draw, `A* w = A ε`.
+fn slowed(values: &mut [f64], noise: &Noise, generator: &mut Pcg64) {
+    if noise.memory.is_empty() || noise.memory_u <= 0.0 {
+        return;
+    }
+    let standard: f64 = generator.sample(StandardNormal);
+    let sum: f64 = noise.memory.iter().sum();
+    let mut own = noise.memory.clone();
+    own[0] += (noise.memory_u * standard).min(SLOWEST - sum);
+    let drawn = values.to_vec();
+    for t in 0..values.len() {
+        let mut value = drawn[t];
+        for (lag, (found, own)) in noise.memory.iter().zip(&own).enumerate() {
+            if let Some(before) = t.checked_sub(lag + 1) {
+                value += own * values[before] - found * drawn[before];
+            }
+        }
+        values[t] = value;
+    }
+}
+
 /// Whitened deviations without structure, in stretches that whitening kept together, of unit variance.
 fn pool(problem: &Problem<'_>, residuals: &[Vec<f64>]) -> Vec<Vec<f64>> {
-    let pure = PureError::of(&problem.tests, residuals, |test, row| {
-        !problem.rejected[test][row]
-    });
+    let kept = |test: usize, row: usize| !problem.rejected[test][row];
+    let pure = PureError::of(&problem.tests, residuals, kept).without_waves(&problem.tests, kept);
     let repeats = pure.freedom >= LEAST_POOL;
     let coordinates = problem.coordinates();
     let mut stretches = Vec::new();

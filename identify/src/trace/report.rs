@@ -44,7 +44,8 @@ pub fn effect_name(effect: &Effect) -> EffectName {
     }
 }
 
-pub(super) fn report(findings: &Findings<'_, '_>) -> Result<TraceResult, IdentifyError> {
+/// What is reported, and for each effect what looks like it.
+pub(super) fn report(findings: &Findings<'_, '_>) -> Result<(TraceResult, Vec<Vec<Effect>>), IdentifyError> {
     let Findings {
         before,
         before_fit,
@@ -65,6 +66,7 @@ pub(super) fn report(findings: &Findings<'_, '_>) -> Result<TraceResult, Identif
 
     let families = library::families()?;
     let mut effects = Vec::new();
+    let mut look_alikes: Vec<Vec<Effect>> = Vec::new();
     let mut alias_shifts = vec![0.0_f64; before_fit.beta.len()];
     let variance = if in_residual_variance {
         let sum: f64 = after_fit
@@ -82,6 +84,8 @@ pub(super) fn report(findings: &Findings<'_, '_>) -> Result<TraceResult, Identif
         let model = search.model_without(Some(k));
         let aliases = alias::aliases(search, k, variance);
         let named = model.joined(taken.candidate).0;
+        let effect_of = |alias: &Alias| search.candidates[alias.candidate].effect.clone();
+        look_alikes.push(aliases.iter().map(effect_of).collect());
         widen(&mut alias_shifts, &aliases, &named, findings.start);
         let gain = model.gain(taken.candidate).gain;
         effects.push(EffectResult {
@@ -97,11 +101,9 @@ pub(super) fn report(findings: &Findings<'_, '_>) -> Result<TraceResult, Identif
             p_value: taken.p_value,
             rms_gain_um: (gain / whitened_rows).sqrt() * before.noise.sigma_mm * 1e3,
             heldout_rms_um: held_out_um(search.held_out.get(k + 1).copied().unwrap_or(last), scale),
-            aliases: aliases
-                .iter()
-                .map(|a| effect_name(&search.candidates[a.candidate].effect))
-                .collect(),
+            aliases: look_alikes[k].iter().map(effect_name).collect(),
             separated_by: None,
+            separation: None,
         });
     }
     for parameter in &mut after_result.parameters {
@@ -114,7 +116,7 @@ pub(super) fn report(findings: &Findings<'_, '_>) -> Result<TraceResult, Identif
     let (verdict, remainder) = verdict(findings, &mut effects);
     let moved = moved(&before_result.parameters, &after_result.parameters);
     let warnings = before.session.warnings.clone();
-    Ok(TraceResult {
+    let result = TraceResult {
         verdict,
         noise_um: before.noise.sigma_mm * 1e3,
         noise_source: before.noise.source.word().to_string(),
@@ -136,7 +138,8 @@ pub(super) fn report(findings: &Findings<'_, '_>) -> Result<TraceResult, Identif
         unobservable: fit::unobservable(after, &after_fit.rank),
         rejected: fit::rejected(after, after_fit),
         warnings,
-    })
+    };
+    Ok((result, look_alikes))
 }
 
 fn model_result(problem: &Problem<'_>, fit: &Fit, held_out_mm: f64) -> ModelResult {

@@ -45,6 +45,16 @@ pub fn ln_chi_square_tail(x: f64, k: usize) -> f64 {
     -z + a * z.ln() - ln_gamma(a) + h.ln()
 }
 
+/// No less than `−ln P(χ²ₖ > x)`, and quick: the tail of two degrees of freedom is `e^(−x/2)`, that of more is larger, that of one at least
+/// `√(2/π) √x/(1 + x) e^(−x/2)`.
+fn most_evidence(x: f64, k: usize) -> f64 {
+    if k == 1 && x > 0.0 {
+        0.5 * x + ((1.0 + x) / x.sqrt()).ln() + 0.5 * std::f64::consts::FRAC_PI_2.ln()
+    } else {
+        0.5 * x
+    }
+}
+
 /// A model over the base: which base columns it has, and which folds it is trained on.
 pub struct Trained<'m> {
     moments: &'m Moments,
@@ -54,10 +64,8 @@ pub struct Trained<'m> {
     pub folds: Vec<usize>,
     /// `(XᵀX)⁻¹`.
     pub inverse: Mat<f64>,
-    /// `(XᵀX)⁻¹ Xᵀ C`.
-    solved: Mat<f64>,
-    /// `Xᵀ C`.
-    cross: Mat<f64>,
+    /// `Xᵀ C` and `(XᵀX)⁻¹ Xᵀ C` of all candidates, or none yet: many models are asked for few candidates or for none.
+    all: Option<(Mat<f64>, Mat<f64>)>,
     /// The products that are summed: which, and with what sign. Nearly all folds are all of them less a few.
     parts: Vec<(&'m FoldMoments, f64)>,
     /// `Xᵀ y`.
@@ -79,15 +87,33 @@ pub struct PriorMoments {
 pub struct Gain {
     /// Fall of the sum of squares.
     pub gain: f64,
-    /// Directions that it adds.
+    /// Directions that it adds, and numbers of its shape that were chosen.
     pub freedom: usize,
     /// The share of its own length that the model does not have already.
     pub visible: f64,
 }
 
 impl<'m> Trained<'m> {
-    /// Trains a model.
+    /// Trains a model that will be asked for every candidate.
     pub fn new(
+        moments: &'m Moments,
+        prior: &PriorMoments,
+        base: Vec<usize>,
+        folds: Vec<usize>,
+    ) -> Trained<'m> {
+        let mut trained = Trained::lean(moments, prior, base, folds);
+        let total = moments
+            .first
+            .last()
+            .map_or(0, |first| first + moments.count.last().copied().unwrap_or(0));
+        let cross = trained.cross(0, total);
+        let solved = &trained.inverse * &cross;
+        trained.all = Some((cross, solved));
+        trained
+    }
+
+    /// Trains a model that will be asked for few candidates.
+    pub fn lean(
         moments: &'m Moments,
         prior: &PriorMoments,
         base: Vec<usize>,
@@ -124,22 +150,7 @@ impl<'m> Trained<'m> {
                 base_y[i] += sign * part.base_y[*bi];
             }
         }
-        let total = moments
-            .first
-            .last()
-            .map_or(0, |first| first + moments.count.last().copied().unwrap_or(0));
-        let mut cross = Mat::<f64>::zeros(m, total);
-        for j in 0..total {
-            for (i, bi) in base.iter().enumerate() {
-                let mut sum = 0.0;
-                for (part, sign) in &parts {
-                    sum += sign * part.cross[(*bi, j)];
-                }
-                cross[(i, j)] = sum;
-            }
-        }
         let inverse = pseudo_inverse(&gram);
-        let solved = &inverse * &cross;
         let coefficients = (0..m)
             .map(|i| (0..m).map(|j| inverse[(i, j)] * base_y[j]).sum())
             .collect();
@@ -148,11 +159,36 @@ impl<'m> Trained<'m> {
             base,
             folds,
             inverse,
-            solved,
-            cross,
+            all: None,
             parts,
             base_y,
             coefficients,
+        }
+    }
+
+    /// `Xᵀ C` of consecutive candidate columns.
+    fn cross(&self, first: usize, count: usize) -> Mat<f64> {
+        Mat::from_fn(self.base.len(), count, |i, j| {
+            self.parts
+                .iter()
+                .map(|(part, sign)| sign * part.cross[(self.base[i], first + j)])
+                .sum()
+        })
+    }
+
+    /// `Xᵀ C` and `(XᵀX)⁻¹ Xᵀ C` of a candidate.
+    fn beside(&self, candidate: usize) -> (Mat<f64>, Mat<f64>) {
+        let (first, count) = (self.moments.first[candidate], self.moments.count[candidate]);
+        match &self.all {
+            Some((cross, solved)) => (
+                cross.subcols(first, count).to_owned(),
+                solved.subcols(first, count).to_owned(),
+            ),
+            None => {
+                let cross = self.cross(first, count);
+                let solved = &self.inverse * &cross;
+                (cross, solved)
+            }
         }
     }
 
@@ -176,16 +212,15 @@ impl<'m> Trained<'m> {
                 g[k] = 0.0;
             }
         }
+        let (cross, solved) = self.beside(candidate);
         let mut d = own.clone();
         for k in 0..count {
             for l in 0..count {
-                let sum: f64 = (0..self.base.len())
-                    .map(|i| self.cross[(i, first + k)] * self.solved[(i, first + l)])
-                    .sum();
+                let sum: f64 = (0..self.base.len()).map(|i| cross[(i, k)] * solved[(i, l)]).sum();
                 d[(k, l)] -= sum;
             }
             g[k] -= (0..self.base.len())
-                .map(|i| self.solved[(i, first + k)] * self.base_y[i])
+                .map(|i| solved[(i, k)] * self.base_y[i])
                 .sum::<f64>();
         }
         (d, g, own)
@@ -200,13 +235,23 @@ impl<'m> Trained<'m> {
             .sum()
     }
 
+    /// What the gain of a candidate is judged by: its directions that are seen, and the numbers of its shape. Without the latter whatever may be tuned would
+    /// be preferred to what may not.
+    fn freedom(&self, candidate: usize, seen: usize) -> usize {
+        if seen == 0 {
+            0
+        } else {
+            seen + self.moments.numbers[candidate]
+        }
+    }
+
     /// What a candidate would gain.
     pub fn gain(&self, candidate: usize) -> Gain {
         let (d, g, own) = self.projected(candidate);
         let inverse = Visible::of(&d, &own);
         Gain {
             gain: inverse.quadratic(&g),
-            freedom: inverse.freedom,
+            freedom: self.freedom(candidate, inverse.freedom),
             visible: inverse.share,
         }
     }
@@ -232,21 +277,25 @@ impl<'m> Trained<'m> {
                 for &candidate in chunk.iter().filter(|candidate| costs[**candidate].is_finite()) {
                     let (d, _, own) = self.projected(candidate);
                     let inverse = Visible::of(&d, &own);
-                    if inverse.freedom == 0 {
+                    let freedom = self.freedom(candidate, inverse.freedom);
+                    if freedom == 0 {
                         continue;
                     }
                     let (first, count) = (self.moments.first[candidate], self.moments.count[candidate]);
+                    let (_, solved) = self.beside(candidate);
                     for draw in 0..draws {
                         let g: Vec<f64> = (0..count)
                             .map(|k| {
-                                let modelled: f64 =
-                                    (0..m).map(|i| self.solved[(i, first + k)] * h[(i, draw)]).sum();
+                                let modelled: f64 = (0..m).map(|i| solved[(i, k)] * h[(i, draw)]).sum();
                                 self.moments.null_cross[(draw, first + k)] - modelled
                             })
                             .collect();
                         let gain = inverse.quadratic(&g) / variance;
                         // The tail is worth computing only where it can be the best.
-                        let score = -ln_chi_square_tail(gain, inverse.freedom) - costs[candidate];
+                        if most_evidence(gain, freedom) - costs[candidate] <= best[draw] {
+                            continue;
+                        }
+                        let score = -ln_chi_square_tail(gain, freedom) - costs[candidate];
                         best[draw] = best[draw].max(score);
                     }
                 }
@@ -281,9 +330,10 @@ impl<'m> Trained<'m> {
                 }
             }
         }
+        let (_, solved) = self.beside(candidate);
         for k in 0..count {
             g[k] -= (0..self.base.len())
-                .map(|i| self.solved[(i, first + k)] * gram_with[i])
+                .map(|i| solved[(i, k)] * gram_with[i])
                 .sum::<f64>();
         }
         let inverse = Visible::of(&d, &own);
@@ -309,13 +359,13 @@ impl<'m> Trained<'m> {
     pub fn joined(&self, candidate: usize) -> (Vec<f64>, Vec<f64>) {
         let (d, g, own) = self.projected(candidate);
         let of_candidate = Visible::of(&d, &own).solve(&g);
-        let first = self.moments.first[candidate];
+        let (_, solved) = self.beside(candidate);
         let of_model = (0..self.base.len())
             .map(|i| {
                 let shift: f64 = of_candidate
                     .iter()
                     .enumerate()
-                    .map(|(k, c)| self.solved[(i, first + k)] * c)
+                    .map(|(k, c)| solved[(i, k)] * c)
                     .sum();
                 self.coefficients[i] - shift
             })
@@ -446,4 +496,19 @@ fn pseudo_inverse(gram: &Mat<f64>) -> Mat<f64> {
         }
     });
     &scaled * u.transpose()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_quick_bound_is_a_bound() {
+        for k in 1..6 {
+            for x in [1e-6, 0.01, 0.5, 1.0, 3.0, 20.0, 200.0, 4000.0] {
+                let evidence = -ln_chi_square_tail(x, k);
+                assert!(most_evidence(x, k) >= evidence - 1e-12, "{x} {k} {evidence}");
+            }
+        }
+    }
 }

@@ -6,7 +6,7 @@
 
 use std::collections::BTreeSet;
 
-use abbe_model::effect::Driver;
+use abbe_model::effect::{Driver, Shape};
 use faer::Mat;
 use rayon::prelude::*;
 
@@ -58,7 +58,7 @@ pub struct Search<'s> {
     /// What each fold's own search has taken up: candidates.
     pub of_fold: Vec<Vec<usize>>,
     /// Where the columns of every candidate that was ever taken up stand in the base.
-    materialised: Vec<(usize, std::ops::Range<usize>)>,
+    pub(super) materialised: Vec<(usize, std::ops::Range<usize>)>,
     /// Sum of squares of held-out residuals over the variance of the noise, before and after each addition.
     pub held_out: Vec<f64>,
     /// The best score on readings without structure that is exceeded with the probability of the stop, by round.
@@ -67,11 +67,14 @@ pub struct Search<'s> {
     pub last_resort: bool,
     /// Candidates of last resort that are not laid over the readings yet.
     pub reserve: Vec<(Candidate, Layout)>,
-    plain: Plain,
+    pub(super) plain: Plain,
     /// Entries of the library that would not stand out however large they plausibly were.
-    unseen: Vec<bool>,
-    stop: Stop,
+    pub(super) unseen: Vec<bool>,
+    pub(super) stop: Stop,
 }
+
+/// The most effects whose places and periods are looked at again whenever one is added.
+pub(super) const MOST_SHARPENED: usize = 4;
 
 /// By how many standard deviations an effect as large as is plausible has to change the readings, all together and beyond what the model absorbs, to be
 /// looked for.
@@ -159,18 +162,18 @@ impl<'s> Search<'s> {
         unseen || candidate.dictionary || candidate.last_resort && !self.last_resort
     }
 
-    fn all_folds(&self) -> Vec<usize> {
+    pub(super) fn all_folds(&self) -> Vec<usize> {
         (0..self.columns.fold_rows.len()).collect()
     }
 
-    fn places(&self, candidate: usize) -> std::ops::Range<usize> {
+    pub(super) fn places(&self, candidate: usize) -> std::ops::Range<usize> {
         self.materialised
             .iter()
             .find(|(c, _)| *c == candidate)
             .map_or(0..0, |(_, places)| places.clone())
     }
 
-    fn base_with(&self, candidates: &[usize]) -> Vec<usize> {
+    pub(super) fn base_with(&self, candidates: &[usize]) -> Vec<usize> {
         (0..self.rank)
             .chain(candidates.iter().flat_map(|candidate| self.places(*candidate)))
             .collect()
@@ -234,9 +237,14 @@ impl<'s> Search<'s> {
         -ln_chi_square_tail(gain.gain / variance, gain.freedom)
     }
 
-    /// `−ln P` of a gain, less the candidate's cost.
+    /// The evidence for a candidate: `−ln P` of its gain, less the price of its places.
+    pub fn evidence_for(&self, candidate: usize, gain: &Gain, variance: f64) -> f64 {
+        self.evidence(gain, variance) - self.candidates[candidate].price
+    }
+
+    /// The same, less the candidate's cost.
     pub fn score(&self, candidate: usize, gain: &Gain, variance: f64) -> f64 {
-        self.evidence(gain, variance) - self.candidates[candidate].cost
+        self.evidence_for(candidate, gain, variance) - self.candidates[candidate].cost
     }
 
     /// What can be composed of the library's dictionaries beside a model.
@@ -252,7 +260,7 @@ impl<'s> Search<'s> {
     }
 
     /// Adds what comes near the best, with the best numbers that it can have beside a model of some candidates.
-    fn sharpen(&mut self, beside: &[usize]) {
+    pub(super) fn sharpen(&mut self, beside: &[usize]) {
         let fresh = {
             let model = self.model_of(beside, &self.all_folds());
             sharpen::sharpened(self, &model, &self.composed(&model))
@@ -264,14 +272,14 @@ impl<'s> Search<'s> {
         self.append(fresh);
     }
 
-    fn append(&mut self, fresh: Vec<(Candidate, Layout)>) {
+    pub(super) fn append(&mut self, fresh: Vec<(Candidate, Layout)>) {
         if fresh.is_empty() {
             return;
         }
         let (candidates, layouts): (Vec<Candidate>, Vec<Layout>) = fresh.into_iter().unzip();
-        self.moments.append(self.columns, &layouts);
         self.candidates.extend(candidates);
         self.layouts.extend(layouts);
+        self.moments.append(self.columns, &self.layouts);
     }
 
     /// Lays the candidates of last resort over the readings.
@@ -280,12 +288,13 @@ impl<'s> Search<'s> {
         self.append(reserve);
     }
 
-    fn model_of(&self, chosen: &[usize], folds: &[usize]) -> Trained<'_> {
+    pub(super) fn model_of(&self, chosen: &[usize], folds: &[usize]) -> Trained<'_> {
         Trained::new(&self.moments, &self.prior, self.base_with(chosen), folds.to_vec())
     }
 
     /// Puts several effects that follow one axis down to one, where that one says as much in fewer words: what they explain together is compared, each
-    /// effect being charged its cost and the number of entries of the library that it was chosen from. From three on, a free curve may be that one.
+    /// effect being charged its cost and the number of entries of the library that it was chosen from. From three effects or places on, a free curve may
+    /// be that one.
     pub fn merge(&mut self) {
         if self.stop.in_residual_variance {
             return;
@@ -300,49 +309,13 @@ impl<'s> Search<'s> {
         let mut merged = false;
         for driver in drivers {
             let chosen: Vec<usize> = self.taken.iter().map(|taken| taken.candidate).collect();
-            let (group, rest) = self.following(&driver, &chosen);
-            if group.len() < 2 {
-                continue;
+            let whole = self.following(&driver, &chosen).0;
+            let mut groups = vec![whole.clone()];
+            if whole.len() > 2 {
+                let without = |left_out: &usize| whole.iter().copied().filter(|c| c != left_out).collect();
+                groups.extend(whole.iter().map(without));
             }
-            self.sharpen(&rest);
-            if group.len() > 2 {
-                self.bring_reserve();
-            }
-            let curves = group.len() > 2;
-            let pool: Vec<usize> = (0..self.candidates.len())
-                .filter(|c| !self.is_held_back(*c) || curves && self.candidates[*c].last_resort)
-                .filter(|c| !rest.contains(c))
-                .collect();
-            let Some(one) = self.in_fewer_words(&group, &rest, &pool, &self.all_folds()) else {
-                continue;
-            };
-            self.materialise(&[one]);
-            let of_group = |taken: &Taken| group.contains(&taken.candidate);
-            let p_value = self
-                .taken
-                .iter()
-                .filter(|t| of_group(t))
-                .map(|t| t.p_value)
-                .fold(1.0, f64::min);
-            let places = self.places(one);
-            self.taken.retain(|taken| !group.contains(&taken.candidate));
-            self.taken.push(Taken {
-                candidate: one,
-                places,
-                p_value,
-            });
-            for fold in self.all_folds() {
-                let (group, rest) = self.following(&driver, &self.of_fold[fold]);
-                if !group.is_empty()
-                    && self
-                        .in_fewer_words(&group, &rest, &[one], &self.others(fold))
-                        .is_some()
-                {
-                    self.of_fold[fold] = rest;
-                    self.of_fold[fold].push(one);
-                }
-            }
-            merged = true;
+            merged |= groups.into_iter().any(|group| self.merge_group(&driver, &group));
         }
         if merged {
             let held_out = self.held_out_now();
@@ -350,6 +323,152 @@ impl<'s> Search<'s> {
                 *last = held_out;
             }
         }
+    }
+
+    /// Puts a group of effects down to one, if one says as much in fewer words. Returns whether it did.
+    fn merge_group(&mut self, driver: &Driver, group: &[usize]) -> bool {
+        let columns: usize = group.iter().map(|c| self.moments.count[*c]).sum();
+        let curves = group.len() > 2 || columns > 2 && self.is_composed(group);
+        if group.len() < 2 && !curves {
+            return false;
+        }
+        let chosen = self.taken.iter().map(|taken| taken.candidate);
+        let rest: Vec<usize> = chosen.filter(|c| !group.contains(c)).collect();
+        if group.len() > 1 {
+            self.sharpen(&rest);
+        }
+        if curves {
+            self.bring_reserve();
+        }
+        let pool: Vec<usize> = (0..self.candidates.len())
+            .filter(|c| !self.is_held_back(*c) || curves && self.candidates[*c].last_resort)
+            .filter(|c| !rest.contains(c))
+            .collect();
+        let Some(one) = self.in_fewer_words(group, &rest, &pool, &self.all_folds()) else {
+            return false;
+        };
+        self.materialise(&[one]);
+        let of_group = self.taken.iter().filter(|taken| group.contains(&taken.candidate));
+        let p_value = of_group.map(|taken| taken.p_value).fold(1.0, f64::min);
+        let places = self.places(one);
+        self.taken.retain(|taken| !group.contains(&taken.candidate));
+        self.taken.push(Taken {
+            candidate: one,
+            places,
+            p_value,
+        });
+        for fold in self.all_folds() {
+            let (group, rest) = self.following(driver, &self.of_fold[fold]);
+            let others = self.others(fold);
+            if !group.is_empty() && self.in_fewer_words(&group, &rest, &[one], &others).is_some() {
+                self.of_fold[fold] = rest;
+                self.of_fold[fold].push(one);
+            }
+        }
+        true
+    }
+
+    pub(super) fn is_composed(&self, group: &[usize]) -> bool {
+        let composed =
+            |c: &usize| matches!(&self.candidates[*c].effect.shape, Shape::Steps { at } if at.len() > 2);
+        group.iter().any(composed)
+    }
+
+    /// Enough for every effect that may be taken up, and some that were put down to one.
+    pub fn most_rounds(&self) -> usize {
+        self.stop.most.saturating_add(self.stop.most / 2).max(1)
+    }
+
+    /// Gives back effects that follow one axis where they are no explanation: where curves over that axis, another in every test and in no component's name,
+    /// say as much in fewer words. One simple effect is asked only where structure remains beside it. Returns whether any were.
+    pub fn disown(&mut self, structured: bool) -> bool {
+        let chosen: Vec<usize> = self.taken.iter().map(|taken| taken.candidate).collect();
+        let mut drivers: Vec<Driver> = Vec::new();
+        for candidate in &chosen {
+            let driver = &self.candidates[*candidate].effect.driver;
+            if matches!(driver, Driver::Axis(_)) && !drivers.contains(driver) {
+                drivers.push(driver.clone());
+            }
+        }
+        let mut any = false;
+        for driver in drivers {
+            let chosen: Vec<usize> = self.taken.iter().map(|taken| taken.candidate).collect();
+            let (group, rest) = self.following(&driver, &chosen);
+            let curve = |c: &usize| matches!(self.candidates[*c].effect.shape, Shape::Curve { .. });
+            let few = group.len() < 2 && !self.is_composed(&group) && !structured;
+            if few || group.iter().all(curve) {
+                continue;
+            }
+            let words = self.words_of(&group);
+            let of_group = self.evidence_of(&group, &rest, &self.all_folds()) - words;
+            for intervals in [8, 16, 32] {
+                let layouts = self.columns.curves_of_tests(&driver, intervals);
+                let first = self.candidates.len();
+                let pattern = &self.candidates[group[0]];
+                let nameless: Vec<(Candidate, Layout)> = layouts
+                    .into_iter()
+                    .map(|layout| {
+                        let candidate = Candidate {
+                            dictionary: true,
+                            ..pattern.clone()
+                        };
+                        (candidate, layout)
+                    })
+                    .collect();
+                if nameless.is_empty() {
+                    continue;
+                }
+                self.append(nameless);
+                let curves: Vec<usize> = (first..self.candidates.len()).collect();
+                self.materialise(&curves);
+                // One choice: the axis and how fine.
+                let of_curves = self.evidence_of(&curves, &rest, &self.all_folds()) - self.choice();
+                if of_curves > of_group {
+                    self.taken.retain(|taken| !group.contains(&taken.candidate));
+                    for fold in self.all_folds() {
+                        self.of_fold[fold] = self.following(&driver, &self.of_fold[fold]).1;
+                    }
+                    any = true;
+                    break;
+                }
+            }
+        }
+        if any {
+            let held_out = self.held_out_now();
+            self.held_out.truncate(self.taken.len());
+            self.held_out.push(held_out);
+        }
+        any
+    }
+
+    /// What it costs to have chosen one entry of the library.
+    pub(super) fn choice(&self) -> f64 {
+        (self.unseen.iter().filter(|unseen| !**unseen).count().max(1) as f64).ln()
+    }
+
+    pub(super) fn words_of(&self, group: &[usize]) -> f64 {
+        group
+            .iter()
+            .map(|c| self.candidates[*c].length() + self.choice())
+            .sum()
+    }
+
+    /// `−ln P` of what candidates gain together.
+    pub(super) fn evidence_of(&self, group: &[usize], rest: &[usize], folds: &[usize]) -> f64 {
+        let lean = |chosen: &[usize]| {
+            Trained::lean(&self.moments, &self.prior, self.base_with(chosen), folds.to_vec())
+        };
+        let without = lean(rest);
+        let all: Vec<usize> = rest.iter().chain(group).copied().collect();
+        let gain = Gain {
+            gain: lean(&all).explained() - without.explained(),
+            freedom: group
+                .iter()
+                .map(|c| self.moments.count[*c] + self.moments.numbers[*c])
+                .sum(),
+            visible: 1.0,
+        };
+        self.evidence(&gain, self.variance(&without))
     }
 
     /// Which of the chosen follow a driver, and which do not.
@@ -367,17 +486,14 @@ impl<'s> Search<'s> {
         pool: &[usize],
         folds: &[usize],
     ) -> Option<usize> {
-        let without = self.model_of(rest, folds);
-        let variance = self.variance(&without);
-        let all: Vec<usize> = rest.iter().chain(group).copied().collect();
-        let of_group = Gain {
-            gain: self.model_of(&all, folds).explained() - without.explained(),
-            freedom: group.iter().map(|c| self.moments.count[*c]).sum(),
-            visible: 1.0,
+        let without = if pool.len() > 1 {
+            self.model_of(rest, folds)
+        } else {
+            Trained::lean(&self.moments, &self.prior, self.base_with(rest), folds.to_vec())
         };
-        let choice = (self.unseen.iter().filter(|unseen| !**unseen).count().max(1) as f64).ln();
-        let words: f64 = group.iter().map(|c| self.candidates[*c].cost + choice).sum();
-        let of_group = self.evidence(&of_group, variance) - words;
+        let variance = self.variance(&without);
+        let choice = self.choice();
+        let of_group = self.evidence_of(group, rest, folds) - self.words_of(group);
         pool.par_iter()
             .filter(|c| !group.contains(c))
             .map(|c| (*c, self.score(*c, &without.gain(*c), variance) - choice))
@@ -386,7 +502,7 @@ impl<'s> Search<'s> {
             .map(|(c, _)| c)
     }
 
-    fn best_of(&self, model: &Trained<'_>, taken: &[usize]) -> Option<(usize, f64)> {
+    pub(super) fn best_of(&self, model: &Trained<'_>, taken: &[usize]) -> Option<(usize, f64)> {
         let variance = self.variance(model);
         let gains = model.gains();
         let mut best: Option<(usize, f64)> = None;
@@ -403,21 +519,20 @@ impl<'s> Search<'s> {
     }
 
     /// The simplest of the candidates that the readings cannot tell from the best one.
-    fn named_first(&self, model: &Trained<'_>, best: usize, taken: &[usize]) -> usize {
+    pub(super) fn named_first(&self, model: &Trained<'_>, best: usize, taken: &[usize]) -> usize {
         let variance = self.variance(model);
         let of_best = model.gain(best);
-        let evidence = |gain: &Gain| -ln_chi_square_tail(gain.gain / variance, gain.freedom);
-        let least = evidence(&of_best) - super::alias::INDISTINGUISHABLE;
+        let least = self.evidence_for(best, &of_best, variance) - super::alias::INDISTINGUISHABLE;
         let mut first = best;
         let mut first_gain = of_best.clone();
         for (candidate, gain) in model.gains().iter().enumerate() {
             let passed_over = taken.contains(&candidate) || self.is_held_back(candidate);
-            if passed_over || gain.freedom == 0 || evidence(gain) < least {
+            if passed_over || gain.freedom == 0 || self.evidence_for(candidate, gain, variance) < least {
                 continue;
             }
-            let cost = self.candidates[candidate].cost;
-            let present = self.candidates[first].cost;
-            if cost < present || (cost == present && gain.gain > first_gain.gain * (1.0 + 1e-9)) {
+            let length = self.candidates[candidate].length();
+            let present = self.candidates[first].length();
+            if length < present || (length == present && gain.gain > first_gain.gain * (1.0 + 1e-9)) {
                 first = candidate;
                 first_gain = gain.clone();
             }
@@ -443,7 +558,7 @@ impl<'s> Search<'s> {
                     if self.is_held_back(c) {
                         f64::INFINITY
                     } else {
-                        self.candidates[c].cost
+                        self.candidates[c].length()
                     }
                 })
                 .collect();
@@ -527,69 +642,8 @@ impl<'s> Search<'s> {
         }
     }
 
-    /// Exchanges effects for candidates that explain clearly better what they stand for, in the search on all readings and in that of each fold.
-    pub fn exchange(&mut self) {
-        if self.taken.len() > 1 && !self.stop.in_residual_variance {
-            let chosen: Vec<usize> = self.taken.iter().map(|taken| taken.candidate).collect();
-            for k in 0..chosen.len() {
-                let mut others = chosen.clone();
-                others.remove(k);
-                self.sharpen(&others);
-            }
-        }
-        let mut of_all: Vec<usize> = self.taken.iter().map(|taken| taken.candidate).collect();
-        self.exchange_in(&mut of_all, &self.all_folds());
-        for (k, candidate) in of_all.into_iter().enumerate() {
-            if self.taken[k].candidate != candidate {
-                let places = self.places(candidate);
-                self.taken[k] = Taken {
-                    candidate,
-                    places,
-                    p_value: self.taken[k].p_value,
-                };
-            }
-        }
-        for fold in self.all_folds() {
-            let mut chosen = std::mem::take(&mut self.of_fold[fold]);
-            self.exchange_in(&mut chosen, &self.others(fold));
-            self.of_fold[fold] = chosen;
-        }
-        let held_out = self.held_out_now();
-        if let Some(last) = self.held_out.last_mut() {
-            *last = held_out;
-        }
-    }
-
-    /// One sweep of exchanges over what a search on some of the folds has chosen. A change has to be worth more than what cannot be told apart, so
-    /// that the sweeps end.
-    fn exchange_in(&mut self, chosen: &mut [usize], folds: &[usize]) {
-        for k in 0..chosen.len() {
-            let others: Vec<usize> = chosen
-                .iter()
-                .enumerate()
-                .filter(|(j, _)| *j != k)
-                .map(|(_, candidate)| *candidate)
-                .collect();
-            let better = {
-                let base = self.base_with(&others);
-                let model = Trained::new(&self.moments, &self.prior, base, folds.to_vec());
-                let score = self.score(chosen[k], &model.gain(chosen[k]), self.variance(&model));
-                self.best_of(&model, &others)
-                    .filter(|(best, most)| {
-                        *best != chosen[k] && *most > score + super::alias::INDISTINGUISHABLE
-                    })
-                    .map(|(best, _)| self.named_first(&model, best, &others))
-            };
-            let Some(better) = better.filter(|better| *better != chosen[k]) else {
-                continue;
-            };
-            self.materialise(&[better]);
-            chosen[k] = better;
-        }
-    }
-
     /// Puts the columns of candidates into the base, where they are not there yet.
-    fn materialise(&mut self, candidates: &[usize]) {
+    pub(super) fn materialise(&mut self, candidates: &[usize]) {
         let fresh: Vec<usize> = candidates
             .iter()
             .copied()
@@ -613,7 +667,7 @@ impl<'s> Search<'s> {
         self.materialised.extend(fresh.into_iter().zip(places));
     }
 
-    fn others(&self, fold: usize) -> Vec<usize> {
+    pub(super) fn others(&self, fold: usize) -> Vec<usize> {
         self.all_folds()
             .into_iter()
             .filter(|other| *other != fold)
@@ -623,19 +677,21 @@ impl<'s> Search<'s> {
     /// The model that a fold's own search has built, trained on the other folds.
     pub fn model_of_fold(&self, fold: usize) -> Trained<'_> {
         let others = self.others(fold);
-        Trained::new(
-            &self.moments,
-            &self.prior,
-            self.base_with(&self.of_fold[fold]),
-            others,
-        )
+        let base = self.base_with(&self.of_fold[fold]);
+        Trained::new(&self.moments, &self.prior, base, others)
     }
 
-    fn held_out_now(&self) -> f64 {
+    /// The same, for its coefficients alone.
+    fn lean_model_of_fold(&self, fold: usize) -> Trained<'_> {
+        let base = self.base_with(&self.of_fold[fold]);
+        Trained::lean(&self.moments, &self.prior, base, self.others(fold))
+    }
+
+    pub(super) fn held_out_now(&self) -> f64 {
         let models: Vec<Trained<'_>> = self
             .all_folds()
             .into_par_iter()
-            .map(|fold| self.model_of_fold(fold))
+            .map(|fold| self.lean_model_of_fold(fold))
             .collect();
         let predicted = |model: &Trained<'_>, row: usize| -> f64 {
             let along = model.base.iter().zip(&model.coefficients);

@@ -65,7 +65,7 @@ pub fn sharpened(search: &Search<'_>, model: &Trained<'_>, composed: &[Composed]
         let (effect, gain) = moved_steps(search, model, &composed.candidate);
         let gain = Gain {
             gain,
-            freedom: effect.shape.coefficients(),
+            freedom: effect.shape.coefficients() + effect.shape.numbers(),
             visible: 1.0,
         };
         let evidence = search.evidence(&gain, variance);
@@ -87,7 +87,12 @@ pub fn sharpened(search: &Search<'_>, model: &Trained<'_>, composed: &[Composed]
 
 /// Looks around an effect for the numbers of its shape that gain most; `None` where nothing is gained. Line search by golden section (Kiefer, Proc. Am. Math.
 /// Soc. 4 (1953) 502).
-fn sharpen(search: &Search<'_>, model: &Trained<'_>, original: &Candidate, before: f64) -> Option<Effect> {
+pub(super) fn sharpen(
+    search: &Search<'_>,
+    model: &Trained<'_>,
+    original: &Candidate,
+    before: f64,
+) -> Option<Effect> {
     let mut effect = original.effect.clone();
     let brackets = brackets(original)?;
     let mut best = before;

@@ -158,6 +158,17 @@ impl Shape {
         }
     }
 
+    /// How many numbers of the shape itself are free besides its coefficients where it is searched for: a period, a time constant, a width, a place. The
+    /// places of several steps are not counted.
+    pub fn numbers(&self) -> usize {
+        match self {
+            Shape::Periodic { .. } | Shape::Warmup { .. } | Shape::ReversalSpike { .. } => 1,
+            Shape::Steps { at } if at.len() == 1 => 1,
+            Shape::Local { .. } => 2,
+            _ => 0,
+        }
+    }
+
     /// Names of the coefficients, for identifiers: `cos`, `sin`, `1`, …; empty for a shape with one.
     pub fn coefficient_names(&self) -> Vec<String> {
         match self {
