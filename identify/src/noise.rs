@@ -289,7 +289,7 @@ impl PureError {
         let (coefficients, variance) = without_trends_taken(&seen, insignificant, &lengths);
         // Bartlett's standard error of the correlation between neighbours, carried through the correction.
         let neighbours = seen[1] / seen[0];
-        let u = ((1.0 - neighbours * neighbours).max(0.0) / self.freedom.max(1) as f64).sqrt();
+        let u = SCATTER * ((1.0 - neighbours * neighbours).max(0.0) / self.freedom.max(1) as f64).sqrt();
         let mut slower = seen;
         slower[1..].iter_mut().for_each(|value| *value += u * seen[0]);
         let (of_slower, _) = without_trends_taken(&slower, insignificant, &lengths);
@@ -323,6 +323,9 @@ fn without_trends_taken(
 /// The highest order of a memory.
 const MOST: usize = 3;
 const CORRECTIONS: usize = 8;
+/// By how much memories scatter beyond Bartlett's formula, for trends that were taken out and orders that were chosen: 0.035 was seen over 79 simulated
+/// sessions of memory 0.8.
+const SCATTER: f64 = 1.4;
 /// Runs longer than this lose next to nothing with a parabola.
 const LONG: usize = 600;
 
