@@ -79,7 +79,7 @@ impl Arena {
                         Unary::Cos => pass(a, -(w * x.sin_cos().0)),
                         Unary::Sqrt => pass(a, w * (constant(0.5) / n)),
                         Unary::Exp => pass(a, w * n),
-                        Unary::Signum => {}
+                        Unary::Signum | Unary::Step | Unary::Floor | Unary::Round => {}
                     }
                 }
                 Node::Binary(op, a, b) => {

@@ -3,19 +3,21 @@
 use abbe_model::axis::AxisKind;
 use abbe_model::chain::Machine;
 use abbe_model::component::ErrorName;
+use abbe_model::effect::{Effect, Shape};
 use abbe_model::frames::Rotation;
 use abbe_model::instrument::Station;
 
 use crate::check::{Check, Deviation};
+use crate::effect::Coefficient;
 use crate::error::CodegenError;
 use crate::first::FirstOrder;
-use crate::forms;
+use crate::forms::{self, Written};
 use crate::normal::Ring;
 use crate::polynomial::Polynomial;
 use crate::program::{Input, Label, Naming, Program, Tree};
 use crate::run::Run;
 use crate::subject::{Source, Subject, ToolPoint};
-use crate::symbol::{Arena, Operand, Symbol, VariableId};
+use crate::symbol::{Arena, NodeId, Operand, Symbol, VariableId};
 use crate::variable::{Symbols, Variable};
 use crate::vectors::{self, NamedVector};
 
@@ -44,6 +46,8 @@ pub struct Options {
     pub gradient: bool,
     /// The instrument's own unknowns that are carried, by their places in its list.
     pub unknowns: Vec<usize>,
+    /// Effects that are carried, with all their coefficients.
+    pub effects: Vec<Effect>,
 }
 
 /// What an equation is of.
@@ -98,7 +102,7 @@ pub struct Equation {
     pub kind: Kind,
     /// Where its expressions live.
     pub arena: Arena,
-    /// The errors and instrument unknowns that it is written in.
+    /// The errors, instrument unknowns and coefficients of effects that it is written in.
     pub parameters: Vec<Variable>,
     /// The coordinates of the reading as the chain has them.
     pub exact: Vec<Operand>,
@@ -108,8 +112,14 @@ pub struct Equation {
     pub form: Form,
     /// The vectors on the way there.
     pub vectors: Vec<NamedVector>,
+    /// The errors and instrument unknowns that effects alone make up, as they follow their drivers.
+    pub followers: Vec<(Variable, Operand)>,
     /// The stated length of the bar, where a bar is read.
     pub stated_length: Option<Operand>,
+    /// The error of the bar and of its sensor's gain, where they are carried.
+    pub(crate) bar_unknowns: [Option<Operand>; 2],
+    /// Basis functions that are written as they are, never multiplied out.
+    pub(crate) whole: Vec<Operand>,
     /// Errors and unknowns that the form does not contain.
     pub absent: Vec<Variable>,
     /// How well it agrees with the chain.
@@ -135,8 +145,8 @@ impl Equation {
         let mut machine = machine.clone();
         machine.rotation = options.rotation.unwrap_or(machine.rotation);
         let arena = Arena::new();
-        let parameters = parameters(&arena, source, errors, options)?;
-        let (kind, exact, vectors, outputs, form, stated_length) = {
+        let parameters = parameters(&arena, &machine, source, errors, options)?;
+        let (kind, exact, vectors, outputs, form, stated_length, followers, bar_unknowns, whole) = {
             let run = Run::<Symbol<'_>>::new(
                 &machine,
                 source,
@@ -154,16 +164,39 @@ impl Equation {
                 run.unknown(slot)
             });
             let inputs = inputs(&arena, &machine, &parameters);
+            let symbol = |place: usize| arena.variable(parameters[place].clone());
+            let followers = run.followers(&symbol).into_iter();
+            let followers = followers
+                .map(|(variable, value)| (variable, value.operand()))
+                .collect();
+            let bar_unknowns = run.bar_unknowns().map(|unknown| unknown.map(Symbol::operand));
+            let whole = curves(&run, &parameters);
+            let written = Written {
+                arena: &arena,
+                inputs: &inputs,
+                parameters: &parameters,
+                whole: &whole,
+            };
             let (outputs, form) = match options.order {
                 Order::Exact => (exact.clone(), Form::Exact),
-                Order::Bilinear => forms::bilinear(&arena, &run, &exact, &mut vectors, &inputs)?,
-                Order::First => forms::first(&arena, &run, &exact, &mut vectors, &inputs, &parameters)?,
+                Order::Bilinear => forms::bilinear(&run, &exact, &mut vectors, &written)?,
+                Order::First => forms::first(&run, &exact, &mut vectors, &written)?,
             };
             let stated = match &run.subject {
                 Subject::Station(Station::BallBar(bar)) => Some(bar.bar.operand()),
                 _ => None,
             };
-            (kind, exact, vectors, outputs, form, stated)
+            (
+                kind,
+                exact,
+                vectors,
+                outputs,
+                form,
+                stated,
+                followers,
+                bar_unknowns,
+                whole,
+            )
         };
         let mut equation = Equation {
             machine,
@@ -175,7 +208,10 @@ impl Equation {
             outputs,
             form,
             vectors,
+            followers,
             stated_length,
+            bar_unknowns,
+            whole,
             absent: Vec::new(),
             check: Check::default(),
             range: Vec::new(),
@@ -206,6 +242,7 @@ impl Equation {
                 _ => self.outputs.clone(),
             };
             let mut ring = Ring::exact(&self.arena);
+            ring.keep(&self.whole);
             let forms = wanted
                 .iter()
                 .map(|w| ring.normal_form(*w))
@@ -228,7 +265,8 @@ impl Equation {
     }
 
     /// The arguments of its programs in their order: lengths, positions of moving axes from workpiece to tool (a rotary axis by sine and
-    /// cosine), then errors and instrument unknowns as they were asked for.
+    /// cosine, and by its angle where an effect follows that), what else effects follow, then errors, instrument unknowns and coefficients
+    /// as they were asked for.
     pub fn inputs(&self) -> Vec<Input> {
         inputs(&self.arena, &self.machine, &self.parameters)
     }
@@ -263,11 +301,21 @@ impl Equation {
             }
         }
         let mut labels = vectors::labels(&vectors);
+        labels.extend(self.follower_labels());
         if let (Kind::Length, Operand::Node(id)) = (self.kind, self.outputs[0]) {
             labels.insert(id, Label::Scalar("reading"));
         }
         self.arena
             .program(self.inputs(), &outputs, &labels, Naming::Shared)
+    }
+
+    /// The names of errors that effects make up.
+    pub(crate) fn follower_labels(&self) -> impl Iterator<Item = (NodeId, Label)> {
+        let label = |(variable, value): &(Variable, Operand)| match value {
+            Operand::Node(id) => Some((*id, Label::Quantity(variable.clone()))),
+            Operand::Constant(_) => None,
+        };
+        self.followers.iter().filter_map(label)
     }
 
     /// The operands of the parameters.
@@ -277,9 +325,20 @@ impl Equation {
     }
 }
 
-/// The errors and unknowns that were asked for.
+/// The basis functions of curves: piece by piece they are hundreds of terms.
+fn curves(run: &Run<'_, Symbol<'_>>, parameters: &[Variable]) -> Vec<Operand> {
+    let of_curve = |parameter: &Variable| matches!(parameter, Variable::Coefficient(c) if matches!(c.effect.shape, Shape::Curve { .. }));
+    let places = (0..parameters.len()).filter(|place| of_curve(&parameters[*place]));
+    places
+        .flat_map(|place| run.bases(place))
+        .map(Symbol::operand)
+        .collect()
+}
+
+/// The errors, unknowns and effects that were asked for.
 fn parameters(
     arena: &Arena,
+    machine: &Machine,
     source: &impl Source,
     errors: &[ErrorName],
     options: &Options,
@@ -292,6 +351,8 @@ fn parameters(
         })?;
         parameters.push(Variable::Unknown(*unknown));
     }
+    let coefficients = Coefficient::of_effects(&options.effects, machine, known)?;
+    parameters.extend(coefficients.into_iter().map(Variable::Coefficient));
     // Named here, they keep the order in which they were asked for wherever terms are sorted.
     for (place, parameter) in parameters.iter().enumerate() {
         if parameters[..place].contains(parameter) {
@@ -318,11 +379,16 @@ fn inputs(arena: &Arena, machine: &Machine, parameters: &[Variable]) -> Vec<Inpu
                 AxisKind::Linear => inputs.push(Input::Plain(position)),
                 AxisKind::Rotary => {
                     inputs.push(Input::Sine(position.clone()));
-                    inputs.push(Input::Cosine(position));
+                    inputs.push(Input::Cosine(position.clone()));
+                    if arena.holds_itself(&position) {
+                        inputs.push(Input::Plain(position));
+                    }
                 }
             }
         }
     }
+    let drivers = variables.iter().filter(|v| matches!(v, Variable::Driver(_)));
+    inputs.extend(drivers.cloned().map(Input::Plain));
     inputs.extend(parameters.iter().cloned().map(Input::Plain));
     inputs
 }

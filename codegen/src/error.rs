@@ -6,7 +6,7 @@ use crate::symbol::Unary;
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum CodegenError {
-    /// An exponential or a sign of an error: it has no derivative that the chain could carry.
+    /// An exponential, a sign, a step or a whole number of an error: it has no derivative that the chain could carry.
     #[error("{function:?} is taken of an error; only nominal quantities may go through it")]
     FunctionOfError {
         /// The function.
@@ -42,6 +42,14 @@ pub enum CodegenError {
         /// What they are of.
         what: &'static str,
     },
+    /// A curve, which is hundreds of pieces, for a reader.
+    #[error(
+        "the curve `{effect}` is written as code only: as rust, c, python or matlab; name what to keep with --errors to leave it out"
+    )]
+    CurveForReaders {
+        /// The effect.
+        effect: String,
+    },
     /// An expression that has no normal form.
     #[error("{what} has no place in the polynomial normal form")]
     NoPolynomial {
@@ -53,6 +61,28 @@ pub enum CodegenError {
     OrderTooHigh {
         /// What was asked for.
         order: u32,
+    },
+    /// An effect that has no closed form.
+    #[error(
+        "the effect `{effect}` cannot be written: {why}; name the errors to keep with --errors to leave it out"
+    )]
+    EffectWithoutForm {
+        /// The effect.
+        effect: String,
+        /// What stands in the way.
+        why: String,
+    },
+    /// An effect of more coefficients than an equation can carry.
+    #[error(
+        "the effect `{effect}` has {coefficients} coefficients, more than the {most} that an equation is written with; give its shape fewer intervals, steps or powers, or name what to keep with --errors to leave it out"
+    )]
+    EffectTooLong {
+        /// The effect.
+        effect: String,
+        /// How many it has.
+        coefficients: usize,
+        /// How many are written.
+        most: usize,
     },
     /// A program that the chain with dual numbers does not confirm; it is not written.
     #[error(

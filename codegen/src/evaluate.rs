@@ -33,13 +33,16 @@ impl<S: Scalar> Value<S> {
                 Unary::Sqrt => Nominal::sqrt(a),
                 Unary::Exp => a.exp(),
                 Unary::Signum => a.signum(),
+                Unary::Step => a.step(),
+                Unary::Floor => a.floor(),
+                Unary::Round => a.round(),
             }),
             Value::Error(a) => Value::Error(match op {
                 Unary::Neg => -a,
                 Unary::Sin => Scalar::sin_cos(a).0,
                 Unary::Cos => Scalar::sin_cos(a).1,
                 Unary::Sqrt => Scalar::sqrt(a),
-                Unary::Exp | Unary::Signum => return None,
+                Unary::Exp | Unary::Signum | Unary::Step | Unary::Floor | Unary::Round => return None,
             }),
         })
     }
@@ -69,7 +72,7 @@ impl Arena {
     /// The values of `outputs`, every node computed once.
     ///
     /// # Errors
-    /// If an exponential or a sign is taken of an error; the chain does neither.
+    /// If an exponential, a sign, a step or a whole number is taken of an error; the chain does none of it.
     pub fn evaluate<S: Scalar>(
         &self,
         outputs: &[Operand],

@@ -51,11 +51,12 @@ pub enum Column {
 }
 
 impl FirstOrder {
-    /// Of a bar vector in a ring of first order; `bar` and `gain` are the unknowns of that name and the bar's nominal length.
+    /// Of a bar vector in a ring of first order; `unknowns` are the error of the bar and of its sensor's gain, as far as they are carried.
     pub(crate) fn of_length(
         ring: &mut Ring<'_>,
         vector: [Operand; 3],
         stated: Operand,
+        unknowns: [Option<Operand>; 2],
         parameters: &[Variable],
     ) -> Result<Self, CodegenError> {
         let [x, y, z] = vector.map(|component| ring.normal_form(component));
@@ -64,17 +65,20 @@ impl FirstOrder {
         let square = dot(ring, &nominal, &nominal);
         let length = ring.root(square.clone());
         let stated = ring.normal_form(stated)?;
+        let [bar, gain] = unknowns.map(|unknown| unknown.unwrap_or(Operand::constant(0.0)));
+        let (bar, gain) = (ring.normal_form(bar)?, ring.normal_form(gain)?);
+        let beyond = &length - &stated;
         let mut sensitivities = Vec::new();
         for parameter in parameters {
-            let (coefficient, over_length) = match parameter {
-                Variable::Unknown(unknown) if unknown.thing == "bar" => (Polynomial::constant(-1.0), false),
-                Variable::Unknown(unknown) if unknown.thing == "gain" => (&length - &stated, false),
-                _ => {
-                    let slope = vector
-                        .each_ref()
-                        .map(|component| coefficient_of(ring, component, parameter));
-                    (dot(ring, &nominal, &slope), true)
-                }
+            let of_bar = coefficient_of(ring, &bar, parameter);
+            let of_gain = coefficient_of(ring, &gain, parameter);
+            let (coefficient, over_length) = if of_bar.is_zero() && of_gain.is_zero() {
+                let slope = vector
+                    .each_ref()
+                    .map(|component| coefficient_of(ring, component, parameter));
+                (dot(ring, &nominal, &slope), true)
+            } else {
+                (&ring.product(&beyond, &of_gain) - &of_bar, false)
             };
             sensitivities.push(Sensitivity {
                 parameter: parameter.clone(),

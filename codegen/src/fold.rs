@@ -3,6 +3,8 @@
 //! Constants are computed, 0, 1 and −1 drop out, and a minus sign moves outwards until a difference takes it up. Signs and powers
 //! of two move without rounding, so a folded expression evaluates to the same bits as the unfolded one (but for the sign of zero).
 
+use abbe_model::scalar::Nominal;
+
 use crate::symbol::{Arena, Binary, Node, Operand, Unary};
 
 /// A function of a constant.
@@ -13,13 +15,10 @@ pub(crate) fn unary_value(op: Unary, value: f64) -> f64 {
         Unary::Cos => value.cos(),
         Unary::Sqrt => value.sqrt(),
         Unary::Exp => value.exp(),
-        Unary::Signum => {
-            if value == 0.0 {
-                0.0
-            } else {
-                value.signum()
-            }
-        }
+        Unary::Signum => Nominal::signum(value),
+        Unary::Step => value.step(),
+        Unary::Floor => value.floor(),
+        Unary::Round => value.round(),
     }
 }
 

@@ -18,15 +18,26 @@ use crate::vectors::NamedVector;
 
 type Formed = (Vec<Operand>, Form);
 
+/// What a form is written in.
+pub(crate) struct Written<'a, 'w> {
+    pub(crate) arena: &'a Arena,
+    /// The inputs of its programs.
+    pub(crate) inputs: &'w [Input],
+    pub(crate) parameters: &'w [Variable],
+    /// Expressions that stand as they are.
+    pub(crate) whole: &'w [Operand],
+}
+
 /// Coordinates up to second order in the errors, a length still their norm.
 pub(crate) fn bilinear<'a>(
-    arena: &'a Arena,
     run: &Run<'_, Symbol<'a>>,
     exact: &[Operand],
     vectors: &mut Vec<NamedVector>,
-    inputs: &[Input],
+    written: &Written<'a, '_>,
 ) -> Result<Formed, CodegenError> {
+    let &Written { arena, inputs, .. } = written;
     let mut ring = Ring::truncated(arena, 2)?;
+    ring.keep(written.whole);
     let bar = bar_vector(run, vectors);
     let wanted = bar.as_ref().map_or(exact, |bar| bar.components.as_slice());
     let groups = wanted
@@ -38,6 +49,7 @@ pub(crate) fn bilinear<'a>(
         .filter(|input| matches!(input, Input::Plain(v) if v.is_small()));
     let complete = parameters.count() <= 12 && {
         let mut whole = Ring::exact(arena);
+        whole.keep(written.whole);
         let forms: Result<Vec<Polynomial>, _> =
             wanted.iter().map(|group| whole.normal_form(*group)).collect();
         forms.is_ok_and(|forms| forms == groups)
@@ -66,24 +78,36 @@ pub(crate) fn bilinear<'a>(
 
 /// The value without errors and a coefficient for each error.
 pub(crate) fn first<'a>(
-    arena: &'a Arena,
     run: &Run<'_, Symbol<'a>>,
     exact: &[Operand],
     vectors: &mut Vec<NamedVector>,
-    inputs: &[Input],
-    parameters: &[Variable],
+    written: &Written<'a, '_>,
 ) -> Result<Formed, CodegenError> {
+    let &Written {
+        arena,
+        inputs,
+        parameters,
+        whole,
+    } = written;
     let mut ring = Ring::truncated(arena, 1)?;
+    ring.keep(whole);
     let bar = bar_vector(run, vectors);
     let form = match (&bar, &run.subject) {
         (Some(bar), Subject::Station(Station::BallBar(station))) => {
-            FirstOrder::of_length(&mut ring, bar.components, station.bar.operand(), parameters)?
+            let unknowns = run.bar_unknowns().map(|unknown| unknown.map(Symbol::operand));
+            FirstOrder::of_length(
+                &mut ring,
+                bar.components,
+                station.bar.operand(),
+                unknowns,
+                parameters,
+            )?
         }
         _ => FirstOrder::of_coordinates(&mut ring, exact, parameters)?,
     };
     let layout = Layout { ring: &ring, inputs };
     let lay_out = |polynomials: &[Polynomial]| polynomials.iter().map(|p| layout.group(p)).collect();
-    let written = FirstLayout {
+    let laid_out = FirstLayout {
         nominal: lay_out(&form.nominal),
         coefficients: form
             .sensitivities
@@ -107,7 +131,7 @@ pub(crate) fn first<'a>(
     };
     let terms = |coordinate: usize, over_length: bool| {
         let mut terms = Vec::new();
-        for (sensitivity, coefficients) in form.sensitivities.iter().zip(&written.coefficients) {
+        for (sensitivity, coefficients) in form.sensitivities.iter().zip(&laid_out.coefficients) {
             let coefficient = &coefficients[coordinate];
             let seen = *coefficient != Tree::Number(0.0) && sensitivity.over_length == over_length;
             if let (true, Some(place)) = (seen, place(&sensitivity.parameter)) {
@@ -128,8 +152,8 @@ pub(crate) fn first<'a>(
         };
         whole.symbol(arena, &operands).operand()
     };
-    let outputs = written.nominal.iter().enumerate().map(output).collect();
-    Ok((outputs, Form::First(form, written)))
+    let outputs = laid_out.nominal.iter().enumerate().map(output).collect();
+    Ok((outputs, Form::First(form, laid_out)))
 }
 
 /// The vector whose norm is read, where a length is read.

@@ -1,11 +1,14 @@
 //! Polynomials as a person would write them: collected by error, then by the turns of the axes, lengths in parentheses.
 
+use std::collections::HashMap;
+
+use abbe_model::scalar::Nominal;
 use num_rational::BigRational;
 use num_traits::{One, Signed, ToPrimitive};
 
 use crate::normal::Ring;
 use crate::polynomial::{Atom, Monomial, Polynomial};
-use crate::program::{Input, Tree};
+use crate::program::{Input, Naming, Tree};
 use crate::symbol::{Arena, Binary, Operand, Symbol, Unary};
 
 /// A term with its sign: true for minus.
@@ -34,7 +37,7 @@ impl Layout<'_, '_> {
                 terms.extend(self.coefficient_terms(coefficient));
                 continue;
             }
-            let turns = coefficient.contains(|atom| matches!(atom, Atom::Sin(_) | Atom::Cos(_)));
+            let turns = coefficient.contains(is_turn);
             let (minus, mut factors) = if turns {
                 let (minus, factor) = as_factor(self.coefficient_terms(coefficient));
                 (minus, factor.into_iter().collect())
@@ -49,7 +52,7 @@ impl Layout<'_, '_> {
 
     /// A polynomial in lengths and turns: turn by turn.
     fn coefficient_terms(&self, polynomial: &Polynomial) -> Vec<Term> {
-        let turns = polynomial.collect(|atom| matches!(atom, Atom::Sin(_) | Atom::Cos(_)));
+        let turns = polynomial.collect(is_turn);
         let mut terms = Vec::new();
         for (turn, lengths) in &turns {
             if turn.powers().is_empty() {
@@ -127,9 +130,25 @@ impl Layout<'_, '_> {
                     None => Tree::Unary(function, Box::new(self.atom(Atom::Variable(id)))),
                 }
             }
+            Atom::Function(id) => {
+                let arena = self.ring.arena();
+                let function = [Operand::Node(id)];
+                let program =
+                    arena.program(self.inputs.to_vec(), &function, &HashMap::new(), Naming::Labelled);
+                program
+                    .outputs
+                    .into_iter()
+                    .next()
+                    .unwrap_or(Tree::Number(f64::NAN))
+            }
             Atom::Root(root) => Tree::Unary(Unary::Sqrt, Box::new(self.group(self.ring.radicand(root)))),
         }
     }
+}
+
+/// What coefficients are collected by before their lengths.
+fn is_turn(atom: Atom) -> bool {
+    matches!(atom, Atom::Sin(_) | Atom::Cos(_) | Atom::Function(_))
 }
 
 fn binary(op: Binary, a: Tree, b: Tree) -> Tree {
@@ -197,8 +216,11 @@ impl Tree {
                     Unary::Sqrt => a.sqrt(),
                     Unary::Sin => a.sin_cos().0,
                     Unary::Cos => a.sin_cos().1,
-                    Unary::Exp => abbe_model::scalar::Nominal::exp(a),
-                    Unary::Signum => abbe_model::scalar::Nominal::signum(a),
+                    Unary::Exp => a.exp(),
+                    Unary::Signum => a.signum(),
+                    Unary::Step => a.step(),
+                    Unary::Floor => a.floor(),
+                    Unary::Round => a.round(),
                 }
             }
             Tree::Binary(op, a, b) => {

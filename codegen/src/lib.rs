@@ -2,6 +2,7 @@
 //!
 //! - [`symbol`]: the symbolic scalar, and the arena that holds its expressions;
 //! - [`variable`], [`subject`], [`session`]: what a symbol may stand for, what an equation is of;
+//! - [`effect`]: declared effects, coefficients and what they follow;
 //! - [`evaluate`], [`derivative`]: expressions at numbers, and their derivatives;
 //! - [`polynomial`], [`normal`]: the exact normal form, in which equality is decided;
 //! - [`equation`]: the closed form of a reading, with its named vectors;
@@ -10,6 +11,7 @@
 
 pub mod check;
 pub mod derivative;
+pub mod effect;
 pub mod equation;
 pub mod error;
 pub mod evaluate;
@@ -28,6 +30,7 @@ pub mod symbol;
 pub mod variable;
 pub mod vectors;
 
+pub use effect::{Coefficient, Followed};
 pub use equation::{Equation, Form, Kind, Options, Order};
 pub use error::CodegenError;
 pub use evaluate::Value;

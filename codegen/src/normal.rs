@@ -1,12 +1,12 @@
 //! From an expression graph to its normal form, whole or up to an order in the errors.
 
-use std::collections::HashMap;
+use std::collections::{BTreeSet, HashMap};
 
 use num_rational::BigRational;
 
 use crate::error::CodegenError;
 use crate::polynomial::{Atom, Monomial, Polynomial};
-use crate::symbol::{Arena, Binary, Node, NodeId, Operand, Unary, VariableId};
+use crate::symbol::{Arena, Binary, Node, NodeId, Operand, Unary, VariableId, operands};
 use crate::variable::Variable;
 
 /// The ring that normal forms live in: the arena's variables, and the roots that were met.
@@ -64,15 +64,19 @@ impl<'a> Ring<'a> {
     pub fn is_small(&self, atom: Atom) -> bool {
         match atom {
             Atom::Variable(id) | Atom::Sin(id) | Atom::Cos(id) => self.variable(id).is_small(),
-            Atom::Root(_) => false,
+            Atom::Root(_) | Atom::Function(_) => false,
         }
     }
 
     /// Whether an atom follows the position of an axis.
     pub fn moves(&self, atom: Atom) -> bool {
         match atom {
-            Atom::Variable(id) | Atom::Sin(id) | Atom::Cos(id) => {
-                matches!(self.variable(id), Variable::Position { .. })
+            Atom::Variable(id) | Atom::Sin(id) | Atom::Cos(id) => self.variable(id).moves(),
+            Atom::Function(id) => {
+                let variables = self.arena.variables_of(&[Operand::Node(id)]);
+                variables
+                    .into_iter()
+                    .any(|variable| self.variable(variable).moves())
             }
             Atom::Root(root) => self.roots[root].contains(|inner| self.moves(inner)),
         }
@@ -84,7 +88,8 @@ impl<'a> Ring<'a> {
         Some(Atom::Variable(VariableId(place as u32)))
     }
 
-    /// Whether two expressions are equal, decided by their normal forms.
+    /// Whether two expressions are equal, decided by their normal forms. Of functions that the form does not look into, an exponential or
+    /// the cosine of a multiple, equal terms prove equality and different terms prove nothing.
     ///
     /// # Errors
     /// If one of them is no polynomial.
@@ -95,15 +100,46 @@ impl<'a> Ring<'a> {
     /// The normal form of an expression.
     ///
     /// # Errors
-    /// If it is no polynomial: a quotient of expressions, a root of errors, a sine of anything but a variable.
+    /// If it is no polynomial: a quotient of expressions, a root of errors, a function of errors other than the sine or cosine of one.
     pub fn normal_form(&mut self, operand: Operand) -> Result<Polynomial, CodegenError> {
-        for id in self.arena.reachable(&[operand]) {
-            if !self.known.contains_key(&id) {
-                let form = self.of_node(id)?;
-                self.known.insert(id, form);
+        let mut wanted = BTreeSet::new();
+        let mut pending = vec![operand];
+        while let Some(next) = pending.pop() {
+            if let Operand::Node(id) = next
+                && !self.known.contains_key(&id)
+                && wanted.insert(id)
+                && !self.is_function(id)
+            {
+                pending.extend(operands(self.arena.node(id)));
             }
         }
+        for id in wanted {
+            let form = self.of_node(id)?;
+            self.known.insert(id, form);
+        }
         Ok(self.look_up(operand))
+    }
+
+    /// Takes nominal expressions as they are, to be neither looked into nor multiplied out.
+    pub(crate) fn keep(&mut self, whole: &[Operand]) {
+        for operand in whole {
+            if let Operand::Node(id) = operand {
+                self.known.insert(*id, Polynomial::atom(Atom::Function(*id)));
+            }
+        }
+    }
+
+    /// Whether a node is a function that the form does not look into.
+    fn is_function(&self, id: NodeId) -> bool {
+        match self.arena.node(id) {
+            Node::Unary(Unary::Sin | Unary::Cos, a) => {
+                let of_variable = matches!(self.arena.node_of(a), Some(Node::Variable(_)));
+                // An angle that effects make up is small; in a truncated ring its sine and cosine are series.
+                !(of_variable || self.order.is_some() && self.holds_errors(a))
+            }
+            Node::Unary(function, _) => !matches!(function, Unary::Neg | Unary::Sqrt),
+            Node::Variable(_) | Node::Binary(..) => false,
+        }
     }
 
     fn look_up(&self, operand: Operand) -> Polynomial {
@@ -117,6 +153,13 @@ impl<'a> Ring<'a> {
         let no = |what: &str| CodegenError::NoPolynomial {
             what: what.to_string(),
         };
+        if self.is_function(id) {
+            return if self.order.is_some() && self.holds_errors(Operand::Node(id)) {
+                Err(no("a function of errors"))
+            } else {
+                Ok(Polynomial::atom(Atom::Function(id)))
+            };
+        }
         Ok(match self.arena.node(id) {
             Node::Variable(variable) => {
                 let atom = Atom::Variable(variable);
@@ -127,12 +170,10 @@ impl<'a> Ring<'a> {
                 }
             }
             Node::Unary(Unary::Neg, a) => -&self.look_up(a),
-            Node::Unary(function @ (Unary::Sin | Unary::Cos), a) => {
-                let Some(Node::Variable(variable)) = self.arena.node_of(a) else {
-                    return Err(no("a sine of an expression"));
-                };
-                self.turn(function, variable)
-            }
+            Node::Unary(function @ (Unary::Sin | Unary::Cos), a) => match self.arena.node_of(a) {
+                Some(Node::Variable(variable)) => self.turn(function, variable),
+                _ => self.series(function, &self.look_up(a))?,
+            },
             Node::Unary(Unary::Sqrt, a) => {
                 let radicand = self.look_up(a);
                 if radicand.contains(|atom| self.is_small(atom)) {
@@ -140,7 +181,7 @@ impl<'a> Ring<'a> {
                 }
                 self.root(radicand)
             }
-            Node::Unary(Unary::Exp | Unary::Signum, _) => return Err(no("an exponential or a sign")),
+            Node::Unary(..) => return Err(no("a function")),
             Node::Binary(op, a, b) => {
                 let (x, y) = (self.look_up(a), self.look_up(b));
                 match op {
@@ -157,6 +198,29 @@ impl<'a> Ring<'a> {
                 }
             }
         })
+    }
+
+    /// Whether an expression holds an error, an instrument unknown or a coefficient of an effect.
+    fn holds_errors(&self, operand: Operand) -> bool {
+        let variables = self.arena.variables_of(&[operand]);
+        variables
+            .into_iter()
+            .any(|variable| self.variable(variable).is_small())
+    }
+
+    /// The sine or cosine of a sum of errors in a truncated ring: `x` or `1 − x²/2`.
+    fn series(&self, function: Unary, angle: &Polynomial) -> Result<Polynomial, CodegenError> {
+        let mut terms = angle.terms();
+        if !terms.all(|(monomial, _)| monomial.degree(|atom| self.is_small(atom)) > 0) {
+            return Err(CodegenError::NoPolynomial {
+                what: "a sine of an error and what is none".to_string(),
+            });
+        }
+        if function == Unary::Sin {
+            return Ok(angle.clone());
+        }
+        let half = BigRational::new(1.into(), 2.into());
+        Ok(&Polynomial::constant(1.0) - &self.product(angle, angle).scaled(&half))
     }
 
     /// The sine or cosine of a variable, as a series where it is an error and the ring is truncated.
@@ -210,6 +274,8 @@ impl<'a> Ring<'a> {
             }
             let square = match atom {
                 Atom::Root(root) => self.roots[root].clone(),
+                // Nothing is known of the square of a function; `squared` names none.
+                Atom::Function(_) => continue,
                 Atom::Sin(variable) | Atom::Cos(variable) | Atom::Variable(variable) => {
                     let cosine = Polynomial::atom(Atom::Cos(variable));
                     &Polynomial::constant(1.0) - &cosine.product(&cosine, |_| false)
@@ -228,8 +294,11 @@ impl<'a> Ring<'a> {
             let Some(Atom::Variable(id)) = self.atom_of(variable) else {
                 return false;
             };
-            let own =
-                |atom: Atom| atom == Atom::Variable(id) || atom == Atom::Sin(id) || atom == Atom::Cos(id);
+            let own = |atom: Atom| match atom {
+                Atom::Variable(own) | Atom::Sin(own) | Atom::Cos(own) => own == id,
+                Atom::Function(node) => self.arena.variables_of(&[Operand::Node(node)]).contains(&id),
+                Atom::Root(_) => false,
+            };
             forms.iter().any(|form| form.contains(own))
         };
         parameters.iter().filter(|variable| !contains(variable)).collect()

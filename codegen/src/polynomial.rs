@@ -9,7 +9,7 @@ use std::ops::{Add, Mul, Neg, Sub};
 
 use num_rational::BigRational;
 
-use crate::symbol::VariableId;
+use crate::symbol::{NodeId, VariableId};
 
 /// What polynomials are in.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
@@ -22,6 +22,8 @@ pub enum Atom {
     Sin(VariableId),
     /// The cosine of a variable.
     Cos(VariableId),
+    /// A function of nominal quantities that the form does not look into.
+    Function(NodeId),
 }
 
 /// A product of powers of atoms, in the order of the atoms.

@@ -32,6 +32,15 @@ impl Tree {
         }
     }
 
+    /// How many names and numbers stand in it.
+    pub(crate) fn leaves(&self) -> usize {
+        match self {
+            Tree::Number(_) | Tree::Input(_) | Tree::Step(_) => 1,
+            Tree::Unary(_, a) => a.leaves(),
+            Tree::Binary(_, a, b) => a.leaves() + b.leaves(),
+        }
+    }
+
     fn value(&self, inputs: &[f64], steps: &[f64]) -> f64 {
         match self {
             Tree::Number(value) => *value,
@@ -55,7 +64,7 @@ pub enum Input {
 }
 
 /// The name of a step.
-#[derive(Clone, Debug, PartialEq, Eq, Hash)]
+#[derive(Clone, Debug, PartialEq)]
 pub enum Label {
     /// A coordinate of a named vector.
     Vector {
@@ -70,6 +79,8 @@ pub enum Label {
     },
     /// A quantity with a name of its own: the length.
     Scalar(&'static str),
+    /// An error or instrument unknown that effects make up.
+    Quantity(Variable),
     /// A common subexpression without a meaning of its own.
     Temporary(usize),
 }

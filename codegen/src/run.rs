@@ -4,6 +4,7 @@ use abbe_model::chain::{AxisPosition, BodyErrors, Machine};
 use abbe_model::instrument::{Station, ballbar};
 use abbe_model::scalar::{Nominal, Scalar};
 
+use crate::effect::Movement;
 use crate::error::CodegenError;
 use crate::subject::{Source, Subject};
 use crate::variable::Variable;
@@ -15,10 +16,12 @@ pub(crate) struct Run<'m, S: Scalar> {
     pub(crate) state: Vec<AxisPosition<S::Nominal>>,
     pub(crate) errors: Vec<BodyErrors<S>>,
     unknowns: Vec<(usize, S)>,
-    /// The parameter in each error slot, and slots of instrument unknowns with theirs.
-    slots: Vec<Option<usize>>,
-    unknown_slots: Vec<(usize, usize)>,
+    /// What makes up each slot, the machine's errors before the instrument's unknowns: places of parameters, and what multiplies them.
+    slots: Vec<Vec<Share<S::Nominal>>>,
 }
+
+/// A parameter in a slot: its place, and its basis function where an effect gives it one.
+type Share<N> = (usize, Option<N>);
 
 impl<'m, S: Scalar> Run<'m, S> {
     /// `nominal` gives lengths and the positions of moving axes, `small` the parameters by their places.
@@ -31,21 +34,27 @@ impl<'m, S: Scalar> Run<'m, S> {
     ) -> Result<Self, CodegenError> {
         let length = |name: &str| nominal(Variable::Length(name.to_string()));
         let subject = source.subject(&length);
-        let state = machine
-            .axes
-            .iter()
-            .map(|axis| {
-                let position = source.held(&axis.name, &length).unwrap_or_else(|| {
-                    nominal(Variable::Position {
-                        axis: axis.name.clone(),
-                        kind: axis.kind,
-                    })
-                });
-                AxisPosition::new(axis.kind, position)
-            })
-            .collect();
-        let mut slots = vec![None; machine.error_slots()];
-        let mut unknown_slots = Vec::new();
+        let mut held = Vec::with_capacity(machine.axes.len());
+        let mut state = Vec::with_capacity(machine.axes.len());
+        for axis in &machine.axes {
+            let stands = source.held(&axis.name, &length);
+            held.push(stands.is_some());
+            let position = stands.unwrap_or_else(|| {
+                nominal(Variable::Position {
+                    axis: axis.name.clone(),
+                    kind: axis.kind,
+                })
+            });
+            state.push(AxisPosition::new(axis.kind, position));
+        }
+        let unknowns = subject.unknowns();
+        let movement = Movement {
+            machine,
+            state: &state,
+            held: &held,
+        };
+        let mut slots = vec![Vec::new(); machine.error_slots() + unknowns.len()];
+        let mut basis = Vec::new();
         for (place, parameter) in parameters.iter().enumerate() {
             match parameter {
                 Variable::Error(name) => {
@@ -54,16 +63,29 @@ impl<'m, S: Scalar> Run<'m, S> {
                         axis: name.axis.clone(),
                         machine: machine.code(),
                     })?;
-                    slots[slot] = Some(place);
+                    slots[slot].push((place, None));
                 }
                 Variable::Unknown(unknown) => {
-                    let slot = subject.unknowns().iter().position(|known| known == unknown);
+                    let slot = unknowns.iter().position(|known| known == unknown);
                     let slot = slot.ok_or_else(|| CodegenError::NoSuchUnknown {
                         unknown: parameter.meaning(),
                     })?;
-                    unknown_slots.push((slot, place));
+                    slots[machine.error_slots() + slot].push((place, None));
                 }
-                Variable::Length(_) | Variable::Position { .. } => {}
+                Variable::Coefficient(coefficient) => {
+                    let effect = &coefficient.effect;
+                    // The coefficients of an effect stand side by side.
+                    if coefficient.place == 0 {
+                        basis.clear();
+                        effect.shape.basis(&movement.sample(effect, nominal)?, &mut basis);
+                    }
+                    for (slot, factor) in movement.slots(effect, unknowns, nominal) {
+                        let own = basis[coefficient.place];
+                        let share = factor.map_or(own, |factor| own * factor);
+                        slots[slot].push((place, Some(share)));
+                    }
+                }
+                Variable::Length(_) | Variable::Position { .. } | Variable::Driver(_) => {}
             }
         }
         let mut run = Run {
@@ -73,7 +95,6 @@ impl<'m, S: Scalar> Run<'m, S> {
             errors: Vec::new(),
             unknowns: Vec::new(),
             slots,
-            unknown_slots,
         };
         run.seed(small);
         Ok(run)
@@ -82,18 +103,55 @@ impl<'m, S: Scalar> Run<'m, S> {
     /// Other values for the parameters, everything nominal as it is.
     pub(crate) fn seed(&mut self, small: &impl Fn(usize) -> S) {
         let zero = S::nominal(S::Nominal::constant(0.0));
+        let value = |slot: usize| in_slot(&self.slots[slot], small);
         self.errors = self.machine.body_errors(
-            |slot| self.slots[slot].is_some(),
-            |slot| self.slots[slot].map_or(zero, small),
+            |slot| !self.slots[slot].is_empty(),
+            |slot| value(slot).unwrap_or(zero),
         );
-        let unknown = |(slot, place): &(usize, usize)| (*slot, small(*place));
-        self.unknowns = self.unknown_slots.iter().map(unknown).collect();
+        let first = self.machine.error_slots();
+        let unknowns = (first..self.slots.len()).filter_map(|slot| Some((slot - first, value(slot)?)));
+        self.unknowns = unknowns.collect();
+    }
+
+    /// What a coefficient of an effect is multiplied by, in each slot that it moves.
+    pub(crate) fn bases(&self, place: usize) -> impl Iterator<Item = S::Nominal> {
+        let shares = self.slots.iter().flatten();
+        shares
+            .filter(move |(parameter, _)| *parameter == place)
+            .filter_map(|(_, basis)| *basis)
+    }
+
+    /// The errors and unknowns that effects make up, and their values.
+    pub(crate) fn followers(&self, small: &impl Fn(usize) -> S) -> Vec<(Variable, S)> {
+        let first = self.machine.error_slots();
+        let mut followers = Vec::new();
+        for (slot, shares) in self.slots.iter().enumerate() {
+            let effects_alone = !shares.is_empty() && shares.iter().all(|(_, basis)| basis.is_some());
+            if let (true, Some(value)) = (effects_alone, in_slot(shares, small)) {
+                let variable = match slot.checked_sub(first) {
+                    None => Variable::Error(self.machine.error_name(slot)),
+                    Some(place) => Variable::Unknown(self.subject.unknowns()[place]),
+                };
+                followers.push((variable, value));
+            }
+        }
+        followers
     }
 
     /// The instrument's unknown in a slot, if it is carried.
     pub(crate) fn unknown(&self, slot: usize) -> Option<S> {
         let found = self.unknowns.iter().find(|(known, _)| *known == slot);
         found.map(|(_, value)| *value)
+    }
+
+    /// The error of the bar and of its sensor's gain, where a bar is read and they are carried.
+    pub(crate) fn bar_unknowns(&self) -> [Option<S>; 2] {
+        match self.subject {
+            Subject::Station(Station::BallBar(_)) => {
+                [ballbar::BAR, ballbar::GAIN].map(|slot| self.unknown(slot))
+            }
+            _ => [None; 2],
+        }
     }
 
     /// The coordinates of the reading.
@@ -108,13 +166,23 @@ impl<'m, S: Scalar> Run<'m, S> {
         let Subject::Station(Station::BallBar(bar)) = &self.subject else {
             return distance;
         };
-        let length = match self.unknown(ballbar::BAR) {
+        let [error, gain] = self.bar_unknowns();
+        let length = match error {
             Some(error) => distance - error,
             None => distance,
         };
-        match self.unknown(ballbar::GAIN) {
+        match gain {
             Some(gain) => length + gain * (distance - bar.bar),
             None => length,
         }
     }
+}
+
+/// The sum of what makes up a slot.
+fn in_slot<S: Scalar>(shares: &[Share<S::Nominal>], small: &impl Fn(usize) -> S) -> Option<S> {
+    let value = |(place, basis): &Share<S::Nominal>| match basis {
+        Some(basis) => small(*place) * *basis,
+        None => small(*place),
+    };
+    shares.iter().map(value).reduce(|sum, value| sum + value)
 }

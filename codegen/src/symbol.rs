@@ -75,6 +75,9 @@ pub enum Unary {
     Sqrt,
     Exp,
     Signum,
+    Step,
+    Floor,
+    Round,
 }
 
 /// An operation on two operands.
@@ -188,6 +191,20 @@ impl Arena {
         nodes.push(node);
         places.insert(node, id);
         Operand::Node(id)
+    }
+
+    /// Whether anything but a sine or a cosine is taken of a variable.
+    pub(crate) fn holds_itself(&self, variable: &Variable) -> bool {
+        let nodes = self.nodes.borrow();
+        let variables = self.variables.borrow();
+        let itself = |operand: Operand| {
+            matches!(operand, Operand::Node(id) if matches!(nodes[id.0 as usize], Node::Variable(place)
+                if variables[place.0 as usize] == *variable))
+        };
+        let plain = |node: &Node| {
+            !matches!(node, Node::Unary(Unary::Sin | Unary::Cos, _)) && operands(*node).any(itself)
+        };
+        nodes.iter().any(plain)
     }
 
     /// The variables that `outputs` are made of.
@@ -361,6 +378,15 @@ impl Nominal for Symbol<'_> {
     }
     fn signum(self) -> Self {
         self.unary(Unary::Signum)
+    }
+    fn step(self) -> Self {
+        self.unary(Unary::Step)
+    }
+    fn floor(self) -> Self {
+        self.unary(Unary::Floor)
+    }
+    fn round(self) -> Self {
+        self.unary(Unary::Round)
     }
     fn known(self) -> Option<f64> {
         self.operand().known()

@@ -4,6 +4,8 @@ use abbe_model::axis::AxisKind;
 use abbe_model::component::{ErrorKind, ErrorName};
 use abbe_model::instrument::{InsideUnit, InstrumentUnknown};
 
+use crate::effect::{Coefficient, Followed};
+
 /// A quantity that an expression is written in.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Variable {
@@ -20,6 +22,10 @@ pub enum Variable {
     Error(ErrorName),
     /// An unknown of the instrument itself, mm, rad or a ratio.
     Unknown(InstrumentUnknown),
+    /// What an effect follows, where that is not the position of an axis.
+    Driver(Followed),
+    /// A coefficient of an effect.
+    Coefficient(Coefficient),
 }
 
 /// Which names errors go by in print.
@@ -33,15 +39,24 @@ pub enum Symbols {
 }
 
 impl Variable {
-    /// Whether it is small and expressions are truncated in it: an error or an unknown of the instrument.
+    /// Whether it is small and expressions are truncated in it: an error, an unknown of the instrument, a coefficient of an effect.
     pub fn is_small(&self) -> bool {
-        matches!(self, Variable::Error(_) | Variable::Unknown(_))
+        matches!(
+            self,
+            Variable::Error(_) | Variable::Unknown(_) | Variable::Coefficient(_)
+        )
     }
 
-    /// Whether it is an angle.
+    /// Whether it follows the movement, reading by reading.
+    pub fn moves(&self) -> bool {
+        matches!(self, Variable::Position { .. } | Variable::Driver(_))
+    }
+
+    /// Whether it is an angle; of a coefficient, whether what it moves is one.
     pub fn is_angle(&self) -> bool {
         match self {
-            Variable::Length(_) => false,
+            Variable::Length(_) | Variable::Driver(_) => false,
+            Variable::Coefficient(coefficient) => coefficient.component == Some(InsideUnit::Radian),
             Variable::Position { kind, .. } => *kind == AxisKind::Rotary,
             Variable::Error(name) => name.freedom.is_angle(),
             Variable::Unknown(unknown) => unknown.unit == InsideUnit::Radian,
@@ -52,6 +67,8 @@ impl Variable {
     pub fn unit(&self) -> &'static str {
         match self {
             Variable::Unknown(unknown) if unknown.unit == InsideUnit::Ratio => "1",
+            Variable::Driver(followed) => followed.unit(),
+            Variable::Coefficient(coefficient) => coefficient.unit(),
             _ if self.is_angle() => "rad",
             _ => "mm",
         }
@@ -82,6 +99,8 @@ impl Variable {
                     coordinate => format!("error of the {thing} in {coordinate}"),
                 }
             }
+            Variable::Driver(followed) => followed.meaning(),
+            Variable::Coefficient(coefficient) => coefficient.meaning(),
         }
     }
 
@@ -93,6 +112,8 @@ impl Variable {
             Variable::Error(name) => name.to_string(),
             Variable::Unknown(unknown) if unknown.coordinate.is_empty() => unknown.thing.to_string(),
             Variable::Unknown(unknown) => format!("{}.{}", unknown.thing, unknown.coordinate),
+            Variable::Driver(followed) => followed.meaning(),
+            Variable::Coefficient(coefficient) => coefficient.id(),
         }
     }
 
@@ -112,6 +133,8 @@ impl Variable {
                 "" => format!("δ_{}", unknown.thing),
                 coordinate => format!("δ_{}_{coordinate}", unknown.thing),
             },
+            Variable::Driver(followed) => followed.text(),
+            Variable::Coefficient(coefficient) => format!("k_{}", coefficient.number),
         }
     }
 
@@ -137,6 +160,7 @@ impl Variable {
                 AxisKind::Rotary => format!("angle_{}", axis.to_lowercase()),
             },
             Variable::Unknown(_) => self.text(symbols).replace('δ', "delta"),
+            Variable::Driver(followed) => followed.identifier(),
             _ => self.text(symbols).replace('θ', "theta"),
         };
         identifier(&text)

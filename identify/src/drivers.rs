@@ -2,7 +2,6 @@
 
 use abbe_model::axis::AxisKind;
 use abbe_model::chain::Machine;
-use abbe_model::component::{ErrorName, Freedom};
 use abbe_model::effect::{Component, Driver, DriverSample, Effect, Shape};
 use abbe_model::instrument::InsideUnit;
 use abbe_model::sensitivity::TestModel;
@@ -136,21 +135,8 @@ pub fn component_slots(
                 if rates.iter().all(|rate| *rate == 0.0) {
                     continue;
                 }
-                let turns = usize::from(axis.kind == AxisKind::Rotary) * 3;
-                for (i, along) in axis
-                    .direction
-                    .into_iter()
-                    .enumerate()
-                    .filter(|(_, along)| *along != 0.0)
-                {
-                    let name = ErrorName {
-                        kind: abbe_model::component::ErrorKind::Motion,
-                        freedom: Freedom::ALL[i + turns],
-                        axis: axis.name.clone(),
-                    };
-                    if let Some(slot) = machine.error_slot(&name) {
-                        slots.push((slot, Some(rates.iter().map(|rate| rate * along).collect())));
-                    }
+                for (slot, along) in machine.slots_along(index) {
+                    slots.push((slot, Some(rates.iter().map(|rate| rate * along).collect())));
                 }
             }
             slots

@@ -206,7 +206,7 @@ impl Parameters {
         };
         let mut greatest = vec![0.0_f64; effect.shape.coefficients()];
         for (position, (test, model)) in tests.iter().zip(models).enumerate() {
-            if !effect.tests.is_empty() && !effect.tests.contains(&test.name) {
+            if !effect.acts_in(&test.name) {
                 continue;
             }
             let Some(readings) = &test.readings else { continue };

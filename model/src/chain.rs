@@ -169,6 +169,17 @@ impl Machine {
         }
     }
 
+    /// The error motions of an axis along or about its own direction, as slots with the share of the movement that each takes: what a
+    /// position that is read too late looks like.
+    pub fn slots_along(&self, axis: usize) -> impl Iterator<Item = (usize, f64)> {
+        let turns = usize::from(self.axes[axis].kind == AxisKind::Rotary) * 3;
+        let start = axis * ERRORS_PER_AXIS + 6 + turns;
+        let shares = self.axes[axis].direction.into_iter().enumerate();
+        shares
+            .filter(|(_, along)| *along != 0.0)
+            .map(move |(i, along)| (start + i, along))
+    }
+
     /// The errors of every axis, made ready, from slots for which `carried` holds; the others are exact zeros.
     /// `slot(i)` gives the value of slot `i`.
     pub fn body_errors<S: Scalar>(

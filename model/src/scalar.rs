@@ -29,6 +29,26 @@ pub trait Nominal:
     fn exp(self) -> Self;
     /// −1, 0 or 1 by sign; a direction of travel.
     fn signum(self) -> Self;
+    /// 0 below zero, 1 at and above it.
+    fn step(self) -> Self;
+    /// The greatest whole number that is not above it.
+    fn floor(self) -> Self;
+    /// The nearest whole number.
+    fn round(self) -> Self;
+    /// A whole power, at least 1.
+    fn power(self, exponent: i32) -> Self {
+        (1..exponent).fold(self, |power, _| power * self)
+    }
+    /// The value, or `limit` where it is above that.
+    fn at_most(self, limit: f64) -> Self {
+        let beyond = self - Self::constant(limit);
+        self - beyond.step() * beyond
+    }
+    /// The value, or `limit` where it is below that.
+    fn at_least(self, limit: f64) -> Self {
+        let missing = Self::constant(limit) - self;
+        self + missing.step() * missing
+    }
     /// The value where it is a known constant: what lets an exact zero drop out of a printed equation.
     fn known(self) -> Option<f64>;
 }
@@ -48,6 +68,24 @@ impl Nominal for f64 {
     }
     fn signum(self) -> Self {
         if self == 0.0 { 0.0 } else { f64::signum(self) }
+    }
+    fn step(self) -> Self {
+        if self >= 0.0 { 1.0 } else { 0.0 }
+    }
+    fn floor(self) -> Self {
+        f64::floor(self)
+    }
+    fn round(self) -> Self {
+        f64::round(self)
+    }
+    fn power(self, exponent: i32) -> Self {
+        self.powi(exponent)
+    }
+    fn at_most(self, limit: f64) -> Self {
+        self.min(limit)
+    }
+    fn at_least(self, limit: f64) -> Self {
+        self.max(limit)
     }
     fn known(self) -> Option<f64> {
         Some(self)

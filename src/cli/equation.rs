@@ -6,7 +6,7 @@ use abbe::codegen::{Equation, Language, Options, Order, SessionTest, Symbols, Va
 use abbe::model::axis::AxisKind;
 use abbe::model::chain::Machine;
 use abbe::model::component::{ErrorKind, ErrorName, Freedom};
-use abbe::model::effect::Component;
+use abbe::model::effect::{Component, Effect};
 use abbe::model::frames::Rotation;
 use abbe::model::instrument::InstrumentUnknown;
 use abbe::model::session::Session;
@@ -74,7 +74,8 @@ struct FormArguments {
     #[arg(long, value_enum)]
     rotation: Option<RotationWord>,
     /// What to keep, by name and separated by commas; what is not named is zero. Errors as EX0C or e_x0c, of a session also unknowns of the
-    /// instrument, as bar or workpiece_ball.x. Without it a session's unknown errors, of a machine all.
+    /// instrument, as bar or workpiece_ball.x, and effects that it declares, as EZC~C:h2. Without it a session's unknown errors and declared
+    /// effects, of a machine all errors.
     #[arg(long, value_delimiter = ',', value_name = "NAMES")]
     errors: Vec<String>,
     /// Which names errors go by in print: e_y0a, or EY0A of ISO 230-1.
@@ -115,13 +116,18 @@ struct Kept {
     errors: Vec<ErrorName>,
     /// Places in the instrument's list of unknowns.
     unknowns: Vec<usize>,
+    effects: Vec<Effect>,
 }
 
 impl Kept {
-    /// Reads names of errors and of the instrument's unknowns.
-    fn parse(names: &[String], known: &[InstrumentUnknown]) -> Result<Kept, Failure> {
+    /// Reads names of errors, of the instrument's unknowns and of effects.
+    fn parse(names: &[String], known: &[InstrumentUnknown], effects: &[Effect]) -> Result<Kept, Failure> {
         let mut kept = Kept::default();
         for name in names {
+            if name.contains('~') {
+                kept.effects.extend(named(name, effects)?);
+                continue;
+            }
             match Component::parse(name) {
                 Some(Component::Axis(error)) => kept.errors.push(error),
                 Some(Component::Instrument { thing, coordinate }) => {
@@ -151,8 +157,26 @@ impl Kept {
     }
 }
 
+/// The declared effects of a name such as `EZC~C:h2`; those that differ in their numbers alone share one.
+fn named(name: &str, effects: &[Effect]) -> Result<Vec<Effect>, Failure> {
+    let found: Vec<Effect> = effects
+        .iter()
+        .filter(|effect| effect.id() == name)
+        .cloned()
+        .collect();
+    if found.is_empty() {
+        let declared: Vec<String> = effects.iter().map(Effect::id).collect();
+        let has = match declared.as_slice() {
+            [] => "no effect that is declared acts here".to_string(),
+            declared => format!("declared here: {}", declared.join(", ")),
+        };
+        return Err(Failure::Other(format!("no effect is called `{name}`; {has}")));
+    }
+    Ok(found)
+}
+
 impl FormArguments {
-    fn options(&self, unknowns: Vec<usize>) -> Options {
+    fn options(&self, kept: &Kept) -> Options {
         Options {
             order: match self.order {
                 OrderWord::Exact => Order::Exact,
@@ -168,7 +192,8 @@ impl FormArguments {
                 SymbolsWord::Iso => Symbols::Iso,
             },
             gradient: self.gradient,
-            unknowns,
+            unknowns: kept.unknowns.clone(),
+            effects: kept.effects.clone(),
         }
     }
 
@@ -219,16 +244,18 @@ pub fn run(arguments: &EquationArguments) -> Result<(), Failure> {
     };
     let source = SessionTest::new(&session, test)?;
     let form = &arguments.form;
-    let mut kept = Kept::parse(&form.errors, session.instrument.unknowns())?;
+    let effects: Vec<Effect> = session
+        .effects
+        .iter()
+        .filter(|effect| effect.acts_in(&test.name))
+        .cloned()
+        .collect();
+    let mut kept = Kept::parse(&form.errors, session.instrument.unknowns(), &effects)?;
     if form.errors.is_empty() {
         kept.errors.clone_from(&session.unknowns);
+        kept.effects = effects;
     }
-    let equation = Equation::of(
-        &session.machine,
-        &source,
-        &kept.errors,
-        &form.options(kept.unknowns),
-    )?;
+    let equation = Equation::of(&session.machine, &source, &kept.errors, &form.options(&kept))?;
     form.write(&equation)
 }
 
@@ -236,11 +263,11 @@ pub fn run(arguments: &EquationArguments) -> Result<(), Failure> {
 pub fn run_volumetric(arguments: &VolumetricArguments) -> Result<(), Failure> {
     let machine = read::machine(&arguments.machine)?;
     let form = &arguments.form;
-    let mut kept = Kept::parse(&form.errors, &[])?;
+    let mut kept = Kept::parse(&form.errors, &[], &[])?;
     if form.errors.is_empty() {
         kept.errors = errors_of(&machine);
     }
-    let equation = Equation::volumetric(&machine, &kept.errors, &form.options(Vec::new()))?;
+    let equation = Equation::volumetric(&machine, &kept.errors, &form.options(&kept))?;
     form.write(&equation)
 }
 

@@ -21,7 +21,7 @@ fn machine() -> PathBuf {
 
 /// What a command that succeeds prints; nothing else is said.
 #[track_caller]
-fn printed(arguments: &[&str]) -> String {
+pub(super) fn printed(arguments: &[&str]) -> String {
     let output = abbe(arguments);
     let told = String::from_utf8(output.stderr).unwrap();
     assert!(output.status.success() && told.is_empty(), "{told}");
@@ -30,7 +30,7 @@ fn printed(arguments: &[&str]) -> String {
 
 /// What a command that fails says.
 #[track_caller]
-fn refused(arguments: &[&str], parts: &[&str]) {
+pub(super) fn refused(arguments: &[&str], parts: &[&str]) {
     let output = abbe(arguments);
     let told = String::from_utf8(output.stderr).unwrap();
     assert_eq!(output.status.code(), Some(1), "{told}");

@@ -4,6 +4,7 @@ mod bad_input;
 mod codes;
 mod data;
 mod equation_command;
+mod equation_effects;
 mod jacobians;
 mod measured;
 mod new;

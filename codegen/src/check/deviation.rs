@@ -38,19 +38,28 @@ impl Equation {
         let mut exact = self.machine.clone();
         exact.rotation = Rotation::Exact;
         let count = self.parameters.len();
+        // What an effect adds reaches the stated size where it is largest.
+        let mut reach = vec![f64::MIN_POSITIVE; count];
+        let mut draws = Draws::new(6);
+        for _ in 0..60 {
+            let point = drawn_between(range, count, &mut draws);
+            let at = |variable: Variable| point.nominal(&variable);
+            let run = Run::<f64>::new(&exact, source, &self.parameters, &at, &|_| 0.0)?;
+            for (place, reach) in reach.iter_mut().enumerate() {
+                *reach = run.bases(place).fold(*reach, |most, basis| most.max(basis.abs()));
+            }
+        }
+        for reach in &mut reach {
+            if *reach < 1e-6 {
+                *reach = 1.0;
+            }
+        }
         let mut deviations = Vec::new();
         for (shift_um, tilt_deg) in [(10.0, 0.01), (100.0, 0.1_f64)] {
             let mut draws = Draws::new(5);
             let mut largest = 0.0_f64;
             for _ in 0..60 {
-                let nominal = range.iter().map(|(variable, [low, high])| {
-                    let along = draws.between(-1.0 / 6.0, 7.0 / 6.0).clamp(0.0, 1.0);
-                    (variable.clone(), low + (high - low) * along)
-                });
-                let point = Point {
-                    nominal: nominal.collect(),
-                    small: vec![0.0; count],
-                };
+                let point = drawn_between(range, count, &mut draws);
                 let at = |variable: Variable| point.nominal(&variable);
                 let mut run = Run::<f64>::new(&exact, source, &self.parameters, &at, &|_| 0.0)?;
                 // The parameters are the last of the inputs, in their order.
@@ -69,7 +78,7 @@ impl Equation {
                         } else {
                             shift_um * 1e-3
                         };
-                        inputs[first + place] = sign * size;
+                        inputs[first + place] = sign * size / reach[place];
                     }
                     run.seed(&|place| inputs[first + place]);
                     let found = program.run(&inputs);
@@ -85,5 +94,17 @@ impl Equation {
             });
         }
         Ok(deviations)
+    }
+}
+
+/// A point between the ends of the range, at which every fourth coordinate stands, without errors.
+fn drawn_between(range: &[(Variable, [f64; 2])], count: usize, draws: &mut Draws) -> Point {
+    let nominal = range.iter().map(|(variable, [low, high])| {
+        let along = draws.between(-1.0 / 6.0, 7.0 / 6.0).clamp(0.0, 1.0);
+        (variable.clone(), low + (high - low) * along)
+    });
+    Point {
+        nominal: nominal.collect(),
+        small: vec![0.0; count],
     }
 }

@@ -1,5 +1,9 @@
 //! Points to compare at: numbers that look random and are the same every time.
 
+use abbe_model::axis::AxisKind;
+use abbe_model::effect::{Driver, Effect, Shape};
+
+use crate::effect::Followed;
 use crate::equation::Equation;
 use crate::program::{Input, Program};
 use crate::subject::Source;
@@ -57,6 +61,38 @@ impl Point {
 }
 
 impl Equation {
+    /// Between which values of a driver the shapes that follow it have something to show, where that is less than everywhere.
+    fn places_of_effects(&self, driver: &Variable) -> Vec<[f64; 2]> {
+        let follows = |effect: &Effect| match (driver, &effect.driver) {
+            (Variable::Position { axis, .. }, Driver::Axis(name)) => axis == name,
+            (Variable::Driver(Followed::SinceReversal(axis, _)), Driver::Axis(name)) => axis == name,
+            (Variable::Driver(Followed::Time), Driver::Time) => true,
+            (Variable::Driver(Followed::Temperature), Driver::Temperature) => true,
+            (Variable::Driver(Followed::Gravity(_)), Driver::Gravity) => true,
+            _ => false,
+        };
+        let turn_back = matches!(driver, Variable::Driver(Followed::SinceReversal(..)));
+        let around = |low: f64, high: f64, margin: f64| Some([low - margin, high + margin]);
+        let place = |effect: &Effect| match &effect.shape {
+            Shape::ReversalSpike { width } if turn_back => Some([0.0, 3.0 * width]),
+            _ if turn_back => None,
+            Shape::Local { centre, width, .. } => around(*centre, *centre, 1.2 * width),
+            Shape::Curve { from, to, .. } => around(*from, *to, 0.1 * (to - from)),
+            Shape::Warmup { tau_s } => Some([0.0, 3.0 * tau_s]),
+            Shape::Steps { at } => {
+                let low = at.iter().copied().fold(f64::INFINITY, f64::min);
+                let high = at.iter().copied().fold(f64::NEG_INFINITY, f64::max);
+                around(low, high, (0.2 * (high - low)).max(1e-3))
+            }
+            _ => None,
+        };
+        let effects = self.options.effects.iter();
+        effects
+            .filter(|effect| follows(effect))
+            .filter_map(place)
+            .collect()
+    }
+
     /// The variables that no derivative is taken by, anywhere: lengths near what the source states, positions over every one there is.
     pub(crate) fn draw_anywhere(&self, source: &impl Source, draws: &mut Draws) -> Vec<(Variable, f64)> {
         let draw = |variable: Variable| {
@@ -65,8 +101,22 @@ impl Equation {
                     Some(value) => value * (1.0 + draws.between(-0.01, 0.01)),
                     None => UNSTATED_MM * (1.0 + draws.between(-0.5, 0.5)),
                 },
-                position => {
-                    let [low, high] = whole_range(position);
+                Variable::Driver(Followed::Direction(_)) => {
+                    if draws.bits() & 1 == 0 {
+                        -1.0
+                    } else {
+                        1.0
+                    }
+                }
+                moving => {
+                    let places = self.places_of_effects(moving);
+                    // Half of the points lie where the shapes of effects have something to show.
+                    let anywhere = places.is_empty() || draws.bits() & 1 == 0;
+                    let [low, high] = if anywhere {
+                        whole_range(moving)
+                    } else {
+                        places[(draws.bits() % places.len() as u64) as usize]
+                    };
                     draws.between(low, high)
                 }
             };
@@ -88,7 +138,8 @@ impl Equation {
                     let stated = source.range(axis).or(travel);
                     stated.unwrap_or_else(|| whole_range(&variable))
                 }
-                Variable::Error(_) | Variable::Unknown(_) => [0.0; 2],
+                Variable::Driver(_) => whole_range(&variable),
+                Variable::Error(_) | Variable::Unknown(_) | Variable::Coefficient(_) => [0.0; 2],
             };
             (variable, ends)
         };
@@ -97,9 +148,19 @@ impl Equation {
     }
 }
 
-/// Of a position whose range nobody states, mm or rad.
-fn whole_range(position: &Variable) -> [f64; 2] {
-    if position.is_angle() {
+/// Of a position or another driver whose range nobody states, in its unit.
+fn whole_range(moving: &Variable) -> [f64; 2] {
+    if let Variable::Driver(followed) = moving {
+        match followed {
+            Followed::Direction(_) | Followed::Gravity(_) => [-1.0, 1.0],
+            Followed::Rate(_, AxisKind::Linear) => [-50.0, 50.0],
+            Followed::Rate(_, AxisKind::Rotary) => [-1.0, 1.0],
+            Followed::SinceReversal(_, AxisKind::Linear) => [0.0, 100.0],
+            Followed::SinceReversal(_, AxisKind::Rotary) => [0.0, std::f64::consts::PI],
+            Followed::Time => [0.0, 3600.0],
+            Followed::Temperature => [-5.0, 5.0],
+        }
+    } else if moving.is_angle() {
         [-std::f64::consts::PI, std::f64::consts::PI]
     } else {
         [-200.0, 200.0]

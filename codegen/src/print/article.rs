@@ -7,7 +7,7 @@ use crate::first::{Column, FirstOrder};
 use crate::layout::{product, sum};
 use crate::print::{exact, words};
 use crate::program::{Input, Label, Naming, Program, Step, Tree};
-use crate::symbol::{Binary, Unary};
+use crate::symbol::{Binary, Operand, Unary};
 use crate::variable::Variable;
 
 /// The left-hand side of a row.
@@ -164,7 +164,7 @@ fn groups(equation: &Equation, trees: &[Tree], complete: bool) -> (Program, Vec<
         .into_iter()
         .zip(trees)
         .map(|(label, tree)| row(Left::Named(label), tree.clone()));
-    let length = with_bar_unknowns(equation, norm_of_steps(0));
+    let length = with_bar_unknowns(equation, &program, norm_of_steps(0));
     let sections = vec![
         Section {
             heading: bar.meaning.clone(),
@@ -182,24 +182,29 @@ fn groups(equation: &Equation, trees: &[Tree], complete: bool) -> (Program, Vec<
 }
 
 /// `d − δ_bar + δ_gain·(d − bar)`, as far as these unknowns are carried.
-pub(crate) fn with_bar_unknowns(equation: &Equation, distance: Tree) -> Tree {
-    let inputs = equation.inputs();
-    let place = |thing: &str| {
-        inputs
-            .iter()
-            .position(|input| matches!(input, Input::Plain(Variable::Unknown(u)) if u.thing == thing))
-    };
-    let mut terms = vec![(false, distance.clone())];
-    if let Some(bar) = place("bar") {
-        terms.push((true, Tree::Input(bar)));
-    }
-    if let (Some(gain), Some(stated)) = (place("gain"), equation.stated_length) {
+pub(crate) fn with_bar_unknowns(equation: &Equation, program: &Program, distance: Tree) -> Tree {
+    let tree = |operand: Operand| {
+        let follower = equation.followers.iter().find(|(_, value)| *value == operand);
+        let named = follower.and_then(|(variable, _)| {
+            let label = Label::Quantity(variable.clone());
+            program.steps.iter().position(|step| step.label == label)
+        });
         let none = HashMap::new();
-        let stated = equation
-            .arena
-            .program(inputs.clone(), &[stated], &none, Naming::Labelled);
-        let difference = sum(vec![(false, distance), (true, stated.outputs[0].clone())]);
-        terms.push((false, product(vec![Tree::Input(gain), difference])));
+        let own = || {
+            equation
+                .arena
+                .program(equation.inputs(), &[operand], &none, Naming::Labelled)
+        };
+        named.map_or_else(|| own().outputs[0].clone(), Tree::Step)
+    };
+    let [bar, gain] = equation.bar_unknowns;
+    let mut terms = vec![(false, distance.clone())];
+    if let Some(bar) = bar {
+        terms.push((true, tree(bar)));
+    }
+    if let (Some(gain), Some(stated)) = (gain, equation.stated_length) {
+        let difference = sum(vec![(false, distance), (true, tree(stated))]);
+        terms.push((false, product(vec![tree(gain), difference])));
     }
     sum(terms)
 }
@@ -276,7 +281,7 @@ fn first_order(equation: &Equation, first: &FirstOrder, layout: &FirstLayout) ->
 
 /// `a/b`, or `(1/b)·a` where the numerator is too long to be kept on one line.
 fn over(numerator: Tree, denominator: Tree) -> Tree {
-    if terms_of(&numerator).len() > 4 {
+    if terms_of(&numerator).len() > 4 || numerator.leaves() > 24 {
         product(vec![
             binary(Binary::Div, Tree::Number(1.0), denominator),
             numerator,

@@ -30,6 +30,9 @@ impl Dialect for C<'_, '_> {
             Unary::Sqrt => format!("sqrt({argument})"),
             Unary::Exp => format!("exp({argument})"),
             Unary::Signum => format!("(double)((({argument}) > 0.0) - (({argument}) < 0.0))"),
+            Unary::Step => format!("(double)(({argument}) >= 0.0)"),
+            Unary::Floor => format!("floor({argument})"),
+            Unary::Round => format!("round({argument})"),
         }
     }
 }

@@ -7,7 +7,7 @@ use crate::equation::{Equation, Kind};
 use crate::print::dialect::{self, Dialect};
 use crate::print::words;
 use crate::program::{Input, Label, Program};
-use crate::variable::{Variable, identifier};
+use crate::variable::{Symbols, Variable, identifier};
 
 /// Words that are no names in Rust, C, Python or MATLAB, or that the printed code uses itself.
 const TAKEN: &[&str] = &[
@@ -44,6 +44,7 @@ const TAKEN: &[&str] = &[
     "false",
     "finally",
     "float",
+    "floor",
     "fn",
     "for",
     "from",
@@ -87,6 +88,7 @@ const TAKEN: &[&str] = &[
     "register",
     "restrict",
     "return",
+    "round",
     "self",
     "short",
     "sign",
@@ -173,7 +175,7 @@ impl<'e> Code<'e> {
         let steps = program
             .steps
             .iter()
-            .map(|step| name(step_name(&step.label)))
+            .map(|step| name(step_name(&step.label, symbols)))
             .collect();
         let count = |wanted: &dyn Fn(&Input) -> bool| program.inputs.iter().filter(|i| wanted(i)).count();
         let lengths = count(&|input| matches!(input, Input::Plain(Variable::Length(_))));
@@ -263,7 +265,10 @@ impl<'e> Code<'e> {
         let operations = self.program.operations();
         let functions = match operations.functions {
             0 => String::new(),
-            some => format!(", and {some} sines and cosines of errors"),
+            some if equation.options.effects.is_empty() => {
+                format!(", and {some} sines and cosines of errors")
+            }
+            some => format!(", and {some} functions of errors and drivers"),
         };
         let with = if self.program.outputs.len() > self.outputs() {
             "Value and gradient"
@@ -283,7 +288,7 @@ impl<'e> Code<'e> {
     }
 }
 
-fn step_name(label: &Label) -> String {
+fn step_name(label: &Label, symbols: Symbols) -> String {
     match label {
         Label::Vector {
             letter,
@@ -300,6 +305,7 @@ fn step_name(label: &Label) -> String {
             format!("{letter}{turned}{frame}_{}", ["x", "y", "z"][*coordinate])
         }
         Label::Scalar(name) => (*name).to_string(),
+        Label::Quantity(variable) => variable.identifier(symbols),
         Label::Temporary(number) => format!("t{number}"),
     }
 }

@@ -173,6 +173,16 @@ fn bound(tree: &Tree, dialect: &impl Dialect) -> (String, Binding) {
                 (format!("{left} {sign} {right}"), Binding::Sum)
             }
             Binary::Mul => {
+                // A reader is given the number first.
+                if let (false, Tree::Binary(Binary::Mul, number, rest)) = (dialect.keeps_order(), &**b)
+                    && matches!(
+                        (&**number, &**a),
+                        (Tree::Number(_), Tree::Input(_) | Tree::Step(_))
+                    )
+                {
+                    let first = Tree::Binary(Binary::Mul, number.clone(), a.clone());
+                    return bound(&Tree::Binary(Binary::Mul, Box::new(first), rest.clone()), dialect);
+                }
                 if a == b
                     && let Some(square) = dialect.square(&at_least(a, Binding::Atom))
                 {

@@ -14,6 +14,7 @@ use crate::vectors::{self, NamedVector};
 pub(crate) fn sections(equation: &Equation) -> (Program, Vec<Section>) {
     let forth = &equation.vectors;
     let mut labels = vectors::labels(forth);
+    labels.extend(equation.follower_labels());
     let mut back: Vec<NamedVector> = Vec::new();
     let mut slopes: Vec<Operand> = Vec::new();
     if let (Kind::Length, true, Some(Operand::Node(distance))) =
@@ -51,11 +52,19 @@ pub(crate) fn sections(equation: &Equation) -> (Program, Vec<Section>) {
     let mut asked: Vec<Operand> = equation.outputs.clone();
     asked.extend(forth.iter().chain(&back).flat_map(|vector| vector.components));
     asked.extend(&slopes);
+    asked.extend(equation.followers.iter().map(|(_, value)| *value));
     let mut program = equation
         .arena
         .program(equation.inputs(), &asked, &labels, Naming::Labelled);
     let (outputs, rest) = program.outputs.split_at(equation.outputs.len());
+    let (rest, followers) = rest.split_at(rest.len() - equation.followers.len());
     let (vectors, slopes) = rest.split_at(rest.len() - slopes.len());
+    let followers = equation.followers.iter().zip(followers);
+    let followers = followers.map(|((variable, _), tree)| {
+        let label = Label::Quantity(variable.clone());
+        row(Left::Named(label.clone()), value_of(&program, &label, tree))
+    });
+    let followers: Vec<Row> = followers.collect();
     let mut vectors = forth
         .iter()
         .chain(&back)
@@ -68,6 +77,13 @@ pub(crate) fn sections(equation: &Equation) -> (Program, Vec<Section>) {
             }
         });
     let mut sections: Vec<Section> = vectors.by_ref().take(forth.len()).collect();
+    if !followers.is_empty() {
+        let follow = Section {
+            heading: "errors that effects make up".to_string(),
+            rows: followers,
+        };
+        sections.insert(0, follow);
+    }
     let outputs = outputs.iter().enumerate();
     let mut read = Section {
         heading: what_is_read(equation).to_string(),
@@ -96,9 +112,12 @@ pub(crate) fn sections(equation: &Equation) -> (Program, Vec<Section>) {
         read.rows = match named {
             Some(place) => vec![
                 row(Left::Named(Label::Scalar("d")), norm),
-                row(Left::Output(0), with_bar_unknowns(equation, Tree::Step(place))),
+                row(
+                    Left::Output(0),
+                    with_bar_unknowns(equation, &program, Tree::Step(place)),
+                ),
             ],
-            None => vec![row(Left::Output(0), with_bar_unknowns(equation, norm))],
+            None => vec![row(Left::Output(0), with_bar_unknowns(equation, &program, norm))],
         };
     }
     sections.push(read);
@@ -115,9 +134,14 @@ pub(crate) fn sections(equation: &Equation) -> (Program, Vec<Section>) {
 /// A coordinate of a named vector. One that is an input, a constant or another name is written as that.
 fn component(program: &Program, vector: &NamedVector, trees: &[Tree], coordinate: usize) -> Row {
     let label = vector.label(coordinate);
-    let own = program.steps.iter().find(|step| step.label == label);
-    let right = own.map_or_else(|| trees[coordinate].clone(), |step| step.value.clone());
+    let right = value_of(program, &label, &trees[coordinate]);
     row(Left::Named(label), as_quotient(right))
+}
+
+/// How a name is computed: by its own step or, where it has none, as it stands.
+fn value_of(program: &Program, label: &Label, stands: &Tree) -> Tree {
+    let own = program.steps.iter().find(|step| step.label == *label);
+    own.map_or_else(|| stands.clone(), |step| step.value.clone())
 }
 
 /// `x/y` for `(1/y)·x`, which is what a compiler is given to share.

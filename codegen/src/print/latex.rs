@@ -1,5 +1,6 @@
 //! LaTeX: a fragment for a paper that loads `amsmath`, broken at the coordinate groups, with a table of symbols.
 
+use std::f64::consts::{PI, TAU};
 use std::fmt::Write;
 
 use crate::equation::{Equation, Kind};
@@ -22,6 +23,11 @@ struct Latex<'a> {
 
 impl Dialect for Latex<'_> {
     fn number(&self, value: f64) -> String {
+        match value {
+            PI => return "\\pi".to_string(),
+            TAU => return "2 \\pi".to_string(),
+            _ => {}
+        }
         let value = dialect::for_readers(value);
         let plain = format!("{value}");
         if plain.len() <= 12 {
@@ -37,7 +43,7 @@ impl Dialect for Latex<'_> {
         input(&self.program.inputs[place], self.symbols)
     }
     fn step(&self, place: usize) -> String {
-        label(&self.program.steps[place].label)
+        label(&self.program.steps[place].label, self.symbols)
     }
     fn product(&self, a: &str, b: &str) -> String {
         // Between digits a space would be read as a separator of thousands.
@@ -56,10 +62,13 @@ impl Dialect for Latex<'_> {
     fn call(&self, function: Unary, argument: &str) -> String {
         match function {
             Unary::Sqrt => format!("\\sqrt{{{argument}}}"),
-            Unary::Sin => format!("\\sin {argument}"),
-            Unary::Cos => format!("\\cos {argument}"),
+            Unary::Sin => format!("\\sin {}", of_turn(self, argument)),
+            Unary::Cos => format!("\\cos {}", of_turn(self, argument)),
             Unary::Exp => format!("\\exp({argument})"),
             Unary::Signum => format!("\\operatorname{{sgn}}({argument})"),
+            Unary::Step => format!("\\operatorname{{step}}({argument})"),
+            Unary::Floor => format!("\\operatorname{{floor}}({argument})"),
+            Unary::Round => format!("\\operatorname{{round}}({argument})"),
             Unary::Neg => format!("-({argument})"),
         }
     }
@@ -75,8 +84,18 @@ impl Dialect for Latex<'_> {
     }
 }
 
+/// The argument of a sine or cosine: in parentheses where it is more than one name.
+pub(crate) fn of_turn(dialect: &impl Dialect, argument: &str) -> String {
+    if argument.contains([' ', '^']) || argument.starts_with(dialect.minus()) {
+        dialect.group(argument)
+    } else {
+        argument.to_string()
+    }
+}
+
 fn letter(text: &str) -> String {
     match text {
+        "σ" => "\\sigma".to_string(),
         "θ" => "\\theta".to_string(),
         "δ" => "\\delta".to_string(),
         one if one.chars().count() == 1 => one.to_string(),
@@ -112,7 +131,7 @@ fn input(input: &Input, symbols: Symbols) -> String {
     }
 }
 
-fn label(name: &Label) -> String {
+fn label(name: &Label, symbols: Symbols) -> String {
     match name {
         Label::Vector {
             letter,
@@ -129,6 +148,7 @@ fn label(name: &Label) -> String {
             }
         }
         Label::Scalar(name) => (*name).to_string(),
+        Label::Quantity(variable) => self::variable(variable, symbols),
         Label::Temporary(number) => format!("t_{{{number}}}"),
     }
 }
@@ -227,7 +247,7 @@ pub(crate) fn print(equation: &Equation) -> String {
                 }
                 Input::Plain(_) => input(symbol, symbols),
             };
-            let _ = writeln!(page, "  ${names}$ & {unit} & {} \\\\", escape(meaning));
+            let _ = writeln!(page, "  ${names}$ & {} & {} \\\\", escape(unit), escape(meaning));
         }
         page.push_str("\\end{tabular}\n");
     }
@@ -241,8 +261,8 @@ pub(crate) fn print(equation: &Equation) -> String {
 fn write_row(equation: &Equation, program: &Program, row: &Row, symbols: Symbols) -> String {
     let spelling = Latex { program, symbols };
     let left = match &row.left {
-        Left::Named(name) => label(name),
-        Left::Square(name) => format!("{}^2", label(name)),
+        Left::Named(name) => label(name, symbols),
+        Left::Square(name) => format!("{}^2", label(name, symbols)),
         Left::Output(place) => output(equation.kind, *place),
         Left::Slope(place, parameter) => format!(
             "\\frac{{\\partial {}}}{{\\partial {}}}",

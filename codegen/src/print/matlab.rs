@@ -33,6 +33,9 @@ impl Dialect for Matlab<'_, '_> {
             Unary::Sqrt => format!("sqrt({argument})"),
             Unary::Exp => format!("exp({argument})"),
             Unary::Signum => format!("sign({argument})"),
+            Unary::Step => format!("double(({argument}) >= 0.0)"),
+            Unary::Floor => format!("floor({argument})"),
+            Unary::Round => format!("round({argument})"),
         }
     }
 }

@@ -16,6 +16,8 @@ mod text;
 mod typst;
 mod words;
 
+use abbe_model::effect::{Effect, Shape};
+
 use crate::equation::{Equation, Kind, Order};
 use crate::error::CodegenError;
 
@@ -76,6 +78,10 @@ impl Equation {
     /// If the form that was asked for cannot be written in that language.
     pub fn print(&self, language: Language) -> Result<String, CodegenError> {
         let for_readers = matches!(language, Language::Text | Language::Latex | Language::Typst);
+        let curve = |effect: &&Effect| matches!(effect.shape, Shape::Curve { .. });
+        if let (true, Some(effect)) = (for_readers, self.options.effects.iter().find(curve)) {
+            return Err(CodegenError::CurveForReaders { effect: effect.id() });
+        }
         if for_readers && self.options.gradient {
             match (self.kind, self.options.order) {
                 (Kind::Length, Order::Exact) | (_, Order::First) => {}

@@ -30,6 +30,9 @@ impl Dialect for Python<'_, '_> {
             Unary::Sqrt => format!("np.sqrt({argument})"),
             Unary::Exp => format!("np.exp({argument})"),
             Unary::Signum => format!("np.sign({argument})"),
+            Unary::Step => format!("np.heaviside({argument}, 1.0)"),
+            Unary::Floor => format!("np.floor({argument})"),
+            Unary::Round => format!("np.round({argument})"),
         }
     }
 }

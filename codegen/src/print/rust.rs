@@ -30,6 +30,9 @@ impl Dialect for Rust<'_, '_> {
             Unary::Sqrt => "sqrt",
             Unary::Exp => "exp",
             Unary::Signum => "sign",
+            Unary::Step => "step",
+            Unary::Floor => "floor",
+            Unary::Round => "round",
         };
         format!("elementary::{name}({argument})")
     }
@@ -47,7 +50,12 @@ pub(crate) fn print(equation: &Equation) -> String {
     for (name, places) in ["LENGTHS", "AXES", "ERRORS"].iter().zip(&whole.groups) {
         let what = match *name {
             "LENGTHS" => "Lengths of the set-up.",
-            "AXES" => "Positions of moving axes: sine and cosine of a rotary one.",
+            "AXES" if whole.equation.options.effects.is_empty() => {
+                "Positions of moving axes: sine and cosine of a rotary one."
+            }
+            "AXES" => {
+                "Positions of moving axes: sine and cosine of a rotary one; and what else effects follow."
+            }
             _ => "Errors and instrument unknowns.",
         };
         let _ = writeln!(file, "/// {what}\npub const {name}: usize = {};", places.len());
@@ -256,6 +264,9 @@ fn elementary(file: &mut String, code: &Code<'_>) {
         ("cos", "x.cos()"),
         ("exp", "x.exp()"),
         ("sign", "if x == 0.0 { 0.0 } else { x.signum() }"),
+        ("step", "if x >= 0.0 { 1.0 } else { 0.0 }"),
+        ("floor", "x.floor()"),
+        ("round", "x.round()"),
     ];
     let used: Vec<_> = functions
         .iter()

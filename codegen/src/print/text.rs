@@ -1,5 +1,6 @@
 //! Plain text, UTF-8.
 
+use std::f64::consts::{PI, TAU};
 use std::fmt::Write;
 
 use crate::equation::{Equation, Kind};
@@ -21,13 +22,17 @@ struct Text<'a> {
 
 impl Dialect for Text<'_> {
     fn number(&self, value: f64) -> String {
-        format!("{}", dialect::for_readers(value))
+        match value {
+            PI => "π".to_string(),
+            TAU => "(2·π)".to_string(),
+            value => format!("{}", dialect::for_readers(value)),
+        }
     }
     fn input(&self, place: usize) -> String {
         input(&self.program.inputs[place], self.symbols)
     }
     fn step(&self, place: usize) -> String {
-        label(&self.program.steps[place].label)
+        label(&self.program.steps[place].label, self.symbols)
     }
     fn product(&self, a: &str, b: &str) -> String {
         format!("{a}·{b}")
@@ -42,6 +47,9 @@ impl Dialect for Text<'_> {
             Unary::Cos => format!("cos({argument})"),
             Unary::Exp => format!("exp({argument})"),
             Unary::Signum => format!("sign({argument})"),
+            Unary::Step => format!("step({argument})"),
+            Unary::Floor => format!("⌊{argument}⌋"),
+            Unary::Round => format!("round({argument})"),
             Unary::Neg => format!("−({argument})"),
         }
     }
@@ -71,7 +79,7 @@ fn input(input: &Input, symbols: Symbols) -> String {
 }
 
 /// `p_A.x` for a coordinate of the point p in the frame of A.
-fn label(label: &Label) -> String {
+fn label(label: &Label, symbols: Symbols) -> String {
     match label {
         Label::Vector {
             letter,
@@ -88,6 +96,7 @@ fn label(label: &Label) -> String {
             format!("{letter}{prime}{frame}.{}", ["x", "y", "z"][*coordinate])
         }
         Label::Scalar(name) => (*name).to_string(),
+        Label::Quantity(variable) => variable.text(symbols),
         Label::Temporary(number) => format!("t{number}"),
     }
 }
@@ -112,8 +121,8 @@ pub(crate) fn print(equation: &Equation) -> String {
     for section in &article.sections {
         let _ = writeln!(page, "\n{}", section.heading);
         let left = |left: &Left| match left {
-            Left::Named(name) => label(name),
-            Left::Square(name) => format!("{}²", label(name)),
+            Left::Named(name) => label(name, symbols),
+            Left::Square(name) => format!("{}²", label(name, symbols)),
             Left::Output(place) => output(equation.kind, *place),
             Left::Slope(place, parameter) => {
                 format!("∂{}/∂{}", output(equation.kind, *place), parameter.text(symbols))

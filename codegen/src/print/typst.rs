@@ -1,11 +1,12 @@
 //! Typst: a fragment for a document, broken at the coordinate groups, with a table of symbols.
 
+use std::f64::consts::{PI, TAU};
 use std::fmt::Write;
 
 use crate::equation::{Equation, Kind};
 use crate::print::article::{Article, Left, Remark, Row, terms_of};
 use crate::print::dialect::{self, Dialect};
-use crate::print::latex::capital;
+use crate::print::latex::{capital, of_turn};
 use crate::print::words;
 use crate::program::{Input, Label, Program};
 use crate::symbol::Unary;
@@ -21,13 +22,17 @@ struct Typst<'a> {
 
 impl Dialect for Typst<'_> {
     fn number(&self, value: f64) -> String {
-        format!("{}", dialect::for_readers(value))
+        match value {
+            PI => "pi".to_string(),
+            TAU => "2 pi".to_string(),
+            value => format!("{}", dialect::for_readers(value)),
+        }
     }
     fn input(&self, place: usize) -> String {
         input(&self.program.inputs[place], self.symbols)
     }
     fn step(&self, place: usize) -> String {
-        label(&self.program.steps[place].label)
+        label(&self.program.steps[place].label, self.symbols)
     }
     fn product(&self, a: &str, b: &str) -> String {
         if a.ends_with(|c: char| c.is_ascii_digit()) && b.starts_with(|c: char| c.is_ascii_digit()) {
@@ -45,10 +50,13 @@ impl Dialect for Typst<'_> {
     fn call(&self, function: Unary, argument: &str) -> String {
         match function {
             Unary::Sqrt => format!("sqrt({argument})"),
-            Unary::Sin => format!("sin {argument}"),
-            Unary::Cos => format!("cos {argument}"),
+            Unary::Sin => format!("sin {}", of_turn(self, argument)),
+            Unary::Cos => format!("cos {}", of_turn(self, argument)),
             Unary::Exp => format!("exp \\({argument}\\)"),
             Unary::Signum => format!("\"sgn\" \\({argument}\\)"),
+            Unary::Step => format!("\"step\" \\({argument}\\)"),
+            Unary::Floor => format!("\"floor\" \\({argument}\\)"),
+            Unary::Round => format!("\"round\" \\({argument}\\)"),
             Unary::Neg => format!("- \\({argument}\\)"),
         }
     }
@@ -66,6 +74,7 @@ impl Dialect for Typst<'_> {
 
 fn letter(text: &str) -> String {
     match text {
+        "σ" => "sigma".to_string(),
         "θ" => "theta".to_string(),
         "δ" => "delta".to_string(),
         one if one.chars().count() == 1 => one.to_string(),
@@ -93,7 +102,7 @@ fn input(input: &Input, symbols: Symbols) -> String {
     }
 }
 
-fn label(name: &Label) -> String {
+fn label(name: &Label, symbols: Symbols) -> String {
     match name {
         Label::Vector {
             letter,
@@ -110,6 +119,7 @@ fn label(name: &Label) -> String {
             }
         }
         Label::Scalar(name) => (*name).to_string(),
+        Label::Quantity(variable) => self::variable(variable, symbols),
         Label::Temporary(number) => format!("t_{number}"),
     }
 }
@@ -165,7 +175,7 @@ pub(crate) fn print(equation: &Equation) -> String {
             }
             Input::Plain(_) => input(symbol, symbols),
         };
-        let _ = writeln!(page, "  [${names}$], [{unit}], [{}],", escape(meaning));
+        let _ = writeln!(page, "  [${names}$], [{}], [{}],", escape(unit), escape(meaning));
     }
     page.push_str(")\n\n");
     for note in words::notes_spelt(equation, &escape, &|of| format!("${}$", variable(of, symbols))) {
@@ -177,8 +187,8 @@ pub(crate) fn print(equation: &Equation) -> String {
 fn write_row(equation: &Equation, program: &Program, row: &Row, symbols: Symbols) -> String {
     let spelling = Typst { program, symbols };
     let left = match &row.left {
-        Left::Named(name) => label(name),
-        Left::Square(name) => format!("{}^2", label(name)),
+        Left::Named(name) => label(name, symbols),
+        Left::Square(name) => format!("{}^2", label(name, symbols)),
         Left::Output(place) => output(equation.kind, *place),
         Left::Slope(place, parameter) => format!(
             "frac(partial {}, partial {})",

@@ -2,6 +2,7 @@
 
 use abbe_model::frames::Rotation;
 
+use crate::effect::Followed;
 use crate::equation::{Equation, Form, Kind, Order};
 use crate::first::Column;
 use crate::variable::Variable;
@@ -109,6 +110,14 @@ fn range(equation: &Equation) -> String {
                 "{axis} {} mm to {} mm",
                 two_places(*low),
                 two_places(*high)
+            )),
+            Variable::Driver(Followed::Direction(_)) => None,
+            Variable::Driver(followed) => Some(format!(
+                "{} {low} {unit} to {high} {unit}",
+                followed.text(),
+                low = two_places(*low),
+                high = two_places(*high),
+                unit = followed.unit()
             )),
             Variable::Length(name) if equation.kind == Kind::Volumetric => {
                 Some(format!("{name} {} mm", two_places(*low)))

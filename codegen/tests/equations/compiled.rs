@@ -5,12 +5,14 @@ use std::fmt::Write;
 use std::path::Path;
 use std::process::Command;
 
-use abbe_codegen::{Equation, Language, Options};
+use abbe_codegen::program::Input;
+use abbe_codegen::{Equation, Followed, Language, Options, Variable};
 use abbe_model::chain::Machine;
 use abbe_model::component::ErrorName;
 use abbe_model::frames::Rotation;
 use rand::{RngExt, SeedableRng};
 
+use crate::effects::{Bar, curve, every_shape};
 use crate::operators::Batch;
 use crate::tools;
 use crate::topologies::{AnyBar, CODES, Case, What, all_errors, cases, disagreement, machine, short};
@@ -55,6 +57,7 @@ fn all(language: Language) -> Vec<Printed> {
         }
     }
     printed.extend(operators(language, &mut random));
+    printed.push(effects(language, &mut random));
     printed
 }
 
@@ -90,6 +93,52 @@ fn operators(language: Language, random: &mut impl rand::Rng) -> Vec<Printed> {
         });
     }
     printed
+}
+
+/// A bar with an effect of every shape, against the steps that the dual numbers confirmed.
+fn effects(language: Language, random: &mut impl rand::Rng) -> Printed {
+    let machine = Machine::from_code("w C b X t").expect("a code");
+    let options = Options {
+        gradient: true,
+        effects: every_shape().into_iter().chain([curve()]).collect(),
+        ..Options::default()
+    };
+    let errors: Vec<ErrorName> = ErrorName::parse("EX0C").into_iter().collect();
+    let equation = Equation::of(&machine, &Bar, &errors, &options).expect("an equation");
+    let program = equation.program(true);
+    let cases = (0..CASES).map(|_| {
+        let angle = random.random_range(-3.0..3.0_f64);
+        let mut arguments = [Vec::new(), Vec::new(), Vec::new()];
+        for input in &program.inputs {
+            let (group, value) = match input {
+                Input::Sine(_) => (1, angle.sin()),
+                Input::Cosine(_) => (1, angle.cos()),
+                Input::Plain(variable) => match variable {
+                    Variable::Length(_) => (0, random.random_range(90.0..110.0)),
+                    Variable::Position { axis, .. } if axis == "C" => (1, angle),
+                    Variable::Position { .. } => (1, random.random_range(-150.0..-50.0)),
+                    Variable::Driver(Followed::Direction(_)) => (1, if random.random() { 1.0 } else { -1.0 }),
+                    Variable::Driver(Followed::Time) => (1, random.random_range(0.0..4000.0)),
+                    Variable::Driver(Followed::SinceReversal(..)) => (1, random.random_range(0.0..0.5)),
+                    Variable::Driver(_) => (1, random.random_range(-2.0..2.0)),
+                    _ => (2, random.random_range(-0.1..0.1)),
+                },
+            };
+            arguments[group].push(value);
+        }
+        let found = program.run(&arguments.concat());
+        Case {
+            arguments,
+            values: found[..1].to_vec(),
+            gradient: found[1..].to_vec(),
+        }
+    });
+    Printed {
+        name: "effects".to_string(),
+        function: "bar_length",
+        cases: cases.collect(),
+        text: equation.print(language).expect("code"),
+    }
 }
 
 /// Values and gradients of the cases against rows of numbers, twice: one reading at a time, then in columns.

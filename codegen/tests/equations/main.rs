@@ -5,6 +5,7 @@ mod support;
 
 mod chain;
 mod compiled;
+mod effects;
 mod forms;
 mod operators;
 mod second;

@@ -6,7 +6,7 @@ use abbe_model::instrument::{Station, socket::Socket};
 use abbe_model::scalar::Nominal;
 
 /// Operands: sums, differences, products, quotients, negations, functions.
-const OPERANDS: usize = 10;
+const OPERANDS: usize = 13;
 /// Operators between two operands.
 const OPERATORS: usize = 4;
 /// Expressions in a coordinate.
@@ -27,7 +27,10 @@ fn operand<N: Nominal>(kind: usize, a: N, b: N) -> N {
         6 => (a * a + b * b).sqrt(),
         7 => (a / hundred).sin_cos().0 * (b - a).sin_cos().1,
         8 => -((a - b) / hundred).exp(),
-        _ => (a - b).signum() * b,
+        9 => (a - b).signum() * b,
+        10 => (a - b).step() * a + b,
+        11 => (a / b).floor() - b,
+        _ => (a - b / hundred).round(),
     }
 }
 

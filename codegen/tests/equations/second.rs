@@ -65,7 +65,7 @@ fn draw(equation: &Equation, random: &mut impl rand::Rng) -> Point {
                     .positions
                     .push((axis.clone(), random.random_range(-size..size)));
             }
-            Variable::Error(_) | Variable::Unknown(_) => {}
+            Variable::Error(_) | Variable::Unknown(_) | Variable::Driver(_) | Variable::Coefficient(_) => {}
         }
     }
     point.small = equation

@@ -4,9 +4,11 @@ use std::fmt::Write;
 use std::process::Command;
 
 use abbe_codegen::{Equation, Language, Options, Order, Symbols};
+use abbe_model::chain::Machine;
 use abbe_model::component::{ErrorKind, ErrorName};
 use abbe_model::frames::Rotation;
 
+use crate::effects::{Bar, every_shape};
 use crate::support::{Chapter5, eight, hermle};
 use crate::tools;
 use crate::topologies::{AnyBar, CODES, all_errors, machine};
@@ -25,6 +27,7 @@ fn fragments(language: Language) -> Vec<String> {
                     rotation: Some(rotation),
                     unknowns: (0..8).collect(),
                     gradient: order != Order::Bilinear,
+                    ..Options::default()
                 };
                 let bar = Chapter5 { extended: true };
                 add(Equation::of(&hermle(rotation), &bar, &eight(), &options).expect("an equation"));
@@ -46,6 +49,17 @@ fn fragments(language: Language) -> Vec<String> {
         };
         add(Equation::of(&machine, &AnyBar, &errors, &first).expect("an equation"));
         add(Equation::volumetric(&machine, &motions, &first).expect("an equation"));
+    }
+    // Every declared shape.
+    let machine = Machine::from_code("w C b X t").expect("a code");
+    for order in [Order::Exact, Order::Bilinear, Order::First] {
+        let options = Options {
+            order,
+            gradient: order != Order::Bilinear,
+            effects: every_shape(),
+            ..Options::default()
+        };
+        add(Equation::of(&machine, &Bar, &eight()[4..], &options).expect("an equation"));
     }
     fragments
 }

@@ -194,7 +194,7 @@ impl<'p, 'a> Columns<'p, 'a> {
         let mut parts = Vec::new();
         for (number, test) in self.problem.tests.iter().enumerate() {
             let mut of_test = Vec::new();
-            if effect.tests.is_empty() || effect.tests.contains(&test.name) {
+            if effect.acts_in(&test.name) {
                 let readings = test.readings.as_ref()?;
                 let axis = drivers::component_axis(session, &effect.component);
                 let follows = match effect.driver {

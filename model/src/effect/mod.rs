@@ -5,6 +5,7 @@
 //! sensitivity to its component times the shape's basis function: `∂L/∂k = (∂L/∂component) · b_k(driver)`.
 //! A PIGE is `component × constant`.
 
+mod basis;
 mod shape;
 
 pub use shape::{Shape, ShapeFault};
@@ -132,6 +133,11 @@ pub struct Effect {
 }
 
 impl Effect {
+    /// Whether the effect acts in a test of this name.
+    pub fn acts_in(&self, test: &str) -> bool {
+        self.tests.is_empty() || self.tests.iter().any(|name| name == test)
+    }
+
     /// The identifier used in results: `EZC~C:h2` (component, driver, shape).
     pub fn id(&self) -> String {
         let tests = if self.tests.is_empty() {

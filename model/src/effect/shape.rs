@@ -3,24 +3,7 @@
 //! A shape is linear in its coefficients: `component = Σ c_k · b_k(driver; shape parameters)`. Shape parameters (a period, a time
 //! constant, a centre, a width, knots) are fixed numbers of the shape; the coefficients are what a fit finds.
 //!
-//! | shape | basis |
-//! |---|---|
-//! | constant | 1 |
-//! | polynomial(n) | (q/s), …, (q/s)ⁿ, s the scale of the driver |
-//! | harmonic(n) | cos nq, sin nq |
-//! | periodic(p) | cos 2πq/p, sin 2πq/p |
-//! | curve | periodic or clamped cubic B-splines on equal knots |
-//! | backlash | −½ · direction: the coefficient is the full lost motion |
-//! | lag | −rate: the coefficient is the delay in s |
-//! | reversal-spike | direction · exp(−distance since the turn / width) |
-//! | drift | t/h, hours |
-//! | warmup(τ) | 1 − exp(−t/τ) |
-//! | steps | one at and beyond each position |
-//! | local(centre, width) | (1 + cos(π(q − centre)/width))/2 within ±width, else 0 |
-
-use std::f64::consts::{PI, TAU};
-
-use super::DriverSample;
+//! [`super::basis`] has the basis functions.
 
 /// How a component follows its driver. Positions, periods and widths are in the driver's inside unit: mm, rad, s, °C, m.
 #[derive(Clone, Debug, PartialEq)]
@@ -98,8 +81,6 @@ pub enum Shape {
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[error("{0}")]
 pub struct ShapeFault(pub String);
-
-const SECONDS_AN_HOUR: f64 = 3600.0;
 
 impl Shape {
     /// The word that files and results use.
@@ -234,92 +215,5 @@ impl Shape {
             }
             Shape::Constant | Shape::Backlash | Shape::Lag | Shape::Drift => Ok(()),
         }
-    }
-
-    /// The basis functions at one reading, pushed onto `basis` in the order of the coefficients.
-    pub fn basis(&self, sample: &DriverSample<f64>, basis: &mut Vec<f64>) {
-        let q = sample.value;
-        match self {
-            Shape::Constant => basis.push(1.0),
-            Shape::Polynomial { degree, scale } => {
-                let mut power = 1.0;
-                for _ in 0..*degree {
-                    power *= q / scale;
-                    basis.push(power);
-                }
-            }
-            Shape::Power { degree, scale } => basis.push((q / scale).powi(*degree as i32)),
-            Shape::Harmonic { order } => {
-                let (sin, cos) = (order * q).sin_cos();
-                basis.extend([cos, sin]);
-            }
-            Shape::Periodic { period } => {
-                let (sin, cos) = (TAU * q / period).sin_cos();
-                basis.extend([cos, sin]);
-            }
-            Shape::Curve {
-                from,
-                to,
-                intervals,
-                closed,
-            } => b_splines(q, *from, *to, *intervals, *closed, basis),
-            Shape::Backlash => basis.push(-0.5 * sample.direction),
-            Shape::Lag => basis.push(-sample.rate),
-            Shape::ReversalSpike { width } => {
-                basis.push(sample.direction * (-sample.since_reversal / width).exp());
-            }
-            Shape::Drift => basis.push(q / SECONDS_AN_HOUR),
-            Shape::Warmup { tau_s } => basis.push(1.0 - (-q / tau_s).exp()),
-            Shape::Steps { at } => {
-                basis.extend(at.iter().map(|position| if q >= *position { 1.0 } else { 0.0 }));
-            }
-            Shape::Local {
-                centre,
-                width,
-                recurs,
-            } => {
-                let mut from_centre = q - centre;
-                if let Some(period) = recurs {
-                    from_centre -= period * (from_centre / period).round();
-                }
-                let within = from_centre / width;
-                basis.push(if within.abs() < 1.0 {
-                    0.5 * (1.0 + (PI * within).cos())
-                } else {
-                    0.0
-                });
-            }
-        }
-    }
-}
-
-/// Uniform cubic B-splines (de Boor, A Practical Guide to Splines, ch. IX): four of them are not zero at any place.
-fn b_splines(q: f64, from: f64, to: f64, intervals: usize, closed: bool, basis: &mut Vec<f64>) {
-    let start = basis.len();
-    let count = if closed { intervals } else { intervals + 3 };
-    basis.resize(start + count, 0.0);
-    let mut along = (q - from) / (to - from);
-    along = if closed {
-        along - along.floor()
-    } else {
-        along.clamp(0.0, 1.0)
-    };
-    let place = along * intervals as f64;
-    let interval = (place.floor() as usize).min(intervals - 1);
-    let u = place - interval as f64;
-    let v = 1.0 - u;
-    let four = [
-        v * v * v / 6.0,
-        (3.0 * u * u * u - 6.0 * u * u + 4.0) / 6.0,
-        (3.0 * v * v * v - 6.0 * v * v + 4.0) / 6.0,
-        u * u * u / 6.0,
-    ];
-    for (k, value) in four.into_iter().enumerate() {
-        let index = if closed {
-            (interval + k) % intervals
-        } else {
-            interval + k
-        };
-        basis[start + index] += value;
     }
 }

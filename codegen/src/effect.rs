@@ -1,0 +1,326 @@
+//! Declared effects in an equation: `component × driver × shape` as `component = Σ k_i · b_i(driver)`.
+//!
+//! The coefficients `k_i` are parameters like any error. What is followed stays a symbol: the position of an axis, or else a quantity named
+//! here. The basis functions `b_i` are those of the fit, taken at symbols.
+
+use std::sync::Arc;
+
+use abbe_model::axis::AxisKind;
+use abbe_model::chain::{AxisPosition, Machine};
+use abbe_model::component::ErrorName;
+use abbe_model::effect::{Component, Driver, DriverSample, Effect, Shape};
+use abbe_model::instrument::{InsideUnit, InstrumentUnknown};
+use abbe_model::scalar::Nominal;
+
+use crate::error::CodegenError;
+use crate::variable::Variable;
+
+/// What an effect follows, where that is not the position of an axis.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Followed {
+    /// The direction in which an axis last moved: −1, 0 or 1.
+    Direction(String),
+    /// The rate of an axis, mm/s or rad/s.
+    Rate(String, AxisKind),
+    /// How far an axis has moved since it last turned round, mm or rad.
+    SinceReversal(String, AxisKind),
+    /// Time since the session's first reading, s.
+    Time,
+    /// Temperature above the session's mean, °C.
+    Temperature,
+    /// The moment that a unit weight at the instrument's point exerts about an axis, m.
+    Gravity(String),
+}
+
+impl Followed {
+    pub(crate) fn unit(&self) -> &'static str {
+        match self {
+            Followed::Direction(_) => "1",
+            Followed::Rate(_, AxisKind::Linear) => "mm/s",
+            Followed::Rate(_, AxisKind::Rotary) => "rad/s",
+            Followed::SinceReversal(_, AxisKind::Linear) => "mm",
+            Followed::SinceReversal(_, AxisKind::Rotary) => "rad",
+            Followed::Time => "s",
+            Followed::Temperature => "°C",
+            Followed::Gravity(_) => "m",
+        }
+    }
+
+    pub(crate) fn meaning(&self) -> String {
+        match self {
+            Followed::Direction(axis) => format!("direction in which axis {axis} last moved: −1, 0 or 1"),
+            Followed::Rate(axis, _) => format!("rate of axis {axis}"),
+            Followed::SinceReversal(axis, _) => {
+                format!("how far axis {axis} has moved since it last turned round")
+            }
+            Followed::Time => "time since the first reading of the session".to_string(),
+            Followed::Temperature => "temperature above the mean of the session".to_string(),
+            Followed::Gravity(axis) => {
+                format!("moment of a unit weight about axis {axis}")
+            }
+        }
+    }
+
+    /// In plain text; typeset print takes the letter and the subscript from it.
+    pub(crate) fn text(&self) -> String {
+        let of = |letter: &str, axis: &str| format!("{letter}_{}", axis.to_lowercase());
+        match self {
+            Followed::Direction(axis) => of("σ", axis),
+            Followed::Rate(axis, _) => of("v", axis),
+            Followed::SinceReversal(axis, _) => of("w", axis),
+            Followed::Time => "t".to_string(),
+            Followed::Temperature => "T".to_string(),
+            Followed::Gravity(axis) => of("g", axis),
+        }
+    }
+
+    pub(crate) fn identifier(&self) -> String {
+        match self {
+            Followed::Direction(axis) => format!("direction_{axis}"),
+            Followed::Rate(axis, _) => format!("rate_{axis}"),
+            Followed::SinceReversal(axis, _) => format!("since_reversal_{axis}"),
+            Followed::Time => "time_s".to_string(),
+            Followed::Temperature => "temperature_c".to_string(),
+            Followed::Gravity(axis) => format!("gravity_{axis}"),
+        }
+    }
+}
+
+/// A coefficient of an effect.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Coefficient {
+    /// Its number in the equation, from 1.
+    pub number: usize,
+    /// The effect.
+    pub effect: Arc<Effect>,
+    /// Its place among the coefficients of the effect.
+    pub place: usize,
+    /// The unit of what moves; none of a delay.
+    pub component: Option<InsideUnit>,
+    /// Whether component and driver are both lengths or both angles.
+    pub same_kind: bool,
+}
+
+impl Coefficient {
+    /// The coefficients of effects, numbered through.
+    ///
+    /// # Errors
+    /// If an effect is named twice, moves what the machine or the instrument does not have, or follows what has no value.
+    pub(crate) fn of_effects(
+        effects: &[Effect],
+        machine: &Machine,
+        unknowns: &[InstrumentUnknown],
+    ) -> Result<Vec<Coefficient>, CodegenError> {
+        let mut coefficients = Vec::new();
+        for (earlier, effect) in effects.iter().enumerate() {
+            if effects[..earlier].contains(effect) {
+                return Err(CodegenError::Twice { name: effect.id() });
+            }
+            let count = effect.shape.coefficients();
+            if count > MOST_COEFFICIENTS {
+                return Err(CodegenError::EffectTooLong {
+                    effect: effect.id(),
+                    coefficients: count,
+                    most: MOST_COEFFICIENTS,
+                });
+            }
+            let component = unit_of_component(effect, machine, unknowns)?;
+            let same_kind = match &effect.driver {
+                Driver::Axis(name) => {
+                    kind_of(machine, effect, name)? == (component == Some(InsideUnit::Radian))
+                }
+                _ => false,
+            };
+            let shared = Arc::new(effect.clone());
+            for place in 0..count {
+                coefficients.push(Coefficient {
+                    number: coefficients.len() + 1,
+                    effect: Arc::clone(&shared),
+                    place,
+                    component,
+                    same_kind,
+                });
+            }
+        }
+        Ok(coefficients)
+    }
+
+    /// `EZC~C:h2.cos`: as in the results of a fit.
+    pub fn id(&self) -> String {
+        let names = self.effect.shape.coefficient_names();
+        match names.get(self.place).map(String::as_str) {
+            None | Some("") => self.effect.id(),
+            Some(name) => format!("{}.{name}", self.effect.id()),
+        }
+    }
+
+    pub(crate) fn meaning(&self) -> String {
+        let what = match self.effect.component {
+            Component::TriggerDelay => "delay of the reading".to_string(),
+            _ => format!("{} coefficient", self.effect.shape.word()),
+        };
+        format!("{what} ({})", self.id())
+    }
+
+    pub(crate) fn unit(&self) -> &'static str {
+        let Some(component) = self.component else {
+            return "s";
+        };
+        match (&self.effect.shape, component) {
+            (Shape::Lag, _) if self.same_kind => "s",
+            (Shape::Lag, InsideUnit::Millimetre) => "mm·s/rad",
+            (Shape::Lag, InsideUnit::Radian) => "rad·s/mm",
+            (Shape::Lag, InsideUnit::Ratio) => "1/rate",
+            (Shape::Drift, InsideUnit::Millimetre) => "mm/h",
+            (Shape::Drift, InsideUnit::Radian) => "rad/h",
+            (Shape::Drift, InsideUnit::Ratio) => "1/h",
+            (_, InsideUnit::Millimetre) => "mm",
+            (_, InsideUnit::Radian) => "rad",
+            (_, InsideUnit::Ratio) => "1",
+        }
+    }
+}
+
+/// Coefficients of one effect that can still be read, and that a compiler takes in one function.
+const MOST_COEFFICIENTS: usize = 40;
+
+fn unit_of_component(
+    effect: &Effect,
+    machine: &Machine,
+    unknowns: &[InstrumentUnknown],
+) -> Result<Option<InsideUnit>, CodegenError> {
+    match &effect.component {
+        Component::Axis(name) => match machine.axis_index(&name.axis) {
+            Some(_) if name.freedom.is_angle() => Ok(Some(InsideUnit::Radian)),
+            Some(_) => Ok(Some(InsideUnit::Millimetre)),
+            None => Err(no_axis(machine, effect, &name.axis)),
+        },
+        Component::Instrument { thing, coordinate } => {
+            let own =
+                |unknown: &&InstrumentUnknown| unknown.thing == thing && unknown.coordinate == coordinate;
+            let found = unknowns.iter().find(own);
+            found
+                .map(|unknown| Some(unknown.unit))
+                .ok_or_else(|| CodegenError::NoSuchUnknown {
+                    unknown: format!("`{}` that the effect `{}` moves", effect.component, effect.id()),
+                })
+        }
+        Component::TriggerDelay => Ok(None),
+    }
+}
+
+fn no_axis(machine: &Machine, effect: &Effect, axis: &str) -> CodegenError {
+    CodegenError::NoSuchAxis {
+        error: effect.id(),
+        axis: axis.to_string(),
+        machine: machine.code(),
+    }
+}
+
+/// Whether the axis turns.
+fn kind_of(machine: &Machine, effect: &Effect, axis: &str) -> Result<bool, CodegenError> {
+    let index = machine.axis_index(axis);
+    let index = index.ok_or_else(|| no_axis(machine, effect, axis))?;
+    Ok(machine.axes[index].kind == AxisKind::Rotary)
+}
+
+/// Where the axes stand, and which of them the test holds: those have no direction and no rate.
+pub(crate) struct Movement<'m, N> {
+    pub(crate) machine: &'m Machine,
+    pub(crate) state: &'m [AxisPosition<N>],
+    pub(crate) held: &'m [bool],
+}
+
+impl<N: Nominal> Movement<'_, N> {
+    /// What the driver of an effect tells about a reading. Only what the shape asks for is named.
+    pub(crate) fn sample(
+        &self,
+        effect: &Effect,
+        nominal: &impl Fn(Variable) -> N,
+    ) -> Result<DriverSample<N>, CodegenError> {
+        let zero = N::constant(0.0);
+        let mut sample = DriverSample {
+            value: zero,
+            direction: N::constant(1.0),
+            rate: zero,
+            since_reversal: zero,
+            since_reversal_s: zero,
+        };
+        let followed = |followed: Followed| nominal(Variable::Driver(followed));
+        match &effect.driver {
+            Driver::None => {}
+            Driver::Time => sample.value = followed(Followed::Time),
+            Driver::Temperature => sample.value = followed(Followed::Temperature),
+            Driver::Gravity => {
+                let Component::Axis(ErrorName { axis, .. }) = &effect.component else {
+                    return Err(CodegenError::EffectWithoutForm {
+                        effect: effect.id(),
+                        why: "gravity exerts a moment about an axis, and it moves none".to_string(),
+                    });
+                };
+                sample.value = followed(Followed::Gravity(axis.clone()));
+            }
+            Driver::Axis(name) => {
+                let index = self.machine.axis_index(name);
+                let index = index.ok_or_else(|| no_axis(self.machine, effect, name))?;
+                let direction = || match self.held[index] {
+                    true => zero,
+                    false => followed(Followed::Direction(name.clone())),
+                };
+                match effect.shape {
+                    Shape::Backlash => sample.direction = direction(),
+                    Shape::Lag => sample.rate = self.rate(index, nominal),
+                    Shape::ReversalSpike { .. } => {
+                        sample.direction = direction();
+                        if !self.held[index] {
+                            let kind = self.machine.axes[index].kind;
+                            sample.since_reversal = followed(Followed::SinceReversal(name.clone(), kind));
+                        }
+                    }
+                    _ => sample.value = self.state[index].value,
+                }
+            }
+        }
+        Ok(sample)
+    }
+
+    /// The rate of an axis.
+    fn rate(&self, index: usize, nominal: &impl Fn(Variable) -> N) -> N {
+        if self.held[index] {
+            return N::constant(0.0);
+        }
+        let axis = &self.machine.axes[index];
+        nominal(Variable::Driver(Followed::Rate(axis.name.clone(), axis.kind)))
+    }
+
+    /// The slots that an effect moves, the machine's errors first, and what multiplies its basis there.
+    pub(crate) fn slots(
+        &self,
+        effect: &Effect,
+        unknowns: &[InstrumentUnknown],
+        nominal: &impl Fn(Variable) -> N,
+    ) -> Vec<(usize, Option<N>)> {
+        match &effect.component {
+            Component::Axis(name) => {
+                let slot = self.machine.error_slot(name);
+                slot.map(|slot| (slot, None)).into_iter().collect()
+            }
+            Component::Instrument { thing, coordinate } => {
+                let own =
+                    |unknown: &InstrumentUnknown| unknown.thing == thing && unknown.coordinate == coordinate;
+                let place = unknowns.iter().position(own);
+                let slot = place.map(|place| (self.machine.error_slots() + place, None));
+                slot.into_iter().collect()
+            }
+            Component::TriggerDelay => {
+                let moving = (0..self.machine.axes.len()).filter(|index| !self.held[*index]);
+                let slots = moving.flat_map(|index| {
+                    let rate = self.rate(index, nominal);
+                    let shares = self.machine.slots_along(index);
+                    shares.map(move |(slot, along)| (slot, Some(rate * N::constant(along))))
+                });
+                slots.collect()
+            }
+        }
+    }
+}

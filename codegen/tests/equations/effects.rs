@@ -1,0 +1,353 @@
+//! Declared effects in equations: every shape against its closed form by hand, forms, refusals.
+
+use std::f64::consts::{PI, TAU};
+
+use abbe_codegen::{CodegenError, Equation, Followed, Language, Options, Order, Source, Subject, Variable};
+use abbe_model::chain::Machine;
+use abbe_model::component::ErrorName;
+use abbe_model::effect::{Component, Driver, Effect, Shape};
+use abbe_model::instrument::{Station, ballbar::BallBar, socket::Socket};
+use abbe_model::scalar::Nominal;
+
+/// A ball in the tool frame's origin, in a socket there: what is read is where the ball is.
+#[derive(Clone, Copy)]
+struct Ball;
+
+impl Source for Ball {
+    fn subject<N: Nominal>(&self, _length: &impl Fn(&str) -> N) -> Subject<N> {
+        Subject::Station(Station::Socket(Socket {
+            ball: [N::constant(0.0); 3],
+            socket: [N::constant(0.0); 3],
+        }))
+    }
+}
+
+pub fn effect(component: &str, driver: &str, shape: Shape) -> Effect {
+    Effect {
+        component: Component::parse(component).expect("a component"),
+        driver: Driver::parse(driver),
+        shape,
+        tests: Vec::new(),
+    }
+}
+
+fn with(effects: Vec<Effect>) -> Options {
+    Options {
+        effects,
+        gradient: true,
+        ..Options::default()
+    }
+}
+
+/// What a driver does at a point: position, direction, rate, way since the turn.
+#[derive(Clone, Copy)]
+struct At {
+    q: f64,
+    direction: f64,
+    rate: f64,
+    way: f64,
+}
+
+/// What the linear axis X of a machine that has nothing else reads in Y where its error EYX follows a driver: the derivatives are the basis
+/// functions, and the reading their sum.
+fn bases(driver: &str, shape: Shape, at: At) -> Vec<f64> {
+    let machine = Machine::from_code("w b X t").expect("a code");
+    let options = with(vec![effect("EYX", driver, shape)]);
+    let equation = Equation::of(&machine, &Ball, &[], &options).expect("an equation");
+    let variable = |variable: &Variable| match variable {
+        Variable::Position { .. } | Variable::Driver(Followed::Time | Followed::Temperature) => at.q,
+        Variable::Driver(Followed::Direction(_)) => at.direction,
+        Variable::Driver(Followed::Rate(..)) => at.rate,
+        Variable::Driver(Followed::SinceReversal(..)) => at.way,
+        Variable::Coefficient(coefficient) => coefficient.number as f64,
+        other => panic!("{other:?} has no place here"),
+    };
+    let slopes = equation.gradients()[1].clone();
+    let found = equation.arena.evaluate_f64(&slopes, variable).expect("numbers");
+    let value = equation
+        .arena
+        .evaluate_f64(&equation.outputs, variable)
+        .expect("numbers")[1];
+    let sum: f64 = found.iter().enumerate().map(|(k, b)| (k + 1) as f64 * b).sum();
+    assert!((value - sum).abs() <= 1e-12 * (1.0 + sum.abs()), "{value} {sum}");
+    found
+}
+
+#[track_caller]
+fn near(found: &[f64], expected: &[f64]) {
+    assert_eq!(found.len(), expected.len());
+    for (found, expected) in found.iter().zip(expected) {
+        assert!((found - expected).abs() < 1e-13, "{found} for {expected}");
+    }
+}
+
+const HERE: At = At {
+    q: 37.0,
+    direction: -1.0,
+    rate: 4.0,
+    way: 6.0,
+};
+
+fn here(q: f64) -> At {
+    At { q, ..HERE }
+}
+
+#[test]
+fn smooth_shapes_by_hand() {
+    let polynomial = Shape::Polynomial {
+        degree: 3,
+        scale: 100.0,
+    };
+    near(&bases("X", polynomial, HERE), &[0.37, 0.1369, 0.050653]);
+    let power = Shape::Power {
+        degree: 5,
+        scale: 10.0,
+    };
+    near(&bases("temperature", power, here(12.0)), &[2.48832]);
+    let harmonic = Shape::Harmonic { order: 3.0 };
+    near(
+        &bases("X", harmonic, here(PI / 12.0)),
+        &[0.5_f64.sqrt(), 0.5_f64.sqrt()],
+    );
+    let periodic = Shape::Periodic { period: 12.0 };
+    near(
+        &bases("X", periodic, here(38.0)),
+        &[(TAU / 6.0).cos(), (TAU / 6.0).sin()],
+    );
+    near(&bases("time", Shape::Drift, here(1800.0)), &[0.5]);
+    let warmup = Shape::Warmup { tau_s: 600.0 };
+    near(&bases("time", warmup, here(1200.0)), &[1.0 - (-2.0_f64).exp()]);
+    near(&bases("X", Shape::Lag, HERE), &[-4.0]);
+}
+
+#[test]
+fn shapes_of_reversal_by_hand() {
+    near(&bases("X", Shape::Backlash, HERE), &[0.5]);
+    let spike = Shape::ReversalSpike { width: 3.0 };
+    near(&bases("X", spike, HERE), &[-(-2.0_f64).exp()]);
+}
+
+#[test]
+fn shapes_with_edges_by_hand_on_both_sides() {
+    let steps = || Shape::Steps {
+        at: vec![10.0, 37.0, 50.0],
+    };
+    near(&bases("X", steps(), HERE), &[1.0, 1.0, 0.0]);
+    near(&bases("X", steps(), here(36.999)), &[1.0, 0.0, 0.0]);
+    let bump = |recurs| Shape::Local {
+        centre: 30.0,
+        width: 10.0,
+        recurs,
+    };
+    let expected = 0.5 * (1.0 + (0.7 * PI).cos());
+    near(&bases("X", bump(None), HERE), &[expected]);
+    for outside in [19.9, 40.1, 137.0, -63.0] {
+        near(&bases("X", bump(None), here(outside)), &[0.0]);
+    }
+    for again in [37.0, 137.0, -63.0, -163.0] {
+        near(&bases("X", bump(Some(100.0)), here(again)), &[expected]);
+    }
+    near(&bases("X", bump(Some(100.0)), here(180.0)), &[0.0]);
+}
+
+/// The cardinal cubic B-spline by its truncated powers (de Boor, ch. IX), which the shape does not use: N(s) = Σ (−1)^k (4 over k) (s − k)₊³ / 6.
+fn cardinal(s: f64) -> f64 {
+    let terms = [1.0, -4.0, 6.0, -4.0, 1.0].into_iter().enumerate();
+    let sum: f64 = terms.map(|(k, c)| c * (s - k as f64).max(0.0).powi(3)).sum();
+    if (0.0..4.0).contains(&s) { sum / 6.0 } else { 0.0 }
+}
+
+#[test]
+fn curves_by_truncated_powers() {
+    let open = || Shape::Curve {
+        from: 10.0,
+        to: 60.0,
+        intervals: 5,
+        closed: false,
+    };
+    // Beyond its ends a curve stands where it ended.
+    for (q, place) in [(10.0, 0.0), (22.5, 1.25), (37.0, 2.7), (59.9, 4.99), (-20.0, 0.0)] {
+        let expected: Vec<f64> = (0..8).map(|j| cardinal(place - j as f64 + 3.0)).collect();
+        near(&bases("X", open(), here(q)), &expected);
+    }
+    for at in [60.0, 80.0] {
+        near(
+            &bases("X", open(), here(at)),
+            &[0.0, 0.0, 0.0, 0.0, 0.0, 1.0 / 6.0, 4.0 / 6.0, 1.0 / 6.0],
+        );
+    }
+    let closed = || Shape::Curve {
+        from: 0.0,
+        to: 60.0,
+        intervals: 6,
+        closed: true,
+    };
+    for q in [0.0_f64, 13.0, 59.0, 73.0, -47.0] {
+        let place = (q / 10.0).rem_euclid(6.0);
+        let turns = |j: i32| (-1..=1).map(move |turn| f64::from(j + 6 * turn));
+        let expected: Vec<f64> = (0..6)
+            .map(|j| turns(j).map(|j| cardinal(place - j + 3.0)).sum())
+            .collect();
+        near(&bases("X", closed(), here(q)), &expected);
+    }
+}
+
+/// One of each shape on a machine with a rotary axis, an instrument unknown and a delay among the components.
+pub fn every_shape() -> Vec<Effect> {
+    let polynomial = |degree, scale| Shape::Polynomial { degree, scale };
+    let local = Shape::Local {
+        centre: 0.5,
+        width: 0.4,
+        recurs: Some(TAU),
+    };
+    vec![
+        effect("EZC", "C", Shape::Harmonic { order: 2.0 }),
+        effect("EXC", "C", Shape::Periodic { period: 0.3 }),
+        effect("EYC", "C", polynomial(2, PI)),
+        effect("EX0C", "temperature", polynomial(1, 1.0)),
+        effect("EY0C", "time", Shape::Drift),
+        effect("EBC", "C", Shape::Backlash),
+        effect("ECC", "C", Shape::Lag),
+        effect("EAC", "C", Shape::ReversalSpike { width: 0.1 }),
+        effect("EZC", "C", Shape::Steps { at: vec![-1.0, 1.0] }),
+        effect("EXC", "C", local),
+        effect("EBC", "gravity", polynomial(1, 1.0)),
+        effect(
+            "EYX",
+            "X",
+            Shape::Power {
+                degree: 3,
+                scale: 100.0,
+            },
+        ),
+        effect("bar", "time", Shape::Warmup { tau_s: 900.0 }),
+        effect("workpiece_ball.x", "temperature", polynomial(1, 1.0)),
+        effect("gain", "temperature", polynomial(1, 1.0)),
+        effect("trigger", "none", Shape::Constant),
+    ]
+}
+
+/// A curve, which is for compilers.
+pub fn curve() -> Effect {
+    let shape = Shape::Curve {
+        from: 0.0,
+        to: TAU,
+        intervals: 4,
+        closed: true,
+    };
+    effect("EYC", "C", shape)
+}
+
+/// A bar between balls at stated places.
+#[derive(Clone, Copy)]
+pub struct Bar;
+
+impl Source for Bar {
+    fn subject<N: Nominal>(&self, length: &impl Fn(&str) -> N) -> Subject<N> {
+        let zero = N::constant(0.0);
+        Subject::Station(Station::BallBar(BallBar {
+            workpiece_ball: [zero, length("R"), N::constant(20.0)],
+            spindle_ball: [zero; 3],
+            bar: length("R"),
+        }))
+    }
+}
+
+#[test]
+fn every_form_is_confirmed_with_every_shape() {
+    let machine = Machine::from_code("w C b X t").expect("a code");
+    let errors: Vec<ErrorName> = ErrorName::parse("EX0X").into_iter().collect();
+    for order in [Order::Exact, Order::Bilinear, Order::First] {
+        let mut options = Options {
+            order,
+            gradient: order != Order::Bilinear,
+            ..with(every_shape())
+        };
+        for curved in [false, true] {
+            options.effects.extend(curved.then(curve));
+            let equation = Equation::of(&machine, &Bar, &errors, &options).expect("an equation");
+            assert!(equation.check.points == 40 && equation.check.largest() < 1e-12);
+            for language in Language::ALL {
+                let for_readers = matches!(language, Language::Text | Language::Latex | Language::Typst);
+                match equation.print(language) {
+                    Ok(text) => assert!(!(text.contains("NaN") || curved && for_readers), "{text}"),
+                    Err(refused) => {
+                        let told = refused.to_string();
+                        assert!(curved && for_readers, "{told}");
+                        assert!(
+                            told.contains("`EYC~C:curve`") && told.contains("rust, c, python"),
+                            "{told}"
+                        );
+                    }
+                }
+            }
+        }
+    }
+}
+
+#[test]
+fn an_equation_names_what_effects_make_up_and_what_they_follow() {
+    let machine = Machine::from_code("w C b X t").expect("a code");
+    let effects = vec![
+        effect("EZC", "C", Shape::Harmonic { order: 2.0 }),
+        effect("bar", "time", Shape::Warmup { tau_s: 900.0 }),
+    ];
+    let equation = Equation::of(&machine, &Bar, &[], &with(effects)).expect("an equation");
+    let text = equation.print(Language::Text).expect("a text");
+    for line in [
+        "errors that effects make up\n",
+        "  e_zc  = k_1·cos(2·θ_c) + k_2·sin(2·θ_c)\n",
+        "  δ_bar = k_3·(1 − exp(−t/900))\n",
+        " − δ_bar\n",
+        "harmonic coefficient (EZC~C:h2.sin)",
+        "time since the first reading of the session",
+    ] {
+        assert!(text.contains(line), "`{line}` is not in\n{text}");
+    }
+    let latex = equation.print(Language::Latex).expect("a text");
+    assert!(
+        latex.contains("e_{zc} &= k_{1} \\cos (2 \\theta_{c}) + k_{2} \\sin (2 \\theta_{c})"),
+        "{latex}"
+    );
+}
+
+/// A harmonic of the first order in X and Y of C is where the ball's own eccentricity shows: one column, twice.
+#[test]
+fn an_effect_that_is_a_location_error_is_marked() {
+    let machine = Machine::from_code("w C b X t").expect("a code");
+    let options = Options {
+        order: Order::First,
+        ..with(vec![effect("EX0C", "none", Shape::Constant)])
+    };
+    let errors: Vec<ErrorName> = ErrorName::parse("EX0C").into_iter().collect();
+    let equation = Equation::of(&machine, &Bar, &errors, &options).expect("an equation");
+    let text = equation.print(Language::Text).expect("a text");
+    assert!(text.contains("k_1 cannot be told from e_x0c"), "{text}");
+}
+
+#[test]
+fn what_cannot_be_written_is_refused_by_name() {
+    let machine = Machine::from_code("w C b X t").expect("a code");
+    let refused = |effect: Effect| {
+        let equation = Equation::of(&machine, &Bar, &[], &with(vec![effect]));
+        equation.expect_err("no equation").to_string()
+    };
+    let long = Shape::Curve {
+        from: 0.0,
+        to: TAU,
+        intervals: 200,
+        closed: true,
+    };
+    let told = refused(effect("EZC", "C", long));
+    assert!(
+        told.contains("EZC~C:curve") && told.contains("200") && told.contains("fewer intervals"),
+        "{told}"
+    );
+    let told = refused(effect("EZA", "A", Shape::Backlash));
+    assert!(told.contains("EZA~A:backlash") && told.contains("`A`"), "{told}");
+    let told = refused(effect("tracker.x", "time", Shape::Drift));
+    assert!(told.contains("tracker.x~time:drift"), "{told}");
+    let twice = effect("EZC", "C", Shape::Backlash);
+    let equation = Equation::of(&machine, &Bar, &[], &with(vec![twice.clone(), twice]));
+    assert!(matches!(equation, Err(CodegenError::Twice { .. })));
+}
