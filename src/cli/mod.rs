@@ -9,9 +9,11 @@ mod equation;
 mod failure;
 mod fit;
 mod folder;
+mod geometric;
 mod new;
 mod output;
 mod plan;
+mod self_calibration;
 mod simulate;
 mod table;
 mod trace;
@@ -48,9 +50,7 @@ enum Command {
     )]
     Volumetric(equation::VolumetricArguments),
     /// Identify errors from readings, with uncertainties.
-    #[command(
-        after_help = "Example:\n  abbe fit sessions/hermle-c600u/measured/session.toml --json fit.json"
-    )]
+    #[command(after_help = fit::HELP)]
     Fit(fit::FitArguments),
     /// What can these tests see, before anybody measures?
     #[command(after_help = plan::EXAMPLES)]

@@ -63,6 +63,40 @@ const TEMPLATES: &[Template] = &[
         files: files!("kuka-iiwa14": "machine.toml", "session.toml"),
     },
     Template {
+        name: "self-calibration",
+        about: "rotary table probed on an uncalibrated cylinder; a plan, and readings simulated from it",
+        files: &[
+            (
+                "machine.toml",
+                include_str!("../../sessions/self-calibration/machine.toml"),
+            ),
+            (
+                "plan.toml",
+                include_str!("../../sessions/self-calibration/session.toml"),
+            ),
+            (
+                "session.toml",
+                include_str!("../../sessions/self-calibration/measured/session.toml"),
+            ),
+            (
+                "1a.csv",
+                include_str!("../../sessions/self-calibration/measured/1a.csv"),
+            ),
+            (
+                "1b.csv",
+                include_str!("../../sessions/self-calibration/measured/1b.csv"),
+            ),
+            (
+                "2.csv",
+                include_str!("../../sessions/self-calibration/measured/2.csv"),
+            ),
+            (
+                "3.csv",
+                include_str!("../../sessions/self-calibration/measured/3.csv"),
+            ),
+        ],
+    },
+    Template {
         name: "ur10",
         about: "six-axis robot before a laser tracker (public data set, to be fetched)",
         files: files!("ur10": "machine.toml", "session.toml"),

@@ -14,6 +14,7 @@ mod plan_rank;
 mod plan_uncertainty;
 mod recovery;
 mod robots;
+mod self_calibration;
 mod simulate;
 mod topologies;
 mod trace;
