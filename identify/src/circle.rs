@@ -1,8 +1,8 @@
 //! The least-squares circle through points of a plane.
 //!
 //! `Σ (x² + y² − 2·a·x − 2·b·y − c)² → min`: linear in the centre `(a, b)` and in `c = ρ² − a² − b²`, so that it needs no start and knows no false
-//! minimum. Points that scatter by σ about a circle of radius ρ give the centre of the geometric least-squares circle (ISO 230-7, 3.3.1) up
-//! to terms of σ²/ρ; [`refined`] takes the last step to that circle.
+//! minimum (the equations of Section 4.2 of the thesis). Points that scatter by σ about a circle of radius ρ give the centre of the geometric
+//! least-squares circle of ISO 230-7 up to terms of σ²/ρ.
 
 use num_dual::DualNum;
 
@@ -49,35 +49,6 @@ pub fn through<D: DualNum<Primitive = f64> + Copy>(points: &[[D; 2]]) -> Option<
         centre: [mx + a, my + b],
         radius,
     })
-}
-
-/// The geometric least-squares circle, `Σ (√((x−a)² + (y−b)²) − ρ)² → min`, by Gauss–Newton from [`through`]. `None` where that has none, or where
-/// the iterations do not settle: points that scatter as far as the circle is wide have no such circle worth the name.
-pub fn refined(points: &[[f64; 2]]) -> Option<Circle<f64>> {
-    const MOST_STEPS: usize = 50;
-    let mut circle = through(points)?;
-    for _ in 0..MOST_STEPS {
-        let mut normal = nalgebra::Matrix3::zeros();
-        let mut right = nalgebra::Vector3::zeros();
-        for p in points {
-            let (dx, dy) = (p[0] - circle.centre[0], p[1] - circle.centre[1]);
-            let distance = dx.hypot(dy);
-            if distance == 0.0 {
-                return None;
-            }
-            let row = nalgebra::Vector3::new(dx / distance, dy / distance, 1.0);
-            normal += row * row.transpose();
-            right += row * (distance - circle.radius);
-        }
-        let step = normal.cholesky()?.solve(&right);
-        circle.centre[0] += step[0];
-        circle.centre[1] += step[1];
-        circle.radius += step[2];
-        if step.norm() <= 1e-12 * circle.radius.abs() {
-            return Some(circle);
-        }
-    }
-    None
 }
 
 #[cfg(test)]

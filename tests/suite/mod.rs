@@ -3,6 +3,7 @@
 mod bad_input;
 mod codes;
 mod data;
+mod geometric;
 mod jacobians;
 mod measured;
 mod new;
