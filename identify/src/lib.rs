@@ -30,5 +30,6 @@ pub mod start;
 pub mod trace;
 pub mod triangle;
 pub mod unit;
+pub mod volumetric;
 
 pub use error::IdentifyError;

@@ -100,6 +100,8 @@ pub struct VolumetricArguments {
     machine: PathBuf,
     #[command(flatten)]
     form: FormArguments,
+    #[command(flatten)]
+    map: super::map::MapArguments,
 }
 
 impl FormArguments {
@@ -172,6 +174,9 @@ pub fn run(arguments: &EquationArguments) -> Result<(), Failure> {
 /// Runs `abbe volumetric`.
 pub fn run_volumetric(arguments: &VolumetricArguments) -> Result<(), Failure> {
     let machine = abbe::model::session::read::machine(&arguments.machine)?;
+    if arguments.map.wanted() {
+        return super::map::run(&machine, &arguments.map);
+    }
     // Every error motion and location error that the chain applies.
     let all = machine
         .axes

@@ -97,6 +97,11 @@ const TEMPLATES: &[Template] = &[
         ],
     },
     Template {
+        name: "volumetric",
+        about: "five-axis machine with 33 error functions, to map and to compensate (`abbe volumetric --map`)",
+        files: files!("volumetric": "machine.toml", "errors.toml"),
+    },
+    Template {
         name: "ur10",
         about: "six-axis robot before a laser tracker (public data set, to be fetched)",
         files: files!("ur10": "machine.toml", "session.toml"),

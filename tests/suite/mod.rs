@@ -19,6 +19,7 @@ mod self_calibration;
 mod simulate;
 mod topologies;
 mod trace;
+mod volumetric;
 
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output};
