@@ -102,6 +102,74 @@ const TEMPLATES: &[Template] = &[
         files: files!("volumetric": "machine.toml", "errors.toml"),
     },
     Template {
+        name: "table-and-head",
+        about: "five-axis machine with a rotary table and a tilting head; ball-bar plan of chapter 7, and simulated readings",
+        files: &[
+            (
+                "machine.toml",
+                include_str!("../../sessions/table-and-head/machine.toml"),
+            ),
+            (
+                "plan.toml",
+                include_str!("../../sessions/table-and-head/session.toml"),
+            ),
+            (
+                "session.toml",
+                include_str!("../../sessions/table-and-head/measured/session.toml"),
+            ),
+            (
+                "A100.csv",
+                include_str!("../../sessions/table-and-head/measured/A100.csv"),
+            ),
+            (
+                "A150.csv",
+                include_str!("../../sessions/table-and-head/measured/A150.csv"),
+            ),
+            (
+                "C100.csv",
+                include_str!("../../sessions/table-and-head/measured/C100.csv"),
+            ),
+            (
+                "C150.csv",
+                include_str!("../../sessions/table-and-head/measured/C150.csv"),
+            ),
+        ],
+    },
+    Template {
+        name: "tilting-head",
+        about: "five-axis machine with a tilting head; ball-bar plan of chapter 7, and simulated readings",
+        files: &[
+            (
+                "machine.toml",
+                include_str!("../../sessions/tilting-head/machine.toml"),
+            ),
+            (
+                "plan.toml",
+                include_str!("../../sessions/tilting-head/session.toml"),
+            ),
+            (
+                "session.toml",
+                include_str!("../../sessions/tilting-head/measured/session.toml"),
+            ),
+            (
+                "B100.csv",
+                include_str!("../../sessions/tilting-head/measured/B100.csv"),
+            ),
+            (
+                "B150.csv",
+                include_str!("../../sessions/tilting-head/measured/B150.csv"),
+            ),
+            (
+                "C100.csv",
+                include_str!("../../sessions/tilting-head/measured/C100.csv"),
+            ),
+            (
+                "C150.csv",
+                include_str!("../../sessions/tilting-head/measured/C150.csv"),
+            ),
+        ],
+    },
+    Template {
         name: "ur10",
         about: "six-axis robot before a laser tracker (public data set, to be fetched)",
         files: files!("ur10": "machine.toml", "session.toml"),

@@ -409,3 +409,59 @@ fn one_command_shows_both_on_the_same_readings() {
     assert_eq!(refused.status.code(), Some(1));
     assert!(String::from_utf8_lossy(&refused.stderr).contains("two tests in planes apart"));
 }
+
+/// Chapter 7 (Figs. 7.1, 7.2): the method of Chapter 5 where rotary axes carry the spindle. The values are those that the sessions' own notes give.
+#[test]
+fn heads_that_tilt_are_identified_by_both_ways() {
+    let cases = [
+        (
+            "tilting-head",
+            vec![
+                ("EX0B", 12.0),
+                ("EZ0B", -8.0),
+                ("EA0B", 6.0),
+                ("EC0B", -9.0),
+                ("EX0C", -15.0),
+                ("EY0C", 10.0),
+                ("EA0C", -12.0),
+                ("EB0C", 7.0),
+            ],
+        ),
+        (
+            "table-and-head",
+            vec![
+                ("EZ0A", -8.0),
+                ("EB0A", 6.0),
+                ("EC0A", -9.0),
+                ("EX0C", -15.0),
+                ("EY0C", 10.0),
+                ("EA0C", -12.0),
+                ("EB0C", 7.0),
+            ],
+        ),
+    ];
+    for (name, truth) in cases {
+        let path = ready(&format!("{name}/measured/session.toml"));
+        let session = read::session(&path, &ReadOptions::default()).unwrap();
+        let comparison = compare(&session, Method::Cone, 1).unwrap();
+        assert_eq!(comparison.errors.len(), truth.len());
+        for (id, value) in truth {
+            let row = comparison.errors.iter().find(|row| row.id == id).unwrap();
+            for (found, u) in [(row.value, row.u), (row.full_value, row.full_u)] {
+                assert!(
+                    (found.unwrap() - value).abs() < 3.5 * u.unwrap(),
+                    "{name}: {row:?}"
+                );
+            }
+            assert!(row.bias.unwrap().abs() < 0.02, "{name}: {row:?}");
+        }
+    }
+    // Where A lies along Y from where C lies is all that a table and a head show: with both errors unknown neither way gives a number.
+    let path = ready("table-and-head/measured/session.toml");
+    let mut session = read::session(&path, &ReadOptions::default()).unwrap();
+    session
+        .unknowns
+        .push(abbe::model::component::ErrorName::parse("EY0A").unwrap());
+    let refused = compare(&session, Method::Cone, 1).unwrap_err().to_string();
+    assert!(refused.contains("EY0C") && refused.contains("EY0A"), "{refused}");
+}
