@@ -156,6 +156,9 @@ impl Equation {
             )?;
             let kind = match run.subject {
                 Subject::Station(Station::BallBar(_)) => Kind::Length,
+                Subject::Station(Station::Probe(_)) => {
+                    return Err(CodegenError::NoForm { instrument: "probe" });
+                }
                 Subject::Station(_) => Kind::Coordinates,
                 Subject::Volumetric { .. } => Kind::Volumetric,
             };

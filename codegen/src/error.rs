@@ -50,6 +50,14 @@ pub enum CodegenError {
         /// The effect.
         effect: String,
     },
+    /// An instrument whose readings have no printed form.
+    #[error(
+        "the readings of a {instrument} have no printed form; those of a ball bar, a tracker and a socket have"
+    )]
+    NoForm {
+        /// The instrument.
+        instrument: &'static str,
+    },
     /// An expression that has no normal form.
     #[error("{what} has no place in the polynomial normal form")]
     NoPolynomial {

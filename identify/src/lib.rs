@@ -8,11 +8,14 @@
 //! - [`simulate`]: readings from a model; [`quantity`]: values with their units as people write them;
 //! - [`results`]: what is reported, as it stands in JSON.
 
+pub mod circle;
 pub mod drivers;
 pub mod error;
 pub mod fit;
+pub mod geometric;
 pub mod heldout;
 pub mod least_squares;
+pub mod monte_carlo;
 pub mod noise;
 pub mod outliers;
 pub mod parameters;
@@ -21,10 +24,12 @@ pub mod problem;
 pub mod quantity;
 pub mod rank;
 pub mod results;
+pub mod self_calibration;
 pub mod simulate;
 pub mod start;
 pub mod trace;
 pub mod triangle;
 pub mod unit;
+pub mod volumetric;
 
 pub use error::IdentifyError;

@@ -15,18 +15,18 @@ pub fn stations(session: &Session, tests: &[&Test]) -> Vec<Station<f64>> {
         .map(|test| match test.station {
             Station::Tracker(_) => test.setup.as_str(),
             Station::Socket(_) => test.socket.as_deref().unwrap_or(""),
-            Station::BallBar(_) => "",
+            Station::BallBar(_) | Station::Probe(_) => "",
         })
         .collect();
     for index in 0..tests.len() {
-        if groups[..index].contains(&groups[index]) && !matches!(stations[index], Station::BallBar(_)) {
+        if groups[..index].contains(&groups[index]) && !stations[index].kind().is_two_sided() {
             continue;
         }
         let members: Vec<usize> = (0..tests.len())
             .filter(|other| groups[*other] == groups[index])
             .collect();
         match &stations[index] {
-            Station::BallBar(_) => {}
+            Station::BallBar(_) | Station::Probe(_) => {}
             Station::Tracker(_) => {
                 let (mut machine_points, mut observed) = (Vec::new(), Vec::new());
                 for member in &members {

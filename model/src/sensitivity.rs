@@ -108,7 +108,7 @@ impl<'a> TestModel<'a> {
     /// The slots that can move a reading of this test at all: errors of the axes between ball and bed that are applied (a linear axis has no
     /// position errors), and all of the instrument's unknowns. An instrument that holds no workpiece point leaves that side out.
     pub fn effective_slots(&self) -> Vec<usize> {
-        let two_sided = matches!(self.station, Station::BallBar(_));
+        let two_sided = self.station.kind().is_two_sided();
         let machine = (0..self.machine.error_slots()).filter(|slot| {
             let axis = slot / crate::chain::ERRORS_PER_AXIS;
             let within = slot % crate::chain::ERRORS_PER_AXIS;

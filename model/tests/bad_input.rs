@@ -500,7 +500,7 @@ fn instruments_that_are_not_built() {
     );
     holds(
         &with_session("\"ballbar\"", "\"bar\""),
-        &["\"ballbar\", \"tracker\" or \"socket\" is expected"],
+        &["\"ballbar\", \"tracker\", \"socket\" or \"probe\" is expected"],
     );
     holds(
         &with_session("\"ballbar\"", "\"tracker\""),
@@ -617,4 +617,63 @@ fn files_that_are_none() {
     let latin = folder.path().join("latin.toml");
     fs::write(&latin, b"name = \"\xe4\"").unwrap();
     holds(&read(&latin), &["byte 9 is not UTF-8"]);
+}
+
+#[test]
+fn probes_that_cannot_touch() {
+    const PROBE: &str = r#"[machine]
+file = "machine.toml"
+
+[instrument]
+kind = "probe"
+
+[[test]]
+name = "1a"
+data = "C100.csv"
+radius_mm = 45
+artefact_mm = [0, 0, 0]
+stylus_mm = [0, 0, 0]
+at = { x_mm = 45, y_mm = 0, z_mm = 0, a_deg = 0 }
+"#;
+    const TOUCHES: &str = "c_deg,deviation_um\n0,1.5\n90,-2.0\n";
+    let read = |from: &str, to: &str| session(MACHINE, &PROBE.replace(from, to), Some(TOUCHES));
+    let readings = read("", "").unwrap().tests.remove(0).readings.unwrap();
+    assert_eq!(readings.observed, [-1.5e-3, 2.0e-3]);
+    for (from, to, expected) in [
+        (
+            "radius_mm = 45",
+            "radius_mm = 30",
+            "stands 15.000 mm before the artefact's nominal surface",
+        ),
+        (
+            "x_mm = 45",
+            "x_mm = 0",
+            "looks past the artefact, or stands on its axis",
+        ),
+        (
+            "stylus_mm = [0, 0, 0]",
+            "stylus_mm = [0, 0, 0]\ndirection = [0, 1, 0]\nartefact_axis = [0, 1, 0]",
+            "looks past",
+        ),
+        (
+            "stylus_mm = [0, 0, 0]",
+            "stylus_mm = [0, 0, 0]\ndirection = [0, 0, 0]",
+            "`direction` has no length",
+        ),
+        (
+            "radius_mm = 45",
+            "radius_mm = 0",
+            "a cylinder has a radius above 0",
+        ),
+        (
+            "radius_mm = 45",
+            "radius_mm = 45\nbar_mm = 100",
+            "`bar_mm` belongs to a ballbar",
+        ),
+    ] {
+        let told = told(read(from, to));
+        assert!(told.contains(expected), "{to}: {told}");
+    }
+    let named = session(MACHINE, PROBE, Some("c_deg,length_mm\n0,1\n90,2\n"));
+    assert!(told(named).contains("`length_mm`, which is not known"));
 }

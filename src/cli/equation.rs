@@ -108,6 +108,8 @@ pub struct VolumetricArguments {
     machine: PathBuf,
     #[command(flatten)]
     form: FormArguments,
+    #[command(flatten)]
+    map: super::map::MapArguments,
 }
 
 /// What an equation is written in.
@@ -262,6 +264,9 @@ pub fn run(arguments: &EquationArguments) -> Result<(), Failure> {
 /// Runs `abbe volumetric`.
 pub fn run_volumetric(arguments: &VolumetricArguments) -> Result<(), Failure> {
     let machine = read::machine(&arguments.machine)?;
+    if arguments.map.wanted() {
+        return super::map::run(&machine, &arguments.map);
+    }
     let form = &arguments.form;
     let mut kept = Kept::parse(&form.errors, &[], &[])?;
     if form.errors.is_empty() {

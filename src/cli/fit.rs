@@ -1,10 +1,31 @@
 //! `abbe fit`.
 
 use abbe::identify::results::{FitResult, ParameterResult, Unobservable};
-use clap::Args;
+use clap::{Args, ValueEnum};
 
 use super::failure::Failure;
-use super::{CommonArguments, SessionArguments, output, read_session, table};
+use super::{CommonArguments, SessionArguments, geometric, output, read_session, self_calibration, table};
+
+/// Examples of `abbe fit`.
+pub const HELP: &str = "Examples:
+  abbe fit sessions/hermle-c600u/measured/session.toml --json fit.json
+  abbe fit run1/session.toml --method cone
+  abbe fit sessions/self-calibration/measured/session.toml --method self-calibration --monte-carlo 1000000";
+
+/// How errors are identified.
+#[derive(Clone, Copy, PartialEq, Eq, ValueEnum)]
+enum Method {
+    /// All unknowns of the session at once, by least squares on the chain.
+    Full,
+    /// Position errors from the centre of one circle for each axis (thesis, Section 4.2), beside the full fit.
+    Circle,
+    /// Orientation errors from the cone of the bar with its extension (Sections 4.2.1, 5.2), beside the full fit.
+    Cone,
+    /// Orientation errors from circles in two planes along each axis (Section 6.1.2), beside the full fit.
+    TwoPlane,
+    /// Rotary axis, linear axes and artefact apart, from a probed cylinder (Zimmermann & Ibaraki 2020).
+    SelfCalibration,
+}
 
 /// `abbe fit SESSION`
 #[derive(Args)]
@@ -13,11 +34,29 @@ pub struct FitArguments {
     session: SessionArguments,
     #[command(flatten)]
     common: CommonArguments,
+    /// How errors are identified.
+    #[arg(long, value_enum, default_value = "full")]
+    method: Method,
+    #[command(flatten)]
+    draws: self_calibration::DrawArguments,
 }
 
 /// Runs `abbe fit`.
 pub fn run(arguments: &FitArguments) -> Result<(), Failure> {
     let session = read_session(&arguments.session)?;
+    if arguments.method == Method::SelfCalibration {
+        return self_calibration::run(&session, &arguments.draws, &arguments.common);
+    }
+    arguments.draws.refuse()?;
+    let geometric = match arguments.method {
+        Method::Full | Method::SelfCalibration => None,
+        Method::Circle => Some(abbe::identify::geometric::Method::Circle),
+        Method::Cone => Some(abbe::identify::geometric::Method::Cone),
+        Method::TwoPlane => Some(abbe::identify::geometric::Method::TwoPlane),
+    };
+    if let Some(method) = geometric {
+        return geometric::run(&session, method, &arguments.common);
+    }
     let (problem, fit) = abbe::identify::fit::prepare(&session, arguments.common.seed)?;
     let result = abbe::identify::fit::report(&problem, &fit);
     print(&result);

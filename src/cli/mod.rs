@@ -9,9 +9,12 @@ mod equation;
 mod failure;
 mod fit;
 mod folder;
+mod geometric;
+mod map;
 mod new;
 mod output;
 mod plan;
+mod self_calibration;
 mod simulate;
 mod table;
 mod trace;
@@ -42,15 +45,13 @@ enum Command {
         after_help = "Example:\n  abbe equation sessions/hermle-c600u/chapter5.toml --test A150 --as latex --rotation small-angle"
     )]
     Equation(equation::EquationArguments),
-    /// Print the error vector of the tool in the workpiece frame.
+    /// Print the error vector of the tool in the workpiece frame, or map it over the workspace.
     #[command(
-        after_help = "Example:\n  abbe volumetric sessions/hermle-c600u/machine.toml --order first --errors EX0C,EY0C,EXX"
+        after_help = "Examples:\n  abbe volumetric sessions/hermle-c600u/machine.toml --order first --errors EX0C,EY0C,EXX\n  abbe volumetric sessions/volumetric/machine.toml --map map.csv --functions sessions/volumetric/errors.toml --compensate"
     )]
     Volumetric(equation::VolumetricArguments),
     /// Identify errors from readings, with uncertainties.
-    #[command(
-        after_help = "Example:\n  abbe fit sessions/hermle-c600u/measured/session.toml --json fit.json"
-    )]
+    #[command(after_help = fit::HELP)]
     Fit(fit::FitArguments),
     /// What can these tests see, before anybody measures?
     #[command(after_help = plan::EXAMPLES)]

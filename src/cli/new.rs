@@ -63,6 +63,113 @@ const TEMPLATES: &[Template] = &[
         files: files!("kuka-iiwa14": "machine.toml", "session.toml"),
     },
     Template {
+        name: "self-calibration",
+        about: "rotary table probed on an uncalibrated cylinder; a plan, and readings simulated from it",
+        files: &[
+            (
+                "machine.toml",
+                include_str!("../../sessions/self-calibration/machine.toml"),
+            ),
+            (
+                "plan.toml",
+                include_str!("../../sessions/self-calibration/session.toml"),
+            ),
+            (
+                "session.toml",
+                include_str!("../../sessions/self-calibration/measured/session.toml"),
+            ),
+            (
+                "1a.csv",
+                include_str!("../../sessions/self-calibration/measured/1a.csv"),
+            ),
+            (
+                "1b.csv",
+                include_str!("../../sessions/self-calibration/measured/1b.csv"),
+            ),
+            (
+                "2.csv",
+                include_str!("../../sessions/self-calibration/measured/2.csv"),
+            ),
+            (
+                "3.csv",
+                include_str!("../../sessions/self-calibration/measured/3.csv"),
+            ),
+        ],
+    },
+    Template {
+        name: "volumetric",
+        about: "five-axis machine with 33 error functions, to map and to compensate (`abbe volumetric --map`)",
+        files: files!("volumetric": "machine.toml", "errors.toml"),
+    },
+    Template {
+        name: "table-and-head",
+        about: "five-axis machine with a rotary table and a tilting head; ball-bar plan of chapter 7, and simulated readings",
+        files: &[
+            (
+                "machine.toml",
+                include_str!("../../sessions/table-and-head/machine.toml"),
+            ),
+            (
+                "plan.toml",
+                include_str!("../../sessions/table-and-head/session.toml"),
+            ),
+            (
+                "session.toml",
+                include_str!("../../sessions/table-and-head/measured/session.toml"),
+            ),
+            (
+                "A100.csv",
+                include_str!("../../sessions/table-and-head/measured/A100.csv"),
+            ),
+            (
+                "A150.csv",
+                include_str!("../../sessions/table-and-head/measured/A150.csv"),
+            ),
+            (
+                "C100.csv",
+                include_str!("../../sessions/table-and-head/measured/C100.csv"),
+            ),
+            (
+                "C150.csv",
+                include_str!("../../sessions/table-and-head/measured/C150.csv"),
+            ),
+        ],
+    },
+    Template {
+        name: "tilting-head",
+        about: "five-axis machine with a tilting head; ball-bar plan of chapter 7, and simulated readings",
+        files: &[
+            (
+                "machine.toml",
+                include_str!("../../sessions/tilting-head/machine.toml"),
+            ),
+            (
+                "plan.toml",
+                include_str!("../../sessions/tilting-head/session.toml"),
+            ),
+            (
+                "session.toml",
+                include_str!("../../sessions/tilting-head/measured/session.toml"),
+            ),
+            (
+                "B100.csv",
+                include_str!("../../sessions/tilting-head/measured/B100.csv"),
+            ),
+            (
+                "B150.csv",
+                include_str!("../../sessions/tilting-head/measured/B150.csv"),
+            ),
+            (
+                "C100.csv",
+                include_str!("../../sessions/tilting-head/measured/C100.csv"),
+            ),
+            (
+                "C150.csv",
+                include_str!("../../sessions/tilting-head/measured/C150.csv"),
+            ),
+        ],
+    },
+    Template {
         name: "ur10",
         about: "six-axis robot before a laser tracker (public data set, to be fetched)",
         files: files!("ur10": "machine.toml", "session.toml"),

@@ -6,7 +6,7 @@ use std::collections::HashMap;
 use std::sync::Arc;
 
 use abbe_model::effect::{Component, Driver, DriverSample, Effect, Shape};
-use abbe_model::instrument::{InsideUnit, InstrumentKind};
+use abbe_model::instrument::InsideUnit;
 use abbe_model::sensitivity::Sensitivities;
 use faer::{Mat, MatMut};
 use rayon::prelude::*;
@@ -166,7 +166,7 @@ impl<'p, 'a> Columns<'p, 'a> {
     /// The greatest coefficient that an effect may plausibly have, in inside units: 0.1 mm and 1 mrad on a machine tool, ten times as much on the
     /// robots and long chains that trackers and sockets measure.
     pub fn plausible(&self, effect: &Effect, layout: &Layout) -> f64 {
-        let machine_tool = self.problem.session.instrument == InstrumentKind::BallBar;
+        let machine_tool = self.problem.session.instrument.is_two_sided();
         let scale = if machine_tool { 1.0 } else { 10.0 };
         let most = match drivers::component_unit(self.problem.session, &effect.component) {
             Some(InsideUnit::Millimetre) => 0.1 * scale,

@@ -3,6 +3,7 @@
 //! A new instrument is one file here: its nominal geometry, its unknowns in a fixed order, and `read`.
 
 pub mod ballbar;
+pub mod probe;
 pub mod socket;
 pub mod tracker;
 
@@ -46,15 +47,26 @@ pub enum InstrumentKind {
     Tracker,
     /// A ball in fixed sockets.
     Socket,
+    /// A touch probe.
+    Probe,
 }
 
 impl InstrumentKind {
     /// All kinds.
-    pub const ALL: [InstrumentKind; 3] = [
+    pub const ALL: [InstrumentKind; 4] = [
         InstrumentKind::BallBar,
         InstrumentKind::Tracker,
         InstrumentKind::Socket,
+        InstrumentKind::Probe,
     ];
+
+    /// Whether a reading lies between a point of the table and one of the tool, so that errors of both sides move it.
+    pub fn is_two_sided(self) -> bool {
+        match self {
+            InstrumentKind::BallBar | InstrumentKind::Probe => true,
+            InstrumentKind::Tracker | InstrumentKind::Socket => false,
+        }
+    }
 
     /// The word that a session file uses.
     pub fn word(self) -> &'static str {
@@ -62,13 +74,14 @@ impl InstrumentKind {
             InstrumentKind::BallBar => "ballbar",
             InstrumentKind::Tracker => "tracker",
             InstrumentKind::Socket => "socket",
+            InstrumentKind::Probe => "probe",
         }
     }
 
     /// Scalar coordinates of a reading.
     pub fn coordinates(self) -> usize {
         match self {
-            InstrumentKind::BallBar => 1,
+            InstrumentKind::BallBar | InstrumentKind::Probe => 1,
             InstrumentKind::Tracker | InstrumentKind::Socket => 3,
         }
     }
@@ -79,6 +92,7 @@ impl InstrumentKind {
             InstrumentKind::BallBar => &ballbar::UNKNOWNS,
             InstrumentKind::Tracker => &tracker::UNKNOWNS,
             InstrumentKind::Socket => &socket::UNKNOWNS,
+            InstrumentKind::Probe => &probe::UNKNOWNS,
         }
     }
 }
@@ -101,7 +115,7 @@ pub enum SharedBy {
 /// One of an instrument's own unknowns.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct InstrumentUnknown {
-    /// The thing: `workpiece_ball`, `spindle_ball`, `bar`, `tracker`, `target`, `socket`, `ball`.
+    /// The thing: `workpiece_ball`, `spindle_ball`, `bar`, `tracker`, `target`, `socket`, `ball`, `artefact`, `stylus`.
     pub thing: &'static str,
     /// Its coordinate, `x` … `c`, or empty.
     pub coordinate: &'static str,
@@ -131,6 +145,8 @@ pub enum Station<N> {
     Tracker(tracker::Tracker<N>),
     /// A socket.
     Socket(socket::Socket<N>),
+    /// A touch probe.
+    Probe(probe::Probe<N>),
 }
 
 impl<N> Station<N> {
@@ -152,6 +168,13 @@ impl<N> Station<N> {
                 ball: point(&socket.ball),
                 socket: point(&socket.socket),
             }),
+            Station::Probe(probe) => Station::Probe(probe::Probe {
+                artefact: point(&probe.artefact),
+                axis: point(&probe.axis),
+                radius: to(&probe.radius),
+                stylus: point(&probe.stylus),
+                direction: probe.direction.as_ref().map(point),
+            }),
         }
     }
 
@@ -161,6 +184,7 @@ impl<N> Station<N> {
             Station::BallBar(_) => InstrumentKind::BallBar,
             Station::Tracker(_) => InstrumentKind::Tracker,
             Station::Socket(_) => InstrumentKind::Socket,
+            Station::Probe(_) => InstrumentKind::Probe,
         }
     }
 
@@ -180,6 +204,7 @@ impl<N> Station<N> {
             Station::BallBar(bar) => Reading::length(bar.read(machine, state, errors, unknown)),
             Station::Tracker(tracker) => Reading::vector(tracker.read(machine, state, errors, unknown).0),
             Station::Socket(socket) => Reading::vector(socket.read(machine, state, errors, unknown).0),
+            Station::Probe(probe) => Reading::length(probe.read(machine, state, errors, unknown)),
         }
     }
 
@@ -190,6 +215,7 @@ impl<N> Station<N> {
     {
         match self {
             Station::BallBar(bar) => Some(bar.workpiece_ball),
+            Station::Probe(probe) => Some(probe.artefact),
             Station::Tracker(_) | Station::Socket(_) => None,
         }
     }
@@ -203,6 +229,7 @@ impl<N> Station<N> {
             Station::BallBar(bar) => bar.spindle_ball,
             Station::Tracker(tracker) => tracker.target,
             Station::Socket(socket) => socket.ball,
+            Station::Probe(probe) => probe.stylus,
         }
     }
 }

@@ -88,6 +88,8 @@ pub enum FollowOffset {
     Tangential,
     /// Along the axis.
     Axial,
+    /// No bar: the tool point stays on the point of the table over which it stands before the axis turns.
+    None,
 }
 
 /// The states that a test is planned to read at: positions, runs and times, with nothing observed yet.
@@ -192,20 +194,20 @@ pub(crate) fn stand(
     at: &mut [f64],
 ) {
     if let (
-        Station::BallBar(bar),
+        Some(pair),
         Some(Motion::Circle {
             first,
             second,
             centre,
             ..
         }),
-    ) = (station, motion)
+    ) = (plan::pair(station), motion)
     {
         let open: Vec<usize> = plan::linear_axes(machine)
             .into_iter()
             .filter(|axis| !listed[*axis] || axis == first || axis == second)
             .collect();
-        let placed = plan::placed(machine, bar, at, &open, *centre);
+        let placed = plan::placed(machine, &pair, at, &open, *centre);
         for axis in open {
             if axis != *first && axis != *second {
                 at[axis] = placed.0[axis];

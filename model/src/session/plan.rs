@@ -50,16 +50,12 @@ pub(super) fn states(machine: &Machine, test: &Test, motion: &Motion) -> Result<
             runs,
             both_directions,
         } => {
-            let zero = BallBar {
+            let bar = pair(&test.station).unwrap_or(BallBar {
                 workpiece_ball: [0.0; 3],
                 spindle_ball: [0.0; 3],
                 bar: 0.0,
-            };
-            let bar = match &test.station {
-                Station::BallBar(bar) => bar,
-                _ => &zero,
-            };
-            let circle = Circle::new(machine, bar, &test.at, [*first, *second], *centre)?;
+            });
+            let circle = Circle::new(machine, &bar, &test.at, [*first, *second], *centre)?;
             let along = steps(*from, *to, *step);
             let turn = *speed / *radius;
             traversals(machine, &along, turn, *runs, *both_directions, |angle| {
@@ -76,19 +72,22 @@ pub(super) fn states(machine: &Machine, test: &Test, motion: &Motion) -> Result<
             both_directions,
             offset,
         } => {
-            let Station::BallBar(bar) = &test.station else {
+            let Some(mut bar) = pair(&test.station) else {
                 return Err((
-                    format!("test \"{}\" follows without a ball bar", test.name),
-                    "a path of kind \"follow\" needs one".into(),
+                    format!("test \"{}\" follows no point of the table", test.name),
+                    "a path of kind \"follow\" needs a ball bar or a probe".into(),
                 ));
             };
+            if *offset == FollowOffset::None {
+                bar.workpiece_ball = under_the_tool(machine, &bar, &test.at);
+            }
             let linear = linear_axes(machine);
             let along = steps(*from, *to, *step);
             traversals(machine, &along, *speed, *runs, *both_directions, |q| {
                 let mut at = test.at.clone();
                 at[*axis] = q;
-                let wanted = offset_vector(machine, bar, &at, *axis, *offset)?;
-                let (state, missed) = placed(machine, bar, &at, &linear, wanted);
+                let wanted = offset_vector(machine, &bar, &at, *axis, *offset)?;
+                let (state, missed) = placed(machine, &bar, &at, &linear, wanted);
                 if missed > MISSED_MM {
                     return Err((
                         format!(
@@ -104,6 +103,26 @@ pub(super) fn states(machine: &Machine, test: &Test, motion: &Motion) -> Result<
         }
         Motion::List => Ok(Readings::default()),
     }
+}
+
+/// The point of the table and the point of the tool that an instrument holds together, as the ends of a bar.
+pub(super) fn pair(station: &Station<f64>) -> Option<BallBar<f64>> {
+    if let Station::BallBar(bar) = station {
+        return Some(bar.clone());
+    }
+    station.table_point_mm().map(|point| BallBar {
+        workpiece_ball: point,
+        spindle_ball: station.tool_point_mm(),
+        bar: 0.0,
+    })
+}
+
+/// The point of the table frame at which the tool point stands.
+fn under_the_tool(machine: &Machine, bar: &BallBar<f64>, at: &[f64]) -> [f64; 3] {
+    let state = positions(machine, at);
+    let none = vec![BodyErrors::<f64>::NONE; machine.axes.len()];
+    let tool = machine.tool_point::<f64>(&state, &none, Point(bar.spindle_ball));
+    machine.table_point::<f64>(&state, &none, tool).0
 }
 
 /// `from`, `from + step`, … up to `to`.
@@ -303,6 +322,7 @@ fn offset_vector(
     let radial: [f64; 3] = std::array::from_fn(|i| from[i] - height * along[i]);
     let radius = radial.iter().map(|x| x * x).sum::<f64>().sqrt();
     let unit = match offset {
+        FollowOffset::None => [0.0; 3],
         FollowOffset::Axial => along,
         _ if radius < 1e-6 => {
             return Err((

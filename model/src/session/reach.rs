@@ -18,8 +18,10 @@ pub(crate) fn bar_mm(station: &Station<f64>) -> f64 {
 
 /// That the nominal distance between the balls, by the median over the readings, is the length of the bar.
 pub(crate) fn check(machine: &Machine, test: &Test, readings: &Readings) -> Result<(), (String, String)> {
-    let Station::BallBar(bar) = &test.station else {
-        return Ok(());
+    let bar = match &test.station {
+        Station::BallBar(bar) => bar,
+        Station::Probe(_) => return check_touch(machine, test, readings),
+        Station::Tracker(_) | Station::Socket(_) => return Ok(()),
     };
     let none = vec![BodyErrors::<f64>::NONE; machine.axes.len()];
     let mut state = Vec::new();
@@ -44,6 +46,32 @@ pub(crate) fn check(machine: &Machine, test: &Test, readings: &Readings) -> Resu
          in `at` or an axis direction that is not as on the machine"
             .into(),
     ))
+}
+
+/// That the stylus stands before the artefact, and near it, wherever a reading is taken.
+fn check_touch(machine: &Machine, test: &Test, readings: &Readings) -> Result<(), (String, String)> {
+    let none = vec![BodyErrors::<f64>::NONE; machine.axes.len()];
+    let mut state = Vec::new();
+    for row in 0..readings.rows() {
+        readings.state(machine, row, &mut state);
+        let reading = test.station.read::<f64>(machine, &state, &none, |_| None);
+        let distance = reading.coordinates()[0];
+        if distance.abs() <= MOST_MM {
+            continue;
+        }
+        let found = if distance.is_finite() {
+            format!("stands {distance:.3} mm before the artefact's nominal surface; {MOST_MM} mm is the most")
+        } else {
+            "looks past the artefact, or stands on its axis without a `direction`".into()
+        };
+        return Err((
+            format!("test \"{}\", reading {}: the stylus {found}", test.name, row + 1),
+            "check `radius_mm` (the stylus' radius included), `artefact_mm`, `stylus_mm`, `direction` and the axis \
+             positions in `at` and the data"
+                .into(),
+        ));
+    }
+    Ok(())
 }
 
 /// That the bar read about its own length.

@@ -51,6 +51,7 @@ pub fn readings_text(machine: &Machine, instrument: InstrumentKind, readings: &R
         InstrumentKind::Tracker => header.extend(["px_mm", "py_mm", "pz_mm"].map(String::from)),
         // A pose of a socket is the axes' positions and nothing else.
         InstrumentKind::Socket => {}
+        InstrumentKind::Probe => header.push("distance_mm".into()),
     }
     let mut text = header.join(",");
     text.push('\n');

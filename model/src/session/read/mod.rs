@@ -231,17 +231,17 @@ impl Instrument {
     fn read(root: &mut Table<'_>) -> Result<Instrument, ModelError> {
         let value = root.need("instrument", "[instrument] with `kind = \"ballbar\"`")?;
         let mut table = value.table("[instrument]".into())?;
-        let value = table.need("kind", "\"ballbar\", \"tracker\" or \"socket\"")?;
+        let value = table.need("kind", "\"ballbar\", \"tracker\", \"socket\" or \"probe\"")?;
         let word = value.text()?;
         let Some(kind) = InstrumentKind::ALL.into_iter().find(|kind| kind.word() == word) else {
-            if word == "probe" || word == "r-test" {
-                let help = "ballbar, tracker and socket are";
+            if word == "r-test" {
+                let help = "ballbar, tracker, socket and probe are";
                 return Err(value.error(
                     format!("the instrument \"{word}\" is not built yet"),
                     Some(help.into()),
                 ));
             }
-            return Err(value.unlike("\"ballbar\", \"tracker\" or \"socket\""));
+            return Err(value.unlike("\"ballbar\", \"tracker\", \"socket\" or \"probe\""));
         };
         let mut not_negative = |key: &'static str| -> Result<Option<f64>, ModelError> {
             let Some(value) = table.take(key) else {

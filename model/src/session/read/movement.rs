@@ -109,9 +109,9 @@ fn circle(context: &Context<'_>, mut table: Table<'_>) -> Result<Motion, ModelEr
 }
 
 fn follow(context: &Context<'_>, mut table: Table<'_>, station: &Station<f64>) -> Result<Motion, ModelError> {
-    if !matches!(station, Station::BallBar(_)) {
+    if station.table_point_mm().is_none() {
         return Err(table.error(
-            "a path of kind \"follow\" needs a ball bar between its balls",
+            "a path of kind \"follow\" needs an instrument that holds a point of the table: a ball bar or a probe",
             None,
         ));
     }
@@ -123,12 +123,18 @@ fn follow(context: &Context<'_>, mut table: Table<'_>, station: &Station<f64>) -
             None,
         ));
     }
-    let offset = table.need("offset", "\"radial\", \"tangential\" or \"axial\"")?;
-    let offset = match offset.text()?.as_str() {
-        "radial" => FollowOffset::Radial,
-        "tangential" => FollowOffset::Tangential,
-        "axial" => FollowOffset::Axial,
-        _ => return Err(offset.unlike("\"radial\", \"tangential\" or \"axial\"")),
+    let offset = match station {
+        Station::BallBar(_) => {
+            let offset = table.need("offset", "\"radial\", \"tangential\" or \"axial\"")?;
+            match offset.text()?.as_str() {
+                "radial" => FollowOffset::Radial,
+                "tangential" => FollowOffset::Tangential,
+                "axial" => FollowOffset::Axial,
+                _ => return Err(offset.unlike("\"radial\", \"tangential\" or \"axial\"")),
+            }
+        }
+        // Nothing of a fixed length lies between the points.
+        _ => FollowOffset::None,
     };
     let way = Way::read(&mut table, kind, false)?;
     let speed = speed(context, &mut table, axis, station)?;
@@ -252,8 +258,10 @@ fn speed(
         (AxisKind::Rotary, Some(feed), None) => {
             let feed_mm_s = feed.positive()? / 60.0;
             let carried = match station {
-                Station::BallBar(bar) if axis < context.machine.workpiece_side => bar.workpiece_ball,
-                other => other.tool_point_mm(),
+                station if axis < context.machine.workpiece_side => {
+                    station.table_point_mm().unwrap_or(station.tool_point_mm())
+                }
+                station => station.tool_point_mm(),
             };
             let radius = radius_about(&context.machine.axes[axis], carried);
             if radius < 1e-3 {

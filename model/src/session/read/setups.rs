@@ -54,6 +54,7 @@ fn nominal(station: &Station<f64>, group: SharedBy) -> [f64; 3] {
         (Station::BallBar(bar), SharedBy::Setup) => bar.workpiece_ball,
         (Station::BallBar(bar), SharedBy::BarSetup) => [bar.bar, 0.0, 0.0],
         (Station::Tracker(_), SharedBy::Setup) => [0.0; 3],
+        (Station::Probe(probe), SharedBy::Setup) => probe.artefact,
         (station, _) => station.tool_point_mm(),
     }
 }

@@ -4,6 +4,7 @@ use super::Context;
 use super::quantity::MICROMETRE;
 use crate::error::ModelError;
 use crate::instrument::ballbar::BallBar;
+use crate::instrument::probe::Probe;
 use crate::instrument::socket::Socket;
 use crate::instrument::tracker::Tracker;
 use crate::instrument::{InstrumentKind, Station};
@@ -20,7 +21,7 @@ pub(super) struct SetUp {
 }
 
 /// Keys of a test that only one instrument has.
-const OWN: [(InstrumentKind, &[&str]); 3] = [
+const OWN: [(InstrumentKind, &[&str]); 4] = [
     (
         InstrumentKind::BallBar,
         &[
@@ -35,6 +36,20 @@ const OWN: [(InstrumentKind, &[&str]); 3] = [
     ),
     (InstrumentKind::Tracker, &["target_mm", "target_u_um"]),
     (InstrumentKind::Socket, &["ball_mm", "ball_u_um", "socket"]),
+    (
+        InstrumentKind::Probe,
+        &[
+            "artefact_mm",
+            "artefact_u_um",
+            "artefact_u_arcsec",
+            "artefact_axis",
+            "radius_mm",
+            "radius_u_um",
+            "stylus_mm",
+            "stylus_u_um",
+            "direction",
+        ],
+    ),
 ];
 
 /// Takes the instrument's keys out of a test.
@@ -58,6 +73,7 @@ pub(super) fn set_up(context: &Context<'_>, table: &mut Table<'_>) -> Result<Set
         InstrumentKind::BallBar => ball_bar(context, table),
         InstrumentKind::Tracker => tracker(context, table),
         InstrumentKind::Socket => socket(context, table),
+        InstrumentKind::Probe => probe(context, table),
     }
 }
 
@@ -140,6 +156,79 @@ fn socket(context: &Context<'_>, table: &mut Table<'_>) -> Result<SetUp, ModelEr
         priors,
         socket,
     })
+}
+
+fn probe(context: &Context<'_>, table: &mut Table<'_>) -> Result<SetUp, ModelError> {
+    let artefact = table.need("artefact_mm", "a point of the cylinder's axis in the table frame")?;
+    let (artefact, artefact_mm) = context.point(artefact)?;
+    let radius = table.need("radius_mm", "the cylinder's radius, the stylus' included")?;
+    let (radius_as_written, radius_mm) = context.length(&radius)?;
+    if radius_mm <= 0.0 {
+        let message = format!("`radius_mm` is {radius_mm}; a cylinder has a radius above 0");
+        return Err(radius.error(message, None));
+    }
+    let stylus = table.need("stylus_mm", "the stylus' centre in the tool frame")?;
+    let (stylus, stylus_mm) = context.point(stylus)?;
+    let axis = match table.take("artefact_axis") {
+        Some(value) => unit_vector(value)?,
+        None => [0.0, 0.0, 1.0],
+    };
+    let direction = match table.take("direction") {
+        Some(value) => Some(unit_vector(value)?),
+        None => None,
+    };
+    let mut priors = priors(table.take("artefact_u_um"), 3)?;
+    priors.extend(angle_priors(table.take("artefact_u_arcsec"))?);
+    priors.extend(self::priors(table.take("radius_u_um"), 1)?);
+    priors.push(Prior::Known); // the form
+    priors.extend(self::priors(table.take("stylus_u_um"), 3)?);
+    let written = |vector: [f64; 3]| vector.map(Length::Number);
+    Ok(SetUp {
+        station: Station::Probe(Probe {
+            artefact: artefact_mm,
+            axis,
+            radius: radius_mm,
+            stylus: stylus_mm,
+            direction,
+        }),
+        geometry: Station::Probe(Probe {
+            artefact,
+            axis: written(axis),
+            radius: radius_as_written,
+            stylus,
+            direction: direction.map(written),
+        }),
+        priors,
+        socket: None,
+    })
+}
+
+/// A direction as three numbers, brought to unit length.
+fn unit_vector(value: Value<'_>) -> Result<[f64; 3], ModelError> {
+    let (source, span, key) = (value.source, value.span.clone(), value.key.clone());
+    let items = value.three("a direction as three numbers")?;
+    let mut vector = [0.0; 3];
+    for (component, item) in vector.iter_mut().zip(&items) {
+        *component = item.number()?;
+    }
+    let length = vector.iter().map(|x| x * x).sum::<f64>().sqrt();
+    if length < 1e-9 {
+        return Err(source.error(span, format!("`{key}` has no length"), None));
+    }
+    Ok(vector.map(|x| x / length))
+}
+
+/// `…_u_arcsec`, as [`priors`] for three angles.
+fn angle_priors(value: Option<Value<'_>>) -> Result<Vec<Prior>, ModelError> {
+    const ARCSECOND: f64 = std::f64::consts::PI / (180.0 * 3600.0);
+    let in_mm = priors(value, 3)?;
+    Ok(in_mm
+        .into_iter()
+        .map(|prior| match prior {
+            Prior::Gaussian(u) => Prior::Gaussian(u / MICROMETRE * ARCSECOND),
+            other => other,
+        })
+        .collect())
 }
 
 /// `…_u_um`: a number for all coordinates or a list with one for each. Absent or 0 is known, `inf` is free.

@@ -37,6 +37,8 @@ pub(super) enum Role {
     Axis(usize, Unit),
     Length(Unit),
     Deviation(Unit),
+    /// Against the probing direction: how far out a surface was met beyond the target.
+    Outward(Unit),
     Coordinate(usize, Unit),
     Socket,
 }
@@ -69,6 +71,8 @@ impl Role {
         match (request.instrument, what) {
             (InstrumentKind::BallBar, "length") => Some(Role::Length(unit)),
             (InstrumentKind::BallBar, "deviation") => Some(Role::Deviation(unit)),
+            (InstrumentKind::Probe, "distance") => Some(Role::Length(unit)),
+            (InstrumentKind::Probe, "deviation") => Some(Role::Outward(unit)),
             (InstrumentKind::Tracker, "px") => Some(Role::Coordinate(0, unit)),
             (InstrumentKind::Tracker, "py") => Some(Role::Coordinate(1, unit)),
             (InstrumentKind::Tracker, "pz") => Some(Role::Coordinate(2, unit)),
@@ -81,7 +85,10 @@ impl Role {
         match (self, other) {
             (Role::Axis(a, _), Role::Axis(b, _)) => a == b,
             (Role::Coordinate(a, _), Role::Coordinate(b, _)) => a == b,
-            (Role::Length(_) | Role::Deviation(_), Role::Length(_) | Role::Deviation(_)) => true,
+            (
+                Role::Length(_) | Role::Deviation(_) | Role::Outward(_),
+                Role::Length(_) | Role::Deviation(_) | Role::Outward(_),
+            ) => true,
             _ => self == other,
         }
     }
@@ -99,6 +106,7 @@ fn known(request: &Request<'_>) -> Vec<String> {
         InstrumentKind::BallBar => &["length_mm", "deviation_um"],
         InstrumentKind::Tracker => &["px_mm", "py_mm", "pz_mm"],
         InstrumentKind::Socket => &["socket"],
+        InstrumentKind::Probe => &["distance_mm", "deviation_um"],
     };
     known.extend(own.iter().map(|name| name.to_string()));
     known
@@ -286,6 +294,15 @@ fn required(
                 return missing(
                     "with what the bar read".into(),
                     "a ball bar needs `length_mm`, or `deviation_um` from `bar_mm`".into(),
+                );
+            }
+        }
+        InstrumentKind::Probe => {
+            if !has(&|role| matches!(role, Role::Length(_) | Role::Outward(_))) {
+                return missing(
+                    "with what the probe read".into(),
+                    "a probe needs `distance_mm` to the surface, or `deviation_um`, by how much further out it was met"
+                        .into(),
                 );
             }
         }

@@ -199,6 +199,7 @@ impl<'a> Filled<'a> {
                 }
                 Role::Length(unit) => observed[0] = unit.inside(value),
                 Role::Deviation(unit) => observed[0] = self.request.bar_mm + unit.inside(value),
+                Role::Outward(unit) => observed[0] = -unit.inside(value),
                 Role::Coordinate(i, unit) => observed[i] = unit.inside(value),
                 Role::Socket => {}
             }

@@ -1,0 +1,212 @@
+//! The centre of the circle that one ball describes about a turning axis while the other ball stands.
+//!
+//! With `m` the moving ball from the standing one, `h` its part along the axis and φ the angle of the rest, all nominal, a reading `L` is laid out as
+//!
+//! ```text
+//! (u, v) = √(L² − h²) · (cos φ, sin φ)
+//! ```
+//!
+//! and the centre of the least-squares circle through these points is where the axis passes the standing ball. Without extension bar `h = 0` (Section
+//! 4.2 of the thesis); with it the lengths are brought down to the bottom of the cone (Sections 4.2.1 and 5.2). A start angle that is off (Eq. 4.1) is
+//! in φ as soon as `workpiece_ball_mm` says where the ball was found.
+
+use abbe_model::axis::AxisKind;
+use abbe_model::chain::{BodyErrors, Machine};
+use abbe_model::frames::Point;
+use abbe_model::instrument::Station;
+use abbe_model::instrument::ballbar::BallBar;
+use abbe_model::sensitivity::TestModel;
+use num_dual::{Derivative, DualNum, DualSVec64};
+
+use crate::circle;
+
+/// How far the standing ball may move nominally, and an axis turn beside the one that sweeps, mm or rad.
+const STILL: f64 = 1e-6;
+/// Readings differentiated at once.
+const PACK: usize = 8;
+
+/// How one test sees its axis.
+#[derive(Clone, Debug)]
+pub struct Layout {
+    /// The axis that turns, by index.
+    pub axis: usize,
+    /// The two directions of R across it: 0, 1, 2 for X, Y, Z.
+    pub across: [usize; 2],
+    /// Where the axis nominally passes the standing ball, mm across.
+    pub nominal_mm: [f64; 2],
+    /// Of the moving ball from the standing one, along the axis, mm: what an extension bar makes room for.
+    pub height_mm: f64,
+    /// Of the circle's plane from the origin of the axis, along the axis, mm.
+    pub plane_mm: f64,
+    /// Sine and cosine of φ, reading by reading.
+    angle: Vec<[f64; 2]>,
+}
+
+/// The centre that readings of a test give.
+#[derive(Clone, Debug)]
+pub struct Centre {
+    /// Of the fitted circle from where the axis nominally is, mm across.
+    pub offset_mm: [f64; 2],
+    /// Radius of the fitted circle, mm.
+    pub radius_mm: f64,
+    /// Derivative of each offset by each reading; 0 for those that are left out.
+    pub by_reading: [Vec<f64>; 2],
+}
+
+impl Layout {
+    /// From the nominal machine; or why a test is no circle.
+    pub fn of(machine: &Machine, model: &TestModel<'_>) -> Result<Layout, String> {
+        let Station::BallBar(bar) = model.station() else {
+            return Err("it is no ball-bar test".into());
+        };
+        let axis = turning(machine, model)?;
+        let on_table = axis < machine.workpiece_side;
+        let balls = |row| balls(machine, model, bar, row, on_table);
+        let (origin, along) = line(machine, model, axis);
+        let Some(principal) = (0..3).find(|k| (along[*k].abs() - 1.0).abs() < STILL) else {
+            return Err(format!(
+                "axis `{}` does not lie along X, Y or Z while it turns",
+                machine.axes[axis].name
+            ));
+        };
+        let across = [(principal + 1) % 3, (principal + 2) % 3];
+        let (_, standing) = balls(0);
+        let mut angle = Vec::with_capacity(model.rows());
+        let (mut height_mm, mut plane_mm) = (0.0, 0.0);
+        for row in 0..model.rows() {
+            let (moving, stands) = balls(row);
+            if (0..3).any(|k| (stands[k] - standing[k]).abs() > STILL) {
+                return Err("the other ball does not stand still".into());
+            }
+            let from: [f64; 3] = std::array::from_fn(|k| moving[k] - stands[k]);
+            if row == 0 {
+                height_mm = from[principal];
+                plane_mm = moving[principal] - origin[principal];
+            }
+            let [u, v] = across.map(|k| from[k]);
+            let radius = u.hypot(v);
+            if radius < 1.0 {
+                return Err("the moving ball stands over the other: its angle says nothing".into());
+            }
+            angle.push([v / radius, u / radius]);
+        }
+        Ok(Layout {
+            axis,
+            nominal_mm: across.map(|k| origin[k] - standing[k]),
+            across,
+            height_mm,
+            plane_mm,
+            angle,
+        })
+    }
+
+    /// The centre that readings give, those left out for which `left_out` holds.
+    pub fn centre(&self, lengths_mm: &[f64], left_out: &[bool]) -> Result<Centre, String> {
+        let kept: Vec<usize> = (0..lengths_mm.len()).filter(|row| !left_out[*row]).collect();
+        if let Some(row) = kept.iter().find(|row| lengths_mm[**row] <= self.height_mm.abs()) {
+            return Err(format!(
+                "reading {} is {:.3} mm, shorter than the balls are nominally apart along the axis ({:.3} mm)",
+                row + 1,
+                lengths_mm[*row],
+                self.height_mm.abs()
+            ));
+        }
+        let mut centre = Centre {
+            offset_mm: [0.0; 2],
+            radius_mm: 0.0,
+            by_reading: [vec![0.0; lengths_mm.len()], vec![0.0; lengths_mm.len()]],
+        };
+        let mut points: Vec<[DualSVec64<PACK>; 2]> = Vec::with_capacity(kept.len());
+        for pack in kept.chunks(PACK) {
+            points.clear();
+            for &row in &kept {
+                let mut length = DualSVec64::<PACK>::from(lengths_mm[row]);
+                if let Some(place) = pack.iter().position(|seeded| *seeded == row) {
+                    let mut seed = nalgebra::SVector::<f64, PACK>::zeros();
+                    seed[place] = 1.0;
+                    length.eps = Derivative::some(seed);
+                }
+                let radius = (length * length - self.height_mm * self.height_mm).sqrt();
+                let [sin, cos] = self.angle[row];
+                points.push([radius * cos, radius * sin]);
+            }
+            let Some(circle) = circle::through(&points) else {
+                return Err("its readings lie on no circle".into());
+            };
+            centre.radius_mm = circle.radius.re;
+            for (which, coordinate) in circle.centre.iter().enumerate() {
+                centre.offset_mm[which] = coordinate.re - self.nominal_mm[which];
+                let gradient = coordinate
+                    .eps
+                    .unwrap_generic(nalgebra::Const::<PACK>, nalgebra::Const::<1>);
+                for (place, row) in pack.iter().enumerate() {
+                    centre.by_reading[which][*row] = gradient[place];
+                }
+            }
+        }
+        Ok(centre)
+    }
+}
+
+/// The one axis that turns in a test.
+fn turning(machine: &Machine, model: &TestModel<'_>) -> Result<usize, String> {
+    let moves = |axis: &usize| {
+        let first = model.state(0)[*axis].value;
+        (1..model.rows()).any(|row| (model.state(row)[*axis].value - first).abs() > STILL)
+    };
+    let moving: Vec<usize> = (0..machine.axes.len()).filter(moves).collect();
+    match moving[..] {
+        [axis] if machine.axes[axis].kind == AxisKind::Rotary => Ok(axis),
+        _ => {
+            let names: Vec<&str> = moving
+                .iter()
+                .map(|axis| machine.axes[*axis].name.as_str())
+                .collect();
+            Err(format!(
+                "one rotary axis alone has to turn, and {} {}",
+                if names.is_empty() {
+                    "none".into()
+                } else {
+                    names.join(", ")
+                },
+                if names.len() == 1 { "moves" } else { "move" }
+            ))
+        }
+    }
+}
+
+/// The moving ball and the standing one in R, nominal.
+fn balls(
+    machine: &Machine,
+    model: &TestModel<'_>,
+    bar: &BallBar<f64>,
+    row: usize,
+    on_table: bool,
+) -> ([f64; 3], [f64; 3]) {
+    let none = vec![BodyErrors::<f64>::NONE; machine.axes.len()];
+    let (workpiece, spindle) = bar.balls::<f64>(machine, model.state(row), &none, &|_| None);
+    if on_table {
+        (workpiece.0, spindle.0)
+    } else {
+        (spindle.0, workpiece.0)
+    }
+}
+
+/// A point of an axis and its direction in R, carried by the axes between it and the bed as they stand in the first reading.
+fn line(machine: &Machine, model: &TestModel<'_>, axis: usize) -> ([f64; 3], [f64; 3]) {
+    let none = vec![BodyErrors::<f64>::NONE; machine.axes.len()];
+    let state = model.state(0);
+    let in_r = |point: [f64; 3]| {
+        let outward: Vec<usize> = if axis < machine.workpiece_side {
+            (axis + 1..machine.workpiece_side).collect()
+        } else {
+            (machine.workpiece_side..axis).rev().collect()
+        };
+        let carried = |point, index: usize| machine.push::<f64>(index, state, &none, point);
+        outward.into_iter().fold(Point(point), carried).0
+    };
+    let axis = &machine.axes[axis];
+    let origin = in_r(axis.origin_mm);
+    let tip = in_r(std::array::from_fn(|k| axis.origin_mm[k] + axis.direction[k]));
+    (origin, std::array::from_fn(|k| tip[k] - origin[k]))
+}

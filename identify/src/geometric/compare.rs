@@ -1,0 +1,234 @@
+//! A geometric method and the full fit on the same readings: value, uncertainty, and bias on readings simulated with known errors.
+
+use abbe_model::session::Session;
+use serde::Serialize;
+
+use super::{Estimator, Method};
+use crate::error::IdentifyError;
+use crate::fit::{self, Fit};
+use crate::parameters::Role;
+use crate::problem::Problem;
+
+/// The centre of one test.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct CentreResult {
+    /// The test.
+    pub test: String,
+    /// The axis that turns.
+    pub axis: String,
+    /// The two directions across it, `X`, `Y` or `Z`.
+    pub across: [String; 2],
+    /// Of the circle's centre from where the axis nominally is, µm.
+    pub offset_um: [f64; 2],
+    /// Standard uncertainties, µm.
+    pub u_um: [f64; 2],
+    /// Radius of the circle, mm.
+    pub radius_mm: f64,
+    /// Of the circle's plane along the axis, mm from the axis' origin.
+    pub plane_mm: f64,
+    /// Height of the cone, mm; 0 where both balls lie in the plane.
+    pub height_mm: f64,
+    /// What each declared error adds to the offsets, µm a µm or µm an arcsec.
+    pub shares: Vec<(String, [f64; 2])>,
+}
+
+/// One error by both ways, in its own unit.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct ComparisonRow {
+    /// The error.
+    pub id: String,
+    /// Unit of all figures.
+    pub unit: String,
+    /// By the method; `None` where it does not tell the error.
+    pub value: Option<f64>,
+    /// Its standard uncertainty from noise and set-ups.
+    pub u: Option<f64>,
+    /// By the method on noise-free readings simulated with the full fit's errors, less those errors.
+    pub bias: Option<f64>,
+    /// By the full fit; `None` where it does not see the error.
+    pub full_value: Option<f64>,
+    /// Its standard uncertainty.
+    pub full_u: Option<f64>,
+    /// As `bias`, for the full fit.
+    pub full_bias: Option<f64>,
+}
+
+/// A method beside the full fit.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Comparison {
+    /// `circle`, `cone`, `two-plane`.
+    pub method: String,
+    /// Number of readings in the session.
+    pub readings: usize,
+    /// Standard uncertainty of a reading, µm.
+    pub noise_um: f64,
+    /// Where that comes from.
+    pub noise_source: String,
+    /// Residual of the full fit, µm.
+    pub rms_um: f64,
+    /// Residual of the method's errors on the readings that it took, set-ups nominal, µm.
+    pub method_rms_um: f64,
+    /// Residual of the nominal machine on the same readings, µm: before compensation.
+    pub nominal_rms_um: f64,
+    /// The centres.
+    pub centres: Vec<CentreResult>,
+    /// The errors.
+    pub errors: Vec<ComparisonRow>,
+    /// What a user should know.
+    pub warnings: Vec<String>,
+}
+
+/// Estimates the errors of a session by a geometric method and by the full fit.
+///
+/// # Errors
+/// See [`Estimator::new`] and [`fit::prepare`].
+pub fn compare(session: &Session, method: Method, seed: u64) -> Result<Comparison, IdentifyError> {
+    let (problem, full) = fit::prepare(session, seed)?;
+    let estimator = Estimator::new(&problem, method)?;
+    let observed = observed(&problem);
+    let estimate = estimator.estimate(&problem, &observed)?;
+    let list = &problem.parameters.list;
+
+    // Known errors: the full fit's, set-ups and effects left out.
+    let mut known = vec![0.0; list.len()];
+    for (p, parameter) in list.iter().enumerate() {
+        if parameter.role == Role::Error && full.rank.is_seen(p) {
+            known[p] = full.beta[p];
+        }
+    }
+    let simulated = readings(&problem, &known);
+    let of_simulated: Vec<&[f64]> = simulated.iter().map(Vec::as_slice).collect();
+    let again = estimator.estimate(&problem, &of_simulated)?;
+    let full_again = refitted(&problem, &simulated, &full)?;
+
+    let mut errors = Vec::new();
+    for (p, parameter) in list.iter().enumerate() {
+        if parameter.role != Role::Error {
+            continue;
+        }
+        let outside = parameter.unit.per_inside;
+        let place = estimator.errors.iter().position(|error| *error == p);
+        let seen = full.rank.is_seen(p).then_some(());
+        errors.push(ComparisonRow {
+            id: parameter.id.clone(),
+            unit: parameter.unit.name.clone(),
+            value: place.map(|k| estimate.values[k] * outside),
+            u: place.map(|k| estimate.covariance[(k, k)].max(0.0).sqrt() * outside),
+            bias: place.map(|k| (again.values[k] - known[p]) * outside),
+            full_value: seen.map(|()| full.beta[p] * outside),
+            full_u: seen.map(|()| full.covariance[(p, p)].max(0.0).sqrt() * full.birge_ratio * outside),
+            full_bias: seen.map(|()| (full_again[p] - known[p]) * outside),
+        });
+    }
+    let mut by_method = vec![0.0; list.len()];
+    for (k, p) in estimator.errors.iter().enumerate() {
+        by_method[*p] = estimate.values[k];
+    }
+    let rms_um = |beta: &[f64]| {
+        let modelled = readings(&problem, beta);
+        let (mut sum, mut count) = (0.0, 0);
+        for test in &estimator.tests {
+            for (row, (o, m)) in observed[*test].iter().zip(&modelled[*test]).enumerate() {
+                if !problem.rejected[*test][row] {
+                    sum += (o - m).powi(2);
+                    count += 1;
+                }
+            }
+        }
+        (sum / f64::from(count.max(1))).sqrt() * 1e3
+    };
+    let mut warnings = session.warnings.clone();
+    if !problem.parameters.effects.is_empty() {
+        warnings.push(format!(
+            "the {} method knows nothing of the declared effects: what they move is in its errors",
+            method.word()
+        ));
+    }
+    Ok(Comparison {
+        method: method.word().into(),
+        readings: problem.readings(),
+        noise_um: problem.noise.sigma_mm * 1e3,
+        noise_source: problem.noise.source.word().into(),
+        rms_um: crate::heldout::rms_mm(&problem, &full.residuals) * 1e3,
+        method_rms_um: rms_um(&by_method),
+        nominal_rms_um: rms_um(&vec![0.0; list.len()]),
+        centres: centres(&problem, &estimator, &estimate),
+        errors,
+        warnings,
+    })
+}
+
+fn observed<'p>(problem: &'p Problem<'_>) -> Vec<&'p [f64]> {
+    let of = |test: &&'p abbe_model::session::Test| {
+        test.readings
+            .as_ref()
+            .map_or(&[][..], |readings| readings.observed.as_slice())
+    };
+    problem.tests.iter().map(of).collect()
+}
+
+/// Noise-free readings for values of the unknowns, test by test, mm.
+fn readings(problem: &Problem<'_>, beta: &[f64]) -> Vec<Vec<f64>> {
+    let values = problem.slot_values(beta);
+    let models = problem.models.iter().zip(&values);
+    models.map(|(model, values)| model.readings_mm(values)).collect()
+}
+
+/// The full fit on other readings of the same tests: its unknowns.
+fn refitted(problem: &Problem<'_>, readings: &[Vec<f64>], full: &Fit) -> Result<Vec<f64>, IdentifyError> {
+    let mut session = problem.session.clone();
+    let mut left = readings.iter();
+    for test in &mut session.tests {
+        if let (Some(known), Some(drawn)) = (
+            &mut test.readings,
+            test_has(problem, &test.name).then(|| left.next()).flatten(),
+        ) {
+            known.observed.clone_from(drawn);
+        }
+    }
+    let mut again = Problem::new(&session, problem.noise.clone(), 0)?;
+    again.rejected.clone_from(&problem.rejected);
+    Ok(fit::fit(&again, Some(&full.beta))?.beta)
+}
+
+fn test_has(problem: &Problem<'_>, name: &str) -> bool {
+    problem.tests.iter().any(|test| test.name == name)
+}
+
+fn centres(problem: &Problem<'_>, estimator: &Estimator, estimate: &super::Estimate) -> Vec<CentreResult> {
+    let list = &problem.parameters.list;
+    let declared: Vec<usize> = (0..list.len()).filter(|p| list[*p].role == Role::Error).collect();
+    let letter = |k: usize| ["X", "Y", "Z"][k].to_string();
+    let tests = estimator
+        .tests
+        .iter()
+        .zip(&estimator.layouts)
+        .zip(&estimate.centres);
+    tests
+        .enumerate()
+        .map(|(place, ((test, layout), centre))| {
+            let u = |which: usize| {
+                let row = 2 * place + which;
+                estimate.centre_covariance[(row, row)].max(0.0).sqrt() * 1e3
+            };
+            let share = |p: usize| {
+                let scale = 1e3 / list[p].unit.per_inside;
+                [0, 1].map(|which| estimator.shares[(2 * place + which, p)] * scale)
+            };
+            CentreResult {
+                test: problem.tests[*test].name.clone(),
+                axis: problem.session.machine.axes[layout.axis].name.clone(),
+                across: layout.across.map(letter),
+                offset_um: centre.offset_mm.map(|mm| mm * 1e3),
+                u_um: [u(0), u(1)],
+                radius_mm: centre.radius_mm,
+                plane_mm: layout.plane_mm,
+                height_mm: layout.height_mm,
+                shares: declared
+                    .iter()
+                    .map(|p| (list[*p].id.clone(), share(*p)))
+                    .collect(),
+            }
+        })
+        .collect()
+}

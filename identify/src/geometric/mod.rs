@@ -1,0 +1,277 @@
+//! The geometric methods of the thesis beside the full fit: errors of rotary axes from the centres of circles (Chapters 4 to 6).
+//!
+//! Each test gives the place where an axis passes the standing ball. To first order that place is a linear combination of position and orientation
+//! errors,
+//!
+//! ```text
+//! centre = Σ S·error,    S = ∂centre/∂L · ∂L/∂error
+//! ```
+//!
+//! with the derivative of the length from the chain and that of the centre from the circle's own equations. `S` holds what the thesis
+//! derives by hand: the levers of the cone and of the two planes, the share that axis A's errors have in the centres of axis C, and
+//! the conversion from local to reference position errors. No sign is typed in.
+
+mod centre;
+mod compare;
+
+use abbe_model::component::ErrorName;
+use faer::Mat;
+
+pub use centre::{Centre, Layout};
+pub use compare::{CentreResult, Comparison, ComparisonRow, compare};
+
+use crate::error::IdentifyError;
+use crate::parameters::Role;
+use crate::problem::{Block, Problem};
+use abbe_model::session::Prior;
+
+/// Which tests a method takes, and what it makes of them.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Method {
+    /// Position errors from one plane for each axis, as if there were no orientation errors (Section 4.2).
+    Circle,
+    /// Position errors from the plane, orientation errors from the cone of the bar with its extension (Sections 4.2.1, 5.2).
+    Cone,
+    /// Position and orientation errors from two planes along each axis (Section 6.1.2).
+    TwoPlane,
+}
+
+impl Method {
+    /// As it stands on the command line and in results.
+    pub fn word(self) -> &'static str {
+        match self {
+            Method::Circle => "circle",
+            Method::Cone => "cone",
+            Method::TwoPlane => "two-plane",
+        }
+    }
+}
+
+/// Height of a cone, and distance of two planes, below which they are none, mm.
+const LEAST_LEVER_MM: f64 = 1.0;
+
+/// A method made ready: its tests, its errors, and how the errors follow from the centres.
+#[derive(Clone, Debug)]
+pub struct Estimator {
+    /// The method.
+    pub method: Method,
+    /// The tests it takes, by place among the problem's.
+    pub tests: Vec<usize>,
+    /// How each sees its axis.
+    pub layouts: Vec<Layout>,
+    /// The errors that it tells, by place among the problem's parameters.
+    pub errors: Vec<usize>,
+    /// `S`: two rows a test, a column for each of the problem's parameters, mm or rad.
+    pub shares: Mat<f64>,
+    /// Errors from centres: errors × rows.
+    pub inverse: Mat<f64>,
+}
+
+/// What a method found.
+#[derive(Clone, Debug)]
+pub struct Estimate {
+    /// The centre of each test.
+    pub centres: Vec<Centre>,
+    /// Each error, mm or rad.
+    pub values: Vec<f64>,
+    /// Covariance of the centres from noise and from what is known of the set-ups, mm².
+    pub centre_covariance: Mat<f64>,
+    /// Covariance of the errors.
+    pub covariance: Mat<f64>,
+}
+
+impl Estimator {
+    /// For a session.
+    ///
+    /// # Errors
+    /// If the session has no tests for the method, or they leave errors undetermined.
+    pub fn new(problem: &Problem<'_>, method: Method) -> Result<Estimator, IdentifyError> {
+        let machine = &problem.session.machine;
+        let no = |message: String| IdentifyError::Request(format!("--method {}: {message}", method.word()));
+        let mut circles = Vec::new();
+        let mut refused = Vec::new();
+        for (test, model) in problem.models.iter().enumerate() {
+            match Layout::of(machine, model) {
+                Ok(layout) => circles.push((test, layout)),
+                Err(why) => refused.push(format!("test \"{}\": {why}", problem.tests[test].name)),
+            }
+        }
+        let (tests, layouts): (Vec<usize>, Vec<Layout>) = chosen(method, circles).into_iter().unzip();
+        if tests.is_empty() {
+            let wanted = match method {
+                Method::Circle => {
+                    "a test in which one rotary axis turns and the balls lie in one plane across it"
+                }
+                Method::Cone => {
+                    "for each axis a test with the balls in one plane and one with the bar on a cone"
+                }
+                Method::TwoPlane => "for each axis two tests in planes apart from each other along the axis",
+            };
+            let refused = if refused.is_empty() {
+                String::new()
+            } else {
+                format!("; {}", refused.join("; "))
+            };
+            return Err(no(format!("the session lacks {wanted}{refused}")));
+        }
+        let errors = errors(problem, method, &layouts);
+        let shares = shares(problem, &tests, &layouts)?;
+        let of_errors = Mat::from_fn(shares.nrows(), errors.len(), |i, k| {
+            // An angle moves a centre by its lever: radians times 100 mm compare with mm.
+            shares[(i, errors[k])] * problem.parameters.list[errors[k]].size
+        });
+        let svd = of_errors.svd().map_err(|_| IdentifyError::Decomposition)?;
+        let singular: Vec<f64> = svd.S().column_vector().iter().copied().collect();
+        let seen = singular.iter().filter(|s| **s > 1e-6 * singular[0]).count();
+        if seen < errors.len() {
+            let hidden: Vec<&str> = (0..errors.len())
+                .filter(|k| (seen..errors.len()).any(|j| svd.V()[(*k, j)].abs() > 1e-3))
+                .map(|k| problem.parameters.list[errors[k]].id.as_str())
+                .collect();
+            return Err(no(format!(
+                "the centres of {} tests do not tell {} apart",
+                tests.len(),
+                hidden.join(", ")
+            )));
+        }
+        let inverse = Mat::from_fn(errors.len(), shares.nrows(), |k, i| {
+            let sum: f64 = (0..errors.len())
+                .map(|j| svd.V()[(k, j)] * svd.U()[(i, j)] / singular[j])
+                .sum();
+            sum * problem.parameters.list[errors[k]].size
+        });
+        Ok(Estimator {
+            method,
+            tests,
+            layouts,
+            errors,
+            shares,
+            inverse,
+        })
+    }
+
+    /// From readings, test by test as the problem has them, mm.
+    ///
+    /// # Errors
+    /// If the readings of a test lie on no circle.
+    pub fn estimate(&self, problem: &Problem<'_>, observed: &[&[f64]]) -> Result<Estimate, IdentifyError> {
+        let mut centres = Vec::new();
+        for (test, layout) in self.tests.iter().zip(&self.layouts) {
+            let centre = layout
+                .centre(observed[*test], &problem.rejected[*test])
+                .map_err(|why| {
+                    IdentifyError::Request(format!("test \"{}\": {why}", problem.tests[*test].name))
+                })?;
+            centres.push(centre);
+        }
+        let offsets: Vec<f64> = centres.iter().flat_map(|centre| centre.offset_mm).collect();
+        let rows = offsets.len();
+        let values = (0..self.errors.len())
+            .map(|k| (0..rows).map(|i| self.inverse[(k, i)] * offsets[i]).sum())
+            .collect();
+        let variance = problem.noise.sigma_mm.powi(2);
+        let mut centre_covariance = Mat::from_fn(rows, rows, |i, j| {
+            if i / 2 != j / 2 {
+                return 0.0;
+            }
+            let (a, b) = (
+                &centres[i / 2].by_reading[i % 2],
+                &centres[j / 2].by_reading[j % 2],
+            );
+            variance * a.iter().zip(b).map(|(a, b)| a * b).sum::<f64>()
+        });
+        for (p, parameter) in problem.parameters.list.iter().enumerate() {
+            let (Role::Setup, Prior::Gaussian(u)) = (parameter.role, parameter.prior) else {
+                continue;
+            };
+            for i in 0..rows {
+                for j in 0..rows {
+                    centre_covariance[(i, j)] += self.shares[(i, p)] * u * u * self.shares[(j, p)];
+                }
+            }
+        }
+        let covariance = &self.inverse * &centre_covariance * self.inverse.transpose();
+        Ok(Estimate {
+            centres,
+            values,
+            centre_covariance,
+            covariance,
+        })
+    }
+}
+
+/// The tests of a method.
+fn chosen(method: Method, circles: Vec<(usize, Layout)>) -> Vec<(usize, Layout)> {
+    let plane = |layout: &Layout| layout.height_mm.abs() < LEAST_LEVER_MM;
+    let of = |axis: usize| circles.iter().filter(move |(_, layout)| layout.axis == axis);
+    let taken = |(_, layout): &&(usize, Layout)| {
+        let planes = || {
+            of(layout.axis)
+                .map(|(_, other)| other)
+                .filter(|other| plane(other))
+        };
+        match method {
+            Method::Circle => {
+                let nearest = planes()
+                    .map(|other| other.plane_mm.abs())
+                    .fold(f64::INFINITY, f64::min);
+                plane(layout) && layout.plane_mm.abs() <= nearest + LEAST_LEVER_MM
+            }
+            Method::Cone => planes().next().is_some() && of(layout.axis).any(|(_, other)| !plane(other)),
+            Method::TwoPlane => {
+                plane(layout)
+                    && planes().any(|other| (other.plane_mm - layout.plane_mm).abs() > LEAST_LEVER_MM)
+            }
+        }
+    };
+    circles.iter().filter(taken).cloned().collect()
+}
+
+/// The declared errors of the axes that turn which the method tells.
+fn errors(problem: &Problem<'_>, method: Method, layouts: &[Layout]) -> Vec<usize> {
+    let machine = &problem.session.machine;
+    let of_method = |id: &str| {
+        let Some(name) = ErrorName::parse(id) else {
+            return false;
+        };
+        let turns = layouts
+            .iter()
+            .any(|layout| machine.axes[layout.axis].name == name.axis);
+        turns && (method != Method::Circle || !name.freedom.is_angle())
+    };
+    let list = &problem.parameters.list;
+    (0..list.len())
+        .filter(|p| list[*p].role == Role::Error && of_method(&list[*p].id))
+        .collect()
+}
+
+/// `S` at the nominal machine.
+fn shares(problem: &Problem<'_>, tests: &[usize], layouts: &[Layout]) -> Result<Mat<f64>, IdentifyError> {
+    let parameters = problem.parameters.list.len();
+    let nominal = problem.slot_values(&vec![0.0; parameters]);
+    let mut shares = Mat::zeros(2 * tests.len(), parameters);
+    for (k, (test, layout)) in tests.iter().zip(layouts).enumerate() {
+        let lengths = problem.models[*test].readings_mm(&nominal[*test]);
+        let centre = layout.centre(&lengths, &problem.rejected[*test]).map_err(|why| {
+            IdentifyError::Request(format!(
+                "test \"{}\", nominally: {why}",
+                problem.tests[*test].name
+            ))
+        })?;
+        let block = Block {
+            test: *test,
+            rows: 0..problem.models[*test].rows(),
+        };
+        let rows = problem.rows(&nominal, &block)?;
+        for (which, by_reading) in centre.by_reading.iter().enumerate() {
+            for p in 0..parameters {
+                shares[(2 * k + which, p)] = by_reading
+                    .iter()
+                    .enumerate()
+                    .map(|(row, by)| by * rows[(row, p)])
+                    .sum::<f64>();
+            }
+        }
+    }
+    Ok(shares)
+}

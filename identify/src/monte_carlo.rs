@@ -1,0 +1,254 @@
+//! Propagation of distributions by drawing (JCGM 101): what a function of uncertain quantities is distributed like, linear or not.
+//!
+//! Runs are counted into a histogram for each output and forgotten, so that memory does not grow with their number. They are drawn in blocks, each
+//! from its own stream of the generator: the result depends on the seed and the number of runs, not on how many processors there are.
+
+use rand_distr::{Distribution as _, StandardNormal};
+use rand_pcg::Pcg64;
+use rayon::prelude::*;
+
+/// A function from quantities to quantities.
+pub trait Function: Sync {
+    /// Memory that evaluations may use again and again.
+    type Scratch: Default;
+    /// Number of quantities it takes.
+    fn inputs(&self) -> usize;
+    /// Number of quantities it gives.
+    fn outputs(&self) -> usize;
+    /// Evaluates it. An output that is not finite is counted as having none.
+    fn evaluate(&self, inputs: &[f64], outputs: &mut [f64], scratch: &mut Self::Scratch);
+}
+
+/// What is drawn, and how often.
+#[derive(Clone, Copy, Debug)]
+pub struct Draws<'a> {
+    /// Expectation of each input.
+    pub mean: &'a [f64],
+    /// Standard uncertainty of each input; the inputs are independent and Gaussian.
+    pub u: &'a [f64],
+    /// Number of runs.
+    pub runs: u64,
+    /// Seed.
+    pub seed: u64,
+    /// Probability that a coverage interval is to hold.
+    pub coverage: f64,
+}
+
+/// What an output is distributed like, in the output's unit.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Distribution {
+    /// Mean over the runs.
+    pub mean: f64,
+    /// Standard deviation over the runs: the standard uncertainty (JCGM 101, 7.6).
+    pub u: f64,
+    /// The shortest interval that holds the coverage probability (JCGM 101, 5.3.4).
+    pub shortest: [f64; 2],
+    /// The probabilistically symmetric one (JCGM 101, 5.3.3).
+    pub symmetric: [f64; 2],
+    /// Lower end of the first bin.
+    pub from: f64,
+    /// Upper end of the last bin.
+    pub to: f64,
+    /// Runs in each bin.
+    pub counts: Vec<u64>,
+    /// Runs below the first bin, above the last, and without a value.
+    pub outside: [u64; 3],
+}
+
+/// Runs of a stream.
+const BLOCK: u64 = 4096;
+/// Accumulators, each for every `LANES`th block: what parallel work is parted into, and a bound on memory.
+const LANES: u64 = 32;
+/// Runs from which the ranges of the histograms are taken.
+const PILOT: u64 = 4096;
+/// Stream of the pilot runs; blocks have their own number.
+const PILOT_STREAM: u128 = 1 << 64;
+/// Bins of a histogram: with 16 standard deviations across, a bin is a sixtieth of one.
+const BINS: usize = 1000;
+/// Standard deviations on either side that a histogram covers at least.
+const REACH: f64 = 8.0;
+
+/// Counts of one output.
+#[derive(Clone)]
+struct Count {
+    centre: f64,
+    from: f64,
+    per_width: f64,
+    sum: f64,
+    square: f64,
+    counts: Vec<u64>,
+    outside: [u64; 3],
+}
+
+impl Count {
+    fn over(centre: f64, reach: f64) -> Count {
+        Count {
+            centre,
+            from: centre - reach,
+            per_width: BINS as f64 / (2.0 * reach),
+            sum: 0.0,
+            square: 0.0,
+            counts: vec![0; BINS],
+            outside: [0; 3],
+        }
+    }
+
+    #[inline]
+    fn take(&mut self, value: f64) {
+        if !value.is_finite() {
+            self.outside[2] += 1;
+            return;
+        }
+        let off = value - self.centre;
+        self.sum += off;
+        self.square += off * off;
+        let place = (value - self.from) * self.per_width;
+        if place < 0.0 {
+            self.outside[0] += 1;
+        } else if let Some(bin) = self.counts.get_mut(place as usize) {
+            *bin += 1;
+        } else {
+            self.outside[1] += 1;
+        }
+    }
+
+    fn merge(&mut self, other: &Count) {
+        self.sum += other.sum;
+        self.square += other.square;
+        for (mine, theirs) in self.counts.iter_mut().zip(&other.counts) {
+            *mine += theirs;
+        }
+        for (mine, theirs) in self.outside.iter_mut().zip(other.outside) {
+            *mine += theirs;
+        }
+    }
+
+    fn distribution(self, coverage: f64) -> Distribution {
+        let inside: u64 = self.counts.iter().sum();
+        let count = (inside + self.outside[0] + self.outside[1]).max(1) as f64;
+        let off = self.sum / count;
+        let variance = (self.square - self.sum * off) / (count - 1.0).max(1.0);
+        let width = 1.0 / self.per_width;
+        let to = self.from + BINS as f64 * width;
+        let mut below = Vec::with_capacity(BINS + 1);
+        let mut total = self.outside[0];
+        below.push(total as f64);
+        for bin in &self.counts {
+            total += bin;
+            below.push(total as f64);
+        }
+        let quantile = |share: f64| -> f64 {
+            let wanted = share * count;
+            if wanted < below[0] {
+                return f64::NEG_INFINITY;
+            }
+            let Some(end) = below.iter().position(|reached| *reached >= wanted) else {
+                return f64::INFINITY;
+            };
+            if end == 0 {
+                return self.from;
+            }
+            let part = (wanted - below[end - 1]) / (below[end] - below[end - 1]);
+            self.from + (end as f64 - 1.0 + part) * width
+        };
+        let tail = (1.0 - coverage) / 2.0;
+        let symmetric = [quantile(tail), quantile(1.0 - tail)];
+        // The ends of the shortest interval have equal density; sliding the lower share over the tails finds it.
+        const SLIDES: usize = 400;
+        let mut shortest = symmetric;
+        for slide in 0..=SLIDES {
+            let share = 2.0 * tail * slide as f64 / SLIDES as f64;
+            let interval = [quantile(share), quantile(share + coverage)];
+            if interval[1] - interval[0] < shortest[1] - shortest[0] {
+                shortest = interval;
+            }
+        }
+        Distribution {
+            mean: self.centre + off,
+            u: variance.max(0.0).sqrt(),
+            shortest,
+            symmetric,
+            from: self.from,
+            to,
+            counts: self.counts,
+            outside: self.outside,
+        }
+    }
+}
+
+/// Draws inputs and passes on the outputs.
+fn draw(function: &impl Function, draws: &Draws<'_>, stream: u128, runs: u64, mut take: impl FnMut(&[f64])) {
+    let mut random = Pcg64::new(u128::from(draws.seed), stream);
+    let mut inputs = vec![0.0; function.inputs()];
+    let mut outputs = vec![0.0; function.outputs()];
+    let mut scratch = Default::default();
+    for _ in 0..runs {
+        for ((input, mean), u) in inputs.iter_mut().zip(draws.mean).zip(draws.u) {
+            let normal: f64 = StandardNormal.sample(&mut random);
+            *input = mean + u * normal;
+        }
+        function.evaluate(&inputs, &mut outputs, &mut scratch);
+        take(&outputs);
+    }
+}
+
+/// The distribution of every output.
+pub fn propagate(function: &impl Function, draws: &Draws<'_>) -> Vec<Distribution> {
+    let empty = pilot(function, draws);
+    let blocks = draws.runs.div_ceil(BLOCK);
+    let lanes: Vec<Vec<Count>> = (0..LANES.min(blocks))
+        .into_par_iter()
+        .map(|lane| {
+            let mut counts = empty.clone();
+            for block in (lane..blocks).step_by(LANES as usize) {
+                let runs = BLOCK.min(draws.runs - block * BLOCK);
+                draw(function, draws, u128::from(block), runs, |outputs| {
+                    for (count, value) in counts.iter_mut().zip(outputs) {
+                        count.take(*value);
+                    }
+                });
+            }
+            counts
+        })
+        .collect();
+    let mut counts = empty;
+    for lane in &lanes {
+        for (count, other) in counts.iter_mut().zip(lane) {
+            count.merge(other);
+        }
+    }
+    counts
+        .into_iter()
+        .map(|count| count.distribution(draws.coverage))
+        .collect()
+}
+
+/// Empty histograms over the ranges that a few runs show.
+fn pilot(function: &impl Function, draws: &Draws<'_>) -> Vec<Count> {
+    let mut values = vec![Vec::with_capacity(PILOT as usize); function.outputs()];
+    draw(function, draws, PILOT_STREAM, PILOT, |outputs| {
+        for (column, value) in values.iter_mut().zip(outputs) {
+            if value.is_finite() {
+                column.push(*value);
+            }
+        }
+    });
+    values
+        .into_iter()
+        .map(|mut column| {
+            column.sort_by(f64::total_cmp);
+            let at = |share: f64| {
+                column
+                    .get(((column.len() as f64 - 1.0) * share) as usize)
+                    .copied()
+            };
+            let (Some(low), Some(middle), Some(high)) = (at(0.1587), at(0.5), at(0.8413)) else {
+                return Count::over(0.0, 1.0);
+            };
+            // Quantiles, not moments: a few runs far out are to be counted as outside rather than to coarsen the bins.
+            let reach = REACH * (high - low) / 2.0;
+            let least = (middle.abs() * 1e-12).max(f64::MIN_POSITIVE * 1e20);
+            Count::over(middle, reach.max(least))
+        })
+        .collect()
+}

@@ -1,0 +1,363 @@
+//! Readings of a probe as linear equations in four functions of an angle.
+
+use std::f64::consts::{PI, TAU};
+
+use abbe_model::axis::AxisKind;
+use abbe_model::chain::{BodyErrors, ERRORS_PER_AXIS};
+use abbe_model::frames::Point;
+use abbe_model::instrument::probe::{FORM, Probe, RADIUS};
+use abbe_model::instrument::{InstrumentKind, Station};
+use abbe_model::sensitivity::{SlotValues, TestModel};
+use abbe_model::session::{Prior, Session, Test};
+
+use crate::error::IdentifyError;
+
+/// Angles nearer than this are one, rad: positions in files are rounded to 0.1 µm or so.
+const SAME_ANGLE: f64 = 1e-4;
+/// Sine of the angle up to which a probing direction counts as radial.
+const RADIAL: f64 = 1e-6;
+
+/// The four functions, in the order of their columns.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Function {
+    /// Displacement of the table along the first direction across its axis, over the axis' position: `E_XC,total`.
+    First,
+    /// The same along the second direction: `E_YC,total`.
+    Second,
+    /// Positioning error of the linear axes away from the rotary axis, over the angle of the place: `E_radial`.
+    Linear,
+    /// What the artefact's surface stands out by, over the angle on the artefact: `W_radial`.
+    Artefact,
+}
+
+impl Function {
+    /// All four.
+    pub const ALL: [Function; 4] = [
+        Function::First,
+        Function::Second,
+        Function::Linear,
+        Function::Artefact,
+    ];
+}
+
+/// Equations `Σ a·f(angle) = Δr`, one a reading.
+#[derive(Clone, Debug)]
+pub struct Equations {
+    /// Index of the rotary axis in the machine.
+    pub axis: usize,
+    /// The two directions of R across the axis: 0, 1, 2 for X, Y, Z; a positive turn carries the first towards the second.
+    pub across: [usize; 2],
+    /// 1 where the axis turns from the first direction towards the second for an increasing command, else −1.
+    pub sense: f64,
+    /// The angles at which each function is met, rad in (−π, π], ascending.
+    pub angles: [Vec<f64>; 4],
+    /// One row a reading, one column an angle of a function.
+    pub rows: Vec<Vec<f64>>,
+    /// By how much further out than nominal the surface was met, mm: `Δr`.
+    pub outward_mm: Vec<f64>,
+    /// The traversal of each reading, as numbered in its file; 0 where the file numbers none.
+    pub run: Vec<i64>,
+    /// What the readings are referred to.
+    pub reference: Reference,
+}
+
+/// What the radius of an uncalibrated artefact is taken from.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Reference {
+    /// An unknown of its own, from all readings.
+    Estimated,
+    /// The first reading at which every angle is 0, as in the paper: it is taken off all readings, and its own noise is not propagated.
+    FirstReading,
+}
+
+impl Equations {
+    /// The column of the first angle of a function.
+    pub fn offset(&self, function: Function) -> usize {
+        self.angles[..function as usize].iter().map(Vec::len).sum()
+    }
+
+    /// Number of unknown values of the functions.
+    pub fn columns(&self) -> usize {
+        self.angles.iter().map(Vec::len).sum()
+    }
+
+    /// The column of a function at an angle, if some reading meets it there.
+    pub fn column(&self, function: Function, angle: f64) -> Option<usize> {
+        let place = self.angles[function as usize]
+            .iter()
+            .position(|known| apart(*known, angle) < SAME_ANGLE)?;
+        Some(self.offset(function) + place)
+    }
+
+    /// Function and angle of a column.
+    pub fn node(&self, column: usize) -> (Function, f64) {
+        let mut place = column;
+        for function in Function::ALL {
+            let angles = &self.angles[function as usize];
+            if let Some(angle) = angles.get(place) {
+                return (function, *angle);
+            }
+            place -= angles.len();
+        }
+        (Function::Artefact, f64::NAN)
+    }
+
+    /// What a function is called: `EXC`, `EYC` with the axis' own letters, `E_radial`, `W_radial`.
+    pub fn name(&self, function: Function, axis: &str) -> String {
+        let letter = |k: usize| ["X", "Y", "Z"][self.across[k]];
+        match function {
+            Function::First => format!("E{}{axis},total", letter(0)),
+            Function::Second => format!("E{}{axis},total", letter(1)),
+            Function::Linear => "E_radial".into(),
+            Function::Artefact => "W_radial".into(),
+        }
+    }
+
+    /// From the readings of a session: the coefficients are the chain's own derivatives.
+    ///
+    /// # Errors
+    /// If the session is none of this kind: another instrument, no or several rotary axes that turn under the artefact, another rotary
+    /// axis off its zero, artefacts that are not one and the same, a probing direction that is not radial, no readings.
+    pub fn of(session: &Session) -> Result<Equations, IdentifyError> {
+        let no = |message: String| IdentifyError::Request(format!("self-calibration: {message}"));
+        if session.instrument != InstrumentKind::Probe {
+            return Err(no(format!(
+                "the session's instrument is a {}; the method takes a probe",
+                session.instrument.word()
+            )));
+        }
+        let tests: Vec<&Test> = session
+            .tests
+            .iter()
+            .filter(|test| test.readings.is_some())
+            .collect();
+        let Some(first) = tests.first() else {
+            return Err(IdentifyError::NoReadings);
+        };
+        if let Some(other) = tests.iter().find(|test| test.setup != first.setup) {
+            return Err(no(format!(
+                "tests \"{}\" and \"{}\" have different set-ups; all tests touch one artefact in one clamping: give them the same `setup`",
+                first.name, other.name
+            )));
+        }
+        let axis = turning_axis(session, &tests).map_err(no)?;
+        let Some((coordinate, sense)) = session.machine.axes[axis].principal() else {
+            return Err(no(format!(
+                "axis `{}` does not lie along X, Y or Z",
+                session.machine.axes[axis].name
+            )));
+        };
+        let along = coordinate.index();
+        let mut equations = Equations {
+            axis,
+            across: [(along + 1) % 3, (along + 2) % 3],
+            sense,
+            angles: Default::default(),
+            rows: Vec::new(),
+            outward_mm: Vec::new(),
+            run: Vec::new(),
+            reference: match first.priors[RADIUS] {
+                Prior::Known => Reference::FirstReading,
+                Prior::Free | Prior::Gaussian(_) => Reference::Estimated,
+            },
+        };
+        let mut touches = Vec::new();
+        for test in &tests {
+            touches.extend(equations.touches(session, test).map_err(no)?);
+        }
+        for touch in &touches {
+            for (known, angle) in equations.angles.iter_mut().zip(touch.angles) {
+                if known.iter().all(|known| apart(*known, angle) >= SAME_ANGLE) {
+                    known.push(angle);
+                }
+            }
+        }
+        for known in &mut equations.angles {
+            known.sort_by(f64::total_cmp);
+        }
+        if equations.reference == Reference::FirstReading {
+            let at_zero = |touch: &&Touch| touch.angles.iter().all(|angle| apart(*angle, 0.0) < SAME_ANGLE);
+            let Some(first) = touches.iter().find(at_zero).map(|touch| touch.outward_mm) else {
+                return Err(no(
+                    "no reading at 0° of axis, machine and artefact, to which the others could be referred; \
+                     `radius_u_um = inf` makes the radius an unknown instead"
+                        .into(),
+                ));
+            };
+            for touch in &mut touches {
+                touch.outward_mm -= first;
+            }
+        }
+        for touch in touches {
+            let mut row = vec![0.0; equations.columns()];
+            for function in Function::ALL {
+                if let Some(column) = equations.column(function, touch.angles[function as usize]) {
+                    row[column] += touch.coefficients[function as usize];
+                }
+            }
+            equations.rows.push(row);
+            equations.outward_mm.push(touch.outward_mm);
+            equations.run.push(touch.run);
+        }
+        Ok(equations)
+    }
+
+    /// What each reading of a test touches.
+    fn touches(&self, session: &Session, test: &Test) -> Result<Vec<Touch>, String> {
+        let (Station::Probe(probe), Some(readings)) = (&test.station, &test.readings) else {
+            return Ok(Vec::new());
+        };
+        let machine = &session.machine;
+        let model = TestModel::new(machine, test.station.clone(), readings);
+        let motions = self.axis * ERRORS_PER_AXIS + 6;
+        let slots = [
+            motions + self.across[0],
+            motions + self.across[1],
+            machine.error_slots() + FORM,
+        ];
+        let places: Vec<Place> = (0..model.rows())
+            .map(|row| self.place(machine, probe, &model, row))
+            .collect();
+        // Eq. (2): a table that stands at 0 throughout has no displacement but that to which all are referred. Eq. (3): nor has a spot at 0 of the
+        // artefact, touched throughout, any form.
+        let varies = |angle: fn(&Place) -> f64| {
+            let stays = places.iter().all(|place| apart(angle(place), 0.0) < SAME_ANGLE);
+            f64::from(u8::from(!stays))
+        };
+        let (turns, wanders) = (varies(|place| place.position), varies(|place| place.on_artefact));
+        let nominal = SlotValues::zero(model.slots());
+        let sensitivities = model.sensitivities(&nominal, &slots, 0..model.rows());
+        (0..model.rows())
+            .map(|row| {
+                let place = &places[row];
+                if place.beside > RADIAL {
+                    return Err(format!(
+                        "test \"{}\", reading {}: the probe does not move straight towards axis `{}`; the method takes radial touches",
+                        test.name,
+                        row + 1,
+                        machine.axes[self.axis].name
+                    ));
+                }
+                // The measured radius grows as the distance shrinks.
+                let by = |slot: usize| -sensitivities.derivatives[slot][row];
+                Ok(Touch {
+                    angles: [place.position, place.position, place.angle, place.on_artefact],
+                    coefficients: [turns * by(0), turns * by(1), -1.0, wanders * by(2)],
+                    outward_mm: sensitivities.readings_mm[row] - readings.observed[row],
+                    run: readings.run.get(row).copied().unwrap_or(0),
+                })
+            })
+            .collect()
+    }
+
+    /// Where a reading touches.
+    fn place(
+        &self,
+        machine: &abbe_model::chain::Machine,
+        probe: &Probe<f64>,
+        model: &TestModel<'_>,
+        row: usize,
+    ) -> Place {
+        let state = model.state(row);
+        let none = vec![BodyErrors::<f64>::NONE; machine.axes.len()];
+        let origin = machine.axes[self.axis].origin_mm;
+        let stylus = machine.tool_point::<f64>(state, &none, Point(probe.stylus));
+        let on_table = machine.table_point::<f64>(state, &none, stylus);
+        let angle_of = |point: Point<f64>| {
+            let [first, second] = self.across.map(|k| point.0[k] - origin[k]);
+            second.atan2(first)
+        };
+        let angle = angle_of(stylus);
+        let direction = probe.direction_at::<f64>(machine, state).0;
+        let [first, second] = self.across.map(|k| direction[k]);
+        Place {
+            position: wrapped(state[self.axis].value),
+            angle: wrapped(angle),
+            on_artefact: wrapped(angle_of(on_table)),
+            // Inwards, the direction is minus the unit vector at the angle.
+            beside: (first + angle.cos()).hypot(second + angle.sin()),
+        }
+    }
+}
+
+/// One reading.
+struct Touch {
+    angles: [f64; 4],
+    coefficients: [f64; 4],
+    outward_mm: f64,
+    run: i64,
+}
+
+struct Place {
+    position: f64,
+    angle: f64,
+    on_artefact: f64,
+    beside: f64,
+}
+
+/// The rotary axis that turns under the artefact.
+fn turning_axis(session: &Session, tests: &[&Test]) -> Result<usize, String> {
+    let machine = &session.machine;
+    let moves = |axis: usize| {
+        tests
+            .iter()
+            .filter_map(|test| test.readings.as_ref())
+            .any(|readings| {
+                let positions = &readings.positions[axis];
+                positions.iter().any(|q| (q - positions[0]).abs() > SAME_ANGLE)
+            })
+    };
+    let rotary = |axis: &usize| machine.axes[*axis].kind == AxisKind::Rotary;
+    let turning: Vec<usize> = (0..machine.axes.len())
+        .filter(rotary)
+        .filter(|axis| moves(*axis))
+        .collect();
+    let [axis] = turning[..] else {
+        let names: Vec<&str> = turning
+            .iter()
+            .map(|axis| machine.axes[*axis].name.as_str())
+            .collect();
+        return Err(match names.len() {
+            0 => "no rotary axis turns in these tests".into(),
+            _ => format!("axes {} turn; the method is for one", names.join(" and ")),
+        });
+    };
+    if axis >= machine.workpiece_side {
+        return Err(format!(
+            "axis `{}` turns the tool; the method is for an axis that turns the table",
+            machine.axes[axis].name
+        ));
+    }
+    for other in (0..machine.axes.len())
+        .filter(rotary)
+        .filter(|other| *other != axis)
+    {
+        let readings = tests.iter().filter_map(|test| test.readings.as_ref());
+        if readings
+            .flat_map(|readings| &readings.positions[other])
+            .any(|q| q.abs() > SAME_ANGLE)
+        {
+            return Err(format!(
+                "axis `{}` does not stand at zero; the directions across axis `{}` are then not those of R",
+                machine.axes[other].name, machine.axes[axis].name
+            ));
+        }
+    }
+    Ok(axis)
+}
+
+/// An angle in (−π, π].
+fn wrapped(angle: f64) -> f64 {
+    let turned = angle.rem_euclid(TAU);
+    if turned > PI + SAME_ANGLE / 2.0 {
+        turned - TAU
+    } else {
+        turned
+    }
+}
+
+/// By how much two angles differ, whole turns aside.
+pub(super) fn apart(a: f64, b: f64) -> f64 {
+    let turned = (a - b).rem_euclid(TAU);
+    turned.min(TAU - turned)
+}

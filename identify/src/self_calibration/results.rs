@@ -1,0 +1,382 @@
+//! What a self-calibration reports, as it stands in JSON.
+
+use abbe_model::component::{ErrorKind, ErrorName, Freedom};
+use abbe_model::session::Session;
+use serde::Serialize;
+
+use super::position::{self, Position};
+use super::{Calibration, Function, MonteCarlo, Reference};
+use crate::monte_carlo::Distribution;
+use crate::results::{ParameterResult, Unobservable};
+
+/// Bins of a histogram in a report.
+const REPORTED_BINS: usize = 100;
+/// A circle narrower than this many standard uncertainties of its points has a centre that propagation by derivatives says too little about.
+const NARROW: f64 = 3.0;
+
+/// A function at one angle.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct FunctionPoint {
+    /// The angle, degrees.
+    pub at_deg: f64,
+    /// The value; `None` where the readings do not tell it.
+    pub value_um: Option<f64>,
+    /// Its standard uncertainty by the law of propagation (JCGM 100, 5.2); 0 where a condition fixes the value.
+    pub u_um: Option<f64>,
+}
+
+/// A function of an angle.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct FunctionResult {
+    /// Its name.
+    pub id: String,
+    /// Its values.
+    pub points: Vec<FunctionPoint>,
+}
+
+/// Runs by value.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Histogram {
+    /// Lower end of the first bin.
+    pub from_um: f64,
+    /// Upper end of the last bin.
+    pub to_um: f64,
+    /// Runs in each bin, all bins of one width.
+    pub counts: Vec<u64>,
+    /// Runs below the first bin.
+    pub below: u64,
+    /// Runs above the last.
+    pub above: u64,
+}
+
+/// What a quantity is distributed like.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct DistributionResult {
+    /// The quantity.
+    pub id: String,
+    /// Mean over the runs.
+    pub mean_um: f64,
+    /// Standard deviation over the runs.
+    pub u_um: f64,
+    /// The shortest coverage interval.
+    pub shortest_um: [f64; 2],
+    /// The probabilistically symmetric one.
+    pub symmetric_um: [f64; 2],
+    /// The runs by value.
+    pub histogram: Histogram,
+}
+
+/// Monte Carlo of a self-calibration.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct MonteCarloResult {
+    /// Number of runs.
+    pub runs: u64,
+    /// Seed.
+    pub seed: u64,
+    /// Coverage probability of the intervals.
+    pub coverage: f64,
+    /// Every quantity.
+    pub quantities: Vec<DistributionResult>,
+}
+
+/// What `abbe fit --method self-calibration` reports.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct SelfCalibration {
+    /// `self-calibration`.
+    pub method: String,
+    /// The rotary axis.
+    pub axis: String,
+    /// Number of readings.
+    pub readings: usize,
+    /// Standard uncertainty of a reading, µm.
+    pub noise_um: f64,
+    /// `stated`, or `fit` where it is what the solution leaves over.
+    pub noise_source: String,
+    /// Root mean square of what the solution leaves over, µm.
+    pub rms_um: f64,
+    /// Values that the functions have in all.
+    pub values: usize,
+    /// How many of them, or combinations, the readings tell before any condition.
+    pub rank_before: usize,
+    /// The boundary conditions.
+    pub conditions: Vec<String>,
+    /// Values that remain unknown under the conditions, with the radius where it is estimated.
+    pub unknowns: usize,
+    /// How many of those, or combinations, the readings tell.
+    pub rank: usize,
+    /// The functions.
+    pub functions: Vec<FunctionResult>,
+    /// Deviation of the radius at 0° from what is stated, where it is estimated.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub radius: Option<ParameterResult>,
+    /// Position errors of the axis: centre of the least-squares circle.
+    pub parameters: Vec<ParameterResult>,
+    /// The same from the angles of the turn.
+    pub parameters_by_turn: Vec<ParameterResult>,
+    /// Radius of the circle, µm.
+    pub circle_radius_um: Option<f64>,
+    /// Error motions: what the displacements leave over of the turn about that centre.
+    pub error_motions: Vec<FunctionResult>,
+    /// What the readings do not tell.
+    pub unobservable: Vec<Unobservable>,
+    /// What was drawn, where it was asked for.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub monte_carlo: Option<MonteCarloResult>,
+    /// What a user should know.
+    pub warnings: Vec<String>,
+}
+
+impl Calibration {
+    /// The calibration as it is reported.
+    pub fn report(&self, session: &Session, draws: Option<&MonteCarlo>) -> SelfCalibration {
+        let axis = session.machine.axes[self.equations.axis].name.clone();
+        let mut warnings = session.warnings.clone();
+        if self.equations.reference == Reference::FirstReading {
+            warnings.push(
+                "the readings are referred to the first one, as in the paper, and its noise is not propagated; `radius_u_um = inf` in the \
+                 tests takes the radius from all readings"
+                    .into(),
+            );
+        }
+        let position = self.has_position().then(|| self.position());
+        match &position {
+            None => warnings.push(
+                "the displacements of the table are not told at every position of the axis: it gets no position"
+                    .into(),
+            ),
+            Some(position) if position.narrow => warnings.push(format!(
+                "the circle of the displacements (radius {:.2} µm) is hardly wider than their uncertainty: its centre is far from \
+                 Gaussian; the estimate from the turn, and `--monte-carlo`, say more",
+                position.radius_mm * 1e3
+            )),
+            Some(_) => {}
+        }
+        let parameters = |which: usize| {
+            position.as_ref().map_or(Vec::new(), |position| {
+                (0..2)
+                    .map(|k| ParameterResult {
+                        id: self.location(k, &axis),
+                        value: position.centres_mm[which][k] * 1e3,
+                        u: position.u_mm[which][k] * 1e3,
+                        unit: "um".into(),
+                    })
+                    .collect()
+            })
+        };
+        let columns = self.equations.columns();
+        SelfCalibration {
+            method: "self-calibration".into(),
+            readings: self.equations.rows.len(),
+            noise_um: self.sigma_mm * 1e3,
+            noise_source: if self.sigma_stated { "stated" } else { "fit" }.into(),
+            rms_um: self.solution.rms_mm * 1e3,
+            values: columns,
+            rank_before: self.rank_before,
+            conditions: self
+                .conditions
+                .iter()
+                .map(|condition| condition.words.clone())
+                .collect(),
+            unknowns: self.solution.unknowns,
+            rank: self.solution.rank.seen.ncols(),
+            functions: Function::ALL
+                .map(|function| self.function(function, &axis))
+                .to_vec(),
+            radius: (self.solution.values_mm.len() > columns && self.solution.seen[columns]).then(|| {
+                ParameterResult {
+                    id: "radius".into(),
+                    value: self.solution.values_mm[columns] * 1e3,
+                    u: self.u_mm(columns) * 1e3,
+                    unit: "um".into(),
+                }
+            }),
+            parameters: parameters(0),
+            parameters_by_turn: parameters(1),
+            circle_radius_um: position.as_ref().map(|position| position.radius_mm * 1e3),
+            error_motions: position
+                .as_ref()
+                .map_or(Vec::new(), |position| self.error_motions(position, &axis)),
+            unobservable: self.unobservable(&axis),
+            monte_carlo: draws.map(|draws| self.drawn(draws, &axis, position.is_some())),
+            warnings,
+            axis,
+        }
+    }
+
+    fn u_mm(&self, column: usize) -> f64 {
+        self.solution.covariance[(column, column)].max(0.0).sqrt()
+    }
+
+    /// `EX0C` for the first direction across axis C where that is X.
+    fn location(&self, which: usize, axis: &str) -> String {
+        ErrorName {
+            kind: ErrorKind::Location,
+            freedom: Freedom::ALL[self.equations.across[which]],
+            axis: axis.into(),
+        }
+        .to_string()
+    }
+
+    fn function(&self, function: Function, axis: &str) -> FunctionResult {
+        let offset = self.equations.offset(function);
+        let angles = &self.equations.angles[function as usize];
+        let points = angles.iter().enumerate().map(|(k, angle)| {
+            let seen = self.solution.seen[offset + k];
+            FunctionPoint {
+                at_deg: degrees(*angle),
+                value_um: seen.then(|| self.solution.values_mm[offset + k] * 1e3),
+                u_um: seen.then(|| self.u_mm(offset + k) * 1e3),
+            }
+        });
+        FunctionResult {
+            id: self.equations.name(function, axis),
+            points: points.collect(),
+        }
+    }
+
+    fn position(&self) -> Located {
+        let turns = self.turns();
+        let (first, second) = (self.values_mm(Function::First), self.values_mm(Function::Second));
+        let sense = self.equations.sense;
+        let found: Position<f64> =
+            position::position(&turns, sense, &mut Vec::new(), |k| [first[k], second[k]]);
+        let jacobian = position::jacobian(&turns, sense, first, second);
+        let covariance = &self.solution.covariance;
+        let u = jacobian.map(|row| {
+            let terms = row.iter().enumerate().flat_map(|(i, a)| {
+                row.iter()
+                    .enumerate()
+                    .map(move |(j, b)| a * b * covariance[(i, j)])
+            });
+            terms.sum::<f64>().max(0.0).sqrt()
+        });
+        let count = 2 * turns.len();
+        let mean_square = (0..count).map(|k| covariance[(k, k)]).sum::<f64>() / count as f64;
+        Located {
+            centres_mm: [found.circle, found.turn],
+            u_mm: [[u[0], u[1]], [u[2], u[3]]],
+            radius_mm: found.radius,
+            narrow: found.radius.is_nan() || found.radius < NARROW * mean_square.sqrt(),
+        }
+    }
+
+    fn error_motions(&self, position: &Located, axis: &str) -> Vec<FunctionResult> {
+        let [a, b] = position.centres_mm[0];
+        let sense = self.equations.sense;
+        let turns = self.turns();
+        (0..2)
+            .map(|which| {
+                let function = [Function::First, Function::Second][which];
+                let offset = self.equations.offset(function);
+                let points = turns.iter().enumerate().map(|(k, [sin, cos])| {
+                    let turned = match which {
+                        0 => a * (1.0 - cos) + sense * b * sin,
+                        _ => b * (1.0 - cos) - sense * a * sin,
+                    };
+                    FunctionPoint {
+                        at_deg: degrees(self.equations.angles[0][k]),
+                        value_um: Some((self.solution.values_mm[offset + k] - turned) * 1e3),
+                        u_um: Some(self.u_mm(offset + k) * 1e3),
+                    }
+                });
+                FunctionResult {
+                    id: ErrorName {
+                        kind: ErrorKind::Motion,
+                        freedom: Freedom::ALL[self.equations.across[which]],
+                        axis: axis.into(),
+                    }
+                    .to_string(),
+                    points: points.collect(),
+                }
+            })
+            .collect()
+    }
+
+    /// What a value is called: `EXC,total(45°)`, `radius`.
+    fn id(&self, column: usize, axis: &str) -> String {
+        if column >= self.equations.columns() {
+            return "radius".into();
+        }
+        let (function, angle) = self.equations.node(column);
+        format!("{}({}°)", self.equations.name(function, axis), degrees(angle))
+    }
+
+    fn unobservable(&self, axis: &str) -> Vec<Unobservable> {
+        let name = |free: usize| {
+            let column = self.free.get(free).copied().unwrap_or(self.equations.columns());
+            self.id(column, axis)
+        };
+        self.solution
+            .rank
+            .unseen
+            .iter()
+            .map(|row| {
+                let terms = row.iter().enumerate().filter(|(_, value)| **value != 0.0);
+                Unobservable {
+                    combination: terms.map(|(k, value)| (name(k), *value)).collect(),
+                    why: "no reading of these tests changes when these values change together; touch at a second direction that \
+                          shares no divisor with the number of angles, or at more angles"
+                        .into(),
+                }
+            })
+            .collect()
+    }
+
+    fn drawn(&self, draws: &MonteCarlo, axis: &str, with_position: bool) -> MonteCarloResult {
+        let distributions = self.monte_carlo(draws);
+        let values = self.solution.values_mm.len();
+        let mut quantities = Vec::new();
+        for (k, distribution) in distributions.iter().enumerate() {
+            let id = match k.checked_sub(values) {
+                None if !self.solution.seen[k] || self.u_mm(k) <= 1e-9 * self.sigma_mm => continue,
+                None => self.id(k, axis),
+                Some(_) if !with_position => continue,
+                Some(place @ 0..2) => self.location(place, axis),
+                Some(place) => format!("{} by turn", self.location(place - 2, axis)),
+            };
+            quantities.push(reported(id, distribution));
+        }
+        MonteCarloResult {
+            runs: draws.runs,
+            seed: draws.seed,
+            coverage: draws.coverage,
+            quantities,
+        }
+    }
+}
+
+/// The axis' position by circle and by turn.
+struct Located {
+    centres_mm: [[f64; 2]; 2],
+    u_mm: [[f64; 2]; 2],
+    radius_mm: f64,
+    narrow: bool,
+}
+
+fn reported(id: String, distribution: &Distribution) -> DistributionResult {
+    let merged = distribution.counts.len() / REPORTED_BINS;
+    let um = |interval: [f64; 2]| interval.map(|end| end * 1e3);
+    DistributionResult {
+        id,
+        mean_um: distribution.mean * 1e3,
+        u_um: distribution.u * 1e3,
+        shortest_um: um(distribution.shortest),
+        symmetric_um: um(distribution.symmetric),
+        histogram: Histogram {
+            from_um: distribution.from * 1e3,
+            to_um: distribution.to * 1e3,
+            counts: distribution
+                .counts
+                .chunks(merged.max(1))
+                .map(|bins| bins.iter().sum())
+                .collect(),
+            below: distribution.outside[0],
+            above: distribution.outside[1],
+        },
+    }
+}
+
+/// An angle in degrees without the rounding of its radians.
+fn degrees(angle: f64) -> f64 {
+    (angle.to_degrees() * 1e4).round() / 1e4 + 0.0
+}

@@ -1,0 +1,126 @@
+//! The functions' values from the equations: linear least squares in what the boundary conditions leave free.
+
+use faer::Mat;
+
+use super::boundary::Reduction;
+use super::equations::{Equations, Reference};
+use crate::error::IdentifyError;
+use crate::rank::Rank;
+use crate::triangle::Triangle;
+
+/// Values of the functions, mm, and how they follow from the readings.
+#[derive(Clone, Debug)]
+pub struct Solution {
+    /// Every column of the equations, then the radius where it is estimated.
+    pub values_mm: Vec<f64>,
+    /// Their covariance, mm².
+    pub covariance: Mat<f64>,
+    /// `values = estimator · inputs`: rows as the values, columns as the readings.
+    pub estimator: Mat<f64>,
+    /// Standard uncertainty of each input, mm.
+    pub u_inputs_mm: Vec<f64>,
+    /// What is seen of the free values.
+    pub rank: Rank,
+    /// Whether each of the values is seen.
+    pub seen: Vec<bool>,
+    /// Number of free values, the radius included where it is one.
+    pub unknowns: usize,
+    /// Square root of the mean square residual over the readings, mm.
+    pub rms_mm: f64,
+    /// Readings that say something, less what is seen.
+    pub freedom: usize,
+}
+
+/// Solves the equations for readings with the standard uncertainty `sigma_mm`.
+///
+/// # Errors
+/// If an equation holds a number that is not finite.
+pub fn solve(equations: &Equations, reduction: &Reduction, sigma_mm: f64) -> Result<Solution, IdentifyError> {
+    let columns = equations.columns();
+    let free = reduction.free.len();
+    let radius = equations.reference == Reference::Estimated;
+    let unknowns = free + usize::from(radius);
+    let inputs = &equations.outward_mm;
+    let u_inputs_mm = vec![sigma_mm; inputs.len()];
+    let rows: Vec<Vec<f64>> = equations
+        .rows
+        .iter()
+        .map(|row| {
+            let mut reduced = vec![0.0; unknowns];
+            for (column, coefficient) in row.iter().enumerate().filter(|(_, a)| **a != 0.0) {
+                for k in 0..free {
+                    reduced[k] += coefficient * reduction.spread[(column, k)];
+                }
+            }
+            if radius {
+                reduced[free] = 1.0;
+            }
+            reduced
+        })
+        .collect();
+    let white = Mat::from_fn(rows.len(), unknowns + 1, |i, j| {
+        let entry = if j == unknowns { inputs[i] } else { rows[i][j] };
+        entry / u_inputs_mm[i]
+    });
+    let mut triangle = Triangle::new(unknowns);
+    triangle.absorb(white.as_ref());
+    let rank = Rank::decide(triangle.parts().0.as_ref(), &vec![1.0; unknowns])?;
+    let of_free = crate::fit::covariance(&triangle, &rank.seen)?;
+
+    let outputs = columns + usize::from(radius);
+    let spread = Mat::from_fn(outputs, unknowns, |i, k| match (i < columns, k < free) {
+        (true, true) => reduction.spread[(i, k)],
+        (false, false) => 1.0,
+        _ => 0.0,
+    });
+    let weighted = Mat::from_fn(unknowns, rows.len(), |k, i| rows[i][k] / u_inputs_mm[i].powi(2));
+    let estimator = &spread * (&of_free * weighted);
+    let covariance = &spread * of_free * spread.transpose();
+    let values_mm: Vec<f64> = (0..outputs)
+        .map(|i| (0..inputs.len()).map(|j| estimator[(i, j)] * inputs[j]).sum())
+        .collect();
+    let seen = (0..outputs)
+        .map(|i| (0..unknowns).all(|k| spread[(i, k)] == 0.0 || rank.is_seen(k)))
+        .collect();
+
+    let residual = |(row, observed): (&Vec<f64>, &f64)| {
+        let model: f64 = row.iter().zip(&values_mm).map(|(a, x)| a * x).sum();
+        let radius = if radius { values_mm[columns] } else { 0.0 };
+        observed - model - radius
+    };
+    let count = equations.rows.len();
+    let sum: f64 = equations
+        .rows
+        .iter()
+        .zip(&equations.outward_mm)
+        .map(residual)
+        .map(|r| r * r)
+        .sum();
+    let informative = rows.iter().filter(|row| row.iter().any(|a| *a != 0.0)).count();
+    let freedom = informative.saturating_sub(rank.seen.ncols());
+    Ok(Solution {
+        values_mm,
+        covariance,
+        estimator,
+        u_inputs_mm,
+        rank,
+        seen,
+        unknowns,
+        rms_mm: (sum / count.max(1) as f64).sqrt(),
+        freedom,
+    })
+}
+
+/// Rank of the equations before any condition is agreed upon.
+///
+/// # Errors
+/// If an equation holds a number that is not finite.
+pub fn rank_before(equations: &Equations) -> Result<usize, IdentifyError> {
+    let rows = &equations.rows;
+    let matrix = Mat::from_fn(rows.len(), equations.columns(), |i, j| rows[i][j]);
+    let svd = matrix.svd().map_err(|_| IdentifyError::Decomposition)?;
+    let singular: Vec<f64> = svd.S().column_vector().iter().copied().collect();
+    let largest = singular.first().copied().unwrap_or(0.0);
+    // Coefficients are sines and cosines: what is dependent comes out at rounding, what is not at a hundredth or more.
+    Ok(singular.iter().filter(|s| **s > 1e-9 * largest).count())
+}

@@ -1,0 +1,271 @@
+//! The volumetric error: where the tool point is in the table frame, less where it should be, anywhere in the workspace.
+//!
+//! ```text
+//! e(q) = T_w(q, E(q))⁻¹ T_t(q, E(q)) p − T_w(q)⁻¹ T_t(q) p
+//! ```
+//!
+//! with the errors `E` functions of the axes. Compensation looks for commands `q′` at which the machine with its errors is where the
+//! machine without them is at `q`: Newton's iteration on the chain, `q′ ← q′ − J⁻¹ r`, with `J` the directions in which the linear axes move the tool over
+//! the table. The errors, which change by a few parts in 10⁵ of the way, are left out of `J`, so that every step gains four digits or so.
+
+pub mod functions;
+
+use abbe_model::axis::AxisKind;
+use abbe_model::chain::{AxisPosition, BodyErrors, ERRORS_PER_AXIS, Machine};
+use abbe_model::frames::Point;
+use nalgebra::{DMatrix, DVector, Vector3};
+use rayon::prelude::*;
+use serde::Serialize;
+
+pub use functions::{ErrorFunction, Form};
+
+use crate::error::IdentifyError;
+
+/// Most points of a map.
+pub const MOST_POINTS: usize = 1_000_000;
+/// Most steps of a compensation.
+const MOST_STEPS: usize = 20;
+/// Residual at which a compensation has ended, mm.
+const SETTLED_MM: f64 = 1e-10;
+
+/// A machine with errors.
+#[derive(Clone, Debug)]
+pub struct Erring<'a> {
+    /// The machine.
+    pub machine: &'a Machine,
+    /// Its errors.
+    pub functions: &'a [ErrorFunction],
+    /// The tool point in the tool frame, mm.
+    pub tool_mm: [f64; 3],
+}
+
+/// The error at one place, mm.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Place {
+    /// Positions of the axes, mm or rad.
+    pub positions: Vec<f64>,
+    /// Where the tool point should be in the table frame.
+    pub nominal_mm: [f64; 3],
+    /// Where it is, less that.
+    pub error_mm: [f64; 3],
+    /// The commands that cancel it and what they leave, where asked for.
+    pub compensated: Option<Compensated>,
+}
+
+/// Corrected commands.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Compensated {
+    /// Positions to command, mm or rad; rotary axes as they were.
+    pub positions: Vec<f64>,
+    /// The error that remains, mm.
+    pub error_mm: [f64; 3],
+}
+
+impl Erring<'_> {
+    /// The tool point in the table frame, with errors or without.
+    fn point(&self, positions: &[f64], with_errors: bool, only: Option<usize>) -> Vector3<f64> {
+        let machine = self.machine;
+        let state: Vec<AxisPosition<f64>> = machine
+            .axes
+            .iter()
+            .zip(positions)
+            .map(|(axis, q)| AxisPosition::new(axis.kind, *q))
+            .collect();
+        let errors = if with_errors {
+            let mut slots = vec![0.0; machine.error_slots()];
+            for function in self.functions {
+                if only.is_none_or(|axis| function.slot / ERRORS_PER_AXIS == axis) {
+                    slots[function.slot] += function.form.at(positions[function.over]);
+                }
+            }
+            machine.body_errors(|slot| slots[slot] != 0.0, |slot| slots[slot])
+        } else {
+            vec![BodyErrors::NONE; machine.axes.len()]
+        };
+        let tool = machine.tool_point(&state, &errors, Point(self.tool_mm));
+        Vector3::from(machine.table_point(&state, &errors, tool).0)
+    }
+
+    /// The error vector where the axes stand.
+    pub fn place(&self, positions: &[f64]) -> Place {
+        let nominal = self.point(positions, false, None);
+        Place {
+            positions: positions.to_vec(),
+            nominal_mm: nominal.into(),
+            error_mm: (self.point(positions, true, None) - nominal).into(),
+            compensated: None,
+        }
+    }
+
+    /// The error vector from the errors of one axis alone, mm.
+    pub fn of_axis(&self, positions: &[f64], axis: usize) -> [f64; 3] {
+        (self.point(positions, true, Some(axis)) - self.point(positions, false, None)).into()
+    }
+
+    /// The commands of the linear axes that bring the tool where it should be.
+    ///
+    /// # Errors
+    /// If the linear axes do not span the space, or the iteration does not settle.
+    pub fn compensate(&self, positions: &[f64]) -> Result<Compensated, IdentifyError> {
+        let linear: Vec<usize> = (0..self.machine.axes.len())
+            .filter(|axis| self.machine.axes[*axis].kind == AxisKind::Linear)
+            .collect();
+        let wanted = self.point(positions, false, None);
+        // The nominal point is affine in the linear axes: a step of a millimetre gives the derivative itself.
+        let columns: Vec<Vector3<f64>> = linear
+            .iter()
+            .map(|axis| {
+                let mut moved = positions.to_vec();
+                moved[*axis] += 1.0;
+                self.point(&moved, false, None) - wanted
+            })
+            .collect();
+        let jacobian = DMatrix::from_fn(3, linear.len(), |i, j| columns[j][i]);
+        let spans = |inverse: &DMatrix<f64>| (&jacobian * inverse - DMatrix::identity(3, 3)).norm() < 1e-6;
+        let inverse = match linear.len() {
+            0 => None,
+            _ => jacobian.clone().pseudo_inverse(1e-9).ok().filter(spans),
+        };
+        let Some(inverse) = inverse else {
+            return Err(IdentifyError::Request(format!(
+                "compensation: the {} linear axes of the machine do not span the space",
+                linear.len()
+            )));
+        };
+        let mut commands = positions.to_vec();
+        for _ in 0..MOST_STEPS {
+            let residual = self.point(&commands, true, None) - wanted;
+            if residual.norm() <= SETTLED_MM {
+                return Ok(Compensated {
+                    positions: commands,
+                    error_mm: residual.into(),
+                });
+            }
+            let step = &inverse * DVector::from_column_slice(residual.as_slice());
+            for (axis, change) in linear.iter().zip(step.iter()) {
+                commands[*axis] -= change;
+            }
+        }
+        Err(IdentifyError::Request(format!(
+            "compensation: no settling within {MOST_STEPS} steps; the errors are not small"
+        )))
+    }
+}
+
+/// Largest and root mean square of a length over a map, µm.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
+pub struct Size {
+    /// The largest.
+    pub largest_um: f64,
+    /// Root mean square.
+    pub rms_um: f64,
+}
+
+impl Size {
+    fn of(lengths_mm: impl Iterator<Item = f64>) -> Size {
+        let (mut largest, mut sum, mut count) = (0.0_f64, 0.0, 0);
+        for length in lengths_mm {
+            largest = largest.max(length.abs());
+            sum += length * length;
+            count += 1;
+        }
+        Size {
+            largest_um: largest * 1e3,
+            rms_um: (sum / f64::from(count.max(1))).sqrt() * 1e3,
+        }
+    }
+}
+
+/// A map in figures.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Summary {
+    /// Number of places.
+    pub places: usize,
+    /// Of the error vector.
+    pub error: Size,
+    /// Positions of the axes where the error is largest, mm or degrees, by axis.
+    pub largest_at: Vec<(String, f64)>,
+    /// Of its coordinates X, Y, Z in the table frame.
+    pub coordinates: [Size; 3],
+    /// Of the error vector from each axis' errors alone.
+    pub by_axis: Vec<(String, Size)>,
+    /// Of what compensation leaves, where asked for.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub residual: Option<Size>,
+}
+
+/// A map: every place of a grid, in the order of the axes, the last one fastest.
+///
+/// # Errors
+/// If the grid has too many places, or a compensation fails.
+pub fn map(
+    erring: &Erring<'_>,
+    grid: &[Vec<f64>],
+    compensate: bool,
+) -> Result<(Vec<Place>, Summary), IdentifyError> {
+    let total = grid
+        .iter()
+        .try_fold(1_usize, |total, axis| total.checked_mul(axis.len()));
+    let Some(total) = total.filter(|total| *total > 0 && *total <= MOST_POINTS) else {
+        return Err(IdentifyError::Request(format!(
+            "a map has at least one and at most {MOST_POINTS} places"
+        )));
+    };
+    let places: Vec<(Place, Vec<f64>)> = (0..total)
+        .into_par_iter()
+        .map(|number| {
+            let mut rest = number;
+            let mut positions = vec![0.0; grid.len()];
+            for (axis, values) in grid.iter().enumerate().rev() {
+                positions[axis] = values[rest % values.len()];
+                rest /= values.len();
+            }
+            let mut place = erring.place(&positions);
+            if compensate {
+                place.compensated = Some(erring.compensate(&positions)?);
+            }
+            let by_axis = (0..grid.len())
+                .map(|axis| norm(erring.of_axis(&positions, axis)))
+                .collect();
+            Ok((place, by_axis))
+        })
+        .collect::<Result<_, IdentifyError>>()?;
+    let machine = erring.machine;
+    let largest = places
+        .iter()
+        .max_by(|(a, _), (b, _)| norm(a.error_mm).total_cmp(&norm(b.error_mm)));
+    let outside = |axis: usize, q: f64| match machine.axes[axis].kind {
+        AxisKind::Linear => q,
+        AxisKind::Rotary => q.to_degrees(),
+    };
+    let residual = compensate.then(|| {
+        let left = places.iter().filter_map(|(place, _)| place.compensated.as_ref());
+        Size::of(left.map(|compensated| norm(compensated.error_mm)))
+    });
+    let summary = Summary {
+        places: total,
+        error: Size::of(places.iter().map(|(place, _)| norm(place.error_mm))),
+        largest_at: largest.map_or(Vec::new(), |(place, _)| {
+            let named = machine.axes.iter().zip(&place.positions).enumerate();
+            named
+                .map(|(k, (axis, q))| (axis.name.clone(), outside(k, *q)))
+                .collect()
+        }),
+        coordinates: std::array::from_fn(|k| Size::of(places.iter().map(|(place, _)| place.error_mm[k]))),
+        by_axis: machine
+            .axes
+            .iter()
+            .enumerate()
+            .map(|(k, axis)| {
+                let size = Size::of(places.iter().map(|(_, by_axis)| by_axis[k]));
+                (axis.name.clone(), size)
+            })
+            .collect(),
+        residual,
+    };
+    Ok((places.into_iter().map(|(place, _)| place).collect(), summary))
+}
+
+fn norm(vector: [f64; 3]) -> f64 {
+    Vector3::from(vector).norm()
+}

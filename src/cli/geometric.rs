@@ -1,0 +1,110 @@
+//! `abbe fit --method circle|cone|two-plane`: a geometric method beside the full fit.
+
+use abbe::identify::geometric::{self, Comparison, Method};
+use abbe::model::session::Session;
+
+use super::failure::Failure;
+use super::{CommonArguments, fit, output, table};
+
+/// Runs a geometric method and the full fit on the same readings.
+pub fn run(session: &Session, method: Method, common: &CommonArguments) -> Result<(), Failure> {
+    let result = geometric::compare(session, method, common.seed)?;
+    print(&result);
+    if let Some(path) = &common.json {
+        output::write_json(path, &result)?;
+    }
+    Ok(())
+}
+
+fn print(result: &Comparison) {
+    say!(
+        "{} readings, noise {} ({})",
+        result.readings,
+        table::micrometres(result.noise_um),
+        result.noise_source
+    );
+    say!("\nWhere the axes pass the standing ball, from their nominal places:");
+    let rows: Vec<Vec<String>> = result
+        .centres
+        .iter()
+        .flat_map(|centre| {
+            (0..2).map(move |which| {
+                let (offset, u) = table::value_and_u(centre.offset_um[which], centre.u_um[which]);
+                let shares: Vec<String> = centre
+                    .shares
+                    .iter()
+                    .filter(|(_, share)| share[which].abs() > 1e-6)
+                    .map(|(id, share)| format!("{:+.3} {id}", share[which]))
+                    .collect();
+                vec![
+                    centre.test.clone(),
+                    format!("{} of {}", centre.across[which], centre.axis),
+                    offset,
+                    u,
+                    shares.join(" "),
+                ]
+            })
+        })
+        .collect();
+    table::print(
+        &[
+            "test",
+            "centre",
+            "µm",
+            "u (k=1)",
+            "in µm and arcsec, to first order",
+        ],
+        &rows,
+    );
+    say!(
+        "\n{} beside the full fit; bias on noise-free readings with the full fit's errors:",
+        result.method
+    );
+    let rows: Vec<Vec<String>> = result
+        .errors
+        .iter()
+        .map(|row| {
+            let pair = |value: Option<f64>, u: Option<f64>| match (value, u) {
+                (Some(value), Some(u)) => {
+                    let (value, u) = table::value_and_u(value, u);
+                    [value, u]
+                }
+                _ => ["–".to_string(), "–".to_string()],
+            };
+            let bias =
+                |bias: Option<f64>| bias.map_or("–".to_string(), |bias| format!("{:.4}", bias + 0.0));
+            let [value, u] = pair(row.value, row.u);
+            let [full, full_u] = pair(row.full_value, row.full_u);
+            vec![
+                row.id.clone(),
+                value,
+                u,
+                bias(row.bias),
+                full,
+                full_u,
+                bias(row.full_bias),
+                row.unit.clone(),
+            ]
+        })
+        .collect();
+    table::print(
+        &[
+            "error",
+            result.method.as_str(),
+            "u (k=1)",
+            "bias",
+            "full fit",
+            "u (k=1)",
+            "bias",
+            "unit",
+        ],
+        &rows,
+    );
+    say!(
+        "\nResidual of the tests that the method takes: {} nominal, {} with its errors; of all tests {} with the full fit",
+        table::micrometres(result.nominal_rms_um),
+        table::micrometres(result.method_rms_um),
+        table::micrometres(result.rms_um)
+    );
+    fit::print_warnings(&result.warnings);
+}

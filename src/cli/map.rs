@@ -1,0 +1,223 @@
+//! `abbe volumetric --map`: the volumetric error over a grid, and its compensation.
+
+use std::fmt::Write as _;
+use std::path::PathBuf;
+
+use abbe::identify::volumetric::{self, Erring, Place, Summary, functions};
+use abbe::model::axis::AxisKind;
+use abbe::model::chain::Machine;
+use clap::Args;
+
+use super::failure::Failure;
+use super::{output, table};
+
+/// A map of the volumetric error.
+#[derive(Args)]
+pub struct MapArguments {
+    /// Write the error vector over the workspace to a CSV file instead of printing the closed form.
+    #[arg(long, value_name = "FILE.csv", requires = "functions")]
+    map: Option<PathBuf>,
+    /// The errors as functions of the axes: a TOML file of constants, tables, polynomials and harmonics.
+    #[arg(long, value_name = "FILE", requires = "map")]
+    functions: Option<PathBuf>,
+    /// Places along each axis that moves.
+    #[arg(long, value_name = "N", requires = "map", default_value_t = 5)]
+    places: usize,
+    /// Where an axis stands in the map, or its own number of places: `A=30` (mm or degrees), `X:11`; may be repeated.
+    #[arg(
+        long = "axis",
+        value_name = "AXIS=AT|AXIS:N",
+        requires = "map",
+        allow_hyphen_values = true
+    )]
+    axes: Vec<String>,
+    /// The tool point in the tool frame.
+    #[arg(
+        long,
+        value_name = "X,Y,Z",
+        requires = "map",
+        value_delimiter = ',',
+        allow_hyphen_values = true
+    )]
+    tool_mm: Vec<f64>,
+    /// Add the commands of the linear axes that cancel the error, and what they leave.
+    #[arg(long, requires = "map")]
+    compensate: bool,
+    /// Write the summary of the map as JSON.
+    #[arg(long, value_name = "FILE", requires = "map")]
+    json: Option<PathBuf>,
+}
+
+impl MapArguments {
+    /// Whether a map is asked for.
+    pub fn wanted(&self) -> bool {
+        self.map.is_some()
+    }
+}
+
+/// Runs `abbe volumetric --map`.
+pub fn run(machine: &Machine, arguments: &MapArguments) -> Result<(), Failure> {
+    let (Some(path), Some(file)) = (&arguments.map, &arguments.functions) else {
+        return Err(Failure::Other("--map and --functions go together".into()));
+    };
+    let functions = functions::read(file, machine)?;
+    let tool_mm = match arguments.tool_mm[..] {
+        [] => [0.0; 3],
+        [x, y, z] => [x, y, z],
+        _ => return Err(Failure::Other("--tool-mm: three numbers, as in 0,0,-120".into())),
+    };
+    let grid = grid(machine, arguments)?;
+    let erring = Erring {
+        machine,
+        functions: &functions,
+        tool_mm,
+    };
+    let (places, summary) = volumetric::map(&erring, &grid, arguments.compensate)?;
+    output::write_whole(path, csv(machine, &places).as_bytes())?;
+    print(&summary, functions.len(), &path.display().to_string());
+    if let Some(json) = &arguments.json {
+        output::write_json(json, &summary)?;
+    }
+    Ok(())
+}
+
+/// Positions of each axis, mm or rad.
+fn grid(machine: &Machine, arguments: &MapArguments) -> Result<Vec<Vec<f64>>, Failure> {
+    let mut wanted: Vec<Option<(char, f64)>> = vec![None; machine.axes.len()];
+    for text in &arguments.axes {
+        let fault = || {
+            Failure::Other(format!(
+                "--axis {text}: write where the axis stands, `A=30`, or its number of places, `X:11`"
+            ))
+        };
+        let sign = if text.contains('=') { '=' } else { ':' };
+        let (name, number) = text.split_once(sign).ok_or_else(fault)?;
+        let number: f64 = number.trim().parse().map_err(|_| fault())?;
+        if !number.is_finite() || (sign == ':' && (number < 1.0 || number.fract() != 0.0)) {
+            return Err(fault());
+        }
+        let Some(axis) = machine.axis_index(name.trim()) else {
+            let names: Vec<&str> = machine.axes.iter().map(|axis| axis.name.as_str()).collect();
+            return Err(Failure::Other(format!(
+                "--axis {text}: the machine has no axis `{}`; its axes are {}",
+                name.trim(),
+                names.join(", ")
+            )));
+        };
+        wanted[axis] = Some((sign, number));
+    }
+    let along = |axis: usize| -> Result<Vec<f64>, Failure> {
+        let body = &machine.axes[axis];
+        let inside = |q: f64| match body.kind {
+            AxisKind::Linear => q,
+            AxisKind::Rotary => q.to_radians(),
+        };
+        let count = match wanted[axis] {
+            Some(('=', at)) => return Ok(vec![inside(at)]),
+            Some((_, count)) => count as usize,
+            None => arguments.places,
+        };
+        let [least, greatest] = match (body.travel, body.kind) {
+            (Some(travel), _) => travel,
+            (None, AxisKind::Rotary) => [-std::f64::consts::PI, std::f64::consts::PI],
+            (None, AxisKind::Linear) => {
+                return Err(Failure::Other(format!(
+                    "axis `{}` states no travel: add `travel_mm` to the machine, or `--axis {}=0`",
+                    body.name, body.name
+                )));
+            }
+        };
+        Ok(match count {
+            0 => return Err(Failure::Other("--places 0: a map has at least one place".into())),
+            1 => vec![0.5 * (least + greatest)],
+            _ => (0..count)
+                .map(|k| least + (greatest - least) * k as f64 / (count - 1) as f64)
+                .collect(),
+        })
+    };
+    (0..machine.axes.len()).map(along).collect()
+}
+
+/// The map as a table: positions, the nominal point, the error; with compensation the commands and what they leave.
+fn csv(machine: &Machine, places: &[Place]) -> String {
+    let position = |k: usize, q: f64| match machine.axes[k].kind {
+        AxisKind::Linear => q,
+        AxisKind::Rotary => q.to_degrees(),
+    };
+    let mut header: Vec<String> = Vec::new();
+    let named = |suffix: &str| {
+        machine
+            .axes
+            .iter()
+            .map(move |axis| {
+                let unit = match axis.kind {
+                    AxisKind::Linear => "mm",
+                    AxisKind::Rotary => "deg",
+                };
+                format!("{}{suffix}_{unit}", axis.name.to_lowercase())
+            })
+            .collect::<Vec<_>>()
+    };
+    header.extend(named(""));
+    header.extend(["px_mm", "py_mm", "pz_mm", "ex_um", "ey_um", "ez_um", "e_um"].map(String::from));
+    if places.iter().any(|place| place.compensated.is_some()) {
+        header.extend(named("_command"));
+        header.push("left_um".into());
+    }
+    let mut text = header.join(",");
+    text.push('\n');
+    for place in places {
+        let mut cells: Vec<String> = Vec::new();
+        cells.extend(
+            place
+                .positions
+                .iter()
+                .enumerate()
+                .map(|(k, q)| format!("{:.6}", position(k, *q))),
+        );
+        cells.extend(place.nominal_mm.iter().map(|p| format!("{p:.6}")));
+        cells.extend(place.error_mm.iter().map(|e| format!("{:.6}", e * 1e3)));
+        let norm = |e: [f64; 3]| e.iter().map(|x| x * x).sum::<f64>().sqrt() * 1e3;
+        cells.push(format!("{:.6}", norm(place.error_mm)));
+        if let Some(compensated) = &place.compensated {
+            let commands = compensated.positions.iter().enumerate();
+            cells.extend(commands.map(|(k, q)| format!("{:.9}", position(k, *q))));
+            cells.push(format!("{:.9}", norm(compensated.error_mm)));
+        }
+        // Writing to a String does not fail.
+        let _ = writeln!(text, "{}", cells.join(","));
+    }
+    text
+}
+
+fn print(summary: &Summary, functions: usize, path: &str) {
+    say!("{path}: {} places, {functions} error functions", summary.places);
+    let at: Vec<String> = summary
+        .largest_at
+        .iter()
+        .map(|(name, q)| format!("{name} {q:.1}"))
+        .collect();
+    say!("largest at {}\n", at.join(", "));
+    let row = |name: String, size: &volumetric::Size| {
+        vec![
+            name,
+            format!("{:.3}", size.largest_um),
+            format!("{:.3}", size.rms_um),
+        ]
+    };
+    let mut rows = vec![row("error vector".into(), &summary.error)];
+    for (name, size) in ["X", "Y", "Z"].iter().zip(&summary.coordinates) {
+        rows.push(row(format!("its {name}"), size));
+    }
+    for (axis, size) in &summary.by_axis {
+        rows.push(row(format!("from axis {axis} alone"), size));
+    }
+    if let Some(residual) = &summary.residual {
+        rows.push(vec![
+            "after compensation".into(),
+            format!("{:.1e}", residual.largest_um),
+            format!("{:.1e}", residual.rms_um),
+        ]);
+    }
+    table::print(&["µm", "largest", "rms"], &rows);
+}

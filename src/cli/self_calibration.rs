@@ -1,0 +1,173 @@
+//! `abbe fit --method self-calibration`.
+
+use abbe::identify::self_calibration::{self, FunctionResult, MonteCarlo, SelfCalibration};
+use abbe::model::session::Session;
+use clap::Args;
+
+use super::failure::Failure;
+use super::{CommonArguments, fit, output, table};
+
+/// Monte Carlo of a self-calibration.
+#[derive(Args)]
+pub struct DrawArguments {
+    /// Propagate distributions by so many runs (self-calibration).
+    #[arg(long, value_name = "RUNS")]
+    monte_carlo: Option<u64>,
+    /// Probability that a coverage interval is to hold.
+    #[arg(long, value_name = "P", requires = "monte_carlo", default_value_t = 0.95)]
+    coverage: f64,
+}
+
+/// Fewest runs of which 95 % intervals mean anything (JCGM 101, 7.2.2 asks for 200 of them at the ends: 10⁴).
+const FEWEST_RUNS: u64 = 10_000;
+
+impl DrawArguments {
+    /// That nothing is to be drawn.
+    pub fn refuse(&self) -> Result<(), Failure> {
+        match self.monte_carlo {
+            None => Ok(()),
+            Some(_) => Err(Failure::Other(
+                "--monte-carlo goes with `--method self-calibration`; the full fit propagates by derivatives"
+                    .into(),
+            )),
+        }
+    }
+
+    fn draws(&self, seed: u64) -> Result<Option<MonteCarlo>, Failure> {
+        let Some(runs) = self.monte_carlo else {
+            return Ok(None);
+        };
+        if runs < FEWEST_RUNS {
+            return Err(Failure::Other(format!(
+                "--monte-carlo {runs}: {FEWEST_RUNS} runs are the fewest whose intervals mean anything"
+            )));
+        }
+        if !(self.coverage > 0.5 && self.coverage < 0.9999) {
+            return Err(Failure::Other(format!(
+                "--coverage {}: a probability between 0.5 and 0.9999",
+                self.coverage
+            )));
+        }
+        Ok(Some(MonteCarlo {
+            runs,
+            seed,
+            coverage: self.coverage,
+        }))
+    }
+}
+
+/// Runs `abbe fit --method self-calibration`.
+pub fn run(session: &Session, draws: &DrawArguments, common: &CommonArguments) -> Result<(), Failure> {
+    let draws = draws.draws(common.seed)?;
+    let calibration = self_calibration::calibrate(session)?;
+    let result = calibration.report(session, draws.as_ref());
+    print(&result);
+    if let Some(path) = &common.json {
+        output::write_json(path, &result)?;
+    }
+    Ok(())
+}
+
+fn print(result: &SelfCalibration) {
+    say!(
+        "{} readings, noise {} ({}), residual {}",
+        result.readings,
+        table::micrometres(result.noise_um),
+        result.noise_source,
+        table::micrometres(result.rms_um)
+    );
+    say!(
+        "{} values of four functions, rank {} before boundary conditions",
+        result.values,
+        result.rank_before
+    );
+    say!(
+        "{} unknowns under {} conditions, rank {}",
+        result.unknowns,
+        result.conditions.len(),
+        result.rank
+    );
+    for condition in &result.conditions {
+        say!("  {condition}");
+    }
+    say!("\nµm, with standard uncertainty:");
+    print_functions(&result.functions);
+    if let Some(radius) = &result.radius {
+        say!("");
+        fit::print_parameters(std::slice::from_ref(radius));
+    }
+    if !result.parameters.is_empty() {
+        say!(
+            "\nPosition of axis {}, by the least-squares circle of its displacements:",
+            result.axis
+        );
+        fit::print_parameters(&result.parameters);
+        say!("\nThe same from the angles of the turn:");
+        fit::print_parameters(&result.parameters_by_turn);
+        say!("\nError motions of axis {}, µm:", result.axis);
+        print_functions(&result.error_motions);
+    }
+    fit::print_unobservable(&result.unobservable);
+    if let Some(drawn) = &result.monte_carlo {
+        say!(
+            "\nMonte Carlo, {} runs, seed {}; intervals of {} % in µm:",
+            drawn.runs,
+            drawn.seed,
+            drawn.coverage * 100.0
+        );
+        let rows: Vec<Vec<String>> = drawn
+            .quantities
+            .iter()
+            .map(|quantity| {
+                let (mean, u) = table::value_and_u(quantity.mean_um, quantity.u_um);
+                let interval = |[low, high]: [f64; 2]| {
+                    let (low, _) = table::value_and_u(low, quantity.u_um);
+                    let (high, _) = table::value_and_u(high, quantity.u_um);
+                    format!("{low} … {high}")
+                };
+                vec![
+                    quantity.id.clone(),
+                    mean,
+                    u,
+                    interval(quantity.shortest_um),
+                    interval(quantity.symmetric_um),
+                ]
+            })
+            .collect();
+        table::print(&["quantity", "mean", "u (k=1)", "shortest", "symmetric"], &rows);
+    }
+    fit::print_warnings(&result.warnings);
+}
+
+/// Functions side by side, one line an angle.
+fn print_functions(functions: &[FunctionResult]) {
+    let mut angles: Vec<f64> = Vec::new();
+    for point in functions.iter().flat_map(|function| &function.points) {
+        if !angles.contains(&point.at_deg) {
+            angles.push(point.at_deg);
+        }
+    }
+    angles.sort_by(f64::total_cmp);
+    let mut header = vec!["at"];
+    header.extend(functions.iter().map(|function| function.id.as_str()));
+    let cell = |function: &FunctionResult, angle: f64| {
+        let point = function.points.iter().find(|point| point.at_deg == angle);
+        let Some((value, u)) = point.and_then(|point| Some((point.value_um?, point.u_um?))) else {
+            return "–".to_string();
+        };
+        if u < 1e-9 {
+            return format!("{:.2}", value + 0.0);
+        }
+        let (value, u) = table::value_and_u(value, u);
+        format!("{value} ± {u}")
+    };
+    let rows: Vec<Vec<String>> = angles
+        .iter()
+        .map(|angle| {
+            let mut row = vec![format!("{angle}°")];
+            row.extend(functions.iter().map(|function| cell(function, *angle)));
+            row
+        })
+        .collect();
+    table::print(&header, &rows);
+}

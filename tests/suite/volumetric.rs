@@ -1,0 +1,271 @@
+//! The volumetric error and its compensation, against plain matrices and over every topology.
+
+use abbe::identify::volumetric::{self, Erring, ErrorFunction, Form, functions};
+use abbe::model::axis::AxisKind;
+use abbe::model::chain::{ERRORS_PER_AXIS, Machine};
+use nalgebra::{Isometry3, Point3, Rotation3, Translation3, UnitQuaternion, Vector3};
+use rand::SeedableRng;
+use rand_pcg::Pcg64;
+
+use super::topologies::{self, uniform};
+use super::{abbe, ready, text};
+
+fn machine() -> Machine {
+    abbe::model::session::read::machine(&ready("volumetric/machine.toml")).unwrap()
+}
+
+fn errors(machine: &Machine) -> Vec<ErrorFunction> {
+    functions::read(&ready("volumetric/errors.toml"), machine).unwrap()
+}
+
+/// Values of the twelve errors of each axis.
+fn slots(machine: &Machine, functions: &[ErrorFunction], positions: &[f64]) -> Vec<f64> {
+    let mut slots = vec![0.0; machine.error_slots()];
+    for function in functions {
+        slots[function.slot] += function.form.at(positions[function.over]);
+    }
+    slots
+}
+
+/// The tool point in the table frame of `w C A b Y X Z t` by homogeneous transformations.
+fn by_matrices(machine: &Machine, slots: &[f64], positions: &[f64], tool: [f64; 3]) -> Point3<f64> {
+    let small = |six: &[f64]| -> Isometry3<f64> {
+        let turn = Rotation3::from_axis_angle(&Vector3::x_axis(), six[3])
+            * Rotation3::from_axis_angle(&Vector3::y_axis(), six[4])
+            * Rotation3::from_axis_angle(&Vector3::z_axis(), six[5]);
+        Isometry3::from_parts(
+            Translation3::new(six[0], six[1], six[2]),
+            UnitQuaternion::from_rotation_matrix(&turn),
+        )
+    };
+    let body = |name: &str| -> Isometry3<f64> {
+        let axis = machine.axis_index(name).unwrap();
+        let twelve = &slots[axis * ERRORS_PER_AXIS..(axis + 1) * ERRORS_PER_AXIS];
+        let direction = Vector3::from(machine.axes[axis].direction);
+        if machine.axes[axis].kind == AxisKind::Rotary {
+            let turn = UnitQuaternion::new(direction * positions[axis]);
+            return small(&twelve[..6]) * small(&twelve[6..]) * turn;
+        }
+        let tilted = direction + Vector3::new(twelve[3], twelve[4], twelve[5]).cross(&direction);
+        Translation3::from(tilted * positions[axis]) * small(&twelve[6..])
+    };
+    let tool = body("Y") * body("X") * body("Z") * Point3::from(tool);
+    (body("A") * body("C")).inverse() * tool
+}
+
+#[test]
+fn the_33_errors_of_the_ready_machine_move_the_tool_as_matrices_do() {
+    let machine = machine();
+    let functions = errors(&machine);
+    let mut kinds: Vec<usize> = functions.iter().map(|function| function.slot).collect();
+    kinds.sort_unstable();
+    kinds.dedup();
+    assert_eq!(kinds.len(), 33);
+    let tool = [10.0, -20.0, -120.0];
+    let erring = Erring {
+        machine: &machine,
+        functions: &functions,
+        tool_mm: tool,
+    };
+    let mut random = Pcg64::seed_from_u64(3);
+    for _ in 0..200 {
+        let positions: Vec<f64> = machine
+            .axes
+            .iter()
+            .map(|axis| {
+                uniform(
+                    &mut random,
+                    if axis.kind == AxisKind::Linear { 250.0 } else { 2.0 },
+                )
+            })
+            .collect();
+        let nominal = by_matrices(&machine, &vec![0.0; machine.error_slots()], &positions, tool);
+        let actual = by_matrices(
+            &machine,
+            &slots(&machine, &functions, &positions),
+            &positions,
+            tool,
+        );
+        let place = erring.place(&positions);
+        let expected = actual - nominal;
+        assert!(
+            (Vector3::from(place.error_mm) - expected).norm() < 1e-10,
+            "{place:?} {expected}"
+        );
+        assert!(expected.norm() > 1e-3);
+        // The corrected commands put the independent machine where it should be.
+        let commands = erring.compensate(&positions).unwrap().positions;
+        let corrected = by_matrices(&machine, &slots(&machine, &functions, &commands), &commands, tool);
+        assert!(
+            (corrected - nominal).norm() < 1e-3 * expected.norm(),
+            "{}",
+            (corrected - nominal).norm()
+        );
+    }
+}
+
+#[test]
+fn every_topology_is_compensated() {
+    let mut random = Pcg64::seed_from_u64(4);
+    let mut compensated = 0;
+    for machine in topologies::all(&mut random) {
+        // Every error that the chain applies, as a straight line over its axis.
+        let mut functions = Vec::new();
+        for slot in 0..machine.error_slots() {
+            let (axis, within) = (slot / ERRORS_PER_AXIS, slot % ERRORS_PER_AXIS);
+            if machine.axes[axis].kind == AxisKind::Linear && within < 3 {
+                continue;
+            }
+            let most = if within % 6 < 3 { 0.01 } else { 5e-5 };
+            let form = Form::Polynomial {
+                scale: if machine.axes[axis].kind == AxisKind::Linear {
+                    250.0
+                } else {
+                    2.0
+                },
+                coefficients: vec![uniform(&mut random, most), uniform(&mut random, most)],
+            };
+            functions.push(ErrorFunction {
+                slot,
+                over: axis,
+                form,
+            });
+        }
+        let erring = Erring {
+            machine: &machine,
+            functions: &functions,
+            tool_mm: [0.0, 0.0, -100.0],
+        };
+        let grid: Vec<Vec<f64>> = machine
+            .axes
+            .iter()
+            .map(|axis| match axis.kind {
+                AxisKind::Linear => vec![-200.0, 0.0, 200.0],
+                AxisKind::Rotary => vec![-1.0, 0.3, 1.5],
+            })
+            .collect();
+        let linear = machine
+            .axes
+            .iter()
+            .filter(|axis| axis.kind == AxisKind::Linear)
+            .count();
+        if linear < 3 {
+            let refused = volumetric::map(&erring, &grid, true).unwrap_err().to_string();
+            assert!(refused.contains("do not span the space"), "{refused}");
+            continue;
+        }
+        compensated += 1;
+        let (places, summary) = volumetric::map(&erring, &grid, true).unwrap();
+        assert_eq!(places.len(), grid.iter().map(Vec::len).product::<usize>());
+        for place in &places {
+            let size = |vector: [f64; 3]| Vector3::from(vector).norm();
+            let left = size(place.compensated.as_ref().unwrap().error_mm);
+            assert!(left < 1e-3 * size(place.error_mm), "{}: {left}", machine.name);
+        }
+        assert!(summary.error.rms_um > 1.0 && summary.residual.unwrap().largest_um < 1e-6);
+    }
+    assert!(compensated >= 12, "{compensated}");
+}
+
+#[test]
+fn functions_have_the_values_of_their_closed_forms() {
+    let table = Form::Table {
+        at: vec![-1.0, 0.0, 2.0],
+        values: vec![3.0, 1.0, 2.0],
+    };
+    for (q, expected) in [
+        (-5.0, 3.0),
+        (-1.0, 3.0),
+        (-0.5, 2.0),
+        (0.0, 1.0),
+        (1.0, 1.5),
+        (2.0, 2.0),
+        (9.0, 2.0),
+    ] {
+        assert_eq!(table.at(q), expected, "{q}");
+    }
+    let polynomial = Form::Polynomial {
+        scale: 10.0,
+        coefficients: vec![1.0, -2.0, 4.0],
+    };
+    assert_eq!(polynomial.at(5.0), 1.0 - 1.0 + 1.0);
+    let harmonic = Form::Harmonic {
+        period: 8.0,
+        amplitude: 2.0,
+        phase: 0.5,
+    };
+    assert!((harmonic.at(3.0) - 2.0 * (0.75 * std::f64::consts::PI + 0.5).cos()).abs() < 1e-15);
+}
+
+#[test]
+fn the_command_writes_map_and_summary_and_names_what_is_wrong() {
+    let folder = tempfile::tempdir().unwrap();
+    let (map, json) = (folder.path().join("map.csv"), folder.path().join("map.json"));
+    let (machine, errors) = (ready("volumetric/machine.toml"), ready("volumetric/errors.toml"));
+    let base = ["volumetric", text(&machine), "--map", text(&map), "--functions"];
+    let run = |functions: &str, more: &[&str]| {
+        let output = abbe(&[&base[..], &[functions], more].concat());
+        (
+            output.status.code(),
+            String::from_utf8_lossy(&output.stderr).into_owned(),
+        )
+    };
+    let more = [
+        "--compensate",
+        "--places",
+        "3",
+        "--axis",
+        "C:4",
+        "--axis",
+        "A=-30",
+        "--json",
+        text(&json),
+    ];
+    let (status, told) = run(text(&errors), &more);
+    assert_eq!(status, Some(0), "{told}");
+    let table = std::fs::read_to_string(&map).unwrap();
+    assert_eq!(table.lines().count(), 1 + 27 * 4);
+    assert!(
+        table
+            .starts_with("c_deg,a_deg,y_mm,x_mm,z_mm,px_mm,py_mm,pz_mm,ex_um,ey_um,ez_um,e_um,c_command_deg")
+    );
+    assert!(std::fs::read_to_string(&json).unwrap().contains("\"rms_um\""));
+
+    let file = folder.path().join("errors.toml");
+    for (written, expected) in [
+        ("[constant]\nEX0W = \"1 um\"\n", "no axis `W`"),
+        ("[constant]\nEX0X = \"1 um\"\n", "a linear axis has squarenesses"),
+        ("[constant]\nEX0C = \"1 arcsec\"\n", "arcsec"),
+        (
+            "[[function]]\nerror = \"EXX\"\n",
+            "[[function]] 1 (`EXX`): it is one of",
+        ),
+        (
+            "[[function]]\nerror = \"EXX\"\ntable = { at_deg = [0, 1], um = [0, 1] }\n",
+            "`at_mm` is meant",
+        ),
+        (
+            "[[function]]\nerror = \"EXX\"\ntable = { at_mm = [1, 0], um = [0, 1] }\n",
+            "ascend",
+        ),
+        (
+            "[[function]]\nerror = \"EAX\"\npolynomial = { um = [0, 1] }\n",
+            "in `arcsec`",
+        ),
+        (
+            "[[function]]\nerror = \"EXX\"\nharmonic = { order = 2, amplitude_um = 1 }\n",
+            "`period_",
+        ),
+        ("[[function]]\nerror = \"EXX\"\nspline = 1\n", "line 3"),
+    ] {
+        std::fs::write(&file, written).unwrap();
+        let (status, told) = run(text(&file), &[]);
+        assert_eq!(status, Some(1));
+        assert!(
+            told.contains(expected) && told.contains("errors.toml"),
+            "{written}: {told}"
+        );
+    }
+    let (status, told) = run(text(&errors), &["--axis", "Q=3"]);
+    assert!(status == Some(1) && told.contains("no axis `Q`"), "{told}");
+}
