@@ -26,8 +26,8 @@ pub const NOISES: [Noise; 3] = [
     },
 ];
 
-/// Standard deviations of trace's own level of significance, 1 % two-sided.
-pub const LEVEL: f64 = 2.5758;
+/// Standard deviations of trace's own level of significance, 0.5 % two-sided.
+pub const LEVEL: f64 = 2.8070;
 
 /// Sessions a kind where `ABBE_STUDY` says nothing else: enough to notice what has broken, too few for figures.
 const FEW: usize = 8;

@@ -52,7 +52,8 @@ pub struct TraceOptions {
     pub exclude: Vec<String>,
     /// Number of null draws.
     pub draws: usize,
-    /// Probability that a session without structure is claimed to have an effect.
+    /// Probability that a session without structure is claimed to have an effect, if the null were exact. What is estimated of the noise makes it larger: see
+    /// the rates in the documentation of the method.
     pub significance: f64,
 }
 
@@ -64,7 +65,7 @@ impl Default for TraceOptions {
             only: Vec::new(),
             exclude: Vec::new(),
             draws: 199,
-            significance: 0.01,
+            significance: 0.005,
         }
     }
 }
