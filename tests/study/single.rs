@@ -114,7 +114,13 @@ fn an_effect_at_five_times_the_smallest_is_found() {
         rms < 1.2 * (1.0 + 4.0 / (2.0 * count).sqrt()),
         "pulls {rms} of {count}"
     );
-    assert!(tally.before.rms() > rms, "no bias before: {}", tally.before.rms());
+    // Few effects bias what they hide; a few sessions may hold none that does.
+    let many = sessions() >= 64;
+    assert!(
+        !many || tally.before.rms() > rms,
+        "no bias before: {}",
+        tally.before.rms()
+    );
 }
 
 #[test]

@@ -151,7 +151,7 @@ fn trace_with<'a>(
     let columns = Columns::new(&problem, &before_fit.beta)?;
     let start = Start::of(&problem, &columns, &before_fit)?;
     let null = |block: usize| {
-        let (count, seed) = (options.draws, options.seed);
+        let (count, seed) = (draws_of(options), options.seed);
         null::draws(&problem, &columns, pure, &start.residual, count, block, seed)
     };
     let draws = null(null::BLOCK);
@@ -336,7 +336,7 @@ fn judge<'a>(
                 &columns,
                 &after_fit.residuals,
                 &end.residual,
-                options.draws,
+                draws_of(options),
                 null::SINGLE,
                 seed,
             );
@@ -357,6 +357,12 @@ fn judge<'a>(
         effects,
         structure,
     })
+}
+
+/// As many draws as are asked for, and as many as the significance needs: fewer could not show it.
+fn draws_of(options: &TraceOptions) -> usize {
+    let least = (1.0 / options.significance.max(1e-6)).ceil() as usize;
+    options.draws.max(least - 1)
 }
 
 fn chosen(options: &TraceOptions, id: &str) -> bool {
