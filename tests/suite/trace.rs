@@ -82,6 +82,35 @@ fn lost_motion_is_found_with_its_size() {
     assert!((lost.value - 4.0).abs() < 4.0 * lost.u, "{lost:?}");
 }
 
+/// EZC of order n looks like a tilt of order n − 1 at one radius; a second radius tells them apart (first order: the one is the same at all radii, the
+/// other grows with the radius).
+#[test]
+fn another_radius_is_proposed_to_tell_an_axial_wobble_from_a_tilt() {
+    let name = "another_radius_is_proposed_to_tell_an_axial_wobble_from_a_tilt";
+    let Some(folder) = data(name, ".") else {
+        return;
+    };
+    let session = folder.join("../sample/rotary-axial-h3/session.toml");
+    let out = tempfile::tempdir().unwrap();
+    let json = out.path().join("trace.json");
+    let outcome = abbe(&["trace", text(&session), "-q", "--json", text(&json)]);
+    assert!(outcome.status.success());
+    let result: serde_json::Value = serde_json::from_str(&std::fs::read_to_string(&json).unwrap()).unwrap();
+    let effect = &result["effects"][0];
+    assert_eq!(effect["component"], "EZC");
+    let separation = &effect["separation"];
+    assert_eq!(separation["from"]["component"], "EBC");
+    assert_eq!(separation["from"]["order"], 2.0);
+    // The session's ball sits at 100 mm.
+    let test = effect["separated_by"].as_str().unwrap();
+    assert!(
+        test.contains("radius 50 mm") || test.contains("radius 150 mm"),
+        "{test}"
+    );
+    assert!(separation["before_sigma"].as_f64().unwrap() < 1.0, "{separation}");
+    assert!(separation["after_sigma"].as_f64().unwrap() > 10.0, "{separation}");
+}
+
 #[test]
 fn the_bundled_session_is_explained_at_the_command_line() {
     let folder = tempfile::tempdir().unwrap();
