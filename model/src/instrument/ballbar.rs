@@ -8,30 +8,16 @@ use crate::chain::{AxisPosition, BodyErrors, Machine};
 use crate::frames::Point;
 use crate::scalar::Scalar;
 
-const fn ball(thing: &'static str, coordinate: &'static str, by: SharedBy) -> InstrumentUnknown {
-    InstrumentUnknown {
-        thing,
-        coordinate,
-        unit: InsideUnit::Millimetre,
-        shared_by: by,
-    }
-}
-
 /// Both balls, the bar's length, the sensor's gain.
 pub const UNKNOWNS: [InstrumentUnknown; 8] = [
-    ball("workpiece_ball", "x", SharedBy::Setup),
-    ball("workpiece_ball", "y", SharedBy::Setup),
-    ball("workpiece_ball", "z", SharedBy::Setup),
-    ball("spindle_ball", "x", SharedBy::SpindleSetup),
-    ball("spindle_ball", "y", SharedBy::SpindleSetup),
-    ball("spindle_ball", "z", SharedBy::SpindleSetup),
-    ball("bar", "", SharedBy::BarSetup),
-    InstrumentUnknown {
-        thing: "gain",
-        coordinate: "",
-        unit: InsideUnit::Ratio,
-        shared_by: SharedBy::Session,
-    },
+    InstrumentUnknown::length("workpiece_ball", "x", SharedBy::Setup),
+    InstrumentUnknown::length("workpiece_ball", "y", SharedBy::Setup),
+    InstrumentUnknown::length("workpiece_ball", "z", SharedBy::Setup),
+    InstrumentUnknown::length("spindle_ball", "x", SharedBy::SpindleSetup),
+    InstrumentUnknown::length("spindle_ball", "y", SharedBy::SpindleSetup),
+    InstrumentUnknown::length("spindle_ball", "z", SharedBy::SpindleSetup),
+    InstrumentUnknown::length("bar", "", SharedBy::BarSetup),
+    InstrumentUnknown::new("gain", "", InsideUnit::Ratio, SharedBy::Session),
 ];
 
 /// Place of the bar's length among [`UNKNOWNS`].

@@ -8,6 +8,7 @@ pub mod socket;
 pub mod tracker;
 
 use crate::chain::{AxisPosition, BodyErrors, Machine};
+use crate::frames::{Point, Rotation, SmallMotion};
 use crate::scalar::Scalar;
 
 /// The scalar coordinates of one reading: one length, or three coordinates; mm.
@@ -115,7 +116,8 @@ pub enum SharedBy {
 /// One of an instrument's own unknowns.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct InstrumentUnknown {
-    /// The thing: `workpiece_ball`, `spindle_ball`, `bar`, `tracker`, `target`, `socket`, `ball`, `artefact`, `stylus`.
+    /// The thing: `workpiece_ball`, `spindle_ball`, `bar`, `tracker`, `target`, `socket`, `ball`, `artefact`, `radius`,
+    /// `form`, `stylus`, `gain`.
     pub thing: &'static str,
     /// Its coordinate, `x` … `c`, or empty.
     pub coordinate: &'static str,
@@ -123,6 +125,30 @@ pub struct InstrumentUnknown {
     pub unit: InsideUnit,
     /// Which tests share it.
     pub shared_by: SharedBy,
+}
+
+impl InstrumentUnknown {
+    const fn new(
+        thing: &'static str,
+        coordinate: &'static str,
+        unit: InsideUnit,
+        shared_by: SharedBy,
+    ) -> InstrumentUnknown {
+        InstrumentUnknown {
+            thing,
+            coordinate,
+            unit,
+            shared_by,
+        }
+    }
+
+    const fn length(thing: &'static str, coordinate: &'static str, shared_by: SharedBy) -> InstrumentUnknown {
+        InstrumentUnknown::new(thing, coordinate, InsideUnit::Millimetre, shared_by)
+    }
+
+    const fn angle(thing: &'static str, coordinate: &'static str, shared_by: SharedBy) -> InstrumentUnknown {
+        InstrumentUnknown::new(thing, coordinate, InsideUnit::Radian, shared_by)
+    }
 }
 
 /// Unit of a quantity inside the program.
@@ -239,9 +265,18 @@ pub fn displaced<S: Scalar>(
     nominal: [S::Nominal; 3],
     first: usize,
     unknown: &impl Fn(usize) -> Option<S>,
-) -> crate::frames::Point<S> {
-    crate::frames::Point(std::array::from_fn(|i| match unknown(first + i) {
+) -> Point<S> {
+    Point(std::array::from_fn(|i| match unknown(first + i) {
         Some(displacement) => displacement + nominal[i],
         None => S::nominal(nominal[i]),
     }))
+}
+
+/// The small motion of what the first six unknowns place and turn, where one of them is carried.
+fn moved<S: Scalar>(unknown: &impl Fn(usize) -> Option<S>) -> Option<SmallMotion<S>> {
+    let carried = (0..6).any(|i| unknown(i).is_some());
+    carried.then(|| {
+        let six = std::array::from_fn(|i| unknown(i).unwrap_or_else(|| S::constant(0.0)));
+        SmallMotion::new(six, Rotation::Exact)
+    })
 }

@@ -10,38 +10,24 @@
 //! the nearer of the two points in which the line meets the surface. The distance is positive while the surface is still ahead. A surface that
 //! stands out by `w` is met `w` earlier: what the literature calls the measured radius less the target is `−d`.
 
-use super::{InsideUnit, InstrumentUnknown, SharedBy, displaced};
+use super::{InstrumentUnknown, SharedBy, displaced, moved};
 use crate::chain::{AxisPosition, BodyErrors, Machine};
-use crate::frames::{Point, Rotation, SmallMotion};
+use crate::frames::Point;
 use crate::scalar::{Nominal, Scalar};
-
-const fn unknown(
-    thing: &'static str,
-    coordinate: &'static str,
-    unit: InsideUnit,
-    shared_by: SharedBy,
-) -> InstrumentUnknown {
-    InstrumentUnknown {
-        thing,
-        coordinate,
-        unit,
-        shared_by,
-    }
-}
 
 /// The artefact's pose on the table, its radius, what its surface stands out by; the stylus in the tool frame.
 pub const UNKNOWNS: [InstrumentUnknown; 11] = [
-    unknown("artefact", "x", InsideUnit::Millimetre, SharedBy::Setup),
-    unknown("artefact", "y", InsideUnit::Millimetre, SharedBy::Setup),
-    unknown("artefact", "z", InsideUnit::Millimetre, SharedBy::Setup),
-    unknown("artefact", "a", InsideUnit::Radian, SharedBy::Setup),
-    unknown("artefact", "b", InsideUnit::Radian, SharedBy::Setup),
-    unknown("artefact", "c", InsideUnit::Radian, SharedBy::Setup),
-    unknown("radius", "", InsideUnit::Millimetre, SharedBy::Setup),
-    unknown("form", "", InsideUnit::Millimetre, SharedBy::Setup),
-    unknown("stylus", "x", InsideUnit::Millimetre, SharedBy::SpindleSetup),
-    unknown("stylus", "y", InsideUnit::Millimetre, SharedBy::SpindleSetup),
-    unknown("stylus", "z", InsideUnit::Millimetre, SharedBy::SpindleSetup),
+    InstrumentUnknown::length("artefact", "x", SharedBy::Setup),
+    InstrumentUnknown::length("artefact", "y", SharedBy::Setup),
+    InstrumentUnknown::length("artefact", "z", SharedBy::Setup),
+    InstrumentUnknown::angle("artefact", "a", SharedBy::Setup),
+    InstrumentUnknown::angle("artefact", "b", SharedBy::Setup),
+    InstrumentUnknown::angle("artefact", "c", SharedBy::Setup),
+    InstrumentUnknown::length("radius", "", SharedBy::Setup),
+    InstrumentUnknown::length("form", "", SharedBy::Setup),
+    InstrumentUnknown::length("stylus", "x", SharedBy::SpindleSetup),
+    InstrumentUnknown::length("stylus", "y", SharedBy::SpindleSetup),
+    InstrumentUnknown::length("stylus", "z", SharedBy::SpindleSetup),
 ];
 
 /// Place of the artefact's radius among [`UNKNOWNS`].
@@ -102,9 +88,7 @@ impl<N: Nominal> Probe<N> {
         let ahead = machine.table_point(state, errors, ahead);
         let mut from_artefact = stylus.minus(Point::nominal(self.artefact));
         let mut direction = ahead.minus(stylus);
-        if (0..6).any(|i| unknown(i).is_some()) {
-            let six = std::array::from_fn(|i| unknown(i).unwrap_or_else(|| S::constant(0.0)));
-            let pose = SmallMotion::new(six, Rotation::Exact);
+        if let Some(pose) = moved(&unknown) {
             from_artefact = pose.pull(from_artefact);
             direction = pose.rotate_back(direction);
         }

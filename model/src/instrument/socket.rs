@@ -2,28 +2,19 @@
 //!
 //! The reading is the closure `P_s − s`, the ball in R less the socket in R; what is observed is zero.
 
-use super::{InsideUnit, InstrumentUnknown, SharedBy, displaced};
+use super::{InstrumentUnknown, SharedBy, displaced};
 use crate::chain::{AxisPosition, BodyErrors, Machine};
 use crate::frames::Point;
 use crate::scalar::Scalar;
 
-const fn unknown(thing: &'static str, coordinate: &'static str, shared_by: SharedBy) -> InstrumentUnknown {
-    InstrumentUnknown {
-        thing,
-        coordinate,
-        unit: InsideUnit::Millimetre,
-        shared_by,
-    }
-}
-
 /// The socket in R, then the ball in the tool frame.
 pub const UNKNOWNS: [InstrumentUnknown; 6] = [
-    unknown("socket", "x", SharedBy::Socket),
-    unknown("socket", "y", SharedBy::Socket),
-    unknown("socket", "z", SharedBy::Socket),
-    unknown("ball", "x", SharedBy::SpindleSetup),
-    unknown("ball", "y", SharedBy::SpindleSetup),
-    unknown("ball", "z", SharedBy::SpindleSetup),
+    InstrumentUnknown::length("socket", "x", SharedBy::Socket),
+    InstrumentUnknown::length("socket", "y", SharedBy::Socket),
+    InstrumentUnknown::length("socket", "z", SharedBy::Socket),
+    InstrumentUnknown::length("ball", "x", SharedBy::SpindleSetup),
+    InstrumentUnknown::length("ball", "y", SharedBy::SpindleSetup),
+    InstrumentUnknown::length("ball", "z", SharedBy::SpindleSetup),
 ];
 
 /// A ball and the socket it sits in, mm.

@@ -3,36 +3,22 @@
 //! `m = B · E · P`, with `P` the target in R through the chain, `E` a small motion (the pose's unknowns) and `B` a fixed rigid
 //! motion, so that the unknown angles stay small however the tracker is turned.
 
-use super::{InsideUnit, InstrumentUnknown, SharedBy, displaced};
+use super::{InstrumentUnknown, SharedBy, displaced, moved};
 use crate::chain::{AxisPosition, BodyErrors, Machine};
-use crate::frames::{Point, Rotation, SmallMotion};
+use crate::frames::Point;
 use crate::scalar::{Nominal, Scalar};
-
-const fn unknown(
-    thing: &'static str,
-    coordinate: &'static str,
-    unit: InsideUnit,
-    shared_by: SharedBy,
-) -> InstrumentUnknown {
-    InstrumentUnknown {
-        thing,
-        coordinate,
-        unit,
-        shared_by,
-    }
-}
 
 /// The pose, then the target in the tool frame.
 pub const UNKNOWNS: [InstrumentUnknown; 9] = [
-    unknown("tracker", "x", InsideUnit::Millimetre, SharedBy::Setup),
-    unknown("tracker", "y", InsideUnit::Millimetre, SharedBy::Setup),
-    unknown("tracker", "z", InsideUnit::Millimetre, SharedBy::Setup),
-    unknown("tracker", "a", InsideUnit::Radian, SharedBy::Setup),
-    unknown("tracker", "b", InsideUnit::Radian, SharedBy::Setup),
-    unknown("tracker", "c", InsideUnit::Radian, SharedBy::Setup),
-    unknown("target", "x", InsideUnit::Millimetre, SharedBy::SpindleSetup),
-    unknown("target", "y", InsideUnit::Millimetre, SharedBy::SpindleSetup),
-    unknown("target", "z", InsideUnit::Millimetre, SharedBy::SpindleSetup),
+    InstrumentUnknown::length("tracker", "x", SharedBy::Setup),
+    InstrumentUnknown::length("tracker", "y", SharedBy::Setup),
+    InstrumentUnknown::length("tracker", "z", SharedBy::Setup),
+    InstrumentUnknown::angle("tracker", "a", SharedBy::Setup),
+    InstrumentUnknown::angle("tracker", "b", SharedBy::Setup),
+    InstrumentUnknown::angle("tracker", "c", SharedBy::Setup),
+    InstrumentUnknown::length("target", "x", SharedBy::SpindleSetup),
+    InstrumentUnknown::length("target", "y", SharedBy::SpindleSetup),
+    InstrumentUnknown::length("target", "z", SharedBy::SpindleSetup),
 ];
 
 /// A tracker as set up for one test, lengths in mm.
@@ -67,9 +53,8 @@ impl<N: Nominal> Tracker<N> {
         unknown: impl Fn(usize) -> Option<S>,
     ) -> Point<S> {
         let mut point = self.target_point(machine, state, errors, &unknown);
-        if (0..6).any(|i| unknown(i).is_some()) {
-            let six = std::array::from_fn(|i| unknown(i).unwrap_or_else(|| S::constant(0.0)));
-            point = SmallMotion::new(six, Rotation::Exact).push(point);
+        if let Some(pose) = moved(&unknown) {
+            point = pose.push(point);
         }
         let [x, y, z] = point.0;
         Point(std::array::from_fn(|i| {

@@ -1,0 +1,120 @@
+//! What any file can get wrong, whatever it says: no file, no text, no TOML, unknown keys, numbers that are none.
+
+use std::fs;
+use std::path::Path;
+
+use abbe_model::session::read::{self, ReadOptions};
+
+use super::{DATA, MACHINE, SESSION, holds, session, told, with_data, with_machine, with_session};
+
+#[test]
+fn files_that_are_none() {
+    let folder = tempfile::tempdir().unwrap();
+    let read = |path: &Path| told(read::session(path, &ReadOptions::default()));
+    holds(&read(folder.path()), &["this is a folder"]);
+    holds(
+        &read(&folder.path().join("no.toml")),
+        &["the session file cannot be read"],
+    );
+    let latin = folder.path().join("latin.toml");
+    fs::write(&latin, b"name = \"\xe4\"").unwrap();
+    holds(&read(&latin), &["byte 9 is not UTF-8"]);
+}
+
+#[test]
+fn text_that_is_no_toml() {
+    holds(
+        &with_session("kind = ", "kind "),
+        &["session.toml:5", "not valid TOML"],
+    );
+    holds(
+        &with_session("100.0", "\"a\" 1"),
+        &["session.toml:11", "not valid TOML"],
+    );
+}
+
+#[test]
+fn unknown_keys() {
+    holds(
+        &with_session("bar_mm", "bar_length = 1\nbar_mm"),
+        &["session.toml:11", "test \"C100\" knows no key `bar_length`"],
+    );
+    holds(
+        &with_session("noise_um", "nois_um"),
+        &[
+            "session.toml:6",
+            "[instrument] knows no key `nois_um`",
+            "did you mean `noise_um`?",
+        ],
+    );
+    holds(
+        &with_session("[instrument]", "[instruments]"),
+        &["has no `instrument`"],
+    );
+    holds(
+        &with_session("[machine]", "extra = 1\n[machine]"),
+        &["session.toml:1", "the file knows no key `extra`"],
+    );
+    holds(
+        &with_machine("direction = [1, 0, 0]", "directon = [1, 0, 0]"),
+        &[
+            "machine.toml:8",
+            "knows no key `directon`",
+            "did you mean `direction`?",
+        ],
+    );
+}
+
+#[test]
+fn numbers_that_are_none() {
+    holds(
+        &with_data(&DATA.replace("100.0010", "NaN")),
+        &["C100.csv:3", "column 4", "NaN"],
+    );
+    holds(
+        &with_data(&DATA.replace("100.0010", "inf")),
+        &["C100.csv:3", "column 4", "infinite"],
+    );
+    holds(
+        &with_session("100.0", "nan"),
+        &["session.toml:11", "`bar_mm` is NaN"],
+    );
+    holds(
+        &with_machine("[1, 0, 0]", "[nan, 0, 0]"),
+        &["machine.toml:8", "`direction` is NaN"],
+    );
+    holds(
+        &with_machine("[1, 0, 0]", "[0, 0, 0]"),
+        &["machine.toml:8", "has no length"],
+    );
+}
+
+#[test]
+fn spans_count_the_byte_order_mark() {
+    let marked = format!("\u{feff}{}", SESSION.replace("100.0", "nan"));
+    let fault = session(MACHINE, &marked, Some(DATA)).unwrap_err();
+    let span = fault.place().unwrap().span.clone().unwrap();
+    assert_eq!(&marked[span], "nan");
+}
+
+#[test]
+fn torn_and_garbled_files_are_refused_or_read_and_never_panic() {
+    for cut in 0..SESSION.len() {
+        let _ = session(MACHINE, &SESSION[..cut], Some(DATA));
+    }
+    for cut in 0..MACHINE.len() {
+        let _ = session(&MACHINE[..cut], SESSION, Some(DATA));
+    }
+    for cut in 0..DATA.len() {
+        let _ = session(MACHINE, SESSION, Some(&DATA[..cut]));
+        for garbage in ["\"", ",", "\n", "-", "é", "\0", "1e999"] {
+            let garbled = format!("{}{garbage}{}", &DATA[..cut], &DATA[cut..]);
+            let _ = session(MACHINE, SESSION, Some(&garbled));
+        }
+    }
+    let nested = format!("x = {}", "[".repeat(100_000));
+    holds(
+        &told(session(MACHINE, &nested, None)),
+        &["session.toml:1", "not valid TOML"],
+    );
+}
