@@ -227,12 +227,6 @@ fn finish(problem: &Problem<'_>, beta: Vec<f64>, rank: Rank) -> Result<Fit, Iden
     let free = (problem.readings() * problem.coordinates())
         .saturating_sub(rank.seen.ncols())
         .max(1) as f64;
-    let significance = ChiSquared::new(free).map(|law| law.sf(chi_square)).unwrap_or(1.0);
-    let birge_ratio = if significance < BIRGE_SIGNIFICANCE {
-        (chi_square / free).sqrt().max(1.0)
-    } else {
-        1.0
-    };
     Ok(Fit {
         beta,
         rank,
@@ -240,7 +234,28 @@ fn finish(problem: &Problem<'_>, beta: Vec<f64>, rank: Rank) -> Result<Fit, Iden
         triangles,
         residuals,
         held_out,
-        birge_ratio,
+        birge_ratio: birge_ratio(chi_square, free),
+    })
+}
+
+/// `√(χ²/ν)` where it is significantly above 1, else 1: by how much uncertainties are enlarged.
+pub(crate) fn birge_ratio(chi_square: f64, free: f64) -> f64 {
+    let significance = ChiSquared::new(free).map(|law| law.sf(chi_square)).unwrap_or(1.0);
+    if significance < BIRGE_SIGNIFICANCE {
+        (chi_square / free).sqrt().max(1.0)
+    } else {
+        1.0
+    }
+}
+
+/// What a user should know where uncertainties are enlarged.
+pub(crate) fn birge_warning(ratio: f64) -> Option<String> {
+    (ratio > 1.0).then(|| {
+        format!(
+            "the residual exceeds the noise (χ² is {:.2} times its degrees of freedom); uncertainties are enlarged by {ratio:.2}; \
+             `abbe trace` looks for the cause",
+            ratio.powi(2)
+        )
     })
 }
 
@@ -273,13 +288,7 @@ pub fn report(problem: &Problem<'_>, fit: &Fit) -> FitResult {
     let held = fit.held_out.rms_mm;
     let in_3d = |rms: f64| three.then(|| rms * 3.0_f64.sqrt() * 1e3);
     let mut warnings = problem.session.warnings.clone();
-    if fit.birge_ratio > 1.0 {
-        warnings.push(format!(
-            "the residual exceeds the noise (χ² is {:.2} times its degrees of freedom); uncertainties are enlarged by {:.2}; `abbe trace` looks for the cause",
-            fit.birge_ratio.powi(2),
-            fit.birge_ratio
-        ));
-    }
+    warnings.extend(birge_warning(fit.birge_ratio));
     FitResult {
         noise_um: problem.noise.sigma_mm * 1e3,
         noise_source: problem.noise.source.word().to_string(),

@@ -3,7 +3,7 @@
 use abbe_model::session::Session;
 use serde::Serialize;
 
-use super::{Estimator, Method};
+use super::{Estimate, Estimator, Method};
 use crate::error::IdentifyError;
 use crate::fit::{self, Fit};
 use crate::parameters::Role;
@@ -41,7 +41,7 @@ pub struct ComparisonRow {
     pub unit: String,
     /// By the method; `None` where it does not tell the error.
     pub value: Option<f64>,
-    /// Its standard uncertainty from noise and set-ups.
+    /// Its standard uncertainty from noise and set-ups, enlarged as that of the full fit.
     pub u: Option<f64>,
     /// By the method on noise-free readings simulated with the full fit's errors, less those errors.
     pub bias: Option<f64>,
@@ -113,7 +113,7 @@ pub fn compare(session: &Session, method: Method, seed: u64) -> Result<Compariso
             id: parameter.id.clone(),
             unit: parameter.unit.name.clone(),
             value: place.map(|k| estimate.values[k] * outside),
-            u: place.map(|k| estimate.covariance[(k, k)].max(0.0).sqrt() * outside),
+            u: place.map(|k| estimate.covariance[(k, k)].max(0.0).sqrt() * full.birge_ratio * outside),
             bias: place.map(|k| (again.values[k] - known[p]) * outside),
             full_value: seen.map(|()| full.beta[p] * outside),
             full_u: seen.map(|()| full.covariance[(p, p)].max(0.0).sqrt() * full.birge_ratio * outside),
@@ -138,6 +138,7 @@ pub fn compare(session: &Session, method: Method, seed: u64) -> Result<Compariso
         (sum / f64::from(count.max(1))).sqrt() * 1e3
     };
     let mut warnings = session.warnings.clone();
+    warnings.extend(fit::birge_warning(full.birge_ratio));
     if !problem.parameters.effects.is_empty() {
         warnings.push(format!(
             "the {} method knows nothing of the declared effects: what they move is in its errors",
@@ -152,7 +153,7 @@ pub fn compare(session: &Session, method: Method, seed: u64) -> Result<Compariso
         rms_um: crate::heldout::rms_mm(&problem, &full.residuals) * 1e3,
         method_rms_um: rms_um(&by_method),
         nominal_rms_um: rms_um(&vec![0.0; list.len()]),
-        centres: centres(&problem, &estimator, &estimate),
+        centres: centres(&problem, &estimator, &estimate, full.birge_ratio),
         errors,
         warnings,
     })
@@ -195,7 +196,12 @@ fn test_has(problem: &Problem<'_>, name: &str) -> bool {
     problem.tests.iter().any(|test| test.name == name)
 }
 
-fn centres(problem: &Problem<'_>, estimator: &Estimator, estimate: &super::Estimate) -> Vec<CentreResult> {
+fn centres(
+    problem: &Problem<'_>,
+    estimator: &Estimator,
+    estimate: &Estimate,
+    birge_ratio: f64,
+) -> Vec<CentreResult> {
     let list = &problem.parameters.list;
     let declared: Vec<usize> = (0..list.len()).filter(|p| list[*p].role == Role::Error).collect();
     let letter = |k: usize| ["X", "Y", "Z"][k].to_string();
@@ -209,7 +215,7 @@ fn centres(problem: &Problem<'_>, estimator: &Estimator, estimate: &super::Estim
         .map(|(place, ((test, layout), centre))| {
             let u = |which: usize| {
                 let row = 2 * place + which;
-                estimate.centre_covariance[(row, row)].max(0.0).sqrt() * 1e3
+                estimate.centre_covariance[(row, row)].max(0.0).sqrt() * birge_ratio * 1e3
             };
             let share = |p: usize| {
                 let scale = 1e3 / list[p].unit.per_inside;

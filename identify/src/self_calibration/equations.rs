@@ -55,8 +55,6 @@ pub struct Equations {
     pub rows: Vec<Vec<f64>>,
     /// By how much further out than nominal the surface was met, mm: `Δr`.
     pub outward_mm: Vec<f64>,
-    /// The traversal of each reading, as numbered in its file; 0 where the file numbers none.
-    pub run: Vec<i64>,
     /// What the readings are referred to.
     pub reference: Reference,
 }
@@ -155,7 +153,6 @@ impl Equations {
             angles: Default::default(),
             rows: Vec::new(),
             outward_mm: Vec::new(),
-            run: Vec::new(),
             reference: match first.priors[RADIUS] {
                 Prior::Known => Reference::FirstReading,
                 Prior::Free | Prior::Gaussian(_) => Reference::Estimated,
@@ -197,7 +194,6 @@ impl Equations {
             }
             equations.rows.push(row);
             equations.outward_mm.push(touch.outward_mm);
-            equations.run.push(touch.run);
         }
         Ok(equations)
     }
@@ -244,7 +240,6 @@ impl Equations {
                     angles: [place.position, place.position, place.angle, place.on_artefact],
                     coefficients: [turns * by(0), turns * by(1), -1.0, wanders * by(2)],
                     outward_mm: sensitivities.readings_mm[row] - readings.observed[row],
-                    run: readings.run.get(row).copied().unwrap_or(0),
                 })
             })
             .collect()
@@ -285,7 +280,6 @@ struct Touch {
     angles: [f64; 4],
     coefficients: [f64; 4],
     outward_mm: f64,
-    run: i64,
 }
 
 struct Place {
@@ -357,7 +351,7 @@ fn wrapped(angle: f64) -> f64 {
 }
 
 /// By how much two angles differ, whole turns aside.
-pub(super) fn apart(a: f64, b: f64) -> f64 {
+fn apart(a: f64, b: f64) -> f64 {
     let turned = (a - b).rem_euclid(TAU);
     turned.min(TAU - turned)
 }

@@ -52,6 +52,8 @@ pub struct Calibration {
     pub solution: Solution,
     /// Standard uncertainty of a reading, mm.
     pub sigma_mm: f64,
+    /// `√(χ²/ν)` where a stated uncertainty is significantly less than the readings scatter, else 1; the solution's uncertainties are enlarged by it.
+    pub birge_ratio: f64,
     /// The columns of the equations that the conditions leave free.
     pub free: Vec<usize>,
     /// Whether the session states it; else it is what the solution leaves over.
@@ -70,27 +72,35 @@ pub fn calibrate(session: &Session) -> Result<Calibration, IdentifyError> {
     let conditions = conditions(&equations, &session.machine.axes[equations.axis].name)?;
     let reduction = reduce(equations.columns(), &conditions);
     let stated = session.noise_mm.filter(|sigma| *sigma > 0.0);
-    let mut sigma_mm = stated.unwrap_or(FIRST_GUESS_MM);
-    let mut solution = solve(&equations, &reduction, sigma_mm)?;
-    if stated.is_none() {
-        if solution.freedom == 0 {
+    // What is left over tells of the noise only with the radius as an unknown: referred to one reading, all rows have that reading's noise.
+    let free_radius = Equations {
+        reference: Reference::Estimated,
+        ..equations.clone()
+    };
+    let left = solve(&free_radius, &reduction, stated.unwrap_or(FIRST_GUESS_MM))?;
+    let square = left.rms_mm.powi(2) * equations.rows.len() as f64;
+    let freedom = left.freedom as f64;
+    let (sigma_mm, birge_ratio) = match stated {
+        Some(sigma) => (sigma, crate::fit::birge_ratio(square / sigma.powi(2), freedom)),
+        None if left.freedom == 0 => {
             return Err(IdentifyError::Request(
                 "self-calibration: the session states no `noise_um`, and there are no more readings than unknowns to tell it from; \
                  state it, or repeat the cycle"
                     .into(),
             ));
         }
-        let count = equations.rows.len() as f64;
-        let floor = session.resolution_mm.unwrap_or(0.0) / 12.0_f64.sqrt();
-        let left = solution.rms_mm * (count / solution.freedom as f64).sqrt();
-        sigma_mm = left.max(floor).max(1e-9);
-        solution = solve(&equations, &reduction, sigma_mm)?;
-    }
+        None => {
+            let floor = session.resolution_mm.unwrap_or(0.0) / 12.0_f64.sqrt();
+            ((square / freedom).sqrt().max(floor).max(1e-9), 1.0)
+        }
+    };
+    let solution = solve(&equations, &reduction, sigma_mm * birge_ratio)?;
     Ok(Calibration {
         rank_before: rank_before(&equations)?,
         conditions,
         solution,
         sigma_mm,
+        birge_ratio,
         sigma_stated: stated.is_some(),
         free: reduction.free,
         equations,

@@ -131,6 +131,13 @@ impl Calibration {
     pub fn report(&self, session: &Session, draws: Option<&MonteCarlo>) -> SelfCalibration {
         let axis = session.machine.axes[self.equations.axis].name.clone();
         let mut warnings = session.warnings.clone();
+        warnings.extend(crate::fit::birge_warning(self.birge_ratio));
+        if !session.effects.is_empty() {
+            warnings.push(
+                "self-calibration knows nothing of the declared effects: what they move is in its functions"
+                    .into(),
+            );
+        }
         if self.equations.reference == Reference::FirstReading {
             warnings.push(
                 "the readings are referred to the first one, as in the paper, and its noise is not propagated; `radius_u_um = inf` in the \
