@@ -250,6 +250,7 @@ fn function(machine: &Machine, entry: &Entry) -> Result<ErrorFunction, String> {
                 single(harmonic.amplitude_um),
                 single(harmonic.amplitude_arcsec),
             )?;
+            finite(Some(&[harmonic.phase_deg]))?;
             Form::Harmonic {
                 period,
                 amplitude: amplitude[0],
