@@ -43,6 +43,27 @@ fn a_clean_session_is_called_clean() {
     assert_eq!(result.before.parameters, result.after.parameters);
 }
 
+/// Made to take up effects where there are none, a search gains on the readings that it sees and loses on those that it does not.
+#[test]
+fn what_is_no_effect_does_not_lower_the_error_held_out() {
+    let Some(session) = sample(
+        "what_is_no_effect_does_not_lower_the_error_held_out",
+        "rotary-clean",
+    ) else {
+        return;
+    };
+    let options = TraceOptions {
+        significance: 0.99,
+        max_effects: Some(6),
+        ..TraceOptions::default()
+    };
+    let result = traced(&session, &options);
+    assert!(!result.effects.is_empty());
+    assert!(result.after.rms_um < result.before.rms_um);
+    let (before, after) = (result.before.heldout_rms_um, result.after.heldout_rms_um);
+    assert!(after > before, "{before} {after}");
+}
+
 #[test]
 fn an_axial_wobble_is_found_or_stands_among_what_looks_the_same() {
     let name = "an_axial_wobble_is_found_or_stands_among_what_looks_the_same";

@@ -25,7 +25,7 @@ pub struct Alias {
 /// The aliases of the `k`-th taken effect, nearest first.
 pub fn aliases(search: &Search<'_>, k: usize, variance: f64) -> Vec<Alias> {
     let model = search.model_without(Some(k));
-    let taken = &search.taken[k];
+    let taken = &search.taken()[k];
     let of_named = model.gain(taken.candidate);
     let least = search.evidence_for(taken.candidate, &of_named, variance) - INDISTINGUISHABLE;
     let least_unpriced = search.evidence(&of_named, variance) - INDISTINGUISHABLE;
@@ -35,12 +35,11 @@ pub fn aliases(search: &Search<'_>, k: usize, variance: f64) -> Vec<Alias> {
     let (_, coefficients) = model.joined(taken.candidate);
     // Base columns are unit-length copies of the candidate's own; the signature is what they do together.
     let norms = search.norms(taken.candidate);
-    let signature: Vec<(usize, f64)> = taken
-        .places
-        .clone()
+    let signature: Vec<(usize, f64)> = search
+        .places(taken.candidate)
         .zip(coefficients.iter().zip(&norms).map(|(c, norm)| c * norm))
         .collect();
-    let others: Vec<usize> = search.taken.iter().map(|t| t.candidate).collect();
+    let others: Vec<usize> = search.taken().iter().map(|t| t.candidate).collect();
     let mut aliases: Vec<Alias> = model
         .gains()
         .iter()
@@ -48,7 +47,7 @@ pub fn aliases(search: &Search<'_>, k: usize, variance: f64) -> Vec<Alias> {
         .filter(|(candidate, gain)| {
             !others.contains(candidate)
                 && !search.candidates[*candidate].last_resort
-                && !search.is_held_back(*candidate)
+                && search.is_open(*candidate, &model.folds)
                 && gain.freedom > 0
                 && (search.evidence_for(*candidate, gain, variance) >= least
                     || search.evidence(gain, variance) >= least_unpriced

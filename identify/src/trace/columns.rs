@@ -379,7 +379,7 @@ impl<'p, 'a> Columns<'p, 'a> {
 
     /// A free curve over an axis in each test in which it moves, in the readings themselves, whatever component would cause it; none where the readings are
     /// too few for that many intervals.
-    pub fn curves_of_tests(&self, driver: &Driver, intervals: usize) -> Vec<Layout> {
+    pub fn curves_of_tests(&self, driver: &Driver, intervals: usize) -> Vec<(Effect, Layout)> {
         let Driver::Axis(name) = driver else {
             return Vec::new();
         };
@@ -408,7 +408,8 @@ impl<'p, 'a> Columns<'p, 'a> {
                 tests: vec![test.name.clone()],
             };
             for coordinate in 0..self.problem.coordinates() {
-                layouts.extend(self.reading_layout(&effect, number, coordinate, false, None));
+                let layout = self.reading_layout(&effect, number, coordinate, false, None);
+                layouts.extend(layout.map(|layout| (effect.clone(), layout)));
             }
         }
         layouts

@@ -10,7 +10,9 @@ use faer::prelude::Solve;
 use statrs::function::gamma::ln_gamma;
 
 use super::library::Candidate;
-use super::score::{LEAST_VISIBLE, Trained, ln_chi_square_tail};
+use super::score::Trained;
+use super::tail::ln_chi_square_tail;
+use super::visible::LEAST_VISIBLE;
 
 /// The most places of one effect: what takes more is a curve.
 const MOST_PLACES: usize = 6;

@@ -12,6 +12,7 @@ pub mod alias;
 pub mod columns;
 pub mod compose;
 mod exchange;
+mod fewer;
 pub mod further;
 pub mod library;
 pub mod moments;
@@ -21,6 +22,8 @@ mod report;
 pub mod score;
 pub mod search;
 pub mod sharpen;
+pub mod tail;
+mod visible;
 
 use abbe_model::effect::Effect;
 use abbe_model::session::Session;
@@ -209,13 +212,13 @@ fn trace_with<'a>(
         .structure
         .as_ref()
         .is_none_or(|structure| structure.p_value <= STRUCTURED);
-    if unexplained && ended.is_some() && search.taken.len() < stop.most {
+    if unexplained && ended.is_some() && search.taken().len() < stop.most {
         // Nothing simpler is left: free curves.
         search.bring_reserve();
         search.last_resort = true;
-        let taken = search.taken.len();
+        let taken = search.taken().len();
         ended = search_on(&mut search, &rms_um, progress);
-        if search.taken.len() != taken {
+        if search.taken().len() != taken {
             judged = judge(&problem, &before_fit, &search, options, structure_before.as_ref())?;
         }
     }
@@ -242,7 +245,7 @@ fn trace_with<'a>(
         structure_before: structure_before.as_ref(),
         structure_after: structure_after.as_ref(),
         last_p_value: ended.unwrap_or(1.0),
-        stopped_early: ended.is_none() || search.taken.len() >= stop.most,
+        stopped_early: ended.is_none() || search.taken().len() >= stop.most,
         candidates: looked_for,
         candidates_seen: seen,
     })?;
@@ -277,14 +280,14 @@ fn search_on(
             Round::Done { p_value } => return Some(p_value),
             Round::Added { candidate } => {
                 // Every exchange costs a model an effect; among many effects the gain is small and a sweep now and then will do.
-                let taken = search.taken.len();
+                let taken = search.taken().len();
                 if taken <= EXCHANGED_EACH_ROUND || taken.is_multiple_of(EXCHANGED_EACH) {
                     search.exchange();
                 }
                 search.merge();
                 let held_out = search.held_out.last().copied().unwrap_or(0.0);
                 let id = search.candidates[candidate].effect.id();
-                if !progress(Progress::Taken(search.taken.len(), id, rms_um(held_out))) {
+                if !progress(Progress::Taken(search.taken().len(), id, rms_um(held_out))) {
                     return None;
                 }
             }
@@ -308,7 +311,7 @@ fn judge<'a>(
     structure_before: Option<&remainder::Structure>,
 ) -> Result<Judged<'a>, IdentifyError> {
     let effects: Vec<Effect> = search
-        .taken
+        .taken()
         .iter()
         .map(|taken| search.candidates[taken.candidate].effect.clone())
         .collect();

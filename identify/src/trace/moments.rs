@@ -92,6 +92,24 @@ pub struct Moments {
     null: Mat<f64>,
 }
 
+/// Rows and columns by which room is made.
+const ROOM_ROWS: usize = 32;
+const ROOM_COLUMNS: usize = 128;
+
+/// Enlarges a matrix, with room for more: candidates and effects come one after another, and what is large is not copied each time.
+pub(super) fn grow(
+    matrix: &mut Mat<f64>,
+    rows: usize,
+    columns: usize,
+    value: impl FnMut(usize, usize) -> f64,
+) {
+    matrix.reserve(
+        rows.next_multiple_of(ROOM_ROWS),
+        columns.next_multiple_of(ROOM_COLUMNS),
+    );
+    matrix.resize_with(rows, columns, value);
+}
+
 fn transposed_product(a: MatRef<'_, f64>, b: MatRef<'_, f64>) -> Mat<f64> {
     let mut product = Mat::zeros(a.ncols(), b.ncols());
     matmul(product.as_mut(), Accum::Replace, a.transpose(), b, 1.0, Par::Seq);
@@ -191,20 +209,18 @@ impl Moments {
                 }
             }
         }
-        self.base_columns
-            .resize_with(rows, next, |i, j| fresh[(i, j - old)]);
+        grow(&mut self.base_columns, rows, next, |i, j| fresh[(i, j - old)]);
         let products = products_by_fold(columns, layouts, &self.blocks, fresh.as_ref());
         let null_fresh = transposed_product(fresh.as_ref(), self.null.as_ref());
         let draws = self.null.ncols();
-        self.null_base
-            .resize_with(next, draws, |i, d| null_fresh[(i - old, d)]);
+        grow(&mut self.null_base, next, draws, |i, d| null_fresh[(i - old, d)]);
         let total = self.null_cross.ncols();
         for (fold, range) in columns.fold_rows.iter().enumerate() {
             let moments = &mut self.folds[fold];
             let fresh_part = fresh.as_ref().subrows(range.start, range.len());
             let base_part = self.base_columns.as_ref().subrows(range.start, range.len());
             let gram = transposed_product(base_part, fresh_part);
-            moments.base.resize_with(next, next, |i, j| {
+            grow(&mut moments.base, next, next, |i, j| {
                 if j < old {
                     gram[(j, i - old)]
                 } else {
@@ -212,9 +228,7 @@ impl Moments {
                 }
             });
             let product = &products[fold];
-            moments
-                .cross
-                .resize_with(next, total, |i, j| product[(i - old, j)]);
+            grow(&mut moments.cross, next, total, |i, j| product[(i - old, j)]);
             for j in 0..added {
                 let sum = (range.start..range.end)
                     .map(|i| fresh[(i, j)] * self.residual[i])
@@ -246,9 +260,9 @@ impl Moments {
         let mut of_null = Mat::<f64>::zeros(draws, added);
         for (fold, (product, own)) in products.into_iter().zip(own).enumerate() {
             let moments = &mut self.folds[fold];
-            moments
-                .cross
-                .resize_with(rank, total + added, |i, j| product[(i, j - total)]);
+            grow(&mut moments.cross, rank, total + added, |i, j| {
+                product[(i, j - total)]
+            });
             moments.cross_y.extend((0..added).map(|k| product[(rank, k)]));
             moments.own.extend(own);
             for d in 0..draws {
@@ -258,17 +272,18 @@ impl Moments {
             }
         }
         self.sum_up(rank, total + added);
-        self.null_cross
-            .resize_with(draws, total + added, |d, j| of_null[(d, j - total)]);
+        grow(&mut self.null_cross, draws, total + added, |d, j| {
+            of_null[(d, j - total)]
+        });
     }
 
     /// Extends the products over all folds to what each fold has now: so many base columns and candidate columns.
     fn sum_up(&mut self, base: usize, total: usize) {
         let (folds, whole) = (&self.folds, &mut self.whole);
-        whole.base.resize_with(base, base, |i, j| {
+        grow(&mut whole.base, base, base, |i, j| {
             folds.iter().map(|fold| fold.base[(i, j)]).sum()
         });
-        whole.cross.resize_with(base, total, |i, j| {
+        grow(&mut whole.cross, base, total, |i, j| {
             folds.iter().map(|fold| fold.cross[(i, j)]).sum()
         });
         for i in whole.base_y.len()..base {
@@ -284,7 +299,7 @@ impl Moments {
         }
     }
 
-    /// What a layout would gain on all readings beside a model trained on all readings.
+    /// What a layout would gain beside a model, on the folds that the model is trained on.
     pub fn gain_of(
         &self,
         columns: &Columns<'_, '_>,
@@ -294,9 +309,25 @@ impl Moments {
         let (base, inverse, base_y) = (&model.base, &model.inverse, &model.base_y);
         let mut fresh = Mat::zeros(columns.rows(), layout.count);
         columns.fill(&[layout], fresh.as_mut());
-        let cross_all = transposed_product(self.base_columns.as_ref(), fresh.as_ref());
-        let cross = Mat::from_fn(base.len(), layout.count, |i, k| cross_all[(base[i], k)]);
-        let own = transposed_product(fresh.as_ref(), fresh.as_ref());
+        let residual = MatRef::from_column_major_slice(&self.residual, columns.rows(), 1);
+        let mut cross = Mat::zeros(base.len(), layout.count);
+        let mut own = Mat::zeros(layout.count, layout.count);
+        let mut with_y = Mat::zeros(layout.count, 1);
+        for fold in &model.folds {
+            let range = &columns.fold_rows[*fold];
+            let (start, rows) = (range.start, range.len());
+            let fresh = fresh.as_ref().subrows(start, rows);
+            let present = self.base_columns.as_ref().subrows(start, rows);
+            let mut place = 0;
+            for run in base.chunk_by(|a, b| a + 1 == *b) {
+                let product = transposed_product(present.subcols(run[0], run.len()), fresh);
+                let mut part = cross.as_mut().subrows_mut(place, run.len());
+                part += product;
+                place += run.len();
+            }
+            own += transposed_product(fresh, fresh);
+            with_y += transposed_product(fresh, residual.subrows(start, rows));
+        }
         let solved = inverse * &cross;
         let d = Mat::from_fn(layout.count, layout.count, |k, l| {
             own[(k, l)]
@@ -306,13 +337,11 @@ impl Moments {
         });
         let g: Vec<f64> = (0..layout.count)
             .map(|k| {
-                let with_y: f64 = (0..columns.rows())
-                    .map(|i| fresh[(i, k)] * self.residual[i])
-                    .sum();
-                with_y - (0..base.len()).map(|i| solved[(i, k)] * base_y[i]).sum::<f64>()
+                let modelled: f64 = (0..base.len()).map(|i| solved[(i, k)] * base_y[i]).sum();
+                with_y[(k, 0)] - modelled
             })
             .collect();
-        super::score::quadratic_gain(&d, &own, &g)
+        super::visible::quadratic_gain(&d, &own, &g)
     }
 
     /// Model, residual and null draws side by side: one product with each chunk of candidates.

@@ -9,7 +9,8 @@ use abbe_model::effect::{Component, Driver, Effect, Shape};
 
 use super::columns::{Columns, Layout};
 use super::moments::Moments;
-use super::score::{PriorMoments, Trained, ln_chi_square_tail};
+use super::score::{PriorMoments, Trained};
+use super::tail::ln_chi_square_tail;
 use crate::problem::Problem;
 
 /// Structure in a residual.

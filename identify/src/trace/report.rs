@@ -79,7 +79,7 @@ pub(super) fn report(findings: &Findings<'_, '_>) -> Result<(TraceResult, Vec<Ve
     } else {
         1.0
     };
-    for (k, taken) in search.taken.iter().enumerate() {
+    for (k, taken) in search.taken().iter().enumerate() {
         let candidate = &search.candidates[taken.candidate];
         let model = search.model_without(Some(k));
         let aliases = alias::aliases(search, k, variance);

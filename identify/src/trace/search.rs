@@ -1,21 +1,19 @@
 //! The search: project out what the model has, score every candidate, add the best, refit all together, let what has lost its place go, exchange
 //! what something else explains better, until the best that is left is no better than the best on readings without structure.
 //!
-//! It runs on all readings, and beside that once for each fold on the readings outside that fold alone, so that the error on held-out readings
-//! is that of a search that never saw them.
+//! It runs on all readings, and beside that once for each fold on the readings outside that fold alone ([`Track`]): each chooses for itself, and uses
+//! numbers and places only that it has tuned itself. So the error on held-out readings is that of a search that never saw them.
 
-use std::collections::BTreeSet;
-
-use abbe_model::effect::{Driver, Shape};
 use faer::Mat;
 use rayon::prelude::*;
 
 use super::columns::{Columns, Layout};
 use super::compose::{self, Composed};
 use super::library::Candidate;
-use super::moments::Moments;
-use super::score::{Gain, PriorMoments, Trained, ln_chi_square_tail};
+use super::moments::{self, Moments};
+use super::score::{Gain, PriorMoments, Trained};
 use super::sharpen;
+use super::tail::ln_chi_square_tail;
 
 /// When the search stops.
 #[derive(Clone, Copy, Debug)]
@@ -28,16 +26,33 @@ pub struct Stop {
     pub in_residual_variance: bool,
 }
 
-/// An effect that the search has taken up.
-#[derive(Clone, Debug)]
+/// An effect that a search has taken up.
+#[derive(Clone, Copy, Debug)]
 pub struct Taken {
     /// Index of the candidate.
     pub candidate: usize,
-    /// Its columns in the base.
-    pub places: std::ops::Range<usize>,
     /// Probability that the search finds as good on readings without structure.
     pub p_value: f64,
 }
+
+/// One of the searches: on all readings, or on all but one fold.
+#[derive(Clone, Debug)]
+pub struct Track {
+    /// The folds that it sees, ascending.
+    pub folds: Vec<usize>,
+    /// What it has taken up.
+    pub taken: Vec<Taken>,
+}
+
+impl Track {
+    /// The candidates that it has taken up.
+    pub fn chosen(&self) -> Vec<usize> {
+        self.taken.iter().map(|taken| taken.candidate).collect()
+    }
+}
+
+/// Place of the search on all readings among the tracks; that which leaves out fold `k` is at `k + 1`.
+pub(super) const ALL: usize = 0;
 
 /// Where the search stands.
 pub struct Search<'s> {
@@ -53,12 +68,12 @@ pub struct Search<'s> {
     pub prior: PriorMoments,
     /// Number of base columns that the fitted model has.
     pub rank: usize,
-    /// What has been taken up.
-    pub taken: Vec<Taken>,
-    /// What each fold's own search has taken up: candidates.
-    pub of_fold: Vec<Vec<usize>>,
+    /// The search on all readings, then that of each fold.
+    pub tracks: Vec<Track>,
+    /// For each candidate the folds whose readings its numbers and places were tuned on; none for an entry of the library.
+    tuned_on: Vec<Vec<usize>>,
     /// Where the columns of every candidate that was ever taken up stand in the base.
-    pub(super) materialised: Vec<(usize, std::ops::Range<usize>)>,
+    materialised: Vec<(usize, std::ops::Range<usize>)>,
     /// Sum of squares of held-out residuals over the variance of the noise, before and after each addition.
     pub held_out: Vec<f64>,
     /// The best score on readings without structure that is exceeded with the probability of the stop, by round.
@@ -67,14 +82,11 @@ pub struct Search<'s> {
     pub last_resort: bool,
     /// Candidates of last resort that are not laid over the readings yet.
     pub reserve: Vec<(Candidate, Layout)>,
-    pub(super) plain: Plain,
+    plain: Plain,
     /// Entries of the library that would not stand out however large they plausibly were.
-    pub(super) unseen: Vec<bool>,
+    unseen: Vec<bool>,
     pub(super) stop: Stop,
 }
-
-/// The most effects whose places and periods are looked at again whenever one is added.
-pub(super) const MOST_SHARPENED: usize = 4;
 
 /// By how many standard deviations an effect as large as is plausible has to change the readings, all together and beyond what the model absorbs, to be
 /// looked for.
@@ -118,16 +130,23 @@ impl<'s> Search<'s> {
         stop: Stop,
     ) -> Search<'s> {
         let rank = moments.base();
-        let folds = columns.fold_rows.len();
+        let folds = 0..columns.fold_rows.len();
+        let without = |left_out: Option<usize>| Track {
+            folds: folds.clone().filter(|fold| Some(*fold) != left_out).collect(),
+            taken: Vec::new(),
+        };
         let mut search = Search {
             columns,
+            tuned_on: vec![Vec::new(); candidates.len()],
             candidates,
             layouts,
             moments,
             prior,
             rank,
-            taken: Vec::new(),
-            of_fold: vec![Vec::new(); folds],
+            tracks: std::iter::once(None)
+                .chain(folds.clone().map(Some))
+                .map(without)
+                .collect(),
             materialised: Vec::new(),
             held_out: Vec::new(),
             thresholds: Vec::new(),
@@ -150,50 +169,67 @@ impl<'s> Search<'s> {
                 })
                 .collect()
         };
-        let before = search.held_out_now();
-        search.held_out.push(before);
+        search.note_held_out();
         search
     }
 
-    /// Whether a candidate is not to be taken up now.
-    pub fn is_held_back(&self, candidate: usize) -> bool {
+    /// What the search on all readings has taken up.
+    pub fn taken(&self) -> &[Taken] {
+        &self.tracks[ALL].taken
+    }
+
+    /// Whether a search that sees some folds may take a candidate up now.
+    pub fn is_open(&self, candidate: usize, folds: &[usize]) -> bool {
         let unseen = self.unseen.get(candidate).is_some_and(|unseen| *unseen);
-        let candidate = &self.candidates[candidate];
-        unseen || candidate.dictionary || candidate.last_resort && !self.last_resort
+        let entry = &self.candidates[candidate];
+        !unseen
+            && !entry.dictionary
+            && (!entry.last_resort || self.last_resort)
+            && self.is_own(candidate, folds)
     }
 
-    pub(super) fn all_folds(&self) -> Vec<usize> {
-        (0..self.columns.fold_rows.len()).collect()
+    /// Whether a candidate is an entry of the library, or was tuned on the very folds that a search sees.
+    pub(super) fn is_own(&self, candidate: usize, folds: &[usize]) -> bool {
+        let tuned_on = &self.tuned_on[candidate];
+        tuned_on.is_empty() || tuned_on == folds
     }
 
-    pub(super) fn places(&self, candidate: usize) -> std::ops::Range<usize> {
+    /// Whether folds are all that there are.
+    pub(super) fn sees_all(&self, folds: &[usize]) -> bool {
+        folds.len() == self.tracks[ALL].folds.len()
+    }
+
+    /// Where a candidate's columns stand in the base; nowhere before it was ever taken up.
+    pub fn places(&self, candidate: usize) -> std::ops::Range<usize> {
         self.materialised
             .iter()
             .find(|(c, _)| *c == candidate)
             .map_or(0..0, |(_, places)| places.clone())
     }
 
-    pub(super) fn base_with(&self, candidates: &[usize]) -> Vec<usize> {
+    fn base_with(&self, chosen: &[usize]) -> Vec<usize> {
         (0..self.rank)
-            .chain(candidates.iter().flat_map(|candidate| self.places(*candidate)))
+            .chain(chosen.iter().flat_map(|candidate| self.places(*candidate)))
             .collect()
+    }
+
+    /// The model with some candidates, trained on some folds.
+    pub(super) fn model_of(&self, chosen: &[usize], folds: &[usize]) -> Trained<'_> {
+        Trained::new(&self.moments, &self.prior, self.base_with(chosen), folds.to_vec())
+    }
+
+    /// The same, to be asked for few candidates.
+    pub(super) fn lean_model_of(&self, chosen: &[usize], folds: &[usize]) -> Trained<'_> {
+        Trained::lean(&self.moments, &self.prior, self.base_with(chosen), folds.to_vec())
     }
 
     /// The model with what has been taken, less one of it, on all readings.
     pub fn model_without(&self, left_out: Option<usize>) -> Trained<'_> {
-        let chosen: Vec<usize> = self
-            .taken
-            .iter()
-            .enumerate()
-            .filter(|(k, _)| Some(*k) != left_out)
-            .map(|(_, taken)| taken.candidate)
-            .collect();
-        Trained::new(
-            &self.moments,
-            &self.prior,
-            self.base_with(&chosen),
-            self.all_folds(),
-        )
+        let mut chosen = self.tracks[ALL].chosen();
+        if let Some(k) = left_out {
+            chosen.remove(k);
+        }
+        self.model_of(&chosen, &self.tracks[ALL].folds)
     }
 
     /// The variance that gains are measured in.
@@ -217,16 +253,7 @@ impl<'s> Search<'s> {
 
     /// The variance of the null draws, in the same sense.
     fn null_variance(&self) -> f64 {
-        if !self.stop.in_residual_variance {
-            return 1.0;
-        }
-        let model = Trained::new(
-            &self.moments,
-            &self.prior,
-            (0..self.rank).collect(),
-            self.all_folds(),
-        );
-        self.variance(&model)
+        self.variance(&self.lean_model_of(&[], &self.tracks[ALL].folds))
     }
 
     /// `−ln P` of a gain.
@@ -248,7 +275,7 @@ impl<'s> Search<'s> {
     }
 
     /// What can be composed of the library's dictionaries beside a model.
-    pub fn composed(&self, model: &Trained<'_>) -> Vec<Composed> {
+    fn composed(&self, model: &Trained<'_>) -> Vec<Composed> {
         let variance = self.variance(model);
         (0..self.candidates.len())
             .into_par_iter()
@@ -259,119 +286,47 @@ impl<'s> Search<'s> {
             .collect()
     }
 
-    /// Adds what comes near the best, with the best numbers that it can have beside a model of some candidates.
-    pub(super) fn sharpen(&mut self, beside: &[usize]) {
+    /// Adds what comes near the best, with the best numbers that it can have beside some candidates on some folds.
+    pub(super) fn sharpen(&mut self, beside: &[usize], folds: &[usize]) {
+        if !self.candidates.iter().any(sharpen::can_be_tuned) {
+            return;
+        }
         let fresh = {
-            let model = self.model_of(beside, &self.all_folds());
+            let model = self.model_of(beside, folds);
             sharpen::sharpened(self, &model, &self.composed(&model))
         };
-        let fresh = fresh
-            .into_iter()
-            .filter_map(|candidate| Some((candidate.clone(), self.columns.layout(&candidate.effect)?)))
-            .collect();
-        self.append(fresh);
+        for candidate in fresh {
+            self.add_tuned(candidate, folds);
+        }
     }
 
-    pub(super) fn append(&mut self, fresh: Vec<(Candidate, Layout)>) {
+    /// Adds a candidate that was tuned on some folds; its number, if the data have what it follows.
+    pub(super) fn add_tuned(&mut self, candidate: Candidate, folds: &[usize]) -> Option<usize> {
+        let layout = self.columns.layout(&candidate.effect)?;
+        self.append(vec![(candidate, layout)], folds);
+        Some(self.candidates.len() - 1)
+    }
+
+    pub(super) fn append(&mut self, fresh: Vec<(Candidate, Layout)>, tuned_on: &[usize]) {
         if fresh.is_empty() {
             return;
         }
         let (candidates, layouts): (Vec<Candidate>, Vec<Layout>) = fresh.into_iter().unzip();
         self.candidates.extend(candidates);
         self.layouts.extend(layouts);
+        self.tuned_on.resize(self.candidates.len(), tuned_on.to_vec());
         self.moments.append(self.columns, &self.layouts);
+    }
+
+    /// How many entries of the library would stand out if they were as large as is plausible.
+    pub(super) fn seen_entries(&self) -> usize {
+        self.unseen.iter().filter(|unseen| !**unseen).count()
     }
 
     /// Lays the candidates of last resort over the readings.
     pub fn bring_reserve(&mut self) {
         let reserve = std::mem::take(&mut self.reserve);
-        self.append(reserve);
-    }
-
-    pub(super) fn model_of(&self, chosen: &[usize], folds: &[usize]) -> Trained<'_> {
-        Trained::new(&self.moments, &self.prior, self.base_with(chosen), folds.to_vec())
-    }
-
-    /// Puts several effects that follow one axis down to one, where that one says as much in fewer words: what they explain together is compared, each
-    /// effect being charged its cost and the number of entries of the library that it was chosen from. From three effects or places on, a free curve may
-    /// be that one.
-    pub fn merge(&mut self) {
-        if self.stop.in_residual_variance {
-            return;
-        }
-        let mut drivers: Vec<Driver> = Vec::new();
-        for taken in &self.taken {
-            let driver = &self.candidates[taken.candidate].effect.driver;
-            if matches!(driver, Driver::Axis(_)) && !drivers.contains(driver) {
-                drivers.push(driver.clone());
-            }
-        }
-        let mut merged = false;
-        for driver in drivers {
-            let chosen: Vec<usize> = self.taken.iter().map(|taken| taken.candidate).collect();
-            let whole = self.following(&driver, &chosen).0;
-            let mut groups = vec![whole.clone()];
-            if whole.len() > 2 {
-                let without = |left_out: &usize| whole.iter().copied().filter(|c| c != left_out).collect();
-                groups.extend(whole.iter().map(without));
-            }
-            merged |= groups.into_iter().any(|group| self.merge_group(&driver, &group));
-        }
-        if merged {
-            let held_out = self.held_out_now();
-            if let Some(last) = self.held_out.last_mut() {
-                *last = held_out;
-            }
-        }
-    }
-
-    /// Puts a group of effects down to one, if one says as much in fewer words. Returns whether it did.
-    fn merge_group(&mut self, driver: &Driver, group: &[usize]) -> bool {
-        let columns: usize = group.iter().map(|c| self.moments.count[*c]).sum();
-        let curves = group.len() > 2 || columns > 2 && self.is_composed(group);
-        if group.len() < 2 && !curves {
-            return false;
-        }
-        let chosen = self.taken.iter().map(|taken| taken.candidate);
-        let rest: Vec<usize> = chosen.filter(|c| !group.contains(c)).collect();
-        if group.len() > 1 {
-            self.sharpen(&rest);
-        }
-        if curves {
-            self.bring_reserve();
-        }
-        let pool: Vec<usize> = (0..self.candidates.len())
-            .filter(|c| !self.is_held_back(*c) || curves && self.candidates[*c].last_resort)
-            .filter(|c| !rest.contains(c))
-            .collect();
-        let Some(one) = self.in_fewer_words(group, &rest, &pool, &self.all_folds()) else {
-            return false;
-        };
-        self.materialise(&[one]);
-        let of_group = self.taken.iter().filter(|taken| group.contains(&taken.candidate));
-        let p_value = of_group.map(|taken| taken.p_value).fold(1.0, f64::min);
-        let places = self.places(one);
-        self.taken.retain(|taken| !group.contains(&taken.candidate));
-        self.taken.push(Taken {
-            candidate: one,
-            places,
-            p_value,
-        });
-        for fold in self.all_folds() {
-            let (group, rest) = self.following(driver, &self.of_fold[fold]);
-            let others = self.others(fold);
-            if !group.is_empty() && self.in_fewer_words(&group, &rest, &[one], &others).is_some() {
-                self.of_fold[fold] = rest;
-                self.of_fold[fold].push(one);
-            }
-        }
-        true
-    }
-
-    pub(super) fn is_composed(&self, group: &[usize]) -> bool {
-        let composed =
-            |c: &usize| matches!(&self.candidates[*c].effect.shape, Shape::Steps { at } if at.len() > 2);
-        group.iter().any(composed)
+        self.append(reserve, &[]);
     }
 
     /// Enough for every effect that may be taken up, and some that were put down to one.
@@ -379,135 +334,17 @@ impl<'s> Search<'s> {
         self.stop.most.saturating_add(self.stop.most / 2).max(1)
     }
 
-    /// Gives back effects that follow one axis where they are no explanation: where curves over that axis, another in every test and in no component's name,
-    /// say as much in fewer words. One simple effect is asked only where structure remains beside it. Returns whether any were.
-    pub fn disown(&mut self, structured: bool) -> bool {
-        let chosen: Vec<usize> = self.taken.iter().map(|taken| taken.candidate).collect();
-        let mut drivers: Vec<Driver> = Vec::new();
-        for candidate in &chosen {
-            let driver = &self.candidates[*candidate].effect.driver;
-            if matches!(driver, Driver::Axis(_)) && !drivers.contains(driver) {
-                drivers.push(driver.clone());
-            }
-        }
-        let mut any = false;
-        for driver in drivers {
-            let chosen: Vec<usize> = self.taken.iter().map(|taken| taken.candidate).collect();
-            let (group, rest) = self.following(&driver, &chosen);
-            let curve = |c: &usize| matches!(self.candidates[*c].effect.shape, Shape::Curve { .. });
-            let few = group.len() < 2 && !self.is_composed(&group) && !structured;
-            if few || group.iter().all(curve) {
-                continue;
-            }
-            let words = self.words_of(&group);
-            let of_group = self.evidence_of(&group, &rest, &self.all_folds()) - words;
-            for intervals in [8, 16, 32] {
-                let layouts = self.columns.curves_of_tests(&driver, intervals);
-                let first = self.candidates.len();
-                let pattern = &self.candidates[group[0]];
-                let nameless: Vec<(Candidate, Layout)> = layouts
-                    .into_iter()
-                    .map(|layout| {
-                        let candidate = Candidate {
-                            dictionary: true,
-                            ..pattern.clone()
-                        };
-                        (candidate, layout)
-                    })
-                    .collect();
-                if nameless.is_empty() {
-                    continue;
-                }
-                self.append(nameless);
-                let curves: Vec<usize> = (first..self.candidates.len()).collect();
-                self.materialise(&curves);
-                // One choice: the axis and how fine.
-                let of_curves = self.evidence_of(&curves, &rest, &self.all_folds()) - self.choice();
-                if of_curves > of_group {
-                    self.taken.retain(|taken| !group.contains(&taken.candidate));
-                    for fold in self.all_folds() {
-                        self.of_fold[fold] = self.following(&driver, &self.of_fold[fold]).1;
-                    }
-                    any = true;
-                    break;
-                }
-            }
-        }
-        if any {
-            let held_out = self.held_out_now();
-            self.held_out.truncate(self.taken.len());
-            self.held_out.push(held_out);
-        }
-        any
-    }
-
-    /// What it costs to have chosen one entry of the library.
-    pub(super) fn choice(&self) -> f64 {
-        (self.unseen.iter().filter(|unseen| !**unseen).count().max(1) as f64).ln()
-    }
-
-    pub(super) fn words_of(&self, group: &[usize]) -> f64 {
-        group
-            .iter()
-            .map(|c| self.candidates[*c].length() + self.choice())
-            .sum()
-    }
-
-    /// `−ln P` of what candidates gain together.
-    pub(super) fn evidence_of(&self, group: &[usize], rest: &[usize], folds: &[usize]) -> f64 {
-        let lean = |chosen: &[usize]| {
-            Trained::lean(&self.moments, &self.prior, self.base_with(chosen), folds.to_vec())
-        };
-        let without = lean(rest);
-        let all: Vec<usize> = rest.iter().chain(group).copied().collect();
-        let gain = Gain {
-            gain: lean(&all).explained() - without.explained(),
-            freedom: group
-                .iter()
-                .map(|c| self.moments.count[*c] + self.moments.numbers[*c])
-                .sum(),
-            visible: 1.0,
-        };
-        self.evidence(&gain, self.variance(&without))
-    }
-
-    /// Which of the chosen follow a driver, and which do not.
-    fn following(&self, driver: &Driver, chosen: &[usize]) -> (Vec<usize>, Vec<usize>) {
-        chosen
-            .iter()
-            .partition(|candidate| self.candidates[**candidate].effect.driver == *driver)
-    }
-
-    /// The one of a pool that says more than a group, if there is one.
-    fn in_fewer_words(
+    /// The best beside a model of what has been chosen, of what each would gain there.
+    pub(super) fn best_of(
         &self,
-        group: &[usize],
-        rest: &[usize],
-        pool: &[usize],
-        folds: &[usize],
-    ) -> Option<usize> {
-        let without = if pool.len() > 1 {
-            self.model_of(rest, folds)
-        } else {
-            Trained::lean(&self.moments, &self.prior, self.base_with(rest), folds.to_vec())
-        };
-        let variance = self.variance(&without);
-        let choice = self.choice();
-        let of_group = self.evidence_of(group, rest, folds) - self.words_of(group);
-        pool.par_iter()
-            .filter(|c| !group.contains(c))
-            .map(|c| (*c, self.score(*c, &without.gain(*c), variance) - choice))
-            .filter(|(_, one)| *one > of_group)
-            .max_by(|a, b| a.1.total_cmp(&b.1))
-            .map(|(c, _)| c)
-    }
-
-    pub(super) fn best_of(&self, model: &Trained<'_>, taken: &[usize]) -> Option<(usize, f64)> {
+        model: &Trained<'_>,
+        gains: &[Gain],
+        chosen: &[usize],
+    ) -> Option<(usize, f64)> {
         let variance = self.variance(model);
-        let gains = model.gains();
         let mut best: Option<(usize, f64)> = None;
         for (candidate, gain) in gains.iter().enumerate() {
-            if taken.contains(&candidate) || self.is_held_back(candidate) {
+            if chosen.contains(&candidate) || !self.is_open(candidate, &model.folds) {
                 continue;
             }
             let score = self.score(candidate, gain, variance);
@@ -519,22 +356,25 @@ impl<'s> Search<'s> {
     }
 
     /// The simplest of the candidates that the readings cannot tell from the best one.
-    pub(super) fn named_first(&self, model: &Trained<'_>, best: usize, taken: &[usize]) -> usize {
+    pub(super) fn named_first(
+        &self,
+        model: &Trained<'_>,
+        gains: &[Gain],
+        best: usize,
+        chosen: &[usize],
+    ) -> usize {
         let variance = self.variance(model);
-        let of_best = model.gain(best);
-        let least = self.evidence_for(best, &of_best, variance) - super::alias::INDISTINGUISHABLE;
+        let least = self.evidence_for(best, &gains[best], variance) - super::alias::INDISTINGUISHABLE;
         let mut first = best;
-        let mut first_gain = of_best.clone();
-        for (candidate, gain) in model.gains().iter().enumerate() {
-            let passed_over = taken.contains(&candidate) || self.is_held_back(candidate);
+        for (candidate, gain) in gains.iter().enumerate() {
+            let passed_over = chosen.contains(&candidate) || !self.is_open(candidate, &model.folds);
             if passed_over || gain.freedom == 0 || self.evidence_for(candidate, gain, variance) < least {
                 continue;
             }
             let length = self.candidates[candidate].length();
             let present = self.candidates[first].length();
-            if length < present || (length == present && gain.gain > first_gain.gain * (1.0 + 1e-9)) {
+            if length < present || (length == present && gain.gain > gains[first].gain * (1.0 + 1e-9)) {
                 first = candidate;
-                first_gain = gain.clone();
             }
         }
         first
@@ -542,100 +382,100 @@ impl<'s> Search<'s> {
 
     /// One round.
     pub fn round(&mut self) -> Round {
-        let taken: Vec<usize> = self.taken.iter().map(|t| t.candidate).collect();
-        let (score, null) = {
-            let model = self.model_without(None);
-            let Some((_, score)) = self.best_of(&model, &taken) else {
-                return Round::Done { p_value: 1.0 };
-            };
-            let score = self
-                .composed(&model)
-                .iter()
-                .map(Composed::score)
-                .fold(score, f64::max);
-            let costs: Vec<f64> = (0..self.candidates.len())
-                .map(|c| {
-                    if self.is_held_back(c) {
-                        f64::INFINITY
-                    } else {
-                        self.candidates[c].length()
-                    }
-                })
-                .collect();
-            (score, model.null_best(&costs, self.null_variance()))
+        let (p_value, threshold) = match self.best_against_null() {
+            Some(found) => found,
+            None => return Round::Done { p_value: 1.0 },
         };
-        let above = null.iter().filter(|best| **best >= score).count();
-        let p_value = (above + 1) as f64 / (null.len() + 1) as f64;
-        let mut sorted = null;
-        sorted.sort_by(f64::total_cmp);
-        let rank = ((1.0 - self.stop.significance) * sorted.len() as f64).ceil() as usize;
-        let threshold = sorted
-            .get(rank.min(sorted.len().saturating_sub(1)))
-            .copied()
-            .unwrap_or(0.0);
         self.thresholds.push(threshold);
-        if p_value > self.stop.significance || self.taken.len() >= self.stop.most {
+        if p_value > self.stop.significance || self.taken().len() >= self.stop.most {
             return Round::Done { p_value };
         }
-        self.sharpen(&taken);
-        let candidate = {
-            let model = self.model_without(None);
-            let Some((best, _)) = self.best_of(&model, &taken) else {
-                return Round::Done { p_value };
-            };
-            self.named_first(&model, best, &taken)
+        let Some(candidate) = self.pick(ALL, f64::NEG_INFINITY) else {
+            return Round::Done { p_value };
         };
-        // Each fold searches for itself, by the same rule.
-        let picks: Vec<Option<usize>> = self
-            .all_folds()
-            .into_iter()
-            .map(|fold| {
-                let model = self.model_of_fold(fold);
-                self.best_of(&model, &self.of_fold[fold])
-                    .filter(|(_, score)| *score >= threshold)
-                    .map(|(best, _)| best)
-            })
-            .collect();
-        let mut wanted: BTreeSet<usize> = picks.iter().flatten().copied().collect();
-        wanted.insert(candidate);
-        self.materialise(&wanted.into_iter().collect::<Vec<_>>());
-        for (fold, pick) in picks.into_iter().enumerate() {
-            self.of_fold[fold].extend(pick);
+        let before = self.tracks.clone();
+        self.take(ALL, Taken { candidate, p_value });
+        for track in 1..self.tracks.len() {
+            if let Some(candidate) = self.pick(track, threshold) {
+                self.take(track, Taken { candidate, p_value });
+            }
         }
-        let places = self.places(candidate);
-        self.taken.push(Taken {
-            candidate,
-            places,
-            p_value,
-        });
         let held_out = self.held_out_now();
         // For poses p-values say little; there an effect has to earn its place on the readings that were held out.
         if self.stop.in_residual_variance
             && held_out >= self.held_out.last().copied().unwrap_or(f64::INFINITY)
         {
-            self.taken.pop();
+            self.tracks = before;
             return Round::Done { p_value };
         }
-        self.held_out.push(held_out);
-        self.let_go(threshold);
+        for track in 0..self.tracks.len() {
+            self.let_go(track, threshold);
+        }
+        self.note_held_out();
         Round::Added { candidate }
     }
 
-    /// Drops what the later effects have made superfluous.
-    fn let_go(&mut self, threshold: f64) {
-        while self.taken.len() > 1 {
-            let mut weakest: Option<(usize, f64)> = None;
-            for k in 0..self.taken.len() - 1 {
-                let model = self.model_without(Some(k));
-                let candidate = self.taken[k].candidate;
-                let score = self.score(candidate, &model.gain(candidate), self.variance(&model));
-                if weakest.is_none_or(|(_, least)| score < least) {
-                    weakest = Some((k, score));
+    /// The p-value of the best beside what has been taken, among the best of draws without structure, and the score that those exceed with the probability
+    /// of the stop.
+    fn best_against_null(&self) -> Option<(f64, f64)> {
+        let chosen = self.tracks[ALL].chosen();
+        let model = self.model_without(None);
+        let (_, score) = self.best_of(&model, &model.gains(), &chosen)?;
+        let composed = self.composed(&model);
+        let score = composed.iter().map(Composed::score).fold(score, f64::max);
+        let costs: Vec<f64> = (0..self.candidates.len())
+            .map(|c| {
+                if self.is_open(c, &model.folds) {
+                    self.candidates[c].length()
+                } else {
+                    f64::INFINITY
                 }
-            }
+            })
+            .collect();
+        let mut null = model.null_best(&costs, self.null_variance());
+        null.sort_by(f64::total_cmp);
+        let above = null.iter().filter(|best| **best >= score).count();
+        let p_value = (above + 1) as f64 / (null.len() + 1) as f64;
+        let rank = ((1.0 - self.stop.significance) * null.len() as f64).ceil() as usize;
+        let threshold = null.get(rank.min(null.len().saturating_sub(1)));
+        Some((p_value, threshold.copied().unwrap_or(0.0)))
+    }
+
+    /// What a search would add: the simplest that cannot be told from the best, if that reaches a score.
+    fn pick(&mut self, track: usize, least: f64) -> Option<usize> {
+        let Track { folds, .. } = self.tracks[track].clone();
+        let chosen = self.tracks[track].chosen();
+        self.sharpen(&chosen, &folds);
+        let model = self.model_of(&chosen, &folds);
+        let gains = model.gains();
+        let (best, score) = self.best_of(&model, &gains, &chosen)?;
+        (score >= least).then(|| self.named_first(&model, &gains, best, &chosen))
+    }
+
+    fn take(&mut self, track: usize, taken: Taken) {
+        self.materialise(&[taken.candidate]);
+        self.tracks[track].taken.push(taken);
+    }
+
+    /// Drops what the later effects have made superfluous.
+    fn let_go(&mut self, track: usize, threshold: f64) {
+        let folds = self.tracks[track].folds.clone();
+        loop {
+            let chosen = self.tracks[track].chosen();
+            let weakest = (0..chosen.len().saturating_sub(1))
+                .map(|k| {
+                    let mut others = chosen.clone();
+                    let candidate = others.remove(k);
+                    let model = self.lean_model_of(&others, &folds);
+                    (
+                        k,
+                        self.score(candidate, &model.gain(candidate), self.variance(&model)),
+                    )
+                })
+                .min_by(|a, b| a.1.total_cmp(&b.1));
             match weakest {
                 Some((k, score)) if score < threshold => {
-                    self.taken.remove(k);
+                    self.tracks[track].taken.remove(k);
                 }
                 _ => return,
             }
@@ -656,42 +496,24 @@ impl<'s> Search<'s> {
         let chosen: Vec<&Layout> = fresh.iter().map(|c| &self.layouts[*c]).collect();
         let rows = self.columns.plain_rows(&chosen);
         let norms: Vec<f64> = fresh.iter().flat_map(|c| self.norms(*c)).collect();
-        let (before, old) = (&self.plain.base, self.plain.base.ncols());
-        self.plain.base = Mat::from_fn(rows.nrows(), old + rows.ncols(), |i, j| {
-            match j.checked_sub(old) {
-                None => before[(i, j)],
-                Some(k) if norms[k] > 0.0 => rows[(i, k)] / (norms[k] * self.plain.sigma_mm),
-                Some(_) => 0.0,
+        let old = self.plain.base.ncols();
+        let sigma_mm = self.plain.sigma_mm;
+        moments::grow(&mut self.plain.base, rows.nrows(), old + rows.ncols(), |i, j| {
+            let norm = norms[j - old];
+            if norm > 0.0 {
+                rows[(i, j - old)] / (norm * sigma_mm)
+            } else {
+                0.0
             }
         });
         self.materialised.extend(fresh.into_iter().zip(places));
     }
 
-    pub(super) fn others(&self, fold: usize) -> Vec<usize> {
-        self.all_folds()
-            .into_iter()
-            .filter(|other| *other != fold)
-            .collect()
-    }
-
-    /// The model that a fold's own search has built, trained on the other folds.
-    pub fn model_of_fold(&self, fold: usize) -> Trained<'_> {
-        let others = self.others(fold);
-        let base = self.base_with(&self.of_fold[fold]);
-        Trained::new(&self.moments, &self.prior, base, others)
-    }
-
-    /// The same, for its coefficients alone.
-    fn lean_model_of_fold(&self, fold: usize) -> Trained<'_> {
-        let base = self.base_with(&self.of_fold[fold]);
-        Trained::lean(&self.moments, &self.prior, base, self.others(fold))
-    }
-
-    pub(super) fn held_out_now(&self) -> f64 {
-        let models: Vec<Trained<'_>> = self
-            .all_folds()
-            .into_par_iter()
-            .map(|fold| self.lean_model_of_fold(fold))
+    /// Sum of squares of held-out residuals over the variance of the noise: each fold under the model of the search that did not see it.
+    fn held_out_now(&self) -> f64 {
+        let models: Vec<Trained<'_>> = self.tracks[ALL + 1..]
+            .par_iter()
+            .map(|track| self.lean_model_of(&track.chosen(), &track.folds))
             .collect();
         let predicted = |model: &Trained<'_>, row: usize| -> f64 {
             let along = model.base.iter().zip(&model.coefficients);
@@ -705,7 +527,15 @@ impl<'s> Search<'s> {
             .sum()
     }
 
-    /// What any effect would gain beside a model on all readings; `None` where the data lack what it follows.
+    /// Writes down the held-out error with as many effects as there are now.
+    pub(super) fn note_held_out(&mut self) {
+        let held_out = self.held_out_now();
+        let taken = self.taken().len();
+        self.held_out.truncate(taken);
+        self.held_out.resize(taken + 1, held_out);
+    }
+
+    /// What any effect would gain beside a model, on the folds that it is trained on; `None` where the data lack what it follows.
     pub fn gain_beside(&self, model: &Trained<'_>, effect: &abbe_model::effect::Effect) -> Option<f64> {
         let layout = self.columns.layout_uncached(effect)?;
         Some(self.moments.gain_of(self.columns, &layout, model))

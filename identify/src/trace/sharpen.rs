@@ -12,22 +12,35 @@ use super::library::Candidate;
 use super::score::{Gain, Trained};
 use super::search::Search;
 
+/// Steps of a line search, each to 0.62 of the interval: to name a period, and to predict a fold.
 const STEPS: usize = 12;
+const STEPS_TO_PREDICT: usize = 6;
 /// The share of the best evidence that a candidate has to have on the grid to be sharpened: a bump between two grid points loses a third.
 const NEAR: f64 = 0.5;
-/// The most candidates that are sharpened at a time.
+/// The most candidates that are sharpened at a time: enough to name one of them, and where one fold is left out, to predict that.
 const MOST: usize = 10;
+const MOST_TO_PREDICT: usize = 2;
 /// What a composed effect may lack of the best evidence and still be told as what it might be.
 const BEHIND: f64 = 4.0;
+
+/// Whether a candidate has numbers or places that can be chosen better than the library's grid has them.
+pub(super) fn can_be_tuned(candidate: &Candidate) -> bool {
+    candidate.dictionary || brackets(candidate).is_some()
+}
 
 /// Candidates with the best numbers that they can have beside a model, of those that come near the best; with what has been composed.
 pub fn sharpened(search: &Search<'_>, model: &Trained<'_>, composed: &[Composed]) -> Vec<Candidate> {
     let variance = search.variance(model);
     let gains = model.gains();
+    let most = if search.sees_all(&model.folds) {
+        MOST
+    } else {
+        MOST_TO_PREDICT
+    };
     let mut nearest: HashMap<String, (usize, f64)> = HashMap::new();
     let mut best = 0.0_f64;
     for (candidate, gain) in gains.iter().enumerate() {
-        if gain.freedom == 0 || search.is_held_back(candidate) {
+        if gain.freedom == 0 || !search.is_open(candidate, &model.folds) {
             continue;
         }
         let evidence = search.evidence(gain, variance);
@@ -46,7 +59,7 @@ pub fn sharpened(search: &Search<'_>, model: &Trained<'_>, composed: &[Composed]
         .filter(|(_, evidence)| *evidence >= NEAR * best)
         .collect();
     near.sort_by(|a, b| b.1.total_cmp(&a.1).then(a.0.cmp(&b.0)));
-    near.truncate(MOST);
+    near.truncate(most);
     let mut fresh: Vec<Candidate> = near
         .into_iter()
         .filter_map(|(candidate, _)| {
@@ -60,7 +73,7 @@ pub fn sharpened(search: &Search<'_>, model: &Trained<'_>, composed: &[Composed]
         .collect();
     let mut nearest: Vec<&Composed> = composed.iter().filter(|c| c.evidence >= NEAR * best).collect();
     nearest.sort_by(|a, b| b.evidence.total_cmp(&a.evidence));
-    nearest.truncate(MOST);
+    nearest.truncate(most);
     for composed in nearest {
         let (effect, gain) = moved_steps(search, model, &composed.candidate);
         let gain = Gain {
@@ -77,10 +90,10 @@ pub fn sharpened(search: &Search<'_>, model: &Trained<'_>, composed: &[Composed]
         }
     }
     fresh.retain(|candidate| {
-        !search
-            .candidates
-            .iter()
-            .any(|present| present.effect == candidate.effect)
+        let is_same = |present: usize| {
+            search.candidates[present].effect == candidate.effect && search.is_own(present, &model.folds)
+        };
+        !(0..search.candidates.len()).any(is_same)
     });
     fresh
 }
@@ -96,7 +109,13 @@ pub(super) fn sharpen(
     let mut effect = original.effect.clone();
     let brackets = brackets(original)?;
     let mut best = before;
-    for _ in 0..2 {
+    let steps = if search.sees_all(&model.folds) {
+        STEPS
+    } else {
+        STEPS_TO_PREDICT
+    };
+    // Numbers of one shape are looked for in turn.
+    for _ in 0..brackets.len() {
         for (which, low, high) in &brackets {
             let value_at = |share: f64| low + (high - low) * share;
             let gain_at = |share: f64| {
@@ -107,7 +126,7 @@ pub(super) fn sharpen(
             let (mut a, mut b) = (0.0, 1.0);
             let (mut c, mut d) = (b - golden * (b - a), a + golden * (b - a));
             let (mut at_c, mut at_d) = (gain_at(c), gain_at(d));
-            for _ in 0..STEPS {
+            for _ in 0..steps {
                 if at_c.0 > at_d.0 {
                     (b, d) = (d, c);
                     at_d = at_c;

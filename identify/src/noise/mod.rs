@@ -1,0 +1,217 @@
+//! How much of a reading is noise: its size and its memory.
+//!
+//! Readings at the same test, direction and position in repeated runs differ by noise alone (pure error: Box, Hunter & Hunter, Statistics for
+//! Experimenters, ch. 10). What they differ by from their mean, rescaled by `√(R/(R−1))`, needs no model of the structure. A parabola a run is
+//! taken out first, since slow drift and warming up are structure and would be taken for noise.
+
+mod memory;
+mod waves;
+
+use std::collections::BTreeMap;
+
+use abbe_model::session::Test;
+
+pub use memory::Memory;
+
+/// The noise of one scalar reading.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Noise {
+    /// Standard deviation, mm.
+    pub sigma_mm: f64,
+    /// Autoregressive coefficients along a run; empty for white noise.
+    pub memory: Vec<f64>,
+    /// Standard uncertainty of the sum of these coefficients: how slow noise is, which decides how large it is where it is slow.
+    pub memory_u: f64,
+    /// Where the size comes from.
+    pub source: NoiseSource,
+}
+
+/// Where a noise figure comes from.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum NoiseSource {
+    /// The session states it.
+    Stated,
+    /// Repeated readings.
+    Repeats,
+    /// What the fit leaves over.
+    Fit,
+}
+
+impl NoiseSource {
+    /// As it stands in results.
+    pub fn word(self) -> &'static str {
+        match self {
+            NoiseSource::Stated => "stated",
+            NoiseSource::Repeats => "repeats",
+            NoiseSource::Fit => "fit",
+        }
+    }
+}
+
+impl Noise {
+    /// White noise.
+    pub fn white(sigma_mm: f64, source: NoiseSource) -> Noise {
+        Noise {
+            sigma_mm,
+            memory: Vec::new(),
+            memory_u: 0.0,
+            source,
+        }
+    }
+
+    /// Standard deviation of what a reading adds to the readings before it, mm: the innovation.
+    pub fn innovation_mm(&self) -> f64 {
+        // Yule–Walker: γ0 (1 − Σ a_k ρ_k) with ρ of the process itself; for the orders used here by the recursion on simulated
+        // autocovariances is not needed, since ρ follows from the coefficients (Durbin–Levinson run backwards).
+        let mut variance_ratio = 1.0;
+        let mut coefficients = self.memory.clone();
+        while let Some(reflection) = coefficients.last().copied() {
+            let bound = 1.0 - reflection * reflection;
+            variance_ratio *= bound;
+            let n = coefficients.len();
+            coefficients = (0..n - 1)
+                .map(|k| (coefficients[k] + reflection * coefficients[n - 2 - k]) / bound)
+                .collect();
+        }
+        self.sigma_mm * variance_ratio.max(0.0).sqrt()
+    }
+}
+
+/// Readings that differ by noise alone: the residuals (rows × coordinates, mm) less their mean over repeats, rescaled; `None` for readings without a
+/// partner.
+pub struct PureError {
+    /// For each test, one value a scalar reading.
+    pub deviations: Vec<Vec<Option<f64>>>,
+    /// Degrees of freedom.
+    pub freedom: usize,
+}
+
+impl PureError {
+    /// From residuals of any model (a model that is wrong alike in all repeats does no harm). `kept(test, row)` leaves rejected readings out.
+    pub fn of(tests: &[&Test], residuals: &[Vec<f64>], kept: impl Fn(usize, usize) -> bool) -> PureError {
+        let mut deviations = Vec::new();
+        let mut freedom = 0;
+        for (number, test) in tests.iter().enumerate() {
+            let residual = &residuals[number];
+            let mut deviation = vec![None; residual.len()];
+            if let Some(readings) = &test.readings {
+                let coordinates = readings.coordinates;
+                let level = without_trends(readings, residual, |row| kept(number, row));
+                let mut groups: BTreeMap<Vec<i64>, Vec<usize>> = BTreeMap::new();
+                let directions = directions(readings);
+                for row in (0..readings.rows()).filter(|row| kept(number, *row)) {
+                    let mut key: Vec<i64> = readings
+                        .positions
+                        .iter()
+                        // Positions agree to 0.1 µm or 10⁻⁶ rad.
+                        .map(|column| (column[row] * 1e4).round() as i64)
+                        .collect();
+                    if !readings.run.is_empty() {
+                        key.push(directions[row]);
+                    }
+                    groups.entry(key).or_default().push(row);
+                }
+                for rows in groups.values().filter(|rows| rows.len() > 1) {
+                    let count = rows.len() as f64;
+                    let rescale = (count / (count - 1.0)).sqrt();
+                    for coordinate in 0..coordinates {
+                        let at = |row: &usize| level[row * coordinates + coordinate];
+                        let mean = rows.iter().map(at).sum::<f64>() / count;
+                        for row in rows {
+                            deviation[row * coordinates + coordinate] = Some((at(row) - mean) * rescale);
+                        }
+                    }
+                    freedom += (rows.len() - 1) * coordinates;
+                }
+            }
+            deviations.push(deviation);
+        }
+        PureError { deviations, freedom }
+    }
+
+    /// The standard deviation, mm, if there are at least ten degrees of freedom.
+    pub fn sigma_mm(&self) -> Option<f64> {
+        let (sum, count) = self
+            .deviations
+            .iter()
+            .flatten()
+            .flatten()
+            .fold((0.0, 0_usize), |(sum, count), value| {
+                (sum + value * value, count + 1)
+            });
+        (self.freedom >= 10).then(|| (sum / count as f64).sqrt())
+    }
+}
+
+/// The direction of travel of every axis as one number a row.
+fn directions(readings: &abbe_model::session::readings::Readings) -> Vec<i64> {
+    let mut code = vec![0_i64; readings.rows()];
+    for axis in 0..readings.positions.len() {
+        let samples = readings.axis_samples(axis, abbe_model::axis::AxisKind::Rotary);
+        for (code, sample) in code.iter_mut().zip(samples) {
+            *code = *code * 3 + sample.direction as i64 + 1;
+        }
+    }
+    code
+}
+
+/// Coefficients of the trend that is taken out of a run: constant, slope, curvature.
+pub(self) const TERMS: usize = 3;
+
+/// Polynomials in time that are orthonormal over given times (Gram–Schmidt, twice); those that the times are too few for are zero.
+fn polynomials(times: &[f64]) -> Vec<[f64; TERMS]> {
+    let n = times.len() as f64;
+    let middle = times.iter().sum::<f64>() / n;
+    let half = times
+        .iter()
+        .map(|t| (t - middle).abs())
+        .fold(f64::MIN_POSITIVE, f64::max);
+    let mut q: Vec<[f64; TERMS]> = times
+        .iter()
+        .map(|t| std::array::from_fn(|power| ((t - middle) / half).powi(power as i32)))
+        .collect();
+    for i in 0..TERMS {
+        for j in (0..i).chain(0..i) {
+            let along: f64 = q.iter().map(|row| row[i] * row[j]).sum();
+            q.iter_mut().for_each(|row| row[i] -= along * row[j]);
+        }
+        let length = q.iter().map(|row| row[i] * row[i]).sum::<f64>().sqrt();
+        let scale = if length > 1e-9 { 1.0 / length } else { 0.0 };
+        q.iter_mut().for_each(|row| row[i] *= scale);
+    }
+    q
+}
+
+/// Residuals less a parabola a run (and coordinate).
+fn without_trends(
+    readings: &abbe_model::session::readings::Readings,
+    residual: &[f64],
+    kept: impl Fn(usize) -> bool,
+) -> Vec<f64> {
+    let coordinates = readings.coordinates;
+    let mut level = residual.to_vec();
+    if readings.run.is_empty() {
+        return level;
+    }
+    for run in readings.runs() {
+        let rows: Vec<usize> = run.filter(|row| kept(*row)).collect();
+        if rows.len() <= TERMS {
+            continue;
+        }
+        let times: Vec<f64> = rows.iter().map(|row| *row as f64).collect();
+        let q = polynomials(&times);
+        for coordinate in 0..coordinates {
+            let at = |row: usize| row * coordinates + coordinate;
+            let along: [f64; TERMS] = std::array::from_fn(|i| {
+                rows.iter()
+                    .zip(&q)
+                    .map(|(row, q)| residual[at(*row)] * q[i])
+                    .sum()
+            });
+            for (row, q) in rows.iter().zip(&q) {
+                level[at(*row)] -= along.iter().zip(q).map(|(a, q)| a * q).sum::<f64>();
+            }
+        }
+    }
+    level
+}

@@ -1,0 +1,330 @@
+//! The library of effects: data in `library.toml`, laid out for a session here.
+
+mod sampling;
+mod shapes;
+
+use abbe_model::axis::AxisKind;
+use abbe_model::component::{ErrorKind, ErrorName, Freedom};
+use abbe_model::effect::{Component, Driver, Effect, Shape};
+use serde::Deserialize;
+
+use crate::error::IdentifyError;
+use crate::problem::Problem;
+use sampling::Sampling;
+use shapes::shapes;
+
+const LIBRARY: &str = include_str!("library.toml");
+
+/// Intervals of the travel between the places where steps are looked for.
+const PLACES_OF_STEPS: usize = 40;
+
+/// A family of effects, as it stands in the library.
+#[derive(Clone, Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Family {
+    /// In words.
+    pub name: String,
+    components: Components,
+    driver: DriverChoice,
+    shape: String,
+    #[serde(default)]
+    degrees: Vec<usize>,
+    #[serde(default)]
+    tau_s: Vec<f64>,
+    /// What a member costs in the score.
+    pub simplicity: f64,
+    /// Whether it is tried only when nothing simpler is left to find and structure remains.
+    #[serde(default)]
+    pub last_resort: bool,
+}
+
+#[derive(Clone, Copy, Debug, Deserialize, PartialEq)]
+#[serde(rename_all = "kebab-case")]
+enum Components {
+    Motion,
+    OwnMotion,
+    AnyMotion,
+    Location,
+    Body,
+    Balls,
+    Bar,
+    Gain,
+    Trigger,
+}
+
+#[derive(Clone, Copy, Debug, Deserialize, PartialEq)]
+#[serde(rename_all = "kebab-case")]
+enum DriverChoice {
+    None,
+    Own,
+    OwnRotary,
+    OwnLinear,
+    Other,
+    Time,
+    Temperature,
+    Gravity,
+}
+
+#[derive(Deserialize)]
+struct Library {
+    family: Vec<Family>,
+}
+
+/// An effect that is looked for.
+#[derive(Clone, Debug)]
+pub struct Candidate {
+    /// The effect.
+    pub effect: Effect,
+    /// Index of its family.
+    pub family: usize,
+    /// What it costs in the score beside its coefficients, in natural-log units.
+    pub cost: f64,
+    /// What the choice of its places takes from its evidence, where it is composed of several; 0 for an entry of the library.
+    pub price: f64,
+    /// Whether it is tried only when nothing simpler is left to find and structure remains.
+    pub last_resort: bool,
+    /// Whether it holds the places that an effect may be composed of ([`super::compose`]) and is no effect itself.
+    pub dictionary: bool,
+    /// How far apart the entries of the library are in the number of the shape that is the first to be tuned, in the driver's unit; 0 without one.
+    pub grid: f64,
+}
+
+impl Candidate {
+    /// A curve that no component's name stands for: what names are weighed against, and nothing that is looked for.
+    pub fn nameless(effect: Effect) -> Candidate {
+        Candidate {
+            effect,
+            family: usize::MAX,
+            cost: 0.0,
+            price: 0.0,
+            last_resort: false,
+            dictionary: true,
+            grid: 0.0,
+        }
+    }
+
+    /// How long it takes to say what it is: the simplest is the shortest.
+    pub fn length(&self) -> f64 {
+        self.cost + self.price
+    }
+}
+
+/// The families of the library.
+///
+/// # Errors
+/// Only if the library that is compiled in cannot be read.
+pub fn families() -> Result<Vec<Family>, IdentifyError> {
+    let library: Library = toml::from_str(LIBRARY)
+        .map_err(|fault| IdentifyError::Request(format!("the library of effects cannot be read: {fault}")))?;
+    Ok(library.family)
+}
+
+/// The library laid out for a session: every member that its axes, its instrument and its columns allow, less what the model has already.
+///
+/// # Errors
+/// See [`families`].
+pub fn candidates(problem: &Problem<'_>) -> Result<Vec<Candidate>, IdentifyError> {
+    let sampling = Sampling::of(problem);
+    let families = families()?;
+    let mut candidates = Vec::new();
+    for (number, family) in families.iter().enumerate() {
+        for component in components(problem, &sampling, family.components) {
+            for driver in drivers(problem, &sampling, family.driver, &component) {
+                for (shape, tests, extra) in shapes(problem, &sampling, family, &component, &driver) {
+                    let effect = Effect {
+                        component: component.clone(),
+                        driver: driver.clone(),
+                        shape,
+                        tests,
+                    };
+                    let cost = family.simplicity + extra + tilt_cost(problem, &component);
+                    let last_resort = family.last_resort;
+                    let span = match &driver {
+                        Driver::Axis(name) => problem
+                            .session
+                            .machine
+                            .axis_index(name)
+                            .map_or(0.0, |axis| sampling.span(axis)),
+                        _ => 0.0,
+                    };
+                    let grid = match &effect.shape {
+                        // Frequencies lie half a cycle over the travel apart.
+                        Shape::Periodic { period } => 0.5 * period * period / span,
+                        Shape::Steps { .. } => span / PLACES_OF_STEPS as f64,
+                        Shape::Local { width, .. } => *width,
+                        _ => 0.0,
+                    };
+                    let dictionary = matches!(&effect.shape, Shape::Steps { at } if at.len() > 1);
+                    candidates.push(Candidate {
+                        effect,
+                        family: number,
+                        cost,
+                        price: 0.0,
+                        last_resort,
+                        dictionary,
+                        grid,
+                    });
+                }
+            }
+        }
+    }
+    let declared: Vec<String> = problem
+        .parameters
+        .list
+        .iter()
+        .map(|parameter| parameter.id.clone())
+        .collect();
+    candidates.retain(|candidate| {
+        let constant = candidate.effect.shape == Shape::Constant;
+        let same_error = constant && declared.contains(&candidate.effect.component.to_string());
+        let free = constant && is_free_setup(problem, &candidate.effect);
+        !same_error && !free && !problem.parameters.effects.contains(&candidate.effect)
+    });
+    Ok(candidates)
+}
+
+/// Whether a set-up quantity is free already, so that freeing it is no effect.
+fn is_free_setup(problem: &Problem<'_>, effect: &Effect) -> bool {
+    let Component::Instrument { thing, coordinate } = &effect.component else {
+        return false;
+    };
+    let Some(test) = problem
+        .tests
+        .iter()
+        .find(|test| effect.tests.contains(&test.name))
+    else {
+        return false;
+    };
+    let unknowns = problem.session.instrument.unknowns();
+    let place = unknowns
+        .iter()
+        .position(|u| u.thing == thing && u.coordinate == coordinate);
+    place.is_some_and(|place| test.priors[place] == abbe_model::session::Prior::Free)
+}
+
+fn components(problem: &Problem<'_>, sampling: &Sampling, choice: Components) -> Vec<Component> {
+    let machine = &problem.session.machine;
+    let error = |axis: usize, kind: ErrorKind, freedom: Freedom| {
+        Component::Axis(ErrorName {
+            kind,
+            freedom,
+            axis: machine.axes[axis].name.clone(),
+        })
+    };
+    let moving = || (0..machine.axes.len()).filter(|axis| sampling.moves[*axis]);
+    let things = |names: &[&str]| -> Vec<Component> {
+        problem
+            .session
+            .instrument
+            .unknowns()
+            .iter()
+            .filter(|unknown| names.contains(&unknown.thing))
+            .map(|unknown| Component::Instrument {
+                thing: unknown.thing.to_string(),
+                coordinate: unknown.coordinate.to_string(),
+            })
+            .collect()
+    };
+    match choice {
+        Components::Motion => moving()
+            .flat_map(|axis| Freedom::ALL.map(|freedom| error(axis, ErrorKind::Motion, freedom)))
+            .collect(),
+        Components::OwnMotion => moving()
+            .map(|axis| error(axis, ErrorKind::Motion, machine.axes[axis].own_freedom()))
+            .collect(),
+        Components::AnyMotion => (0..machine.axes.len())
+            .filter(|axis| machine.axes[*axis].kind == AxisKind::Rotary)
+            .flat_map(|axis| Freedom::ALL.map(|freedom| error(axis, ErrorKind::Motion, freedom)))
+            .collect(),
+        Components::Location | Components::Body => (0..machine.axes.len())
+            .flat_map(|axis| {
+                let own = machine.axes[axis].own_freedom();
+                let rotary = machine.axes[axis].kind == AxisKind::Rotary;
+                let along = Freedom::ALL[own.index() % 3];
+                let body = choice == Components::Body;
+                Freedom::ALL
+                    .into_iter()
+                    // An axis is a line: it has no location along itself, and its zero is no error of the line. What it carries may well move there.
+                    .filter(move |f| {
+                        if rotary {
+                            body || *f != own && *f != along
+                        } else {
+                            f.is_angle() && f.index() != own.index() + 3
+                        }
+                    })
+                    .map(move |freedom| error(axis, ErrorKind::Location, freedom))
+            })
+            .collect(),
+        Components::Balls => things(&["workpiece_ball", "spindle_ball"]),
+        Components::Bar => things(&["bar"]),
+        Components::Gain => things(&["gain"]),
+        Components::Trigger => {
+            if sampling.has_time && sampling.step.iter().any(|step| *step > 0.0) {
+                vec![Component::TriggerDelay]
+            } else {
+                Vec::new()
+            }
+        }
+    }
+}
+
+fn drivers(
+    problem: &Problem<'_>,
+    sampling: &Sampling,
+    choice: DriverChoice,
+    component: &Component,
+) -> Vec<Driver> {
+    let machine = &problem.session.machine;
+    let own = crate::drivers::component_axis(problem.session, component);
+    let own_of_kind = |kind: Option<AxisKind>| -> Vec<Driver> {
+        own.filter(|axis| kind.is_none_or(|kind| machine.axes[*axis].kind == kind))
+            .map(|axis| Driver::Axis(machine.axes[axis].name.clone()))
+            .into_iter()
+            .collect()
+    };
+    match choice {
+        DriverChoice::None => vec![Driver::None],
+        DriverChoice::Own => own_of_kind(None),
+        DriverChoice::OwnRotary => own_of_kind(Some(AxisKind::Rotary)),
+        DriverChoice::OwnLinear => own_of_kind(Some(AxisKind::Linear)),
+        // Among independent poses every axis moves at once and any pair could be blamed; what a body gives there, the moment tells.
+        DriverChoice::Other if sampling.is_poses() => Vec::new(),
+        DriverChoice::Other => (0..machine.axes.len())
+            .filter(|axis| sampling.moves[*axis] && Some(*axis) != own)
+            .map(|axis| Driver::Axis(machine.axes[axis].name.clone()))
+            .collect(),
+        DriverChoice::Time => {
+            if sampling.has_time {
+                vec![Driver::Time]
+            } else {
+                Vec::new()
+            }
+        }
+        DriverChoice::Temperature => {
+            if sampling.has_temperature {
+                vec![Driver::Temperature]
+            } else {
+                Vec::new()
+            }
+        }
+        DriverChoice::Gravity => {
+            let turns = own.is_some_and(|axis| machine.axes[axis].kind == AxisKind::Rotary);
+            if turns { vec![Driver::Gravity] } else { Vec::new() }
+        }
+    }
+}
+
+/// A translation is a simpler cause than a tilt that moves the point as much; the angle that an axis itself turns is no tilt.
+fn tilt_cost(problem: &Problem<'_>, component: &Component) -> f64 {
+    match component {
+        Component::Axis(name) if name.freedom.is_angle() => {
+            let own = problem
+                .session
+                .machine
+                .axis_index(&name.axis)
+                .map(|axis| problem.session.machine.axes[axis].own_freedom());
+            if own == Some(name.freedom) { 0.0 } else { 1.0 }
+        }
+        _ => 0.0,
+    }
+}
