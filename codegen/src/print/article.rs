@@ -8,7 +8,9 @@ use crate::layout::{product, sum};
 use crate::print::{exact, words};
 use crate::program::{Input, Label, Naming, Program, Step, Tree};
 use crate::symbol::{Binary, Operand, Unary};
+use crate::touch::{self, Touch};
 use crate::variable::Variable;
+use crate::vectors::NamedVector;
 
 /// The left-hand side of a row.
 #[derive(Clone, Debug, PartialEq)]
@@ -113,6 +115,7 @@ pub(crate) fn row(left: Left, right: Tree) -> Row {
 pub(crate) fn what_is_read(equation: &Equation) -> &'static str {
     match equation.kind {
         Kind::Length => "length of the bar",
+        Kind::Distance => "distance read",
         Kind::Coordinates => "coordinates read",
         Kind::Volumetric => "error vector of the tool in the table frame",
     }
@@ -146,6 +149,9 @@ pub(crate) fn norm_of_steps(start: usize) -> Tree {
 
 /// The coordinate groups, and the length over them.
 fn groups(equation: &Equation, trees: &[Tree], complete: bool) -> (Program, Vec<Section>) {
+    if let (Kind::Distance, Some(touch)) = (equation.kind, &equation.touch) {
+        return touch_groups(equation, touch, trees, complete);
+    }
     if equation.kind != Kind::Length {
         let rows = trees.iter().enumerate().map(|(place, tree)| Row {
             approximate: !complete,
@@ -181,22 +187,76 @@ fn groups(equation: &Equation, trees: &[Tree], complete: bool) -> (Program, Vec<
     (program, sections)
 }
 
+/// The groups of stylus and step, and the distance over them.
+fn touch_groups(
+    equation: &Equation,
+    touch: &Touch,
+    trees: &[Tree],
+    complete: bool,
+) -> (Program, Vec<Section>) {
+    let vectors = &equation.vectors;
+    let coordinates = |vector: &NamedVector| (0..3).map(|i| vector.label(i)).collect::<Vec<Label>>();
+    let mut labels: Vec<Label> = vectors.iter().flat_map(coordinates).collect();
+    labels.extend(touch::QUADRATIC);
+    labels.extend(touch.step_length.map(|_| touch::STEP_LENGTH));
+    let program = naming(equation, labels);
+    let dot = |a: usize, b: usize| {
+        let there = |i: &usize| trees[a + i] != Tree::Number(0.0) && trees[b + i] != Tree::Number(0.0);
+        let parts = (0..3).filter(there);
+        sum(parts
+            .map(|i| (false, binary(Binary::Mul, Tree::Step(a + i), Tree::Step(b + i))))
+            .collect())
+    };
+    let mut sections: Vec<Section> = Vec::new();
+    for (vector, trees) in vectors.iter().zip(trees.chunks(3)) {
+        let rows = coordinates(vector).into_iter().zip(trees);
+        sections.push(Section {
+            heading: vector.meaning.clone(),
+            rows: rows
+                .map(|(label, tree)| row(Left::Named(label), tree.clone()))
+                .collect(),
+        });
+    }
+    let radius = as_it_stands(equation, &program, touch.radius);
+    let radius = (true, binary(Binary::Mul, radius.clone(), radius));
+    let mut beyond = terms_of(&dot(0, 0));
+    beyond.push(radius);
+    let quadratic = [dot(3, 3), dot(0, 3), sum(beyond)];
+    let mut rows: Vec<Row> = touch::QUADRATIC
+        .into_iter()
+        .zip(quadratic)
+        .map(|(label, tree)| row(Left::Named(label), tree))
+        .collect();
+    if let Some(length) = touch.step_length {
+        rows.push(row(
+            Left::Named(touch::STEP_LENGTH),
+            as_it_stands(equation, &program, length),
+        ));
+    }
+    rows.push(Row {
+        approximate: !complete,
+        ..row(Left::Output(0), distance_of_steps(6, touch.step_length.is_some()))
+    });
+    sections.push(Section {
+        heading: what_is_read(equation).to_string(),
+        rows,
+    });
+    (program, sections)
+}
+
+/// `−l_n·(b + √(b² − a·c))/a`, with `a`, `b`, `c` and `l_n` in this order from the step `start`.
+fn distance_of_steps(start: usize, with_length: bool) -> Tree {
+    let [a, b, c, length] = [0, 1, 2, 3].map(|place| Tree::Step(start + place));
+    let product_of = |x: &Tree, y: &Tree| binary(Binary::Mul, x.clone(), y.clone());
+    let under = binary(Binary::Sub, product_of(&b, &b), product_of(&a, &c));
+    let way = binary(Binary::Add, b, Tree::Unary(Unary::Sqrt, Box::new(under)));
+    let way = if with_length { product_of(&length, &way) } else { way };
+    Tree::Unary(Unary::Neg, Box::new(binary(Binary::Div, way, a)))
+}
+
 /// `d − δ_bar + δ_gain·(d − bar)`, as far as these unknowns are carried.
 pub(crate) fn with_bar_unknowns(equation: &Equation, program: &Program, distance: Tree) -> Tree {
-    let tree = |operand: Operand| {
-        let follower = equation.followers.iter().find(|(_, value)| *value == operand);
-        let named = follower.and_then(|(variable, _)| {
-            let label = Label::Quantity(variable.clone());
-            program.steps.iter().position(|step| step.label == label)
-        });
-        let none = HashMap::new();
-        let own = || {
-            equation
-                .arena
-                .program(equation.inputs(), &[operand], &none, Naming::Labelled)
-        };
-        named.map_or_else(|| own().outputs[0].clone(), Tree::Step)
-    };
+    let tree = |operand: Operand| as_it_stands(equation, program, operand);
     let [bar, gain] = equation.bar_unknowns;
     let mut terms = vec![(false, distance.clone())];
     if let Some(bar) = bar {
@@ -209,12 +269,28 @@ pub(crate) fn with_bar_unknowns(equation: &Equation, program: &Program, distance
     sum(terms)
 }
 
+/// An operand by the name that effects give it or, where they give it none, as it stands.
+fn as_it_stands(equation: &Equation, program: &Program, operand: Operand) -> Tree {
+    let follower = equation.followers.iter().find(|(_, value)| *value == operand);
+    let named = follower.and_then(|(variable, _)| {
+        let label = Label::Quantity(variable.clone());
+        program.steps.iter().position(|step| step.label == label)
+    });
+    let none = HashMap::new();
+    let own = || {
+        equation
+            .arena
+            .program(equation.inputs(), &[operand], &none, Naming::Labelled)
+    };
+    named.map_or_else(|| own().outputs[0].clone(), Tree::Step)
+}
+
 const L_0: Label = Label::Scalar("L_0");
 const S: Label = Label::Scalar("S");
 
 /// The value without errors, the sum, and the table of coefficients.
 fn first_order(equation: &Equation, first: &FirstOrder, layout: &FirstLayout) -> (Program, Vec<Section>) {
-    let is_length = equation.kind == Kind::Length;
+    let is_length = matches!(equation.kind, Kind::Length | Kind::Distance);
     let program = naming(equation, if is_length { vec![L_0, S] } else { Vec::new() });
     let (l_0, s) = (Tree::Step(0), Tree::Step(1));
     let mut sum_rows = Vec::new();
@@ -222,7 +298,8 @@ fn first_order(equation: &Equation, first: &FirstOrder, layout: &FirstLayout) ->
         sum_rows.push(row(Left::Square(L_0), layout.nominal[0].clone()));
         sum_rows.push(row(Left::Named(S), sum(terms(equation, first, layout, 0, true))));
         let slope = binary(Binary::Div, s, l_0.clone());
-        let mut all = vec![(false, l_0.clone()), (false, slope)];
+        let mut all = terms_of(&layout.without_errors(l_0.clone()));
+        all.push((false, slope));
         all.extend(terms(equation, first, layout, 0, false));
         sum_rows.push(Row {
             approximate: true,

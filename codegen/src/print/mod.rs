@@ -16,6 +16,8 @@ mod text;
 mod typst;
 mod words;
 
+pub(crate) use article::terms_of;
+
 use abbe_model::effect::{Effect, Shape};
 
 use crate::equation::{Equation, Kind, Order};
@@ -88,6 +90,11 @@ impl Equation {
                 (Kind::Length, Order::Bilinear) => {
                     return Err(CodegenError::GradientForReaders {
                         what: "a bilinear form",
+                    });
+                }
+                (Kind::Distance, _) => {
+                    return Err(CodegenError::GradientForReaders {
+                        what: "a probed distance",
                     });
                 }
                 (Kind::Coordinates, _) => {
