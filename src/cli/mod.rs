@@ -14,6 +14,7 @@ mod map;
 mod new;
 mod output;
 mod plan;
+mod repeated;
 mod self_calibration;
 mod simulate;
 mod table;
