@@ -104,7 +104,11 @@ pub(crate) fn of_subject<'a>(
             vectors.extend(into_the_table(tool("stylus"), machine, state, errors, stylus));
             vectors.extend(into_the_table(ahead, machine, state, errors, stylus.plus(step)));
             let sight = probe.sight(machine, state, errors, unknown);
-            vectors.push(named("v", sight.stylus, "stylus from the artefact's axis, across it"));
+            vectors.push(named(
+                "v",
+                sight.stylus,
+                "stylus from the artefact's axis, across it",
+            ));
             vectors.push(named("u", sight.step, "the step across the artefact's axis"));
             vectors
         }
@@ -141,7 +145,11 @@ fn into_the_table<'a>(
             let axis = &machine.axes[index].name;
             vectors.push(NamedVector {
                 frame: axis.clone(),
-                ..named(body.letter, pulled, &format!("{} in the frame of axis {axis}", body.meaning))
+                ..named(
+                    body.letter,
+                    pulled,
+                    &format!("{} in the frame of axis {axis}", body.meaning),
+                )
             });
         }
         point = pulled;

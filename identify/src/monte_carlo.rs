@@ -241,14 +241,22 @@ fn pilot<F: Function>(function: &F, draws: &Draws<'_>) -> Vec<Count> {
         .map(|block| {
             let runs = F::BLOCK.min(F::PILOT - block * F::BLOCK);
             let mut drawn = Vec::with_capacity(runs as usize * function.outputs());
-            draw(function, draws, PILOT_STREAM + u128::from(block), runs, |outputs| {
-                drawn.extend_from_slice(outputs);
-            });
+            draw(
+                function,
+                draws,
+                PILOT_STREAM + u128::from(block),
+                runs,
+                |outputs| {
+                    drawn.extend_from_slice(outputs);
+                },
+            );
             drawn
         })
         .collect();
     let values = (0..function.outputs()).map(|output| {
-        let runs = blocks.iter().flat_map(|drawn| drawn.chunks_exact(function.outputs()));
+        let runs = blocks
+            .iter()
+            .flat_map(|drawn| drawn.chunks_exact(function.outputs()));
         let column = runs.map(|outputs| outputs[output]);
         column.filter(|value| value.is_finite()).collect::<Vec<f64>>()
     });

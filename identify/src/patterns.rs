@@ -52,7 +52,11 @@ pub struct Patterns {
 /// The session's unknown errors, positions by 10 µm and orientations by 0.01°.
 pub fn usual_sizes(session: &Session) -> Vec<Given> {
     let given = |name: &abbe_model::component::ErrorName| {
-        let (value, unit) = if name.freedom.is_angle() { ORIENTATION } else { POSITION };
+        let (value, unit) = if name.freedom.is_angle() {
+            ORIENTATION
+        } else {
+            POSITION
+        };
         Given {
             id: name.to_string(),
             value,
@@ -117,7 +121,13 @@ pub fn patterns(session: &Session, errors: &[Given]) -> Result<Patterns, Identif
 impl Patterns {
     /// As a CSV file, a line for each reading and error: test, error and its size, run, positions of the axes, deviation.
     pub fn csv(&self, session: &Session) -> String {
-        let mut header = vec!["test".to_string(), "error".into(), "size".into(), "unit".into(), "run".into()];
+        let mut header = vec![
+            "test".to_string(),
+            "error".into(),
+            "size".into(),
+            "unit".into(),
+            "run".into(),
+        ];
         for axis in &session.machine.axes {
             let unit = match axis.kind {
                 AxisKind::Linear => "mm",

@@ -308,7 +308,16 @@ pub fn add_monte_carlo(
         .parameters
         .iter()
         .zip(&distributions)
-        .map(|(parameter, drawn)| compared(&parameter.id, parameter.value, parameter.u, &parameter.unit, drawn, draws))
+        .map(|(parameter, drawn)| {
+            compared(
+                &parameter.id,
+                parameter.value,
+                parameter.u,
+                &parameter.unit,
+                drawn,
+                draws,
+            )
+        })
         .collect();
     for (parameter, drawn) in result.parameters.iter_mut().zip(&parameters) {
         if drawn.verdict != Verdict::Agree {
@@ -395,5 +404,9 @@ pub fn tolerance(u: f64) -> f64 {
         power
     };
     // Dividing by a whole power of ten keeps short decimals short.
-    if power < 0 { 0.5 / 10.0_f64.powi(-power) } else { 0.5 * 10.0_f64.powi(power) }
+    if power < 0 {
+        0.5 / 10.0_f64.powi(-power)
+    } else {
+        0.5 * 10.0_f64.powi(power)
+    }
 }

@@ -191,7 +191,11 @@ fn same_plan(first: &Session, other: &Session) -> Result<(), IdentifyError> {
         return Err(fault(format!("it is {}, not {}", other.plan, first.plan)));
     }
     let ids = |session: &Session| -> BTreeSet<String> {
-        session.parameters.iter().map(|parameter| parameter.id.clone()).collect()
+        session
+            .parameters
+            .iter()
+            .map(|parameter| parameter.id.clone())
+            .collect()
     };
     let (own, known) = (ids(other), ids(first));
     if own == known {
@@ -199,7 +203,11 @@ fn same_plan(first: &Session, other: &Session) -> Result<(), IdentifyError> {
     }
     let list = |a: &BTreeSet<String>, b: &BTreeSet<String>| {
         let only: Vec<&str> = a.difference(b).map(String::as_str).collect();
-        if only.is_empty() { "nothing".to_string() } else { only.join(", ") }
+        if only.is_empty() {
+            "nothing".to_string()
+        } else {
+            only.join(", ")
+        }
     };
     Err(fault(format!(
         "its readings tell {} besides and {} not",
@@ -208,11 +216,7 @@ fn same_plan(first: &Session, other: &Session) -> Result<(), IdentifyError> {
     )))
 }
 
-fn over_sessions(
-    parameter: &ParameterResult,
-    values: &[(f64, f64)],
-    significance: f64,
-) -> RepeatedParameter {
+fn over_sessions(parameter: &ParameterResult, values: &[(f64, f64)], significance: f64) -> RepeatedParameter {
     let count = values.len() as f64;
     let mean = values.iter().map(|(x, _)| x).sum::<f64>() / count;
     let free = count - 1.0;
@@ -221,7 +225,9 @@ fn over_sessions(
     let ratio = (u_type_b > 0.0).then(|| s / u_type_b);
     let chi_square = ratio.map(|ratio| free * ratio * ratio);
     let law = ChiSquared::new(free).ok();
-    let tails = law.zip(chi_square).map(|(law, found)| [law.cdf(found), law.sf(found)]);
+    let tails = law
+        .zip(chi_square)
+        .map(|(law, found)| [law.cdf(found), law.sf(found)]);
     let p_value = tails.map(|[below, above]| (2.0 * below.min(above)).min(1.0));
     let scatter = match (p_value, tails) {
         (Some(p), Some([below, above])) if p < significance => {

@@ -172,7 +172,15 @@ fn print_drawn(drawn: &FitMonteCarlo) {
         .collect();
     let interval = format!("{} %", drawn.coverage * 100.0);
     table::print(
-        &["parameter", "value", "u GUM", "u drawn", &interval, "unit", "quoted"],
+        &[
+            "parameter",
+            "value",
+            "u GUM",
+            "u drawn",
+            &interval,
+            "unit",
+            "quoted",
+        ],
         &rows,
     );
     let off = |verdict: Verdict| drawn.parameters.iter().filter(|p| p.verdict == verdict).count();

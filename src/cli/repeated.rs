@@ -34,7 +34,11 @@ pub fn run(first: &SessionArguments, repeat: &[PathBuf], common: &CommonArgument
             .map(|warning| format!("{}: {warning}", path.display()))
             .collect();
         fit::print_warnings(&named);
-        sessions.push(repeated::Session::new(&path.display().to_string(), &problem, &fit));
+        sessions.push(repeated::Session::new(
+            &path.display().to_string(),
+            &problem,
+            &fit,
+        ));
     }
     let result = repeated::compare(&sessions)?;
     print(&result);
@@ -52,7 +56,10 @@ fn same_file(a: &Path, b: &Path) -> bool {
 }
 
 fn print(result: &Repeated) {
-    say!("{} sessions of one plan, each fitted by itself\n", result.sessions.len());
+    say!(
+        "{} sessions of one plan, each fitted by itself\n",
+        result.sessions.len()
+    );
     let rows: Vec<Vec<String>> = result
         .parameters
         .iter()
@@ -82,10 +89,22 @@ fn print(result: &Repeated) {
         })
         .collect();
     table::print(
-        &["parameter", "mean", "s/√n (A)", "s (A)", "u (B)", "unit", "s/u", "p", ""],
+        &[
+            "parameter",
+            "mean",
+            "s/√n (A)",
+            "s (A)",
+            "u (B)",
+            "unit",
+            "s/u",
+            "p",
+            "",
+        ],
         &rows,
     );
-    say!("\nA: over the sessions, of their mean and of one; B: of one session by its fit; p: of such an s/u by chance");
+    say!(
+        "\nA: over the sessions, of their mean and of one; B: of one session by its fit; p: of such an s/u by chance"
+    );
     if result.deviating.is_empty() {
         if result.sessions.len() > 2 {
             say!("No session is off the others by more than the fits explain");
@@ -108,5 +127,8 @@ fn print(result: &Repeated) {
             ]
         })
         .collect();
-    table::print(&["session", "parameter", "by", "u (k=1)", "unit", "times u"], &rows);
+    table::print(
+        &["session", "parameter", "by", "u (k=1)", "unit", "times u"],
+        &rows,
+    );
 }

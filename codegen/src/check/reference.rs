@@ -38,7 +38,9 @@ impl Equation {
             }
             Subject::Station(Station::Probe(_)) => {
                 let sight = run.sight().into_iter();
-                sight.flat_map(|sight| [sight.stylus.0, sight.step.0].concat()).collect()
+                sight
+                    .flat_map(|sight| [sight.stylus.0, sight.step.0].concat())
+                    .collect()
             }
             _ => run.read(),
         };

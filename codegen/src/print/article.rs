@@ -250,7 +250,11 @@ fn distance_of_steps(start: usize, with_length: bool) -> Tree {
     let product_of = |x: &Tree, y: &Tree| binary(Binary::Mul, x.clone(), y.clone());
     let under = binary(Binary::Sub, product_of(&b, &b), product_of(&a, &c));
     let way = binary(Binary::Add, b, Tree::Unary(Unary::Sqrt, Box::new(under)));
-    let way = if with_length { product_of(&length, &way) } else { way };
+    let way = if with_length {
+        product_of(&length, &way)
+    } else {
+        way
+    };
     Tree::Unary(Unary::Neg, Box::new(binary(Binary::Div, way, a)))
 }
 

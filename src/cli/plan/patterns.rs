@@ -17,7 +17,12 @@ pub struct PatternArguments {
     #[arg(long, value_name = "FILE.csv")]
     patterns: Option<PathBuf>,
     /// Size of an error whose pattern is wanted; may be repeated. Without it: the session's unknown errors, 10 µm and 0.01°.
-    #[arg(long = "error", value_name = "NAME=SIZE", allow_hyphen_values = true, requires = "patterns")]
+    #[arg(
+        long = "error",
+        value_name = "NAME=SIZE",
+        allow_hyphen_values = true,
+        requires = "patterns"
+    )]
     errors: Vec<String>,
 }
 
@@ -34,14 +39,22 @@ impl PatternArguments {
             .iter()
             .map(|text| Given::parse(text))
             .collect::<Result<_, _>>()?;
-        let given = if given.is_empty() { usual_sizes(session) } else { given };
+        let given = if given.is_empty() {
+            usual_sizes(session)
+        } else {
+            given
+        };
         let found = patterns(session, &given)?;
         if let Some(path) = &self.patterns {
             output::write_whole(path, found.csv(session).as_bytes())?;
         }
         let number = |value: f64| {
             let rounded = format!("{value:.3}");
-            if rounded == "-0.000" { "0.000".to_string() } else { rounded }
+            if rounded == "-0.000" {
+                "0.000".to_string()
+            } else {
+                rounded
+            }
         };
         let rows: Vec<Vec<String>> = found
             .patterns
@@ -58,7 +71,14 @@ impl PatternArguments {
             })
             .collect();
         table::print(
-            &["test", "error", "size", "largest, µm", "mean, µm", "rms about it, µm"],
+            &[
+                "test",
+                "error",
+                "size",
+                "largest, µm",
+                "mean, µm",
+                "rms about it, µm",
+            ],
             &rows,
         );
         if let Some(path) = json {
