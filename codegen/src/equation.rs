@@ -19,7 +19,7 @@ use crate::print::terms_of;
 use crate::program::{Input, Label, Naming, Program, Tree};
 use crate::run::Run;
 use crate::subject::{Source, Subject, ToolPoint};
-use crate::symbol::{Arena, NodeId, Operand, Symbol, VariableId};
+use crate::symbol::{Arena, NodeId, Operand, Symbol, Unary, VariableId};
 use crate::touch::{self, Touch};
 use crate::variable::{Symbols, Variable};
 use crate::vectors::{self, NamedVector};
@@ -99,6 +99,16 @@ pub struct FirstLayout {
 }
 
 impl FirstLayout {
+    /// With `length` in the place of the root that it is.
+    pub(crate) fn with_named_length(&self, length: &Tree) -> FirstLayout {
+        let root = Tree::Unary(Unary::Sqrt, Box::new(self.nominal[0].clone()));
+        let named = |trees: &Vec<Tree>| trees.iter().map(|tree| tree.replaced(&root, length)).collect();
+        FirstLayout {
+            coefficients: self.coefficients.iter().map(named).collect(),
+            ..self.clone()
+        }
+    }
+
     /// What is read without errors, from the length `L₀`.
     pub(crate) fn without_errors(&self, length: Tree) -> Tree {
         match &self.beside_length {
@@ -187,6 +197,7 @@ impl Equation {
             let mut vectors = vectors::of_subject(&run.subject, &machine, &run.state, &run.errors, &|slot| {
                 run.unknown(slot)
             });
+            let on_the_way = vectors.clone();
             let inputs = inputs(&arena, &machine, &parameters);
             let symbol = |place: usize| arena.variable(parameters[place].clone());
             let followers = run.followers(&symbol).into_iter();
@@ -216,9 +227,9 @@ impl Equation {
                         .iter()
                         .flat_map(|vector| vector.components.map(|component| arena.symbol(component)))
                         .collect();
-                    Touch::of(&touch::with_groups(&sight, &groups))
+                    Touch::of(&touch::with_groups(&sight, &groups), &on_the_way)
                 }
-                _ => Touch::of(&sight),
+                _ => Touch::of(&sight, &on_the_way),
             });
             (
                 kind,

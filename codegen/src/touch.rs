@@ -16,6 +16,7 @@ use crate::program::Label;
 use crate::run::Run;
 use crate::subject::Subject;
 use crate::symbol::{NodeId, Operand, Symbol};
+use crate::vectors::NamedVector;
 
 /// The named quantities between the vectors of a probe and its reading.
 #[derive(Clone, Debug, PartialEq)]
@@ -26,6 +27,8 @@ pub struct Touch {
     pub radius: Operand,
     /// `l_n`.
     pub step_length: Option<Operand>,
+    /// The step in R, whose length `l_n` is.
+    pub step: Option<NamedVector>,
 }
 
 /// The length of a step, in every language.
@@ -34,11 +37,13 @@ pub(crate) const STEP_LENGTH: Label = Label::Scalar("l_n");
 pub(crate) const QUADRATIC: [Label; 3] = [Label::Scalar("a"), Label::Scalar("b"), Label::Scalar("c")];
 
 impl Touch {
-    pub(crate) fn of(sight: &Sight<Symbol<'_>>) -> Self {
+    /// From stylus and step as the artefact sees them, and the vectors on the way there.
+    pub(crate) fn of(sight: &Sight<Symbol<'_>>, vectors: &[NamedVector]) -> Self {
         Touch {
             quadratic: sight.quadratic().map(Symbol::operand),
             radius: sight.radius.operand(),
             step_length: sight.step_length.map(Symbol::operand),
+            step: vectors.iter().find(|vector| vector.letter == "n").cloned(),
         }
     }
 

@@ -394,7 +394,7 @@ fn compared(
 /// assert_eq!(tolerance(9.7), 5.0);
 /// ```
 pub fn tolerance(u: f64) -> f64 {
-    if !(u > 0.0 && u.is_finite()) {
+    if u.is_nan() || u <= 0.0 || u.is_infinite() {
         return 0.0;
     }
     let power = u.log10().floor() as i32;

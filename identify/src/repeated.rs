@@ -275,8 +275,8 @@ fn off_the_others(values: &[(f64, f64)], significance: f64) -> Vec<(usize, f64, 
             .max_by(|a, b| (a.1 / a.2).abs().total_cmp(&(b.1 / b.2).abs()));
         let Some((k, by, u)) = clearest else { break };
         let p_value = 2.0 * normal.sf((by / u).abs());
-        // Not a number, of uncertainties of zero, is none either.
-        if !(p_value < significance) {
+        // Where uncertainties are zero there is no probability.
+        if p_value.is_nan() || p_value >= significance {
             break;
         }
         found.push((k, by, u, p_value));

@@ -277,7 +277,7 @@ fn a_file_is_written_whole_or_not_at_all() {
     assert_eq!(fs::read_dir(folder.path()).unwrap().count(), 1);
 }
 
-/// The paper's Eq. (3) of test 3: C turns clockwise and the probe goes with it, so that E_XC counts by cos C and E_YC by −sin C.
+/// By hand: a stylus at (x, y) is √(x² + y²) from the axis, and a shift of the cylinder along X brings the surface nearer by its part along the way.
 #[test]
 fn the_reading_of_a_probe_in_every_language() {
     let session = ready("self-calibration/session.toml");

@@ -84,7 +84,7 @@ fn the_file_holds_every_reading_of_every_error() {
         String::from_utf8_lossy(&output.stderr)
     );
     let screen = String::from_utf8(output.stdout).unwrap();
-    assert!(screen.contains("A150   bar[A150]"), "{screen}");
+    assert!(screen.contains("A150  bar[A150]"), "{screen}");
     let written = std::fs::read_to_string(&file).unwrap();
     let mut lines = written.lines();
     assert_eq!(

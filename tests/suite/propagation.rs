@@ -173,7 +173,7 @@ fn they_differ_where_a_set_up_counts_by_its_square() {
 #[test]
 fn the_drawn_interval_covers_where_the_gums_does_not() {
     let plan = bent();
-    let sessions = 150_u64;
+    let sessions = 80_u64;
     let covered: Vec<[bool; 2]> = (0..sessions)
         .into_par_iter()
         .map(|seed| {
@@ -185,14 +185,14 @@ fn the_drawn_interval_covers_where_the_gums_does_not() {
             };
             let (session, truth) = measured(&plan, &simulation);
             let (_, truth, _) = truth.iter().find(|(id, ..)| id == "bar[C]").unwrap();
-            let found = drawn(&session, 2000, seed);
+            let found = drawn(&session, 500, seed);
             let bar = bar(&found);
             [bar.symmetric, bar.gum_interval].map(|[low, high]| low <= *truth && *truth <= high)
         })
         .collect();
     let share = |which: usize| covered.iter().filter(|both| both[which]).count() as f64 / sessions as f64;
-    // 95 % of 150, with a standard deviation of 1.8 %.
-    assert!((share(0) - 0.95).abs() < 0.06, "Monte Carlo {}", share(0));
+    // 95 % of 80, with a standard deviation of 2.4 %, and 1 % from the number of draws.
+    assert!((share(0) - 0.95).abs() < 0.08, "Monte Carlo {}", share(0));
     assert!(share(1) < 0.3, "GUM {}", share(1));
 }
 

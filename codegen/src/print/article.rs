@@ -5,12 +5,10 @@ use std::collections::HashMap;
 use crate::equation::{Equation, FirstLayout, Form, Kind, Order};
 use crate::first::{Column, FirstOrder};
 use crate::layout::{product, sum};
-use crate::print::{exact, words};
+use crate::print::{exact, touch, words};
 use crate::program::{Input, Label, Naming, Program, Step, Tree};
 use crate::symbol::{Binary, Operand, Unary};
-use crate::touch::{self, Touch};
 use crate::variable::Variable;
-use crate::vectors::NamedVector;
 
 /// The left-hand side of a row.
 #[derive(Clone, Debug, PartialEq)]
@@ -122,7 +120,7 @@ pub(crate) fn what_is_read(equation: &Equation) -> &'static str {
 }
 
 /// A program that only names: its steps are the coordinates of the bar vector or nothing.
-fn naming(equation: &Equation, labels: Vec<Label>) -> Program {
+pub(crate) fn naming(equation: &Equation, labels: Vec<Label>) -> Program {
     let step = |label| Step {
         label,
         value: Tree::Number(0.0),
@@ -134,7 +132,7 @@ fn naming(equation: &Equation, labels: Vec<Label>) -> Program {
     }
 }
 
-fn binary(op: Binary, a: Tree, b: Tree) -> Tree {
+pub(crate) fn binary(op: Binary, a: Tree, b: Tree) -> Tree {
     Tree::Binary(op, Box::new(a), Box::new(b))
 }
 
@@ -150,7 +148,7 @@ pub(crate) fn norm_of_steps(start: usize) -> Tree {
 /// The coordinate groups, and the length over them.
 fn groups(equation: &Equation, trees: &[Tree], complete: bool) -> (Program, Vec<Section>) {
     if let (Kind::Distance, Some(touch)) = (equation.kind, &equation.touch) {
-        return touch_groups(equation, touch, trees, complete);
+        return touch::groups(equation, touch, trees, complete);
     }
     if equation.kind != Kind::Length {
         let rows = trees.iter().enumerate().map(|(place, tree)| Row {
@@ -187,77 +185,6 @@ fn groups(equation: &Equation, trees: &[Tree], complete: bool) -> (Program, Vec<
     (program, sections)
 }
 
-/// The groups of stylus and step, and the distance over them.
-fn touch_groups(
-    equation: &Equation,
-    touch: &Touch,
-    trees: &[Tree],
-    complete: bool,
-) -> (Program, Vec<Section>) {
-    let vectors = &equation.vectors;
-    let coordinates = |vector: &NamedVector| (0..3).map(|i| vector.label(i)).collect::<Vec<Label>>();
-    let mut labels: Vec<Label> = vectors.iter().flat_map(coordinates).collect();
-    labels.extend(touch::QUADRATIC);
-    labels.extend(touch.step_length.map(|_| touch::STEP_LENGTH));
-    let program = naming(equation, labels);
-    let dot = |a: usize, b: usize| {
-        let there = |i: &usize| trees[a + i] != Tree::Number(0.0) && trees[b + i] != Tree::Number(0.0);
-        let parts = (0..3).filter(there);
-        sum(parts
-            .map(|i| (false, binary(Binary::Mul, Tree::Step(a + i), Tree::Step(b + i))))
-            .collect())
-    };
-    let mut sections: Vec<Section> = Vec::new();
-    for (vector, trees) in vectors.iter().zip(trees.chunks(3)) {
-        let rows = coordinates(vector).into_iter().zip(trees);
-        sections.push(Section {
-            heading: vector.meaning.clone(),
-            rows: rows
-                .map(|(label, tree)| row(Left::Named(label), tree.clone()))
-                .collect(),
-        });
-    }
-    let radius = as_it_stands(equation, &program, touch.radius);
-    let radius = (true, binary(Binary::Mul, radius.clone(), radius));
-    let mut beyond = terms_of(&dot(0, 0));
-    beyond.push(radius);
-    let quadratic = [dot(3, 3), dot(0, 3), sum(beyond)];
-    let mut rows: Vec<Row> = touch::QUADRATIC
-        .into_iter()
-        .zip(quadratic)
-        .map(|(label, tree)| row(Left::Named(label), tree))
-        .collect();
-    if let Some(length) = touch.step_length {
-        rows.push(row(
-            Left::Named(touch::STEP_LENGTH),
-            as_it_stands(equation, &program, length),
-        ));
-    }
-    rows.push(Row {
-        approximate: !complete,
-        ..row(Left::Output(0), distance_of_steps(6, touch.step_length.is_some()))
-    });
-    sections.push(Section {
-        heading: what_is_read(equation).to_string(),
-        rows,
-    });
-    (program, sections)
-}
-
-/// `−l_n·(b + √(b² − a·c))/a`, with `a`, `b`, `c` and `l_n` in this order from the step `start`.
-fn distance_of_steps(start: usize, with_length: bool) -> Tree {
-    let [a, b, c, length] = [0, 1, 2, 3].map(|place| Tree::Step(start + place));
-    let product_of = |x: &Tree, y: &Tree| binary(Binary::Mul, x.clone(), y.clone());
-    let under = binary(Binary::Sub, product_of(&b, &b), product_of(&a, &c));
-    let way = binary(Binary::Add, b, Tree::Unary(Unary::Sqrt, Box::new(under)));
-    let way = if with_length {
-        product_of(&length, &way)
-    } else {
-        way
-    };
-    Tree::Unary(Unary::Neg, Box::new(binary(Binary::Div, way, a)))
-}
-
 /// `d − δ_bar + δ_gain·(d − bar)`, as far as these unknowns are carried.
 pub(crate) fn with_bar_unknowns(equation: &Equation, program: &Program, distance: Tree) -> Tree {
     let tree = |operand: Operand| as_it_stands(equation, program, operand);
@@ -274,7 +201,7 @@ pub(crate) fn with_bar_unknowns(equation: &Equation, program: &Program, distance
 }
 
 /// An operand by the name that effects give it or, where they give it none, as it stands.
-fn as_it_stands(equation: &Equation, program: &Program, operand: Operand) -> Tree {
+pub(crate) fn as_it_stands(equation: &Equation, program: &Program, operand: Operand) -> Tree {
     let follower = equation.followers.iter().find(|(_, value)| *value == operand);
     let named = follower.and_then(|(variable, _)| {
         let label = Label::Quantity(variable.clone());
@@ -297,6 +224,8 @@ fn first_order(equation: &Equation, first: &FirstOrder, layout: &FirstLayout) ->
     let is_length = matches!(equation.kind, Kind::Length | Kind::Distance);
     let program = naming(equation, if is_length { vec![L_0, S] } else { Vec::new() });
     let (l_0, s) = (Tree::Step(0), Tree::Step(1));
+    let named = (equation.kind == Kind::Distance).then(|| layout.with_named_length(&l_0));
+    let layout = named.as_ref().unwrap_or(layout);
     let mut sum_rows = Vec::new();
     if is_length {
         sum_rows.push(row(Left::Square(L_0), layout.nominal[0].clone()));

@@ -13,6 +13,7 @@ mod matlab;
 mod python;
 mod rust;
 mod text;
+mod touch;
 mod typst;
 mod words;
 

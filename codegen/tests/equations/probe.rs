@@ -29,7 +29,7 @@ const LENGTHS: [(&str, f64); 8] = [
     ("D", 70.0),
 ];
 /// Where the probe stands that goes in a stated direction.
-const HELD: [(&str, f64); 2] = [("Y", 12.0), ("Z", -7.0)];
+const HELD: [(&str, f64); 2] = [("Y", -8.0), ("Z", -7.0)];
 const STATED: [f64; 3] = [-0.96, 0.28, 0.0];
 const TILTED: [f64; 3] = [0.28, 0.0, 0.96];
 
@@ -47,7 +47,12 @@ impl Touch {
         let mut machine = Machine::from_code(code).expect("a code");
         for axis in &mut machine.axes {
             if axis.kind == AxisKind::Rotary {
-                axis.origin_mm = [12.5, -30.0, 41.25];
+                // In a stated direction the cylinder is met only where the table does not carry it away.
+                axis.origin_mm = if self.stated {
+                    [1.0, -3.5, 41.25]
+                } else {
+                    [12.5, -30.0, 41.25]
+                };
             }
         }
         machine
