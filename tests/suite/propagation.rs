@@ -8,7 +8,6 @@ use abbe::identify::results::{DrawnParameter, FitMonteCarlo, Verdict};
 use abbe::identify::simulate::{Simulation, simulate};
 use abbe::model::session::Session;
 use abbe::model::session::read::{self, ReadOptions};
-use rayon::prelude::*;
 
 use super::{abbe, ready, text};
 
@@ -168,32 +167,6 @@ fn they_differ_where_a_set_up_counts_by_its_square() {
     for parameter in others {
         assert_eq!(parameter.verdict, Verdict::Agree, "{parameter:?}");
     }
-}
-
-#[test]
-fn the_drawn_interval_covers_where_the_gums_does_not() {
-    let plan = bent();
-    let sessions = 80_u64;
-    let covered: Vec<[bool; 2]> = (0..sessions)
-        .into_par_iter()
-        .map(|seed| {
-            let simulation = Simulation {
-                given: vec![Given::parse("bar[C]=7um").unwrap()],
-                draw_setups: true,
-                seed: 1000 + seed,
-                ..Simulation::default()
-            };
-            let (session, truth) = measured(&plan, &simulation);
-            let (_, truth, _) = truth.iter().find(|(id, ..)| id == "bar[C]").unwrap();
-            let found = drawn(&session, 500, seed);
-            let bar = bar(&found);
-            [bar.symmetric, bar.gum_interval].map(|[low, high]| low <= *truth && *truth <= high)
-        })
-        .collect();
-    let share = |which: usize| covered.iter().filter(|both| both[which]).count() as f64 / sessions as f64;
-    // 95 % of 80, with a standard deviation of 2.4 %, and 1 % from the number of draws.
-    assert!((share(0) - 0.95).abs() < 0.08, "Monte Carlo {}", share(0));
-    assert!(share(1) < 0.3, "GUM {}", share(1));
 }
 
 #[test]
