@@ -56,7 +56,7 @@ enum Command {
     Fit(fit::FitArguments),
     /// What can these tests see, before anybody measures?
     #[command(after_help = plan::EXAMPLES)]
-    Plan(plan::PlanArguments),
+    Plan(Box<plan::PlanArguments>),
     /// Start from a ready session.
     #[command(after_help = new::HELP)]
     New(new::NewArguments),
