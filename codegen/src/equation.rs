@@ -12,12 +12,15 @@ use crate::effect::Coefficient;
 use crate::error::CodegenError;
 use crate::first::FirstOrder;
 use crate::forms::{self, Written};
+use crate::layout::sum;
 use crate::normal::Ring;
 use crate::polynomial::Polynomial;
+use crate::print::terms_of;
 use crate::program::{Input, Label, Naming, Program, Tree};
 use crate::run::Run;
 use crate::subject::{Source, Subject, ToolPoint};
-use crate::symbol::{Arena, NodeId, Operand, Symbol, VariableId};
+use crate::symbol::{Arena, NodeId, Operand, Symbol, Unary, VariableId};
+use crate::touch::{self, Touch};
 use crate::variable::{Symbols, Variable};
 use crate::vectors::{self, NamedVector};
 
@@ -55,6 +58,8 @@ pub struct Options {
 pub enum Kind {
     /// The length of a ball bar.
     Length,
+    /// The distance from a probe to the surface of its artefact.
+    Distance,
     /// Three coordinates that an instrument reads.
     Coordinates,
     /// The error vector of the tool in the table frame.
@@ -85,10 +90,36 @@ pub enum Form {
 pub struct FirstLayout {
     /// The coordinates without errors; of a length its square.
     pub nominal: Vec<Tree>,
+    /// Sign of `L₀` and what is added to it, where that is read without errors.
+    pub beside_length: Option<(f64, Tree)>,
     /// The coefficients, parameter by parameter, coordinate by coordinate.
     pub coefficients: Vec<Vec<Tree>>,
     /// For a fixed multiple of an earlier column: numerator and denominator of the factor.
     pub factors: Vec<Option<(Tree, Tree)>>,
+}
+
+impl FirstLayout {
+    /// With `length` in the place of the root that it is.
+    pub(crate) fn with_named_length(&self, length: &Tree) -> FirstLayout {
+        let root = Tree::Unary(Unary::Sqrt, Box::new(self.nominal[0].clone()));
+        let named = |trees: &Vec<Tree>| trees.iter().map(|tree| tree.replaced(&root, length)).collect();
+        FirstLayout {
+            coefficients: self.coefficients.iter().map(named).collect(),
+            ..self.clone()
+        }
+    }
+
+    /// What is read without errors, from the length `L₀`.
+    pub(crate) fn without_errors(&self, length: Tree) -> Tree {
+        match &self.beside_length {
+            None => length,
+            Some((sign, offset)) => {
+                let mut terms = vec![(*sign < 0.0, length)];
+                terms.extend(terms_of(offset));
+                sum(terms)
+            }
+        }
+    }
 }
 
 /// The closed form of one reading of one machine, confirmed against the chain with dual numbers.
@@ -118,6 +149,8 @@ pub struct Equation {
     pub stated_length: Option<Operand>,
     /// The error of the bar and of its sensor's gain, where they are carried.
     pub(crate) bar_unknowns: [Option<Operand>; 2],
+    /// What lies between the vectors of a probe and its reading, where one is read.
+    pub touch: Option<Touch>,
     /// Basis functions that are written as they are, never multiplied out.
     pub(crate) whole: Vec<Operand>,
     /// Errors and unknowns that the form does not contain.
@@ -146,7 +179,7 @@ impl Equation {
         machine.rotation = options.rotation.unwrap_or(machine.rotation);
         let arena = Arena::new();
         let parameters = parameters(&arena, &machine, source, errors, options)?;
-        let (kind, exact, vectors, outputs, form, stated_length, followers, bar_unknowns, whole) = {
+        let (kind, exact, vectors, outputs, form, stated_length, followers, bar_unknowns, touch, whole) = {
             let run = Run::<Symbol<'_>>::new(
                 &machine,
                 source,
@@ -156,9 +189,7 @@ impl Equation {
             )?;
             let kind = match run.subject {
                 Subject::Station(Station::BallBar(_)) => Kind::Length,
-                Subject::Station(Station::Probe(_)) => {
-                    return Err(CodegenError::NoForm { instrument: "probe" });
-                }
+                Subject::Station(Station::Probe(_)) => Kind::Distance,
                 Subject::Station(_) => Kind::Coordinates,
                 Subject::Volumetric { .. } => Kind::Volumetric,
             };
@@ -166,6 +197,7 @@ impl Equation {
             let mut vectors = vectors::of_subject(&run.subject, &machine, &run.state, &run.errors, &|slot| {
                 run.unknown(slot)
             });
+            let on_the_way = vectors.clone();
             let inputs = inputs(&arena, &machine, &parameters);
             let symbol = |place: usize| arena.variable(parameters[place].clone());
             let followers = run.followers(&symbol).into_iter();
@@ -189,6 +221,16 @@ impl Equation {
                 Subject::Station(Station::BallBar(bar)) => Some(bar.bar.operand()),
                 _ => None,
             };
+            let touch = run.sight().map(|sight| match vectors.as_slice() {
+                [.., stylus, step] if options.order == Order::Bilinear => {
+                    let groups: Vec<Symbol<'_>> = [stylus, step]
+                        .iter()
+                        .flat_map(|vector| vector.components.map(|component| arena.symbol(component)))
+                        .collect();
+                    Touch::of(&touch::with_groups(&sight, &groups), &on_the_way)
+                }
+                _ => Touch::of(&sight, &on_the_way),
+            });
             (
                 kind,
                 exact,
@@ -198,6 +240,7 @@ impl Equation {
                 stated,
                 followers,
                 bar_unknowns,
+                touch,
                 whole,
             )
         };
@@ -214,6 +257,7 @@ impl Equation {
             followers,
             stated_length,
             bar_unknowns,
+            touch,
             whole,
             absent: Vec::new(),
             check: Check::default(),
@@ -240,8 +284,13 @@ impl Equation {
             |parameter: &Variable| below.iter().any(|id| self.arena.variable_at(*id) == *parameter);
         let (doubtful, mut absent): (Vec<Variable>, Vec<Variable>) = unseen.into_iter().partition(in_graph);
         if !doubtful.is_empty() {
-            let wanted = match (self.kind, self.vectors.last()) {
-                (Kind::Length, Some(bar)) => bar.components.to_vec(),
+            let wanted = match (self.kind, self.vectors.as_slice()) {
+                (Kind::Length, [.., bar]) => bar.components.to_vec(),
+                (Kind::Distance, [.., stylus, step]) => {
+                    let radius = self.touch.iter().map(|touch| touch.radius);
+                    let vectors = stylus.components.into_iter().chain(step.components);
+                    vectors.chain(radius).collect()
+                }
                 _ => self.outputs.clone(),
             };
             let mut ring = Ring::exact(&self.arena);
@@ -305,7 +354,10 @@ impl Equation {
         }
         let mut labels = vectors::labels(&vectors);
         labels.extend(self.follower_labels());
-        if let (Kind::Length, Operand::Node(id)) = (self.kind, self.outputs[0]) {
+        if let (Some(touch), false) = (&self.touch, self.options.order == Order::First) {
+            labels.extend(touch.labels());
+        }
+        if let (Kind::Length | Kind::Distance, Operand::Node(id)) = (self.kind, self.outputs[0]) {
             labels.insert(id, Label::Scalar("reading"));
         }
         self.arena

@@ -50,14 +50,11 @@ pub enum CodegenError {
         /// The effect.
         effect: String,
     },
-    /// An instrument whose readings have no printed form.
+    /// A stated probing direction whose angle with the artefact's axis changes as the axes move.
     #[error(
-        "the readings of a {instrument} have no printed form; those of a ball bar, a tracker and a socket have"
+        "the first order of a distance has no short form where the angle between the stated probing `direction` and the artefact's axis changes as the axes move; `--order exact` and `--order bilinear` have one"
     )]
-    NoForm {
-        /// The instrument.
-        instrument: &'static str,
-    },
+    ObliqueProbing,
     /// An expression that has no normal form.
     #[error("{what} has no place in the polynomial normal form")]
     NoPolynomial {

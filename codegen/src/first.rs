@@ -19,6 +19,17 @@ pub struct FirstOrder {
     pub nominal: Vec<Polynomial>,
     /// One for each parameter.
     pub sensitivities: Vec<Sensitivity>,
+    /// What is read without errors where that is not `L₀` itself.
+    pub beside_length: Option<BesideLength>,
+}
+
+/// `±L₀ + offset`: what a probe reads without errors.
+#[derive(Clone, Debug, PartialEq)]
+pub struct BesideLength {
+    /// 1 or −1.
+    pub sign: f64,
+    /// What is added.
+    pub offset: Polynomial,
 }
 
 /// How the coordinates of a reading answer to one parameter.
@@ -90,6 +101,80 @@ impl FirstOrder {
         let mut form = FirstOrder {
             nominal: vec![square],
             sensitivities,
+            beside_length: None,
+        };
+        form.mark(ring);
+        Ok(form)
+    }
+
+    /// Of a probe that goes straight to the artefact's axis: the distance from there less the radius. That errors turn its way
+    /// across the axis counts in the second order only.
+    pub(crate) fn of_way_to_the_axis(
+        ring: &mut Ring<'_>,
+        stylus: [Operand; 3],
+        radius: Operand,
+        parameters: &[Variable],
+    ) -> Result<Self, CodegenError> {
+        let none = Operand::constant(0.0);
+        let mut form = FirstOrder::of_length(ring, stylus, none, [Some(radius), None], parameters)?;
+        let radius = ring.normal_form(radius)?;
+        form.beside_length = Some(BesideLength {
+            sign: 1.0,
+            offset: -&without_errors(ring, &radius),
+        });
+        Ok(form)
+    }
+
+    /// Of a probe that goes in a stated direction. With `w = v₀ + d₀·u₀` from the axis to where it touches and `L₀ = √(b₀² − a₀·c₀)`, half
+    /// of what the artefact cuts out of its way,
+    ///
+    /// ```text
+    /// d₀ = −(b₀ + L₀)/a₀,   ∂d/∂eᵢ = (w·(vᵢ + d₀·uᵢ) − r₀·rᵢ)/L₀
+    /// ```
+    pub(crate) fn of_stated_way(
+        ring: &mut Ring<'_>,
+        [stylus, step]: [[Operand; 3]; 2],
+        radius: Operand,
+        parameters: &[Variable],
+    ) -> Result<Self, CodegenError> {
+        let mut vector = |components: [Operand; 3]| -> Result<[Polynomial; 3], CodegenError> {
+            let [x, y, z] = components.map(|component| ring.normal_form(component));
+            Ok([x?, y?, z?])
+        };
+        let (v, u) = (vector(stylus)?, vector(step)?);
+        let r = ring.normal_form(radius)?;
+        let nominal = |vector: &[Polynomial; 3]| vector.each_ref().map(|part| without_errors(ring, part));
+        let (v_0, u_0, r_0) = (nominal(&v), nominal(&u), without_errors(ring, &r));
+        // A unit vector in floating point is one but for its rounding.
+        if !dot(ring, &u_0, &u_0).is_about(1.0) {
+            return Err(CodegenError::ObliqueProbing);
+        }
+        let b = dot(ring, &v_0, &u_0);
+        let c = &dot(ring, &v_0, &v_0) - &ring.product(&r_0, &r_0);
+        let square = &ring.product(&b, &b) - &c;
+        let d_0 = -&(&b + &ring.root(square.clone()));
+        let along = |start: &[Polynomial; 3], way: &[Polynomial; 3]| -> [Polynomial; 3] {
+            std::array::from_fn(|i| &start[i] + &ring.product(&d_0, &way[i]))
+        };
+        let w = along(&v_0, &u_0);
+        let sensitivity = |parameter: &Variable| {
+            let slope = |form: &Polynomial| coefficient_of(ring, form, parameter);
+            let moved = along(&v.each_ref().map(slope), &u.each_ref().map(slope));
+            let coefficient = &dot(ring, &w, &moved) - &ring.product(&r_0, &slope(&r));
+            Sensitivity {
+                parameter: parameter.clone(),
+                coefficients: vec![coefficient],
+                over_length: true,
+                column: Column::Distinct,
+            }
+        };
+        let mut form = FirstOrder {
+            sensitivities: parameters.iter().map(sensitivity).collect(),
+            nominal: vec![square],
+            beside_length: Some(BesideLength {
+                sign: -1.0,
+                offset: -&b,
+            }),
         };
         form.mark(ring);
         Ok(form)
@@ -120,6 +205,7 @@ impl FirstOrder {
         let mut form = FirstOrder {
             nominal: forms.iter().map(|form| without_errors(ring, form)).collect(),
             sensitivities,
+            beside_length: None,
         };
         form.mark(ring);
         Ok(form)

@@ -38,8 +38,11 @@ pub(crate) fn bilinear<'a>(
     let &Written { arena, inputs, .. } = written;
     let mut ring = Ring::truncated(arena, 2)?;
     ring.keep(written.whole);
-    let bar = bar_vector(run, vectors);
-    let wanted = bar.as_ref().map_or(exact, |bar| bar.components.as_slice());
+    let read_over = read_over(run, vectors);
+    let wanted: Vec<Operand> = match read_over.as_slice() {
+        [] => exact.to_vec(),
+        vectors => vectors.iter().flat_map(|vector| vector.components).collect(),
+    };
     let groups = wanted
         .iter()
         .map(|group| ring.normal_form(*group))
@@ -58,14 +61,12 @@ pub(crate) fn bilinear<'a>(
     let trees: Vec<Tree> = groups.iter().map(|group| layout.group(group)).collect();
     let operands = operands(arena, inputs);
     let symbols: Vec<Symbol<'a>> = trees.iter().map(|tree| tree.symbol(arena, &operands)).collect();
-    vectors.clear();
-    let outputs = match bar {
-        Some(mut bar) => {
-            let [x, y, z] = [symbols[0], symbols[1], symbols[2]];
-            bar.components = [x, y, z].map(Symbol::operand);
-            vectors.push(bar);
-            vec![run.length_reading((x * x + y * y + z * z).sqrt()).operand()]
-        }
+    *vectors = read_over;
+    for (vector, symbols) in vectors.iter_mut().zip(symbols.chunks(3)) {
+        vector.components = [symbols[0], symbols[1], symbols[2]].map(Symbol::operand);
+    }
+    let outputs = match run.reading_of_groups(&symbols) {
+        Some(reading) => vec![reading.operand()],
         None => symbols.into_iter().map(Symbol::operand).collect(),
     };
     let form = Form::Groups {
@@ -91,9 +92,9 @@ pub(crate) fn first<'a>(
     } = written;
     let mut ring = Ring::truncated(arena, 1)?;
     ring.keep(whole);
-    let bar = bar_vector(run, vectors);
-    let form = match (&bar, &run.subject) {
-        (Some(bar), Subject::Station(Station::BallBar(station))) => {
+    let read_over = read_over(run, vectors);
+    let form = match (read_over.as_slice(), &run.subject) {
+        ([bar], Subject::Station(Station::BallBar(station))) => {
             let unknowns = run.bar_unknowns().map(|unknown| unknown.map(Symbol::operand));
             FirstOrder::of_length(
                 &mut ring,
@@ -103,12 +104,29 @@ pub(crate) fn first<'a>(
                 parameters,
             )?
         }
+        ([stylus, step], Subject::Station(Station::Probe(probe))) => {
+            let nominal = probe.radius.operand();
+            let radius = run.sight().map_or(nominal, |sight| sight.radius.operand());
+            match probe.direction {
+                Some(_) => FirstOrder::of_stated_way(
+                    &mut ring,
+                    [stylus.components, step.components],
+                    radius,
+                    parameters,
+                )?,
+                None => FirstOrder::of_way_to_the_axis(&mut ring, stylus.components, radius, parameters)?,
+            }
+        }
         _ => FirstOrder::of_coordinates(&mut ring, exact, parameters)?,
     };
     let layout = Layout { ring: &ring, inputs };
     let lay_out = |polynomials: &[Polynomial]| polynomials.iter().map(|p| layout.group(p)).collect();
     let laid_out = FirstLayout {
         nominal: lay_out(&form.nominal),
+        beside_length: form
+            .beside_length
+            .as_ref()
+            .map(|beside| (beside.sign, layout.group(&beside.offset))),
         coefficients: form
             .sensitivities
             .iter()
@@ -142,10 +160,10 @@ pub(crate) fn first<'a>(
     };
     let binary = |op, a: Tree, b: Tree| Tree::Binary(op, Box::new(a), Box::new(b));
     let output = |(coordinate, nominal): (usize, &Tree)| {
-        let whole = if bar.is_some() {
+        let whole = if !read_over.is_empty() {
             let length = Tree::Unary(Unary::Sqrt, Box::new(nominal.clone()));
             let slope = binary(Binary::Div, terms(coordinate, true), length.clone());
-            let whole = binary(Binary::Add, length, slope);
+            let whole = binary(Binary::Add, laid_out.without_errors(length), slope);
             binary(Binary::Add, whole, terms(coordinate, false))
         } else {
             binary(Binary::Add, nominal.clone(), terms(coordinate, false))
@@ -156,12 +174,14 @@ pub(crate) fn first<'a>(
     Ok((outputs, Form::First(form, laid_out)))
 }
 
-/// The vector whose norm is read, where a length is read.
-fn bar_vector(run: &Run<'_, Symbol<'_>>, vectors: &[NamedVector]) -> Option<NamedVector> {
-    match run.subject {
-        Subject::Station(Station::BallBar(_)) => vectors.last().cloned(),
-        _ => None,
-    }
+/// The vectors that the reading is a function of, where it is none of three coordinates: the bar; the stylus and the step of a probe.
+fn read_over(run: &Run<'_, Symbol<'_>>, vectors: &[NamedVector]) -> Vec<NamedVector> {
+    let last = match run.subject {
+        Subject::Station(Station::BallBar(_)) => 1,
+        Subject::Station(Station::Probe(_)) => 2,
+        _ => 0,
+    };
+    vectors[vectors.len() - last..].to_vec()
 }
 
 /// The operands that a program's inputs are.

@@ -27,6 +27,7 @@ mod run;
 pub mod session;
 pub mod subject;
 pub mod symbol;
+pub mod touch;
 pub mod variable;
 pub mod vectors;
 

@@ -8,6 +8,7 @@ use std::collections::BTreeMap;
 use std::ops::{Add, Mul, Neg, Sub};
 
 use num_rational::BigRational;
+use num_traits::ToPrimitive;
 
 use crate::symbol::{NodeId, VariableId};
 
@@ -127,6 +128,16 @@ impl Polynomial {
     /// Whether it is zero: decided, since the normal form of zero has no term.
     pub fn is_zero(&self) -> bool {
         self.0.is_empty()
+    }
+
+    /// Whether it is this constant but for rounding.
+    pub fn is_about(&self, value: f64) -> bool {
+        let constant = match self.0.iter().next() {
+            None => Some(0.0),
+            Some((monomial, coefficient)) if self.len() == 1 && monomial.0.is_empty() => coefficient.to_f64(),
+            Some(_) => None,
+        };
+        constant.is_some_and(|constant| (constant - value).abs() <= 1e-12 * value.abs().max(1.0))
     }
 
     /// Terms: monomials and their coefficients.

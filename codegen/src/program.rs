@@ -41,6 +41,19 @@ impl Tree {
         }
     }
 
+    /// With one expression in the place of another, wherever that stands.
+    pub(crate) fn replaced(&self, what: &Tree, by: &Tree) -> Tree {
+        if self == what {
+            return by.clone();
+        }
+        let inner = |tree: &Tree| Box::new(tree.replaced(what, by));
+        match self {
+            Tree::Number(_) | Tree::Input(_) | Tree::Step(_) => self.clone(),
+            Tree::Unary(function, a) => Tree::Unary(*function, inner(a)),
+            Tree::Binary(op, a, b) => Tree::Binary(*op, inner(a), inner(b)),
+        }
+    }
+
     fn value(&self, inputs: &[f64], steps: &[f64]) -> f64 {
         match self {
             Tree::Number(value) => *value,

@@ -7,6 +7,7 @@ use abbe_model::scalar::{Nominal, Scalar};
 use crate::effect::Movement;
 use crate::error::CodegenError;
 use crate::subject::{Source, Subject};
+use crate::touch;
 use crate::variable::Variable;
 
 /// Everything that a reading is computed from.
@@ -158,6 +159,19 @@ impl<'m, S: Scalar> Run<'m, S> {
     pub(crate) fn read(&self) -> Vec<S> {
         self.subject
             .read(self.machine, &self.state, &self.errors, |slot| self.unknown(slot))
+    }
+
+    /// The reading from the coordinate groups that it is a function of: the bar, or stylus and step of a probe. None where the reading is
+    /// the groups themselves.
+    pub(crate) fn reading_of_groups(&self, groups: &[S]) -> Option<S> {
+        match (self.sight(), &self.subject) {
+            (Some(sight), _) => Some(touch::with_groups(&sight, groups).distance()),
+            (None, Subject::Station(Station::BallBar(_))) => {
+                let [x, y, z] = [groups[0], groups[1], groups[2]];
+                Some(self.length_reading((x * x + y * y + z * z).sqrt()))
+            }
+            (None, _) => None,
+        }
     }
 
     /// The reading of a ball bar from the distance between its balls, with the bar's own unknowns; the distance itself for any

@@ -8,7 +8,7 @@ use std::collections::HashMap;
 use abbe_model::axis::AxisKind;
 use abbe_model::chain::{AxisPosition, BodyErrors, Machine};
 use abbe_model::frames::Point;
-use abbe_model::instrument::{Station, displaced};
+use abbe_model::instrument::{Station, displaced, probe};
 use abbe_model::scalar::Nominal;
 
 use crate::derivative::Adjoints;
@@ -19,7 +19,8 @@ use crate::symbol::{NodeId, Operand, Symbol};
 /// A vector with a name, such as the workpiece ball in the frame of axis A.
 #[derive(Clone, Debug, PartialEq)]
 pub struct NamedVector {
-    /// `p` for a point on the workpiece side, `q` on the tool side, `b` for the bar, `u` for its unit vector.
+    /// `p` for a point on the workpiece side, `q` on the tool side, `b` for the bar, `u` for its unit vector; of a probe `n`, `r`, `v` and `u`
+    /// for its step in R, the point a step ahead, the stylus and the step as the artefact sees them.
     pub letter: &'static str,
     /// The frame it is given in: an axis, or `R`; empty where it needs none.
     pub frame: String,
@@ -86,12 +87,74 @@ pub(crate) fn of_subject<'a>(
             let q = displaced(socket.ball, 3, unknown);
             on_tool_side(tool("ball"), machine, state, errors, q)
         }
-        #[allow(unreachable_patterns)]
-        Subject::Station(_) => Vec::new(),
+        Subject::Station(Station::Probe(probe)) => {
+            let stylus = displaced(probe.stylus, probe::STYLUS, unknown);
+            let mut vectors = on_tool_side(tool("stylus"), machine, state, errors, stylus);
+            let stylus = machine.tool_point(state, errors, stylus);
+            let (step, _) = probe.step_at(machine, state);
+            let ahead = Body {
+                letter: "r",
+                meaning: "a step ahead",
+            };
+            let meaning = match probe.direction {
+                Some(_) => "step of the probe in R, 1 mm in the stated direction",
+                None => "step of the probe in R, all the way to the artefact's nominal axis",
+            };
+            vectors.push(named("n", step, meaning));
+            vectors.extend(into_the_table(tool("stylus"), machine, state, errors, stylus));
+            vectors.extend(into_the_table(ahead, machine, state, errors, stylus.plus(step)));
+            let sight = probe.sight(machine, state, errors, unknown);
+            vectors.push(named(
+                "v",
+                sight.stylus,
+                "stylus from the artefact's axis, across it",
+            ));
+            vectors.push(named("u", sight.step, "the step across the artefact's axis"));
+            vectors
+        }
         Subject::Volumetric { tool: point } => {
             on_tool_side(tool("tool point"), machine, state, errors, Point::nominal(*point))
         }
     }
+}
+
+/// A vector that needs no frame.
+fn named(letter: &'static str, vector: Point<Symbol<'_>>, meaning: &str) -> NamedVector {
+    NamedVector {
+        letter,
+        frame: String::new(),
+        prime: false,
+        components: vector.0.map(Symbol::operand),
+        meaning: meaning.to_string(),
+    }
+}
+
+/// A point of R on its way to the table frame, axis by axis.
+fn into_the_table<'a>(
+    body: Body,
+    machine: &Machine,
+    state: &[AxisPosition<Symbol<'a>>],
+    errors: &[BodyErrors<Symbol<'a>>],
+    point: Point<Symbol<'a>>,
+) -> Vec<NamedVector> {
+    let mut vectors: Vec<NamedVector> = Vec::new();
+    let mut point = point;
+    for index in (0..machine.workpiece_side).rev() {
+        let pulled = machine.pull(index, state, errors, point);
+        if pulled != point {
+            let axis = &machine.axes[index].name;
+            vectors.push(NamedVector {
+                frame: axis.clone(),
+                ..named(
+                    body.letter,
+                    pulled,
+                    &format!("{} in the frame of axis {axis}", body.meaning),
+                )
+            });
+        }
+        point = pulled;
+    }
+    vectors
 }
 
 fn on_workpiece_side<'a>(

@@ -305,7 +305,44 @@ pub fn report(problem: &Problem<'_>, fit: &Fit) -> FitResult {
         unobservable: unobservable(problem, &fit.rank),
         rejected: rejected(problem, fit),
         warnings,
+        monte_carlo: None,
     }
+}
+
+/// A quantity that a fit reports.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Quantity {
+    /// An unknown, by its place.
+    Unknown(usize),
+    /// Amplitude and phase of a harmonic, by the place of its cosine.
+    Harmonic(usize),
+}
+
+/// What is reported, in its order: the unknowns that are seen.
+pub(crate) fn quantities(problem: &Problem<'_>, rank: &Rank) -> Vec<Quantity> {
+    let list = &problem.parameters.list;
+    let mut quantities = Vec::new();
+    let mut j = 0;
+    while j < list.len() {
+        if let Role::Coefficient {
+            effect,
+            coefficient: 0,
+        } = list[j].role
+        {
+            let effect = &problem.parameters.effects[effect];
+            let pair = matches!(effect.shape, Shape::Harmonic { .. } | Shape::Periodic { .. });
+            if pair && rank.is_seen(j) && rank.is_seen(j + 1) {
+                quantities.push(Quantity::Harmonic(j));
+                j += 2;
+                continue;
+            }
+        }
+        if rank.is_seen(j) {
+            quantities.push(Quantity::Unknown(j));
+        }
+        j += 1;
+    }
+    quantities
 }
 
 /// The unknowns that are seen, in outside units; harmonics as amplitude and phase of `amplitude · cos(order · angle + phase)`.
@@ -313,37 +350,22 @@ pub fn parameters(problem: &Problem<'_>, fit: &Fit) -> Vec<ParameterResult> {
     let list = &problem.parameters.list;
     let u_inside = |j: usize| fit.covariance[(j, j)].max(0.0).sqrt() * fit.birge_ratio;
     let mut results = Vec::new();
-    let mut j = 0;
-    while j < list.len() {
-        let parameter = &list[j];
-        if let Role::Coefficient {
-            effect,
-            coefficient: 0,
-        } = parameter.role
-        {
-            let id = &problem.parameters.effect_ids[effect];
-            let effect = &problem.parameters.effects[effect];
-            let pair = matches!(effect.shape, Shape::Harmonic { .. } | Shape::Periodic { .. });
-            if pair && fit.rank.is_seen(j) && fit.rank.is_seen(j + 1) {
-                results.extend(amplitude_and_phase(problem, fit, j, id));
-                j += 2;
-                continue;
-            }
+    for quantity in quantities(problem, &fit.rank) {
+        match quantity {
+            Quantity::Harmonic(j) => results.extend(amplitude_and_phase(problem, fit, j)),
+            Quantity::Unknown(j) => results.push(ParameterResult {
+                id: list[j].id.clone(),
+                value: fit.beta[j] * list[j].unit.per_inside,
+                u: u_inside(j) * list[j].unit.per_inside,
+                unit: list[j].unit.name.clone(),
+            }),
         }
-        if fit.rank.is_seen(j) {
-            results.push(ParameterResult {
-                id: parameter.id.clone(),
-                value: fit.beta[j] * parameter.unit.per_inside,
-                u: u_inside(j) * parameter.unit.per_inside,
-                unit: parameter.unit.name.clone(),
-            });
-        }
-        j += 1;
     }
     results
 }
 
-fn amplitude_and_phase(problem: &Problem<'_>, fit: &Fit, j: usize, id: &str) -> [ParameterResult; 2] {
+fn amplitude_and_phase(problem: &Problem<'_>, fit: &Fit, j: usize) -> [ParameterResult; 2] {
+    let id = problem.parameters.list[j].id.trim_end_matches(".cos");
     let (a, b) = (fit.beta[j], fit.beta[j + 1]);
     let cov = |p: usize, q: usize| fit.covariance[(p, q)] * fit.birge_ratio.powi(2);
     let amplitude = a.hypot(b);

@@ -3,9 +3,10 @@
 //! - [`least_squares`], [`triangle`], [`rank`]: the numerical core, which knows no machine;
 //! - [`parameters`], [`problem`]: a session as a least-squares problem;
 //! - [`fit`]: identify; [`heldout`]: judge on readings that the fit did not see; [`noise`]: how much is noise;
+//! - [`monte_carlo`], [`propagation`]: distributions by drawing; [`repeated`]: Type A beside Type B;
 //! - [`trace`]: close the loop;
 //! - [`plan`]: what tests can see before anybody measures;
-//! - [`simulate`]: readings from a model; [`quantity`]: values with their units as people write them;
+//! - [`simulate`]: readings from a model; [`patterns`]: what each error alone does to a test; [`quantity`]: values with their units as people write them;
 //! - [`results`]: what is reported, as it stands in JSON.
 
 pub mod circle;
@@ -19,10 +20,13 @@ pub mod monte_carlo;
 pub mod noise;
 pub mod outliers;
 pub mod parameters;
+pub mod patterns;
 pub mod plan;
 pub mod problem;
+pub mod propagation;
 pub mod quantity;
 pub mod rank;
+pub mod repeated;
 pub mod results;
 pub mod self_calibration;
 pub mod simulate;

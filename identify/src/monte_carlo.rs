@@ -11,6 +11,10 @@ use rayon::prelude::*;
 pub trait Function: Sync {
     /// Memory that evaluations may use again and again.
     type Scratch: Default;
+    /// Runs of a stream: fewer where a run is long, so that processors share the work.
+    const BLOCK: u64 = 4096;
+    /// Runs from which the ranges of the histograms are taken.
+    const PILOT: u64 = 4096;
     /// Number of quantities it takes.
     fn inputs(&self) -> usize;
     /// Number of quantities it gives.
@@ -26,6 +30,17 @@ pub struct Draws<'a> {
     pub mean: &'a [f64],
     /// Standard uncertainty of each input; the inputs are independent and Gaussian.
     pub u: &'a [f64],
+    /// Number of runs.
+    pub runs: u64,
+    /// Seed.
+    pub seed: u64,
+    /// Probability that a coverage interval is to hold.
+    pub coverage: f64,
+}
+
+/// How often to draw, from which seed, for which intervals.
+#[derive(Clone, Copy, Debug)]
+pub struct MonteCarlo {
     /// Number of runs.
     pub runs: u64,
     /// Seed.
@@ -55,13 +70,9 @@ pub struct Distribution {
     pub outside: [u64; 3],
 }
 
-/// Runs of a stream.
-const BLOCK: u64 = 4096;
 /// Accumulators, each for every `LANES`th block: what parallel work is parted into, and a bound on memory.
 const LANES: u64 = 32;
-/// Runs from which the ranges of the histograms are taken.
-const PILOT: u64 = 4096;
-/// Stream of the pilot runs; blocks have their own number.
+/// Stream of the first pilot runs; blocks have their own number.
 const PILOT_STREAM: u128 = 1 << 64;
 /// Bins of a histogram: with 16 standard deviations across, a bin is a sixtieth of one.
 const BINS: usize = 1000;
@@ -193,15 +204,15 @@ fn draw(function: &impl Function, draws: &Draws<'_>, stream: u128, runs: u64, mu
 }
 
 /// The distribution of every output.
-pub fn propagate(function: &impl Function, draws: &Draws<'_>) -> Vec<Distribution> {
+pub fn propagate<F: Function>(function: &F, draws: &Draws<'_>) -> Vec<Distribution> {
     let empty = pilot(function, draws);
-    let blocks = draws.runs.div_ceil(BLOCK);
+    let blocks = draws.runs.div_ceil(F::BLOCK);
     let lanes: Vec<Vec<Count>> = (0..LANES.min(blocks))
         .into_par_iter()
         .map(|lane| {
             let mut counts = empty.clone();
             for block in (lane..blocks).step_by(LANES as usize) {
-                let runs = BLOCK.min(draws.runs - block * BLOCK);
+                let runs = F::BLOCK.min(draws.runs - block * F::BLOCK);
                 draw(function, draws, u128::from(block), runs, |outputs| {
                     for (count, value) in counts.iter_mut().zip(outputs) {
                         count.take(*value);
@@ -224,17 +235,32 @@ pub fn propagate(function: &impl Function, draws: &Draws<'_>) -> Vec<Distributio
 }
 
 /// Empty histograms over the ranges that a few runs show.
-fn pilot(function: &impl Function, draws: &Draws<'_>) -> Vec<Count> {
-    let mut values = vec![Vec::with_capacity(PILOT as usize); function.outputs()];
-    draw(function, draws, PILOT_STREAM, PILOT, |outputs| {
-        for (column, value) in values.iter_mut().zip(outputs) {
-            if value.is_finite() {
-                column.push(*value);
-            }
-        }
+fn pilot<F: Function>(function: &F, draws: &Draws<'_>) -> Vec<Count> {
+    let blocks: Vec<Vec<f64>> = (0..F::PILOT.div_ceil(F::BLOCK))
+        .into_par_iter()
+        .map(|block| {
+            let runs = F::BLOCK.min(F::PILOT - block * F::BLOCK);
+            let mut drawn = Vec::with_capacity(runs as usize * function.outputs());
+            draw(
+                function,
+                draws,
+                PILOT_STREAM + u128::from(block),
+                runs,
+                |outputs| {
+                    drawn.extend_from_slice(outputs);
+                },
+            );
+            drawn
+        })
+        .collect();
+    let values = (0..function.outputs()).map(|output| {
+        let runs = blocks
+            .iter()
+            .flat_map(|drawn| drawn.chunks_exact(function.outputs()));
+        let column = runs.map(|outputs| outputs[output]);
+        column.filter(|value| value.is_finite()).collect::<Vec<f64>>()
     });
     values
-        .into_iter()
         .map(|mut column| {
             column.sort_by(f64::total_cmp);
             let at = |share: f64| {

@@ -305,17 +305,28 @@ impl<'a> Problem<'a> {
 
     /// What is known beforehand, as rows: Gaussian priors and distances between sockets.
     pub fn prior_triangle(&self, beta: &[f64]) -> Triangle {
+        self.prior_triangle_about(beta, |_| 0.0, |_| 0.0)
+    }
+
+    /// The same with other expectations: `centre` of each unknown with a Gaussian prior, and by how much each distance between sockets is
+    /// `longer`, mm.
+    pub fn prior_triangle_about(
+        &self,
+        beta: &[f64],
+        centre: impl Fn(usize) -> f64,
+        longer: impl Fn(usize) -> f64,
+    ) -> Triangle {
         let unknowns = self.parameters.list.len();
         let mut rows: Vec<Vec<f64>> = Vec::new();
         for (j, parameter) in self.parameters.list.iter().enumerate() {
             if let Prior::Gaussian(u) = parameter.prior {
                 let mut row = vec![0.0; unknowns + 1];
                 row[j] = 1.0 / u;
-                row[unknowns] = -beta[j] / u;
+                row[unknowns] = (centre(j) - beta[j]) / u;
                 rows.push(row);
             }
         }
-        for distance in &self.session.socket_distances {
+        for (number, distance) in self.session.socket_distances.iter().enumerate() {
             let ends: Vec<Option<([usize; 3], [f64; 3])>> =
                 distance.between.iter().map(|name| self.socket(name)).collect();
             let [Some((a, nominal_a)), Some((b, nominal_b))] = ends[..] else {
@@ -338,7 +349,7 @@ impl<'a> Problem<'a> {
                 row[a[i]] += gradient[i] / distance.u_mm;
                 row[b[i]] += gradient[i + 3] / distance.u_mm;
             }
-            row[unknowns] = (distance.distance_mm - length.re) / distance.u_mm;
+            row[unknowns] = (distance.distance_mm + longer(number) - length.re) / distance.u_mm;
             rows.push(row);
         }
         let mut triangle = Triangle::new(unknowns);

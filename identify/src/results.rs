@@ -74,6 +74,67 @@ pub struct FitResult {
     pub rejected: Vec<Rejected>,
     /// What a user should know.
     pub warnings: Vec<String>,
+    /// The same by Monte Carlo, where it was asked for. `u` in `parameters` is then what is quoted.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub monte_carlo: Option<FitMonteCarlo>,
+}
+
+/// A fit by Monte Carlo (JCGM 101).
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct FitMonteCarlo {
+    /// Number of runs.
+    pub runs: u64,
+    /// Seed.
+    pub seed: u64,
+    /// Coverage probability of the intervals.
+    pub coverage: f64,
+    /// Runs whose fit has no end; they are in no figure.
+    pub unconverged: u64,
+    /// In the order of the fit's parameters.
+    pub parameters: Vec<DrawnParameter>,
+}
+
+/// A parameter by both propagations, in `unit`.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct DrawnParameter {
+    /// As in the fit.
+    pub id: String,
+    /// `um`, `arcsec`, …
+    pub unit: String,
+    /// What the fit found.
+    pub value: f64,
+    /// Its standard uncertainty by the law of propagation (GUM).
+    pub gum_u: f64,
+    /// The interval that follows from it, with a Gaussian coverage factor.
+    pub gum_interval: [f64; 2],
+    /// Mean over the runs.
+    pub mean: f64,
+    /// Standard deviation over the runs.
+    pub u: f64,
+    /// The probabilistically symmetric coverage interval over the runs.
+    pub symmetric: [f64; 2],
+    /// The shortest one.
+    pub shortest: [f64; 2],
+    /// By how much the ends of the symmetric interval are off those of the GUM's.
+    pub end_differences: [f64; 2],
+    /// By how much they may be (JCGM 101, 8.1), one digit of `gum_u` counting.
+    pub tolerance: f64,
+    /// Standard uncertainty of such an end, from the number of runs.
+    pub end_u: f64,
+    /// `agree`, `differ`, or `undecided` where the runs are too few to tell.
+    pub verdict: Verdict,
+}
+
+/// Whether GUM and Monte Carlo agree.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Verdict {
+    /// Within the tolerance: the GUM's figures are quoted.
+    Agree,
+    /// Not within it: the Monte Carlo's are.
+    Differ,
+    /// The runs are too few to tell: the Monte Carlo's are.
+    Undecided,
 }
 
 /// A residual and parameters, before or after the found effects.

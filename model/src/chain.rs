@@ -238,9 +238,9 @@ impl Machine {
         errors: &[BodyErrors<S>],
         point: Point<S>,
     ) -> Point<S> {
-        (0..self.workpiece_side).rev().fold(point, |point, index| {
-            pull(&self.axes[index], &state[index], &errors[index], point)
-        })
+        (0..self.workpiece_side)
+            .rev()
+            .fold(point, |point, index| self.pull(index, state, errors, point))
     }
 
     /// A point on the moved side of axis `index`, seen from its other side: one step of the chain.
@@ -252,6 +252,17 @@ impl Machine {
         point: Point<S>,
     ) -> Point<S> {
         push(&self.axes[index], &state[index], &errors[index], point)
+    }
+
+    /// A point on the bed's side of axis `index`, seen from its moved side: what [`Machine::push`] undoes.
+    pub fn pull<S: Scalar>(
+        &self,
+        index: usize,
+        state: &[AxisPosition<S::Nominal>],
+        errors: &[BodyErrors<S>],
+        point: Point<S>,
+    ) -> Point<S> {
+        pull(&self.axes[index], &state[index], &errors[index], point)
     }
 
     /// The moment about axis `index` that a unit weight at `point_mm` of the tool frame (of the table frame for an axis on the

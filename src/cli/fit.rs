@@ -1,14 +1,20 @@
 //! `abbe fit`.
 
-use abbe::identify::results::{FitResult, ParameterResult, Unobservable};
+use std::path::PathBuf;
+
+use abbe::identify::results::{FitMonteCarlo, FitResult, ParameterResult, Unobservable, Verdict};
 use clap::{Args, ValueEnum};
 
 use super::failure::Failure;
-use super::{CommonArguments, SessionArguments, geometric, output, read_session, self_calibration, table};
+use super::{
+    CommonArguments, SessionArguments, geometric, output, read_session, repeated, self_calibration, table,
+};
 
 /// Examples of `abbe fit`.
 pub const HELP: &str = "Examples:
   abbe fit sessions/hermle-c600u/measured/session.toml --json fit.json
+  abbe fit sessions/hermle-c600u/measured/session.toml --monte-carlo 10000
+  abbe fit day1/session.toml --repeat day2/session.toml day3/session.toml
   abbe fit run1/session.toml --method cone
   abbe fit sessions/self-calibration/measured/session.toml --method self-calibration --monte-carlo 1000000";
 
@@ -39,15 +45,25 @@ pub struct FitArguments {
     method: Method,
     #[command(flatten)]
     draws: self_calibration::DrawArguments,
+    /// Further sessions of the same plan: the scatter of their fits (Type A) beside the fits' own uncertainties (Type B).
+    #[arg(long, value_name = "SESSION", num_args = 1.., conflicts_with = "monte_carlo")]
+    repeat: Vec<PathBuf>,
 }
 
 /// Runs `abbe fit`.
 pub fn run(arguments: &FitArguments) -> Result<(), Failure> {
+    if !arguments.repeat.is_empty() {
+        if arguments.method != Method::Full {
+            return Err(Failure::Other(
+                "--repeat compares full fits; leave out `--method`, or --repeat".into(),
+            ));
+        }
+        return repeated::run(&arguments.session, &arguments.repeat, &arguments.common);
+    }
     let session = read_session(&arguments.session)?;
     if arguments.method == Method::SelfCalibration {
         return self_calibration::run(&session, &arguments.draws, &arguments.common);
     }
-    arguments.draws.refuse()?;
     let geometric = match arguments.method {
         Method::Full | Method::SelfCalibration => None,
         Method::Circle => Some(abbe::identify::geometric::Method::Circle),
@@ -55,10 +71,15 @@ pub fn run(arguments: &FitArguments) -> Result<(), Failure> {
         Method::TwoPlane => Some(abbe::identify::geometric::Method::TwoPlane),
     };
     if let Some(method) = geometric {
+        arguments.draws.refuse()?;
         return geometric::run(&session, method, &arguments.common);
     }
+    let draws = arguments.draws.draws(arguments.common.seed)?;
     let (problem, fit) = abbe::identify::fit::prepare(&session, arguments.common.seed)?;
-    let result = abbe::identify::fit::report(&problem, &fit);
+    let mut result = abbe::identify::fit::report(&problem, &fit);
+    if let Some(draws) = &draws {
+        abbe::identify::propagation::add_monte_carlo(&problem, &fit, draws, &mut result)?;
+    }
     print(&result);
     if let Some(path) = &arguments.common.json {
         output::write_json(path, &result)?;
@@ -92,7 +113,10 @@ fn print(result: &FitResult) {
         result.unknowns
     );
     say!("");
-    print_parameters(&result.parameters);
+    match &result.monte_carlo {
+        Some(drawn) => print_drawn(drawn),
+        None => print_parameters(&result.parameters),
+    }
     print_unobservable(&result.unobservable);
     if !result.rejected.is_empty() {
         say!("\nLeft out as wild:");
@@ -119,6 +143,55 @@ pub fn print_parameters(parameters: &[ParameterResult]) {
         })
         .collect();
     table::print(&["parameter", "value", "u (k=1)", "unit"], &rows);
+}
+
+/// Both propagations side by side, with the interval that is quoted.
+fn print_drawn(drawn: &FitMonteCarlo) {
+    let rows: Vec<Vec<String>> = drawn
+        .parameters
+        .iter()
+        .map(|parameter| {
+            let (value, gum_u) = table::value_and_u(parameter.value, parameter.gum_u);
+            let (_, u) = table::value_and_u(parameter.value, parameter.u);
+            let (quoted, of) = match parameter.verdict {
+                Verdict::Agree => (parameter.gum_interval, "GUM"),
+                Verdict::Differ => (parameter.symmetric, "Monte Carlo"),
+                Verdict::Undecided => (parameter.symmetric, "Monte Carlo (too few runs to compare)"),
+            };
+            let [low, high] = quoted.map(|end| table::value_and_u(end, parameter.u).0);
+            vec![
+                parameter.id.clone(),
+                value,
+                gum_u,
+                u,
+                format!("{low} … {high}"),
+                parameter.unit.clone(),
+                of.to_string(),
+            ]
+        })
+        .collect();
+    let interval = format!("{} %", drawn.coverage * 100.0);
+    table::print(
+        &[
+            "parameter",
+            "value",
+            "u GUM",
+            "u drawn",
+            &interval,
+            "unit",
+            "quoted",
+        ],
+        &rows,
+    );
+    let off = |verdict: Verdict| drawn.parameters.iter().filter(|p| p.verdict == verdict).count();
+    say!(
+        "\nMonte Carlo, {} runs, seed {}: {} of {} parameters agree with the GUM within the tolerance of JCGM 101, 8.1; {} differ",
+        drawn.runs,
+        drawn.seed,
+        off(Verdict::Agree),
+        drawn.parameters.len(),
+        off(Verdict::Differ)
+    );
 }
 
 /// What cannot be seen, in words.

@@ -14,6 +14,7 @@ mod map;
 mod new;
 mod output;
 mod plan;
+mod repeated;
 mod self_calibration;
 mod simulate;
 mod table;
@@ -55,7 +56,7 @@ enum Command {
     Fit(fit::FitArguments),
     /// What can these tests see, before anybody measures?
     #[command(after_help = plan::EXAMPLES)]
-    Plan(plan::PlanArguments),
+    Plan(Box<plan::PlanArguments>),
     /// Start from a ready session.
     #[command(after_help = new::HELP)]
     New(new::NewArguments),

@@ -7,10 +7,10 @@ use clap::Args;
 use super::failure::Failure;
 use super::{CommonArguments, fit, output, table};
 
-/// Monte Carlo of a self-calibration.
+/// Monte Carlo of a self-calibration or of the full fit.
 #[derive(Args)]
 pub struct DrawArguments {
-    /// Propagate distributions by so many runs (self-calibration).
+    /// Propagate distributions by so many runs (JCGM 101): of the full fit, of a self-calibration.
     #[arg(long, value_name = "RUNS")]
     monte_carlo: Option<u64>,
     /// Probability that a coverage interval is to hold.
@@ -27,13 +27,14 @@ impl DrawArguments {
         match self.monte_carlo {
             None => Ok(()),
             Some(_) => Err(Failure::Other(
-                "--monte-carlo goes with `--method self-calibration`; the full fit propagates by derivatives"
+                "--monte-carlo goes with the full fit and with `--method self-calibration`; leave out `--method`, or --monte-carlo"
                     .into(),
             )),
         }
     }
 
-    fn draws(&self, seed: u64) -> Result<Option<MonteCarlo>, Failure> {
+    /// What is to be drawn, if anything is.
+    pub fn draws(&self, seed: u64) -> Result<Option<MonteCarlo>, Failure> {
         let Some(runs) = self.monte_carlo else {
             return Ok(None);
         };

@@ -277,6 +277,55 @@ fn a_file_is_written_whole_or_not_at_all() {
     assert_eq!(fs::read_dir(folder.path()).unwrap().count(), 1);
 }
 
+/// By hand: a stylus at (x, y) is √(x² + y²) from the axis, and a shift of the cylinder along X brings the surface nearer by its part along the way.
+#[test]
+fn the_reading_of_a_probe_in_every_language() {
+    let session = ready("self-calibration/session.toml");
+    let of = |test: &str, more: &[&str]| {
+        let mut all = vec!["equation", text(&session), "--test", test];
+        all.extend(more);
+        printed(&all)
+    };
+    let first = of("2", &["--order", "first", "--errors", "EX0C,EXX,radius"]);
+    for line in [
+        "L_0² = y² + x²",
+        "d    ≈ L_0 − R + S/L_0 − δ_radius",
+        "∂d/∂e_x0c    = −x/L_0",
+        "∂d/∂e_xx     = x/L_0   (a fixed multiple of that of e_x0c)",
+    ] {
+        assert!(first.contains(line), "{first}");
+    }
+    let exact = of("1a", &[]);
+    assert!(exact.contains("d   = −l_n·(b + √(b² − a·c))/a"), "{exact}");
+    for (language, start) in [
+        ("latex", "\\begin{align}"),
+        ("typst", "#table("),
+        ("rust", "pub fn probe_distance("),
+        ("c", "probe_distance("),
+        ("python", "def probe_distance("),
+        ("matlab", "probe_distance("),
+    ] {
+        for order in ["exact", "bilinear", "first"] {
+            let page = of(
+                "3",
+                &[
+                    "--as",
+                    language,
+                    "--order",
+                    order,
+                    "--errors",
+                    "EX0C,artefact.x,form",
+                ],
+            );
+            assert!(page.contains(start), "{language} {order}: {page}");
+        }
+    }
+    refused(
+        &["equation", text(&session), "--test", "1a", "--gradient"],
+        &["the derivatives of a probed distance are written as code only"],
+    );
+}
+
 #[test]
 fn what_cannot_be_is_said() {
     let (plan, machine) = (plan(), machine());

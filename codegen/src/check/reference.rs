@@ -4,7 +4,7 @@ use abbe_model::instrument::Station;
 use num_dual::{Derivative, Dual64, DualNum, DualSVec64, HyperDual64};
 
 use crate::check::points::Point;
-use crate::equation::{Equation, Kind, Order};
+use crate::equation::{Equation, Order};
 use crate::error::CodegenError;
 use crate::run::Run;
 use crate::subject::{Source, Subject};
@@ -35,6 +35,12 @@ impl Equation {
                 let unknown = |slot: usize| run.unknown(slot);
                 let (p, q) = bar.balls(&self.machine, &run.state, &run.errors, &unknown);
                 p.minus(q).0.to_vec()
+            }
+            Subject::Station(Station::Probe(_)) => {
+                let sight = run.sight().into_iter();
+                sight
+                    .flat_map(|sight| [sight.stylus.0, sight.step.0].concat())
+                    .collect()
             }
             _ => run.read(),
         };
@@ -143,7 +149,7 @@ impl Equation {
         Ok((values, gradient))
     }
 
-    /// The reading from its coordinate groups: themselves, or the length with the bar's own unknowns.
+    /// The reading from its coordinate groups: themselves, the length with the bar's own unknowns, or the distance of a probe.
     fn reading_of_groups(
         &self,
         source: &impl Source,
@@ -151,13 +157,9 @@ impl Equation {
         groups: &[Dual64],
         small: &impl Fn(usize) -> Dual64,
     ) -> Result<Vec<Dual64>, CodegenError> {
-        if self.kind != Kind::Length {
-            return Ok(groups.to_vec());
-        }
         let nominal = |variable: Variable| point.nominal(&variable);
         let run = Run::<Dual64>::new(&self.machine, source, &self.parameters, &nominal, small)?;
-        let [x, y, z] = [groups[0], groups[1], groups[2]];
-        let norm = (x * x + y * y + z * z).sqrt();
-        Ok(vec![run.length_reading(norm)])
+        let reading = run.reading_of_groups(groups);
+        Ok(reading.map_or_else(|| groups.to_vec(), |reading| vec![reading]))
     }
 }

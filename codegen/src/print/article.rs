@@ -5,7 +5,7 @@ use std::collections::HashMap;
 use crate::equation::{Equation, FirstLayout, Form, Kind, Order};
 use crate::first::{Column, FirstOrder};
 use crate::layout::{product, sum};
-use crate::print::{exact, words};
+use crate::print::{exact, touch, words};
 use crate::program::{Input, Label, Naming, Program, Step, Tree};
 use crate::symbol::{Binary, Operand, Unary};
 use crate::variable::Variable;
@@ -113,13 +113,14 @@ pub(crate) fn row(left: Left, right: Tree) -> Row {
 pub(crate) fn what_is_read(equation: &Equation) -> &'static str {
     match equation.kind {
         Kind::Length => "length of the bar",
+        Kind::Distance => "distance read",
         Kind::Coordinates => "coordinates read",
         Kind::Volumetric => "error vector of the tool in the table frame",
     }
 }
 
 /// A program that only names: its steps are the coordinates of the bar vector or nothing.
-fn naming(equation: &Equation, labels: Vec<Label>) -> Program {
+pub(crate) fn naming(equation: &Equation, labels: Vec<Label>) -> Program {
     let step = |label| Step {
         label,
         value: Tree::Number(0.0),
@@ -131,7 +132,7 @@ fn naming(equation: &Equation, labels: Vec<Label>) -> Program {
     }
 }
 
-fn binary(op: Binary, a: Tree, b: Tree) -> Tree {
+pub(crate) fn binary(op: Binary, a: Tree, b: Tree) -> Tree {
     Tree::Binary(op, Box::new(a), Box::new(b))
 }
 
@@ -146,6 +147,9 @@ pub(crate) fn norm_of_steps(start: usize) -> Tree {
 
 /// The coordinate groups, and the length over them.
 fn groups(equation: &Equation, trees: &[Tree], complete: bool) -> (Program, Vec<Section>) {
+    if let (Kind::Distance, Some(touch)) = (equation.kind, &equation.touch) {
+        return touch::groups(equation, touch, trees, complete);
+    }
     if equation.kind != Kind::Length {
         let rows = trees.iter().enumerate().map(|(place, tree)| Row {
             approximate: !complete,
@@ -183,20 +187,7 @@ fn groups(equation: &Equation, trees: &[Tree], complete: bool) -> (Program, Vec<
 
 /// `d − δ_bar + δ_gain·(d − bar)`, as far as these unknowns are carried.
 pub(crate) fn with_bar_unknowns(equation: &Equation, program: &Program, distance: Tree) -> Tree {
-    let tree = |operand: Operand| {
-        let follower = equation.followers.iter().find(|(_, value)| *value == operand);
-        let named = follower.and_then(|(variable, _)| {
-            let label = Label::Quantity(variable.clone());
-            program.steps.iter().position(|step| step.label == label)
-        });
-        let none = HashMap::new();
-        let own = || {
-            equation
-                .arena
-                .program(equation.inputs(), &[operand], &none, Naming::Labelled)
-        };
-        named.map_or_else(|| own().outputs[0].clone(), Tree::Step)
-    };
+    let tree = |operand: Operand| as_it_stands(equation, program, operand);
     let [bar, gain] = equation.bar_unknowns;
     let mut terms = vec![(false, distance.clone())];
     if let Some(bar) = bar {
@@ -209,20 +200,39 @@ pub(crate) fn with_bar_unknowns(equation: &Equation, program: &Program, distance
     sum(terms)
 }
 
+/// An operand by the name that effects give it or, where they give it none, as it stands.
+pub(crate) fn as_it_stands(equation: &Equation, program: &Program, operand: Operand) -> Tree {
+    let follower = equation.followers.iter().find(|(_, value)| *value == operand);
+    let named = follower.and_then(|(variable, _)| {
+        let label = Label::Quantity(variable.clone());
+        program.steps.iter().position(|step| step.label == label)
+    });
+    let none = HashMap::new();
+    let own = || {
+        equation
+            .arena
+            .program(equation.inputs(), &[operand], &none, Naming::Labelled)
+    };
+    named.map_or_else(|| own().outputs[0].clone(), Tree::Step)
+}
+
 const L_0: Label = Label::Scalar("L_0");
 const S: Label = Label::Scalar("S");
 
 /// The value without errors, the sum, and the table of coefficients.
 fn first_order(equation: &Equation, first: &FirstOrder, layout: &FirstLayout) -> (Program, Vec<Section>) {
-    let is_length = equation.kind == Kind::Length;
+    let is_length = matches!(equation.kind, Kind::Length | Kind::Distance);
     let program = naming(equation, if is_length { vec![L_0, S] } else { Vec::new() });
     let (l_0, s) = (Tree::Step(0), Tree::Step(1));
+    let named = (equation.kind == Kind::Distance).then(|| layout.with_named_length(&l_0));
+    let layout = named.as_ref().unwrap_or(layout);
     let mut sum_rows = Vec::new();
     if is_length {
         sum_rows.push(row(Left::Square(L_0), layout.nominal[0].clone()));
         sum_rows.push(row(Left::Named(S), sum(terms(equation, first, layout, 0, true))));
         let slope = binary(Binary::Div, s, l_0.clone());
-        let mut all = vec![(false, l_0.clone()), (false, slope)];
+        let mut all = terms_of(&layout.without_errors(l_0.clone()));
+        all.push((false, slope));
         all.extend(terms(equation, first, layout, 0, false));
         sum_rows.push(Row {
             approximate: true,

@@ -204,6 +204,7 @@ impl<'e> Code<'e> {
     pub(crate) fn function(&self) -> &'static str {
         match self.equation.kind {
             Kind::Length => "bar_length",
+            Kind::Distance => "probe_distance",
             Kind::Coordinates => "coordinates",
             Kind::Volumetric => "volumetric_error",
         }
@@ -254,6 +255,7 @@ impl<'e> Code<'e> {
         }
         let what = match equation.kind {
             Kind::Length => "the length read, mm",
+            Kind::Distance => "the distance to the surface along the probing direction, mm",
             Kind::Coordinates => "the three coordinates read, mm",
             Kind::Volumetric => "the error vector x, y, z, mm",
         };

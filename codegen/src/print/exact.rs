@@ -8,6 +8,7 @@ use crate::equation::{Equation, Kind};
 use crate::print::article::{Left, Row, Section, norm_of_steps, row, what_is_read, with_bar_unknowns};
 use crate::program::{Label, Naming, Program, Step, Tree};
 use crate::symbol::{Binary, Operand, Symbol};
+use crate::touch::{self, Touch};
 use crate::vectors::{self, NamedVector};
 
 /// What the program and the sections are made of: the vectors on the way to the outputs, and those on the way back.
@@ -15,6 +16,7 @@ pub(crate) fn sections(equation: &Equation) -> (Program, Vec<Section>) {
     let forth = &equation.vectors;
     let mut labels = vectors::labels(forth);
     labels.extend(equation.follower_labels());
+    labels.extend(equation.touch.iter().flat_map(Touch::labels));
     let mut back: Vec<NamedVector> = Vec::new();
     let mut slopes: Vec<Operand> = Vec::new();
     if let (Kind::Length, true, Some(Operand::Node(distance))) =
@@ -91,6 +93,14 @@ pub(crate) fn sections(equation: &Equation) -> (Program, Vec<Section>) {
             .map(|(place, tree)| row(Left::Output(place), tree.clone()))
             .collect(),
     };
+    if equation.kind == Kind::Distance {
+        let between = touch::QUADRATIC.into_iter().chain([touch::STEP_LENGTH]);
+        let between = between.filter_map(|label| {
+            let own = program.steps.iter().find(|step| step.label == label)?;
+            Some(row(Left::Named(label), own.value.clone()))
+        });
+        read.rows.splice(0..0, between.collect::<Vec<Row>>());
+    }
     let back: Vec<Section> = vectors.collect();
     let slopes = equation.parameters.iter().zip(slopes);
     let slopes: Vec<Row> = slopes

@@ -157,6 +157,7 @@ fn output(kind: Kind, place: usize) -> String {
     let coordinate = ["x", "y", "z"][place];
     match kind {
         Kind::Length => "L".to_string(),
+        Kind::Distance => "d".to_string(),
         Kind::Coordinates => format!("m_{coordinate}"),
         Kind::Volumetric => format!("\\Delta_{coordinate}"),
     }

@@ -13,8 +13,11 @@ mod matlab;
 mod python;
 mod rust;
 mod text;
+mod touch;
 mod typst;
 mod words;
+
+pub(crate) use article::terms_of;
 
 use abbe_model::effect::{Effect, Shape};
 
@@ -88,6 +91,11 @@ impl Equation {
                 (Kind::Length, Order::Bilinear) => {
                     return Err(CodegenError::GradientForReaders {
                         what: "a bilinear form",
+                    });
+                }
+                (Kind::Distance, _) => {
+                    return Err(CodegenError::GradientForReaders {
+                        what: "a probed distance",
                     });
                 }
                 (Kind::Coordinates, _) => {

@@ -104,6 +104,7 @@ fn label(label: &Label, symbols: Symbols) -> String {
 fn output(kind: Kind, place: usize) -> String {
     match kind {
         Kind::Length => "L".to_string(),
+        Kind::Distance => "d".to_string(),
         Kind::Coordinates => format!("m.{}", ["x", "y", "z"][place]),
         Kind::Volumetric => format!("Δ.{}", ["x", "y", "z"][place]),
     }

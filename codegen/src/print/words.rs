@@ -11,6 +11,7 @@ use crate::variable::Variable;
 pub(crate) fn title(equation: &Equation) -> Vec<String> {
     let what = match equation.kind {
         Kind::Length => "Length read by a ball bar",
+        Kind::Distance => "Distance from a probe to the surface of its artefact",
         Kind::Coordinates => "Coordinates read by the instrument",
         Kind::Volumetric => "Error vector of the tool in the table frame",
     };

@@ -58,6 +58,13 @@ fn all(language: Language) -> Vec<Printed> {
     }
     printed.extend(operators(language, &mut random));
     printed.push(effects(language, &mut random));
+    let probes = crate::probe::printed(language, CASES, &mut random);
+    printed.extend(probes.into_iter().map(|(name, text, cases)| Printed {
+        name,
+        function: "probe_distance",
+        text,
+        cases,
+    }));
     printed
 }
 

@@ -8,6 +8,7 @@ mod compiled;
 mod effects;
 mod forms;
 mod operators;
+mod probe;
 mod second;
 mod seed000;
 mod seed003;

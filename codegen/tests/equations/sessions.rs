@@ -34,6 +34,28 @@ fn every_test_of_the_bundled_plans() {
     }
 }
 
+#[test]
+fn every_test_of_the_self_calibration() {
+    let path = file("self-calibration/session.toml");
+    let session = read::session(&path, &read::ReadOptions::default()).expect("a session");
+    for test in &session.tests {
+        let source = SessionTest::new(&session, test).expect("a plan");
+        for order in [Order::Exact, Order::Bilinear, Order::First] {
+            let options = Options {
+                order,
+                unknowns: (0..11).collect(),
+                ..Options::default()
+            };
+            let equation = Equation::of(&session.machine, &source, &session.unknowns, &options);
+            let equation = equation.expect("an equation");
+            assert_eq!(equation.kind, Kind::Distance);
+            for language in Language::ALL {
+                assert!(!equation.print(language).expect("a page").is_empty());
+            }
+        }
+    }
+}
+
 /// The distance that follows from the bar's length stands in the equation as that expression.
 #[test]
 fn lengths_that_follow_from_the_bar_stay_expressions() {

@@ -61,6 +61,7 @@ fn fragments(language: Language) -> Vec<String> {
         };
         add(Equation::of(&machine, &Bar, &eight()[4..], &options).expect("an equation"));
     }
+    fragments.extend(crate::probe::fragments(language));
     fragments
 }
 

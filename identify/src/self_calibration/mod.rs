@@ -27,17 +27,7 @@ pub use solve::{Solution, rank_before, solve};
 
 use crate::error::IdentifyError;
 use crate::monte_carlo;
-
-/// Monte Carlo of a self-calibration.
-#[derive(Clone, Copy, Debug)]
-pub struct MonteCarlo {
-    /// Number of runs.
-    pub runs: u64,
-    /// Seed.
-    pub seed: u64,
-    /// Probability that a coverage interval is to hold.
-    pub coverage: f64,
-}
+pub use crate::monte_carlo::MonteCarlo;
 
 /// A session's equations, solved.
 #[derive(Clone, Debug)]

@@ -52,15 +52,47 @@ pub struct Probe<N> {
     pub direction: Option<[N; 3]>,
 }
 
+/// What decides a reading, seen from the artefact's axis and across it.
+#[derive(Clone, Copy, Debug)]
+pub struct Sight<S> {
+    /// The stylus, mm: `v⊥`.
+    pub stylus: Point<S>,
+    /// A step of the probe on its way to the surface, mm: `u⊥` times the step's length.
+    pub step: Point<S>,
+    /// How far the stylus is from the axis where it touches, mm: `ρ + δρ + w`.
+    pub radius: S,
+    /// Length of the step in R, mm; `None` where it is 1 mm.
+    pub step_length: Option<S>,
+}
+
+impl<S: Scalar> Sight<S> {
+    /// `A`, `B` and `C`, for a step of any length.
+    pub fn quadratic(&self) -> [S; 3] {
+        let (v, u) = (self.stylus, self.step);
+        [dot(u, u), dot(v, u), dot(v, v) - self.radius * self.radius]
+    }
+
+    /// The reading: how many steps it takes, times their length. Not a number where the line misses the artefact.
+    pub fn distance(&self) -> S {
+        let [a, b, c] = self.quadratic();
+        let steps = -(b + (b * b - a * c).sqrt()) / a;
+        match self.step_length {
+            Some(length) => length * steps,
+            None => steps,
+        }
+    }
+}
+
 impl<N: Nominal> Probe<N> {
-    /// The probing direction at a state of the axes, in R.
-    pub fn direction_at<S: Scalar<Nominal = N>>(
+    /// A step of the probing way in R at a state of the axes, and its length: the stated direction, or all the way to the artefact's
+    /// nominal axis.
+    pub fn step_at<S: Scalar<Nominal = N>>(
         &self,
         machine: &Machine,
         state: &[AxisPosition<N>],
-    ) -> Point<S> {
+    ) -> (Point<S>, Option<S>) {
         if let Some(direction) = self.direction {
-            return Point::nominal(direction);
+            return (Point::nominal(direction), None);
         }
         let none = vec![BodyErrors::<S>::NONE; machine.axes.len()];
         let stylus = machine.tool_point(state, &none, Point::nominal(self.stylus));
@@ -70,8 +102,52 @@ impl<N: Nominal> Probe<N> {
             .workpiece_point(state, &none, Point::nominal(tip))
             .minus(foot);
         let inward = across(foot.minus(stylus), along);
-        let length = inward.norm();
-        Point(inward.0.map(|x| x / length))
+        (inward, Some(inward.norm()))
+    }
+
+    /// The probing direction at a state of the axes, in R.
+    pub fn direction_at<S: Scalar<Nominal = N>>(
+        &self,
+        machine: &Machine,
+        state: &[AxisPosition<N>],
+    ) -> Point<S> {
+        match self.step_at(machine, state) {
+            (step, Some(length)) => Point(step.0.map(|x| x / length)),
+            (direction, None) => direction,
+        }
+    }
+
+    /// Stylus and probing way as the artefact sees them.
+    pub fn sight<S: Scalar<Nominal = N>>(
+        &self,
+        machine: &Machine,
+        state: &[AxisPosition<N>],
+        errors: &[BodyErrors<S>],
+        unknown: impl Fn(usize) -> Option<S>,
+    ) -> Sight<S> {
+        let stylus = machine.tool_point(state, errors, displaced(self.stylus, STYLUS, &unknown));
+        let (step, step_length) = self.step_at(machine, state);
+        let ahead = machine.table_point(state, errors, stylus.plus(step));
+        let stylus = machine.table_point(state, errors, stylus);
+        let mut from_artefact = stylus.minus(Point::nominal(self.artefact));
+        let mut direction = ahead.minus(stylus);
+        if let Some(pose) = moved(&unknown) {
+            from_artefact = pose.pull(from_artefact);
+            direction = pose.rotate_back(direction);
+        }
+        let axis = Point::nominal(self.axis);
+        let mut radius = S::nominal(self.radius);
+        for place in [RADIUS, FORM] {
+            if let Some(larger) = unknown(place) {
+                radius = radius + larger;
+            }
+        }
+        Sight {
+            stylus: across(from_artefact, axis),
+            step: across(direction, axis),
+            radius,
+            step_length,
+        }
     }
 
     /// The reading: the signed distance to the surface, mm. Not a number where the line misses the artefact.
@@ -82,26 +158,7 @@ impl<N: Nominal> Probe<N> {
         errors: &[BodyErrors<S>],
         unknown: impl Fn(usize) -> Option<S>,
     ) -> S {
-        let stylus = machine.tool_point(state, errors, displaced(self.stylus, STYLUS, &unknown));
-        let ahead = stylus.plus(self.direction_at(machine, state));
-        let stylus = machine.table_point(state, errors, stylus);
-        let ahead = machine.table_point(state, errors, ahead);
-        let mut from_artefact = stylus.minus(Point::nominal(self.artefact));
-        let mut direction = ahead.minus(stylus);
-        if let Some(pose) = moved(&unknown) {
-            from_artefact = pose.pull(from_artefact);
-            direction = pose.rotate_back(direction);
-        }
-        let axis = Point::nominal(self.axis);
-        let (v, u) = (across(from_artefact, axis), across(direction, axis));
-        let mut radius = S::nominal(self.radius);
-        for place in [RADIUS, FORM] {
-            if let Some(larger) = unknown(place) {
-                radius = radius + larger;
-            }
-        }
-        let (a, b, c) = (dot(u, u), dot(v, u), dot(v, v) - radius * radius);
-        -(b + (b * b - a * c).sqrt()) / a
+        self.sight(machine, state, errors, unknown).distance()
     }
 }
 

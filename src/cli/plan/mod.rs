@@ -1,6 +1,7 @@
 //! `abbe plan`.
 
 mod improve;
+mod patterns;
 mod tables;
 
 use abbe::identify::plan::clearance::Clearance;
@@ -39,6 +40,8 @@ pub struct PlanArguments {
     no_effects: bool,
     #[command(flatten)]
     improve: improve::ImproveArguments,
+    #[command(flatten)]
+    patterns: patterns::PatternArguments,
     /// How far each sweep can shrink before an uncertainty doubles.
     #[arg(long)]
     range: bool,
@@ -49,11 +52,15 @@ pub const EXAMPLES: &str = "Examples:
   abbe plan sessions/hermle-c600u/chapter5.toml
   abbe plan sessions/hermle-c600u/chapter5.toml --setup-um 1 --no-effects --json plan.json
   abbe plan sessions/hermle-c600u/chapter5.toml --improve 2 --bars-mm 50,100,150,300
-  abbe plan sessions/hermle-c600u/chapter5.toml --separate EZC~C:h2,EAC~C:h1";
+  abbe plan sessions/hermle-c600u/chapter5.toml --separate EZC~C:h2,EAC~C:h1
+  abbe plan sessions/hermle-c600u/chapter5.toml --patterns patterns.csv --error EY0A=10um --error EB0A=0.01deg";
 
 /// Runs `abbe plan`.
 pub fn run(arguments: &PlanArguments) -> Result<(), Failure> {
     let mut session = read_session(&arguments.session)?;
+    if arguments.patterns.asked() {
+        return arguments.patterns.run(&session, arguments.common.json.as_deref());
+    }
     if let Some(u_um) = arguments.setup_um {
         set_priors(&mut session, positive("--setup-um", u_um)?);
     }

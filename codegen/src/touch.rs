@@ -1,0 +1,80 @@
+//! What a probe's reading is made of: the stylus `v` and a step `u` of its way, both across the artefact's axis, and the radius.
+//!
+//! ```text
+//! a = u·u,   b = v·u,   c = v·v − r²,   d = −l_n·(b + √(b² − a·c))/a
+//! ```
+//!
+//! `l_n` is the length of the step in R, 1 where the way is stated. The root's sign is that of the nearer of two points wherever
+//! the artefact is met, so that nothing has to be decided.
+
+use abbe_model::frames::Point;
+use abbe_model::instrument::Station;
+use abbe_model::instrument::probe::Sight;
+use abbe_model::scalar::Scalar;
+
+use crate::program::Label;
+use crate::run::Run;
+use crate::subject::Subject;
+use crate::symbol::{NodeId, Operand, Symbol};
+use crate::vectors::NamedVector;
+
+/// The named quantities between the vectors of a probe and its reading.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Touch {
+    /// `a`, `b`, `c`.
+    pub quadratic: [Operand; 3],
+    /// `r`: the artefact's radius, the stylus' included, with what it is off by.
+    pub radius: Operand,
+    /// `l_n`.
+    pub step_length: Option<Operand>,
+    /// The step in R, whose length `l_n` is.
+    pub step: Option<NamedVector>,
+}
+
+/// The length of a step, in every language.
+pub(crate) const STEP_LENGTH: Label = Label::Scalar("l_n");
+/// The coefficients of the quadratic equation.
+pub(crate) const QUADRATIC: [Label; 3] = [Label::Scalar("a"), Label::Scalar("b"), Label::Scalar("c")];
+
+impl Touch {
+    /// From stylus and step as the artefact sees them, and the vectors on the way there.
+    pub(crate) fn of(sight: &Sight<Symbol<'_>>, vectors: &[NamedVector]) -> Self {
+        Touch {
+            quadratic: sight.quadratic().map(Symbol::operand),
+            radius: sight.radius.operand(),
+            step_length: sight.step_length.map(Symbol::operand),
+            step: vectors.iter().find(|vector| vector.letter == "n").cloned(),
+        }
+    }
+
+    /// The names of those that are computed.
+    pub(crate) fn labels(&self) -> impl Iterator<Item = (NodeId, Label)> {
+        let step = self.step_length.map(|length| (length, STEP_LENGTH));
+        let named = self.quadratic.into_iter().zip(QUADRATIC).chain(step);
+        named.filter_map(|(operand, label)| match operand {
+            Operand::Node(id) => Some((id, label)),
+            Operand::Constant(_) => None,
+        })
+    }
+}
+
+impl<S: Scalar> Run<'_, S> {
+    /// What a probe's reading is made of; none of any other subject.
+    pub(crate) fn sight(&self) -> Option<Sight<S>> {
+        match &self.subject {
+            Subject::Station(Station::Probe(probe)) => {
+                Some(probe.sight(self.machine, &self.state, &self.errors, |slot| self.unknown(slot)))
+            }
+            _ => None,
+        }
+    }
+}
+
+/// The same with the six coordinates of stylus and step replaced.
+pub(crate) fn with_groups<S: Scalar>(sight: &Sight<S>, groups: &[S]) -> Sight<S> {
+    Sight {
+        stylus: Point(std::array::from_fn(|i| groups[i])),
+        step: Point(std::array::from_fn(|i| groups[i + 3])),
+        ..*sight
+    }
+}

@@ -1,0 +1,187 @@
+//! What each error alone does to the readings of each test: the trace patterns by which a known fault is told on a plot (thesis, Figs. 3.7 and 3.8).
+//!
+//! `ΔL_e = L(state; e) − L(state; 0)` by the exact chain, for one error of a stated size at a time, everything else zero.
+
+use std::fmt::Write;
+
+use abbe_model::axis::AxisKind;
+use abbe_model::session::Session;
+use abbe_model::session::readings::Readings;
+use serde::Serialize;
+
+use crate::error::IdentifyError;
+use crate::quantity::Given;
+use crate::simulate::{Simulation, simulate};
+
+/// Size of a position error (thesis, Table 3.1).
+const POSITION: (f64, &str) = (10.0, "um");
+/// Size of an orientation error.
+const ORIENTATION: (f64, &str) = (0.01, "deg");
+
+/// What one error does to one test.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Pattern {
+    /// The test.
+    pub test: String,
+    /// The error, by the name that it was given by.
+    pub error: String,
+    /// Its size, in `unit`.
+    pub size: f64,
+    /// `um`, `deg`, …
+    pub unit: String,
+    /// The largest deviation along the path, µm.
+    pub largest_um: f64,
+    /// Their mean, µm: what a circle's radius takes up.
+    pub mean_um: f64,
+    /// Their rms about the mean, µm.
+    pub rms_um: f64,
+    /// Reading by reading, a reading's coordinates together, µm.
+    #[serde(skip)]
+    pub deviations_um: Vec<f64>,
+}
+
+/// The patterns of a session.
+#[derive(Clone, Debug)]
+pub struct Patterns {
+    /// Names and states of the tests.
+    pub tests: Vec<(String, Readings)>,
+    /// Test by test, error by error.
+    pub patterns: Vec<Pattern>,
+}
+
+/// The session's unknown errors, positions by 10 µm and orientations by 0.01°.
+pub fn usual_sizes(session: &Session) -> Vec<Given> {
+    let given = |name: &abbe_model::component::ErrorName| {
+        let (value, unit) = if name.freedom.is_angle() {
+            ORIENTATION
+        } else {
+            POSITION
+        };
+        Given {
+            id: name.to_string(),
+            value,
+            unit: unit.to_string(),
+        }
+    };
+    session.unknowns.iter().map(given).collect()
+}
+
+/// The pattern of each error alone, along the path that each test makes or is planned to make.
+///
+/// # Errors
+/// If a movement cannot be made, a name or unit does not fit the session, or the model yields a number that is not finite.
+pub fn patterns(session: &Session, errors: &[Given]) -> Result<Patterns, IdentifyError> {
+    if errors.is_empty() {
+        return Err(IdentifyError::Request(
+            "no error to show: `[unknowns] errors` is empty; name one, as in `--error EY0A=10um`".into(),
+        ));
+    }
+    let mut exact = session.clone();
+    exact.resolution_mm = None;
+    let drawn = |given: Vec<Given>| {
+        let simulation = Simulation {
+            given,
+            noise_mm: Some(0.0),
+            ..Simulation::default()
+        };
+        Ok::<_, IdentifyError>(simulate(&exact, &simulation)?.readings)
+    };
+    let without = drawn(Vec::new())?;
+    let mut by_error = Vec::with_capacity(errors.len());
+    for error in errors {
+        by_error.push(drawn(vec![error.clone()])?);
+    }
+    let mut patterns = Vec::new();
+    for (place, test) in session.tests.iter().enumerate() {
+        for (error, with) in errors.iter().zip(&by_error) {
+            let pairs = with[place].observed.iter().zip(&without[place].observed);
+            let deviations_um: Vec<f64> = pairs.map(|(with, without)| (with - without) * 1e3).collect();
+            let count = deviations_um.len().max(1) as f64;
+            let mean_um = deviations_um.iter().sum::<f64>() / count;
+            let square: f64 = deviations_um.iter().map(|d| (d - mean_um).powi(2)).sum();
+            patterns.push(Pattern {
+                test: test.name.clone(),
+                error: error.id.clone(),
+                size: error.value,
+                unit: error.unit.clone(),
+                largest_um: deviations_um.iter().fold(0.0, |most, d| d.abs().max(most)),
+                mean_um,
+                rms_um: (square / count).sqrt(),
+                deviations_um,
+            });
+        }
+    }
+    let names = session.tests.iter().map(|test| test.name.clone());
+    Ok(Patterns {
+        tests: names.zip(without).collect(),
+        patterns,
+    })
+}
+
+impl Patterns {
+    /// As a CSV file, a line for each reading and error: test, error and its size, run, positions of the axes, deviation.
+    pub fn csv(&self, session: &Session) -> String {
+        let mut header = vec![
+            "test".to_string(),
+            "error".into(),
+            "size".into(),
+            "unit".into(),
+            "run".into(),
+        ];
+        for axis in &session.machine.axes {
+            let unit = match axis.kind {
+                AxisKind::Linear => "mm",
+                AxisKind::Rotary => "deg",
+            };
+            header.push(format!("{}_{unit}", axis.name.to_lowercase()));
+        }
+        match session.instrument.coordinates() {
+            1 => header.push("deviation_um".into()),
+            _ => header.extend(["x", "y", "z"].map(|k| format!("deviation_{k}_um"))),
+        }
+        let mut text = header.join(",") + "\n";
+        let per_test = self.patterns.len() / self.tests.len().max(1);
+        for ((name, states), patterns) in self.tests.iter().zip(self.patterns.chunks(per_test.max(1))) {
+            for pattern in patterns {
+                let start = format!(
+                    "{},{},{},{}",
+                    quoted(name),
+                    quoted(&pattern.error),
+                    pattern.size,
+                    quoted(&pattern.unit)
+                );
+                for row in 0..states.rows() {
+                    let run = states.run.get(row).map_or(String::new(), ToString::to_string);
+                    let _ = write!(text, "{start},{run}");
+                    for (axis, column) in session.machine.axes.iter().zip(&states.positions) {
+                        let _ = write!(text, ",{}", position(axis.kind, column[row]));
+                    }
+                    let coordinates = states.coordinates.max(1);
+                    for deviation in &pattern.deviations_um[row * coordinates..(row + 1) * coordinates] {
+                        let _ = write!(text, ",{deviation:.6}");
+                    }
+                    text.push('\n');
+                }
+            }
+        }
+        text
+    }
+}
+
+/// mm or degrees, without the digits that are rounding.
+fn position(kind: AxisKind, inside: f64) -> f64 {
+    let outside = match kind {
+        AxisKind::Linear => inside,
+        AxisKind::Rotary => inside.to_degrees(),
+    };
+    (outside * 1e9).round() / 1e9 + 0.0
+}
+
+/// A cell that may hold the separator.
+fn quoted(cell: &str) -> String {
+    if cell.contains([',', '"', '\n']) {
+        format!("\"{}\"", cell.replace('"', "\"\""))
+    } else {
+        cell.to_string()
+    }
+}

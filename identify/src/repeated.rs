@@ -1,0 +1,286 @@
+//! Repeated sessions of one plan: Type A beside Type B (JCGM 100, 4.2 and 4.3).
+//!
+//! Of `n` sessions, each fitted by itself, with values `x_k` and standard uncertainties `u_k`:
+//!
+//! ```text
+//! mean x̄,   s² = Σ (x_k − x̄)²/(n − 1),   Type A of the mean s/√n,   Type B of one session u = √(Σ u_k²/n)
+//! (n − 1)·s²/u² ~ χ²(n − 1)    if the sessions scatter by as much as their fits say
+//! ```
+//!
+//! Set-up quantities are not compared: every session has its own. Nor do Type A and Type B have to agree: a set-up that was not mounted anew, or a
+//! calibration that all sessions share, is in every `u_k` and in no scatter.
+
+use std::collections::BTreeSet;
+
+use serde::Serialize;
+use statrs::distribution::{ChiSquared, ContinuousCDF, Normal};
+
+use crate::error::IdentifyError;
+use crate::fit::{Fit, parameters};
+use crate::parameters::Role;
+use crate::problem::Problem;
+use crate::results::ParameterResult;
+
+/// Probability at which one of all comparisons is called significant though nothing differs.
+const SIGNIFICANCE: f64 = 0.01;
+
+/// One session, fitted.
+#[derive(Clone, Debug)]
+pub struct Session {
+    /// Its file.
+    pub name: String,
+    /// What it was made with, in words: sessions that differ in it are not repeats.
+    plan: String,
+    /// Errors and coefficients of effects.
+    parameters: Vec<ParameterResult>,
+}
+
+impl Session {
+    /// A fitted session by the name of its file.
+    pub fn new(name: &str, problem: &Problem<'_>, fit: &Fit) -> Session {
+        let list = &problem.parameters.list;
+        let setup = |id: &str| list.iter().any(|p| p.id == id && p.role == Role::Setup);
+        let tests: Vec<&str> = problem.tests.iter().map(|test| test.name.as_str()).collect();
+        Session {
+            name: name.to_string(),
+            plan: format!(
+                "a {} on {} with the tests {}",
+                problem.session.instrument.word(),
+                problem.session.machine.code(),
+                tests.join(", ")
+            ),
+            parameters: parameters(problem, fit)
+                .into_iter()
+                .filter(|parameter| !setup(&parameter.id))
+                .collect(),
+        }
+    }
+}
+
+/// What repeated sessions say together.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Repeated {
+    /// The sessions' files.
+    pub sessions: Vec<String>,
+    /// Parameter by parameter.
+    pub parameters: Vec<RepeatedParameter>,
+    /// Sessions that are off the others by more than the fits' uncertainties explain, the clearest first.
+    pub deviating: Vec<Deviating>,
+}
+
+/// One parameter over the sessions, in `unit`.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct RepeatedParameter {
+    /// `EY0A`, `EZC~C:h2.amplitude`.
+    pub id: String,
+    /// `um`, `arcsec`, …
+    pub unit: String,
+    /// Mean over the sessions.
+    pub mean: f64,
+    /// Standard deviation over the sessions: Type A of one session.
+    pub s: f64,
+    /// Standard uncertainty of the mean, Type A.
+    pub u_type_a: f64,
+    /// Standard uncertainty of one session by its fit, Type B: the root mean square over the sessions.
+    pub u_type_b: f64,
+    /// `s` over `u_type_b`; `null` where the latter is zero.
+    pub ratio: Option<f64>,
+    /// `(n − 1)·ratio²`.
+    pub chi_square: Option<f64>,
+    /// Two-sided probability of such a ratio if the sessions scatter as their fits say.
+    pub p_value: Option<f64>,
+    /// What follows, at a probability of 1 % over all parameters.
+    pub scatter: Scatter,
+    /// Session by session.
+    pub values: Vec<f64>,
+}
+
+/// Scatter of the sessions against what their fits say.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Scatter {
+    /// Nothing speaks against it.
+    AsStated,
+    /// Something differs between the sessions that no fit knows of.
+    More,
+    /// The fits allow for something that did not change between the sessions.
+    Less,
+}
+
+/// A session that is off the mean of the others.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Deviating {
+    /// The session's file.
+    pub session: String,
+    /// The parameter.
+    pub id: String,
+    /// Its value there less the mean over the others.
+    pub by: f64,
+    /// Standard uncertainty of this difference, by the fits.
+    pub u: f64,
+    /// Unit of both.
+    pub unit: String,
+    /// Two-sided probability.
+    pub p_value: f64,
+}
+
+/// Compares sessions of one plan.
+///
+/// # Errors
+/// If there are fewer than two, or they are not of one plan.
+pub fn compare(sessions: &[Session]) -> Result<Repeated, IdentifyError> {
+    let [first, others @ ..] = sessions else {
+        return Err(one_session());
+    };
+    if others.is_empty() {
+        return Err(one_session());
+    }
+    for other in others {
+        same_plan(first, other)?;
+    }
+    let count = first.parameters.len() as f64;
+    let mut result = Repeated {
+        sessions: sessions.iter().map(|session| session.name.clone()).collect(),
+        parameters: Vec::new(),
+        deviating: Vec::new(),
+    };
+    for (place, parameter) in first.parameters.iter().enumerate() {
+        let turn = (parameter.unit == "deg").then_some(360.0);
+        let of = |session: &Session| {
+            let own = &session.parameters[place];
+            // A phase is the same a turn further.
+            let turns = turn.map_or(0.0, |turn| ((own.value - parameter.value) / turn).round() * turn);
+            (own.value - turns, own.u)
+        };
+        let values: Vec<(f64, f64)> = sessions.iter().map(of).collect();
+        result
+            .parameters
+            .push(over_sessions(parameter, &values, SIGNIFICANCE / count));
+        if sessions.len() > 2 {
+            let significance = SIGNIFICANCE / (count * sessions.len() as f64);
+            for (k, by, u, p_value) in off_the_others(&values, significance) {
+                result.deviating.push(Deviating {
+                    session: sessions[k].name.clone(),
+                    id: parameter.id.clone(),
+                    by,
+                    u,
+                    unit: parameter.unit.clone(),
+                    p_value,
+                });
+            }
+        }
+    }
+    let sigma = |deviating: &Deviating| (deviating.by / deviating.u).abs();
+    result.deviating.sort_by(|a, b| sigma(b).total_cmp(&sigma(a)));
+    Ok(result)
+}
+
+fn one_session() -> IdentifyError {
+    IdentifyError::Request("one session has no scatter: name at least one more behind --repeat".into())
+}
+
+/// That two sessions are repeats of one plan.
+fn same_plan(first: &Session, other: &Session) -> Result<(), IdentifyError> {
+    let fault = |what: String| {
+        IdentifyError::Request(format!(
+            "{} is no repeat of {}: {what}; repeated sessions have the same machine, tests and unknowns",
+            other.name, first.name
+        ))
+    };
+    if first.plan != other.plan {
+        return Err(fault(format!("it is {}, not {}", other.plan, first.plan)));
+    }
+    let ids = |session: &Session| -> BTreeSet<String> {
+        session
+            .parameters
+            .iter()
+            .map(|parameter| parameter.id.clone())
+            .collect()
+    };
+    let (own, known) = (ids(other), ids(first));
+    if own == known {
+        return Ok(());
+    }
+    let list = |a: &BTreeSet<String>, b: &BTreeSet<String>| {
+        let only: Vec<&str> = a.difference(b).map(String::as_str).collect();
+        if only.is_empty() {
+            "nothing".to_string()
+        } else {
+            only.join(", ")
+        }
+    };
+    Err(fault(format!(
+        "its readings tell {} besides and {} not",
+        list(&own, &known),
+        list(&known, &own)
+    )))
+}
+
+fn over_sessions(parameter: &ParameterResult, values: &[(f64, f64)], significance: f64) -> RepeatedParameter {
+    let count = values.len() as f64;
+    let mean = values.iter().map(|(x, _)| x).sum::<f64>() / count;
+    let free = count - 1.0;
+    let s = (values.iter().map(|(x, _)| (x - mean).powi(2)).sum::<f64>() / free).sqrt();
+    let u_type_b = (values.iter().map(|(_, u)| u * u).sum::<f64>() / count).sqrt();
+    let ratio = (u_type_b > 0.0).then(|| s / u_type_b);
+    let chi_square = ratio.map(|ratio| free * ratio * ratio);
+    let law = ChiSquared::new(free).ok();
+    let tails = law
+        .zip(chi_square)
+        .map(|(law, found)| [law.cdf(found), law.sf(found)]);
+    let p_value = tails.map(|[below, above]| (2.0 * below.min(above)).min(1.0));
+    let scatter = match (p_value, tails) {
+        (Some(p), Some([below, above])) if p < significance => {
+            if above < below {
+                Scatter::More
+            } else {
+                Scatter::Less
+            }
+        }
+        _ => Scatter::AsStated,
+    };
+    RepeatedParameter {
+        id: parameter.id.clone(),
+        unit: parameter.unit.clone(),
+        mean,
+        s,
+        u_type_a: s / count.sqrt(),
+        u_type_b,
+        ratio,
+        chi_square,
+        p_value,
+        scatter,
+        values: values.iter().map(|(x, _)| *x).collect(),
+    }
+}
+
+/// The values that are off the mean of the rest, the clearest taken out before the next is looked for: place, by how much, with what standard
+/// uncertainty, with what probability.
+fn off_the_others(values: &[(f64, f64)], significance: f64) -> Vec<(usize, f64, f64, f64)> {
+    let normal = Normal::standard();
+    let mut rest: Vec<usize> = (0..values.len()).collect();
+    let mut found = Vec::new();
+    while rest.len() > 2 {
+        let others = rest.len() as f64 - 1.0;
+        let sum: f64 = rest.iter().map(|k| values[*k].0).sum();
+        let square: f64 = rest.iter().map(|k| values[*k].1.powi(2)).sum();
+        let off = |k: &usize| {
+            let (x, u) = values[*k];
+            let by = x - (sum - x) / others;
+            (*k, by, (u * u + (square - u * u) / others.powi(2)).sqrt())
+        };
+        let clearest = rest
+            .iter()
+            .map(off)
+            .max_by(|a, b| (a.1 / a.2).abs().total_cmp(&(b.1 / b.2).abs()));
+        let Some((k, by, u)) = clearest else { break };
+        let p_value = 2.0 * normal.sf((by / u).abs());
+        // Where uncertainties are zero there is no probability.
+        if p_value.is_nan() || p_value >= significance {
+            break;
+        }
+        found.push((k, by, u, p_value));
+        rest.retain(|other| *other != k);
+    }
+    found
+}
