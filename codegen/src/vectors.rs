@@ -8,6 +8,7 @@ use std::collections::HashMap;
 use abbe_model::axis::AxisKind;
 use abbe_model::chain::{AxisPosition, BodyErrors, Machine};
 use abbe_model::frames::Point;
+use abbe_model::instrument::rtest::Setting;
 use abbe_model::instrument::{Station, displaced};
 use abbe_model::scalar::Nominal;
 
@@ -86,6 +87,21 @@ pub(crate) fn of_subject<'a>(
             let q = displaced(socket.ball, 3, unknown);
             on_tool_side(tool("ball"), machine, state, errors, q)
         }
+        // The point that the sensors do not carry; theirs is the origin that it is counted from.
+        Subject::Station(Station::RTest(rtest)) => match rtest.setting {
+            Setting::Table => {
+                let q = displaced(rtest.spindle_ball, 3, unknown);
+                on_tool_side(tool("master ball"), machine, state, errors, q)
+            }
+            Setting::Spindle => {
+                let p = displaced(rtest.workpiece_ball, 0, unknown);
+                let ball = Body {
+                    letter: "p",
+                    meaning: "master ball",
+                };
+                on_workpiece_side(ball, machine, state, errors, p)
+            }
+        },
         #[allow(unreachable_patterns)]
         Subject::Station(_) => Vec::new(),
         Subject::Volumetric { tool: point } => {

@@ -75,7 +75,7 @@ pub(super) fn states(machine: &Machine, test: &Test, motion: &Motion) -> Result<
             let Some(mut bar) = pair(&test.station) else {
                 return Err((
                     format!("test \"{}\" follows no point of the table", test.name),
-                    "a path of kind \"follow\" needs a ball bar or a probe".into(),
+                    "a path of kind \"follow\" needs a ball bar, an R-test or a probe".into(),
                 ));
             };
             if *offset == FollowOffset::None {
@@ -322,7 +322,7 @@ fn offset_vector(
     let radial: [f64; 3] = std::array::from_fn(|i| from[i] - height * along[i]);
     let radius = radial.iter().map(|x| x * x).sum::<f64>().sqrt();
     let unit = match offset {
-        FollowOffset::None => [0.0; 3],
+        FollowOffset::None | FollowOffset::Touching => [0.0; 3],
         FollowOffset::Axial => along,
         _ if radius < 1e-6 => {
             return Err((
