@@ -5,6 +5,7 @@
 //! - [`fit`]: identify; [`heldout`]: judge on readings that the fit did not see; [`noise`]: how much is noise;
 //! - [`trace`]: close the loop;
 //! - [`plan`]: what tests can see before anybody measures;
+//! - [`views`]: readings and residuals of an R-test by direction;
 //! - [`simulate`]: readings from a model; [`quantity`]: values with their units as people write them;
 //! - [`results`]: what is reported, as it stands in JSON.
 
@@ -30,6 +31,7 @@ pub mod start;
 pub mod trace;
 pub mod triangle;
 pub mod unit;
+pub mod views;
 pub mod volumetric;
 
 pub use error::IdentifyError;

@@ -4,12 +4,15 @@ use abbe::identify::results::{FitResult, ParameterResult, Unobservable};
 use clap::{Args, ValueEnum};
 
 use super::failure::Failure;
-use super::{CommonArguments, SessionArguments, geometric, output, read_session, self_calibration, table};
+use super::{
+    CommonArguments, SessionArguments, geometric, output, read_session, self_calibration, table, views,
+};
 
 /// Examples of `abbe fit`.
 pub const HELP: &str = "Examples:
   abbe fit sessions/hermle-c600u/measured/session.toml --json fit.json
   abbe fit run1/session.toml --method cone
+  abbe fit sessions/r-test/measured/session.toml --views views.csv
   abbe fit sessions/self-calibration/measured/session.toml --method self-calibration --monte-carlo 1000000";
 
 /// How errors are identified.
@@ -37,6 +40,9 @@ pub struct FitArguments {
     /// How errors are identified.
     #[arg(long, value_enum, default_value = "full")]
     method: Method,
+    /// Write readings and residuals of an R-test by direction: that of the sensors, X-, Y- and Z-wise, radial, tangential and axial.
+    #[arg(long, value_name = "FILE.csv")]
+    views: Option<std::path::PathBuf>,
     #[command(flatten)]
     draws: self_calibration::DrawArguments,
 }
@@ -44,6 +50,10 @@ pub struct FitArguments {
 /// Runs `abbe fit`.
 pub fn run(arguments: &FitArguments) -> Result<(), Failure> {
     let session = read_session(&arguments.session)?;
+    if arguments.views.is_some() && arguments.method != Method::Full {
+        let message = "`--views` shows what the full fit leaves over: leave `--method` out";
+        return Err(Failure::Other(message.into()));
+    }
     if arguments.method == Method::SelfCalibration {
         return self_calibration::run(&session, &arguments.draws, &arguments.common);
     }
@@ -58,6 +68,9 @@ pub fn run(arguments: &FitArguments) -> Result<(), Failure> {
         return geometric::run(&session, method, &arguments.common);
     }
     let (problem, fit) = abbe::identify::fit::prepare(&session, arguments.common.seed)?;
+    if let Some(path) = &arguments.views {
+        views::write(&problem, &fit, path)?;
+    }
     let result = abbe::identify::fit::report(&problem, &fit);
     print(&result);
     if let Some(path) = &arguments.common.json {

@@ -18,6 +18,7 @@ mod self_calibration;
 mod simulate;
 mod table;
 mod trace;
+mod views;
 
 use std::path::PathBuf;
 use std::process::ExitCode;

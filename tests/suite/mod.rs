@@ -18,6 +18,8 @@ mod plan_rank;
 mod plan_uncertainty;
 mod recovery;
 mod robots;
+mod rtest;
+mod rtest_findings;
 mod self_calibration;
 mod simulate;
 mod topologies;
