@@ -1,5 +1,7 @@
 //! The R-test against the paper (Yamaji, Hamabata & Ihara, HPC 2014), against the plant, and at the command line.
 
+use std::f64::consts::FRAC_1_SQRT_2;
+
 use abbe::identify::fit::prepare;
 use abbe::identify::views::views;
 use abbe::model::axis::AxisKind;
@@ -71,8 +73,8 @@ fn equations_4_to_6_have_their_constants() {
     let orientation = Orientation::new(angles, Rotation::Exact);
     for (sensor, expected) in [
         ([1.0, 0.0, 0.0], [0.81650, 0.0, -0.57735]),
-        ([0.0, 1.0, 0.0], [-0.40825, -0.70711, -0.57735]),
-        ([0.0, 0.0, 1.0], [-0.40825, 0.70711, -0.57735]),
+        ([0.0, 1.0, 0.0], [-0.40825, -FRAC_1_SQRT_2, -0.57735]),
+        ([0.0, 0.0, 1.0], [-0.40825, FRAC_1_SQRT_2, -0.57735]),
     ] {
         near(orientation.to_machine(Point(sensor)).0, expected, 1e-5);
     }
@@ -305,6 +307,32 @@ fn the_equation_of_bk2_is_what_a_turning_table_shows() {
         "∂m.y/∂θ_z0c = −y·s_c − x·c_c",
     ] {
         assert!(printed.contains(line), "{line} is not in\n{printed}");
+    }
+}
+
+/// In every order and with the sensors on either body the printed form is checked against the chain over dual numbers, or nothing is printed.
+#[test]
+fn equations_of_raw_sensors_are_printed_in_every_order() {
+    for test in ["BK1", "BK1-Es"] {
+        for order in ["exact", "bilinear", "first"] {
+            let printed = said(&[
+                "equation",
+                text(&ready("r-test/machine-b.toml")),
+                "--test",
+                test,
+                "--order",
+                order,
+                "--errors",
+                "EY0A,EA0Z,sensor.omega,workpiece_ball.x",
+            ]);
+            // cos 35.264°: what sensor u counts of X.
+            assert!(printed.contains("0.816500507611"), "{test} {order}: {printed}");
+            // X need not move and does not.
+            assert!(
+                !printed.contains("position of axis X"),
+                "{test} {order}: {printed}"
+            );
+        }
     }
 }
 
