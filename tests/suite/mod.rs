@@ -19,6 +19,7 @@ mod plan_uncertainty;
 mod recovery;
 mod robots;
 mod rtest;
+mod rtest_command;
 mod rtest_findings;
 mod self_calibration;
 mod simulate;
