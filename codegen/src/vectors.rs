@@ -8,6 +8,7 @@ use std::collections::HashMap;
 use abbe_model::axis::AxisKind;
 use abbe_model::chain::{AxisPosition, BodyErrors, Machine};
 use abbe_model::frames::Point;
+use abbe_model::instrument::rtest::Setting;
 use abbe_model::instrument::{Station, displaced, probe};
 use abbe_model::scalar::Nominal;
 
@@ -112,6 +113,21 @@ pub(crate) fn of_subject<'a>(
             vectors.push(named("u", sight.step, "the step across the artefact's axis"));
             vectors
         }
+        // The point that the sensors do not carry; theirs is the origin that it is counted from.
+        Subject::Station(Station::RTest(rtest)) => match rtest.setting {
+            Setting::Table => {
+                let q = displaced(rtest.spindle_ball, 3, unknown);
+                on_tool_side(tool("master ball"), machine, state, errors, q)
+            }
+            Setting::Spindle => {
+                let p = displaced(rtest.workpiece_ball, 0, unknown);
+                let ball = Body {
+                    letter: "p",
+                    meaning: "master ball",
+                };
+                on_workpiece_side(ball, machine, state, errors, p)
+            }
+        },
         Subject::Volumetric { tool: point } => {
             on_tool_side(tool("tool point"), machine, state, errors, Point::nominal(*point))
         }

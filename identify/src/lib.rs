@@ -6,6 +6,7 @@
 //! - [`monte_carlo`], [`propagation`]: distributions by drawing; [`repeated`]: Type A beside Type B;
 //! - [`trace`]: close the loop;
 //! - [`plan`]: what tests can see before anybody measures;
+//! - [`views`]: readings and residuals of an R-test by direction;
 //! - [`simulate`]: readings from a model; [`patterns`]: what each error alone does to a test; [`quantity`]: values with their units as people write them;
 //! - [`results`]: what is reported, as it stands in JSON.
 
@@ -34,6 +35,7 @@ pub mod start;
 pub mod trace;
 pub mod triangle;
 pub mod unit;
+pub mod views;
 pub mod volumetric;
 
 pub use error::IdentifyError;

@@ -15,7 +15,7 @@ pub fn stations(session: &Session, tests: &[&Test]) -> Vec<Station<f64>> {
         .map(|test| match test.station {
             Station::Tracker(_) => test.setup.as_str(),
             Station::Socket(_) => test.socket.as_deref().unwrap_or(""),
-            Station::BallBar(_) | Station::Probe(_) => "",
+            Station::BallBar(_) | Station::Probe(_) | Station::RTest(_) => "",
         })
         .collect();
     for index in 0..tests.len() {
@@ -26,7 +26,7 @@ pub fn stations(session: &Session, tests: &[&Test]) -> Vec<Station<f64>> {
             .filter(|other| groups[*other] == groups[index])
             .collect();
         match &stations[index] {
-            Station::BallBar(_) | Station::Probe(_) => {}
+            Station::BallBar(_) | Station::Probe(_) | Station::RTest(_) => {}
             Station::Tracker(_) => {
                 let (mut machine_points, mut observed) = (Vec::new(), Vec::new());
                 for member in &members {

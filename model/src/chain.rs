@@ -243,6 +243,18 @@ impl Machine {
             .fold(point, |point, index| self.pull(index, state, errors, point))
     }
 
+    /// A point of R in the tool frame: what [`Machine::tool_point`] undoes; with small-angle errors as [`Machine::table_point`].
+    pub fn spindle_point<S: Scalar>(
+        &self,
+        state: &[AxisPosition<S::Nominal>],
+        errors: &[BodyErrors<S>],
+        point: Point<S>,
+    ) -> Point<S> {
+        (self.workpiece_side..self.axes.len()).fold(point, |point, index| {
+            pull(&self.axes[index], &state[index], &errors[index], point)
+        })
+    }
+
     /// A point on the moved side of axis `index`, seen from its other side: one step of the chain.
     pub fn push<S: Scalar>(
         &self,

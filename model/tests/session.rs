@@ -260,8 +260,13 @@ fn a_plan_becomes_a_measured_session() {
     for (test, mut readings) in session.tests.iter().zip(plans) {
         readings.observed = nominal(&session, test, &readings);
         let name = format!("{}.csv", test.name);
-        let kind = test.station.kind();
-        write::readings(&folder.path().join(&name), &session.machine, kind, &readings).unwrap();
+        write::readings(
+            &folder.path().join(&name),
+            &session.machine,
+            &test.station,
+            &readings,
+        )
+        .unwrap();
         data.push((test.name.clone(), name));
         measured.push(readings);
     }

@@ -8,6 +8,7 @@ use clap::{Args, ValueEnum};
 use super::failure::Failure;
 use super::{
     CommonArguments, SessionArguments, geometric, output, read_session, repeated, self_calibration, table,
+    views,
 };
 
 /// Examples of `abbe fit`.
@@ -16,6 +17,7 @@ pub const HELP: &str = "Examples:
   abbe fit sessions/hermle-c600u/measured/session.toml --monte-carlo 10000
   abbe fit day1/session.toml --repeat day2/session.toml day3/session.toml
   abbe fit run1/session.toml --method cone
+  abbe fit sessions/r-test/measured/session.toml --views views.csv
   abbe fit sessions/self-calibration/measured/session.toml --method self-calibration --monte-carlo 1000000";
 
 /// How errors are identified.
@@ -43,6 +45,9 @@ pub struct FitArguments {
     /// How errors are identified.
     #[arg(long, value_enum, default_value = "full")]
     method: Method,
+    /// Write readings and residuals of an R-test by direction: that of the sensors, X-, Y- and Z-wise, radial, tangential and axial.
+    #[arg(long, value_name = "FILE.csv")]
+    views: Option<std::path::PathBuf>,
     #[command(flatten)]
     draws: self_calibration::DrawArguments,
     /// Further sessions of the same plan: the scatter of their fits (Type A) beside the fits' own uncertainties (Type B).
@@ -61,6 +66,10 @@ pub fn run(arguments: &FitArguments) -> Result<(), Failure> {
         return repeated::run(&arguments.session, &arguments.repeat, &arguments.common);
     }
     let session = read_session(&arguments.session)?;
+    if arguments.views.is_some() && arguments.method != Method::Full {
+        let message = "`--views` shows what the full fit leaves over: leave `--method` out";
+        return Err(Failure::Other(message.into()));
+    }
     if arguments.method == Method::SelfCalibration {
         return self_calibration::run(&session, &arguments.draws, &arguments.common);
     }
@@ -76,6 +85,9 @@ pub fn run(arguments: &FitArguments) -> Result<(), Failure> {
     }
     let draws = arguments.draws.draws(arguments.common.seed)?;
     let (problem, fit) = abbe::identify::fit::prepare(&session, arguments.common.seed)?;
+    if let Some(path) = &arguments.views {
+        views::write(&problem, &fit, path)?;
+    }
     let mut result = abbe::identify::fit::report(&problem, &fit);
     if let Some(draws) = &draws {
         abbe::identify::propagation::add_monte_carlo(&problem, &fit, draws, &mut result)?;

@@ -19,6 +19,7 @@ mod self_calibration;
 mod simulate;
 mod table;
 mod trace;
+mod views;
 
 use std::path::PathBuf;
 use std::process::ExitCode;

@@ -63,6 +63,28 @@ const TEMPLATES: &[Template] = &[
         files: files!("kuka-iiwa14": "machine.toml", "session.toml"),
     },
     Template {
+        name: "r-test",
+        about: "R-test on machines with B, C and with A, B tables: plans of BK1 and BK2, and readings with pitch-compensation steps to trace",
+        files: &[
+            ("machine.toml", include_str!("../../sessions/r-test/machine.toml")),
+            ("plan.toml", include_str!("../../sessions/r-test/plan.toml")),
+            (
+                "machine-b.toml",
+                include_str!("../../sessions/r-test/machine-b.toml"),
+            ),
+            (
+                "session.toml",
+                include_str!("../../sessions/r-test/measured/session.toml"),
+            ),
+            ("BK1.csv", include_str!("../../sessions/r-test/measured/BK1.csv")),
+            ("BK2.csv", include_str!("../../sessions/r-test/measured/BK2.csv")),
+            (
+                "C-alone.csv",
+                include_str!("../../sessions/r-test/measured/C-alone.csv"),
+            ),
+        ],
+    },
+    Template {
         name: "self-calibration",
         about: "rotary table probed on an uncalibrated cylinder; a plan, and readings simulated from it",
         files: &[

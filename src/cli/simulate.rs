@@ -128,7 +128,7 @@ fn files(
     let mut data: Vec<(String, String)> = Vec::new();
     for (test, readings) in session.tests.iter().zip(&simulated.readings) {
         let name = data_name(&test.name, &data);
-        let text = write::readings_text(&session.machine, session.instrument, readings);
+        let text = write::readings_text(&session.machine, &test.station, readings);
         data.push((test.name.clone(), name.clone()));
         files.push((name, text));
     }

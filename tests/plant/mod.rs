@@ -28,6 +28,7 @@ pub mod oracle;
 pub mod plan;
 pub mod pose;
 pub mod recipe;
+pub mod rtest;
 pub mod schedule;
 pub mod whitening;
 

@@ -5,8 +5,9 @@ use abbe::model::chain::{ERRORS_PER_AXIS, Machine};
 use abbe::model::component::ErrorName;
 use abbe::model::instrument::ballbar::BallBar;
 use abbe::model::instrument::probe::Probe;
+use abbe::model::instrument::rtest::{RTest, Setting};
 use abbe::model::instrument::tracker::Tracker;
-use abbe::model::instrument::{InstrumentKind, Station};
+use abbe::model::instrument::{InsideUnit, InstrumentKind, Station};
 use abbe::model::sensitivity::{SlotValues, TestModel};
 use abbe::model::session::readings::Readings;
 use rand::{Rng, SeedableRng};
@@ -41,6 +42,16 @@ fn probe(artefact: [f64; 3], stylus: [f64; 3]) -> Station<f64> {
     })
 }
 
+/// Sensors that point three ways, far from where the other point is.
+fn r_test(setting: Setting, workpiece_ball: [f64; 3], spindle_ball: [f64; 3]) -> Station<f64> {
+    Station::RTest(RTest {
+        setting,
+        workpiece_ball,
+        spindle_ball,
+        sensors: Some([[0.8, 0.0, -0.6], [0.0, -1.0, 0.0], [0.36, 0.48, 0.8]]),
+    })
+}
+
 /// States anywhere in reach.
 fn states(machine: &Machine, rows: usize, random: &mut impl Rng) -> Readings {
     let positions = machine.axes.iter().map(|axis| {
@@ -57,30 +68,29 @@ fn states(machine: &Machine, rows: usize, random: &mut impl Rng) -> Readings {
 }
 
 /// A tenth of a millimetre and a tenth of a degree: large enough that second derivatives count.
-fn errors(slots: usize, machine: &Machine, random: &mut impl Rng) -> SlotValues {
+fn errors(slots: usize, machine: &Machine, kind: InstrumentKind, random: &mut impl Rng) -> SlotValues {
     let mut values = SlotValues::zero(slots);
     for (slot, value) in values.constant.iter_mut().enumerate() {
-        *value = uniform(random, if is_angle(machine, slot) { 2e-3 } else { 0.1 });
+        *value = uniform(random, if is_angle(machine, kind, slot) { 2e-3 } else { 0.1 });
     }
     values
 }
 
-/// Whether a slot of a machine, of its tracker or of a probe's artefact is an angle; a ball bar's gain is varied as one.
-fn is_angle(machine: &Machine, slot: usize) -> bool {
-    let errors = machine.error_slots();
-    if slot < errors {
-        slot % ERRORS_PER_AXIS % 6 >= 3
-    } else {
-        (errors + 3..errors + 6).contains(&slot)
+/// Whether a slot of a machine or of its instrument is an angle; a ball bar's gain is varied as a length.
+fn is_angle(machine: &Machine, kind: InstrumentKind, slot: usize) -> bool {
+    match slot.checked_sub(machine.error_slots()) {
+        None => slot % ERRORS_PER_AXIS % 6 >= 3,
+        Some(place) => kind.unknowns()[place].unit == InsideUnit::Radian,
     }
 }
 
 /// The worst relative difference between the derivatives by dual numbers and by central differences.
 fn worst(machine: &Machine, station: Station<f64>, random: &mut impl Rng) -> f64 {
     let readings = states(machine, 6, random);
+    let kind = station.kind();
     let model = TestModel::new(machine, station, &readings);
     let slots: Vec<usize> = (0..model.slots()).collect();
-    let values = errors(model.slots(), machine, random);
+    let values = errors(model.slots(), machine, kind, random);
     let dual = model.sensitivities(&values, &slots, 0..model.rows());
     assert_eq!(dual.readings_mm.len(), model.rows() * model.coordinates());
     for (dual, plain) in dual.readings_mm.iter().zip(model.readings_mm(&values)) {
@@ -88,7 +98,7 @@ fn worst(machine: &Machine, station: Station<f64>, random: &mut impl Rng) -> f64
     }
     let mut worst = 0.0_f64;
     for slot in slots {
-        let (step, least) = if is_angle(machine, slot) {
+        let (step, least) = if is_angle(machine, kind, slot) {
             (1e-4, 1.0)
         } else {
             (1e-2, 1e-2)
@@ -115,7 +125,13 @@ fn dual_numbers_agree_with_central_differences_on_every_topology() {
         for machine in topologies::all(&mut random) {
             let mut point = || [(); 3].map(|()| uniform(&mut random, 300.0));
             let (table, tool) = (point(), point());
-            for station in [ball_bar(table, tool), tracker(tool), probe(table, tool)] {
+            for station in [
+                ball_bar(table, tool),
+                tracker(tool),
+                probe(table, tool),
+                r_test(Setting::Table, table, tool),
+                r_test(Setting::Spindle, table, tool),
+            ] {
                 let kind = station.kind();
                 let worst = worst(&machine, station, &mut random);
                 // Differences over 1e-4 rad miss by that squared times the lever: 5 m of a cylinder in place of 300 mm.

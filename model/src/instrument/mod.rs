@@ -4,6 +4,7 @@
 
 pub mod ballbar;
 pub mod probe;
+pub mod rtest;
 pub mod socket;
 pub mod tracker;
 
@@ -50,21 +51,24 @@ pub enum InstrumentKind {
     Socket,
     /// A touch probe.
     Probe,
+    /// An R-test: three displacement sensors about a ball.
+    RTest,
 }
 
 impl InstrumentKind {
     /// All kinds.
-    pub const ALL: [InstrumentKind; 4] = [
+    pub const ALL: [InstrumentKind; 5] = [
         InstrumentKind::BallBar,
         InstrumentKind::Tracker,
         InstrumentKind::Socket,
         InstrumentKind::Probe,
+        InstrumentKind::RTest,
     ];
 
     /// Whether a reading lies between a point of the table and one of the tool, so that errors of both sides move it.
     pub fn is_two_sided(self) -> bool {
         match self {
-            InstrumentKind::BallBar | InstrumentKind::Probe => true,
+            InstrumentKind::BallBar | InstrumentKind::Probe | InstrumentKind::RTest => true,
             InstrumentKind::Tracker | InstrumentKind::Socket => false,
         }
     }
@@ -76,6 +80,7 @@ impl InstrumentKind {
             InstrumentKind::Tracker => "tracker",
             InstrumentKind::Socket => "socket",
             InstrumentKind::Probe => "probe",
+            InstrumentKind::RTest => "r-test",
         }
     }
 
@@ -83,7 +88,7 @@ impl InstrumentKind {
     pub fn coordinates(self) -> usize {
         match self {
             InstrumentKind::BallBar | InstrumentKind::Probe => 1,
-            InstrumentKind::Tracker | InstrumentKind::Socket => 3,
+            InstrumentKind::Tracker | InstrumentKind::Socket | InstrumentKind::RTest => 3,
         }
     }
 
@@ -94,6 +99,7 @@ impl InstrumentKind {
             InstrumentKind::Tracker => &tracker::UNKNOWNS,
             InstrumentKind::Socket => &socket::UNKNOWNS,
             InstrumentKind::Probe => &probe::UNKNOWNS,
+            InstrumentKind::RTest => &rtest::UNKNOWNS,
         }
     }
 }
@@ -107,6 +113,8 @@ pub enum SharedBy {
     SpindleSetup,
     /// Tests of one `bar_setup`: the bar as it is assembled.
     BarSetup,
+    /// Tests of one mount of an R-test's sensors: of one `setup` where they stand on the table, of one `spindle_setup` where they sit in the spindle.
+    Sensors,
     /// Tests of one `socket`.
     Socket,
     /// All tests of the session.
@@ -117,9 +125,9 @@ pub enum SharedBy {
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct InstrumentUnknown {
     /// The thing: `workpiece_ball`, `spindle_ball`, `bar`, `tracker`, `target`, `socket`, `ball`, `artefact`, `radius`,
-    /// `form`, `stylus`, `gain`.
+    /// `form`, `stylus`, `sensor`, `gain`.
     pub thing: &'static str,
-    /// Its coordinate, `x` … `c`, or empty.
+    /// Its coordinate, `x` … `c`, `omega`, `phi`, `theta`, or empty.
     pub coordinate: &'static str,
     /// The unit inside.
     pub unit: InsideUnit,
@@ -173,6 +181,8 @@ pub enum Station<N> {
     Socket(socket::Socket<N>),
     /// A touch probe.
     Probe(probe::Probe<N>),
+    /// An R-test.
+    RTest(rtest::RTest<N>),
 }
 
 impl<N> Station<N> {
@@ -201,6 +211,12 @@ impl<N> Station<N> {
                 stylus: point(&probe.stylus),
                 direction: probe.direction.as_ref().map(point),
             }),
+            Station::RTest(rtest) => Station::RTest(rtest::RTest {
+                setting: rtest.setting,
+                workpiece_ball: point(&rtest.workpiece_ball),
+                spindle_ball: point(&rtest.spindle_ball),
+                sensors: rtest.sensors.as_ref().map(|rows| rows.each_ref().map(point)),
+            }),
         }
     }
 
@@ -211,6 +227,7 @@ impl<N> Station<N> {
             Station::Tracker(_) => InstrumentKind::Tracker,
             Station::Socket(_) => InstrumentKind::Socket,
             Station::Probe(_) => InstrumentKind::Probe,
+            Station::RTest(_) => InstrumentKind::RTest,
         }
     }
 
@@ -231,6 +248,7 @@ impl<N> Station<N> {
             Station::Tracker(tracker) => Reading::vector(tracker.read(machine, state, errors, unknown).0),
             Station::Socket(socket) => Reading::vector(socket.read(machine, state, errors, unknown).0),
             Station::Probe(probe) => Reading::length(probe.read(machine, state, errors, unknown)),
+            Station::RTest(rtest) => Reading::vector(rtest.read(machine, state, errors, unknown).0),
         }
     }
 
@@ -242,6 +260,7 @@ impl<N> Station<N> {
         match self {
             Station::BallBar(bar) => Some(bar.workpiece_ball),
             Station::Probe(probe) => Some(probe.artefact),
+            Station::RTest(rtest) => Some(rtest.workpiece_ball),
             Station::Tracker(_) | Station::Socket(_) => None,
         }
     }
@@ -256,6 +275,7 @@ impl<N> Station<N> {
             Station::Tracker(tracker) => tracker.target,
             Station::Socket(socket) => socket.ball,
             Station::Probe(probe) => probe.stylus,
+            Station::RTest(rtest) => rtest.spindle_ball,
         }
     }
 }

@@ -20,6 +20,7 @@ use std::path::PathBuf;
 use crate::chain::Machine;
 use crate::component::ErrorName;
 use crate::effect::Effect;
+use crate::instrument::rtest::Setting;
 use crate::instrument::{InstrumentKind, SharedBy, Station};
 use readings::Readings;
 
@@ -86,6 +87,10 @@ impl Test {
             SharedBy::Setup => &self.setup,
             SharedBy::SpindleSetup => &self.spindle_setup,
             SharedBy::BarSetup => &self.bar_setup,
+            SharedBy::Sensors => match &self.station {
+                Station::RTest(rtest) if rtest.setting == Setting::Spindle => &self.spindle_setup,
+                _ => &self.setup,
+            },
             SharedBy::Socket => self.socket.as_deref().unwrap_or(""),
             SharedBy::Session => "",
         }

@@ -90,6 +90,28 @@ pub enum FollowOffset {
     Axial,
     /// No bar: the tool point stays on the point of the table over which it stands before the axis turns.
     None,
+    /// No bar: the tool point stays on the instrument's point of the table.
+    Touching,
+}
+
+/// How many times the speed of the ball on its circle of `radius_mm` the programmed feed is, where a control reads a degree as a millimetre: with
+/// the ball at `v = R·ω` and the rotary axis at `v·180/(π·R)` degrees,
+///
+/// ```text
+/// F = v · √(1 + (180/(π·R))²)
+/// ```
+///
+/// so that the ball goes at `F` *divided* by the root. Eq. (12) of Yamaji, Hamabata & Ihara (2014) multiplies: it gives the feed to be programmed
+/// for a wanted speed, not the actual speed under a programmed feed.
+///
+/// ```
+/// use abbe_model::session::motion::programmed_over_path_feed;
+///
+/// // On a circle of 180/π mm a degree is a millimetre.
+/// assert!((programmed_over_path_feed(180.0 / std::f64::consts::PI) - 2.0_f64.sqrt()).abs() < 1e-12);
+/// ```
+pub fn programmed_over_path_feed(radius_mm: f64) -> f64 {
+    1.0_f64.hypot(180.0 / (std::f64::consts::PI * radius_mm))
 }
 
 /// The states that a test is planned to read at: positions, runs and times, with nothing observed yet.

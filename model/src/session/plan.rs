@@ -13,6 +13,9 @@ use crate::instrument::ballbar::BallBar;
 
 /// Pause between two traversals, s.
 const BETWEEN_RUNS_S: f64 = 3.0;
+/// Steps in a millimetre to which planned positions are rounded: far finer than a control resolves and far coarser than a solve rounds, so that an axis that
+/// need not move does not.
+const STEPS_IN_A_MM: f64 = 1e10;
 /// How far the balls may miss the path that was asked for, mm.
 const MISSED_MM: f64 = 1e-6;
 
@@ -75,7 +78,7 @@ pub(super) fn states(machine: &Machine, test: &Test, motion: &Motion) -> Result<
             let Some(mut bar) = pair(&test.station) else {
                 return Err((
                     format!("test \"{}\" follows no point of the table", test.name),
-                    "a path of kind \"follow\" needs a ball bar or a probe".into(),
+                    "a path of kind \"follow\" needs a ball bar, an R-test or a probe".into(),
                 ));
             };
             if *offset == FollowOffset::None {
@@ -87,7 +90,10 @@ pub(super) fn states(machine: &Machine, test: &Test, motion: &Motion) -> Result<
                 let mut at = test.at.clone();
                 at[*axis] = q;
                 let wanted = offset_vector(machine, &bar, &at, *axis, *offset)?;
-                let (state, missed) = placed(machine, &bar, &at, &linear, wanted);
+                let (mut state, missed) = placed(machine, &bar, &at, &linear, wanted);
+                for axis in &linear {
+                    state[*axis] = (state[*axis] * STEPS_IN_A_MM).round() / STEPS_IN_A_MM + 0.0;
+                }
                 if missed > MISSED_MM {
                     return Err((
                         format!(
@@ -322,7 +328,7 @@ fn offset_vector(
     let radial: [f64; 3] = std::array::from_fn(|i| from[i] - height * along[i]);
     let radius = radial.iter().map(|x| x * x).sum::<f64>().sqrt();
     let unit = match offset {
-        FollowOffset::None => [0.0; 3],
+        FollowOffset::None | FollowOffset::Touching => [0.0; 3],
         FollowOffset::Axial => along,
         _ if radius < 1e-6 => {
             return Err((

@@ -1,11 +1,11 @@
-//! Whether a ball bar can lie between its balls where the session says that they are.
+//! Whether an instrument reaches where the session says that it is: a bar between its balls, a stylus before its artefact, a ball in its nest.
 
 use super::Test;
 use super::readings::Readings;
 use crate::chain::{BodyErrors, Machine};
 use crate::instrument::Station;
 
-/// A ball bar's sensor moves a millimetre or two; beyond this something else than an error of the machine is wrong, mm.
+/// A ball bar's sensor moves a millimetre or two, those of an R-test a few; beyond this something else than an error of the machine is wrong, mm.
 const MOST_MM: f64 = 5.0;
 
 /// The calibrated length of a ball bar; 0 for other instruments.
@@ -21,6 +21,7 @@ pub(crate) fn check(machine: &Machine, test: &Test, readings: &Readings) -> Resu
     let bar = match &test.station {
         Station::BallBar(bar) => bar,
         Station::Probe(_) => return check_touch(machine, test, readings),
+        Station::RTest(_) => return check_nest(machine, test, readings),
         Station::Tracker(_) | Station::Socket(_) => return Ok(()),
     };
     let none = vec![BodyErrors::<f64>::NONE; machine.axes.len()];
@@ -74,10 +75,36 @@ fn check_touch(machine: &Machine, test: &Test, readings: &Readings) -> Result<()
     Ok(())
 }
 
-/// That the bar read about its own length.
+/// That the master ball nominally lies in the nest wherever a reading is taken.
+fn check_nest(machine: &Machine, test: &Test, readings: &Readings) -> Result<(), (String, String)> {
+    let none = vec![BodyErrors::<f64>::NONE; machine.axes.len()];
+    let mut state = Vec::new();
+    for row in 0..readings.rows() {
+        readings.state(machine, row, &mut state);
+        let reading = test.station.read::<f64>(machine, &state, &none, |_| None);
+        let apart = reading.coordinates().iter().map(|x| x * x).sum::<f64>().sqrt();
+        if apart > MOST_MM {
+            return Err((
+                format!(
+                    "test \"{}\", reading {}: the master ball nominally lies {apart:.3} mm from the centre of the sensors; {MOST_MM} mm is the most",
+                    test.name,
+                    row + 1
+                ),
+                "check `workpiece_ball_mm`, `spindle_ball_mm` and the axis positions in `at` and the data: the linear axes \
+                 have to follow the rotary one"
+                    .into(),
+            ));
+        }
+    }
+    Ok(())
+}
+
+/// That the bar read about its own length, the sensors of an R-test within their range.
 pub(crate) fn check_lengths(test: &Test, readings: &Readings) -> Result<(), (String, String)> {
-    let Station::BallBar(bar) = &test.station else {
-        return Ok(());
+    let bar = match &test.station {
+        Station::BallBar(bar) => bar,
+        Station::RTest(_) => return check_sensors(test, readings),
+        _ => return Ok(()),
     };
     let mut off: Vec<f64> = readings.observed.iter().map(|length| length - bar.bar).collect();
     let read = bar.bar + median(&mut off);
@@ -92,6 +119,24 @@ pub(crate) fn check_lengths(test: &Test, readings: &Readings) -> Result<(), (Str
             off.len()
         ),
         "is the column a deviation from `bar_mm` rather than a length, or in another unit than its name says?".into(),
+    ))
+}
+
+fn check_sensors(test: &Test, readings: &Readings) -> Result<(), (String, String)> {
+    let mut sizes: Vec<f64> = readings.observed.iter().map(|value| value.abs()).collect();
+    let read = median(&mut sizes);
+    if read <= MOST_MM {
+        return Ok(());
+    }
+    Err((
+        format!(
+            "test \"{}\": the sensors read {read:.3} mm (median of {} values); {MOST_MM} mm is the most",
+            test.name,
+            sizes.len()
+        ),
+        "are the columns in another unit than their name says, or counted from another zero than the ball in the middle \
+         of the nest?"
+            .into(),
     ))
 }
 

@@ -7,10 +7,11 @@ use std::path::{Path, PathBuf};
 use super::document::Source;
 use super::read::quantity;
 use super::readings::Readings;
+use super::table::r_test_columns;
 use crate::chain::Machine;
 use crate::effect::{Driver, Effect, Shape};
 use crate::error::ModelError;
-use crate::instrument::InstrumentKind;
+use crate::instrument::Station;
 
 /// Writes readings as a CSV file with our column names: whole or not at all.
 ///
@@ -21,14 +22,14 @@ use crate::instrument::InstrumentKind;
 pub fn readings(
     path: &Path,
     machine: &Machine,
-    instrument: InstrumentKind,
+    station: &Station<f64>,
     readings: &Readings,
 ) -> Result<(), ModelError> {
-    whole_file(path, &readings_text(machine, instrument, readings))
+    whole_file(path, &readings_text(machine, station, readings))
 }
 
 /// The text of [`readings`].
-pub fn readings_text(machine: &Machine, instrument: InstrumentKind, readings: &Readings) -> String {
+pub fn readings_text(machine: &Machine, station: &Station<f64>, readings: &Readings) -> String {
     let mut header = Vec::new();
     if !readings.time_s.is_empty() {
         header.push("time_s".to_string());
@@ -46,12 +47,15 @@ pub fn readings_text(machine: &Machine, instrument: InstrumentKind, readings: &R
     if !readings.temperature_c.is_empty() {
         header.push("temperature_c".into());
     }
-    match instrument {
-        InstrumentKind::BallBar => header.push("length_mm".into()),
-        InstrumentKind::Tracker => header.extend(["px_mm", "py_mm", "pz_mm"].map(String::from)),
+    match station {
+        Station::BallBar(_) => header.push("length_mm".into()),
+        Station::Tracker(_) => header.extend(["px_mm", "py_mm", "pz_mm"].map(String::from)),
         // A pose of a socket is the axes' positions and nothing else.
-        InstrumentKind::Socket => {}
-        InstrumentKind::Probe => header.push("distance_mm".into()),
+        Station::Socket(_) => {}
+        Station::Probe(_) => header.push("distance_mm".into()),
+        Station::RTest(rtest) => {
+            header.extend(r_test_columns(rtest.sensors.is_some()).map(|name| format!("{name}_mm")));
+        }
     }
     let mut text = header.join(",");
     text.push('\n');
@@ -69,7 +73,7 @@ pub fn readings_text(machine: &Machine, instrument: InstrumentKind, readings: &R
         if let Some(temperature) = readings.temperature_c.get(row) {
             cells.push(decimal(*temperature));
         }
-        if instrument != InstrumentKind::Socket {
+        if !matches!(station, Station::Socket(_)) {
             let start = row * readings.coordinates;
             for k in start..start + readings.coordinates {
                 cells.push(readings.observed.get(k).map_or(String::new(), |mm| decimal(*mm)));

@@ -3,14 +3,13 @@
 use super::{DATA, MACHINE, SESSION, holds, session, told, with_data, with_session, without_tests};
 
 #[test]
-fn instruments_that_are_not_built() {
-    holds(
-        &with_session("\"ballbar\"", "\"r-test\""),
-        &["session.toml:5", "\"r-test\" is not built yet"],
-    );
+fn instruments_that_there_are_not() {
     holds(
         &with_session("\"ballbar\"", "\"bar\""),
-        &["\"ballbar\", \"tracker\", \"socket\" or \"probe\" is expected"],
+        &[
+            "session.toml:5",
+            "\"ballbar\", \"r-test\", \"probe\", \"tracker\" or \"socket\" is expected",
+        ],
     );
     holds(
         &with_session("\"ballbar\"", "\"tracker\""),
@@ -113,4 +112,152 @@ at = { x_mm = 45, y_mm = 0, z_mm = 0, a_deg = 0 }
     }
     let named = session(MACHINE, &probe, Some("c_deg,length_mm\n0,1\n90,2\n"));
     assert!(told(named).contains("`length_mm`, which is not known"));
+}
+
+/// An R-test that cannot be: what is changed in a good one, and what is told.
+#[test]
+fn sensors_that_cannot_read() {
+    const TEST: &str = r#"[[test]]
+name = "BK2"
+data = "C100.csv"
+setting = "E"
+workpiece_ball_mm = [100, 0, 50]
+spindle_ball_mm = [0, 0, 0]
+sensor_angles_deg = [135, -35.264, 0]
+at = { y_mm = 0, z_mm = 50, a_deg = 0 }
+"#;
+    const DATA: &str = "c_deg,x_mm,y_mm,du_um,dv_um,dw_um\n0,100,0,1.5,0,2\n90,0,100,-2,1,3\n";
+    let good = without_tests().replace("ballbar", "r-test") + &TEST.replace("y_mm = 0, ", "");
+    let read = |from: &str, to: &str, data: (&str, &str)| {
+        assert!(good.contains(from) && DATA.contains(data.0), "{from} {}", data.0);
+        session(
+            MACHINE,
+            &good.replacen(from, to, 1),
+            Some(&DATA.replace(data.0, data.1)),
+        )
+    };
+    let readings = read("", "", ("", "")).unwrap().tests.remove(0).readings.unwrap();
+    assert_eq!(readings.observed, [1.5e-3, 0.0, 2.0e-3, -2.0e-3, 1.0e-3, 3.0e-3]);
+    let angles = "sensor_angles_deg = [135, -35.264, 0]";
+    for (from, to, expected) in [
+        (
+            "setting = \"E\"\n",
+            "",
+            &["session.toml:8", "no `setting`", "\"Es\""][..],
+        ),
+        (
+            "\"E\"",
+            "\"F\"",
+            &["session.toml:11", "the text \"F\"", "sensors in the spindle"],
+        ),
+        (
+            "workpiece_ball_mm = [100, 0, 50]\n",
+            "",
+            &["session.toml:8", "no `workpiece_ball_mm`", "table frame"],
+        ),
+        (
+            "spindle_ball_mm",
+            "bar_mm = 100\nspindle_ball_mm",
+            &["session.toml:13", "`bar_mm` belongs to a ballbar"],
+        ),
+        (
+            angles,
+            "sensor_angles_deg = [135, 0]",
+            &["session.toml:14", "three angles"],
+        ),
+        (
+            angles,
+            "sensor_angles_deg = [135, nan, 0]",
+            &["session.toml:14", "`sensor_angles_deg` is NaN"],
+        ),
+        (
+            angles,
+            "sensor_angles_deg = [135, -35.264, 0]\nsensor_directions = [[1, 0, 0], [0, 1, 0], [0, 0, 1]]",
+            &[
+                "session.toml:15",
+                "both `sensor_angles_deg` and `sensor_directions`",
+                "keep one",
+            ],
+        ),
+        (
+            angles,
+            "sensor_directions = [[1, 0, 0], [0, 1, 0], [1, 1, 0.01]]",
+            &["session.toml:14", "almost in a plane", "0.007", "three ways"],
+        ),
+        (
+            angles,
+            "sensor_directions = [[1, 0, 0], [0, 0, 0], [1, 1, 0.01]]",
+            &["session.toml:14", "`sensor_directions` has no length"],
+        ),
+        (
+            angles,
+            "sensor_u_arcsec = -1",
+            &["session.toml:14", "`sensor_u_arcsec` is -1", "cannot be negative"],
+        ),
+        (
+            angles,
+            "",
+            &[
+                "C100.csv:1",
+                "column 4 is called `du_um`",
+                "needs `dx_um`, `dy_um` and `dz_um`",
+            ],
+        ),
+        (
+            "[100, 0, 50]",
+            "[100, 6, 50]",
+            &[
+                "session.toml:8",
+                "reading 1",
+                "6.000 mm from the centre of the sensors",
+            ],
+        ),
+        (
+            angles,
+            "path = { kind = \"follow\", axis = \"C\", offset = \"radial\", step_deg = 10 }",
+            &[
+                "session.toml:14",
+                "`offset` is the direction of a bar",
+                "leave it out",
+            ],
+        ),
+        (
+            angles,
+            "path = { kind = \"follow\", axis = \"C\", step_deg = 10, feed_mm_min = 10, programmed_feed_mm_min = 10 }",
+            &[
+                "session.toml:14",
+                "both `programmed_feed_mm_min` and `feed_mm_min`",
+            ],
+        ),
+    ] {
+        holds(&told(read(from, to, ("", ""))), expected);
+    }
+    for (from, to, expected) in [
+        (
+            "dw_um",
+            "dz_um",
+            &["C100.csv:1", "`dz_um`, which is not known", "what they count"][..],
+        ),
+        (",dw_um", ",temperature_c", &["C100.csv:1", "no column `dw_um`"]),
+        ("dv_um", "du_mm", &["C100.csv:1", "tell the same"]),
+        (
+            "_um",
+            "_m",
+            &["session.toml:8", "the sensors read", "another unit"],
+        ),
+    ] {
+        holds(&told(read("", "", (from, to))), expected);
+    }
+    let on_axis = good.replace("[100, 0, 50]", "[0, 0, 50]").replace(
+        angles,
+        "path = { kind = \"follow\", axis = \"C\", step_deg = 10, programmed_feed_mm_min = 10 }",
+    );
+    holds(
+        &told(session(MACHINE, &on_axis, Some(DATA))),
+        &[
+            "session.toml:14",
+            "`programmed_feed_mm_min` of a ball that lies on the axis",
+            "feed_deg_min",
+        ],
+    );
 }

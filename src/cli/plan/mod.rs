@@ -6,6 +6,8 @@ mod tables;
 
 use abbe::identify::plan::clearance::Clearance;
 use abbe::identify::plan::{self, PlanOptions};
+use abbe::model::instrument::Station;
+use abbe::model::instrument::rtest::Setting;
 use abbe::model::session::{Prior, Session};
 use clap::Args;
 
@@ -85,7 +87,7 @@ pub fn run(arguments: &PlanArguments) -> Result<(), Failure> {
     }
     let mut analysis = plan::analyse(&session, &options)?;
     if let Some(sizes) = &arguments.clearance_mm {
-        analysis.warnings.extend(clearance(sizes)?);
+        analysis.warnings.extend(clearance(&session, sizes)?);
     }
     tables::print(&analysis);
     if let Some(path) = &arguments.common.json {
@@ -127,8 +129,8 @@ fn next_test(arguments: &PlanArguments, session: &Session, options: &PlanOptions
     Ok(())
 }
 
-/// What would touch, with the device on the table and in the spindle.
-fn clearance(sizes: &str) -> Result<Vec<String>, Failure> {
+/// What would touch: with the device where the R-tests of the session have it, else on the table and in the spindle.
+fn clearance(session: &Session, sizes: &str) -> Result<Vec<String>, Failure> {
     let numbers: Vec<f64> = sizes
         .split(',')
         .filter_map(|size| size.trim().parse().ok())
@@ -152,23 +154,37 @@ fn clearance(sizes: &str) -> Result<Vec<String>, Failure> {
             "`--clearance-mm {sizes}`: every length has to be positive"
         )));
     }
-    let faults =
-        [(true, "device on the table"), (false, "device in the spindle")].map(|(device_on_table, words)| {
-            let clearance = Clearance {
-                spindle_mm,
-                table_mm,
-                device_height_mm,
-                device_width_mm,
-                shaft_mm,
-                jig_mm,
-                device_on_table,
-            };
-            clearance
-                .faults()
-                .into_iter()
-                .map(move |fault| format!("{words}: {fault}"))
-        });
-    Ok(faults.into_iter().flatten().collect())
+    let settings: Vec<Setting> = session
+        .tests
+        .iter()
+        .filter_map(|test| match &test.station {
+            Station::RTest(rtest) => Some(rtest.setting),
+            _ => None,
+        })
+        .collect();
+    let faults = [
+        (Setting::Table, "device on the table"),
+        (Setting::Spindle, "device in the spindle"),
+    ]
+    .into_iter()
+    .filter(|(setting, _)| settings.is_empty() || settings.contains(setting))
+    .flat_map(|(setting, words)| {
+        let device_on_table = setting == Setting::Table;
+        let clearance = Clearance {
+            spindle_mm,
+            table_mm,
+            device_height_mm,
+            device_width_mm,
+            shaft_mm,
+            jig_mm,
+            device_on_table,
+        };
+        clearance
+            .faults()
+            .into_iter()
+            .map(move |fault| format!("{words}: {fault}"))
+    });
+    Ok(faults.collect())
 }
 
 /// A length in µm that has to be positive, in mm.

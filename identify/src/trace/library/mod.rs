@@ -314,16 +314,17 @@ fn drivers(
     }
 }
 
-/// A translation is a simpler cause than a tilt that moves the point as much; the angle that an axis itself turns is no tilt.
+/// A translation is a simpler cause than a tilt that moves the point as much; the angle that an axis itself turns is no tilt, nor is the squareness of a
+/// linear axis, which slides askew and turns nothing.
 fn tilt_cost(problem: &Problem<'_>, component: &Component) -> f64 {
     match component {
         Component::Axis(name) if name.freedom.is_angle() => {
-            let own = problem
-                .session
-                .machine
-                .axis_index(&name.axis)
-                .map(|axis| problem.session.machine.axes[axis].own_freedom());
-            if own == Some(name.freedom) { 0.0 } else { 1.0 }
+            let machine = &problem.session.machine;
+            let axis = machine.axis_index(&name.axis).map(|axis| &machine.axes[axis]);
+            let own = axis.is_some_and(|axis| axis.own_freedom() == name.freedom);
+            let slides = axis.is_some_and(|axis| axis.kind == AxisKind::Linear);
+            let squareness = slides && name.kind == ErrorKind::Location;
+            if own || squareness { 0.0 } else { 1.0 }
         }
         _ => 0.0,
     }

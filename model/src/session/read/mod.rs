@@ -221,6 +221,9 @@ fn constants(root: &mut Table<'_>) -> Result<Vec<(String, f64)>, ModelError> {
     Ok(constants)
 }
 
+/// What `kind` of an instrument may be.
+const KINDS: &str = "\"ballbar\", \"r-test\", \"probe\", \"tracker\" or \"socket\"";
+
 struct Instrument {
     kind: InstrumentKind,
     noise_mm: Option<f64>,
@@ -231,17 +234,10 @@ impl Instrument {
     fn read(root: &mut Table<'_>) -> Result<Instrument, ModelError> {
         let value = root.need("instrument", "[instrument] with `kind = \"ballbar\"`")?;
         let mut table = value.table("[instrument]".into())?;
-        let value = table.need("kind", "\"ballbar\", \"tracker\", \"socket\" or \"probe\"")?;
+        let value = table.need("kind", KINDS)?;
         let word = value.text()?;
         let Some(kind) = InstrumentKind::ALL.into_iter().find(|kind| kind.word() == word) else {
-            if word == "r-test" {
-                let help = "ballbar, tracker, socket and probe are";
-                return Err(value.error(
-                    format!("the instrument \"{word}\" is not built yet"),
-                    Some(help.into()),
-                ));
-            }
-            return Err(value.unlike("\"ballbar\", \"tracker\", \"socket\" or \"probe\""));
+            return Err(value.unlike(KINDS));
         };
         let mut not_negative = |key: &'static str| -> Result<Option<f64>, ModelError> {
             let Some(value) = table.take(key) else {

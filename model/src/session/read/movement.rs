@@ -5,7 +5,7 @@ use crate::axis::AxisKind;
 use crate::error::ModelError;
 use crate::instrument::Station;
 use crate::session::document::{Table, Value};
-use crate::session::motion::{FollowOffset, MOST_READINGS, Motion};
+use crate::session::motion::{FollowOffset, MOST_READINGS, Motion, programmed_over_path_feed};
 
 /// Feed of a linear axis or a circle where none is stated, mm/s: 1000 mm/min.
 const DEFAULT_FEED_MM_S: f64 = 1000.0 / 60.0;
@@ -111,7 +111,7 @@ fn circle(context: &Context<'_>, mut table: Table<'_>) -> Result<Motion, ModelEr
 fn follow(context: &Context<'_>, mut table: Table<'_>, station: &Station<f64>) -> Result<Motion, ModelError> {
     if station.table_point_mm().is_none() {
         return Err(table.error(
-            "a path of kind \"follow\" needs an instrument that holds a point of the table: a ball bar or a probe",
+            "a path of kind \"follow\" needs an instrument that holds a point of the table: a ball bar, an R-test or a probe",
             None,
         ));
     }
@@ -133,11 +133,24 @@ fn follow(context: &Context<'_>, mut table: Table<'_>, station: &Station<f64>) -
                 _ => return Err(offset.unlike("\"radial\", \"tangential\" or \"axial\"")),
             }
         }
+        Station::RTest(_) => {
+            if let Some(offset) = table.take("offset") {
+                return Err(offset.source.error(
+                    offset.key_span.clone(),
+                    "`offset` is the direction of a bar; an R-test has none and reads all three directions at once",
+                    Some("leave it out; `abbe fit --views` parts radial, tangential and axial".into()),
+                ));
+            }
+            FollowOffset::Touching
+        }
         // Nothing of a fixed length lies between the points.
         _ => FollowOffset::None,
     };
     let way = Way::read(&mut table, kind, false)?;
-    let speed = speed(context, &mut table, axis, station)?;
+    let speed = match table.take("programmed_feed_mm_min") {
+        Some(feed) => programmed_speed(context, &mut table, axis, station, &feed)?,
+        None => speed(context, &mut table, axis, station)?,
+    };
     let (runs, both_directions) = repeats(&mut table, way.steps())?;
     table.finish()?;
     Ok(Motion::Follow {
@@ -257,23 +270,52 @@ fn speed(
         (AxisKind::Rotary, None, None) => Ok(DEFAULT_TURN_RAD_S),
         (AxisKind::Rotary, Some(feed), None) => {
             let feed_mm_s = feed.positive()? / 60.0;
-            let carried = match station {
-                station if axis < context.machine.workpiece_side => {
-                    station.table_point_mm().unwrap_or(station.tool_point_mm())
-                }
-                station => station.tool_point_mm(),
-            };
-            let radius = radius_about(&context.machine.axes[axis], carried);
-            if radius < 1e-3 {
-                let help = "give `feed_deg_min`";
-                return Err(feed.error(
-                    "`feed_mm_min` of a ball that lies on the axis it turns about",
-                    Some(help.into()),
-                ));
-            }
-            Ok(feed_mm_s / radius)
+            Ok(feed_mm_s / carried_radius(context, axis, station, &feed)?)
         }
     }
+}
+
+/// The speed of a rotary axis that linear axes follow, from the feed as programmed.
+fn programmed_speed(
+    context: &Context<'_>,
+    table: &mut Table<'_>,
+    axis: usize,
+    station: &Station<f64>,
+    feed: &Value<'_>,
+) -> Result<f64, ModelError> {
+    let feed_mm_s = feed.positive()? / 60.0;
+    for key in ["feed_mm_min", "feed_deg_min"] {
+        if let Some(other) = table.take(key) {
+            let help = "the programmed feed already says how fast the ball goes: keep one of them";
+            return Err(other.error(
+                format!("both `programmed_feed_mm_min` and `{key}`"),
+                Some(help.into()),
+            ));
+        }
+    }
+    let radius = carried_radius(context, axis, station, feed)?;
+    Ok(feed_mm_s / programmed_over_path_feed(radius) / radius)
+}
+
+/// How far from a rotary axis the ball lies that it carries, mm.
+fn carried_radius(
+    context: &Context<'_>,
+    axis: usize,
+    station: &Station<f64>,
+    feed: &Value<'_>,
+) -> Result<f64, ModelError> {
+    let carried = match station {
+        station if axis < context.machine.workpiece_side => {
+            station.table_point_mm().unwrap_or(station.tool_point_mm())
+        }
+        station => station.tool_point_mm(),
+    };
+    let radius = radius_about(&context.machine.axes[axis], carried);
+    if radius < 1e-3 {
+        let message = format!("`{}` of a ball that lies on the axis it turns about", feed.key);
+        return Err(feed.error(message, Some("give `feed_deg_min`".into())));
+    }
+    Ok(radius)
 }
 
 /// Distance of a point from an axis, all axes at zero.

@@ -55,6 +55,7 @@ fn nominal(station: &Station<f64>, group: SharedBy) -> [f64; 3] {
         (Station::BallBar(bar), SharedBy::BarSetup) => [bar.bar, 0.0, 0.0],
         (Station::Tracker(_), SharedBy::Setup) => [0.0; 3],
         (Station::Probe(probe), SharedBy::Setup) => probe.artefact,
+        (Station::RTest(rtest), SharedBy::Setup) => rtest.workpiece_ball,
         (station, _) => station.tool_point_mm(),
     }
 }

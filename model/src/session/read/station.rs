@@ -3,8 +3,10 @@
 use super::Context;
 use super::quantity::MICROMETRE;
 use crate::error::ModelError;
+use crate::frames::{Point, Rotation};
 use crate::instrument::ballbar::BallBar;
 use crate::instrument::probe::Probe;
+use crate::instrument::rtest::{Orientation, RTest, Setting};
 use crate::instrument::socket::Socket;
 use crate::instrument::tracker::Tracker;
 use crate::instrument::{InstrumentKind, Station};
@@ -20,8 +22,8 @@ pub(super) struct SetUp {
     pub socket: Option<String>,
 }
 
-/// Keys of a test that only one instrument has.
-const OWN: [(InstrumentKind, &[&str]); 4] = [
+/// Keys of a test that not every instrument has.
+const OWN: [(InstrumentKind, &[&str]); 5] = [
     (
         InstrumentKind::BallBar,
         &[
@@ -32,6 +34,19 @@ const OWN: [(InstrumentKind, &[&str]); 4] = [
             "spindle_ball_mm",
             "spindle_ball_u_um",
             "bar_setup",
+        ],
+    ),
+    (
+        InstrumentKind::RTest,
+        &[
+            "setting",
+            "workpiece_ball_mm",
+            "workpiece_ball_u_um",
+            "spindle_ball_mm",
+            "spindle_ball_u_um",
+            "sensor_angles_deg",
+            "sensor_directions",
+            "sensor_u_arcsec",
         ],
     ),
     (InstrumentKind::Tracker, &["target_mm", "target_u_um"]),
@@ -54,11 +69,10 @@ const OWN: [(InstrumentKind, &[&str]); 4] = [
 
 /// Takes the instrument's keys out of a test.
 pub(super) fn set_up(context: &Context<'_>, table: &mut Table<'_>) -> Result<SetUp, ModelError> {
+    let own = OWN.iter().find(|(kind, _)| *kind == context.instrument);
+    let own = own.map_or(&[][..], |(_, keys)| keys);
     for (kind, keys) in OWN {
-        if kind == context.instrument {
-            continue;
-        }
-        for key in keys {
+        for key in keys.iter().filter(|key| !own.contains(key)) {
             if let Some(value) = table.take(key) {
                 let message = format!(
                     "`{key}` belongs to a {}; this session's instrument is a {}",
@@ -74,6 +88,7 @@ pub(super) fn set_up(context: &Context<'_>, table: &mut Table<'_>) -> Result<Set
         InstrumentKind::Tracker => tracker(context, table),
         InstrumentKind::Socket => socket(context, table),
         InstrumentKind::Probe => probe(context, table),
+        InstrumentKind::RTest => r_test(context, table),
     }
 }
 
@@ -83,18 +98,11 @@ fn ball_bar(context: &Context<'_>, table: &mut Table<'_>) -> Result<SetUp, Model
     if bar_mm <= 0.0 {
         return Err(bar.error(format!("`bar_mm` is {bar_mm}; a bar has a length above 0"), None));
     }
-    let workpiece = table.need(
-        "workpiece_ball_mm",
-        "the workpiece ball in the table frame, as [0, 100, 0]",
-    )?;
-    let spindle = table.need(
-        "spindle_ball_mm",
-        "the spindle ball in the tool frame, as [0, 0, 0]",
-    )?;
-    let (workpiece, workpiece_mm) = context.point(workpiece)?;
-    let (spindle, spindle_mm) = context.point(spindle)?;
-    let mut priors = priors(table.take("workpiece_ball_u_um"), 3)?;
-    priors.extend(self::priors(table.take("spindle_ball_u_um"), 3)?);
+    let Balls {
+        workpiece: (workpiece, workpiece_mm),
+        spindle: (spindle, spindle_mm),
+        mut priors,
+    } = balls(context, table)?;
     priors.extend(self::priors(table.take("bar_u_um"), 1)?);
     priors.push(Prior::Known); // the sensor's gain
     Ok(SetUp {
@@ -112,6 +120,112 @@ fn ball_bar(context: &Context<'_>, table: &mut Table<'_>) -> Result<SetUp, Model
         socket: None,
     })
 }
+
+/// The point on the table and the one in the spindle, as written and in mm, and what is known of them.
+struct Balls {
+    workpiece: ([Length; 3], [f64; 3]),
+    spindle: ([Length; 3], [f64; 3]),
+    priors: Vec<Prior>,
+}
+
+fn balls(context: &Context<'_>, table: &mut Table<'_>) -> Result<Balls, ModelError> {
+    let workpiece = table.need(
+        "workpiece_ball_mm",
+        "the workpiece ball in the table frame, as [0, 100, 0]",
+    )?;
+    let spindle = table.need(
+        "spindle_ball_mm",
+        "the spindle ball in the tool frame, as [0, 0, 0]",
+    )?;
+    let (workpiece, spindle) = (context.point(workpiece)?, context.point(spindle)?);
+    let mut priors = priors(table.take("workpiece_ball_u_um"), 3)?;
+    priors.extend(self::priors(table.take("spindle_ball_u_um"), 3)?);
+    Ok(Balls {
+        workpiece,
+        spindle,
+        priors,
+    })
+}
+
+fn r_test(context: &Context<'_>, table: &mut Table<'_>) -> Result<SetUp, ModelError> {
+    const SETTINGS: &str = "\"E\" (sensors on the table) or \"Es\" (sensors in the spindle)";
+    let setting = table.need("setting", SETTINGS)?;
+    let setting = match setting.text()?.as_str() {
+        "E" => Setting::Table,
+        "Es" => Setting::Spindle,
+        _ => return Err(setting.unlike(SETTINGS)),
+    };
+    let Balls {
+        workpiece: (workpiece, workpiece_mm),
+        spindle: (spindle, spindle_mm),
+        mut priors,
+    } = balls(context, table)?;
+    let sensors = sensors(table)?;
+    priors.extend(angle_priors(table.take("sensor_u_arcsec"))?);
+    Ok(SetUp {
+        station: Station::RTest(RTest {
+            setting,
+            workpiece_ball: workpiece_mm,
+            spindle_ball: spindle_mm,
+            sensors,
+        }),
+        geometry: Station::RTest(RTest {
+            setting,
+            workpiece_ball: workpiece,
+            spindle_ball: spindle,
+            sensors: sensors.map(|rows| rows.map(|row| row.map(Length::Number))),
+        }),
+        priors,
+        socket: None,
+    })
+}
+
+/// The directions along which three sensors count: ω, φ, θ, or the directions themselves; `None` where readings come in X, Y, Z.
+fn sensors(table: &mut Table<'_>) -> Result<Option<[[f64; 3]; 3]>, ModelError> {
+    let (angles, directions) = (table.take("sensor_angles_deg"), table.take("sensor_directions"));
+    match (angles, directions) {
+        (Some(_), Some(directions)) => Err(directions.source.error(
+            directions.key_span.clone(),
+            "both `sensor_angles_deg` and `sensor_directions`",
+            Some("keep one of them: either says along which directions the sensors count".into()),
+        )),
+        (None, None) => Ok(None),
+        (Some(angles), None) => {
+            let items = angles.three("the three angles ω, φ, θ")?;
+            let mut radians = [0.0; 3];
+            for (angle, item) in radians.iter_mut().zip(&items) {
+                *angle = item.number()?.to_radians();
+            }
+            let orientation = Orientation::new(radians, Rotation::Exact);
+            let unit = |i: usize| Point(std::array::from_fn(|j| if i == j { 1.0 } else { 0.0 }));
+            Ok(Some(std::array::from_fn(|i| orientation.to_machine(unit(i)).0)))
+        }
+        (None, Some(directions)) => {
+            let (source, span) = (directions.source, directions.span.clone());
+            let mut rows = [[0.0; 3]; 3];
+            for (row, item) in rows
+                .iter_mut()
+                .zip(directions.three("a list of three directions")?)
+            {
+                *row = unit_vector(item)?;
+            }
+            let [a, b, c] = rows;
+            let normal = crate::frames::cross(a, Point(b)).0;
+            let volume: f64 = (0..3).map(|i| normal[i] * c[i]).sum();
+            if volume.abs() < LEAST_VOLUME {
+                let message = format!(
+                    "the three `sensor_directions` lie almost in a plane (their triple product is {volume:.3}; 1 at right angles)"
+                );
+                let help = "sensors that read three coordinates point three ways; check the directions";
+                return Err(source.error(span, message, Some(help.into())));
+            }
+            Ok(Some(rows))
+        }
+    }
+}
+
+/// Least triple product of three unit directions that still tell three coordinates: below it one of them is read with twenty times the noise.
+const LEAST_VOLUME: f64 = 0.05;
 
 fn tracker(context: &Context<'_>, table: &mut Table<'_>) -> Result<SetUp, ModelError> {
     let target = table.need("target_mm", "the target in the tool frame")?;

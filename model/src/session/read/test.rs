@@ -6,7 +6,7 @@ use super::station::{self, SetUp};
 use super::{Context, Declared, layout, movement, quantity};
 use crate::axis::AxisKind;
 use crate::error::ModelError;
-use crate::instrument::InstrumentKind;
+use crate::instrument::{InstrumentKind, Station};
 use crate::session::document::{Table, Value};
 use crate::session::expression::Length;
 use crate::session::motion::{self, Motion};
@@ -127,6 +127,7 @@ pub(super) fn tests(
         machine: context.machine,
         instrument: context.instrument,
         bar_mm: reach::bar_mm(&test.station),
+        sensors: matches!(&test.station, Station::RTest(rtest) if rtest.sensors.is_some()),
         format,
         columns: columns.as_deref(),
         at: &test.at,

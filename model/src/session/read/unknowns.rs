@@ -25,7 +25,9 @@ pub(super) fn unknowns(
     };
     let Some(value) = stated else {
         return Ok(match kind {
-            InstrumentKind::BallBar | InstrumentKind::Probe => default_unknowns(machine),
+            InstrumentKind::BallBar | InstrumentKind::Probe | InstrumentKind::RTest => {
+                default_unknowns(machine)
+            }
             InstrumentKind::Tracker | InstrumentKind::Socket => Vec::new(),
         });
     };

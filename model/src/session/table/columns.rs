@@ -76,6 +76,12 @@ impl Role {
             (InstrumentKind::Tracker, "px") => Some(Role::Coordinate(0, unit)),
             (InstrumentKind::Tracker, "py") => Some(Role::Coordinate(1, unit)),
             (InstrumentKind::Tracker, "pz") => Some(Role::Coordinate(2, unit)),
+            (InstrumentKind::RTest, name) => {
+                let place = r_test_columns(request.sensors)
+                    .iter()
+                    .position(|own| *own == name)?;
+                Some(Role::Coordinate(place, unit))
+            }
             _ => None,
         }
     }
@@ -94,6 +100,26 @@ impl Role {
     }
 }
 
+/// What an R-test's columns are called before their unit: what the sensors count one by one, or the vector in the frame that carries them.
+pub(crate) fn r_test_columns(sensors: bool) -> [&'static str; 3] {
+    if sensors {
+        ["du", "dv", "dw"]
+    } else {
+        ["dx", "dy", "dz"]
+    }
+}
+
+/// What an R-test's columns need to be, where they are the other kind's.
+fn r_test_help(request: &Request<'_>) -> &'static str {
+    if request.sensors {
+        "the test says how the sensors stand: it needs what they count, `du_um`, `dv_um` and `dw_um`; without `sensor_angles_deg` and \
+         `sensor_directions` it takes `dx_um`, `dy_um` and `dz_um`"
+    } else {
+        "an R-test needs `dx_um`, `dy_um` and `dz_um`; what single sensors count, `du_um`, `dv_um` and `dw_um`, needs \
+         `sensor_angles_deg` or `sensor_directions` in the test"
+    }
+}
+
 /// Every name that a column may have in this test.
 fn known(request: &Request<'_>) -> Vec<String> {
     let mut known: Vec<String> = ["time_s", "run"].map(str::to_string).to_vec();
@@ -107,6 +133,8 @@ fn known(request: &Request<'_>) -> Vec<String> {
         InstrumentKind::Tracker => &["px_mm", "py_mm", "pz_mm"],
         InstrumentKind::Socket => &["socket"],
         InstrumentKind::Probe => &["distance_mm", "deviation_um"],
+        InstrumentKind::RTest if request.sensors => &["du_um", "dv_um", "dw_um"],
+        InstrumentKind::RTest => &["dx_um", "dy_um", "dz_um"],
     };
     known.extend(own.iter().map(|name| name.to_string()));
     known
@@ -196,6 +224,10 @@ fn unknown_column_help(request: &Request<'_>, name: &str, header: &[String], kno
         return "a number where a name is expected: a file without a header declares `[format] header = false` \
                 and numbers its columns in [columns]"
             .into();
+    }
+    let stem = name.rsplit_once('_').map_or(name, |(stem, _)| stem);
+    if request.instrument == InstrumentKind::RTest && r_test_columns(!request.sensors).contains(&stem) {
+        return r_test_help(request).into();
     }
     let names: Vec<&str> = known.iter().map(String::as_str).collect();
     let near = nearest(name, &names).map_or(String::new(), |near| format!("did you mean `{near}`? "));
@@ -313,6 +345,13 @@ fn required(
                         format!("`{name}`"),
                         "a tracker needs px_mm, py_mm and pz_mm".into(),
                     );
+                }
+            }
+        }
+        InstrumentKind::RTest => {
+            for (index, name) in r_test_columns(request.sensors).into_iter().enumerate() {
+                if !has(&|role| matches!(role, Role::Coordinate(i, _) if i == index)) {
+                    return missing(format!("`{name}_um`"), r_test_help(request).into());
                 }
             }
         }

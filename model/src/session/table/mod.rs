@@ -8,7 +8,7 @@ mod rows;
 
 use std::path::Path;
 
-pub(crate) use columns::{Mapped, Theirs};
+pub(crate) use columns::{Mapped, Theirs, r_test_columns};
 
 use columns::{Column, Role};
 use rows::Rows;
@@ -45,6 +45,8 @@ pub(crate) struct Request<'a> {
     pub machine: &'a Machine,
     /// What read.
     pub instrument: InstrumentKind,
+    /// Whether an R-test's sensors are read one by one rather than as X, Y, Z.
+    pub sensors: bool,
     /// What a deviation is counted from, mm.
     pub bar_mm: f64,
     /// How the rows are written.

@@ -1,0 +1,155 @@
+//! One vector of an R-test in three frames: that of the sensors, that of the machine, and that of the rotary axis that turns.
+//!
+//! ```text
+//! x-wise, y-wise, z-wise        d · X, d · Y, d · Z       R's directions: the share of each linear axis is the same wherever it stands
+//! radial, tangential, axial     d · r, d · (a × r), d · a
+//! ```
+//!
+//! with `a` the direction of the axis that turns, as the axes beneath it carry it, and `r` the direction from it to the ball. For a C axis with the ball at
+//! +X at C = 0 the two are Eqs. (10) and (11) of Yamaji, Hamabata & Ihara (2014): radial `X cos C + Y sin C`, tangential `−X sin C + Y cos C`.
+
+use abbe_model::axis::AxisKind;
+use abbe_model::chain::{AxisPosition, BodyErrors, Machine};
+use abbe_model::frames::{Point, cross};
+use abbe_model::instrument::Station;
+use abbe_model::instrument::rtest::{Orientation, RTest, SENSOR, Setting};
+use abbe_model::session::{placing, readings::Readings};
+use nalgebra::{Matrix3, Vector3};
+
+use crate::error::IdentifyError;
+use crate::fit::Fit;
+use crate::problem::Problem;
+
+/// A ball nearer than this to the axis that turns has no radial direction, mm.
+const ON_THE_AXIS_MM: f64 = 1e-6;
+
+/// A vector, mm, in the frames in which it is looked at.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct View {
+    /// In the frame that carries the sensors.
+    pub sensors: [f64; 3],
+    /// Along X, Y, Z of R.
+    pub wise: [f64; 3],
+    /// Radial, tangential, axial; `None` where no single rotary axis turns in the test, or the ball lies on it.
+    pub turning: Option<[f64; 3]>,
+}
+
+/// One reading of a test in its views.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Viewed {
+    /// What was read.
+    pub reading: View,
+    /// What the fit leaves of it.
+    pub residual: View,
+}
+
+/// The views of every reading, test by test. Sensors are turned back by their directions and by the ω₁, φ₁, θ₁ that the fit finds.
+///
+/// # Errors
+/// If the session's instrument is no R-test.
+pub fn views(problem: &Problem<'_>, fit: &Fit) -> Result<Vec<Vec<Viewed>>, IdentifyError> {
+    let machine = &problem.session.machine;
+    let values = problem.slot_values(&fit.beta);
+    let mut all = Vec::with_capacity(problem.tests.len());
+    for (number, test) in problem.tests.iter().enumerate() {
+        let (Station::RTest(rtest), Some(readings)) = (&test.station, &test.readings) else {
+            return Err(IdentifyError::Request(format!(
+                "views part the three directions of an r-test; this session's instrument is a {}",
+                problem.session.instrument.word()
+            )));
+        };
+        let angles = std::array::from_fn(|i| values[number].constant[machine.error_slots() + SENSOR + i]);
+        let orientation = Orientation::new(angles, machine.rotation);
+        let turning = turning(machine, readings);
+        let mut state = Vec::new();
+        let viewed = (0..readings.rows())
+            .map(|row| {
+                readings.state(machine, row, &mut state);
+                let frames = Frames::at(machine, rtest, &state, turning);
+                let seen = |read: &[f64]| frames.view(rtest, &orientation, read);
+                let three = 3 * row..3 * row + 3;
+                Viewed {
+                    reading: seen(&readings.observed[three.clone()]),
+                    residual: seen(&fit.residuals[number][three]),
+                }
+            })
+            .collect();
+        all.push(viewed);
+    }
+    Ok(all)
+}
+
+/// The one rotary axis that turns in a test.
+fn turning(machine: &Machine, readings: &Readings) -> Option<usize> {
+    let mut turning = (0..machine.axes.len()).filter(|&axis| {
+        let positions = &readings.positions[axis];
+        let first = positions.first().copied().unwrap_or(0.0);
+        machine.axes[axis].kind == AxisKind::Rotary && positions.iter().any(|q| (q - first).abs() > 1e-9)
+    });
+    turning.next().filter(|_| turning.next().is_none())
+}
+
+/// The directions of a reading, in R, of the nominal machine.
+struct Frames {
+    /// From the frame that carries the sensors to R.
+    carrier: Matrix3<f64>,
+    /// Radial, tangential, axial, row by row.
+    turning: Option<Matrix3<f64>>,
+}
+
+impl Frames {
+    fn at(
+        machine: &Machine,
+        rtest: &RTest<f64>,
+        state: &[AxisPosition<f64>],
+        turning: Option<usize>,
+    ) -> Frames {
+        let none = vec![BodyErrors::<f64>::NONE; machine.axes.len()];
+        let in_r = |point: [f64; 3]| {
+            Vector3::from(match rtest.setting {
+                Setting::Table => machine.workpiece_point(state, &none, Point(point)).0,
+                Setting::Spindle => machine.tool_point(state, &none, Point(point)).0,
+            })
+        };
+        let origin = in_r([0.0; 3]);
+        let columns = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]].map(|unit| in_r(unit) - origin);
+        let turning = turning.and_then(|axis| {
+            let at: Vec<f64> = state.iter().map(|position| position.value).collect();
+            let (on_axis, along) = placing::axis_line(machine, &at, axis);
+            let ball = machine.workpiece_point(state, &none, Point(rtest.workpiece_ball));
+            let along = Vector3::from(along);
+            let from = Vector3::from(ball.0) - Vector3::from(on_axis);
+            let outward = from - along * from.dot(&along);
+            let radial = (outward.norm() > ON_THE_AXIS_MM).then(|| outward.normalize())?;
+            let tangential = Vector3::from(cross(along.into(), Point(radial.into())).0);
+            Some(Matrix3::from_rows(&[
+                radial.transpose(),
+                tangential.transpose(),
+                along.transpose(),
+            ]))
+        });
+        Frames {
+            carrier: Matrix3::from_columns(&columns),
+            turning,
+        }
+    }
+
+    fn view(&self, rtest: &RTest<f64>, orientation: &Orientation<f64>, read: &[f64]) -> View {
+        let read = Vector3::from_row_slice(read);
+        let nominal = match rtest.sensors {
+            None => read,
+            // Directions that lie in a plane are refused where they are read.
+            Some(rows) => {
+                let directions = Matrix3::from_fn(|i, j| rows[i][j]);
+                directions.lu().solve(&read).unwrap_or(read)
+            }
+        };
+        let sensors = orientation.to_machine(Point(nominal.into())).0;
+        let wise = self.carrier * Vector3::from(sensors);
+        View {
+            sensors,
+            wise: wise.into(),
+            turning: self.turning.map(|rows| (rows * wise).into()),
+        }
+    }
+}

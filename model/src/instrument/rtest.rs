@@ -1,0 +1,160 @@
+//! The R-test: three displacement sensors in a nest about a master ball read where the ball lies, as the vector `P_s − P_w`.
+//!
+//! With the nest on the table (E-setting) the vector is given in the table frame, with the nest in the spindle (Es-setting) in the tool frame:
+//!
+//! ```text
+//! E:   m = T_w⁻¹·P_s − w          Es:   m = s − T_s⁻¹·P_w          r = D · Rᵀ(ω₁, φ₁, θ₁) · m
+//! ```
+//!
+//! `w` and `s` are the points of table and tool that nominally coincide, ω₁, φ₁, θ₁ the orientation error of the nest, and the rows of `D` the
+//! directions along which the sensors count (without them the reading has been turned into X, Y, Z already). Yamaji, Hamabata & Ihara, Evaluation of
+//! linear axis motion error of machine tools using an R-test device (HPC 2014), Section 4: sensor outputs become machine coordinates by
+//! `R = R_φ·R_θ·R_ω` (Eqs. 1–3; the matrices above Eq. 1 are printed in another order than the expanded equations and the text have).
+
+use super::{InstrumentUnknown, SharedBy, displaced};
+use crate::chain::{AxisPosition, BodyErrors, Machine};
+use crate::frames::{Coordinate, Point, Rotation, Turn, turn_about};
+use crate::scalar::{Nominal, Scalar};
+
+/// Both points, then ω₁, φ₁ and θ₁ of the nest.
+pub const UNKNOWNS: [InstrumentUnknown; 9] = [
+    InstrumentUnknown::length("workpiece_ball", "x", SharedBy::Setup),
+    InstrumentUnknown::length("workpiece_ball", "y", SharedBy::Setup),
+    InstrumentUnknown::length("workpiece_ball", "z", SharedBy::Setup),
+    InstrumentUnknown::length("spindle_ball", "x", SharedBy::SpindleSetup),
+    InstrumentUnknown::length("spindle_ball", "y", SharedBy::SpindleSetup),
+    InstrumentUnknown::length("spindle_ball", "z", SharedBy::SpindleSetup),
+    InstrumentUnknown::angle("sensor", "omega", SharedBy::Sensors),
+    InstrumentUnknown::angle("sensor", "phi", SharedBy::Sensors),
+    InstrumentUnknown::angle("sensor", "theta", SharedBy::Sensors),
+];
+
+/// Place of ω₁ among [`UNKNOWNS`].
+pub const SENSOR: usize = 6;
+
+/// What carries the sensors.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Setting {
+    /// E: the sensors on the table, the master ball in the spindle.
+    Table,
+    /// Es: the sensors in the spindle, the master ball on the table.
+    Spindle,
+}
+
+/// An R-test as set up for one test, lengths in mm.
+#[derive(Clone, Debug, PartialEq)]
+pub struct RTest<N> {
+    /// What carries the sensors.
+    pub setting: Setting,
+    /// The point on the table, in the table frame: the centre of the nest in E, of the master ball in Es.
+    pub workpiece_ball: [N; 3],
+    /// The point in the spindle, in the tool frame: the centre of the master ball in E, of the nest in Es.
+    pub spindle_ball: [N; 3],
+    /// The direction along which each sensor counts, in the carrying frame, row by row; `None` where readings are given in that frame.
+    pub sensors: Option<[[N; 3]; 3]>,
+}
+
+/// Three turns between sensors and machine: `R = R_φ·R_θ·R_ω` with
+///
+/// ```text
+///       ⎛ 1    0     0   ⎞        ⎛ cos φ  0  −sin φ ⎞        ⎛  cos θ  sin θ  0 ⎞
+/// R_ω = ⎜ 0  cos ω  sin ω⎟  R_φ = ⎜   0    1     0   ⎟  R_θ = ⎜ −sin θ  cos θ  0 ⎟
+///       ⎝ 0 −sin ω  cos ω⎠        ⎝ sin φ  0   cos φ ⎠        ⎝    0      0    1 ⎠
+/// ```
+///
+/// ```
+/// use abbe_model::frames::{Point, Rotation};
+/// use abbe_model::instrument::rtest::Orientation;
+///
+/// // Eq. (4) of the paper: what sensor u counts is cos(−35.264°) of X and sin(−35.264°) of Z.
+/// let angles: [f64; 3] = [135.0_f64, -35.264, 0.0].map(f64::to_radians);
+/// let machine = Orientation::new(angles, Rotation::Exact).to_machine(Point([1.0, 0.0, 0.0])).0;
+/// assert!((machine[0] - 0.81650).abs() < 1e-5 && machine[1] == 0.0 && (machine[2] + 0.57735).abs() < 1e-5);
+/// ```
+#[derive(Clone, Copy, Debug)]
+pub struct Orientation<S> {
+    omega: Turn<S>,
+    phi: Turn<S>,
+    theta: Turn<S>,
+}
+
+impl<S: Scalar> Orientation<S> {
+    /// From ω, φ, θ in radians. The small-angle form has the angle for its sine and 1 for its cosine: Eqs. (7) to (9), which keep the products of
+    /// two angles and leave out their squares.
+    pub fn new(angles: [S; 3], rotation: Rotation) -> Self {
+        let [omega, phi, theta] = angles.map(|angle| match rotation {
+            Rotation::Exact => {
+                let (sin, cos) = angle.sin_cos();
+                Turn { sin, cos }
+            }
+            Rotation::SmallAngle => Turn {
+                sin: angle,
+                cos: S::constant(1.0),
+            },
+        });
+        Orientation { omega, phi, theta }
+    }
+
+    /// `R · v`: from the sensors' coordinates to those of the frame that carries them.
+    pub fn to_machine(&self, sensors: Point<S>) -> Point<S> {
+        let [omega, phi, theta] = [self.omega, self.phi, self.theta].map(|turn| Turn {
+            sin: -turn.sin,
+            cos: turn.cos,
+        });
+        let about_u = turn_about(Coordinate::X, omega, sensors);
+        let about_w = turn_about(Coordinate::Z, theta, about_u);
+        turn_about(Coordinate::Y, phi, about_w)
+    }
+
+    /// `Rᵀ · v`: from the carrying frame to the sensors.
+    pub fn to_sensors(&self, machine: Point<S>) -> Point<S> {
+        let about_v = turn_about(Coordinate::Y, self.phi, machine);
+        let about_w = turn_about(Coordinate::Z, self.theta, about_v);
+        turn_about(Coordinate::X, self.omega, about_w)
+    }
+}
+
+impl<N: Nominal> RTest<N> {
+    /// `P_s − P_w` in the frame that carries the sensors, mm.
+    pub fn difference<S: Scalar<Nominal = N>>(
+        &self,
+        machine: &Machine,
+        state: &[AxisPosition<N>],
+        errors: &[BodyErrors<S>],
+        unknown: &impl Fn(usize) -> Option<S>,
+    ) -> Point<S> {
+        let workpiece = displaced(self.workpiece_ball, 0, unknown);
+        let spindle = displaced(self.spindle_ball, 3, unknown);
+        match self.setting {
+            Setting::Table => {
+                let ball = machine.tool_point(state, errors, spindle);
+                machine.table_point(state, errors, ball).minus(workpiece)
+            }
+            Setting::Spindle => {
+                let ball = machine.workpiece_point(state, errors, workpiece);
+                spindle.minus(machine.spindle_point(state, errors, ball))
+            }
+        }
+    }
+
+    /// The reading: what the three sensors count, or the vector in the carrying frame, mm.
+    pub fn read<S: Scalar<Nominal = N>>(
+        &self,
+        machine: &Machine,
+        state: &[AxisPosition<N>],
+        errors: &[BodyErrors<S>],
+        unknown: impl Fn(usize) -> Option<S>,
+    ) -> Point<S> {
+        let mut vector = self.difference(machine, state, errors, &unknown);
+        let carried = (SENSOR..SENSOR + 3).any(|place| unknown(place).is_some());
+        if carried {
+            let angles = std::array::from_fn(|i| unknown(SENSOR + i).unwrap_or_else(|| S::constant(0.0)));
+            vector = Orientation::new(angles, machine.rotation).to_sensors(vector);
+        }
+        let Some(sensors) = &self.sensors else {
+            return vector;
+        };
+        let [x, y, z] = vector.0;
+        Point(sensors.map(|[a, b, c]| x * a + y * b + z * c))
+    }
+}
