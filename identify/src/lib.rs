@@ -3,12 +3,16 @@
 //! - [`least_squares`], [`triangle`], [`rank`]: the numerical core, which knows no machine;
 //! - [`parameters`], [`problem`]: a session as a least-squares problem;
 //! - [`fit`]: identify; [`heldout`]: judge on readings that the fit did not see; [`noise`]: how much is noise;
+//! - [`compensation`]: identified error motions as curves over their axis;
+//! - [`circular`]: ball-bar figures of ISO 230-4 and the classical diagnosis;
 //! - [`trace`]: close the loop;
 //! - [`plan`]: what tests can see before anybody measures;
 //! - [`simulate`]: readings from a model; [`quantity`]: values with their units as people write them;
 //! - [`results`]: what is reported, as it stands in JSON.
 
 pub mod circle;
+pub mod circular;
+pub mod compensation;
 pub mod drivers;
 pub mod error;
 pub mod fit;
