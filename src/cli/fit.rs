@@ -4,13 +4,17 @@ use abbe::identify::results::{FitResult, ParameterResult, Unobservable};
 use clap::{Args, ValueEnum};
 
 use super::failure::Failure;
-use super::{CommonArguments, SessionArguments, geometric, output, read_session, self_calibration, table};
+use super::{
+    CommonArguments, SessionArguments, circular, compensation, csv, geometric, output, read_session,
+    self_calibration, table,
+};
 
 /// Examples of `abbe fit`.
 pub const HELP: &str = "Examples:
-  abbe fit sessions/hermle-c600u/measured/session.toml --json fit.json
+  abbe fit sessions/hermle-c600u/measured/session.toml --json fit.json --csv fit.csv
   abbe fit run1/session.toml --method cone
-  abbe fit sessions/self-calibration/measured/session.toml --method self-calibration --monte-carlo 1000000";
+  abbe fit sessions/self-calibration/measured/session.toml --method self-calibration \\
+      --monte-carlo 100000";
 
 /// How errors are identified.
 #[derive(Clone, Copy, PartialEq, Eq, ValueEnum)]
@@ -39,11 +43,21 @@ pub struct FitArguments {
     method: Method,
     #[command(flatten)]
     draws: self_calibration::DrawArguments,
+    /// Write the result as CSV, one row a figure (not with another `--method`).
+    #[arg(long, value_name = "FILE")]
+    csv: Option<std::path::PathBuf>,
+    #[command(flatten)]
+    compensation: compensation::CompensationArguments,
 }
 
 /// Runs `abbe fit`.
 pub fn run(arguments: &FitArguments) -> Result<(), Failure> {
     let session = read_session(&arguments.session)?;
+    if arguments.method != Method::Full && (arguments.csv.is_some() || arguments.compensation.wanted()) {
+        return Err(Failure::Other(
+            "--csv and --compensation go with the full fit; leave out --method, or use --json".into(),
+        ));
+    }
     if arguments.method == Method::SelfCalibration {
         return self_calibration::run(&session, &arguments.draws, &arguments.common);
     }
@@ -63,7 +77,10 @@ pub fn run(arguments: &FitArguments) -> Result<(), Failure> {
     if let Some(path) = &arguments.common.json {
         output::write_json(path, &result)?;
     }
-    Ok(())
+    if let Some(path) = &arguments.csv {
+        csv::write_fit(path, &result)?;
+    }
+    arguments.compensation.run(&problem, &fit)
 }
 
 fn print(result: &FitResult) {
@@ -106,6 +123,7 @@ fn print(result: &FitResult) {
             );
         }
     }
+    circular::print(&result.circular);
     print_warnings(&result.warnings);
 }
 
