@@ -304,6 +304,7 @@ pub fn report(problem: &Problem<'_>, fit: &Fit) -> FitResult {
         parameters: parameters(problem, fit),
         unobservable: unobservable(problem, &fit.rank),
         rejected: rejected(problem, fit),
+        circular: crate::circular::of_session(problem.session, problem.noise.sigma_mm, &problem.rejected),
         warnings,
         monte_carlo: None,
     }

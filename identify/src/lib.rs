@@ -4,6 +4,8 @@
 //! - [`parameters`], [`problem`]: a session as a least-squares problem;
 //! - [`fit`]: identify; [`heldout`]: judge on readings that the fit did not see; [`noise`]: how much is noise;
 //! - [`monte_carlo`], [`propagation`]: distributions by drawing; [`repeated`]: Type A beside Type B;
+//! - [`compensation`]: identified error motions as curves over their axis;
+//! - [`circular`]: ball-bar figures of ISO 230-4 and the classical diagnosis;
 //! - [`trace`]: close the loop;
 //! - [`plan`]: what tests can see before anybody measures;
 //! - [`views`]: readings and residuals of an R-test by direction;
@@ -11,6 +13,8 @@
 //! - [`results`]: what is reported, as it stands in JSON.
 
 pub mod circle;
+pub mod circular;
+pub mod compensation;
 pub mod drivers;
 pub mod error;
 pub mod fit;

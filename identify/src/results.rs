@@ -2,10 +2,13 @@
 
 use std::collections::BTreeMap;
 
+use schemars::JsonSchema;
 use serde::Serialize;
 
+use crate::circular::CircularTest;
+
 /// A value with its standard uncertainty.
-#[derive(Clone, Debug, PartialEq, Serialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, JsonSchema)]
 pub struct ParameterResult {
     /// `EY0A`, `bar[A100]`, `EZC~C:h2.amplitude`.
     pub id: String,
@@ -18,7 +21,7 @@ pub struct ParameterResult {
 }
 
 /// A combination of unknowns that no reading can see.
-#[derive(Clone, Debug, PartialEq, Serialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, JsonSchema)]
 pub struct Unobservable {
     /// How much of each unknown, in its outside unit: moving all of them by these amounts changes no reading.
     pub combination: BTreeMap<String, f64>,
@@ -27,7 +30,7 @@ pub struct Unobservable {
 }
 
 /// A reading that was left out.
-#[derive(Clone, Debug, PartialEq, Serialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, JsonSchema)]
 pub struct Rejected {
     /// The test.
     pub test: String,
@@ -40,7 +43,7 @@ pub struct Rejected {
 }
 
 /// What `abbe fit` reports.
-#[derive(Clone, Debug, PartialEq, Serialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, JsonSchema)]
 pub struct FitResult {
     /// Standard deviation of one scalar reading, µm.
     pub noise_um: f64,
@@ -72,6 +75,9 @@ pub struct FitResult {
     pub unobservable: Vec<Unobservable>,
     /// Readings left out.
     pub rejected: Vec<Rejected>,
+    /// Ball-bar figures of the tests whose path is a circle.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub circular: Vec<CircularTest>,
     /// What a user should know.
     pub warnings: Vec<String>,
     /// The same by Monte Carlo, where it was asked for. `u` in `parameters` is then what is quoted.
@@ -138,7 +144,7 @@ pub enum Verdict {
 }
 
 /// A residual and parameters, before or after the found effects.
-#[derive(Clone, Debug, PartialEq, Serialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, JsonSchema)]
 pub struct ModelResult {
     /// Residual over scalar readings, µm.
     pub rms_um: f64,
@@ -155,7 +161,7 @@ pub struct ModelResult {
 }
 
 /// An effect by its name in the vocabulary of session files.
-#[derive(Clone, Debug, PartialEq, Serialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, JsonSchema)]
 pub struct EffectName {
     /// What moves.
     pub component: String,
@@ -172,7 +178,7 @@ pub struct EffectName {
 }
 
 /// A point of a free curve. What location errors can absorb of a curve is not in it.
-#[derive(Clone, Debug, PartialEq, Serialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, JsonSchema)]
 pub struct CurvePoint {
     /// Where on the driver.
     pub at: f64,
@@ -183,7 +189,7 @@ pub struct CurvePoint {
 }
 
 /// An effect that trace has found.
-#[derive(Clone, Debug, PartialEq, Serialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, JsonSchema)]
 pub struct EffectResult {
     /// Component, driver, shape, order.
     #[serde(flatten)]
@@ -217,7 +223,7 @@ pub struct EffectResult {
 }
 
 /// How well a further test tells a found effect from what looks like it.
-#[derive(Clone, Debug, PartialEq, Serialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, JsonSchema)]
 pub struct SeparationResult {
     /// From what.
     pub from: EffectName,
@@ -230,7 +236,7 @@ pub struct SeparationResult {
 }
 
 /// What is left.
-#[derive(Clone, Debug, PartialEq, Serialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, JsonSchema)]
 pub struct Remainder {
     /// Whether it has structure beyond noise.
     pub structured: bool,
@@ -242,7 +248,7 @@ pub struct Remainder {
 }
 
 /// A parameter that moved by more than its uncertainty between before and after.
-#[derive(Clone, Debug, PartialEq, Serialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, JsonSchema)]
 pub struct Moved {
     /// The parameter.
     pub id: String,
@@ -255,7 +261,7 @@ pub struct Moved {
 }
 
 /// What `abbe trace` reports.
-#[derive(Clone, Debug, PartialEq, Serialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, JsonSchema)]
 pub struct TraceResult {
     /// `clean`, `explained`, `partly-explained`, `unexplained`.
     pub verdict: String,

@@ -7,18 +7,19 @@ use clap::{Args, ValueEnum};
 
 use super::failure::Failure;
 use super::{
-    CommonArguments, SessionArguments, geometric, output, read_session, repeated, self_calibration, table,
-    views,
+    CommonArguments, SessionArguments, circular, compensation, csv, geometric, output, read_session, repeated,
+    self_calibration, table, views,
 };
 
 /// Examples of `abbe fit`.
 pub const HELP: &str = "Examples:
-  abbe fit sessions/hermle-c600u/measured/session.toml --json fit.json
+  abbe fit sessions/hermle-c600u/measured/session.toml --json fit.json --csv fit.csv
   abbe fit sessions/hermle-c600u/measured/session.toml --monte-carlo 10000
   abbe fit day1/session.toml --repeat day2/session.toml day3/session.toml
   abbe fit run1/session.toml --method cone
   abbe fit sessions/r-test/measured/session.toml --views views.csv
-  abbe fit sessions/self-calibration/measured/session.toml --method self-calibration --monte-carlo 1000000";
+  abbe fit sessions/self-calibration/measured/session.toml --method self-calibration \\
+      --monte-carlo 100000";
 
 /// How errors are identified.
 #[derive(Clone, Copy, PartialEq, Eq, ValueEnum)]
@@ -53,6 +54,11 @@ pub struct FitArguments {
     /// Further sessions of the same plan: the scatter of their fits (Type A) beside the fits' own uncertainties (Type B).
     #[arg(long, value_name = "SESSION", num_args = 1.., conflicts_with = "monte_carlo")]
     repeat: Vec<PathBuf>,
+    /// Write the result as CSV, one row a figure (not with another `--method`).
+    #[arg(long, value_name = "FILE")]
+    csv: Option<std::path::PathBuf>,
+    #[command(flatten)]
+    compensation: compensation::CompensationArguments,
 }
 
 /// Runs `abbe fit`.
@@ -69,6 +75,11 @@ pub fn run(arguments: &FitArguments) -> Result<(), Failure> {
     if arguments.views.is_some() && arguments.method != Method::Full {
         let message = "`--views` shows what the full fit leaves over: leave `--method` out";
         return Err(Failure::Other(message.into()));
+    }
+    if arguments.method != Method::Full && (arguments.csv.is_some() || arguments.compensation.wanted()) {
+        return Err(Failure::Other(
+            "--csv and --compensation go with the full fit; leave out --method, or use --json".into(),
+        ));
     }
     if arguments.method == Method::SelfCalibration {
         return self_calibration::run(&session, &arguments.draws, &arguments.common);
@@ -96,7 +107,10 @@ pub fn run(arguments: &FitArguments) -> Result<(), Failure> {
     if let Some(path) = &arguments.common.json {
         output::write_json(path, &result)?;
     }
-    Ok(())
+    if let Some(path) = &arguments.csv {
+        csv::write_fit(path, &result)?;
+    }
+    arguments.compensation.run(&problem, &fit)
 }
 
 fn print(result: &FitResult) {
@@ -142,6 +156,7 @@ fn print(result: &FitResult) {
             );
         }
     }
+    circular::print(&result.circular);
     print_warnings(&result.warnings);
 }
 

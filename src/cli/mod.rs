@@ -5,16 +5,21 @@ macro_rules! say {
     ($($text:tt)*) => { $crate::cli::output::line(format_args!($($text)*)) };
 }
 
+mod circular;
+mod compensation;
+mod csv;
 mod equation;
 mod failure;
 mod fit;
 mod folder;
 mod geometric;
+mod layout;
 mod map;
 mod new;
 mod output;
 mod plan;
 mod repeated;
+mod schema;
 mod self_calibration;
 mod simulate;
 mod table;
@@ -24,7 +29,7 @@ mod views;
 use std::path::PathBuf;
 use std::process::ExitCode;
 
-use clap::{Args, Parser, Subcommand};
+use clap::{Args, CommandFactory, Parser, Subcommand};
 
 use failure::Failure;
 
@@ -36,20 +41,32 @@ struct Arguments {
     command: Command,
 }
 
-const EXAMPLES: &str = "Examples:
-  abbe trace sessions/hermle-c600u/measured/session.toml
-  abbe fit sessions/ur10/session.toml --data ../data --json fit.json";
+const EXAMPLES: &str = "Example, from nothing to a found effect:
+  abbe new my --template hermle-c600u
+  abbe plan my/chapter5.toml
+  abbe simulate my/chapter5.toml --out my/run1 --error EY0A=35.3um --error EB0A=-1.29arcsec
+  abbe fit my/run1/session.toml --json my/fit.json
+  abbe trace my/run1/session.toml --only EZC --only EAC
+  abbe equation my/chapter5.toml --test C150 --order first
+
+`abbe new` lists the templates; `abbe new mine --from-code \"[wCAbYXZt]\"` lays out a machine of your own. `abbe COMMAND --help` has examples of each.";
+
+const COMPLETIONS: &str = "Example:
+  abbe completions bash
+
+Put what it prints where the shell looks for it: ~/.local/share/bash-completion/completions/abbe (bash), a folder of $fpath as _abbe (zsh),
+~/.config/fish/completions/abbe.fish (fish).";
 
 #[derive(Subcommand)]
 enum Command {
     /// Print the closed form of a test's reading.
     #[command(
-        after_help = "Example:\n  abbe equation sessions/hermle-c600u/chapter5.toml --test A150 --as latex --rotation small-angle"
+        after_help = "Example:\n  abbe equation sessions/hermle-c600u/chapter5.toml --test A150 --as latex"
     )]
     Equation(equation::EquationArguments),
     /// Print the error vector of the tool in the workpiece frame, or map it over the workspace.
     #[command(
-        after_help = "Examples:\n  abbe volumetric sessions/hermle-c600u/machine.toml --order first --errors EX0C,EY0C,EXX\n  abbe volumetric sessions/volumetric/machine.toml --map map.csv --functions sessions/volumetric/errors.toml --compensate"
+        after_help = "Examples:\n  abbe volumetric sessions/hermle-c600u/machine.toml --order first --errors EX0C,EY0C,EXX\n  abbe volumetric sessions/volumetric/machine.toml --map map.csv \\\n      --functions sessions/volumetric/errors.toml --compensate"
     )]
     Volumetric(equation::VolumetricArguments),
     /// Identify errors from readings, with uncertainties.
@@ -61,12 +78,21 @@ enum Command {
     /// Start from a ready session.
     #[command(after_help = new::HELP)]
     New(new::NewArguments),
+    /// Write a script that completes the command line in a shell.
+    #[command(after_help = COMPLETIONS)]
+    Completions {
+        /// For which shell.
+        shell: clap_complete::Shell,
+    },
+    /// Describe a file or a result as JSON Schema.
+    #[command(after_help = schema::HELP)]
+    Schema(schema::SchemaArguments),
     /// Draw readings from a plan with given errors.
     #[command(after_help = simulate::HELP)]
     Simulate(Box<simulate::SimulateArguments>),
     /// Close the loop: trace what the fit leaves over to the effect that the model lacks.
     #[command(
-        after_help = "Example:\n  abbe trace sessions/hermle-c600u/measured/session.toml --json trace.json --write next.toml"
+        after_help = "Example:\n  abbe trace sessions/hermle-c600u/measured/session.toml --json trace.json --csv trace.csv"
     )]
     Trace(trace::TraceArguments),
 }
@@ -104,6 +130,13 @@ pub fn run() -> ExitCode {
         Command::Fit(arguments) => fit::run(&arguments),
         Command::Plan(arguments) => plan::run(&arguments),
         Command::New(arguments) => new::run(&arguments),
+        Command::Completions { shell } => {
+            let mut script = Vec::new();
+            clap_complete::generate(shell, &mut Arguments::command(), "abbe", &mut script);
+            say!("{}", String::from_utf8_lossy(&script).trim_end());
+            Ok(())
+        }
+        Command::Schema(arguments) => schema::run(&arguments),
         Command::Simulate(arguments) => simulate::run(&arguments),
         Command::Trace(arguments) => trace::run(&arguments),
     };

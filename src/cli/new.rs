@@ -1,27 +1,34 @@
-//! `abbe new`: ready sessions to start from.
+//! `abbe new`: ready sessions to start from, or a machine laid out from its structural code.
 
 use std::path::PathBuf;
 
 use clap::Args;
 
 use super::failure::Failure;
-use super::folder;
+use super::{folder, layout};
 
 /// Examples of `abbe new`.
 pub const HELP: &str = "Examples:
-  abbe new --list
-  abbe new mymachine --template hermle-c600u";
+  abbe new
+  abbe new mymachine --template hermle-c600u
+  abbe new mine --from-code \"[wCXbYZAt]\"
 
-/// `abbe new DIR --template NAME`
+The first lists the templates. The last lays out machine.toml and plan.toml with every line explained; `abbe plan mine/plan.toml` runs at once.";
+
+/// `abbe new [DIR --template NAME | DIR --from-code CODE]`
 #[derive(Args)]
+#[command(group = clap::ArgGroup::new("start").args(["template", "from_code"]))]
 pub struct NewArguments {
-    /// The folder to make.
-    #[arg(required_unless_present = "list")]
+    /// The folder to make; without it, the templates are listed.
+    #[arg(requires = "start")]
     folder: Option<PathBuf>,
     /// Which session to start from.
-    #[arg(long, value_name = "NAME", required_unless_present = "list")]
+    #[arg(long, value_name = "NAME", requires = "folder")]
     template: Option<String>,
-    /// Say which there are.
+    /// Lay out a machine with this structural code, from workpiece over bed to tool, and a plan for it.
+    #[arg(long, value_name = "CODE", requires = "folder")]
+    from_code: Option<String>,
+    /// Say which templates there are.
     #[arg(long)]
     list: bool,
     /// Replace files in a folder that is there.
@@ -200,32 +207,48 @@ const TEMPLATES: &[Template] = &[
 
 /// Runs `abbe new`.
 pub fn run(arguments: &NewArguments) -> Result<(), Failure> {
-    let (Some(folder), Some(name), false) = (&arguments.folder, &arguments.template, arguments.list) else {
-        let width = TEMPLATES
-            .iter()
-            .map(|template| template.name.len())
-            .max()
-            .unwrap_or(0);
-        for template in TEMPLATES {
-            say!("  {:width$}  {}", template.name, template.about);
-        }
+    let (Some(folder), false) = (&arguments.folder, arguments.list) else {
+        list();
         return Ok(());
     };
-    let Some(template) = TEMPLATES.iter().find(|template| template.name == name) else {
-        let names: Vec<&str> = TEMPLATES.iter().map(|template| template.name).collect();
-        return Err(Failure::Other(format!(
-            "there is no template `{name}`; there are {}",
-            names.join(", ")
-        )));
+    let files = match (&arguments.template, &arguments.from_code) {
+        (Some(name), _) => template(name)?,
+        (None, Some(code)) => layout::files(code)?,
+        (None, None) => return Ok(()),
     };
-    let files: Vec<folder::NewFile> = template
-        .files
-        .iter()
-        .map(|(name, text)| (name.to_string(), text.to_string()))
-        .collect();
     folder::write(folder, &files, arguments.force, |_| Ok(()))?;
     for (name, _) in files {
         say!("{}", folder.join(name).display());
     }
     Ok(())
+}
+
+/// The menu: each template in a line.
+fn list() {
+    let width = TEMPLATES
+        .iter()
+        .map(|template| template.name.len())
+        .max()
+        .unwrap_or(0);
+    for template in TEMPLATES {
+        say!("  {:width$}  {}", template.name, template.about);
+    }
+}
+
+fn names() -> String {
+    let names: Vec<&str> = TEMPLATES.iter().map(|template| template.name).collect();
+    names.join(", ")
+}
+
+fn template(name: &str) -> Result<Vec<folder::NewFile>, Failure> {
+    let Some(template) = TEMPLATES.iter().find(|template| template.name == name) else {
+        return Err(Failure::Other(format!(
+            "there is no template `{name}`; there are {}",
+            names()
+        )));
+    };
+    let files = template.files.iter();
+    Ok(files
+        .map(|(name, text)| (name.to_string(), text.to_string()))
+        .collect())
 }

@@ -6,6 +6,7 @@ use abbe::identify::quantity::Given;
 use abbe::identify::simulate::{Simulated, Simulation, simulate};
 use abbe::model::session::{Session, read, rewrite, write};
 use clap::Args;
+use schemars::JsonSchema;
 use serde::Serialize;
 
 use super::failure::Failure;
@@ -13,13 +14,13 @@ use super::{CommonArguments, SessionArguments, fit, folder, output, read_session
 
 /// Examples and the names that values go by.
 pub const HELP: &str = "Values go by the names that results use, with their unit: errors by ISO 230-1 or the literature (EY0A, e_y0a), set-up \
-quantities (`bar[A100]`, `workpiece_ball.x[P1]`), coefficients of the [[effect]]s that the session declares. A harmonic takes amplitude and phase of \
+quantities (`bar[A100]`, `workpiece_ball.x[P1]`), coefficients of the [[effect]]s that the session declares (--effect \"EZC~C:h2.amplitude=1.5um\"). A harmonic takes amplitude and phase of \
 amplitude · cos(order · angle + phase). What is not given is zero.
 
 Examples:
-  abbe simulate sessions/hermle-c600u/chapter5.toml --out run1 --error EY0A=35.3um --error EB0A=-1.29arcsec
-  abbe simulate plan.toml --out run2 --effect \"EZC~C:h2.amplitude=1.5um\" --effect \"EZC~C:h2.phase=60deg\" --hide-effects
-  abbe simulate plan.toml --out run3 --errors errors.toml --draw-setups --noise-um 0.5 --seed 7
+  abbe simulate sessions/hermle-c600u/chapter5.toml --out run1 --error EY0A=35.3um \\
+      --error EB0A=-1.29arcsec
+  abbe simulate sessions/hermle-c600u/chapter5.toml --out run2 --draw-setups --seed 7
 
 errors.toml holds one value a line, `EY0A = \"35.3 um\"`; names with other than letters and digits stand in quotes.";
 
@@ -174,8 +175,8 @@ fn data_name(test: &str, taken: &[(String, String)]) -> String {
 }
 
 /// What `abbe simulate` reports as JSON.
-#[derive(Serialize)]
-struct Report {
+#[derive(Serialize, JsonSchema)]
+pub struct Report {
     session: String,
     readings: usize,
     noise_um: f64,
@@ -186,7 +187,7 @@ struct Report {
 }
 
 /// A value that was put into the model.
-#[derive(Serialize)]
+#[derive(Serialize, JsonSchema)]
 struct Value {
     id: String,
     value: f64,

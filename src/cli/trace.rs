@@ -12,7 +12,7 @@ use clap::Args;
 use indicatif::{ProgressBar, ProgressStyle};
 
 use super::failure::Failure;
-use super::{CommonArguments, SessionArguments, fit, output, read_session, table};
+use super::{CommonArguments, SessionArguments, compensation, csv, fit, output, read_session, table};
 
 /// `abbe trace SESSION`
 #[derive(Args)]
@@ -36,6 +36,11 @@ pub struct TraceArguments {
     /// Write the session that declares the found effects.
     #[arg(long, value_name = "FILE")]
     write: Option<std::path::PathBuf>,
+    /// Write the result as CSV, one row a figure.
+    #[arg(long, value_name = "FILE")]
+    csv: Option<std::path::PathBuf>,
+    #[command(flatten)]
+    compensation: compensation::CompensationArguments,
 }
 
 /// Runs `abbe trace`.
@@ -87,7 +92,10 @@ pub fn run(arguments: &TraceArguments) -> Result<(), Failure> {
         let next = abbe::model::session::write::with_effects(&text, &trace.effects, &session.machine);
         output::write_whole(path, next.as_bytes())?;
     }
-    Ok(())
+    if let Some(path) = &arguments.csv {
+        csv::write_trace(path, &trace.result)?;
+    }
+    arguments.compensation.run(&trace.after, &trace.after_fit)
 }
 
 fn progress_bar(quiet: bool) -> ProgressBar {

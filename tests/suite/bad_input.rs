@@ -225,8 +225,8 @@ fn a_wrong_command_line_is_status_2() {
         &["fot", "a.toml"],
         &["simulate", "a.toml"],
         &["simulate", "a.toml", "--out", "b", "--seed", "one"],
-        &["new"],
         &["new", "a"],
+        &["new", "a", "--template", "ur10", "--from-code", "[wbXt]"],
         &[],
     ] {
         let output = abbe(arguments);

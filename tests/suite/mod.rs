@@ -1,11 +1,15 @@
 //! What the program promises, one file a promise.
 
 mod bad_input;
+mod circular;
 mod codes;
+mod compensation;
 mod data;
 mod equation_command;
 mod equation_effects;
+mod field_files;
 mod geometric;
+mod help;
 mod jacobians;
 mod measured;
 mod new;
@@ -24,6 +28,7 @@ mod robots;
 mod rtest;
 mod rtest_command;
 mod rtest_findings;
+mod schema;
 mod self_calibration;
 mod simulate;
 mod topologies;

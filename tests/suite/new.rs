@@ -73,3 +73,96 @@ fn an_unknown_template_names_those_there_are() {
         "{told}"
     );
 }
+
+#[test]
+fn any_structural_code_is_laid_out_and_plans_at_once() {
+    use super::topologies::{FIGURE_1_1, TABLE_1_1};
+    let folder = tempfile::tempdir().unwrap();
+    let mut codes: Vec<String> = TABLE_1_1
+        .iter()
+        .chain(&FIGURE_1_1)
+        .map(|code| code.to_string())
+        .collect();
+    codes.extend(
+        [
+            "[wXYbZt]",
+            "[wbXYZt]",
+            "[wXbYZt]",
+            "[wYXZbt]",
+            "[wCXbYZAt]",
+            "[wCbXYZAt]",
+            "[wbXYZABCt]",
+            "[wCBAbXYZt]",
+            "[wCbt]",
+            "[wbXYt]",
+            "w C A b Y X Z U t",
+            "w b Z Y X W t",
+        ]
+        .map(str::to_string),
+    );
+    for (index, code) in codes.iter().enumerate() {
+        let made = folder.path().join(index.to_string());
+        let run = abbe(&["new", text(&made), "--from-code", code]);
+        assert!(
+            run.status.success(),
+            "{code}: {}",
+            String::from_utf8_lossy(&run.stderr)
+        );
+        let machine = read::machine(&made.join("machine.toml")).unwrap();
+        assert_eq!(
+            machine.code().replace(' ', ""),
+            code.replace(' ', "").trim_matches(['[', ']'])
+        );
+        let plan = abbe(&["plan", text(&made.join("plan.toml")), "--no-effects"]);
+        assert!(
+            plan.status.success(),
+            "{code}: {}",
+            String::from_utf8_lossy(&plan.stderr)
+        );
+        // Every line that says something has its reason above it or beside it.
+        for file in ["machine.toml", "plan.toml"] {
+            let written = std::fs::read_to_string(made.join(file)).unwrap();
+            let lines: Vec<&str> = written.lines().collect();
+            let mut explained = false;
+            for line in lines {
+                if line.starts_with('#') {
+                    explained = true;
+                } else if line.is_empty() || line.starts_with('[') || line == "]" {
+                    explained = explained && line.starts_with("[[");
+                } else if line.starts_with("  \"") {
+                    assert!(line.contains('#'), "{code}: {file}: {line}");
+                } else {
+                    let group = ["spindle_ball", "bar_u_um", "direction"]
+                        .iter()
+                        .any(|key| line.starts_with(key));
+                    assert!(explained || group, "{code}: {file}: {line}");
+                    explained = false;
+                }
+            }
+        }
+    }
+    for (code, message) in [
+        ("[wCAYXZt]", "it holds 0 beds"),
+        (
+            "w b J1 J2 t",
+            "axis `J1` of `w b J1 J2 t` is no letter of ISO 841",
+        ),
+        ("wbt", "has no axis"),
+    ] {
+        let told = abbe(&["new", text(&folder.path().join("no")), "--from-code", code]);
+        assert_eq!(told.status.code(), Some(1));
+        let told = String::from_utf8_lossy(&told.stderr).into_owned();
+        assert!(told.contains(message), "{code}: {told}");
+    }
+    assert!(!folder.path().join("no").exists());
+}
+
+#[test]
+fn the_menu_comes_without_arguments() {
+    let menu = abbe(&["new"]);
+    assert!(menu.status.success());
+    assert_eq!(menu.stdout, abbe(&["new", "--list"]).stdout);
+    let told = abbe(&["new", "somewhere"]);
+    assert_eq!(told.status.code(), Some(2));
+    assert!(String::from_utf8_lossy(&told.stderr).contains("--from-code"));
+}

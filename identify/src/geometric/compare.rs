@@ -1,6 +1,7 @@
 //! A geometric method and the full fit on the same readings: value, uncertainty, and bias on readings simulated with known errors.
 
 use abbe_model::session::Session;
+use schemars::JsonSchema;
 use serde::Serialize;
 
 use super::{Estimate, Estimator, Method};
@@ -10,7 +11,7 @@ use crate::parameters::Role;
 use crate::problem::Problem;
 
 /// The centre of one test.
-#[derive(Clone, Debug, PartialEq, Serialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, JsonSchema)]
 pub struct CentreResult {
     /// The test.
     pub test: String,
@@ -33,7 +34,7 @@ pub struct CentreResult {
 }
 
 /// One error by both ways, in its own unit.
-#[derive(Clone, Debug, PartialEq, Serialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, JsonSchema)]
 pub struct ComparisonRow {
     /// The error.
     pub id: String,
@@ -54,7 +55,7 @@ pub struct ComparisonRow {
 }
 
 /// A method beside the full fit.
-#[derive(Clone, Debug, PartialEq, Serialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, JsonSchema)]
 pub struct Comparison {
     /// `circle`, `cone`, `two-plane`.
     pub method: String,

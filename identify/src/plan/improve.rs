@@ -3,6 +3,7 @@
 //! Greedy: the entry after which the goal stands best, again and again. Exchange: each proposed test is taken away in turn and the best entry for
 //! its place looked for, until no place changes (Fedorov's algorithm: Atkinson, Donev & Tobias, Optimum Experimental Designs, 2007, ch. 12).
 
+use schemars::JsonSchema;
 use serde::Serialize;
 
 use super::goal::{Goal, asked, figure, reported};
@@ -24,7 +25,7 @@ pub struct ImproveOptions {
 }
 
 /// What is proposed.
-#[derive(Clone, Debug, Serialize)]
+#[derive(Clone, Debug, Serialize, JsonSchema)]
 pub struct Improvement {
     /// What the figures are: `worst standard uncertainty, um or arcsec`, or `separation, standard deviations`.
     pub figure: String,
@@ -43,7 +44,7 @@ pub struct Improvement {
 }
 
 /// A proposed test.
-#[derive(Clone, Debug, Serialize)]
+#[derive(Clone, Debug, Serialize, JsonSchema)]
 pub struct Step {
     /// In words.
     pub test: String,
@@ -66,7 +67,7 @@ pub struct Step {
 }
 
 /// An entry that comes close.
-#[derive(Clone, Debug, Serialize)]
+#[derive(Clone, Debug, Serialize, JsonSchema)]
 pub struct Alternative {
     /// In words.
     pub test: String,

@@ -1,6 +1,7 @@
 //! How far a sweep can shrink, about its middle, before an uncertainty doubles.
 
 use faer::Mat;
+use schemars::JsonSchema;
 use serde::Serialize;
 
 use super::linear::{Linearisation, is_wanted, merged};
@@ -10,7 +11,7 @@ use crate::problem::Problem;
 use crate::rank::Rank;
 
 /// What a sweep could spare.
-#[derive(Clone, Debug, Serialize)]
+#[derive(Clone, Debug, Serialize, JsonSchema)]
 pub struct Shrinkage {
     /// The test.
     pub test: String,

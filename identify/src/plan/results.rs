@@ -1,11 +1,12 @@
 //! What a plan's analysis says, as it stands in JSON. Units stand in the names, or beside the value.
 
+use schemars::JsonSchema;
 use serde::Serialize;
 
 use crate::results::Unobservable;
 
 /// What `abbe plan` reports.
-#[derive(Clone, Debug, Serialize)]
+#[derive(Clone, Debug, Serialize, JsonSchema)]
 pub struct PlanAnalysis {
     /// Standard deviation of one scalar reading, µm.
     pub noise_um: f64,
@@ -43,7 +44,7 @@ pub struct PlanAnalysis {
 }
 
 /// A test in short.
-#[derive(Clone, Debug, Serialize)]
+#[derive(Clone, Debug, Serialize, JsonSchema)]
 pub struct TestSummary {
     /// Its name.
     pub name: String,
@@ -59,7 +60,7 @@ pub struct TestSummary {
 }
 
 /// An error and what the plan says of it.
-#[derive(Clone, Debug, Serialize)]
+#[derive(Clone, Debug, Serialize, JsonSchema)]
 pub struct ErrorAnalysis {
     /// `EY0A`, `EZC~C:h2.cos`.
     pub id: String,
@@ -80,7 +81,7 @@ pub struct ErrorAnalysis {
 }
 
 /// µm of reading a unit of an error.
-#[derive(Clone, Debug, Serialize)]
+#[derive(Clone, Debug, Serialize, JsonSchema)]
 pub struct Sensitivity {
     /// The largest over all readings, its sign kept.
     pub largest: f64,
@@ -91,7 +92,7 @@ pub struct Sensitivity {
 }
 
 /// A part of a standard uncertainty.
-#[derive(Clone, Debug, Serialize)]
+#[derive(Clone, Debug, Serialize, JsonSchema)]
 pub struct Contribution {
     /// `noise`, or a set-up quantity: `spindle_ball.z[A150]`.
     pub from: String,
@@ -102,7 +103,7 @@ pub struct Contribution {
 }
 
 /// Another error that shares the variance of an error.
-#[derive(Clone, Debug, Serialize)]
+#[derive(Clone, Debug, Serialize, JsonSchema)]
 pub struct SharedWith {
     /// The other error.
     pub id: String,
@@ -111,7 +112,7 @@ pub struct SharedWith {
 }
 
 /// Sensitivity along one traversal.
-#[derive(Clone, Debug, Serialize)]
+#[derive(Clone, Debug, Serialize, JsonSchema)]
 pub struct Curve {
     /// The test.
     pub test: String,
@@ -120,7 +121,7 @@ pub struct Curve {
 }
 
 /// An error that readings alone cannot tell from set-up quantities.
-#[derive(Clone, Debug, Serialize)]
+#[derive(Clone, Debug, Serialize, JsonSchema)]
 pub struct HeldBySetup {
     /// The error.
     pub error: String,
@@ -131,7 +132,7 @@ pub struct HeldBySetup {
 }
 
 /// Unknowns that are nearly one combination.
-#[derive(Clone, Debug, Serialize)]
+#[derive(Clone, Debug, Serialize, JsonSchema)]
 pub struct NearDependency {
     /// Condition index: the largest over this singular value of the Jacobian with columns of unit length.
     pub condition_index: f64,
@@ -142,7 +143,7 @@ pub struct NearDependency {
 }
 
 /// Correlations of the errors.
-#[derive(Clone, Debug, Serialize)]
+#[derive(Clone, Debug, Serialize, JsonSchema)]
 pub struct Correlation {
     /// The errors.
     pub ids: Vec<String>,
@@ -151,7 +152,7 @@ pub struct Correlation {
 }
 
 /// Figures of merit of the information on the errors, set-up quantities being unknown within their priors.
-#[derive(Clone, Debug, Default, Serialize)]
+#[derive(Clone, Debug, Default, Serialize, JsonSchema)]
 pub struct Indices {
     /// Errors that are seen by themselves.
     pub seen: usize,
@@ -180,7 +181,7 @@ pub struct Indices {
 }
 
 /// What becomes of the uncertainties without a test.
-#[derive(Clone, Debug, Serialize)]
+#[derive(Clone, Debug, Serialize, JsonSchema)]
 pub struct WithoutTest {
     /// The test that is left out.
     pub test: String,
@@ -191,7 +192,7 @@ pub struct WithoutTest {
 }
 
 /// What undeclared effects would do.
-#[derive(Clone, Debug, Serialize)]
+#[derive(Clone, Debug, Serialize, JsonSchema)]
 pub struct EffectsAnalysis {
     /// Significance of one look.
     pub significance: f64,
@@ -206,7 +207,7 @@ pub struct EffectsAnalysis {
 }
 
 /// One undeclared effect.
-#[derive(Clone, Debug, Serialize)]
+#[derive(Clone, Debug, Serialize, JsonSchema)]
 pub struct EffectDetectability {
     /// `EZC~C:h2`.
     pub id: String,
@@ -227,7 +228,7 @@ pub struct EffectDetectability {
 }
 
 /// By how much an effect biases an error.
-#[derive(Clone, Debug, Serialize)]
+#[derive(Clone, Debug, Serialize, JsonSchema)]
 pub struct Bias {
     /// The error.
     pub id: String,

@@ -1,6 +1,7 @@
 //! The test that tells a found effect from one that looks like it.
 
 use abbe_model::effect::Effect;
+use schemars::JsonSchema;
 use serde::Serialize;
 
 use super::goal::{Goal, asked, figure};
@@ -17,7 +18,7 @@ const LEAST_GAIN: f64 = 1e-6;
 const AS_GOOD_AS: f64 = 0.9;
 
 /// A test that separates an effect from one that looks like it.
-#[derive(Clone, Debug, PartialEq, Serialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, JsonSchema)]
 pub struct Separated {
     /// In words: `C150 with the workpiece ball at radius 50 mm`.
     pub test: String,

@@ -2,6 +2,7 @@
 
 use abbe_model::component::{ErrorKind, ErrorName, Freedom};
 use abbe_model::session::Session;
+use schemars::JsonSchema;
 use serde::Serialize;
 
 use super::position::{self, Position};
@@ -15,7 +16,7 @@ const REPORTED_BINS: usize = 100;
 const NARROW: f64 = 3.0;
 
 /// A function at one angle.
-#[derive(Clone, Debug, PartialEq, Serialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, JsonSchema)]
 pub struct FunctionPoint {
     /// The angle, degrees.
     pub at_deg: f64,
@@ -26,7 +27,7 @@ pub struct FunctionPoint {
 }
 
 /// A function of an angle.
-#[derive(Clone, Debug, PartialEq, Serialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, JsonSchema)]
 pub struct FunctionResult {
     /// Its name.
     pub id: String,
@@ -35,7 +36,7 @@ pub struct FunctionResult {
 }
 
 /// Runs by value.
-#[derive(Clone, Debug, PartialEq, Serialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, JsonSchema)]
 pub struct Histogram {
     /// Lower end of the first bin.
     pub from_um: f64,
@@ -50,7 +51,7 @@ pub struct Histogram {
 }
 
 /// What a quantity is distributed like.
-#[derive(Clone, Debug, PartialEq, Serialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, JsonSchema)]
 pub struct DistributionResult {
     /// The quantity.
     pub id: String,
@@ -67,7 +68,7 @@ pub struct DistributionResult {
 }
 
 /// Monte Carlo of a self-calibration.
-#[derive(Clone, Debug, PartialEq, Serialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, JsonSchema)]
 pub struct MonteCarloResult {
     /// Number of runs.
     pub runs: u64,
@@ -80,7 +81,7 @@ pub struct MonteCarloResult {
 }
 
 /// What `abbe fit --method self-calibration` reports.
-#[derive(Clone, Debug, PartialEq, Serialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, JsonSchema)]
 pub struct SelfCalibration {
     /// `self-calibration`.
     pub method: String,

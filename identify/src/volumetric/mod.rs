@@ -15,6 +15,7 @@ use abbe_model::chain::{AxisPosition, BodyErrors, ERRORS_PER_AXIS, Machine};
 use abbe_model::frames::Point;
 use nalgebra::{DMatrix, DVector, Vector3};
 use rayon::prelude::*;
+use schemars::JsonSchema;
 use serde::Serialize;
 
 pub use functions::{ErrorFunction, Form};
@@ -153,7 +154,7 @@ impl Erring<'_> {
 }
 
 /// Largest and root mean square of a length over a map, µm.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, JsonSchema)]
 pub struct Size {
     /// The largest.
     pub largest_um: f64,
@@ -177,7 +178,7 @@ impl Size {
 }
 
 /// A map in figures.
-#[derive(Clone, Debug, PartialEq, Serialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, JsonSchema)]
 pub struct Summary {
     /// Number of places.
     pub places: usize,

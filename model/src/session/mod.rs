@@ -11,6 +11,7 @@ mod reach;
 pub mod read;
 pub mod readings;
 pub mod rewrite;
+pub mod schema;
 mod spelling;
 mod table;
 pub mod write;

@@ -182,6 +182,27 @@ fn traversals(
     Ok(readings)
 }
 
+/// Where the axes stand at these angles of a test's circle; `None` for another movement.
+pub(super) fn on_circle(
+    machine: &Machine,
+    test: &Test,
+    angles: &[f64],
+) -> Option<Result<Vec<Vec<f64>>, Fault>> {
+    let Some(Motion::Circle {
+        first,
+        second,
+        radius,
+        centre,
+        ..
+    }) = &test.motion
+    else {
+        return None;
+    };
+    let bar = pair(&test.station)?;
+    let circle = Circle::new(machine, &bar, &test.at, [*first, *second], *centre);
+    Some(circle.map(|circle| angles.iter().map(|angle| circle.state(*radius, *angle)).collect()))
+}
+
 /// A circle of two linear axes.
 struct Circle {
     at: Vec<f64>,

@@ -97,8 +97,8 @@ pub fn run(arguments: &PlanArguments) -> Result<(), Failure> {
 }
 
 /// What `--improve`, `--separate` and `--range` ask for.
-#[derive(serde::Serialize)]
-struct NextTest {
+#[derive(serde::Serialize, schemars::JsonSchema)]
+pub struct NextTest {
     #[serde(skip_serializing_if = "Option::is_none")]
     improvement: Option<plan::improve::Improvement>,
     #[serde(skip_serializing_if = "Vec::is_empty")]

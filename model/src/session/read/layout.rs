@@ -4,7 +4,7 @@ use crate::error::ModelError;
 use crate::session::document::{Table, Value};
 use crate::session::table::{Format, Mapped, Theirs};
 
-/// `[format]`: separator, decimal, header.
+/// `[format]`: separator, decimal, header; sheet of a spreadsheet; direction in a ball-bar file.
 pub(super) fn format(mut table: Table<'_>) -> Result<Format, ModelError> {
     let mut format = Format::default();
     if let Some(value) = table.take("separator") {
@@ -16,6 +16,12 @@ pub(super) fn format(mut table: Table<'_>) -> Result<Format, ModelError> {
     }
     if let Some(value) = table.take("header") {
         format.header = value.truth()?;
+    }
+    if let Some(value) = table.take("sheet") {
+        format.sheet = Some(value.text()?);
+    }
+    if let Some(value) = table.take("anticlockwise") {
+        format.anticlockwise = Some(value.text()?);
     }
     if format.decimal == format.separator
         && let Some(value) = decimal

@@ -64,7 +64,7 @@ pub(super) fn tests(
     } = at(context, &mut table)?;
     let format = match table.take("format") {
         Some(value) => layout::format(value.table(format!("[test.format] of \"{name}\""))?)?,
-        None => context.format,
+        None => context.format.clone(),
     };
     let columns = match table.take("columns") {
         Some(value) => Some(layout::columns(
@@ -136,6 +136,13 @@ pub(super) fn tests(
         socket: test.socket.as_deref(),
     };
     let mut tests = Vec::new();
+    if table::is_xml(&file) {
+        let (readings, unread) = table::read_xml(&file, &request, &test)?;
+        warnings.extend(unread);
+        check_readings(context, &test, &readings, warnings).map_err(here)?;
+        test.readings = Some(readings);
+        return Ok(vec![test]);
+    }
     for (socket, readings) in table::read(&file, &request)? {
         check_readings(context, &test, &readings, warnings).map_err(here)?;
         let Some(socket) = socket else {

@@ -1,13 +1,16 @@
-//! Tables of readings: CSV files of our own, and other people's through `[format]` and `[columns]`.
+//! Tables of readings: CSV files of our own, other people's through `[format]` and `[columns]`, spreadsheets, and ball-bar files in XML.
 //!
 //! A header line, then a row a reading; `#` begins a comment line; empty lines, a byte order mark and CRLF do no harm. What is wrong
 //! is told with file, line and column.
 
+mod ballbar_xml;
 mod columns;
 mod rows;
+mod sheet;
 
 use std::path::Path;
 
+pub(crate) use ballbar_xml::{is_xml, read as read_xml};
 pub(crate) use columns::{Mapped, Theirs, r_test_columns};
 
 use columns::{Column, Role};
@@ -19,7 +22,7 @@ use crate::instrument::InstrumentKind;
 use crate::session::readings::Readings;
 
 /// How a file writes its rows.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq)]
 pub(crate) struct Format {
     /// Between cells.
     pub separator: u8,
@@ -27,6 +30,10 @@ pub(crate) struct Format {
     pub decimal: u8,
     /// Whether the first row names the columns.
     pub header: bool,
+    /// The sheet of a spreadsheet; the first that is not empty where absent.
+    pub sheet: Option<String>,
+    /// How a ball-bar file in XML calls the direction from the first axis of the plane towards the second.
+    pub anticlockwise: Option<String>,
 }
 
 impl Default for Format {
@@ -35,6 +42,8 @@ impl Default for Format {
             separator: b',',
             decimal: b'.',
             header: true,
+            sheet: None,
+            anticlockwise: None,
         }
     }
 }
@@ -72,7 +81,11 @@ pub(crate) type BySocket = Vec<(Option<String>, Readings)>;
 /// Anything that is not a finite number where one is expected, with file, line and column; missing or unknown columns; time that
 /// runs backwards; fewer than two readings.
 pub(crate) fn read(file: &Path, request: &Request<'_>) -> Result<BySocket, ModelError> {
-    let mut rows = Rows::open(file, request.format)?;
+    let mut rows = if sheet::is_spreadsheet(file) {
+        Source::Sheet(sheet::rows(file, &request.format)?.into_iter())
+    } else {
+        Source::Text(Rows::open(file, &request.format)?)
+    };
     let empty = |what: &str| ModelError::Input {
         place: Place::file(file),
         message: format!("an empty data file: {what}"),
@@ -90,7 +103,7 @@ pub(crate) fn read(file: &Path, request: &Request<'_>) -> Result<BySocket, Model
     }
     while let Some(row) = rows.next_row()? {
         if row.cells.len() != width {
-            return Err(wrong_width(file, &row, width, request.format));
+            return Err(wrong_width(file, &row, width, &request.format));
         }
         filled.push(&row)?;
     }
@@ -105,7 +118,22 @@ pub(crate) fn read(file: &Path, request: &Request<'_>) -> Result<BySocket, Model
     }
 }
 
-fn wrong_width(file: &Path, row: &rows::Row, width: usize, format: Format) -> ModelError {
+/// Rows of a text or of a sheet.
+enum Source {
+    Text(Rows),
+    Sheet(std::vec::IntoIter<rows::Row>),
+}
+
+impl Source {
+    fn next_row(&mut self) -> Result<Option<rows::Row>, ModelError> {
+        match self {
+            Source::Text(rows) => rows.next_row(),
+            Source::Sheet(rows) => Ok(rows.next()),
+        }
+    }
+}
+
+fn wrong_width(file: &Path, row: &rows::Row, width: usize, format: &Format) -> ModelError {
     let found = row.cells.len();
     let cells = |n: usize| format!("{n} cell{}", if n == 1 { "" } else { "s" });
     let help = if format.separator == b',' && found > width {
@@ -171,7 +199,7 @@ impl<'a> Filled<'a> {
                 message: format!("column {} (`{}`): {message}", column.index + 1, column.name),
                 help: Some(help.to_string()),
             };
-            let value = number(cell, self.request.format).map_err(|(message, help)| fault(message, help))?;
+            let value = number(cell, &self.request.format).map_err(|(message, help)| fault(message, help))?;
             match column.role {
                 Role::Time => {
                     if let Some(&before) = readings.time_s.last()
@@ -231,7 +259,7 @@ impl<'a> Filled<'a> {
 }
 
 /// A finite number in a cell, or what is wrong with it and what to do.
-fn number(cell: &str, format: Format) -> Result<f64, (String, &'static str)> {
+fn number(cell: &str, format: &Format) -> Result<f64, (String, &'static str)> {
     const NUMBER: &str = "put a number there or remove the row";
     if cell.is_empty() {
         return Err(("an empty cell where a number is expected".into(), NUMBER));

@@ -25,6 +25,16 @@ pub(super) struct Row {
 }
 
 impl Row {
+    /// A row that stands in no text: of a sheet.
+    pub fn of_cells(line: usize, cells: Vec<String>) -> Row {
+        Row {
+            line,
+            cells,
+            start: 0,
+            text: String::new(),
+        }
+    }
+
     /// The bytes of the file that a cell takes, where no quotes hide them.
     pub fn span(&self, cell: usize) -> Option<Range<usize>> {
         let cell = self.cells.get(cell).filter(|cell| !cell.is_empty())?;
@@ -41,7 +51,7 @@ impl Row {
 /// The rows of a file: no comments, no empty lines.
 pub(super) struct Rows {
     file: PathBuf,
-    format: Format,
+    separator: u8,
     reader: BufReader<File>,
     line: usize,
     byte: usize,
@@ -50,7 +60,7 @@ pub(super) struct Rows {
 
 impl Rows {
     /// Opens a file.
-    pub fn open(file: &Path, format: Format) -> Result<Rows, ModelError> {
+    pub fn open(file: &Path, format: &Format) -> Result<Rows, ModelError> {
         let reader = File::open(file).and_then(|opened| {
             if opened.metadata()?.is_dir() {
                 return Err(std::io::Error::other("it is a folder"));
@@ -60,7 +70,7 @@ impl Rows {
         match reader {
             Ok(reader) => Ok(Rows {
                 file: file.to_path_buf(),
-                format,
+                separator: format.separator,
                 reader,
                 line: 0,
                 byte: 0,
@@ -88,7 +98,7 @@ impl Rows {
             let cells = if text.contains('"') {
                 self.quoted(&text)?
             } else {
-                text.split(char::from(self.format.separator))
+                text.split(char::from(self.separator))
                     .map(|cell| cell.trim().to_string())
                     .collect()
             };
@@ -134,7 +144,7 @@ impl Rows {
         let mut record = csv::StringRecord::new();
         let mut reader = csv::ReaderBuilder::new()
             .has_headers(false)
-            .delimiter(self.format.separator)
+            .delimiter(self.separator)
             .trim(csv::Trim::All)
             .from_reader(text.as_bytes());
         match reader.read_record(&mut record) {

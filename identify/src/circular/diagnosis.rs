@@ -1,0 +1,299 @@
+//! The classical diagnosis: which faults of two linear axes make up the deviation of a circle.
+//!
+//! The terms of [`super::terms`] are fitted together by least squares with radius and centre, which the set-up takes up. Reversal spikes
+//! and cyclic errors have a width and a pitch that are searched for; they are taken in only where chance would not give as good a one in
+//! a thousand circles. A share is the range of a fault's own `δL` over the sum of all ranges.
+//!
+//! Uncertainties follow from the noise, or from what is left over where that is more; where neighbouring readings err alike with the
+//! correlation r, they are enlarged by √((1 + r)/(1 − r)).
+
+use abbe_model::chain::Machine;
+
+use super::fault::Fault;
+use super::path::{Moves, Path};
+use super::regression::Regression;
+use super::results::{CircularTest, Diagnosis};
+use super::search::{cyclic, spikes};
+use super::terms::Rows;
+use crate::results::ParameterResult;
+
+/// A single reading beyond this many standard deviations is wild.
+const WILD: f64 = 6.0;
+/// An arc shorter than this is not taken apart.
+const SHORTEST_ARC_DEG: f64 = 180.0;
+
+/// A circle taken apart.
+struct Model {
+    names: [String; 2],
+    rows: Rows,
+    faults: Vec<Fault>,
+    regression: Regression,
+}
+
+impl Model {
+    /// Of a path; or why it has none, in words where it is a circle of linear axes.
+    fn of(machine: &Machine, path: &Path) -> Result<Model, Option<String>> {
+        let Moves::Linear {
+            axes,
+            radius_mm,
+            radial,
+        } = path.moves
+        else {
+            return Err(None);
+        };
+        let arc_deg = path.arc().to_degrees();
+        if !radial {
+            return Err(Some(
+                "no diagnosis: the bar does not lie in the plane of the circle".into(),
+            ));
+        }
+        if arc_deg < SHORTEST_ARC_DEG * 0.99 {
+            return Err(Some(format!(
+                "no diagnosis: an arc of {arc_deg:.0}° is too short for it"
+            )));
+        }
+        let names = axes.map(|axis| machine.axes[axis].name.clone());
+        let rows = Rows::of(path);
+        let mut faults = standard(path, &rows, &names, radius_mm);
+        let Some(mut regression) = solve(&rows, &faults) else {
+            return Err(Some(
+                "no diagnosis: the readings cannot tell the faults apart".into(),
+            ));
+        };
+        let found = spikes(path, &rows, &names, &faults, &regression);
+        take_up(&rows, &mut faults, &mut regression, found);
+        let found = cyclic(&rows, &names, &faults, &regression);
+        take_up(&rows, &mut faults, &mut regression, found);
+        Ok(Model {
+            names,
+            rows,
+            faults,
+            regression,
+        })
+    }
+}
+
+/// The wild readings of a circle: single ones that stand out of what the diagnosis leaves over; `None` where there is no diagnosis.
+pub(super) fn wild(machine: &Machine, path: &Path) -> Option<Vec<bool>> {
+    let model = Model::of(machine, path).ok()?;
+    let residual = &model.regression.residual;
+    let mut sizes: Vec<f64> = residual.iter().map(|r| r.abs()).collect();
+    sizes.sort_by(f64::total_cmp);
+    // Of a normal distribution the median size is 0.6745 σ.
+    let limit = WILD * sizes[sizes.len() / 2] / 0.6745;
+    let mut wild = path.left_out.clone();
+    for (i, value) in residual.iter().enumerate() {
+        let neighbours = [i.checked_sub(1), Some(i + 1)];
+        let alone = neighbours
+            .into_iter()
+            .filter_map(|j| residual.get(j?))
+            .all(|other| other.abs() < 0.5 * value.abs());
+        if value.abs() > limit && alone {
+            wild[model.rows.row[i]] = true;
+        }
+    }
+    Some(wild)
+}
+
+/// Adds the diagnosis to a result, and what the test cannot tell.
+pub(super) fn add(machine: &Machine, path: &Path, noise_mm: f64, result: &mut CircularTest) {
+    match Model::of(machine, path) {
+        Ok(model) => {
+            let sigma = scatter(&model.rows, &model.regression, noise_mm);
+            report(&model.rows, &model.faults, &model.regression, sigma, result);
+            limits(path, &model.regression, sigma, &model.names, result);
+        }
+        Err(why) => result.not_told.extend(why),
+    }
+}
+
+/// Takes further faults into the model, where the readings can tell them from the others.
+fn take_up(rows: &Rows, faults: &mut Vec<Fault>, regression: &mut Regression, found: Vec<Fault>) {
+    if found.is_empty() {
+        return;
+    }
+    let kept = faults.len();
+    faults.extend(found);
+    match solve(rows, faults) {
+        Some(better) => *regression = better,
+        None => faults.truncate(kept),
+    }
+}
+
+pub(super) fn columns(rows: &Rows, faults: &[Fault]) -> Vec<Vec<f64>> {
+    let mut columns = rows.setup();
+    columns.extend(faults.iter().flat_map(|fault| fault.columns.iter().cloned()));
+    columns
+}
+
+fn solve(rows: &Rows, faults: &[Fault]) -> Option<Regression> {
+    Regression::solve(&columns(rows, faults), &rows.y)
+}
+
+/// The faults that every circle is asked for.
+fn standard(path: &Path, rows: &Rows, names: &[String; 2], radius_mm: f64) -> Vec<Fault> {
+    let plane = names.concat();
+    let ppm = 1e6 / radius_mm;
+    let mut faults = vec![
+        Fault::new("scale mismatch", plane.clone(), vec![rows.scale()])
+            .figure("ratio", &[(0, 1.0)], ppm, "um/m")
+            .figure("over_diameter", &[(0, 2.0)], 1e3, "um"),
+        Fault::new("squareness", plane.clone(), vec![rows.squareness()]).figure(
+            "angle",
+            &[(0, 1.0)],
+            ppm,
+            "um/m",
+        ),
+    ];
+    if let (true, Some(feed)) = (path.both_directions(), path.feed_mm_s) {
+        faults.push(Fault::new("servo mismatch", plane, vec![rows.servo()]).figure(
+            "delay",
+            &[(0, 1.0)],
+            1e3 / feed,
+            "ms",
+        ));
+    } else if path.both_directions() {
+        faults.push(Fault::new("servo mismatch", plane, vec![rows.servo()]).figure(
+            "lag",
+            &[(0, 1.0)],
+            1e3,
+            "um",
+        ));
+    }
+    for axis in 0..2 {
+        let name = &names[axis];
+        faults.push(
+            Fault::new("backlash", name.clone(), rows.backlash(axis).to_vec())
+                .figure(format!("{name}+"), &[(0, 1.0), (1, 1.0)], 1e3, "um")
+                .figure(format!("{name}-"), &[(0, 1.0), (1, -1.0)], 1e3, "um"),
+        );
+        faults.push(
+            Fault::new("straightness", name.clone(), vec![rows.straightness(axis)]).figure(
+                "sagitta",
+                &[(0, 1.0)],
+                1e3,
+                "um",
+            ),
+        );
+        if path.both_directions() {
+            faults.push(
+                Fault::new("lateral play", name.clone(), vec![rows.lateral(axis)]).figure(
+                    "play",
+                    &[(0, 1.0)],
+                    1e3,
+                    "um",
+                ),
+            );
+        }
+    }
+    faults
+}
+
+/// Variance of the residual, and the correlation of neighbours in it.
+pub(super) fn variance_and_correlation(rows: &Rows, regression: &Regression) -> (f64, f64) {
+    let residual = &regression.residual;
+    let sum = regression.sum_of_squares();
+    let neighbours: f64 = (1..residual.len())
+        .filter(|i| rows.follows[*i])
+        .map(|i| residual[i] * residual[i - 1])
+        .sum();
+    let freedom = residual.len().saturating_sub(regression.beta.len()).max(1);
+    let correlation = if sum > 0.0 {
+        (neighbours / sum).clamp(0.0, 0.99)
+    } else {
+        0.0
+    };
+    (sum / freedom as f64, correlation)
+}
+
+/// The standard deviation that uncertainties follow from, mm.
+fn scatter(rows: &Rows, regression: &Regression, noise_mm: f64) -> f64 {
+    let (variance, r) = variance_and_correlation(rows, regression);
+    (variance.max(noise_mm * noise_mm) * (1.0 + r) / (1.0 - r)).sqrt()
+}
+
+fn report(rows: &Rows, faults: &[Fault], regression: &Regression, sigma: f64, result: &mut CircularTest) {
+    let mut first = rows.setup().len();
+    for fault in faults {
+        let mut values: Vec<ParameterResult> = fault
+            .figures
+            .iter()
+            .map(|figure| {
+                let weights: Vec<(usize, f64)> = figure
+                    .weights
+                    .iter()
+                    .map(|(j, w)| (first + j, w * figure.per_mm))
+                    .collect();
+                ParameterResult {
+                    id: figure.name.clone(),
+                    value: weights.iter().map(|(j, w)| regression.beta[*j] * w).sum(),
+                    u: regression.u(&weights, sigma),
+                    unit: figure.unit.to_string(),
+                }
+            })
+            .collect();
+        for (name, column) in &fault.amplitudes {
+            let (j, k) = (first + column, first + column + 1);
+            let (a, b) = (regression.beta[j], regression.beta[k]);
+            let amplitude = a.hypot(b);
+            let along = [(j, a / amplitude * 1e3), (k, b / amplitude * 1e3)];
+            values.push(ParameterResult {
+                id: name.clone(),
+                value: amplitude * 1e3,
+                u: regression.u(&along, sigma),
+                unit: "um".into(),
+            });
+        }
+        values.extend(fault.searched.iter().cloned());
+        let own = (0..rows.count()).map(|i| {
+            let terms = fault.columns.iter().enumerate();
+            terms
+                .map(|(j, column)| column[i] * regression.beta[first + j])
+                .sum::<f64>()
+        });
+        let (least, most) = own.fold((f64::INFINITY, f64::NEG_INFINITY), |(a, b), x| {
+            (a.min(x), b.max(x))
+        });
+        result.diagnosis.push(Diagnosis {
+            fault: fault.fault.to_string(),
+            axes: fault.axes.clone(),
+            values,
+            circularity_um: (most - least) * 1e3,
+            share_percent: 0.0,
+        });
+        first += fault.columns.len();
+    }
+    let total: f64 = result.diagnosis.iter().map(|fault| fault.circularity_um).sum();
+    for fault in &mut result.diagnosis {
+        fault.share_percent = if total > 0.0 {
+            100.0 * fault.circularity_um / total
+        } else {
+            0.0
+        };
+    }
+    result
+        .diagnosis
+        .sort_by(|a, b| b.circularity_um.total_cmp(&a.circularity_um));
+    result.diagnosis_rms_um = Some((regression.sum_of_squares() / rows.count() as f64).sqrt() * 1e3);
+}
+
+/// What cannot be told from these readings.
+fn limits(path: &Path, regression: &Regression, sigma: f64, names: &[String; 2], result: &mut CircularTest) {
+    let (radius_um, u) = (regression.beta[0] * 1e3, regression.u(&[(0, 1e3)], sigma));
+    result.not_told.push(format!(
+        "the mean radius is off by {radius_um:.2} µm (u {u:.2}): the bar's length, the mean scale of {} and {}, and what both axes lag \
+         (that grows with the square of the feed) do the same",
+        names[0], names[1]
+    ));
+    if !path.both_directions() {
+        let why = "one direction only: servo mismatch is in the squareness, lateral play in radius and scale, and neither is told apart";
+        result.not_told.push(why.into());
+    } else if path.feed_mm_s.is_none() {
+        let why = "no time in the data: servo mismatch is given as a lag in µm at this feed, not in ms";
+        result.not_told.push(why.into());
+    }
+    result.not_told.push(
+        "straightness cannot be told from a positioning error of the other axis that grows with the square"
+            .into(),
+    );
+}

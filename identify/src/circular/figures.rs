@@ -1,0 +1,182 @@
+//! The figures of ISO 230-4: circular deviation G, bidirectional circular deviation G(b), radial deviation F, mean bidirectional radial
+//! deviation D, circular hysteresis H (of the edition of 1996).
+//!
+//! ```text
+//! p(θ) = L(θ)·(cos θ, sin θ)     c, ρ: least-squares circle through p     G = max ‖p − c‖ − min ‖p − c‖     F(θ) = ‖p − c‖ − L_nominal
+//! ```
+//!
+//! The standard's minimum-zone circles may be replaced by the least-squares circle (its clause 3); that is what is done here, so that
+//! G is never smaller than the standard's.
+
+use std::f64::consts::{PI, TAU};
+
+use abbe_model::chain::Machine;
+use abbe_model::session::Test;
+
+use super::path::{Moves, Path};
+use super::results::{CircularTest, DirectionFigures};
+use crate::circle;
+
+/// A path as points: angle, deviation of the length from nominal, nominal length.
+struct Trace(Vec<[f64; 3]>);
+
+/// The figures of a path.
+pub(super) fn figures(machine: &Machine, test: &Test, path: &Path) -> CircularTest {
+    let name = |axis: usize| machine.axes[axis].name.clone();
+    let (axes, radius_mm) = match path.moves {
+        Moves::Linear { axes, radius_mm, .. } => (axes.map(name).concat(), Some(radius_mm)),
+        Moves::Rotary(axis) => (name(axis), None),
+    };
+    let traces = [1.0, -1.0].map(|direction| mean(path, direction));
+    let mut not_told = Vec::new();
+    let arc = path.arc();
+    if arc < TAU * 0.99 {
+        not_told.push(format!(
+            "an arc of {:.0}°: the figures are of that arc, ISO 230-4 asks for a full circle",
+            arc.to_degrees()
+        ));
+    }
+    let directions = traces
+        .iter()
+        .zip(["+", "-"])
+        .filter_map(|(trace, direction)| {
+            let (trace, runs) = trace.as_ref()?;
+            let around = about(path, trace);
+            let (least, most) = range(&around.deviations_mm);
+            Some(DirectionFigures {
+                direction: direction.to_string(),
+                runs: *runs,
+                circular_deviation_um: (most - least) * 1e3,
+                radial_deviation_max_um: most * 1e3,
+                radial_deviation_min_um: least * 1e3,
+            })
+        })
+        .collect();
+    let mut result = CircularTest {
+        test: test.name.clone(),
+        axes,
+        radius_mm,
+        feed_mm_min: path.feed_mm_s.map(|feed| feed * 60.0),
+        arc_deg: arc.to_degrees(),
+        directions,
+        bidirectional_circular_deviation_um: None,
+        mean_bidirectional_radial_deviation_um: None,
+        hysteresis_um: None,
+        diagnosis: Vec::new(),
+        diagnosis_rms_um: None,
+        not_told,
+    };
+    match &traces {
+        [Some((there, _)), Some((back, _))] => {
+            let both = Trace(there.0.iter().chain(&back.0).copied().collect());
+            let around = about(path, &both);
+            let (least, most) = range(&around.deviations_mm);
+            result.bidirectional_circular_deviation_um = Some((most - least) * 1e3);
+            result.mean_bidirectional_radial_deviation_um = Some(around.radius_mm * 1e3);
+            let differences = there.0.iter().filter_map(|p| Some((p[1] - back.at(p[0])?).abs()));
+            result.hysteresis_um = differences.reduce(f64::max).map(|most| most * 1e3);
+        }
+        _ => result
+            .not_told
+            .push("one direction only: G(b), D and hysteresis need the other one too".into()),
+    }
+    result
+}
+
+/// The mean path of the runs in one direction, on the angles of the first of them; and how many they are.
+fn mean(path: &Path, direction: f64) -> Option<(Trace, usize)> {
+    let runs: Vec<Trace> = path
+        .runs
+        .iter()
+        .filter(|run| run.direction == direction)
+        .map(|run| {
+            let kept = run
+                .rows
+                .clone()
+                .filter(|row| !path.left_out.get(*row).copied().unwrap_or(false));
+            let mut points: Vec<[f64; 3]> = kept
+                .map(|row| [path.angle[row], path.deviation_mm[row], path.nominal_mm[row]])
+                .collect();
+            points.sort_by(|a, b| a[0].total_cmp(&b[0]));
+            Trace(points)
+        })
+        .collect();
+    let first = runs.first()?;
+    let points = first.0.iter().map(|p| {
+        let others: Vec<f64> = runs[1..].iter().filter_map(|run| run.at(p[0])).collect();
+        let sum = p[1] + others.iter().sum::<f64>();
+        [p[0], sum / (1 + others.len()) as f64, p[2]]
+    });
+    Some((Trace(points.collect()), runs.len()))
+}
+
+impl Trace {
+    /// The deviation at an angle or at one that differs by whole turns, between the neighbouring readings.
+    fn at(&self, angle: f64) -> Option<f64> {
+        const SAME: f64 = 1e-6;
+        let points = &self.0;
+        let (first, last) = (points.first()?[0], points.last()?[0]);
+        let turns = ((first - SAME - angle) / TAU).ceil();
+        let angle = (angle + turns * TAU).clamp(first, f64::INFINITY);
+        if angle > last + SAME {
+            return None;
+        }
+        let next = points.partition_point(|p| p[0] < angle).min(points.len() - 1);
+        if next == 0 {
+            return Some(points[0][1]);
+        }
+        let (a, b) = (points[next - 1], points[next]);
+        let share = ((angle - a[0]) / (b[0] - a[0]).max(SAME)).clamp(0.0, 1.0);
+        Some(a[1] + share * (b[1] - a[1]))
+    }
+}
+
+/// A path about the centre of its least-squares circle.
+struct Around {
+    /// Distance from the centre less the nominal length, mm.
+    deviations_mm: Vec<f64>,
+    /// Radius of the circle less the nominal length, mm.
+    radius_mm: f64,
+}
+
+/// Takes out the centre. What a rotary axis turns need not read a radius; there it is the first harmonic of the reading.
+fn about(path: &Path, trace: &Trace) -> Around {
+    let mean = |values: &mut dyn Iterator<Item = f64>| values.sum::<f64>() / trace.0.len() as f64;
+    let nominal = mean(&mut trace.0.iter().map(|p| p[2]));
+    let radial = matches!(path.moves, Moves::Linear { radial: true, .. });
+    let points: Vec<[f64; 2]> = trace
+        .0
+        .iter()
+        .map(|p| {
+            let length = if radial { p[2] + p[1] } else { nominal + p[1] };
+            [length * p[0].cos(), length * p[0].sin()]
+        })
+        .collect();
+    // The centre of a short arc cannot be told from its radius.
+    let found = (path.arc() >= PI * 0.99)
+        .then(|| circle::through(&points))
+        .flatten();
+    let Some(circle) = found else {
+        return Around {
+            deviations_mm: trace.0.iter().map(|p| p[1]).collect(),
+            radius_mm: mean(&mut trace.0.iter().map(|p| p[1])),
+        };
+    };
+    let distance = |p: &[f64; 2]| (p[0] - circle.centre[0]).hypot(p[1] - circle.centre[1]);
+    Around {
+        deviations_mm: points
+            .iter()
+            .zip(&trace.0)
+            .map(|(point, p)| distance(point) - if radial { p[2] } else { nominal })
+            .collect(),
+        radius_mm: circle.radius - nominal,
+    }
+}
+
+fn range(values: &[f64]) -> (f64, f64) {
+    values
+        .iter()
+        .fold((f64::INFINITY, f64::NEG_INFINITY), |(least, most), x| {
+            (least.min(*x), most.max(*x))
+        })
+}

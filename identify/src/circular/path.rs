@@ -1,0 +1,209 @@
+//! The circular path of a test: angle, direction and radial deviation of every reading.
+
+use std::f64::consts::{PI, TAU};
+use std::ops::Range;
+
+use abbe_model::axis::AxisKind;
+use abbe_model::chain::Machine;
+use abbe_model::effect::DriverSample;
+use abbe_model::instrument::{InstrumentKind, Station};
+use abbe_model::sensitivity::{SlotValues, TestModel};
+use abbe_model::session::Test;
+
+use crate::circle;
+
+/// Readings that a run needs.
+const LEAST_READINGS: usize = 8;
+/// How far positions may lie off a circle, as a share of its radius.
+const OFF_CIRCLE: f64 = 1e-3;
+/// How much the nominal length may differ from the radius where the bar lies in the plane of the circle, as a share.
+const OFF_PLANE: f64 = 0.02;
+
+/// What moves.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) enum Moves {
+    /// Two linear axes, by index, about a circle of this radius, mm.
+    Linear {
+        axes: [usize; 2],
+        radius_mm: f64,
+        /// Whether the bar lies along the radius, so that it reads the path's radius.
+        radial: bool,
+    },
+    /// A rotary axis, by index.
+    Rotary(usize),
+}
+
+/// One run in one direction.
+#[derive(Clone, Debug)]
+pub(super) struct Run {
+    /// Its rows.
+    pub rows: Range<usize>,
+    /// +1 where the angle grows.
+    pub direction: f64,
+}
+
+/// A test's path.
+#[derive(Clone, Debug)]
+pub(super) struct Path {
+    pub moves: Moves,
+    pub runs: Vec<Run>,
+    /// Angle of each row, rad, without jumps inside a run.
+    pub angle: Vec<f64>,
+    /// Observed less nominal length, mm.
+    pub deviation_mm: Vec<f64>,
+    /// Nominal length, mm.
+    pub nominal_mm: Vec<f64>,
+    /// Wild readings.
+    pub left_out: Vec<bool>,
+    /// Of the two linear axes: where they stand and travel.
+    pub samples: [Vec<DriverSample<f64>>; 2],
+    /// Speed along the path, mm/s, where the data have time and linear axes move.
+    pub feed_mm_s: Option<f64>,
+}
+
+impl Path {
+    /// The path of a ball-bar test that is circular.
+    pub fn of(machine: &Machine, test: &Test) -> Option<Path> {
+        let readings = test.readings.as_ref()?;
+        let Station::BallBar(_) = test.station else {
+            return None;
+        };
+        debug_assert_eq!(test.station.kind(), InstrumentKind::BallBar);
+        let model = TestModel::new(machine, test.station.clone(), readings);
+        let nominal_mm = model.readings_mm(&SlotValues::zero(model.slots()));
+        let moves = moves(machine, &readings.positions, &nominal_mm)?;
+        let mut angle = match moves {
+            Moves::Rotary(axis) => readings.positions[axis].clone(),
+            Moves::Linear { axes, .. } => around(&readings.positions, axes)?,
+        };
+        let mut runs = Vec::new();
+        for rows in readings.runs() {
+            for row in rows.start + 1..rows.end {
+                if let Moves::Linear { .. } = moves {
+                    angle[row] -= ((angle[row] - angle[row - 1]) / TAU).round() * TAU;
+                }
+            }
+            if rows.len() >= LEAST_READINGS {
+                let direction = (angle[rows.end - 1] - angle[rows.start]).signum();
+                runs.push(Run { rows, direction });
+            }
+        }
+        if runs.is_empty() {
+            return None;
+        }
+        let samples = match moves {
+            Moves::Linear { axes, .. } => axes.map(|axis| readings.axis_samples(axis, AxisKind::Linear)),
+            Moves::Rotary(_) => [Vec::new(), Vec::new()],
+        };
+        let feed_mm_s = feed(&samples, !readings.time_s.is_empty());
+        Some(Path {
+            moves,
+            runs,
+            angle,
+            deviation_mm: readings
+                .observed
+                .iter()
+                .zip(&nominal_mm)
+                .map(|(observed, nominal)| observed - nominal)
+                .collect(),
+            nominal_mm,
+            left_out: vec![false; readings.rows()],
+            samples,
+            feed_mm_s,
+        })
+    }
+
+    /// Whether the path was run in both directions.
+    pub fn both_directions(&self) -> bool {
+        self.runs.iter().any(|run| run.direction > 0.0) && self.runs.iter().any(|run| run.direction < 0.0)
+    }
+
+    /// How far round the longest run goes, rad, not beyond a full turn.
+    pub fn arc(&self) -> f64 {
+        let of = |run: &Run| {
+            let angles = &self.angle[run.rows.clone()];
+            let (least, most) = angles
+                .iter()
+                .fold((f64::INFINITY, f64::NEG_INFINITY), |(a, b), x| {
+                    (a.min(*x), b.max(*x))
+                });
+            most - least
+        };
+        self.runs.iter().map(of).fold(0.0, f64::max).min(TAU)
+    }
+}
+
+/// What moves in a test, if that makes a circle.
+fn moves(machine: &Machine, positions: &[Vec<f64>], nominal_mm: &[f64]) -> Option<Moves> {
+    let range = |column: &[f64]| {
+        let least = column.iter().copied().fold(f64::INFINITY, f64::min);
+        column.iter().copied().fold(f64::NEG_INFINITY, f64::max) - least
+    };
+    let moving = |kind: AxisKind, least: f64| -> Vec<usize> {
+        (0..machine.axes.len())
+            .filter(|&axis| machine.axes[axis].kind == kind && range(&positions[axis]) > least)
+            .collect()
+    };
+    let (linear, rotary) = (moving(AxisKind::Linear, 1e-3), moving(AxisKind::Rotary, 1e-4));
+    match (&linear[..], &rotary[..]) {
+        (_, [axis]) => Some(Moves::Rotary(*axis)),
+        (&[first, second], []) => {
+            let points: Vec<[f64; 2]> = points(positions, [first, second]);
+            let circle = circle::through(&points)?;
+            let off = points
+                .iter()
+                .map(|p| ((p[0] - circle.centre[0]).hypot(p[1] - circle.centre[1]) - circle.radius).abs())
+                .fold(0.0, f64::max);
+            (off < OFF_CIRCLE * circle.radius).then(|| Moves::Linear {
+                axes: ordered(machine, [first, second]),
+                radius_mm: circle.radius,
+                radial: nominal_mm
+                    .iter()
+                    .all(|length| (length - circle.radius).abs() < OFF_PLANE * circle.radius),
+            })
+        }
+        _ => None,
+    }
+}
+
+/// The two axes in the order of their names: XY, XZ, YZ.
+fn ordered(machine: &Machine, axes: [usize; 2]) -> [usize; 2] {
+    if machine.axes[axes[0]].name <= machine.axes[axes[1]].name {
+        axes
+    } else {
+        [axes[1], axes[0]]
+    }
+}
+
+fn points(positions: &[Vec<f64>], axes: [usize; 2]) -> Vec<[f64; 2]> {
+    positions[axes[0]]
+        .iter()
+        .zip(&positions[axes[1]])
+        .map(|(a, b)| [*a, *b])
+        .collect()
+}
+
+/// Angles of positions about the centre of their circle, in (−π, π].
+fn around(positions: &[Vec<f64>], axes: [usize; 2]) -> Option<Vec<f64>> {
+    let points = points(positions, axes);
+    let centre = circle::through(&points)?.centre;
+    let angle = |p: &[f64; 2]| {
+        let angle = (p[1] - centre[1]).atan2(p[0] - centre[0]);
+        if angle <= -PI + 1e-9 { PI } else { angle }
+    };
+    Some(points.iter().map(angle).collect())
+}
+
+/// The median speed along the path.
+fn feed(samples: &[Vec<DriverSample<f64>>; 2], timed: bool) -> Option<f64> {
+    if !timed || samples[0].is_empty() {
+        return None;
+    }
+    let mut speeds: Vec<f64> = samples[0]
+        .iter()
+        .zip(&samples[1])
+        .map(|(a, b)| a.rate.hypot(b.rate))
+        .collect();
+    speeds.sort_by(f64::total_cmp);
+    speeds.get(speeds.len() / 2).copied().filter(|speed| *speed > 0.0)
+}

@@ -1,0 +1,121 @@
+//! Linear least squares with named columns, and which of them the rows cannot tell apart.
+
+use faer::Mat;
+
+use crate::triangle::Triangle;
+
+/// Singular values below this share of the largest, columns at unit length, are no information.
+const NEGLIGIBLE: f64 = 1e-7;
+
+/// A solved regression `y ≈ Σ βⱼ·xⱼ`.
+pub(super) struct Regression {
+    /// The coefficients.
+    pub beta: Vec<f64>,
+    /// `(XᵀX)⁻¹`.
+    pub inverse: Mat<f64>,
+    /// What is left over, row by row.
+    pub residual: Vec<f64>,
+}
+
+impl Regression {
+    /// Solves; `None` where the columns cannot be told apart.
+    pub fn solve(columns: &[Vec<f64>], y: &[f64]) -> Option<Regression> {
+        let n = columns.len();
+        if y.len() <= n {
+            return None;
+        }
+        let mut triangle = Triangle::new(n);
+        triangle
+            .absorb(Mat::from_fn(y.len(), n + 1, |i, j| if j < n { columns[j][i] } else { y[i] }).as_ref());
+        let (r, c, _) = triangle.parts();
+        let norms: Vec<f64> = (0..n)
+            .map(|j| (0..n).map(|i| r[(i, j)].powi(2)).sum::<f64>().sqrt())
+            .collect();
+        if norms.iter().any(|norm| *norm <= 0.0) {
+            return None;
+        }
+        let scaled = Mat::from_fn(n, n, |i, j| r[(i, j)] / norms[j]);
+        let svd = scaled.svd().ok()?;
+        let singular: Vec<f64> = svd.S().column_vector().iter().copied().collect();
+        if singular.last()? / singular.first()? < NEGLIGIBLE {
+            return None;
+        }
+        let spread = Mat::from_fn(n, n, |j, k| svd.V()[(j, k)] / singular[k] / norms[j]);
+        let projected: Vec<f64> = (0..n)
+            .map(|k| (0..n).map(|i| svd.U()[(i, k)] * c[i]).sum())
+            .collect();
+        let beta: Vec<f64> = (0..n)
+            .map(|j| (0..n).map(|k| spread[(j, k)] * projected[k]).sum())
+            .collect();
+        let residual = (0..y.len())
+            .map(|i| y[i] - (0..n).map(|j| columns[j][i] * beta[j]).sum::<f64>())
+            .collect();
+        Some(Regression {
+            beta,
+            inverse: &spread * spread.transpose(),
+            residual,
+        })
+    }
+
+    /// Sum of squares of the residual.
+    pub fn sum_of_squares(&self) -> f64 {
+        self.residual.iter().map(|v| v * v).sum()
+    }
+
+    /// Standard deviation of `Σ wⱼ·βⱼ` for readings that scatter by `sigma`.
+    pub fn u(&self, weights: &[(usize, f64)], sigma: f64) -> f64 {
+        let variance: f64 = weights
+            .iter()
+            .flat_map(|(j, a)| weights.iter().map(move |(k, b)| a * b * self.inverse[(*j, *k)]))
+            .sum();
+        variance.max(0.0).sqrt() * sigma
+    }
+}
+
+/// Columns made orthonormal, to look for what else a residual holds.
+pub(super) struct Orthonormal(Vec<Vec<f64>>);
+
+impl Orthonormal {
+    /// Of these columns.
+    pub fn of(columns: &[Vec<f64>]) -> Orthonormal {
+        let mut basis = Orthonormal(Vec::new());
+        for column in columns {
+            basis.push(column.clone());
+        }
+        basis
+    }
+
+    fn push(&mut self, column: Vec<f64>) -> bool {
+        let before = dot(&column, &column).sqrt();
+        let mut rest = column;
+        // Twice is enough (Giraud, Langou & Rozložník 2005).
+        for _ in 0..2 {
+            for q in &self.0 {
+                let along = dot(q, &rest);
+                rest.iter_mut().zip(q).for_each(|(r, q)| *r -= along * q);
+            }
+        }
+        let norm = dot(&rest, &rest).sqrt();
+        let seen = norm > 1e-6 * before.max(f64::MIN_POSITIVE);
+        if seen {
+            rest.iter_mut().for_each(|r| *r /= norm);
+            self.0.push(rest);
+        }
+        seen
+    }
+
+    /// By how much further columns lower the sum of squares of a residual that is orthogonal to these.
+    pub fn gain(&mut self, residual: &[f64], further: Vec<Vec<f64>>) -> f64 {
+        let kept = self.0.len();
+        for column in further {
+            self.push(column);
+        }
+        let gain = self.0[kept..].iter().map(|q| dot(q, residual).powi(2)).sum();
+        self.0.truncate(kept);
+        gain
+    }
+}
+
+fn dot(a: &[f64], b: &[f64]) -> f64 {
+    a.iter().zip(b).map(|(x, y)| x * y).sum()
+}

@@ -1,0 +1,215 @@
+//! What a ball-bar file in XML says: its runs, its plane, and the names of all else.
+
+use std::collections::BTreeMap;
+use std::path::Path;
+
+use quick_xml::Reader;
+use quick_xml::events::{BytesStart, Event};
+
+use crate::error::{ModelError, Place};
+
+/// Most bytes of a file.
+const MOST_BYTES: u64 = 64 << 20;
+/// The element that holds the numbers of a run.
+pub(super) const READINGS: &str = "READINGS";
+const DIRECTION: &str = "RUN_DIRECTION";
+
+/// A run as the file has it.
+pub(super) struct Run {
+    pub line: usize,
+    pub direction: Option<String>,
+    pub text: String,
+}
+
+/// What a file says.
+#[derive(Default)]
+pub(super) struct Contents {
+    pub runs: Vec<Run>,
+    pub plane: Option<(String, usize)>,
+    /// How often each element occurs that means nothing here.
+    pub unread: BTreeMap<String, usize>,
+}
+
+/// An element that is open.
+struct Open {
+    name: String,
+    line: usize,
+    text: String,
+    direction: Option<String>,
+    /// Whether that stands in an element of its own, and so speaks for one run.
+    once: bool,
+    /// Runs in it whose direction is not known yet.
+    waiting: Vec<usize>,
+}
+
+/// The text of a file: UTF-8, or UTF-16 with its mark.
+fn decoded(file: &Path) -> Result<String, ModelError> {
+    let fault = |message: String| ModelError::Input {
+        place: Place::file(file),
+        message,
+        help: Some("check `data` and the file".into()),
+    };
+    let length = std::fs::metadata(file).map_or(0, |found| found.len());
+    if length > MOST_BYTES {
+        return Err(fault(format!(
+            "a file of {length} bytes; {MOST_BYTES} is the most that is read"
+        )));
+    }
+    let bytes =
+        std::fs::read(file).map_err(|cause| fault(format!("the data file cannot be read: {cause}")))?;
+    let wide = |of: fn([u8; 2]) -> u16| -> String {
+        let units: Vec<u16> = bytes[2..]
+            .chunks_exact(2)
+            .map(|pair| of([pair[0], pair[1]]))
+            .collect();
+        String::from_utf16_lossy(&units)
+    };
+    Ok(match bytes.as_slice() {
+        [0xff, 0xfe, ..] => wide(u16::from_le_bytes),
+        [0xfe, 0xff, ..] => wide(u16::from_be_bytes),
+        // Names and numbers are ASCII; what else the file holds is not read.
+        bytes => String::from_utf8_lossy(bytes.strip_prefix(b"\xef\xbb\xbf").unwrap_or(bytes)).into_owned(),
+    })
+}
+
+/// Reads a file.
+///
+/// # Errors
+/// If it is no XML.
+pub(super) fn parse(file: &Path) -> Result<Contents, ModelError> {
+    let text = decoded(file)?;
+    let mut reader = Reader::from_str(&text);
+    let mut contents = Contents::default();
+    let mut open: Vec<Open> = Vec::new();
+    let line_at = |position: u64| {
+        let until = (position as usize).min(text.len());
+        1 + text.as_bytes()[..until]
+            .iter()
+            .filter(|byte| **byte == b'\n')
+            .count()
+    };
+    loop {
+        let line = line_at(reader.buffer_position());
+        let broken = |cause: String| ModelError::Input {
+            place: Place::line(file, line),
+            message: format!("not valid XML: {cause}"),
+            help: Some(
+                "a ball-bar file in XML is expected; other files are read by another name, as .csv or .xlsx"
+                    .into(),
+            ),
+        };
+        match reader.read_event() {
+            Err(cause) => return Err(broken(cause.to_string())),
+            Ok(Event::Eof) if open.is_empty() => return Ok(contents),
+            Ok(Event::Eof) => {
+                let unclosed = open.last().map_or("", |element| element.name.as_str());
+                return Err(broken(format!("it ends within <{unclosed}>")));
+            }
+            Ok(Event::Start(start)) => open.push(opened(&start, line, &mut contents, &broken)?),
+            Ok(Event::Empty(start)) => {
+                let element = opened(&start, line, &mut contents, &broken)?;
+                close(element, &mut open, &mut contents);
+            }
+            Ok(Event::End(_)) => {
+                if let Some(element) = open.pop() {
+                    close(element, &mut open, &mut contents);
+                }
+            }
+            Ok(Event::Text(piece)) => {
+                let piece = piece.into_inner();
+                if let Some(element) = open.last_mut() {
+                    element.text.push_str(piece.as_ref());
+                }
+            }
+            Ok(_) => {}
+        }
+    }
+}
+
+fn opened(
+    start: &BytesStart<'_>,
+    line: usize,
+    contents: &mut Contents,
+    broken: &impl Fn(String) -> ModelError,
+) -> Result<Open, ModelError> {
+    let name = start.local_name().as_ref().to_string();
+    let mut element = Open {
+        name,
+        line,
+        text: String::new(),
+        direction: None,
+        once: false,
+        waiting: Vec::new(),
+    };
+    for attribute in start.attributes() {
+        let attribute = attribute.map_err(|cause| broken(cause.to_string()))?;
+        let value = attribute.value.trim().to_string();
+        match attribute.key.local_name().as_ref() {
+            DIRECTION => element.direction = Some(value),
+            "TEST_PLANE" => contents.plane = Some((value, line)),
+            _ => {}
+        }
+    }
+    Ok(element)
+}
+
+/// What an element says to the one about it.
+fn close(mut element: Open, open: &mut [Open], contents: &mut Contents) {
+    let within = open.iter().any(|outer| outer.name == READINGS);
+    if within {
+        // A reading may have an element of its own.
+        if let Some(outer) = open.last_mut() {
+            outer.text.push(' ');
+            outer.text.push_str(&element.text);
+        }
+        return;
+    }
+    match element.name.as_str() {
+        READINGS => {
+            element.waiting.push(contents.runs.len());
+            contents.runs.push(Run {
+                line: element.line,
+                direction: None,
+                text: std::mem::take(&mut element.text),
+            });
+        }
+        DIRECTION => {
+            if element.direction.is_none() {
+                element.direction = Some(element.text.trim().to_string()).filter(|word| !word.is_empty());
+            }
+            if let Some(outer) = open.last_mut() {
+                outer.direction = element.direction.take();
+                outer.once = true;
+                settle(outer, contents);
+            }
+            return;
+        }
+        "PLANE" => {}
+        other => {
+            if element.waiting.is_empty() {
+                *contents.unread.entry(other.to_string()).or_default() += 1;
+            }
+        }
+    }
+    settle(&mut element, contents);
+    if let Some(outer) = open.last_mut() {
+        outer.waiting.append(&mut element.waiting);
+        settle(outer, contents);
+    }
+}
+
+/// Gives the runs that wait in an element its direction, where it has one.
+fn settle(element: &mut Open, contents: &mut Contents) {
+    let Some(direction) = &element.direction else {
+        return;
+    };
+    let settled = !element.waiting.is_empty();
+    for run in element.waiting.drain(..) {
+        contents.runs[run]
+            .direction
+            .get_or_insert_with(|| direction.clone());
+    }
+    if settled && element.once {
+        element.direction = None;
+    }
+}

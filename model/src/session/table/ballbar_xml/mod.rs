@@ -1,0 +1,219 @@
+//! Ball-bar files in XML (`.b5r` and others), as far as anything is publicly known of them.
+//!
+//! There is no public description of the format. What programs that read such files rely on is: an element `READINGS` for each run with
+//! numbers in it, a `RUN_DIRECTION` beside it or about it (element or attribute), and an element `PLANE` with `TEST_PLANE="XY"`. Neither the
+//! unit of the readings nor the angles at which they were taken is known, so nothing is assumed: `[columns]` states the unit, as
+//! `deviation_um = "READINGS"`, and the test's `path` states the circle, over which the readings of a run lie evenly from one end to the
+//! other. Everything else in the file is named in a warning, not interpreted.
+
+mod contents;
+
+use std::path::Path;
+
+use contents::{READINGS, Run};
+
+use super::columns::{Role, Theirs};
+use super::{Request, number};
+use crate::error::{ModelError, Place};
+use crate::session::motion::Motion;
+use crate::session::readings::Readings;
+use crate::session::{Test, plan};
+
+const CLOCKWISE: [&str; 3] = ["CW", "CLOCKWISE", "CLOCK_WISE"];
+const ANTICLOCKWISE: [&str; 6] = [
+    "CCW",
+    "ACW",
+    "ANTICLOCKWISE",
+    "COUNTERCLOCKWISE",
+    "ANTI_CLOCKWISE",
+    "COUNTER_CLOCKWISE",
+];
+
+/// Whether a file is one of these, by its name.
+pub(crate) fn is_xml(file: &Path) -> bool {
+    let extension = file
+        .extension()
+        .map(|extension| extension.to_string_lossy().to_lowercase());
+    matches!(extension.as_deref(), Some("xml" | "b5r"))
+}
+
+/// Reads a file for a test. Beside the readings: what in the file was not read.
+///
+/// # Errors
+/// If it is no XML, holds no readings, or does not say what it takes to use them, with the line and what to do.
+pub(crate) fn read(
+    file: &Path,
+    request: &Request<'_>,
+    test: &Test,
+) -> Result<(Readings, Vec<String>), ModelError> {
+    let role = value_role(file, request)?;
+    let contents = contents::parse(file)?;
+    let fault = |line: usize, message: String, help: String| ModelError::Input {
+        place: if line == 0 {
+            Place::file(file)
+        } else {
+            Place::line(file, line)
+        },
+        message,
+        help: Some(help),
+    };
+    if contents.runs.is_empty() {
+        let help = "only ball-bar files with runs of READINGS are read; export the readings as CSV and map its columns";
+        return Err(fault(0, "no element READINGS in it".into(), help.into()));
+    }
+    let Some(Motion::Circle {
+        first,
+        second,
+        from,
+        to,
+        ..
+    }) = &test.motion
+    else {
+        let help = "say which circle it is: `path = { kind = \"circle\", plane = \"XY\", radius_mm = …, from_deg = …, to_deg = …, step_deg = 1 }`; \
+                    readings lie evenly from one end to the other";
+        return Err(fault(
+            0,
+            "READINGS have no angles, and the test has no `path`".into(),
+            help.into(),
+        ));
+    };
+    let plane = [*first, *second]
+        .map(|axis| request.machine.axes[axis].name.clone())
+        .concat();
+    if let Some((stated, line)) = &contents.plane {
+        let letters = |text: &str| {
+            let mut letters: Vec<char> = text.to_uppercase().chars().collect();
+            letters.sort_unstable();
+            letters
+        };
+        if letters(stated) != letters(&plane) {
+            let message = format!("TEST_PLANE is `{stated}`, the test's `path` is in {plane}");
+            return Err(fault(
+                *line,
+                message,
+                "name the file that belongs to the test".into(),
+            ));
+        }
+    }
+    let mut readings = Readings {
+        file: file.to_path_buf(),
+        positions: vec![Vec::new(); request.machine.axes.len()],
+        coordinates: 1,
+        ..Readings::default()
+    };
+    for (index, run) in contents.runs.iter().enumerate() {
+        let forward = forward(run, request).map_err(|(message, help)| fault(run.line, message, help))?;
+        let part = |c: char| c.is_whitespace() || c == ';' || (c == ',' && request.format.decimal != b',');
+        let numbers: Vec<&str> = run.text.split(part).filter(|word| !word.is_empty()).collect();
+        let count = numbers.len();
+        if count < 2 {
+            let message = format!(
+                "READINGS with {count} number{}",
+                if count == 1 { "" } else { "s" }
+            );
+            return Err(fault(
+                run.line,
+                message,
+                "a run has one for each place on the circle".into(),
+            ));
+        }
+        let (start, end) = if forward { (*from, *to) } else { (*to, *from) };
+        let angles: Vec<f64> = (0..count)
+            .map(|k| start + (end - start) * k as f64 / (count - 1) as f64)
+            .collect();
+        let Some(states) = plan::on_circle(request.machine, test, &angles) else {
+            continue;
+        };
+        let states = states.map_err(|(message, help)| fault(0, message, help))?;
+        for (state, cell) in states.iter().zip(&numbers) {
+            let value = number(cell, &request.format).map_err(|(message, help)| {
+                fault(run.line, format!("READINGS: {message}"), help.to_string())
+            })?;
+            for (column, at) in readings.positions.iter_mut().zip(state) {
+                column.push(*at);
+            }
+            readings.observed.push(match role {
+                Role::Deviation(unit) => request.bar_mm + unit.inside(value),
+                Role::Length(unit) => unit.inside(value),
+                _ => value,
+            });
+            readings.line.push(run.line);
+            readings.run.push(index as i64 + 1);
+        }
+    }
+    let mut warnings = Vec::new();
+    if !contents.unread.is_empty() {
+        let names: Vec<String> = contents
+            .unread
+            .iter()
+            .map(|(name, count)| {
+                if *count > 1 {
+                    format!("{name} ({count})")
+                } else {
+                    name.clone()
+                }
+            })
+            .collect();
+        warnings.push(format!(
+            "{}: {} runs read; not read, since their meaning is not publicly known: {}",
+            file.display(),
+            contents.runs.len(),
+            names.join(", ")
+        ));
+    }
+    Ok((readings, warnings))
+}
+
+/// Which of our columns READINGS are, as `[columns]` states.
+fn value_role(file: &Path, request: &Request<'_>) -> Result<Role, ModelError> {
+    let help = "state their unit: `[columns]` with `deviation_um = \"READINGS\"` (from `bar_mm`), or `length_mm = \"READINGS\"`";
+    let mapped = request.columns.unwrap_or(&[]);
+    let fault = |place: Place, message: String| ModelError::Input {
+        place,
+        message,
+        help: Some(help.into()),
+    };
+    let Some(entry) = mapped
+        .iter()
+        .find(|entry| entry.theirs == Theirs::Name(READINGS.into()))
+    else {
+        return Err(fault(
+            Place::file(file),
+            "the file does not say in which unit its READINGS are".into(),
+        ));
+    };
+    if let Some(other) = mapped.iter().find(|other| other.ours != entry.ours) {
+        let message = format!("a ball-bar file in XML has no column for `{}`", other.ours);
+        return Err(fault(other.place.clone(), message));
+    }
+    match Role::of(&entry.ours, request) {
+        Some(role @ (Role::Deviation(_) | Role::Length(_))) => Ok(role),
+        _ => Err(fault(
+            entry.place.clone(),
+            format!("READINGS cannot be `{}`", entry.ours),
+        )),
+    }
+}
+
+/// Whether a run goes from the first axis of the plane towards the second.
+fn forward(run: &Run, request: &Request<'_>) -> Result<bool, (String, String)> {
+    let known = "words that speak for themselves are CW, CCW, CLOCKWISE, ANTICLOCKWISE, COUNTERCLOCKWISE; for others say \
+                 `[format] anticlockwise = \"…\"`, which word means from the first axis of the plane towards the second";
+    let Some(direction) = &run.direction else {
+        return Err(("READINGS without a RUN_DIRECTION".into(), known.into()));
+    };
+    if let Some(word) = &request.format.anticlockwise {
+        return Ok(direction == word);
+    }
+    let word = direction.to_uppercase().replace([' ', '-'], "_");
+    if ANTICLOCKWISE.contains(&word.as_str()) {
+        Ok(true)
+    } else if CLOCKWISE.contains(&word.as_str()) {
+        Ok(false)
+    } else {
+        Err((
+            format!("RUN_DIRECTION is `{direction}`, which is not known"),
+            known.into(),
+        ))
+    }
+}

@@ -1,0 +1,378 @@
+//! `abbe fit --compensation`: identified errors in the forms that controls read, as far as those are publicly documented.
+//!
+//! - **LinuxCNC** `COMP_FILE` of type 0 (INI Configuration, `[JOINT_n]`): nominal, actual forward, actual reverse; the control adds nominal less actual.
+//! - **Heidenhain** `.COM` (Technical Manual MANUALplus 620, 6.10.3): columns AXISPOS, BACKLASH, and one for each axis; points of the error curve
+//!   (Technical Manual TNC 406/306, 4-21), positive where the travel is too long (TNC 407, 1.6.3). How the file is framed is not publicly documented.
+//! - **Beckhoff** TF5280 (and ISG kernel) ISG CSV format: the errors themselves by the names of ISO 230, in mm and rad over mm and degrees.
+
+use std::fmt::Write;
+use std::path::PathBuf;
+
+use abbe::identify::compensation::{self, Compensation, ErrorCurve};
+use abbe::identify::fit::Fit;
+use abbe::identify::problem::Problem;
+use abbe::model::axis::AxisKind;
+use abbe::model::chain::Machine;
+use abbe::model::component::Freedom;
+use clap::{Args, ValueEnum};
+
+use super::failure::Failure;
+use super::folder::{self, NewFile};
+
+/// Most points of a table: LinuxCNC takes 256 triplets a joint, Heidenhain 256 points a table.
+const MOST_POINTS: usize = 256;
+
+/// Whose table.
+#[derive(Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub enum Control {
+    /// LinuxCNC, COMP_FILE of type 0.
+    Linuxcnc,
+    /// Heidenhain, columns of a .COM table.
+    Heidenhain,
+    /// Beckhoff TwinCAT CNC TF5280, ISG CSV format.
+    Beckhoff,
+}
+
+/// What commands that identify take.
+#[derive(Args)]
+pub struct CompensationArguments {
+    /// Write compensation tables of the error motions that were identified into a new folder.
+    #[arg(long, value_name = "DIR", requires = "control")]
+    compensation: Option<PathBuf>,
+    /// For which control.
+    #[arg(long, value_enum, requires = "compensation")]
+    control: Option<Control>,
+    /// Points of a table, over the positions that the readings cover.
+    #[arg(long, value_name = "N", default_value_t = 37)]
+    points: usize,
+}
+
+impl CompensationArguments {
+    /// Whether tables are asked for.
+    pub fn wanted(&self) -> bool {
+        self.compensation.is_some()
+    }
+
+    /// Writes the tables if they were asked for.
+    pub fn run(&self, problem: &Problem<'_>, fit: &Fit) -> Result<(), Failure> {
+        let (Some(folder), Some(control)) = (&self.compensation, self.control) else {
+            return Ok(());
+        };
+        let compensation = compensation::of_fit(problem, fit);
+        write(
+            &problem.session.machine,
+            &compensation,
+            control,
+            self.points,
+            folder,
+        )
+    }
+}
+
+/// Writes tables of what was identified into a folder, and says what is not in them.
+fn write(
+    machine: &Machine,
+    compensation: &Compensation,
+    control: Control,
+    points: usize,
+    folder: &std::path::Path,
+) -> Result<(), Failure> {
+    if !(2..=MOST_POINTS).contains(&points) {
+        return Err(Failure::Other(format!(
+            "--points {points}: from 2 to {MOST_POINTS}, which is the most that LinuxCNC and Heidenhain take"
+        )));
+    }
+    let mut left_out = compensation.left_out.clone();
+    let files = match control {
+        Control::Linuxcnc => linuxcnc(machine, compensation, points, &mut left_out),
+        Control::Heidenhain => heidenhain(machine, compensation, points, &mut left_out),
+        Control::Beckhoff => beckhoff(machine, compensation, points, &mut left_out),
+    };
+    if files.is_empty() {
+        let all = left_out
+            .iter()
+            .map(|line| format!("\n  {line}"))
+            .collect::<String>();
+        return Err(Failure::Other(format!(
+            "nothing to compensate in this form: declare error motions as [[effect]], as `abbe trace --write` does, and fit again{all}"
+        )));
+    }
+    folder::write(folder, &files, false, |_| Ok(()))?;
+    say!("");
+    for (name, _) in &files {
+        say!("{}", folder.join(name).display());
+    }
+    match control {
+        Control::Linuxcnc => {
+            say!(
+                "  in [JOINT_n] of the INI file: COMP_FILE = the file, COMP_FILE_TYPE = 0; BACKLASH is then not used"
+            );
+        }
+        Control::Heidenhain => {
+            say!(
+                "  columns of a .COM table; how the file is framed is not publicly documented: enter or import them in the table editor"
+            );
+            say!(
+                "  values are points of the error curve, positive where the travel is too long; check the sign on one axis first"
+            );
+        }
+        Control::Beckhoff => {
+            say!(
+                "  file_format[0] ISG_CSV; values are errors (actual less nominal), the control takes them off; `negate` turns the sign"
+            );
+        }
+    }
+    for line in &left_out {
+        say!("  left out: {line}");
+    }
+    Ok(())
+}
+
+/// Positions over the covered range, equidistant, inside units.
+fn positions(curve: &ErrorCurve, points: usize) -> impl Iterator<Item = f64> {
+    let (from, to) = (curve.range.start, curve.range.end);
+    (0..points).map(move |k| from + (to - from) * k as f64 / (points - 1) as f64)
+}
+
+/// A position or an angle as files have it: mm or degrees.
+fn outside(kind: AxisKind, value: f64) -> f64 {
+    match kind {
+        AxisKind::Linear => value,
+        AxisKind::Rotary => value.to_degrees(),
+    }
+}
+
+/// The axis that moves in the freedom of an error, and what an error of 1 in R is as a position of that axis: the tool against the workpiece,
+/// rotary axes at zero.
+fn as_position(machine: &Machine, curve: &ErrorCurve) -> Option<(usize, f64)> {
+    let side = |axis: usize| if axis < machine.workpiece_side { -1.0 } else { 1.0 };
+    let freedom = curve.error.freedom;
+    let moves =
+        |axis: usize| machine.axes[axis].own_freedom() == freedom && machine.axes[axis].principal().is_some();
+    // Its own axis before another that moves alike.
+    let axis = std::iter::once(curve.axis)
+        .chain((0..machine.axes.len()).filter(|_| !freedom.is_angle()))
+        .find(|axis| moves(*axis))?;
+    let (_, sign) = machine.axes[axis].principal()?;
+    Some((axis, side(curve.axis) / (side(axis) * sign)))
+}
+
+fn linuxcnc(
+    machine: &Machine,
+    compensation: &Compensation,
+    points: usize,
+    left_out: &mut Vec<String>,
+) -> Vec<NewFile> {
+    left_out.extend(locations(compensation));
+    let mut files = Vec::new();
+    for curve in &compensation.curves {
+        let Some((axis, factor)) = as_position(machine, curve).filter(|(axis, _)| *axis == curve.axis) else {
+            left_out.push(format!(
+                "{}: COMP_FILE corrects the positioning of a joint only",
+                curve.error
+            ));
+            continue;
+        };
+        let kind = machine.axes[axis].kind;
+        let mut text = String::new();
+        for q in positions(curve, points) {
+            let actual = |direction: f64| outside(kind, q + factor * curve.at(q, direction));
+            let _ = writeln!(
+                text,
+                "{:.6} {:.6} {:.6}",
+                outside(kind, q),
+                actual(1.0),
+                actual(-1.0)
+            );
+        }
+        files.push((format!("{}.comp", machine.axes[axis].name), text));
+    }
+    files
+}
+
+fn heidenhain(
+    machine: &Machine,
+    compensation: &Compensation,
+    points: usize,
+    left_out: &mut Vec<String>,
+) -> Vec<NewFile> {
+    left_out.extend(locations(compensation));
+    let mut files = Vec::new();
+    for axis in 0..machine.axes.len() {
+        let mut columns = Vec::new();
+        for curve in compensation.curves.iter().filter(|curve| curve.axis == axis) {
+            match as_position(machine, curve) {
+                Some((column, factor)) => columns.push((curve, column, factor)),
+                None => left_out.push(format!(
+                    "{}: a column of a .COM table corrects the position of an axis",
+                    curve.error
+                )),
+            }
+        }
+        let Some((first, _, _)) = columns.first() else {
+            continue;
+        };
+        let kind = machine.axes[axis].kind;
+        let own = columns.iter().find(|(_, column, _)| *column == axis);
+        let backlash = own.filter(|(curve, ..)| curve.is_directional());
+        for (curve, column, _) in &columns {
+            if *column != axis && curve.is_directional() {
+                left_out.push(format!(
+                    "{}: what depends on the direction; the mean of both is in the table",
+                    curve.error
+                ));
+            }
+        }
+        let mut text = format!("{:>12}", "AXISPOS");
+        if backlash.is_some() {
+            let _ = write!(text, " {:>12}", "BACKLASH");
+        }
+        for (_, column, _) in &columns {
+            let _ = write!(text, " {:>12}", machine.axes[*column].name);
+        }
+        text.push('\n');
+        for q in positions(first, points) {
+            let _ = write!(text, "{:>12.5}", outside(kind, q));
+            if let Some((curve, _, factor)) = backlash {
+                let _ = write!(text, " {:>12.6}", outside(kind, factor * curve.at(q, -1.0)));
+            }
+            for (curve, column, factor) in &columns {
+                let value = if *column == axis {
+                    curve.at(q, 1.0)
+                } else {
+                    mean(curve, q)
+                };
+                let _ = write!(
+                    text,
+                    " {:>12.6}",
+                    outside(machine.axes[*column].kind, factor * value)
+                );
+            }
+            text.push('\n');
+        }
+        files.push((format!("{}.COM", machine.axes[axis].name), text));
+    }
+    files
+}
+
+fn beckhoff(
+    machine: &Machine,
+    compensation: &Compensation,
+    points: usize,
+    left_out: &mut Vec<String>,
+) -> Vec<NewFile> {
+    let letter = |name: &str| matches!(name, "X" | "Y" | "Z" | "A" | "B" | "C");
+    let mut blocks = Vec::new();
+    let known: Vec<_> = compensation
+        .locations
+        .iter()
+        .filter(|(name, _)| {
+            let known = letter(&name.axis);
+            if !known {
+                left_out.push(format!("{name}: the format knows axes X, Y, Z, A, B, C"));
+            }
+            known
+        })
+        .collect();
+    if !known.is_empty() {
+        let names: Vec<String> = known
+            .iter()
+            .map(|(name, _)| format!("{name}")[1..].to_string())
+            .collect();
+        let values: Vec<String> = known.iter().map(|(_, value)| format!("{value:.9}")).collect();
+        blocks.push(format!(
+            "// Position errors, mm and rad\n{}\n",
+            table(&[names, values])
+        ));
+    }
+    for (index, axis) in machine.axes.iter().enumerate() {
+        let curves: Vec<&ErrorCurve> = compensation
+            .curves
+            .iter()
+            .filter(|curve| curve.axis == index)
+            .collect();
+        let Some(first) = curves.first() else { continue };
+        if !letter(&axis.name) {
+            left_out.push(format!(
+                "error motions of {}: the format knows axes X, Y, Z, A, B, C",
+                axis.name
+            ));
+            continue;
+        }
+        for curve in curves.iter().filter(|curve| curve.is_directional()) {
+            left_out.push(format!(
+                "{}: what depends on the direction; the mean of both is in the table",
+                curve.error
+            ));
+        }
+        let mut rows = vec![
+            std::iter::once(axis.name.clone())
+                .chain(curves.iter().map(|curve| curve.error.to_string()))
+                .collect::<Vec<_>>(),
+        ];
+        for q in positions(first, points) {
+            let position = format!("{:.5}", outside(axis.kind, q));
+            rows.push(
+                std::iter::once(position)
+                    .chain(curves.iter().map(|curve| format!("{:.9}", mean(curve, q))))
+                    .collect(),
+            );
+        }
+        blocks.push(format!(
+            "// Component errors of {}, mm and rad\n{}\n",
+            axis.name,
+            table(&rows)
+        ));
+    }
+    if blocks.is_empty() {
+        return Vec::new();
+    }
+    vec![("volcomp.csv".to_string(), blocks.join("#\n"))]
+}
+
+/// Location errors, for forms that have no place for them.
+fn locations(compensation: &Compensation) -> impl Iterator<Item = String> + '_ {
+    let locations = compensation.locations.iter();
+    locations.map(|(name, _)| {
+        format!("{name}: a location error belongs in the kinematics of the control, not in this table")
+    })
+}
+
+/// The mean of both directions.
+fn mean(curve: &ErrorCurve, q: f64) -> f64 {
+    0.5 * (curve.at(q, 1.0) + curve.at(q, -1.0))
+}
+
+/// Cells aligned by spaces, as in the manual's examples.
+fn table(rows: &[Vec<String>]) -> String {
+    let lines = rows.iter().map(|row| {
+        let cells: Vec<String> = row.iter().map(|cell| format!("{cell:<14}")).collect();
+        cells.join(" ").trim_end().to_string()
+    });
+    lines.collect::<Vec<_>>().join("\n")
+}
+
+/// What an error is, in the words of ISO 230-1.
+pub fn words(name: &abbe::model::component::ErrorName) -> String {
+    use abbe::model::component::ErrorKind;
+    let letter = name.freedom.letter();
+    let direction = if name.freedom.is_angle() {
+        let about = Freedom::ALL[name.freedom.index() % 3].letter();
+        format!("{letter} (about {about})")
+    } else {
+        letter.to_string()
+    };
+    match (name.kind, name.freedom.is_angle()) {
+        (ErrorKind::Location, false) => {
+            format!("error of the position of {} in direction {direction}", name.axis)
+        }
+        (ErrorKind::Location, true) => format!(
+            "error of the orientation of {} in direction {direction}",
+            name.axis
+        ),
+        (ErrorKind::Motion, false) => format!("error motion of {} in direction {direction}", name.axis),
+        (ErrorKind::Motion, true) => {
+            format!("angular error motion of {} in direction {direction}", name.axis)
+        }
+    }
+}

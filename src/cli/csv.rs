@@ -1,0 +1,153 @@
+//! Results as CSV: one row a figure, for spreadsheets.
+
+use std::path::Path;
+
+use abbe::identify::circular::CircularTest;
+use abbe::identify::results::{FitResult, ParameterResult, TraceResult};
+use abbe::model::component::ErrorName;
+
+use super::failure::Failure;
+use super::{compensation, output};
+
+/// How the signs are meant, in front of the table.
+const CONVENTION: &str = "# Errors by their names of ISO 230-1: EX0C is a location error, EXC an error motion. Value = actual less nominal: the body that the axis\n\
+# carries is displaced along +X, +Y, +Z of R and turned about them by the right-hand rule, E = Trans(EX, EY, EZ) Rx(EA) Ry(EB) Rz(EC), whatever\n\
+# the axis' own direction. A correction has the opposite sign. u is one standard uncertainty.\n";
+const HEADER: [&str; 6] = ["section", "id", "meaning", "value", "u", "unit"];
+
+struct Rows(csv::Writer<Vec<u8>>);
+
+impl Rows {
+    fn new() -> Result<Rows, Failure> {
+        let mut rows = Rows(csv::Writer::from_writer(Vec::new()));
+        rows.row(&HEADER.map(str::to_string))?;
+        Ok(rows)
+    }
+
+    fn row(&mut self, cells: &[String]) -> Result<(), Failure> {
+        self.0
+            .write_record(cells)
+            .map_err(|error| Failure::Other(format!("the CSV cannot be written: {error}")))
+    }
+
+    fn parameters(&mut self, section: &str, parameters: &[ParameterResult]) -> Result<(), Failure> {
+        for parameter in parameters {
+            let meaning =
+                ErrorName::parse(&parameter.id).map_or(String::new(), |name| compensation::words(&name));
+            self.row(&[
+                section.to_string(),
+                parameter.id.clone(),
+                meaning,
+                parameter.value.to_string(),
+                parameter.u.to_string(),
+                parameter.unit.clone(),
+            ])?;
+        }
+        Ok(())
+    }
+
+    fn figure(
+        &mut self,
+        section: &str,
+        id: &str,
+        meaning: &str,
+        value: f64,
+        unit: &str,
+    ) -> Result<(), Failure> {
+        let value = value.to_string();
+        self.row(&[section, id, meaning, &value, "", unit].map(str::to_string))
+    }
+
+    fn circular(&mut self, test: &CircularTest) -> Result<(), Failure> {
+        let section = format!("circle {}", test.test);
+        for direction in &test.directions {
+            let of = |figure: &str| format!("{figure}({}{})", test.axes, direction.direction);
+            for (id, meaning, value) in [
+                (of("G"), "circular deviation", direction.circular_deviation_um),
+                (
+                    of("Fmax"),
+                    "radial deviation, greatest",
+                    direction.radial_deviation_max_um,
+                ),
+                (
+                    of("Fmin"),
+                    "radial deviation, least",
+                    direction.radial_deviation_min_um,
+                ),
+            ] {
+                self.figure(&section, &id, meaning, value, "um")?;
+            }
+        }
+        for (id, meaning, value) in [
+            (
+                "G(b)",
+                "bidirectional circular deviation",
+                test.bidirectional_circular_deviation_um,
+            ),
+            (
+                "D",
+                "mean bidirectional radial deviation",
+                test.mean_bidirectional_radial_deviation_um,
+            ),
+            ("H", "circular hysteresis", test.hysteresis_um),
+        ] {
+            if let Some(value) = value {
+                self.figure(&section, id, meaning, value, "um")?;
+            }
+        }
+        for fault in &test.diagnosis {
+            for value in &fault.values {
+                self.row(&[
+                    section.clone(),
+                    format!("{} {}", fault.fault, value.id),
+                    format!(
+                        "{} of {}, {:.1} % of the path",
+                        fault.fault, fault.axes, fault.share_percent
+                    ),
+                    value.value.to_string(),
+                    if value.u > 0.0 {
+                        value.u.to_string()
+                    } else {
+                        String::new()
+                    },
+                    value.unit.clone(),
+                ])?;
+            }
+        }
+        Ok(())
+    }
+
+    fn write(self, path: &Path) -> Result<(), Failure> {
+        let table = self
+            .0
+            .into_inner()
+            .map_err(|error| Failure::Other(format!("the CSV cannot be written: {error}")))?;
+        output::write_whole(path, &[CONVENTION.as_bytes(), &table].concat())
+    }
+}
+
+/// Writes what `abbe fit` found.
+pub fn write_fit(path: &Path, result: &FitResult) -> Result<(), Failure> {
+    let mut rows = Rows::new()?;
+    rows.figure("residual", "rms", "", result.rms_um, "um")?;
+    rows.figure("residual", "held out", "", result.heldout_rms_um, "um")?;
+    rows.parameters("parameters", &result.parameters)?;
+    for test in &result.circular {
+        rows.circular(test)?;
+    }
+    rows.write(path)
+}
+
+/// Writes what `abbe trace` found.
+pub fn write_trace(path: &Path, result: &TraceResult) -> Result<(), Failure> {
+    let mut rows = Rows::new()?;
+    for (name, model) in [("before", &result.before), ("after", &result.after)] {
+        rows.figure(name, "rms", "", model.rms_um, "um")?;
+        rows.figure(name, "held out", "", model.heldout_rms_um, "um")?;
+        rows.parameters(name, &model.parameters)?;
+    }
+    for (index, effect) in result.effects.iter().enumerate() {
+        rows.parameters(&format!("effect {}", index + 1), &effect.parameters)?;
+    }
+    rows.write(path)
+}

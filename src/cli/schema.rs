@@ -1,0 +1,120 @@
+//! `abbe schema`: what the files hold, as JSON Schema.
+
+use abbe::identify::geometric::Comparison;
+use abbe::identify::plan::results::PlanAnalysis;
+use abbe::identify::results::{FitResult, TraceResult};
+use abbe::identify::self_calibration::SelfCalibration;
+use abbe::identify::volumetric::Summary;
+use abbe::model::session::schema;
+use clap::{Args, ValueEnum};
+use schemars::JsonSchema;
+use schemars::generate::SchemaSettings;
+use serde_json::{Value, json};
+
+use super::failure::Failure;
+use super::{plan, simulate};
+
+/// Examples of `abbe schema`.
+pub const HELP: &str = "Examples:
+  abbe schema session
+  abbe schema fit
+
+Put `#:schema session.schema.json` in the first line of a session.toml, and an editor that knows TOML schemas (taplo, Even Better TOML)
+completes keys and marks what is misspelt.";
+
+/// What can be described.
+#[derive(Clone, Copy, PartialEq, Eq, ValueEnum)]
+enum Subject {
+    /// session.toml
+    Session,
+    /// machine.toml
+    Machine,
+    /// `abbe fit --json`
+    Fit,
+    /// `abbe fit --method circle|cone|two-plane --json`
+    Geometric,
+    /// `abbe fit --method self-calibration --json`
+    SelfCalibration,
+    /// `abbe trace --json`
+    Trace,
+    /// `abbe plan --json`
+    Plan,
+    /// `abbe plan --improve|--separate|--range --json`
+    NextTest,
+    /// `abbe simulate --json`
+    Simulate,
+    /// `abbe volumetric --map --json`
+    Map,
+}
+
+/// `abbe schema SUBJECT`
+#[derive(Args)]
+pub struct SchemaArguments {
+    /// Which file.
+    #[arg(value_enum)]
+    subject: Subject,
+}
+
+/// Runs `abbe schema`.
+pub fn run(arguments: &SchemaArguments) -> Result<(), Failure> {
+    let schema = match arguments.subject {
+        Subject::Session => session()?,
+        Subject::Machine => parsed(schema::MACHINE)?,
+        Subject::Fit => of::<FitResult>(),
+        Subject::Geometric => of::<Comparison>(),
+        Subject::SelfCalibration => of::<SelfCalibration>(),
+        Subject::Trace => of::<TraceResult>(),
+        Subject::Plan => of::<PlanAnalysis>(),
+        Subject::NextTest => of::<plan::NextTest>(),
+        Subject::Simulate => of::<simulate::Report>(),
+        Subject::Map => of::<Summary>(),
+    };
+    let text = serde_json::to_string_pretty(&schema)
+        .map_err(|error| Failure::Other(format!("the schema cannot be written: {error}")))?;
+    say!("{text}");
+    Ok(())
+}
+
+/// The session's schema with that of the machine in it.
+fn session() -> Result<Value, Failure> {
+    let mut session = parsed(schema::SESSION)?;
+    let mut machine = parsed(schema::MACHINE)?;
+    // A schema within a schema is a resource of its own: its references start from it.
+    machine["$id"] = json!("machine");
+    session["$defs"]["machine"] = machine;
+    Ok(session)
+}
+
+fn parsed(text: &str) -> Result<Value, Failure> {
+    serde_json::from_str(text)
+        .map_err(|error| Failure::Other(format!("a schema of this program is no JSON: {error}")))
+}
+
+/// The schema of a result as it is written.
+fn of<T: JsonSchema>() -> Value {
+    let mut schema = SchemaSettings::draft2020_12()
+        .for_serialize()
+        .into_generator()
+        .into_root_schema_for::<T>()
+        .to_value();
+    close(&mut schema);
+    schema
+}
+
+/// A result has the fields that are described and no others, so that a program may rely on both.
+fn close(schema: &mut Value) {
+    match schema {
+        Value::Object(entries) => {
+            if entries.get("properties").is_some_and(Value::is_object)
+                && entries.get("type") == Some(&json!("object"))
+            {
+                entries
+                    .entry("additionalProperties")
+                    .or_insert(Value::Bool(false));
+            }
+            entries.values_mut().for_each(close);
+        }
+        Value::Array(items) => items.iter_mut().for_each(close),
+        _ => {}
+    }
+}

@@ -1,0 +1,306 @@
+//! Ball-bar figures against closed forms, the independent plant and the sample that another simulator made.
+
+use std::f64::consts::{PI, TAU};
+use std::path::Path;
+
+use serde_json::Value;
+
+use super::{abbe, data, text};
+use crate::plant::{AxisName, Component, Driver, Freedom, Injected, Kind, Recipe, Shape};
+
+const RADIUS_MM: f64 = 100.0;
+const FEED_MM_S: f64 = 20.0;
+const STEP: f64 = PI / 360.0;
+
+/// A reading of a circle: angle of the path, its direction, which way either axis travels; angle since either turned round, and at which end.
+struct At {
+    angle: f64,
+    path: f64,
+    travels: [f64; 2],
+    turned: [Option<(f64, f64)>; 2],
+}
+
+/// The session of a circle in XY whose tool is off by what `error` says, mm along X and Y: exact geometry, no formula of the diagnosis.
+fn circle(folder: &Path, directions: &[f64], time: bool, error: impl Fn(&At) -> [f64; 2]) -> Value {
+    let mut rows = String::from(if time { "time_s," } else { "" });
+    rows.push_str("run,x_mm,y_mm,length_mm\n");
+    let mut run = 0;
+    for _ in 0..2 {
+        for path in directions {
+            run += 1;
+            for k in 0..=720 {
+                let angle = if *path > 0.0 {
+                    k as f64 * STEP
+                } else {
+                    TAU - k as f64 * STEP
+                };
+                // The reading at an end still belongs to the travel that led there.
+                let middle = angle - path * STEP / 2.0;
+                let middle = if k == 0 { angle + path * STEP / 2.0 } else { middle };
+                let travels = [-path * middle.sin(), path * middle.cos()].map(f64::signum);
+                let along = if *path > 0.0 { angle } else { TAU - angle };
+                let turned = [(PI, -1.0), (PI / 2.0, *path)].map(|(first, end)| {
+                    let passed = along - first - 1e-9;
+                    let again = (passed / PI).floor();
+                    (passed > 0.0).then(|| (passed - again * PI, if again == 0.0 { end } else { -end }))
+                });
+                let at = At {
+                    angle,
+                    path: *path,
+                    travels,
+                    turned,
+                };
+                let off = error(&at);
+                let (x, y) = (RADIUS_MM * angle.cos(), RADIUS_MM * angle.sin());
+                let length = (x + off[0]).hypot(y + off[1]);
+                if time {
+                    let seconds = f64::from(run) * 60.0 + k as f64 * STEP * RADIUS_MM / FEED_MM_S;
+                    rows.push_str(&format!("{seconds:.6},"));
+                }
+                rows.push_str(&format!("{run},{x:.9},{y:.9},{length:.9}\n"));
+            }
+        }
+    }
+    std::fs::write(folder.join("xy.csv"), rows).unwrap();
+    let session = folder.join("session.toml");
+    let text_of = "[machine]\nchain = \"w b Y X Z t\"\naxis.X = {}\naxis.Y = {}\naxis.Z = {}\n[instrument]\nkind = \"ballbar\"\nnoise_um = 0.01\n\
+         [unknowns]\nerrors = []\n[[test]]\nname = \"XY\"\ndata = \"xy.csv\"\nbar_mm = 100\nworkpiece_ball_mm = [0, 0, 0]\n\
+         spindle_ball_mm = [0, 0, 0]\nworkpiece_ball_u_um = inf\nbar_u_um = inf\n";
+    std::fs::write(&session, text_of).unwrap();
+    figures(&session)[0].clone()
+}
+
+/// What `abbe fit` says of the circles of a session.
+fn figures(session: &Path) -> Vec<Value> {
+    let folder = tempfile::tempdir().unwrap();
+    let file = folder.path().join("fit.json");
+    let run = abbe(&["fit", text(session), "--json", text(&file)]);
+    assert!(run.status.success(), "{}", String::from_utf8_lossy(&run.stderr));
+    let fit: Value = serde_json::from_slice(&std::fs::read(&file).unwrap()).unwrap();
+    fit["circular"].as_array().unwrap().clone()
+}
+
+fn fault<'v>(test: &'v Value, fault: &str, axes: &str) -> Option<&'v Value> {
+    let all = test["diagnosis"].as_array().unwrap();
+    all.iter()
+        .find(|found| found["fault"] == fault && found["axes"] == axes)
+}
+
+/// A figure of a fault with its uncertainty.
+fn figure(test: &Value, name: &str, axes: &str, id: &str) -> (f64, f64) {
+    let fault = fault(test, name, axes).unwrap_or_else(|| panic!("no {name} of {axes}: {test}"));
+    let values = fault["values"].as_array().unwrap();
+    let value = values.iter().find(|value| value["id"] == id).unwrap();
+    (value["value"].as_f64().unwrap(), value["u"].as_f64().unwrap())
+}
+
+fn is(test: &Value, name: &str, axes: &str, id: &str, expected: f64, within: f64) {
+    let (value, _) = figure(test, name, axes, id);
+    assert!(
+        (value - expected).abs() < within,
+        "{name} of {axes}, {id}: {value}, not {expected}"
+    );
+}
+
+fn um(test: &Value, key: &str) -> f64 {
+    test[key].as_f64().unwrap()
+}
+
+#[test]
+fn every_fault_is_told_by_its_closed_form() {
+    let folder = tempfile::tempdir().unwrap();
+    let both = [1.0, -1.0];
+    let q = |at: &At| [RADIUS_MM * at.angle.cos(), RADIUS_MM * at.angle.sin()];
+
+    // X is 30 ppm longer than Y: an ellipse.
+    let test = circle(folder.path(), &both, true, |at| {
+        [40e-6 * q(at)[0], 10e-6 * q(at)[1]]
+    });
+    is(&test, "scale mismatch", "XY", "ratio", 30.0, 0.01);
+    is(&test, "scale mismatch", "XY", "over_diameter", 6.0, 0.002);
+    for direction in test["directions"].as_array().unwrap() {
+        assert!(
+            (um(direction, "circular_deviation_um") - 3.0).abs() < 0.006,
+            "{test}"
+        );
+        assert!((um(direction, "radial_deviation_max_um") - 4.0).abs() < 0.006);
+        assert!((um(direction, "radial_deviation_min_um") - 1.0).abs() < 0.006);
+    }
+    assert!((um(&test, "bidirectional_circular_deviation_um") - 3.0).abs() < 0.006);
+    assert!((um(&test, "mean_bidirectional_radial_deviation_um") - 2.5).abs() < 0.006);
+    assert!(um(&test, "hysteresis_um") < 0.002);
+    assert!(test["diagnosis"][0]["fault"] == "scale mismatch");
+    assert!(um(&test["diagnosis"][0], "share_percent") > 99.0, "{test}");
+
+    // Y leans 20 µm/m towards −X: the angle between the positive axes is more than 90°.
+    let test = circle(folder.path(), &both, true, |at| [-20e-6 * q(at)[1], 0.0]);
+    is(&test, "squareness", "XY", "angle", 20.0, 0.01);
+    assert!((um(&test, "bidirectional_circular_deviation_um") - 2.0).abs() < 0.006);
+
+    // X lags by 0.3 ms, Y by 0.1 ms.
+    let test = circle(folder.path(), &both, true, |at| {
+        let speed = [
+            -at.path * FEED_MM_S * at.angle.sin(),
+            at.path * FEED_MM_S * at.angle.cos(),
+        ];
+        [-0.3e-3 * speed[0], -0.1e-3 * speed[1]]
+    });
+    is(&test, "servo mismatch", "XY", "delay", 0.2, 1e-3);
+    assert!((um(&test, "feed_mm_min") - 1200.0).abs() < 1.0);
+    // ½v·Δτ·sin 2θ with either sign: twice 2 µm apart.
+    assert!((um(&test, "hysteresis_um") - 4.0).abs() < 0.01, "{test}");
+
+    // X loses 3 µm at its positive end and 1 µm at the other.
+    let test = circle(folder.path(), &both, true, |at| {
+        [-0.5 * (2e-3 + 1e-3 * at.angle.cos()) * at.travels[0], 0.0]
+    });
+    is(&test, "backlash", "X", "X+", 3.0, 0.02);
+    is(&test, "backlash", "X", "X-", 1.0, 0.02);
+    is(&test, "backlash", "Y", "Y+", 0.0, 0.02);
+
+    // X moves the tool 2 µm along Y when it turns round, and bows by 5 µm.
+    let test = circle(folder.path(), &both, true, |at| {
+        [0.0, -0.5 * 2e-3 * at.travels[0] + 5e-3 * at.angle.cos().powi(2)]
+    });
+    is(&test, "lateral play", "X", "play", 2.0, 0.02);
+    is(&test, "straightness", "X", "sagitta", 5.0, 0.02);
+    is(&test, "straightness", "Y", "sagitta", 0.0, 0.02);
+
+    // Y sticks for 2° when it turns round at its positive end.
+    let test = circle(folder.path(), &both, true, |at| match at.turned[1] {
+        Some((since, end)) if end > 0.0 && since < 0.5 => [0.0, 6e-3 * (-since / 2f64.to_radians()).exp()],
+        _ => [0.0, 0.0],
+    });
+    is(&test, "reversal spike", "Y", "Y+", 6.0, 0.2);
+    is(&test, "reversal spike", "Y", "width", 2.0, 1e-9);
+
+    // A screw of 5 mm pitch under X, 1.2 µm forward and 0.8 µm backward.
+    let test = circle(folder.path(), &both, true, |at| {
+        let size = if at.travels[0] > 0.0 { 1.2e-3 } else { 0.8e-3 };
+        [size * (TAU * q(at)[0] / 5.0 + 0.7).cos(), 0.0]
+    });
+    is(&test, "cyclic error", "X", "pitch", 5.0, 0.01);
+    is(&test, "cyclic error", "X", "forward", 1.2, 0.02);
+    is(&test, "cyclic error", "X", "backward", 0.8, 0.02);
+    assert!(fault(&test, "cyclic error", "Y").is_none() && fault(&test, "reversal spike", "X").is_none());
+}
+
+#[test]
+fn what_one_direction_cannot_tell_is_said() {
+    let folder = tempfile::tempdir().unwrap();
+    let test = circle(folder.path(), &[1.0], false, |at| {
+        [-20e-6 * RADIUS_MM * at.angle.sin(), 0.0]
+    });
+    assert!(fault(&test, "servo mismatch", "XY").is_none() && fault(&test, "lateral play", "X").is_none());
+    is(&test, "squareness", "XY", "angle", 20.0, 0.01);
+    let told = test["not_told"].to_string();
+    assert!(
+        told.contains("servo mismatch is in the squareness") && told.contains("hysteresis need"),
+        "{told}"
+    );
+    assert!(test.get("hysteresis_um").is_none() && test.get("feed_mm_min").is_none());
+    // Without time a lag is a length.
+    let test = circle(folder.path(), &[1.0, -1.0], false, |_| [0.0, 0.0]);
+    let told = test["not_told"].to_string();
+    assert!(told.contains("not in ms") && told.contains("one feed"), "{told}");
+    figure(&test, "servo mismatch", "XY", "lag");
+}
+
+#[test]
+fn the_plant_s_faults_are_found_within_their_uncertainty() {
+    let motion = |freedom, axis, shape, size| {
+        Injected::new(Component::Motion(freedom, axis), Driver::Axis(axis), shape, size)
+    };
+    let backlash = motion(Freedom::Y, AxisName::Y, Shape::Backlash, 4.0);
+    let play = motion(Freedom::Y, AxisName::X, Shape::Backlash, 1.5);
+    let lag = motion(Freedom::X, AxisName::X, Shape::Lag, 0.05);
+    let square = Injected::new(
+        Component::Location(Freedom::C, AxisName::Y),
+        Driver::Nothing,
+        Shape::Constant,
+        3.0,
+    );
+    let mut pulls = Vec::new();
+    for seed in 0..4 {
+        let mut recipe = Recipe::new(Kind::LinearCircles, 40 + seed);
+        for effect in [&backlash, &play, &lag, &square] {
+            recipe = recipe.with(effect.clone());
+        }
+        let folder = tempfile::tempdir().unwrap();
+        recipe.draw().write(folder.path()).unwrap();
+        for test in figures(&folder.path().join("session.toml")) {
+            let arcsec = PI / 648_000.0 * 1e6;
+            for (name, axes, id, expected) in [
+                ("backlash", "Y", "Y+", 4.0),
+                ("backlash", "Y", "Y-", 4.0),
+                ("backlash", "X", "X+", 0.0),
+                ("lateral play", "X", "play", 1.5),
+                ("lateral play", "Y", "play", 0.0),
+                ("servo mismatch", "XY", "delay", 0.05),
+                ("squareness", "XY", "angle", 3.0 * arcsec),
+                ("scale mismatch", "XY", "ratio", 0.0),
+                ("straightness", "X", "sagitta", 0.0),
+            ] {
+                let (value, u) = figure(&test, name, axes, id);
+                pulls.push((value - expected) / u);
+                assert!(
+                    (value - expected).abs() < 4.5 * u,
+                    "{name} {axes} {id}: {value} ± {u}, not {expected}"
+                );
+            }
+            assert!(um(&test, "diagnosis_rms_um") < 0.35, "{test}");
+            assert!(
+                test["not_told"].to_string().contains("at the feed of XY-F"),
+                "{test}"
+            );
+        }
+    }
+    let rms = (pulls.iter().map(|pull| pull * pull).sum::<f64>() / pulls.len() as f64).sqrt();
+    println!("{} pulls, rms {rms:.2}", pulls.len());
+    // 72 pulls, whose readings are rounded to 0.1 µm.
+    assert!((0.7..1.3).contains(&rms), "pulls {rms}");
+}
+
+#[test]
+fn rotary_axes_have_figures_without_a_diagnosis() {
+    let wobble = Injected::new(
+        Component::Motion(Freedom::X, AxisName::C),
+        Driver::Axis(AxisName::C),
+        Shape::Harmonic {
+            order: 3,
+            phase_deg: 0.0,
+        },
+        5.0,
+    );
+    let folder = tempfile::tempdir().unwrap();
+    Recipe::new(Kind::Rotary, 7)
+        .with(wobble)
+        .draw()
+        .write(folder.path())
+        .unwrap();
+    let tests = figures(&folder.path().join("session.toml"));
+    let c = tests.iter().find(|test| test["test"] == "C100").unwrap();
+    assert_eq!(c["axes"], "C");
+    assert!(c.get("diagnosis").is_none() && c.get("radius_mm").is_none());
+    // EXC of order 3 is orders 2 and 4 of half its size each across a bar that stands: 5·cos 3θ·cos θ less its centre, twice 5 µm with the noise.
+    let g = um(c, "bidirectional_circular_deviation_um");
+    assert!((8.0..12.5).contains(&g), "{c}");
+}
+
+#[test]
+fn the_sample_of_another_simulator_is_diagnosed() {
+    let name = "the_sample_of_another_simulator_is_diagnosed";
+    let Some(sample) = data::data(name, "../sample/circle-backlash-y/session.toml") else {
+        return;
+    };
+    for test in figures(&sample) {
+        assert_eq!(test["diagnosis"][0]["fault"], "backlash", "{test}");
+        assert_eq!(test["diagnosis"][0]["axes"], "Y");
+        for end in ["Y+", "Y-"] {
+            let (value, u) = figure(&test, "backlash", "Y", end);
+            assert!((value - 4.0).abs() < 4.0 * u && u < 0.2, "{end}: {value} ± {u}");
+        }
+        let (value, u) = figure(&test, "squareness", "XY", "angle");
+        assert!(value.abs() < 4.0 * u, "{value} ± {u}");
+    }
+}

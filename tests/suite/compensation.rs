@@ -1,0 +1,260 @@
+//! Compensation tables read back as the control reads them: what is added to the command is the identified curve with the opposite sign.
+
+use std::path::Path;
+
+use serde_json::Value;
+
+use super::{abbe, text};
+
+/// A session of circles and a rotary sweep with known error motions, simulated without noise; what was put in, mm or rad, by axis position.
+fn identified(folder: &Path) -> std::path::PathBuf {
+    let plan = folder.join("plan.toml");
+    let text_of = "[machine]\nchain = \"w C b X Y Z t\"\naxis.C = {}\naxis.X = {}\naxis.Y = { direction = [0, -1, 0] }\naxis.Z = {}\n\
+        [instrument]\nkind = \"ballbar\"\nnoise_um = 0.1\n[unknowns]\nerrors = [\"EX0C\", \"EC0Y\"]\n\
+        [[effect]]\ncomponent = \"EXX\"\nshape = \"polynomial\"\norder = 3\n\
+        [[effect]]\ncomponent = \"EYY\"\nshape = \"backlash\"\n\
+        [[effect]]\ncomponent = \"EYX\"\nshape = \"periodic\"\nperiod_mm = 40\n\
+        [[effect]]\ncomponent = \"ECC\"\nshape = \"harmonic\"\norder = 3\n\
+        [[effect]]\ncomponent = \"bar\"\ndriver = \"time\"\nshape = \"drift\"\n\
+        [[effect]]\ncomponent = \"EXX\"\nshape = \"lag\"\n\
+        [[test]]\nname = \"XY\"\nbar_mm = 100\nworkpiece_ball_mm = [0, 0, 0]\nspindle_ball_mm = [0, 0, 0]\n\
+        path = { kind = \"circle\", plane = \"XY\", radius_mm = 100, step_deg = 1 }\n\
+        [[test]]\nname = \"XY off centre\"\nbar_mm = 100\nworkpiece_ball_mm = [60, 0, 0]\nspindle_ball_mm = [0, 0, 0]\n\
+        path = { kind = \"circle\", plane = \"XY\", radius_mm = 100, step_deg = 1, feed_mm_min = 3000 }\n\
+        [[test]]\nname = \"C\"\nbar_mm = 100\nworkpiece_ball_mm = [100, 0, 0]\nspindle_ball_mm = [0, 0, 0]\n\
+        path = { kind = \"follow\", axis = \"C\", offset = \"tangential\", step_deg = 1 }\n";
+    std::fs::write(&plan, text_of).unwrap();
+    let out = folder.join("run");
+    let mut arguments = vec![
+        "simulate".to_string(),
+        text(&plan).into(),
+        "--out".into(),
+        text(&out).into(),
+    ];
+    for (flag, value) in [
+        ("--error", "EX0C=12um"),
+        ("--error", "EC0Y=5arcsec"),
+        ("--effect", "EXX~X:p3.1=6um"),
+        ("--effect", "EXX~X:p3.2=-3um"),
+        ("--effect", "EXX~X:p3.3=2um"),
+        ("--effect", "EYY~Y:backlash=4um"),
+        ("--effect", "ECC~C:h3.amplitude=4arcsec"),
+        ("--effect", "ECC~C:h3.phase=30deg"),
+    ] {
+        arguments.extend([flag.to_string(), value.to_string()]);
+    }
+    arguments.extend(["--noise-um", "0.02"].map(str::to_string));
+    let run = abbe(&arguments.iter().map(String::as_str).collect::<Vec<_>>());
+    assert!(run.status.success(), "{}", String::from_utf8_lossy(&run.stderr));
+    out.join("session.toml")
+}
+
+/// The coefficients that `abbe fit` reports: the curves below are made of these alone.
+fn coefficients(folder: &Path, session: &Path) -> impl Fn(&str) -> f64 {
+    let file = folder.join("fit.json");
+    assert!(
+        abbe(&["fit", text(session), "--json", text(&file)])
+            .status
+            .success()
+    );
+    let fit: Value = serde_json::from_slice(&std::fs::read(file).unwrap()).unwrap();
+    move |id: &str| {
+        let parameters = fit["parameters"].as_array().unwrap();
+        let found = parameters.iter().find(|parameter| parameter["id"] == id);
+        found.unwrap_or_else(|| panic!("{id} in {parameters:?}"))["value"]
+            .as_f64()
+            .unwrap()
+    }
+}
+
+fn tables(session: &Path, out: &Path, control: &str) -> String {
+    let run = abbe(&[
+        "fit",
+        text(session),
+        "--compensation",
+        text(out),
+        "--control",
+        control,
+        "--points",
+        "41",
+    ]);
+    assert!(run.status.success(), "{}", String::from_utf8_lossy(&run.stderr));
+    String::from_utf8(run.stdout).unwrap()
+}
+
+fn numbers(line: &str) -> Vec<f64> {
+    line.split_whitespace()
+        .map(|cell| cell.parse().unwrap())
+        .collect()
+}
+
+#[test]
+fn tables_read_back_are_the_curves_with_the_opposite_sign() {
+    let folder = tempfile::tempdir().unwrap();
+    let folder = folder.path();
+    let session = identified(folder);
+    let value = coefficients(folder, &session);
+    // Outside units to mm and rad; a polynomial is over 100 mm.
+    let exx = |x: f64| {
+        let q = x / 100.0;
+        1e-3 * (value("EXX~X:p3.1") * q + value("EXX~X:p3.2") * q * q + value("EXX~X:p3.3") * q.powi(3))
+    };
+    let eyy = |direction: f64| -0.5e-3 * value("EYY~Y:backlash") * direction;
+    let ecc_deg = |c_deg: f64| {
+        let phase = (3.0 * c_deg + value("ECC~C:h3.phase")).to_radians();
+        value("ECC~C:h3.amplitude") * phase.cos() / 3600.0
+    };
+
+    // LinuxCNC adds nominal less actual (`comp_forward = nom - fwd` where the type is 0).
+    let out = folder.join("linuxcnc");
+    let said = tables(&session, &out, "linuxcnc");
+    assert!(said.contains("COMP_FILE_TYPE = 0"), "{said}");
+    assert!(
+        said.contains("EYX: COMP_FILE corrects the positioning of a joint only"),
+        "{said}"
+    );
+    assert!(said.contains("EXX~X:lag: no table over the position"), "{said}");
+    assert!(
+        said.contains("EX0C: a location error belongs in the kinematics"),
+        "{said}"
+    );
+    type Curve<'c> = &'c dyn Fn(f64, f64) -> f64;
+    // Y counts against R's Y: where its body is off by +e in R, its own position is off by −e.
+    let expected: [(&str, Curve<'_>); 3] = [
+        ("X", &|x, _| exx(x)),
+        ("Y", &|_, direction| -eyy(direction)),
+        ("C", &|c, _| ecc_deg(c)),
+    ];
+    for (axis, error) in expected {
+        let table = std::fs::read_to_string(out.join(format!("{axis}.comp"))).unwrap();
+        let rows: Vec<Vec<f64>> = table.lines().map(numbers).collect();
+        assert_eq!(rows.len(), 41);
+        assert!(rows.iter().all(|row| row.len() == 3) && rows.windows(2).all(|pair| pair[0][0] < pair[1][0]));
+        for row in rows {
+            for (column, direction) in [(1, 1.0), (2, -1.0)] {
+                let correction = row[0] - row[column];
+                let error = error(row[0], direction);
+                assert!(
+                    (correction + error).abs() < 2e-6,
+                    "{axis} at {}: {correction}, error {error}",
+                    row[0]
+                );
+            }
+        }
+    }
+
+    // Heidenhain takes points of the error curve, and corrects against them.
+    let out = folder.join("heidenhain");
+    tables(&session, &out, "heidenhain");
+    let table = std::fs::read_to_string(out.join("X.COM")).unwrap();
+    let mut lines = table.lines();
+    assert_eq!(
+        lines.next().unwrap().split_whitespace().collect::<Vec<_>>(),
+        ["AXISPOS", "X", "Y"]
+    );
+    for row in lines.map(numbers) {
+        assert!((row[1] - exx(row[0])).abs() < 2e-6, "{row:?}");
+    }
+    let table = std::fs::read_to_string(out.join("Y.COM")).unwrap();
+    let mut lines = table.lines();
+    assert_eq!(
+        lines.next().unwrap().split_whitespace().collect::<Vec<_>>(),
+        ["AXISPOS", "BACKLASH", "Y"]
+    );
+    for row in lines.map(numbers) {
+        assert!(
+            (row[1] + eyy(-1.0)).abs() < 2e-6 && (row[2] + eyy(1.0)).abs() < 2e-6,
+            "{row:?}"
+        );
+    }
+
+    // Beckhoff: the errors themselves, mm and rad, blocks parted by #.
+    let out = folder.join("beckhoff");
+    let said = tables(&session, &out, "beckhoff");
+    assert!(
+        said.contains("EYY: what depends on the direction; the mean of both"),
+        "{said}"
+    );
+    let file = std::fs::read_to_string(out.join("volcomp.csv")).unwrap();
+    let blocks: Vec<Vec<&str>> = file
+        .split("#\n")
+        .map(|block| block.lines().filter(|line| !line.starts_with("//")).collect())
+        .collect();
+    assert_eq!(
+        blocks[0][0].split_whitespace().collect::<Vec<_>>(),
+        ["X0C", "C0Y"]
+    );
+    let location = numbers(blocks[0][1]);
+    assert!((location[0] - 1e-3 * value("EX0C")).abs() < 1e-8);
+    assert!((location[1] - (value("EC0Y") / 3600.0).to_radians()).abs() < 1e-9);
+    let block = |axis: &str| {
+        blocks
+            .iter()
+            .find(|block| block[0].split_whitespace().next() == Some(axis))
+            .unwrap()
+    };
+    for row in block("X")[1..].iter().map(|line| numbers(line)) {
+        assert!((row[1] - exx(row[0])).abs() < 1e-7, "{row:?}");
+    }
+    for row in block("C")[1..].iter().map(|line| numbers(line)) {
+        assert!((row[1] - ecc_deg(row[0]).to_radians()).abs() < 1e-8, "{row:?}");
+    }
+}
+
+#[test]
+fn results_as_csv_hold_what_the_json_holds() {
+    let folder = tempfile::tempdir().unwrap();
+    let folder = folder.path();
+    let session = identified(folder);
+    let (csv, json) = (folder.join("fit.csv"), folder.join("fit.json"));
+    let run = abbe(&["fit", text(&session), "--csv", text(&csv), "--json", text(&json)]);
+    assert!(run.status.success(), "{}", String::from_utf8_lossy(&run.stderr));
+    let written = std::fs::read_to_string(csv).unwrap();
+    assert!(
+        written.starts_with("# Errors by their names of ISO 230-1")
+            && written.contains("actual less nominal")
+    );
+    let mut reader = csv::ReaderBuilder::new()
+        .comment(Some(b'#'))
+        .from_reader(written.as_bytes());
+    let rows: Vec<csv::StringRecord> = reader.records().map(Result::unwrap).collect();
+    let fit: Value = serde_json::from_slice(&std::fs::read(json).unwrap()).unwrap();
+    for parameter in fit["parameters"].as_array().unwrap() {
+        let row = rows.iter().find(|row| parameter["id"] == row[1]).unwrap();
+        assert_eq!(
+            row[3].parse::<f64>().unwrap(),
+            parameter["value"].as_f64().unwrap()
+        );
+        assert_eq!(row[4].parse::<f64>().unwrap(), parameter["u"].as_f64().unwrap());
+        assert_eq!(parameter["unit"], row[5]);
+    }
+    let meaning = |id: &str| rows.iter().find(|row| &row[1] == id).unwrap()[2].to_string();
+    assert_eq!(meaning("EX0C"), "error of the position of C in direction X");
+    assert_eq!(
+        meaning("EC0Y"),
+        "error of the orientation of Y in direction C (about Z)"
+    );
+    assert!(rows.iter().any(|row| &row[0] == "circle XY" && &row[1] == "G(b)"));
+}
+
+#[test]
+fn what_has_no_curve_makes_no_table() {
+    let measured = super::ready("hermle-c600u/measured/session.toml");
+    let folder = tempfile::tempdir().unwrap();
+    let out = folder.path().join("tables");
+    let run = abbe(&[
+        "fit",
+        text(&measured),
+        "--compensation",
+        text(&out),
+        "--control",
+        "linuxcnc",
+    ]);
+    assert_eq!(run.status.code(), Some(1));
+    let message = String::from_utf8_lossy(&run.stderr).into_owned();
+    assert!(
+        message.contains("nothing to compensate") && message.contains("EY0A: a location error"),
+        "{message}"
+    );
+    assert!(!out.exists());
+}

@@ -1,0 +1,291 @@
+//! Files of the field: the same readings from a spreadsheet, from other people's columns and from ball-bar XML give the same fit.
+
+use std::path::{Path, PathBuf};
+
+use rust_xlsxwriter::Workbook;
+use serde_json::Value;
+
+use super::{abbe, text};
+use crate::plant::{AxisName, Component, Driver, Freedom, Injected, Kind, Recipe, Shape};
+
+/// A session of circles in a folder: its rows by column, test by test.
+fn circles(folder: &Path) -> Vec<(String, Vec<String>, Vec<Vec<f64>>)> {
+    let backlash = Injected::new(
+        Component::Motion(Freedom::Y, AxisName::Y),
+        Driver::Axis(AxisName::Y),
+        Shape::Backlash,
+        4.0,
+    );
+    let recipe = Recipe::new(Kind::LinearCircles, 3).with(backlash);
+    recipe.draw().write(folder).unwrap();
+    ["XY-F1000", "XY-F3000"]
+        .map(|test| {
+            let table = std::fs::read_to_string(folder.join(format!("{test}.csv"))).unwrap();
+            let mut lines = table.lines();
+            let header = lines.next().unwrap().split(',').map(str::to_string).collect();
+            let rows = lines
+                .map(|line| line.split(',').map(|cell| cell.parse().unwrap()).collect())
+                .collect();
+            (test.to_string(), header, rows)
+        })
+        .to_vec()
+}
+
+fn fit(session: &Path) -> Value {
+    let file = session.with_extension("json");
+    let run = abbe(&["fit", text(session), "--json", text(&file)]);
+    assert!(run.status.success(), "{}", String::from_utf8_lossy(&run.stderr));
+    serde_json::from_slice(&std::fs::read(&file).unwrap()).unwrap()
+}
+
+/// What a session that cannot be used is told.
+fn told(session: &Path) -> String {
+    let run = abbe(&["fit", text(session)]);
+    assert_eq!(
+        run.status.code(),
+        Some(1),
+        "{}",
+        String::from_utf8_lossy(&run.stdout)
+    );
+    String::from_utf8_lossy(&run.stderr).into_owned()
+}
+
+fn rewritten(folder: &Path, name: &str, change: impl Fn(String) -> String) -> PathBuf {
+    let session = std::fs::read_to_string(folder.join("session.toml")).unwrap();
+    let file = folder.join(name);
+    std::fs::write(&file, change(session)).unwrap();
+    file
+}
+
+#[test]
+fn a_spreadsheet_reads_as_its_rows() {
+    let folder = tempfile::tempdir().unwrap();
+    let folder = folder.path();
+    let tests = circles(folder);
+    let expected = fit(&folder.join("session.toml"));
+    // Other names, another order, a title nobody reads among comments, both tests in one book.
+    let theirs = ["Zeit", "Lauf", "X-Position", "Y-Position", "Z", "A", "C", "Länge"];
+    let mut book = Workbook::new();
+    for (test, _, rows) in &tests {
+        let sheet = book.add_worksheet().set_name(test).unwrap();
+        sheet.write_string(0, 0, "# measured on Tuesday").unwrap();
+        for (column, name) in theirs.iter().enumerate() {
+            sheet.write_string(2, column as u16, *name).unwrap();
+        }
+        for (row, cells) in rows.iter().enumerate() {
+            for (column, cell) in cells.iter().enumerate() {
+                sheet.write_number(row as u32 + 3, column as u16, *cell).unwrap();
+            }
+        }
+    }
+    book.save(folder.join("circles.xlsx")).unwrap();
+    let columns = "[columns]\ntime_s = \"Zeit\"\nrun = \"Lauf\"\nx_mm = \"X-Position\"\ny_mm = \"Y-Position\"\nz_mm = \"Z\"\na_deg = \"A\"\n\
+                   c_deg = \"C\"\nlength_mm = \"Länge\"\n";
+    let in_book = |session: String| {
+        let mut session = session
+            .replace("[[test]]", &format!("{columns}[[test]]"))
+            .replacen(columns, "", 1);
+        session = session.replace(columns, "");
+        session = session.replacen("[[test]]", &format!("{columns}\n[[test]]"), 1);
+        for (test, ..) in &tests {
+            session = session.replace(
+                &format!("data = \"{test}.csv\""),
+                &format!("data = \"circles.xlsx\"\nformat = {{ sheet = \"{test}\" }}"),
+            );
+        }
+        session
+    };
+    let read = fit(&rewritten(folder, "book.toml", in_book));
+    assert_eq!(read["parameters"], expected["parameters"]);
+    assert_eq!(read["circular"], expected["circular"]);
+
+    let several = rewritten(folder, "several.toml", |session| {
+        in_book(session).replace("format = { sheet = \"XY-F1000\" }", "")
+    });
+    let message = told(&several);
+    assert!(
+        message.contains("several sheets hold cells: XY-F1000, XY-F3000") && message.contains("sheet = "),
+        "{message}"
+    );
+    let none = rewritten(folder, "none.toml", |session| {
+        in_book(session).replace("sheet = \"XY-F1000\"", "sheet = \"YZ\"")
+    });
+    assert!(told(&none).contains("there is no sheet `YZ`"));
+    std::fs::write(folder.join("circles.xlsx"), "no zip at all").unwrap();
+    let message = told(&rewritten(folder, "broken.toml", in_book));
+    assert!(
+        message.contains("circles.xlsx: the spreadsheet cannot be read"),
+        "{message}"
+    );
+}
+
+#[test]
+fn a_cell_that_is_no_number_is_named_by_row_and_column() {
+    let folder = tempfile::tempdir().unwrap();
+    let folder = folder.path();
+    let (test, header, rows) = circles(folder).swap_remove(0);
+    let mut book = Workbook::new();
+    let sheet = book.add_worksheet();
+    for (column, name) in header.iter().enumerate() {
+        sheet.write_string(0, column as u16, name).unwrap();
+        for (row, cells) in rows.iter().enumerate() {
+            sheet
+                .write_number(row as u32 + 1, column as u16, cells[column])
+                .unwrap();
+        }
+    }
+    sheet.write_string(7, 2, "about 99").unwrap();
+    book.save(folder.join("one.xlsx")).unwrap();
+    let message = told(&rewritten(folder, "one.toml", |session| {
+        session.replace(&format!("{test}.csv"), "one.xlsx")
+    }));
+    assert!(
+        message.contains("one.xlsx:8: column 3 (`x_mm`): `about 99` is not a number"),
+        "{message}"
+    );
+}
+
+/// Ball-bar XML of a test's runs: deviations from 100 mm in µm.
+fn xml(rows: &[Vec<f64>], run: &dyn Fn(usize, &str, &str) -> String) -> String {
+    let mut text = String::from(
+        "<?xml version=\"1.0\"?>\n<BALLBAR_TEST>\n<OPERATOR>N.N.</OPERATOR><PLANE TEST_PLANE=\"XY\"/>\n",
+    );
+    for (index, rows) in rows.chunk_by(|a, b| a[1] == b[1]).enumerate() {
+        let turn = rows[0][2] * rows[1][3] - rows[1][2] * rows[0][3];
+        let readings: Vec<String> = rows
+            .iter()
+            .map(|row| format!("{:.4}", (row[7] - 100.0) * 1e3))
+            .collect();
+        text.push_str(&run(
+            index,
+            if turn > 0.0 { "CCW" } else { "CW" },
+            &readings.join(" "),
+        ));
+    }
+    text + "<FEATURE NAME=\"AF_CIRCULARITY\" DT=\"UT_LENGTH_UM\">4.1</FEATURE><FEATURE/></BALLBAR_TEST>\n"
+}
+
+#[test]
+fn ball_bar_xml_reads_as_its_rows() {
+    let folder = tempfile::tempdir().unwrap();
+    let folder = folder.path();
+    let tests = circles(folder);
+    let expected = fit(&folder.join("session.toml"));
+    let path = |session: String| {
+        let movement = "columns = { deviation_um = \"READINGS\" }\npath = { kind = \"circle\", plane = \"XY\", radius_mm = 100, step_deg = 1 }\n";
+        let mut session = session;
+        for (test, ..) in &tests {
+            session = session.replace(
+                &format!("data = \"{test}.csv\""),
+                &format!("data = \"{test}.b5r\"\n{movement}"),
+            );
+        }
+        session
+    };
+    let in_elements = |_: usize, direction: &str, readings: &str| {
+        format!(
+            "<RUN>\n<RUN_DIRECTION>{direction}</RUN_DIRECTION>\n<READINGS>{readings}</READINGS>\n</RUN>\n"
+        )
+    };
+    let in_attributes = |_: usize, direction: &str, readings: &str| {
+        let each: Vec<String> = readings
+            .split(' ')
+            .map(|value| format!("<R>{value}</R>"))
+            .collect();
+        format!(
+            "<READINGS RUN_DIRECTION=\"{direction}\">{}</READINGS>\n",
+            each.concat()
+        )
+    };
+    let forms: [&dyn Fn(usize, &str, &str) -> String; 2] = [&in_elements, &in_attributes];
+    for form in forms {
+        for (test, _, rows) in &tests {
+            std::fs::write(folder.join(format!("{test}.b5r")), xml(rows, form)).unwrap();
+        }
+        let read = fit(&rewritten(folder, "xml.toml", path));
+        for (read, expected) in read["parameters"]
+            .as_array()
+            .unwrap()
+            .iter()
+            .zip(expected["parameters"].as_array().unwrap())
+        {
+            assert_eq!(read["id"], expected["id"]);
+            let values = [read, expected].map(|parameter| parameter["value"].as_f64().unwrap());
+            assert!((values[0] - values[1]).abs() < 1e-3, "{read} {expected}");
+        }
+        for (read, expected) in read["circular"]
+            .as_array()
+            .unwrap()
+            .iter()
+            .zip(expected["circular"].as_array().unwrap())
+        {
+            let key = "bidirectional_circular_deviation_um";
+            assert!((read[key].as_f64().unwrap() - expected[key].as_f64().unwrap()).abs() < 1e-3);
+        }
+        let warnings = read["warnings"].to_string();
+        assert!(
+            warnings.contains("not publicly known") && warnings.contains("FEATURE (2), OPERATOR"),
+            "{warnings}"
+        );
+    }
+    // UTF-16, as programs of one system write it.
+    let (test, _, rows) = &tests[0];
+    let wide: Vec<u8> = std::iter::once(0xfeff)
+        .chain(xml(rows, &in_elements).encode_utf16())
+        .flat_map(u16::to_le_bytes)
+        .collect();
+    let file = folder.join(format!("{test}.b5r"));
+    std::fs::write(&file, wide).unwrap();
+    fit(&rewritten(folder, "wide.toml", path));
+
+    // What the file does not say is asked for, not guessed.
+    let session = rewritten(folder, "xml.toml", path);
+    let says = |contents: &str, message: &str| {
+        std::fs::write(&file, contents).unwrap();
+        let said = told(&session);
+        assert!(said.contains(message), "{message}: {said}");
+    };
+    let good = xml(rows, &in_elements);
+    says(
+        &good.replace(
+            "<RUN_DIRECTION>CCW</RUN_DIRECTION>",
+            "<RUN_DIRECTION>0</RUN_DIRECTION>",
+        ),
+        "RUN_DIRECTION is `0`, which is not known",
+    );
+    says(
+        &good.replace("<RUN_DIRECTION>CCW</RUN_DIRECTION>", ""),
+        "READINGS without a RUN_DIRECTION",
+    );
+    says(
+        &good.replace("TEST_PLANE=\"XY\"", "TEST_PLANE=\"YZ\""),
+        "TEST_PLANE is `YZ`, the test's `path` is in XY",
+    );
+    says(
+        &good.replace("<READINGS>", "<READINGS>dropout "),
+        "READINGS: `dropout` is not a number",
+    );
+    says(&good.replace("READINGS", "VALUES"), "no element READINGS in it");
+    says(
+        &good[..good.find("<READINGS>").unwrap() + 40],
+        "it ends within <READINGS>",
+    );
+    says("<a></b>", "not valid XML");
+    std::fs::write(&file, &good).unwrap();
+    let numbered = good.replace(">CCW<", ">0<").replace(">CW<", ">1<");
+    std::fs::write(&file, numbered).unwrap();
+    fit(&rewritten(folder, "numbered.toml", |session| {
+        path(session).replace(
+            "data = \"XY-F1000.b5r\"",
+            "data = \"XY-F1000.b5r\"\nformat = { anticlockwise = \"0\" }",
+        )
+    }));
+    std::fs::write(&file, &good).unwrap();
+    let message = told(&rewritten(folder, "unit.toml", |session| {
+        path(session).replace("columns = { deviation_um = \"READINGS\" }", "")
+    }));
+    assert!(
+        message.contains("in which unit its READINGS are") && message.contains("deviation_um = "),
+        "{message}"
+    );
+}

@@ -1,0 +1,117 @@
+//! The help teaches by examples, and every one of them runs.
+
+use std::path::Path;
+use std::process::Command;
+
+use super::{abbe, workspace};
+
+/// The lines of a help that begin with `abbe`.
+fn examples(help: &str) -> Vec<String> {
+    // A backslash at the end of a line goes on, as in a shell.
+    help.replace("\\\n", "")
+        .lines()
+        .filter_map(|line| line.strip_prefix("  "))
+        .filter(|line| line.starts_with("abbe ") && !line.contains("COMMAND"))
+        .map(str::to_string)
+        .collect()
+}
+
+/// Arguments as a shell parts them: by spaces, outside quotes.
+fn words(line: &str) -> Vec<String> {
+    let mut words = vec![String::new()];
+    let mut quoted = false;
+    for letter in line.chars() {
+        match letter {
+            '"' => quoted = !quoted,
+            ' ' if !quoted && words.last().unwrap().is_empty() => {}
+            ' ' if !quoted => words.push(String::new()),
+            letter => words.last_mut().unwrap().push(letter),
+        }
+    }
+    words
+}
+
+fn copy(from: &Path, to: &Path) {
+    std::fs::create_dir_all(to).unwrap();
+    for entry in std::fs::read_dir(from).unwrap() {
+        let path = entry.unwrap().path();
+        let target = to.join(path.file_name().unwrap());
+        if path.is_dir() {
+            copy(&path, &target);
+        } else {
+            std::fs::copy(&path, &target).unwrap();
+        }
+    }
+}
+
+#[test]
+fn every_example_of_the_help_runs() {
+    let help = |arguments: &[&str]| String::from_utf8(abbe(arguments).stdout).unwrap();
+    let whole = help(&["--help"]);
+    let commands: Vec<&str> = whole
+        .lines()
+        .skip_while(|line| !line.starts_with("Commands:"))
+        .skip(1)
+        .take_while(|line| !line.is_empty())
+        .filter_map(|line| line.strip_prefix("  "))
+        .filter(|line| !line.starts_with(' '))
+        .filter_map(|line| line.split_whitespace().next())
+        .filter(|command| *command != "help")
+        .collect();
+    assert!(commands.len() >= 9, "{commands:?}");
+    let mut lines = examples(&whole);
+    assert!(lines.len() >= 6, "{whole}");
+    // What an example reads another one writes: readings come first.
+    let mut later = Vec::new();
+    for command in commands {
+        let of_command = examples(&help(&[command, "--help"]));
+        assert!(
+            of_command
+                .iter()
+                .any(|line| line.starts_with(&format!("abbe {command}"))),
+            "abbe {command} --help has no example"
+        );
+        if ["new", "simulate"].contains(&command) {
+            lines.extend(of_command);
+        } else {
+            later.extend(of_command);
+        }
+    }
+    lines.extend(later);
+    let folder = tempfile::tempdir().unwrap();
+    copy(&workspace().join("sessions"), &folder.path().join("sessions"));
+    for line in lines {
+        let run = Command::new(env!("CARGO_BIN_EXE_abbe"))
+            .args(&words(&line)[1..])
+            .current_dir(folder.path())
+            .output()
+            .unwrap();
+        assert!(
+            run.status.success(),
+            "{line}: {}",
+            String::from_utf8_lossy(&run.stderr)
+        );
+    }
+}
+
+#[test]
+fn completions_are_written_for_every_shell() {
+    for shell in ["bash", "zsh", "fish", "elvish", "powershell"] {
+        let script = String::from_utf8(abbe(&["completions", shell]).stdout).unwrap();
+        for word in ["volumetric", "template", "abbe"] {
+            assert!(script.contains(word), "{shell} does not complete {word}");
+        }
+    }
+    // bash takes what is meant for it.
+    let mut bash = Command::new("bash")
+        .arg("-n")
+        .stdin(std::process::Stdio::piped())
+        .spawn()
+        .unwrap();
+    std::io::Write::write_all(
+        bash.stdin.as_mut().unwrap(),
+        &abbe(&["completions", "bash"]).stdout,
+    )
+    .unwrap();
+    assert!(bash.wait().unwrap().success());
+}
