@@ -6,6 +6,7 @@
 //! - [`trace`]: close the loop;
 //! - [`plan`]: what tests can see before anybody measures;
 //! - [`simulate`]: readings from a model; [`quantity`]: values with their units as people write them;
+//! - [`views`]: a session reading by reading, as plots draw it;
 //! - [`results`]: what is reported, as it stands in JSON.
 
 pub mod circle;
@@ -30,6 +31,7 @@ pub mod start;
 pub mod trace;
 pub mod triangle;
 pub mod unit;
+pub mod views;
 pub mod volumetric;
 
 pub use error::IdentifyError;

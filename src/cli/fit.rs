@@ -4,11 +4,13 @@ use abbe::identify::results::{FitResult, ParameterResult, Unobservable};
 use clap::{Args, ValueEnum};
 
 use super::failure::Failure;
+use super::report::ReportArguments;
 use super::{CommonArguments, SessionArguments, geometric, output, read_session, self_calibration, table};
 
 /// Examples of `abbe fit`.
 pub const HELP: &str = "Examples:
   abbe fit sessions/hermle-c600u/measured/session.toml --json fit.json
+  abbe fit sessions/hermle-c600u/measured/session.toml --report fit.html --plots plots
   abbe fit run1/session.toml --method cone
   abbe fit sessions/self-calibration/measured/session.toml --method self-calibration --monte-carlo 1000000";
 
@@ -34,6 +36,8 @@ pub struct FitArguments {
     session: SessionArguments,
     #[command(flatten)]
     common: CommonArguments,
+    #[command(flatten)]
+    faces: ReportArguments,
     /// How errors are identified.
     #[arg(long, value_enum, default_value = "full")]
     method: Method,
@@ -43,7 +47,13 @@ pub struct FitArguments {
 
 /// Runs `abbe fit`.
 pub fn run(arguments: &FitArguments) -> Result<(), Failure> {
+    arguments.faces.check()?;
     let session = read_session(&arguments.session)?;
+    if arguments.method != Method::Full && arguments.faces.asked() {
+        return Err(Failure::Other(
+            "`--report` and `--plots` show the full fit; leave `--method` out".to_string(),
+        ));
+    }
     if arguments.method == Method::SelfCalibration {
         return self_calibration::run(&session, &arguments.draws, &arguments.common);
     }
@@ -62,6 +72,13 @@ pub fn run(arguments: &FitArguments) -> Result<(), Failure> {
     print(&result);
     if let Some(path) = &arguments.common.json {
         output::write_json(path, &result)?;
+    }
+    if arguments.faces.asked() {
+        let document = crate::report::fit::document(&problem, &fit, &result)?;
+        let method = crate::report::fit::method(&result);
+        arguments
+            .faces
+            .write(&document, &method, &session, arguments.common.seed)?;
     }
     Ok(())
 }

@@ -14,10 +14,11 @@ mod map;
 mod new;
 mod output;
 mod plan;
+mod report;
 mod self_calibration;
 mod simulate;
-mod table;
-mod trace;
+pub mod table;
+pub mod trace;
 
 use std::path::PathBuf;
 use std::process::ExitCode;
