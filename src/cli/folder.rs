@@ -18,7 +18,7 @@ pub fn write(
     look: impl FnOnce(&Path) -> Result<(), Failure>,
 ) -> Result<(), Failure> {
     let fault = |source| fault(folder, source);
-    let present = self::check(folder, force)?;
+    let present = check(folder, Some(force))?;
     let parent = match folder.parent() {
         Some(parent) if !parent.as_os_str().is_empty() => parent,
         _ => Path::new("."),
@@ -52,8 +52,8 @@ fn fault(folder: &Path, source: std::io::Error) -> Failure {
     }
 }
 
-/// Whether the folder is there; an error where nothing may be written into it.
-pub fn check(folder: &Path, force: bool) -> Result<bool, Failure> {
+/// Whether the folder is there; an error where nothing may be written into it. `force` is what the user said, where the command has a `--force`.
+pub fn check(folder: &Path, force: Option<bool>) -> Result<bool, Failure> {
     if folder.is_file() {
         return Err(Failure::Other(format!(
             "{}: this is a file; name a folder",
@@ -66,11 +66,14 @@ pub fn check(folder: &Path, force: bool) -> Result<bool, Failure> {
             .map_err(|source| fault(folder, source))?
             .next()
             .is_some();
-    if occupied && !force {
+    if occupied && force != Some(true) {
+        let or = match force {
+            Some(_) => ", or say --force to replace the files in it that are of the same names",
+            None => "",
+        };
         return Err(Failure::Other(format!(
-            "{}: the folder is there and not empty; name another{}",
-            folder.display(),
-            ", or say --force to replace the files in it that are of the same names"
+            "{}: the folder is there and not empty; name another{or}",
+            folder.display()
         )));
     }
     Ok(present)

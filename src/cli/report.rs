@@ -36,7 +36,7 @@ impl ReportArguments {
             output::check(path)?;
         }
         if let Some(path) = &self.plots {
-            folder::check(path, false)?;
+            folder::check(path, None)?;
         }
         Ok(())
     }

@@ -8,7 +8,7 @@ use serde_json::json;
 
 use super::plot::lines::{ACROSS, Lines, Mark, Series, UP, span};
 use super::plot::polar::{DIVISIONS, Round, Trace, division_um};
-use super::plot::scale::{Scale, text};
+use super::plot::scale::Scale;
 use super::plot::{Plot, polar};
 use super::thin;
 
@@ -16,8 +16,10 @@ use super::thin;
 const TRACE_STRIPS: usize = 360;
 /// Strips of an axis of poses.
 const POSE_STRIPS: usize = 150;
+/// Poses that are drawn however ordinary they are, so that the bulk is seen beside the extremes.
+const POSE_SAMPLE: usize = 500;
 /// Strips of a plot over time.
-const TIME_STRIPS: usize = 480;
+const TIME_STRIPS: usize = 240;
 /// Tests that are drawn one by one; what a session has beyond is in its data.
 pub const MOST_TESTS: usize = 12;
 
@@ -84,6 +86,10 @@ impl<'d> Drawn<'d> {
                             axes_of(problem, test, number)
                                 .iter()
                                 .flat_map(|(_, values)| thin::kept(&part(values), &columns, POSE_STRIPS))
+                                .chain(
+                                    (0..stretch.rows.len())
+                                        .step_by(stretch.rows.len().div_ceil(POSE_SAMPLE).max(1)),
+                                )
                                 .collect()
                         };
                         kept.sort_unstable();
@@ -127,10 +133,7 @@ impl<'d> Drawn<'d> {
             })
             .collect();
         let um = um.unwrap_or_else(|| division_um(traces.iter().flat_map(|trace| &trace.points)));
-        let caption = format!(
-            "Magnified; the heavy circle is zero, {} µm a division.",
-            text(um, um)
-        );
+        let caption = "Magnified; the heavy circle is zero.".to_string();
         let mut plot = polar::plot(
             format!("{name}-{}", test.name),
             title,
@@ -276,7 +279,7 @@ impl<'d> Drawn<'d> {
             caption: if is_deviation {
                 "Observed less what the nominal machine would read.".to_string()
             } else {
-                "Before (red, broken) and after (blue).".to_string()
+                "Before (red; broken or large) and after (blue).".to_string()
             },
             x: (x, format!("{}, {}", axis.name, axis.unit)),
             y: (y, format!("{what}, µm")),
@@ -323,8 +326,13 @@ impl<'d> Drawn<'d> {
             columns[2].extend(lengths(&view.after_um, self.views.coordinates));
         }
         let [time, before, after] = columns;
-        let kept = thin::kept(&time, &[&before, &after], TIME_STRIPS);
-        let of = |values: &[f64]| kept.iter().map(|row| (time[*row], values[*row])).collect();
+        let of = |values: &[f64]| -> Vec<(f64, f64)> {
+            let strips = thin::strips(&time, values, TIME_STRIPS);
+            strips
+                .into_iter()
+                .flat_map(|(at, low, high)| [(at, low), (at, high)])
+                .collect()
+        };
         let [low, high] = span(time.iter().copied());
         let [least, most] = span(before.iter().chain(&after).copied());
         let (what, unit) = if timed {
@@ -351,17 +359,17 @@ impl<'d> Drawn<'d> {
                 Series {
                     class: "before",
                     live: None,
-                    mark: Mark::Dots,
+                    mark: Mark::Bars,
                     points: of(&before),
                 },
                 Series {
                     class: "after",
                     live: None,
-                    mark: Mark::Dots,
+                    mark: Mark::Bars,
                     points: of(&after),
                 },
             ],
-            legend: vec![("before dots", "before".into()), ("after dots", "after".into())],
+            legend: vec![("before bars", "before".into()), ("after bars", "after".into())],
             over: html! {},
         }
         .plot()

@@ -29,7 +29,9 @@ pub fn document(problem: &Problem<'_>, fit: &Fit, result: &FitResult) -> Result<
     let views = views(problem, fit, None)?;
     let drawn = Drawn::new(problem, &views);
     let spectra = spectrum::spectra(problem, &views);
-    let excess = if result.birge_ratio > 1.0 {
+    let excess = if result.noise_source == "fit" {
+        "The noise was taken from this very fit and cannot say whether the model lacks anything; `abbe trace` looks for that.".to_string()
+    } else if result.birge_ratio > 1.0 {
         format!(
             "The residual is {:.2} times what noise would leave: something is missing from the model, and `abbe trace` looks for it.",
             result.birge_ratio
@@ -61,7 +63,17 @@ pub fn document(problem: &Problem<'_>, fit: &Fit, result: &FitResult) -> Result<
     let section = readings::before_and_after(
         &mut document,
         &drawn,
-        &[("nominal machine", &nominal), ("fitted", &fitted)],
+        &[
+            (
+                if drawn.is_round() {
+                    "nominal machine and set-up"
+                } else {
+                    "nominal machine, fitted set-up"
+                },
+                &nominal,
+            ),
+            ("fitted", &fitted),
+        ],
         [
             "before: deviation of the nominal machine",
             "after: residual of the fit",

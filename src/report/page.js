@@ -65,6 +65,7 @@
     }
     return [live.x0 + live.kx * along, live.y0 - away];
   };
+  const scales = ({ live }) => live.column === "deviation" && (live.kind === "polar" || live.scaled);
   const compute = (plot) => {
     const paths = [...plot.svg.querySelectorAll("path[data-run]")];
     const columns = paths.map((path) => {
@@ -73,8 +74,7 @@
       return { path, stretch, name, values: values(stretch, name), along: column(stretch.along, plot.live.along) };
     });
     plot.um = plot.live.um;
-    const scales = plot.live.column === "deviation" && (plot.live.kind === "polar" || plot.live.scaled);
-    if (fit.on && scales) {
+    if (fit.on && scales(plot)) {
       let most = 0;
       for (const c of columns) if (shown(c.stretch)) for (const v of c.values) most = Math.max(most, Math.abs(v));
       plot.um = roundUp(most / 4);
@@ -157,7 +157,7 @@
       controls.append(make("fieldset", {},
         make("legend", { textContent: "With this much of" }),
         button("all errors", all(100)), button("none", all(0)),
-        box("magnify what is left", (on) => { fit.on = on; }, false),
+        ...(plots.some(scales) ? [box("magnify what is left", (on) => { fit.on = on; }, false)] : []),
         make("div", { className: "sliders" }, ...inputs.map((i) => i.label))));
     }
   }

@@ -9,8 +9,7 @@ use maud::{Markup, html};
 use super::document::{Document, list, table};
 use super::plot::Plot;
 use super::plot::bars::{self, Fill};
-use super::readings::{self, um, unit};
-use crate::cli::table::value_and_u;
+use super::readings::{self, um, unit, value_and_u};
 
 /// Rows of a table at most; the JSON holds all.
 const MOST_ROWS: usize = 30;

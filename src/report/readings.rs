@@ -17,7 +17,6 @@ use super::plot::lines::{ACROSS, Lines, Mark, Series, UP};
 use super::plot::polar::{Round, Trace, drawing};
 use super::plot::scale::{Scale, place, polyline, text};
 use super::plot::{Plot, chain, cut, heat};
-use crate::cli::table::value_and_u;
 
 /// The most unknowns of one unit in one plot.
 const MOST_ROWS: usize = 30;
@@ -31,9 +30,13 @@ pub fn um(value: f64) -> String {
 
 /// A unit as people write it.
 pub fn unit(name: &str) -> String {
-    name.replace("um", "µm")
-        .replace("arcsec", "″")
-        .replace("deg", "°")
+    name.replace("um", "µm").replace("deg", "°")
+}
+
+/// A value and its uncertainty, rounded alike, with a minus that is one.
+pub fn value_and_u(value: f64, u: f64) -> (String, String) {
+    let (value, u) = crate::cli::table::value_and_u(value, u);
+    (value.replace('-', "\u{2212}"), u)
 }
 
 /// What the page moves: the data, and a slider for each error and effect.
@@ -55,7 +58,7 @@ pub fn live(document: &mut Document, drawn: &Drawn<'_>, parameters: &[ParameterR
             });
             let words = match share.cause {
                 Cause::Setup => "set-up: balls and bar".to_string(),
-                Cause::Unseen => "what the readings cannot tell apart".to_string(),
+                Cause::Unseen => "not told apart, together".to_string(),
                 Cause::Error | Cause::Effect => format!("{}{}", share.id, value.unwrap_or_default()),
             };
             json!({"id": share.id, "words": words})
@@ -267,22 +270,22 @@ pub fn residuals(document: &mut Document, drawn: &Drawn<'_>, spectra: &[Spectrum
         .collect();
     plots.push(drawn.over_time());
     let effects = &drawn.problem.parameters.effects;
+    // One height for all, so that a wave in one test stands out against the others.
+    let highest = spectra
+        .iter()
+        .flat_map(|spectrum| spectrum.before_um.iter().chain(&spectrum.after_um))
+        .copied()
+        .fold(0.0, f64::max);
     plots.extend(
         spectra
             .iter()
             .take(2 * MOST_TESTS)
-            .map(|spectrum| spectrum_plot(spectrum, effects)),
+            .map(|spectrum| spectrum_plot(spectrum, highest, effects)),
     );
     document.show(plots)
 }
 
-fn spectrum_plot(spectrum: &Spectrum, effects: &[abbe::model::effect::Effect]) -> Plot {
-    let highest = spectrum
-        .before_um
-        .iter()
-        .chain(&spectrum.after_um)
-        .copied()
-        .fold(0.0, f64::max);
+fn spectrum_plot(spectrum: &Spectrum, highest: f64, effects: &[abbe::model::effect::Effect]) -> Plot {
     let orders = spectrum.before_um.len() as f64;
     let x = Scale {
         step: 5.0,
@@ -310,7 +313,9 @@ fn spectrum_plot(spectrum: &Spectrum, effects: &[abbe::model::effect::Effect]) -
     let over = html! {
         @for (number, (order, id)) in found.iter().enumerate() {
             @let (at, down) = (x.at(*order), UP[1] + 12.0 + 12.0 * (number % 3) as f64);
-            path class="found-line" d=(polyline([(at, UP[0]), (at, down + 2.0)])) {}
+            @let stem = spectrum.before_um.iter().zip(&spectrum.after_um).nth((order.round() as usize).saturating_sub(1));
+            @let top = y.at(stem.map_or(0.0, |(before, after)| before.max(*after)));
+            path class="found-line" d=(polyline([(at, (top - 3.0).max(down + 2.0)), (at, down + 2.0)])) {}
             path class="found" d=(format!("M{} {}l-4 8h8z", place(at), UP[0])) {}
             text class=(if at > 400.0 { "small right" } else { "small" }) x=(place(if at > 400.0 { at - 4.0 } else { at + 4.0 })) y=(place(down)) { title { (id) } (cut(id, 24)) }
         }
@@ -330,13 +335,13 @@ fn spectrum_plot(spectrum: &Spectrum, effects: &[abbe::model::effect::Effect]) -
                 class: "before",
                 live: None,
                 mark: Mark::Stems,
-                points: stems(&spectrum.before_um, -0.12),
+                points: stems(&spectrum.before_um, -0.16),
             },
             Series {
                 class: "after",
                 live: None,
                 mark: Mark::Stems,
-                points: stems(&spectrum.after_um, 0.12),
+                points: stems(&spectrum.after_um, 0.16),
             },
         ],
         legend,

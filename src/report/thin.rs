@@ -31,6 +31,22 @@ pub fn kept(abscissa: &[f64], columns_of_values: &[&[f64]], columns: usize) -> V
     (0..rows).filter(|row| chosen[*row]).collect()
 }
 
+/// Least and greatest of each of `columns` strips of the abscissa that holds any value: middle of the strip, least, greatest.
+pub fn strips(abscissa: &[f64], values: &[f64], columns: usize) -> Vec<(f64, f64, f64)> {
+    let low = abscissa.iter().copied().fold(f64::INFINITY, f64::min);
+    let high = abscissa.iter().copied().fold(f64::NEG_INFINITY, f64::max);
+    let width = ((high - low) / columns as f64).max(f64::MIN_POSITIVE);
+    let mut extremes: Vec<Option<(f64, f64)>> = vec![None; columns];
+    for (at, value) in abscissa.iter().zip(values) {
+        let strip = &mut extremes[(((at - low) / width) as usize).min(columns - 1)];
+        let (least, most) = strip.unwrap_or((*value, *value));
+        *strip = Some((least.min(*value), most.max(*value)));
+    }
+    let middle = |k: usize| low + (k as f64 + 0.5) * width;
+    let strip = |(k, pair): (usize, Option<(f64, f64)>)| pair.map(|(least, most)| (middle(k), least, most));
+    extremes.into_iter().enumerate().filter_map(strip).collect()
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

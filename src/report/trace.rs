@@ -13,8 +13,7 @@ use super::plot::bars::{self, Fill};
 use super::plot::lines::{ACROSS, Lines, Mark, Series, UP, span};
 use super::plot::scale::{Scale, place, polyline};
 use super::plot::{Plot, cut};
-use super::readings::{self, um, unit};
-use crate::cli::table::value_and_u;
+use super::readings::{self, um, unit, value_and_u};
 use crate::cli::trace::name;
 
 /// Effects whose rivals are drawn.
@@ -39,8 +38,8 @@ fn sentence(result: &TraceResult) -> String {
         um(result.noise_um)
     );
     let count = match result.effects.len() {
-        1 => "One effect".to_string(),
-        n => format!("{n} effects"),
+        1 => "One effect of the library accounts".to_string(),
+        n => format!("{n} effects of the library account"),
     };
     match result.verdict.as_str() {
         "clean" => format!(
@@ -48,9 +47,9 @@ fn sentence(result: &TraceResult) -> String {
             um(result.before.heldout_rms_um),
             um(result.noise_um)
         ),
-        "explained" => format!("{count} of the library account for what the declared model left: {figures}"),
+        "explained" => format!("{count} for what the declared model left: {figures}"),
         "partly-explained" => {
-            format!("{count} of the library account for a part of what the declared model left: {figures}")
+            format!("{count} for a part of what the declared model left: {figures}")
         }
         _ => format!("There is structure, and nothing in the library accounts for it: {figures}"),
     }

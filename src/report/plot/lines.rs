@@ -28,6 +28,8 @@ pub enum Mark {
     Dots,
     /// Upright strokes from zero.
     Stems,
+    /// Upright strokes from each odd point to the next.
+    Bars,
 }
 
 /// One series.
@@ -45,11 +47,16 @@ pub struct Series<'s> {
 impl Series<'_> {
     fn path(&self, x: &Scale, y: &Scale) -> String {
         let placed = self.points.iter().map(|p| (x.at(p.0), y.at(p.1)));
+        let stroke = |x: f64, from: f64, to: f64| format!("M{} {}V{}", place(x), place(from), place(to));
         match self.mark {
             Mark::Line => polyline(placed),
             Mark::Dots => dots(placed),
-            Mark::Stems => placed
-                .map(|(x, top)| format!("M{} {}V{}", place(x), place(y.at(0.0)), place(top)))
+            Mark::Stems => placed.map(|(x, top)| stroke(x, y.at(0.0), top)).collect(),
+            // A single reading is a stroke too.
+            Mark::Bars => self
+                .points
+                .chunks_exact(2)
+                .map(|pair| stroke(x.at(pair[0].0), y.at(pair[0].1) + 0.5, y.at(pair[1].1) - 0.5))
                 .collect(),
         }
     }
@@ -57,7 +64,9 @@ impl Series<'_> {
     fn full_class(&self) -> String {
         match self.mark {
             Mark::Dots => format!("run {} dots", self.class),
-            Mark::Line | Mark::Stems => format!("run {}", self.class),
+            Mark::Line => format!("run {}", self.class),
+            Mark::Stems => format!("run {} stem", self.class),
+            Mark::Bars => format!("run {} bars", self.class),
         }
     }
 }

@@ -216,24 +216,24 @@ pub fn legend(entries: &[(&str, String)], x: f64, y: f64, width: f64) -> (Markup
     let mut placed = Vec::new();
     let (mut along, mut down) = (x, y);
     for (class, words) in entries {
-        let needed = 30.0 + 7.0 * words.chars().count() as f64;
+        let needed = 26.0 + 7.2 * words.chars().count() as f64;
         if along > x && along + needed > x + width {
             along = x;
             down += 17.0;
         }
         placed.push((along, down, *class, words));
-        along += needed + 6.0;
+        along += needed + 4.0;
     }
     let markup = html! {
         @for (along, down, class, words) in &placed {
             @if class.starts_with("key-") {
-                (key(class, *along + 11.0, *down - 4.0))
+                (key(class, *along + 9.0, *down - 4.0))
             } @else if class.contains("dots") {
-                path class=(class) d=(scale::dots([(along + 4.0, down - 4.0), (along + 11.0, down - 4.0), (along + 18.0, down - 4.0)])) {}
+                path class=(class) d=(scale::dots([(along + 2.0, down - 4.0), (along + 9.0, down - 4.0), (along + 16.0, down - 4.0)])) {}
             } @else {
-                path class=(class) d=(format!("M{along} {}h22", down - 4.0)) {}
+                path class=(class) d=(format!("M{along} {}h18", down - 4.0)) {}
             }
-            text x=(along + 27.0) y=(down) { (words) }
+            text x=(along + 23.0) y=(down) { (words) }
         }
     };
     (markup, down)

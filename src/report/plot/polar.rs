@@ -41,12 +41,12 @@ impl Round {
 
     /// Distance of two circles.
     pub fn division(self) -> f64 {
-        self.side * 0.045
+        self.side * 0.042
     }
 
     /// Radius of the nominal circle.
     pub fn nominal(self) -> f64 {
-        self.side * 0.235
+        self.side * 0.22
     }
 
     /// Where a reading lies.
@@ -67,18 +67,18 @@ pub fn division_um<'p>(points: impl IntoIterator<Item = &'p (f64, f64)>) -> f64 
 pub fn drawing(round: Round, division_um: f64, traces: &[Trace<'_>]) -> Markup {
     let middle = round.side / 2.0;
     html! {
-        @for k in -4..=4 {
-            circle class=(if k == 0 { "nominal" } else { "grid" }) cx=(middle) cy=(middle)
-                r=(place(round.nominal() + f64::from(k) * round.division())) {}
+        @for k in (-4..=4).filter(|k| *k != 0) {
+            circle class="grid" cx=(middle) cy=(middle) r=(place(round.nominal() + f64::from(k) * round.division())) {}
         }
         @for k in 0..8 {
             @let (x, y) = round.at(45.0 * f64::from(k), DIVISIONS);
             path class="grid" d=(polyline([(middle, middle), (x, y)])) {}
             @if round.full {
-                @let (x, y) = round.at(45.0 * f64::from(k), DIVISIONS + 0.8);
+                @let (x, y) = round.at(45.0 * f64::from(k), DIVISIONS + 0.6);
                 text class=(beside(k)) x=(place(x)) y=(place(y + 4.0)) { (45 * k) "°" }
             }
         }
+        circle class="nominal" cx=(middle) cy=(middle) r=(place(round.nominal())) {}
         @for trace in traces {
             @let at = |point: &(f64, f64)| round.at(point.0, point.1 / division_um);
             path class=(format!("run {}", trace.class)) data-run=[trace.number] d=(polyline(trace.points.iter().map(at))) {}
