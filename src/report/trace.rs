@@ -7,7 +7,7 @@ use abbe::identify::trace::alias::Rival;
 use abbe::identify::views::{patterns, spectrum, views};
 use maud::{Markup, html};
 
-use super::document::{Document, list};
+use super::document::{Document, list, table};
 use super::drawn::Drawn;
 use super::plot::bars::{self, Fill};
 use super::plot::lines::{ACROSS, Lines, Mark, Series, UP, span};
@@ -130,25 +130,45 @@ fn effects(document: &mut Document, trace: &Trace<'_>) -> Markup {
     } else {
         document.show([convergence(trace)])
     };
+    let rows: Vec<Vec<String>> = result.effects.iter().enumerate().map(row).collect();
     html! {
         @if result.effects.is_empty() { p { "No effect was taken up." } }
-        @for (number, effect) in result.effects.iter().enumerate() {
-            h3 { (number + 1) ". " (name(&effect.name)) }
-            p {
-                (effect.family) ". "
-                @for p in &effect.parameters {
-                    @let (value, u) = value_and_u(p.value, p.u);
-                    (p.id) " = " (value) " ± " (u) " " (unit(&p.unit)) "; "
-                }
-                "explains " (um(effect.rms_gain_um)) " rms; p ≤ " (format!("{:.3}", effect.p_value)) "."
-            }
-        }
+        @if !rows.is_empty() { (table(&["", "effect", "found", "explains, rms", "p ≤", "family"], &rows)) }
         @if result.remainder.structured {
             p { "Structure remains (p ≤ " (format!("{:.3}", result.remainder.p_value)) "): " (result.remainder.place.as_deref().unwrap_or("")) "." }
         }
         (shown)
         (curves(document, &result.effects))
     }
+}
+
+/// A found effect as a row of a table.
+fn row((number, effect): (usize, &EffectResult)) -> Vec<String> {
+    let values: Vec<String> = effect
+        .parameters
+        .iter()
+        .map(|p| {
+            let (value, u) = value_and_u(p.value, p.u);
+            // A component may have a dot of its own: `spindle_ball.y~time:drift`.
+            let what = p.id.rsplit_once('.').map_or("", |(_, what)| what);
+            let what = if what.contains('~') { "" } else { what };
+            format!("{what} {value} ± {u} {}", unit(&p.unit))
+                .trim()
+                .to_string()
+        })
+        .collect();
+    vec![
+        (number + 1).to_string(),
+        name(&effect.name),
+        if effect.curve.is_empty() {
+            values.join(", ")
+        } else {
+            "a curve, drawn below".to_string()
+        },
+        um(effect.rms_gain_um),
+        format!("{:.3}", effect.p_value),
+        effect.family.clone(),
+    ]
 }
 
 /// Free curves with their band.

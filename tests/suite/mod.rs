@@ -17,6 +17,8 @@ mod plan_next;
 mod plan_rank;
 mod plan_uncertainty;
 mod recovery;
+mod report;
+mod report_browser;
 mod robots;
 mod self_calibration;
 mod simulate;
