@@ -60,19 +60,35 @@ impl Document {
     }
 }
 
-/// A table: header, rows; the first column to the left.
+/// A table: header, rows; columns of words to the left, of numbers to the right.
 pub fn table(header: &[&str], rows: &[Vec<String>]) -> Markup {
+    let is_word = |cell: &String| cell.starts_with(char::is_alphabetic);
+    let class: Vec<Option<&str>> = (0..header.len())
+        .map(|column| {
+            let words = rows.iter().any(|row| row.get(column).is_some_and(is_word));
+            words.then_some("word-column")
+        })
+        .collect();
     html! {
         div class="scroll" {
             table {
-                thead { tr { @for cell in header { th { (cell) } } } }
-                tbody { @for row in rows { tr { @for cell in row { td { (cell) } } } } }
+                thead { tr { @for (cell, class) in header.iter().zip(&class) { th class=[*class] { (cell) } } } }
+                tbody { @for row in rows { tr { @for (cell, class) in row.iter().zip(&class) { td class=[*class] { (cell) } } } } }
             }
+        }
+    }
+}
+
+/// Words in which what stands between backquotes is to be typed.
+pub fn prose(text: &str) -> Markup {
+    html! {
+        @for (number, part) in text.split('`').enumerate() {
+            @if number % 2 == 1 { code { (part) } } @else { (part) }
         }
     }
 }
 
 /// Sentences, one a line.
 pub fn list(items: impl IntoIterator<Item = String>) -> Markup {
-    html! { ul { @for item in items { li { (item) } } } }
+    html! { ul { @for item in items { li { (prose(&item)) } } } }
 }

@@ -7,7 +7,7 @@ use abbe::identify::results::{FitResult, ModelResult};
 use abbe::identify::views::{lengths, patterns, spectrum, views};
 use maud::{Markup, html};
 
-use super::document::Document;
+use super::document::{Document, prose};
 use super::drawn::Drawn;
 use super::readings::{self, um};
 
@@ -105,11 +105,11 @@ pub fn document(problem: &Problem<'_>, fit: &Fit, result: &FitResult) -> Result<
         "What to measure next",
         html! {
             p {
-                @if result.birge_ratio > 1.0 { "First `abbe trace` on the same session. " }
+                @if result.birge_ratio > 1.0 { (prose("First `abbe trace` on the same session. ")) }
                 @if result.unobservable.is_empty() {
-                    "Every unknown is seen; `abbe plan SESSION --improve 1` names the test that lowers the uncertainties most."
+                    (prose("Every unknown is seen; `abbe plan SESSION --improve 1` names the test that lowers the uncertainties most."))
                 } @else {
-                    "`abbe plan SESSION --improve 1` names the cheapest test that sees what these readings do not: "
+                    (prose("`abbe plan SESSION --improve 1` names the cheapest test that sees what these readings do not: "))
                     (result.unobservable.len()) " combinations."
                 }
             }

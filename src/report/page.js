@@ -81,12 +81,26 @@
     }
     plot.points = columns.map((c) => ({ ...c, at: Array.from(c.values, (v, i) => place(plot, c.stretch, c.along[i], v)) }));
   };
+  // Readings that lie far apart are joined along the arc, as in the drawing that came with the page.
+  const way = (plot, { stretch, along, values, at }) => {
+    if (plot.live.kind !== "polar") return at;
+    const joined = at.slice(0, 1);
+    for (let i = 1; i < at.length; i++) {
+      const parts = Math.max(1, Math.ceil(Math.abs(along[i] - along[i - 1]) / 4));
+      for (let k = 1; k <= parts; k++) {
+        const between = (list) => list[i - 1] + (k / parts) * (list[i] - list[i - 1]);
+        joined.push(k === parts ? at[i] : place(plot, stretch, between(along), between(values)));
+      }
+    }
+    return joined;
+  };
   const number = (value) => String(Math.round(value * 10) / 10);
   const draw = (plot) => {
     compute(plot);
-    for (const { path, stretch, at } of plot.points) {
+    for (const points of plot.points) {
+      const { path, stretch, at } = points;
       const dots = path.classList.contains("dots");
-      path.setAttribute("d", at.map(([x, y], i) => (dots || !i ? "M" : "L") + number(x) + " " + number(y) + (dots ? "h0" : "")).join(""));
+      path.setAttribute("d", way(plot, points).map(([x, y], i) => (dots || !i ? "M" : "L") + number(x) + " " + number(y) + (dots ? "h0" : "")).join(""));
       const signs = plot.svg.querySelectorAll(`.start[data-run="${path.dataset.run}"],.end[data-run="${path.dataset.run}"]`);
       for (const sign of signs) {
         const [x, y] = sign.classList.contains("start") ? at[0] : at[at.length - 1];

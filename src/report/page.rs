@@ -2,7 +2,7 @@
 
 use maud::{DOCTYPE, Markup, PreEscaped, html};
 
-use super::document::{Document, table};
+use super::document::{Document, prose, table};
 use super::embed;
 use super::plot::{DARK, LIGHT, STYLE};
 use super::provenance::Provenance;
@@ -33,7 +33,7 @@ pub fn html(document: &Document, method: &Markup, provenance: &Provenance) -> St
                     h1 { (document.title) }
                     p class="verdict" {
                         @if !document.word.is_empty() { strong class=(format!("word {}", super::plot::file_name(&document.word))) { (document.word) } " " }
-                        (document.verdict)
+                        (prose(&document.verdict))
                     }
                     nav { @for (anchor, heading, _) in &document.sections { a href=(format!("#{anchor}")) { (heading) } " " } a href="#method" { "Method and provenance" } }
                 }

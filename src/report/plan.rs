@@ -6,7 +6,7 @@ use abbe::identify::problem::Problem;
 use abbe::identify::views::{is_round, patterns};
 use maud::{Markup, html};
 
-use super::document::{Document, list, table};
+use super::document::{Document, list, prose, table};
 use super::plot::Plot;
 use super::plot::bars::{self, Fill};
 use super::readings::{self, um, unit, value_and_u};
@@ -122,7 +122,8 @@ fn row(error: &ErrorAnalysis) -> Vec<String> {
             error.sensitivity.largest,
             unit(&error.unit),
             error.sensitivity.largest_in
-        ),
+        )
+        .replace('-', "\u{2212}"),
         budget.join(", "),
     ]
 }
@@ -177,7 +178,10 @@ fn next(analysis: &PlanAnalysis) -> Markup {
             h3 { "What each test contributes" }
             (list(analysis.without.iter().map(|without| without.why.clone())))
         }
-        p { "`abbe plan SESSION --improve 1` names the test that lowers the uncertainties most for its time; `--separate A,B` the one that tells two effects apart." }
+        p {
+            (prose("`abbe plan SESSION --improve 1` names the test that lowers the uncertainties most for its time, `--separate A,B` the one that tells two \
+                    effects apart."))
+        }
         @if !analysis.warnings.is_empty() { h3 { "Warnings" } (list(analysis.warnings.iter().cloned())) }
     }
 }

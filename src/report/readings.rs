@@ -454,7 +454,7 @@ fn curves(test: &TestPatterns, columns: &[abbe::identify::views::patterns::Patte
         legend: columns
             .iter()
             .zip(CLASSES)
-            .map(|(c, class)| (class, format!("{} a {}", cut(&c.id, 20), unit(&c.unit))))
+            .map(|(c, class)| (class, format!("{}, per {}", cut(&c.id, 20), unit(&c.unit))))
             .collect(),
         over: html! {},
     }

@@ -7,7 +7,7 @@ use abbe::identify::trace::alias::Rival;
 use abbe::identify::views::{patterns, spectrum, views};
 use maud::{Markup, html};
 
-use super::document::{Document, list, table};
+use super::document::{Document, list, prose, table};
 use super::drawn::Drawn;
 use super::plot::bars::{self, Fill};
 use super::plot::lines::{ACROSS, Lines, Mark, Series, UP, span};
@@ -358,7 +358,9 @@ fn next(result: &TraceResult) -> Markup {
         @if tests.is_empty() {
             p {
                 "No further test on the menu is needed to tell what was found from what looks like it. "
-                @if !result.unobservable.is_empty() { "`abbe plan SESSION --improve 1` names the cheapest test that sees what these readings do not." }
+                @if !result.unobservable.is_empty() {
+                    (prose("`abbe plan SESSION --improve 1` names the cheapest test that sees what these readings do not."))
+                }
             }
         } @else { (list(tests)) }
         (readings::warnings(&result.rejected, &result.warnings))

@@ -102,7 +102,7 @@ pub struct Step {
     pub id: String,
     /// How many effects there were then.
     pub effects: usize,
-    /// Held-out rms then, µm, of whitened readings times the noise.
+    /// Held-out rms then, µm.
     pub heldout_rms_um: f64,
 }
 

@@ -68,7 +68,10 @@ impl Way {
                 moving,
             };
         }
-        if let &[first, second] = moving.as_slice()
+        // The names in their order: X to the right, Y up.
+        let mut pair = moving.clone();
+        pair.sort_by(|a, b| machine.axes[*a].name.cmp(&machine.axes[*b].name));
+        if let &[first, second] = pair.as_slice()
             && let Some(values) = about_a_circle(&readings.positions[first], &readings.positions[second])
         {
             return Way {

@@ -32,6 +32,9 @@ pub enum Mark {
     Bars,
 }
 
+/// Fewer dots than this are drawn large.
+const SPARSE: usize = 150;
+
 /// One series.
 pub struct Series<'s> {
     /// Class that colours it.
@@ -63,6 +66,7 @@ impl Series<'_> {
 
     fn full_class(&self) -> String {
         match self.mark {
+            Mark::Dots if self.points.len() < SPARSE => format!("run {} dots sparse", self.class),
             Mark::Dots => format!("run {} dots", self.class),
             Mark::Line => format!("run {}", self.class),
             Mark::Stems => format!("run {} stem", self.class),

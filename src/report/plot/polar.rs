@@ -80,8 +80,8 @@ pub fn drawing(round: Round, division_um: f64, traces: &[Trace<'_>]) -> Markup {
         }
         circle class="nominal" cx=(middle) cy=(middle) r=(place(round.nominal())) {}
         @for trace in traces {
-            @let at = |point: &(f64, f64)| round.at(point.0, point.1 / division_um);
-            path class=(format!("run {}", trace.class)) data-run=[trace.number] d=(polyline(trace.points.iter().map(at))) {}
+            @let way = along_arcs(&trace.points).into_iter().map(|(angle, um)| round.at(angle, um / division_um));
+            path class=(format!("run {}", trace.class)) data-run=[trace.number] d=(polyline(way)) {}
         }
         @if round.full {
             @for trace in traces {
@@ -93,6 +93,23 @@ pub fn drawing(round: Round, division_um: f64, traces: &[Trace<'_>]) -> Markup {
             }
         }
     }
+}
+
+/// Degrees between two points beyond which a straight line would cut the circle short.
+const CHORD_DEG: f64 = 4.0;
+
+/// Readings that lie far apart are joined along the arc, the deviation in proportion.
+fn along_arcs(points: &[(f64, f64)]) -> Vec<(f64, f64)> {
+    let mut way: Vec<(f64, f64)> = points.first().copied().into_iter().collect();
+    for pair in points.windows(2) {
+        let ((from, low), (to, high)) = (pair[0], pair[1]);
+        let parts = ((to - from).abs() / CHORD_DEG).ceil().max(1.0);
+        for k in 1..=parts as usize {
+            let share = k as f64 / parts;
+            way.push((from + share * (to - from), low + share * (high - low)));
+        }
+    }
+    way
 }
 
 /// How the angle at a spoke is set, so that it stays out of the circles.
