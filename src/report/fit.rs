@@ -75,8 +75,8 @@ pub fn document(problem: &Problem<'_>, fit: &Fit, result: &FitResult) -> Result<
             ("fitted", &fitted),
         ],
         [
-            "before: deviation of the nominal machine",
-            "after: residual of the fit",
+            "before, deviation of the nominal machine",
+            "after, residual of the fit",
         ],
     );
     document.section("Before and after", section);

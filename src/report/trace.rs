@@ -235,14 +235,15 @@ fn convergence(trace: &Trace<'_>) -> Plot {
     );
     let most = points.iter().map(|p| p.1).fold(0.0, f64::max);
     let steps = trace.steps.len() as f64;
-    let x = Scale::over(0.0, steps + 0.5, ACROSS, 10);
+    // Names stand to the right of the points as long as they have room.
+    let named = trace.steps.len() <= 8;
+    let wide = if named { 1.5 * steps } else { steps + 0.5 };
+    let x = Scale::over(0.0, wide, ACROSS, 10);
     let x = Scale {
         step: x.step.max(1.0),
         ..x
     };
     let y = Scale::rounded(0.0, most * 1.05, UP, 5);
-    // Names beside the points as long as they have room.
-    let named = trace.steps.len() <= 8;
     let over = html! {
         @for (number, step) in trace.steps.iter().enumerate() {
             @let (at, high) = (x.at(number as f64 + 1.0), y.at(step.heldout_rms_um));
@@ -250,7 +251,7 @@ fn convergence(trace: &Trace<'_>) -> Plot {
                 title { (step.id) ": " (um(step.heldout_rms_um)) ", " (step.effects) " effects" }
             }
             @if named {
-                text class=(if at > 380.0 { "small right" } else { "small" }) x=(place(if at > 380.0 { at - 6.0 } else { at + 6.0 })) y=(place(high - 7.0)) { (cut(&step.id, 26)) }
+                text class="small" x=(place(at + 6.0)) y=(place(high - 7.0)) { (cut(&step.id, 26)) }
             }
         }
         @let noise = y.at(trace.result.noise_um);

@@ -222,7 +222,8 @@ pub fn legend(entries: &[(&str, String)], x: f64, y: f64, width: f64) -> (Markup
             down += 17.0;
         }
         placed.push((along, down, *class, words));
-        along += needed + 4.0;
+        // A filled key is as wide as the strokes, but looks nearer.
+        along += needed + if class.starts_with("key-") { 12.0 } else { 4.0 };
     }
     let markup = html! {
         @for (along, down, class, words) in &placed {
