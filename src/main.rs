@@ -1,6 +1,7 @@
 //! The command `abbe`.
 
 mod cli;
+mod report;
 
 use std::process::ExitCode;
 

@@ -8,13 +8,15 @@
 //! - [`circular`]: ball-bar figures of ISO 230-4 and the classical diagnosis;
 //! - [`trace`]: close the loop;
 //! - [`plan`]: what tests can see before anybody measures;
-//! - [`views`]: readings and residuals of an R-test by direction;
+//! - [`directions`]: readings and residuals of an R-test by direction;
 //! - [`simulate`]: readings from a model; [`patterns`]: what each error alone does to a test; [`quantity`]: values with their units as people write them;
+//! - [`views`]: a session reading by reading, as plots draw it;
 //! - [`results`]: what is reported, as it stands in JSON.
 
 pub mod circle;
 pub mod circular;
 pub mod compensation;
+pub mod directions;
 pub mod drivers;
 pub mod error;
 pub mod fit;

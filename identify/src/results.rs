@@ -86,7 +86,7 @@ pub struct FitResult {
 }
 
 /// A fit by Monte Carlo (JCGM 101).
-#[derive(Clone, Debug, PartialEq, Serialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, JsonSchema)]
 pub struct FitMonteCarlo {
     /// Number of runs.
     pub runs: u64,
@@ -101,7 +101,7 @@ pub struct FitMonteCarlo {
 }
 
 /// A parameter by both propagations, in `unit`.
-#[derive(Clone, Debug, PartialEq, Serialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, JsonSchema)]
 pub struct DrawnParameter {
     /// As in the fit.
     pub id: String,
@@ -132,7 +132,7 @@ pub struct DrawnParameter {
 }
 
 /// Whether GUM and Monte Carlo agree.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 pub enum Verdict {
     /// Within the tolerance: the GUM's figures are quoted.

@@ -6,16 +6,18 @@ use abbe::identify::results::{FitMonteCarlo, FitResult, ParameterResult, Unobser
 use clap::{Args, ValueEnum};
 
 use super::failure::Failure;
+use super::report::ReportArguments;
 use super::{
-    CommonArguments, SessionArguments, circular, compensation, csv, geometric, output, read_session, repeated,
-    self_calibration, table, views,
+    CommonArguments, SessionArguments, circular, compensation, csv, geometric, output, read_session,
+    repeated, self_calibration, table, views,
 };
 
 /// Examples of `abbe fit`.
 pub const HELP: &str = "Examples:
   abbe fit sessions/hermle-c600u/measured/session.toml --json fit.json --csv fit.csv
-  abbe fit sessions/hermle-c600u/measured/session.toml --monte-carlo 10000
-  abbe fit day1/session.toml --repeat day2/session.toml day3/session.toml
+  abbe fit sessions/hermle-c600u/measured/session.toml --report fit.html --plots plots
+  abbe fit sessions/hermle-c600u/measured/session.toml --monte-carlo 1000
+  abbe fit run2/session.toml --repeat run3/session.toml
   abbe fit run1/session.toml --method cone
   abbe fit sessions/r-test/measured/session.toml --views views.csv
   abbe fit sessions/self-calibration/measured/session.toml --method self-calibration \\
@@ -43,6 +45,8 @@ pub struct FitArguments {
     session: SessionArguments,
     #[command(flatten)]
     common: CommonArguments,
+    #[command(flatten)]
+    faces: ReportArguments,
     /// How errors are identified.
     #[arg(long, value_enum, default_value = "full")]
     method: Method,
@@ -63,6 +67,7 @@ pub struct FitArguments {
 
 /// Runs `abbe fit`.
 pub fn run(arguments: &FitArguments) -> Result<(), Failure> {
+    arguments.faces.check()?;
     if !arguments.repeat.is_empty() {
         if arguments.method != Method::Full {
             return Err(Failure::Other(
@@ -79,6 +84,11 @@ pub fn run(arguments: &FitArguments) -> Result<(), Failure> {
     if arguments.method != Method::Full && (arguments.csv.is_some() || arguments.compensation.wanted()) {
         return Err(Failure::Other(
             "--csv and --compensation go with the full fit; leave out --method, or use --json".into(),
+        ));
+    }
+    if arguments.method != Method::Full && arguments.faces.asked() {
+        return Err(Failure::Other(
+            "`--report` and `--plots` show the full fit; leave `--method` out".to_string(),
         ));
     }
     if arguments.method == Method::SelfCalibration {
@@ -109,6 +119,13 @@ pub fn run(arguments: &FitArguments) -> Result<(), Failure> {
     }
     if let Some(path) = &arguments.csv {
         csv::write_fit(path, &result)?;
+    }
+    if arguments.faces.asked() {
+        let document = crate::report::fit::document(&problem, &fit, &result)?;
+        let method = crate::report::fit::method(&result);
+        arguments
+            .faces
+            .write(&document, &method, &session, arguments.common.seed)?;
     }
     arguments.compensation.run(&problem, &fit)
 }

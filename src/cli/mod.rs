@@ -19,11 +19,12 @@ mod new;
 mod output;
 mod plan;
 mod repeated;
+mod report;
 mod schema;
 mod self_calibration;
 mod simulate;
-mod table;
-mod trace;
+pub mod table;
+pub mod trace;
 mod views;
 
 use std::path::PathBuf;

@@ -11,17 +11,7 @@ pub fn write_whole(path: &Path, contents: &[u8]) -> Result<(), Failure> {
         path: path.display().to_string(),
         source,
     };
-    let folder = match path.parent() {
-        Some(folder) if !folder.as_os_str().is_empty() => folder,
-        _ => Path::new("."),
-    };
-    if !folder.is_dir() {
-        return Err(Failure::Other(format!(
-            "{}: cannot be written: there is no folder {}; make it first, or name another",
-            path.display(),
-            folder.display()
-        )));
-    }
+    let folder = check(path)?;
     let mut builder = tempfile::Builder::new();
     // As any other new file: what the user's mask lets through.
     #[cfg(unix)]
@@ -31,6 +21,28 @@ pub fn write_whole(path: &Path, contents: &[u8]) -> Result<(), Failure> {
     file.as_file().sync_all().map_err(fault)?;
     file.persist(path).map_err(|error| fault(error.error))?;
     Ok(())
+}
+
+/// The folder that a file is to lie in; an error where there is none.
+pub fn check(path: &Path) -> Result<&Path, Failure> {
+    let folder = match path.parent() {
+        Some(folder) if !folder.as_os_str().is_empty() => folder,
+        _ => Path::new("."),
+    };
+    if path.is_dir() {
+        return Err(Failure::Other(format!(
+            "{}: this is a folder; name a file in it",
+            path.display()
+        )));
+    }
+    if !folder.is_dir() {
+        return Err(Failure::Other(format!(
+            "{}: cannot be written: there is no folder {}; make it first, or name another",
+            path.display(),
+            folder.display()
+        )));
+    }
+    Ok(folder)
 }
 
 /// Writes a line to standard output; the end of the program where nobody reads on.

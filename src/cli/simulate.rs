@@ -21,6 +21,7 @@ Examples:
   abbe simulate sessions/hermle-c600u/chapter5.toml --out run1 --error EY0A=35.3um \\
       --error EB0A=-1.29arcsec
   abbe simulate sessions/hermle-c600u/chapter5.toml --out run2 --draw-setups --seed 7
+  abbe simulate sessions/hermle-c600u/chapter5.toml --out run3 --draw-setups --seed 8
 
 errors.toml holds one value a line, `EY0A = \"35.3 um\"`; names with other than letters and digits stand in quotes.";
 

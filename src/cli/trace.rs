@@ -12,6 +12,7 @@ use clap::Args;
 use indicatif::{ProgressBar, ProgressStyle};
 
 use super::failure::Failure;
+use super::report::ReportArguments;
 use super::{CommonArguments, SessionArguments, compensation, csv, fit, output, read_session, table};
 
 /// `abbe trace SESSION`
@@ -21,6 +22,8 @@ pub struct TraceArguments {
     session: SessionArguments,
     #[command(flatten)]
     common: CommonArguments,
+    #[command(flatten)]
+    faces: ReportArguments,
     /// The most effects to take up; as many as earn their place if not given.
     #[arg(long, value_name = "N")]
     max_effects: Option<usize>,
@@ -45,6 +48,7 @@ pub struct TraceArguments {
 
 /// Runs `abbe trace`.
 pub fn run(arguments: &TraceArguments) -> Result<(), Failure> {
+    arguments.faces.check()?;
     let session = read_session(&arguments.session)?;
     let options = TraceOptions {
         seed: arguments.common.seed,
@@ -94,6 +98,13 @@ pub fn run(arguments: &TraceArguments) -> Result<(), Failure> {
     }
     if let Some(path) = &arguments.csv {
         csv::write_trace(path, &trace.result)?;
+    }
+    if arguments.faces.asked() {
+        let document = crate::report::trace::document(&trace)?;
+        let method = crate::report::trace::method(&trace.result);
+        arguments
+            .faces
+            .write(&document, &method, &session, arguments.common.seed)?;
     }
     arguments.compensation.run(&trace.after, &trace.after_fit)
 }
@@ -215,7 +226,8 @@ fn print(result: &TraceResult) {
     fit::print_warnings(&result.warnings);
 }
 
-fn name(effect: &EffectName) -> String {
+/// An effect in words.
+pub fn name(effect: &EffectName) -> String {
     let order = effect
         .order
         .map_or(String::new(), |order| format!(" order {order}"));

@@ -3,9 +3,9 @@
 use std::fmt::Write;
 use std::path::Path;
 
+use abbe::identify::directions::{View, views};
 use abbe::identify::fit::Fit;
 use abbe::identify::problem::Problem;
-use abbe::identify::views::{View, views};
 use abbe::model::axis::AxisKind;
 
 use super::failure::Failure;

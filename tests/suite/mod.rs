@@ -24,6 +24,8 @@ mod plan_uncertainty;
 mod propagation;
 mod recovery;
 mod repeated;
+mod report;
+mod report_browser;
 mod robots;
 mod rtest;
 mod rtest_command;

@@ -2,8 +2,8 @@
 
 use std::f64::consts::FRAC_1_SQRT_2;
 
+use abbe::identify::directions::views;
 use abbe::identify::fit::prepare;
-use abbe::identify::views::views;
 use abbe::model::axis::AxisKind;
 use abbe::model::chain::Machine;
 use abbe::model::component::ErrorName;

@@ -22,8 +22,70 @@ pub struct Alias {
     pub model_coefficients: Vec<f64>,
 }
 
-/// The aliases of the `k`-th taken effect, nearest first.
-pub fn aliases(search: &Search<'_>, k: usize, variance: f64) -> Vec<Alias> {
+/// A candidate in a named effect's place.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Rival {
+    /// Its identifier; one member stands for all of a name.
+    pub id: String,
+    /// `−ln P` of its gain in that place, less the price of its places.
+    pub evidence: f64,
+    /// Whether it is the named effect itself.
+    pub named: bool,
+    /// Whether the readings cannot tell it from the named effect.
+    pub alias: bool,
+}
+
+/// How many rivals are kept.
+const MOST_RIVALS: usize = 16;
+
+/// What stands highest in the place of the `k`-th taken effect, the best first: that effect, its aliases, and what loses.
+fn rivals(
+    search: &Search<'_>,
+    k: usize,
+    gains: &[super::score::Gain],
+    variance: f64,
+    aliases: &[Alias],
+) -> Vec<Rival> {
+    let taken = search.taken()[k].candidate;
+    let named = search.candidates[taken].effect.id();
+    let alike: std::collections::HashSet<String> = aliases
+        .iter()
+        .map(|alias| search.candidates[alias.candidate].effect.id())
+        .collect();
+    let others: Vec<usize> = search.taken().iter().map(|t| t.candidate).collect();
+    let mut standing: Vec<(f64, usize)> = gains
+        .iter()
+        .enumerate()
+        .filter(|(candidate, gain)| {
+            gain.freedom > 0
+                && (*candidate == taken || !others.contains(candidate))
+                && !search.candidates[*candidate].last_resort
+                && search.is_open(*candidate, &search.tracks[super::search::ALL].folds)
+        })
+        .map(|(candidate, gain)| (search.evidence_for(candidate, gain, variance), candidate))
+        .collect();
+    standing.sort_by(|a, b| b.0.total_cmp(&a.0));
+    let mut rivals: Vec<Rival> = Vec::new();
+    for (evidence, candidate) in standing {
+        let id = search.candidates[candidate].effect.id();
+        if rivals.iter().any(|rival| rival.id == id) {
+            continue;
+        }
+        if rivals.len() == MOST_RIVALS {
+            break;
+        }
+        rivals.push(Rival {
+            named: id == named,
+            alias: alike.contains(&id),
+            id,
+            evidence,
+        });
+    }
+    rivals
+}
+
+/// The aliases of the `k`-th taken effect, nearest first, and what stands highest in its place.
+pub fn aliases(search: &Search<'_>, k: usize, variance: f64) -> (Vec<Alias>, Vec<Rival>) {
     let model = search.model_without(Some(k));
     let taken = &search.taken()[k];
     let of_named = model.gain(taken.candidate);
@@ -40,8 +102,8 @@ pub fn aliases(search: &Search<'_>, k: usize, variance: f64) -> Vec<Alias> {
         .zip(coefficients.iter().zip(&norms).map(|(c, norm)| c * norm))
         .collect();
     let others: Vec<usize> = search.taken().iter().map(|t| t.candidate).collect();
-    let mut aliases: Vec<Alias> = model
-        .gains()
+    let gains = model.gains();
+    let mut aliases: Vec<Alias> = gains
         .iter()
         .enumerate()
         .filter(|(candidate, gain)| {
@@ -73,5 +135,6 @@ pub fn aliases(search: &Search<'_>, k: usize, variance: f64) -> Vec<Alias> {
     let named = search.candidates[taken.candidate].effect.id();
     let mut seen = std::collections::HashSet::from([named]);
     aliases.retain(|alias| seen.insert(search.candidates[alias.candidate].effect.id()));
-    aliases
+    let rivals = rivals(search, k, &gains, variance, &aliases);
+    (aliases, rivals)
 }

@@ -98,6 +98,17 @@ const EXPLAINED_SHARE: f64 = 0.5;
 /// Significance below which a remainder counts as structured.
 const STRUCTURED: f64 = 0.01;
 
+/// One addition of a search.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Step {
+    /// The effect that was added, by its identifier; later rounds may have let it go or exchanged it.
+    pub id: String,
+    /// How many effects there were then.
+    pub effects: usize,
+    /// Held-out rms then, µm.
+    pub heldout_rms_um: f64,
+}
+
 /// Everything that a trace knows when it ends.
 pub struct Trace<'a> {
     /// The declared model.
@@ -112,6 +123,10 @@ pub struct Trace<'a> {
     pub effects: Vec<Effect>,
     /// For each of them what the readings cannot tell from it, nearest first.
     pub look_alikes: Vec<Vec<Effect>>,
+    /// For each of them what stands highest in its place, the best first.
+    pub rivals: Vec<Vec<alias::Rival>>,
+    /// How the search came to them.
+    pub steps: Vec<Step>,
     /// As it is reported.
     pub result: TraceResult,
 }
@@ -205,7 +220,8 @@ fn trace_with<'a>(
     search.reserve = reserve;
     let scale_um = problem.noise.sigma_mm * 1e3;
     let rms_um = |sum: f64| (sum / columns.rows().max(1) as f64).sqrt() * scale_um;
-    let mut ended = search_on(&mut search, &rms_um, progress);
+    let mut steps = Vec::new();
+    let mut ended = search_on(&mut search, &rms_um, &mut steps, progress);
     progress(Progress::Judging);
     let mut judged = judge(&problem, &before_fit, &search, options, structure_before.as_ref())?;
     let unexplained = judged
@@ -217,7 +233,7 @@ fn trace_with<'a>(
         search.bring_reserve();
         search.last_resort = true;
         let taken = search.taken().len();
-        ended = search_on(&mut search, &rms_um, progress);
+        ended = search_on(&mut search, &rms_um, &mut steps, progress);
         if search.taken().len() != taken {
             judged = judge(&problem, &before_fit, &search, options, structure_before.as_ref())?;
         }
@@ -235,7 +251,7 @@ fn trace_with<'a>(
         effects,
         structure: structure_after,
     } = judged;
-    let (result, look_alikes) = report::report(&report::Findings {
+    let reported = report::report(&report::Findings {
         before: &problem,
         before_fit: &before_fit,
         after: &after,
@@ -257,8 +273,10 @@ fn trace_with<'a>(
         after,
         after_fit,
         effects,
-        look_alikes,
-        result,
+        look_alikes: reported.look_alikes,
+        rivals: reported.rivals,
+        steps,
+        result: reported.result,
     })
 }
 
@@ -266,6 +284,7 @@ fn trace_with<'a>(
 fn search_on(
     search: &mut Search<'_>,
     rms_um: &dyn Fn(f64) -> f64,
+    steps: &mut Vec<Step>,
     progress: &(dyn Fn(Progress) -> bool + Sync),
 ) -> Option<f64> {
     // Effects that are put down to one make room for others; that must end.
@@ -287,6 +306,11 @@ fn search_on(
                 search.merge();
                 let held_out = search.held_out.last().copied().unwrap_or(0.0);
                 let id = search.candidates[candidate].effect.id();
+                steps.push(Step {
+                    id: id.clone(),
+                    effects: search.taken().len(),
+                    heldout_rms_um: rms_um(held_out),
+                });
                 if !progress(Progress::Taken(search.taken().len(), id, rms_um(held_out))) {
                     return None;
                 }

@@ -3,7 +3,7 @@
 use abbe_model::axis::AxisKind;
 use abbe_model::effect::{Driver, DriverSample, Effect, Shape};
 
-use super::alias::{self, Alias};
+use super::alias::{self, Alias, Rival};
 use super::remainder::Structure;
 use super::search::Search;
 use super::{EXPLAINED_SHARE, STRUCTURED, Start, library};
@@ -33,6 +33,13 @@ pub(super) struct Findings<'f, 'a> {
     pub candidates_seen: usize,
 }
 
+/// What is reported, and what stands behind it.
+pub(super) struct Reported {
+    pub result: TraceResult,
+    pub look_alikes: Vec<Vec<Effect>>,
+    pub rivals: Vec<Vec<Rival>>,
+}
+
 /// An effect's name as it stands in results.
 pub fn effect_name(effect: &Effect) -> EffectName {
     EffectName {
@@ -44,8 +51,8 @@ pub fn effect_name(effect: &Effect) -> EffectName {
     }
 }
 
-/// What is reported, and for each effect what looks like it.
-pub(super) fn report(findings: &Findings<'_, '_>) -> Result<(TraceResult, Vec<Vec<Effect>>), IdentifyError> {
+/// What is reported, and for each effect what looks like it and what stands highest in its place.
+pub(super) fn report(findings: &Findings<'_, '_>) -> Result<Reported, IdentifyError> {
     let Findings {
         before,
         before_fit,
@@ -67,6 +74,7 @@ pub(super) fn report(findings: &Findings<'_, '_>) -> Result<(TraceResult, Vec<Ve
     let families = library::families()?;
     let mut effects = Vec::new();
     let mut look_alikes: Vec<Vec<Effect>> = Vec::new();
+    let mut rivals = Vec::new();
     let mut alias_shifts = vec![0.0_f64; before_fit.beta.len()];
     let variance = if in_residual_variance {
         let sum: f64 = after_fit
@@ -82,7 +90,8 @@ pub(super) fn report(findings: &Findings<'_, '_>) -> Result<(TraceResult, Vec<Ve
     for (k, taken) in search.taken().iter().enumerate() {
         let candidate = &search.candidates[taken.candidate];
         let model = search.model_without(Some(k));
-        let aliases = alias::aliases(search, k, variance);
+        let (aliases, of_effect) = alias::aliases(search, k, variance);
+        rivals.push(of_effect);
         let named = model.joined(taken.candidate).0;
         let effect_of = |alias: &Alias| search.candidates[alias.candidate].effect.clone();
         look_alikes.push(aliases.iter().map(effect_of).collect());
@@ -139,7 +148,11 @@ pub(super) fn report(findings: &Findings<'_, '_>) -> Result<(TraceResult, Vec<Ve
         rejected: fit::rejected(after, after_fit),
         warnings,
     };
-    Ok((result, look_alikes))
+    Ok(Reported {
+        result,
+        look_alikes,
+        rivals,
+    })
 }
 
 fn model_result(problem: &Problem<'_>, fit: &Fit, held_out_mm: f64) -> ModelResult {

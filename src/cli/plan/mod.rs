@@ -12,6 +12,7 @@ use abbe::model::session::{Prior, Session};
 use clap::Args;
 
 use super::failure::Failure;
+use super::report::ReportArguments;
 use super::{CommonArguments, SessionArguments, output, read_session};
 
 /// `abbe plan SESSION`
@@ -21,6 +22,8 @@ pub struct PlanArguments {
     session: SessionArguments,
     #[command(flatten)]
     common: CommonArguments,
+    #[command(flatten)]
+    faces: ReportArguments,
     /// Standard deviation of a reading, in place of the session's.
     #[arg(long, value_name = "UM")]
     noise_um: Option<f64>,
@@ -59,6 +62,7 @@ pub const EXAMPLES: &str = "Examples:
 
 /// Runs `abbe plan`.
 pub fn run(arguments: &PlanArguments) -> Result<(), Failure> {
+    arguments.faces.check()?;
     let mut session = read_session(&arguments.session)?;
     if arguments.patterns.asked() {
         return arguments.patterns.run(&session, arguments.common.json.as_deref());
@@ -83,6 +87,11 @@ pub fn run(arguments: &PlanArguments) -> Result<(), Failure> {
         reach_mm: arguments.improve.reach_mm()?,
     };
     if arguments.improve.asked() || arguments.range {
+        if arguments.faces.asked() {
+            return Err(Failure::Other(
+                "`--report` and `--plots` show the analysis of the plan; leave `--improve`, `--separate` and `--range` out".to_string(),
+            ));
+        }
         return next_test(arguments, &session, &options);
     }
     let mut analysis = plan::analyse(&session, &options)?;
@@ -92,6 +101,15 @@ pub fn run(arguments: &PlanArguments) -> Result<(), Failure> {
     tables::print(&analysis);
     if let Some(path) = &arguments.common.json {
         output::write_json(path, &analysis)?;
+    }
+    if arguments.faces.asked() {
+        let (complete, noise) = plan::prepared(&session, &options)?;
+        let problem = plan::states::problem_by_test(&complete, noise)?;
+        let document = crate::report::plan::document(&problem, &analysis)?;
+        let method = crate::report::plan::method(&analysis);
+        arguments
+            .faces
+            .write(&document, &method, &session, arguments.common.seed)?;
     }
     Ok(())
 }

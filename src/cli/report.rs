@@ -1,0 +1,80 @@
+//! `--report FILE.html` and `--plots DIR`.
+
+use std::path::{Path, PathBuf};
+
+use abbe::model::session::Session;
+use clap::Args;
+use maud::Markup;
+
+use super::failure::Failure;
+use super::{folder, output};
+use crate::report::document::Document;
+use crate::report::page;
+use crate::report::plot::Fonts;
+use crate::report::provenance::Provenance;
+
+/// Where a report goes.
+#[derive(Args, Clone)]
+pub struct ReportArguments {
+    /// Write a report for people: one HTML file that needs nothing else.
+    #[arg(long, value_name = "FILE.html")]
+    report: Option<PathBuf>,
+    /// Write every plot of the report by itself, as SVG and PNG, into a folder that is new or empty.
+    #[arg(long, value_name = "DIR")]
+    plots: Option<PathBuf>,
+}
+
+impl ReportArguments {
+    /// Whether anything is to be written.
+    pub fn asked(&self) -> bool {
+        self.report.is_some() || self.plots.is_some()
+    }
+
+    /// Refuses before the work is done what could not be written after it.
+    pub fn check(&self) -> Result<(), Failure> {
+        if let Some(path) = &self.report {
+            output::check(path)?;
+        }
+        if let Some(path) = &self.plots {
+            folder::check(path, None)?;
+        }
+        Ok(())
+    }
+
+    /// Writes what was asked for.
+    pub fn write(
+        &self,
+        document: &Document,
+        method: &Markup,
+        session: &Session,
+        seed: u64,
+    ) -> Result<(), Failure> {
+        if let Some(path) = &self.report {
+            let provenance = Provenance::of(session, seed).map_err(|(path, error)| {
+                Failure::Other(format!(
+                    "{}: cannot be read again for its checksum: {error}",
+                    path.display()
+                ))
+            })?;
+            let text = page::html(document, method, &provenance);
+            output::write_whole(path, text.as_bytes())?;
+        }
+        if let Some(path) = &self.plots {
+            write_plots(document, path)?;
+        }
+        Ok(())
+    }
+}
+
+fn write_plots(document: &Document, path: &Path) -> Result<(), Failure> {
+    let fonts = Fonts::bundled();
+    let mut files = Vec::new();
+    for plot in &document.plots {
+        let png = plot
+            .png(&fonts)
+            .ok_or_else(|| Failure::Other(format!("the plot `{}` cannot be drawn as PNG", plot.name)))?;
+        files.push((format!("{}.svg", plot.name), plot.svg().into_bytes()));
+        files.push((format!("{}.png", plot.name), png));
+    }
+    folder::write(path, &files, false, |_| Ok(()))
+}

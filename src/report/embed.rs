@@ -1,0 +1,211 @@
+//! The data that the page brings along: what is drawn as whole numbers of two bytes with a scale, all readings as compressed CSV.
+
+use std::fmt::Write as _;
+use std::io::Write as _;
+
+use abbe::identify::views::Cause;
+use base64::Engine;
+use base64::engine::general_purpose::STANDARD;
+use serde_json::{Value, json};
+
+use super::drawn::{Column, Drawn, axes_of};
+
+/// The most errors and effects that get a slider.
+pub const MOST_SLIDERS: usize = 40;
+
+/// Numbers in two bytes each: `offset + scale · k`, `k` from −32767 to 32767.
+fn quantised(values: impl Iterator<Item = f64> + Clone) -> Value {
+    let (low, high) = values
+        .clone()
+        .fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), v| {
+            (l.min(v), h.max(v))
+        });
+    if !(high - low).is_finite() {
+        return json!({"o": 0.0, "s": 0.0, "d": ""});
+    }
+    let (offset, scale) = ((low + high) / 2.0, (high - low) / 65534.0);
+    let bytes: Vec<u8> = values
+        .flat_map(|value| {
+            let k = if scale > 0.0 {
+                ((value - offset) / scale).round() as i16
+            } else {
+                0
+            };
+            k.to_le_bytes()
+        })
+        .collect();
+    json!({"o": offset, "s": scale, "d": STANDARD.encode(bytes)})
+}
+
+/// The shares that get a slider, the largest first: their places.
+pub fn sliders(drawn: &Drawn<'_>) -> Vec<usize> {
+    let size = |k: usize| -> f64 {
+        let of =
+            |test: &abbe::identify::views::TestView| test.shares_um[k].iter().map(|v| v * v).sum::<f64>();
+        drawn.views.tests.iter().map(of).sum()
+    };
+    let mut chosen: Vec<(f64, usize)> = (0..drawn.views.shares.len())
+        .filter(|k| {
+            let cause = drawn.views.shares[*k].cause;
+            cause != Cause::Setup || drawn.views.coordinates == 1
+        })
+        .map(|k| (size(k), k))
+        .filter(|(size, _)| *size > 0.0)
+        .collect();
+    chosen.sort_by(|a, b| b.0.total_cmp(&a.0));
+    chosen.truncate(MOST_SLIDERS);
+    chosen.into_iter().map(|(_, k)| k).collect()
+}
+
+/// What the page moves and shows under the pointer.
+pub fn data(drawn: &Drawn<'_>) -> Value {
+    let coordinates = drawn.views.coordinates;
+    let sliders = sliders(drawn);
+    let tests: Vec<Value> = drawn
+        .tests()
+        .map(|(number, test)| {
+            let readings = drawn.problem.tests[number].readings.as_ref();
+            let axes = axes_of(drawn.problem, test, number);
+            let mut ordinals: Vec<i64> = Vec::new();
+            let stretches: Vec<Value> = test
+                .stretches
+                .iter()
+                .enumerate()
+                .map(|(k, stretch)| {
+                    let rows = &drawn.rows[number][k];
+                    let ordinal = ordinals.iter().position(|run| *run == stretch.run).unwrap_or_else(|| {
+                        ordinals.push(stretch.run);
+                        ordinals.len() - 1
+                    });
+                    let of = |values: &[f64]| quantised(rows.iter().map(|row| values[*row]));
+                    let scalars = |values: &[f64]| {
+                        let all = rows.iter().flat_map(|row| row * coordinates..(row + 1) * coordinates);
+                        quantised(all.map(|i| values[i]))
+                    };
+                    let along: serde_json::Map<String, Value> = axes
+                        .iter()
+                        .map(|(axis, values)| {
+                            let key = if stretch.forward.is_some() { "x" } else { &axis.name };
+                            (key.to_string(), of(values))
+                        })
+                        .collect();
+                    let lines: Option<Value> = readings
+                        .filter(|r| !r.line.is_empty())
+                        .map(|r| quantised(rows.iter().map(|row| r.line[*row] as f64)));
+                    json!({
+                        "run": ordinal, "number": stretch.run, "forward": stretch.forward, "n": rows.len(), "along": along, "line": lines,
+                        "deviation": scalars(&test.deviation_um), "before": scalars(&test.before_um), "after": scalars(&test.after_um),
+                        "shares": sliders.iter().map(|s| scalars(&test.shares_um[*s])).collect::<Vec<_>>(),
+                    })
+                })
+                .collect();
+            let units: Vec<&str> = axes.iter().map(|(axis, _)| axis.unit).collect();
+            json!({"name": test.name, "over": test.way.name, "units": units, "stretches": stretches})
+        })
+        .collect();
+    json!({"coordinates": coordinates, "tests": tests})
+}
+
+/// All readings as CSV.
+pub fn table(drawn: &Drawn<'_>) -> String {
+    let machine = &drawn.problem.session.machine;
+    let mut text = String::from("test,file_line,run,time_s");
+    for axis in &machine.axes {
+        let unit = if axis.kind == abbe::model::axis::AxisKind::Rotary {
+            "deg"
+        } else {
+            "mm"
+        };
+        text.push_str(&format!(",{}_{unit}", axis.name));
+    }
+    let coordinates = drawn.views.coordinates;
+    let names: &[&str] = if coordinates == 3 {
+        &["_x", "_y", "_z"]
+    } else {
+        &[""]
+    };
+    for column in ["deviation", "residual_before", "residual_after"] {
+        for name in names {
+            text.push_str(&format!(",{column}{name}_um"));
+        }
+    }
+    text.push('\n');
+    for (test, view) in drawn.problem.tests.iter().zip(&drawn.views.tests) {
+        let Some(readings) = &test.readings else { continue };
+        for row in 0..readings.rows() {
+            text.push_str(&quoted(&test.name));
+            let number = |text: &mut String, value: Option<String>| {
+                text.push(',');
+                text.push_str(&value.unwrap_or_default());
+            };
+            number(&mut text, readings.line.get(row).map(ToString::to_string));
+            number(&mut text, readings.run.get(row).map(ToString::to_string));
+            number(&mut text, readings.time_s.get(row).map(|t| format!("{t:.3}")));
+            for (axis, column) in machine.axes.iter().zip(&readings.positions) {
+                let rotary = axis.kind == abbe::model::axis::AxisKind::Rotary;
+                let value = if rotary {
+                    column[row].to_degrees()
+                } else {
+                    column[row]
+                };
+                // Writing to a string cannot fail.
+                let _ = write!(text, ",{value:.5}");
+            }
+            for column in [Column::Deviation, Column::Before, Column::After] {
+                for value in &column.of(view)[row * coordinates..(row + 1) * coordinates] {
+                    let _ = write!(text, ",{value:.3}");
+                }
+            }
+            text.push('\n');
+        }
+    }
+    text
+}
+
+/// A field of a CSV file.
+fn quoted(field: &str) -> String {
+    if field.contains([',', '"', '\n', '\r']) {
+        format!("\"{}\"", field.replace('"', "\"\""))
+    } else {
+        field.to_string()
+    }
+}
+
+/// A text, deflated with the header of zlib (what browsers call `deflate`), in base64.
+pub fn packed(text: &str) -> String {
+    let mut encoder = flate2::write::ZlibEncoder::new(Vec::new(), flate2::Compression::best());
+    let whole = encoder.write_all(text.as_bytes()).and_then(|()| encoder.finish());
+    whole.map(|bytes| STANDARD.encode(bytes)).unwrap_or_default()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn two_bytes_hold_a_number_to_a_part_in_65534() {
+        let values = [-17.25, 3.5, 48.125, 0.0];
+        let packed = quantised(values.into_iter());
+        let bytes = STANDARD.decode(packed["d"].as_str().unwrap()).unwrap();
+        let number = |key: &str| packed[key].as_f64().unwrap();
+        for (value, pair) in values.iter().zip(bytes.chunks(2)) {
+            let found = number("o") + number("s") * f64::from(i16::from_le_bytes([pair[0], pair[1]]));
+            assert!(
+                (found - value).abs() <= 0.5 * 65.375 / 65534.0 + 1e-9,
+                "{found} {value}"
+            );
+        }
+    }
+
+    #[test]
+    fn packed_text_comes_back() {
+        use std::io::Read as _;
+        let text = "test,µm\n\"a,b\",1.25\n".repeat(40);
+        let bytes = STANDARD.decode(packed(&text)).unwrap();
+        let mut found = String::new();
+        flate2::read::ZlibDecoder::new(bytes.as_slice())
+            .read_to_string(&mut found)
+            .unwrap();
+        assert_eq!(found, text);
+    }
+}

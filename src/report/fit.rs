@@ -1,0 +1,144 @@
+//! The report of `abbe fit`.
+
+use abbe::identify::IdentifyError;
+use abbe::identify::fit::Fit;
+use abbe::identify::problem::Problem;
+use abbe::identify::results::{FitResult, ModelResult};
+use abbe::identify::views::{lengths, patterns, spectrum, views};
+use maud::{Markup, html};
+
+use super::document::{Document, prose};
+use super::drawn::Drawn;
+use super::readings::{self, um};
+
+/// How a fit was made.
+pub fn method(result: &FitResult) -> Markup {
+    html! {
+        p {
+            "Least squares on the kinematic chain, all unknowns at once, in the directions that the readings see; covariance by the law of propagation \
+             of uncertainty (JCGM 100, JCGM 102). Noise " (um(result.noise_um)) " (" (result.noise_source) "); held out: leaving out " (result.heldout_by) "."
+        }
+    }
+}
+
+/// The report.
+///
+/// # Errors
+/// If the model cannot be evaluated.
+pub fn document(problem: &Problem<'_>, fit: &Fit, result: &FitResult) -> Result<Document, IdentifyError> {
+    let views = views(problem, fit, None)?;
+    let drawn = Drawn::new(problem, &views);
+    let spectra = spectrum::spectra(problem, &views);
+    let excess = if result.noise_source == "fit" {
+        "The noise was taken from this very fit and cannot say whether the model lacks anything; `abbe trace` looks for that.".to_string()
+    } else if result.birge_ratio > 1.0 {
+        format!(
+            "The residual is {:.2} times what noise would leave: something is missing from the model, and `abbe trace` looks for it.",
+            result.birge_ratio
+        )
+    } else {
+        "The residual is what noise would leave.".to_string()
+    };
+    let mut document = Document {
+        title: format!("Fit of {}", problem.session.machine.name),
+        verdict: format!(
+            "{} of {} unknowns or combinations of them are identified from {} readings; they leave {} ({} held out). {excess}",
+            result.rank,
+            result.unknowns,
+            result.readings,
+            um(result.rms_um),
+            um(result.heldout_rms_um),
+        ),
+        ..Document::default()
+    };
+    readings::live(&mut document, &drawn, &result.parameters);
+    let nominal = nominal_result(&drawn);
+    let fitted = ModelResult {
+        rms_um: result.rms_um,
+        heldout_rms_um: result.heldout_rms_um,
+        rms_3d_um: result.rms_3d_um,
+        heldout_rms_3d_um: result.heldout_rms_3d_um,
+        parameters: Vec::new(),
+    };
+    let section = readings::before_and_after(
+        &mut document,
+        &drawn,
+        &[
+            (
+                if drawn.is_round() {
+                    "nominal machine and set-up"
+                } else {
+                    "nominal machine, fitted set-up"
+                },
+                &nominal,
+            ),
+            ("fitted", &fitted),
+        ],
+        [
+            "before, deviation of the nominal machine",
+            "after, residual of the fit",
+        ],
+    );
+    document.section("Before and after", section);
+    let section = readings::traces(&mut document, &drawn);
+    document.section("Traces", section);
+    let section = readings::parameters(&mut document, &result.parameters, None);
+    document.section("Parameters", section);
+    let section = readings::residuals(&mut document, &drawn, &spectra);
+    document.section("Residuals", section);
+    let correlations = readings::correlations(&mut document, problem, fit);
+    document.section(
+        "What else it could be",
+        html! {
+            p { "Errors that are strongly correlated are told apart only by small differences; what is not told apart at all is no number." }
+            (correlations)
+            (readings::unobservable(&result.unobservable))
+        },
+    );
+    let found = patterns::patterns(problem, &fit.beta)?;
+    let shown = if drawn.is_round() {
+        readings::patterns(&mut document, &found)
+    } else {
+        html! {}
+    };
+    document.section(
+        "What to measure next",
+        html! {
+            p {
+                @if result.birge_ratio > 1.0 { (prose("First `abbe trace` on the same session. ")) }
+                @if result.unobservable.is_empty() {
+                    (prose("Every unknown is seen; `abbe plan SESSION --improve 1` names the test that lowers the uncertainties most."))
+                } @else {
+                    (prose("`abbe plan SESSION --improve 1` names the cheapest test that sees what these readings do not: "))
+                    (result.unobservable.len()) " combinations."
+                }
+            }
+            @if drawn.is_round() { p { "What each error does to each test:" } (shown) }
+            (readings::warnings(&result.rejected, &result.warnings))
+        },
+    );
+    let section = readings::machine(&mut document, problem);
+    document.section("Machine", section);
+    Ok(document)
+}
+
+/// The deviation of the nominal machine as a model; nothing was fitted, so held out is no different.
+fn nominal_result(drawn: &Drawn<'_>) -> ModelResult {
+    let coordinates = drawn.views.coordinates;
+    let squares = |values: &[f64]| values.iter().map(|v| v * v).sum::<f64>();
+    let (mut sum, mut count, mut of_lengths) = (0.0, 0, 0.0);
+    for test in &drawn.views.tests {
+        sum += squares(&test.before_um);
+        count += test.before_um.len();
+        of_lengths += squares(&lengths(&test.before_um, coordinates));
+    }
+    let rms_um = (sum / count.max(1) as f64).sqrt();
+    let rms_3d_um = (coordinates == 3).then(|| (of_lengths * 3.0 / count.max(1) as f64).sqrt());
+    ModelResult {
+        rms_um,
+        heldout_rms_um: rms_um,
+        rms_3d_um,
+        heldout_rms_3d_um: rms_3d_um,
+        parameters: Vec::new(),
+    }
+}

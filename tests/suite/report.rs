@@ -1,0 +1,247 @@
+//! What reports and plots promise: whole, small enough, safe from what names hold, and true to the model.
+
+use std::path::Path;
+
+use abbe::identify::plan::states;
+use abbe::identify::views::{Cause, patterns, views};
+use abbe::model::session::Session;
+use abbe::model::session::read::{self, ReadOptions};
+
+use super::data::data;
+use super::{abbe, ready, text};
+use crate::plant::{Kind, Recipe};
+
+fn session(path: &Path) -> Session {
+    read::session(path, &ReadOptions::default()).unwrap()
+}
+
+/// `∂L/∂error` of the first order, derived apart from the chain: ball at (0, R, 0), spindle ball at (−D, 0, 0), so that for a turn of A
+/// `L₀ = √(R² + D²)`, with `ca = cos A`, `sa = sin A` (thesis, Eqs. 3.20 and 3.21, to first order).
+#[test]
+fn the_patterns_of_single_errors_are_those_of_the_closed_form() {
+    let session = session(&ready("hermle-c600u/chapter5.toml"));
+    let (complete, noise) = abbe::identify::plan::prepared(&session, &Default::default()).unwrap();
+    let problem = states::problem_by_test(&complete, noise).unwrap();
+    let beta = vec![0.0; problem.parameters.list.len()];
+    let found = patterns::patterns(&problem, &beta).unwrap();
+    let (r, bar_without, bar_with) = (100.0_f64, 99.9881_f64, 149.9946_f64);
+    let d = (bar_with * bar_with - r * r).sqrt();
+    let arcsec = 1.0 / (3600.0 * 180.0 / std::f64::consts::PI) * 1e3;
+    let mut compared = 0;
+    for (name, d, _) in [("A100", 0.0, bar_without), ("A150", d, bar_with)] {
+        let test = found.iter().find(|test| test.test == name).unwrap();
+        let length = r.hypot(d);
+        for (k, angle) in test.way.values.iter().enumerate() {
+            let (sa, ca) = angle.to_radians().sin_cos();
+            for pattern in &test.columns {
+                let wanted = match pattern.id.as_str() {
+                    "EY0A" => r * ca / length,
+                    "EZ0A" => r * sa / length,
+                    "EB0A" => r * sa * d / length * arcsec,
+                    "EC0A" => -r * ca * d / length * arcsec,
+                    "EX0C" => d / length,
+                    "EY0C" => r / length,
+                    other => panic!("{other} moves no reading of {name}"),
+                };
+                let value = pattern.values[k];
+                assert!(
+                    (value - wanted).abs() < 1e-6,
+                    "{name} {}: {value} {wanted}",
+                    pattern.id
+                );
+                compared += 1;
+            }
+        }
+    }
+    assert!(compared > 1000);
+}
+
+/// A share is what the model's readings lose when that share's unknowns are put to zero: the difference, not the derivative.
+#[test]
+fn a_share_is_what_the_readings_lose_without_it() {
+    let session = session(&ready("hermle-c600u/measured/session.toml"));
+    let (problem, fit) = abbe::identify::fit::prepare(&session, 1).unwrap();
+    let views = views(&problem, &fit, None).unwrap();
+    assert!(views.second_order_um < 0.05, "{}", views.second_order_um);
+    assert_eq!(
+        views
+            .shares
+            .iter()
+            .filter(|share| share.cause == Cause::Error)
+            .count(),
+        8
+    );
+    for (k, share) in views.shares.iter().enumerate() {
+        let mut without = fit.beta.clone();
+        share.unknowns.iter().for_each(|j| without[*j] = 0.0);
+        let residuals = problem.residuals(&without);
+        for (test, view) in views.tests.iter().enumerate() {
+            for (i, share_um) in view.shares_um[k].iter().enumerate() {
+                let lost_um = (residuals[test][i] - fit.residuals[test][i]) * 1e3;
+                assert!(
+                    (lost_um - share_um).abs() < 0.05,
+                    "{} in {}: {lost_um} {share_um}",
+                    share.id,
+                    view.name
+                );
+            }
+        }
+    }
+}
+
+/// The bundled session with names that a page might take for markup.
+pub fn with_markup_in_names(folder: &Path) {
+    let from = ready("hermle-c600u/measured");
+    for entry in std::fs::read_dir(&from).unwrap() {
+        let path = entry.unwrap().path();
+        std::fs::copy(&path, folder.join(path.file_name().unwrap())).unwrap();
+    }
+    let edit = |file: &str, old: &str, new: &str| {
+        let path = folder.join(file);
+        let text = std::fs::read_to_string(&path).unwrap();
+        assert!(text.contains(old), "{file} has no {old}");
+        std::fs::write(&path, text.replacen(old, new, 1)).unwrap();
+    };
+    edit(
+        "machine.toml",
+        "name = \"Hermle C600U\"",
+        "name = '''<script>window.hit = 1</script>'''",
+    );
+    edit(
+        "session.toml",
+        "name = \"C150\"",
+        "name = '''C150</script><img src=x onerror=\"window.hit=2\">&amp;'''",
+    );
+}
+
+#[test]
+fn names_with_markup_are_text_in_a_report() {
+    let folder = tempfile::tempdir().unwrap();
+    with_markup_in_names(folder.path());
+    let (report, plots) = (folder.path().join("fit.html"), folder.path().join("plots"));
+    let output = abbe(&[
+        "fit",
+        text(&folder.path().join("session.toml")),
+        "--report",
+        text(&report),
+        "--plots",
+        text(&plots),
+    ]);
+    assert!(
+        output.status.success(),
+        "{}",
+        String::from_utf8_lossy(&output.stderr)
+    );
+    let page = std::fs::read_to_string(&report).unwrap();
+    assert!(!page.contains("<script>window") && !page.contains("<img"));
+    assert!(page.contains("&lt;script&gt;window.hit = 1&lt;/script&gt;"));
+    for entry in std::fs::read_dir(&plots).unwrap() {
+        let path = entry.unwrap().path();
+        let name = path.file_name().unwrap().to_str().unwrap();
+        assert!(!name.contains(['<', '>', '"', '/', '&', ' ']), "{name}");
+        if path.extension().is_some_and(|extension| extension == "svg") {
+            let drawing = std::fs::read_to_string(&path).unwrap();
+            assert!(!drawing.contains("<img") && !drawing.contains("<script"));
+        }
+    }
+}
+
+#[test]
+fn plots_come_in_pairs_and_all_or_none() {
+    let folder = tempfile::tempdir().unwrap();
+    let plots = folder.path().join("plots");
+    let session = ready("hermle-c600u/measured/session.toml");
+    let arguments = ["trace", text(&session), "--quiet", "--plots", text(&plots)];
+    assert!(abbe(&arguments).status.success());
+    let mut names: Vec<String> = std::fs::read_dir(&plots)
+        .unwrap()
+        .map(|entry| entry.unwrap().file_name().into_string().unwrap())
+        .collect();
+    names.sort();
+    for wanted in [
+        "trace-C150",
+        "deviation-C150-over-C",
+        "residual-C150-over-C",
+        "residual-over-time",
+        "spectrum-C150-C",
+        "sensitivity-C150",
+        "patterns-C150",
+        "correlation",
+        "ranking-EZC-C-h2",
+        "convergence",
+        "machine",
+    ] {
+        assert!(names.contains(&format!("{wanted}.svg")), "{wanted}");
+        let png = std::fs::read(plots.join(format!("{wanted}.png"))).unwrap();
+        assert_eq!(png[..8], [0x89, b'P', b'N', b'G', 13, 10, 26, 10]);
+    }
+    assert_eq!(names.len() % 2, 0);
+    // A folder that is not empty is refused before any work is done.
+    let again = abbe(&arguments);
+    let message = String::from_utf8_lossy(&again.stderr).into_owned();
+    assert_eq!(again.status.code(), Some(1));
+    assert!(
+        again.stdout.is_empty() && message.contains("not empty; name another"),
+        "{message}"
+    );
+    let nowhere = folder.path().join("no/such/report.html");
+    let refused = abbe(&["fit", text(&session), "--report", text(&nowhere)]);
+    assert_eq!(refused.status.code(), Some(1));
+    assert!(refused.stdout.is_empty(), "refused before the work, not after it");
+}
+
+/// A bound of the size of a page.
+const MOST_BYTES: usize = 3_000_000;
+
+#[test]
+fn a_report_of_6000_readings_is_under_3_mb() {
+    let folder = tempfile::tempdir().unwrap();
+    let draw = Recipe::new(Kind::Rotary, 5).readings(6000).draw();
+    draw.write(folder.path()).unwrap();
+    let path = folder.path().join("session.toml");
+    let rows: usize = session(&path)
+        .tests
+        .iter()
+        .filter_map(|test| test.readings.as_ref())
+        .map(|readings| readings.rows())
+        .sum();
+    assert!(rows >= 5_900, "{rows} readings");
+    let report = folder.path().join("fit.html");
+    assert!(
+        abbe(&["fit", text(&path), "--report", text(&report)])
+            .status
+            .success()
+    );
+    let bytes = std::fs::metadata(&report).unwrap().len() as usize;
+    assert!(bytes < MOST_BYTES, "{bytes} bytes");
+}
+
+#[test]
+fn a_report_of_11911_poses_is_under_3_mb_and_names_its_inputs() {
+    let name = "a_report_of_11911_poses_is_under_3_mb_and_names_its_inputs";
+    let Some(measured) = data(name, "landgraf_ur10/Series_A/measurements_grid.csv") else {
+        return;
+    };
+    let root = measured.ancestors().nth(3).unwrap();
+    let folder = tempfile::tempdir().unwrap();
+    let report = folder.path().join("fit.html");
+    let path = ready("ur10/session.toml");
+    let output = abbe(&[
+        "fit",
+        text(&path),
+        "--data",
+        text(root),
+        "--report",
+        text(&report),
+    ]);
+    assert!(output.status.success());
+    let page = std::fs::read_to_string(&report).unwrap();
+    assert!(page.len() < MOST_BYTES, "{} bytes", page.len());
+    for input in [
+        "sessions/ur10/session.toml",
+        "sessions/ur10/machine.toml",
+        "measurements_grid.csv",
+    ] {
+        assert!(page.contains(input), "{input}");
+    }
+}
