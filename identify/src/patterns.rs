@@ -2,9 +2,6 @@
 //!
 //! `ΔL_e = L(state; e) − L(state; 0)` by the exact chain, for one error of a stated size at a time, everything else zero.
 
-use std::fmt::Write;
-
-use abbe_model::axis::AxisKind;
 use abbe_model::session::Session;
 use abbe_model::session::readings::Readings;
 use serde::Serialize;
@@ -116,72 +113,4 @@ pub fn patterns(session: &Session, errors: &[Given]) -> Result<Patterns, Identif
         tests: names.zip(without).collect(),
         patterns,
     })
-}
-
-impl Patterns {
-    /// As a CSV file, a line for each reading and error: test, error and its size, run, positions of the axes, deviation.
-    pub fn csv(&self, session: &Session) -> String {
-        let mut header = vec![
-            "test".to_string(),
-            "error".into(),
-            "size".into(),
-            "unit".into(),
-            "run".into(),
-        ];
-        for axis in &session.machine.axes {
-            let unit = match axis.kind {
-                AxisKind::Linear => "mm",
-                AxisKind::Rotary => "deg",
-            };
-            header.push(format!("{}_{unit}", axis.name.to_lowercase()));
-        }
-        match session.instrument.coordinates() {
-            1 => header.push("deviation_um".into()),
-            _ => header.extend(["x", "y", "z"].map(|k| format!("deviation_{k}_um"))),
-        }
-        let mut text = header.join(",") + "\n";
-        let per_test = self.patterns.len() / self.tests.len().max(1);
-        for ((name, states), patterns) in self.tests.iter().zip(self.patterns.chunks(per_test.max(1))) {
-            for pattern in patterns {
-                let start = format!(
-                    "{},{},{},{}",
-                    quoted(name),
-                    quoted(&pattern.error),
-                    pattern.size,
-                    quoted(&pattern.unit)
-                );
-                for row in 0..states.rows() {
-                    let run = states.run.get(row).map_or(String::new(), ToString::to_string);
-                    let _ = write!(text, "{start},{run}");
-                    for (axis, column) in session.machine.axes.iter().zip(&states.positions) {
-                        let _ = write!(text, ",{}", position(axis.kind, column[row]));
-                    }
-                    let coordinates = states.coordinates.max(1);
-                    for deviation in &pattern.deviations_um[row * coordinates..(row + 1) * coordinates] {
-                        let _ = write!(text, ",{deviation:.6}");
-                    }
-                    text.push('\n');
-                }
-            }
-        }
-        text
-    }
-}
-
-/// mm or degrees, without the digits that are rounding.
-fn position(kind: AxisKind, inside: f64) -> f64 {
-    let outside = match kind {
-        AxisKind::Linear => inside,
-        AxisKind::Rotary => inside.to_degrees(),
-    };
-    (outside * 1e9).round() / 1e9 + 0.0
-}
-
-/// A cell that may hold the separator.
-fn quoted(cell: &str) -> String {
-    if cell.contains([',', '"', '\n']) {
-        format!("\"{}\"", cell.replace('"', "\"\""))
-    } else {
-        cell.to_string()
-    }
 }

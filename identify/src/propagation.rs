@@ -102,9 +102,8 @@ impl<'p, 'a> Refit<'p, 'a> {
             deviations,
         };
         let mut z = self.end.clone();
-        let mut last = f64::INFINITY;
         for _ in 0..FEW_STEPS {
-            let descent = drawn.descent(&z)?;
+            let Ok(descent) = drawn.descent(&z) else { break };
             let step: Vec<f64> = (0..z.len())
                 .map(|i| (0..z.len()).map(|k| self.inverse[(i, k)] * descent[k]).sum())
                 .collect();
@@ -113,10 +112,9 @@ impl<'p, 'a> Refit<'p, 'a> {
             if fall < SMALLEST_FALL {
                 return Ok(z);
             }
-            if fall > 0.25 * last {
+            if !fall.is_finite() {
                 break;
             }
-            last = fall;
         }
         // Too far from linear for the fit's curvature.
         let scale = Scaling::Physical(vec![1.0; self.end.len()]);

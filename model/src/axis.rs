@@ -21,6 +21,30 @@ impl AxisKind {
             _ => None,
         }
     }
+
+    /// `mm` or `deg`: the unit of a position outside the program.
+    pub fn unit(self) -> &'static str {
+        match self {
+            AxisKind::Linear => "mm",
+            AxisKind::Rotary => "deg",
+        }
+    }
+
+    /// A position in mm or radians, from mm or degrees.
+    pub fn inside(self, position: f64) -> f64 {
+        match self {
+            AxisKind::Linear => position,
+            AxisKind::Rotary => position.to_radians(),
+        }
+    }
+
+    /// A position in mm or degrees, from mm or radians.
+    pub fn outside(self, position: f64) -> f64 {
+        match self {
+            AxisKind::Linear => position,
+            AxisKind::Rotary => position.to_degrees(),
+        }
+    }
 }
 
 /// An axis with its line in the reference frame R, all axes at zero.
@@ -47,6 +71,11 @@ impl Axis {
             "C" | "Z" | "W" => Some([0.0, 0.0, 1.0]),
             _ => None,
         }
+    }
+
+    /// The name of its column in tables of positions: `x_mm`, `c_deg`; with a suffix `x_command_mm`.
+    pub fn column(&self, suffix: &str) -> String {
+        format!("{}{suffix}_{}", self.name.to_lowercase(), self.kind.unit())
     }
 
     /// R's coordinate axis that the direction lies along, with its sign, if it lies along one.

@@ -1,6 +1,5 @@
 //! `abbe volumetric --map`: the volumetric error over a grid, and its compensation.
 
-use std::fmt::Write as _;
 use std::path::PathBuf;
 
 use abbe::identify::volumetric::{self, Erring, Place, Summary, functions};
@@ -73,7 +72,7 @@ pub fn run(machine: &Machine, arguments: &MapArguments) -> Result<(), Failure> {
         tool_mm,
     };
     let (places, summary) = volumetric::map(&erring, &grid, arguments.compensate)?;
-    output::write_whole(path, csv(machine, &places).as_bytes())?;
+    output::write_whole(path, &csv(machine, &places)?)?;
     print(&summary, functions.len(), &path.display().to_string());
     if let Some(json) = &arguments.json {
         output::write_json(json, &summary)?;
@@ -139,55 +138,31 @@ fn grid(machine: &Machine, arguments: &MapArguments) -> Result<Vec<Vec<f64>>, Fa
 }
 
 /// The map as a table: positions, the nominal point, the error; with compensation the commands and what they leave.
-fn csv(machine: &Machine, places: &[Place]) -> String {
-    let position = |k: usize, q: f64| match machine.axes[k].kind {
-        AxisKind::Linear => q,
-        AxisKind::Rotary => q.to_degrees(),
-    };
-    let mut header: Vec<String> = Vec::new();
-    let named = |suffix: &str| {
-        machine
-            .axes
-            .iter()
-            .map(move |axis| {
-                let unit = match axis.kind {
-                    AxisKind::Linear => "mm",
-                    AxisKind::Rotary => "deg",
-                };
-                format!("{}{suffix}_{unit}", axis.name.to_lowercase())
-            })
-            .collect::<Vec<_>>()
-    };
-    header.extend(named(""));
+fn csv(machine: &Machine, places: &[Place]) -> Result<Vec<u8>, Failure> {
+    let named = |suffix: &'static str| machine.axes.iter().map(move |axis| axis.column(suffix));
+    let mut header: Vec<String> = named("").collect();
     header.extend(["px_mm", "py_mm", "pz_mm", "ex_um", "ey_um", "ez_um", "e_um"].map(String::from));
     if places.iter().any(|place| place.compensated.is_some()) {
         header.extend(named("_command"));
         header.push("left_um".into());
     }
-    let mut text = header.join(",");
-    text.push('\n');
-    for place in places {
-        let mut cells: Vec<String> = Vec::new();
-        cells.extend(
-            place
-                .positions
-                .iter()
-                .enumerate()
-                .map(|(k, q)| format!("{:.6}", position(k, *q))),
-        );
+    let norm = |e: [f64; 3]| e.iter().map(|x| x * x).sum::<f64>().sqrt() * 1e3;
+    let row = |place: &Place| {
+        let at = machine.axes.iter().zip(&place.positions);
+        let mut cells: Vec<String> = at
+            .map(|(axis, q)| format!("{:.6}", axis.kind.outside(*q)))
+            .collect();
         cells.extend(place.nominal_mm.iter().map(|p| format!("{p:.6}")));
         cells.extend(place.error_mm.iter().map(|e| format!("{:.6}", e * 1e3)));
-        let norm = |e: [f64; 3]| e.iter().map(|x| x * x).sum::<f64>().sqrt() * 1e3;
         cells.push(format!("{:.6}", norm(place.error_mm)));
         if let Some(compensated) = &place.compensated {
-            let commands = compensated.positions.iter().enumerate();
-            cells.extend(commands.map(|(k, q)| format!("{:.9}", position(k, *q))));
+            let at = machine.axes.iter().zip(&compensated.positions);
+            cells.extend(at.map(|(axis, q)| format!("{:.9}", axis.kind.outside(*q))));
             cells.push(format!("{:.9}", norm(compensated.error_mm)));
         }
-        // Writing to a String does not fail.
-        let _ = writeln!(text, "{}", cells.join(","));
-    }
-    text
+        cells
+    };
+    output::csv(&header, places.iter().map(row))
 }
 
 fn print(summary: &Summary, functions: usize, path: &str) {

@@ -53,6 +53,21 @@ pub fn line(text: std::fmt::Arguments<'_>) {
     }
 }
 
+/// A table as CSV: cells that hold a separator stand in quotes.
+pub fn csv(header: &[String], rows: impl IntoIterator<Item = Vec<String>>) -> Result<Vec<u8>, Failure> {
+    let fault = |error: String| Failure::Other(format!("the table cannot be written as CSV: {error}"));
+    let mut writer = csv::Writer::from_writer(Vec::new());
+    writer
+        .write_record(header)
+        .map_err(|error| fault(error.to_string()))?;
+    for row in rows {
+        writer
+            .write_record(row)
+            .map_err(|error| fault(error.to_string()))?;
+    }
+    writer.into_inner().map_err(|error| fault(error.to_string()))
+}
+
 /// Writes a result as JSON.
 pub fn write_json<T: serde::Serialize>(path: &Path, result: &T) -> Result<(), Failure> {
     let mut text = serde_json::to_string_pretty(result)

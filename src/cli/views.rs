@@ -1,12 +1,10 @@
 //! `abbe fit --views`: readings and residuals of an R-test by direction, as a CSV file.
 
-use std::fmt::Write;
 use std::path::Path;
 
 use abbe::identify::directions::{View, views};
 use abbe::identify::fit::Fit;
 use abbe::identify::problem::Problem;
-use abbe::model::axis::AxisKind;
 
 use super::failure::Failure;
 use super::output;
@@ -28,55 +26,31 @@ const VIEW: [&str; 9] = [
 pub fn write(problem: &Problem<'_>, fit: &Fit, path: &Path) -> Result<(), Failure> {
     let machine = &problem.session.machine;
     let mut header = vec!["test".to_string(), "run".to_string()];
-    for axis in &machine.axes {
-        let unit = match axis.kind {
-            AxisKind::Linear => "mm",
-            AxisKind::Rotary => "deg",
-        };
-        header.push(format!("{}_{unit}", axis.name.to_lowercase()));
-    }
+    header.extend(machine.axes.iter().map(|axis| axis.column("")));
     header.extend(VIEW.map(|name| format!("{name}_um")));
     header.extend(VIEW.map(|name| format!("residual_{name}_um")));
-    let mut text = header.join(",");
-    text.push('\n');
+    let mut rows = Vec::new();
     for (test, viewed) in problem.tests.iter().zip(views(problem, fit)?) {
         let Some(readings) = &test.readings else { continue };
         for (row, viewed) in viewed.iter().enumerate() {
             let run = readings.run.get(row).map_or(String::new(), i64::to_string);
-            // Writing to a String does not fail.
-            let _ = write!(text, "{},{run}", quoted(&test.name));
-            for (axis, column) in machine.axes.iter().zip(&readings.positions) {
-                let shown = match axis.kind {
-                    AxisKind::Linear => column[row],
-                    AxisKind::Rotary => column[row].to_degrees(),
-                };
-                let _ = write!(text, ",{shown:.6}");
-            }
-            push(&mut text, &viewed.reading);
-            push(&mut text, &viewed.residual);
-            text.push('\n');
+            let mut cells = vec![test.name.clone(), run];
+            let at = machine.axes.iter().zip(&readings.positions);
+            cells.extend(at.map(|(axis, column)| format!("{:.6}", axis.kind.outside(column[row]))));
+            cells.extend(micrometres(&viewed.reading));
+            cells.extend(micrometres(&viewed.residual));
+            rows.push(cells);
         }
     }
-    output::write_whole(path, text.as_bytes())
+    output::write_whole(path, &output::csv(&header, rows)?)
 }
 
-fn push(text: &mut String, view: &View) {
-    for mm in view.sensors.iter().chain(&view.wise) {
-        let _ = write!(text, ",{:.4}", mm * 1e3);
-    }
-    match view.turning {
-        Some(turning) => turning.iter().for_each(|mm| {
-            let _ = write!(text, ",{:.4}", mm * 1e3);
-        }),
-        None => text.push_str(",,,"),
-    }
-}
-
-/// A cell of a CSV file: in quotes where it has to be.
-fn quoted(name: &str) -> String {
-    if name.contains([',', '"', '\n', '\r']) {
-        format!("\"{}\"", name.replace('"', "\"\""))
-    } else {
-        name.to_string()
-    }
+/// The cells of one view; those about the axis that turns are empty where none or several do.
+fn micrometres(view: &View) -> Vec<String> {
+    let along = view.sensors.iter().chain(&view.wise).map(Some);
+    let about = (0..3).map(|k| view.turning.as_ref().map(|turning| &turning[k]));
+    along
+        .chain(about)
+        .map(|mm| mm.map_or(String::new(), |mm| format!("{:.4}", mm * 1e3)))
+        .collect()
 }

@@ -5,7 +5,6 @@ use super::{Session, Test, plan};
 use crate::chain::Machine;
 use crate::error::ModelError;
 use crate::instrument::Station;
-use crate::session::read::quantity;
 
 /// Most readings of one planned test.
 pub const MOST_READINGS: usize = 1_000_000;
@@ -186,14 +185,14 @@ pub(crate) fn beyond_travel(machine: &Machine, readings: &Readings) -> Option<St
             let beyond = positions
                 .iter()
                 .find(|&&q| q < least - slack || q > greatest + slack)?;
-            let outside = |q: f64| quantity::outside(axis.kind, q);
+            let outside = |q: f64| axis.kind.outside(q);
             Some(format!(
                 "axis `{}` goes to {:.3} {unit}; its travel is {} to {} {unit}",
                 axis.name,
                 outside(*beyond),
                 outside(least),
                 outside(greatest),
-                unit = quantity::unit_word(axis.kind),
+                unit = axis.kind.unit(),
             ))
         })
 }

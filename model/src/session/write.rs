@@ -5,7 +5,6 @@ use std::io::Write as _;
 use std::path::{Path, PathBuf};
 
 use super::document::Source;
-use super::read::quantity;
 use super::readings::Readings;
 use super::table::r_test_columns;
 use crate::chain::Machine;
@@ -38,11 +37,7 @@ pub fn readings_text(machine: &Machine, station: &Station<f64>, readings: &Readi
         header.push("run".into());
     }
     for axis in &machine.axes {
-        header.push(format!(
-            "{}_{}",
-            axis.name.to_lowercase(),
-            quantity::unit_word(axis.kind)
-        ));
+        header.push(axis.column(""));
     }
     if !readings.temperature_c.is_empty() {
         header.push("temperature_c".into());
@@ -68,7 +63,7 @@ pub fn readings_text(machine: &Machine, station: &Station<f64>, readings: &Readi
             cells.push(run.to_string());
         }
         for (axis, column) in machine.axes.iter().zip(&readings.positions) {
-            cells.push(decimal(quantity::outside(axis.kind, column[row])));
+            cells.push(decimal(axis.kind.outside(column[row])));
         }
         if let Some(temperature) = readings.temperature_c.get(row) {
             cells.push(decimal(*temperature));
@@ -228,7 +223,7 @@ fn effect_table(effect: &Effect, machine: &Machine) -> String {
 fn unit(driver: &Driver, machine: &Machine) -> &'static str {
     match driver {
         Driver::Axis(name) => match machine.axis_index(name).map(|index| machine.axes[index].kind) {
-            Some(kind) => quantity::unit_word(kind),
+            Some(kind) => kind.unit(),
             None => "mm",
         },
         Driver::Time => "s",

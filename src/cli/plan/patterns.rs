@@ -2,7 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
-use abbe::identify::patterns::{patterns, usual_sizes};
+use abbe::identify::patterns::{Patterns, patterns, usual_sizes};
 use abbe::identify::quantity::Given;
 use abbe::model::session::Session;
 use clap::Args;
@@ -46,7 +46,7 @@ impl PatternArguments {
         };
         let found = patterns(session, &given)?;
         if let Some(path) = &self.patterns {
-            output::write_whole(path, found.csv(session).as_bytes())?;
+            output::write_whole(path, &csv(&found, session)?)?;
         }
         let number = |value: f64| {
             let rounded = format!("{value:.3}");
@@ -86,4 +86,44 @@ impl PatternArguments {
         }
         Ok(())
     }
+}
+
+/// A line for each reading and error: test, error and its size, run, positions of the axes, deviation.
+fn csv(found: &Patterns, session: &Session) -> Result<Vec<u8>, Failure> {
+    let axes = &session.machine.axes;
+    let mut header: Vec<String> = ["test", "error", "size", "unit", "run"]
+        .map(String::from)
+        .to_vec();
+    header.extend(axes.iter().map(|axis| axis.column("")));
+    match session.instrument.coordinates() {
+        1 => header.push("deviation_um".into()),
+        _ => header.extend(["x", "y", "z"].map(|k| format!("deviation_{k}_um"))),
+    }
+    let mut rows = Vec::new();
+    for pattern in &found.patterns {
+        let Some((name, states)) = found.tests.iter().find(|(name, _)| *name == pattern.test) else {
+            continue;
+        };
+        for (row, deviations) in pattern
+            .deviations_um
+            .chunks(states.coordinates.max(1))
+            .enumerate()
+        {
+            let run = states.run.get(row).map_or(String::new(), ToString::to_string);
+            let mut cells = vec![
+                name.clone(),
+                pattern.error.clone(),
+                pattern.size.to_string(),
+                pattern.unit.clone(),
+                run,
+            ];
+            // Without the digits that are rounding.
+            let shown = |position: f64| (position * 1e9).round() / 1e9 + 0.0;
+            let at = axes.iter().zip(&states.positions);
+            cells.extend(at.map(|(axis, column)| shown(axis.kind.outside(column[row])).to_string()));
+            cells.extend(deviations.iter().map(|deviation| format!("{deviation:.6}")));
+            rows.push(cells);
+        }
+    }
+    output::csv(&header, rows)
 }

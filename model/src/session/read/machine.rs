@@ -180,9 +180,7 @@ fn travel(name: &str, kind: AxisKind, table: &mut Table<'_>) -> Result<Option<[f
         .map(|end| end.number())
         .collect::<Result<Vec<_>, _>>()?;
     match numbers[..] {
-        [least, greatest] if least < greatest => {
-            Ok(Some([least, greatest].map(|end| quantity::inside(kind, end))))
-        }
+        [least, greatest] if least < greatest => Ok(Some([least, greatest].map(|end| kind.inside(end)))),
         _ => Err(source.error(
             span,
             format!("`{key}` of axis `{name}` is not two numbers, the least before the greatest"),

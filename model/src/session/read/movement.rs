@@ -188,7 +188,7 @@ impl Way {
         let from = end(table, kind, ["from_mm", "from_deg"])?;
         let to = end(table, kind, ["to_mm", "to_deg"])?;
         let step = end(table, kind, ["step_mm", "step_deg"])?;
-        let unit = quantity::unit_word(kind);
+        let unit = kind.unit();
         let missing = |key: &str| {
             let help = format!("add `{key}_{unit}`");
             table.error(format!("{} has no `{key}_{unit}`", table.called()), Some(help))
@@ -244,11 +244,11 @@ fn end<'a>(
         AxisKind::Rotary => (table.take(deg), table.take(mm)),
     };
     if let Some(wrong) = wrong {
-        let message = format!("`{}` for what moves in {}", wrong.key, quantity::unit_word(kind));
+        let message = format!("`{}` for what moves in {}", wrong.key, kind.unit());
         return Err(wrong.source.error(wrong.key_span.clone(), message, None));
     }
     match right {
-        Some(value) => Ok(Some((quantity::inside(kind, value.number()?), value))),
+        Some(value) => Ok(Some((kind.inside(value.number()?), value))),
         None => Ok(None),
     }
 }

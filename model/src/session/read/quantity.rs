@@ -15,30 +15,6 @@ pub(crate) fn kind_word(kind: AxisKind) -> &'static str {
     }
 }
 
-/// `mm` or `deg`: the unit of an axis in files.
-pub(crate) fn unit_word(kind: AxisKind) -> &'static str {
-    match kind {
-        AxisKind::Linear => "mm",
-        AxisKind::Rotary => "deg",
-    }
-}
-
-/// A position in mm or degrees, in the unit inside.
-pub(crate) fn inside(kind: AxisKind, value: f64) -> f64 {
-    match kind {
-        AxisKind::Linear => value,
-        AxisKind::Rotary => value.to_radians(),
-    }
-}
-
-/// A position in the unit inside, in mm or degrees.
-pub(crate) fn outside(kind: AxisKind, value: f64) -> f64 {
-    match kind {
-        AxisKind::Linear => value,
-        AxisKind::Rotary => value.to_degrees(),
-    }
-}
-
 /// The axis of this name; by another case of the letters where that leaves no doubt.
 pub(crate) fn axis_index(machine: &Machine, name: &str) -> Option<usize> {
     if let Some(index) = machine.axis_index(name) {

@@ -204,11 +204,7 @@ fn at(context: &Context<'_>, table: &mut Table<'_>) -> Result<Standing, ModelErr
     };
     for entry in value.table("`at`".into())?.take_all() {
         let Some((axis, unit)) = quantity::axis_position(machine, &entry.key) else {
-            let known: Vec<String> = machine
-                .axes
-                .iter()
-                .map(|axis| format!("{}_{}", axis.name.to_lowercase(), quantity::unit_word(axis.kind)))
-                .collect();
+            let known: Vec<String> = machine.axes.iter().map(|axis| axis.column("")).collect();
             let message = format!("`at` knows no position `{}`", entry.key);
             let help = format!("known: {}", known.join(", "));
             return Err(entry.source.error(entry.key_span.clone(), message, Some(help)));

@@ -124,7 +124,7 @@ fn r_test_help(request: &Request<'_>) -> &'static str {
 fn known(request: &Request<'_>) -> Vec<String> {
     let mut known: Vec<String> = ["time_s", "run"].map(str::to_string).to_vec();
     for axis in &request.machine.axes {
-        let unit = quantity::unit_word(axis.kind);
+        let unit = axis.kind.unit();
         known.push(format!("{}_{unit}", axis.name.to_lowercase()));
     }
     known.push("temperature_c".into());
@@ -369,7 +369,7 @@ fn required(
         if stated || has(&|role| matches!(role, Role::Axis(i, _) if i == index)) {
             continue;
         }
-        let name = format!("{}_{}", axis.name.to_lowercase(), quantity::unit_word(axis.kind));
+        let name = axis.column("");
         if request.moved.contains(&index) {
             return missing(
                 format!("`{name}`, though axis `{}` moves in this test", axis.name),
