@@ -18,8 +18,6 @@ const TRACE_STRIPS: usize = 360;
 const POSE_STRIPS: usize = 150;
 /// Poses that are drawn however ordinary they are, so that the bulk is seen beside the extremes.
 const POSE_SAMPLE: usize = 500;
-/// Strips of a plot over time.
-const TIME_STRIPS: usize = 240;
 /// Tests that are drawn one by one; what a session has beyond is in its data.
 pub const MOST_TESTS: usize = 12;
 
@@ -299,80 +297,6 @@ impl<'d> Drawn<'d> {
         })
         .to_string();
         plot
-    }
-
-    /// Residuals of the whole session over time, or in the order of the readings where there is no time.
-    pub fn over_time(&self) -> Plot {
-        let timed = self
-            .problem
-            .tests
-            .iter()
-            .all(|test| test.readings.as_ref().is_some_and(|r| !r.time_s.is_empty()));
-        let mut columns: [Vec<f64>; 3] = [const { Vec::new() }; 3];
-        for (test, view) in self.problem.tests.iter().zip(&self.views.tests) {
-            let Some(readings) = &test.readings else { continue };
-            let past = columns[0].len();
-            if timed {
-                columns[0].extend(
-                    readings
-                        .time_s
-                        .iter()
-                        .map(|t| (t - self.problem.origin.time_s) / 60.0),
-                );
-            } else {
-                columns[0].extend((0..readings.rows()).map(|row| (past + row) as f64 + 1.0));
-            }
-            columns[1].extend(lengths(&view.before_um, self.views.coordinates));
-            columns[2].extend(lengths(&view.after_um, self.views.coordinates));
-        }
-        let [time, before, after] = columns;
-        let of = |values: &[f64]| -> Vec<(f64, f64)> {
-            let strips = thin::strips(&time, values, TIME_STRIPS);
-            strips
-                .into_iter()
-                .flat_map(|(at, low, high)| [(at, low), (at, high)])
-                .collect()
-        };
-        let [low, high] = span(time.iter().copied());
-        let [least, most] = span(before.iter().chain(&after).copied());
-        let (what, unit) = if timed {
-            ("time", "min")
-        } else {
-            ("reading", "in the order of the files")
-        };
-        Lines {
-            name: "residual-over-time".to_string(),
-            title: format!("Residual against {what}"),
-            caption:
-                "All tests one after another: drift, and what comes and goes. Before (red) and after (blue)."
-                    .to_string(),
-            x: (Scale::over(low, high, ACROSS, 7), format!("{what}, {unit}")),
-            y: (
-                Scale::rounded(least.min(0.0), most.max(0.0), UP, 6),
-                if self.views.coordinates == 3 {
-                    "length of the residual, µm".to_string()
-                } else {
-                    "residual, µm".to_string()
-                },
-            ),
-            series: vec![
-                Series {
-                    class: "before",
-                    live: None,
-                    mark: Mark::Bars,
-                    points: of(&before),
-                },
-                Series {
-                    class: "after",
-                    live: None,
-                    mark: Mark::Bars,
-                    points: of(&after),
-                },
-            ],
-            legend: vec![("before bars", "before".into()), ("after bars", "after".into())],
-            over: html! {},
-        }
-        .plot()
     }
 }
 

@@ -7,6 +7,7 @@ use abbe::identify::results::{FitResult, ModelResult};
 use abbe::identify::views::{lengths, patterns, spectrum, views};
 use maud::{Markup, html};
 
+use super::curves;
 use super::document::{Document, prose};
 use super::drawn::Drawn;
 use super::readings::{self, um};
@@ -97,7 +98,7 @@ pub fn document(problem: &Problem<'_>, fit: &Fit, result: &FitResult) -> Result<
     );
     let found = patterns::patterns(problem, &fit.beta)?;
     let shown = if drawn.is_round() {
-        readings::patterns(&mut document, &found)
+        curves::patterns(&mut document, &found)
     } else {
         html! {}
     };

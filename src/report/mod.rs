@@ -1,12 +1,13 @@
 //! Reports: one HTML file that needs nothing else, and its plots by themselves. No mathematics: what is drawn was computed by `identify`.
 //!
 //! - [`document`], [`page`]: sections, and the page around them; [`provenance`]: what it takes to do the same again;
-//! - [`drawn`], [`readings`]: the plots of readings; [`thin`]: fewer points, no peak lost; [`embed`]: the data that the page brings along;
+//! - [`drawn`], [`readings`], [`curves`]: the plots of readings and of what stands behind them; [`thin`]: fewer points, no peak lost; [`embed`]: the data that the page brings along;
 //! - [`fit`], [`trace`], [`plan`]: what a report of each command holds;
 //! - [`plot`]: the drawings.
 //!
 //! Everything goes through templates that escape; only drawings of this module and the page's own style and script are taken as they are.
 
+pub mod curves;
 pub mod document;
 pub mod drawn;
 pub mod embed;

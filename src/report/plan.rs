@@ -6,6 +6,7 @@ use abbe::identify::problem::Problem;
 use abbe::identify::views::{is_round, patterns};
 use maud::{Markup, html};
 
+use super::curves;
 use super::document::{Document, list, prose, table};
 use super::plot::Plot;
 use super::plot::bars::{self, Fill};
@@ -56,7 +57,7 @@ pub fn document(problem: &Problem<'_>, analysis: &PlanAnalysis) -> Result<Docume
     let beta = vec![0.0; problem.parameters.list.len()];
     let found = patterns::patterns(problem, &beta)?;
     let section = if is_round(problem.session.instrument) {
-        readings::patterns(&mut document, &found)
+        curves::patterns(&mut document, &found)
     } else {
         html! { p { "Traces of single errors are drawn for instruments that read one length." } }
     };

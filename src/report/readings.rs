@@ -3,20 +3,17 @@
 use abbe::identify::fit::Fit;
 use abbe::identify::problem::Problem;
 use abbe::identify::results::{ModelResult, ParameterResult, Rejected, Unobservable};
-use abbe::identify::views::patterns::TestPatterns;
 use abbe::identify::views::spectrum::Spectrum;
 use abbe::identify::views::{Cause, Views, correlation};
 use maud::{Markup, html};
 use serde_json::json;
 
+use super::curves;
 use super::document::{Document, list, table};
 use super::drawn::{Drawn, MOST_TESTS};
 use super::embed;
 use super::plot::bars::{self, Row, Value};
-use super::plot::lines::{ACROSS, Lines, Mark, Series, UP};
-use super::plot::polar::{Round, Trace, drawing};
-use super::plot::scale::{Scale, place, polyline, text};
-use super::plot::{Plot, chain, cut, heat};
+use super::plot::{Plot, chain, heat};
 
 /// The most unknowns of one unit in one plot.
 const MOST_ROWS: usize = 30;
@@ -97,7 +94,7 @@ pub fn before_and_after(
         .flatten()
         .collect();
     let shown = if pairs.is_empty() {
-        document.show([histogram(drawn, words)])
+        document.show([curves::histogram(drawn, words)])
     } else {
         document.show(pairs)
     };
@@ -111,63 +108,6 @@ pub fn left_out_note(views: &Views) -> Markup {
             p class="note" { "The first " (MOST_TESTS) " of " (views.tests.len()) " tests are drawn one by one; the readings of all are in the data." }
         }
     }
-}
-
-/// How many readings have how long a residual.
-fn histogram(drawn: &Drawn<'_>, words: [&str; 2]) -> Plot {
-    const CLASSES: usize = 60;
-    let all = |after: bool| -> Vec<f64> {
-        drawn
-            .views
-            .tests
-            .iter()
-            .flat_map(|test| {
-                let values = if after { &test.after_um } else { &test.before_um };
-                abbe::identify::views::lengths(values, drawn.views.coordinates)
-            })
-            .map(f64::abs)
-            .collect()
-    };
-    let [before, after] = [all(false), all(true)];
-    let most = before.iter().chain(&after).copied().fold(0.0, f64::max);
-    let counted = |values: &[f64]| -> Vec<(f64, f64)> {
-        let mut counts = vec![0.0; CLASSES];
-        for value in values {
-            counts[((value / most * CLASSES as f64) as usize).min(CLASSES - 1)] += 1.0;
-        }
-        let width = most / CLASSES as f64;
-        let steps = counts
-            .into_iter()
-            .enumerate()
-            .flat_map(|(k, count)| [(k as f64 * width, count), ((k + 1) as f64 * width, count)]);
-        steps.collect()
-    };
-    let [before, after] = [counted(&before), counted(&after)];
-    let highest = before.iter().chain(&after).map(|p| p.1).fold(0.0, f64::max);
-    Lines {
-        name: "residual-lengths".to_string(),
-        title: "How many readings have how large a residual".to_string(),
-        caption: "All tests together.".to_string(),
-        x: (Scale::over(0.0, most, ACROSS, 7), "residual, µm".to_string()),
-        y: (Scale::rounded(0.0, highest, UP, 5), "readings".to_string()),
-        series: vec![
-            Series {
-                class: "before",
-                live: None,
-                mark: Mark::Line,
-                points: before,
-            },
-            Series {
-                class: "after",
-                live: None,
-                mark: Mark::Line,
-                points: after,
-            },
-        ],
-        legend: vec![("before", words[0].to_string()), ("after", words[1].to_string())],
-        over: html! {},
-    }
-    .plot()
 }
 
 /// Traces with their controls.
@@ -268,7 +208,7 @@ pub fn residuals(document: &mut Document, drawn: &Drawn<'_>, spectra: &[Spectrum
         .tests()
         .flat_map(|(number, _)| drawn.residuals(number))
         .collect();
-    plots.push(drawn.over_time());
+    plots.push(curves::over_time(drawn));
     let effects = &drawn.problem.parameters.effects;
     // One height for all, so that a wave in one test stands out against the others.
     let highest = spectra
@@ -280,185 +220,9 @@ pub fn residuals(document: &mut Document, drawn: &Drawn<'_>, spectra: &[Spectrum
         spectra
             .iter()
             .take(2 * MOST_TESTS)
-            .map(|spectrum| spectrum_plot(spectrum, highest, effects)),
+            .map(|spectrum| curves::spectrum_plot(spectrum, highest, effects)),
     );
     document.show(plots)
-}
-
-fn spectrum_plot(spectrum: &Spectrum, highest: f64, effects: &[abbe::model::effect::Effect]) -> Plot {
-    let orders = spectrum.before_um.len() as f64;
-    let x = Scale {
-        step: 5.0,
-        ..Scale::over(0.0, orders + 1.0, ACROSS, 8)
-    };
-    // A fifth of the height stays free for the names of found orders.
-    let y = Scale::over(0.0, (highest * 1.25).max(1e-6), UP, 5);
-    let stems = |values: &[f64], shift: f64| -> Vec<(f64, f64)> {
-        values
-            .iter()
-            .enumerate()
-            .map(|(k, v)| (k as f64 + 1.0 + shift, *v))
-            .collect()
-    };
-    let mut found: Vec<(f64, String)> = effects
-        .iter()
-        .filter(|effect| effect.driver.to_string() == spectrum.over && effect.acts_in(&spectrum.of))
-        .filter_map(|effect| match effect.shape {
-            abbe::model::effect::Shape::Harmonic { order } => Some((order, effect.id())),
-            _ => None,
-        })
-        .filter(|(order, _)| *order <= orders)
-        .collect();
-    found.sort_by(|a, b| a.0.total_cmp(&b.0));
-    let over = html! {
-        @for (number, (order, id)) in found.iter().enumerate() {
-            @let (at, down) = (x.at(*order), UP[1] + 12.0 + 12.0 * (number % 3) as f64);
-            @let stem = spectrum.before_um.iter().zip(&spectrum.after_um).nth((order.round() as usize).saturating_sub(1));
-            @let top = y.at(stem.map_or(0.0, |(before, after)| before.max(*after)));
-            path class="found-line" d=(polyline([(at, (top - 3.0).max(down + 2.0)), (at, down + 2.0)])) {}
-            path class="found" d=(format!("M{} {}l-4 8h8z", place(at), UP[0])) {}
-            text class=(if at > 400.0 { "small right" } else { "small" }) x=(place(if at > 400.0 { at - 4.0 } else { at + 4.0 })) y=(place(down)) { title { (id) } (cut(id, 24)) }
-        }
-    };
-    let mut legend = vec![("before", "before".to_string()), ("after", "after".to_string())];
-    if !found.is_empty() {
-        legend.push(("found-line", "found order".to_string()));
-    }
-    Lines {
-        name: format!("spectrum-{}-{}", spectrum.of, spectrum.over),
-        title: format!("{}: residual by order over {}", spectrum.of, spectrum.over),
-        caption: "Amplitude of the wave that each order explains by itself.".to_string(),
-        x: (x, format!("order, cycles a turn of {}", spectrum.over)),
-        y: (y, "amplitude, µm".to_string()),
-        series: vec![
-            Series {
-                class: "before",
-                live: None,
-                mark: Mark::Stems,
-                points: stems(&spectrum.before_um, -0.16),
-            },
-            Series {
-                class: "after",
-                live: None,
-                mark: Mark::Stems,
-                points: stems(&spectrum.after_um, 0.16),
-            },
-        ],
-        legend,
-        over,
-    }
-    .plot()
-}
-
-/// What one error at a time does to each test: 10 µm and 0.01° (Table 3.1 of the thesis), 5 µm a division (its Figs. 3.7, 3.8).
-pub fn patterns(document: &mut Document, patterns: &[TestPatterns]) -> Markup {
-    const DIVISION_UM: f64 = 5.0;
-    let mut plots = Vec::new();
-    for test in patterns.iter().take(MOST_TESTS) {
-        if test.columns.is_empty() {
-            continue;
-        }
-        if test.way.is_angle {
-            for chunk in test.columns.chunks(12) {
-                plots.push(small_circles(test, chunk, DIVISION_UM));
-            }
-        }
-        for chunk in test.columns.chunks(8) {
-            plots.push(curves(test, chunk));
-        }
-    }
-    document.show(plots)
-}
-
-/// By how much an error of this unit is drawn, and in words.
-fn amount(unit_name: &str) -> Option<(f64, &'static str)> {
-    match unit_name {
-        "um" => Some((10.0, "10 µm")),
-        "arcsec" => Some((36.0, "0.01°")),
-        _ => None,
-    }
-}
-
-fn small_circles(test: &TestPatterns, columns: &[abbe::identify::views::patterns::Pattern], um: f64) -> Plot {
-    let round = Round::SMALL;
-    let across = 3;
-    let drawn: Vec<_> = columns
-        .iter()
-        .filter_map(|c| Some((c, amount(&c.unit)?)))
-        .collect();
-    let rows = drawn.len().div_ceil(across).max(1);
-    let high = round.side + 22.0;
-    let inner = html! {
-        @for (number, (column, (size, words))) in drawn.iter().enumerate() {
-            @let x = (number % across) as f64 * round.side;
-            @let y = (number / across) as f64 * high;
-            g transform=(format!("translate({x} {y})")) {
-                @let points = test.way.values.iter().zip(&column.values).map(|(angle, value)| (*angle, value * size)).collect();
-                (drawing(round, um, &[Trace { class: "forward", number: None, points }]))
-                text class="middle" x=(round.side / 2.0) y=(round.side + 8.0) { (cut(&column.id, 18)) " = " (words) }
-            }
-        }
-    };
-    Plot::still(
-        format!("patterns-{}", test.test),
-        format!("{}: the trace of one error at a time", test.test),
-        format!(
-            "{} µm a division; first order. What no reading of the test changes with is left out.",
-            text(um, um)
-        ),
-        [round.side * across as f64, high * rows as f64 + 6.0],
-        inner,
-    )
-}
-
-fn curves(test: &TestPatterns, columns: &[abbe::identify::views::patterns::Pattern]) -> Plot {
-    const CLASSES: [&str; 8] = ["c0", "c1", "c2", "c3", "c4", "c5", "c6", "c7"];
-    let ways = super::plot::lines::span(test.way.values.iter().copied());
-    let values = super::plot::lines::span(columns.iter().flat_map(|c| c.values.iter().copied()));
-    let x = Scale::over(ways[0], ways[1], ACROSS, 9);
-    let x = if test.way.is_angle { x.in_degrees() } else { x };
-    let points = |column: &abbe::identify::views::patterns::Pattern| {
-        test.way
-            .values
-            .iter()
-            .copied()
-            .zip(column.values.iter().copied())
-            .collect()
-    };
-    Lines {
-        name: format!("sensitivity-{}", test.test),
-        title: format!("{}: sensitivity", test.test),
-        caption: "µm of reading for a unit of each error, along the first run.".to_string(),
-        x: (
-            x,
-            format!(
-                "{}, {}",
-                test.way.name,
-                if test.way.is_angle { "°" } else { "mm" }
-            ),
-        ),
-        y: (
-            Scale::rounded(values[0].min(0.0), values[1].max(0.0), UP, 6),
-            "µm a unit".to_string(),
-        ),
-        series: columns
-            .iter()
-            .zip(CLASSES)
-            .map(|(column, class)| Series {
-                class,
-                live: None,
-                mark: Mark::Line,
-                points: points(column),
-            })
-            .collect(),
-        legend: columns
-            .iter()
-            .zip(CLASSES)
-            .map(|(c, class)| (class, format!("{}, per {}", cut(&c.id, 20), unit(&c.unit))))
-            .collect(),
-        over: html! {},
-    }
-    .plot()
 }
 
 /// The map of correlations of a fit.

@@ -7,6 +7,7 @@ use abbe::identify::trace::alias::Rival;
 use abbe::identify::views::{patterns, spectrum, views};
 use maud::{Markup, html};
 
+use super::curves;
 use super::document::{Document, list, prose, table};
 use super::drawn::Drawn;
 use super::plot::bars::{self, Fill};
@@ -115,7 +116,7 @@ pub fn document(trace: &Trace<'_>) -> Result<Document, IdentifyError> {
     document.section("What to measure next", next(result));
     let found = patterns::patterns(problem, &trace.after_fit.beta)?;
     if drawn.is_round() {
-        let section = readings::patterns(&mut document, &found);
+        let section = curves::patterns(&mut document, &found);
         document.section("What each error does to each test", section);
     }
     let section = readings::machine(&mut document, problem);

@@ -89,6 +89,29 @@ fn a_share_is_what_the_readings_lose_without_it() {
     }
 }
 
+/// What the plant put in is `EZC~C:h2`; one height of the ball cannot tell it from a tilt of one order less (EFFECTS, METHOD).
+#[test]
+fn a_trace_tells_how_it_came_to_its_effects_and_who_else_could_stand_there() {
+    let session = session(&ready("hermle-c600u/measured/session.toml"));
+    let trace = abbe::identify::trace::trace(&session, &Default::default(), &|_| true).unwrap();
+    let [rivals] = trace.rivals.as_slice() else {
+        panic!("one effect was put in, {} were found", trace.rivals.len());
+    };
+    let of = |id: &str| rivals.iter().find(|rival| rival.id == id).unwrap();
+    assert!(of("EZC~C:h2").named && !of("EZC~C:h2").alias);
+    for id in ["EAC~C:h1", "EBC~C:h1"] {
+        assert!(of(id).alias && !of(id).named, "{id}");
+    }
+    assert!(rivals.is_sorted_by(|a, b| a.evidence >= b.evidence));
+    let beaten = rivals.iter().filter(|rival| !rival.named && !rival.alias);
+    for rival in beaten {
+        assert!(rival.evidence < of("EZC~C:h2").evidence - 2.0, "{}", rival.id);
+    }
+    assert_eq!(trace.steps[0].id, "EZC~C:h2");
+    let (last, after) = (trace.steps.last().unwrap(), &trace.result.after);
+    assert!((last.heldout_rms_um / after.heldout_rms_um - 1.0).abs() < 0.02);
+}
+
 /// The bundled session with names that a page might take for markup.
 pub fn with_markup_in_names(folder: &Path) {
     let from = ready("hermle-c600u/measured");
