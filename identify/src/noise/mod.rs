@@ -156,7 +156,7 @@ fn directions(readings: &abbe_model::session::readings::Readings) -> Vec<i64> {
 }
 
 /// Coefficients of the trend that is taken out of a run: constant, slope, curvature.
-pub(self) const TERMS: usize = 3;
+const TERMS: usize = 3;
 
 /// Polynomials in time that are orthonormal over given times (Gram–Schmidt, twice); those that the times are too few for are zero.
 fn polynomials(times: &[f64]) -> Vec<[f64; TERMS]> {
