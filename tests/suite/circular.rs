@@ -304,3 +304,35 @@ fn the_sample_of_another_simulator_is_diagnosed() {
         assert!(value.abs() < 4.0 * u, "{value} ± {u}");
     }
 }
+
+#[test]
+fn a_short_arc_is_said_to_be_one() {
+    let folder = tempfile::tempdir().unwrap();
+    circle(folder.path(), &[1.0, -1.0], true, |at| {
+        [40e-6 * RADIUS_MM * at.angle.cos(), 0.0]
+    });
+    let file = folder.path().join("xy.csv");
+    let table = std::fs::read_to_string(&file).unwrap();
+    let kept: Vec<&str> = table
+        .lines()
+        .filter(|line| {
+            let y = line.split(',').nth(3).unwrap();
+            y.parse().is_ok_and(|y: f64| y >= 50.0) || y == "y_mm"
+        })
+        .collect();
+    std::fs::write(&file, kept.join("\n")).unwrap();
+    let test = figures(&folder.path().join("session.toml"))[0].clone();
+    assert!((um(&test, "arc_deg") - 120.0).abs() < 0.6, "{test}");
+    assert!(test.get("diagnosis").is_none(), "{test}");
+    let told = test["not_told"].to_string();
+    assert!(
+        told.contains("ISO 230-4 asks for a full circle") && told.contains("an arc of 120° is too short"),
+        "{told}"
+    );
+    // 40 µm/m of X alone, from the set-up's centre: 40·cos²θ·R, between 30° and 90°.
+    let direction = &test["directions"][0];
+    assert!(
+        (um(direction, "circular_deviation_um") - 3.0).abs() < 0.06,
+        "{test}"
+    );
+}

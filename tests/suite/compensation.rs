@@ -257,4 +257,17 @@ fn what_has_no_curve_makes_no_table() {
         "{message}"
     );
     assert!(!out.exists());
+    let few = [
+        "fit",
+        text(&measured),
+        "--compensation",
+        text(&out),
+        "--control",
+        "beckhoff",
+        "--points",
+        "1",
+    ];
+    let run = abbe(&few);
+    assert_eq!(run.status.code(), Some(1));
+    assert!(String::from_utf8_lossy(&run.stderr).contains("--points 1: from 2 to 256"));
 }

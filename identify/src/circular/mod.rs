@@ -1,7 +1,7 @@
 //! Ball-bar figures of ISO 230-4 and the classical diagnosis of a circle.
 //!
 //! A bar between spindle and workpiece ball reads the radius of the path, `L(θ) = R + δL(θ)`. Figures are taken of the path as it is;
-//! the diagnosis takes `δL` apart, by least squares, into what each classical fault of two linear axes does to it (see [`diagnosis`]).
+//! the diagnosis takes `δL` apart, by least squares, into what each classical fault of two linear axes does to it (module `diagnosis`).
 //! Both are of the readings alone: no error that the fit identifies is taken off first.
 
 mod diagnosis;
