@@ -171,6 +171,7 @@ const BAR: &str = "bar_mm = 100\nworkpiece_ball_mm = [100, 0, 0]\nspindle_ball_m
 const TARGET: &str = "target_mm = [0, 0, 0]";
 const BALL: &str = "ball_mm = [0, 0, 0]\nsocket = \"0\"";
 const PROBE: &str = "artefact_mm = [50, 0, 0]\nradius_mm = 10\nstylus_mm = [0, 0, 0]";
+const NEST: &str = "setting = \"E\"\nworkpiece_ball_mm = [100, 0, 0]\nspindle_ball_mm = [0, 0, 0]";
 const SWEEP: &str = "sweep = { axis = \"C\", from_deg = 0, to_deg = 90, step_deg = 10 }";
 
 #[test]
@@ -198,6 +199,7 @@ fn the_session_schema_has_the_keys_that_the_reader_knows() {
         ("tracker", TARGET),
         ("socket", BALL),
         ("probe", PROBE),
+        ("r-test", NEST),
     ] {
         known.extend(known_to_the_reader(&with(
             "TEST",
