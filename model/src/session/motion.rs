@@ -40,7 +40,7 @@ pub enum Motion {
         second: usize,
         /// mm.
         radius: f64,
-        /// Centre in R, mm.
+        /// Centre, counted from the workpiece ball in the directions of R, mm.
         centre: [f64; 3],
         /// rad.
         from: f64,
