@@ -39,18 +39,13 @@ fn quantised(values: impl Iterator<Item = f64> + Clone) -> Value {
 
 /// The shares that get a slider, the largest first: their places.
 pub fn sliders(drawn: &Drawn<'_>) -> Vec<usize> {
-    let size = |k: usize| -> f64 {
-        let of =
-            |test: &abbe::identify::views::TestView| test.shares_um[k].iter().map(|v| v * v).sum::<f64>();
-        drawn.views.tests.iter().map(of).sum()
-    };
     let mut chosen: Vec<(f64, usize)> = (0..drawn.views.shares.len())
         .filter(|k| {
             let cause = drawn.views.shares[*k].cause;
             cause != Cause::Setup || drawn.views.coordinates == 1
         })
-        .map(|k| (size(k), k))
-        .filter(|(size, _)| *size > 0.0)
+        .map(|k| (drawn.views.weight_of(k), k))
+        .filter(|(weight, _)| *weight > 0.0)
         .collect();
     chosen.sort_by(|a, b| b.0.total_cmp(&a.0));
     chosen.truncate(MOST_SLIDERS);

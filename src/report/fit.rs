@@ -4,7 +4,7 @@ use abbe::identify::IdentifyError;
 use abbe::identify::fit::Fit;
 use abbe::identify::problem::Problem;
 use abbe::identify::results::{FitResult, ModelResult};
-use abbe::identify::views::{lengths, patterns, spectrum, views};
+use abbe::identify::views::{patterns, spectrum, views};
 use maud::{Markup, html};
 
 use super::curves;
@@ -125,16 +125,8 @@ pub fn document(problem: &Problem<'_>, fit: &Fit, result: &FitResult) -> Result<
 
 /// The deviation of the nominal machine as a model; nothing was fitted, so held out is no different.
 fn nominal_result(drawn: &Drawn<'_>) -> ModelResult {
-    let coordinates = drawn.views.coordinates;
-    let squares = |values: &[f64]| values.iter().map(|v| v * v).sum::<f64>();
-    let (mut sum, mut count, mut of_lengths) = (0.0, 0, 0.0);
-    for test in &drawn.views.tests {
-        sum += squares(&test.before_um);
-        count += test.before_um.len();
-        of_lengths += squares(&lengths(&test.before_um, coordinates));
-    }
-    let rms_um = (sum / count.max(1) as f64).sqrt();
-    let rms_3d_um = (coordinates == 3).then(|| (of_lengths * 3.0 / count.max(1) as f64).sqrt());
+    let rms_um = drawn.views.rms_before_um(drawn.problem);
+    let rms_3d_um = (drawn.views.coordinates == 3).then(|| rms_um * 3.0_f64.sqrt());
     ModelResult {
         rms_um,
         heldout_rms_um: rms_um,

@@ -16,7 +16,7 @@ use abbe_model::instrument::InstrumentKind;
 
 use crate::error::IdentifyError;
 use crate::fit::Fit;
-use crate::heldout::FoldKind;
+use crate::heldout::{FoldKind, rms_mm};
 use crate::parameters::Role;
 use crate::problem::Problem;
 use way::{Stretch, Way};
@@ -75,6 +75,20 @@ pub struct Views {
     pub coordinates: usize,
     /// The greatest that the sum of shares misses any reading of the model by, µm.
     pub second_order_um: f64,
+}
+
+impl Views {
+    /// Root mean square of what the model before leaves over the scalar readings that count, µm.
+    pub fn rms_before_um(&self, problem: &Problem<'_>) -> f64 {
+        let before: Vec<Vec<f64>> = self.tests.iter().map(|test| test.before_um.clone()).collect();
+        rms_mm(problem, &before)
+    }
+
+    /// How much a share takes part in: the sum of its squares, µm².
+    pub fn weight_of(&self, share: usize) -> f64 {
+        let of = |test: &TestView| test.shares_um[share].iter().map(|v| v * v).sum::<f64>();
+        self.tests.iter().map(of).sum()
+    }
 }
 
 /// The shares of a fit: each identified error, each effect, the set-up, and what is not told apart.
