@@ -1,7 +1,7 @@
 //! Plots of what stands behind the readings: orders, lengths, and what one error at a time does.
 
 use abbe::identify::views::lengths;
-use abbe::identify::views::patterns::{Pattern, TestPatterns};
+use abbe::identify::views::sensitivities::{Sensitivity, TestSensitivities};
 use abbe::identify::views::spectrum::Spectrum;
 use abbe::model::effect::{Effect, Shape};
 use maud::{Markup, html};
@@ -216,7 +216,7 @@ pub fn spectrum_plot(spectrum: &Spectrum, highest: f64, effects: &[Effect]) -> P
 }
 
 /// What one error at a time does to each test: 10 µm and 0.01° (Table 3.1 of the thesis), 5 µm a division (its Figs. 3.7, 3.8).
-pub fn patterns(document: &mut Document, patterns: &[TestPatterns]) -> Markup {
+pub fn patterns(document: &mut Document, patterns: &[TestSensitivities]) -> Markup {
     const DIVISION_UM: f64 = 5.0;
     let mut plots = Vec::new();
     for test in patterns.iter().take(MOST_TESTS) {
@@ -244,7 +244,7 @@ fn amount(unit_name: &str) -> Option<(f64, &'static str)> {
     }
 }
 
-fn small_circles(test: &TestPatterns, columns: &[Pattern], um: f64) -> Plot {
+fn small_circles(test: &TestSensitivities, columns: &[Sensitivity], um: f64) -> Plot {
     let round = Round::SMALL;
     let across = 3;
     let drawn: Vec<_> = columns
@@ -276,13 +276,13 @@ fn small_circles(test: &TestPatterns, columns: &[Pattern], um: f64) -> Plot {
     )
 }
 
-fn curves(test: &TestPatterns, columns: &[Pattern]) -> Plot {
+fn curves(test: &TestSensitivities, columns: &[Sensitivity]) -> Plot {
     const CLASSES: [&str; 8] = ["c0", "c1", "c2", "c3", "c4", "c5", "c6", "c7"];
     let ways = span(test.way.values.iter().copied());
     let values = span(columns.iter().flat_map(|c| c.values.iter().copied()));
     let x = Scale::over(ways[0], ways[1], ACROSS, 9);
     let x = if test.way.is_angle { x.in_degrees() } else { x };
-    let points = |column: &Pattern| {
+    let points = |column: &Sensitivity| {
         test.way
             .values
             .iter()

@@ -4,7 +4,7 @@ use abbe::identify::IdentifyError;
 use abbe::identify::fit::Fit;
 use abbe::identify::problem::Problem;
 use abbe::identify::results::{FitResult, ModelResult};
-use abbe::identify::views::{patterns, spectrum, views};
+use abbe::identify::views::{sensitivities, spectrum, views};
 use maud::{Markup, html};
 
 use super::curves;
@@ -96,7 +96,7 @@ pub fn document(problem: &Problem<'_>, fit: &Fit, result: &FitResult) -> Result<
             (readings::unobservable(&result.unobservable))
         },
     );
-    let found = patterns::patterns(problem, &fit.beta)?;
+    let found = sensitivities::sensitivities(problem, &fit.beta)?;
     let shown = if drawn.is_round() {
         curves::patterns(&mut document, &found)
     } else {

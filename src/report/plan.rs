@@ -3,7 +3,7 @@
 use abbe::identify::IdentifyError;
 use abbe::identify::plan::results::{ErrorAnalysis, PlanAnalysis};
 use abbe::identify::problem::Problem;
-use abbe::identify::views::{is_round, patterns};
+use abbe::identify::views::{is_round, sensitivities};
 use maud::{Markup, html};
 
 use super::curves;
@@ -55,7 +55,7 @@ pub fn document(problem: &Problem<'_>, analysis: &PlanAnalysis) -> Result<Docume
         },
     );
     let beta = vec![0.0; problem.parameters.list.len()];
-    let found = patterns::patterns(problem, &beta)?;
+    let found = sensitivities::sensitivities(problem, &beta)?;
     let section = if is_round(problem.session.instrument) {
         curves::patterns(&mut document, &found)
     } else {

@@ -3,7 +3,7 @@
 use std::path::Path;
 
 use abbe::identify::plan::states;
-use abbe::identify::views::{Cause, patterns, views};
+use abbe::identify::views::{Cause, sensitivities, views};
 use abbe::model::session::Session;
 use abbe::model::session::read::{self, ReadOptions};
 
@@ -23,7 +23,7 @@ fn the_patterns_of_single_errors_are_those_of_the_closed_form() {
     let (complete, noise) = abbe::identify::plan::prepared(&session, &Default::default()).unwrap();
     let problem = states::problem_by_test(&complete, noise).unwrap();
     let beta = vec![0.0; problem.parameters.list.len()];
-    let found = patterns::patterns(&problem, &beta).unwrap();
+    let found = sensitivities::sensitivities(&problem, &beta).unwrap();
     let (r, bar_without, bar_with) = (100.0_f64, 99.9881_f64, 149.9946_f64);
     let d = (bar_with * bar_with - r * r).sqrt();
     let arcsec = 1.0 / (3600.0 * 180.0 / std::f64::consts::PI) * 1e3;

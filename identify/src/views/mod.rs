@@ -8,7 +8,7 @@
 //!
 //! so that what a trace would look like without an error is `d` less that error's share. [`Views::second_order_um`] says how large the last term is.
 
-pub mod patterns;
+pub mod sensitivities;
 pub mod spectrum;
 pub mod way;
 

@@ -10,20 +10,20 @@ const MOST_POINTS: usize = 181;
 /// µm of reading a unit below which an error does nothing to a test: what other errors make of it, second order, is not its pattern.
 const NOTHING: f64 = 1e-3;
 
-/// The patterns of one test.
+/// The sensitivities of one test.
 #[derive(Clone, Debug)]
-pub struct TestPatterns {
+pub struct TestSensitivities {
     /// Its name.
     pub test: String,
     /// What it goes along, thinned like the columns.
     pub way: Way,
     /// The errors that move it.
-    pub columns: Vec<Pattern>,
+    pub columns: Vec<Sensitivity>,
 }
 
-/// One error's pattern in one test.
+/// One error's sensitivity along one test.
 #[derive(Clone, Debug)]
-pub struct Pattern {
+pub struct Sensitivity {
     /// The error.
     pub id: String,
     /// Its unit.
@@ -32,11 +32,11 @@ pub struct Pattern {
     pub values: Vec<f64>,
 }
 
-/// The patterns of every error that is to be identified, at the values `beta` of the unknowns.
+/// The sensitivity to every error that is to be identified, at the values `beta` of the unknowns.
 ///
 /// # Errors
 /// If the model cannot be evaluated.
-pub fn patterns(problem: &Problem<'_>, beta: &[f64]) -> Result<Vec<TestPatterns>, IdentifyError> {
+pub fn sensitivities(problem: &Problem<'_>, beta: &[f64]) -> Result<Vec<TestSensitivities>, IdentifyError> {
     let values = problem.slot_values(beta);
     let coordinates = problem.coordinates();
     let list = &problem.parameters.list;
@@ -72,14 +72,14 @@ pub fn patterns(problem: &Problem<'_>, beta: &[f64]) -> Result<Vec<TestPatterns>
                 };
                 let values: Vec<f64> = picked.iter().map(value).collect();
                 let moves = values.iter().any(|value| value.abs() > NOTHING);
-                moves.then(|| Pattern {
+                moves.then(|| Sensitivity {
                     id: list[j].id.clone(),
                     unit: list[j].unit.name.clone(),
                     values,
                 })
             })
             .collect();
-        of_tests.push(TestPatterns {
+        of_tests.push(TestSensitivities {
             test: test.name.clone(),
             way,
             columns,
