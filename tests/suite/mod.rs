@@ -34,6 +34,7 @@ mod schema;
 mod self_calibration;
 mod simulate;
 mod topologies;
+mod tour;
 mod trace;
 mod volumetric;
 
