@@ -16,7 +16,6 @@ use super::{
 pub const HELP: &str = "Examples:
   abbe fit sessions/hermle-c600u/measured/session.toml --json fit.json --csv fit.csv
   abbe fit sessions/hermle-c600u/measured/session.toml --report fit.html --plots plots
-  abbe fit sessions/hermle-c600u/measured/session.toml --monte-carlo 1000
   abbe fit run2/session.toml --repeat run3/session.toml
   abbe fit run1/session.toml --method cone
   abbe fit sessions/r-test/measured/session.toml --views views.csv

@@ -31,7 +31,7 @@ pub fn check(path: &Path) -> Result<&Path, Failure> {
     };
     if path.is_dir() {
         return Err(Failure::Other(format!(
-            "{}: this is a folder; name a file in it",
+            "{}: cannot be written: this is a folder; name a file in it",
             path.display()
         )));
     }

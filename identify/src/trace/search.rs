@@ -408,9 +408,7 @@ impl<'s> Search<'s> {
             self.tracks = before;
             return Round::Done { p_value };
         }
-        for track in 0..self.tracks.len() {
-            self.let_go(track, threshold);
-        }
+        self.let_go(threshold);
         self.note_held_out();
         Round::Added { candidate }
     }
@@ -441,7 +439,8 @@ impl<'s> Search<'s> {
         Some((p_value, threshold.copied().unwrap_or(0.0)))
     }
 
-    /// What a search would add: the simplest that cannot be told from the best, if that reaches a score.
+    /// What a search would add, if it reaches a score: on all readings the simplest that cannot be told from the best; where a fold is left out, which has to
+    /// be predicted and not named, the best.
     fn pick(&mut self, track: usize, least: f64) -> Option<usize> {
         let Track { folds, .. } = self.tracks[track].clone();
         let chosen = self.tracks[track].chosen();
@@ -449,7 +448,11 @@ impl<'s> Search<'s> {
         let model = self.model_of(&chosen, &folds);
         let gains = model.gains();
         let (best, score) = self.best_of(&model, &gains, &chosen)?;
-        (score >= least).then(|| self.named_first(&model, &gains, best, &chosen))
+        let first = || match track {
+            ALL => self.named_first(&model, &gains, best, &chosen),
+            _ => best,
+        };
+        (score >= least).then(first)
     }
 
     fn take(&mut self, track: usize, taken: Taken) {
@@ -458,10 +461,10 @@ impl<'s> Search<'s> {
     }
 
     /// Drops what the later effects have made superfluous.
-    fn let_go(&mut self, track: usize, threshold: f64) {
-        let folds = self.tracks[track].folds.clone();
+    fn let_go(&mut self, threshold: f64) {
+        let folds = self.tracks[ALL].folds.clone();
         loop {
-            let chosen = self.tracks[track].chosen();
+            let chosen = self.tracks[ALL].chosen();
             let weakest = (0..chosen.len().saturating_sub(1))
                 .map(|k| {
                     let mut others = chosen.clone();
@@ -475,7 +478,7 @@ impl<'s> Search<'s> {
                 .min_by(|a, b| a.1.total_cmp(&b.1));
             match weakest {
                 Some((k, score)) if score < threshold => {
-                    self.tracks[track].taken.remove(k);
+                    self.tracks[ALL].taken.remove(k);
                 }
                 _ => return,
             }
