@@ -272,7 +272,7 @@ fn a_file_is_written_whole_or_not_at_all() {
     );
     refused(
         &[&latex[..], &["--out", text(folder.path())]].concat(),
-        &["cannot be written", "irectory"],
+        &["cannot be written", "this is a folder"],
     );
     assert_eq!(fs::read_dir(folder.path()).unwrap().count(), 1);
 }

@@ -291,7 +291,7 @@ fn first_order(equation: &Equation, first: &FirstOrder, layout: &FirstLayout) ->
 
 /// `a/b`, or `(1/b)·a` where the numerator is too long to be kept on one line.
 fn over(numerator: Tree, denominator: Tree) -> Tree {
-    if terms_of(&numerator).len() > 4 || numerator.leaves() > 24 {
+    if terms_of(&numerator).len() > 4 || numerator.leaves() > 20 {
         product(vec![
             binary(Binary::Div, Tree::Number(1.0), denominator),
             numerator,

@@ -58,7 +58,8 @@ pub const EXAMPLES: &str = "Examples:
   abbe plan sessions/hermle-c600u/chapter5.toml --setup-um 1 --no-effects --json plan.json
   abbe plan sessions/hermle-c600u/chapter5.toml --improve 2 --bars-mm 50,100,150,300
   abbe plan sessions/hermle-c600u/chapter5.toml --separate EZC~C:h2,EAC~C:h1
-  abbe plan sessions/hermle-c600u/chapter5.toml --patterns patterns.csv --error EY0A=10um --error EB0A=0.01deg";
+  abbe plan sessions/hermle-c600u/chapter5.toml --patterns patterns.csv \\
+      --error EY0A=10um --error EB0A=0.01deg";
 
 /// Runs `abbe plan`.
 pub fn run(arguments: &PlanArguments) -> Result<(), Failure> {
