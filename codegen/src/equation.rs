@@ -19,7 +19,7 @@ use crate::print::terms_of;
 use crate::program::{Input, Label, Naming, Program, Tree};
 use crate::run::Run;
 use crate::subject::{Source, Subject, ToolPoint};
-use crate::symbol::{Arena, NodeId, Operand, Symbol, Unary, VariableId};
+use crate::symbol::{Arena, NodeId, Operand, Symbol, Unary, VariableId, length};
 use crate::touch::{self, Touch};
 use crate::variable::{Symbols, Variable};
 use crate::vectors::{self, NamedVector};
@@ -360,8 +360,7 @@ impl Equation {
         if let (Kind::Length | Kind::Distance, Operand::Node(id)) = (self.kind, self.outputs[0]) {
             labels.insert(id, Label::Scalar("reading"));
         }
-        self.arena
-            .program(self.inputs(), &outputs, &labels, Naming::Shared)
+        Program::of(&self.arena, self.inputs(), &outputs, &labels, Naming::Shared)
     }
 
     /// The names of errors that effects make up.
@@ -398,7 +397,7 @@ fn parameters(
     errors: &[ErrorName],
     options: &Options,
 ) -> Result<Vec<Variable>, CodegenError> {
-    let known = source.subject(&|name: &str| arena.length(name)).unknowns();
+    let known = source.subject(&|name: &str| length(arena, name)).unknowns();
     let mut parameters: Vec<Variable> = errors.iter().cloned().map(Variable::Error).collect();
     for place in &options.unknowns {
         let unknown = known.get(*place).ok_or_else(|| CodegenError::NoSuchUnknown {

@@ -3,7 +3,7 @@
 use abbe_model::scalar::{Nominal, Scalar};
 
 use crate::error::CodegenError;
-use crate::symbol::{Arena, Binary, Node, NodeId, Operand, Unary};
+use crate::symbol::{Arena, Binary, Node, Operand, Unary};
 use crate::variable::Variable;
 
 /// The value of a variable: nominal, or an error that derivatives are taken by.
@@ -26,17 +26,7 @@ impl<S: Scalar> Value<S> {
 
     fn unary(self, op: Unary) -> Option<Self> {
         Some(match self {
-            Value::Nominal(a) => Value::Nominal(match op {
-                Unary::Neg => -a,
-                Unary::Sin => Nominal::sin_cos(a).0,
-                Unary::Cos => Nominal::sin_cos(a).1,
-                Unary::Sqrt => Nominal::sqrt(a),
-                Unary::Exp => a.exp(),
-                Unary::Signum => a.signum(),
-                Unary::Step => a.step(),
-                Unary::Floor => a.floor(),
-                Unary::Round => a.round(),
-            }),
+            Value::Nominal(a) => Value::Nominal(op.of(a)),
             Value::Error(a) => Value::Error(match op {
                 Unary::Neg => -a,
                 Unary::Sin => Scalar::sin_cos(a).0,
@@ -49,12 +39,7 @@ impl<S: Scalar> Value<S> {
 
     fn binary(self, op: Binary, other: Self) -> Self {
         match (self, other) {
-            (Value::Nominal(a), Value::Nominal(b)) => Value::Nominal(match op {
-                Binary::Add => a + b,
-                Binary::Sub => a - b,
-                Binary::Mul => a * b,
-                Binary::Div => a / b,
-            }),
+            (Value::Nominal(a), Value::Nominal(b)) => Value::Nominal(op.of(a, b)),
             (a, b) => {
                 let (a, b) = (a.scalar(), b.scalar());
                 Value::Error(match op {
@@ -68,47 +53,45 @@ impl<S: Scalar> Value<S> {
     }
 }
 
-impl Arena {
-    /// The values of `outputs`, every node computed once.
-    ///
-    /// # Errors
-    /// If an exponential, a sign, a step or a whole number is taken of an error; the chain does none of it.
-    pub fn evaluate<S: Scalar>(
-        &self,
-        outputs: &[Operand],
-        variable: impl Fn(&Variable) -> Value<S>,
-    ) -> Result<Vec<S>, CodegenError> {
-        let mut values: Vec<Option<Value<S>>> = vec![None; self.len()];
-        let constant = |value: f64| Value::<S>::Nominal(S::Nominal::constant(value));
-        let look_up = |values: &[Option<Value<S>>], operand: Operand| match operand {
-            Operand::Constant(value) => constant(value.value()),
-            Operand::Node(NodeId(id)) => values[id as usize].unwrap_or_else(|| constant(f64::NAN)),
+/// The values of `outputs`, every node computed once.
+///
+/// # Errors
+/// If an exponential, a sign, a step or a whole number is taken of an error; the chain does none of it.
+pub fn evaluate<S: Scalar>(
+    arena: &Arena,
+    outputs: &[Operand],
+    variable: impl Fn(&Variable) -> Value<S>,
+) -> Result<Vec<S>, CodegenError> {
+    let mut values: Vec<Option<Value<S>>> = vec![None; arena.len()];
+    let constant = |value: f64| Value::<S>::Nominal(S::Nominal::constant(value));
+    let look_up = |values: &[Option<Value<S>>], operand: Operand| match operand {
+        Operand::Constant(value) => constant(value.value()),
+        Operand::Node(id) => values[id.index()].unwrap_or_else(|| constant(f64::NAN)),
+    };
+    for id in arena.reachable(outputs) {
+        let value = match arena.node(id) {
+            Node::Variable(place) => variable(&arena.variable_at(place)),
+            Node::Unary(op, a) => look_up(&values, a)
+                .unary(op)
+                .ok_or(CodegenError::FunctionOfError { function: op })?,
+            Node::Binary(op, a, b) => look_up(&values, a).binary(op, look_up(&values, b)),
         };
-        for id in self.reachable(outputs) {
-            let value = match self.node(id) {
-                Node::Variable(place) => variable(&self.variable_at(place)),
-                Node::Unary(op, a) => look_up(&values, a)
-                    .unary(op)
-                    .ok_or(CodegenError::FunctionOfError { function: op })?,
-                Node::Binary(op, a, b) => look_up(&values, a).binary(op, look_up(&values, b)),
-            };
-            values[id.0 as usize] = Some(value);
-        }
-        Ok(outputs
-            .iter()
-            .map(|output| look_up(&values, *output).scalar())
-            .collect())
+        values[id.index()] = Some(value);
     }
+    Ok(outputs
+        .iter()
+        .map(|output| look_up(&values, *output).scalar())
+        .collect())
+}
 
-    /// The values of `outputs` at plain numbers.
-    ///
-    /// # Errors
-    /// None that plain numbers can cause.
-    pub fn evaluate_f64(
-        &self,
-        outputs: &[Operand],
-        variable: impl Fn(&Variable) -> f64,
-    ) -> Result<Vec<f64>, CodegenError> {
-        self.evaluate(outputs, |v| Value::Nominal(variable(v)))
-    }
+/// The values of `outputs` at plain numbers.
+///
+/// # Errors
+/// None that plain numbers can cause.
+pub fn evaluate_f64(
+    arena: &Arena,
+    outputs: &[Operand],
+    variable: impl Fn(&Variable) -> f64,
+) -> Result<Vec<f64>, CodegenError> {
+    evaluate(arena, outputs, |v| Value::Nominal(variable(v)))
 }

@@ -8,7 +8,7 @@ use num_traits::{One, Signed, ToPrimitive};
 
 use crate::normal::Ring;
 use crate::polynomial::{Atom, Monomial, Polynomial};
-use crate::program::{Input, Naming, Tree};
+use crate::program::{Input, Naming, Program, Tree};
 use crate::symbol::{Arena, Binary, Operand, Symbol, Unary};
 
 /// A term with its sign: true for minus.
@@ -133,8 +133,8 @@ impl Layout<'_, '_> {
             Atom::Function(id) => {
                 let arena = self.ring.arena();
                 let function = [Operand::Node(id)];
-                let program =
-                    arena.program(self.inputs.to_vec(), &function, &HashMap::new(), Naming::Labelled);
+                let inputs = self.inputs.to_vec();
+                let program = Program::of(arena, inputs, &function, &HashMap::new(), Naming::Labelled);
                 program
                     .outputs
                     .into_iter()

@@ -1,22 +1,20 @@
 //! Equations of readings: the closed form that the model's one kinematic chain yields for symbols in the place of numbers.
 //!
-//! - [`symbol`]: the symbolic scalar, and the arena that holds its expressions;
+//! - [`symbol`]: symbols with names, and the arena that holds their expressions and derivatives;
 //! - [`variable`], [`subject`], [`session`]: what a symbol may stand for, what an equation is of;
 //! - [`effect`]: declared effects, coefficients and what they follow;
-//! - [`evaluate`], [`derivative`]: expressions at numbers, and their derivatives;
+//! - [`mod@evaluate`]: expressions at numbers;
 //! - [`polynomial`], [`normal`]: the exact normal form, in which equality is decided;
 //! - [`equation`]: the closed form of a reading, with its named vectors;
 //! - [`first`]: its first order, as a table of sensitivities; [`check`]: what confirms it before it is written;
 //! - [`program`], [`mod@print`]: as a sequence of steps, and in a language.
 
 pub mod check;
-pub mod derivative;
 pub mod effect;
 pub mod equation;
 pub mod error;
 pub mod evaluate;
 pub mod first;
-mod fold;
 mod forms;
 mod layout;
 pub mod normal;

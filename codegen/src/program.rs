@@ -2,7 +2,6 @@
 
 use std::collections::HashMap;
 
-use crate::fold::{binary_value, unary_value};
 use crate::symbol::{Arena, Binary, Node, NodeId, Operand, Unary, operands};
 use crate::variable::Variable;
 
@@ -59,8 +58,8 @@ impl Tree {
             Tree::Number(value) => *value,
             Tree::Input(place) => inputs[*place],
             Tree::Step(place) => steps[*place],
-            Tree::Unary(function, a) => unary_value(*function, a.value(inputs, steps)),
-            Tree::Binary(op, a, b) => binary_value(*op, a.value(inputs, steps), b.value(inputs, steps)),
+            Tree::Unary(function, a) => function.of(a.value(inputs, steps)),
+            Tree::Binary(op, a, b) => op.of(a.value(inputs, steps), b.value(inputs, steps)),
         }
     }
 }
@@ -125,59 +124,6 @@ pub enum Naming {
     Shared,
     /// Only those that have a name: for a reader.
     Labelled,
-}
-
-impl Arena {
-    /// The steps that compute `outputs`. `labels` names nodes by what they are.
-    pub fn program(
-        &self,
-        inputs: Vec<Input>,
-        outputs: &[Operand],
-        labels: &HashMap<NodeId, Label>,
-        naming: Naming,
-    ) -> Program {
-        let nodes = self.reachable(outputs);
-        let mut uses: HashMap<NodeId, usize> = HashMap::new();
-        let mut count = |operand: Operand| {
-            if let Operand::Node(id) = operand {
-                *uses.entry(id).or_default() += 1;
-            }
-        };
-        outputs.iter().copied().for_each(&mut count);
-        for id in &nodes {
-            operands(self.node(*id)).for_each(&mut count);
-        }
-        let mut builder = Builder {
-            arena: self,
-            inputs: &inputs,
-            places: HashMap::new(),
-        };
-        let mut steps = Vec::new();
-        let mut temporaries = 0;
-        for id in nodes {
-            // An angle whose sine and cosine are the inputs is itself none, and is not computed either.
-            if builder.input(id).is_some() || matches!(self.node(id), Node::Variable(_)) {
-                continue;
-            }
-            let label = match labels.get(&id) {
-                Some(label) => label.clone(),
-                None if naming == Naming::Shared && uses[&id] > 1 => {
-                    temporaries += 1;
-                    Label::Temporary(temporaries)
-                }
-                None => continue,
-            };
-            let value = builder.expand(id);
-            builder.places.insert(id, steps.len());
-            steps.push(Step { label, value });
-        }
-        let outputs = outputs.iter().map(|output| builder.tree(*output)).collect();
-        Program {
-            inputs,
-            steps,
-            outputs,
-        }
-    }
 }
 
 struct Builder<'a> {
@@ -278,6 +224,57 @@ impl Operations {
 }
 
 impl Program {
+    /// The steps that compute `outputs`. `labels` names nodes by what they are.
+    pub fn of(
+        arena: &Arena,
+        inputs: Vec<Input>,
+        outputs: &[Operand],
+        labels: &HashMap<NodeId, Label>,
+        naming: Naming,
+    ) -> Program {
+        let nodes = arena.reachable(outputs);
+        let mut uses: HashMap<NodeId, usize> = HashMap::new();
+        let mut count = |operand: Operand| {
+            if let Operand::Node(id) = operand {
+                *uses.entry(id).or_default() += 1;
+            }
+        };
+        outputs.iter().copied().for_each(&mut count);
+        for id in &nodes {
+            operands(arena.node(*id)).for_each(&mut count);
+        }
+        let mut builder = Builder {
+            arena,
+            inputs: &inputs,
+            places: HashMap::new(),
+        };
+        let mut steps = Vec::new();
+        let mut temporaries = 0;
+        for id in nodes {
+            // An angle whose sine and cosine are the inputs is itself none, and is not computed either.
+            if builder.input(id).is_some() || matches!(arena.node(id), Node::Variable(_)) {
+                continue;
+            }
+            let label = match labels.get(&id) {
+                Some(label) => label.clone(),
+                None if naming == Naming::Shared && uses[&id] > 1 => {
+                    temporaries += 1;
+                    Label::Temporary(temporaries)
+                }
+                None => continue,
+            };
+            let value = builder.expand(id);
+            builder.places.insert(id, steps.len());
+            steps.push(Step { label, value });
+        }
+        let outputs = outputs.iter().map(|output| builder.tree(*output)).collect();
+        Program {
+            inputs,
+            steps,
+            outputs,
+        }
+    }
+
     /// The outputs for the values of the inputs.
     pub fn run(&self, inputs: &[f64]) -> Vec<f64> {
         let mut steps = Vec::with_capacity(self.steps.len());

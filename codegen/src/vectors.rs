@@ -12,9 +12,9 @@ use abbe_model::instrument::rtest::Setting;
 use abbe_model::instrument::{Station, displaced, probe};
 use abbe_model::scalar::Nominal;
 
-use crate::derivative::Adjoints;
 use crate::program::Label;
 use crate::subject::Subject;
+use crate::symbol::Adjoints;
 use crate::symbol::{NodeId, Operand, Symbol};
 
 /// A vector with a name, such as the workpiece ball in the frame of axis A.

@@ -80,7 +80,7 @@ pub fn samples(
             } else {
                 station.tool_point_mm()
             };
-            let moment = |row| machine.gravity_moment_mm(axis, model.state(row), point) / 1000.0;
+            let moment = |row| machine.gravity_moment_mm(axis, &model.state(row), point) / 1000.0;
             Some((0..model.rows()).map(|row| plain(moment(row), 0.0)).collect())
         }
     }

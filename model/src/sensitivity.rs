@@ -1,19 +1,22 @@
-//! Readings of a test and their derivatives by every component, by dual numbers through the one chain.
+//! Readings of a test and their derivatives by every component, through the one chain.
 //!
 //! A *slot* is a component that the chain can see: the machine's errors ([`crate::chain::ERRORS_PER_AXIS`] an axis), then the instrument's own
-//! unknowns. Slots are seeded in packs; a slot that is neither seeded nor different from zero is left out of the chain altogether.
+//! unknowns. The chain is recorded once for a test, with symbols; its derivatives by all slots follow by reverse accumulation on what was recorded,
+//! at the price of a few readings however many slots there are; both are [replayed](crate::replay) over the columns of readings. An axis that stands
+//! still in a test is a constant of the recording, and a slot that is neither asked for nor different from zero is left out of it.
+
+use std::collections::HashMap;
+use std::ops::Range;
+use std::sync::{Arc, Mutex, PoisonError};
 
 use crate::axis::AxisKind;
-use crate::chain::{AxisPosition, BodyErrors, Machine};
-use crate::gradient::Gradient;
+use crate::chain::{AxisPosition, Machine};
+use crate::expression::{Arena, Operand, Symbol};
+use crate::frames::Turn;
 use crate::instrument::Station;
-use crate::scalar::Scalar;
+use crate::replay::Replay;
+use crate::scalar::Nominal;
 use crate::session::readings::Readings;
-
-/// Slots seeded at once.
-const PACK: usize = 8;
-
-type PackDual = Gradient<PACK>;
 
 /// What the components are, reading by reading.
 #[derive(Clone, Debug, Default)]
@@ -33,17 +36,19 @@ impl SlotValues {
         }
     }
 
-    fn at(&self, slot: usize, row: usize) -> f64 {
-        let varying = self.varying.iter().filter(|(varied, _)| *varied == slot);
-        self.constant[slot] + varying.map(|(_, values)| values[row]).sum::<f64>()
-    }
-
-    fn is_zero(&self, slot: usize) -> bool {
-        self.constant[slot] == 0.0 && self.varying.iter().all(|(varied, _)| *varied != slot)
-    }
-
     fn varies(&self, slot: usize) -> bool {
         self.varying.iter().any(|(varied, _)| *varied == slot)
+    }
+
+    /// What a varying slot is at some rows.
+    fn column(&self, slot: usize, rows: Range<usize>) -> Vec<f64> {
+        let mut sum = vec![self.constant[slot]; rows.len()];
+        for (_, values) in self.varying.iter().filter(|(varied, _)| *varied == slot) {
+            for (sum, value) in sum.iter_mut().zip(&values[rows.clone()]) {
+                *sum += value;
+            }
+        }
+        sum
     }
 }
 
@@ -58,30 +63,99 @@ pub struct Sensitivities {
     pub derivatives: Vec<Vec<f64>>,
 }
 
-/// A test made ready: its states with sines and cosines taken once.
+/// What the recorded chain is a function of.
+#[derive(Clone, Copy, Debug, PartialEq)]
+enum Quantity {
+    /// Position of an axis that moves, by its place in the machine.
+    Position(usize),
+    /// The sine of that position.
+    Sine(usize),
+    /// The cosine of that position.
+    Cosine(usize),
+    /// A component.
+    Slot { slot: usize, varies: bool },
+}
+
+/// What a recording depends on: which slots there are, whether they vary, and which of them derivatives are taken by.
+#[derive(Clone, Debug, PartialEq, Eq, Hash)]
+struct Carried {
+    slots: Vec<(usize, bool)>,
+    derivatives: Vec<usize>,
+}
+
+/// Where an axis stands, row by row.
+#[derive(Clone, Debug)]
+enum Course {
+    /// The same at every row.
+    Still(AxisPosition<f64>),
+    /// Positions, and sines and cosines of a rotary axis, taken once.
+    Moving {
+        position: Vec<f64>,
+        sine: Vec<f64>,
+        cosine: Vec<f64>,
+    },
+}
+
+impl Course {
+    fn new(kind: AxisKind, positions: &[f64]) -> Course {
+        let first = positions.first().copied().unwrap_or(0.0);
+        if positions.iter().all(|position| *position == first) {
+            return Course::Still(AxisPosition::new(kind, first));
+        }
+        let (sine, cosine) = match kind {
+            AxisKind::Rotary => positions.iter().map(|position| position.sin_cos()).unzip(),
+            AxisKind::Linear => (Vec::new(), Vec::new()),
+        };
+        Course::Moving {
+            position: positions.to_vec(),
+            sine,
+            cosine,
+        }
+    }
+
+    fn at(&self, row: usize) -> AxisPosition<f64> {
+        match self {
+            Course::Still(position) => *position,
+            Course::Moving {
+                position,
+                sine,
+                cosine,
+            } => AxisPosition {
+                value: position[row],
+                turn: match sine.get(row) {
+                    Some(sin) => Turn {
+                        sin: *sin,
+                        cos: cosine[row],
+                    },
+                    None => Turn { sin: 0.0, cos: 1.0 },
+                },
+            },
+        }
+    }
+}
+
+/// A test made ready: its states with sines and cosines taken once, and its chain as it was recorded.
 #[derive(Clone, Debug)]
 pub struct TestModel<'a> {
     machine: &'a Machine,
     station: Station<f64>,
-    states: Vec<AxisPosition<f64>>,
+    courses: Vec<Course>,
     rows: usize,
+    recorded: Arc<Mutex<HashMap<Carried, Arc<Replay<Quantity>>>>>,
 }
 
 impl<'a> TestModel<'a> {
     /// From the states that the readings list.
     pub fn new(machine: &'a Machine, station: Station<f64>, readings: &Readings) -> Self {
-        let rows = readings.rows();
-        let mut states = Vec::with_capacity(rows * machine.axes.len());
-        for row in 0..rows {
-            for (axis, column) in machine.axes.iter().zip(&readings.positions) {
-                states.push(AxisPosition::new(axis.kind, column[row]));
-            }
-        }
+        let axes = machine.axes.iter().zip(&readings.positions);
         TestModel {
             machine,
             station,
-            states,
-            rows,
+            courses: axes
+                .map(|(axis, positions)| Course::new(axis.kind, positions))
+                .collect(),
+            rows: readings.rows(),
+            recorded: Arc::default(),
         }
     }
 
@@ -119,112 +193,169 @@ impl<'a> TestModel<'a> {
     }
 
     /// Where the axes stand at a row.
-    pub fn state(&self, row: usize) -> &[AxisPosition<f64>] {
-        let axes = self.machine.axes.len();
-        &self.states[row * axes..(row + 1) * axes]
+    pub fn state(&self, row: usize) -> Vec<AxisPosition<f64>> {
+        self.courses.iter().map(|course| course.at(row)).collect()
     }
 
-    /// The instrument's unknowns at a row, from slots for which `carried` holds.
-    fn unknowns<S: Scalar<Nominal = f64>>(
-        &self,
-        carried: impl Fn(usize) -> bool,
-        slot: impl Fn(usize) -> S,
-    ) -> Vec<Option<S>> {
-        let range = self.machine.error_slots()..self.slots();
-        range.map(|index| carried(index).then(|| slot(index))).collect()
+    /// The recorded chain: the reading's coordinates, then for each of them its derivatives by the slots asked for.
+    fn recording(&self, values: &SlotValues, derivatives: &[usize]) -> Arc<Replay<Quantity>> {
+        let slots = (0..self.slots())
+            .filter(|slot| {
+                derivatives.contains(slot) || values.constant[*slot] != 0.0 || values.varies(*slot)
+            })
+            .map(|slot| (slot, values.varies(slot)))
+            .collect();
+        let carried = Carried {
+            slots,
+            derivatives: derivatives.to_vec(),
+        };
+        // A thread that panicked left whole recordings behind or none.
+        let mut recorded = self.recorded.lock().unwrap_or_else(PoisonError::into_inner);
+        match recorded.get(&carried) {
+            Some(replay) => replay.clone(),
+            None => {
+                let replay = Arc::new(self.record(&carried));
+                recorded.insert(carried, replay.clone());
+                replay
+            }
+        }
     }
 
-    /// The reading at a row.
-    fn read<S: Scalar<Nominal = f64>>(
+    fn record(&self, carried: &Carried) -> Replay<Quantity> {
+        let arena = Arena::new();
+        let constant = Symbol::constant;
+        let state: Vec<AxisPosition<Symbol<'_, Quantity>>> =
+            (self.machine.axes.iter().zip(&self.courses).enumerate())
+                .map(|(index, (axis, course))| match course {
+                    Course::Still(position) => AxisPosition {
+                        value: constant(position.value),
+                        turn: Turn {
+                            sin: constant(position.turn.sin),
+                            cos: constant(position.turn.cos),
+                        },
+                    },
+                    Course::Moving { .. } => AxisPosition {
+                        value: arena.variable(Quantity::Position(index)),
+                        turn: match axis.kind {
+                            AxisKind::Rotary => Turn {
+                                sin: arena.variable(Quantity::Sine(index)),
+                                cos: arena.variable(Quantity::Cosine(index)),
+                            },
+                            AxisKind::Linear => Turn {
+                                sin: constant(0.0),
+                                cos: constant(1.0),
+                            },
+                        },
+                    },
+                })
+                .collect();
+        let slots: HashMap<usize, Symbol<'_, Quantity>> = (carried.slots.iter())
+            .map(|&(slot, varies)| (slot, arena.variable(Quantity::Slot { slot, varies })))
+            .collect();
+        let bodies = self
+            .machine
+            .body_errors(|slot| slots.contains_key(&slot), |slot| slots[&slot]);
+        let first = self.machine.error_slots();
+        let station = self.station.map(|number| constant(*number));
+        let reading = station.read(self.machine, &state, &bodies, |unknown| {
+            slots.get(&(first + unknown)).copied()
+        });
+        let coordinates: Vec<Operand> = reading
+            .coordinates()
+            .iter()
+            .map(|value| value.operand())
+            .collect();
+        let by: Vec<Operand> = carried
+            .derivatives
+            .iter()
+            .map(|slot| slots[slot].operand())
+            .collect();
+        let gradients = coordinates
+            .iter()
+            .flat_map(|coordinate| arena.gradient(*coordinate, &by));
+        let outputs: Vec<Operand> = coordinates.iter().copied().chain(gradients).collect();
+        Replay::new(&arena, &outputs, |quantity| match quantity {
+            Quantity::Slot { varies, .. } => *varies,
+            Quantity::Position(_) | Quantity::Sine(_) | Quantity::Cosine(_) => true,
+        })
+    }
+
+    /// The readings of a range of rows and their derivatives by `slots`, block by block, for whom they need not stand in memory all at once: `put` takes
+    /// an output by its number (the reading's coordinates in mm, then for each coordinate its derivative by each slot), the first row of the block
+    /// counted from the first row asked for, and a value a row.
+    pub fn sweep(
         &self,
-        row: usize,
-        bodies: &[BodyErrors<S>],
-        unknowns: &[Option<S>],
-    ) -> crate::instrument::Reading<S> {
-        self.station
-            .read(self.machine, self.state(row), bodies, |unknown| unknowns[unknown])
+        values: &SlotValues,
+        derivatives: &[usize],
+        rows: Range<usize>,
+        put: impl FnMut(usize, usize, &[f64]),
+    ) {
+        let recording = self.recording(values, derivatives);
+        let varying: HashMap<usize, Vec<f64>> = (values.varying.iter())
+            .map(|(slot, _)| (*slot, values.column(*slot, rows.clone())))
+            .collect();
+        let course = |axis: usize| match &self.courses[axis] {
+            Course::Moving {
+                position,
+                sine,
+                cosine,
+            } => [position, sine, cosine].map(|column| column.as_slice()),
+            Course::Still(_) => [&[][..]; 3],
+        };
+        recording.run(
+            rows.len(),
+            |quantity| match quantity {
+                Quantity::Slot { slot, .. } => values.constant[*slot],
+                Quantity::Position(_) | Quantity::Sine(_) | Quantity::Cosine(_) => f64::NAN,
+            },
+            |quantity| match quantity {
+                Quantity::Position(axis) => &course(*axis)[0][rows.clone()],
+                Quantity::Sine(axis) => &course(*axis)[1][rows.clone()],
+                Quantity::Cosine(axis) => &course(*axis)[2][rows.clone()],
+                Quantity::Slot { slot, .. } => &varying[slot],
+            },
+            put,
+        );
     }
 
     /// The readings, mm: rows × coordinates.
     pub fn readings_mm(&self, values: &SlotValues) -> Vec<f64> {
-        let carried = |slot: usize| !values.is_zero(slot);
-        let errors = self.machine.error_slots();
-        let machine_varies = (0..errors).any(|slot| values.varies(slot));
-        let instrument_varies = (errors..self.slots()).any(|slot| values.varies(slot));
-        let bodies_at = |row: usize| self.machine.body_errors(carried, |slot| values.at(slot, row));
-        let unknowns_at = |row: usize| self.unknowns(carried, |slot| values.at(slot, row));
-        if self.rows == 0 {
-            return Vec::new();
-        }
-        let (mut bodies, mut unknowns) = (bodies_at(0), unknowns_at(0));
-        let mut readings = Vec::with_capacity(self.rows * self.coordinates());
-        for row in 0..self.rows {
-            if machine_varies && row > 0 {
-                bodies = bodies_at(row);
-            }
-            if instrument_varies && row > 0 {
-                unknowns = unknowns_at(row);
-            }
-            let reading = self.read(row, &bodies, &unknowns);
-            readings.extend_from_slice(reading.coordinates());
-        }
+        let coordinates = self.coordinates();
+        let mut readings = vec![0.0; self.rows * coordinates];
+        self.sweep(values, &[], 0..self.rows, |coordinate, start, column| {
+            place(&mut readings, coordinates, coordinate, start, column);
+        });
         readings
     }
 
     /// The readings of a range of rows and their derivatives by `slots`.
-    pub fn sensitivities(
-        &self,
-        values: &SlotValues,
-        slots: &[usize],
-        rows: std::ops::Range<usize>,
-    ) -> Sensitivities {
-        let scalars = rows.len() * self.coordinates();
+    pub fn sensitivities(&self, values: &SlotValues, slots: &[usize], rows: Range<usize>) -> Sensitivities {
+        let coordinates = self.coordinates();
+        let scalars = rows.len() * coordinates;
         let mut result = Sensitivities {
             slots: slots.to_vec(),
-            readings_mm: Vec::with_capacity(scalars),
-            derivatives: vec![Vec::with_capacity(scalars); slots.len()],
+            readings_mm: vec![0.0; scalars],
+            derivatives: vec![vec![0.0; scalars]; slots.len()],
         };
-        if rows.is_empty() {
-            return result;
-        }
-        let errors = self.machine.error_slots();
-        let machine_varies = (0..errors).any(|slot| values.varies(slot));
-        let instrument_varies = (errors..self.slots()).any(|slot| values.varies(slot));
-        let packs: Vec<&[usize]> = if slots.is_empty() {
-            vec![&[]]
-        } else {
-            slots.chunks(PACK).collect()
-        };
-        for (pack_index, pack) in packs.iter().enumerate() {
-            let carried = |slot: usize| pack.contains(&slot) || !values.is_zero(slot);
-            let seeded = |slot: usize, row: usize| -> PackDual {
-                let value = values.at(slot, row);
-                match pack.iter().position(|seed| *seed == slot) {
-                    Some(place) => PackDual::seed(value, place),
-                    None => PackDual::constant(value),
-                }
+        self.sweep(values, slots, rows, |output, start, column| {
+            let (coordinate, into) = match output.checked_sub(coordinates) {
+                None => (output, &mut result.readings_mm),
+                Some(by) => (by / slots.len(), &mut result.derivatives[by % slots.len()]),
             };
-            let bodies_at = |row: usize| self.machine.body_errors(carried, |slot| seeded(slot, row));
-            let unknowns_at = |row: usize| self.unknowns(carried, |slot| seeded(slot, row));
-            let (mut bodies, mut unknowns) = (bodies_at(rows.start), unknowns_at(rows.start));
-            for row in rows.clone() {
-                if machine_varies && row > rows.start {
-                    bodies = bodies_at(row);
-                }
-                if instrument_varies && row > rows.start {
-                    unknowns = unknowns_at(row);
-                }
-                let reading = self.read(row, &bodies, &unknowns);
-                for value in reading.coordinates() {
-                    if pack_index == 0 {
-                        result.readings_mm.push(value.value);
-                    }
-                    for place in 0..pack.len() {
-                        result.derivatives[pack_index * PACK + place].push(value.by[place]);
-                    }
-                }
-            }
-        }
+            place(into, coordinates, coordinate, start, column);
+        });
         result
     }
+}
+
+/// Writes a coordinate of consecutive readings among the others: `into` is readings × coordinates.
+fn place(into: &mut [f64], coordinates: usize, coordinate: usize, start: usize, column: &[f64]) {
+    if coordinates == 1 {
+        into[start..start + column.len()].copy_from_slice(column);
+        return;
+    }
+    let places = into[start * coordinates + coordinate..]
+        .iter_mut()
+        .step_by(coordinates);
+    places.zip(column).for_each(|(place, value)| *place = *value);
 }

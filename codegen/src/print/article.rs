@@ -209,9 +209,8 @@ pub(crate) fn as_it_stands(equation: &Equation, program: &Program, operand: Oper
     });
     let none = HashMap::new();
     let own = || {
-        equation
-            .arena
-            .program(equation.inputs(), &[operand], &none, Naming::Labelled)
+        let inputs = equation.inputs();
+        Program::of(&equation.arena, inputs, &[operand], &none, Naming::Labelled)
     };
     named.map_or_else(|| own().outputs[0].clone(), Tree::Step)
 }

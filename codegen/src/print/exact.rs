@@ -55,9 +55,13 @@ pub(crate) fn sections(equation: &Equation) -> (Program, Vec<Section>) {
     asked.extend(forth.iter().chain(&back).flat_map(|vector| vector.components));
     asked.extend(&slopes);
     asked.extend(equation.followers.iter().map(|(_, value)| *value));
-    let mut program = equation
-        .arena
-        .program(equation.inputs(), &asked, &labels, Naming::Labelled);
+    let mut program = Program::of(
+        &equation.arena,
+        equation.inputs(),
+        &asked,
+        &labels,
+        Naming::Labelled,
+    );
     let (outputs, rest) = program.outputs.split_at(equation.outputs.len());
     let (rest, followers) = rest.split_at(rest.len() - equation.followers.len());
     let (vectors, slopes) = rest.split_at(rest.len() - slopes.len());

@@ -1,5 +1,6 @@
 //! The chain over symbols against the chain over numbers.
 
+use abbe_codegen::evaluate::evaluate_f64;
 use abbe_codegen::{Equation, Options, Variable};
 use abbe_model::chain::AxisPosition;
 use abbe_model::frames::Rotation;
@@ -57,28 +58,26 @@ fn the_symbolic_chain_evaluates_to_the_chain_over_numbers() {
             let bodies = machine.body_errors(|s| slot(s).is_some(), |s| slot(s).map_or(0.0, |i| values[i]));
             let expected = Station::BallBar(bar).read::<f64>(&machine, &state, &bodies, |_| None);
             let expected = expected.coordinates()[0];
-            let found = equation
-                .arena
-                .evaluate_f64(&equation.exact, |variable| match variable {
-                    Variable::Length(name) => match name.as_str() {
-                        "R" => r,
-                        "H" => h,
-                        "Z_CA" => z_ca,
-                        _ => d,
-                    },
-                    Variable::Position { axis, .. } => {
-                        if axis == "A" {
-                            a
-                        } else {
-                            c
-                        }
+            let found = evaluate_f64(&equation.arena, &equation.exact, |variable| match variable {
+                Variable::Length(name) => match name.as_str() {
+                    "R" => r,
+                    "H" => h,
+                    "Z_CA" => z_ca,
+                    _ => d,
+                },
+                Variable::Position { axis, .. } => {
+                    if axis == "A" {
+                        a
+                    } else {
+                        c
                     }
-                    Variable::Error(name) => errors
-                        .iter()
-                        .position(|e| e == name)
-                        .map_or(f64::NAN, |i| values[i]),
-                    Variable::Unknown(_) | Variable::Driver(_) | Variable::Coefficient(_) => f64::NAN,
-                });
+                }
+                Variable::Error(name) => errors
+                    .iter()
+                    .position(|e| e == name)
+                    .map_or(f64::NAN, |i| values[i]),
+                Variable::Unknown(_) | Variable::Driver(_) | Variable::Coefficient(_) => f64::NAN,
+            });
             let found = found.expect("plain numbers")[0];
             assert!((found - expected).abs() <= 1e-12 * expected, "{found} {expected}");
         }

@@ -2,6 +2,7 @@
 
 use std::f64::consts::{PI, TAU};
 
+use abbe_codegen::evaluate::evaluate_f64;
 use abbe_codegen::{CodegenError, Equation, Followed, Language, Options, Order, Source, Subject, Variable};
 use abbe_model::chain::Machine;
 use abbe_model::component::ErrorName;
@@ -63,11 +64,8 @@ fn bases(driver: &str, shape: Shape, at: At) -> Vec<f64> {
         other => panic!("{other:?} has no place here"),
     };
     let slopes = equation.gradients()[1].clone();
-    let found = equation.arena.evaluate_f64(&slopes, variable).expect("numbers");
-    let value = equation
-        .arena
-        .evaluate_f64(&equation.outputs, variable)
-        .expect("numbers")[1];
+    let found = evaluate_f64(&equation.arena, &slopes, variable).expect("numbers");
+    let value = evaluate_f64(&equation.arena, &equation.outputs, variable).expect("numbers")[1];
     let sum: f64 = found.iter().enumerate().map(|(k, b)| (k + 1) as f64 * b).sum();
     assert!((value - sum).abs() <= 1e-12 * (1.0 + sum.abs()), "{value} {sum}");
     found

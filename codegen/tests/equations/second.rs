@@ -1,5 +1,6 @@
 //! Second derivatives: their own expressions against central differences of the gradient that dual numbers give at large random errors.
 
+use abbe_codegen::evaluate::evaluate;
 use abbe_codegen::{Equation, Options, Source, Subject, Value, Variable};
 use abbe_model::chain::{AxisPosition, Machine};
 use abbe_model::component::ErrorName;
@@ -149,7 +150,7 @@ fn agrees(what: &str, source: &impl Source, machine: &Machine, errors: &[ErrorNa
             .iter()
             .map(|rows| {
                 rows.iter()
-                    .map(|row| equation.arena.evaluate(row, value).expect("numbers"))
+                    .map(|row| evaluate(&equation.arena, row, value).expect("numbers"))
                     .collect()
             })
             .collect();

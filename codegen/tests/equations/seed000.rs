@@ -1,5 +1,7 @@
 //! Equations of seed 000 (a thesis on ball-bar tests of a five-axis machine), entered by hand as printed, decided against the chain.
 
+use abbe_codegen::evaluate::evaluate;
+use abbe_codegen::symbol::length;
 use abbe_codegen::{Arena, Equation, Operand, Options, Ring, Symbol, Variable};
 use abbe_model::axis::AxisKind;
 use abbe_model::chain::Machine;
@@ -51,9 +53,9 @@ impl<'a> Printed<'a> {
             e_y0c: error(arena, "e_y0c"),
             tx0c: error(arena, "θ_x0c"),
             ty0c: error(arena, "θ_y0c"),
-            r: arena.length("R"),
-            h: arena.length("H"),
-            z_ca: arena.length("Z_CA"),
+            r: length(arena, "R"),
+            h: length(arena, "H"),
+            z_ca: length(arena, "Z_CA"),
             sa,
             ca,
             sc,
@@ -146,8 +148,8 @@ fn eq_3_21_is_the_chain_for_any_d() {
         .map(|c| arena.symbol(c));
     let chain = sum_of_squares(bar);
     assert_eq!(chain.sqrt().operand(), equation.exact[0]);
-    let printed = sum_of_squares(Printed::new(arena).groups(arena.length("D")));
-    let wrong = sum_of_squares(Printed::new(arena).groups(-arena.length("D")));
+    let printed = sum_of_squares(Printed::new(arena).groups(length(arena, "D")));
+    let wrong = sum_of_squares(Printed::new(arena).groups(-length(arena, "D")));
     let mut ring = Ring::exact(arena);
     assert!(
         ring.equal(printed.operand(), chain.operand())
@@ -198,7 +200,7 @@ fn eq_3_21_with_the_printed_d_and_with_the_right_one() {
         let equation = Equation::of(&machine, &Bar { printed }, &eight(), &Options::default());
         let equation = equation.expect("an equation");
         let arena = &equation.arena;
-        let (r, l) = (arena.length("R"), arena.length("L"));
+        let (r, l) = (length(arena, "R"), length(arena, "L"));
         let d = if printed {
             arena.symbol(Operand::constant(50.0 * 2.0_f64.sqrt()))
         } else {
@@ -219,12 +221,12 @@ fn eq_3_21_with_the_printed_d_and_with_the_right_one() {
         );
 
         // Without errors, at C = 0 and H = Z_CA, the bar must be as long as it is: only the right D has it so.
-        let nominal = arena.evaluate::<Symbol<'_>>(&[chain.operand()], |variable| {
+        let nominal = evaluate::<Symbol<'_>>(arena, &[chain.operand()], |variable| {
             let zero = arena.symbol(Operand::constant(0.0));
             abbe_codegen::Value::Nominal(match variable {
                 Variable::Error(_) | Variable::Unknown(_) => zero,
                 Variable::Position { axis, .. } if axis == "C" => zero,
-                Variable::Length(name) if name == "H" => arena.length("Z_CA"),
+                Variable::Length(name) if name == "H" => length(arena, "Z_CA"),
                 other => arena.variable(other.clone()),
             })
         });
@@ -258,7 +260,7 @@ fn the_matrices_of_eqs_3_2_and_3_3() {
     use abbe_model::frames::Point;
     let arena = Arena::new();
     let p = Printed::new(&arena);
-    let (x, y, z) = (arena.length("x"), arena.length("y"), arena.length("z"));
+    let (x, y, z) = (length(&arena, "x"), length(&arena, "y"), length(&arena, "z"));
     let machine: Machine = hermle(Rotation::SmallAngle);
     let names = eight();
     let slot_symbol = |slot: usize| arena.variable(Variable::Error(machine.error_name(slot)));
@@ -335,7 +337,7 @@ fn the_first_order_term_for_term() {
         cc,
         ..
     } = Printed::new(arena);
-    let (h, d) = (h - z_ca, arena.length("D"));
+    let (h, d) = (h - z_ca, length(arena, "D"));
     let two = arena.symbol(Operand::constant(2.0));
     let zero = arena.symbol(Operand::constant(0.0));
     let (y, z) = (r * cc * ca - h * sa, r * cc * sa + h * ca);

@@ -1,6 +1,7 @@
 //! Section VI of seed 003 (volumetric errors of machines with two rotary axes on the table) against the chain, and the
 //! same for every arrangement, with the nominal turns that the paper leaves out.
 
+use abbe_codegen::symbol::length;
 use abbe_codegen::{Arena, Equation, Operand, Options, Ring, Source, Subject, Symbol, ToolPoint, Variable};
 use abbe_model::axis::AxisKind;
 use abbe_model::chain::Machine;
@@ -56,7 +57,7 @@ fn the_three_expressions_of_section_vi() {
     let arena = &equation.arena;
     let e = |name: &str| error(arena, name);
     let (x, y, z) = (position(arena, "X"), position(arena, "Y"), position(arena, "Z"));
-    let (xt, yt, zt) = (arena.length("X_t"), arena.length("Y_t"), arena.length("Z_t"));
+    let (xt, yt, zt) = (length(arena, "X_t"), length(arena, "Y_t"), length(arena, "Z_t"));
     // The paper's δx(X), ∂X_C … are defined against R in T_X, T_C and T_A; β₁ is −EB0Z, β₂ is EA0Z, α is EC0X.
     let (dx_x, dy_x, dz_x) = (-e("EXX"), e("EYX"), e("EZX"));
     let (dx_y, dy_y, dz_y) = (e("EXY"), e("EYY"), e("EZY"));
@@ -154,7 +155,7 @@ fn by_rigid_bodies<'a>(arena: &'a Arena, machine: &Machine) -> Vector<'a> {
         let q = position(arena, &axis.name);
         axis.direction.map(|d| if d == 0.0 { zero } else { q })
     };
-    let mut point = ["X_t", "Y_t", "Z_t"].map(|name| arena.length(name));
+    let mut point = ["X_t", "Y_t", "Z_t"].map(|name| length(arena, name));
     let mut displacement = [zero; 3];
     for axis in machine.axes[machine.workpiece_side..].iter().rev() {
         let (shift, tilt) = six(&axis.name);

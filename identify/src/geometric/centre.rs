@@ -184,7 +184,7 @@ fn balls(
     on_table: bool,
 ) -> ([f64; 3], [f64; 3]) {
     let none = vec![BodyErrors::<f64>::NONE; machine.axes.len()];
-    let (workpiece, spindle) = bar.balls::<f64>(machine, model.state(row), &none, &|_| None);
+    let (workpiece, spindle) = bar.balls::<f64>(machine, &model.state(row), &none, &|_| None);
     if on_table {
         (workpiece.0, spindle.0)
     } else {
@@ -195,7 +195,7 @@ fn balls(
 /// A point of an axis and its direction in R, carried by the axes between it and the bed as they stand in the first reading.
 fn line(machine: &Machine, model: &TestModel<'_>, axis: usize) -> ([f64; 3], [f64; 3]) {
     let none = vec![BodyErrors::<f64>::NONE; machine.axes.len()];
-    let state = model.state(0);
+    let state = &model.state(0);
     let in_r = |point: [f64; 3]| {
         let outward: Vec<usize> = if axis < machine.workpiece_side {
             (axis + 1..machine.workpiece_side).collect()

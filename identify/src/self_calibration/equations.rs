@@ -253,7 +253,7 @@ impl Equations {
         model: &TestModel<'_>,
         row: usize,
     ) -> Place {
-        let state = model.state(row);
+        let state = &model.state(row);
         let none = vec![BodyErrors::<f64>::NONE; machine.axes.len()];
         let origin = machine.axes[self.axis].origin_mm;
         let stylus = machine.tool_point::<f64>(state, &none, Point(probe.stylus));

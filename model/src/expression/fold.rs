@@ -3,39 +3,12 @@
 //! Constants are computed, 0, 1 and −1 drop out, and a minus sign moves outwards until a difference takes it up. Signs and powers
 //! of two move without rounding, so a folded expression evaluates to the same bits as the unfolded one (but for the sign of zero).
 
-use abbe_model::scalar::Nominal;
-
-use crate::symbol::{Arena, Binary, Node, Operand, Unary};
-
-/// A function of a constant.
-pub(crate) fn unary_value(op: Unary, value: f64) -> f64 {
-    match op {
-        Unary::Neg => -value,
-        Unary::Sin => value.sin(),
-        Unary::Cos => value.cos(),
-        Unary::Sqrt => value.sqrt(),
-        Unary::Exp => value.exp(),
-        Unary::Signum => Nominal::signum(value),
-        Unary::Step => value.step(),
-        Unary::Floor => value.floor(),
-        Unary::Round => value.round(),
-    }
-}
-
-/// An operation on two constants.
-pub(crate) fn binary_value(op: Binary, a: f64, b: f64) -> f64 {
-    match op {
-        Binary::Add => a + b,
-        Binary::Sub => a - b,
-        Binary::Mul => a * b,
-        Binary::Div => a / b,
-    }
-}
+use super::{Arena, Binary, Node, Operand, Unary};
 
 /// A function of an operand.
-pub(crate) fn unary(arena: &Arena, op: Unary, a: Operand) -> Operand {
+pub(crate) fn unary<V: Clone + PartialEq>(arena: &Arena<V>, op: Unary, a: Operand) -> Operand {
     if let Some(value) = a.known() {
-        return Operand::constant(unary_value(op, value));
+        return Operand::constant(op.of(value));
     }
     let node = arena.node_of(a);
     match (op, node) {
@@ -52,9 +25,9 @@ pub(crate) fn unary(arena: &Arena, op: Unary, a: Operand) -> Operand {
 }
 
 /// An operation on two operands.
-pub(crate) fn binary(arena: &Arena, op: Binary, a: Operand, b: Operand) -> Operand {
+pub(crate) fn binary<V: Clone + PartialEq>(arena: &Arena<V>, op: Binary, a: Operand, b: Operand) -> Operand {
     if let (Some(a), Some(b)) = (a.known(), b.known()) {
-        return Operand::constant(binary_value(op, a, b));
+        return Operand::constant(op.of(a, b));
     }
     match op {
         Binary::Add => add(arena, a, b),
@@ -64,7 +37,7 @@ pub(crate) fn binary(arena: &Arena, op: Binary, a: Operand, b: Operand) -> Opera
     }
 }
 
-fn add(arena: &Arena, a: Operand, b: Operand) -> Operand {
+fn add<V: Clone + PartialEq>(arena: &Arena<V>, a: Operand, b: Operand) -> Operand {
     if a.known() == Some(0.0) {
         return b;
     }
@@ -80,7 +53,7 @@ fn add(arena: &Arena, a: Operand, b: Operand) -> Operand {
     arena.intern(Node::Binary(Binary::Add, a, b))
 }
 
-fn sub(arena: &Arena, a: Operand, b: Operand) -> Operand {
+fn sub<V: Clone + PartialEq>(arena: &Arena<V>, a: Operand, b: Operand) -> Operand {
     if b.known() == Some(0.0) {
         return a;
     }
@@ -100,7 +73,7 @@ fn sub(arena: &Arena, a: Operand, b: Operand) -> Operand {
     arena.intern(Node::Binary(Binary::Sub, a, b))
 }
 
-fn mul(arena: &Arena, a: Operand, b: Operand) -> Operand {
+fn mul<V: Clone + PartialEq>(arena: &Arena<V>, a: Operand, b: Operand) -> Operand {
     let (a, b) = if b.known().is_some() { (b, a) } else { (a, b) };
     match a.known() {
         Some(0.0) => return Operand::constant(0.0),
@@ -140,7 +113,7 @@ fn mul(arena: &Arena, a: Operand, b: Operand) -> Operand {
     arena.intern(Node::Binary(Binary::Mul, a, b))
 }
 
-fn div(arena: &Arena, a: Operand, b: Operand) -> Operand {
+fn div<V: Clone + PartialEq>(arena: &Arena<V>, a: Operand, b: Operand) -> Operand {
     if a.known() == Some(0.0) {
         return a;
     }
@@ -164,7 +137,7 @@ fn div(arena: &Arena, a: Operand, b: Operand) -> Operand {
 }
 
 /// `x` where the operand is `−x` in so many words: a negation, a negative constant, a product with one.
-fn without_minus(arena: &Arena, operand: Operand) -> Option<Operand> {
+fn without_minus<V: Clone + PartialEq>(arena: &Arena<V>, operand: Operand) -> Option<Operand> {
     if let Some(value) = operand.known() {
         return (value < 0.0).then(|| Operand::constant(-value));
     }

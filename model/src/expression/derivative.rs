@@ -12,7 +12,7 @@
 
 use std::collections::HashMap;
 
-use crate::symbol::{Arena, Binary, Node, NodeId, Operand, Symbol, Unary, operands};
+use super::{Arena, Binary, Node, NodeId, Operand, Symbol, Unary, operands};
 
 /// `∂output/∂node` for the nodes that the variables of interest reach.
 #[derive(Clone, Debug, Default)]
@@ -27,7 +27,12 @@ impl Adjoints {
         }
     }
 
-    fn add<'a>(&mut self, arena: &'a Arena, operand: Operand, contribution: Symbol<'a>) {
+    fn add<'a, V: Clone + PartialEq>(
+        &mut self,
+        arena: &'a Arena<V>,
+        operand: Operand,
+        contribution: Symbol<'a, V>,
+    ) {
         if let Operand::Node(id) = operand {
             let sum = match self.0.get(&id) {
                 Some(sum) => arena.symbol(*sum) + contribution,
@@ -38,7 +43,7 @@ impl Adjoints {
     }
 }
 
-impl Arena {
+impl<V: Clone + PartialEq> Arena<V> {
     /// The derivatives of `output` by every node between it and `variables`.
     pub fn adjoints(&self, output: Operand, variables: &[Operand]) -> Adjoints {
         let mut adjoints = Adjoints::default();
@@ -63,7 +68,7 @@ impl Arena {
             };
             let w = self.symbol(weight);
             let n = self.symbol(Operand::Node(id));
-            let mut pass = |operand: Operand, contribution: Symbol<'_>| {
+            let mut pass = |operand: Operand, contribution: Symbol<'_, V>| {
                 if is_active(operand) {
                     adjoints.add(self, operand, self.symbol(contribution.operand()));
                 }
