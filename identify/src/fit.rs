@@ -4,6 +4,7 @@
 //! be seen stays at its nominal value and is reported as a combination, never as a number. Uncertainties follow from the law of propagation,
 //! `Cov = N (Nᵀ JᵀV⁻¹J N)⁻¹ Nᵀ` with `N` the seen directions (JCGM 100, 5.2; JCGM 102, 6.2).
 
+use std::cell::RefCell;
 use std::collections::BTreeMap;
 
 use abbe_model::effect::Shape;
@@ -13,7 +14,7 @@ use statrs::distribution::{ChiSquared, ContinuousCDF};
 
 use crate::error::IdentifyError;
 use crate::heldout::{HeldOut, held_out, rms_mm};
-use crate::least_squares::{LeastSquares, Scaling, Solution, minimise};
+use crate::least_squares::{LeastSquares, Scaling, minimise};
 use crate::noise::{Noise, NoiseSource, PureError};
 use crate::parameters::Role;
 use crate::problem::Problem;
@@ -49,6 +50,8 @@ const BIRGE_SIGNIFICANCE: f64 = 1e-3;
 struct SeenDirections<'p, 'a> {
     problem: &'p Problem<'a>,
     basis: &'p Mat<f64>,
+    /// The last linearisation: the unknowns, and the triangles of the folds there.
+    last: RefCell<(Vec<f64>, Vec<Triangle>)>,
 }
 
 impl SeenDirections<'_, '_> {
@@ -66,16 +69,24 @@ impl LeastSquares for SeenDirections<'_, '_> {
 
     fn linearise(&self, z: &[f64]) -> Result<Triangle, IdentifyError> {
         let beta = self.beta(z);
-        let mut whole = self.problem.prior_triangle(&beta);
-        for triangle in self.problem.triangles(&beta)? {
-            whole.merge(&triangle);
+        if self.last.borrow().0 != beta {
+            let triangles = self.problem.triangles(&beta)?;
+            self.last.replace((beta, triangles));
         }
-        Ok(in_directions(&whole, self.basis))
+        let (beta, triangles) = &*self.last.borrow();
+        Ok(in_directions(&whole(self.problem, beta, triangles), self.basis))
     }
 
     fn sum_of_squares(&self, z: &[f64]) -> f64 {
         self.problem.sum_of_squares(&self.beta(z))
     }
+}
+
+/// The triangle of all readings and of what is known beforehand.
+fn whole(problem: &Problem<'_>, beta: &[f64], triangles: &[Triangle]) -> Triangle {
+    let mut whole = problem.prior_triangle(beta);
+    triangles.iter().for_each(|triangle| whole.merge(triangle));
+    whole
 }
 
 /// The triangle of `[J·N | r]` from that of `[J | r]`.
@@ -182,43 +193,33 @@ pub fn fit(problem: &Problem<'_>, start: Option<&[f64]>) -> Result<Fit, Identify
         .map(|parameter| parameter.size)
         .collect();
     let nominal = vec![0.0; unknowns];
-    let mut whole = problem.prior_triangle(&nominal);
-    for triangle in problem.triangles(&nominal)? {
-        whole.merge(&triangle);
-    }
-    let rank = Rank::decide(whole.parts().0.as_ref(), &size)?;
+    let triangles = problem.triangles(&nominal)?;
+    let rank = Rank::decide(whole(problem, &nominal, &triangles).parts().0.as_ref(), &size)?;
     let seen = SeenDirections {
         problem,
         basis: &rank.seen,
+        last: RefCell::new((nominal, triangles)),
     };
-    let solution = if rank.seen.ncols() == 0 {
-        Solution {
-            x: Vec::new(),
-            triangle: Triangle::new(0),
-            sum_of_squares: 0.0,
-            iterations: 0,
-        }
-    } else {
+    if rank.seen.ncols() > 0 {
         let scale = Scaling::Physical(vec![1.0; rank.seen.ncols()]);
         let from = start.map_or_else(
             || vec![0.0; rank.seen.ncols()],
             |beta| rank.coordinates(beta, &size),
         );
-        minimise(&seen, &from, &scale)?
-    };
-    let beta = if solution.x.is_empty() {
-        nominal
-    } else {
-        seen.beta(&solution.x)
-    };
-    finish(problem, beta, rank)
+        minimise(&seen, &from, &scale)?;
+    }
+    let (beta, triangles) = seen.last.into_inner();
+    finish(problem, beta, triangles, rank)
 }
 
 /// Everything that follows from the solution.
-fn finish(problem: &Problem<'_>, beta: Vec<f64>, rank: Rank) -> Result<Fit, IdentifyError> {
-    let triangles = problem.triangles(&beta)?;
-    let mut whole = problem.prior_triangle(&beta);
-    triangles.iter().for_each(|triangle| whole.merge(triangle));
+fn finish(
+    problem: &Problem<'_>,
+    beta: Vec<f64>,
+    triangles: Vec<Triangle>,
+    rank: Rank,
+) -> Result<Fit, IdentifyError> {
+    let whole = whole(problem, &beta, &triangles);
     let covariance = covariance(&whole, &rank.seen)?;
     let residuals = problem.residuals(&beta);
     let held_out = held_out(problem, &beta, &triangles, &rank.seen)?;

@@ -8,6 +8,7 @@ use abbe_model::session::{Session, Test};
 use faer::Mat;
 use rand::SeedableRng;
 use rand::seq::SliceRandom;
+use rayon::prelude::*;
 
 use crate::error::IdentifyError;
 use crate::problem::Problem;
@@ -146,40 +147,53 @@ pub fn held_out(
     triangles: &[Triangle],
     basis: &Mat<f64>,
 ) -> Result<HeldOut, IdentifyError> {
-    let prior = problem.prior_triangle(beta);
-    let steps = triangles
-        .iter()
-        .enumerate()
-        .map(|(fold, _)| {
-            let mut rest = prior.clone();
-            for (other, triangle) in triangles.iter().enumerate() {
-                if other != fold {
-                    rest.merge(triangle);
-                }
-            }
+    // All folds before one, and all behind it: what a fold is left out of, in two merges.
+    let mut before = vec![problem.prior_triangle(beta)];
+    let mut behind = vec![Triangle::new(beta.len())];
+    for (first, last) in triangles.iter().zip(triangles.iter().rev()) {
+        before.push(with(&before[before.len() - 1], first));
+        behind.push(with(&behind[behind.len() - 1], last));
+    }
+    let steps: Vec<Vec<f64>> = (0..triangles.len())
+        .into_par_iter()
+        .map(|fold| {
+            let rest = with(&before[fold], &behind[triangles.len() - 1 - fold]);
             step_without(&rest, beta, basis)
         })
-        .collect::<Result<Vec<_>, _>>()?;
+        .collect::<Result<_, _>>()?;
     let values = problem.slot_values(beta);
-    let unknowns = beta.len();
-    let mut residuals: Vec<Vec<f64>> = problem
-        .models
-        .iter()
-        .map(|model| vec![0.0; model.rows() * problem.coordinates()])
-        .collect();
-    for block in problem.blocks() {
-        let rows = problem.rows(&values, &block)?;
-        for i in 0..rows.nrows() {
-            let scalar = block.rows.start * problem.coordinates() + i;
-            let fold = problem.folds.of_row[block.test][scalar / problem.coordinates()];
-            let predicted: f64 = (0..unknowns).map(|j| rows[(i, j)] * steps[fold][j]).sum();
-            residuals[block.test][scalar] = rows[(i, unknowns)] - predicted;
+    let coordinates = problem.coordinates();
+    let mut residuals: Vec<Vec<f64>> = vec![Vec::new(); problem.models.len()];
+    let blocks = problem.blocks();
+    let predicted = blocks.par_iter().map(|block| {
+        let own = problem.own_unknowns(block.test);
+        let rows = problem.own_rows(&values[block.test], block)?;
+        let mut residual = rows.col(own.len()).to_owned();
+        let fold_of = &problem.folds.of_row[block.test][block.rows.clone()];
+        for (unknown, column) in own.iter().zip(rows.col_iter()) {
+            for (i, residual) in residual.iter_mut().enumerate() {
+                *residual -= column[i] * steps[fold_of[i / coordinates]][*unknown];
+            }
         }
+        Ok(residual)
+    });
+    // Blocks come in the order of the rows.
+    for (block, residual) in blocks
+        .iter()
+        .zip(predicted.collect::<Result<Vec<_>, IdentifyError>>()?)
+    {
+        residuals[block.test].extend(residual.iter());
     }
     Ok(HeldOut {
         rms_mm: rms_mm(problem, &residuals),
         residuals,
     })
+}
+
+fn with(triangle: &Triangle, other: &Triangle) -> Triangle {
+    let mut sum = triangle.clone();
+    sum.merge(other);
+    sum
 }
 
 /// From the fit of all readings to that of the readings in `rest`: the least solution in absolute terms, so that what the remaining readings do

@@ -58,7 +58,7 @@ pub fn minimise(
 ) -> Result<Solution, IdentifyError> {
     let n = problem.unknowns();
     let mut x = start.to_vec();
-    let mut current = problem.sum_of_squares(&x);
+    let mut current = f64::NAN;
     let mut scale = match scaling {
         Scaling::Physical(sizes) => sizes.clone(),
         Scaling::Columns => vec![f64::INFINITY; n],

@@ -5,6 +5,7 @@
 //! out of all proportion to the bulk.
 
 use abbe_model::session::readings::Readings;
+use rayon::prelude::*;
 
 use crate::fit::Fit;
 use crate::heldout::FoldKind;
@@ -41,7 +42,7 @@ pub fn wild(problem: &Problem<'_>, fit: &Fit) -> Vec<Vec<bool>> {
     }
     problem
         .tests
-        .iter()
+        .par_iter()
         .zip(&fit.residuals)
         .map(|(test, residual)| match &test.readings {
             Some(readings) => wild_along_runs(readings, residual, coordinates, problem.noise.sigma_mm),
@@ -64,12 +65,13 @@ fn wild_along_runs(readings: &Readings, residual: &[f64], coordinates: usize, si
                 let start = row.saturating_sub(NEIGHBOURS).max(run.start);
                 let end = (row + NEIGHBOURS + 1).min(run.end);
                 let from = |side: std::ops::Range<usize>| {
-                    let mut window: Vec<f64> = side.map(value).collect();
-                    if window.len() < 3 {
-                        None
-                    } else {
-                        Some(value(row) - median(&mut window))
-                    }
+                    let mut window = [0.0; NEIGHBOURS];
+                    let window = &mut window[..side.len()];
+                    window
+                        .iter_mut()
+                        .zip(side)
+                        .for_each(|(place, row)| *place = value(row));
+                    (window.len() >= 3).then(|| value(row) - median(window))
                 };
                 let deviation = match (from(start..row), from(row + 1..end)) {
                     (Some(before), Some(after)) if before * after <= 0.0 => 0.0,

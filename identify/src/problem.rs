@@ -1,9 +1,13 @@
 //! A session with readings as a least-squares problem over blocks of rows.
 //!
-//! A block is a stretch of consecutive readings of one run. Its rows of `[J | r]` are made from one sweep of dual numbers times the basis
-//! functions, whitened along the run, and absorbed into the triangle of the fold that they belong to.
+//! A block is a stretch of consecutive readings of one run. Its rows of `[J | r]` are made from one sweep of the chain times the basis
+//! functions, whitened along the run, and absorbed into the triangle of the test and fold that they belong to, which is as wide as that test has
+//! unknowns.
 
+use std::collections::btree_map::Entry;
+use std::collections::{BTreeMap, BTreeSet};
 use std::ops::Range;
+use std::sync::Arc;
 
 use abbe_model::effect::Effect;
 use abbe_model::instrument::Station;
@@ -17,7 +21,7 @@ use crate::drivers::Origin;
 use crate::error::IdentifyError;
 use crate::heldout::Folds;
 use crate::noise::Noise;
-use crate::parameters::Parameters;
+use crate::parameters::{Parameters, Part};
 use crate::triangle::{BLOCK_ROWS, Triangle};
 
 /// A session with readings, its unknowns, and how its readings are weighted.
@@ -39,8 +43,41 @@ pub struct Problem<'a> {
     pub rejected: Vec<Vec<bool>>,
     /// Which readings are left out together when the model is judged.
     pub folds: Folds,
-    /// The slots that some parameter moves, by test.
-    slots: Vec<Vec<usize>>,
+    /// What moves the readings of each test.
+    own: Vec<Own>,
+}
+
+/// What moves the readings of one test: a test of many has few of the session's unknowns.
+#[derive(Clone, Debug, Default)]
+struct Own {
+    /// The slots that some unknown moves.
+    slots: Vec<usize>,
+    /// The unknowns.
+    unknowns: Vec<usize>,
+    /// For each slot, the unknowns that move it, by their places among these, and their basis functions.
+    movers: Vec<Vec<(usize, Option<Arc<Vec<f64>>>)>>,
+}
+
+impl Own {
+    fn of(parts: &[Part]) -> Own {
+        let sorted = |numbers: &mut dyn Iterator<Item = usize>| {
+            let numbers: BTreeSet<usize> = numbers.collect();
+            numbers.into_iter().collect::<Vec<usize>>()
+        };
+        let slots = sorted(&mut parts.iter().map(|part| part.slot));
+        let unknowns = sorted(&mut parts.iter().map(|part| part.parameter));
+        let mut movers = vec![Vec::new(); slots.len()];
+        for part in parts {
+            let slot = slots.partition_point(|slot| *slot < part.slot);
+            let unknown = unknowns.partition_point(|unknown| *unknown < part.parameter);
+            movers[slot].push((unknown, part.basis.clone()));
+        }
+        Own {
+            slots,
+            unknowns,
+            movers,
+        }
+    }
 }
 
 /// Consecutive rows of one run of one test.
@@ -51,6 +88,12 @@ pub struct Block {
     /// Its rows.
     pub rows: Range<usize>,
 }
+
+/// Triangles over the tests' own unknowns, by test and fold.
+type Narrow = BTreeMap<(usize, usize), Triangle>;
+
+/// How many blocks one thread takes at a time.
+const BLOCKS_A_STRETCH: usize = 16;
 
 impl<'a> Problem<'a> {
     /// From a session, with its declared unknowns and effects.
@@ -88,9 +131,9 @@ impl<'a> Problem<'a> {
             noise,
             rejected,
             folds,
-            slots: Vec::new(),
+            own: Vec::new(),
         };
-        problem.update_slots();
+        problem.update_own();
         for effect in &session.effects {
             problem.add_effect(effect)?;
         }
@@ -104,22 +147,12 @@ impl<'a> Problem<'a> {
     pub fn add_effect(&mut self, effect: &Effect) -> Result<(), IdentifyError> {
         self.parameters
             .add_effect(self.session, &self.tests, &self.models, &self.origin, effect)?;
-        self.update_slots();
+        self.update_own();
         Ok(())
     }
 
-    fn update_slots(&mut self) {
-        self.slots = self
-            .parameters
-            .parts
-            .iter()
-            .map(|parts| {
-                let mut slots: Vec<usize> = parts.iter().map(|part| part.slot).collect();
-                slots.sort_unstable();
-                slots.dedup();
-                slots
-            })
-            .collect();
+    fn update_own(&mut self) {
+        self.own = self.parameters.parts.iter().map(|parts| Own::of(parts)).collect();
     }
 
     /// Number of readings that count.
@@ -167,64 +200,77 @@ impl<'a> Problem<'a> {
         self.parameters.slot_values(&self.models, beta)
     }
 
-    /// Residuals observed − model of a block, mm, a reading's coordinates together.
-    fn residual_block(&self, values: &[SlotValues], block: &Block, readings_mm: &[f64]) -> Vec<f64> {
-        let _ = values;
-        let coordinates = self.coordinates();
-        let scalars = block.rows.start * coordinates..block.rows.end * coordinates;
-        let Some(readings) = &self.tests[block.test].readings else {
-            return Vec::new();
-        };
-        readings.observed[scalars]
-            .iter()
-            .zip(readings_mm)
-            .map(|(observed, model)| observed - model)
-            .collect()
-    }
-
     /// Rows of `[J | r]` of a block in mm, not whitened, rejected rows included: (rows × coordinates) × (unknowns + 1).
     ///
     /// # Errors
     /// If the model yields a number that is not finite.
     pub fn rows(&self, values: &[SlotValues], block: &Block) -> Result<Mat<f64>, IdentifyError> {
-        let model = &self.models[block.test];
-        let slots = &self.slots[block.test];
-        let sensitivities = model.sensitivities(&values[block.test], slots, block.rows.clone());
-        let residual = self.residual_block(values, block, &sensitivities.readings_mm);
-        let coordinates = self.coordinates();
-        if let Some(bad) = residual.iter().position(|value| !value.is_finite()) {
-            return Err(IdentifyError::NotFinite {
-                test: self.tests[block.test].name.clone(),
-                row: block.rows.start + bad / coordinates + 1,
-                value: sensitivities.readings_mm[bad],
-            });
+        let own = &self.own[block.test].unknowns;
+        let narrow = self.own_rows(&values[block.test], block)?;
+        let mut rows = Mat::zeros(narrow.nrows(), self.parameters.list.len() + 1);
+        let places = own.iter().copied().chain([self.parameters.list.len()]);
+        for (place, column) in places.zip(narrow.col_iter()) {
+            rows.col_mut(place).copy_from(column);
         }
-        let unknowns = self.parameters.list.len();
-        let mut rows = Mat::zeros(residual.len(), unknowns + 1);
-        for part in &self.parameters.parts[block.test] {
-            let Ok(place) = slots.binary_search(&part.slot) else {
-                continue;
+        Ok(rows)
+    }
+
+    /// The unknowns that move the readings of a test.
+    pub fn own_unknowns(&self, test: usize) -> &[usize] {
+        &self.own[test].unknowns
+    }
+
+    /// The columns of [`Problem::rows`] that are not zero throughout: those of [`Problem::own_unknowns`], and the residual. `values` are the test's.
+    ///
+    /// # Errors
+    /// If the model yields a number that is not finite.
+    pub fn own_rows(&self, values: &SlotValues, block: &Block) -> Result<Mat<f64>, IdentifyError> {
+        let coordinates = self.coordinates();
+        let own = &self.own[block.test];
+        let scalars = block.rows.start * coordinates..block.rows.end * coordinates;
+        let mut rows = Mat::zeros(scalars.len(), own.unknowns.len() + 1);
+        let Some(readings) = &self.tests[block.test].readings else {
+            return Ok(rows);
+        };
+        let observed = &readings.observed[scalars];
+        let mut bad = None;
+        self.models[block.test].sweep(values, &own.slots, block.rows.clone(), |output, start, values| {
+            let Some(by) = output.checked_sub(coordinates) else {
+                for (i, value) in values.iter().enumerate() {
+                    let scalar = (start + i) * coordinates + output;
+                    let residual = observed[scalar] - value;
+                    if !residual.is_finite() && bad.is_none() {
+                        bad = Some((scalar, *value));
+                    }
+                    rows[(scalar, own.unknowns.len())] = residual;
+                }
+                return;
             };
-            let derivative = &sensitivities.derivatives[place];
-            let column = rows.col_mut(part.parameter);
-            let entries = column.try_as_col_major_mut().map(|column| column.as_slice_mut());
-            let Some(entries) = entries else { continue };
-            match &part.basis {
-                None => entries
-                    .iter_mut()
-                    .zip(derivative)
-                    .for_each(|(entry, d)| *entry += d),
-                Some(basis) => {
-                    for (i, (entry, d)) in entries.iter_mut().zip(derivative).enumerate() {
-                        *entry += d * basis[block.rows.start + i / coordinates];
+            let coordinate = by / own.slots.len();
+            for (unknown, basis) in &own.movers[by % own.slots.len()] {
+                let first = start * coordinates + coordinate;
+                let Some(column) = rows.col_mut(*unknown).try_as_col_major_mut() else {
+                    continue;
+                };
+                let entries = column.as_slice_mut()[first..].iter_mut().step_by(coordinates);
+                match basis {
+                    None => entries.zip(values).for_each(|(entry, d)| *entry += d),
+                    Some(basis) => {
+                        let basis = &basis[block.rows.start + start..];
+                        let terms = values.iter().zip(basis);
+                        entries.zip(terms).for_each(|(entry, (d, b))| *entry += d * b);
                     }
                 }
             }
+        });
+        match bad {
+            None => Ok(rows),
+            Some((scalar, value)) => Err(IdentifyError::NotFinite {
+                test: self.tests[block.test].name.clone(),
+                row: block.rows.start + scalar / coordinates + 1,
+                value,
+            }),
         }
-        for (i, value) in residual.into_iter().enumerate() {
-            rows[(i, unknowns)] = value;
-        }
-        Ok(rows)
     }
 
     /// The scalar rows of a block that whitening keeps: those that neither are nor remember a rejected reading.
@@ -249,18 +295,18 @@ impl<'a> Problem<'a> {
         let kept = self.kept_rows(block);
         let innovation = 1.0 / self.noise.innovation_mm();
         let marginal = 1.0 / self.noise.sigma_mm;
-        let white = Mat::from_fn(kept.len(), rows.ncols(), |k, j| {
-            let i = kept[k];
-            if i / coordinates < memory.len() {
-                return rows[(i, j)] * marginal;
+        let mut white = Mat::zeros(kept.len(), rows.ncols());
+        for (mut white, column) in white.col_iter_mut().zip(rows.col_iter()) {
+            for (k, &i) in kept.iter().enumerate() {
+                white[k] = if i / coordinates < memory.len() {
+                    column[i] * marginal
+                } else {
+                    let lags = memory.iter().enumerate();
+                    let past: f64 = lags.map(|(lag, a)| a * column[i - (lag + 1) * coordinates]).sum();
+                    (column[i] - past) * innovation
+                };
             }
-            let past: f64 = memory
-                .iter()
-                .enumerate()
-                .map(|(lag, a)| a * rows[(i - (lag + 1) * coordinates, j)])
-                .sum();
-            (rows[(i, j)] - past) * innovation
-        });
+        }
         let folds = kept
             .iter()
             .map(|i| fold_of[block.rows.start + i / coordinates])
@@ -273,34 +319,50 @@ impl<'a> Problem<'a> {
     /// # Errors
     /// If the model yields a number that is not finite.
     pub fn triangles(&self, beta: &[f64]) -> Result<Vec<Triangle>, IdentifyError> {
-        let unknowns = self.parameters.list.len();
         let values = self.slot_values(beta);
-        let blocks = self.blocks();
-        let partial: Vec<Vec<(usize, Triangle)>> = blocks
-            .par_iter()
-            .map(|block| {
-                let rows = self.rows(&values, block)?;
-                let (white, folds) = self.whiten(&rows, block);
-                let mut present: Vec<usize> = folds.clone();
-                present.sort_unstable();
-                present.dedup();
-                Ok(present
-                    .into_iter()
-                    .map(|fold| {
-                        let chosen: Vec<usize> = (0..folds.len()).filter(|i| folds[*i] == fold).collect();
-                        let part = Mat::from_fn(chosen.len(), white.ncols(), |i, j| white[(chosen[i], j)]);
-                        let mut triangle = Triangle::new(unknowns);
-                        triangle.absorb(part.as_ref());
-                        (fold, triangle)
-                    })
-                    .collect())
-            })
+        // Stretches of fixed length, so that the sums do not depend on the number of threads.
+        let stretches: Vec<Narrow> = (self.blocks().par_chunks(BLOCKS_A_STRETCH))
+            .map(|blocks| self.narrow_triangles(&values, blocks))
             .collect::<Result<_, IdentifyError>>()?;
+        let mut narrow = Narrow::new();
+        for ((test, fold), triangle) in stretches.into_iter().flatten() {
+            match narrow.entry((test, fold)) {
+                Entry::Vacant(place) => {
+                    place.insert(triangle);
+                }
+                Entry::Occupied(mut sum) => sum.get_mut().merge(&triangle),
+            }
+        }
+        let unknowns = self.parameters.list.len();
         let mut triangles = vec![Triangle::new(unknowns); self.folds.count];
-        for (fold, triangle) in partial.into_iter().flatten() {
-            triangles[fold].merge(&triangle);
+        for ((test, fold), triangle) in narrow {
+            triangles[fold].merge(&triangle.among(&self.own[test].unknowns, unknowns));
         }
         Ok(triangles)
+    }
+
+    /// The triangles of some blocks over their tests' own unknowns, by test and fold.
+    fn narrow_triangles(&self, values: &[SlotValues], blocks: &[Block]) -> Result<Narrow, IdentifyError> {
+        let mut narrow = Narrow::new();
+        for block in blocks {
+            let rows = self.own_rows(&values[block.test], block)?;
+            let (white, folds) = self.whiten(&rows, block);
+            let present: BTreeSet<usize> = folds.iter().copied().collect();
+            for fold in &present {
+                let triangle = narrow
+                    .entry((block.test, *fold))
+                    .or_insert_with(|| Triangle::new(self.own[block.test].unknowns.len()));
+                if present.len() == 1 {
+                    triangle.absorb(white.as_ref());
+                } else {
+                    let chosen: Vec<usize> = (0..folds.len()).filter(|i| folds[*i] == *fold).collect();
+                    triangle.absorb(
+                        Mat::from_fn(chosen.len(), white.ncols(), |i, j| white[(chosen[i], j)]).as_ref(),
+                    );
+                }
+            }
+        }
+        Ok(narrow)
     }
 
     /// What is known beforehand, as rows: Gaussian priors and distances between sockets.
@@ -381,16 +443,15 @@ impl<'a> Problem<'a> {
     /// Residuals observed − model of every test, mm, rejected readings included.
     pub fn residuals(&self, beta: &[f64]) -> Vec<Vec<f64>> {
         let values = self.slot_values(beta);
-        self.models
-            .par_iter()
-            .enumerate()
-            .map(|(test, model)| {
-                let block = Block {
-                    test,
-                    rows: 0..model.rows(),
-                };
-                let readings = model.readings_mm(&values[test]);
-                self.residual_block(&values, &block, &readings)
+        (self.models.par_iter().zip(&self.tests).zip(&values))
+            .map(|((model, test), values)| {
+                let mut residuals = model.readings_mm(values);
+                let observed = test.readings.iter().flat_map(|readings| &readings.observed);
+                residuals
+                    .iter_mut()
+                    .zip(observed)
+                    .for_each(|(value, observed)| *value = observed - *value);
+                residuals
             })
             .collect()
     }
@@ -399,17 +460,14 @@ impl<'a> Problem<'a> {
     pub fn sum_of_squares(&self, beta: &[f64]) -> f64 {
         let residuals = self.residuals(beta);
         let coordinates = self.coordinates();
-        let readings: f64 = self
-            .blocks()
-            .iter()
-            .map(|block| {
-                let residual =
-                    &residuals[block.test][block.rows.start * coordinates..block.rows.end * coordinates];
-                let column = Mat::from_fn(residual.len(), 1, |i, _| residual[i]);
-                let (white, _) = self.whiten(&column, block);
-                (0..white.nrows()).map(|i| white[(i, 0)].powi(2)).sum::<f64>()
-            })
-            .sum();
+        let squares = self.blocks().into_par_iter().map(|block| {
+            let residual =
+                &residuals[block.test][block.rows.start * coordinates..block.rows.end * coordinates];
+            let column = Mat::from_fn(residual.len(), 1, |i, _| residual[i]);
+            let (white, _) = self.whiten(&column, &block);
+            white.col(0).iter().map(|value| value * value).sum::<f64>()
+        });
+        let readings: f64 = squares.collect::<Vec<f64>>().iter().sum();
         let nothing = vec![0.0; beta.len()];
         readings + self.prior_triangle(beta).sum_of_squares_after(&nothing)
     }

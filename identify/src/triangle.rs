@@ -58,6 +58,17 @@ impl Triangle {
         self.absorb(other.factor.as_ref());
     }
 
+    /// The same rows for more unknowns: `places` says which of them these are; the rows do not depend on the others.
+    pub fn among(&self, places: &[usize], columns: usize) -> Triangle {
+        let mut wide = Mat::zeros(self.factor.nrows(), columns + 1);
+        for (place, column) in places.iter().chain([&columns]).zip(self.factor.col_iter()) {
+            wide.col_mut(*place).copy_from(column);
+        }
+        let mut triangle = Triangle::new(columns);
+        triangle.absorb(wide.as_ref());
+        triangle
+    }
+
     /// The same triangle with few rows made upper-triangular, so that `R`, `c`, `ρ` can be read off.
     fn reduced(&self) -> Mat<f64> {
         let width = self.columns + 1;
