@@ -233,41 +233,53 @@ impl<'a> Problem<'a> {
             return Ok(rows);
         };
         let observed = &readings.observed[scalars];
+        let mut columns: Vec<&mut [f64]> = (rows.col_iter_mut())
+            .filter_map(|column| Some(column.try_as_col_major_mut()?.as_slice_mut()))
+            .collect();
         let mut bad = None;
         self.models[block.test].sweep(values, &own.slots, block.rows.clone(), |output, start, values| {
             let Some(by) = output.checked_sub(coordinates) else {
-                for (i, value) in values.iter().enumerate() {
-                    let scalar = (start + i) * coordinates + output;
-                    let residual = observed[scalar] - value;
+                let first = start * coordinates + output;
+                let residuals = columns[own.unknowns.len()][first..]
+                    .iter_mut()
+                    .step_by(coordinates);
+                let observed = observed[first..].iter().step_by(coordinates);
+                for (i, (residual, (observed, value))) in residuals.zip(observed.zip(values)).enumerate() {
+                    *residual = observed - value;
                     if !residual.is_finite() && bad.is_none() {
-                        bad = Some((scalar, *value));
+                        bad = Some((start + i, *value));
                     }
-                    rows[(scalar, own.unknowns.len())] = residual;
                 }
                 return;
             };
-            let coordinate = by / own.slots.len();
             for (unknown, basis) in &own.movers[by % own.slots.len()] {
-                let first = start * coordinates + coordinate;
-                let Some(column) = rows.col_mut(*unknown).try_as_col_major_mut() else {
-                    continue;
+                let column = &mut columns[*unknown];
+                let mut add = |terms: &mut dyn Iterator<Item = f64>| {
+                    let entries = column[start * coordinates + by / own.slots.len()..].iter_mut();
+                    entries
+                        .step_by(coordinates)
+                        .zip(terms)
+                        .for_each(|(entry, term)| *entry += term);
                 };
-                let entries = column.as_slice_mut()[first..].iter_mut().step_by(coordinates);
                 match basis {
-                    None => entries.zip(values).for_each(|(entry, d)| *entry += d),
+                    // The plain case is worth a loop that the compiler can turn into vector instructions.
+                    None if coordinates == 1 => {
+                        let entries = column[start..].iter_mut();
+                        entries.zip(values).for_each(|(entry, d)| *entry += d);
+                    }
+                    None => add(&mut values.iter().copied()),
                     Some(basis) => {
                         let basis = &basis[block.rows.start + start..];
-                        let terms = values.iter().zip(basis);
-                        entries.zip(terms).for_each(|(entry, (d, b))| *entry += d * b);
+                        add(&mut values.iter().zip(basis).map(|(d, b)| d * b));
                     }
                 }
             }
         });
         match bad {
             None => Ok(rows),
-            Some((scalar, value)) => Err(IdentifyError::NotFinite {
+            Some((row, value)) => Err(IdentifyError::NotFinite {
                 test: self.tests[block.test].name.clone(),
-                row: block.rows.start + scalar / coordinates + 1,
+                row: block.rows.start + row + 1,
                 value,
             }),
         }
@@ -295,6 +307,12 @@ impl<'a> Problem<'a> {
         let kept = self.kept_rows(block);
         let innovation = 1.0 / self.noise.innovation_mm();
         let marginal = 1.0 / self.noise.sigma_mm;
+        let folds = (kept.iter())
+            .map(|i| fold_of[block.rows.start + i / coordinates])
+            .collect();
+        if memory.is_empty() && kept.len() == rows.nrows() {
+            return (rows * faer::Scale(innovation), folds);
+        }
         let mut white = Mat::zeros(kept.len(), rows.ncols());
         for (mut white, column) in white.col_iter_mut().zip(rows.col_iter()) {
             for (k, &i) in kept.iter().enumerate() {
@@ -307,10 +325,6 @@ impl<'a> Problem<'a> {
                 };
             }
         }
-        let folds = kept
-            .iter()
-            .map(|i| fold_of[block.rows.start + i / coordinates])
-            .collect();
         (white, folds)
     }
 

@@ -37,13 +37,9 @@ impl Triangle {
         }
         let kept = self.factor.nrows();
         let width = self.columns + 1;
-        let stacked = Mat::from_fn(kept + block.nrows(), width, |i, j| {
-            if i < kept {
-                self.factor[(i, j)]
-            } else {
-                block[(i - kept, j)]
-            }
-        });
+        let mut stacked = Mat::zeros(kept + block.nrows(), width);
+        stacked.get_mut(..kept, ..).copy_from(&self.factor);
+        stacked.get_mut(kept.., ..).copy_from(block);
         if stacked.nrows() <= width {
             self.factor = stacked;
             return;

@@ -1,6 +1,7 @@
 //! The open scalar: the kinematic chain is written once, and what a number *is* decides what the chain yields.
 //!
-//! With `f64` the chain simulates, with dual numbers it yields Jacobians, with a symbol it yields the closed form.
+//! With `f64` the chain simulates, with a symbol it yields the closed form and, recorded and replayed over columns, every Jacobian; with dual numbers it
+//! yields the derivatives that both are held to.
 //! Two kinds of quantity meet in a chain. *Nominal* ones (axis positions, origins, ball positions) are never
 //! differentiated; *errors* are. A [`Scalar`] is the type of an error, [`Scalar::Nominal`] that of a nominal quantity,
 //! so that a product of two nominal quantities costs no derivative:
@@ -9,7 +10,7 @@
 //! |---|---|---|
 //! | `f64` | `f64` | readings |
 //! | a num-dual number over `f64` | `f64` | readings and derivatives |
-//! | a symbol of `abbe-codegen` | the same symbol | the closed form |
+//! | a [symbol](crate::expression) | the same symbol | the closed form, and what is [replayed](crate::replay) |
 
 use std::ops::{Add, Div, Mul, Neg, Sub};
 

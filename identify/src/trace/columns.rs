@@ -303,17 +303,33 @@ impl<'p, 'a> Columns<'p, 'a> {
                     }
                     Moves::Reading(_) => None,
                 };
+                let factor = part.factor.as_ref().map(|factor| &factor[block.rows.clone()]);
                 for k in 0..layout.count {
-                    let basis = &part.basis[k];
-                    for i in 0..scalars {
-                        let row = first + i / coordinates;
-                        let factor = part.factor.as_ref().map_or(1.0, |factor| factor[row]);
-                        let sensitivity = match (derivative, part.moves) {
-                            (Some(derivative), _) => derivative[i],
-                            (None, Moves::Reading(moved)) if i % coordinates != moved => continue,
-                            (None, _) => 1.0,
-                        };
-                        raw[(i, column + k)] += sensitivity * basis[row] * factor;
+                    let basis = &part.basis[k][block.rows.clone()];
+                    let Some(entries) = raw.col_mut(column + k).try_as_col_major_mut() else {
+                        continue;
+                    };
+                    let entries = entries.as_slice_mut();
+                    // One coordinate a reading and no factor is the common case, and the compiler makes vector instructions of it.
+                    if let (1, Some(derivative), None) = (coordinates, derivative, factor) {
+                        let terms = derivative.iter().zip(basis);
+                        entries
+                            .iter_mut()
+                            .zip(terms)
+                            .for_each(|(entry, (d, b))| *entry += d * b);
+                        continue;
+                    }
+                    for (row, basis) in basis.iter().enumerate() {
+                        let value = factor.map_or(*basis, |factor| basis * factor[row]);
+                        let scalars = row * coordinates..(row + 1) * coordinates;
+                        match (derivative, part.moves) {
+                            (None, Moves::Reading(moved)) => entries[scalars.start + moved] += value,
+                            (derivative, _) => {
+                                let derivative = derivative.map_or(&[][..], |whole| &whole[scalars.clone()]);
+                                let terms = entries[scalars].iter_mut().zip(derivative);
+                                terms.for_each(|(entry, d)| *entry += d * value);
+                            }
+                        }
                     }
                 }
             }
@@ -422,9 +438,10 @@ impl<'p, 'a> Columns<'p, 'a> {
         for block in &self.blocks {
             let raw = self.block_rows(layouts, block);
             let (white, _) = self.problem.whiten(&raw, block);
-            for j in 0..total {
-                for i in 0..white.nrows() {
-                    columns[(self.target[start + i], j)] = white[(i, j)];
+            let target = &self.target[start..start + white.nrows()];
+            for (mut column, white) in columns.as_mut().col_iter_mut().zip(white.col_iter()).take(total) {
+                for (place, value) in target.iter().zip(white.iter()) {
+                    column[*place] = *value;
                 }
             }
             start += white.nrows();
