@@ -1,5 +1,6 @@
 //! The unknowns of a session, and which components of which readings each of them moves.
 
+use std::collections::BTreeSet;
 use std::sync::Arc;
 
 use abbe_model::effect::{Component, Driver, Effect};
@@ -51,6 +52,40 @@ pub struct Part {
     pub slot: usize,
     /// The basis function; `None` is 1.
     pub basis: Option<Arc<Vec<f64>>>,
+}
+
+/// What moves the readings of one test: a test of many has few of the session's unknowns.
+#[derive(Clone, Debug, Default)]
+pub struct Own {
+    /// The slots that some unknown moves.
+    pub slots: Vec<usize>,
+    /// The unknowns.
+    pub unknowns: Vec<usize>,
+    /// For each slot, the unknowns that move it, by their places among these, and their basis functions.
+    pub movers: Vec<Vec<(usize, Option<Arc<Vec<f64>>>)>>,
+}
+
+impl Own {
+    /// From what moves what in the test.
+    pub fn of(parts: &[Part]) -> Own {
+        let sorted = |numbers: &mut dyn Iterator<Item = usize>| {
+            let numbers: BTreeSet<usize> = numbers.collect();
+            numbers.into_iter().collect::<Vec<usize>>()
+        };
+        let slots = sorted(&mut parts.iter().map(|part| part.slot));
+        let unknowns = sorted(&mut parts.iter().map(|part| part.parameter));
+        let mut movers = vec![Vec::new(); slots.len()];
+        for part in parts {
+            let slot = slots.partition_point(|slot| *slot < part.slot);
+            let unknown = unknowns.partition_point(|unknown| *unknown < part.parameter);
+            movers[slot].push((unknown, part.basis.clone()));
+        }
+        Own {
+            slots,
+            unknowns,
+            movers,
+        }
+    }
 }
 
 /// The unknowns of a session.

@@ -7,7 +7,6 @@
 use std::collections::btree_map::Entry;
 use std::collections::{BTreeMap, BTreeSet};
 use std::ops::Range;
-use std::sync::Arc;
 
 use abbe_model::effect::Effect;
 use abbe_model::instrument::Station;
@@ -21,7 +20,7 @@ use crate::drivers::Origin;
 use crate::error::IdentifyError;
 use crate::heldout::Folds;
 use crate::noise::Noise;
-use crate::parameters::{Parameters, Part};
+use crate::parameters::{Own, Parameters};
 use crate::triangle::{BLOCK_ROWS, Triangle};
 
 /// A session with readings, its unknowns, and how its readings are weighted.
@@ -45,39 +44,6 @@ pub struct Problem<'a> {
     pub folds: Folds,
     /// What moves the readings of each test.
     own: Vec<Own>,
-}
-
-/// What moves the readings of one test: a test of many has few of the session's unknowns.
-#[derive(Clone, Debug, Default)]
-struct Own {
-    /// The slots that some unknown moves.
-    slots: Vec<usize>,
-    /// The unknowns.
-    unknowns: Vec<usize>,
-    /// For each slot, the unknowns that move it, by their places among these, and their basis functions.
-    movers: Vec<Vec<(usize, Option<Arc<Vec<f64>>>)>>,
-}
-
-impl Own {
-    fn of(parts: &[Part]) -> Own {
-        let sorted = |numbers: &mut dyn Iterator<Item = usize>| {
-            let numbers: BTreeSet<usize> = numbers.collect();
-            numbers.into_iter().collect::<Vec<usize>>()
-        };
-        let slots = sorted(&mut parts.iter().map(|part| part.slot));
-        let unknowns = sorted(&mut parts.iter().map(|part| part.parameter));
-        let mut movers = vec![Vec::new(); slots.len()];
-        for part in parts {
-            let slot = slots.partition_point(|slot| *slot < part.slot);
-            let unknown = unknowns.partition_point(|unknown| *unknown < part.parameter);
-            movers[slot].push((unknown, part.basis.clone()));
-        }
-        Own {
-            slots,
-            unknowns,
-            movers,
-        }
-    }
 }
 
 /// Consecutive rows of one run of one test.

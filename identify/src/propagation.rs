@@ -181,19 +181,19 @@ impl Drawn<'_, '_, '_> {
         refit.problem.prior_triangle_about(beta, centre, longer)
     }
 
-    /// Passes on the whitened rows `[J | r]` of every block.
-    fn rows(&self, beta: &[f64], mut take: impl FnMut(Mat<f64>)) -> Result<(), IdentifyError> {
+    /// Passes on the unknowns of every block's test, and the whitened rows `[J | r]` over those.
+    fn rows(&self, beta: &[f64], mut take: impl FnMut(&[usize], Mat<f64>)) -> Result<(), IdentifyError> {
         let problem = self.refit.problem;
         let values = problem.slot_values(beta);
         let coordinates = problem.coordinates();
         for block in &self.refit.blocks {
-            let mut rows = problem.rows(&values, block)?;
+            let mut rows = problem.own_rows(&values[block.test], block)?;
             let last = rows.ncols() - 1;
             let start = self.refit.starts[block.test] + block.rows.start * coordinates;
             for i in 0..rows.nrows() {
                 rows[(i, last)] += self.deviations[start + i];
             }
-            take(problem.whiten(&rows, block).0);
+            take(problem.own_unknowns(block.test), problem.whiten(&rows, block).0);
         }
         Ok(())
     }
@@ -203,18 +203,19 @@ impl Drawn<'_, '_, '_> {
         let beta = self.refit.beta(z);
         let unknowns = beta.len();
         let mut whole = vec![0.0; unknowns];
-        let mut add = |rows: &Mat<f64>| {
-            for (j, sum) in whole.iter_mut().enumerate() {
-                *sum += (0..rows.nrows())
-                    .map(|i| rows[(i, j)] * rows[(i, unknowns)])
-                    .sum::<f64>();
+        let mut add = |own: &[usize], rows: &Mat<f64>| {
+            let residual = rows.col(own.len());
+            for (j, column) in own.iter().zip(rows.col_iter()) {
+                whole[*j] += column.transpose() * residual;
             }
         };
         let (r, c, _) = self.prior_triangle(&beta).parts();
-        add(&Mat::from_fn(unknowns, unknowns + 1, |i, j| {
+        let all: Vec<usize> = (0..unknowns).collect();
+        let known = Mat::from_fn(unknowns, unknowns + 1, |i, j| {
             if j == unknowns { c[i] } else { r[(i, j)] }
-        }));
-        self.rows(&beta, |rows| add(&rows))?;
+        });
+        add(&all, &known);
+        self.rows(&beta, |own, rows| add(own, &rows))?;
         let seen = &self.refit.fit.rank.seen;
         Ok((0..seen.ncols())
             .map(|k| (0..unknowns).map(|j| seen[(j, k)] * whole[j]).sum())
@@ -230,11 +231,13 @@ impl LeastSquares for Drawn<'_, '_, '_> {
     fn linearise(&self, z: &[f64]) -> Result<Triangle, IdentifyError> {
         let beta = self.refit.beta(z);
         let mut whole = self.prior_triangle(&beta);
-        self.rows(&beta, |rows| {
+        self.rows(&beta, |own, rows| {
+            let mut narrow = Triangle::new(own.len());
             for start in (0..rows.nrows()).step_by(BLOCK_ROWS) {
                 let count = BLOCK_ROWS.min(rows.nrows() - start);
-                whole.absorb(rows.subrows(start, count));
+                narrow.absorb(rows.subrows(start, count));
             }
+            whole.merge(&narrow.among(own, beta.len()));
         })?;
         Ok(in_directions(&whole, &self.refit.fit.rank.seen))
     }
