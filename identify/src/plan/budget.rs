@@ -13,7 +13,7 @@
 
 use faer::Mat;
 
-use super::linear::{Linearisation, is_wanted, marginal, prior_u};
+use super::linear::{Linearisation, is_wanted, marginal, prior_u, to_nine_digits};
 use super::results::{Contribution, SharedWith};
 use crate::problem::Problem;
 
@@ -45,7 +45,7 @@ pub fn budget(problem: &Problem<'_>, linear: &Linearisation, error: usize) -> Ve
         share: noise / variance,
     });
     parts.retain(|part| part.share >= LEAST_SHARE || part.from == "noise");
-    parts.sort_by(|a, b| b.share.total_cmp(&a.share));
+    parts.sort_by(|a, b| to_nine_digits(b.share).total_cmp(&to_nine_digits(a.share)));
     parts
 }
 
@@ -77,7 +77,8 @@ pub fn shared_with(problem: &Problem<'_>, linear: &Linearisation, error: usize) 
         })
         .filter(|shared| shared.correlation.abs() >= LEAST_CORRELATION)
         .collect();
-    shared.sort_by(|a, b| b.correlation.abs().total_cmp(&a.correlation.abs()));
+    let size = |shared: &SharedWith| to_nine_digits(shared.correlation.abs());
+    shared.sort_by(|a, b| size(b).total_cmp(&size(a)));
     shared
 }
 

@@ -17,7 +17,7 @@ use nalgebra::DMatrix;
 use rayon::prelude::*;
 
 use super::detect::{POWER, SIGNIFICANCE, corrected, noncentrality};
-use super::linear::{Linearisation, is_wanted};
+use super::linear::{Linearisation, is_wanted, to_nine_digits};
 use super::results::{Bias, EffectDetectability, EffectsAnalysis};
 use crate::drivers;
 use crate::error::IdentifyError;
@@ -138,6 +138,9 @@ struct Products<'m> {
     moved: MatRef<'m, f64>,
 }
 
+/// Phases whose information differs by less than this share of the strongest one's are as weak as each other.
+const EQUALLY_WEAK: f64 = 1e-6;
+
 fn judge(
     problem: &Problem<'_>,
     candidate: &Candidate,
@@ -157,10 +160,17 @@ fn judge(
     let symmetric = 0.5 * (&left + left.transpose());
     let eigen = symmetric.symmetric_eigen();
     let worst = eigen.eigenvalues.imin();
-    let direction = eigen.eigenvectors.column(worst).into_owned();
-    let whole = (direction.transpose() * &own * &direction)[(0, 0)];
     let weakest = eigen.eigenvalues[worst].max(0.0);
     let strongest = eigen.eigenvalues.max().max(0.0);
+    // Where several phases are equally weak, the one of which least survives, and not the one that rounding picks.
+    let equally_weak: Vec<usize> = (0..eigen.eigenvalues.len())
+        .filter(|k| eigen.eigenvalues[*k] <= weakest + EQUALLY_WEAK * strongest)
+        .collect();
+    let phases = eigen.eigenvectors.select_columns(&equally_weak);
+    let whole = (phases.transpose() * &own * &phases)
+        .symmetric_eigen()
+        .eigenvalues
+        .max();
     let surviving_share = if whole > 0.0 {
         (weakest / whole).clamp(0.0, 1.0)
     } else {
@@ -220,7 +230,8 @@ fn biases(problem: &Problem<'_>, moved: MatRef<'_, f64>, unit: &Unit) -> Vec<Bia
         })
         .filter(|bias| bias.per_unit.abs() >= LEAST_BIAS)
         .collect();
-    biases.sort_by(|a, b| b.per_unit.abs().total_cmp(&a.per_unit.abs()));
+    let size = |bias: &Bias| to_nine_digits(bias.per_unit.abs());
+    biases.sort_by(|a, b| size(b).total_cmp(&size(a)));
     biases.truncate(BIASES);
     biases
 }
@@ -285,9 +296,9 @@ pub fn hidden_by_error(analysis: &EffectsAnalysis) -> BTreeMap<String, Vec<(Stri
             by_error.entry(bias.id.clone()).or_default().push(entry);
         }
     }
-    by_error
-        .values_mut()
-        .for_each(|list| list.sort_by(|a, b| b.1.abs().total_cmp(&a.1.abs())));
+    by_error.values_mut().for_each(|list| {
+        list.sort_by(|a, b| to_nine_digits(b.1.abs()).total_cmp(&to_nine_digits(a.1.abs())))
+    });
     by_error
 }
 
