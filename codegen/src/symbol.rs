@@ -102,6 +102,19 @@ pub enum Node {
 }
 
 /// Where symbols live. Nothing outlives it, nothing is shared between two of them.
+///
+/// ```
+/// use abbe_codegen::{Arena, Variable};
+///
+/// let arena = Arena::new();
+/// let [a, b] = ["a", "b"].map(|name| arena.length(name));
+/// let hypotenuse = (a * a + b * b).sqrt().operand();
+/// let at = |variable: &Variable| if *variable == Variable::Length("a".into()) { 3.0 } else { 4.0 };
+/// assert_eq!(arena.evaluate_f64(&[hypotenuse], at)?, [5.0]);
+/// // The same expression is the same node.
+/// assert_eq!(hypotenuse, (a * a + b * b).sqrt().operand());
+/// # Ok::<(), abbe_codegen::CodegenError>(())
+/// ```
 #[derive(Debug, Default)]
 pub struct Arena {
     nodes: RefCell<Vec<Node>>,
