@@ -8,6 +8,26 @@
 //! - [`equation`]: the closed form of a reading, with its named vectors;
 //! - [`first`]: its first order, as a table of sensitivities; [`check`]: what confirms it before it is written;
 //! - [`program`], [`mod@print`]: as a sequence of steps, and in a language.
+//!
+//! What the C test with the extended bar sees of the position of C's axis, to first order: ∂L/∂EX0C = −R·sin C/L₀.
+//!
+//! ```
+//! use std::path::Path;
+//!
+//! use abbe_codegen::{Equation, Language, Options, Order, SessionTest};
+//! use abbe_model::component::ErrorName;
+//! use abbe_model::session::read::{self, ReadOptions};
+//!
+//! let plan = Path::new(env!("CARGO_MANIFEST_DIR")).join("../sessions/hermle-c600u/chapter5.toml");
+//! let session = read::session(&plan, &ReadOptions::default())?;
+//! let test = session.tests.iter().find(|test| test.name == "C150").unwrap();
+//! let errors = [ErrorName::parse("EX0C").unwrap()];
+//! let options = Options { order: Order::First, ..Options::default() };
+//! let equation = Equation::of(&session.machine, &SessionTest::new(&session, test)?, &errors, &options)?;
+//! let text = equation.print(Language::Text)?;
+//! assert!(text.contains("∂L/∂e_x0c = −R·s_c/L_0"), "{text}");
+//! # Ok::<(), Box<dyn std::error::Error>>(())
+//! ```
 
 pub mod check;
 pub mod effect;

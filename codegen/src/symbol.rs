@@ -7,6 +7,21 @@ pub use abbe_model::expression::{
 use crate::variable::Variable;
 
 /// Where named symbols live.
+///
+/// ```
+/// use abbe_codegen::evaluate::evaluate_f64;
+/// use abbe_codegen::symbol::length;
+/// use abbe_codegen::{Arena, Variable};
+///
+/// let arena = Arena::new();
+/// let [a, b] = ["a", "b"].map(|name| length(&arena, name));
+/// let hypotenuse = (a * a + b * b).sqrt().operand();
+/// let at = |variable: &Variable| if *variable == Variable::Length("a".into()) { 3.0 } else { 4.0 };
+/// assert_eq!(evaluate_f64(&arena, &[hypotenuse], at)?, [5.0]);
+/// // The same expression is the same node.
+/// assert_eq!(hypotenuse, (a * a + b * b).sqrt().operand());
+/// # Ok::<(), abbe_codegen::CodegenError>(())
+/// ```
 pub type Arena = abbe_model::expression::Arena<Variable>;
 /// A named symbol, or an expression of some.
 pub type Symbol<'arena> = abbe_model::expression::Symbol<'arena, Variable>;

@@ -48,6 +48,31 @@ const SETUP_STREAM: u128 = 0;
 
 /// Draws the readings of every test of a session.
 ///
+/// What is simulated without noise is found again:
+///
+/// ```
+/// use std::path::Path;
+///
+/// use abbe_identify::fit;
+/// use abbe_identify::quantity::Given;
+/// use abbe_identify::simulate::{Simulation, simulate};
+/// use abbe_model::session::read::{self, ReadOptions};
+///
+/// let plan = Path::new(env!("CARGO_MANIFEST_DIR")).join("../sessions/hermle-c600u/chapter5.toml");
+/// let mut session = read::session(&plan, &ReadOptions::default())?;
+/// session.resolution_mm = None;
+/// let given = vec![Given::parse("EY0A=35.3um")?, Given::parse("EB0A=-1.29arcsec")?];
+/// let drawn = simulate(&session, &Simulation { given, noise_mm: Some(0.0), ..Simulation::default() })?;
+/// for (test, readings) in session.tests.iter_mut().zip(drawn.readings) {
+///     test.readings = Some(readings);
+/// }
+/// let (problem, found) = fit::prepare(&session, 1)?;
+/// let parameters = fit::parameters(&problem, &found);
+/// let value = |id: &str| parameters.iter().find(|parameter| parameter.id == id).map(|parameter| parameter.value);
+/// assert!((value("EY0A").unwrap() - 35.3).abs() < 1e-3);
+/// assert!((value("EB0A").unwrap() + 1.29).abs() < 1e-3);
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 /// # Errors
 /// If the plan cannot be carried out, a name or a unit does not fit the session, or the model yields a number that is not finite.
 pub fn simulate(session: &Session, simulation: &Simulation) -> Result<Simulated, IdentifyError> {

@@ -5,6 +5,16 @@
 use crate::error::ModelError;
 
 /// The axes of a structural code, as written.
+///
+/// ```
+/// use abbe_model::code::StructuralCode;
+///
+/// let code = StructuralCode::parse("[wCAbYXZt]")?;
+/// assert_eq!((code.workpiece_side.len(), code.tool_side.len()), (2, 3));
+/// assert_eq!(code.spaced(), "w C A b Y X Z t");
+/// assert!(StructuralCode::parse("wCAYXZt").unwrap_err().to_string().contains("0 beds"));
+/// # Ok::<(), abbe_model::ModelError>(())
+/// ```
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct StructuralCode {
     /// Axes between workpiece and bed, from the workpiece to the bed.

@@ -54,6 +54,15 @@ pub enum ErrorKind {
 }
 
 /// The name of an error of an axis: `EX0C`, `EZC`, `EBJ2`.
+///
+/// ```
+/// use abbe_model::component::{ErrorKind, ErrorName};
+///
+/// let name = ErrorName::parse("θ_y0a").unwrap();
+/// assert_eq!((name.to_string().as_str(), name.kind), ("EB0A", ErrorKind::Location));
+/// assert_eq!(ErrorName::parse("EBJ2").unwrap().kind, ErrorKind::Motion);
+/// assert_eq!(ErrorName::parse("EW0A"), None);
+/// ```
 #[derive(Clone, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
 pub struct ErrorName {
     /// Location error or error motion.

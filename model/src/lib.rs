@@ -7,6 +7,55 @@
 //! - [`instrument`]: from a state of the axes to a reading;
 //! - [`sensitivity`]: readings and their derivatives by every component; [`replay`]: over columns of readings at once;
 //! - [`session`]: machine, tests and readings as they stand in files.
+//!
+//! A chain over plain numbers and over dual ones: what a ball bar reads, and how that changes with a location error of C, ∂L/∂EX0C = −R·sin C/L₀.
+//!
+//! ```
+//! use abbe_model::chain::{AxisPosition, Machine};
+//! use abbe_model::component::ErrorName;
+//! use abbe_model::instrument::Station;
+//! use abbe_model::instrument::ballbar::BallBar;
+//! use abbe_model::scalar::Scalar;
+//! use num_dual::Dual64;
+//!
+//! fn reading<S: Scalar<Nominal = f64>>(machine: &Machine, bar: &Station<f64>, c: f64, ex0c: S) -> S {
+//!     let at = |name: &str| match name {
+//!         "C" => c,
+//!         "Z" => 75.0,
+//!         _ => 0.0,
+//!     };
+//!     let state: Vec<_> = machine.axes.iter().map(|axis| AxisPosition::new(axis.kind, at(&axis.name))).collect();
+//!     let slot = ErrorName::parse("EX0C").and_then(|name| machine.error_slot(&name));
+//!     let errors = machine.body_errors(|each| Some(each) == slot, |_| ex0c);
+//!     bar.read(machine, &state, &errors, |_| None).coordinates()[0]
+//! }
+//!
+//! let machine = Machine::from_code("[wCAbYXZt]")?;
+//! // Ball at R = 100 mm on the table, the other on the axis 75 mm above: L₀ = 125 mm.
+//! let bar = Station::BallBar(BallBar { workpiece_ball: [0.0, 100.0, 0.0], spindle_ball: [0.0; 3], bar: 125.0 });
+//! let c = 0.7_f64;
+//! assert!((reading(&machine, &bar, c, 0.0_f64) - 125.0).abs() < 1e-12);
+//! let with = reading(&machine, &bar, c, Dual64::from(0.0).derivative());
+//! assert!((with.eps + 100.0 * c.sin() / 125.0).abs() < 1e-12);
+//! # Ok::<(), abbe_model::ModelError>(())
+//! ```
+//!
+//! A session as it stands in its file:
+//!
+//! ```
+//! use std::path::Path;
+//!
+//! use abbe_model::session::read::{self, ReadOptions};
+//!
+//! let file = Path::new(env!("CARGO_MANIFEST_DIR")).join("../sessions/hermle-c600u/measured/session.toml");
+//! let session = read::session(&file, &ReadOptions::default())?;
+//! assert_eq!(session.machine.code(), "w C A b Y X Z t");
+//! let names: Vec<&str> = session.tests.iter().map(|test| test.name.as_str()).collect();
+//! assert_eq!(names, ["A100", "A150", "C100", "C150"]);
+//! let readings = session.tests.iter().filter_map(|test| test.readings.as_ref());
+//! assert_eq!(readings.map(|readings| readings.rows()).sum::<usize>(), 2416);
+//! # Ok::<(), abbe_model::ModelError>(())
+//! ```
 
 pub mod axis;
 pub mod chain;

@@ -321,3 +321,50 @@ fn sockets_named_by_a_column_become_tests() {
     assert_eq!(session.machine.axes[0].direction, [0.0, 0.0, 1.0]);
     assert_eq!(session.tests[0].spindle_setup, session.tests[1].spindle_setup);
 }
+
+#[test]
+fn runs_that_the_data_lack_are_said() {
+    let sweep = "sweep = { axis = \"C\", from_deg = 0, to_deg = 270, step_deg = 90, runs = 2, both_directions = true }";
+    let circle = "path = { kind = \"circle\", plane = \"XY\", radius_mm = 100, step_deg = 90, runs = 2, both_directions = true }";
+    for (movement, columns) in [(sweep, "c_deg"), (circle, "x_mm,y_mm")] {
+        let said = |runs: &[bool]| {
+            let folder = tempfile::tempdir().unwrap();
+            let mut data = format!("run,{columns},length_mm\n");
+            for (run, forward) in runs.iter().enumerate() {
+                for k in 0..4 {
+                    let k = if *forward { k } else { 3 - k };
+                    let at = match columns {
+                        "c_deg" => (90 * k).to_string(),
+                        _ => ["100,0", "0,100", "-100,0", "0,-100"][k].to_string(),
+                    };
+                    data += &format!("{},{at},100\n", run + 1);
+                }
+            }
+            fs::write(folder.path().join("t.csv"), data).unwrap();
+            let ball = if columns == "c_deg" {
+                "[100, 0, 0]"
+            } else {
+                "[0, 0, 0]"
+            };
+            let text = format!(
+                "[machine]\nchain = \"w C b Y X Z t\"\n[machine.axis.C]\n[machine.axis.X]\n[machine.axis.Y]\n[machine.axis.Z]\n\n\
+                 [instrument]\nkind = \"ballbar\"\n\n[unknowns]\nerrors = []\n\n[[test]]\nname = \"T\"\ndata = \"t.csv\"\n\
+                 bar_mm = 100\nworkpiece_ball_mm = {ball}\nspindle_ball_mm = [0, 0, 0]\n{movement}\n"
+            );
+            let path = folder.path().join("session.toml");
+            fs::write(&path, text).unwrap();
+            read::session(&path, &ReadOptions::default()).unwrap().warnings
+        };
+        assert!(said(&[true, false, true, false]).is_empty(), "{movement}");
+        for (runs, found) in [
+            (&[true, false, true][..], "2 runs forward and 1 backward"),
+            (&[true, true, true, true][..], "4 runs forward and 0 backward"),
+            (&[false][..], "0 runs forward and 1 backward"),
+        ] {
+            let warnings = said(runs);
+            assert_eq!(warnings.len(), 1, "{warnings:?}");
+            assert!(warnings[0].starts_with("test \"T\": "), "{warnings:?}");
+            assert!(warnings[0].contains(found), "{warnings:?}");
+        }
+    }
+}

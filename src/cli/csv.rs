@@ -15,50 +15,35 @@ const CONVENTION: &str = "# Errors by their names of ISO 230-1: EX0C is a locati
 # the axis' own direction. A correction has the opposite sign. u is one standard uncertainty.\n";
 const HEADER: [&str; 6] = ["section", "id", "meaning", "value", "u", "unit"];
 
-struct Rows(csv::Writer<Vec<u8>>);
+#[derive(Default)]
+struct Rows(Vec<Vec<String>>);
 
 impl Rows {
-    fn new() -> Result<Rows, Failure> {
-        let mut rows = Rows(csv::Writer::from_writer(Vec::new()));
-        rows.row(&HEADER.map(str::to_string))?;
-        Ok(rows)
+    fn row<const N: usize>(&mut self, cells: [String; N]) {
+        self.0.push(cells.into());
     }
 
-    fn row(&mut self, cells: &[String]) -> Result<(), Failure> {
-        self.0
-            .write_record(cells)
-            .map_err(|error| Failure::Other(format!("the CSV cannot be written: {error}")))
-    }
-
-    fn parameters(&mut self, section: &str, parameters: &[ParameterResult]) -> Result<(), Failure> {
+    fn parameters(&mut self, section: &str, parameters: &[ParameterResult]) {
         for parameter in parameters {
             let meaning =
                 ErrorName::parse(&parameter.id).map_or(String::new(), |name| compensation::words(&name));
-            self.row(&[
+            self.row([
                 section.to_string(),
                 parameter.id.clone(),
                 meaning,
                 parameter.value.to_string(),
                 parameter.u.to_string(),
                 parameter.unit.clone(),
-            ])?;
+            ]);
         }
-        Ok(())
     }
 
-    fn figure(
-        &mut self,
-        section: &str,
-        id: &str,
-        meaning: &str,
-        value: f64,
-        unit: &str,
-    ) -> Result<(), Failure> {
+    fn figure(&mut self, section: &str, id: &str, meaning: &str, value: f64, unit: &str) {
         let value = value.to_string();
-        self.row(&[section, id, meaning, &value, "", unit].map(str::to_string))
+        self.row([section, id, meaning, &value, "", unit].map(str::to_string));
     }
 
-    fn circular(&mut self, test: &CircularTest) -> Result<(), Failure> {
+    fn circular(&mut self, test: &CircularTest) {
         let section = format!("circle {}", test.test);
         for direction in &test.directions {
             let of = |figure: &str| format!("{figure}({}{})", test.axes, direction.direction);
@@ -75,7 +60,7 @@ impl Rows {
                     direction.radial_deviation_min_um,
                 ),
             ] {
-                self.figure(&section, &id, meaning, value, "um")?;
+                self.figure(&section, &id, meaning, value, "um");
             }
         }
         for (id, meaning, value) in [
@@ -92,12 +77,12 @@ impl Rows {
             ("H", "circular hysteresis", test.hysteresis_um),
         ] {
             if let Some(value) = value {
-                self.figure(&section, id, meaning, value, "um")?;
+                self.figure(&section, id, meaning, value, "um");
             }
         }
         for fault in &test.diagnosis {
             for value in &fault.values {
-                self.row(&[
+                self.row([
                     section.clone(),
                     format!("{} {}", fault.fault, value.id),
                     format!(
@@ -111,43 +96,39 @@ impl Rows {
                         String::new()
                     },
                     value.unit.clone(),
-                ])?;
+                ]);
             }
         }
-        Ok(())
     }
 
     fn write(self, path: &Path) -> Result<(), Failure> {
-        let table = self
-            .0
-            .into_inner()
-            .map_err(|error| Failure::Other(format!("the CSV cannot be written: {error}")))?;
+        let table = output::csv(&HEADER.map(String::from), self.0)?;
         output::write_whole(path, &[CONVENTION.as_bytes(), &table].concat())
     }
 }
 
 /// Writes what `abbe fit` found.
 pub fn write_fit(path: &Path, result: &FitResult) -> Result<(), Failure> {
-    let mut rows = Rows::new()?;
-    rows.figure("residual", "rms", "", result.rms_um, "um")?;
-    rows.figure("residual", "held out", "", result.heldout_rms_um, "um")?;
-    rows.parameters("parameters", &result.parameters)?;
+    let mut rows = Rows::default();
+    rows.figure("residual", "rms", "", result.rms_um, "um");
+    rows.figure("residual", "held out", "", result.heldout_rms_um, "um");
+    rows.parameters("parameters", &result.parameters);
     for test in &result.circular {
-        rows.circular(test)?;
+        rows.circular(test);
     }
     rows.write(path)
 }
 
 /// Writes what `abbe trace` found.
 pub fn write_trace(path: &Path, result: &TraceResult) -> Result<(), Failure> {
-    let mut rows = Rows::new()?;
+    let mut rows = Rows::default();
     for (name, model) in [("before", &result.before), ("after", &result.after)] {
-        rows.figure(name, "rms", "", model.rms_um, "um")?;
-        rows.figure(name, "held out", "", model.heldout_rms_um, "um")?;
-        rows.parameters(name, &model.parameters)?;
+        rows.figure(name, "rms", "", model.rms_um, "um");
+        rows.figure(name, "held out", "", model.heldout_rms_um, "um");
+        rows.parameters(name, &model.parameters);
     }
     for (index, effect) in result.effects.iter().enumerate() {
-        rows.parameters(&format!("effect {}", index + 1), &effect.parameters)?;
+        rows.parameters(&format!("effect {}", index + 1), &effect.parameters);
     }
     rows.write(path)
 }

@@ -85,9 +85,10 @@ pub fn run(arguments: &FitArguments) -> Result<(), Failure> {
             "--csv and --compensation go with the full fit; leave out --method, or use --json".into(),
         ));
     }
-    if arguments.method != Method::Full && arguments.faces.asked() {
+    if arguments.method == Method::SelfCalibration && arguments.faces.asked() {
         return Err(Failure::Other(
-            "`--report` and `--plots` show the full fit; leave `--method` out".to_string(),
+            "`--report` and `--plots` show the full fit and the geometric methods; leave `--method` out"
+                .to_string(),
         ));
     }
     if arguments.method == Method::SelfCalibration {
@@ -101,7 +102,7 @@ pub fn run(arguments: &FitArguments) -> Result<(), Failure> {
     };
     if let Some(method) = geometric {
         arguments.draws.refuse()?;
-        return geometric::run(&session, method, &arguments.common);
+        return geometric::run(&session, method, &arguments.common, &arguments.faces);
     }
     let draws = arguments.draws.draws(arguments.common.seed)?;
     let (problem, fit) = abbe::identify::fit::prepare(&session, arguments.common.seed)?;

@@ -4,14 +4,26 @@ use abbe::identify::geometric::{self, Comparison, Method};
 use abbe::model::session::Session;
 
 use super::failure::Failure;
+use super::report::ReportArguments;
 use super::{CommonArguments, fit, output, table};
 
 /// Runs a geometric method and the full fit on the same readings.
-pub fn run(session: &Session, method: Method, common: &CommonArguments) -> Result<(), Failure> {
+pub fn run(
+    session: &Session,
+    method: Method,
+    common: &CommonArguments,
+    faces: &ReportArguments,
+) -> Result<(), Failure> {
     let result = geometric::compare(session, method, common.seed)?;
     print(&result);
     if let Some(path) = &common.json {
         output::write_json(path, &result)?;
+    }
+    if faces.asked() {
+        let (problem, _) = abbe::identify::fit::prepare(session, common.seed)?;
+        let document = crate::report::method::document(&problem, &result);
+        let method = crate::report::method::method(&result);
+        faces.write(&document, &method, session, common.seed)?;
     }
     Ok(())
 }

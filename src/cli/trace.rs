@@ -8,6 +8,7 @@ use abbe::identify::plan::menu::Menu;
 use abbe::identify::results::{EffectName, ModelResult, TraceResult};
 use abbe::identify::trace::further::tell_apart;
 use abbe::identify::trace::{Progress, TraceOptions, library};
+use abbe::model::session::{rewrite, write};
 use clap::Args;
 use indicatif::{ProgressBar, ProgressStyle};
 
@@ -49,6 +50,9 @@ pub struct TraceArguments {
 /// Runs `abbe trace`.
 pub fn run(arguments: &TraceArguments) -> Result<(), Failure> {
     arguments.faces.check()?;
+    if let Some(path) = &arguments.write {
+        output::check(path)?;
+    }
     let session = read_session(&arguments.session)?;
     let options = TraceOptions {
         seed: arguments.common.seed,
@@ -93,7 +97,10 @@ pub fn run(arguments: &TraceArguments) -> Result<(), Failure> {
     if let Some(path) = &arguments.write {
         let text = std::fs::read_to_string(&arguments.session.session)
             .map_err(|error| Failure::Other(format!("{}: {error}", arguments.session.session.display())))?;
-        let next = abbe::model::session::write::with_effects(&text, &trace.effects, &session.machine);
+        let folder = output::check(path)?;
+        let data = arguments.session.data.as_deref();
+        let text = rewrite::moved(&text, &session.file, folder, data)?;
+        let next = write::with_effects(&text, &trace.effects, &session.machine);
         output::write_whole(path, next.as_bytes())?;
     }
     if let Some(path) = &arguments.csv {

@@ -1,13 +1,17 @@
 //! Plots of what stands behind the readings: orders, lengths, and what one error at a time does.
 
+use abbe::identify::IdentifyError;
+use abbe::identify::heldout::FoldKind;
+use abbe::identify::problem::Problem;
 use abbe::identify::views::lengths;
-use abbe::identify::views::sensitivities::{Sensitivity, TestSensitivities};
+use abbe::identify::views::sensitivities::{self, Sensitivity, TestSensitivities};
 use abbe::identify::views::spectrum::Spectrum;
 use abbe::model::effect::{Effect, Shape};
 use maud::{Markup, html};
 
 use super::document::Document;
 use super::drawn::{Drawn, MOST_TESTS};
+use super::plot::bars::{Fill, bars};
 use super::plot::lines::{ACROSS, Lines, Mark, Series, UP, span};
 use super::plot::polar::{Round, Trace, drawing};
 use super::plot::scale::{Scale, place, polyline, text};
@@ -17,6 +21,8 @@ use super::thin;
 
 /// Strips of a plot over time.
 const TIME_STRIPS: usize = 240;
+/// Strips of a test at least.
+const LEAST_STRIPS: usize = 12;
 
 /// How many readings have how long a residual.
 pub fn histogram(drawn: &Drawn<'_>, words: [&str; 2]) -> Plot {
@@ -82,33 +88,37 @@ pub fn over_time(drawn: &Drawn<'_>) -> Plot {
         .tests
         .iter()
         .all(|test| test.readings.as_ref().is_some_and(|r| !r.time_s.is_empty()));
-    let mut columns: [Vec<f64>; 3] = [const { Vec::new() }; 3];
+    // Time, before and after of each test, and the classes by which the page switches it off.
+    let mut tests: Vec<[Vec<f64>; 3]> = Vec::new();
+    let mut past = 0;
     for (test, view) in drawn.problem.tests.iter().zip(&drawn.views.tests) {
         let Some(readings) = &test.readings else { continue };
-        let past = columns[0].len();
-        if timed {
-            columns[0].extend(
-                readings
-                    .time_s
-                    .iter()
-                    .map(|t| (t - drawn.problem.origin.time_s) / 60.0),
-            );
+        let time = if timed {
+            let minutes = |t: &f64| (t - drawn.problem.origin.time_s) / 60.0;
+            readings.time_s.iter().map(minutes).collect()
         } else {
-            columns[0].extend((0..readings.rows()).map(|row| (past + row) as f64 + 1.0));
-        }
-        columns[1].extend(lengths(&view.before_um, drawn.views.coordinates));
-        columns[2].extend(lengths(&view.after_um, drawn.views.coordinates));
+            (past..past + readings.rows())
+                .map(|row| row as f64 + 1.0)
+                .collect()
+        };
+        past += readings.rows();
+        let of = |values: &[f64]| lengths(values, drawn.views.coordinates);
+        tests.push([time, of(&view.before_um), of(&view.after_um)]);
     }
-    let [time, before, after] = columns;
-    let of = |values: &[f64]| -> Vec<(f64, f64)> {
-        let strips = thin::strips(&time, values, TIME_STRIPS);
+    let classes: Vec<[String; 2]> = (0..tests.len())
+        .map(|test| ["before", "after"].map(|when| format!("{when} of-test-{test}")))
+        .collect();
+    let strips = (TIME_STRIPS / tests.len().max(1)).max(LEAST_STRIPS);
+    let of = |time: &[f64], values: &[f64]| -> Vec<(f64, f64)> {
+        let strips = thin::strips(time, values, strips);
         strips
             .into_iter()
             .flat_map(|(at, low, high)| [(at, low), (at, high)])
             .collect()
     };
-    let [low, high] = span(time.iter().copied());
-    let [least, most] = span(before.iter().chain(&after).copied());
+    let all = |column: usize| tests.iter().flat_map(move |test| test[column].iter().copied());
+    let [low, high] = span(all(0));
+    let [least, most] = span(all(1).chain(all(2)));
     let (what, unit) = if timed {
         ("time", "min")
     } else {
@@ -118,7 +128,7 @@ pub fn over_time(drawn: &Drawn<'_>) -> Plot {
         name: "residual-over-time".to_string(),
         title: format!("Residual against {what}"),
         caption:
-            "All tests one after another: drift, and what comes and goes. Before (red) and after (blue)."
+            "All tests one after another: drift, and what comes and goes. Before (red) and after (blue). The switches of the traces take tests out here too."
                 .to_string(),
         x: (Scale::over(low, high, ACROSS, 7), format!("{what}, {unit}")),
         y: (
@@ -129,20 +139,18 @@ pub fn over_time(drawn: &Drawn<'_>) -> Plot {
                 "residual, µm".to_string()
             },
         ),
-        series: vec![
-            Series {
-                class: "before",
-                live: None,
-                mark: Mark::Bars,
-                points: of(&before),
-            },
-            Series {
-                class: "after",
-                live: None,
-                mark: Mark::Bars,
-                points: of(&after),
-            },
-        ],
+        series: [0, 1]
+            .into_iter()
+            .flat_map(|when| {
+                let of = &of;
+                tests.iter().zip(&classes).map(move |(test, class)| Series {
+                    class: &class[when],
+                    live: None,
+                    mark: Mark::Bars,
+                    points: of(&test[0], &test[1 + when]),
+                })
+            })
+            .collect(),
         legend: vec![("before bars", "before".into()), ("after bars", "after".into())],
         over: html! {},
     }
@@ -215,15 +223,28 @@ pub fn spectrum_plot(spectrum: &Spectrum, highest: f64, effects: &[Effect]) -> P
     .plot()
 }
 
-/// What one error at a time does to each test: 10 µm and 0.01° (Table 3.1 of the thesis), 5 µm a division (its Figs. 3.7, 3.8).
-pub fn patterns(document: &mut Document, patterns: &[TestSensitivities]) -> Markup {
+/// What one error at a time does to each test: 10 µm and 0.01° (Table 3.1 of the thesis), 5 µm a division (its Figs. 3.7, 3.8); coordinates of a vector
+/// as curves, and among poses by how much.
+///
+/// # Errors
+/// If the model cannot be evaluated.
+pub fn patterns(
+    document: &mut Document,
+    problem: &Problem<'_>,
+    beta: &[f64],
+) -> Result<Markup, IdentifyError> {
     const DIVISION_UM: f64 = 5.0;
+    if problem.folds.kind == FoldKind::Poses {
+        let plots = over_poses(&sensitivities::over_poses(problem, beta)?);
+        return Ok(document.show(plots));
+    }
     let mut plots = Vec::new();
-    for test in patterns.iter().take(MOST_TESTS) {
+    let found = sensitivities::sensitivities(problem, beta)?;
+    for test in found.iter().take(MOST_TESTS * problem.coordinates()) {
         if test.columns.is_empty() {
             continue;
         }
-        if test.way.is_angle {
+        if test.way.is_angle && test.coordinate.is_none() {
             for chunk in test.columns.chunks(12) {
                 plots.push(small_circles(test, chunk, DIVISION_UM));
             }
@@ -232,7 +253,38 @@ pub fn patterns(document: &mut Document, patterns: &[TestSensitivities]) -> Mark
             plots.push(curves(test, chunk));
         }
     }
-    document.show(plots)
+    Ok(document.show(plots))
+}
+
+/// How far each error moves the readings of poses, unit by unit, the greatest first.
+fn over_poses(found: &[Sensitivity]) -> Vec<Plot> {
+    const MOST: usize = 40;
+    let mut units: Vec<&str> = found.iter().map(|error| error.unit.as_str()).collect();
+    units.sort_unstable();
+    units.dedup();
+    units
+        .into_iter()
+        .map(|name| {
+            let own = found.iter().filter(|error| error.unit == name);
+            let mut rows: Vec<(String, f64, Fill)> =
+                own.map(|error| (error.id.clone(), error.values[0], Fill::Named)).collect();
+            rows.sort_by(|a, b| b.1.total_cmp(&a.1));
+            let left = rows.len().saturating_sub(MOST);
+            rows.truncate(MOST);
+            let caption = match left {
+                0 => "Root mean square over all poses of the length by which a unit moves a reading.".to_string(),
+                left => format!("Root mean square over all poses of the length by which a unit moves a reading; {left} that move it less are left out."),
+            };
+            bars(
+                format!("sensitivity-{}", name.replace('/', "-per-")),
+                format!("Sensitivity to errors in {}", unit(name)),
+                caption,
+                &format!("µm for one {}", unit(name)),
+                &rows,
+                &[],
+            )
+        })
+        .collect()
 }
 
 /// By how much an error of this unit is drawn, and in words.
@@ -290,9 +342,16 @@ fn curves(test: &TestSensitivities, columns: &[Sensitivity]) -> Plot {
             .zip(column.values.iter().copied())
             .collect()
     };
+    let (name, what) = match test.coordinate {
+        Some(coordinate) => (
+            format!("{}-{coordinate}", test.test),
+            format!("{}: sensitivity of {coordinate}", test.test),
+        ),
+        None => (test.test.clone(), format!("{}: sensitivity", test.test)),
+    };
     Lines {
-        name: format!("sensitivity-{}", test.test),
-        title: format!("{}: sensitivity", test.test),
+        name: format!("sensitivity-{name}"),
+        title: what,
         caption: "µm of reading for a unit of each error, along the first run.".to_string(),
         x: (
             x,

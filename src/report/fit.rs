@@ -4,7 +4,7 @@ use abbe::identify::IdentifyError;
 use abbe::identify::fit::Fit;
 use abbe::identify::problem::Problem;
 use abbe::identify::results::{FitResult, ModelResult};
-use abbe::identify::views::{sensitivities, spectrum, views};
+use abbe::identify::views::{spectrum, views};
 use maud::{Markup, html};
 
 use super::curves;
@@ -96,12 +96,7 @@ pub fn document(problem: &Problem<'_>, fit: &Fit, result: &FitResult) -> Result<
             (readings::unobservable(&result.unobservable))
         },
     );
-    let found = sensitivities::sensitivities(problem, &fit.beta)?;
-    let shown = if drawn.is_round() {
-        curves::patterns(&mut document, &found)
-    } else {
-        html! {}
-    };
+    let patterns = curves::patterns(&mut document, problem, &fit.beta)?;
     document.section(
         "What to measure next",
         html! {
@@ -114,10 +109,10 @@ pub fn document(problem: &Problem<'_>, fit: &Fit, result: &FitResult) -> Result<
                     (result.unobservable.len()) " combinations."
                 }
             }
-            @if drawn.is_round() { p { "What each error does to each test:" } (shown) }
             (readings::warnings(&result.rejected, &result.warnings))
         },
     );
+    document.section("What each error does to each test", patterns);
     let section = readings::machine(&mut document, problem);
     document.section("Machine", section);
     Ok(document)

@@ -2,7 +2,7 @@
 //!
 //! - [`document`], [`page`]: sections, and the page around them; [`provenance`]: what it takes to do the same again;
 //! - [`drawn`], [`readings`], [`curves`]: the plots of readings and of what stands behind them; [`thin`]: fewer points, no peak lost; [`embed`]: the data that the page brings along;
-//! - [`fit`], [`trace`], [`plan`]: what a report of each command holds;
+//! - [`fit`], [`method`], [`trace`], [`plan`], [`next`]: what a report of each command holds;
 //! - [`plot`]: the drawings.
 //!
 //! Everything goes through templates that escape; only drawings of this module and the page's own style and script are taken as they are.
@@ -12,6 +12,8 @@ pub mod document;
 pub mod drawn;
 pub mod embed;
 pub mod fit;
+pub mod method;
+pub mod next;
 pub mod page;
 pub mod plan;
 pub mod plot;

@@ -143,6 +143,7 @@
     }
     const tests = data.tests.map((test, k) => box(test.name, (on) => {
       for (const plot of plots) if (plot.live.test === k) plot.svg.closest("figure").hidden = !on;
+      for (const path of document.querySelectorAll(`path.of-test-${k}`)) path.style.display = on ? "" : "none";
     }));
     const words = { true: "forward", false: "backward", none: "no direction" };
     controls.append(

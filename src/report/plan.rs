@@ -3,7 +3,6 @@
 use abbe::identify::IdentifyError;
 use abbe::identify::plan::results::{ErrorAnalysis, PlanAnalysis};
 use abbe::identify::problem::Problem;
-use abbe::identify::views::{is_round, sensitivities};
 use maud::{Markup, html};
 
 use super::curves;
@@ -55,12 +54,7 @@ pub fn document(problem: &Problem<'_>, analysis: &PlanAnalysis) -> Result<Docume
         },
     );
     let beta = vec![0.0; problem.parameters.list.len()];
-    let found = sensitivities::sensitivities(problem, &beta)?;
-    let section = if is_round(problem.session.instrument) {
-        curves::patterns(&mut document, &found)
-    } else {
-        html! { p { "Traces of single errors are drawn for instruments that read one length." } }
-    };
+    let section = curves::patterns(&mut document, problem, &beta)?;
     document.section("What each error does to each test", section);
     let section = what_else(&mut document, analysis);
     document.section("What else it could be", section);

@@ -173,6 +173,7 @@ pub fn parameters(
                 format!("Parameters in {}{of}", unit(unit_name)),
                 "Whiskers are two standard uncertainties either way.".to_string(),
                 &unit(unit_name),
+                ["before", "after"],
                 rows,
             ));
         }

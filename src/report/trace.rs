@@ -4,7 +4,7 @@ use abbe::identify::IdentifyError;
 use abbe::identify::results::{EffectResult, TraceResult};
 use abbe::identify::trace::Trace;
 use abbe::identify::trace::alias::Rival;
-use abbe::identify::views::{sensitivities, spectrum, views};
+use abbe::identify::views::{spectrum, views};
 use maud::{Markup, html};
 
 use super::curves;
@@ -114,11 +114,8 @@ pub fn document(trace: &Trace<'_>) -> Result<Document, IdentifyError> {
     let section = what_else(&mut document, trace);
     document.section("What else it could be", section);
     document.section("What to measure next", next(result));
-    let found = sensitivities::sensitivities(problem, &trace.after_fit.beta)?;
-    if drawn.is_round() {
-        let section = curves::patterns(&mut document, &found);
-        document.section("What each error does to each test", section);
-    }
+    let section = curves::patterns(&mut document, problem, &trace.after_fit.beta)?;
+    document.section("What each error does to each test", section);
     let section = readings::machine(&mut document, problem);
     document.section("Machine", section);
     Ok(document)

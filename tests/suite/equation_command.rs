@@ -377,21 +377,29 @@ fn what_cannot_be_is_said() {
     }
 }
 
+/// A Python with NumPy: that of `ABBE_PYTHON`, else the system's. Without one the test that asks is skipped by name, but in CI.
+pub(super) fn python(test: &str) -> Option<String> {
+    let own = std::env::var("ABBE_PYTHON").unwrap_or_default();
+    let runs = |name: &String| {
+        let ran = Command::new(name).args(["-c", "import numpy"]).output();
+        ran.is_ok_and(|output| output.status.success())
+    };
+    let found = [own, "python3".to_string()]
+        .into_iter()
+        .filter(|name| !name.is_empty())
+        .find(runs);
+    if found.is_none() {
+        assert!(std::env::var("CI").is_err(), "no python with numpy");
+        eprintln!("skipped {test}: no python with numpy");
+    }
+    found
+}
+
 /// The printed Python of a session's test, run by Python alone, against the length of a triangle: without errors the balls of the C test
 /// without extension are R apart whatever C; with the axis 0.3 mm off in X the length is √(R² + 0.09 − 2·0.3·R·sin C).
 #[test]
 fn printed_code_runs_as_it_is_written() {
-    let own = std::env::var("ABBE_PYTHON").unwrap_or_default();
-    let candidates = [own.as_str(), "python3"]
-        .into_iter()
-        .filter(|name| !name.is_empty());
-    let runs = |name: &&str| {
-        let ran = Command::new(name).args(["-c", "import numpy"]).output();
-        ran.is_ok_and(|output| output.status.success())
-    };
-    let Some(python) = candidates.into_iter().find(runs) else {
-        assert!(std::env::var("CI").is_err(), "no python with numpy");
-        eprintln!("skipped printed_code_runs_as_it_is_written: no python with numpy");
+    let Some(python) = python("printed_code_runs_as_it_is_written") else {
         return;
     };
     let folder = tempfile::tempdir().unwrap();

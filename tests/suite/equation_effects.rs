@@ -4,7 +4,7 @@ use std::fs;
 use std::path::{Path, PathBuf};
 use std::process::Command;
 
-use super::equation_command::{printed, refused};
+use super::equation_command::{printed, python, refused};
 use super::{ready, text};
 
 const EFFECTS: &str = r#"
@@ -82,17 +82,7 @@ fn declared_effects_are_written_in_where_they_act() {
 /// grown by k₃ (1 − exp(−t/900)), so that it reads √(R² + e²) less what it has grown.
 #[test]
 fn printed_effects_run_as_they_are_written() {
-    let own = std::env::var("ABBE_PYTHON").unwrap_or_default();
-    let candidates = [own.as_str(), "python3"]
-        .into_iter()
-        .filter(|name| !name.is_empty());
-    let runs = |name: &&str| {
-        let ran = Command::new(name).args(["-c", "import numpy"]).output();
-        ran.is_ok_and(|output| output.status.success())
-    };
-    let Some(python) = candidates.into_iter().find(runs) else {
-        assert!(std::env::var("CI").is_err(), "no python with numpy");
-        eprintln!("skipped printed_effects_run_as_they_are_written: no python with numpy");
+    let Some(python) = python("printed_effects_run_as_they_are_written") else {
         return;
     };
     let folder = tempfile::tempdir().unwrap();

@@ -56,6 +56,109 @@ fn the_patterns_of_single_errors_are_those_of_the_closed_form() {
     assert!(compared > 1000);
 }
 
+/// Coordinates of a vector one by one: a table that lies +X of its place takes its nest along, so that the vector from nest to ball, in the frame of a
+/// table at C, changes by −(cos C, −sin C, 0).
+#[test]
+fn the_sensitivities_of_an_r_test_are_those_of_each_coordinate() {
+    let session = session(&ready("r-test/measured/session.toml"));
+    let (problem, _) = abbe::identify::fit::prepare(&session, 1).unwrap();
+    let beta = vec![0.0; problem.parameters.list.len()];
+    let found = sensitivities::sensitivities(&problem, &beta).unwrap();
+    for (coordinate, wanted) in [("dx", (|c: f64| -c.cos()) as fn(f64) -> f64), ("dy", |c| c.sin())] {
+        let of = |test: &&sensitivities::TestSensitivities| {
+            test.test == "C-alone" && test.coordinate == Some(coordinate)
+        };
+        let test = found.iter().find(of).unwrap();
+        let own = test.columns.iter().find(|column| column.id == "EX0C").unwrap();
+        for (angle, value) in test.way.values.iter().zip(&own.values) {
+            let wanted = wanted(angle.to_radians());
+            assert!(
+                (value - wanted).abs() < 1e-9,
+                "{coordinate} at {angle}: {value} {wanted}"
+            );
+        }
+    }
+    let vertical =
+        |test: &&sensitivities::TestSensitivities| test.test == "C-alone" && test.coordinate == Some("dz");
+    let vertical = found.iter().find(vertical).unwrap();
+    assert!(vertical.columns.iter().all(|column| column.id != "EX0C"));
+}
+
+/// Wherever a robot stands, a joint that is shifted by a micrometre shifts the target by one.
+#[test]
+fn the_sensitivity_of_poses_to_a_shift_is_one() {
+    let Some(series) = data("the_sensitivity_of_poses_to_a_shift_is_one", "landgraf_ur10") else {
+        return;
+    };
+    let options = ReadOptions {
+        data_directory: series.parent().map(Path::to_path_buf),
+        ..ReadOptions::default()
+    };
+    let session = read::session(&ready("ur10/session.toml"), &options).unwrap();
+    let (problem, fit) = abbe::identify::fit::prepare(&session, 1).unwrap();
+    let found = sensitivities::over_poses(&problem, &vec![0.0; fit.beta.len()]).unwrap();
+    let shifts: Vec<_> = found.iter().filter(|error| error.unit == "um").collect();
+    assert_eq!(shifts.len(), 18);
+    for shift in shifts {
+        assert!((shift.values[0] - 1.0).abs() < 1e-9, "{shift:?}");
+    }
+}
+
+/// What a page says is what the JSON says.
+#[test]
+fn methods_and_next_tests_have_reports() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = |name: &str| folder.path().join(name);
+    let written = |arguments: &[&str], name: &str| {
+        let (page, json, plots) = (at(&format!("{name}.html")), at(&format!("{name}.json")), at(name));
+        let faces = [
+            "-q",
+            "--report",
+            text(&page),
+            "--json",
+            text(&json),
+            "--plots",
+            text(&plots),
+        ];
+        let output = abbe(&[arguments, &faces].concat());
+        assert!(
+            output.status.success(),
+            "{}",
+            String::from_utf8_lossy(&output.stderr)
+        );
+        let json: serde_json::Value = serde_json::from_str(&std::fs::read_to_string(json).unwrap()).unwrap();
+        (std::fs::read_to_string(page).unwrap(), json)
+    };
+    let measured = ready("hermle-c600u/measured/session.toml");
+    let (page, json) = written(&["fit", text(&measured), "--method", "cone"], "cone");
+    let error = json["errors"]
+        .as_array()
+        .unwrap()
+        .iter()
+        .find(|error| error["id"] == "EB0A")
+        .unwrap();
+    let bias = format!("{:.4}", error["bias"].as_f64().unwrap()).replace('-', "\u{2212}");
+    assert!(page.contains(&bias), "no bias {bias}");
+    assert!(page.contains("cone, ± 2 u") && page.contains("full fit, ± 2 u"));
+    assert!(at("cone/errors-arcsec.svg").exists());
+    let plan = ready("hermle-c600u/chapter5.toml");
+    let (page, json) = written(&["plan", text(&plan), "--improve", "1", "--range"], "next");
+    let step = &json["improvement"]["steps"][0];
+    let test = step["test"].as_str().unwrap().replace('&', "&amp;");
+    assert!(page.contains(&test), "no test {test}");
+    let after = step["after"].as_f64().unwrap();
+    let cells = page
+        .split("<td")
+        .filter_map(|cell| cell.split_once('>')?.1.split('<').next());
+    let mut shown = cells.filter_map(|cell| cell.parse::<f64>().ok());
+    assert!(
+        shown.any(|value| (value / after - 1.0).abs() < 0.006),
+        "no figure {after}"
+    );
+    assert!(page.contains("How far each sweep can shrink"));
+    assert!(at("next/next-test.svg").exists());
+}
+
 /// A share is what the model's readings lose when that share's unknowns are put to zero: the difference, not the derivative.
 #[test]
 fn a_share_is_what_the_readings_lose_without_it() {

@@ -149,12 +149,13 @@ fn pages_ask_for_nothing_and_their_sliders_move_the_traces() {
         const shown = [...trace.querySelectorAll('path[data-run]')].filter((p) => p.style.display !== 'none').length;
         await tick('C100', false);
         const hidden = plot('polar', 'deviation', 'C100').closest('figure').hidden;
+        const over = [...document.querySelectorAll('path.bars')].filter((p) => p.style.display === 'none').map((p) => p.classList[p.classList.length - 2]);
         const at = new DOMPoint(...places(path)[10]).matrixTransform(trace.getScreenCTM());
         trace.dispatchEvent(new PointerEvent('pointermove', {{ clientX: at.x, clientY: at.y }}));
         const tip = document.getElementById('tip').hidden ? '' : document.getElementById('tip').textContent;
         const bytes = Uint8Array.from(atob(document.getElementById('table').textContent), (c) => c.charCodeAt(0));
         const csv = await new Response(new Blob([bytes]).stream().pipeThrough(new DecompressionStream('deflate'))).text();
-        return {{ angles, moves, half, left: Math.max(...left), division, shown, hidden, tip, rows: csv.trim().split('\\n').length,
+        return {{ angles, moves, half, left: Math.max(...left), division, shown, hidden, over, tip, rows: csv.trim().split('\\n').length,
             requests: performance.getEntriesByType('resource').length, wide: document.documentElement.scrollWidth }};"
     );
     let (found, console) = run(browser, &page, &script);
@@ -186,6 +187,8 @@ fn pages_ask_for_nothing_and_their_sliders_move_the_traces() {
     assert!(division <= 0.5, "{division}");
     assert_eq!(found["shown"], 2);
     assert_eq!(found["hidden"], true);
+    // C100 is the third test; it leaves the plot over time, before and after.
+    assert_eq!(found["over"], serde_json::json!(["of-test-2", "of-test-2"]));
     let tip = found["tip"].as_str().unwrap();
     assert!(
         tip.starts_with("C150, run ") && tip.contains("deviation") && tip.contains("line "),

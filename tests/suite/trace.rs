@@ -176,6 +176,14 @@ fn the_bundled_session_is_explained_at_the_command_line() {
         written.contains("[[effect]]") && written.contains("EZC"),
         "{written}"
     );
+    // The written session lies elsewhere than machine and data, and finds them.
+    let again = folder.path().join("fit.json");
+    let outcome = abbe(&["fit", text(&next), "-q", "--json", text(&again)]);
+    let said = String::from_utf8_lossy(&outcome.stderr);
+    assert!(outcome.status.success(), "{said}");
+    let fit: serde_json::Value = serde_json::from_str(&std::fs::read_to_string(&again).unwrap()).unwrap();
+    let [traced, fitted] = [&result["after"], &fit].map(|model| model["rms_um"].as_f64().unwrap());
+    assert!((traced - fitted).abs() < 1e-6, "{traced} {fitted}");
 }
 
 #[test]

@@ -1,7 +1,12 @@
-//! What each single error does to the trace of each test: `∂L/∂error` along the first run (Figs. 3.7, 3.8 of the thesis are such patterns).
+//! What each single error does to each test: `∂L/∂error` along the first run (Figs. 3.7, 3.8 of the thesis are such patterns); of poses, which follow no way, its
+//! root mean square.
+
+use abbe_model::instrument::Station;
+use abbe_model::sensitivity::TestModel;
 
 use super::way::Way;
 use crate::error::IdentifyError;
+use crate::parameters::Parameter;
 use crate::plan::linear::is_wanted;
 use crate::problem::{Block, Problem};
 
@@ -17,6 +22,8 @@ pub struct TestSensitivities {
     pub test: String,
     /// What it goes along, thinned like the columns.
     pub way: Way,
+    /// Which of a reading's three coordinates the columns are of; `None` for a length.
+    pub coordinate: Option<&'static str>,
     /// The errors that move it.
     pub columns: Vec<Sensitivity>,
 }
@@ -28,11 +35,11 @@ pub struct Sensitivity {
     pub id: String,
     /// Its unit.
     pub unit: String,
-    /// µm of reading a unit, along the way; for three coordinates the length.
+    /// µm of reading a unit: along the way, or one root mean square.
     pub values: Vec<f64>,
 }
 
-/// The sensitivity to every error that is to be identified, at the values `beta` of the unknowns.
+/// The sensitivity to every error that is to be identified along the tests' runs, at the values `beta` of the unknowns; of three coordinates one after the other.
 ///
 /// # Errors
 /// If the model cannot be evaluated.
@@ -59,31 +66,70 @@ pub fn sensitivities(problem: &Problem<'_>, beta: &[f64]) -> Result<Vec<TestSens
             rows: run,
         };
         let rows = problem.rows(&values, &block)?;
-        let columns = (0..list.len())
-            .filter(|j| is_wanted(&list[*j]))
-            .filter_map(|j| {
-                let scale = 1e3 / list[j].unit.per_inside;
-                let value = |i: &usize| {
-                    if coordinates == 1 {
-                        return rows[(*i, j)] * scale;
-                    }
-                    let square = |c: usize| rows[(i * coordinates + c, j)].powi(2);
-                    (0..coordinates).map(square).sum::<f64>().sqrt() * scale
-                };
-                let values: Vec<f64> = picked.iter().map(value).collect();
-                let moves = values.iter().any(|value| value.abs() > NOTHING);
-                moves.then(|| Sensitivity {
-                    id: list[j].id.clone(),
-                    unit: list[j].unit.name.clone(),
-                    values,
+        let names = names(&test.station);
+        for coordinate in 0..coordinates {
+            let columns = (0..list.len())
+                .filter(|j| is_wanted(&list[*j]))
+                .filter_map(|j| {
+                    let scale = 1e3 / list[j].unit.per_inside;
+                    let value = |i: &usize| rows[(i * coordinates + coordinate, j)] * scale;
+                    let values: Vec<f64> = picked.iter().map(value).collect();
+                    let moves = values.iter().any(|value| value.abs() > NOTHING);
+                    moves.then(|| sensitivity(&list[j], values))
                 })
-            })
-            .collect();
-        of_tests.push(TestSensitivities {
-            test: test.name.clone(),
-            way,
-            columns,
-        });
+                .collect();
+            of_tests.push(TestSensitivities {
+                test: test.name.clone(),
+                way: way.clone(),
+                coordinate: (coordinates > 1).then(|| names[coordinate]),
+                columns,
+            });
+        }
     }
     Ok(of_tests)
+}
+
+/// The root mean square over all poses of the length by which every error that is to be identified moves a reading, at the values `beta` of the unknowns.
+///
+/// # Errors
+/// If the model cannot be evaluated.
+pub fn over_poses(problem: &Problem<'_>, beta: &[f64]) -> Result<Vec<Sensitivity>, IdentifyError> {
+    let values = problem.slot_values(beta);
+    let list = &problem.parameters.list;
+    let mut squares = vec![0.0; list.len()];
+    for block in problem.blocks() {
+        let rows = problem.rows(&values, &block)?;
+        for (j, square) in squares.iter_mut().enumerate() {
+            *square += rows.col(j).squared_norm_l2();
+        }
+    }
+    let readings = problem.models.iter().map(TestModel::rows).sum::<usize>().max(1) as f64;
+    let wanted = list
+        .iter()
+        .zip(squares)
+        .filter(|(parameter, _)| is_wanted(parameter));
+    Ok(wanted
+        .map(|(parameter, square)| {
+            let rms_um = (square / readings).sqrt() * 1e3 / parameter.unit.per_inside;
+            sensitivity(parameter, vec![rms_um])
+        })
+        .filter(|found| found.values[0] > NOTHING)
+        .collect())
+}
+
+fn sensitivity(parameter: &Parameter, values: Vec<f64>) -> Sensitivity {
+    Sensitivity {
+        id: parameter.id.clone(),
+        unit: parameter.unit.name.clone(),
+        values,
+    }
+}
+
+/// What the coordinates of a vector are called.
+fn names(station: &Station<f64>) -> [&'static str; 3] {
+    match station {
+        Station::RTest(rtest) if rtest.sensors.is_some() => ["du", "dv", "dw"],
+        Station::RTest(_) => ["dx", "dy", "dz"],
+        _ => ["x", "y", "z"],
+    }
 }

@@ -120,6 +120,23 @@ pub struct DriverSample<N> {
 }
 
 /// An effect: component × driver × shape.
+///
+/// ```
+/// use abbe_model::effect::{Component, Driver, DriverSample, Effect, Shape};
+///
+/// let effect = Effect {
+///     component: Component::parse("EZC").unwrap(),
+///     driver: Driver::parse("C"),
+///     shape: Shape::Harmonic { order: 2.0 },
+///     tests: Vec::new(),
+/// };
+/// assert_eq!(effect.id(), "EZC~C:h2");
+/// // Cosine and sine of 2 C, at C = 30°.
+/// let at = DriverSample { value: 30_f64.to_radians(), ..DriverSample::default() };
+/// let mut basis = Vec::new();
+/// effect.shape.basis(&at, &mut basis);
+/// assert!((basis[0] - 0.5).abs() < 1e-15 && (basis[1] - 0.75_f64.sqrt()).abs() < 1e-15);
+/// ```
 #[derive(Clone, Debug, PartialEq)]
 pub struct Effect {
     /// What moves.

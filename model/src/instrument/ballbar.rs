@@ -26,6 +26,20 @@ pub const BAR: usize = 6;
 pub const GAIN: usize = 7;
 
 /// A ball bar as set up for one test, lengths in mm.
+///
+/// ```
+/// use abbe_model::chain::{AxisPosition, BodyErrors, Machine};
+/// use abbe_model::instrument::ballbar::{BAR, BallBar};
+///
+/// let machine = Machine::from_code("wbXYZt")?;
+/// let state: Vec<_> = machine.axes.iter().map(|axis| AxisPosition::new(axis.kind, 0.0)).collect();
+/// let none = vec![BodyErrors::<f64>::NONE; 3];
+/// let bar = BallBar { workpiece_ball: [0.0; 3], spindle_ball: [60.0, 0.0, 80.0], bar: 100.0 };
+/// assert_eq!(bar.read(&machine, &state, &none, |_| None), 100.0);
+/// // A bar that is 2 µm longer than stated reads 2 µm less.
+/// assert_eq!(bar.read(&machine, &state, &none, |unknown| (unknown == BAR).then_some(0.002)), 99.998);
+/// # Ok::<(), abbe_model::ModelError>(())
+/// ```
 #[derive(Clone, Debug, PartialEq)]
 pub struct BallBar<N> {
     /// Centre of the workpiece ball in the table frame.

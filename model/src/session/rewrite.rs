@@ -1,9 +1,10 @@
 //! A session's text with a few things changed and the rest, comments and all, as it was: what a simulation leaves behind.
 
 use std::ops::Range;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 use super::document::{Source, Value};
+use super::write::quoted;
 use crate::error::ModelError;
 
 /// The text with its machine read from another file; a text that holds the machine itself stays as it is.
@@ -42,6 +43,84 @@ pub fn with_noise(original: &str, file: &Path, noise_um: f64) -> Result<String, 
         (None, None) => source.text.clone(),
     };
     Ok(text)
+}
+
+/// The text of session `file` as it has to read in `folder`: names of the machine file and of data files start from there. Absolute names stay, and so do those
+/// that are found in `data_directory`, which the reader looks into first.
+///
+/// # Errors
+/// If the text is no session, or one of the two folders is not there.
+pub fn moved(
+    original: &str,
+    file: &Path,
+    folder: &Path,
+    data_directory: Option<&Path>,
+) -> Result<String, ModelError> {
+    let source = Source::new(file, original);
+    let mut root = source.parse()?;
+    let mut names = Vec::new();
+    if let Some(machine) = root.take("machine") {
+        names.extend(machine.table("[machine]".into())?.take("file"));
+    }
+    if let Some(tests) = root.take("test") {
+        for test in tests.list("tables [[test]]")? {
+            let data = test.table("[[test]]".into())?.take("data");
+            let elsewhere = |data: &Value<'_>| {
+                let named = data.as_text().unwrap_or_default();
+                data_directory.is_some_and(|folder| folder.join(named).exists())
+            };
+            names.extend(data.filter(|data| !elsewhere(data)));
+        }
+    }
+    let mut edits = Vec::new();
+    for name in names {
+        let named = PathBuf::from(name.text()?);
+        if named.is_relative() {
+            let target = parent(file).join(named);
+            edits.push((name.span.clone(), quoted(&seen_from(folder, &target)?)));
+        }
+    }
+    edits.sort_by_key(|(span, _)| span.start);
+    let mut text = source.text.clone();
+    for (span, new) in edits.into_iter().rev() {
+        text.replace_range(span, &new);
+    }
+    Ok(text)
+}
+
+/// The folder that a file lies in.
+fn parent(file: &Path) -> &Path {
+    match file.parent() {
+        Some(folder) if !folder.as_os_str().is_empty() => folder,
+        _ => Path::new("."),
+    }
+}
+
+/// The name of a file from a folder; the whole name where they share no folder but the root.
+fn seen_from(folder: &Path, file: &Path) -> Result<String, ModelError> {
+    let whole = |path: &Path| {
+        path.canonicalize().map_err(|cause| ModelError::Output {
+            file: path.to_path_buf(),
+            cause: cause.to_string(),
+        })
+    };
+    let (from, to) = (whole(folder)?, whole(parent(file))?);
+    let shared = from
+        .components()
+        .zip(to.components())
+        .take_while(|(a, b)| a == b)
+        .count();
+    let name = file.file_name().unwrap_or_default();
+    if shared <= 1 {
+        return Ok(to.join(name).display().to_string());
+    }
+    let up = from.components().skip(shared).map(|_| "..".into());
+    let down = to
+        .components()
+        .skip(shared)
+        .map(|part| part.as_os_str().to_string_lossy());
+    let parts: Vec<_> = up.chain(down).chain([name.to_string_lossy()]).collect();
+    Ok(parts.join("/"))
 }
 
 /// The text without the tables of these names: `[name]`, `[[name]]` and what lies in them.
@@ -115,5 +194,29 @@ mod tests {
         assert!(text.ends_with("\nnoise_um = 0\n"), "{text}");
         let inline = with_noise("instrument = { kind = \"ballbar\" }\n", file, 1.5).unwrap();
         assert_eq!(inline, "instrument = { kind = \"ballbar\", noise_um = 1.5 }\n");
+    }
+
+    #[test]
+    fn names_of_files_follow_the_session_to_another_folder() {
+        let root = tempfile::tempdir().unwrap();
+        let at = |name: &str| root.path().join(name);
+        for folder in ["ours/data", "ours/elsewhere", "theirs/next"] {
+            std::fs::create_dir_all(at(folder)).unwrap();
+        }
+        std::fs::write(at("ours/elsewhere/b.csv"), "").unwrap();
+        let session = "[machine]\nfile = \"../machine.toml\" # ours\n\n[[test]]\nname = \"A\"\ndata = \"data/a.csv\"\n\n\
+                       [[test]]\nname = \"B\"\ndata = \"b.csv\"\n\n[[test]]\nname = \"C\"\ndata = \"/c.csv\"\n";
+        let file = at("ours/session.toml");
+        let elsewhere = at("ours/elsewhere");
+        let moved = |folder: &str| moved(session, &file, &at(folder), Some(&elsewhere)).unwrap();
+        let there = session
+            .replace("../machine.toml", "../../machine.toml")
+            .replace("data/a.csv", "../../ours/data/a.csv");
+        assert_eq!(moved("theirs/next"), there);
+        assert_eq!(moved("ours"), session);
+        assert_eq!(
+            moved("ours/data"),
+            session.replace("../", "../../").replace("data/a", "a")
+        );
     }
 }

@@ -248,7 +248,7 @@ fn in_unit(unit: &'static str, value: f64) -> (&'static str, String) {
 }
 
 /// A TOML string: JSON's escapes are TOML's.
-fn quoted(text: &str) -> String {
+pub(super) fn quoted(text: &str) -> String {
     let mut quoted = String::from("\"");
     for c in text.chars() {
         match c {

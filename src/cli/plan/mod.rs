@@ -88,11 +88,6 @@ pub fn run(arguments: &PlanArguments) -> Result<(), Failure> {
         reach_mm: arguments.improve.reach_mm()?,
     };
     if arguments.improve.asked() || arguments.range {
-        if arguments.faces.asked() {
-            return Err(Failure::Other(
-                "`--report` and `--plots` show the analysis of the plan; leave `--improve`, `--separate` and `--range` out".to_string(),
-            ));
-        }
         return next_test(arguments, &session, &options);
     }
     let mut analysis = plan::analyse(&session, &options)?;
@@ -142,8 +137,16 @@ fn next_test(arguments: &PlanArguments, session: &Session, options: &PlanOptions
     if arguments.range {
         improve::print_ranges(&ranges);
     }
+    let found = NextTest { improvement, ranges };
     if let Some(path) = &arguments.common.json {
-        output::write_json(path, &NextTest { improvement, ranges })?;
+        output::write_json(path, &found)?;
+    }
+    if arguments.faces.asked() {
+        let document = crate::report::next::document(&problem, found.improvement.as_ref(), &found.ranges);
+        let method = crate::report::next::method();
+        arguments
+            .faces
+            .write(&document, &method, session, arguments.common.seed)?;
     }
     Ok(())
 }

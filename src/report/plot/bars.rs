@@ -44,8 +44,15 @@ fn scale_below(x: &Scale, down: f64, label: &str) -> Markup {
     }
 }
 
-/// Values of one unit with whiskers of ± 2 u, zero marked.
-pub fn values(name: String, title: String, caption: String, unit: &str, rows: &[Row]) -> Plot {
+/// Values of one unit with whiskers of ± 2 u, zero marked; `words` are what the first and second of a row are called.
+pub fn values(
+    name: String,
+    title: String,
+    caption: String,
+    unit: &str,
+    words: [&str; 2],
+    rows: &[Row],
+) -> Plot {
     let ends = rows
         .iter()
         .flat_map(|row| [row.before, row.after])
@@ -55,9 +62,9 @@ pub fn values(name: String, title: String, caption: String, unit: &str, rows: &[
     let x = Scale::rounded(low, high, [NAMES, WIDTH - 18.0], 6);
     let down = 10.0 + ROW * rows.len() as f64;
     let has_before = rows.iter().any(|row| row.before.is_some());
-    let mut entries = vec![("whisker-after", "after, ± 2 u".to_string())];
+    let mut entries = vec![("whisker-after", format!("{}, ± 2 u", words[1]))];
     if has_before {
-        entries.insert(0, ("whisker-before", "before, ± 2 u".to_string()));
+        entries.insert(0, ("whisker-before", format!("{}, ± 2 u", words[0])));
     } else {
         entries[0].1 = "value ± 2 u".to_string();
     }
@@ -68,9 +75,9 @@ pub fn values(name: String, title: String, caption: String, unit: &str, rows: &[
         @for (number, row) in rows.iter().enumerate() {
             @let y = 10.0 + ROW * (number as f64 + 0.5);
             text class="right" x=(NAMES - 10.0) y=(y + 4.0) { title { (row.name) } (cut(&row.name, MOST_LETTERS)) }
-            @if let Some(before) = row.before { (whisker(&x, y - 3.5, before, "before", unit)) }
+            @if let Some(before) = row.before { (whisker(&x, y - 3.5, before, ["before", words[0]], unit)) }
             @if let Some(after) = row.after {
-                (whisker(&x, if row.before.is_some() { y + 3.5 } else { y }, after, "after", unit))
+                (whisker(&x, if row.before.is_some() { y + 3.5 } else { y }, after, ["after", words[1]], unit))
             }
         }
         (keys)
@@ -78,13 +85,13 @@ pub fn values(name: String, title: String, caption: String, unit: &str, rows: &[
     Plot::still(name, title, caption, [WIDTH, end + 10.0], inner)
 }
 
-fn whisker(x: &Scale, y: f64, value: Value, when: &str, unit: &str) -> Markup {
+fn whisker(x: &Scale, y: f64, value: Value, [class, word]: [&str; 2], unit: &str) -> Markup {
     let at = |v: f64| place(x.at(v));
     html! {
         g {
-            title { (when) ": " (format!("{:.4} ± {:.2}", value.value, value.u)) " " (unit) }
-            path class=(format!("whisker-{when}")) d=(format!("M{} {}H{}", at(value.value - 2.0 * value.u), place(y), at(value.value + 2.0 * value.u))) {}
-            circle class=(format!("dot-{when}")) cx=(at(value.value)) cy=(place(y)) r="3.2" {}
+            title { (word) ": " (format!("{:.4} ± {:.2}", value.value, value.u)) " " (unit) }
+            path class=(format!("whisker-{class}")) d=(format!("M{} {}H{}", at(value.value - 2.0 * value.u), place(y), at(value.value + 2.0 * value.u))) {}
+            circle class=(format!("dot-{class}")) cx=(at(value.value)) cy=(place(y)) r="3.2" {}
         }
     }
 }

@@ -174,9 +174,15 @@ fn check_readings(
 ) -> Result<(), (String, String)> {
     reach::check(context.machine, test, readings)?;
     reach::check_lengths(test, readings)?;
+    let doubts = [
+        motion::beyond_travel(context.machine, readings),
+        motion::missing_runs(test.motion.as_ref(), readings),
+    ];
     warnings.extend(
-        motion::beyond_travel(context.machine, readings)
-            .map(|beyond| format!("test \"{}\": {beyond}; the data are used as they are", test.name)),
+        doubts
+            .into_iter()
+            .flatten()
+            .map(|doubt| format!("test \"{}\": {doubt}; the data are used as they are", test.name)),
     );
     Ok(())
 }

@@ -1,0 +1,152 @@
+//! The report of `abbe fit --method circle|cone|two-plane`.
+
+use abbe::identify::geometric::Comparison;
+use abbe::identify::problem::Problem;
+use maud::{Markup, html};
+
+use super::document::{Document, list, table};
+use super::plot::Plot;
+use super::plot::bars::{Row, Value, values};
+use super::readings::{self, um, unit, value_and_u};
+
+/// How the errors were found.
+pub fn method(result: &Comparison) -> Markup {
+    html! {
+        p {
+            "The method of the literature (" (result.method) ") and the full least-squares fit on the same readings; noise " (um(result.noise_um)) " ("
+            (result.noise_source) "). Bias: both on noise-free readings that were simulated with the full fit's errors, less those errors."
+        }
+    }
+}
+
+/// The report.
+pub fn document(problem: &Problem<'_>, result: &Comparison) -> Document {
+    let mut document = Document {
+        title: format!(
+            "{}: {} beside the full fit",
+            problem.session.machine.name, result.method
+        ),
+        verdict: format!(
+            "The errors of the {} method leave {} of {} in the tests that it takes; the full fit leaves {} in all tests.",
+            result.method,
+            um(result.method_rms_um),
+            um(result.nominal_rms_um),
+            um(result.rms_um)
+        ),
+        ..Document::default()
+    };
+    let shown = document.show(plots(result));
+    document.section(
+        "Errors by both ways",
+        html! {
+            (shown)
+            (errors(result))
+        },
+    );
+    document.section("Where the axes pass the standing ball", centres(result));
+    if !result.warnings.is_empty() {
+        document.section("Warnings", list(result.warnings.iter().cloned()));
+    }
+    let section = readings::machine(&mut document, problem);
+    document.section("Machine", section);
+    document
+}
+
+fn plots(result: &Comparison) -> Vec<Plot> {
+    let value = |value: Option<f64>, u: Option<f64>| Some(Value { value: value?, u: u? });
+    let mut units: Vec<&str> = result.errors.iter().map(|row| row.unit.as_str()).collect();
+    units.sort_unstable();
+    units.dedup();
+    units
+        .into_iter()
+        .map(|name| {
+            let rows: Vec<Row> = result
+                .errors
+                .iter()
+                .filter(|row| row.unit == name)
+                .map(|row| Row {
+                    name: row.id.clone(),
+                    before: value(row.value, row.u),
+                    after: value(row.full_value, row.full_u),
+                })
+                .collect();
+            values(
+                format!("errors-{name}"),
+                format!("Errors by both ways, {}", unit(name)),
+                "What a method does not tell has no mark.".to_string(),
+                &unit(name),
+                [&result.method, "full fit"],
+                &rows,
+            )
+        })
+        .collect()
+}
+
+fn errors(result: &Comparison) -> Markup {
+    let pair = |value: Option<f64>, u: Option<f64>| match (value, u) {
+        (Some(value), Some(u)) => value_and_u(value, u),
+        _ => ("–".to_string(), "–".to_string()),
+    };
+    let bias = |bias: Option<f64>| {
+        // Without the sign of what is rounded to nothing.
+        let rounded = |bias: f64| (bias * 1e4).round() / 1e4 + 0.0;
+        bias.map_or("–".to_string(), |bias| {
+            format!("{:.4}", rounded(bias)).replace('-', "\u{2212}")
+        })
+    };
+    let rows: Vec<Vec<String>> = result
+        .errors
+        .iter()
+        .map(|row| {
+            let (value, u) = pair(row.value, row.u);
+            let (full, full_u) = pair(row.full_value, row.full_u);
+            vec![
+                row.id.clone(),
+                value,
+                u,
+                bias(row.bias),
+                full,
+                full_u,
+                bias(row.full_bias),
+                unit(&row.unit),
+            ]
+        })
+        .collect();
+    table(
+        &[
+            "error",
+            &result.method,
+            "u (k=1)",
+            "bias",
+            "full fit",
+            "u (k=1)",
+            "bias",
+            "unit",
+        ],
+        &rows,
+    )
+}
+
+fn centres(result: &Comparison) -> Markup {
+    let rows: Vec<Vec<String>> = result
+        .centres
+        .iter()
+        .flat_map(|centre| {
+            (0..2).map(move |which| {
+                let (offset, u) = value_and_u(centre.offset_um[which], centre.u_um[which]);
+                vec![
+                    centre.test.clone(),
+                    format!("{} of {}", centre.across[which], centre.axis),
+                    offset,
+                    u,
+                    format!("{:.4}", centre.radius_mm),
+                    format!("{:.4}", centre.height_mm).replace('-', "\u{2212}"),
+                ]
+            })
+        })
+        .collect();
+    html! {
+        p { "From their nominal places." }
+        (table(&["test", "centre", "µm", "u (k=1)", "radius, mm", "height of the cone, mm"], &rows))
+    }
+}
