@@ -26,7 +26,7 @@ impl Rows {
 
     fn row(&mut self, cells: &[String]) -> Result<(), Failure> {
         self.0
-            .write_record(cells)
+            .write_record(cells.iter().cloned().map(output::cell))
             .map_err(|error| Failure::Other(format!("the CSV cannot be written: {error}")))
     }
 

@@ -67,6 +67,8 @@ pub struct FitArguments {
 /// Runs `abbe fit`.
 pub fn run(arguments: &FitArguments) -> Result<(), Failure> {
     arguments.faces.check()?;
+    let others = [arguments.csv.as_ref(), arguments.views.as_ref()];
+    arguments.common.check(&others)?;
     if !arguments.repeat.is_empty() {
         if arguments.method != Method::Full {
             return Err(Failure::Other(

@@ -49,6 +49,8 @@ pub struct TraceArguments {
 /// Runs `abbe trace`.
 pub fn run(arguments: &TraceArguments) -> Result<(), Failure> {
     arguments.faces.check()?;
+    let others = [arguments.csv.as_ref(), arguments.write.as_ref()];
+    arguments.common.check(&others)?;
     let session = read_session(&arguments.session)?;
     let options = TraceOptions {
         seed: arguments.common.seed,
@@ -91,9 +93,7 @@ pub fn run(arguments: &TraceArguments) -> Result<(), Failure> {
         output::write_json(path, &trace.result)?;
     }
     if let Some(path) = &arguments.write {
-        let text = std::fs::read_to_string(&arguments.session.session)
-            .map_err(|error| Failure::Other(format!("{}: {error}", arguments.session.session.display())))?;
-        let next = abbe::model::session::write::with_effects(&text, &trace.effects, &session.machine);
+        let next = abbe::model::session::write::with_effects(&session.text, &trace.effects, &session.machine);
         output::write_whole(path, next.as_bytes())?;
     }
     if let Some(path) = &arguments.csv {

@@ -1,6 +1,8 @@
 //! TOML files as the readers of this crate want them: every key and value knows where it stands, a table says which keys nobody asked
 //! for, and a wrong value says what it is and what was wanted.
 
+use std::fs::File;
+use std::io::Read;
 use std::ops::Range;
 use std::path::{Path, PathBuf};
 
@@ -8,6 +10,7 @@ use toml::Spanned;
 use toml::de::{DeTable, DeValue};
 
 use super::spelling::known_names;
+use super::stamp::Stamp;
 use crate::error::{ModelError, Place};
 
 /// Most bytes of a machine or session file.
@@ -21,6 +24,8 @@ pub(crate) struct Source {
     pub text: String,
     /// Bytes of the file before the text: those of a byte order mark.
     pub skipped: usize,
+    /// The file as it was; `None` for a text that was read from none.
+    pub stamp: Option<Stamp>,
 }
 
 impl Source {
@@ -31,32 +36,32 @@ impl Source {
             message,
             help: Some(help.to_string()),
         };
-        let length = match std::fs::metadata(file) {
-            Ok(found) if found.is_dir() => {
-                return Err(fault(
-                    format!("this is a folder; {what} is a file"),
-                    "name the .toml file in it",
-                ));
-            }
-            Ok(found) => found.len(),
-            Err(cause) => {
-                let help = "check the name; a relative one starts from the file that mentions it, or from where \
-                            the command was called";
-                return Err(fault(format!("{what} cannot be read: {cause}"), help));
-            }
-        };
-        if length > MOST_BYTES {
+        if file.is_dir() {
             return Err(fault(
-                format!("{what} of {length} bytes; {MOST_BYTES} is the most that is read"),
+                format!("this is a folder; {what} is a file"),
+                "name the .toml file in it",
+            ));
+        }
+        let unreadable = |cause: std::io::Error| {
+            let help = "check the name; a relative one starts from the file that mentions it, or from where \
+                        the command was called";
+            fault(format!("{what} cannot be read: {cause}"), help)
+        };
+        let opened = File::open(file).map_err(unreadable)?;
+        let stamp = Stamp::of(file, &opened.metadata().map_err(unreadable)?);
+        let mut bytes = Vec::new();
+        // A pipe does not say how much there is to come.
+        (&opened)
+            .take(MOST_BYTES + 1)
+            .read_to_end(&mut bytes)
+            .map_err(unreadable)?;
+        if bytes.len() as u64 > MOST_BYTES {
+            return Err(fault(
+                format!("{what} has more than {MOST_BYTES} bytes, the most that is read"),
                 "readings belong in CSV files named by `data`",
             ));
         }
-        let bytes = std::fs::read(file).map_err(|cause| {
-            fault(
-                format!("{what} cannot be read: {cause}"),
-                "check that the file may be read",
-            )
-        })?;
+        stamp.check(&opened)?;
         let text = String::from_utf8(bytes).map_err(|cause| {
             fault(
                 format!(
@@ -66,7 +71,10 @@ impl Source {
                 "save the file as UTF-8",
             )
         })?;
-        Ok(Source::new(file, &text))
+        Ok(Source {
+            stamp: Some(stamp),
+            ..Source::new(file, &text)
+        })
     }
 
     /// A text that stands in a file.
@@ -76,6 +84,7 @@ impl Source {
             file: file.to_path_buf(),
             text: content.to_string(),
             skipped: text.len() - content.len(),
+            stamp: None,
         }
     }
 

@@ -16,8 +16,12 @@ use crate::session::spelling::known_names;
 /// # Errors
 /// If the file cannot be read or does not describe a machine, with its line and what to do.
 pub fn machine(path: &Path) -> Result<Machine, ModelError> {
-    let source = Source::read(path, "the machine file")?;
-    from_table(source.parse()?)
+    from_table(source(path)?.parse()?)
+}
+
+/// The text of a machine file.
+pub(super) fn source(path: &Path) -> Result<Source, ModelError> {
+    Source::read(path, "the machine file")
 }
 
 /// A machine from the tables `name`, `chain`, `[axis.…]`.

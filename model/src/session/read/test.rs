@@ -3,7 +3,7 @@
 use std::path::{Path, PathBuf};
 
 use super::station::{self, SetUp};
-use super::{Context, Declared, layout, movement, quantity};
+use super::{Context, Declared, layout, movement, quantity, within};
 use crate::axis::AxisKind;
 use crate::error::ModelError;
 use crate::instrument::{InstrumentKind, Station};
@@ -232,6 +232,7 @@ fn data_file(context: &Context<'_>, data: &Value<'_>) -> Result<PathBuf, ModelEr
         .as_ref()
         .map(|folder| folder.join(&named));
     if let Some(found) = elsewhere.iter().chain([&beside]).find(|file| file.exists()) {
+        within::check(context.file, context.options, data, found)?;
         return Ok(found.clone());
     }
     let (looked, help) = match &elsewhere {

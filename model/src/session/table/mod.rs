@@ -20,6 +20,7 @@ use crate::chain::Machine;
 use crate::error::{ModelError, Place};
 use crate::instrument::InstrumentKind;
 use crate::session::readings::Readings;
+use crate::session::stamp::Stamp;
 
 /// How a file writes its rows.
 #[derive(Clone, Debug, PartialEq)]
@@ -81,10 +82,12 @@ pub(crate) type BySocket = Vec<(Option<String>, Readings)>;
 /// Anything that is not a finite number where one is expected, with file, line and column; missing or unknown columns; time that
 /// runs backwards; fewer than two readings.
 pub(crate) fn read(file: &Path, request: &Request<'_>) -> Result<BySocket, ModelError> {
-    let mut rows = if sheet::is_spreadsheet(file) {
-        Source::Sheet(sheet::rows(file, &request.format)?.into_iter())
+    let (stamp, mut rows) = if sheet::is_spreadsheet(file) {
+        let (stamp, rows) = sheet::rows(file, &request.format)?;
+        (stamp, Source::Sheet(rows.into_iter()))
     } else {
-        Source::Text(Rows::open(file, &request.format)?)
+        let rows = Rows::open(file, &request.format)?;
+        (rows.stamp().clone(), Source::Text(rows))
     };
     let empty = |what: &str| ModelError::Input {
         place: Place::file(file),
@@ -97,7 +100,7 @@ pub(crate) fn read(file: &Path, request: &Request<'_>) -> Result<BySocket, Model
     let width = first.cells.len();
     let header = request.format.header.then(|| first.cells.clone());
     let columns = columns::columns(request, file, first.line, header.as_deref(), width)?;
-    let mut filled = Filled::new(request, file, columns);
+    let mut filled = Filled::new(request, stamp, columns);
     if header.is_none() {
         filled.push(&first)?;
     }
@@ -160,12 +163,13 @@ struct Filled<'a> {
 }
 
 impl<'a> Filled<'a> {
-    fn new(request: &'a Request<'a>, file: &Path, columns: Vec<Column>) -> Self {
+    fn new(request: &'a Request<'a>, stamp: Stamp, columns: Vec<Column>) -> Self {
         Filled {
             request,
             columns,
             readings: Readings {
-                file: file.to_path_buf(),
+                file: stamp.file.clone(),
+                stamp: Some(stamp),
                 positions: vec![Vec::new(); request.machine.axes.len()],
                 coordinates: request.instrument.coordinates(),
                 ..Readings::default()

@@ -7,9 +7,17 @@ use std::path::{Path, PathBuf};
 
 use super::Format;
 use crate::error::{ModelError, Place};
+use crate::session::stamp::Stamp;
 
 /// Most bytes of one line.
 const LONGEST_LINE: u64 = 1 << 20;
+/// Most bytes of a file.
+const MOST_BYTES: u64 = 2 << 30;
+/// Most rows of a file.
+const MOST_ROWS: usize = 10_000_000;
+
+/// What to do with a file that is too long.
+const SPLIT: &str = "leave out readings (every tenth will do), or split the file over several tests";
 
 /// One row.
 #[derive(Clone, Debug)]
@@ -53,7 +61,9 @@ pub(super) struct Rows {
     file: PathBuf,
     separator: u8,
     reader: BufReader<File>,
+    stamp: Stamp,
     line: usize,
+    rows: usize,
     byte: usize,
     buffer: Vec<u8>,
 }
@@ -61,27 +71,45 @@ pub(super) struct Rows {
 impl Rows {
     /// Opens a file.
     pub fn open(file: &Path, format: &Format) -> Result<Rows, ModelError> {
-        let reader = File::open(file).and_then(|opened| {
-            if opened.metadata()?.is_dir() {
+        let fault = |message: String, help: &str| ModelError::Input {
+            place: Place::file(file),
+            message,
+            help: Some(help.into()),
+        };
+        let opened = File::open(file).and_then(|opened| {
+            let found = opened.metadata()?;
+            if found.is_dir() {
                 return Err(std::io::Error::other("it is a folder"));
             }
-            Ok(BufReader::with_capacity(1 << 16, opened))
+            Ok((opened, found))
         });
-        match reader {
-            Ok(reader) => Ok(Rows {
-                file: file.to_path_buf(),
-                separator: format.separator,
-                reader,
-                line: 0,
-                byte: 0,
-                buffer: Vec::new(),
-            }),
-            Err(cause) => Err(ModelError::Input {
-                place: Place::file(file),
-                message: format!("the data file cannot be read: {cause}"),
-                help: Some("check `data` and the file".into()),
-            }),
+        let (opened, found) = opened.map_err(|cause| {
+            fault(
+                format!("the data file cannot be read: {cause}"),
+                "check `data` and the file",
+            )
+        })?;
+        if found.len() > MOST_BYTES {
+            return Err(fault(
+                format!("a data file of {} bytes; {MOST_BYTES} is the most that is read", found.len()),
+                SPLIT,
+            ));
         }
+        Ok(Rows {
+            file: file.to_path_buf(),
+            separator: format.separator,
+            stamp: Stamp::of(file, &found),
+            reader: BufReader::with_capacity(1 << 16, opened),
+            line: 0,
+            rows: 0,
+            byte: 0,
+            buffer: Vec::new(),
+        })
+    }
+
+    /// The file as it was when it was opened.
+    pub fn stamp(&self) -> &Stamp {
+        &self.stamp
     }
 
     /// The next row, or `None` at the end.
@@ -102,6 +130,10 @@ impl Rows {
                     .map(|cell| cell.trim().to_string())
                     .collect()
             };
+            self.rows += 1;
+            if self.rows > MOST_ROWS {
+                return Err(self.fault(format!("a row beyond {MOST_ROWS}, the most that are read"), SPLIT));
+            }
             return Ok(Some(Row {
                 line: self.line,
                 cells,
@@ -120,10 +152,15 @@ impl Rows {
             .read_until(b'\n', &mut self.buffer)
             .map_err(|cause| self.fault(format!("the data file cannot be read: {cause}"), "try again"))?;
         if read == 0 {
+            self.stamp.check(self.reader.get_ref())?;
             return Ok(None);
         }
         self.line += 1;
         self.byte += read;
+        // A pipe does not say how much there is to come.
+        if self.byte as u64 > MOST_BYTES {
+            return Err(self.fault(format!("more than {MOST_BYTES} bytes, the most that are read"), SPLIT));
+        }
         if read as u64 == LONGEST_LINE && self.buffer.last() != Some(&b'\n') {
             return Err(self.fault(
                 format!("a line of more than {LONGEST_LINE} bytes"),
