@@ -55,7 +55,10 @@ fn told(fault: &ModelError) {
     if let Ok(text) = fs::read_to_string(&place.file)
         && span.end <= text.len()
     {
-        assert!(text.is_char_boundary(span.start) && text.is_char_boundary(span.end), "{fault}: {span:?}");
+        assert!(
+            text.is_char_boundary(span.start) && text.is_char_boundary(span.end),
+            "{fault}: {span:?}"
+        );
     }
 }
 
@@ -75,7 +78,10 @@ fn session_in(folder: &Path) -> Option<Session> {
         assert!(readings.observed.iter().all(|value| value.is_finite()));
         assert!(readings.positions.iter().flatten().all(|value| value.is_finite()));
         // Runs cover the rows, each once.
-        assert_eq!(readings.runs().iter().map(|run| run.len()).sum::<usize>(), readings.rows());
+        assert_eq!(
+            readings.runs().iter().map(|run| run.len()).sum::<usize>(),
+            readings.rows()
+        );
     }
     Some(session)
 }
@@ -85,7 +91,13 @@ pub fn machine(input: &[u8]) {
     within(|folder| {
         put(folder, "other.toml", input);
         match read::machine(&folder.join("other.toml")) {
-            Ok(machine) => assert!(machine.axes.iter().flat_map(|axis| axis.direction).all(f64::is_finite)),
+            Ok(machine) => assert!(
+                machine
+                    .axes
+                    .iter()
+                    .flat_map(|axis| axis.direction)
+                    .all(f64::is_finite)
+            ),
             Err(fault) => told(&fault),
         }
     });
@@ -94,7 +106,11 @@ pub fn machine(input: &[u8]) {
 /// `session.toml`: a plan or, with `data = "C.csv"`, a measured session.
 pub fn session(input: &[u8]) {
     within(|folder| {
-        put(folder, "C.csv", b"run,c_deg,length_mm\n1,0,100.0\n1,90,100.001\n2,90,100.0\n2,0,99.999\n");
+        put(
+            folder,
+            "C.csv",
+            b"run,c_deg,length_mm\n1,0,100.0\n1,90,100.001\n2,90,100.0\n2,0,99.999\n",
+        );
         put(folder, "session.toml", input);
         let Some(session) = session_in(folder) else { return };
         let text = std::str::from_utf8(input).expect("what was read is UTF-8");
@@ -117,7 +133,10 @@ pub fn session(input: &[u8]) {
 
 fn table_of(data: &str, format: &str, columns: &str, input: &[u8]) {
     within(|folder| {
-        let text = SESSION.replace("DATA", data).replace("FORMAT", format).replace("COLUMNS", columns);
+        let text = SESSION
+            .replace("DATA", data)
+            .replace("FORMAT", format)
+            .replace("COLUMNS", columns);
         put(folder, "session.toml", text.as_bytes());
         put(folder, data, input);
         session_in(folder);
@@ -131,10 +150,13 @@ pub fn table(input: &[u8]) {
 
 /// A CSV file of somebody else: the first byte chooses the format, the rest is the file.
 pub fn foreign(input: &[u8]) {
-    let Some((choice, rest)) = input.split_first() else { return };
-    let (separator, decimal) = [(";", ","), ("\\t", "."), (" ", "."), ("|", ",")][usize::from(choice % 4)];
+    let Some((choice, rest)) = input.split_first() else {
+        return;
+    };
+    let (separator, decimal) = [(";", ","), ("\\t", "."), (":", "."), ("|", ",")][usize::from(choice % 4)];
     let header = choice & 4 == 0;
-    let format = format!("[format]\nseparator = \"{separator}\"\ndecimal = \"{decimal}\"\nheader = {header}\n");
+    let format =
+        format!("[format]\nseparator = \"{separator}\"\ndecimal = \"{decimal}\"\nheader = {header}\n");
     let columns = match (header, choice & 8 == 0) {
         (true, true) => "columns = { x_mm = \"X act\", y_mm = \"Y act\", deviation_um = \"ΔL\" }",
         (true, false) => "columns = { time_s = \"t\", c_rad = \"C\", length_mm = \"L\" }",
@@ -163,11 +185,26 @@ pub fn sheet(input: &[u8]) {
 /// The smallest workbook around the XML of a sheet.
 fn book(sheet: &[u8]) -> zip::result::ZipResult<Vec<u8>> {
     const PARTS: [(&str, &str); 5] = [
-        ("[Content_Types].xml", r#"<Types xmlns="http://schemas.openxmlformats.org/package/2006/content-types"><Default Extension="xml" ContentType="application/xml"/></Types>"#),
-        ("_rels/.rels", r#"<Relationships xmlns="http://schemas.openxmlformats.org/package/2006/relationships"><Relationship Id="rId1" Type="http://schemas.openxmlformats.org/officeDocument/2006/relationships/officeDocument" Target="xl/workbook.xml"/></Relationships>"#),
-        ("xl/workbook.xml", r#"<workbook xmlns="http://schemas.openxmlformats.org/spreadsheetml/2006/main" xmlns:r="http://schemas.openxmlformats.org/officeDocument/2006/relationships"><sheets><sheet name="A" sheetId="1" r:id="rId1"/></sheets></workbook>"#),
-        ("xl/_rels/workbook.xml.rels", r#"<Relationships xmlns="http://schemas.openxmlformats.org/package/2006/relationships"><Relationship Id="rId1" Type="http://schemas.openxmlformats.org/officeDocument/2006/relationships/worksheet" Target="worksheets/sheet1.xml"/><Relationship Id="rId2" Type="http://schemas.openxmlformats.org/officeDocument/2006/relationships/sharedStrings" Target="sharedStrings.xml"/></Relationships>"#),
-        ("xl/sharedStrings.xml", r#"<sst xmlns="http://schemas.openxmlformats.org/spreadsheetml/2006/main"><si><t>x_mm</t></si><si><t>y_mm</t></si><si><t>length_mm</t></si></sst>"#),
+        (
+            "[Content_Types].xml",
+            r#"<Types xmlns="http://schemas.openxmlformats.org/package/2006/content-types"><Default Extension="xml" ContentType="application/xml"/></Types>"#,
+        ),
+        (
+            "_rels/.rels",
+            r#"<Relationships xmlns="http://schemas.openxmlformats.org/package/2006/relationships"><Relationship Id="rId1" Type="http://schemas.openxmlformats.org/officeDocument/2006/relationships/officeDocument" Target="xl/workbook.xml"/></Relationships>"#,
+        ),
+        (
+            "xl/workbook.xml",
+            r#"<workbook xmlns="http://schemas.openxmlformats.org/spreadsheetml/2006/main" xmlns:r="http://schemas.openxmlformats.org/officeDocument/2006/relationships"><sheets><sheet name="A" sheetId="1" r:id="rId1"/></sheets></workbook>"#,
+        ),
+        (
+            "xl/_rels/workbook.xml.rels",
+            r#"<Relationships xmlns="http://schemas.openxmlformats.org/package/2006/relationships"><Relationship Id="rId1" Type="http://schemas.openxmlformats.org/officeDocument/2006/relationships/worksheet" Target="worksheets/sheet1.xml"/><Relationship Id="rId2" Type="http://schemas.openxmlformats.org/officeDocument/2006/relationships/sharedStrings" Target="sharedStrings.xml"/></Relationships>"#,
+        ),
+        (
+            "xl/sharedStrings.xml",
+            r#"<sst xmlns="http://schemas.openxmlformats.org/spreadsheetml/2006/main"><si><t>x_mm</t></si><si><t>y_mm</t></si><si><t>length_mm</t></si></sst>"#,
+        ),
     ];
     let mut writer = zip::ZipWriter::new(std::io::Cursor::new(Vec::new()));
     let stored = zip::write::SimpleFileOptions::default().compression_method(zip::CompressionMethod::Stored);

@@ -5,7 +5,7 @@ use std::path::PathBuf;
 use abbe::identify::results::{FitMonteCarlo, FitResult, ParameterResult, Unobservable, Verdict};
 use clap::{Args, ValueEnum};
 
-use super::failure::Failure;
+use super::failure::{Failure, visible};
 use super::report::ReportArguments;
 use super::{
     CommonArguments, SessionArguments, circular, compensation, csv, geometric, output, read_session,
@@ -261,6 +261,6 @@ pub fn print_unobservable(unobservable: &[Unobservable]) {
 /// Named warnings, on standard error.
 pub fn print_warnings(warnings: &[String]) {
     for warning in warnings {
-        eprintln!("warning: {warning}");
+        eprintln!("warning: {}", visible(warning));
     }
 }

@@ -34,9 +34,7 @@ pub fn write_whole(path: &Path, contents: &[u8]) -> Result<(), Failure> {
     let mut file = builder.tempfile_in(folder_of(&place)).map_err(fault)?;
     file.write_all(contents).map_err(fault)?;
     if let Ok(old) = std::fs::metadata(&place) {
-        file.as_file()
-            .set_permissions(old.permissions())
-            .map_err(fault)?;
+        file.as_file().set_permissions(old.permissions()).map_err(fault)?;
     }
     file.as_file().sync_all().map_err(fault)?;
     file.persist(&place).map_err(|error| fault(error.error))?;
@@ -59,7 +57,12 @@ fn folder_of(path: &Path) -> &Path {
 
 /// An error where a file cannot come to lie: said before the work, not after it.
 pub fn check(path: &Path) -> Result<(), Failure> {
-    let refused = |why: String| Err(Failure::Other(format!("{}: cannot be written: {why}", path.display())));
+    let refused = |why: String| {
+        Err(Failure::Other(format!(
+            "{}: cannot be written: {why}",
+            path.display()
+        )))
+    };
     let folder = folder_of(path);
     match std::fs::metadata(path) {
         Ok(found) if found.is_dir() => refused("this is a folder; name a file in it".into()),

@@ -15,6 +15,8 @@ use crate::error::{ModelError, Place};
 
 /// Most bytes of a machine or session file.
 const MOST_BYTES: u64 = 8 << 20;
+/// Most items of a list or a table of names: far more than anybody measures, few enough to be compared with each other.
+const MOST_ITEMS: usize = 1000;
 
 /// A file's text with its name.
 pub(crate) struct Source {
@@ -176,8 +178,16 @@ impl<'a> Table<'a> {
     }
 
     /// Every entry, in the order of the file: for tables whose keys are names.
-    pub fn take_all(&mut self) -> Vec<Value<'a>> {
-        std::mem::take(&mut self.entries)
+    pub fn take_all(&mut self) -> Result<Vec<Value<'a>>, ModelError> {
+        if self.entries.len() > MOST_ITEMS {
+            let message = format!(
+                "{} has {} entries; {MOST_ITEMS} are the most",
+                self.called(),
+                self.entries.len()
+            );
+            return Err(self.error(message, None));
+        }
+        Ok(std::mem::take(&mut self.entries))
     }
 
     /// An error unless every key was asked for.
@@ -248,7 +258,16 @@ impl<'a> Value<'a> {
     /// A text.
     pub fn text(&self) -> Result<String, ModelError> {
         match &self.value {
-            DeValue::String(text) => Ok(text.to_string()),
+            DeValue::String(text) => match text.chars().find(|c| c.is_control() && *c != '\t') {
+                None => Ok(text.to_string()),
+                Some(control) => Err(self.error(
+                    format!(
+                        "`{}` holds the control character U+{:04X}",
+                        self.key, control as u32
+                    ),
+                    Some("names are shown as they are: leave it out".into()),
+                )),
+            },
             _ => Err(self.unlike("a text in quotes")),
         }
     }
@@ -273,8 +292,10 @@ impl<'a> Value<'a> {
         let number = match &self.value {
             DeValue::Integer(integer) => {
                 i64::from_str_radix(&integer.as_str().replace('_', ""), integer.radix())
-                    .ok()
                     .map(|integer| integer as f64)
+                    // What is too large for a whole number is a number all the same.
+                    .or_else(|_| integer.as_str().replace('_', "").parse())
+                    .ok()
             }
             DeValue::Float(float) => float.as_str().replace('_', "").parse().ok(),
             _ => None,
@@ -329,10 +350,14 @@ impl<'a> Value<'a> {
         if !self.value.is_array() {
             return Err(self.unlike(wanted));
         }
-        let (source, key) = (self.source, self.key);
+        let (source, key, span) = (self.source, self.key, self.span);
         let DeValue::Array(items) = self.value else {
             return Ok(Vec::new());
         };
+        if items.len() > MOST_ITEMS {
+            let message = format!("`{key}` is a list of {}; {MOST_ITEMS} are the most", items.len());
+            return Err(source.error(span, message, None));
+        }
         Ok(items
             .into_iter()
             .map(|item: Spanned<DeValue<'a>>| Value {

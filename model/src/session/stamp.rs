@@ -46,7 +46,9 @@ impl Stamp {
     /// What the file is now, if it is no longer what was read.
     pub fn changed(&self) -> Option<String> {
         match std::fs::metadata(&self.file) {
-            _ if !self.regular => Some("it is no file but a pipe or a device, which can be read only once".into()),
+            _ if !self.regular => {
+                Some("it is no file but a pipe or a device, which can be read only once".into())
+            }
             Err(cause) => Some(format!("it is no longer there: {cause}")),
             Ok(found) if Stamp::of(&self.file, &found) == *self => None,
             Ok(_) => Some("it has changed since it was read".into()),

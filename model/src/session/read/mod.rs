@@ -114,7 +114,10 @@ impl Context<'_> {
 pub fn session(path: &Path, options: &ReadOptions) -> Result<Session, ModelError> {
     let source = Source::read(path, "the session file")?;
     let mut root = source.parse()?;
-    let Bodies { machine, source: machine_source } = session_machine(path, options, &mut root)?;
+    let Bodies {
+        machine,
+        source: machine_source,
+    } = session_machine(path, options, &mut root)?;
     let constants = constants(&mut root)?;
     let instrument = Instrument::read(&mut root)?;
     let unknowns = unknowns::unknowns(&machine, instrument.kind, &mut root)?;
@@ -150,8 +153,13 @@ pub fn session(path: &Path, options: &ReadOptions) -> Result<Session, ModelError
     let socket_distances = setups::socket_distances(instrument.kind, &tests, &mut root, options.read_data)?;
     root.finish()?;
     let mut files: Vec<Stamp> = Vec::new();
-    let of_tests = tests.iter().filter_map(|test| test.readings.as_ref()?.stamp.as_ref());
-    let own = source.stamp.iter().chain(machine_source.iter().filter_map(|source| source.stamp.as_ref()));
+    let of_tests = tests
+        .iter()
+        .filter_map(|test| test.readings.as_ref()?.stamp.as_ref());
+    let own = source
+        .stamp
+        .iter()
+        .chain(machine_source.iter().filter_map(|source| source.stamp.as_ref()));
     for stamp in own.chain(of_tests) {
         if !files.contains(stamp) {
             files.push(stamp.clone());
@@ -217,7 +225,7 @@ fn constants(root: &mut Table<'_>) -> Result<Vec<(String, f64)>, ModelError> {
         return Ok(Vec::new());
     };
     let mut constants = Vec::new();
-    for entry in value.table("[constants]".into())?.take_all() {
+    for entry in value.table("[constants]".into())?.take_all()? {
         let name = entry.key.clone();
         let mut letters = name.chars();
         let valid = letters.next().is_some_and(|c| c.is_alphabetic() || c == '_')

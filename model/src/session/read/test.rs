@@ -202,7 +202,7 @@ fn at(context: &Context<'_>, table: &mut Table<'_>) -> Result<Standing, ModelErr
     let Some(value) = table.take("at") else {
         return Ok(standing);
     };
-    for entry in value.table("`at`".into())?.take_all() {
+    for entry in value.table("`at`".into())?.take_all()? {
         let Some((axis, unit)) = quantity::axis_position(machine, &entry.key) else {
             let known: Vec<String> = machine.axes.iter().map(|axis| axis.column("")).collect();
             let message = format!("`at` knows no position `{}`", entry.key);

@@ -73,6 +73,9 @@ pub(crate) struct Request<'a> {
     pub socket: Option<&'a str>,
 }
 
+/// Most sockets that a file names.
+const MOST_SOCKETS: usize = 1000;
+
 /// Readings of one data file: one for each socket that it names, else one.
 pub(crate) type BySocket = Vec<(Option<String>, Readings)>;
 
@@ -188,11 +191,8 @@ impl<'a> Filled<'a> {
         for column in &self.columns {
             let cell = row.cells[column.index].as_str();
             if column.role == Role::Socket {
-                let known = self.sockets.iter().position(|socket| socket == cell);
-                self.socket.push(known.unwrap_or(self.sockets.len()));
-                if known.is_none() {
-                    self.sockets.push(cell.to_string());
-                }
+                let place = Place::line(&readings.file, row.line);
+                self.socket.push(socket_index(&mut self.sockets, cell, place)?);
                 continue;
             }
             let fault = |message: String, help: &str| ModelError::Input {
@@ -260,6 +260,34 @@ impl<'a> Filled<'a> {
             })
             .collect()
     }
+}
+
+/// The place of a socket among those that the file has named so far.
+fn socket_index(sockets: &mut Vec<String>, name: &str, place: Place) -> Result<usize, ModelError> {
+    if let Some(known) = sockets.iter().position(|socket| socket == name) {
+        return Ok(known);
+    }
+    let fault = |message: String, help: &str| ModelError::Input {
+        place,
+        message,
+        help: Some(help.into()),
+    };
+    if sockets.len() == MOST_SOCKETS {
+        let message = format!("more than {MOST_SOCKETS} sockets in column `socket`");
+        return Err(fault(
+            message,
+            "a socket has many poses; is the column the socket's name?",
+        ));
+    }
+    if let Some(control) = name.chars().find(|c| c.is_control()) {
+        let message = format!(
+            "a socket's name holds the control character U+{:04X}",
+            control as u32
+        );
+        return Err(fault(message, "names are shown as they are: leave it out"));
+    }
+    sockets.push(name.to_string());
+    Ok(sockets.len() - 1)
 }
 
 /// A finite number in a cell, or what is wrong with it and what to do.

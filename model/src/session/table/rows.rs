@@ -11,10 +11,17 @@ use crate::session::stamp::Stamp;
 
 /// Most bytes of one line.
 const LONGEST_LINE: u64 = 1 << 20;
-/// Most bytes of a file.
-const MOST_BYTES: u64 = 2 << 30;
-/// Most rows of a file.
-const MOST_ROWS: usize = 10_000_000;
+/// How long a file may be.
+#[derive(Clone, Copy)]
+struct Limits {
+    bytes: u64,
+    rows: usize,
+}
+
+const LIMITS: Limits = Limits {
+    bytes: 2 << 30,
+    rows: 10_000_000,
+};
 
 /// What to do with a file that is too long.
 const SPLIT: &str = "leave out readings (every tenth will do), or split the file over several tests";
@@ -62,6 +69,7 @@ pub(super) struct Rows {
     separator: u8,
     reader: BufReader<File>,
     stamp: Stamp,
+    limits: Limits,
     line: usize,
     rows: usize,
     byte: usize,
@@ -71,6 +79,10 @@ pub(super) struct Rows {
 impl Rows {
     /// Opens a file.
     pub fn open(file: &Path, format: &Format) -> Result<Rows, ModelError> {
+        Self::within(file, format, LIMITS)
+    }
+
+    fn within(file: &Path, format: &Format, limits: Limits) -> Result<Rows, ModelError> {
         let fault = |message: String, help: &str| ModelError::Input {
             place: Place::file(file),
             message,
@@ -89,9 +101,13 @@ impl Rows {
                 "check `data` and the file",
             )
         })?;
-        if found.len() > MOST_BYTES {
+        if found.len() > limits.bytes {
             return Err(fault(
-                format!("a data file of {} bytes; {MOST_BYTES} is the most that is read", found.len()),
+                format!(
+                    "a data file of {} bytes; {} is the most that is read",
+                    found.len(),
+                    limits.bytes
+                ),
                 SPLIT,
             ));
         }
@@ -99,6 +115,7 @@ impl Rows {
             file: file.to_path_buf(),
             separator: format.separator,
             stamp: Stamp::of(file, &found),
+            limits,
             reader: BufReader::with_capacity(1 << 16, opened),
             line: 0,
             rows: 0,
@@ -131,8 +148,9 @@ impl Rows {
                     .collect()
             };
             self.rows += 1;
-            if self.rows > MOST_ROWS {
-                return Err(self.fault(format!("a row beyond {MOST_ROWS}, the most that are read"), SPLIT));
+            if self.rows > self.limits.rows {
+                let most = self.limits.rows;
+                return Err(self.fault(format!("a row beyond {most}, the most that are read"), SPLIT));
             }
             return Ok(Some(Row {
                 line: self.line,
@@ -158,8 +176,9 @@ impl Rows {
         self.line += 1;
         self.byte += read;
         // A pipe does not say how much there is to come.
-        if self.byte as u64 > MOST_BYTES {
-            return Err(self.fault(format!("more than {MOST_BYTES} bytes, the most that are read"), SPLIT));
+        if self.byte as u64 > self.limits.bytes {
+            let most = self.limits.bytes;
+            return Err(self.fault(format!("more than {most} bytes, the most that are read"), SPLIT));
         }
         if read as u64 == LONGEST_LINE && self.buffer.last() != Some(&b'\n') {
             return Err(self.fault(
@@ -169,15 +188,30 @@ impl Rows {
         }
         let mut bytes = self.buffer.as_slice();
         if self.line == 1 {
+            if bytes.starts_with(b"\xff\xfe") || bytes.starts_with(b"\xfe\xff") {
+                return Err(self.fault("the file is UTF-16".into(), "save it as UTF-8"));
+            }
             bytes = bytes.strip_prefix(b"\xef\xbb\xbf").unwrap_or(bytes);
         }
         let bytes = bytes.strip_suffix(b"\n").unwrap_or(bytes);
         let bytes = bytes.strip_suffix(b"\r").unwrap_or(bytes);
+        if bytes.contains(&b'\r') {
+            return Err(self.fault(
+                "a carriage return within a line".into(),
+                "save the file with lines that end in LF or CRLF",
+            ));
+        }
         // Foreign headers come in all encodings; a cell that is read as a number has to be ASCII anyhow.
         Ok(Some(String::from_utf8_lossy(bytes).into_owned()))
     }
 
     fn quoted(&self, text: &str) -> Result<Vec<String>, ModelError> {
+        if text.matches('"').count() % 2 == 1 {
+            return Err(self.fault(
+                "a quote without its end".into(),
+                "a quoted cell begins and ends on its line",
+            ));
+        }
         let mut record = csv::StringRecord::new();
         let mut reader = csv::ReaderBuilder::new()
             .has_headers(false)
@@ -200,5 +234,67 @@ impl Rows {
             message,
             help: Some(help.to_string()),
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Reads a file with small limits; the number of rows, or the message.
+    fn read(text: &str, limits: Limits, meanwhile: impl Fn(&Path)) -> Result<usize, String> {
+        let folder = tempfile::tempdir().unwrap();
+        let file = folder.path().join("data.csv");
+        std::fs::write(&file, text).unwrap();
+        let mut rows = Rows::within(&file, &Format::default(), limits).map_err(|fault| fault.to_string())?;
+        meanwhile(&file);
+        let mut count = 0;
+        while rows.next_row().map_err(|fault| fault.to_string())?.is_some() {
+            count += 1;
+        }
+        Ok(count)
+    }
+
+    #[test]
+    fn a_file_at_its_limits_is_read_and_one_beyond_them_is_refused() {
+        let limits = Limits { bytes: 12, rows: 3 };
+        let still = |_: &Path| {};
+        assert_eq!(read("1,2\n3,4\n5,6\n", limits, still), Ok(3));
+        let long = read("1,2\n3,4\n5,67\n", limits, still).unwrap_err();
+        assert!(
+            long.ends_with("a data file of 13 bytes; 12 is the most that is read"),
+            "{long}"
+        );
+        let many = read("1\n2\n3\n4\n", limits, still).unwrap_err();
+        assert!(
+            many.ends_with("data.csv:4: a row beyond 3, the most that are read"),
+            "{many}"
+        );
+    }
+
+    #[test]
+    fn a_file_that_changes_while_it_is_read_is_refused() {
+        let append = |file: &Path| {
+            let mut open = std::fs::OpenOptions::new().append(true).open(file).unwrap();
+            std::io::Write::write_all(&mut open, b"5,6\n").unwrap();
+        };
+        let changed = read("1,2\n3,4\n", LIMITS, append).unwrap_err();
+        assert!(
+            changed.ends_with("the file changed while it was read"),
+            "{changed}"
+        );
+        let cut = |file: &Path| std::fs::write(file, "1,2\n").unwrap();
+        let changed = read("1,2\n3,4\n", LIMITS, cut).unwrap_err();
+        assert!(
+            changed.ends_with("the file changed while it was read"),
+            "{changed}"
+        );
+    }
+
+    #[cfg(unix)]
+    #[test]
+    fn a_file_that_vanishes_while_it_is_read_is_read_to_its_end() {
+        let gone = |file: &Path| std::fs::remove_file(file).unwrap();
+        assert_eq!(read("1,2\n3,4\n", LIMITS, gone), Ok(2));
     }
 }

@@ -51,7 +51,10 @@ pub(super) fn rows(file: &Path, format: &Format) -> Result<(Stamp, Vec<Row>), Mo
     }
     if found.len() > MOST_BYTES {
         return Err(fault(
-            format!("a spreadsheet of {} bytes; {MOST_BYTES} is the most that is read", found.len()),
+            format!(
+                "a spreadsheet of {} bytes; {MOST_BYTES} is the most that is read",
+                found.len()
+            ),
             "export it as CSV".into(),
         ));
     }
@@ -121,7 +124,9 @@ fn cells(book: &mut Sheets<BufReader<File>>, name: &str) -> Result<Vec<Placed>, 
             let range = book.worksheet_range(name)?;
             let (top, left) = range.start().unwrap_or_default();
             let used = range.used_cells();
-            cells.extend(used.map(|(row, column, cell)| (top + row as u32, left + column as u32, cell.clone())));
+            cells.extend(
+                used.map(|(row, column, cell)| (top + row as u32, left + column as u32, cell.clone())),
+            );
         }
     }
     cells.retain(|(_, _, cell)| *cell != Data::Empty);
