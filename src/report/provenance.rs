@@ -45,7 +45,10 @@ impl Provenance {
             .map(|(found, stamp)| found.map_err(|fault| (stamp.file.clone(), fault)))
             .collect::<Result<_, _>>()?;
         Ok(Provenance {
-            command: std::env::args().map(quoted).collect::<Vec<_>>().join(" "),
+            command: std::env::args_os()
+                .map(|argument| quoted(argument.to_string_lossy().into_owned()))
+                .collect::<Vec<_>>()
+                .join(" "),
             seed,
             inputs,
         })

@@ -15,6 +15,8 @@ use crate::error::{ModelError, Place};
 
 /// Most bytes of a machine or session file.
 const MOST_BYTES: u64 = 8 << 20;
+/// How deep the parser of TOML goes.
+const DEEPEST: usize = 80;
 /// Most items of a list or a table of names: far more than anybody measures, few enough to be compared with each other.
 const MOST_ITEMS: usize = 1000;
 
@@ -96,7 +98,9 @@ impl Source {
             self.error(
                 fault.span().unwrap_or(0..0),
                 format!("not valid TOML: {}", fault.message()),
-                None,
+                fault.message().contains("recursion").then(|| {
+                    format!("tables, lists and the parts of a key go {DEEPEST} levels deep at most")
+                }),
             )
         })?;
         Ok(Table::new(self, String::new(), 0..0, root.into_inner()))

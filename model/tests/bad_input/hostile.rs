@@ -198,10 +198,10 @@ fn nested(open: &str, close: &str, times: usize) -> String {
 }
 
 refused! {
-    lists_nested_without_end: told(session(MACHINE, &format!("x = {}", nested("[", "]", 100_000)), None)) => ["session.toml:1", "not valid TOML", "recursion"]
-    tables_nested_without_end: told(session(MACHINE, &format!("x = {}", nested("{a=", "}", 100_000)), None)) => ["session.toml:1", "not valid TOML", "recursion"]
-    keys_of_many_parts: told(session(MACHINE, &format!("a{} = 1", ".a".repeat(100_000)), None)) => ["session.toml:1", "not valid TOML", "recursion"]
-    headers_of_many_parts: told(session(MACHINE, &format!("[a{}]\nx = 1", ".a".repeat(100_000)), None)) => ["session.toml:1", "not valid TOML", "recursion"]
+    lists_nested_without_end: told(session(MACHINE, &format!("x = {}", nested("[", "]", 100_000)), None)) => ["session.toml:1", "not valid TOML", "recursion", "80 levels deep at most"]
+    tables_nested_without_end: told(session(MACHINE, &format!("x = {}", nested("{a=", "}", 100_000)), None)) => ["session.toml:1", "not valid TOML", "recursion", "80 levels deep at most"]
+    keys_of_many_parts: told(session(MACHINE, &format!("a{} = 1", ".a".repeat(100_000)), None)) => ["session.toml:1", "not valid TOML", "recursion", "80 levels deep at most"]
+    headers_of_many_parts: told(session(MACHINE, &format!("[a{}]\nx = 1", ".a".repeat(100_000)), None)) => ["session.toml:1", "not valid TOML", "recursion", "80 levels deep at most"]
     a_key_twice: with_session("noise_um = 0.3", "noise_um = 0.3\nnoise_um = 0.4") => ["session.toml:7", "not valid TOML", "duplicate key"]
     an_expression_beyond_all_length: ball(&"1+".repeat(300)) => ["session.toml:12", "an expression of 600 characters; 400 is the most"]
     parentheses_beyond_all_depth: ball(&nested("(", ")", 60)) => ["session.toml:12", "nested deeper than 40"]
@@ -284,6 +284,45 @@ refused! {
     a_spreadsheet_beyond_the_limit: sparse("C100.xlsx", (64 << 20) + 1) => ["C100.xlsx:0", "a spreadsheet of 67108865 bytes; 67108864 is the most"]
     a_ball_bar_file_beyond_the_limit: sparse("C100.b5r", (64 << 20) + 1) => ["C100.b5r:0", "more than 67108864 bytes"]
     a_session_beyond_the_limit: sparse("other.toml", (8 << 20) + 1) => ["other.toml:0", "the session file has more than 8388608 bytes", "readings belong in CSV files"]
+}
+
+#[test]
+fn a_spreadsheet_that_unpacks_without_end() {
+    use std::io::Write;
+    let folder = tempfile::tempdir().unwrap();
+    let at = |name: &str| folder.path().join(name);
+    fs::write(at("machine.toml"), MACHINE).unwrap();
+    fs::write(at("session.toml"), SESSION.replace("C100.csv", "C.xlsx")).unwrap();
+    let mut writer = zip::ZipWriter::new(fs::File::create(at("C.xlsx")).unwrap());
+    writer
+        .start_file("xl/sharedStrings.xml", zip::write::SimpleFileOptions::default())
+        .unwrap();
+    for _ in 0..257 {
+        writer.write_all(&vec![b' '; 1 << 20]).unwrap();
+    }
+    writer.finish().unwrap();
+    assert!(fs::metadata(at("C.xlsx")).unwrap().len() < 1 << 20);
+    holds(
+        &told(read::session(&at("session.toml"), &ReadOptions::default())),
+        &[
+            "C.xlsx:0",
+            "unpacks to more than 268435456 bytes",
+            "export it as CSV",
+        ],
+    );
+}
+
+#[test]
+fn nesting_up_to_the_limit_is_read() {
+    let deep = |levels: usize| {
+        told(session(
+            MACHINE,
+            &format!("x = {}", nested("[", "]", levels)),
+            None,
+        ))
+    };
+    holds(&deep(79), &["has no `machine`"]);
+    holds(&deep(81), &["80 levels deep at most"]);
 }
 
 fn with_xml(text: &str) -> String {

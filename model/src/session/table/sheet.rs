@@ -4,10 +4,12 @@
 //! number is read with all its digits, a formula by its last value.
 
 use std::fs::File;
-use std::io::BufReader;
+use std::io::{BufReader, Read};
+use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::path::Path;
 
 use calamine::{Data, Reader, Sheets, XlsxError, open_workbook_auto};
+use zip::ZipArchive;
 
 use super::Format;
 use super::rows::Row;
@@ -25,8 +27,10 @@ pub(super) fn is_spreadsheet(file: &Path) -> bool {
     )
 }
 
-/// Most bytes of a spreadsheet: it is held in memory as a whole, unpacked.
+/// Most bytes of a spreadsheet.
 const MOST_BYTES: u64 = 64 << 20;
+/// Most bytes of what is packed in it, which is held in memory.
+const MOST_UNPACKED: u64 = 256 << 20;
 /// Most columns that cells lie in.
 const MOST_COLUMNS: u32 = 1000;
 /// Most cells of the rectangle around all that is filled.
@@ -58,8 +62,14 @@ pub(super) fn rows(file: &Path, format: &Format) -> Result<(Stamp, Vec<Row>), Mo
             "export it as CSV".into(),
         ));
     }
+    if unpacks_beyond(file, MOST_UNPACKED) {
+        return Err(fault(
+            format!("a spreadsheet that unpacks to more than {MOST_UNPACKED} bytes, the most that is read"),
+            "export it as CSV".into(),
+        ));
+    }
     let stamp = Stamp::of(file, &found);
-    let mut book = open_workbook_auto(file).map_err(broken)?;
+    let mut book = guarded(|| open_workbook_auto(file)).map_err(broken)?;
     let names = book.sheet_names();
     let wanted: Vec<String> = match &format.sheet {
         Some(name) if names.contains(name) => vec![name.clone()],
@@ -73,7 +83,7 @@ pub(super) fn rows(file: &Path, format: &Format) -> Result<(Stamp, Vec<Row>), Mo
     };
     let mut filled: Vec<(String, Vec<Row>)> = Vec::new();
     for name in wanted {
-        let cells = cells(&mut book, &name).map_err(broken)?;
+        let cells = guarded(|| cells(&mut book, &name)).map_err(broken)?;
         let rows = by_row(cells, format).map_err(|(message, help)| fault(message, help))?;
         if !rows.is_empty() {
             filled.push((name, rows));
@@ -92,6 +102,34 @@ pub(super) fn rows(file: &Path, format: &Format) -> Result<(Stamp, Vec<Row>), Mo
             ))
         }
     }
+}
+
+/// Whether the parts of a ZIP file come to more than so many bytes: what they say of their size is not relied on.
+fn unpacks_beyond(file: &Path, most: u64) -> bool {
+    let archive = File::open(file)
+        .ok()
+        .and_then(|opened| ZipArchive::new(opened).ok());
+    // What is no ZIP file is not packed.
+    let Some(mut archive) = archive else { return false };
+    let mut left = most;
+    for part in 0..archive.len() {
+        let Ok(part) = archive.by_index(part) else {
+            continue;
+        };
+        let read = std::io::copy(&mut part.take(left + 1), &mut std::io::sink()).unwrap_or(0);
+        if read > left {
+            return true;
+        }
+        left -= read;
+    }
+    false
+}
+
+/// What the library makes of a file. Where it panics over one that contradicts itself (a row number beyond 32 bits does it in builds that check
+/// arithmetic), that is an error as any other.
+fn guarded<T>(read: impl FnOnce() -> Result<T, calamine::Error>) -> Result<T, calamine::Error> {
+    let contradicts = || std::io::Error::other("its contents contradict each other").into();
+    catch_unwind(AssertUnwindSafe(read)).unwrap_or_else(|_| Err(contradicts()))
 }
 
 /// A cell with its row and column, from 0.
