@@ -141,8 +141,8 @@ pub struct CommonArguments {
 impl CommonArguments {
     /// Refuses before the work what could not be written after it: the JSON, and other files that were asked for.
     fn check(&self, others: &[Option<&PathBuf>]) -> Result<(), Failure> {
-        let files = others.iter().copied().flatten().chain(&self.json);
-        files.map(|path| output::check(path)).collect()
+        let mut files = others.iter().copied().flatten().chain(&self.json);
+        files.try_for_each(|path| output::check(path))
     }
 }
 
