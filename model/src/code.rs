@@ -4,6 +4,9 @@
 
 use crate::error::ModelError;
 
+/// Most axes of a chain.
+const MOST_AXES: usize = 64;
+
 /// The axes of a structural code, as written.
 ///
 /// ```
@@ -49,6 +52,12 @@ impl StructuralCode {
         let beds = between.iter().filter(|body| *body == "b").count();
         if beds != 1 {
             return Err(fault(format!("it holds {beds} beds `b` where one is needed")));
+        }
+        if between.len() > MOST_AXES {
+            return Err(fault(format!(
+                "{} bodies; {MOST_AXES} axes are the most",
+                between.len()
+            )));
         }
         for (index, body) in between.iter().enumerate() {
             let named = body.chars().next().is_some_and(char::is_alphabetic)

@@ -218,8 +218,8 @@ fn read(arguments: &super::SessionArguments) -> Result<Session, Failure> {
         Err(fault) => fault,
     };
     let plan_only = ReadOptions {
-        data_directory: None,
         read_data: false,
+        ..arguments.options()
     };
     match read::session(&arguments.session, &plan_only) {
         Ok(session) => {

@@ -47,24 +47,40 @@ impl Failure {
         {
             use ariadne::{Config, IndexType, Label, Report, ReportKind, Source};
             let name = place.file.display().to_string();
+            let source = visible(&source);
             let mut report = Report::build(ReportKind::Error, (name.clone(), span.clone()))
                 .with_config(
                     Config::default()
                         .with_index_type(IndexType::Byte)
                         .with_color(false),
                 )
-                .with_message(format!("{place}: {message}"))
+                .with_message(visible(&format!("{place}: {message}")))
                 .with_label(Label::new((name.clone(), span.clone())).with_message("here"));
             if let Some(help) = help {
-                report = report.with_help(help);
+                report = report.with_help(visible(help));
             }
             if report.finish().eprint((name, Source::from(source))).is_ok() {
                 return;
             }
         }
-        eprintln!("error: {self}");
+        eprintln!("error: {}", visible(&self.to_string()));
         if let Failure::Model(ModelError::Input { help: Some(help), .. }) = self {
-            eprintln!("  help: {help}");
+            eprintln!("  help: {}", visible(help));
         }
     }
+}
+
+/// The text without what would steer a terminal: of a control character `?` is shown, one for each of its bytes, so that places stay.
+pub fn visible(text: &str) -> String {
+    let mut shown = String::with_capacity(text.len());
+    for c in text.chars() {
+        if c == '\r' {
+            shown.push(' ');
+        } else if c.is_control() && !matches!(c, '\n' | '\t') {
+            shown.extend(std::iter::repeat_n('?', c.len_utf8()));
+        } else {
+            shown.push(c);
+        }
+    }
+    shown
 }

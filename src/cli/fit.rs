@@ -5,7 +5,7 @@ use std::path::PathBuf;
 use abbe::identify::results::{FitMonteCarlo, FitResult, ParameterResult, Unobservable, Verdict};
 use clap::{Args, ValueEnum};
 
-use super::failure::Failure;
+use super::failure::{Failure, visible};
 use super::report::ReportArguments;
 use super::{
     CommonArguments, SessionArguments, circular, compensation, csv, geometric, output, read_session,
@@ -67,6 +67,8 @@ pub struct FitArguments {
 /// Runs `abbe fit`.
 pub fn run(arguments: &FitArguments) -> Result<(), Failure> {
     arguments.faces.check()?;
+    let others = [arguments.csv.as_ref(), arguments.views.as_ref()];
+    arguments.common.check(&others)?;
     if !arguments.repeat.is_empty() {
         if arguments.method != Method::Full {
             return Err(Failure::Other(
@@ -260,6 +262,6 @@ pub fn print_unobservable(unobservable: &[Unobservable]) {
 /// Named warnings, on standard error.
 pub fn print_warnings(warnings: &[String]) {
     for warning in warnings {
-        eprintln!("warning: {warning}");
+        eprintln!("warning: {}", visible(warning));
     }
 }

@@ -32,7 +32,13 @@ pub fn write(
     let whole = made.path().join("whole");
     std::fs::create_dir(&whole).map_err(fault)?;
     for (name, contents) in files {
-        super::output::write_whole(&whole.join(name), contents.as_ref())?;
+        // The place that is meant, not the one where it is made.
+        super::output::write_whole(&whole.join(name), contents.as_ref()).map_err(
+            |failure| match failure {
+                Failure::Write { source, .. } => self::fault(&folder.join(name), source),
+                other => other,
+            },
+        )?;
     }
     look(&whole)?;
     if present {

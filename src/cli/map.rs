@@ -59,6 +59,9 @@ pub fn run(machine: &Machine, arguments: &MapArguments) -> Result<(), Failure> {
     let (Some(path), Some(file)) = (&arguments.map, &arguments.functions) else {
         return Err(Failure::Other("--map and --functions go together".into()));
     };
+    for path in std::iter::once(path).chain(&arguments.json) {
+        output::check(path)?;
+    }
     let functions = functions::read(file, machine)?;
     let tool_mm = match arguments.tool_mm[..] {
         [] => [0.0; 3],

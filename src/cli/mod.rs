@@ -16,7 +16,7 @@ mod geometric;
 mod layout;
 mod map;
 mod new;
-mod output;
+pub mod output;
 mod plan;
 mod repeated;
 mod report;
@@ -30,6 +30,8 @@ mod views;
 use std::path::PathBuf;
 use std::process::ExitCode;
 
+use abbe::model::session::Session;
+use abbe::model::session::read::{self, ReadOptions};
 use clap::{Args, CommandFactory, Parser, Subcommand};
 
 use failure::Failure;
@@ -106,6 +108,20 @@ pub struct SessionArguments {
     /// Where the data files lie when they do not lie beside the session file.
     #[arg(long, value_name = "DIR")]
     data: Option<PathBuf>,
+    /// Let the session read files that lie neither beside or below it nor where `--data` points.
+    #[arg(long)]
+    allow_outside: bool,
+}
+
+impl SessionArguments {
+    /// How the session is to be read.
+    fn options(&self) -> ReadOptions {
+        ReadOptions {
+            data_directory: self.data.clone(),
+            read_data: true,
+            allow_outside: self.allow_outside,
+        }
+    }
 }
 
 /// What every command takes.
@@ -120,6 +136,14 @@ pub struct CommonArguments {
     /// Seed of everything that is drawn: folds, null draws, simulated noise.
     #[arg(long, value_name = "N", default_value_t = 1)]
     seed: u64,
+}
+
+impl CommonArguments {
+    /// Refuses before the work what could not be written after it: the JSON, and other files that were asked for.
+    fn check(&self, others: &[Option<&PathBuf>]) -> Result<(), Failure> {
+        let mut files = others.iter().copied().flatten().chain(&self.json);
+        files.try_for_each(|path| output::check(path))
+    }
 }
 
 /// Runs the command line; the exit status.
@@ -151,10 +175,6 @@ pub fn run() -> ExitCode {
 }
 
 /// Reads the session that the arguments name.
-fn read_session(arguments: &SessionArguments) -> Result<abbe::model::session::Session, Failure> {
-    let options = abbe::model::session::read::ReadOptions {
-        data_directory: arguments.data.clone(),
-        read_data: true,
-    };
-    Ok(abbe::model::session::read::session(&arguments.session, &options)?)
+fn read_session(arguments: &SessionArguments) -> Result<Session, Failure> {
+    Ok(read::session(&arguments.session, &arguments.options())?)
 }

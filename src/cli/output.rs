@@ -1,55 +1,104 @@
 //! Files that are written whole or not at all.
 
+use std::fs::OpenOptions;
 use std::io::Write;
 use std::path::Path;
 
 use super::failure::Failure;
 
-/// Writes a file through a temporary one beside it, so that a reader finds the old file or the whole new one.
+/// Writes a file through a temporary one beside it, so that a reader finds the old file or the whole new one, whatever happens meanwhile.
+///
+/// What is no file (a pipe, a terminal, `/dev/stdout`) is written to as it is: nothing may take its place.
 pub fn write_whole(path: &Path, contents: &[u8]) -> Result<(), Failure> {
     let fault = |source| Failure::Write {
         path: path.display().to_string(),
         source,
     };
-    let folder = check(path)?;
+    check(path)?;
+    if is_stream(path) {
+        let mut stream = OpenOptions::new().append(true).open(path).map_err(fault)?;
+        return stream
+            .write_all(contents)
+            .and_then(|()| stream.flush())
+            .map_err(fault);
+    }
+    // A symbolic link stays one: what it leads to is replaced.
+    let place = path.canonicalize().unwrap_or_else(|_| path.to_path_buf());
     let mut builder = tempfile::Builder::new();
-    // As any other new file: what the user's mask lets through.
     #[cfg(unix)]
-    builder.permissions(std::os::unix::fs::PermissionsExt::from_mode(0o666));
-    let mut file = builder.tempfile_in(folder).map_err(fault)?;
+    {
+        use std::os::unix::fs::PermissionsExt;
+        // As any other new file: what the user's mask lets through.
+        builder.permissions(std::fs::Permissions::from_mode(0o666));
+    }
+    let mut file = builder.tempfile_in(folder_of(&place)).map_err(fault)?;
     file.write_all(contents).map_err(fault)?;
+    if let Ok(old) = std::fs::metadata(&place) {
+        file.as_file().set_permissions(old.permissions()).map_err(fault)?;
+    }
     file.as_file().sync_all().map_err(fault)?;
-    file.persist(path).map_err(|error| fault(error.error))?;
+    file.persist(&place).map_err(|error| fault(error.error))?;
     Ok(())
 }
 
-/// The folder that a file is to lie in; an error where there is none.
-pub fn check(path: &Path) -> Result<&Path, Failure> {
-    let folder = match path.parent() {
-        Some(folder) if !folder.as_os_str().is_empty() => folder,
-        _ => Path::new("."),
-    };
-    if path.is_dir() {
-        return Err(Failure::Other(format!(
-            "{}: cannot be written: this is a folder; name a file in it",
-            path.display()
-        )));
-    }
-    if !folder.is_dir() {
-        return Err(Failure::Other(format!(
-            "{}: cannot be written: there is no folder {}; make it first, or name another",
-            path.display(),
-            folder.display()
-        )));
-    }
-    Ok(folder)
+/// Whether bytes go through what the path names rather than into it.
+fn is_stream(path: &Path) -> bool {
+    let descriptor = ["/dev/stdout", "/dev/stderr", "/dev/fd"];
+    let other = std::fs::metadata(path).is_ok_and(|found| !found.is_file() && !found.is_dir());
+    other || descriptor.iter().any(|name| path.starts_with(name))
 }
 
-/// Writes a line to standard output; the end of the program where nobody reads on.
+/// The folder that a file lies in.
+pub fn folder_of(path: &Path) -> &Path {
+    match path.parent() {
+        Some(folder) if !folder.as_os_str().is_empty() => folder,
+        _ => Path::new("."),
+    }
+}
+
+/// An error where a file cannot come to lie: said before the work, not after it.
+pub fn check(path: &Path) -> Result<(), Failure> {
+    let refused = |why: String| {
+        Err(Failure::Other(format!(
+            "{}: cannot be written: {why}",
+            path.display()
+        )))
+    };
+    let folder = folder_of(path);
+    match std::fs::metadata(path) {
+        Ok(found) if found.is_dir() => refused("this is a folder; name a file in it".into()),
+        Ok(found) if found.is_file() && found.permissions().readonly() => {
+            refused("the file is write-protected; take that off, or name another".into())
+        }
+        _ if !folder.is_dir() => refused(format!(
+            "there is no folder {}; make it first, or name another",
+            folder.display()
+        )),
+        _ => Ok(()),
+    }
+}
+
+/// Writes a line to standard output. Where nobody reads on, that is the end of the program; where it cannot be written, an error is.
 pub fn line(text: std::fmt::Arguments<'_>) {
     let mut out = std::io::stdout().lock();
-    if writeln!(out, "{text}").is_err() {
-        std::process::exit(0);
+    if let Err(fault) = writeln!(out, "{text}") {
+        if fault.kind() == std::io::ErrorKind::BrokenPipe {
+            std::process::exit(0);
+        }
+        eprintln!("error: standard output: cannot be written: {fault}");
+        std::process::exit(1);
+    }
+}
+
+/// A cell that a spreadsheet takes for text: one that begins as a formula does (`=`, `+`, `-`, `@`) and is no number stands behind an apostrophe.
+///
+/// Names in a table come from session files, which others may have written.
+pub fn cell(text: String) -> String {
+    let formula = text.trim_start().starts_with(['=', '+', '-', '@']) || text.starts_with(['\t', '\r', '\n']);
+    if formula && text.parse::<f64>().is_err() {
+        format!("'{text}")
+    } else {
+        text
     }
 }
 
@@ -58,11 +107,11 @@ pub fn csv(header: &[String], rows: impl IntoIterator<Item = Vec<String>>) -> Re
     let fault = |error: String| Failure::Other(format!("the table cannot be written as CSV: {error}"));
     let mut writer = csv::Writer::from_writer(Vec::new());
     writer
-        .write_record(header)
+        .write_record(header.iter().cloned().map(cell))
         .map_err(|error| fault(error.to_string()))?;
     for row in rows {
         writer
-            .write_record(row)
+            .write_record(row.into_iter().map(cell))
             .map_err(|error| fault(error.to_string()))?;
     }
     writer.into_inner().map_err(|error| fault(error.to_string()))

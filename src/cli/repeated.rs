@@ -24,7 +24,7 @@ pub fn run(first: &SessionArguments, repeat: &[PathBuf], common: &CommonArgument
         }
         let session = read_session(&SessionArguments {
             session: path.to_path_buf(),
-            data: first.data.clone(),
+            ..first.clone()
         })?;
         let (problem, fit) = abbe::identify::fit::prepare(&session, common.seed)?;
         let report = abbe::identify::fit::report(&problem, &fit);

@@ -52,7 +52,7 @@ impl ReportArguments {
         if let Some(path) = &self.report {
             let provenance = Provenance::of(session, seed).map_err(|(path, error)| {
                 Failure::Other(format!(
-                    "{}: cannot be read again for its checksum: {error}",
+                    "{}: cannot be read again for its checksum in the report: {error}",
                     path.display()
                 ))
             })?;

@@ -123,8 +123,6 @@ fn files(
     simulated: &Simulated,
     arguments: &SimulateArguments,
 ) -> Result<Vec<folder::NewFile>, Failure> {
-    let original = std::fs::read_to_string(&session.file)
-        .map_err(|cause| Failure::Other(format!("{}: cannot be read: {cause}", session.file.display())))?;
     let file = session.file.as_path();
     let mut files = Vec::new();
     let mut data: Vec<(String, String)> = Vec::new();
@@ -134,12 +132,10 @@ fn files(
         data.push((test.name.clone(), name.clone()));
         files.push((name, text));
     }
-    if let Some(machine) = read::machine_file(file)? {
-        let text = std::fs::read_to_string(&machine)
-            .map_err(|cause| Failure::Other(format!("{}: cannot be read: {cause}", machine.display())))?;
-        files.push(("machine.toml".into(), text));
+    if let Some(machine) = &session.machine_text {
+        files.push(("machine.toml".into(), machine.clone()));
     }
-    let mut text = write::with_data(&original, file, &data)?;
+    let mut text = write::with_data(&session.text, file, &data)?;
     text = rewrite::with_machine_file(&text, file, "machine.toml")?;
     if let Some(noise_um) = arguments.noise_um {
         text = rewrite::with_noise(&text, file, noise_um)?;

@@ -50,9 +50,8 @@ pub struct TraceArguments {
 /// Runs `abbe trace`.
 pub fn run(arguments: &TraceArguments) -> Result<(), Failure> {
     arguments.faces.check()?;
-    if let Some(path) = &arguments.write {
-        output::check(path)?;
-    }
+    let others = [arguments.csv.as_ref(), arguments.write.as_ref()];
+    arguments.common.check(&others)?;
     let session = read_session(&arguments.session)?;
     let options = TraceOptions {
         seed: arguments.common.seed,
@@ -95,11 +94,8 @@ pub fn run(arguments: &TraceArguments) -> Result<(), Failure> {
         output::write_json(path, &trace.result)?;
     }
     if let Some(path) = &arguments.write {
-        let text = std::fs::read_to_string(&arguments.session.session)
-            .map_err(|error| Failure::Other(format!("{}: {error}", arguments.session.session.display())))?;
-        let folder = output::check(path)?;
         let data = arguments.session.data.as_deref();
-        let text = rewrite::moved(&text, &session.file, folder, data)?;
+        let text = rewrite::moved(&session.text, &session.file, output::folder_of(path), data)?;
         let next = write::with_effects(&text, &trace.effects, &session.machine);
         output::write_whole(path, next.as_bytes())?;
     }

@@ -159,10 +159,11 @@ pub fn table(drawn: &Drawn<'_>) -> String {
 
 /// A field of a CSV file.
 fn quoted(field: &str) -> String {
+    let field = crate::cli::output::cell(field.to_string());
     if field.contains([',', '"', '\n', '\r']) {
         format!("\"{}\"", field.replace('"', "\"\""))
     } else {
-        field.to_string()
+        field
     }
 }
 

@@ -1,6 +1,6 @@
 //! What it takes to do the same again: inputs with checksums, version, command line, seed.
 
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
 use abbe::model::session::Session;
 use sha2::{Digest, Sha256};
@@ -29,28 +29,34 @@ impl Provenance {
     /// Of a session that was read.
     ///
     /// # Errors
-    /// If a file that was read a moment ago can no longer be read: its path, and why.
-    pub fn of(session: &Session, seed: u64) -> Result<Provenance, (PathBuf, std::io::Error)> {
-        let mut paths = vec![session.file.clone()];
-        paths.extend(machine_file(&session.file));
-        for test in &session.tests {
-            let file = test.readings.as_ref().map(|readings| readings.file.clone());
-            // Planned states come from no file.
-            if let Some(file) = file.filter(|file| !file.as_os_str().is_empty() && !paths.contains(file)) {
-                paths.push(file);
-            }
-        }
-        let inputs = paths.into_iter().map(input).collect::<Result<_, _>>()?;
+    /// If a file is not what was read a moment ago, so that a checksum would be that of something else: its path, and why.
+    pub fn of(session: &Session, seed: u64) -> Result<Provenance, (PathBuf, String)> {
+        let inputs = session
+            .files
+            .iter()
+            .map(|stamp| {
+                let same = || stamp.changed().map_or(Ok(()), Err);
+                same()?;
+                let found = input(stamp.file.clone()).map_err(|cause| cause.to_string())?;
+                same()?;
+                Ok(found)
+            })
+            .zip(&session.files)
+            .map(|(found, stamp)| found.map_err(|fault| (stamp.file.clone(), fault)))
+            .collect::<Result<_, _>>()?;
         Ok(Provenance {
-            command: std::env::args().map(quoted).collect::<Vec<_>>().join(" "),
+            command: std::env::args_os()
+                .map(|argument| quoted(argument.to_string_lossy().into_owned()))
+                .collect::<Vec<_>>()
+                .join(" "),
             seed,
             inputs,
         })
     }
 }
 
-fn input(path: PathBuf) -> Result<Input, (PathBuf, std::io::Error)> {
-    let contents = std::fs::read(&path).map_err(|error| (path.clone(), error))?;
+fn input(path: PathBuf) -> std::io::Result<Input> {
+    let contents = std::fs::read(&path)?;
     Ok(Input {
         path: path.display().to_string(),
         bytes: contents.len(),
@@ -59,14 +65,6 @@ fn input(path: PathBuf) -> Result<Input, (PathBuf, std::io::Error)> {
             .map(|byte| format!("{byte:02x}"))
             .collect(),
     })
-}
-
-/// The machine's file, where the session names one: it says so in `[machine] file`.
-fn machine_file(session: &Path) -> Option<PathBuf> {
-    let text = std::fs::read_to_string(session).ok()?;
-    let table: toml::Table = text.parse().ok()?;
-    let name = table.get("machine")?.get("file")?.as_str()?;
-    Some(session.parent().unwrap_or(Path::new("")).join(name))
 }
 
 /// An argument as a shell takes it.

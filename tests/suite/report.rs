@@ -238,6 +238,14 @@ pub fn with_markup_in_names(folder: &Path) {
         "name = \"C150\"",
         "name = '''C150</script><img src=x onerror=\"window.hit=2\">&amp;'''",
     );
+    edit(
+        "session.toml",
+        "setup = \"P1\"",
+        "setup = '''P1<img src=x onerror=\"window.hit=3\">'''",
+    );
+    let data = "A100<img src=x onerror=\"window.hit=4\">.csv";
+    std::fs::rename(folder.join("A100.csv"), folder.join(data)).unwrap();
+    edit("session.toml", "\"A100.csv\"", &format!("'{data}'"));
 }
 
 #[test]

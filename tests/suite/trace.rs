@@ -176,9 +176,12 @@ fn the_bundled_session_is_explained_at_the_command_line() {
         written.contains("[[effect]]") && written.contains("EZC"),
         "{written}"
     );
-    // The written session lies elsewhere than machine and data, and finds them.
+    // The written session lies elsewhere than machine and data, and finds them where it is let.
     let again = folder.path().join("fit.json");
-    let outcome = abbe(&["fit", text(&next), "-q", "--json", text(&again)]);
+    let refused = abbe(&["fit", text(&next), "-q"]);
+    assert!(!refused.status.success());
+    assert!(String::from_utf8_lossy(&refused.stderr).contains("--allow-outside"));
+    let outcome = abbe(&["fit", text(&next), "-q", "--allow-outside", "--json", text(&again)]);
     let said = String::from_utf8_lossy(&outcome.stderr);
     assert!(outcome.status.success(), "{said}");
     let fit: serde_json::Value = serde_json::from_str(&std::fs::read_to_string(&again).unwrap()).unwrap();

@@ -1,6 +1,8 @@
 //! TOML files as the readers of this crate want them: every key and value knows where it stands, a table says which keys nobody asked
 //! for, and a wrong value says what it is and what was wanted.
 
+use std::fs::File;
+use std::io::Read;
 use std::ops::Range;
 use std::path::{Path, PathBuf};
 
@@ -8,10 +10,15 @@ use toml::Spanned;
 use toml::de::{DeTable, DeValue};
 
 use super::spelling::known_names;
+use super::stamp::Stamp;
 use crate::error::{ModelError, Place};
 
 /// Most bytes of a machine or session file.
 const MOST_BYTES: u64 = 8 << 20;
+/// How deep the parser of TOML goes.
+const DEEPEST: usize = 80;
+/// Most items of a list or a table of names: far more than anybody measures, few enough to be compared with each other.
+const MOST_ITEMS: usize = 1000;
 
 /// A file's text with its name.
 pub(crate) struct Source {
@@ -21,6 +28,8 @@ pub(crate) struct Source {
     pub text: String,
     /// Bytes of the file before the text: those of a byte order mark.
     pub skipped: usize,
+    /// The file as it was; `None` for a text that was read from none.
+    pub stamp: Option<Stamp>,
 }
 
 impl Source {
@@ -31,32 +40,32 @@ impl Source {
             message,
             help: Some(help.to_string()),
         };
-        let length = match std::fs::metadata(file) {
-            Ok(found) if found.is_dir() => {
-                return Err(fault(
-                    format!("this is a folder; {what} is a file"),
-                    "name the .toml file in it",
-                ));
-            }
-            Ok(found) => found.len(),
-            Err(cause) => {
-                let help = "check the name; a relative one starts from the file that mentions it, or from where \
-                            the command was called";
-                return Err(fault(format!("{what} cannot be read: {cause}"), help));
-            }
-        };
-        if length > MOST_BYTES {
+        if file.is_dir() {
             return Err(fault(
-                format!("{what} of {length} bytes; {MOST_BYTES} is the most that is read"),
+                format!("this is a folder; {what} is a file"),
+                "name the .toml file in it",
+            ));
+        }
+        let unreadable = |cause: std::io::Error| {
+            let help = "check the name; a relative one starts from the file that mentions it, or from where \
+                        the command was called";
+            fault(format!("{what} cannot be read: {cause}"), help)
+        };
+        let opened = File::open(file).map_err(unreadable)?;
+        let stamp = Stamp::of(file, &opened.metadata().map_err(unreadable)?);
+        let mut bytes = Vec::new();
+        // A pipe does not say how much there is to come.
+        (&opened)
+            .take(MOST_BYTES + 1)
+            .read_to_end(&mut bytes)
+            .map_err(unreadable)?;
+        if bytes.len() as u64 > MOST_BYTES {
+            return Err(fault(
+                format!("{what} has more than {MOST_BYTES} bytes, the most that is read"),
                 "readings belong in CSV files named by `data`",
             ));
         }
-        let bytes = std::fs::read(file).map_err(|cause| {
-            fault(
-                format!("{what} cannot be read: {cause}"),
-                "check that the file may be read",
-            )
-        })?;
+        stamp.check(&opened)?;
         let text = String::from_utf8(bytes).map_err(|cause| {
             fault(
                 format!(
@@ -66,7 +75,10 @@ impl Source {
                 "save the file as UTF-8",
             )
         })?;
-        Ok(Source::new(file, &text))
+        Ok(Source {
+            stamp: Some(stamp),
+            ..Source::new(file, &text)
+        })
     }
 
     /// A text that stands in a file.
@@ -76,6 +88,7 @@ impl Source {
             file: file.to_path_buf(),
             text: content.to_string(),
             skipped: text.len() - content.len(),
+            stamp: None,
         }
     }
 
@@ -85,7 +98,9 @@ impl Source {
             self.error(
                 fault.span().unwrap_or(0..0),
                 format!("not valid TOML: {}", fault.message()),
-                None,
+                fault.message().contains("recursion").then(|| {
+                    format!("tables, lists and the parts of a key go {DEEPEST} levels deep at most")
+                }),
             )
         })?;
         Ok(Table::new(self, String::new(), 0..0, root.into_inner()))
@@ -167,8 +182,16 @@ impl<'a> Table<'a> {
     }
 
     /// Every entry, in the order of the file: for tables whose keys are names.
-    pub fn take_all(&mut self) -> Vec<Value<'a>> {
-        std::mem::take(&mut self.entries)
+    pub fn take_all(&mut self) -> Result<Vec<Value<'a>>, ModelError> {
+        if self.entries.len() > MOST_ITEMS {
+            let message = format!(
+                "{} has {} entries; {MOST_ITEMS} are the most",
+                self.called(),
+                self.entries.len()
+            );
+            return Err(self.error(message, None));
+        }
+        Ok(std::mem::take(&mut self.entries))
     }
 
     /// An error unless every key was asked for.
@@ -239,7 +262,16 @@ impl<'a> Value<'a> {
     /// A text.
     pub fn text(&self) -> Result<String, ModelError> {
         match &self.value {
-            DeValue::String(text) => Ok(text.to_string()),
+            DeValue::String(text) => match text.chars().find(|c| c.is_control() && *c != '\t') {
+                None => Ok(text.to_string()),
+                Some(control) => Err(self.error(
+                    format!(
+                        "`{}` holds the control character U+{:04X}",
+                        self.key, control as u32
+                    ),
+                    Some("names are shown as they are: leave it out".into()),
+                )),
+            },
             _ => Err(self.unlike("a text in quotes")),
         }
     }
@@ -264,8 +296,10 @@ impl<'a> Value<'a> {
         let number = match &self.value {
             DeValue::Integer(integer) => {
                 i64::from_str_radix(&integer.as_str().replace('_', ""), integer.radix())
-                    .ok()
                     .map(|integer| integer as f64)
+                    // What is too large for a whole number is a number all the same.
+                    .or_else(|_| integer.as_str().replace('_', "").parse())
+                    .ok()
             }
             DeValue::Float(float) => float.as_str().replace('_', "").parse().ok(),
             _ => None,
@@ -320,10 +354,14 @@ impl<'a> Value<'a> {
         if !self.value.is_array() {
             return Err(self.unlike(wanted));
         }
-        let (source, key) = (self.source, self.key);
+        let (source, key, span) = (self.source, self.key, self.span);
         let DeValue::Array(items) = self.value else {
             return Ok(Vec::new());
         };
+        if items.len() > MOST_ITEMS {
+            let message = format!("`{key}` is a list of {}; {MOST_ITEMS} are the most", items.len());
+            return Err(source.error(span, message, None));
+        }
         Ok(items
             .into_iter()
             .map(|item: Spanned<DeValue<'a>>| Value {

@@ -13,6 +13,7 @@ pub mod readings;
 pub mod rewrite;
 pub mod schema;
 mod spelling;
+pub mod stamp;
 mod table;
 pub mod write;
 
@@ -24,12 +25,19 @@ use crate::effect::Effect;
 use crate::instrument::rtest::Setting;
 use crate::instrument::{InstrumentKind, SharedBy, Station};
 use readings::Readings;
+use stamp::Stamp;
 
 /// A session, checked. Lengths in mm, angles in rad.
 #[derive(Clone, Debug)]
 pub struct Session {
     /// The session file.
     pub file: PathBuf,
+    /// What stands in it, as it was read.
+    pub text: String,
+    /// What stands in the machine's file, where the session names one.
+    pub machine_text: Option<String>,
+    /// Every file that was read: the session, its machine, its data.
+    pub files: Vec<Stamp>,
     /// The machine.
     pub machine: Machine,
     /// Named lengths in the order of the file, mm.

@@ -5,12 +5,15 @@ use std::path::PathBuf;
 use crate::axis::AxisKind;
 use crate::chain::{AxisPosition, Machine};
 use crate::effect::DriverSample;
+use crate::session::stamp::Stamp;
 
 /// The readings of one test, one row a reading, in mm, rad, s, °C.
 #[derive(Clone, Debug, Default)]
 pub struct Readings {
     /// The file they were read from.
     pub file: PathBuf,
+    /// That file as it was; `None` for readings that come from no file.
+    pub stamp: Option<Stamp>,
     /// Line of each row in that file, from 1.
     pub line: Vec<usize>,
     /// Which traversal each row belongs to, as numbered in the file; empty where there is no such column.
@@ -43,6 +46,7 @@ impl Readings {
         }
         Readings {
             file: self.file.clone(),
+            stamp: self.stamp.clone(),
             line: of(&self.line, rows),
             run: of(&self.run, rows),
             time_s: of(&self.time_s, rows),

@@ -64,6 +64,7 @@ pub const EXAMPLES: &str = "Examples:
 /// Runs `abbe plan`.
 pub fn run(arguments: &PlanArguments) -> Result<(), Failure> {
     arguments.faces.check()?;
+    arguments.common.check(&[arguments.patterns.file()])?;
     let mut session = read_session(&arguments.session)?;
     if arguments.patterns.asked() {
         return arguments.patterns.run(&session, arguments.common.json.as_deref());

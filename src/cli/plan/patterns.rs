@@ -27,6 +27,11 @@ pub struct PatternArguments {
 }
 
 impl PatternArguments {
+    /// Where they are written.
+    pub fn file(&self) -> Option<&PathBuf> {
+        self.patterns.as_ref()
+    }
+
     /// Whether patterns are asked for.
     pub fn asked(&self) -> bool {
         self.patterns.is_some()

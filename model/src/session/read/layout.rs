@@ -51,7 +51,7 @@ fn one_of(value: &Value<'_>, known: &[u8]) -> Result<u8, ModelError> {
 /// `[columns]`: ours = theirs, by name or number.
 pub(super) fn columns(mut table: Table<'_>) -> Result<Vec<Mapped>, ModelError> {
     let mut columns = Vec::new();
-    for entry in table.take_all() {
+    for entry in table.take_all()? {
         let theirs = match entry.as_text() {
             Some(text) => Theirs::Name(text.trim().to_string()),
             None => Theirs::Number(entry.count(1, 1_000_000)?),

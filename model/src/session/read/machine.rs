@@ -16,8 +16,12 @@ use crate::session::spelling::known_names;
 /// # Errors
 /// If the file cannot be read or does not describe a machine, with its line and what to do.
 pub fn machine(path: &Path) -> Result<Machine, ModelError> {
-    let source = Source::read(path, "the machine file")?;
-    from_table(source.parse()?)
+    from_table(source(path)?.parse()?)
+}
+
+/// The text of a machine file.
+pub(super) fn source(path: &Path) -> Result<Source, ModelError> {
+    Source::read(path, "the machine file")
 }
 
 /// A machine from the tables `name`, `chain`, `[axis.…]`.
@@ -56,7 +60,7 @@ pub(super) fn from_table(mut table: Table<'_>) -> Result<Machine, ModelError> {
 
     let mut tables = Vec::new();
     if let Some(value) = table.take("axis") {
-        for entry in value.table("[axis]".into())?.take_all() {
+        for entry in value.table("[axis]".into())?.take_all()? {
             let name = entry.key.clone();
             if !code.axes().any(|axis| *axis == name) {
                 let known: Vec<&str> = code.axes().map(String::as_str).collect();

@@ -10,6 +10,7 @@ mod shape;
 mod station;
 mod test;
 mod unknowns;
+mod within;
 
 use std::path::{Path, PathBuf};
 
@@ -17,6 +18,7 @@ pub use machine::machine;
 
 use super::document::{Source, Table, Value};
 use super::expression::Length;
+use super::stamp::Stamp;
 use super::table::{Format, Mapped};
 use super::{Session, Test};
 use crate::chain::Machine;
@@ -31,14 +33,17 @@ pub struct ReadOptions {
     pub data_directory: Option<PathBuf>,
     /// Whether the data files are read; without, a session is only its plan.
     pub read_data: bool,
+    /// Whether the session may read files that lie neither beside or below it nor in the data directory.
+    pub allow_outside: bool,
 }
 
 impl Default for ReadOptions {
-    /// Data are read, from beside the session file.
+    /// Data are read, from beside the session file and below.
     fn default() -> Self {
         ReadOptions {
             data_directory: None,
             read_data: true,
+            allow_outside: false,
         }
     }
 }
@@ -109,7 +114,10 @@ impl Context<'_> {
 pub fn session(path: &Path, options: &ReadOptions) -> Result<Session, ModelError> {
     let source = Source::read(path, "the session file")?;
     let mut root = source.parse()?;
-    let machine = session_machine(path, &mut root)?;
+    let Bodies {
+        machine,
+        source: machine_source,
+    } = session_machine(path, options, &mut root)?;
     let constants = constants(&mut root)?;
     let instrument = Instrument::read(&mut root)?;
     let unknowns = unknowns::unknowns(&machine, instrument.kind, &mut root)?;
@@ -144,8 +152,24 @@ pub fn session(path: &Path, options: &ReadOptions) -> Result<Session, ModelError
     };
     let socket_distances = setups::socket_distances(instrument.kind, &tests, &mut root, options.read_data)?;
     root.finish()?;
+    let mut files: Vec<Stamp> = Vec::new();
+    let of_tests = tests
+        .iter()
+        .filter_map(|test| test.readings.as_ref()?.stamp.as_ref());
+    let own = source
+        .stamp
+        .iter()
+        .chain(machine_source.iter().filter_map(|source| source.stamp.as_ref()));
+    for stamp in own.chain(of_tests) {
+        if !files.contains(stamp) {
+            files.push(stamp.clone());
+        }
+    }
     Ok(Session {
         file: path.to_path_buf(),
+        text: source.text.clone(),
+        machine_text: machine_source.map(|source| source.text),
+        files,
         constants,
         instrument: instrument.kind,
         noise_mm: instrument.noise_mm,
@@ -159,31 +183,24 @@ pub fn session(path: &Path, options: &ReadOptions) -> Result<Session, ModelError
     })
 }
 
-/// The machine file that a session names, or `None` where it holds the machine itself.
-///
-/// # Errors
-/// If the session file cannot be read.
-pub fn machine_file(session: &Path) -> Result<Option<PathBuf>, ModelError> {
-    let source = Source::read(session, "the session file")?;
-    let mut root = source.parse()?;
-    let Some(value) = root.take("machine") else {
-        return Ok(None);
-    };
-    match value.table("[machine]".into())?.take("file") {
-        Some(file) => Ok(Some(session.parent().unwrap_or(Path::new("")).join(file.text()?))),
-        None => Ok(None),
-    }
+/// The machine of a session, and the file it stands in where that is one of its own.
+struct Bodies {
+    machine: Machine,
+    source: Option<Source>,
 }
 
 /// The machine: a file beside the session, or the tables themselves.
-fn session_machine(path: &Path, root: &mut Table<'_>) -> Result<Machine, ModelError> {
+fn session_machine(path: &Path, options: &ReadOptions, root: &mut Table<'_>) -> Result<Bodies, ModelError> {
     let value = root.need(
         "machine",
         "[machine] with `file = \"machine.toml\"`, or the machine's tables in it",
     )?;
     let mut table = value.table("[machine]".into())?;
     let Some(file) = table.take("file") else {
-        return machine::from_table(table);
+        return Ok(Bodies {
+            machine: machine::from_table(table)?,
+            source: None,
+        });
     };
     let named = file.text()?;
     let found = path.parent().unwrap_or(Path::new("")).join(&named);
@@ -194,8 +211,13 @@ fn session_machine(path: &Path, root: &mut Table<'_>) -> Result<Machine, ModelEr
         );
         return Err(file.error(message, Some("its name is relative to the session file".into())));
     }
+    within::check(path, options, &file, &found)?;
     table.finish()?;
-    machine(&found)
+    let source = machine::source(&found)?;
+    Ok(Bodies {
+        machine: machine::from_table(source.parse()?)?,
+        source: Some(source),
+    })
 }
 
 fn constants(root: &mut Table<'_>) -> Result<Vec<(String, f64)>, ModelError> {
@@ -203,7 +225,7 @@ fn constants(root: &mut Table<'_>) -> Result<Vec<(String, f64)>, ModelError> {
         return Ok(Vec::new());
     };
     let mut constants = Vec::new();
-    for entry in value.table("[constants]".into())?.take_all() {
+    for entry in value.table("[constants]".into())?.take_all()? {
         let name = entry.key.clone();
         let mut letters = name.chars();
         let valid = letters.next().is_some_and(|c| c.is_alphabetic() || c == '_')

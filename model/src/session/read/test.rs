@@ -3,7 +3,7 @@
 use std::path::{Path, PathBuf};
 
 use super::station::{self, SetUp};
-use super::{Context, Declared, layout, movement, quantity};
+use super::{Context, Declared, layout, movement, quantity, within};
 use crate::axis::AxisKind;
 use crate::error::ModelError;
 use crate::instrument::{InstrumentKind, Station};
@@ -208,7 +208,7 @@ fn at(context: &Context<'_>, table: &mut Table<'_>) -> Result<Standing, ModelErr
     let Some(value) = table.take("at") else {
         return Ok(standing);
     };
-    for entry in value.table("`at`".into())?.take_all() {
+    for entry in value.table("`at`".into())?.take_all()? {
         let Some((axis, unit)) = quantity::axis_position(machine, &entry.key) else {
             let known: Vec<String> = machine.axes.iter().map(|axis| axis.column("")).collect();
             let message = format!("`at` knows no position `{}`", entry.key);
@@ -238,6 +238,7 @@ fn data_file(context: &Context<'_>, data: &Value<'_>) -> Result<PathBuf, ModelEr
         .as_ref()
         .map(|folder| folder.join(&named));
     if let Some(found) = elsewhere.iter().chain([&beside]).find(|file| file.exists()) {
+        within::check(context.file, context.options, data, found)?;
         return Ok(found.clone());
     }
     let (looked, help) = match &elsewhere {

@@ -20,6 +20,7 @@ use crate::chain::Machine;
 use crate::error::{ModelError, Place};
 use crate::instrument::InstrumentKind;
 use crate::session::readings::Readings;
+use crate::session::stamp::Stamp;
 
 /// How a file writes its rows.
 #[derive(Clone, Debug, PartialEq)]
@@ -72,6 +73,9 @@ pub(crate) struct Request<'a> {
     pub socket: Option<&'a str>,
 }
 
+/// Most sockets that a file names.
+const MOST_SOCKETS: usize = 1000;
+
 /// Readings of one data file: one for each socket that it names, else one.
 pub(crate) type BySocket = Vec<(Option<String>, Readings)>;
 
@@ -81,10 +85,12 @@ pub(crate) type BySocket = Vec<(Option<String>, Readings)>;
 /// Anything that is not a finite number where one is expected, with file, line and column; missing or unknown columns; time that
 /// runs backwards; fewer than two readings.
 pub(crate) fn read(file: &Path, request: &Request<'_>) -> Result<BySocket, ModelError> {
-    let mut rows = if sheet::is_spreadsheet(file) {
-        Source::Sheet(sheet::rows(file, &request.format)?.into_iter())
+    let (stamp, mut rows) = if sheet::is_spreadsheet(file) {
+        let (stamp, rows) = sheet::rows(file, &request.format)?;
+        (stamp, Source::Sheet(rows.into_iter()))
     } else {
-        Source::Text(Rows::open(file, &request.format)?)
+        let rows = Rows::open(file, &request.format)?;
+        (rows.stamp().clone(), Source::Text(rows))
     };
     let empty = |what: &str| ModelError::Input {
         place: Place::file(file),
@@ -97,7 +103,7 @@ pub(crate) fn read(file: &Path, request: &Request<'_>) -> Result<BySocket, Model
     let width = first.cells.len();
     let header = request.format.header.then(|| first.cells.clone());
     let columns = columns::columns(request, file, first.line, header.as_deref(), width)?;
-    let mut filled = Filled::new(request, file, columns);
+    let mut filled = Filled::new(request, stamp, columns);
     if header.is_none() {
         filled.push(&first)?;
     }
@@ -160,12 +166,13 @@ struct Filled<'a> {
 }
 
 impl<'a> Filled<'a> {
-    fn new(request: &'a Request<'a>, file: &Path, columns: Vec<Column>) -> Self {
+    fn new(request: &'a Request<'a>, stamp: Stamp, columns: Vec<Column>) -> Self {
         Filled {
             request,
             columns,
             readings: Readings {
-                file: file.to_path_buf(),
+                file: stamp.file.clone(),
+                stamp: Some(stamp),
                 positions: vec![Vec::new(); request.machine.axes.len()],
                 coordinates: request.instrument.coordinates(),
                 ..Readings::default()
@@ -184,11 +191,8 @@ impl<'a> Filled<'a> {
         for column in &self.columns {
             let cell = row.cells[column.index].as_str();
             if column.role == Role::Socket {
-                let known = self.sockets.iter().position(|socket| socket == cell);
-                self.socket.push(known.unwrap_or(self.sockets.len()));
-                if known.is_none() {
-                    self.sockets.push(cell.to_string());
-                }
+                let place = Place::line(&readings.file, row.line);
+                self.socket.push(socket_index(&mut self.sockets, cell, place)?);
                 continue;
             }
             let fault = |message: String, help: &str| ModelError::Input {
@@ -256,6 +260,34 @@ impl<'a> Filled<'a> {
             })
             .collect()
     }
+}
+
+/// The place of a socket among those that the file has named so far.
+fn socket_index(sockets: &mut Vec<String>, name: &str, place: Place) -> Result<usize, ModelError> {
+    if let Some(known) = sockets.iter().position(|socket| socket == name) {
+        return Ok(known);
+    }
+    let fault = |message: String, help: &str| ModelError::Input {
+        place,
+        message,
+        help: Some(help.into()),
+    };
+    if sockets.len() == MOST_SOCKETS {
+        let message = format!("more than {MOST_SOCKETS} sockets in column `socket`");
+        return Err(fault(
+            message,
+            "a socket has many poses; is the column the socket's name?",
+        ));
+    }
+    if let Some(control) = name.chars().find(|c| c.is_control()) {
+        let message = format!(
+            "a socket's name holds the control character U+{:04X}",
+            control as u32
+        );
+        return Err(fault(message, "names are shown as they are: leave it out"));
+    }
+    sockets.push(name.to_string());
+    Ok(sockets.len() - 1)
 }
 
 /// A finite number in a cell, or what is wrong with it and what to do.

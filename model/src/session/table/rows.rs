@@ -7,9 +7,25 @@ use std::path::{Path, PathBuf};
 
 use super::Format;
 use crate::error::{ModelError, Place};
+use crate::session::stamp::Stamp;
 
 /// Most bytes of one line.
 const LONGEST_LINE: u64 = 1 << 20;
+/// How long a file may be.
+#[derive(Clone, Copy)]
+struct Limits {
+    bytes: u64,
+    rows: usize,
+}
+
+const LIMITS: Limits = Limits {
+    bytes: 2 << 30,
+    // A header and ten million readings.
+    rows: 10_000_001,
+};
+
+/// What to do with a file that is too long.
+const SPLIT: &str = "leave out readings (every tenth will do), or split the file over several tests";
 
 /// One row.
 #[derive(Clone, Debug)]
@@ -53,7 +69,10 @@ pub(super) struct Rows {
     file: PathBuf,
     separator: u8,
     reader: BufReader<File>,
+    stamp: Stamp,
+    limits: Limits,
     line: usize,
+    rows: usize,
     byte: usize,
     buffer: Vec<u8>,
 }
@@ -61,27 +80,54 @@ pub(super) struct Rows {
 impl Rows {
     /// Opens a file.
     pub fn open(file: &Path, format: &Format) -> Result<Rows, ModelError> {
-        let reader = File::open(file).and_then(|opened| {
-            if opened.metadata()?.is_dir() {
+        Self::within(file, format, LIMITS)
+    }
+
+    fn within(file: &Path, format: &Format, limits: Limits) -> Result<Rows, ModelError> {
+        let fault = |message: String, help: &str| ModelError::Input {
+            place: Place::file(file),
+            message,
+            help: Some(help.into()),
+        };
+        let opened = File::open(file).and_then(|opened| {
+            let found = opened.metadata()?;
+            if found.is_dir() {
                 return Err(std::io::Error::other("it is a folder"));
             }
-            Ok(BufReader::with_capacity(1 << 16, opened))
+            Ok((opened, found))
         });
-        match reader {
-            Ok(reader) => Ok(Rows {
-                file: file.to_path_buf(),
-                separator: format.separator,
-                reader,
-                line: 0,
-                byte: 0,
-                buffer: Vec::new(),
-            }),
-            Err(cause) => Err(ModelError::Input {
-                place: Place::file(file),
-                message: format!("the data file cannot be read: {cause}"),
-                help: Some("check `data` and the file".into()),
-            }),
+        let (opened, found) = opened.map_err(|cause| {
+            fault(
+                format!("the data file cannot be read: {cause}"),
+                "check `data` and the file",
+            )
+        })?;
+        if found.len() > limits.bytes {
+            return Err(fault(
+                format!(
+                    "a data file of {} bytes; {} is the most that is read",
+                    found.len(),
+                    limits.bytes
+                ),
+                SPLIT,
+            ));
         }
+        Ok(Rows {
+            file: file.to_path_buf(),
+            separator: format.separator,
+            stamp: Stamp::of(file, &found),
+            limits,
+            reader: BufReader::with_capacity(1 << 16, opened),
+            line: 0,
+            rows: 0,
+            byte: 0,
+            buffer: Vec::new(),
+        })
+    }
+
+    /// The file as it was when it was opened.
+    pub fn stamp(&self) -> &Stamp {
+        &self.stamp
     }
 
     /// The next row, or `None` at the end.
@@ -102,6 +148,11 @@ impl Rows {
                     .map(|cell| cell.trim().to_string())
                     .collect()
             };
+            self.rows += 1;
+            if self.rows > self.limits.rows {
+                let most = self.limits.rows;
+                return Err(self.fault(format!("a row beyond {most}, the most that are read"), SPLIT));
+            }
             return Ok(Some(Row {
                 line: self.line,
                 cells,
@@ -120,10 +171,16 @@ impl Rows {
             .read_until(b'\n', &mut self.buffer)
             .map_err(|cause| self.fault(format!("the data file cannot be read: {cause}"), "try again"))?;
         if read == 0 {
+            self.stamp.check(self.reader.get_ref())?;
             return Ok(None);
         }
         self.line += 1;
         self.byte += read;
+        // A pipe does not say how much there is to come.
+        if self.byte as u64 > self.limits.bytes {
+            let most = self.limits.bytes;
+            return Err(self.fault(format!("more than {most} bytes, the most that are read"), SPLIT));
+        }
         if read as u64 == LONGEST_LINE && self.buffer.last() != Some(&b'\n') {
             return Err(self.fault(
                 format!("a line of more than {LONGEST_LINE} bytes"),
@@ -132,15 +189,30 @@ impl Rows {
         }
         let mut bytes = self.buffer.as_slice();
         if self.line == 1 {
+            if bytes.starts_with(b"\xff\xfe") || bytes.starts_with(b"\xfe\xff") {
+                return Err(self.fault("the file is UTF-16".into(), "save it as UTF-8"));
+            }
             bytes = bytes.strip_prefix(b"\xef\xbb\xbf").unwrap_or(bytes);
         }
         let bytes = bytes.strip_suffix(b"\n").unwrap_or(bytes);
         let bytes = bytes.strip_suffix(b"\r").unwrap_or(bytes);
+        if bytes.contains(&b'\r') {
+            return Err(self.fault(
+                "a carriage return within a line".into(),
+                "save the file with lines that end in LF or CRLF",
+            ));
+        }
         // Foreign headers come in all encodings; a cell that is read as a number has to be ASCII anyhow.
         Ok(Some(String::from_utf8_lossy(bytes).into_owned()))
     }
 
     fn quoted(&self, text: &str) -> Result<Vec<String>, ModelError> {
+        if text.matches('"').count() % 2 == 1 {
+            return Err(self.fault(
+                "a quote without its end".into(),
+                "a quoted cell begins and ends on its line",
+            ));
+        }
         let mut record = csv::StringRecord::new();
         let mut reader = csv::ReaderBuilder::new()
             .has_headers(false)
@@ -163,5 +235,67 @@ impl Rows {
             message,
             help: Some(help.to_string()),
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Reads a file with small limits; the number of rows, or the message.
+    fn read(text: &str, limits: Limits, meanwhile: impl Fn(&Path)) -> Result<usize, String> {
+        let folder = tempfile::tempdir().unwrap();
+        let file = folder.path().join("data.csv");
+        std::fs::write(&file, text).unwrap();
+        let mut rows = Rows::within(&file, &Format::default(), limits).map_err(|fault| fault.to_string())?;
+        meanwhile(&file);
+        let mut count = 0;
+        while rows.next_row().map_err(|fault| fault.to_string())?.is_some() {
+            count += 1;
+        }
+        Ok(count)
+    }
+
+    #[test]
+    fn a_file_at_its_limits_is_read_and_one_beyond_them_is_refused() {
+        let limits = Limits { bytes: 12, rows: 3 };
+        let still = |_: &Path| {};
+        assert_eq!(read("1,2\n3,4\n5,6\n", limits, still), Ok(3));
+        let long = read("1,2\n3,4\n5,67\n", limits, still).unwrap_err();
+        assert!(
+            long.ends_with("a data file of 13 bytes; 12 is the most that is read"),
+            "{long}"
+        );
+        let many = read("1\n2\n3\n4\n", limits, still).unwrap_err();
+        assert!(
+            many.ends_with("data.csv:4: a row beyond 3, the most that are read"),
+            "{many}"
+        );
+    }
+
+    #[test]
+    fn a_file_that_changes_while_it_is_read_is_refused() {
+        let append = |file: &Path| {
+            let mut open = std::fs::OpenOptions::new().append(true).open(file).unwrap();
+            std::io::Write::write_all(&mut open, b"5,6\n").unwrap();
+        };
+        let changed = read("1,2\n3,4\n", LIMITS, append).unwrap_err();
+        assert!(
+            changed.ends_with("the file changed while it was read"),
+            "{changed}"
+        );
+        let cut = |file: &Path| std::fs::write(file, "1,2\n").unwrap();
+        let changed = read("1,2\n3,4\n", LIMITS, cut).unwrap_err();
+        assert!(
+            changed.ends_with("the file changed while it was read"),
+            "{changed}"
+        );
+    }
+
+    #[cfg(unix)]
+    #[test]
+    fn a_file_that_vanishes_while_it_is_read_is_read_to_its_end() {
+        let gone = |file: &Path| std::fs::remove_file(file).unwrap();
+        assert_eq!(read("1,2\n3,4\n", LIMITS, gone), Ok(2));
     }
 }

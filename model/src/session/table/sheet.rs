@@ -3,13 +3,18 @@
 //! The first row that is not empty is the header; a row whose first cell begins with `#` is a comment. What a cell shows is of no account: a
 //! number is read with all its digits, a formula by its last value.
 
+use std::fs::File;
+use std::io::{BufReader, Read};
+use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::path::Path;
 
-use calamine::{Data, Reader, open_workbook_auto};
+use calamine::{Data, Reader, Sheets, XlsxError, open_workbook_auto};
+use zip::ZipArchive;
 
 use super::Format;
 use super::rows::Row;
 use crate::error::{ModelError, Place};
+use crate::session::stamp::Stamp;
 
 /// Whether a file is a spreadsheet, by its name.
 pub(super) fn is_spreadsheet(file: &Path) -> bool {
@@ -22,8 +27,17 @@ pub(super) fn is_spreadsheet(file: &Path) -> bool {
     )
 }
 
-/// The rows of a sheet.
-pub(super) fn rows(file: &Path, format: &Format) -> Result<Vec<Row>, ModelError> {
+/// Most bytes of a spreadsheet.
+const MOST_BYTES: u64 = 64 << 20;
+/// Most bytes of what is packed in it, which is held in memory.
+const MOST_UNPACKED: u64 = 256 << 20;
+/// Most columns that cells lie in.
+const MOST_COLUMNS: u32 = 1000;
+/// Most cells of the rectangle around all that is filled.
+const MOST_CELLS: usize = 20_000_000;
+
+/// The rows of a sheet, and the file as it was.
+pub(super) fn rows(file: &Path, format: &Format) -> Result<(Stamp, Vec<Row>), ModelError> {
     let fault = |message: String, help: String| ModelError::Input {
         place: Place::file(file),
         message,
@@ -35,7 +49,27 @@ pub(super) fn rows(file: &Path, format: &Format) -> Result<Vec<Row>, ModelError>
             "check that it opens in a spreadsheet program, or export it as CSV".into(),
         )
     };
-    let mut book = open_workbook_auto(file).map_err(broken)?;
+    let found = std::fs::metadata(file).map_err(|cause| broken(cause.into()))?;
+    if !found.is_file() {
+        return Err(broken(std::io::Error::other("it is no file").into()));
+    }
+    if found.len() > MOST_BYTES {
+        return Err(fault(
+            format!(
+                "a spreadsheet of {} bytes; {MOST_BYTES} is the most that is read",
+                found.len()
+            ),
+            "export it as CSV".into(),
+        ));
+    }
+    if unpacks_beyond(file, MOST_UNPACKED) {
+        return Err(fault(
+            format!("a spreadsheet that unpacks to more than {MOST_UNPACKED} bytes, the most that is read"),
+            "export it as CSV".into(),
+        ));
+    }
+    let stamp = Stamp::of(file, &found);
+    let mut book = guarded(|| open_workbook_auto(file)).map_err(broken)?;
     let names = book.sheet_names();
     let wanted: Vec<String> = match &format.sheet {
         Some(name) if names.contains(name) => vec![name.clone()],
@@ -47,37 +81,131 @@ pub(super) fn rows(file: &Path, format: &Format) -> Result<Vec<Row>, ModelError>
         }
         None => names.clone(),
     };
-    let mut found: Vec<(String, Vec<Row>)> = Vec::new();
+    let mut filled: Vec<(String, Vec<Row>)> = Vec::new();
     for name in wanted {
-        let range = book.worksheet_range(&name).map_err(broken)?;
-        let (top, width) = (range.start().map_or(0, |start| start.0 as usize), range.width());
-        let rows: Vec<Row> = range
-            .rows()
-            .enumerate()
-            .filter(|(_, cells)| cells.iter().any(|cell| *cell != Data::Empty))
-            .filter(
-                |(_, cells)| !matches!(&cells[0], Data::String(text) if text.trim_start().starts_with('#')),
-            )
-            .map(|(index, cells)| {
-                let mut cells: Vec<String> = cells.iter().map(|cell| text(cell, format)).collect();
-                cells.resize(width, String::new());
-                Row::of_cells(top + index + 1, cells)
-            })
-            .collect();
+        let cells = guarded(|| cells(&mut book, &name)).map_err(broken)?;
+        let rows = by_row(cells, format).map_err(|(message, help)| fault(message, help))?;
         if !rows.is_empty() {
-            found.push((name, rows));
+            filled.push((name, rows));
         }
     }
-    match found.len() {
-        0 | 1 => Ok(found.pop().map(|(_, rows)| rows).unwrap_or_default()),
+    if let Some(what) = stamp.changed() {
+        return Err(fault(what, "wait until it is written, and try again".into()));
+    }
+    match filled.len() {
+        0 | 1 => Ok((stamp, filled.pop().map(|(_, rows)| rows).unwrap_or_default())),
         _ => {
-            let names: Vec<&str> = found.iter().map(|(name, _)| name.as_str()).collect();
+            let names: Vec<&str> = filled.iter().map(|(name, _)| name.as_str()).collect();
             Err(fault(
                 format!("several sheets hold cells: {}", names.join(", ")),
                 format!("say which one: `[format] sheet = \"{}\"`", names[0]),
             ))
         }
     }
+}
+
+/// Whether the parts of a ZIP file come to more than so many bytes: what they say of their size is not relied on.
+fn unpacks_beyond(file: &Path, most: u64) -> bool {
+    let archive = File::open(file)
+        .ok()
+        .and_then(|opened| ZipArchive::new(opened).ok());
+    // What is no ZIP file is not packed.
+    let Some(mut archive) = archive else { return false };
+    let mut left = most;
+    for part in 0..archive.len() {
+        let Ok(part) = archive.by_index(part) else {
+            continue;
+        };
+        let read = std::io::copy(&mut part.take(left + 1), &mut std::io::sink()).unwrap_or(0);
+        if read > left {
+            return true;
+        }
+        left -= read;
+    }
+    false
+}
+
+/// What the library makes of a file. Where it panics over one that contradicts itself (a row number beyond 32 bits does it in builds that check
+/// arithmetic), that is an error as any other.
+fn guarded<T>(read: impl FnOnce() -> Result<T, calamine::Error>) -> Result<T, calamine::Error> {
+    let contradicts = || std::io::Error::other("its contents contradict each other").into();
+    catch_unwind(AssertUnwindSafe(read)).unwrap_or_else(|_| Err(contradicts()))
+}
+
+/// A cell with its row and column, from 0.
+type Placed = (u32, u32, Data);
+
+/// The cells of a sheet that hold something.
+///
+/// Where the file lists them one by one they are taken so: the rectangle around two cells at opposite corners would not fit into any memory.
+fn cells(book: &mut Sheets<BufReader<File>>, name: &str) -> Result<Vec<Placed>, calamine::Error> {
+    let mut cells = Vec::new();
+    match book {
+        Sheets::Xlsx(book) => {
+            let mut reader = match book.worksheet_cells_reader(name) {
+                Err(XlsxError::NotAWorksheet(_)) => return Ok(cells),
+                reader => reader?,
+            };
+            while let Some(cell) = reader.next_cell()? {
+                let (row, column) = cell.get_position();
+                cells.push((row, column, Data::from(cell.get_value().clone())));
+            }
+        }
+        Sheets::Xlsb(book) => {
+            let mut reader = book.worksheet_cells_reader(name)?;
+            while let Some(cell) = reader.next_cell()? {
+                let (row, column) = cell.get_position();
+                cells.push((row, column, Data::from(cell.get_value().clone())));
+            }
+        }
+        book => {
+            let range = book.worksheet_range(name)?;
+            let (top, left) = range.start().unwrap_or_default();
+            let used = range.used_cells();
+            cells.extend(
+                used.map(|(row, column, cell)| (top + row as u32, left + column as u32, cell.clone())),
+            );
+        }
+    }
+    cells.retain(|(_, _, cell)| *cell != Data::Empty);
+    Ok(cells)
+}
+
+/// Cells as rows of one width, without comments and empty rows; a message and what to do where they lie too far apart.
+fn by_row(mut cells: Vec<Placed>, format: &Format) -> Result<Vec<Row>, (String, String)> {
+    let columns = || cells.iter().map(|(_, column, _)| *column);
+    let (Some(left), Some(right)) = (columns().min(), columns().max()) else {
+        return Ok(Vec::new());
+    };
+    let help = "clear what lies beside the table, or export it as CSV";
+    if right - left >= MOST_COLUMNS {
+        let message = format!(
+            "cells from column {} to column {}; {MOST_COLUMNS} columns are the most",
+            left + 1,
+            u64::from(right) + 1
+        );
+        return Err((message, help.into()));
+    }
+    let width = (right - left) as usize + 1;
+    // Of two cells that claim one place the later one holds.
+    cells.sort_by_key(|(row, column, _)| (*row, *column));
+    let mut rows: Vec<Row> = Vec::new();
+    for of_row in cells.chunk_by(|(row, ..), (next, ..)| row == next) {
+        let first = of_row.iter().find(|(_, column, _)| *column == left);
+        if matches!(first, Some((_, _, Data::String(text))) if text.trim_start().starts_with('#')) {
+            continue;
+        }
+        if (rows.len() + 1) * width > MOST_CELLS {
+            let message = format!("more than {MOST_CELLS} cells in the rectangle around all that are filled");
+            return Err((message, help.into()));
+        }
+        let mut texts = vec![String::new(); width];
+        for (_, column, cell) in of_row {
+            texts[(column - left) as usize] = text(cell, format);
+        }
+        rows.push(Row::of_cells(of_row[0].0 as usize + 1, texts));
+    }
+    Ok(rows)
 }
 
 /// A cell as it would stand in a CSV file of this format.

@@ -1,15 +1,20 @@
 //! What a ball-bar file in XML says: its runs, its plane, and the names of all else.
 
 use std::collections::BTreeMap;
+use std::fs::File;
+use std::io::Read;
 use std::path::Path;
 
 use quick_xml::Reader;
 use quick_xml::events::{BytesStart, Event};
 
 use crate::error::{ModelError, Place};
+use crate::session::stamp::Stamp;
 
 /// Most bytes of a file.
 const MOST_BYTES: u64 = 64 << 20;
+/// Most elements within one another.
+const DEEPEST: usize = 100;
 /// The element that holds the numbers of a run.
 pub(super) const READINGS: &str = "READINGS";
 const DIRECTION: &str = "RUN_DIRECTION";
@@ -42,21 +47,27 @@ struct Open {
     waiting: Vec<usize>,
 }
 
-/// The text of a file: UTF-8, or UTF-16 with its mark.
-fn decoded(file: &Path) -> Result<String, ModelError> {
+/// A file as it was, and its text: UTF-8, or UTF-16 with its mark.
+fn decoded(file: &Path) -> Result<(Stamp, String), ModelError> {
     let fault = |message: String| ModelError::Input {
         place: Place::file(file),
         message,
         help: Some("check `data` and the file".into()),
     };
-    let length = std::fs::metadata(file).map_or(0, |found| found.len());
-    if length > MOST_BYTES {
+    let unreadable = |cause: std::io::Error| fault(format!("the data file cannot be read: {cause}"));
+    let opened = File::open(file).map_err(unreadable)?;
+    let stamp = Stamp::of(file, &opened.metadata().map_err(unreadable)?);
+    let mut bytes = Vec::new();
+    (&opened)
+        .take(MOST_BYTES + 1)
+        .read_to_end(&mut bytes)
+        .map_err(unreadable)?;
+    if bytes.len() as u64 > MOST_BYTES {
         return Err(fault(format!(
-            "a file of {length} bytes; {MOST_BYTES} is the most that is read"
+            "more than {MOST_BYTES} bytes, the most that are read of a ball-bar file in XML"
         )));
     }
-    let bytes =
-        std::fs::read(file).map_err(|cause| fault(format!("the data file cannot be read: {cause}")))?;
+    stamp.check(&opened)?;
     let wide = |of: fn([u8; 2]) -> u16| -> String {
         let units: Vec<u16> = bytes[2..]
             .chunks_exact(2)
@@ -64,32 +75,32 @@ fn decoded(file: &Path) -> Result<String, ModelError> {
             .collect();
         String::from_utf16_lossy(&units)
     };
-    Ok(match bytes.as_slice() {
+    let text = match bytes.as_slice() {
         [0xff, 0xfe, ..] => wide(u16::from_le_bytes),
         [0xfe, 0xff, ..] => wide(u16::from_be_bytes),
         // Names and numbers are ASCII; what else the file holds is not read.
         bytes => String::from_utf8_lossy(bytes.strip_prefix(b"\xef\xbb\xbf").unwrap_or(bytes)).into_owned(),
-    })
+    };
+    Ok((stamp, text))
 }
 
 /// Reads a file.
 ///
 /// # Errors
 /// If it is no XML.
-pub(super) fn parse(file: &Path) -> Result<Contents, ModelError> {
-    let text = decoded(file)?;
+pub(super) fn parse(file: &Path) -> Result<(Stamp, Contents), ModelError> {
+    let (stamp, text) = decoded(file)?;
     let mut reader = Reader::from_str(&text);
     let mut contents = Contents::default();
     let mut open: Vec<Open> = Vec::new();
-    let line_at = |position: u64| {
-        let until = (position as usize).min(text.len());
-        1 + text.as_bytes()[..until]
+    let (mut line, mut counted) = (1, 0);
+    loop {
+        let until = (reader.buffer_position() as usize).min(text.len());
+        line += text.as_bytes()[counted..until]
             .iter()
             .filter(|byte| **byte == b'\n')
-            .count()
-    };
-    loop {
-        let line = line_at(reader.buffer_position());
+            .count();
+        counted = until;
         let broken = |cause: String| ModelError::Input {
             place: Place::line(file, line),
             message: format!("not valid XML: {cause}"),
@@ -100,10 +111,13 @@ pub(super) fn parse(file: &Path) -> Result<Contents, ModelError> {
         };
         match reader.read_event() {
             Err(cause) => return Err(broken(cause.to_string())),
-            Ok(Event::Eof) if open.is_empty() => return Ok(contents),
+            Ok(Event::Eof) if open.is_empty() => return Ok((stamp, contents)),
             Ok(Event::Eof) => {
                 let unclosed = open.last().map_or("", |element| element.name.as_str());
                 return Err(broken(format!("it ends within <{unclosed}>")));
+            }
+            Ok(Event::Start(_)) if open.len() == DEEPEST => {
+                return Err(broken(format!("elements nested deeper than {DEEPEST}")));
             }
             Ok(Event::Start(start)) => open.push(opened(&start, line, &mut contents, &broken)?),
             Ok(Event::Empty(start)) => {

@@ -47,7 +47,7 @@ pub(crate) fn read(
     test: &Test,
 ) -> Result<(Readings, Vec<String>), ModelError> {
     let role = value_role(file, request)?;
-    let contents = contents::parse(file)?;
+    let (stamp, contents) = contents::parse(file)?;
     let fault = |line: usize, message: String, help: String| ModelError::Input {
         place: if line == 0 {
             Place::file(file)
@@ -97,6 +97,7 @@ pub(crate) fn read(
     }
     let mut readings = Readings {
         file: file.to_path_buf(),
+        stamp: Some(stamp),
         positions: vec![Vec::new(); request.machine.axes.len()],
         coordinates: 1,
         ..Readings::default()

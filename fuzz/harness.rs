@@ -1,0 +1,218 @@
+//! What is fuzzed: every reader of `abbe-model`, through files as the command reads them.
+//!
+//! An input is good or bad; either way the reader returns, a message points at bytes that are there, and what was read is finite.
+//! `model/tests/corpus.rs` replays the corpus with these functions on every test run.
+
+use std::fs;
+use std::io::Write;
+use std::path::Path;
+
+use abbe_model::ModelError;
+use abbe_model::session::read::{self, ReadOptions};
+use abbe_model::session::{Session, motion, rewrite, write};
+
+const MACHINE: &str = "chain = \"w C A b Y X Z t\"\n[axis.C]\n[axis.A]\n[axis.X]\n[axis.Y]\n[axis.Z]\n";
+
+/// A ball-bar session whose data file has the name `DATA`.
+const SESSION: &str = r#"[machine]
+file = "machine.toml"
+[instrument]
+kind = "ballbar"
+FORMAT
+[[test]]
+name = "XY"
+data = "DATA"
+bar_mm = 100.0
+workpiece_ball_mm = [0, 0, 0]
+spindle_ball_mm = [0, 0, 0]
+COLUMNS
+"#;
+
+/// The folder that this thread's files lie in: in memory where the system has such a place.
+fn within<T>(work: impl FnOnce(&Path) -> T) -> T {
+    thread_local! {
+        static FOLDER: tempfile::TempDir = {
+            let memory = Path::new("/dev/shm");
+            let made = if memory.is_dir() { tempfile::tempdir_in(memory) } else { tempfile::tempdir() };
+            let made = made.expect("a temporary folder");
+            put(made.path(), "machine.toml", MACHINE.as_bytes());
+            made
+        };
+    }
+    FOLDER.with(|folder| work(folder.path()))
+}
+
+fn put(folder: &Path, name: &str, contents: &[u8]) {
+    fs::write(folder.join(name), contents).expect("a file in a temporary folder");
+}
+
+/// A message says where, and bytes that it points at are characters of the file: the command shows them.
+fn told(fault: &ModelError) {
+    assert!(!fault.to_string().is_empty());
+    let Some(place) = fault.place() else { return };
+    let Some(span) = &place.span else { return };
+    assert!(span.start <= span.end, "{fault}: {span:?}");
+    if let Ok(text) = fs::read_to_string(&place.file)
+        && span.end <= text.len()
+    {
+        assert!(
+            text.is_char_boundary(span.start) && text.is_char_boundary(span.end),
+            "{fault}: {span:?}"
+        );
+    }
+}
+
+/// A session is read; of a good one, numbers are finite and a plan of moderate length comes to states.
+fn session_in(folder: &Path) -> Option<Session> {
+    let session = match read::session(&folder.join("session.toml"), &ReadOptions::default()) {
+        Ok(session) => session,
+        Err(fault) => {
+            told(&fault);
+            return None;
+        }
+    };
+    for test in &session.tests {
+        assert!(test.at.iter().all(|at| at.is_finite()));
+        let Some(readings) = &test.readings else { continue };
+        assert_eq!(readings.observed.len(), readings.rows() * readings.coordinates);
+        assert!(readings.observed.iter().all(|value| value.is_finite()));
+        assert!(readings.positions.iter().flatten().all(|value| value.is_finite()));
+        // Runs cover the rows, each once.
+        assert_eq!(
+            readings.runs().iter().map(|run| run.len()).sum::<usize>(),
+            readings.rows()
+        );
+    }
+    Some(session)
+}
+
+/// `machine.toml`
+pub fn machine(input: &[u8]) {
+    within(|folder| {
+        put(folder, "other.toml", input);
+        match read::machine(&folder.join("other.toml")) {
+            Ok(machine) => assert!(
+                machine
+                    .axes
+                    .iter()
+                    .flat_map(|axis| axis.direction)
+                    .all(f64::is_finite)
+            ),
+            Err(fault) => told(&fault),
+        }
+    });
+}
+
+/// `session.toml`: a plan or, with `data = "C.csv"`, a measured session.
+pub fn session(input: &[u8]) {
+    within(|folder| {
+        put(
+            folder,
+            "C.csv",
+            b"run,c_deg,length_mm\n1,0,100.0\n1,90,100.001\n2,90,100.0\n2,0,99.999\n",
+        );
+        put(folder, "session.toml", input);
+        let Some(session) = session_in(folder) else { return };
+        let text = std::str::from_utf8(input).expect("what was read is UTF-8");
+        let file = Path::new("session.toml");
+        // What is written from a good session is a session.
+        let again = rewrite::with_machine_file(text, file, "machine.toml").expect("it was read");
+        let again = rewrite::with_noise(&again, file, 0.5).expect("it was read");
+        let again = write::with_effects(&again, &session.effects, &session.machine);
+        assert!(!rewrite::without_tables(&again, &["effect"]).contains("[[effect]]\ncomponent"));
+        let short = text.matches("runs").count() == 0 && text.len() < 4000;
+        let steps = session.tests.iter().filter(|test| test.motion.is_some()).count();
+        if short && steps == 1 {
+            // A plan that the machine cannot carry out says so.
+            if let Err(fault) = motion::planned_session(&session) {
+                told(&fault);
+            }
+        }
+    });
+}
+
+fn table_of(data: &str, format: &str, columns: &str, input: &[u8]) {
+    within(|folder| {
+        let text = SESSION
+            .replace("DATA", data)
+            .replace("FORMAT", format)
+            .replace("COLUMNS", columns);
+        put(folder, "session.toml", text.as_bytes());
+        put(folder, data, input);
+        session_in(folder);
+    });
+}
+
+/// A CSV file of our own.
+pub fn table(input: &[u8]) {
+    table_of("data.csv", "", "", input);
+}
+
+/// A CSV file of somebody else: the first byte chooses the format, the rest is the file.
+pub fn foreign(input: &[u8]) {
+    let Some((choice, rest)) = input.split_first() else {
+        return;
+    };
+    let (separator, decimal) = [(";", ","), ("\\t", "."), (":", "."), ("|", ",")][usize::from(choice % 4)];
+    let header = choice & 4 == 0;
+    let format =
+        format!("[format]\nseparator = \"{separator}\"\ndecimal = \"{decimal}\"\nheader = {header}\n");
+    let columns = match (header, choice & 8 == 0) {
+        (true, true) => "columns = { x_mm = \"X act\", y_mm = \"Y act\", deviation_um = \"ΔL\" }",
+        (true, false) => "columns = { time_s = \"t\", c_rad = \"C\", length_mm = \"L\" }",
+        (false, true) => "columns = { x_mm = 1, y_mm = 2, length_mm = 3 }",
+        (false, false) => "columns = { run = 1, a_rad = 3, length_mm = 2 }",
+    };
+    table_of("data.csv", &format, columns, rest);
+}
+
+/// A ball-bar file in XML.
+pub fn xml(input: &[u8]) {
+    let columns = "columns = { deviation_um = \"READINGS\" }\n\
+                   path = { kind = \"circle\", plane = \"XY\", radius_mm = 100, from_deg = 0, to_deg = 360, step_deg = 1 }";
+    table_of("data.b5r", "", columns, input);
+}
+
+/// A spreadsheet: a whole file where the input begins as a ZIP file does, else the XML of its sheet.
+pub fn sheet(input: &[u8]) {
+    if input.starts_with(b"PK") {
+        table_of("data.xlsx", "", "", input);
+    } else {
+        table_of("data.xlsx", "", "", &book(input).expect("a ZIP file in memory"));
+    }
+}
+
+/// The smallest workbook around the XML of a sheet.
+fn book(sheet: &[u8]) -> zip::result::ZipResult<Vec<u8>> {
+    const PARTS: [(&str, &str); 5] = [
+        (
+            "[Content_Types].xml",
+            r#"<Types xmlns="http://schemas.openxmlformats.org/package/2006/content-types"><Default Extension="xml" ContentType="application/xml"/></Types>"#,
+        ),
+        (
+            "_rels/.rels",
+            r#"<Relationships xmlns="http://schemas.openxmlformats.org/package/2006/relationships"><Relationship Id="rId1" Type="http://schemas.openxmlformats.org/officeDocument/2006/relationships/officeDocument" Target="xl/workbook.xml"/></Relationships>"#,
+        ),
+        (
+            "xl/workbook.xml",
+            r#"<workbook xmlns="http://schemas.openxmlformats.org/spreadsheetml/2006/main" xmlns:r="http://schemas.openxmlformats.org/officeDocument/2006/relationships"><sheets><sheet name="A" sheetId="1" r:id="rId1"/></sheets></workbook>"#,
+        ),
+        (
+            "xl/_rels/workbook.xml.rels",
+            r#"<Relationships xmlns="http://schemas.openxmlformats.org/package/2006/relationships"><Relationship Id="rId1" Type="http://schemas.openxmlformats.org/officeDocument/2006/relationships/worksheet" Target="worksheets/sheet1.xml"/><Relationship Id="rId2" Type="http://schemas.openxmlformats.org/officeDocument/2006/relationships/sharedStrings" Target="sharedStrings.xml"/></Relationships>"#,
+        ),
+        (
+            "xl/sharedStrings.xml",
+            r#"<sst xmlns="http://schemas.openxmlformats.org/spreadsheetml/2006/main"><si><t>x_mm</t></si><si><t>y_mm</t></si><si><t>length_mm</t></si></sst>"#,
+        ),
+    ];
+    let mut writer = zip::ZipWriter::new(std::io::Cursor::new(Vec::new()));
+    let stored = zip::write::SimpleFileOptions::default().compression_method(zip::CompressionMethod::Stored);
+    for (name, text) in PARTS {
+        writer.start_file(name, stored)?;
+        writer.write_all(text.as_bytes())?;
+    }
+    writer.start_file("xl/worksheets/sheet1.xml", stored)?;
+    writer.write_all(sheet)?;
+    Ok(writer.finish()?.into_inner())
+}

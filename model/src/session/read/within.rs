@@ -1,0 +1,49 @@
+//! Where a session may read: beside itself, below, and where `--data` points.
+//!
+//! A session that came by mail should not be able to name `../../secret.csv` and have it shown in a message or a report. What counts is where
+//! a file really lies, symbolic links and `..` resolved.
+
+use std::path::{Path, PathBuf};
+
+use super::ReadOptions;
+use crate::error::ModelError;
+use crate::session::document::Value;
+
+/// The folder that the names in a session start from.
+pub(super) fn folder(session: &Path) -> &Path {
+    match session.parent() {
+        Some(folder) if !folder.as_os_str().is_empty() => folder,
+        _ => Path::new("."),
+    }
+}
+
+/// An error unless the session may read the file that a value of it names.
+pub(super) fn check(
+    session: &Path,
+    options: &ReadOptions,
+    named: &Value<'_>,
+    found: &Path,
+) -> Result<(), ModelError> {
+    if options.allow_outside {
+        return Ok(());
+    }
+    let folders = std::iter::once(folder(session)).chain(options.data_directory.as_deref());
+    // A place that cannot be resolved (a pipe in /proc) lies in no folder.
+    let real: Option<PathBuf> = found.canonicalize().ok();
+    let inside = real.as_ref().is_some_and(|real| {
+        folders
+            .filter_map(|folder| folder.canonicalize().ok())
+            .any(|folder| real.starts_with(folder))
+    });
+    if inside {
+        return Ok(());
+    }
+    let message = format!(
+        "`{} = \"{}\"` leads out of the session's folder, to {}",
+        named.key,
+        named.as_text().unwrap_or(""),
+        real.as_deref().unwrap_or(found).display()
+    );
+    let help = "a session reads beside itself, below, and where `--data DIR` points; copy the file there, or say `--allow-outside` if you trust the session";
+    Err(named.error(message, Some(help.into())))
+}
