@@ -166,9 +166,8 @@ proptest! {
         tool in point(),
         coordinate in 0_usize..3,
     ) {
-        let mirror = |mut point: [f64; 3]| {
-            point[coordinate] *= -1.0;
-            point
+        let mirror = |point: [f64; 3]| -> [f64; 3] {
+            std::array::from_fn(|i| if i == coordinate { -point[i] } else { point[i] })
         };
         let mirrored = drawn.mirrored(coordinate);
         let found = both(&mirrored, 1.0, mirror(table), mirror(tool));
