@@ -141,11 +141,12 @@ fn fitted(session: &Session) -> FitResult {
     result
 }
 
-/// The same fit, up to rounding: every value within a ten-thousandth of its uncertainty, where the iterations end, `expected` giving what the other session should say of a value.
+/// The same fit, up to rounding: every value `within` so many of its uncertainties, since iterations end somewhere, `expected` giving what the other session should say of a value.
 #[track_caller]
 fn same(
     one: &FitResult,
     other: &FitResult,
+    within: f64,
     expected: impl Fn(&str, f64) -> f64,
 ) -> Result<(), TestCaseError> {
     prop_assert_eq!(one.rank, other.rank);
@@ -159,10 +160,10 @@ fn same(
         let (other_value, other_u) = other[id];
         let (value, u) = (expected(id, *value), expected(id, *u).abs());
         prop_assert!(
-            (value - other_value).abs() <= 1e-4 * u,
+            (value - other_value).abs() <= within * u,
             "{id}: {value} {other_value} ± {u}"
         );
-        prop_assert!((u - other_u).abs() <= 1e-4 * u, "{id}: u {u} {other_u}");
+        prop_assert!((u - other_u).abs() <= within * u, "{id}: u {u} {other_u}");
     }
     Ok(())
 }
@@ -192,7 +193,7 @@ proptest! {
             test.readings = Some(readings.of_rows(&rows));
         }
         let (one, other) = (fitted(&session), fitted(&other));
-        same(&one, &other, |_, value| value)?;
+        same(&one, &other, 1e-4, |_, value| value)?;
         close(one.rms_um, other.rms_um)?;
         close(one.heldout_rms_um, other.heldout_rms_um)?;
     }
@@ -203,7 +204,7 @@ proptest! {
         other.unknowns.rotate_left(turn.index(session.unknowns.len()));
         other.unknowns.reverse();
         let (one, other) = (fitted(&session), fitted(&other));
-        same(&one, &other, |_, value| value)?;
+        same(&one, &other, 1e-4, |_, value| value)?;
         close(one.rms_um, other.rms_um)?;
         close(one.heldout_rms_um, other.heldout_rms_um)?;
     }
@@ -234,9 +235,10 @@ proptest! {
         }
         let (one, other) = (fitted(&session), fitted(&other));
         let angle = |id: &str| ErrorName::parse(id).is_some_and(|name| name.freedom.is_angle());
-        same(&one, &other, |id, value| if angle(id) { value } else { FACTOR * value })?;
+        // What is not seen is held at nominal in the proportion of a millimetre to 10 mrad: another proportion, another second order.
+        same(&one, &other, 1e-2, |id, value| if angle(id) { value } else { FACTOR * value })?;
         close(FACTOR * one.rms_um, other.rms_um)?;
-        close(FACTOR * one.heldout_rms_um, other.heldout_rms_um)?;
+        prop_assert!((FACTOR * one.heldout_rms_um / other.heldout_rms_um - 1.0).abs() <= 1e-2);
     }
 
     #[test]
@@ -261,7 +263,7 @@ proptest! {
         }
         let (one, other) = (fitted(&session), fitted(&other));
         let sign = |id: &str| ErrorName::parse(id).map_or(1.0, |name| mirror_sign(name.freedom.index(), coordinate));
-        same(&one, &other, |id, value| sign(id) * value)?;
+        same(&one, &other, 1e-4, |id, value| sign(id) * value)?;
         close(one.heldout_rms_um, other.heldout_rms_um)?;
     }
 
@@ -293,7 +295,7 @@ proptest! {
         }
         let mut elsewhere = session.clone();
         elsewhere.effects.push(Effect { tests: vec!["elsewhere".into()], ..effect });
-        same(&fitted(&session), &fitted(&elsewhere), |_, value| value)?;
+        same(&fitted(&session), &fitted(&elsewhere), 1e-4, |_, value| value)?;
     }
 }
 
