@@ -9,6 +9,7 @@ use std::collections::BTreeMap;
 
 use abbe_model::effect::Shape;
 use abbe_model::session::Session;
+use abbe_model::session::limits::LEAST_UM;
 use faer::Mat;
 use statrs::distribution::{ChiSquared, ContinuousCDF};
 
@@ -43,6 +44,8 @@ pub struct Fit {
 
 /// Guess of the noise from which iterations start where nothing is known: 1 µm.
 const FIRST_GUESS_MM: f64 = 1e-3;
+/// Least noise that is estimated: readings that repeat exactly, as computed ones do, are still rounded.
+const LEAST_NOISE_MM: f64 = LEAST_UM * 1e-3;
 /// Probability below which χ² is taken to say that the residual holds more than noise.
 const BIRGE_SIGNIFICANCE: f64 = 1e-3;
 
@@ -120,7 +123,7 @@ pub fn prepare(session: &Session, seed: u64) -> Result<(Problem<'_>, Fit), Ident
     let mut problem = Problem::new(session, first, seed)?;
     if stated.is_none() {
         problem.noise = Noise::white(
-            nominal_residual_mm(&problem)?.max(floor).max(1e-9),
+            nominal_residual_mm(&problem)?.max(floor).max(LEAST_NOISE_MM),
             NoiseSource::Fit,
         );
     }
@@ -172,12 +175,12 @@ fn estimated_noise(problem: &Problem<'_>, fit: &Fit, floor: f64) -> Noise {
         !problem.rejected[test][row]
     });
     if let Some(sigma) = pure.sigma_mm() {
-        return Noise::white(sigma.max(floor).max(f64::MIN_POSITIVE), NoiseSource::Repeats);
+        return Noise::white(sigma.max(floor).max(LEAST_NOISE_MM), NoiseSource::Repeats);
     }
     let count = (problem.readings() * problem.coordinates()) as f64;
     let freedom = (count - fit.rank.seen.ncols() as f64).max(1.0);
     let sigma = rms_mm(problem, &fit.residuals) * (count / freedom).sqrt();
-    Noise::white(sigma.max(floor).max(1e-9), NoiseSource::Fit)
+    Noise::white(sigma.max(floor).max(LEAST_NOISE_MM), NoiseSource::Fit)
 }
 
 /// Fits a problem, from the nominal machine or from an earlier fit's unknowns.

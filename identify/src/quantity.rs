@@ -1,5 +1,7 @@
 //! Values as people give them on a command line or in a file of errors: `EY0A=35.3um`, `"bar[A100]" = "-0.4 um"`.
 
+use abbe_model::session::limits::LARGEST;
+
 use crate::error::IdentifyError;
 use crate::unit::{ARCSEC, Unit};
 
@@ -64,6 +66,9 @@ impl Given {
                 Some((value, quantity[end..].trim()))
             });
         match number {
+            Some((value, _)) if value.is_finite() && value.abs() > LARGEST => Err(IdentifyError::Request(
+                format!("`{id}={quantity}`: {value:e} is too large; {LARGEST:e} is the most"),
+            )),
             Some((value, unit)) if value.is_finite() && (!unit.is_empty() || value == 0.0) => Ok(Given {
                 id: id.to_string(),
                 value,

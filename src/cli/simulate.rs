@@ -4,6 +4,7 @@ use std::path::{Path, PathBuf};
 
 use abbe::identify::quantity::Given;
 use abbe::identify::simulate::{Simulated, Simulation, simulate};
+use abbe::model::session::limits::{LARGEST, LEAST_UM};
 use abbe::model::session::{Session, read, rewrite, write};
 use clap::Args;
 use schemars::JsonSchema;
@@ -72,10 +73,11 @@ pub fn run(arguments: &SimulateArguments) -> Result<(), Failure> {
         given.push(value);
     }
     if let Some(noise) = arguments.noise_um
-        && !(noise.is_finite() && noise >= 0.0)
+        && noise != 0.0
+        && !(LEAST_UM..=LARGEST).contains(&noise)
     {
         return Err(Failure::Other(format!(
-            "--noise-um {noise}: a standard deviation in µm is a number that is not negative"
+            "--noise-um {noise}: a standard deviation in µm is a number that is not negative: 0, or {LEAST_UM:e} to {LARGEST:e}"
         )));
     }
     let simulation = Simulation {

@@ -181,7 +181,14 @@ fn the_bundled_session_is_explained_at_the_command_line() {
     let refused = abbe(&["fit", text(&next), "-q"]);
     assert!(!refused.status.success());
     assert!(String::from_utf8_lossy(&refused.stderr).contains("--allow-outside"));
-    let outcome = abbe(&["fit", text(&next), "-q", "--allow-outside", "--json", text(&again)]);
+    let outcome = abbe(&[
+        "fit",
+        text(&next),
+        "-q",
+        "--allow-outside",
+        "--json",
+        text(&again),
+    ]);
     let said = String::from_utf8_lossy(&outcome.stderr);
     assert!(outcome.status.success(), "{said}");
     let fit: serde_json::Value = serde_json::from_str(&std::fs::read_to_string(&again).unwrap()).unwrap();

@@ -9,6 +9,7 @@ use std::path::{Path, PathBuf};
 use toml::Spanned;
 use toml::de::{DeTable, DeValue};
 
+use super::limits;
 use super::spelling::known_names;
 use super::stamp::Stamp;
 use crate::error::{ModelError, Place};
@@ -291,7 +292,7 @@ impl<'a> Value<'a> {
         self.value.as_bool().ok_or_else(|| self.unlike("true or false"))
     }
 
-    /// A number, perhaps infinite, never NaN.
+    /// A number within [`limits::LARGEST`], perhaps infinite, never NaN.
     pub fn number_or_inf(&self, wanted: &str) -> Result<f64, ModelError> {
         let number = match &self.value {
             DeValue::Integer(integer) => {
@@ -308,7 +309,10 @@ impl<'a> Value<'a> {
             Some(number) if f64::is_nan(number) => {
                 Err(self.error(format!("`{}` is NaN; {wanted} is expected", self.key), None))
             }
-            Some(number) => Ok(number),
+            Some(number) => match limits::too_large(number) {
+                Some(fault) => Err(self.error(format!("`{}` is {fault}", self.key), None)),
+                None => Ok(number),
+            },
             None => Err(self.unlike(wanted)),
         }
     }

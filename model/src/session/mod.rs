@@ -4,6 +4,7 @@
 
 mod document;
 pub mod expression;
+pub mod limits;
 pub mod motion;
 pub mod placing;
 mod plan;

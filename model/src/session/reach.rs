@@ -8,6 +8,9 @@ use crate::instrument::Station;
 /// A ball bar's sensor moves a millimetre or two, those of an R-test a few; beyond this something else than an error of the machine is wrong, mm.
 const MOST_MM: f64 = 5.0;
 
+/// Balls that lie nearer to each other than this lie in one place, mm.
+const LEAST_MM: f64 = 1e-6;
+
 /// The calibrated length of a ball bar; 0 for other instruments.
 pub(crate) fn bar_mm(station: &Station<f64>) -> f64 {
     match station {
@@ -29,7 +32,20 @@ pub(crate) fn check(machine: &Machine, test: &Test, readings: &Readings) -> Resu
     let mut off: Vec<f64> = Vec::with_capacity(readings.rows());
     for row in 0..readings.rows() {
         readings.state(machine, row, &mut state);
-        off.push(bar.read::<f64>(machine, &state, &none, |_| None) - bar.bar);
+        let length = bar.read::<f64>(machine, &state, &none, |_| None);
+        // A length has no direction there, so that no error moves it one way or the other.
+        if length < LEAST_MM {
+            return Err((
+                format!(
+                    "test \"{}\", reading {}: the two balls nominally lie in one place, and the bar is {:e} mm long",
+                    test.name,
+                    row + 1,
+                    bar.bar
+                ),
+                "check `bar_mm`, the two ball positions and the axis positions in `at` and the data".into(),
+            ));
+        }
+        off.push(length - bar.bar);
     }
     let nominal = bar.bar + median(&mut off);
     if (nominal - bar.bar).abs() <= MOST_MM {

@@ -8,6 +8,7 @@ use abbe::identify::plan::clearance::Clearance;
 use abbe::identify::plan::{self, PlanOptions};
 use abbe::model::instrument::Station;
 use abbe::model::instrument::rtest::Setting;
+use abbe::model::session::limits::{LARGEST, LEAST_UM};
 use abbe::model::session::{Prior, Session};
 use clap::Args;
 
@@ -212,11 +213,11 @@ fn clearance(session: &Session, sizes: &str) -> Result<Vec<String>, Failure> {
 
 /// A length in µm that has to be positive, in mm.
 fn positive(flag: &str, um: f64) -> Result<f64, Failure> {
-    if um.is_finite() && um > 0.0 {
+    if (LEAST_UM..=LARGEST).contains(&um) {
         Ok(um * 1e-3)
     } else {
         Err(Failure::Other(format!(
-            "`{flag} {um}`: it has to be a positive number of µm"
+            "`{flag} {um}`: it has to be a positive number of µm, {LEAST_UM:e} to {LARGEST:e}"
         )))
     }
 }

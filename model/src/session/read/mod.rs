@@ -18,6 +18,7 @@ pub use machine::machine;
 
 use super::document::{Source, Table, Value};
 use super::expression::Length;
+use super::limits;
 use super::stamp::Stamp;
 use super::table::{Format, Mapped};
 use super::{Session, Test};
@@ -82,6 +83,10 @@ impl Context<'_> {
             let found = self.constants.iter().find(|(known, _)| known == name);
             found.map_or(f64::NAN, |(_, value)| *value)
         });
+        if let Some(fault) = limits::too_large(number) {
+            let message = format!("`{}` = \"{text}\" comes to {fault}", value.key);
+            return Err(value.error(message, None));
+        }
         if !number.is_finite() {
             let message = format!(
                 "`{}` = \"{text}\" comes to {number} with these constants",
@@ -269,6 +274,9 @@ impl Instrument {
             if number < 0.0 {
                 let message = format!("`{key}` is {number}; it cannot be negative");
                 return Err(value.error(message, None));
+            }
+            if let Some(fault) = limits::too_small_um(number) {
+                return Err(value.error(format!("`{key}` is {fault}"), None));
             }
             Ok(Some(number * MICROMETRE))
         };

@@ -219,7 +219,7 @@ impl Way {
         }
         let way = Way { from, to, step };
         if way.steps() > MOST_READINGS as f64 {
-            let message = format!("{:.0} steps; {MOST_READINGS} readings is the most", way.steps());
+            let message = format!("{:.2e} steps; {MOST_READINGS} readings is the most", way.steps());
             return Err(stepped.error(message, Some("take a larger step".into())));
         }
         if way.steps() < 1.0 {

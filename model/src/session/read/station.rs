@@ -13,6 +13,7 @@ use crate::instrument::{InstrumentKind, Station};
 use crate::session::Prior;
 use crate::session::document::{Table, Value};
 use crate::session::expression::Length;
+use crate::session::limits;
 
 /// A test's instrument.
 pub(super) struct SetUp {
@@ -366,6 +367,10 @@ fn prior(value: &Value<'_>) -> Result<Prior, ModelError> {
         let message = format!("`{}` is {u}; an uncertainty cannot be negative", value.key);
         let help = "0 says exactly known, `inf` says not known at all";
         return Err(value.error(message, Some(help.into())));
+    }
+    if let Some(fault) = limits::too_small_um(u) {
+        let help = "0 says exactly known";
+        return Err(value.error(format!("`{}` is {fault}", value.key), Some(help.into())));
     }
     Ok(if u == 0.0 {
         Prior::Known

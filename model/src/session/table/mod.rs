@@ -19,6 +19,7 @@ use rows::Rows;
 use crate::chain::Machine;
 use crate::error::{ModelError, Place};
 use crate::instrument::InstrumentKind;
+use crate::session::limits;
 use crate::session::readings::Readings;
 use crate::session::stamp::Stamp;
 
@@ -308,9 +309,15 @@ fn number(cell: &str, format: &Format) -> Result<f64, (String, &'static str)> {
         cell.parse::<f64>()
     };
     match parsed {
-        Ok(value) if value.is_finite() => Ok(value),
+        Ok(value) if value.abs() <= limits::LARGEST => Ok(value),
         Ok(value) if value.is_nan() => Err((format!("`{cell}` is not a number (NaN)"), NUMBER)),
-        Ok(_) => Err((format!("`{cell}` is infinite or too large"), NUMBER)),
+        Ok(_) => {
+            let fault = format!(
+                "`{cell}` is infinite or too large; {:e} is the most",
+                limits::LARGEST
+            );
+            Err((fault, NUMBER))
+        }
         Err(_) if cell.replacen(',', ".", 1).parse::<f64>().is_ok() => Err((
             format!("`{cell}` has a decimal comma, which is not declared"),
             "declare `[format] decimal = \",\"`",

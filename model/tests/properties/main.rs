@@ -1,0 +1,7 @@
+//! What holds for every machine, whatever its axes and errors.
+
+mod chain;
+mod machines;
+mod readings;
+mod session;
+mod shapes;

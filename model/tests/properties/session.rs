@@ -1,0 +1,202 @@
+//! Random sessions as files: what is written reads back the same.
+
+use std::fmt::Write as _;
+use std::fs;
+use std::path::Path;
+
+use abbe_model::ModelError;
+use abbe_model::axis::AxisKind;
+use abbe_model::chain::Machine;
+use abbe_model::component::{ErrorKind, ErrorName, Freedom};
+use abbe_model::effect::{Component, Driver, Effect, Shape};
+use abbe_model::frames::Rotation;
+use abbe_model::instrument::Station;
+use abbe_model::instrument::tracker::Tracker;
+use abbe_model::session::read::{self, ReadOptions};
+use abbe_model::session::readings::Readings;
+use abbe_model::session::{Session, write};
+use proptest::collection::vec;
+use proptest::prelude::*;
+
+use super::machines::{Drawn, cases, machines};
+use super::shapes::shapes;
+
+/// A session of a tracker as a person writes it: whatever a machine is, a tracker can look at its tool.
+fn text(machine: &Machine) -> String {
+    let mut text = format!(
+        "[machine]\nname = \"{}\"\nchain = \"{}\"\nrotation = \"{}\"\n",
+        machine.name,
+        machine.code(),
+        match machine.rotation {
+            Rotation::Exact => "exact",
+            Rotation::SmallAngle => "small-angle",
+        }
+    );
+    for axis in &machine.axes {
+        let kind = if axis.kind == AxisKind::Rotary {
+            "rotary"
+        } else {
+            "linear"
+        };
+        // Writing to a String does not fail.
+        let _ = writeln!(
+            text,
+            "[machine.axis.{}]\nkind = \"{kind}\"\ndirection = {:?}\norigin_mm = {:?}",
+            axis.name, axis.direction, axis.origin_mm
+        );
+    }
+    text + "\n[instrument]\nkind = \"tracker\"\nnoise_um = 10\n\n[[test]]\nname = \"T\"\ndata = \"T.csv\"\ntarget_mm = [1, 2, 3]\n"
+}
+
+fn read(folder: &Path) -> Result<Session, ModelError> {
+    read::session(&folder.join("session.toml"), &ReadOptions::default())
+}
+
+/// Readings with times, runs and whatever positions and coordinates were drawn.
+fn readings(machine: &Machine, rows: &[Vec<f64>]) -> Readings {
+    let count = rows.len();
+    Readings {
+        run: (0..count).map(|row| 1 + row as i64 / 3).collect(),
+        time_s: (0..count).map(|row| 0.25 * row as f64).collect(),
+        temperature_c: rows.iter().map(|row| 20.0 + row[9]).collect(),
+        positions: machine
+            .axes
+            .iter()
+            .enumerate()
+            .map(|(index, axis)| {
+                let reach = match axis.kind {
+                    AxisKind::Linear => 300.0,
+                    AxisKind::Rotary => 3.0,
+                };
+                rows.iter().map(|row| reach * row[index]).collect()
+            })
+            .collect(),
+        coordinates: 3,
+        observed: rows
+            .iter()
+            .flat_map(|row| [6, 7, 8].map(|k| 1000.0 * row[k]))
+            .collect(),
+        ..Readings::default()
+    }
+}
+
+/// An effect on any error motion, following any axis.
+fn effects() -> impl Strategy<Value = Vec<(usize, usize, usize, Shape, Shape)>> {
+    let places = (0_usize..6, 0_usize..6, 0_usize..6);
+    let one = (places, shapes(AxisKind::Linear), shapes(AxisKind::Rotary));
+    vec(
+        one.prop_map(|((a, b, c), linear, rotary)| (a, b, c, linear, rotary)),
+        0..6,
+    )
+}
+
+fn declared(machine: &Machine, drawn: Vec<(usize, usize, usize, Shape, Shape)>) -> Vec<Effect> {
+    let axes = machine.axes.len();
+    let effects = drawn.into_iter().map(|(freedom, of, driver, linear, rotary)| {
+        let driver = &machine.axes[driver % axes];
+        Effect {
+            component: Component::Axis(ErrorName {
+                kind: ErrorKind::Motion,
+                freedom: Freedom::ALL[freedom],
+                axis: machine.axes[of % axes].name.clone(),
+            }),
+            driver: Driver::Axis(driver.name.clone()),
+            shape: if driver.kind == AxisKind::Rotary {
+                rotary
+            } else {
+                linear
+            },
+            tests: Vec::new(),
+        }
+    });
+    effects.collect()
+}
+
+fn near(a: f64, b: f64) -> bool {
+    (a - b).abs() <= 1e-12 * a.abs().max(1.0)
+}
+
+proptest! {
+    #![proptest_config(cases(64))]
+
+    #[test]
+    fn a_session_written_reads_back_the_same(
+        drawn in machines(),
+        effects in effects(),
+        rows in vec(vec(-1.0..1.0, 10), 4..12),
+    ) {
+        let Drawn { machine, .. } = drawn;
+        let folder = tempfile::tempdir().unwrap();
+        let effects = declared(&machine, effects);
+        let readings = readings(&machine, &rows);
+        let session = write::with_effects(&text(&machine), &effects, &machine);
+        fs::write(folder.path().join("session.toml"), &session).unwrap();
+        let station = Station::Tracker(Tracker {
+            target: [1.0, 2.0, 3.0],
+            rotation: [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]],
+            origin: [0.0; 3],
+        });
+        let data = folder.path().join("T.csv");
+        write::readings(&data, &machine, &station, &readings).unwrap();
+
+        let back = read(folder.path()).map_err(|fault| TestCaseError::fail(format!("{fault}\n{session}")))?;
+        prop_assert_eq!(back.machine.code(), machine.code());
+        prop_assert_eq!(back.machine.rotation, machine.rotation);
+        for (back, axis) in back.machine.axes.iter().zip(&machine.axes) {
+            prop_assert_eq!((&back.name, back.kind, back.origin_mm), (&axis.name, axis.kind, axis.origin_mm));
+            // A direction is given its unit length anew.
+            for (back, part) in back.direction.iter().zip(axis.direction) {
+                prop_assert!((back - part).abs() < 1e-15);
+            }
+        }
+        prop_assert_eq!(&back.effects, &effects);
+        let found = back.tests[0].readings.as_ref().unwrap();
+        prop_assert_eq!(&found.run, &readings.run);
+        prop_assert_eq!(found.coordinates, 3);
+        let pairs = [
+            (&found.observed, &readings.observed),
+            (&found.time_s, &readings.time_s),
+            (&found.temperature_c, &readings.temperature_c),
+        ];
+        let positions = found.positions.iter().zip(&readings.positions);
+        for (found, written) in pairs.into_iter().chain(positions) {
+            prop_assert_eq!(found.len(), written.len());
+            prop_assert!(found.iter().zip(written).all(|(a, b)| near(*a, *b)));
+        }
+
+        // Once more: what was read is written the same, to the byte.
+        let first = fs::read(&data).unwrap();
+        write::readings(&data, &back.machine, &back.tests[0].station, found).unwrap();
+        let again = read(folder.path()).unwrap();
+        let found = again.tests[0].readings.as_ref().unwrap();
+        write::readings(&data, &again.machine, &again.tests[0].station, found).unwrap();
+        prop_assert_eq!(first, fs::read(&data).unwrap());
+    }
+
+    /// The unit stands in the column's name: degrees or radians, mm or µm, the same readings come in.
+    #[test]
+    fn a_column_in_another_unit_is_the_same_column(angles in vec(-360.0..360.0, 4..12), lengths in vec(-1.0..1.0, 12)) {
+        let machine = "[machine]\nchain = \"w C b X t\"\n[machine.axis.C]\n[machine.axis.X]\n\n[instrument]\nkind = \"ballbar\"\n\n\
+                       [[test]]\nname = \"T\"\ndata = \"T.csv\"\nbar_mm = 100\nworkpiece_ball_mm = [0, 100, 0]\nspindle_ball_mm = [0, 0, 0]\n";
+        let of = |header: &str, cells: &dyn Fn(f64, f64) -> String| {
+            let folder = tempfile::tempdir().unwrap();
+            let rows: Vec<String> = angles.iter().zip(&lengths).map(|(angle, length)| cells(*angle, *length)).collect();
+            fs::write(folder.path().join("session.toml"), machine).unwrap();
+            fs::write(folder.path().join("T.csv"), format!("{header}\n{}\n", rows.join("\n"))).unwrap();
+            read(folder.path()).unwrap().tests.remove(0).readings.unwrap()
+        };
+        let plain = of("c_deg,length_mm", &|angle, length| format!("{angle},{}", 100.0 + length));
+        for (header, cells) in [
+            ("c_rad,length_mm", &(|angle: f64, length: f64| format!("{},{}", angle.to_radians(), 100.0 + length)) as &dyn Fn(f64, f64) -> String),
+            ("c_deg,deviation_um", &|angle, length| format!("{angle},{}", 1e3 * length)),
+        ] {
+            let other = of(header, cells);
+            for (a, b) in other.positions.iter().flatten().zip(plain.positions.iter().flatten()) {
+                prop_assert!(near(*a, *b), "{header}: {a} {b}");
+            }
+            for (a, b) in other.observed.iter().zip(&plain.observed) {
+                prop_assert!((a - b).abs() < 1e-12 * 100.0, "{header}: {a} {b}");
+            }
+        }
+    }
+}

@@ -1,0 +1,113 @@
+//! Random shapes of effects over the position of an axis, in its inside unit.
+
+use abbe_model::axis::AxisKind;
+use abbe_model::effect::{DriverSample, Shape};
+use proptest::collection::vec;
+use proptest::prelude::*;
+
+use super::machines::cases;
+
+/// Shapes with numbers as files may state them: lengths up to 400 mm, angles up to a turn.
+pub fn shapes(kind: AxisKind) -> impl Strategy<Value = Shape> {
+    let far = match kind {
+        AxisKind::Linear => 400.0,
+        AxisKind::Rotary => std::f64::consts::PI,
+    };
+    let place = move || -far..far;
+    let width = move || 1e-3 * far..far;
+    let recurs = (kind == AxisKind::Rotary).then_some(std::f64::consts::TAU);
+    let of_rotary = (1_u32..40).prop_map(|halves| Shape::Harmonic {
+        order: f64::from(halves) / 2.0,
+    });
+    let harmonic = match kind {
+        AxisKind::Rotary => of_rotary.boxed(),
+        AxisKind::Linear => Just(Shape::Lag).boxed(),
+    };
+    prop_oneof![
+        harmonic,
+        (1_usize..6, width()).prop_map(|(degree, scale)| Shape::Polynomial { degree, scale }),
+        (1_usize..6, width()).prop_map(|(degree, scale)| Shape::Power { degree, scale }),
+        width().prop_map(|period| Shape::Periodic { period }),
+        (place(), width(), 4_usize..30, any::<bool>()).prop_map(|(from, length, intervals, closed)| {
+            Shape::Curve {
+                from,
+                to: from + length,
+                intervals,
+                closed,
+            }
+        }),
+        Just(Shape::Backlash),
+        Just(Shape::Lag),
+        width().prop_map(|width| Shape::ReversalSpike { width }),
+        vec(place(), 1..5).prop_map(|at| Shape::Steps { at }),
+        (place(), width(), any::<bool>()).prop_map(move |(centre, width, again)| Shape::Local {
+            centre,
+            width,
+            recurs: recurs.filter(|_| again),
+        }),
+    ]
+}
+
+fn basis(shape: &Shape, sample: &DriverSample<f64>) -> Vec<f64> {
+    let mut basis = Vec::new();
+    shape.basis(sample, &mut basis);
+    basis
+}
+
+proptest! {
+    #![proptest_config(cases(256))]
+
+    #[test]
+    fn a_shape_has_a_finite_basis_function_a_coefficient(
+        shape in prop_oneof![shapes(AxisKind::Linear), shapes(AxisKind::Rotary)],
+        value in -1e3..1e3,
+        rate in -1e3..1e3,
+        since_reversal in 0.0..1e3,
+        back in any::<bool>(),
+    ) {
+        prop_assert_eq!(shape.check(), Ok(()));
+        let sample = DriverSample {
+            value,
+            direction: if back { -1.0 } else { 1.0 },
+            rate,
+            since_reversal,
+            since_reversal_s: 0.0,
+        };
+        let found = basis(&shape, &sample);
+        prop_assert_eq!(found.len(), shape.coefficients());
+        prop_assert_eq!(found.len(), shape.coefficient_names().len());
+        prop_assert!(found.iter().all(|value| value.is_finite()), "{shape:?} {found:?}");
+        match shape {
+            // Splines share out a unit; a bump and a step lie between nothing and one; cosine and sine on the circle.
+            Shape::Curve { .. } => prop_assert!((found.iter().sum::<f64>() - 1.0).abs() < 1e-12),
+            Shape::Local { .. } | Shape::Steps { .. } => {
+                prop_assert!(found.iter().all(|value| (0.0..=1.0).contains(value)));
+            }
+            Shape::Harmonic { .. } | Shape::Periodic { .. } => {
+                prop_assert!((found[0].hypot(found[1]) - 1.0).abs() < 1e-12);
+            }
+            Shape::Power { degree, scale } => {
+                let all = basis(&Shape::Polynomial { degree, scale }, &sample);
+                prop_assert!((found[0] - all[degree - 1]).abs() <= 1e-12 * found[0].abs());
+            }
+            _ => {}
+        }
+    }
+
+    /// What recurs is the same a period further on.
+    #[test]
+    fn what_recurs_recurs(shape in shapes(AxisKind::Rotary), value in -3.0..3.0, turns in -3_i32..=3) {
+        let period = match &shape {
+            Shape::Harmonic { order } => std::f64::consts::TAU / order,
+            Shape::Periodic { period } => *period,
+            Shape::Curve { from, to, closed: true, .. } => to - from,
+            Shape::Local { recurs: Some(period), .. } => *period,
+            _ => return Ok(()),
+        };
+        let at = |value: f64| DriverSample { value, ..DriverSample::default() };
+        let (here, there) = (basis(&shape, &at(value)), basis(&shape, &at(value + f64::from(turns) * period)));
+        for (here, there) in here.iter().zip(there) {
+            prop_assert!((here - there).abs() < 1e-9, "{shape:?}: {here} {there}");
+        }
+    }
+}

@@ -1,0 +1,106 @@
+//! Plans and arguments.
+
+use std::fs;
+
+use tempfile::TempDir;
+
+use super::super::{abbe, text};
+use super::{Case, folder, refused};
+
+fn plan() -> TempDir {
+    let case = Case {
+        more: "sweep = { axis = \"C\", from_deg = 0, to_deg = 360, step_deg = 10 }",
+        ..Case::default()
+    };
+    folder(&case.session().replace("data = \"C.csv\"\n", ""), "")
+}
+
+#[test]
+fn arguments_at_their_limits() {
+    let folder = plan();
+    let out = folder.path().join("out");
+    for (command, more, message) in [
+        ("plan", &["--noise-um", "1e-300"][..], "`--noise-um 0.000000"),
+        (
+            "plan",
+            &["--noise-um", "inf"],
+            "it has to be a positive number of µm, 1e-6 to 1e12",
+        ),
+        (
+            "plan",
+            &["--setup-um", "1e300"],
+            "it has to be a positive number of µm, 1e-6 to 1e12",
+        ),
+        (
+            "simulate",
+            &["--noise-um", "1e300"],
+            "not negative: 0, or 1e-6 to 1e12",
+        ),
+        (
+            "simulate",
+            &["--noise-um", "1e-300"],
+            "not negative: 0, or 1e-6 to 1e12",
+        ),
+        (
+            "simulate",
+            &["--error", "EX0C=1e300um"],
+            "1e300 is too large; 1e12 is the most",
+        ),
+    ] {
+        let mut arguments = more.to_vec();
+        if command == "simulate" {
+            arguments.extend(["--out", text(&out)]);
+        }
+        refused(folder.path(), command, &arguments, &[message]);
+        assert!(!out.exists());
+    }
+}
+
+/// A sweep in steps that no machine can make, and one of more readings than there is memory.
+#[test]
+fn steps_without_end() {
+    for step in ["1e-300", "1e-6"] {
+        let folder = plan();
+        let path = folder.path().join("session.toml");
+        let session = fs::read_to_string(&path)
+            .unwrap()
+            .replace("step_deg = 10", &format!("step_deg = {step}"));
+        fs::write(&path, session).unwrap();
+        refused(
+            folder.path(),
+            "plan",
+            &["--no-effects"],
+            &[
+                "session.toml:16",
+                "1000000 readings is the most",
+                "take a larger step",
+            ],
+        );
+    }
+}
+
+/// A smallest number given is a smallest number simulated: the same readings as without.
+#[test]
+fn an_error_of_the_smallest_number() {
+    let folder = plan();
+    let session = folder.path().join("session.toml");
+    let simulated = |name: &str, more: &[&str]| {
+        let out = folder.path().join(name);
+        let output = abbe(
+            &[
+                &["simulate", text(&session), "--out", text(&out), "--noise-um", "0"],
+                more,
+            ]
+            .concat(),
+        );
+        assert!(
+            output.status.success(),
+            "{}",
+            String::from_utf8_lossy(&output.stderr)
+        );
+        fs::read_to_string(out.join("C.csv")).unwrap()
+    };
+    let plain = simulated("plain", &[]);
+    assert_eq!(simulated("small", &["--error", "EX0C=5e-324um"]), plain);
+    assert_ne!(simulated("large", &["--error", "EX0C=1um"]), plain);
+}

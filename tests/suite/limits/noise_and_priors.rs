@@ -1,0 +1,161 @@
+//! What is known beforehand: nothing, everything, and what contradicts itself.
+
+use super::{Case, displaced, fitted, found, session_refused, works};
+
+/// A noise of zero says that it is to be found; readings that repeat exactly show none, and what is left is the rounding of a double.
+#[test]
+fn a_noise_of_zero() {
+    for noise in ["noise_um = 0", ""] {
+        let result = works(&Case {
+            noise,
+            ..Case::default()
+        });
+        assert_eq!(result["noise_source"], "repeats");
+        assert!((result["noise_um"].as_f64().unwrap() - 1e-6).abs() < 1e-18);
+        let (_, u) = found(&result, "EX0C");
+        assert!((u - 1e-6 * (2.0_f64 / 72.0).sqrt()).abs() < 1e-9, "{u}");
+    }
+}
+
+#[test]
+fn a_noise_that_is_no_noise() {
+    for (noise, message) in [
+        (
+            "noise_um = 1e-300",
+            "`noise_um` is 1e-300 µm; 1e-6 µm is the least besides 0",
+        ),
+        (
+            "noise_um = 5e-324",
+            "`noise_um` is 5e-324 µm; 1e-6 µm is the least besides 0",
+        ),
+        (
+            "noise_um = 1e300",
+            "`noise_um` is 1e300, which is too large; 1e12 is the most",
+        ),
+        ("noise_um = inf", "`noise_um` is infinite"),
+        ("noise_um = -0.1", "`noise_um` is -0.1; it cannot be negative"),
+        (
+            "resolution_um = 1e-300",
+            "`resolution_um` is 1e-300 µm; 1e-6 µm is the least besides 0",
+        ),
+    ] {
+        session_refused(
+            &Case {
+                noise,
+                ..Case::default()
+            },
+            &["session.toml:6", message],
+        );
+    }
+}
+
+/// The least and the greatest that are taken are computed with as well as any other.
+#[test]
+fn noises_at_their_limits() {
+    let least = works(&Case {
+        noise: "noise_um = 1e-6",
+        ..Case::default()
+    });
+    let (_, u) = found(&least, "EX0C");
+    assert!((u / (1e-6 * (2.0_f64 / 72.0).sqrt()) - 1.0).abs() < 1e-3, "{u}");
+    // A kilometre of noise hides a millimetre of error: nothing is seen, and that is said.
+    let case = Case {
+        noise: "noise_um = 1e9",
+        ..Case::default()
+    };
+    let greatest = fitted(&case.session(), &case.data());
+    assert_eq!(greatest["rank"], 0);
+    assert_eq!(greatest["parameters"].as_array().unwrap().len(), 0);
+    assert_eq!(greatest["unobservable"].as_array().unwrap().len(), 2);
+}
+
+#[test]
+fn priors_of_zero_and_of_infinity() {
+    let known = works(&Case {
+        more: "bar_u_um = 0",
+        ..Case::default()
+    });
+    assert_eq!(known["parameters"].as_array().unwrap().len(), 2);
+    // Known not at all, the mean of 72 readings says how long the bar is.
+    let free = works(&Case {
+        more: "bar_u_um = inf",
+        longer_mm: 0.05,
+        ..Case::default()
+    });
+    let (value, u) = found(&free, "bar[C]");
+    assert!((value + 50.0).abs() < 1e-3, "{value}");
+    assert!((u - 0.3 / 72.0_f64.sqrt()).abs() < 1e-3, "{u}");
+}
+
+#[test]
+fn priors_that_are_none() {
+    for (more, message) in [
+        (
+            "bar_u_um = -1",
+            "`bar_u_um` is -1; an uncertainty cannot be negative",
+        ),
+        ("bar_u_um = nan", "`bar_u_um` is NaN"),
+        (
+            "bar_u_um = 1e-300",
+            "`bar_u_um` is 1e-300 µm; 1e-6 µm is the least besides 0",
+        ),
+        (
+            "bar_u_um = 1e300",
+            "`bar_u_um` is 1e300, which is too large; 1e12 is the most",
+        ),
+    ] {
+        session_refused(
+            &Case {
+                more,
+                ..Case::default()
+            },
+            &["session.toml:17", message],
+        );
+    }
+}
+
+/// A bar known to 0.1 µm that is 50 µm longer: the weighted mean of both statements, and uncertainties enlarged by what they disagree.
+#[test]
+fn a_prior_that_the_readings_contradict() {
+    let case = Case {
+        more: "bar_u_um = 0.1",
+        longer_mm: 0.05,
+        ..Case::default()
+    };
+    let result = fitted(&case.session(), &case.data());
+    displaced(&result, 0.05);
+    let (from_prior, from_readings) = (1.0 / 0.1_f64.powi(2), 72.0 / 0.3_f64.powi(2));
+    let (value, _) = found(&result, "bar[C]");
+    let wanted = -50.0 * from_readings / (from_prior + from_readings);
+    assert!((value - wanted).abs() < 0.01, "{value} {wanted}");
+    assert!(result["birge_ratio"].as_f64().unwrap() > 10.0);
+    assert!(
+        result["told"]
+            .as_str()
+            .unwrap()
+            .contains("the residual exceeds the noise")
+    );
+}
+
+/// One bar, described twice: it is said, and the tighter statement holds.
+#[test]
+fn priors_that_contradict_each_other() {
+    let case = Case {
+        more: "bar_u_um = 1\nbar_setup = \"B\"",
+        ..Case::default()
+    };
+    let session = case.session();
+    let test = &session[session.find("[[test]]").unwrap()..];
+    let second = test
+        .replace("name = \"C\"", "name = \"D\"")
+        .replace("bar_u_um = 1", "bar_u_um = 0.001");
+    let result = fitted(&format!("{session}\n{second}"), &case.data());
+    displaced(&result, 1e-3);
+    let told = result["told"].as_str().unwrap();
+    assert!(
+        told.contains("tests \"C\" and \"D\" share the set-up \"B\" and describe it differently"),
+        "{told}"
+    );
+    let (_, u) = found(&result, "bar[B]");
+    assert!((u - 0.001).abs() < 1e-5, "{u}");
+}

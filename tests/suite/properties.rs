@@ -1,0 +1,344 @@
+//! What holds for the fit of every session, whatever its machine: results depend on what was measured, not on the order in which it is
+//! written down, nor on the unit or the hand of the frame.
+
+#[path = "../../model/tests/properties/machines.rs"]
+mod machines;
+
+use std::collections::BTreeMap;
+
+use abbe::identify::fit::{prepare, report};
+use abbe::identify::noise::{Noise, NoiseSource};
+use abbe::identify::problem::Problem;
+use abbe::identify::results::FitResult;
+use abbe::model::axis::AxisKind;
+use abbe::model::component::{ErrorKind, ErrorName, Freedom};
+use abbe::model::effect::{Component, Driver, Effect, Shape};
+use abbe::model::instrument::ballbar::BallBar;
+use abbe::model::instrument::rtest::{RTest, Setting};
+use abbe::model::instrument::{InstrumentKind, Station};
+use abbe::model::sensitivity::{SlotValues, TestModel};
+use abbe::model::session::expression::Length;
+use abbe::model::session::read::{self, ReadOptions};
+use abbe::model::session::readings::Readings;
+use abbe::model::session::{Prior, Session, Test};
+use machines::{Drawn, cases, is_angle, machines, mirror_sign, point};
+use proptest::collection::vec;
+use proptest::prelude::*;
+use proptest::sample::Index;
+use proptest::strategy::ValueTree;
+use rand::{RngExt, SeedableRng};
+use rand_distr::StandardNormal;
+use rand_pcg::Pcg64;
+
+const NOISE_MM: f64 = 3e-4;
+const TESTS: usize = 3;
+const RUNS: usize = 2;
+const ROWS_A_RUN: usize = 14;
+
+/// A session as if it had been read: a few tests of a bar or an R-test at random places of a random machine, with readings.
+fn sessions() -> impl Strategy<Value = Session> {
+    let balls = vec((point(), point()), TESTS);
+    (machines(), balls, any::<bool>(), any::<u64>())
+        .prop_map(|(drawn, balls, bar, seed)| session(&drawn, &balls, bar, seed))
+}
+
+fn session(drawn: &Drawn, balls: &[([f64; 3], [f64; 3])], bar: bool, seed: u64) -> Session {
+    let machine = &drawn.machine;
+    let mut random = Pcg64::seed_from_u64(seed);
+    let tests = balls.iter().enumerate().map(|(number, (table, tool))| {
+        let station = if bar {
+            Station::BallBar(BallBar {
+                workpiece_ball: *table,
+                spindle_ball: *tool,
+                bar: 100.0,
+            })
+        } else {
+            Station::RTest(RTest {
+                setting: Setting::Table,
+                workpiece_ball: *table,
+                spindle_ball: *tool,
+                sensors: None,
+            })
+        };
+        let rows = RUNS * ROWS_A_RUN;
+        let column = |reach: f64, random: &mut Pcg64| -> Vec<f64> {
+            (0..rows)
+                .map(|_| reach * (2.0 * random.random::<f64>() - 1.0))
+                .collect()
+        };
+        let mut readings = Readings {
+            run: (0..rows).map(|row| (row / ROWS_A_RUN) as i64 + 1).collect(),
+            line: (1..=rows).collect(),
+            positions: machine
+                .axes
+                .iter()
+                .map(|axis| match axis.kind {
+                    AxisKind::Linear => column(200.0, &mut random),
+                    AxisKind::Rotary => column(3.0, &mut random),
+                })
+                .collect(),
+            coordinates: station.kind().coordinates(),
+            ..Readings::default()
+        };
+        let model = TestModel::new(machine, station.clone(), &readings);
+        let mut values = SlotValues::zero(model.slots());
+        // A tenth of what is drawn: 10 µm and 0.2 mrad. What is to be identified is there; the error motions are not.
+        for (slot, error) in drawn.errors.iter().enumerate().filter(|(slot, _)| slot % 12 < 6) {
+            values.constant[slot] = 0.1 * error;
+        }
+        readings.observed = model.readings_mm(&values);
+        for value in &mut readings.observed {
+            *value += NOISE_MM * random.sample::<f64, _>(StandardNormal);
+        }
+        test(number, station, readings, machine.axes.len())
+    });
+    let tests: Vec<Test> = tests.collect();
+    let ready = super::ready("hermle-c600u/chapter5.toml");
+    Session {
+        machine: machine.clone(),
+        constants: Vec::new(),
+        instrument: tests[0].station.kind(),
+        noise_mm: Some(NOISE_MM),
+        resolution_mm: None,
+        unknowns: (0..machine.error_slots())
+            .filter(|slot| slot % 12 < 6)
+            .map(|slot| machine.error_name(slot))
+            .collect(),
+        tests,
+        // What is said of files belongs to a session that was read.
+        ..read::session(&ready, &ReadOptions::default()).unwrap()
+    }
+}
+
+fn test(number: usize, station: Station<f64>, readings: Readings, axes: usize) -> Test {
+    let unknowns = station.kind().unknowns().iter();
+    Test {
+        name: format!("T{number}"),
+        geometry: station.map(|length| Length::Number(*length)),
+        priors: unknowns
+            .map(|unknown| match unknown.thing {
+                "bar" => Prior::Gaussian(5e-4),
+                _ => Prior::Known,
+            })
+            .collect(),
+        station,
+        setup: format!("S{number}"),
+        spindle_setup: format!("S{number}"),
+        bar_setup: "bar".into(),
+        socket: None,
+        motion: None,
+        at: vec![0.0; axes],
+        at_written: vec![None; axes],
+        readings: Some(readings),
+    }
+}
+
+/// What a fit says of a session, in outside units; wild readings are not what these sessions are about.
+fn fitted(session: &Session) -> FitResult {
+    let (problem, fit) = prepare(session, 1).unwrap();
+    let result = report(&problem, &fit);
+    assert!(result.rejected.is_empty());
+    result
+}
+
+/// The same fit, up to rounding: every value `within` so many of its uncertainties, since iterations end somewhere, `expected` giving what the other session should say of a value.
+#[track_caller]
+fn same(
+    one: &FitResult,
+    other: &FitResult,
+    within: f64,
+    expected: impl Fn(&str, f64) -> f64,
+) -> Result<(), TestCaseError> {
+    prop_assert_eq!(one.rank, other.rank);
+    let of = |result: &FitResult| -> BTreeMap<String, (f64, f64)> {
+        let parameters = result.parameters.iter();
+        parameters.map(|p| (p.id.clone(), (p.value, p.u))).collect()
+    };
+    let (one, other) = (of(one), of(other));
+    prop_assert_eq!(one.keys().collect::<Vec<_>>(), other.keys().collect::<Vec<_>>());
+    for (id, (value, u)) in &one {
+        let (other_value, other_u) = other[id];
+        let (value, u) = (expected(id, *value), expected(id, *u).abs());
+        prop_assert!(
+            (value - other_value).abs() <= within * u,
+            "{id}: {value} {other_value} ± {u}"
+        );
+        prop_assert!((u - other_u).abs() <= within * u, "{id}: u {u} {other_u}");
+    }
+    Ok(())
+}
+
+#[track_caller]
+fn close(one: f64, other: f64) -> Result<(), TestCaseError> {
+    prop_assert!((one - other).abs() <= 1e-4 * one.abs(), "{one} {other}");
+    Ok(())
+}
+
+proptest! {
+    #![proptest_config(cases(48))]
+
+    #[test]
+    fn the_order_of_tests_and_of_rows_in_a_run_does_not_count(session in sessions(), turn in any::<Index>(), seed in any::<u64>()) {
+        let mut other = session.clone();
+        other.tests.rotate_left(turn.index(TESTS));
+        let mut random = Pcg64::seed_from_u64(seed);
+        for test in &mut other.tests {
+            let readings = test.readings.as_ref().unwrap();
+            let mut rows = Vec::new();
+            for run in readings.runs() {
+                let mut run: Vec<usize> = run.collect();
+                rand::seq::SliceRandom::shuffle(&mut run[..], &mut random);
+                rows.extend(run);
+            }
+            test.readings = Some(readings.of_rows(&rows));
+        }
+        let (one, other) = (fitted(&session), fitted(&other));
+        same(&one, &other, 1e-4, |_, value| value)?;
+        close(one.rms_um, other.rms_um)?;
+        close(one.heldout_rms_um, other.heldout_rms_um)?;
+    }
+
+    #[test]
+    fn the_order_of_parameters_does_not_count(session in sessions(), turn in any::<Index>()) {
+        let mut other = session.clone();
+        other.unknowns.rotate_left(turn.index(session.unknowns.len()));
+        other.unknowns.reverse();
+        let (one, other) = (fitted(&session), fitted(&other));
+        same(&one, &other, 1e-4, |_, value| value)?;
+        close(one.rms_um, other.rms_um)?;
+        close(one.heldout_rms_um, other.heldout_rms_um)?;
+    }
+
+    /// All lengths twice as long, noise included: angles stay, lengths double.
+    #[test]
+    fn lengths_scale(session in sessions()) {
+        const FACTOR: f64 = 2.0;
+        let mut other = session.clone();
+        for axis in &mut other.machine.axes {
+            axis.origin_mm = axis.origin_mm.map(|length| FACTOR * length);
+        }
+        other.noise_mm = Some(FACTOR * NOISE_MM);
+        for test in &mut other.tests {
+            test.station = lengthened(&test.station, FACTOR);
+            for prior in &mut test.priors {
+                if let Prior::Gaussian(u) = prior {
+                    *u *= FACTOR;
+                }
+            }
+            let readings = test.readings.as_mut().unwrap();
+            readings.observed.iter_mut().for_each(|length| *length *= FACTOR);
+            for (axis, column) in session.machine.axes.iter().zip(&mut readings.positions) {
+                if axis.kind == AxisKind::Linear {
+                    column.iter_mut().for_each(|position| *position *= FACTOR);
+                }
+            }
+        }
+        let (one, other) = (fitted(&session), fitted(&other));
+        let angle = |id: &str| ErrorName::parse(id).is_some_and(|name| name.freedom.is_angle());
+        // What is not seen is held at nominal in the proportion of a millimetre to 10 mrad: another proportion, another second order.
+        same(&one, &other, 1e-2, |id, value| if angle(id) { value } else { FACTOR * value })?;
+        prop_assert!((FACTOR * one.rms_um / other.rms_um - 1.0).abs() <= 1e-2);
+        prop_assert!((FACTOR * one.heldout_rms_um / other.heldout_rms_um - 1.0).abs() <= 1e-2);
+    }
+
+    #[test]
+    fn mirrored_machines_give_mirrored_errors(session in sessions(), coordinate in 0_usize..3) {
+        let mut other = session.clone();
+        other.machine = machines::mirrored(&session.machine, coordinate);
+        for test in &mut other.tests {
+            let mirror = |point: &mut [f64; 3]| point[coordinate] *= -1.0;
+            match &mut test.station {
+                Station::BallBar(bar) => {
+                    mirror(&mut bar.workpiece_ball);
+                    mirror(&mut bar.spindle_ball);
+                }
+                Station::RTest(rtest) => {
+                    mirror(&mut rtest.workpiece_ball);
+                    mirror(&mut rtest.spindle_ball);
+                    let observed = &mut test.readings.as_mut().unwrap().observed;
+                    observed.iter_mut().skip(coordinate).step_by(3).for_each(|value| *value = -*value);
+                }
+                _ => {}
+            }
+        }
+        let (one, other) = (fitted(&session), fitted(&other));
+        let sign = |id: &str| ErrorName::parse(id).map_or(1.0, |name| mirror_sign(name.freedom.index(), coordinate));
+        same(&one, &other, 1e-4, |id, value| sign(id) * value)?;
+        close(one.heldout_rms_um, other.heldout_rms_um)?;
+    }
+
+    /// Readings do not change by an effect whose coefficients are zero, nor by one on a test that is not there.
+    #[test]
+    fn an_effect_of_zero_size_changes_nothing(session in sessions(), axis in any::<Index>(), freedom in 0_usize..6) {
+        let axis = &session.machine.axes[axis.index(session.machine.axes.len())];
+        let effect = Effect {
+            component: Component::Axis(ErrorName {
+                kind: ErrorKind::Motion,
+                freedom: Freedom::ALL[freedom],
+                axis: axis.name.clone(),
+            }),
+            driver: Driver::Axis(axis.name.clone()),
+            shape: Shape::Periodic { period: 0.7 },
+            tests: Vec::new(),
+        };
+        let mut with = session.clone();
+        with.effects.push(effect.clone());
+        let noise = || Noise::white(NOISE_MM, NoiseSource::Stated);
+        let (one, other) = (Problem::new(&session, noise(), 1).unwrap(), Problem::new(&with, noise(), 1).unwrap());
+        let beta: Vec<f64> = (0..one.parameters.list.len()).map(|j| 1e-5 * (j as f64 + 1.0)).collect();
+        let mut wider = beta.clone();
+        wider.resize(other.parameters.list.len(), 0.0);
+        prop_assert_eq!(wider.len(), beta.len() + 2);
+        for (a, b) in one.residuals(&beta).iter().flatten().zip(other.residuals(&wider).iter().flatten()) {
+            // Left out of the chain, or carried through it as a zero.
+            prop_assert!((a - b).abs() <= 1e-10, "{a} {b}");
+        }
+        let mut elsewhere = session.clone();
+        elsewhere.effects.push(Effect { tests: vec!["elsewhere".into()], ..effect });
+        same(&fitted(&session), &fitted(&elsewhere), 1e-4, |_, value| value)?;
+    }
+}
+
+fn lengthened(station: &Station<f64>, factor: f64) -> Station<f64> {
+    match station.kind() {
+        InstrumentKind::BallBar | InstrumentKind::RTest => station.map(|length| factor * length),
+        other => unreachable!("no {} is drawn", other.word()),
+    }
+}
+
+#[test]
+fn the_drawn_errors_come_back() {
+    // That the properties above are about fits that find something: the pulls of what is seen, over a few sessions, have unit variance.
+    let mut runner = proptest::test_runner::TestRunner::new(cases(1));
+    let (mut square, mut count) = (0.0, 0);
+    for _ in 0..40 {
+        let drawn = machines().new_tree(&mut runner).unwrap().current();
+        let balls = vec((point(), point()), TESTS)
+            .new_tree(&mut runner)
+            .unwrap()
+            .current();
+        let session = session(&drawn, &balls, true, 5);
+        for parameter in fitted(&session).parameters {
+            let Some(slot) =
+                ErrorName::parse(&parameter.id).and_then(|name| session.machine.error_slot(&name))
+            else {
+                continue;
+            };
+            let outside = if is_angle(slot) {
+                3600.0 * 180.0 / std::f64::consts::PI
+            } else {
+                1e3
+            };
+            square += ((parameter.value - 0.1 * drawn.errors[slot] * outside) / parameter.u).powi(2);
+            count += 1;
+        }
+    }
+    let variance = square / f64::from(count);
+    println!("{count} errors, mean square of pulls {variance:.3}");
+    assert!(count > 100);
+    // Pulls of one session are correlated: five standard deviations of as many independent ones.
+    assert!(
+        (variance - 1.0).abs() < 5.0 * (2.0 / f64::from(count)).sqrt(),
+        "{variance}"
+    );
+}

@@ -1,0 +1,208 @@
+//! What is built into Abbe: licences, sources and duplicates as `deny.toml` allows them, and a page that says what each direct dependency is for.
+//!
+//! `cargo deny` reads the same file where it is installed; this asks cargo itself and needs no database and no network.
+
+use std::collections::{BTreeMap, BTreeSet};
+use std::fs;
+use std::process::Command;
+
+use super::workspace;
+
+/// A crate that is built for this machine, tests and build scripts included.
+struct Built {
+    name: String,
+    version: String,
+    licence: String,
+}
+
+/// What `cargo tree` lists.
+fn built(more: &[&str]) -> Vec<Built> {
+    let output = Command::new(env!("CARGO"))
+        .args([
+            "tree",
+            "--workspace",
+            "--offline",
+            "--locked",
+            "--edges",
+            "normal,build,dev",
+        ])
+        .args(["--prefix", "none", "--format", "{p}\t{l}"])
+        .args(more)
+        .current_dir(workspace())
+        .output()
+        .expect("cargo starts");
+    assert!(
+        output.status.success(),
+        "{}",
+        String::from_utf8_lossy(&output.stderr)
+    );
+    let listed = String::from_utf8(output.stdout).unwrap();
+    let crates = listed.lines().filter_map(|line| {
+        let (package, licence) = line.split_once('\t')?;
+        let mut words = package.split(' ');
+        Some(Built {
+            name: words.next()?.to_string(),
+            version: words.next()?.to_string(),
+            // What is listed twice has a star.
+            licence: licence.trim_end_matches(" (*)").to_string(),
+        })
+    });
+    crates.collect()
+}
+
+fn policy() -> toml::Table {
+    fs::read_to_string(workspace().join("deny.toml"))
+        .unwrap()
+        .parse()
+        .unwrap()
+}
+
+/// Whether a licence expression (SPDX) can be met: `OR` binds less than `AND`, `/` is an old `OR`, an exception only adds rights.
+fn is_met(expression: &str, allowed: &BTreeSet<&str>) -> bool {
+    let spaced = expression
+        .replace('(', " ( ")
+        .replace(')', " ) ")
+        .replace('/', " OR ");
+    let mut words = spaced.split_whitespace().peekable();
+    any(&mut words, allowed)
+}
+
+type Words<'a> = std::iter::Peekable<std::str::SplitWhitespace<'a>>;
+
+fn any(words: &mut Words<'_>, allowed: &BTreeSet<&str>) -> bool {
+    let mut met = all(words, allowed);
+    while words.next_if_eq(&"OR").is_some() {
+        met |= all(words, allowed);
+    }
+    met
+}
+
+fn all(words: &mut Words<'_>, allowed: &BTreeSet<&str>) -> bool {
+    let mut met = one(words, allowed);
+    while words.next_if_eq(&"AND").is_some() {
+        met &= one(words, allowed);
+    }
+    met
+}
+
+fn one(words: &mut Words<'_>, allowed: &BTreeSet<&str>) -> bool {
+    let word = words.next().unwrap_or("");
+    if word == "(" {
+        let met = any(words, allowed);
+        assert_eq!(words.next(), Some(")"));
+        return met;
+    }
+    if words.next_if_eq(&"WITH").is_some() {
+        words.next();
+    }
+    allowed.contains(word)
+}
+
+#[test]
+fn licence_expressions() {
+    let allowed = BTreeSet::from(["MIT", "Apache-2.0", "Zlib"]);
+    for met in [
+        "MIT",
+        "GPL-3.0 OR MIT",
+        "Unlicense/MIT",
+        "(MIT OR GPL-3.0) AND Zlib",
+        "GPL-3.0 OR MIT AND Zlib",
+        "Apache-2.0 WITH LLVM-exception OR GPL-3.0",
+    ] {
+        assert!(is_met(met, &allowed), "{met}");
+    }
+    for unmet in [
+        "",
+        "GPL-3.0",
+        "MIT AND GPL-3.0",
+        "(MIT AND GPL-3.0) OR MPL-2.0",
+        "GPL-3.0 AND (MIT OR Zlib)",
+    ] {
+        assert!(!is_met(unmet, &allowed), "{unmet}");
+    }
+}
+
+#[test]
+fn every_licence_is_allowed() {
+    let policy = policy();
+    let allowed: BTreeSet<&str> = policy["licenses"]["allow"]
+        .as_array()
+        .unwrap()
+        .iter()
+        .filter_map(toml::Value::as_str)
+        .collect();
+    let built = built(&[]);
+    assert!(built.len() > 100, "{}", built.len());
+    for Built { name, licence, .. } in built {
+        assert!(
+            is_met(&licence, &allowed),
+            "{name} is under \"{licence}\", which deny.toml does not allow"
+        );
+    }
+}
+
+#[test]
+fn everything_comes_from_the_registry_with_a_checksum() {
+    let lock: toml::Table = fs::read_to_string(workspace().join("Cargo.lock"))
+        .unwrap()
+        .parse()
+        .unwrap();
+    for package in lock["package"].as_array().unwrap() {
+        let name = package["name"].as_str().unwrap();
+        match package.get("source").and_then(toml::Value::as_str) {
+            None => assert!(
+                name == "abbe" || name.starts_with("abbe-"),
+                "{name} comes from a folder"
+            ),
+            Some(source) => {
+                assert_eq!(
+                    source, "registry+https://github.com/rust-lang/crates.io-index",
+                    "{name}"
+                );
+                assert!(package.get("checksum").is_some(), "{name} has no checksum");
+            }
+        }
+    }
+}
+
+#[test]
+fn no_crate_is_built_twice_unless_it_is_said() {
+    let policy = policy();
+    let skipped: BTreeSet<&str> = policy["bans"]["skip"]
+        .as_array()
+        .unwrap()
+        .iter()
+        .filter_map(|entry| entry["crate"].as_str())
+        .collect();
+    let mut versions: BTreeMap<String, BTreeSet<String>> = BTreeMap::new();
+    for package in built(&[]) {
+        versions.entry(package.name).or_default().insert(package.version);
+    }
+    let twice: BTreeSet<&str> = versions
+        .iter()
+        .filter(|(_, versions)| versions.len() > 1)
+        .map(|(name, _)| name.as_str())
+        .collect();
+    assert_eq!(
+        twice, skipped,
+        "crates of which several versions are built, and those that deny.toml names"
+    );
+}
+
+/// The first cell of each row of the page's tables, without its ticks.
+fn explained() -> BTreeSet<String> {
+    let page = fs::read_to_string(workspace().join("docs/dependencies.md")).unwrap();
+    let cells = page
+        .lines()
+        .filter_map(|line| line.strip_prefix("| `")?.split_once('`'));
+    cells.map(|(name, _)| name.to_string()).collect()
+}
+
+#[test]
+fn the_page_names_every_direct_dependency_and_no_other() {
+    let listed = built(&["--depth", "1", "--no-dedupe"])
+        .into_iter()
+        .map(|package| package.name);
+    let direct: BTreeSet<String> = listed.filter(|name| !name.starts_with("abbe")).collect();
+    assert_eq!(explained(), direct);
+}
