@@ -98,6 +98,13 @@ pub fn run(arguments: &TraceArguments) -> Result<(), Failure> {
         let text = rewrite::moved(&session.text, &session.file, output::folder_of(path), data)?;
         let next = write::with_effects(&text, &trace.effects, &session.machine);
         output::write_whole(path, next.as_bytes())?;
+        let [own, there] = [&session.file, path].map(|file| output::folder_of(file).canonicalize().ok());
+        if own != there {
+            eprintln!(
+                "note: {} names its machine and data where they are; commands read it with --allow-outside",
+                path.display()
+            );
+        }
     }
     if let Some(path) = &arguments.csv {
         csv::write_trace(path, &trace.result)?;
