@@ -13,9 +13,9 @@ use abbe::identify::results::FitResult;
 use abbe::model::axis::AxisKind;
 use abbe::model::component::{ErrorKind, ErrorName, Freedom};
 use abbe::model::effect::{Component, Driver, Effect, Shape};
+use abbe::model::instrument::Station;
 use abbe::model::instrument::ballbar::BallBar;
 use abbe::model::instrument::rtest::{RTest, Setting};
-use abbe::model::instrument::{InstrumentKind, Station};
 use abbe::model::sensitivity::{SlotValues, TestModel};
 use abbe::model::session::expression::Length;
 use abbe::model::session::read::{self, ReadOptions};
@@ -209,38 +209,6 @@ proptest! {
         close(one.heldout_rms_um, other.heldout_rms_um)?;
     }
 
-    /// All lengths twice as long, noise included: angles stay, lengths double.
-    #[test]
-    fn lengths_scale(session in sessions()) {
-        const FACTOR: f64 = 2.0;
-        let mut other = session.clone();
-        for axis in &mut other.machine.axes {
-            axis.origin_mm = axis.origin_mm.map(|length| FACTOR * length);
-        }
-        other.noise_mm = Some(FACTOR * NOISE_MM);
-        for test in &mut other.tests {
-            test.station = lengthened(&test.station, FACTOR);
-            for prior in &mut test.priors {
-                if let Prior::Gaussian(u) = prior {
-                    *u *= FACTOR;
-                }
-            }
-            let readings = test.readings.as_mut().unwrap();
-            readings.observed.iter_mut().for_each(|length| *length *= FACTOR);
-            for (axis, column) in session.machine.axes.iter().zip(&mut readings.positions) {
-                if axis.kind == AxisKind::Linear {
-                    column.iter_mut().for_each(|position| *position *= FACTOR);
-                }
-            }
-        }
-        let (one, other) = (fitted(&session), fitted(&other));
-        let angle = |id: &str| ErrorName::parse(id).is_some_and(|name| name.freedom.is_angle());
-        // What is not seen is held at nominal in the proportion of a millimetre to 10 mrad: another proportion, another second order.
-        same(&one, &other, 1e-2, |id, value| if angle(id) { value } else { FACTOR * value })?;
-        prop_assert!((FACTOR * one.rms_um / other.rms_um - 1.0).abs() <= 1e-2);
-        prop_assert!((FACTOR * one.heldout_rms_um / other.heldout_rms_um - 1.0).abs() <= 1e-2);
-    }
-
     #[test]
     fn mirrored_machines_give_mirrored_errors(session in sessions(), coordinate in 0_usize..3) {
         let mut other = session.clone();
@@ -296,13 +264,6 @@ proptest! {
         let mut elsewhere = session.clone();
         elsewhere.effects.push(Effect { tests: vec!["elsewhere".into()], ..effect });
         same(&fitted(&session), &fitted(&elsewhere), 1e-4, |_, value| value)?;
-    }
-}
-
-fn lengthened(station: &Station<f64>, factor: f64) -> Station<f64> {
-    match station.kind() {
-        InstrumentKind::BallBar | InstrumentKind::RTest => station.map(|length| factor * length),
-        other => unreachable!("no {} is drawn", other.word()),
     }
 }
 
