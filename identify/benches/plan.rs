@@ -51,7 +51,11 @@ fn large_plan() -> Session {
     }
     let file = folder.path().join("session.toml");
     std::fs::write(&file, text).expect("a file in a temporary folder");
-    read(&file, &ReadOptions::default()).expect("a valid session")
+    let options = ReadOptions {
+        allow_outside: true,
+        ..ReadOptions::default()
+    };
+    read(&file, &options).expect("a valid session")
 }
 
 fn plans(criterion: &mut Criterion) {
