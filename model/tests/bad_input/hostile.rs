@@ -223,7 +223,7 @@ refused! {
     a_name_that_steers_the_terminal: with_session("\"C100\"", "\"\\u001b[2J\"") => ["session.toml:9", "control character U+001B"]
     a_name_of_several_lines: with_session("\"C100\"", "\"a\\nb\"") => ["session.toml:9", "control character U+000A"]
     a_name_of_nothing: with_session("\"C100\"", "\"  \"") => ["session.toml:9", "a test without a name"]
-    a_whole_number_of_forty_digits: with_session("noise_um = 0.3", &format!("noise_um = -{}", "9".repeat(40))) => ["session.toml:6", "cannot be negative"]
+    a_whole_number_of_forty_digits: with_session("noise_um = 0.3", &format!("noise_um = -{}", "9".repeat(40))) => ["session.toml:6", "too large; 1e12 is the most"]
     a_number_beyond_all_numbers: with_session("noise_um = 0.3", "noise_um = 1e999") => ["session.toml:6", "`noise_um` is infinite"]
     a_list_where_a_number_belongs: with_session("noise_um = 0.3", "noise_um = [0.3]") => ["session.toml:6", "`noise_um` is a list of 1; a number is expected"]
     a_date_where_a_number_belongs: with_session("noise_um = 0.3", "noise_um = 2026-01-01") => ["session.toml:6", "`noise_um` is a date"]
