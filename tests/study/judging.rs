@@ -49,9 +49,9 @@ pub fn found<'r>(outcome: &'r Outcome, truth: &Injected) -> Option<&'r EffectRes
         .find(|effect| is_truth(&effect.name) || effect.aliases.iter().any(is_truth))
 }
 
-/// The members of an alias set (the named effect included) that the plant knows and that are neither in the truth's true class nor within 2 σ
+/// The members of an alias set (the named effect included) that the plant knows and that are neither in the truth's true class nor within so many σ
 /// of it.
-pub fn strangers(outcome: &Outcome, effect: &EffectResult, truth: &Injected) -> Vec<Named> {
+pub fn strangers(outcome: &Outcome, effect: &EffectResult, truth: &Injected, sigma: f64) -> Vec<Named> {
     let oracle = oracle(outcome.kind, outcome.noise);
     let mut strangers: Vec<Named> = std::iter::once(&effect.name)
         .chain(&effect.aliases)
@@ -72,7 +72,7 @@ pub fn strangers(outcome: &Outcome, effect: &EffectResult, truth: &Injected) -> 
                 .map(|other| oracle.explained_share(truth, other))
                 .fold(0.0, f64::max);
             let behind = oracle.strength_sigma(truth) * (1.0 - share * share).max(0.0).sqrt();
-            (share < 0.95 && behind > 2.0).then_some(name)
+            (share < 0.95 && behind > sigma).then_some(name)
         })
         .collect();
     strangers.dedup();

@@ -4,16 +4,26 @@ use std::collections::BTreeMap;
 
 use abbe_model::session::Test;
 
-use super::{PureError, TERMS, polynomials};
+use super::{PureError, TERMS, trend_terms};
 
 impl PureError {
     /// How the deviations remember each other along runs: autoregressive coefficients by Yule–Walker, of the least order up to three whose successor
     /// adds nothing. `None` without enough repeats to tell.
     ///
-    /// The parabola that was taken out of every run took slow noise with it: with 0.8 between neighbours and a hundred readings a run, more than half of
+    /// The trend that was taken out of every run took slow noise with it: with 0.8 between neighbours and a hundred readings a run, more than half of
     /// what is slow. Covariances are therefore corrected until noise of the found memory, treated alike, would show those that were seen (indirect inference:
     /// Gouriéroux, Monfort & Renault, J. Appl. Econometrics 8 (1993) S85).
     pub fn memory(&self, tests: &[&Test], kept: impl Fn(usize, usize) -> bool) -> Option<Memory> {
+        self.memory_up_to(MOST, tests, kept)
+    }
+
+    /// The same with no more than so many coefficients.
+    pub(super) fn memory_up_to(
+        &self,
+        order: usize,
+        tests: &[&Test],
+        kept: impl Fn(usize, usize) -> bool,
+    ) -> Option<Memory> {
         let mut covariance = [0.0; MOST + 1];
         let mut pairs = [0_usize; MOST + 1];
         let mut lengths: BTreeMap<usize, usize> = BTreeMap::new();
@@ -44,13 +54,13 @@ impl PureError {
         let seen: [f64; MOST + 1] = std::array::from_fn(|lag| covariance[lag] / pairs[lag] as f64);
         // Two repeats hold the same deviation twice; half the pairs are independent.
         let insignificant = 3.0 / (0.5 * pairs[0] as f64).sqrt();
-        let (coefficients, variance) = without_trends_taken(&seen, insignificant, &lengths);
+        let (coefficients, variance) = without_trends_taken(&seen, order, insignificant, &lengths);
         // Bartlett's standard error of the correlation between neighbours, carried through the correction.
         let neighbours = seen[1] / seen[0];
         let u = SCATTER * ((1.0 - neighbours * neighbours).max(0.0) / self.freedom.max(1) as f64).sqrt();
         let mut slower = seen;
         slower[1..].iter_mut().for_each(|value| *value += u * seen[0]);
-        let (of_slower, _) = without_trends_taken(&slower, insignificant, &lengths);
+        let (of_slower, _) = without_trends_taken(&slower, order, insignificant, &lengths);
         let total = |coefficients: &[f64]| coefficients.iter().sum::<f64>();
         let sum_u = (total(&of_slower) - total(&coefficients)).abs();
         Some(Memory {
@@ -64,16 +74,17 @@ impl PureError {
 /// Coefficients and variance of the noise whose deviations from trends have these autocovariances.
 fn without_trends_taken(
     seen: &[f64; MOST + 1],
+    order: usize,
     insignificant: f64,
     lengths: &BTreeMap<usize, usize>,
 ) -> (Vec<f64>, f64) {
-    let mut coefficients = autoregression(seen, insignificant);
+    let mut coefficients = autoregression(seen, order, insignificant);
     let mut variance = seen[0];
     for _ in 0..CORRECTIONS {
         let (process, shown) = with_trends_out(&coefficients, lengths);
         variance = seen[0] / shown[0];
         let corrected = std::array::from_fn(|lag| seen[lag] + variance * (process[lag] - shown[lag]));
-        coefficients = autoregression(&corrected, insignificant);
+        coefficients = autoregression(&corrected, order, insignificant);
     }
     (coefficients, variance)
 }
@@ -81,10 +92,10 @@ fn without_trends_taken(
 /// The highest order of a memory.
 const MOST: usize = 3;
 const CORRECTIONS: usize = 8;
-/// By how much memories scatter beyond Bartlett's formula, for trends that were taken out and orders that were chosen: 0.035 was seen over 79 simulated
+/// By how much memories scatter beyond Bartlett's formula, for trends that were taken out and orders that were chosen: 0.034 was seen over 64 simulated
 /// sessions of memory 0.8.
-const SCATTER: f64 = 1.4;
-/// Runs longer than this lose next to nothing with a parabola.
+const SCATTER: f64 = 1.6;
+/// Runs longer than this lose next to nothing with a trend.
 const LONG: usize = 600;
 
 /// How readings remember each other along runs.
@@ -94,17 +105,17 @@ pub struct Memory {
     pub coefficients: Vec<f64>,
     /// Standard uncertainty of their sum.
     pub sum_u: f64,
-    /// By how much the noise is larger than its deviations from parabolas show.
+    /// By how much the noise is larger than its deviations from trends show.
     pub inflation: f64,
 }
 
 /// Coefficients from autocovariances (Durbin–Levinson); the last coefficient of each order is its partial autocorrelation.
-fn autoregression(covariance: &[f64; MOST + 1], insignificant: f64) -> Vec<f64> {
+fn autoregression(covariance: &[f64; MOST + 1], most: usize, insignificant: f64) -> Vec<f64> {
     let correlation = covariance.map(|value| value / covariance[0]);
     let mut coefficients: Vec<f64> = Vec::new();
     let mut accepted = Vec::new();
     let mut left = 1.0;
-    for order in 1..=MOST {
+    for order in 1..=most {
         let predicted: f64 = coefficients
             .iter()
             .enumerate()
@@ -124,7 +135,7 @@ fn autoregression(covariance: &[f64; MOST + 1], insignificant: f64) -> Vec<f64> 
     accepted
 }
 
-/// Autocorrelations of a process, and what is seen of them once a parabola is taken out of runs of these lengths (and how many readings are in
+/// Autocorrelations of a process, and what is seen of them once a trend is taken out of runs of these lengths (and how many readings are in
 /// runs of each).
 fn with_trends_out(
     coefficients: &[f64],
@@ -171,7 +182,7 @@ fn with_trends_out(
         }
         // d = e − Q Qᵀe with orthonormal polynomials Q, so Cov d = Γ − Q(QᵀΓ) − (ΓQ)Qᵀ + Q(QᵀΓQ)Qᵀ.
         let times: Vec<f64> = (0..n).map(|t| t as f64).collect();
-        let q = polynomials(&times);
+        let q = trend_terms(&times);
         let gq: Vec<[f64; TERMS]> = (0..n)
             .map(|t| {
                 let along = |i: usize| (0..n).map(|s| correlation[t.abs_diff(s)] * q[s][i]).sum();

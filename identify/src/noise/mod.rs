@@ -1,8 +1,9 @@
 //! How much of a reading is noise: its size and its memory.
 //!
 //! Readings at the same test, direction and position in repeated runs differ by noise alone (pure error: Box, Hunter & Hunter, Statistics for
-//! Experimenters, ch. 10). What they differ by from their mean, rescaled by `√(R/(R−1))`, needs no model of the structure. A parabola a run is
-//! taken out first, since slow drift and warming up are structure and would be taken for noise.
+//! Experimenters, ch. 10). What they differ by from their mean, rescaled by `√(R/(R−1))`, needs no model of the structure. A parabola and one cycle
+//! are taken out of every run first: drift and warming up are structure and would be taken for slow noise, and a ball that has moved from one run to the
+//! next leaves a cycle along each turn.
 
 mod memory;
 mod waves;
@@ -155,20 +156,34 @@ fn directions(readings: &abbe_model::session::readings::Readings) -> Vec<i64> {
     code
 }
 
-/// Coefficients of the trend that is taken out of a run: constant, slope, curvature.
-const TERMS: usize = 3;
+/// Coefficients of the trend that is taken out of a run: constant, slope, curvature, and one cycle over the run.
+const TERMS: usize = 5;
+/// How many of them are powers of time.
+const POWERS: usize = 3;
+/// The fewest readings of a run whose waves are looked at.
+const LEAST_RUN: usize = 24;
 
-/// Polynomials in time that are orthonormal over given times (Gram–Schmidt, twice); those that the times are too few for are zero.
-fn polynomials(times: &[f64]) -> Vec<[f64; TERMS]> {
+/// The terms of a trend, orthonormal over given times (Gram–Schmidt, twice); those that the times are too few for are zero.
+fn trend_terms(times: &[f64]) -> Vec<[f64; TERMS]> {
     let n = times.len() as f64;
     let middle = times.iter().sum::<f64>() / n;
     let half = times
         .iter()
         .map(|t| (t - middle).abs())
         .fold(f64::MIN_POSITIVE, f64::max);
+    let term = |t: &f64, i: usize| -> f64 {
+        let time = (t - middle) / half;
+        let (sin, cos) = (std::f64::consts::PI * time).sin_cos();
+        match i {
+            0..POWERS => time.powi(i as i32),
+            _ if times.len() < LEAST_RUN => 0.0,
+            POWERS => cos,
+            _ => sin,
+        }
+    };
     let mut q: Vec<[f64; TERMS]> = times
         .iter()
-        .map(|t| std::array::from_fn(|power| ((t - middle) / half).powi(power as i32)))
+        .map(|t| std::array::from_fn(|i| term(t, i)))
         .collect();
     for i in 0..TERMS {
         for j in (0..i).chain(0..i) {
@@ -182,7 +197,7 @@ fn polynomials(times: &[f64]) -> Vec<[f64; TERMS]> {
     q
 }
 
-/// Residuals less a parabola a run (and coordinate).
+/// Residuals less the trend of each run (and coordinate).
 fn without_trends(
     readings: &abbe_model::session::readings::Readings,
     residual: &[f64],
@@ -195,11 +210,11 @@ fn without_trends(
     }
     for run in readings.runs() {
         let rows: Vec<usize> = run.filter(|row| kept(*row)).collect();
-        if rows.len() <= TERMS {
+        if rows.len() <= POWERS {
             continue;
         }
         let times: Vec<f64> = rows.iter().map(|row| *row as f64).collect();
-        let q = polynomials(&times);
+        let q = trend_terms(&times);
         for coordinate in 0..coordinates {
             let at = |row: usize| row * coordinates + coordinate;
             let along: [f64; TERMS] = std::array::from_fn(|i| {

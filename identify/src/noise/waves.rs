@@ -1,90 +1,124 @@
 //! What comes and goes from run to run: waves along a run that no memory explains.
+//!
+//! A wave whose size swells and fades is no line in a spectrum but a hump, some cycles wide, and an autoregression of two or three terms can imitate one.
+//! Deviations are therefore whitened with one term, whose spectrum only falls, and a hump is looked for in bands.
+
+use std::ops::Range;
 
 use abbe_model::session::Test;
 use statrs::function::gamma::gamma_ur;
 
-use super::PureError;
+use super::{LEAST_RUN, Memory, PureError};
+use crate::outliers::median;
 
-/// Half cycles along a run of the waves that are looked for in deviations.
-const WAVES: std::ops::RangeInclusive<usize> = 2..=40;
-/// The most waves that are taken out.
-const MOST_WAVES: usize = 6;
-/// Probability that anything is taken out of noise that is as smooth as its memory says.
-const WAVE_BY_CHANCE: f64 = 1e-4;
-/// The fewest readings of a run whose waves are looked at.
-const LEAST_RUN: usize = 24;
+/// Half cycles along a run where the bands may begin that are looked at in deviations, and how many half cycles wide they are.
+const FIRST: std::ops::RangeInclusive<usize> = 2..=40;
+const WIDTHS: [usize; 3] = [1, 4, 8];
+/// Half cycles up to which the level is taken that a band has to stand out from.
+const HIGHEST: usize = 100;
+/// The most bands that are taken out of a test.
+const MOST_BANDS: usize = 4;
+/// Probability that anything is taken out of a test's noise.
+const BAND_BY_CHANCE: f64 = 1e-4;
+
+/// Rows of a test that were read in one go.
+#[derive(Clone)]
+struct Run {
+    test: usize,
+    rows: Range<usize>,
+}
 
 impl PureError {
-    /// The same less waves along runs that no memory explains: what comes and goes from run to run is structure, and would be taken for noise. A wave is taken
-    /// out where the periodogram of the whitened deviations, summed over runs, stands out.
+    /// The same less waves along runs that no memory explains: what comes and goes from run to run is structure, and would be taken for noise. A band is taken
+    /// out of all tests, or of one, where the periodogram of their whitened deviations, summed over runs, stands out from the median of all ordinates.
     pub fn without_waves(mut self, tests: &[&Test], kept: impl Fn(usize, usize) -> bool) -> PureError {
-        for _ in 0..MOST_WAVES {
-            let Some(half_cycles) = self.wave(tests, &kept) else {
-                break;
-            };
-            for (number, test) in tests.iter().enumerate() {
-                let Some(readings) = &test.readings else { continue };
-                for run in readings.runs().into_iter().filter(|run| run.len() >= LEAST_RUN) {
-                    take_out(&mut self.deviations[number][run], half_cycles);
+        let Some(mut memory) = self.memory_up_to(1, tests, &kept) else {
+            return self;
+        };
+        let of_tests: Vec<Vec<Run>> = tests
+            .iter()
+            .enumerate()
+            .map(|(test, of)| {
+                let runs = of.readings.iter().flat_map(|readings| readings.runs());
+                let long = runs.filter(|run| run.len() >= LEAST_RUN);
+                long.map(|rows| Run { test, rows }).collect()
+            })
+            .collect();
+        for runs in std::iter::once(of_tests.concat()).chain(of_tests) {
+            for _ in 0..MOST_BANDS {
+                let Some(band) = self.band(&runs, &memory) else {
+                    break;
+                };
+                for run in &runs {
+                    // Half cycles overlap: every second one of a band holds all of it.
+                    for half_cycles in band.clone().step_by(2) {
+                        take_out(&mut self.deviations[run.test][run.rows.clone()], half_cycles);
+                    }
                 }
+                let Some(of_rest) = self.memory_up_to(1, tests, &kept) else {
+                    return self;
+                };
+                memory = of_rest;
             }
         }
         self
     }
 
-    /// The half cycles of the wave that stands out most, if any does.
-    fn wave(&self, tests: &[&Test], kept: &impl Fn(usize, usize) -> bool) -> Option<usize> {
-        let memory = self.memory(tests, kept)?;
-        let mut whitened: Vec<Vec<f64>> = Vec::new();
-        for (number, test) in tests.iter().enumerate() {
-            for run in test
-                .readings
-                .as_ref()?
-                .runs()
-                .into_iter()
-                .filter(|run| run.len() >= LEAST_RUN)
-            {
-                let deviation = |row: usize| self.deviations[number][row].unwrap_or(0.0);
+    /// The band, in half cycles, that stands out most in runs, if any does.
+    fn band(&self, runs: &[Run], memory: &Memory) -> Option<Range<usize>> {
+        let shortest = runs.iter().map(|run| run.rows.len()).min()?;
+        let whitened: Vec<Vec<f64>> = runs
+            .iter()
+            .map(|Run { test, rows }| {
+                let deviation = |row: usize| self.deviations[*test][row].unwrap_or(0.0);
                 let past = |row: usize| -> f64 {
                     let lags = memory.coefficients.iter().enumerate();
-                    lags.filter(|(lag, _)| row > run.start + lag)
+                    lags.filter(|(lag, _)| row > rows.start + lag)
                         .map(|(lag, a)| a * deviation(row - lag - 1))
                         .sum()
                 };
-                whitened.push(run.clone().map(|row| deviation(row) - past(row)).collect());
-            }
-        }
-        let count: usize = whitened.iter().map(Vec::len).sum();
-        let power: f64 = whitened.iter().flatten().map(|value| value * value).sum();
-        if count == 0 || power <= 0.0 {
-            return None;
-        }
-        let variance = power / count as f64;
-        // Repeats hold the same deviation more than once: so many of these runs are independent.
-        let seen = self.deviations.iter().flatten().flatten().count().max(1);
-        let independent = self.freedom as f64 / seen as f64;
+                rows.clone().map(|row| deviation(row) - past(row)).collect()
+            })
+            .collect();
         let ordinate = |run: &Vec<f64>, half_cycles: usize| {
             let step = std::f64::consts::PI * half_cycles as f64 / run.len() as f64;
             let (c, s) = run.iter().enumerate().fold((0.0, 0.0), |(c, s), (t, value)| {
                 let (sin, cos) = (step * t as f64).sin_cos();
                 (c + value * cos, s + value * sin)
             });
-            (c * c + s * s) / (run.len() as f64 * variance)
+            (c * c + s * s) / run.len() as f64
         };
-        let runs = whitened.len() as f64 * independent;
-        let looks = WAVES.count() as f64;
-        WAVES
-            .map(|half_cycles| {
-                let sum: f64 = whitened.iter().map(|run| ordinate(run, half_cycles)).sum();
-                (half_cycles, sum * independent)
+        let first = *FIRST.start();
+        let sums: Vec<f64> = (first..HIGHEST.min(shortest))
+            .map(|half_cycles| whitened.iter().map(|run| ordinate(run, half_cycles)).sum())
+            .collect();
+        // Repeats hold the same deviation more than once: so many of these runs are independent.
+        let seen = self.deviations.iter().flatten().flatten().count().max(1);
+        let independent = runs.len() as f64 * self.freedom as f64 / seen as f64;
+        // Wilson and Hilferty's median of a gamma distribution.
+        let median_of_gamma = independent * (1.0 - 1.0 / (9.0 * independent)).powi(3);
+        let level = median(&mut sums.clone()) / median_of_gamma;
+        if level <= 0.0 {
+            return None;
+        }
+        let looks = (FIRST.count() * WIDTHS.len()) as f64;
+        WIDTHS
+            .into_iter()
+            .flat_map(|width| sums.windows(width).take(FIRST.count()).enumerate())
+            .map(|(begin, band)| {
+                // Of ordinates half a cycle apart every second one is independent.
+                let cycles = (0.5 * band.len() as f64).max(1.0);
+                let mean = band.iter().sum::<f64>() / (band.len() as f64 * level);
+                let by_chance = gamma_ur(independent * cycles, mean * cycles);
+                (first + begin..first + begin + band.len(), by_chance)
             })
-            .max_by(|a, b| a.1.total_cmp(&b.1))
-            .filter(|(_, sum)| gamma_ur(runs, *sum) < WAVE_BY_CHANCE / looks)
-            .map(|(half_cycles, _)| half_cycles)
+            .min_by(|a, b| a.1.total_cmp(&b.1))
+            .filter(|(_, by_chance)| *by_chance < BAND_BY_CHANCE / looks)
+            .map(|(band, _)| band)
     }
 }
 
-/// Takes a wave of so many half cycles out of the deviations of a run, by least squares.
+/// Takes a wave of so many half cycles out of the deviations of a run, by least squares; what is left is rescaled for what the wave took of the noise.
 fn take_out(run: &mut [Option<f64>], half_cycles: usize) {
     let step = std::f64::consts::PI * half_cycles as f64 / run.len() as f64;
     let (mut cc, mut cs, mut ss, mut cy, mut sy) = (0.0, 0.0, 0.0, 0.0, 0.0);
@@ -106,10 +140,12 @@ fn take_out(run: &mut [Option<f64>], half_cycles: usize) {
         (ss * cy - cs * sy) / determinant,
         (cc * sy - cs * cy) / determinant,
     );
+    let count = run.iter().flatten().count() as f64;
+    let rescale = (count / (count - 2.0).max(1.0)).sqrt();
     for (t, value) in run.iter_mut().enumerate() {
         let (s, c) = (step * t as f64).sin_cos();
         if let Some(value) = value {
-            *value -= a * c + b * s;
+            *value = (*value - a * c - b * s) * rescale;
         }
     }
 }

@@ -2,7 +2,8 @@
 //!
 //! Each effect is exchanged for what explains clearly better beside the others. When nothing more is to be added, effects with numbers or places of
 //! their own are fitted anew beside each of the next best: steps with many places, or a warm-up with its own time constant, can swallow most of a second
-//! effect, which shows only when both are there.
+//! effect, which shows only when both are there. Two effects are also looked for together in the place of two, or of one: where each undoes part of the
+//! other, neither shows much alone, and something that does a little of both is found in their place.
 
 use std::collections::HashSet;
 
@@ -19,6 +20,9 @@ const MOST_SHARPENED: usize = 4;
 /// How many are tried beside an effect that is fitted anew: on all readings, and where one fold is left out.
 const MOST_TRIED: usize = 6;
 const MOST_TRIED_TO_PREDICT: usize = 2;
+/// How many are tried as the first of two that are looked for together: on all readings, and where one fold is left out.
+const MOST_FIRSTS: usize = 32;
+const MOST_FIRSTS_TO_PREDICT: usize = 8;
 /// The most effects that are fitted anew beside others.
 const MOST_ANEW: usize = 3;
 /// Relative difference of scores below which two candidates do the same.
@@ -102,9 +106,7 @@ impl Search<'_> {
                     }
                     self.materialise(&[anew]);
                     // What is added has to hold its own against readings without structure.
-                    let without: Vec<usize> = base.iter().copied().chain([anew]).collect();
-                    let model = self.lean_model_of(&without, &folds);
-                    if self.score(other, &model.gain(other), self.variance(&model)) < threshold {
+                    if !self.holds_its_own(other, &set, &folds, threshold) {
                         continue;
                     }
                     most = value;
@@ -117,6 +119,104 @@ impl Search<'_> {
         let anew = |candidate: usize| Taken { candidate, p_value };
         self.tracks[track].taken = set.into_iter().map(anew).collect();
         true
+    }
+
+    /// Looks for two effects together in the place of one or two, and takes the best two if they say clearly more. Returns whether the search on all
+    /// readings did.
+    pub fn regroup(&mut self) -> bool {
+        if self.stop.in_residual_variance {
+            return false;
+        }
+        let changed: Vec<bool> = (0..self.tracks.len())
+            .map(|track| self.regroup_one(track))
+            .collect();
+        self.note_held_out();
+        changed[ALL]
+    }
+
+    fn regroup_one(&mut self, track: usize) -> bool {
+        let Track { folds, taken } = self.tracks[track].clone();
+        let chosen = self.tracks[track].chosen();
+        if !(1..=MOST_ANEW).contains(&chosen.len()) {
+            return false;
+        }
+        let threshold = self.thresholds.last().copied().unwrap_or(f64::INFINITY);
+        let mut most = self.evidence_of(&chosen, &[], &folds) - self.words_of(&chosen) + INDISTINGUISHABLE;
+        let mut best: Option<Vec<usize>> = None;
+        let places = 0..chosen.len();
+        let given_up = places
+            .clone()
+            .flat_map(|i| places.clone().filter(move |j| i <= *j).map(move |j| (i, j)));
+        for (i, j) in given_up {
+            if i == j && chosen.len() >= self.stop.most {
+                continue;
+            }
+            let base: Vec<usize> = places
+                .clone()
+                .filter(|k| *k != i && *k != j)
+                .map(|k| chosen[k])
+                .collect();
+            let firsts = self.simple_firsts(&base, &folds);
+            self.materialise(&firsts);
+            for first in firsts {
+                let beside: Vec<usize> = base.iter().copied().chain([first]).collect();
+                let second = {
+                    let model = self.model_of(&beside, &folds);
+                    let gains = model.gains();
+                    self.best_of(&model, &gains, &beside)
+                        .map(|(best, _)| self.named_first(&model, &gains, best, &beside))
+                };
+                let Some(second) = second else { continue };
+                let set: Vec<usize> = beside.iter().copied().chain([second]).collect();
+                let value = self.evidence_with(&beside, second, &folds) - self.words_of(&set);
+                if value <= most {
+                    continue;
+                }
+                self.materialise(&[second]);
+                if [first, second]
+                    .into_iter()
+                    .all(|one| self.holds_its_own(one, &set, &folds, threshold))
+                {
+                    most = value;
+                    best = Some(set);
+                }
+            }
+        }
+        let Some(set) = best else { return false };
+        let p_value = taken.iter().map(|taken| taken.p_value).fold(0.0, f64::max);
+        let anew = |candidate: usize| Taken { candidate, p_value };
+        self.tracks[track].taken = set.into_iter().map(anew).collect();
+        true
+    }
+
+    /// Whether one of a set scores beside the others what readings without structure do not give.
+    fn holds_its_own(&self, one: usize, set: &[usize], folds: &[usize], threshold: f64) -> bool {
+        let others: Vec<usize> = set.iter().copied().filter(|c| *c != one).collect();
+        let model = self.lean_model_of(&others, folds);
+        self.score(one, &model.gain(one), self.variance(&model)) >= threshold
+    }
+
+    /// Effects without numbers or places of their own that explain anything beside some others, the best first; of those that do the very same to the
+    /// readings one.
+    fn simple_firsts(&self, base: &[usize], folds: &[usize]) -> Vec<usize> {
+        let model = self.model_of(base, folds);
+        let variance = self.variance(&model);
+        let gains = model.gains();
+        let mut scored: Vec<(usize, f64)> = (0..self.candidates.len())
+            .filter(|c| self.is_open(*c, folds) && !base.contains(c) && !self.is_flexible(*c))
+            .map(|c| (c, self.score(c, &gains[c], variance)))
+            .filter(|(_, score)| *score > 0.0)
+            .collect();
+        scored.sort_by(|a, b| b.1.total_cmp(&a.1).then(a.0.cmp(&b.0)));
+        scored.dedup_by(|a, b| {
+            (a.1 - b.1).abs() < SAME * b.1.abs() && gains[a.0].freedom == gains[b.0].freedom
+        });
+        let most = if self.sees_all(folds) {
+            MOST_FIRSTS
+        } else {
+            MOST_FIRSTS_TO_PREDICT
+        };
+        scored.into_iter().take(most).map(|(c, _)| c).collect()
     }
 
     fn is_flexible(&self, candidate: usize) -> bool {

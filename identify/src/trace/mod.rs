@@ -295,7 +295,7 @@ fn search_on(
             return Some(1.0);
         }
         match search.round() {
-            Round::Done { .. } if search.retune() => {}
+            Round::Done { .. } if search.retune() || search.regroup() => {}
             Round::Done { p_value } => return Some(p_value),
             Round::Added { candidate } => {
                 // Every exchange costs a model an effect; among many effects the gain is small and a sweep now and then will do.
