@@ -2,7 +2,7 @@
 //!
 //! The chain is evaluated once, for the sensitivities of every component; hundreds of candidates cost no further kinematics.
 
-use std::collections::HashMap;
+use std::collections::{BTreeSet, HashMap};
 use std::sync::Arc;
 
 use abbe_model::effect::{Component, Driver, DriverSample, Effect, Shape};
@@ -27,6 +27,11 @@ pub struct Layout {
 }
 
 impl Layout {
+    /// Whether anything moves in a test.
+    fn acts_in(&self, test: usize) -> bool {
+        !self.parts[test].is_empty()
+    }
+
     /// The greatest absolute value of its basis functions.
     pub fn greatest(&self) -> f64 {
         let parts = self.parts.iter().flatten();
@@ -75,6 +80,8 @@ pub struct Columns<'p, 'a> {
     target: Vec<usize>,
     /// The rows of each fold.
     pub fold_rows: Vec<std::ops::Range<usize>>,
+    /// The tests whose readings each fold has.
+    fold_tests: Vec<BTreeSet<usize>>,
     rows: usize,
     samples: std::sync::Mutex<HashMap<(usize, String), SharedSamples>>,
     bases: std::sync::Mutex<HashMap<(usize, String), SharedColumns>>,
@@ -130,9 +137,14 @@ impl<'p, 'a> Columns<'p, 'a> {
             .collect();
         let blocks = problem.blocks();
         let mut fold_of = Vec::new();
+        let mut fold_tests = vec![BTreeSet::new(); problem.folds.count];
         for block in &blocks {
             let rows = Mat::<f64>::zeros(block.rows.len() * problem.coordinates(), 0);
-            fold_of.extend(problem.whiten(&rows, block).1);
+            let folds = problem.whiten(&rows, block).1;
+            folds.iter().for_each(|fold| {
+                fold_tests[*fold].insert(block.test);
+            });
+            fold_of.extend(folds);
         }
         let mut next = 0;
         let mut target = vec![0; fold_of.len()];
@@ -153,6 +165,7 @@ impl<'p, 'a> Columns<'p, 'a> {
             rows: target.len(),
             target,
             fold_rows,
+            fold_tests,
             samples: Default::default(),
             bases: Default::default(),
         })
@@ -431,11 +444,30 @@ impl<'p, 'a> Columns<'p, 'a> {
         layouts
     }
 
-    /// Fills columns with the whitened rows of layouts, one after another.
+    /// The rows of each fold in which any of the layouts moves anything; none of a fold in which none does.
+    pub fn moved_rows(&self, layouts: &[Layout]) -> Vec<std::ops::Range<usize>> {
+        let moved = |test: &usize| layouts.iter().any(|layout| layout.acts_in(*test));
+        let folds = self.fold_rows.iter().zip(&self.fold_tests);
+        folds
+            .map(|(rows, tests)| {
+                if tests.iter().any(moved) {
+                    rows.clone()
+                } else {
+                    rows.start..rows.start
+                }
+            })
+            .collect()
+    }
+
+    /// Fills columns, which are zero before, with the whitened rows of layouts, one after another.
     pub fn fill(&self, layouts: &[&Layout], mut columns: MatMut<'_, f64>) {
         let total: usize = layouts.iter().map(|layout| layout.count).sum();
         let mut start = 0;
         for block in &self.blocks {
+            if !layouts.iter().any(|layout| layout.acts_in(block.test)) {
+                start += self.problem.kept_rows(block).len();
+                continue;
+            }
             let raw = self.block_rows(layouts, block);
             let (white, _) = self.problem.whiten(&raw, block);
             let target = &self.target[start..start + white.nrows()];

@@ -28,6 +28,7 @@ mod visible;
 use abbe_model::effect::Effect;
 use abbe_model::session::Session;
 use faer::Mat;
+use rayon::prelude::*;
 
 use crate::error::IdentifyError;
 use crate::fit::{Fit, fit, in_directions, prepare};
@@ -190,12 +191,14 @@ fn trace_with<'a>(
     let mut candidates = library::candidates(&problem)?;
     candidates.retain(|candidate| chosen(options, &candidate.effect.id()));
     let (reserve, candidates): (Vec<_>, Vec<_>) = candidates
-        .into_iter()
+        .into_par_iter()
         .filter_map(|candidate| {
             columns
                 .layout(&candidate.effect)
                 .map(|layout| (candidate, layout))
         })
+        .collect::<Vec<_>>()
+        .into_iter()
         .partition(|(candidate, _)| candidate.last_resort);
     let (candidates, layouts): (Vec<Candidate>, Vec<Layout>) = candidates.into_iter().unzip();
     let looked_for = candidates.len() + reserve.len();

@@ -132,38 +132,30 @@ impl Moments {
             total += layout.count;
         }
         let count: Vec<usize> = layouts.iter().map(|layout| layout.count).collect();
-        let (rank, draws) = (model.ncols(), null.ncols());
-        let side = beside(&model, residual, &null);
-        let blocks = laid(columns, layouts, 0..layouts.len(), &[]);
-        let products = products_by_fold(columns, layouts, &blocks, side.as_ref());
-        let mut own = own_by_fold(columns, layouts, &blocks);
-        let mut null_cross = Mat::zeros(draws, total);
-        let mut folds = Vec::new();
-        for (fold, range) in columns.fold_rows.iter().enumerate() {
-            let part = side.as_ref().subrows(range.start, range.len());
-            let base_part = part.subcols(0, rank + 1);
-            let gram = transposed_product(base_part, base_part);
-            let product = &products[fold];
-            for j in 0..total {
-                for d in 0..draws {
-                    null_cross[(d, j)] += product[(rank + 1 + d, j)];
+        let rank = model.ncols();
+        let side = beside(&model, residual);
+        let (blocks, products) = laid(columns, layouts, 0..layouts.len(), &[], &side, &null);
+        let products = Products::joined(products, columns.fold_rows.len(), rank + 1, null.ncols());
+        let folds = (columns.fold_rows.iter().zip(products.side).zip(products.own))
+            .map(|((range, product), own)| {
+                let part = side.as_ref().subrows(range.start, range.len());
+                let gram = transposed_product(part, part);
+                FoldMoments {
+                    base: Mat::from_fn(rank, rank, |i, j| gram[(i, j)]),
+                    base_y: (0..rank).map(|i| gram[(i, rank)]).collect(),
+                    yy: gram[(rank, rank)],
+                    cross: product.subrows(0, rank).to_owned(),
+                    cross_y: (0..total).map(|j| product[(rank, j)]).collect(),
+                    own,
                 }
-            }
-            folds.push(FoldMoments {
-                base: Mat::from_fn(rank, rank, |i, j| gram[(i, j)]),
-                base_y: (0..rank).map(|i| gram[(i, rank)]).collect(),
-                yy: gram[(rank, rank)],
-                cross: product.subrows(0, rank).to_owned(),
-                cross_y: (0..total).map(|j| product[(rank, j)]).collect(),
-                own: std::mem::take(&mut own[fold]),
-            });
-        }
+            })
+            .collect::<Vec<_>>();
         let null_base = transposed_product(model.as_ref(), null.as_ref());
         let whole = FoldMoments::sum(&folds);
         Moments {
             folds,
             whole,
-            null_cross,
+            null_cross: products.null,
             null_base,
             first,
             count,
@@ -210,7 +202,18 @@ impl Moments {
             }
         }
         grow(&mut self.base_columns, rows, next, |i, j| fresh[(i, j - old)]);
-        let products = products_by_fold(columns, layouts, &self.blocks, fresh.as_ref());
+        let products: Vec<Products> = (self.blocks.par_iter())
+            .map(|block| {
+                let layouts = &layouts[block.candidates.clone()];
+                let laid = block.kept.is_none().then(|| filled(columns, layouts));
+                let all = block.kept.as_ref().or(laid.as_ref());
+                all.map_or_else(Products::default, |all| Products {
+                    side: side_by_fold(columns, layouts, fresh.as_ref(), all.as_ref()),
+                    ..Products::default()
+                })
+            })
+            .collect();
+        let products = Products::joined(products, columns.fold_rows.len(), added, 0).side;
         let null_fresh = transposed_product(fresh.as_ref(), self.null.as_ref());
         let draws = self.null.ncols();
         grow(&mut self.null_base, next, draws, |i, d| null_fresh[(i - old, d)]);
@@ -242,34 +245,28 @@ impl Moments {
 
     /// Adds the last of the candidates to those that are scored: those that are not yet.
     pub fn append(&mut self, columns: &Columns<'_, '_>, layouts: &[Layout]) {
-        let side = self.side();
         let rank = self.base();
-        let fresh = laid(columns, layouts, self.count.len()..layouts.len(), &self.blocks);
-        let products = products_by_fold(columns, layouts, &fresh, side.as_ref());
-        let own = own_by_fold(columns, layouts, &fresh);
+        let side = beside(&self.base_columns, &self.residual);
+        let candidates = self.count.len()..layouts.len();
+        let (fresh, products) = laid(columns, layouts, candidates.clone(), &self.blocks, &side, &self.null);
         let draws = self.null.ncols();
+        let products = Products::joined(products, columns.fold_rows.len(), rank + 1, draws);
         let total = self.null_cross.ncols();
         let mut added = 0;
-        for layout in &layouts[self.count.len()..] {
+        for layout in &layouts[candidates] {
             self.first.push(total + added);
             self.count.push(layout.count);
             self.numbers.push(layout.numbers);
             added += layout.count;
         }
         self.blocks.extend(fresh);
-        let mut of_null = Mat::<f64>::zeros(draws, added);
-        for (fold, (product, own)) in products.into_iter().zip(own).enumerate() {
-            let moments = &mut self.folds[fold];
+        let of_null = products.null;
+        for ((moments, product), own) in self.folds.iter_mut().zip(products.side).zip(products.own) {
             grow(&mut moments.cross, rank, total + added, |i, j| {
                 product[(i, j - total)]
             });
             moments.cross_y.extend((0..added).map(|k| product[(rank, k)]));
             moments.own.extend(own);
-            for d in 0..draws {
-                for k in 0..added {
-                    of_null[(d, k)] += product[(rank + 1 + d, k)];
-                }
-            }
         }
         self.sum_up(rank, total + added);
         grow(&mut self.null_cross, draws, total + added, |d, j| {
@@ -344,28 +341,19 @@ impl Moments {
         super::visible::quadratic_gain(&d, &own, &g)
     }
 
-    /// Model, residual and null draws side by side: one product with each chunk of candidates.
-    fn side(&self) -> Mat<f64> {
-        beside(&self.base_columns, &self.residual, &self.null)
-    }
-
     /// The base columns, rows × base, in the order of the folds.
     pub fn base_columns(&self) -> MatRef<'_, f64> {
         self.base_columns.as_ref()
     }
 }
 
-fn beside(model: &Mat<f64>, residual: &[f64], null: &Mat<f64>) -> Mat<f64> {
-    let (rank, rows) = (model.ncols(), residual.len());
-    let mut side = Mat::zeros(rows, rank + 1 + null.ncols());
-    for j in 0..rank {
-        side.col_mut(j).copy_from(model.col(j));
-    }
+/// Model and residual side by side: one product with each chunk of candidates.
+fn beside(model: &Mat<f64>, residual: &[f64]) -> Mat<f64> {
+    let rank = model.ncols();
+    let mut side = Mat::zeros(residual.len(), rank + 1);
+    side.as_mut().subcols_mut(0, rank).copy_from(model);
     for (i, value) in residual.iter().enumerate() {
         side[(i, rank)] = *value;
-    }
-    for j in 0..null.ncols() {
-        side.col_mut(rank + 1 + j).copy_from(null.col(j));
     }
     side
 }
@@ -376,13 +364,16 @@ struct Block {
     kept: Option<Mat<f64>>,
 }
 
-/// Lays candidates out block by block; columns are kept as long as they find room beside those that are kept already.
+/// Lays candidates out block by block and multiplies each block while it is at hand; columns are kept as long as they find room beside those that are
+/// kept already.
 fn laid(
     columns: &Columns<'_, '_>,
     layouts: &[Layout],
     candidates: Range<usize>,
     present: &[Block],
-) -> Vec<Block> {
+    side: &Mat<f64>,
+    null: &Mat<f64>,
+) -> (Vec<Block>, Vec<Products>) {
     let count: Vec<usize> = layouts[candidates.clone()]
         .iter()
         .map(|layout| layout.count)
@@ -403,11 +394,18 @@ fn laid(
         .collect();
     blocks
         .into_par_iter()
-        .map(|(candidates, room)| Block {
-            kept: room.then(|| filled(columns, &layouts[candidates.clone()])),
-            candidates,
+        .map(|(candidates, room)| {
+            let layouts = &layouts[candidates.clone()];
+            let all = filled(columns, layouts);
+            let products = Products {
+                side: side_by_fold(columns, layouts, side.as_ref(), all.as_ref()),
+                own: own_by_fold(columns, layouts, all.as_ref()),
+                null: null_product(columns, layouts, null, all.as_ref()),
+            };
+            let kept = room.then_some(all);
+            (Block { candidates, kept }, products)
         })
-        .collect()
+        .unzip()
 }
 
 fn filled(columns: &Columns<'_, '_>, layouts: &[Layout]) -> Mat<f64> {
@@ -418,68 +416,102 @@ fn filled(columns: &Columns<'_, '_>, layouts: &[Layout]) -> Mat<f64> {
     block
 }
 
-/// What is made of the columns of each block in each fold, block by block.
-fn by_block<T: Send>(
-    columns: &Columns<'_, '_>,
-    layouts: &[Layout],
-    blocks: &[Block],
-    make: impl Fn(&[Layout], &Range<usize>, MatRef<'_, f64>) -> T + Sync,
-) -> Vec<Vec<T>> {
-    blocks
-        .par_iter()
-        .map(|block| {
-            let layouts = &layouts[block.candidates.clone()];
-            let fresh = block.kept.is_none().then(|| filled(columns, layouts));
-            let Some(all) = block.kept.as_ref().or(fresh.as_ref()) else {
-                return Vec::new();
-            };
-            let of_fold =
-                |range: &Range<usize>| make(layouts, range, all.as_ref().subrows(range.start, range.len()));
-            columns.fold_rows.iter().map(of_fold).collect()
-        })
-        .collect()
+/// Products with the columns of consecutive candidates.
+struct Products {
+    /// For each fold `sideᵀ · candidates`.
+    side: Vec<Mat<f64>>,
+    /// For each fold each candidate's product with itself.
+    own: Vec<Vec<Mat<f64>>>,
+    /// Null draws with candidates, over all folds.
+    null: Mat<f64>,
 }
 
-/// For each fold `sideᵀ · candidates`.
-fn products_by_fold(
+impl Default for Products {
+    fn default() -> Products {
+        Products {
+            side: Vec::new(),
+            own: Vec::new(),
+            null: Mat::zeros(0, 0),
+        }
+    }
+}
+
+impl Products {
+    /// Of one block after another, with so many columns at the side and null draws.
+    fn joined(parts: Vec<Products>, folds: usize, side: usize, draws: usize) -> Products {
+        let fold = |fold: usize| joined(side, parts.iter().filter_map(|part| part.side.get(fold)));
+        let sides = (0..folds).into_par_iter().map(fold).collect();
+        let null = joined(draws, parts.iter().map(|part| &part.null));
+        let mut own = vec![Vec::new(); folds];
+        for (fold, of_part) in parts.into_iter().flat_map(|part| part.own.into_iter().enumerate()) {
+            own[fold].extend(of_part);
+        }
+        Products {
+            side: sides,
+            own,
+            null,
+        }
+    }
+}
+
+/// Matrices of so many rows, one beside another.
+fn joined<'p>(rows: usize, parts: impl Iterator<Item = &'p Mat<f64>> + Clone) -> Mat<f64> {
+    let mut whole = Mat::zeros(rows, parts.clone().map(Mat::ncols).sum());
+    let mut column = 0;
+    for part in parts {
+        whole.as_mut().subcols_mut(column, part.ncols()).copy_from(part);
+        column += part.ncols();
+    }
+    whole
+}
+
+/// For each fold `sideᵀ · candidates`: zero without a look where none of the candidates moves anything.
+fn side_by_fold(
     columns: &Columns<'_, '_>,
     layouts: &[Layout],
-    blocks: &[Block],
     side: MatRef<'_, f64>,
+    all: MatRef<'_, f64>,
 ) -> Vec<Mat<f64>> {
-    let parts = by_block(columns, layouts, blocks, |_, range, part| {
-        transposed_product(side.subrows(range.start, range.len()), part)
-    });
-    (0..columns.fold_rows.len())
-        .map(|fold| {
-            let total = parts.iter().map(|part| part[fold].ncols()).sum();
-            let mut whole = Mat::zeros(side.ncols(), total);
-            let mut column = 0;
-            for part in &parts {
-                let product = &part[fold];
-                for j in 0..product.ncols() {
-                    whole.col_mut(column + j).copy_from(product.col(j));
-                }
-                column += product.ncols();
-            }
-            whole
+    let moved = columns.moved_rows(layouts).into_iter();
+    moved
+        .map(|rows| {
+            let part = |of: MatRef<'_, f64>| transposed_product(of, all.subrows(rows.start, rows.len()));
+            part(side.subrows(rows.start, rows.len()))
         })
         .collect()
 }
 
 /// For each fold each candidate's product with itself.
-fn own_by_fold(columns: &Columns<'_, '_>, layouts: &[Layout], blocks: &[Block]) -> Vec<Vec<Mat<f64>>> {
-    let parts = by_block(columns, layouts, blocks, |layouts, _, part| {
-        let mut start = 0;
-        let own = |layout: &Layout| {
-            let of = part.subcols(start, layout.count);
-            start += layout.count;
-            transposed_product(of, of)
-        };
-        layouts.iter().map(own).collect::<Vec<_>>()
-    });
-    let fold = |fold: usize| parts.iter().flat_map(|part| part[fold].iter().cloned()).collect();
-    (0..columns.fold_rows.len()).map(fold).collect()
+fn own_by_fold(columns: &Columns<'_, '_>, layouts: &[Layout], all: MatRef<'_, f64>) -> Vec<Vec<Mat<f64>>> {
+    let moved = columns.moved_rows(layouts).into_iter();
+    moved
+        .map(|rows| {
+            let part = all.subrows(rows.start, rows.len());
+            let mut start = 0;
+            let own = |layout: &Layout| {
+                let of = part.subcols(start, layout.count);
+                start += layout.count;
+                transposed_product(of, of)
+            };
+            layouts.iter().map(own).collect()
+        })
+        .collect()
+}
+
+/// Null draws with candidates, over all folds in which any of them moves anything.
+fn null_product(
+    columns: &Columns<'_, '_>,
+    layouts: &[Layout],
+    null: &Mat<f64>,
+    all: MatRef<'_, f64>,
+) -> Mat<f64> {
+    let mut product = Mat::zeros(null.ncols(), all.ncols());
+    for rows in columns.moved_rows(layouts) {
+        let draws = null.as_ref().subrows(rows.start, rows.len());
+        let part = all.subrows(rows.start, rows.len());
+        matmul(product.as_mut(), Accum::Add, draws.transpose(), part, 1.0, Par::Seq);
+    }
+    product
 }
 
 /// Consecutive candidates whose columns together make a chunk.

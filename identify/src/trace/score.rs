@@ -6,7 +6,7 @@
 use super::moments::{FoldMoments, Moments};
 use super::tail::{ln_chi_square_tail, most_evidence};
 use super::visible::{Visible, pseudo_inverse};
-use faer::Mat;
+use faer::{Mat, MatRef};
 use rayon::prelude::*;
 
 /// A model over the base: which base columns it has, and which folds it is trained on.
@@ -45,6 +45,38 @@ pub struct Gain {
     pub freedom: usize,
     /// The share of its own length that the model does not have already.
     pub visible: f64,
+}
+
+/// `Xᵀ C` and `(XᵀX)⁻¹ Xᵀ C` of a candidate: among those of all candidates, or made for this one.
+enum Beside<'t> {
+    Known(MatRef<'t, f64>, MatRef<'t, f64>),
+    Fresh(Mat<f64>, Mat<f64>),
+}
+
+impl Beside<'_> {
+    fn cross(&self) -> MatRef<'_, f64> {
+        match self {
+            Beside::Known(cross, _) => *cross,
+            Beside::Fresh(cross, _) => cross.as_ref(),
+        }
+    }
+
+    fn solved(&self) -> MatRef<'_, f64> {
+        match self {
+            Beside::Known(_, solved) => *solved,
+            Beside::Fresh(_, solved) => solved.as_ref(),
+        }
+    }
+}
+
+/// The entries of a column of a matrix that is stored column by column.
+fn column<'c>(matrix: &MatRef<'c, f64>, column: usize) -> &'c [f64] {
+    let column = matrix.col(column).try_as_col_major();
+    column.map_or(&[], |column| column.as_slice())
+}
+
+fn dot(a: &[f64], b: &[f64]) -> f64 {
+    a.iter().zip(b).map(|(a, b)| a * b).sum()
 }
 
 impl<'m> Trained<'m> {
@@ -122,41 +154,52 @@ impl<'m> Trained<'m> {
 
     /// `Xᵀ C` of consecutive candidate columns.
     fn cross(&self, first: usize, count: usize) -> Mat<f64> {
-        Mat::from_fn(self.base.len(), count, |i, j| {
-            self.parts
-                .iter()
-                .map(|(part, sign)| sign * part.cross[(self.base[i], first + j)])
-                .sum()
-        })
+        let mut cross = Mat::zeros(self.base.len(), count);
+        for (part, sign) in &self.parts {
+            for (j, to) in cross.col_iter_mut().enumerate() {
+                let of_part = part.cross.as_ref();
+                let of_part = column(&of_part, first + j);
+                to.iter_mut()
+                    .zip(&self.base)
+                    .for_each(|(to, base)| *to += sign * of_part[*base]);
+            }
+        }
+        cross
     }
 
     /// `Xᵀ C` and `(XᵀX)⁻¹ Xᵀ C` of a candidate.
-    fn beside(&self, candidate: usize) -> (Mat<f64>, Mat<f64>) {
+    fn beside(&self, candidate: usize) -> Beside<'_> {
         let (first, count) = (self.moments.first[candidate], self.moments.count[candidate]);
         match &self.all {
-            Some((cross, solved)) => (
-                cross.subcols(first, count).to_owned(),
-                solved.subcols(first, count).to_owned(),
-            ),
+            Some((cross, solved)) => Beside::Known(cross.subcols(first, count), solved.subcols(first, count)),
             None => {
                 let cross = self.cross(first, count);
                 let solved = &self.inverse * &cross;
-                (cross, solved)
+                Beside::Fresh(cross, solved)
             }
         }
     }
 
     /// `D` and `g` of a candidate, and its product with itself.
     pub fn projected(&self, candidate: usize) -> (Mat<f64>, Vec<f64>, Mat<f64>) {
+        let beside = self.beside(candidate);
+        self.projected_with(candidate, beside.cross(), beside.solved())
+    }
+
+    fn projected_with(
+        &self,
+        candidate: usize,
+        cross: MatRef<'_, f64>,
+        solved: MatRef<'_, f64>,
+    ) -> (Mat<f64>, Vec<f64>, Mat<f64>) {
         let (first, count) = (self.moments.first[candidate], self.moments.count[candidate]);
-        let mut own = Mat::<f64>::zeros(count, count);
-        let mut g = vec![0.0; count];
-        for (part, sign) in &self.parts {
-            own += faer::Scale(*sign) * &part.own[candidate];
-            for k in 0..count {
-                g[k] += sign * part.cross_y[first + k];
-            }
-        }
+        let over_parts = |of: &dyn Fn(&FoldMoments) -> f64| -> f64 {
+            self.parts.iter().map(|(part, sign)| sign * of(part)).sum()
+        };
+        let mut own = Mat::from_fn(count, count, |k, l| over_parts(&|part| part.own[candidate][(k, l)]));
+        let mut g: Vec<f64> = (0..count)
+            .map(|k| over_parts(&|part| part.cross_y[first + k]))
+            .collect();
         // What is left of a difference by rounding is nothing.
         let whole = &self.moments.whole.own[candidate];
         for k in 0..count {
@@ -166,16 +209,11 @@ impl<'m> Trained<'m> {
                 g[k] = 0.0;
             }
         }
-        let (cross, solved) = self.beside(candidate);
-        let mut d = own.clone();
+        let d = Mat::from_fn(count, count, |k, l| {
+            own[(k, l)] - dot(column(&cross, k), column(&solved, l))
+        });
         for k in 0..count {
-            for l in 0..count {
-                let sum: f64 = (0..self.base.len()).map(|i| cross[(i, k)] * solved[(i, l)]).sum();
-                d[(k, l)] -= sum;
-            }
-            g[k] -= (0..self.base.len())
-                .map(|i| solved[(i, k)] * self.base_y[i])
-                .sum::<f64>();
+            g[k] -= dot(column(&solved, k), &self.base_y);
         }
         (d, g, own)
     }
@@ -221,29 +259,29 @@ impl<'m> Trained<'m> {
     /// The best score that each null draw gives to any candidate: `cost` and the inflation of the variance as in the real search.
     pub fn null_best(&self, costs: &[f64], variance: f64) -> Vec<f64> {
         let draws = self.moments.null_cross.nrows();
-        let m = self.base.len();
-        let h = Mat::from_fn(m, draws, |i, d| self.moments.null_base[(self.base[i], d)]);
+        let h = Mat::from_fn(draws, self.base.len(), |d, i| {
+            self.moments.null_base[(self.base[i], d)]
+        });
         let per_chunk: Vec<Vec<f64>> = (0..costs.len())
             .collect::<Vec<_>>()
             .par_chunks(64)
             .map(|chunk| {
                 let mut best = vec![f64::NEG_INFINITY; draws];
+                let mut g = Vec::new();
                 for &candidate in chunk.iter().filter(|candidate| costs[**candidate].is_finite()) {
-                    let (d, _, own) = self.projected(candidate);
+                    let beside = self.beside(candidate);
+                    let (d, _, own) = self.projected_with(candidate, beside.cross(), beside.solved());
                     let inverse = Visible::of(&d, &own);
                     let freedom = self.freedom(candidate, inverse.freedom);
                     if freedom == 0 {
                         continue;
                     }
                     let (first, count) = (self.moments.first[candidate], self.moments.count[candidate]);
-                    let (_, solved) = self.beside(candidate);
+                    let modelled = &h * beside.solved();
                     for draw in 0..draws {
-                        let g: Vec<f64> = (0..count)
-                            .map(|k| {
-                                let modelled: f64 = (0..m).map(|i| solved[(i, k)] * h[(i, draw)]).sum();
-                                self.moments.null_cross[(draw, first + k)] - modelled
-                            })
-                            .collect();
+                        g.clear();
+                        let left = |k: usize| self.moments.null_cross[(draw, first + k)] - modelled[(draw, k)];
+                        g.extend((0..count).map(left));
                         let gain = inverse.quadratic(&g) / variance;
                         // The tail is worth computing only where it can be the best.
                         if most_evidence(gain, freedom) - costs[candidate] <= best[draw] {
@@ -284,7 +322,8 @@ impl<'m> Trained<'m> {
                 }
             }
         }
-        let (_, solved) = self.beside(candidate);
+        let beside = self.beside(candidate);
+        let solved = beside.solved();
         for k in 0..count {
             g[k] -= (0..self.base.len())
                 .map(|i| solved[(i, k)] * gram_with[i])
@@ -313,7 +352,8 @@ impl<'m> Trained<'m> {
     pub fn joined(&self, candidate: usize) -> (Vec<f64>, Vec<f64>) {
         let (d, g, own) = self.projected(candidate);
         let of_candidate = Visible::of(&d, &own).solve(&g);
-        let (_, solved) = self.beside(candidate);
+        let beside = self.beside(candidate);
+        let solved = beside.solved();
         let of_model = (0..self.base.len())
             .map(|i| {
                 let shift: f64 = of_candidate

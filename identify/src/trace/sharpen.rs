@@ -6,6 +6,7 @@
 use std::collections::HashMap;
 
 use abbe_model::effect::{Effect, Shape};
+use rayon::prelude::*;
 
 use super::compose::Composed;
 use super::library::Candidate;
@@ -61,7 +62,7 @@ pub fn sharpened(search: &Search<'_>, model: &Trained<'_>, composed: &[Composed]
     near.sort_by(|a, b| b.1.total_cmp(&a.1).then(a.0.cmp(&b.0)));
     near.truncate(most);
     let mut fresh: Vec<Candidate> = near
-        .into_iter()
+        .into_par_iter()
         .filter_map(|(candidate, _)| {
             let original = &search.candidates[candidate];
             let effect = sharpen(search, model, original, gains[candidate].gain)?;
@@ -74,8 +75,10 @@ pub fn sharpened(search: &Search<'_>, model: &Trained<'_>, composed: &[Composed]
     let mut nearest: Vec<&Composed> = composed.iter().filter(|c| c.evidence >= NEAR * best).collect();
     nearest.sort_by(|a, b| b.evidence.total_cmp(&a.evidence));
     nearest.truncate(most);
-    for composed in nearest {
-        let (effect, gain) = moved_steps(search, model, &composed.candidate);
+    let moved: Vec<(Effect, f64)> = (nearest.par_iter())
+        .map(|composed| moved_steps(search, model, &composed.candidate))
+        .collect();
+    for (composed, (effect, gain)) in nearest.into_iter().zip(moved) {
         let gain = Gain {
             gain,
             freedom: effect.shape.coefficients() + effect.shape.numbers(),

@@ -50,6 +50,9 @@ impl Visible {
                 share,
             };
         }
+        if n == 2 {
+            return Visible::of_two(scaled, scale, share);
+        }
         let Ok(eigen) = scaled.self_adjoint_eigen(faer::Side::Lower) else {
             return Visible {
                 vectors: Mat::identity(n, n),
@@ -71,6 +74,34 @@ impl Visible {
             values,
             scale,
             freedom,
+            share,
+        }
+    }
+
+    /// Of two columns, as sine and cosine have: by one rotation (Jacobi; Golub & Van Loan 8.5).
+    fn of_two(scaled: Mat<f64>, scale: Vec<f64>, share: f64) -> Visible {
+        let (a, b, c) = (scaled[(0, 0)], scaled[(1, 0)], scaled[(1, 1)]);
+        let tangent = if b == 0.0 {
+            0.0
+        } else {
+            let tau = (c - a) / (2.0 * b);
+            tau.signum() / (tau.abs() + 1.0_f64.hypot(tau))
+        };
+        let cos = 1.0 / 1.0_f64.hypot(tangent);
+        let sin = tangent * cos;
+        let values = vec![a - tangent * b, c + tangent * b].into_iter();
+        let values: Vec<f64> = values
+            .map(|value| if value > LEAST_VISIBLE { 1.0 / value } else { 0.0 })
+            .collect();
+        Visible {
+            vectors: Mat::from_fn(2, 2, |i, k| match (i, k) {
+                (0, 1) => sin,
+                (1, 0) => -sin,
+                _ => cos,
+            }),
+            freedom: values.iter().filter(|value| **value > 0.0).count(),
+            values,
+            scale,
             share,
         }
     }
