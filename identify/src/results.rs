@@ -188,6 +188,17 @@ pub struct CurvePoint {
     pub u: f64,
 }
 
+/// A number in an effect's shape that was chosen, not fitted with the coefficients: it has no uncertainty of its own.
+#[derive(Clone, Debug, PartialEq, Serialize, JsonSchema)]
+pub struct ShapeNumber {
+    /// `period`, `time constant`, `width`, `centre`, or `at` for the places of steps.
+    pub name: String,
+    /// One value, or one for each place.
+    pub values: Vec<f64>,
+    /// Unit of what the effect follows: mm, deg, s.
+    pub unit: String,
+}
+
 /// An effect that trace has found.
 #[derive(Clone, Debug, PartialEq, Serialize, JsonSchema)]
 pub struct EffectResult {
@@ -196,6 +207,9 @@ pub struct EffectResult {
     pub name: EffectName,
     /// Its family in the library, in words.
     pub family: String,
+    /// The numbers and places of its shape.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub numbers: Vec<ShapeNumber>,
     /// Its coefficients.
     pub parameters: Vec<ParameterResult>,
     /// For a free curve: its points with their band.

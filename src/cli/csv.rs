@@ -128,7 +128,13 @@ pub fn write_trace(path: &Path, result: &TraceResult) -> Result<(), Failure> {
         rows.parameters(name, &model.parameters);
     }
     for (index, effect) in result.effects.iter().enumerate() {
-        rows.parameters(&format!("effect {}", index + 1), &effect.parameters);
+        let section = format!("effect {}", index + 1);
+        for number in &effect.numbers {
+            for value in &number.values {
+                rows.figure(&section, &number.name, "", *value, &number.unit);
+            }
+        }
+        rows.parameters(&section, &effect.parameters);
     }
     rows.write(path)
 }

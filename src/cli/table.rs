@@ -1,5 +1,7 @@
 //! Tables for people: aligned, with only the digits that mean something.
 
+use abbe::identify::results::ShapeNumber;
+
 /// Prints rows under a header; the first column to the left, the others to the right.
 pub fn print(header: &[&str], rows: &[Vec<String>]) {
     let mut width: Vec<usize> = header.iter().map(|cell| cell.chars().count()).collect();
@@ -47,4 +49,14 @@ pub fn value_and_u(value: f64, u: f64) -> (String, String) {
 pub fn micrometres(value_um: f64) -> String {
     let places = if value_um >= 100.0 { 1 } else { 3 };
     format!("{value_um:.places$} µm")
+}
+
+/// A number or the places of an effect's shape, to four digits: `period 13.78 mm`, `at -84.72, -40.72 mm`.
+pub fn shape_number(number: &ShapeNumber) -> String {
+    let to_four_digits = |value: &f64| {
+        let magnitude = value.abs().max(1e-3).log10().floor() as i32;
+        format!("{value:.*}", (3 - magnitude).clamp(0, 4) as usize)
+    };
+    let values: Vec<String> = number.values.iter().map(to_four_digits).collect();
+    format!("{} {} {}", number.name, values.join(", "), number.unit)
 }

@@ -183,6 +183,9 @@ fn print(result: &TraceResult) {
     say!("held out: leaving out {}", result.heldout_by);
     for (number, effect) in result.effects.iter().enumerate() {
         say!("\n{}. {}  ({})", number + 1, name(&effect.name), effect.family);
+        for number in &effect.numbers {
+            say!("   {}", table::shape_number(number));
+        }
         for p in &effect.parameters {
             let (value, u) = table::value_and_u(p.value, p.u);
             say!("   {}  {value} ± {u} {}", p.id, p.unit);

@@ -15,6 +15,7 @@ use super::plot::lines::{ACROSS, Lines, Mark, Series, UP, span};
 use super::plot::scale::{Scale, place, polyline};
 use super::plot::{Plot, cut};
 use super::readings::{self, um, unit, value_and_u};
+use crate::cli::table::shape_number;
 use crate::cli::trace::name;
 
 /// Effects whose rivals are drawn.
@@ -142,6 +143,7 @@ fn effects(document: &mut Document, trace: &Trace<'_>) -> Markup {
 
 /// A found effect as a row of a table.
 fn row((number, effect): (usize, &EffectResult)) -> Vec<String> {
+    let numbers = effect.numbers.iter().map(|number| unit(&shape_number(number)));
     let values: Vec<String> = effect
         .parameters
         .iter()
@@ -154,6 +156,7 @@ fn row((number, effect): (usize, &EffectResult)) -> Vec<String> {
                 .trim()
                 .to_string()
         })
+        .chain(numbers)
         .collect();
     vec![
         (number + 1).to_string(),

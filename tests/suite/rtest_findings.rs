@@ -4,7 +4,6 @@
 use std::f64::consts::FRAC_PI_2;
 
 use abbe::identify::trace::{Trace, TraceOptions, trace};
-use abbe::model::effect::Shape as ModelShape;
 use abbe::model::session::read::{self, ReadOptions};
 
 use crate::plant::machine::Stated;
@@ -150,14 +149,11 @@ fn staircase(outcome: &Trace<'_>, component: &str) -> Option<Vec<(f64, f64)>> {
         .effects
         .iter()
         .position(|effect| effect.component.to_string() == component)?;
-    let ModelShape::Steps { at } = &outcome.effects[number].shape else {
-        return None;
-    };
-    let heights = outcome.result.effects[number]
-        .parameters
-        .iter()
-        .map(|height| height.value);
-    Some(at.iter().copied().zip(heights).collect())
+    let effect = &outcome.result.effects[number];
+    let at = effect.numbers.iter().find(|number| number.name == "at")?;
+    assert_eq!(at.unit, "mm");
+    let heights = effect.parameters.iter().map(|height| height.value);
+    Some(at.values.iter().copied().zip(heights).collect())
 }
 
 /// How high a staircase stands at a position, µm.

@@ -248,7 +248,14 @@ impl Moments {
         let rank = self.base();
         let side = beside(&self.base_columns, &self.residual);
         let candidates = self.count.len()..layouts.len();
-        let (fresh, products) = laid(columns, layouts, candidates.clone(), &self.blocks, &side, &self.null);
+        let (fresh, products) = laid(
+            columns,
+            layouts,
+            candidates.clone(),
+            &self.blocks,
+            &side,
+            &self.null,
+        );
         let draws = self.null.ncols();
         let products = Products::joined(products, columns.fold_rows.len(), rank + 1, draws);
         let total = self.null_cross.ncols();
@@ -443,7 +450,10 @@ impl Products {
         let sides = (0..folds).into_par_iter().map(fold).collect();
         let null = joined(draws, parts.iter().map(|part| &part.null));
         let mut own = vec![Vec::new(); folds];
-        for (fold, of_part) in parts.into_iter().flat_map(|part| part.own.into_iter().enumerate()) {
+        for (fold, of_part) in parts
+            .into_iter()
+            .flat_map(|part| part.own.into_iter().enumerate())
+        {
             own[fold].extend(of_part);
         }
         Products {
@@ -509,7 +519,14 @@ fn null_product(
     for rows in columns.moved_rows(layouts) {
         let draws = null.as_ref().subrows(rows.start, rows.len());
         let part = all.subrows(rows.start, rows.len());
-        matmul(product.as_mut(), Accum::Add, draws.transpose(), part, 1.0, Par::Seq);
+        matmul(
+            product.as_mut(),
+            Accum::Add,
+            draws.transpose(),
+            part,
+            1.0,
+            Par::Seq,
+        );
     }
     product
 }

@@ -13,7 +13,8 @@ use crate::heldout::rms_mm;
 use crate::parameters::Role;
 use crate::problem::Problem;
 use crate::results::{
-    CurvePoint, EffectName, EffectResult, ModelResult, Moved, ParameterResult, Remainder, TraceResult,
+    CurvePoint, EffectName, EffectResult, ModelResult, Moved, ParameterResult, Remainder, ShapeNumber,
+    TraceResult,
 };
 
 /// What a search has come to.
@@ -103,6 +104,7 @@ pub(super) fn report(findings: &Findings<'_, '_>) -> Result<Reported, IdentifyEr
                 .get(candidate.family)
                 .map(|family| family.name.clone())
                 .unwrap_or_default(),
+            numbers: numbers_of(after, &candidate.effect),
             parameters: parameters_of(after, after_fit, k + before.parameters.effects.len()),
             curve: curve_of(after, after_fit, k + before.parameters.effects.len()),
             curve_at_unit: curve_units(after, &candidate.effect).0,
@@ -248,19 +250,44 @@ fn curve_units(problem: &Problem<'_>, effect: &Effect) -> (String, String) {
     if !matches!(effect.shape, Shape::Curve { .. }) {
         return (String::new(), String::new());
     }
-    let rotary = match &effect.driver {
-        Driver::Axis(name) => problem
-            .session
-            .machine
-            .axis_index(name)
-            .is_some_and(|axis| problem.session.machine.axes[axis].kind == AxisKind::Rotary),
-        _ => false,
-    };
-    let at = if rotary { "deg" } else { "mm" };
     (
-        at.to_string(),
+        driver_unit(problem, effect).0.to_string(),
         crate::drivers::coefficient_unit(problem.session, effect).name,
     )
+}
+
+/// The unit in which results give places on what an effect follows, and how many of it are one inside unit.
+fn driver_unit(problem: &Problem<'_>, effect: &Effect) -> (&'static str, f64) {
+    let machine = &problem.session.machine;
+    let kind = match &effect.driver {
+        Driver::Axis(name) => machine.axis_index(name).map(|axis| machine.axes[axis].kind),
+        Driver::Time => return ("s", 1.0),
+        _ => None,
+    };
+    if kind == Some(AxisKind::Rotary) {
+        ("deg", 1.0_f64.to_degrees())
+    } else {
+        ("mm", 1.0)
+    }
+}
+
+/// The numbers and places of an effect's shape.
+fn numbers_of(problem: &Problem<'_>, effect: &Effect) -> Vec<ShapeNumber> {
+    let (unit, per_inside) = driver_unit(problem, effect);
+    let numbers = match &effect.shape {
+        Shape::Periodic { period } => vec![("period", vec![*period])],
+        Shape::ReversalSpike { width } => vec![("width", vec![*width])],
+        Shape::Warmup { tau_s } => vec![("time constant", vec![*tau_s])],
+        Shape::Local { centre, width, .. } => vec![("centre", vec![*centre]), ("width", vec![*width])],
+        Shape::Steps { at } => vec![("at", at.clone())],
+        _ => Vec::new(),
+    };
+    let number = |(name, values): (&str, Vec<f64>)| ShapeNumber {
+        name: name.to_string(),
+        values: values.into_iter().map(|value| value * per_inside).collect(),
+        unit: unit.to_string(),
+    };
+    numbers.into_iter().map(number).collect()
 }
 
 /// How far the unknowns would move if an alias stood in an effect's place: the largest move of each, inside units.

@@ -196,7 +196,9 @@ impl<'m> Trained<'m> {
         let over_parts = |of: &dyn Fn(&FoldMoments) -> f64| -> f64 {
             self.parts.iter().map(|(part, sign)| sign * of(part)).sum()
         };
-        let mut own = Mat::from_fn(count, count, |k, l| over_parts(&|part| part.own[candidate][(k, l)]));
+        let mut own = Mat::from_fn(count, count, |k, l| {
+            over_parts(&|part| part.own[candidate][(k, l)])
+        });
         let mut g: Vec<f64> = (0..count)
             .map(|k| over_parts(&|part| part.cross_y[first + k]))
             .collect();
@@ -280,7 +282,8 @@ impl<'m> Trained<'m> {
                     let modelled = &h * beside.solved();
                     for draw in 0..draws {
                         g.clear();
-                        let left = |k: usize| self.moments.null_cross[(draw, first + k)] - modelled[(draw, k)];
+                        let left =
+                            |k: usize| self.moments.null_cross[(draw, first + k)] - modelled[(draw, k)];
                         g.extend((0..count).map(left));
                         let gain = inverse.quadratic(&g) / variance;
                         // The tail is worth computing only where it can be the best.
