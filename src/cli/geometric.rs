@@ -1,6 +1,6 @@
 //! `abbe fit --method circle|cone|two-plane`: a geometric method beside the full fit.
 
-use abbe::identify::geometric::{self, Comparison, Method};
+use abbe::identify::geometric::{self, Comparison, ComparisonRow, Method};
 use abbe::model::session::Session;
 
 use super::failure::Failure;
@@ -72,46 +72,7 @@ fn print(result: &Comparison) {
         "\n{} beside the full fit; bias on noise-free readings with the full fit's errors:",
         result.method
     );
-    let rows: Vec<Vec<String>> = result
-        .errors
-        .iter()
-        .map(|row| {
-            let pair = |value: Option<f64>, u: Option<f64>| match (value, u) {
-                (Some(value), Some(u)) => {
-                    let (value, u) = table::value_and_u(value, u);
-                    [value, u]
-                }
-                _ => ["–".to_string(), "–".to_string()],
-            };
-            let bias =
-                |bias: Option<f64>| bias.map_or("–".to_string(), |bias| format!("{:.4}", bias + 0.0));
-            let [value, u] = pair(row.value, row.u);
-            let [full, full_u] = pair(row.full_value, row.full_u);
-            vec![
-                row.id.clone(),
-                value,
-                u,
-                bias(row.bias),
-                full,
-                full_u,
-                bias(row.full_bias),
-                row.unit.clone(),
-            ]
-        })
-        .collect();
-    table::print(
-        &[
-            "error",
-            result.method.as_str(),
-            "u (k=1)",
-            "bias",
-            "full fit",
-            "u (k=1)",
-            "bias",
-            "unit",
-        ],
-        &rows,
-    );
+    table::print(&error_header(result), &error_rows(result));
     say!(
         "\nResidual of the tests that the method takes: {} nominal, {} with its errors; of all tests {} with the full fit",
         table::micrometres(result.nominal_rms_um),
@@ -119,4 +80,39 @@ fn print(result: &Comparison) {
         table::micrometres(result.rms_um)
     );
     fit::print_warnings(&result.warnings);
+}
+
+/// Header of [`error_rows`].
+pub fn error_header(result: &Comparison) -> [&str; 8] {
+    let method = result.method.as_str();
+    [
+        "error", method, "u (k=1)", "bias", "full fit", "u (k=1)", "bias", "unit",
+    ]
+}
+
+/// The errors by the method and by the full fit, a row an error.
+pub fn error_rows(result: &Comparison) -> Vec<Vec<String>> {
+    let pair = |value: Option<f64>, u: Option<f64>| match (value, u) {
+        (Some(value), Some(u)) => table::value_and_u(value, u),
+        _ => ("–".to_string(), "–".to_string()),
+    };
+    // Without the sign of what is rounded to nothing.
+    let rounded = |bias: f64| (bias * 1e4).round() / 1e4 + 0.0;
+    let bias = |bias: Option<f64>| bias.map_or("–".to_string(), |bias| format!("{:.4}", rounded(bias)));
+    let row = |row: &ComparisonRow| {
+        let (value, u) = pair(row.value, row.u);
+        let (full, full_u) = pair(row.full_value, row.full_u);
+        let [of_method, of_full] = [bias(row.bias), bias(row.full_bias)];
+        vec![
+            row.id.clone(),
+            value,
+            u,
+            of_method,
+            full,
+            full_u,
+            of_full,
+            row.unit.clone(),
+        ]
+    };
+    result.errors.iter().map(row).collect()
 }

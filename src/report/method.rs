@@ -7,7 +7,8 @@ use maud::{Markup, html};
 use super::document::{Document, list, table};
 use super::plot::Plot;
 use super::plot::bars::{Row, Value, values};
-use super::readings::{self, um, unit, value_and_u};
+use super::readings::{self, typeset, um, unit, value_and_u};
+use crate::cli::geometric::{error_header, error_rows};
 
 /// How the errors were found.
 pub fn method(result: &Comparison) -> Markup {
@@ -83,48 +84,13 @@ fn plots(result: &Comparison) -> Vec<Plot> {
 }
 
 fn errors(result: &Comparison) -> Markup {
-    let pair = |value: Option<f64>, u: Option<f64>| match (value, u) {
-        (Some(value), Some(u)) => value_and_u(value, u),
-        _ => ("–".to_string(), "–".to_string()),
-    };
-    let bias = |bias: Option<f64>| {
-        // Without the sign of what is rounded to nothing.
-        let rounded = |bias: f64| (bias * 1e4).round() / 1e4 + 0.0;
-        bias.map_or("–".to_string(), |bias| {
-            format!("{:.4}", rounded(bias)).replace('-', "\u{2212}")
-        })
-    };
-    let rows: Vec<Vec<String>> = result
-        .errors
-        .iter()
-        .map(|row| {
-            let (value, u) = pair(row.value, row.u);
-            let (full, full_u) = pair(row.full_value, row.full_u);
-            vec![
-                row.id.clone(),
-                value,
-                u,
-                bias(row.bias),
-                full,
-                full_u,
-                bias(row.full_bias),
-                unit(&row.unit),
-            ]
-        })
-        .collect();
-    table(
-        &[
-            "error",
-            &result.method,
-            "u (k=1)",
-            "bias",
-            "full fit",
-            "u (k=1)",
-            "bias",
-            "unit",
-        ],
-        &rows,
-    )
+    let mut rows = typeset(error_rows(result));
+    for row in &mut rows {
+        if let Some(name) = row.last_mut() {
+            *name = unit(name);
+        }
+    }
+    table(&error_header(result), &rows)
 }
 
 fn centres(result: &Comparison) -> Markup {

@@ -7,7 +7,8 @@ use maud::{Markup, html};
 
 use super::document::{Document, list, table};
 use super::plot::bars::{Fill, bars};
-use super::readings;
+use super::readings::{self, typeset};
+use crate::cli::plan::improve::{RANGES, range_rows};
 
 /// How tests are proposed.
 pub fn method() -> Markup {
@@ -151,24 +152,9 @@ fn uncertainties(found: &Improvement) -> Markup {
 }
 
 fn shrinkages(ranges: &[Shrinkage]) -> Markup {
-    let rows: Vec<Vec<String>> = ranges
-        .iter()
-        .map(|range| {
-            let span = |[low, high]: [f64; 2]| {
-                format!("{low:.0} … {high:.0} {}", range.unit).replace('-', "\u{2212}")
-            };
-            vec![
-                range.test.clone(),
-                range.axis.clone(),
-                span(range.range),
-                range.least.map_or("can be left out".into(), span),
-                range.first_to_double.clone().unwrap_or("—".into()),
-            ]
-        })
-        .collect();
     html! {
         p { "About its middle, before an uncertainty doubles." }
-        (table(&["test", "axis", "planned", "least", "doubles first"], &rows))
+        (table(&RANGES, &typeset(range_rows(ranges))))
     }
 }
 

@@ -30,6 +30,18 @@ pub fn unit(name: &str) -> String {
     name.replace("um", "µm").replace("deg", "°")
 }
 
+/// Cells as they are printed, with a minus that is one before numbers.
+pub fn typeset(rows: Vec<Vec<String>>) -> Vec<Vec<String>> {
+    let word = |word: &str| match word.strip_prefix('-') {
+        Some(number) if number.starts_with(|c: char| c.is_ascii_digit()) => format!("\u{2212}{number}"),
+        _ => word.to_string(),
+    };
+    let cell = |cell: String| cell.split(' ').map(word).collect::<Vec<_>>().join(" ");
+    rows.into_iter()
+        .map(|row| row.into_iter().map(cell).collect())
+        .collect()
+}
+
 /// A value and its uncertainty, rounded alike, with a minus that is one.
 pub fn value_and_u(value: f64, u: f64) -> (String, String) {
     let (value, u) = crate::cli::table::value_and_u(value, u);

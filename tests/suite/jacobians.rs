@@ -55,6 +55,17 @@ fn r_test(setting: Setting, workpiece_ball: [f64; 3], spindle_ball: [f64; 3]) ->
     })
 }
 
+/// Every instrument between two points.
+fn every_station(table: [f64; 3], tool: [f64; 3]) -> [Station<f64>; 5] {
+    [
+        ball_bar(table, tool),
+        tracker(tool),
+        probe(table, tool),
+        r_test(Setting::Table, table, tool),
+        r_test(Setting::Spindle, table, tool),
+    ]
+}
+
 /// States anywhere in reach.
 fn states(machine: &Machine, rows: usize, random: &mut impl Rng) -> Readings {
     let positions = machine.axes.iter().map(|axis| {
@@ -128,13 +139,7 @@ fn derivatives_agree_with_central_differences_on_every_topology() {
         for machine in topologies::all(&mut random) {
             let mut point = || [(); 3].map(|()| uniform(&mut random, 300.0));
             let (table, tool) = (point(), point());
-            for station in [
-                ball_bar(table, tool),
-                tracker(tool),
-                probe(table, tool),
-                r_test(Setting::Table, table, tool),
-                r_test(Setting::Spindle, table, tool),
-            ] {
+            for station in every_station(table, tool) {
                 let kind = station.kind();
                 let worst = worst(&machine, station, &mut random);
                 // Differences over 1e-4 rad miss by that squared times the lever: 5 m of a cylinder in place of 300 mm.
@@ -204,13 +209,7 @@ fn the_recorded_chain_is_the_chain_over_dual_numbers_at_large_errors() {
             machine.rotation = rotation;
             let mut point = || [(); 3].map(|()| uniform(&mut random, 300.0));
             let (table, tool) = (point(), point());
-            for station in [
-                ball_bar(table, tool),
-                tracker(tool),
-                probe(table, tool),
-                r_test(Setting::Table, table, tool),
-                r_test(Setting::Spindle, table, tool),
-            ] {
+            for station in every_station(table, tool) {
                 let kind = station.kind();
                 let worst = worst_beside_duals(&machine, station, &mut random);
                 // The normal of a cylinder under 10 mm and 0.1 rad can be far from where it was: cancellation, not another formula.

@@ -288,21 +288,26 @@ fn point(mm: [f64; 3]) -> String {
     format!("({}) mm", cells.join(", "))
 }
 
+/// Header of [`range_rows`].
+pub const RANGES: [&str; 5] = ["test", "axis", "planned", "least", "doubles first"];
+
+/// How far each sweep can shrink, a row a sweep.
+pub fn range_rows(ranges: &[Shrinkage]) -> Vec<Vec<String>> {
+    let row = |range: &Shrinkage| {
+        let span = |[low, high]: [f64; 2]| format!("{low:.0} … {high:.0} {}", range.unit);
+        vec![
+            range.test.clone(),
+            range.axis.clone(),
+            span(range.range),
+            range.least.map_or("can be left out".into(), span),
+            range.first_to_double.clone().unwrap_or("—".into()),
+        ]
+    };
+    ranges.iter().map(row).collect()
+}
+
 /// Prints how far sweeps can shrink.
 pub fn print_ranges(ranges: &[Shrinkage]) {
     say!("\nHow far each sweep can shrink about its middle before an uncertainty doubles:");
-    let rows: Vec<Vec<String>> = ranges
-        .iter()
-        .map(|range| {
-            let span = |[low, high]: [f64; 2]| format!("{low:.0} … {high:.0} {}", range.unit);
-            vec![
-                range.test.clone(),
-                range.axis.clone(),
-                span(range.range),
-                range.least.map_or("can be left out".into(), span),
-                range.first_to_double.clone().unwrap_or("—".into()),
-            ]
-        })
-        .collect();
-    table::print(&["test", "axis", "planned", "least", "doubles first"], &rows);
+    table::print(&RANGES, &range_rows(ranges));
 }

@@ -1,6 +1,6 @@
 //! `abbe plan`.
 
-mod improve;
+pub mod improve;
 mod patterns;
 mod tables;
 
