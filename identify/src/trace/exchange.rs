@@ -20,9 +20,9 @@ const MOST_SHARPENED: usize = 4;
 /// How many are tried beside an effect that is fitted anew: on all readings, and where one fold is left out.
 const MOST_TRIED: usize = 6;
 const MOST_TRIED_TO_PREDICT: usize = 2;
-/// How many are tried as the first of two that are looked for together: on all readings, and where one fold is left out.
+/// How many are tried as the first of two that are looked for together: in the place of two, and in the place of one or to predict a fold.
 const MOST_FIRSTS: usize = 32;
-const MOST_FIRSTS_TO_PREDICT: usize = 8;
+const FEW_FIRSTS: usize = 8;
 /// The most effects that are fitted anew beside others.
 const MOST_ANEW: usize = 3;
 /// Relative difference of scores below which two candidates do the same.
@@ -127,11 +127,15 @@ impl Search<'_> {
         if self.stop.in_residual_variance {
             return false;
         }
-        let changed: Vec<bool> = (0..self.tracks.len())
-            .map(|track| self.regroup_one(track))
-            .collect();
+        // Where all readings say no more in another pair, those of a fold have no reason to.
+        if !self.regroup_one(ALL) {
+            return false;
+        }
+        for track in ALL + 1..self.tracks.len() {
+            self.regroup_one(track);
+        }
         self.note_held_out();
-        changed[ALL]
+        true
     }
 
     fn regroup_one(&mut self, track: usize) -> bool {
@@ -156,7 +160,9 @@ impl Search<'_> {
                 .filter(|k| *k != i && *k != j)
                 .map(|k| chosen[k])
                 .collect();
-            let firsts = self.simple_firsts(&base, &folds);
+            let in_place_of_two = i != j && track == ALL;
+            let count = if in_place_of_two { MOST_FIRSTS } else { FEW_FIRSTS };
+            let firsts = self.simple_firsts(&base, &folds, count);
             self.materialise(&firsts);
             for first in firsts {
                 let beside: Vec<usize> = base.iter().copied().chain([first]).collect();
@@ -198,7 +204,7 @@ impl Search<'_> {
 
     /// Effects without numbers or places of their own that explain anything beside some others, the best first; of those that do the very same to the
     /// readings one.
-    fn simple_firsts(&self, base: &[usize], folds: &[usize]) -> Vec<usize> {
+    fn simple_firsts(&self, base: &[usize], folds: &[usize], most: usize) -> Vec<usize> {
         let model = self.model_of(base, folds);
         let variance = self.variance(&model);
         let gains = model.gains();
@@ -211,11 +217,6 @@ impl Search<'_> {
         scored.dedup_by(|a, b| {
             (a.1 - b.1).abs() < SAME * b.1.abs() && gains[a.0].freedom == gains[b.0].freedom
         });
-        let most = if self.sees_all(folds) {
-            MOST_FIRSTS
-        } else {
-            MOST_FIRSTS_TO_PREDICT
-        };
         scored.into_iter().take(most).map(|(c, _)| c).collect()
     }
 
