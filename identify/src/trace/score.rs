@@ -196,7 +196,9 @@ impl<'m> Trained<'m> {
         let over_parts = |of: &dyn Fn(&FoldMoments) -> f64| -> f64 {
             self.parts.iter().map(|(part, sign)| sign * of(part)).sum()
         };
-        let mut own = Mat::from_fn(count, count, |k, l| over_parts(&|part| part.own[candidate][(k, l)]));
+        let mut own = Mat::from_fn(count, count, |k, l| {
+            over_parts(&|part| part.own[candidate][(k, l)])
+        });
         let mut g: Vec<f64> = (0..count)
             .map(|k| over_parts(&|part| part.cross_y[first + k]))
             .collect();
@@ -250,10 +252,17 @@ impl<'m> Trained<'m> {
 
     /// What every candidate would gain.
     pub fn gains(&self) -> Vec<Gain> {
-        (0..self.moments.count.len())
-            .into_par_iter()
-            .map(|candidate| self.gain(candidate))
-            .collect()
+        self.more_gains(Vec::new())
+    }
+
+    /// The same, where those of the first candidates are known from the same model.
+    pub fn more_gains(&self, mut known: Vec<Gain>) -> Vec<Gain> {
+        known.par_extend(
+            (known.len()..self.moments.count.len())
+                .into_par_iter()
+                .map(|candidate| self.gain(candidate)),
+        );
+        known
     }
 
     /// The best score that each null draw gives to any candidate: `cost` and the inflation of the variance as in the real search.
@@ -280,7 +289,8 @@ impl<'m> Trained<'m> {
                     let modelled = &h * beside.solved();
                     for draw in 0..draws {
                         g.clear();
-                        let left = |k: usize| self.moments.null_cross[(draw, first + k)] - modelled[(draw, k)];
+                        let left =
+                            |k: usize| self.moments.null_cross[(draw, first + k)] - modelled[(draw, k)];
                         g.extend((0..count).map(left));
                         let gain = inverse.quadratic(&g) / variance;
                         // The tail is worth computing only where it can be the best.
