@@ -89,13 +89,13 @@ pub fn samples(
 /// The basis functions of a shape over a driver: one column a coefficient.
 pub fn basis_columns(shape: &Shape, samples: &[DriverSample<f64>]) -> Vec<Vec<f64>> {
     let count = shape.coefficients();
-    let mut columns = vec![Vec::with_capacity(samples.len()); count];
+    let mut columns = vec![vec![0.0; samples.len()]; count];
     let mut row = Vec::with_capacity(count);
-    for sample in samples {
+    for (i, sample) in samples.iter().enumerate() {
         row.clear();
         shape.basis(sample, &mut row);
         for (column, value) in columns.iter_mut().zip(&row) {
-            column.push(*value);
+            column[i] = *value;
         }
     }
     columns

@@ -267,17 +267,27 @@ impl<'a> Problem<'a> {
     /// Divides rows by the noise: `(x_t − Σ a_k x_{t−k})/σ_innovation` along a run, and drops rejected ones. Returns the rows that remain, with
     /// the fold of each.
     pub fn whiten(&self, rows: &Mat<f64>, block: &Block) -> (Mat<f64>, Vec<usize>) {
+        let kept = self.kept_rows(block);
+        let folds = self.folds_of(&kept, block).collect();
+        (self.whitened(rows.clone(), &kept), folds)
+    }
+
+    /// The fold of each of some scalar rows of a block.
+    pub fn folds_of(&self, rows: &[usize], block: &Block) -> impl Iterator<Item = usize> {
+        let fold_of = &self.folds.of_row[block.test][block.rows.clone()];
+        let coordinates = self.coordinates();
+        rows.iter().map(move |i| fold_of[i / coordinates])
+    }
+
+    /// The rows of [`Problem::whiten`], where it is known which are kept.
+    pub fn whitened(&self, mut rows: Mat<f64>, kept: &[usize]) -> Mat<f64> {
         let coordinates = self.coordinates();
         let memory = &self.noise.memory;
-        let fold_of = &self.folds.of_row[block.test];
-        let kept = self.kept_rows(block);
         let innovation = 1.0 / self.noise.innovation_mm();
         let marginal = 1.0 / self.noise.sigma_mm;
-        let folds = (kept.iter())
-            .map(|i| fold_of[block.rows.start + i / coordinates])
-            .collect();
         if memory.is_empty() && kept.len() == rows.nrows() {
-            return (rows * faer::Scale(innovation), folds);
+            rows *= faer::Scale(innovation);
+            return rows;
         }
         let mut white = Mat::zeros(kept.len(), rows.ncols());
         for (mut white, column) in white.col_iter_mut().zip(rows.col_iter()) {
@@ -291,7 +301,7 @@ impl<'a> Problem<'a> {
                 };
             }
         }
-        (white, folds)
+        white
     }
 
     /// The triangle of each fold at the unknowns' values, in inside units of the unknowns.
@@ -326,7 +336,9 @@ impl<'a> Problem<'a> {
         let mut narrow = Narrow::new();
         for block in blocks {
             let rows = self.own_rows(&values[block.test], block)?;
-            let (white, folds) = self.whiten(&rows, block);
+            let kept = self.kept_rows(block);
+            let folds: Vec<usize> = self.folds_of(&kept, block).collect();
+            let white = self.whitened(rows, &kept);
             let present: BTreeSet<usize> = folds.iter().copied().collect();
             for fold in &present {
                 let triangle = narrow

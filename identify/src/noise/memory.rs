@@ -84,7 +84,11 @@ fn without_trends_taken(
         let (process, shown) = with_trends_out(&coefficients, lengths);
         variance = seen[0] / shown[0];
         let corrected = std::array::from_fn(|lag| seen[lag] + variance * (process[lag] - shown[lag]));
-        coefficients = autoregression(&corrected, order, insignificant);
+        let next = autoregression(&corrected, order, insignificant);
+        if next == coefficients {
+            break;
+        }
+        coefficients = next;
     }
     (coefficients, variance)
 }

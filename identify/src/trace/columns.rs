@@ -76,6 +76,8 @@ pub struct Columns<'p, 'a> {
     /// Place of each slot among the sensitivities, by test.
     place: Vec<HashMap<usize, usize>>,
     blocks: Vec<Block>,
+    /// The scalar rows of each block that whitening keeps.
+    kept: Vec<Vec<usize>>,
     /// Where each whitened row goes, block after block, so that folds lie together.
     target: Vec<usize>,
     /// The rows of each fold.
@@ -138,13 +140,12 @@ impl<'p, 'a> Columns<'p, 'a> {
         let blocks = problem.blocks();
         let mut fold_of = Vec::new();
         let mut fold_tests = vec![BTreeSet::new(); problem.folds.count];
-        for block in &blocks {
-            let rows = Mat::<f64>::zeros(block.rows.len() * problem.coordinates(), 0);
-            let folds = problem.whiten(&rows, block).1;
-            folds.iter().for_each(|fold| {
-                fold_tests[*fold].insert(block.test);
-            });
-            fold_of.extend(folds);
+        let kept: Vec<Vec<usize>> = blocks.iter().map(|block| problem.kept_rows(block)).collect();
+        for (block, kept) in blocks.iter().zip(&kept) {
+            for fold in problem.folds_of(kept, block) {
+                fold_tests[fold].insert(block.test);
+                fold_of.push(fold);
+            }
         }
         let mut next = 0;
         let mut target = vec![0; fold_of.len()];
@@ -162,6 +163,7 @@ impl<'p, 'a> Columns<'p, 'a> {
             sensitivities,
             place,
             blocks,
+            kept,
             rows: target.len(),
             target,
             fold_rows,
@@ -459,24 +461,48 @@ impl<'p, 'a> Columns<'p, 'a> {
             .collect()
     }
 
+    /// The stretches of rows of some folds in which any of the layouts moves anything.
+    pub fn moved_stretches(
+        &self,
+        layouts: &[Layout],
+        folds: impl IntoIterator<Item = usize>,
+    ) -> Vec<std::ops::Range<usize>> {
+        let moved = self.moved_rows(layouts);
+        let mut stretches: Vec<std::ops::Range<usize>> = Vec::new();
+        for rows in folds
+            .into_iter()
+            .map(|fold| &moved[fold])
+            .filter(|rows| !rows.is_empty())
+        {
+            match stretches.last_mut() {
+                Some(last) if last.end == rows.start => last.end = rows.end,
+                _ => stretches.push(rows.clone()),
+            }
+        }
+        stretches
+    }
+
     /// Fills columns, which are zero before, with the whitened rows of layouts, one after another.
     pub fn fill(&self, layouts: &[&Layout], mut columns: MatMut<'_, f64>) {
         let total: usize = layouts.iter().map(|layout| layout.count).sum();
         let mut start = 0;
-        for block in &self.blocks {
-            if !layouts.iter().any(|layout| layout.acts_in(block.test)) {
-                start += self.problem.kept_rows(block).len();
+        for (block, kept) in self.blocks.iter().zip(&self.kept) {
+            let target = &self.target[start..start + kept.len()];
+            start += kept.len();
+            if target.is_empty() || !layouts.iter().any(|layout| layout.acts_in(block.test)) {
                 continue;
             }
-            let raw = self.block_rows(layouts, block);
-            let (white, _) = self.problem.whiten(&raw, block);
-            let target = &self.target[start..start + white.nrows()];
+            let white = self.problem.whitened(self.block_rows(layouts, block), kept);
+            let together = target[target.len() - 1] - target[0] + 1 == target.len();
             for (mut column, white) in columns.as_mut().col_iter_mut().zip(white.col_iter()).take(total) {
+                if together {
+                    column.subrows_mut(target[0], target.len()).copy_from(white);
+                    continue;
+                }
                 for (place, value) in target.iter().zip(white.iter()) {
                     column[*place] = *value;
                 }
             }
-            start += white.nrows();
         }
     }
 
@@ -515,8 +541,7 @@ impl<'p, 'a> Columns<'p, 'a> {
         let coordinates = self.problem.coordinates();
         let mut origins = vec![(0, 0, 0); self.rows];
         let mut start = 0;
-        for block in &self.blocks {
-            let kept = self.problem.kept_rows(block);
+        for (block, kept) in self.blocks.iter().zip(&self.kept) {
             for (k, i) in kept.iter().enumerate() {
                 let row = block.rows.start + i / coordinates;
                 origins[self.target[start + k]] = (block.test, row, i % coordinates);

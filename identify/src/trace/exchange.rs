@@ -45,11 +45,13 @@ impl Search<'_> {
         let Track { folds, .. } = self.tracks[track].clone();
         let mut others = self.tracks[track].chosen();
         let present = others.remove(k);
-        if (1..MOST_SHARPENED).contains(&others.len()) && !self.stop.in_residual_variance {
-            self.sharpen(&others, &folds);
-        }
+        let known = if (1..MOST_SHARPENED).contains(&others.len()) && !self.stop.in_residual_variance {
+            self.sharpen(&others, &folds)
+        } else {
+            Vec::new()
+        };
         let model = self.model_of(&others, &folds);
-        let gains = model.gains();
+        let gains = model.more_gains(known);
         let score = self.score(present, &gains[present], self.variance(&model));
         let better = self
             .best_of(&model, &gains, &others)

@@ -19,9 +19,6 @@ const TOLD_APART_SIGMA: f64 = 3.0;
 /// # Errors
 /// If an effect cannot be laid over the session.
 pub fn tell_apart(trace: &mut Trace<'_>, menu: &Menu) -> Result<(), IdentifyError> {
-    if crate::plan::menu::entries(trace.after.session, menu).is_err() {
-        return Ok(());
-    }
     let first = trace.before.parameters.effects.len();
     for (k, found) in trace.effects.iter().enumerate() {
         let is_own = |role: &Role| matches!(role, Role::Coefficient { effect, .. } if *effect == first + k);
@@ -36,8 +33,11 @@ pub fn tell_apart(trace: &mut Trace<'_>, menu: &Menu) -> Result<(), IdentifyErro
             .collect();
         for alias in trace.look_alikes[k].iter().take(MOST_TRIED) {
             let beta = &trace.after_fit.beta;
-            let Some(test) = separation(&trace.after, beta, found, &coefficients, alias, menu)? else {
-                continue;
+            let test = match separation(&trace.after, beta, found, &coefficients, alias, menu) {
+                Ok(Some(test)) => test,
+                Ok(None) => continue,
+                Err(IdentifyError::Request(_)) => return Ok(()),
+                Err(error) => return Err(error),
             };
             if test.after < TOLD_APART_SIGMA {
                 continue;

@@ -23,10 +23,12 @@ pub mod score;
 pub mod search;
 pub mod sharpen;
 pub mod tail;
+pub mod trial;
 mod visible;
 
 use abbe_model::effect::Effect;
 use abbe_model::session::Session;
+
 use faer::Mat;
 use rayon::prelude::*;
 
@@ -173,20 +175,12 @@ fn trace_with<'a>(
         let (count, seed) = (draws_of(options), options.seed);
         null::draws(&problem, &columns, pure, &start.residual, count, block, seed)
     };
-    let draws = null(null::BLOCK);
-    let structure_before = if poses {
-        None
-    } else {
+    let structure_before = || {
         let (model, prior) = (start.model.clone(), start.prior());
-        Some(remainder::structure(
-            &problem,
-            &columns,
-            model,
-            &start.residual,
-            null(null::SINGLE),
-            &prior,
-        ))
+        let draws = null(null::SINGLE);
+        remainder::structure(&problem, &columns, model, &start.residual, draws, &prior)
     };
+    let (draws, structure_before) = rayon::join(|| null(null::BLOCK), || (!poses).then(structure_before));
 
     let mut candidates = library::candidates(&problem)?;
     candidates.retain(|candidate| chosen(options, &candidate.effect.id()));

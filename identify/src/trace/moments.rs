@@ -110,7 +110,7 @@ pub(super) fn grow(
     matrix.resize_with(rows, columns, value);
 }
 
-fn transposed_product(a: MatRef<'_, f64>, b: MatRef<'_, f64>) -> Mat<f64> {
+pub(super) fn transposed_product(a: MatRef<'_, f64>, b: MatRef<'_, f64>) -> Mat<f64> {
     let mut product = Mat::zeros(a.ncols(), b.ncols());
     matmul(product.as_mut(), Accum::Replace, a.transpose(), b, 1.0, Par::Seq);
     product
@@ -303,54 +303,14 @@ impl Moments {
         }
     }
 
-    /// What a layout would gain beside a model, on the folds that the model is trained on.
-    pub fn gain_of(
-        &self,
-        columns: &Columns<'_, '_>,
-        layout: &Layout,
-        model: &super::score::Trained<'_>,
-    ) -> f64 {
-        let (base, inverse, base_y) = (&model.base, &model.inverse, &model.base_y);
-        let mut fresh = Mat::zeros(columns.rows(), layout.count);
-        columns.fill(&[layout], fresh.as_mut());
-        let residual = MatRef::from_column_major_slice(&self.residual, columns.rows(), 1);
-        let mut cross = Mat::zeros(base.len(), layout.count);
-        let mut own = Mat::zeros(layout.count, layout.count);
-        let mut with_y = Mat::zeros(layout.count, 1);
-        for fold in &model.folds {
-            let range = &columns.fold_rows[*fold];
-            let (start, rows) = (range.start, range.len());
-            let fresh = fresh.as_ref().subrows(start, rows);
-            let present = self.base_columns.as_ref().subrows(start, rows);
-            let mut place = 0;
-            for run in base.chunk_by(|a, b| a + 1 == *b) {
-                let product = transposed_product(present.subcols(run[0], run.len()), fresh);
-                let mut part = cross.as_mut().subrows_mut(place, run.len());
-                part += product;
-                place += run.len();
-            }
-            own += transposed_product(fresh, fresh);
-            with_y += transposed_product(fresh, residual.subrows(start, rows));
-        }
-        let solved = inverse * &cross;
-        let d = Mat::from_fn(layout.count, layout.count, |k, l| {
-            own[(k, l)]
-                - (0..base.len())
-                    .map(|i| cross[(i, k)] * solved[(i, l)])
-                    .sum::<f64>()
-        });
-        let g: Vec<f64> = (0..layout.count)
-            .map(|k| {
-                let modelled: f64 = (0..base.len()).map(|i| solved[(i, k)] * base_y[i]).sum();
-                with_y[(k, 0)] - modelled
-            })
-            .collect();
-        super::visible::quadratic_gain(&d, &own, &g)
-    }
-
     /// The base columns, rows × base, in the order of the folds.
     pub fn base_columns(&self) -> MatRef<'_, f64> {
         self.base_columns.as_ref()
+    }
+
+    /// The residual, in the same order: rows × 1.
+    pub fn residual(&self) -> MatRef<'_, f64> {
+        MatRef::from_column_major_slice(&self.residual, self.residual.len(), 1)
     }
 }
 
@@ -516,7 +476,7 @@ fn null_product(
     all: MatRef<'_, f64>,
 ) -> Mat<f64> {
     let mut product = Mat::zeros(null.ncols(), all.ncols());
-    for rows in columns.moved_rows(layouts) {
+    for rows in columns.moved_stretches(layouts, 0..columns.fold_rows.len()) {
         let draws = null.as_ref().subrows(rows.start, rows.len());
         let part = all.subrows(rows.start, rows.len());
         matmul(

@@ -252,10 +252,17 @@ impl<'m> Trained<'m> {
 
     /// What every candidate would gain.
     pub fn gains(&self) -> Vec<Gain> {
-        (0..self.moments.count.len())
-            .into_par_iter()
-            .map(|candidate| self.gain(candidate))
-            .collect()
+        self.more_gains(Vec::new())
+    }
+
+    /// The same, where those of the first candidates are known from the same model.
+    pub fn more_gains(&self, mut known: Vec<Gain>) -> Vec<Gain> {
+        known.par_extend(
+            (known.len()..self.moments.count.len())
+                .into_par_iter()
+                .map(|candidate| self.gain(candidate)),
+        );
+        known
     }
 
     /// The best score that each null draw gives to any candidate: `cost` and the inflation of the variance as in the real search.

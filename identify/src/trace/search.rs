@@ -14,6 +14,7 @@ use super::moments::{self, Moments};
 use super::score::{Gain, PriorMoments, Trained};
 use super::sharpen;
 use super::tail::ln_chi_square_tail;
+use super::trial::Trial;
 
 /// When the search stops.
 #[derive(Clone, Copy, Debug)]
@@ -286,18 +287,22 @@ impl<'s> Search<'s> {
             .collect()
     }
 
-    /// Adds what comes near the best, with the best numbers that it can have beside some candidates on some folds.
-    pub(super) fn sharpen(&mut self, beside: &[usize], folds: &[usize]) {
+    /// Adds what comes near the best, with the best numbers that it can have beside some candidates on some folds. Returns what each candidate that was there
+    /// before gains beside them.
+    pub(super) fn sharpen(&mut self, beside: &[usize], folds: &[usize]) -> Vec<Gain> {
         if !self.candidates.iter().any(sharpen::can_be_tuned) {
-            return;
+            return Vec::new();
         }
-        let fresh = {
+        let (gains, fresh) = {
             let model = self.model_of(beside, folds);
-            sharpen::sharpened(self, &model, &self.composed(&model))
+            let gains = model.gains();
+            let fresh = sharpen::sharpened(self, &model, &gains, &self.composed(&model));
+            (gains, fresh)
         };
         for candidate in fresh {
             self.add_tuned(candidate, folds);
         }
+        gains
     }
 
     /// Adds a candidate that was tuned on some folds; its number, if the data have what it follows.
@@ -444,9 +449,9 @@ impl<'s> Search<'s> {
     fn pick(&mut self, track: usize, least: f64) -> Option<usize> {
         let Track { folds, .. } = self.tracks[track].clone();
         let chosen = self.tracks[track].chosen();
-        self.sharpen(&chosen, &folds);
+        let known = self.sharpen(&chosen, &folds);
         let model = self.model_of(&chosen, &folds);
-        let gains = model.gains();
+        let gains = model.more_gains(known);
         let (best, score) = self.best_of(&model, &gains, &chosen)?;
         let first = || match track {
             ALL => self.named_first(&model, &gains, best, &chosen),
@@ -540,8 +545,13 @@ impl<'s> Search<'s> {
 
     /// What any effect would gain beside a model, on the folds that it is trained on; `None` where the data lack what it follows.
     pub fn gain_beside(&self, model: &Trained<'_>, effect: &abbe_model::effect::Effect) -> Option<f64> {
+        Some(self.trial(model, effect)?.gain(model))
+    }
+
+    /// Any effect on trial beside a model; `None` where the data lack what it follows.
+    pub(super) fn trial(&self, model: &Trained<'_>, effect: &abbe_model::effect::Effect) -> Option<Trial> {
         let layout = self.columns.layout_uncached(effect)?;
-        Some(self.moments.gain_of(self.columns, &layout, model))
+        Some(Trial::new(self.columns, &self.moments, &layout, model))
     }
 
     /// The lengths of a candidate's columns over all readings.

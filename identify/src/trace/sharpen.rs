@@ -4,6 +4,7 @@
 //! explains more. So every component that comes near the best is given its own best numbers first.
 
 use std::collections::HashMap;
+use std::ops::Range;
 
 use abbe_model::effect::{Effect, Shape};
 use rayon::prelude::*;
@@ -29,10 +30,15 @@ pub(super) fn can_be_tuned(candidate: &Candidate) -> bool {
     candidate.dictionary || brackets(candidate).is_some()
 }
 
-/// Candidates with the best numbers that they can have beside a model, of those that come near the best; with what has been composed.
-pub fn sharpened(search: &Search<'_>, model: &Trained<'_>, composed: &[Composed]) -> Vec<Candidate> {
+/// Candidates with the best numbers that they can have beside a model, of those that come near the best; with what has been composed. `gains` are those of
+/// all candidates beside the model.
+pub fn sharpened(
+    search: &Search<'_>,
+    model: &Trained<'_>,
+    gains: &[Gain],
+    composed: &[Composed],
+) -> Vec<Candidate> {
     let variance = search.variance(model);
-    let gains = model.gains();
     let most = if search.sees_all(&model.folds) {
         MOST
     } else {
@@ -155,25 +161,31 @@ pub(super) fn sharpen(
 /// Moves each step by parts of the grid to where all together gain most; what that is.
 fn moved_steps(search: &Search<'_>, model: &Trained<'_>, candidate: &Candidate) -> (Effect, f64) {
     let original = &candidate.effect;
-    let mut best = search.gain_beside(model, original).unwrap_or(0.0);
-    let Shape::Steps { at } = &original.shape else {
-        return (original.clone(), best);
+    let (Shape::Steps { at }, Some(mut present)) = (&original.shape, search.trial(model, original)) else {
+        return (original.clone(), 0.0);
     };
+    let mut best = present.gain(model);
     let mut places = at.clone();
     let with = |places: &[f64]| Effect {
         shape: Shape::Steps { at: places.to_vec() },
         ..original.clone()
     };
+    let trained: Vec<Range<usize>> = (model.folds.iter())
+        .map(|fold| search.columns.fold_rows[*fold].clone())
+        .collect();
     for _ in 0..2 {
         for k in 0..places.len() {
             let middle = places[k];
             for part in -3..=3 {
-                let mut trial = places.clone();
-                trial[k] = middle + candidate.grid * f64::from(part) / 4.0;
-                let gain = search.gain_beside(model, &with(&trial)).unwrap_or(0.0);
+                let place = middle + candidate.grid * f64::from(part) / 4.0;
+                let Some(moved) = search.trial(model, &with(&[place])) else {
+                    continue;
+                };
+                let gain = present.gain_with(k, &moved, &trained, model);
                 if gain > best * (1.0 + 1e-9) {
                     best = gain;
-                    places = trial;
+                    places[k] = place;
+                    present.exchange(k, &moved, &trained);
                 }
             }
         }
