@@ -1,6 +1,9 @@
 //! Values as people give them on a command line or in a file of errors: `EY0A=35.3um`, `"bar[A100]" = "-0.4 um"`.
 
+use std::path::Path;
+
 use abbe_model::session::limits::LARGEST;
+use abbe_model::session::read;
 
 use crate::error::IdentifyError;
 use crate::unit::{ARCSEC, Unit};
@@ -23,6 +26,9 @@ pub struct Given {
     /// `um`, `arcsec`, `deg`, …
     pub unit: String,
 }
+
+/// Most bytes of a number with its unit: more digits than any number has, and none that takes long to be told from its unit.
+const LONGEST: usize = 100;
 
 /// Units of one quantity, with how many of the first make one of each.
 const LENGTHS: [(&str, f64); 5] = [("um", 1.0), ("µm", 1.0), ("μm", 1.0), ("nm", 1e-3), ("mm", 1e3)];
@@ -54,9 +60,15 @@ impl Given {
     /// From a name and a number with its unit, `35.3 um`.
     ///
     /// # Errors
-    /// If the text does not start with a finite number, or has no unit.
+    /// If the text does not start with a finite number of moderate size, or has no unit.
     pub fn of(id: &str, quantity: &str) -> Result<Given, IdentifyError> {
         let quantity = quantity.trim();
+        if quantity.len() > LONGEST {
+            return Err(IdentifyError::Request(format!(
+                "`{id}`: a number with its unit of {} bytes; {LONGEST} is the most, write it as in `EY0A=35.3um`",
+                quantity.len()
+            )));
+        }
         // The longest start that is a number: `1e3um` is a thousand, and the `e` of no unit is taken for an exponent.
         let number = (1..=quantity.len())
             .rev()
@@ -130,22 +142,24 @@ fn factor(from: &str, to: &str) -> Option<f64> {
         })
 }
 
-/// The pairs of a file of values, `EY0A = "35.3 um"`, in its order.
+/// Reads a file of values, `EY0A = "35.3 um"` a line, in its order.
 ///
 /// # Errors
-/// If the text is not TOML or a value is not text.
-pub fn pairs(text: &str) -> Result<Vec<(String, String)>, String> {
-    let table = toml::de::DeTable::parse(text).map_err(|fault| fault.to_string())?;
+/// If the file cannot be read, is not TOML, or a value is not text of a number with its unit: with the file, the entry and what to do.
+pub fn read(path: &Path) -> Result<Vec<Given>, IdentifyError> {
+    let fault = |message: String| IdentifyError::Request(format!("{}: {message}", path.display()));
+    let text = read::text(path, "the file of values")?;
+    let table = toml::de::DeTable::parse(&text).map_err(|cause| fault(cause.to_string()))?;
     let mut entries: Vec<_> = table.into_inner().into_iter().collect();
     entries.sort_by_key(|(key, _)| key.span().start);
     entries
         .into_iter()
         .map(|(key, value)| match value.get_ref().as_str() {
-            Some(quantity) => Ok((key.get_ref().to_string(), quantity.to_string())),
-            None => Err(format!(
+            Some(quantity) => Given::of(key.get_ref(), quantity).map_err(|error| fault(error.to_string())),
+            None => Err(fault(format!(
                 "`{key}` is no text; write number and unit in quotes, as in `{key} = \"35.3 um\"`",
                 key = key.get_ref()
-            )),
+            ))),
         })
         .collect()
 }

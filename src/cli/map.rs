@@ -5,6 +5,7 @@ use std::path::PathBuf;
 use abbe::identify::volumetric::{self, Erring, Place, Summary, functions};
 use abbe::model::axis::AxisKind;
 use abbe::model::chain::Machine;
+use abbe::model::session::limits::LARGEST;
 use clap::Args;
 
 use super::failure::Failure;
@@ -65,8 +66,12 @@ pub fn run(machine: &Machine, arguments: &MapArguments) -> Result<(), Failure> {
     let functions = functions::read(file, machine)?;
     let tool_mm = match arguments.tool_mm[..] {
         [] => [0.0; 3],
-        [x, y, z] => [x, y, z],
-        _ => return Err(Failure::Other("--tool-mm: three numbers, as in 0,0,-120".into())),
+        [x, y, z] if [x, y, z].iter().all(|mm: &f64| mm.abs() <= LARGEST) => [x, y, z],
+        _ => {
+            return Err(Failure::Other(format!(
+                "--tool-mm: three numbers of {LARGEST:e} at most, as in 0,0,-120"
+            )));
+        }
     };
     let grid = grid(machine, arguments)?;
     let erring = Erring {
@@ -85,6 +90,13 @@ pub fn run(machine: &Machine, arguments: &MapArguments) -> Result<(), Failure> {
 
 /// Positions of each axis, mm or rad.
 fn grid(machine: &Machine, arguments: &MapArguments) -> Result<Vec<Vec<f64>>, Failure> {
+    if arguments.places > volumetric::MOST_POINTS {
+        return Err(Failure::Other(format!(
+            "--places {}: a map has at most {} places",
+            arguments.places,
+            volumetric::MOST_POINTS
+        )));
+    }
     let mut wanted: Vec<Option<(char, f64)>> = vec![None; machine.axes.len()];
     for text in &arguments.axes {
         let fault = || {
@@ -95,8 +107,16 @@ fn grid(machine: &Machine, arguments: &MapArguments) -> Result<Vec<Vec<f64>>, Fa
         let sign = if text.contains('=') { '=' } else { ':' };
         let (name, number) = text.split_once(sign).ok_or_else(fault)?;
         let number: f64 = number.trim().parse().map_err(|_| fault())?;
-        if !number.is_finite() || (sign == ':' && (number < 1.0 || number.fract() != 0.0)) {
+        if number.is_nan() || (sign == ':' && (number < 1.0 || number.fract() != 0.0)) {
             return Err(fault());
+        }
+        let most = if sign == ':' {
+            volumetric::MOST_POINTS as f64
+        } else {
+            LARGEST
+        };
+        if number.abs() > most {
+            return Err(Failure::Other(format!("--axis {text}: {most:e} is the most")));
         }
         let Some(axis) = machine.axis_index(name.trim()) else {
             let names: Vec<&str> = machine.axes.iter().map(|axis| axis.name.as_str()).collect();

@@ -2,7 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
-use abbe::identify::quantity::Given;
+use abbe::identify::quantity::{self, Given};
 use abbe::identify::simulate::{Simulated, Simulation, simulate};
 use abbe::model::session::limits::{LARGEST, LEAST_UM};
 use abbe::model::session::{Session, read, rewrite, write};
@@ -63,7 +63,7 @@ pub struct SimulateArguments {
 pub fn run(arguments: &SimulateArguments) -> Result<(), Failure> {
     let session = read_session(&arguments.session)?;
     let mut given = match &arguments.file {
-        Some(file) => values(file)?,
+        Some(file) => quantity::read(file)?,
         None => Vec::new(),
     };
     for text in arguments.errors.iter().chain(&arguments.effects) {
@@ -106,17 +106,6 @@ pub fn run(arguments: &SimulateArguments) -> Result<(), Failure> {
         Ok(())
     })?;
     report(&session, &simulated, arguments)
-}
-
-/// The values of a TOML file.
-fn values(file: &Path) -> Result<Vec<Given>, Failure> {
-    let fault = |message: String| Failure::Other(format!("{}: {message}", file.display()));
-    let text = std::fs::read_to_string(file).map_err(|cause| fault(format!("cannot be read: {cause}")))?;
-    let pairs = abbe::identify::quantity::pairs(&text).map_err(fault)?;
-    pairs
-        .into_iter()
-        .map(|(id, quantity)| Given::of(&id, &quantity).map_err(|error| fault(error.to_string())))
-        .collect()
 }
 
 /// `session.toml` last: where it is, the rest is.

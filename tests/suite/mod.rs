@@ -1,5 +1,6 @@
 //! What the program promises, one file a promise.
 
+mod another_build;
 mod bad_input;
 mod circular;
 mod codes;

@@ -5,6 +5,7 @@ use std::path::Path;
 use abbe_model::axis::AxisKind;
 use abbe_model::chain::{ERRORS_PER_AXIS, Machine};
 use abbe_model::component::{ErrorKind, ErrorName};
+use abbe_model::session::{limits, read};
 use serde::Deserialize;
 use std::collections::BTreeMap;
 
@@ -154,10 +155,10 @@ struct HarmonicEntry {
 /// Several functions of one error add up.
 ///
 /// # Errors
-/// If the file cannot be read, is not of this form, or names what the machine lacks: with the file, the entry and what to do.
+/// If the file cannot be read, is not of this form, holds a number beyond [`limits::LARGEST`], or names what the machine lacks: with the file, the entry and what to do.
 pub fn read(path: &Path, machine: &Machine) -> Result<Vec<ErrorFunction>, IdentifyError> {
     let fault = |message: String| IdentifyError::Request(format!("{}: {message}", path.display()));
-    let text = std::fs::read_to_string(path).map_err(|cause| fault(format!("cannot be read: {cause}")))?;
+    let text = read::text(path, "the file of error functions")?;
     parse(&text, machine).map_err(fault)
 }
 
@@ -233,6 +234,7 @@ fn function(machine: &Machine, entry: &Entry) -> Result<ErrorFunction, String> {
                 single(harmonic.period_deg),
                 "period",
             )?;
+            moderate(harmonic.order.as_slice())?;
             let period = match (period, harmonic.order, kind) {
                 (Some(period), None, _) => period[0],
                 (None, Some(order), AxisKind::Rotary) => std::f64::consts::TAU / order,
@@ -250,7 +252,7 @@ fn function(machine: &Machine, entry: &Entry) -> Result<ErrorFunction, String> {
                 single(harmonic.amplitude_um),
                 single(harmonic.amplitude_arcsec),
             )?;
-            finite(Some(&[harmonic.phase_deg]))?;
+            moderate(&[harmonic.phase_deg])?;
             Form::Harmonic {
                 period,
                 amplitude: amplitude[0],
@@ -313,7 +315,7 @@ fn position(
     if wrong.is_some() {
         return Err(format!("`{stem}_{}` is meant over this axis", unit_word(kind)));
     }
-    finite(right.as_deref())?;
+    moderate(right.as_deref().unwrap_or_default())?;
     Ok(right)
 }
 
@@ -327,13 +329,19 @@ fn values(angle: bool, um: Option<Vec<f64>>, arcsec: Option<Vec<f64>>) -> Result
         (Some(values), None) if !values.is_empty() => values,
         _ => return Err(format!("the values of this error are in `{word}`")),
     };
-    finite(Some(&values))?;
+    moderate(&values)?;
     Ok(values.into_iter().map(|value| value / per_inside).collect())
 }
 
-fn finite(values: Option<&[f64]>) -> Result<(), String> {
-    match values.and_then(|values| values.iter().find(|value| !value.is_finite())) {
-        Some(value) => Err(format!("`{value}` is no finite number")),
-        None => Ok(()),
+/// That numbers are numbers within the limits of all files.
+fn moderate(values: &[f64]) -> Result<(), String> {
+    for value in values {
+        if !value.is_finite() {
+            return Err(format!("`{value}` is no finite number"));
+        }
+        if let Some(fault) = limits::too_large(*value) {
+            return Err(fault);
+        }
     }
+    Ok(())
 }

@@ -13,6 +13,7 @@ pub mod functions;
 use abbe_model::axis::AxisKind;
 use abbe_model::chain::{AxisPosition, BodyErrors, ERRORS_PER_AXIS, Machine};
 use abbe_model::frames::Point;
+use abbe_model::session::limits::LARGEST;
 use nalgebra::{DMatrix, DVector, Vector3};
 use rayon::prelude::*;
 use schemars::JsonSchema;
@@ -101,6 +102,15 @@ impl Erring<'_> {
     /// The error vector from the errors of one axis alone, mm.
     pub fn of_axis(&self, positions: &[f64], axis: usize) -> [f64; 3] {
         (self.point(positions, true, Some(axis)) - self.point(positions, false, None)).into()
+    }
+
+    /// Where the axes stand, as people write it, mm or degrees.
+    fn stands(&self, positions: &[f64]) -> String {
+        let axes = self.machine.axes.iter().zip(positions);
+        let each: Vec<String> = axes
+            .map(|(axis, q)| format!("{} {:.3}", axis.name, axis.kind.outside(*q)))
+            .collect();
+        each.join(", ")
     }
 
     /// The commands of the linear axes that bring the tool where it should be.
@@ -198,7 +208,7 @@ pub struct Summary {
 /// A map: every place of a grid, in the order of the axes, the last one fastest.
 ///
 /// # Errors
-/// If the grid has too many places, or a compensation fails.
+/// If the grid has too many places, an error is beyond all limits, or a compensation fails.
 pub fn map(
     erring: &Erring<'_>,
     grid: &[Vec<f64>],
@@ -222,6 +232,13 @@ pub fn map(
                 rest /= values.len();
             }
             let mut place = erring.place(&positions);
+            if !place.error_mm.iter().all(|error| error.abs() <= LARGEST) {
+                return Err(IdentifyError::Request(format!(
+                    "the errors move the tool by {:e} mm at {}; polynomials grow fast beyond their scale",
+                    norm(place.error_mm),
+                    erring.stands(&positions)
+                )));
+            }
             if compensate {
                 place.compensated = Some(erring.compensate(&positions)?);
             }
@@ -230,7 +247,10 @@ pub fn map(
                 .collect();
             Ok((place, by_axis))
         })
-        .collect::<Result<_, IdentifyError>>()?;
+        // Of several faults the first in order is told, whichever thread comes upon one first.
+        .collect::<Vec<Result<_, IdentifyError>>>()
+        .into_iter()
+        .collect::<Result<_, _>>()?;
     let machine = erring.machine;
     let largest = places
         .iter()

@@ -5,6 +5,7 @@
 
 mod arguments;
 mod little_to_see;
+mod map;
 mod noise_and_priors;
 mod numbers;
 

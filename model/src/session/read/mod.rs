@@ -112,6 +112,15 @@ impl Context<'_> {
     }
 }
 
+/// The text of a TOML file of another form than these, read as they are: UTF-8 with or without byte order mark, of a limited size, unchanged while it
+/// is read. `what` says in messages what it is.
+///
+/// # Errors
+/// If the file cannot be read or is not such a text, with its name and what to do.
+pub fn text(path: &Path, what: &str) -> Result<String, ModelError> {
+    Ok(Source::read(path, what)?.text)
+}
+
 /// Reads a session file, its machine and, if asked for, its data.
 ///
 /// # Errors

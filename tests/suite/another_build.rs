@@ -1,0 +1,168 @@
+//! Another build of the same sources prints the same: every line to its last digit, and the numbers of its JSON as far as rounding lets them.
+//!
+//! `ABBE_OTHER` names the other binary, as `target/release/abbe`; without it there is nothing to compare with, and nothing is.
+
+use std::fs;
+use std::path::{Path, PathBuf};
+use std::process::Command;
+
+use serde_json::Value;
+
+use super::ready;
+
+/// How far numbers of two builds may lie apart, relative to the larger one: a ten-thousandth of what any table prints.
+const RELATIVE: f64 = 1e-7;
+/// And in the unit of the number: zeros are rounding.
+const ABSOLUTE: f64 = 1e-8;
+
+fn other() -> Option<PathBuf> {
+    let named = std::env::var_os("ABBE_OTHER")?;
+    Some(fs::canonicalize(&named).unwrap_or_else(|cause| panic!("ABBE_OTHER={}: {cause}", named.display())))
+}
+
+/// Where two documents differ by more than rounding, with how much; the largest gap of two numbers that do not.
+fn differences(path: &str, a: &Value, b: &Value, found: &mut Vec<String>, gap: &mut f64) {
+    match (a, b) {
+        (Value::Number(a), Value::Number(b)) => {
+            let (a, b) = (a.as_f64().unwrap(), b.as_f64().unwrap());
+            let apart = (a - b).abs();
+            let relative = apart / a.abs().max(b.abs()).max(f64::MIN_POSITIVE);
+            if apart > ABSOLUTE && relative > RELATIVE {
+                found.push(format!("{path}: {a} and {b}"));
+            } else if apart > ABSOLUTE {
+                *gap = gap.max(relative);
+            }
+        }
+        (Value::Array(a), Value::Array(b)) if a.len() == b.len() => {
+            for (k, (a, b)) in a.iter().zip(b).enumerate() {
+                differences(&format!("{path}[{k}]"), a, b, found, gap);
+            }
+        }
+        (Value::Object(a), Value::Object(b)) if a.keys().eq(b.keys()) => {
+            for (key, a) in a {
+                differences(&format!("{path}.{key}"), a, &b[key], found, gap);
+            }
+        }
+        _ if a == b => {}
+        _ => found.push(format!("{path}: {a} and {b}")),
+    }
+}
+
+/// Runs commands by a build in a folder; what they print, and the JSON that each writes to `out.json`.
+fn told(binary: &Path, folder: &Path, commands: &[Vec<&str>]) -> Vec<(String, Value)> {
+    commands
+        .iter()
+        .map(|arguments| {
+            let json = folder.join("out.json");
+            let output = Command::new(binary)
+                .args(arguments)
+                .args(["--json", "out.json"])
+                .current_dir(folder)
+                .output()
+                .expect("the command starts");
+            let message = String::from_utf8_lossy(&output.stderr);
+            assert!(output.status.success(), "{arguments:?}: {message}");
+            let document = serde_json::from_str(&fs::read_to_string(&json).unwrap()).unwrap();
+            (String::from_utf8(output.stdout).unwrap(), document)
+        })
+        .collect()
+}
+
+/// Runs the commands by both builds on the files of a ready session; `more` goes to the end of its plan, which is then one of few readings.
+#[track_caller]
+fn the_same(session: &str, more: &str, commands: &[Vec<&str>]) {
+    let Some(other) = other() else {
+        println!("ABBE_OTHER names no other build");
+        return;
+    };
+    let copied = |binary: &Path| {
+        let folder = tempfile::tempdir().unwrap();
+        for entry in fs::read_dir(ready(session)).unwrap() {
+            let path = entry.unwrap().path();
+            if path.is_file() {
+                fs::copy(&path, folder.path().join(path.file_name().unwrap())).unwrap();
+            }
+        }
+        let plan = folder.path().join("chapter5.toml");
+        if !more.is_empty() {
+            // In steps so coarse that a search takes seconds.
+            let text = fs::read_to_string(&plan).unwrap();
+            let text = text
+                .replace("step_deg = 0.25", "step_deg = 3")
+                .replace("step_deg = 0.5", "step_deg = 6");
+            fs::write(&plan, text + more).unwrap();
+        }
+        told(binary, folder.path(), commands)
+    };
+    let this = copied(Path::new(env!("CARGO_BIN_EXE_abbe")));
+    for ((command, this), other) in commands.iter().zip(this).zip(copied(&other)) {
+        let lines: Vec<_> = this
+            .0
+            .lines()
+            .zip(other.0.lines())
+            .filter(|(a, b)| a != b)
+            .collect();
+        assert!(lines.is_empty(), "{command:?}: {lines:#?}");
+        assert_eq!(this.0.lines().count(), other.0.lines().count(), "{command:?}");
+        let (mut found, mut gap) = (Vec::new(), 0.0);
+        differences("", &this.1, &other.1, &mut found, &mut gap);
+        assert!(found.is_empty(), "{command:?}: {found:#?}");
+        println!(
+            "{command:?}: {} lines alike, numbers of the JSON within {gap:.0e} of themselves",
+            this.0.lines().count()
+        );
+    }
+}
+
+#[test]
+fn measured_sessions() {
+    for session in ["hermle-c600u", "table-and-head", "tilting-head"] {
+        the_same(
+            &format!("{session}/measured"),
+            "",
+            &[
+                vec!["fit", "session.toml"],
+                vec!["trace", "session.toml", "--quiet"],
+            ],
+        );
+    }
+    the_same("r-test/measured", "", &[vec!["fit", "session.toml"]]);
+    the_same(
+        "self-calibration/measured",
+        "",
+        &[vec!["fit", "session.toml", "--method", "self-calibration"]],
+    );
+}
+
+#[test]
+fn the_plan_of_chapter_5() {
+    the_same("hermle-c600u", "", &[vec!["plan", "chapter5.toml"]]);
+}
+
+#[test]
+fn a_wobble_that_is_planted() {
+    let effect = "EZC~C:h2.amplitude=1.5um";
+    let plan = "chapter5.toml";
+    the_same(
+        "hermle-c600u",
+        "\n[[effect]]\ncomponent = \"EZC\"\nshape = \"harmonic\"\norder = 2\n",
+        &[
+            vec![
+                "simulate",
+                plan,
+                "--out",
+                "run",
+                "--draw-setups",
+                "--seed",
+                "7",
+                "--error",
+                "EY0A=35.3um",
+                "--effect",
+                effect,
+                "--hide-effects",
+            ],
+            vec!["fit", "run/session.toml"],
+            vec!["trace", "run/session.toml", "--quiet", "--seed", "7"],
+        ],
+    );
+}

@@ -1,0 +1,155 @@
+//! Maps of the volumetric error, and files of errors: what people write for them at its limits.
+
+use std::fs;
+use std::path::Path;
+
+use tempfile::TempDir;
+
+use super::super::{abbe, ready, text};
+
+/// What `abbe volumetric --map` says about what it refuses; no map is left behind.
+#[track_caller]
+fn told(folder: &TempDir, functions: &Path, more: &[&str]) -> String {
+    let (machine, map) = (ready("volumetric/machine.toml"), folder.path().join("map.csv"));
+    let base = [
+        "volumetric",
+        text(&machine),
+        "--map",
+        text(&map),
+        "--functions",
+        text(functions),
+    ];
+    let output = abbe(&[&base[..], more].concat());
+    let told = String::from_utf8(output.stderr).unwrap();
+    assert_eq!(output.status.code(), Some(1), "{told}");
+    assert!(!map.exists());
+    told
+}
+
+#[test]
+fn error_functions_beyond_all_numbers() {
+    let folder = tempfile::tempdir().unwrap();
+    let file = folder.path().join("errors.toml");
+    for (error, form, message) in [
+        (
+            "EXX",
+            "polynomial = { um = [1e300] }",
+            "1e300, which is too large; 1e12 is the most",
+        ),
+        (
+            "EXX",
+            "table = { at_mm = [-1e308, 1e308], um = [0, 1] }",
+            "-1e308, which is too large; 1e12 is the most",
+        ),
+        (
+            "EXC",
+            "harmonic = { order = 1e300, amplitude_um = 1 }",
+            "1e300, which is too large; 1e12 is the most",
+        ),
+        ("EXX", "polynomial = { um = [nan] }", "`NaN` is no finite number"),
+        (
+            "EXX",
+            "polynomial = { scale_mm = 1e-300, um = [0, 1, 1] }",
+            "the errors move the tool by inf mm at C -180.000, A -115.000, Y -250.000, X -300.000, Z -250.000",
+        ),
+    ] {
+        fs::write(&file, format!("[[function]]\nerror = \"{error}\"\n{form}\n")).unwrap();
+        let told = told(&folder, &file, &[]);
+        assert!(told.contains(message), "{told}");
+    }
+}
+
+#[test]
+fn arguments_of_a_map() {
+    let folder = tempfile::tempdir().unwrap();
+    let ready = ready("volumetric/errors.toml");
+    for (more, message) in [
+        (
+            ["--places", "18446744073709551615"],
+            "a map has at most 1000000 places",
+        ),
+        (["--places", "1000000000000"], "a map has at most 1000000 places"),
+        (["--axis", "X:1e18"], "--axis X:1e18: 1e6 is the most"),
+        (["--axis", "A=1e300"], "--axis A=1e300: 1e12 is the most"),
+        (["--axis", "A=inf"], "--axis A=inf: 1e12 is the most"),
+        (["--axis", "A=nan"], "write where the axis stands"),
+        (["--tool-mm", "1e300,0,0"], "three numbers of 1e12 at most"),
+        (["--places", "100"], "at least one and at most 1000000 places"),
+    ] {
+        let told = told(&folder, &ready, &more);
+        assert!(told.contains(message), "{told}");
+    }
+}
+
+/// Files that the command line names are read with the limits of a session: whole or not at all, and never without end.
+#[test]
+fn files_of_errors_that_are_none() {
+    let folder = tempfile::tempdir().unwrap();
+    let large = folder.path().join("large.toml");
+    fs::write(&large, " ".repeat((8 << 20) + 1)).unwrap();
+    let latin = folder.path().join("latin.toml");
+    fs::write(&latin, b"EX0C = \"1 \xb5m\"\n").unwrap();
+    let long = folder.path().join("long.toml");
+    fs::write(&long, format!("EX0C = \"{}\"\n", "1".repeat(300_000))).unwrap();
+    let plan = ready("hermle-c600u/chapter5.toml");
+    let out = folder.path().join("out");
+    let simulated = |file: &Path| {
+        let output = abbe(&[
+            "simulate",
+            text(&plan),
+            "--out",
+            text(&out),
+            "--errors",
+            text(file),
+        ]);
+        assert_eq!(output.status.code(), Some(1));
+        assert!(!out.exists());
+        String::from_utf8(output.stderr).unwrap()
+    };
+    for (file, message) in [
+        (
+            large.as_path(),
+            "has more than 8388608 bytes, the most that is read",
+        ),
+        (latin.as_path(), "byte 11 is not UTF-8"),
+        (folder.path(), "this is a folder"),
+        (Path::new("/dev/zero"), "has more than 8388608 bytes"),
+    ] {
+        for told in [simulated(file), told(&folder, file, &[])] {
+            assert!(told.contains(message) && told.contains(text(file)), "{told}");
+        }
+    }
+    let told = simulated(&long);
+    assert!(
+        told.contains("`EX0C`: a number with its unit of 300000 bytes; 100 is the most"),
+        "{told}"
+    );
+}
+
+/// An editor's byte order mark and line ends change nothing.
+#[test]
+fn a_byte_order_mark_before_errors() {
+    let folder = tempfile::tempdir().unwrap();
+    let file = folder.path().join("errors.toml");
+    fs::write(&file, "\u{feff}EX0C = \"3 um\"\r\nEY0C = \"-2 um\"\r\n").unwrap();
+    let plan = ready("hermle-c600u/chapter5.toml");
+    let out = folder.path().join("out");
+    let output = abbe(&[
+        "simulate",
+        text(&plan),
+        "--out",
+        text(&out),
+        "--errors",
+        text(&file),
+    ]);
+    assert!(
+        output.status.success(),
+        "{}",
+        String::from_utf8_lossy(&output.stderr)
+    );
+    let told = String::from_utf8(output.stdout).unwrap();
+    assert!(
+        told.contains("EX0C") && told.contains("3.0000") && told.contains("-2.0000"),
+        "{told}"
+    );
+}
