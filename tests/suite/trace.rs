@@ -132,6 +132,38 @@ fn another_radius_is_proposed_to_tell_an_axial_wobble_from_a_tilt() {
     assert!(separation["after_sigma"].as_f64().unwrap() > 10.0, "{separation}");
 }
 
+/// A tilt of A under the moment of a ball that stands at y = R cos C on the table lifts it by a · y²  = a R² (1 + cos 2C) / 2, as EZC of second order does
+/// with that phase. One number says it for gravity, two for a wave, and no reading tells them apart.
+#[test]
+fn a_wave_is_named_beside_a_compliance_that_looks_the_same() {
+    let folder = tempfile::tempdir().unwrap();
+    let plan = folder.path().join("chapter5.toml");
+    let machine = ready("hermle-c600u/machine.toml");
+    std::fs::copy(machine, folder.path().join("machine.toml")).unwrap();
+    let effect = "\n[[effect]]\ncomponent = \"EZC\"\nshape = \"harmonic\"\norder = 2\n";
+    let declared = std::fs::read_to_string(ready("hermle-c600u/chapter5.toml")).unwrap() + effect;
+    std::fs::write(&plan, declared).unwrap();
+    let run = folder.path().join("run");
+    let planted = ["--effect", "EZC~C:h2.cos=1.5um", "--hide-effects", "--seed", "7"];
+    let outcome = abbe(&[&["simulate", text(&plan), "--out", text(&run)], &planted[..]].concat());
+    assert!(
+        outcome.status.success(),
+        "{}",
+        String::from_utf8_lossy(&outcome.stderr)
+    );
+    let session = read::session(&run.join("session.toml"), &ReadOptions::default()).unwrap();
+    let result = traced(&session, &TraceOptions::default());
+    assert_eq!(result.effects.len(), 1);
+    let gravity = |effect: &EffectName| effect.driver == "gravity";
+    assert!(gravity(&result.effects[0].name), "{:?}", result.effects[0].name);
+    assert!(named_or_alias(&result, &|effect| is(
+        effect,
+        "EZC",
+        "harmonic",
+        Some(2.0)
+    )));
+}
+
 #[test]
 fn the_bundled_session_is_explained_at_the_command_line() {
     let folder = tempfile::tempdir().unwrap();

@@ -3,6 +3,8 @@
 //! Two candidates are aliases where the readings cannot tell them apart: in place of the named effect, beside the same model, the other explains
 //! the residual as well within [`INDISTINGUISHABLE`] of log-likelihood, whether or not the numbers and places that were chosen in its shape are held against it, and it does at least half of what the named effect did to the readings. The one with the least cost in the library is named first; at equal cost, the one with the larger gain.
 
+use abbe_model::effect::Shape;
+
 use super::search::Search;
 
 /// Difference in `−ln P` below which two candidates cannot be told apart: 2 σ for one column.
@@ -93,7 +95,11 @@ pub fn aliases(search: &Search<'_>, k: usize, variance: f64) -> (Vec<Alias>, Vec
     let least_unpriced = search.evidence(&of_named, variance) - INDISTINGUISHABLE;
     let least_gain = of_named.gain / variance - 2.0 * INDISTINGUISHABLE;
     let columns = |candidate: usize| search.moments.count[candidate];
-    let no_more_columns = |candidate: usize| columns(candidate) <= columns(taken.candidate);
+    // A wave has two columns because its phase is unknown: one that looks the same is no less alike for that.
+    let no_more_said = |candidate: usize| {
+        columns(candidate) <= columns(taken.candidate)
+            || matches!(search.candidates[candidate].effect.shape, Shape::Harmonic { .. })
+    };
     let (_, coefficients) = model.joined(taken.candidate);
     // Base columns are unit-length copies of the candidate's own; the signature is what they do together.
     let norms = search.norms(taken.candidate);
@@ -113,7 +119,7 @@ pub fn aliases(search: &Search<'_>, k: usize, variance: f64) -> (Vec<Alias>, Vec
                 && gain.freedom > 0
                 && (search.evidence_for(*candidate, gain, variance) >= least
                     || search.evidence(gain, variance) >= least_unpriced
-                    || no_more_columns(*candidate) && gain.gain / variance >= least_gain)
+                    || no_more_said(*candidate) && gain.gain / variance >= least_gain)
         })
         .filter_map(|(candidate, _)| {
             let cosine = model.imitated(candidate, &signature).sqrt();
