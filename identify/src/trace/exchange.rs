@@ -77,7 +77,7 @@ impl Search<'_> {
     }
 
     fn retune_one(&mut self, track: usize) -> bool {
-        let Track { folds, taken } = self.tracks[track].clone();
+        let Track { folds, .. } = self.tracks[track].clone();
         let chosen = self.tracks[track].chosen();
         if !(1..=MOST_ANEW).contains(&chosen.len()) {
             return false;
@@ -116,11 +116,7 @@ impl Search<'_> {
                 }
             }
         }
-        let Some(set) = best else { return false };
-        let p_value = taken.iter().map(|taken| taken.p_value).fold(0.0, f64::max);
-        let anew = |candidate: usize| Taken { candidate, p_value };
-        self.tracks[track].taken = set.into_iter().map(anew).collect();
-        true
+        self.replace(track, best)
     }
 
     /// Looks for two effects together in the place of one or two, and takes the best two if they say clearly more. Returns whether the search on all
@@ -141,7 +137,7 @@ impl Search<'_> {
     }
 
     fn regroup_one(&mut self, track: usize) -> bool {
-        let Track { folds, taken } = self.tracks[track].clone();
+        let Track { folds, .. } = self.tracks[track].clone();
         let chosen = self.tracks[track].chosen();
         if !(1..=MOST_ANEW).contains(&chosen.len()) {
             return false;
@@ -190,10 +186,17 @@ impl Search<'_> {
                 }
             }
         }
-        let Some(set) = best else { return false };
+        self.replace(track, best)
+    }
+
+    /// Puts a set, if there is one, in the place of what a search has taken up; it is no more certain than the least certain of that. Returns whether there
+    /// was one.
+    fn replace(&mut self, track: usize, set: Option<Vec<usize>>) -> bool {
+        let Some(set) = set else { return false };
+        let taken = &mut self.tracks[track].taken;
         let p_value = taken.iter().map(|taken| taken.p_value).fold(0.0, f64::max);
         let anew = |candidate: usize| Taken { candidate, p_value };
-        self.tracks[track].taken = set.into_iter().map(anew).collect();
+        *taken = set.into_iter().map(anew).collect();
         true
     }
 
