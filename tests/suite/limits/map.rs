@@ -1,7 +1,8 @@
 //! Maps of the volumetric error, and files of errors: what people write for them at its limits.
 
 use std::fs;
-use std::path::Path;
+use std::path::{Path, PathBuf};
+use std::process::Output;
 
 use tempfile::TempDir;
 
@@ -24,6 +25,20 @@ fn told(folder: &TempDir, functions: &Path, more: &[&str]) -> String {
     assert_eq!(output.status.code(), Some(1), "{told}");
     assert!(!map.exists());
     told
+}
+
+/// What `abbe simulate --errors` comes to with a file, and the folder that it was asked to write.
+fn simulated(folder: &TempDir, errors: &Path) -> (Output, PathBuf) {
+    let (plan, out) = (ready("hermle-c600u/chapter5.toml"), folder.path().join("out"));
+    let output = abbe(&[
+        "simulate",
+        text(&plan),
+        "--out",
+        text(&out),
+        "--errors",
+        text(errors),
+    ]);
+    (output, out)
 }
 
 #[test]
@@ -91,17 +106,8 @@ fn files_of_errors_that_are_none() {
     fs::write(&latin, b"EX0C = \"1 \xb5m\"\n").unwrap();
     let long = folder.path().join("long.toml");
     fs::write(&long, format!("EX0C = \"{}\"\n", "1".repeat(300_000))).unwrap();
-    let plan = ready("hermle-c600u/chapter5.toml");
-    let out = folder.path().join("out");
-    let simulated = |file: &Path| {
-        let output = abbe(&[
-            "simulate",
-            text(&plan),
-            "--out",
-            text(&out),
-            "--errors",
-            text(file),
-        ]);
+    let refused = |file: &Path| {
+        let (output, out) = simulated(&folder, file);
         assert_eq!(output.status.code(), Some(1));
         assert!(!out.exists());
         String::from_utf8(output.stderr).unwrap()
@@ -115,11 +121,11 @@ fn files_of_errors_that_are_none() {
         (folder.path(), "this is a folder"),
         (Path::new("/dev/zero"), "has more than 8388608 bytes"),
     ] {
-        for told in [simulated(file), told(&folder, file, &[])] {
+        for told in [refused(file), told(&folder, file, &[])] {
             assert!(told.contains(message) && told.contains(text(file)), "{told}");
         }
     }
-    let told = simulated(&long);
+    let told = refused(&long);
     assert!(
         told.contains("`EX0C`: a number with its unit of 300000 bytes; 100 is the most"),
         "{told}"
@@ -132,16 +138,7 @@ fn a_byte_order_mark_before_errors() {
     let folder = tempfile::tempdir().unwrap();
     let file = folder.path().join("errors.toml");
     fs::write(&file, "\u{feff}EX0C = \"3 um\"\r\nEY0C = \"-2 um\"\r\n").unwrap();
-    let plan = ready("hermle-c600u/chapter5.toml");
-    let out = folder.path().join("out");
-    let output = abbe(&[
-        "simulate",
-        text(&plan),
-        "--out",
-        text(&out),
-        "--errors",
-        text(&file),
-    ]);
+    let (output, _) = simulated(&folder, &file);
     assert!(
         output.status.success(),
         "{}",
