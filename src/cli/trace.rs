@@ -133,7 +133,7 @@ fn progress_bar(quiet: bool) -> ProgressBar {
 
 fn list(session: &abbe::model::session::Session, options: &TraceOptions) -> Result<(), Failure> {
     let families = library::families()?;
-    let entries = abbe::identify::trace::list(session, options)?;
+    let entries = abbe::identify::trace::list::entries(session, options)?;
     for (number, family) in families.iter().enumerate() {
         let of_family: Vec<_> = entries.iter().filter(|entry| entry.family == number).collect();
         let seen = of_family.iter().filter(|entry| entry.seen).count();

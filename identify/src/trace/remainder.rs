@@ -24,6 +24,16 @@ pub struct Structure {
     pub words: String,
 }
 
+/// Significance below which a remainder counts as structured.
+const STRUCTURED: f64 = 0.01;
+
+impl Structure {
+    /// Whether there is any beyond noise.
+    pub fn is_there(&self) -> bool {
+        self.p_value <= STRUCTURED
+    }
+}
+
 /// One detector.
 struct Detector {
     layout: Layout,

@@ -4,9 +4,10 @@ use abbe_model::axis::AxisKind;
 use abbe_model::effect::{Driver, DriverSample, Effect, Shape};
 
 use super::alias::{self, Alias, Rival};
+use super::library;
 use super::remainder::Structure;
 use super::search::Search;
-use super::{EXPLAINED_SHARE, STRUCTURED, Start, library};
+use super::start::Start;
 use crate::error::IdentifyError;
 use crate::fit::{self, Fit};
 use crate::heldout::rms_mm;
@@ -16,6 +17,9 @@ use crate::results::{
     CurvePoint, EffectName, EffectResult, ModelResult, Moved, ParameterResult, Remainder, ShapeNumber,
     TraceResult,
 };
+
+/// Share of the structure's excess over noise that may remain for the found effects to count as the explanation.
+const EXPLAINED_SHARE: f64 = 0.5;
 
 /// What a search has come to.
 pub(super) struct Findings<'f, 'a> {
@@ -139,7 +143,7 @@ pub(super) fn report(findings: &Findings<'_, '_>) -> Result<Reported, IdentifyEr
         effects,
         remainder,
         residual_before: match findings.structure_before {
-            Some(structure) if structure.p_value <= STRUCTURED => structure.words.clone(),
+            Some(structure) if structure.is_there() => structure.words.clone(),
             Some(_) => "no structure beyond noise".to_string(),
             None => "independent poses: structure is looked for effect by effect".to_string(),
         },
@@ -321,7 +325,7 @@ fn verdict(findings: &Findings<'_, '_>, effects: &mut [EffectResult]) -> (String
         };
         return (word.to_string(), remainder);
     };
-    let structured = after.p_value <= STRUCTURED;
+    let structured = after.is_there();
     let remainder = Remainder {
         structured,
         p_value: after.p_value,

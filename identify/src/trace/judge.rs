@@ -1,0 +1,97 @@
+//! The found effects judged: everything refitted together, and what that leaves.
+
+use abbe_model::effect::Effect;
+
+use super::columns::Columns;
+use super::remainder::{self, Structure};
+use super::search::Search;
+use super::start::Start;
+use super::{TraceOptions, draws_of, null};
+use crate::error::IdentifyError;
+use crate::fit::{Fit, fit};
+use crate::problem::Problem;
+
+/// The model with what the search has taken, refitted, and what it leaves.
+pub(super) struct Judged<'a> {
+    pub after: Problem<'a>,
+    pub after_fit: Fit,
+    pub effects: Vec<Effect>,
+    /// `None` where no structure was looked for before either.
+    pub structure: Option<Structure>,
+}
+
+impl<'a> Judged<'a> {
+    /// Of what a search has taken; `structure_before` is what the declared model leaves.
+    pub fn of(
+        problem: &Problem<'a>,
+        before_fit: &Fit,
+        search: &Search<'_>,
+        options: &TraceOptions,
+        structure_before: Option<&Structure>,
+    ) -> Result<Judged<'a>, IdentifyError> {
+        let effects: Vec<Effect> = search
+            .taken()
+            .iter()
+            .map(|taken| search.candidates[taken.candidate].effect.clone())
+            .collect();
+        if effects.is_empty() {
+            return Ok(Judged {
+                after: problem.clone(),
+                after_fit: before_fit.clone(),
+                effects,
+                structure: structure_before.cloned(),
+            });
+        }
+        let mut after = problem.clone();
+        for effect in &effects {
+            after.add_effect(effect)?;
+        }
+        let after_fit = fit(&after, Some(&start_of(&after, before_fit)))?;
+        let structure = structure_before
+            .map(|_| left_over(&after, &after_fit, options))
+            .transpose()?;
+        Ok(Judged {
+            after,
+            after_fit,
+            effects,
+            structure,
+        })
+    }
+
+    /// Whether structure was looked for and found.
+    pub fn is_structured(&self) -> bool {
+        self.structure.as_ref().is_some_and(Structure::is_there)
+    }
+}
+
+/// The declared model's unknowns, and zeros for the effects' coefficients.
+fn start_of(after: &Problem<'_>, before: &Fit) -> Vec<f64> {
+    let mut start = vec![0.0; after.parameters.list.len()];
+    start[..before.beta.len()].copy_from_slice(&before.beta);
+    start
+}
+
+/// What a fit leaves, beside its model.
+fn left_over(problem: &Problem<'_>, fit: &Fit, options: &TraceOptions) -> Result<Structure, IdentifyError> {
+    let columns = Columns::new(problem, &fit.beta)?;
+    let start = Start::of(problem, &columns, fit)?;
+    let (count, seed) = (draws_of(options), options.seed.wrapping_add(1));
+    let draws = null::draws(
+        problem,
+        &columns,
+        &fit.residuals,
+        &start.residual,
+        count,
+        null::SINGLE,
+        seed,
+    );
+    let prior = start.prior();
+    Ok(remainder::structure(
+        problem,
+        &columns,
+        start.model,
+        &start.residual,
+        draws,
+        &prior,
+    ))
+}

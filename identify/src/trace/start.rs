@@ -1,0 +1,107 @@
+//! Where a search starts: the fitted model in orthonormal columns, priors included.
+//!
+//! With `J` the model's rows, `V` the directions that are seen and `R` the triangle of `J V` with its prior rows, the columns are `J V R⁻¹`: normal
+//! equations over them lose nothing.
+
+use faer::Mat;
+
+use super::columns::Columns;
+use super::score::PriorMoments;
+use super::search::Plain;
+use crate::error::IdentifyError;
+use crate::fit::{Fit, in_directions};
+use crate::problem::Problem;
+use crate::triangle::Triangle;
+
+/// The fitted model as the search takes it: orthonormal columns and the residual, whitened, in the order of the folds.
+pub(super) struct Start {
+    /// Rows × rank.
+    pub model: Mat<f64>,
+    /// One a row.
+    pub residual: Vec<f64>,
+    /// Orthonormal coordinates to unknowns in inside units: unknowns × rank.
+    pub to_unknowns: Mat<f64>,
+    prior_rows: Mat<f64>,
+    prior_residual: Vec<f64>,
+}
+
+impl Start {
+    /// From a fit, whose triangles hold its readings.
+    pub fn of(problem: &Problem<'_>, columns: &Columns<'_, '_>, fit: &Fit) -> Result<Start, IdentifyError> {
+        let unknowns = fit.beta.len();
+        let basis = &fit.rank.seen;
+        let rank = basis.ncols();
+        let rows = columns.model_rows(&fit.beta)?;
+        let residual = (0..rows.nrows()).map(|i| rows[(i, unknowns)]).collect();
+        let prior = problem.prior_triangle(&fit.beta);
+        let mut whole = Triangle::new(unknowns);
+        whole.merge(&prior);
+        fit.triangles.iter().for_each(|triangle| whole.merge(triangle));
+        let (r, _, _) = in_directions(&whole, basis).parts();
+        let inverse = inverse_of_triangle(&r);
+        let to_unknowns = basis * &inverse;
+        let model = rows.as_ref().subcols(0, unknowns) * &to_unknowns;
+        let (of_prior, prior_residual, _) = prior.parts();
+        let prior_rows = &of_prior * &to_unknowns;
+        debug_assert_eq!(model.ncols(), rank);
+        Ok(Start {
+            model,
+            residual,
+            to_unknowns,
+            prior_rows,
+            prior_residual,
+        })
+    }
+
+    /// The same model and residual, not whitened.
+    pub fn plain(
+        &self,
+        columns: &Columns<'_, '_>,
+        beta: &[f64],
+        sigma_mm: f64,
+    ) -> Result<Plain, IdentifyError> {
+        let rows = columns.plain_model_rows(beta)?;
+        let unknowns = beta.len();
+        let base = rows.as_ref().subcols(0, unknowns) * &self.to_unknowns;
+        Ok(Plain {
+            base: Mat::from_fn(base.nrows(), base.ncols(), |i, j| base[(i, j)] / sigma_mm),
+            residual: (0..rows.nrows())
+                .map(|i| rows[(i, unknowns)] / sigma_mm)
+                .collect(),
+            folds: columns.plain_folds(),
+            sigma_mm,
+        })
+    }
+
+    /// What is known beforehand, as products with the columns.
+    pub fn prior(&self) -> PriorMoments {
+        let rank = self.to_unknowns.ncols();
+        PriorMoments {
+            base: self.prior_rows.transpose() * &self.prior_rows,
+            base_y: (0..rank)
+                .map(|k| {
+                    let with = |i: usize| self.prior_rows[(i, k)] * self.prior_residual[i];
+                    (0..self.prior_rows.nrows()).map(with).sum()
+                })
+                .collect(),
+        }
+    }
+}
+
+/// The inverse of an upper triangle by back substitution.
+fn inverse_of_triangle(r: &Mat<f64>) -> Mat<f64> {
+    let n = r.nrows();
+    let mut inverse = Mat::zeros(n, n);
+    for column in 0..n {
+        for i in (0..=column).rev() {
+            let unit = if i == column { 1.0 } else { 0.0 };
+            let sum: f64 = (i + 1..=column).map(|k| r[(i, k)] * inverse[(k, column)]).sum();
+            inverse[(i, column)] = if r[(i, i)] != 0.0 {
+                (unit - sum) / r[(i, i)]
+            } else {
+                0.0
+            };
+        }
+    }
+    inverse
+}
