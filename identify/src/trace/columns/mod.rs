@@ -1,0 +1,301 @@
+//! Columns of candidates: sensitivity × basis, whitened as the readings are.
+//!
+//! The chain is evaluated once, for the sensitivities of every component; hundreds of candidates cost no further kinematics.
+
+mod layout;
+mod plain;
+
+use std::collections::{BTreeSet, HashMap};
+use std::ops::Range;
+use std::sync::{Arc, Mutex};
+
+use abbe_model::effect::DriverSample;
+use abbe_model::sensitivity::Sensitivities;
+use faer::{Mat, MatMut};
+use rayon::prelude::*;
+
+use crate::error::IdentifyError;
+use crate::problem::{Block, Problem};
+pub use layout::Layout;
+use layout::Moves;
+
+/// Readings whose sensitivities are taken at once.
+const ROWS_AT_ONCE: usize = 512;
+
+/// The whitened rows of a problem, by fold, and what is needed to lay any effect over them.
+pub struct Columns<'p, 'a> {
+    problem: &'p Problem<'a>,
+    /// By test.
+    sensitivities: Vec<Sensitivities>,
+    /// Place of each slot among the sensitivities, by test.
+    place: Vec<HashMap<usize, usize>>,
+    blocks: Vec<Block>,
+    /// The scalar rows of each block that whitening keeps.
+    kept: Vec<Vec<usize>>,
+    /// Where each whitened row goes, block after block, so that folds lie together.
+    target: Vec<usize>,
+    /// The rows of each fold.
+    pub fold_rows: Vec<Range<usize>>,
+    /// The tests whose readings each fold has.
+    fold_tests: Vec<BTreeSet<usize>>,
+    rows: usize,
+    /// What each driver does, by test and name; none where the data have no such column.
+    samples: Mutex<HashMap<(usize, String), SharedSamples>>,
+    /// The basis functions of each shape over a driver, likewise.
+    bases: Mutex<HashMap<(usize, String), SharedColumns>>,
+}
+
+type SharedColumns = Arc<Vec<Vec<f64>>>;
+type SharedSamples = Option<Arc<Vec<DriverSample<f64>>>>;
+
+impl<'p, 'a> Columns<'p, 'a> {
+    /// At the unknowns' values of a fit.
+    ///
+    /// # Errors
+    /// If the model cannot be evaluated.
+    pub fn new(problem: &'p Problem<'a>, beta: &[f64]) -> Result<Columns<'p, 'a>, IdentifyError> {
+        let sensitivities = sensitivities(problem, beta);
+        let place = sensitivities
+            .iter()
+            .map(|s| {
+                s.slots
+                    .iter()
+                    .enumerate()
+                    .map(|(place, slot)| (*slot, place))
+                    .collect()
+            })
+            .collect();
+        let blocks = problem.blocks();
+        let mut fold_of = Vec::new();
+        let mut fold_tests = vec![BTreeSet::new(); problem.folds.count];
+        let kept: Vec<Vec<usize>> = blocks.iter().map(|block| problem.kept_rows(block)).collect();
+        for (block, kept) in blocks.iter().zip(&kept) {
+            for fold in problem.folds_of(kept, block) {
+                fold_tests[fold].insert(block.test);
+                fold_of.push(fold);
+            }
+        }
+        let mut next = 0;
+        let mut target = vec![0; fold_of.len()];
+        let mut fold_rows = Vec::new();
+        for fold in 0..problem.folds.count {
+            let start = next;
+            for (row, _) in fold_of.iter().enumerate().filter(|(_, f)| **f == fold) {
+                target[row] = next;
+                next += 1;
+            }
+            fold_rows.push(start..next);
+        }
+        Ok(Columns {
+            problem,
+            sensitivities,
+            place,
+            blocks,
+            kept,
+            rows: target.len(),
+            target,
+            fold_rows,
+            fold_tests,
+            samples: Default::default(),
+            bases: Default::default(),
+        })
+    }
+
+    /// Number of whitened rows.
+    pub fn rows(&self) -> usize {
+        self.rows
+    }
+
+    /// The rows of layouts in one block, in mm, not whitened.
+    fn block_rows(&self, layouts: &[&Layout], block: &Block) -> Mat<f64> {
+        let coordinates = self.problem.coordinates();
+        let total: usize = layouts.iter().map(|layout| layout.count).sum();
+        let scalars = block.rows.len() * coordinates;
+        let first = block.rows.start;
+        let mut raw = Mat::<f64>::zeros(scalars, total);
+        let sensitivities = &self.sensitivities[block.test];
+        let mut column = 0;
+        for layout in layouts {
+            for part in &layout.parts[block.test] {
+                let derivative = match part.moves {
+                    Moves::Slot(slot) => {
+                        let whole = &sensitivities.derivatives[self.place[block.test][&slot]];
+                        Some(&whole[first * coordinates..first * coordinates + scalars])
+                    }
+                    Moves::Reading(_) => None,
+                };
+                let factor = part.factor.as_ref().map(|factor| &factor[block.rows.clone()]);
+                for k in 0..layout.count {
+                    let basis = &part.basis[k][block.rows.clone()];
+                    let Some(entries) = raw.col_mut(column + k).try_as_col_major_mut() else {
+                        continue;
+                    };
+                    let entries = entries.as_slice_mut();
+                    // One coordinate a reading and no factor is the common case, and the compiler makes vector instructions of it.
+                    if let (1, Some(derivative), None) = (coordinates, derivative, factor) {
+                        let terms = derivative.iter().zip(basis);
+                        entries
+                            .iter_mut()
+                            .zip(terms)
+                            .for_each(|(entry, (d, b))| *entry += d * b);
+                        continue;
+                    }
+                    for (row, basis) in basis.iter().enumerate() {
+                        let value = factor.map_or(*basis, |factor| basis * factor[row]);
+                        let scalars = row * coordinates..(row + 1) * coordinates;
+                        match (derivative, part.moves) {
+                            (None, Moves::Reading(moved)) => entries[scalars.start + moved] += value,
+                            (derivative, _) => {
+                                let derivative = derivative.map_or(&[][..], |whole| &whole[scalars.clone()]);
+                                let terms = entries[scalars].iter_mut().zip(derivative);
+                                terms.for_each(|(entry, d)| *entry += d * value);
+                            }
+                        }
+                    }
+                }
+            }
+            column += layout.count;
+        }
+        raw
+    }
+
+    /// The rows of each fold in which any of the layouts moves anything; none of a fold in which none does.
+    pub fn moved_rows(&self, layouts: &[Layout]) -> Vec<Range<usize>> {
+        let moved = |test: &usize| layouts.iter().any(|layout| layout.acts_in(*test));
+        let folds = self.fold_rows.iter().zip(&self.fold_tests);
+        folds
+            .map(|(rows, tests)| {
+                if tests.iter().any(moved) {
+                    rows.clone()
+                } else {
+                    rows.start..rows.start
+                }
+            })
+            .collect()
+    }
+
+    /// The stretches of rows of some folds in which any of the layouts moves anything.
+    pub fn moved_stretches(
+        &self,
+        layouts: &[Layout],
+        folds: impl IntoIterator<Item = usize>,
+    ) -> Vec<Range<usize>> {
+        let moved = self.moved_rows(layouts);
+        let mut stretches: Vec<Range<usize>> = Vec::new();
+        for rows in folds
+            .into_iter()
+            .map(|fold| &moved[fold])
+            .filter(|rows| !rows.is_empty())
+        {
+            match stretches.last_mut() {
+                Some(last) if last.end == rows.start => last.end = rows.end,
+                _ => stretches.push(rows.clone()),
+            }
+        }
+        stretches
+    }
+
+    /// Fills columns, which are zero before, with the whitened rows of layouts, one after another.
+    pub fn fill(&self, layouts: &[&Layout], mut columns: MatMut<'_, f64>) {
+        let total: usize = layouts.iter().map(|layout| layout.count).sum();
+        let mut start = 0;
+        for (block, kept) in self.blocks.iter().zip(&self.kept) {
+            let target = &self.target[start..start + kept.len()];
+            start += kept.len();
+            if target.is_empty() || !layouts.iter().any(|layout| layout.acts_in(block.test)) {
+                continue;
+            }
+            let white = self.problem.whitened(self.block_rows(layouts, block), kept);
+            let together = target[target.len() - 1] - target[0] + 1 == target.len();
+            for (mut column, white) in columns.as_mut().col_iter_mut().zip(white.col_iter()).take(total) {
+                if together {
+                    column.subrows_mut(target[0], target.len()).copy_from(white);
+                    continue;
+                }
+                for (place, value) in target.iter().zip(white.iter()) {
+                    column[*place] = *value;
+                }
+            }
+        }
+    }
+
+    /// Puts whitened rows of `[J | r]` at given values in the same order: rows × (unknowns + 1).
+    ///
+    /// # Errors
+    /// If the model cannot be evaluated.
+    pub fn model_rows(&self, beta: &[f64]) -> Result<Mat<f64>, IdentifyError> {
+        let values = self.problem.slot_values(beta);
+        let mut rows = Mat::zeros(self.rows, beta.len() + 1);
+        let mut start = 0;
+        for block in &self.blocks {
+            let raw = self.problem.rows(&values, block)?;
+            let (white, _) = self.problem.whiten(&raw, block);
+            for j in 0..white.ncols() {
+                for i in 0..white.nrows() {
+                    rows[(self.target[start + i], j)] = white[(i, j)];
+                }
+            }
+            start += white.nrows();
+        }
+        Ok(rows)
+    }
+
+    /// Places columns that were whitened block by block in the order of the folds.
+    pub fn placed(&self, values: &[f64]) -> Vec<f64> {
+        let mut placed = vec![0.0; self.rows];
+        for (value, target) in values.iter().zip(&self.target) {
+            placed[*target] = *value;
+        }
+        placed
+    }
+
+    /// The test, row and coordinate of each whitened row, in the order of the folds.
+    pub fn origin_of_rows(&self) -> Vec<(usize, usize, usize)> {
+        let coordinates = self.problem.coordinates();
+        let mut origins = vec![(0, 0, 0); self.rows];
+        let mut start = 0;
+        for (block, kept) in self.blocks.iter().zip(&self.kept) {
+            for (k, i) in kept.iter().enumerate() {
+                let row = block.rows.start + i / coordinates;
+                origins[self.target[start + k]] = (block.test, row, i % coordinates);
+            }
+            start += kept.len();
+        }
+        origins
+    }
+}
+
+/// The sensitivities of every test, in pieces that both short and long tests keep all cores busy with.
+fn sensitivities(problem: &Problem<'_>, beta: &[f64]) -> Vec<Sensitivities> {
+    let values = problem.slot_values(beta);
+    let pieces: Vec<(usize, Range<usize>)> = problem
+        .models
+        .iter()
+        .enumerate()
+        .flat_map(|(test, model)| {
+            let rows = model.rows();
+            (0..rows.div_ceil(ROWS_AT_ONCE))
+                .map(move |k| (test, k * ROWS_AT_ONCE..((k + 1) * ROWS_AT_ONCE).min(rows)))
+        })
+        .collect();
+    let parts: Vec<Sensitivities> = pieces
+        .par_iter()
+        .map(|(test, rows)| {
+            let model = &problem.models[*test];
+            model.sensitivities(&values[*test], &model.effective_slots(), rows.clone())
+        })
+        .collect();
+    let mut tests: Vec<Sensitivities> = Vec::new();
+    for ((test, _), part) in pieces.iter().zip(parts) {
+        match tests.get_mut(*test) {
+            Some(whole) => {
+                whole.readings_mm.extend(part.readings_mm);
+                for (column, more) in whole.derivatives.iter_mut().zip(part.derivatives) {
+                    column.extend(more);
+                }
+            }
+            None => tests.push(part),
+        }
+    }
+    tests
+}

@@ -1,0 +1,65 @@
+//! Rows as they are, not whitened, block after block: those whose readings count.
+
+use faer::Mat;
+
+use super::{Columns, Layout};
+use crate::error::IdentifyError;
+use crate::problem::Block;
+
+impl Columns<'_, '_> {
+    /// The rows of layouts that count, in mm, not whitened, block after block.
+    pub fn plain_rows(&self, layouts: &[&Layout]) -> Mat<f64> {
+        let blocks = self.blocks.iter().map(|block| self.block_rows(layouts, block));
+        self.plain(blocks.collect())
+    }
+
+    /// `[J | r]` at given values, likewise.
+    ///
+    /// # Errors
+    /// If the model cannot be evaluated.
+    pub fn plain_model_rows(&self, beta: &[f64]) -> Result<Mat<f64>, IdentifyError> {
+        let values = self.problem.slot_values(beta);
+        let blocks = self.blocks.iter().map(|block| self.problem.rows(&values, block));
+        Ok(self.plain(blocks.collect::<Result<_, _>>()?))
+    }
+
+    /// The fold of each row of [`Columns::plain_rows`].
+    pub fn plain_folds(&self) -> Vec<usize> {
+        let coordinates = self.problem.coordinates();
+        let fold = |block: &Block, i: usize| {
+            self.problem.folds.of_row[block.test][block.rows.start + i / coordinates]
+        };
+        self.blocks
+            .iter()
+            .flat_map(|block| self.counting(block).into_iter().map(move |i| fold(block, i)))
+            .collect()
+    }
+
+    /// The scalar rows of a block whose readings count.
+    fn counting(&self, block: &Block) -> Vec<usize> {
+        let coordinates = self.problem.coordinates();
+        let rejected = &self.problem.rejected[block.test];
+        (0..block.rows.len() * coordinates)
+            .filter(|i| !rejected[block.rows.start + i / coordinates])
+            .collect()
+    }
+
+    /// The rows of all blocks that count, one block below another.
+    fn plain(&self, blocks: Vec<Mat<f64>>) -> Mat<f64> {
+        let counting: Vec<Vec<usize>> = self.blocks.iter().map(|block| self.counting(block)).collect();
+        let mut rows = Mat::zeros(
+            counting.iter().map(Vec::len).sum(),
+            blocks.first().map_or(0, Mat::ncols),
+        );
+        let mut start = 0;
+        for (block, counting) in blocks.iter().zip(&counting) {
+            for (k, i) in counting.iter().enumerate() {
+                for j in 0..block.ncols() {
+                    rows[(start + k, j)] = block[(*i, j)];
+                }
+            }
+            start += counting.len();
+        }
+        rows
+    }
+}
