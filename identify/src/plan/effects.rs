@@ -54,7 +54,7 @@ const LEAST_BIAS: f64 = 1e-3;
 pub fn effects(problem: &Problem<'_>) -> Result<EffectsAnalysis, IdentifyError> {
     let nominal = vec![0.0; problem.parameters.list.len()];
     let linear = Linearisation::of(problem, &nominal)?;
-    let columns = Columns::new(problem, &nominal)?;
+    let columns = Columns::new(problem, &nominal);
     let model = columns.model_rows(&nominal)?;
     let families = library::families()?;
     let all = library::candidates(problem)?;

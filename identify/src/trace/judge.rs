@@ -73,7 +73,7 @@ fn start_of(after: &Problem<'_>, before: &Fit) -> Vec<f64> {
 
 /// What a fit leaves, beside its model.
 fn left_over(problem: &Problem<'_>, fit: &Fit, options: &TraceOptions) -> Result<Structure, IdentifyError> {
-    let columns = Columns::new(problem, &fit.beta)?;
+    let columns = Columns::new(problem, &fit.beta);
     let start = Start::of(problem, &columns, fit)?;
     let (count, seed) = (draws_of(options), options.seed.wrapping_add(1));
     let draws = null::draws(

@@ -31,7 +31,7 @@ pub struct Entry {
 /// If the session cannot be fitted.
 pub fn entries(session: &Session, options: &TraceOptions) -> Result<Vec<Entry>, IdentifyError> {
     let (problem, fit) = prepare(session, options.seed)?;
-    let columns = Columns::new(&problem, &fit.beta)?;
+    let columns = Columns::new(&problem, &fit.beta);
     let start = Start::of(&problem, &columns, &fit)?;
     let prior = start.prior();
     let laid = laid(&problem, &columns, options)?;

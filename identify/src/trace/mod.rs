@@ -164,7 +164,7 @@ fn trace_with<'a>(
     progress: &(dyn Fn(Progress) -> bool + Sync),
 ) -> Result<Trace<'a>, IdentifyError> {
     let poses = problem.folds.kind == FoldKind::Poses;
-    let columns = Columns::new(&problem, &before_fit.beta)?;
+    let columns = Columns::new(&problem, &before_fit.beta);
     let start = Start::of(&problem, &columns, &before_fit)?;
     let null = |block: usize| {
         let (count, seed) = (draws_of(options), options.seed);

@@ -50,10 +50,7 @@ type SharedSamples = Option<Arc<Vec<DriverSample<f64>>>>;
 
 impl<'p, 'a> Columns<'p, 'a> {
     /// At the unknowns' values of a fit.
-    ///
-    /// # Errors
-    /// If the model cannot be evaluated.
-    pub fn new(problem: &'p Problem<'a>, beta: &[f64]) -> Result<Columns<'p, 'a>, IdentifyError> {
+    pub fn new(problem: &'p Problem<'a>, beta: &[f64]) -> Columns<'p, 'a> {
         let sensitivities = sensitivities(problem, beta);
         let place = sensitivities
             .iter()
@@ -86,7 +83,7 @@ impl<'p, 'a> Columns<'p, 'a> {
             }
             fold_rows.push(start..next);
         }
-        Ok(Columns {
+        Columns {
             problem,
             sensitivities,
             place,
@@ -98,7 +95,7 @@ impl<'p, 'a> Columns<'p, 'a> {
             fold_tests,
             samples: Default::default(),
             bases: Default::default(),
-        })
+        }
     }
 
     /// Number of whitened rows.
