@@ -9,18 +9,15 @@
 //!
 //! `X` begins with an orthonormal basis of what the fit has (priors included), so that the normal equations lose nothing.
 
+mod products;
+
 use std::ops::Range;
 
 use faer::linalg::matmul::matmul;
 use faer::{Accum, Mat, MatRef, Par};
-use rayon::prelude::*;
 
 use super::columns::{Columns, Layout};
-
-/// The most entries of columns that are kept: 320 MB.
-const MOST_KEPT: usize = 40_000_000;
-/// Candidates whose columns are made together.
-const CHUNK_COLUMNS: usize = 48;
+use products::{Block, laid, with_side};
 
 /// Products over one fold.
 #[derive(Clone, Debug)]
@@ -66,6 +63,21 @@ impl FoldMoments {
                 .for_each(|(to, more)| *to += more);
         }
         sum
+    }
+
+    /// Adds base columns by their products with the whole base (base × added), with the candidates (added × candidate columns) and with the residual.
+    fn extend_base(&mut self, gram: &Mat<f64>, cross: &Mat<f64>, with_y: impl Iterator<Item = f64>) {
+        let base = gram.nrows();
+        let old = base - gram.ncols();
+        grow(&mut self.base, base, base, |i, j| {
+            if j < old {
+                gram[(j, i - old)]
+            } else {
+                gram[(i, j - old)]
+            }
+        });
+        grow(&mut self.cross, base, cross.ncols(), |i, j| cross[(i - old, j)]);
+        self.base_y.extend(with_y);
     }
 }
 
@@ -135,7 +147,6 @@ impl Moments {
         let rank = model.ncols();
         let side = beside(&model, residual);
         let (blocks, products) = laid(columns, layouts, 0..layouts.len(), &[], &side, &null);
-        let products = Products::joined(products, columns.fold_rows.len(), rank + 1, null.ncols());
         let folds = (columns.fold_rows.iter().zip(products.side).zip(products.own))
             .map(|((range, product), own)| {
                 let part = side.as_ref().subrows(range.start, range.len());
@@ -191,29 +202,9 @@ impl Moments {
         if added == 0 {
             return places;
         }
-        let mut fresh = Mat::zeros(rows, added);
-        columns.fill(&chosen, fresh.as_mut());
-        for j in 0..added {
-            let norm = fresh.col(j).norm_l2();
-            if norm > 0.0 {
-                for i in 0..rows {
-                    fresh[(i, j)] /= norm;
-                }
-            }
-        }
+        let fresh = unit_columns(columns, &chosen);
         grow(&mut self.base_columns, rows, next, |i, j| fresh[(i, j - old)]);
-        let products: Vec<Products> = (self.blocks.par_iter())
-            .map(|block| {
-                let layouts = &layouts[block.candidates.clone()];
-                let laid = block.kept.is_none().then(|| filled(columns, layouts));
-                let all = block.kept.as_ref().or(laid.as_ref());
-                all.map_or_else(Products::default, |all| Products {
-                    side: side_by_fold(columns, layouts, fresh.as_ref(), all.as_ref()),
-                    ..Products::default()
-                })
-            })
-            .collect();
-        let products = Products::joined(products, columns.fold_rows.len(), added, 0).side;
+        let products = with_side(&self.blocks, columns, layouts, fresh.as_ref());
         let null_fresh = transposed_product(fresh.as_ref(), self.null.as_ref());
         let draws = self.null.ncols();
         grow(&mut self.null_base, next, draws, |i, d| null_fresh[(i - old, d)]);
@@ -223,21 +214,8 @@ impl Moments {
             let fresh_part = fresh.as_ref().subrows(range.start, range.len());
             let base_part = self.base_columns.as_ref().subrows(range.start, range.len());
             let gram = transposed_product(base_part, fresh_part);
-            grow(&mut moments.base, next, next, |i, j| {
-                if j < old {
-                    gram[(j, i - old)]
-                } else {
-                    gram[(i, j - old)]
-                }
-            });
-            let product = &products[fold];
-            grow(&mut moments.cross, next, total, |i, j| product[(i - old, j)]);
-            for j in 0..added {
-                let sum = (range.start..range.end)
-                    .map(|i| fresh[(i, j)] * self.residual[i])
-                    .sum();
-                moments.base_y.push(sum);
-            }
+            let with_y = |j: usize| range.clone().map(|i| fresh[(i, j)] * self.residual[i]).sum();
+            moments.extend_base(&gram, &products[fold], (0..added).map(with_y));
         }
         self.sum_up(next, total);
         places
@@ -257,7 +235,6 @@ impl Moments {
             &self.null,
         );
         let draws = self.null.ncols();
-        let products = Products::joined(products, columns.fold_rows.len(), rank + 1, draws);
         let total = self.null_cross.ncols();
         let mut added = 0;
         for layout in &layouts[candidates] {
@@ -314,6 +291,22 @@ impl Moments {
     }
 }
 
+/// The columns of layouts, each of unit length.
+fn unit_columns(columns: &Columns<'_, '_>, layouts: &[&Layout]) -> Mat<f64> {
+    let width = layouts.iter().map(|layout| layout.count).sum();
+    let mut fresh = Mat::zeros(columns.rows(), width);
+    columns.fill(layouts, fresh.as_mut());
+    for j in 0..width {
+        let norm = fresh.col(j).norm_l2();
+        if norm > 0.0 {
+            for i in 0..columns.rows() {
+                fresh[(i, j)] /= norm;
+            }
+        }
+    }
+    fresh
+}
+
 /// Model and residual side by side: one product with each chunk of candidates.
 fn beside(model: &Mat<f64>, residual: &[f64]) -> Mat<f64> {
     let rank = model.ncols();
@@ -323,187 +316,4 @@ fn beside(model: &Mat<f64>, residual: &[f64]) -> Mat<f64> {
         side[(i, rank)] = *value;
     }
     side
-}
-
-/// Consecutive candidates with their columns, where these are kept.
-struct Block {
-    candidates: Range<usize>,
-    kept: Option<Mat<f64>>,
-}
-
-/// Lays candidates out block by block and multiplies each block while it is at hand; columns are kept as long as they find room beside those that are
-/// kept already.
-fn laid(
-    columns: &Columns<'_, '_>,
-    layouts: &[Layout],
-    candidates: Range<usize>,
-    present: &[Block],
-    side: &Mat<f64>,
-    null: &Mat<f64>,
-) -> (Vec<Block>, Vec<Products>) {
-    let count: Vec<usize> = layouts[candidates.clone()]
-        .iter()
-        .map(|layout| layout.count)
-        .collect();
-    let mut kept: usize = present
-        .iter()
-        .filter_map(|block| block.kept.as_ref())
-        .map(|kept| kept.nrows() * kept.ncols())
-        .sum();
-    let blocks: Vec<(Range<usize>, bool)> = chunked(&count)
-        .into_iter()
-        .map(|chunk| {
-            let entries = columns.rows() * count[chunk.clone()].iter().sum::<usize>();
-            let room = kept + entries <= MOST_KEPT;
-            kept += if room { entries } else { 0 };
-            (candidates.start + chunk.start..candidates.start + chunk.end, room)
-        })
-        .collect();
-    blocks
-        .into_par_iter()
-        .map(|(candidates, room)| {
-            let layouts = &layouts[candidates.clone()];
-            let all = filled(columns, layouts);
-            let products = Products {
-                side: side_by_fold(columns, layouts, side.as_ref(), all.as_ref()),
-                own: own_by_fold(columns, layouts, all.as_ref()),
-                null: null_product(columns, layouts, null, all.as_ref()),
-            };
-            let kept = room.then_some(all);
-            (Block { candidates, kept }, products)
-        })
-        .unzip()
-}
-
-fn filled(columns: &Columns<'_, '_>, layouts: &[Layout]) -> Mat<f64> {
-    let chosen: Vec<&Layout> = layouts.iter().collect();
-    let width: usize = chosen.iter().map(|layout| layout.count).sum();
-    let mut block = Mat::zeros(columns.rows(), width);
-    columns.fill(&chosen, block.as_mut());
-    block
-}
-
-/// Products with the columns of consecutive candidates.
-struct Products {
-    /// For each fold `sideᵀ · candidates`.
-    side: Vec<Mat<f64>>,
-    /// For each fold each candidate's product with itself.
-    own: Vec<Vec<Mat<f64>>>,
-    /// Null draws with candidates, over all folds.
-    null: Mat<f64>,
-}
-
-impl Default for Products {
-    fn default() -> Products {
-        Products {
-            side: Vec::new(),
-            own: Vec::new(),
-            null: Mat::zeros(0, 0),
-        }
-    }
-}
-
-impl Products {
-    /// Of one block after another, with so many columns at the side and null draws.
-    fn joined(parts: Vec<Products>, folds: usize, side: usize, draws: usize) -> Products {
-        let fold = |fold: usize| joined(side, parts.iter().filter_map(|part| part.side.get(fold)));
-        let sides = (0..folds).into_par_iter().map(fold).collect();
-        let null = joined(draws, parts.iter().map(|part| &part.null));
-        let mut own = vec![Vec::new(); folds];
-        for (fold, of_part) in parts
-            .into_iter()
-            .flat_map(|part| part.own.into_iter().enumerate())
-        {
-            own[fold].extend(of_part);
-        }
-        Products {
-            side: sides,
-            own,
-            null,
-        }
-    }
-}
-
-/// Matrices of so many rows, one beside another.
-fn joined<'p>(rows: usize, parts: impl Iterator<Item = &'p Mat<f64>> + Clone) -> Mat<f64> {
-    let mut whole = Mat::zeros(rows, parts.clone().map(Mat::ncols).sum());
-    let mut column = 0;
-    for part in parts {
-        whole.as_mut().subcols_mut(column, part.ncols()).copy_from(part);
-        column += part.ncols();
-    }
-    whole
-}
-
-/// For each fold `sideᵀ · candidates`: zero without a look where none of the candidates moves anything.
-fn side_by_fold(
-    columns: &Columns<'_, '_>,
-    layouts: &[Layout],
-    side: MatRef<'_, f64>,
-    all: MatRef<'_, f64>,
-) -> Vec<Mat<f64>> {
-    let moved = columns.moved_rows(layouts).into_iter();
-    moved
-        .map(|rows| {
-            let part = |of: MatRef<'_, f64>| transposed_product(of, all.subrows(rows.start, rows.len()));
-            part(side.subrows(rows.start, rows.len()))
-        })
-        .collect()
-}
-
-/// For each fold each candidate's product with itself.
-fn own_by_fold(columns: &Columns<'_, '_>, layouts: &[Layout], all: MatRef<'_, f64>) -> Vec<Vec<Mat<f64>>> {
-    let moved = columns.moved_rows(layouts).into_iter();
-    moved
-        .map(|rows| {
-            let part = all.subrows(rows.start, rows.len());
-            let mut start = 0;
-            let own = |layout: &Layout| {
-                let of = part.subcols(start, layout.count);
-                start += layout.count;
-                transposed_product(of, of)
-            };
-            layouts.iter().map(own).collect()
-        })
-        .collect()
-}
-
-/// Null draws with candidates, over all folds in which any of them moves anything.
-fn null_product(
-    columns: &Columns<'_, '_>,
-    layouts: &[Layout],
-    null: &Mat<f64>,
-    all: MatRef<'_, f64>,
-) -> Mat<f64> {
-    let mut product = Mat::zeros(null.ncols(), all.ncols());
-    for rows in columns.moved_stretches(layouts, 0..columns.fold_rows.len()) {
-        let draws = null.as_ref().subrows(rows.start, rows.len());
-        let part = all.subrows(rows.start, rows.len());
-        matmul(
-            product.as_mut(),
-            Accum::Add,
-            draws.transpose(),
-            part,
-            1.0,
-            Par::Seq,
-        );
-    }
-    product
-}
-
-/// Consecutive candidates whose columns together make a chunk.
-fn chunked(count: &[usize]) -> Vec<std::ops::Range<usize>> {
-    let mut chunks = Vec::new();
-    let (mut start, mut width) = (0, 0);
-    for (index, columns) in count.iter().enumerate() {
-        if width > 0 && width + columns > CHUNK_COLUMNS {
-            chunks.push(start..index);
-            (start, width) = (index, 0);
-        }
-        width += columns;
-    }
-    if start < count.len() {
-        chunks.push(start..count.len());
-    }
-    chunks
 }

@@ -1,0 +1,214 @@
+//! Columns of candidates multiplied block by block, while a block is at hand: all of them at once need more room than there is.
+
+use std::ops::Range;
+
+use faer::linalg::matmul::matmul;
+use faer::{Accum, Mat, MatRef, Par};
+use rayon::prelude::*;
+
+use super::transposed_product;
+use crate::trace::columns::{Columns, Layout};
+
+/// The most entries of columns that are kept: 320 MB.
+const MOST_KEPT: usize = 40_000_000;
+/// Candidates whose columns are made together.
+const CHUNK_COLUMNS: usize = 48;
+
+/// Consecutive candidates with their columns, where these are kept.
+pub(super) struct Block {
+    candidates: Range<usize>,
+    kept: Option<Mat<f64>>,
+}
+
+/// Lays candidates out block by block and multiplies each block while it is at hand; columns are kept as long as they find room beside those that are
+/// kept already.
+pub(super) fn laid(
+    columns: &Columns<'_, '_>,
+    layouts: &[Layout],
+    candidates: Range<usize>,
+    present: &[Block],
+    side: &Mat<f64>,
+    null: &Mat<f64>,
+) -> (Vec<Block>, Products) {
+    let count: Vec<usize> = layouts[candidates.clone()]
+        .iter()
+        .map(|layout| layout.count)
+        .collect();
+    let mut kept: usize = present
+        .iter()
+        .filter_map(|block| block.kept.as_ref())
+        .map(|kept| kept.nrows() * kept.ncols())
+        .sum();
+    let blocks: Vec<(Range<usize>, bool)> = chunked(&count)
+        .into_iter()
+        .map(|chunk| {
+            let entries = columns.rows() * count[chunk.clone()].iter().sum::<usize>();
+            let room = kept + entries <= MOST_KEPT;
+            kept += if room { entries } else { 0 };
+            (candidates.start + chunk.start..candidates.start + chunk.end, room)
+        })
+        .collect();
+    let (blocks, products): (Vec<Block>, Vec<Products>) = blocks
+        .into_par_iter()
+        .map(|(candidates, room)| {
+            let layouts = &layouts[candidates.clone()];
+            let all = filled(columns, layouts);
+            let products = Products {
+                side: side_by_fold(columns, layouts, side.as_ref(), all.as_ref()),
+                own: own_by_fold(columns, layouts, all.as_ref()),
+                null: null_product(columns, layouts, null, all.as_ref()),
+            };
+            let kept = room.then_some(all);
+            (Block { candidates, kept }, products)
+        })
+        .unzip();
+    let products = Products::joined(products, columns.fold_rows.len(), side.ncols(), null.ncols());
+    (blocks, products)
+}
+
+/// For each fold `sideᵀ · candidates` of everything that has been laid out; what is not kept is laid out once more.
+pub(super) fn with_side(
+    blocks: &[Block],
+    columns: &Columns<'_, '_>,
+    layouts: &[Layout],
+    side: MatRef<'_, f64>,
+) -> Vec<Mat<f64>> {
+    let parts: Vec<Vec<Mat<f64>>> = blocks
+        .par_iter()
+        .map(|block| {
+            let layouts = &layouts[block.candidates.clone()];
+            let anew = block.kept.is_none().then(|| filled(columns, layouts));
+            let all = block.kept.as_ref().or(anew.as_ref());
+            all.map_or_else(Vec::new, |all| side_by_fold(columns, layouts, side, all.as_ref()))
+        })
+        .collect();
+    joined_by_fold(&parts, columns.fold_rows.len(), side.ncols())
+}
+
+fn filled(columns: &Columns<'_, '_>, layouts: &[Layout]) -> Mat<f64> {
+    let chosen: Vec<&Layout> = layouts.iter().collect();
+    let width: usize = chosen.iter().map(|layout| layout.count).sum();
+    let mut block = Mat::zeros(columns.rows(), width);
+    columns.fill(&chosen, block.as_mut());
+    block
+}
+
+/// Products with the columns of consecutive candidates.
+pub(super) struct Products {
+    /// For each fold `sideᵀ · candidates`.
+    pub side: Vec<Mat<f64>>,
+    /// For each fold each candidate's product with itself.
+    pub own: Vec<Vec<Mat<f64>>>,
+    /// Null draws with candidates, over all folds.
+    pub null: Mat<f64>,
+}
+
+impl Products {
+    /// Of one block after another, with so many columns at the side and null draws.
+    fn joined(parts: Vec<Products>, folds: usize, side: usize, draws: usize) -> Products {
+        let null = joined(draws, parts.iter().map(|part| &part.null));
+        let mut sides = Vec::with_capacity(parts.len());
+        let mut own = vec![Vec::new(); folds];
+        for part in parts {
+            sides.push(part.side);
+            own.iter_mut()
+                .zip(part.own)
+                .for_each(|(own, more)| own.extend(more));
+        }
+        Products {
+            side: joined_by_fold(&sides, folds, side),
+            own,
+            null,
+        }
+    }
+}
+
+/// The products of one block beside those of another, fold by fold.
+fn joined_by_fold(parts: &[Vec<Mat<f64>>], folds: usize, rows: usize) -> Vec<Mat<f64>> {
+    let of_fold = |fold: usize| joined(rows, parts.iter().filter_map(|part| part.get(fold)));
+    (0..folds).into_par_iter().map(of_fold).collect()
+}
+
+/// Matrices of so many rows, one beside another.
+fn joined<'p>(rows: usize, parts: impl Iterator<Item = &'p Mat<f64>> + Clone) -> Mat<f64> {
+    let mut whole = Mat::zeros(rows, parts.clone().map(Mat::ncols).sum());
+    let mut column = 0;
+    for part in parts {
+        whole.as_mut().subcols_mut(column, part.ncols()).copy_from(part);
+        column += part.ncols();
+    }
+    whole
+}
+
+/// For each fold `sideᵀ · candidates`: zero without a look where none of the candidates moves anything.
+fn side_by_fold(
+    columns: &Columns<'_, '_>,
+    layouts: &[Layout],
+    side: MatRef<'_, f64>,
+    all: MatRef<'_, f64>,
+) -> Vec<Mat<f64>> {
+    let moved = columns.moved_rows(layouts).into_iter();
+    moved
+        .map(|rows| {
+            let part = |of: MatRef<'_, f64>| transposed_product(of, all.subrows(rows.start, rows.len()));
+            part(side.subrows(rows.start, rows.len()))
+        })
+        .collect()
+}
+
+/// For each fold each candidate's product with itself.
+fn own_by_fold(columns: &Columns<'_, '_>, layouts: &[Layout], all: MatRef<'_, f64>) -> Vec<Vec<Mat<f64>>> {
+    let moved = columns.moved_rows(layouts).into_iter();
+    moved
+        .map(|rows| {
+            let part = all.subrows(rows.start, rows.len());
+            let mut start = 0;
+            let own = |layout: &Layout| {
+                let of = part.subcols(start, layout.count);
+                start += layout.count;
+                transposed_product(of, of)
+            };
+            layouts.iter().map(own).collect()
+        })
+        .collect()
+}
+
+/// Null draws with candidates, over all folds in which any of them moves anything.
+fn null_product(
+    columns: &Columns<'_, '_>,
+    layouts: &[Layout],
+    null: &Mat<f64>,
+    all: MatRef<'_, f64>,
+) -> Mat<f64> {
+    let mut product = Mat::zeros(null.ncols(), all.ncols());
+    for rows in columns.moved_stretches(layouts, 0..columns.fold_rows.len()) {
+        let draws = null.as_ref().subrows(rows.start, rows.len());
+        let part = all.subrows(rows.start, rows.len());
+        matmul(
+            product.as_mut(),
+            Accum::Add,
+            draws.transpose(),
+            part,
+            1.0,
+            Par::Seq,
+        );
+    }
+    product
+}
+
+/// Consecutive candidates whose columns together make a chunk.
+fn chunked(count: &[usize]) -> Vec<Range<usize>> {
+    let mut chunks = Vec::new();
+    let (mut start, mut width) = (0, 0);
+    for (index, columns) in count.iter().enumerate() {
+        if width > 0 && width + columns > CHUNK_COLUMNS {
+            chunks.push(start..index);
+            (start, width) = (index, 0);
+        }
+        width += columns;
+    }
+    if start < count.len() {
+        chunks.push(start..count.len());
+    }
+    chunks
+}
