@@ -1,0 +1,132 @@
+//! The models that a search compares: what has been chosen, trained on the folds that it sees, and what a candidate is worth beside that.
+
+use std::ops::Range;
+
+use abbe_model::effect::Effect;
+
+use super::{ALL, Search};
+use crate::trace::columns::Layout;
+use crate::trace::score::{Gain, Trained};
+use crate::trace::tail::ln_chi_square_tail;
+use crate::trace::trial::Trial;
+
+impl Search<'_> {
+    /// Where a candidate's columns stand in the base; nowhere before it was ever taken up.
+    pub fn places(&self, candidate: usize) -> Range<usize> {
+        self.materialised
+            .iter()
+            .find(|(c, _)| *c == candidate)
+            .map_or(0..0, |(_, places)| places.clone())
+    }
+
+    fn base_with(&self, chosen: &[usize]) -> Vec<usize> {
+        (0..self.rank)
+            .chain(chosen.iter().flat_map(|candidate| self.places(*candidate)))
+            .collect()
+    }
+
+    /// The model with some candidates, trained on some folds.
+    pub(in crate::trace) fn model_of(&self, chosen: &[usize], folds: &[usize]) -> Trained<'_> {
+        Trained::new(&self.moments, &self.prior, self.base_with(chosen), folds.to_vec())
+    }
+
+    /// The same, to be asked for few candidates.
+    pub(in crate::trace) fn lean_model_of(&self, chosen: &[usize], folds: &[usize]) -> Trained<'_> {
+        Trained::lean(&self.moments, &self.prior, self.base_with(chosen), folds.to_vec())
+    }
+
+    /// The model with what has been taken, less one of it, on all readings.
+    pub fn model_without(&self, left_out: Option<usize>) -> Trained<'_> {
+        let mut chosen = self.tracks[ALL].chosen();
+        if let Some(k) = left_out {
+            chosen.remove(k);
+        }
+        self.model_of(&chosen, &self.tracks[ALL].folds)
+    }
+
+    /// Puts the columns of candidates into the base, where they are not there yet.
+    pub(in crate::trace) fn materialise(&mut self, candidates: &[usize]) {
+        let fresh: Vec<usize> = candidates
+            .iter()
+            .copied()
+            .filter(|c| !self.materialised.iter().any(|(present, _)| present == c))
+            .collect();
+        if fresh.is_empty() {
+            return;
+        }
+        let places = self.moments.materialise(self.columns, &self.layouts, &fresh);
+        let chosen: Vec<&Layout> = fresh.iter().map(|c| &self.layouts[*c]).collect();
+        let rows = self.columns.plain_rows(&chosen);
+        let norms: Vec<f64> = fresh.iter().flat_map(|c| self.norms(*c)).collect();
+        self.plain.extend(&rows, &norms);
+        self.materialised.extend(fresh.into_iter().zip(places));
+    }
+
+    /// The lengths of a candidate's columns over all readings.
+    pub fn norms(&self, candidate: usize) -> Vec<f64> {
+        (0..self.moments.count[candidate])
+            .map(|k| {
+                self.moments
+                    .folds
+                    .iter()
+                    .map(|fold| fold.own[candidate][(k, k)])
+                    .sum::<f64>()
+                    .max(0.0)
+                    .sqrt()
+            })
+            .collect()
+    }
+
+    /// The variance that gains are measured in.
+    pub fn variance(&self, model: &Trained<'_>) -> f64 {
+        if !self.stop.in_residual_variance {
+            return 1.0;
+        }
+        let sum: f64 = model
+            .folds
+            .iter()
+            .map(|fold| model.sum_of_squares_on(*fold))
+            .sum();
+        let rows: usize = model
+            .folds
+            .iter()
+            .map(|fold| self.columns.fold_rows[*fold].len())
+            .sum();
+        let freedom = rows.saturating_sub(model.base.len()).max(1) as f64;
+        (sum / freedom).max(f64::MIN_POSITIVE)
+    }
+
+    /// The variance of the null draws, in the same sense.
+    pub(super) fn null_variance(&self) -> f64 {
+        self.variance(&self.lean_model_of(&[], &self.tracks[ALL].folds))
+    }
+
+    /// `−ln P` of a gain.
+    pub fn evidence(&self, gain: &Gain, variance: f64) -> f64 {
+        if gain.freedom == 0 {
+            return f64::NEG_INFINITY;
+        }
+        -ln_chi_square_tail(gain.gain / variance, gain.freedom)
+    }
+
+    /// The evidence for a candidate: `−ln P` of its gain, less the price of its places.
+    pub fn evidence_for(&self, candidate: usize, gain: &Gain, variance: f64) -> f64 {
+        self.evidence(gain, variance) - self.candidates[candidate].price
+    }
+
+    /// The same, less the candidate's cost.
+    pub fn score(&self, candidate: usize, gain: &Gain, variance: f64) -> f64 {
+        self.evidence_for(candidate, gain, variance) - self.candidates[candidate].cost
+    }
+
+    /// Any effect on trial beside a model; `None` where the data lack what it follows.
+    pub(in crate::trace) fn trial(&self, model: &Trained<'_>, effect: &Effect) -> Option<Trial> {
+        let layout = self.columns.layout_uncached(effect)?;
+        Some(Trial::new(self.columns, &self.moments, &layout, model))
+    }
+
+    /// What any effect would gain beside a model, on the folds that it is trained on; `None` where the data lack what it follows.
+    pub fn gain_beside(&self, model: &Trained<'_>, effect: &Effect) -> Option<f64> {
+        Some(self.trial(model, effect)?.gain(model))
+    }
+}
