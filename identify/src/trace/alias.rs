@@ -1,21 +1,22 @@
 //! What else would look the same.
 //!
 //! Two candidates are aliases where the readings cannot tell them apart: in place of the named effect, beside the same model, the other explains
-//! the residual as well within [`INDISTINGUISHABLE`] of log-likelihood, whether or not the numbers and places that were chosen in its shape are held against it, and it does at least half of what the named effect did to the readings. The one with the least cost in the library is named first; at equal cost, the one with the larger gain.
+//! the residual as well within 2 of log-likelihood, whether or not the numbers and places that were chosen in its shape are held against it, and it does
+//! at least half of what the named effect did to the readings. The search names the one that is the shortest to say; the others are told, nearest first.
 
 use abbe_model::effect::Shape;
 
 use super::search::Search;
 
 /// Difference in `−ln P` below which two candidates cannot be told apart: 2 σ for one column.
-pub const INDISTINGUISHABLE: f64 = 2.0;
+pub(super) const INDISTINGUISHABLE: f64 = 2.0;
 /// Least cosine between the named effect's signature and what an alias can do: at least half of it. What is nearer than the evidence can tell is an
 /// alias however small the angle; what explains as much of something else is none.
-pub const LEAST_COSINE: f64 = std::f64::consts::FRAC_1_SQRT_2;
+const LEAST_COSINE: f64 = std::f64::consts::FRAC_1_SQRT_2;
 
 /// An alias of a taken effect.
 #[derive(Clone, Debug)]
-pub struct Alias {
+pub(super) struct Alias {
     /// Its candidate.
     pub candidate: usize,
     /// Cosine of the angle between the named effect's signature and what the alias can do, beside the model.
@@ -87,7 +88,7 @@ fn rivals(
 }
 
 /// The aliases of the `k`-th taken effect, nearest first, and what stands highest in its place.
-pub fn aliases(search: &Search<'_>, k: usize, variance: f64) -> (Vec<Alias>, Vec<Rival>) {
+pub(super) fn aliases(search: &Search<'_>, k: usize, variance: f64) -> (Vec<Alias>, Vec<Rival>) {
     let model = search.model_without(Some(k));
     let taken = &search.taken()[k];
     let of_named = model.gain(taken.candidate);

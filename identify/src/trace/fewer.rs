@@ -192,7 +192,6 @@ impl Search<'_> {
                 .iter()
                 .map(|c| self.moments.count[*c] + self.moments.numbers[*c])
                 .sum(),
-            visible: 1.0,
         };
         self.evidence(&gain, self.variance(&without))
     }

@@ -1,33 +1,31 @@
 //! Close the loop: from what a fitted model leaves over to the effect that it lacks.
 //!
 //! 1. Noise first: size and memory from repeats ([`crate::noise`]), wild readings left out by name ([`crate::outliers`]).
-//! 2. The library of effects ([`library`]) is laid over the session ([`columns`]) and multiplied once with model, residual and null draws
-//!    ([`moments`]).
-//! 3. The search ([`search`]) adds, lets go and exchanges effects; its p-values come from the same search on readings without structure
-//!    ([`null`]).
-//! 4. For each effect, what would look the same ([`alias`]); for the rest, whether it has structure ([`remainder`]).
-//! 5. Everything is refitted together, and reported before and after on readings that neither fit nor search saw.
+//! 2. The library of effects ([`library`]) is laid over the session (`columns`) and multiplied once with model, residual and null draws (`moments`).
+//! 3. The search (`search`) adds, lets go and exchanges effects; its p-values come from the same search on readings without structure (`null`).
+//! 4. Everything is refitted together (`judge`), and reported before and after (`report`) on readings that neither fit nor search saw.
+//! 5. For each effect, what would look the same ([`alias`]); for the rest, whether it has structure (`remainder`).
 
 pub mod alias;
-pub mod columns;
-pub mod compose;
+pub(crate) mod columns;
+mod compose;
 mod exchange;
 mod fewer;
 pub mod further;
 mod judge;
 pub mod library;
 pub mod list;
-pub mod moments;
-pub mod null;
-pub mod remainder;
+mod moments;
+mod null;
+mod remainder;
 mod report;
 mod rounds;
-pub mod score;
-pub mod search;
-pub mod sharpen;
+mod score;
+mod search;
+mod sharpen;
 mod start;
-pub mod tail;
-pub mod trial;
+mod tail;
+mod trial;
 mod visible;
 
 use abbe_model::effect::Effect;

@@ -46,7 +46,7 @@ pub(super) struct Reported {
 }
 
 /// An effect's name as it stands in results.
-pub fn effect_name(effect: &Effect) -> EffectName {
+pub(super) fn effect_name(effect: &Effect) -> EffectName {
     EffectName {
         component: effect.component.to_string(),
         driver: effect.driver.to_string(),

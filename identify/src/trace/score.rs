@@ -43,8 +43,6 @@ pub struct Gain {
     pub gain: f64,
     /// Directions that it adds, and numbers of its shape that were chosen.
     pub freedom: usize,
-    /// The share of its own length that the model does not have already.
-    pub visible: f64,
 }
 
 /// `Xᵀ C` and `(XᵀX)⁻¹ Xᵀ C` of a candidate: among those of all candidates, or made for this one.
@@ -246,7 +244,6 @@ impl<'m> Trained<'m> {
         Gain {
             gain: inverse.quadratic(&g),
             freedom: self.freedom(candidate, inverse.freedom),
-            visible: inverse.share,
         }
     }
 

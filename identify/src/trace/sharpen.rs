@@ -88,7 +88,6 @@ pub fn sharpened(
         let gain = Gain {
             gain,
             freedom: effect.shape.coefficients() + effect.shape.numbers(),
-            visible: 1.0,
         };
         let evidence = search.evidence(&gain, variance);
         if evidence >= best - BEHIND || evidence - composed.candidate.cost >= NEAR * best {

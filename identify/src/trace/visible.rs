@@ -17,8 +17,6 @@ pub(super) struct Visible {
     scale: Vec<f64>,
     /// Number of directions that are seen.
     pub freedom: usize,
-    /// The largest share of a column's length that remains beside the model.
-    pub share: f64,
 }
 
 impl Visible {
@@ -34,11 +32,6 @@ impl Visible {
             })
             .collect();
         let scaled = Mat::from_fn(n, n, |i, j| d[(i, j)] * scale[i] * scale[j]);
-        let share = if n == 0 {
-            0.0
-        } else {
-            (0..n).map(|i| scaled[(i, i)]).fold(0.0, f64::max)
-        };
         if n == 1 {
             let seen = scaled[(0, 0)] > LEAST_VISIBLE;
             let values = vec![if seen { 1.0 / scaled[(0, 0)] } else { 0.0 }];
@@ -47,11 +40,10 @@ impl Visible {
                 values,
                 scale,
                 freedom: usize::from(seen),
-                share,
             };
         }
         if n == 2 {
-            return Visible::of_two(scaled, scale, share);
+            return Visible::of_two(scaled, scale);
         }
         let Ok(eigen) = scaled.self_adjoint_eigen(faer::Side::Lower) else {
             return Visible {
@@ -59,7 +51,6 @@ impl Visible {
                 values: vec![0.0; n],
                 scale,
                 freedom: 0,
-                share,
             };
         };
         let values: Vec<f64> = eigen
@@ -74,12 +65,11 @@ impl Visible {
             values,
             scale,
             freedom,
-            share,
         }
     }
 
     /// Of two columns, as sine and cosine have: by one rotation (Jacobi; Golub & Van Loan 8.5).
-    fn of_two(scaled: Mat<f64>, scale: Vec<f64>, share: f64) -> Visible {
+    fn of_two(scaled: Mat<f64>, scale: Vec<f64>) -> Visible {
         let (a, b, c) = (scaled[(0, 0)], scaled[(1, 0)], scaled[(1, 1)]);
         let tangent = if b == 0.0 {
             0.0
@@ -102,7 +92,6 @@ impl Visible {
             freedom: values.iter().filter(|value| **value > 0.0).count(),
             values,
             scale,
-            share,
         }
     }
 

@@ -83,7 +83,7 @@ pub struct Candidate {
     pub price: f64,
     /// Whether it is tried only when nothing simpler is left to find and structure remains.
     pub last_resort: bool,
-    /// Whether it holds the places that an effect may be composed of ([`super::compose`]) and is no effect itself.
+    /// Whether it holds the places that an effect may be composed of (`compose`) and is no effect itself.
     pub dictionary: bool,
     /// How far apart the entries of the library are in the number of the shape that is the first to be tuned, in the driver's unit; 0 without one.
     pub grid: f64,
