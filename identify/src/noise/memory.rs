@@ -184,7 +184,7 @@ fn with_trends_out(
             (0..=MOST).for_each(|lag| shown[lag] += weight * process[lag]);
             continue;
         }
-        // d = e − Q Qᵀe with orthonormal polynomials Q, so Cov d = Γ − Q(QᵀΓ) − (ΓQ)Qᵀ + Q(QᵀΓQ)Qᵀ.
+        // d = e − Q Qᵀe with orthonormal terms Q, so Cov d = Γ − Q(QᵀΓ) − (ΓQ)Qᵀ + Q(QᵀΓQ)Qᵀ.
         let times: Vec<f64> = (0..n).map(|t| t as f64).collect();
         let q = trend_terms(&times);
         let gq: Vec<[f64; TERMS]> = (0..n)
