@@ -83,6 +83,9 @@ fn write(
         )));
     }
     let mut left_out = compensation.left_out.clone();
+    if control != Control::Beckhoff {
+        left_out.extend(locations(compensation));
+    }
     let files = match control {
         Control::Linuxcnc => linuxcnc(machine, compensation, points, &mut left_out),
         Control::Heidenhain => heidenhain(machine, compensation, points, &mut left_out),
@@ -163,7 +166,6 @@ fn linuxcnc(
     points: usize,
     left_out: &mut Vec<String>,
 ) -> Vec<NewFile> {
-    left_out.extend(locations(compensation));
     let mut files = Vec::new();
     for curve in &compensation.curves {
         let Some((axis, factor)) = as_position(machine, curve).filter(|(axis, _)| *axis == curve.axis) else {
@@ -196,7 +198,6 @@ fn heidenhain(
     points: usize,
     left_out: &mut Vec<String>,
 ) -> Vec<NewFile> {
-    left_out.extend(locations(compensation));
     let mut files = Vec::new();
     for axis in 0..machine.axes.len() {
         let mut columns = Vec::new();
@@ -217,10 +218,7 @@ fn heidenhain(
         let backlash = own.filter(|(curve, ..)| curve.is_directional());
         for (curve, column, _) in &columns {
             if *column != axis && curve.is_directional() {
-                left_out.push(format!(
-                    "{}: what depends on the direction; the mean of both is in the table",
-                    curve.error
-                ));
+                left_out.push(without_direction(curve));
             }
         }
         let mut text = format!("{:>12}", "AXISPOS");
@@ -300,10 +298,7 @@ fn beckhoff(
             continue;
         }
         for curve in curves.iter().filter(|curve| curve.is_directional()) {
-            left_out.push(format!(
-                "{}: what depends on the direction; the mean of both is in the table",
-                curve.error
-            ));
+            left_out.push(without_direction(curve));
         }
         let mut rows = vec![
             std::iter::once(axis.name.clone())
@@ -336,6 +331,14 @@ fn locations(compensation: &Compensation) -> impl Iterator<Item = String> + '_ {
     locations.map(|(name, _)| {
         format!("{name}: a location error belongs in the kinematics of the control, not in this table")
     })
+}
+
+/// A curve of which a table has the mean of both directions only.
+fn without_direction(curve: &ErrorCurve) -> String {
+    format!(
+        "{}: what depends on the direction; the mean of both is in the table",
+        curve.error
+    )
 }
 
 /// The mean of both directions.
