@@ -28,6 +28,28 @@ const MOST_ANEW: usize = 3;
 /// Relative difference of scores below which two candidates do the same.
 const SAME: f64 = 1e-6;
 
+/// Sets of effects against what a search has taken up.
+#[derive(Clone)]
+struct Contest {
+    /// The folds that the search sees.
+    folds: Vec<usize>,
+    /// What it has taken up.
+    chosen: Vec<usize>,
+    /// The score that readings without structure hardly reach.
+    threshold: f64,
+    /// What a set has to say more than: what the best so far says, and for what was there what cannot be told apart.
+    most: f64,
+    /// The best that does.
+    best: Option<Vec<usize>>,
+}
+
+impl Contest {
+    fn won_by(&mut self, set: Vec<usize>, value: f64) {
+        self.most = value;
+        self.best = Some(set);
+    }
+}
+
 impl Search<'_> {
     /// Exchanges effects for candidates that explain clearly better what they stand for.
     pub fn exchange(&mut self) {
@@ -77,14 +99,10 @@ impl Search<'_> {
     }
 
     fn retune_one(&mut self, track: usize) -> bool {
-        let Track { folds, .. } = self.tracks[track].clone();
-        let chosen = self.tracks[track].chosen();
-        if !(1..=MOST_ANEW).contains(&chosen.len()) {
+        let Some(mut contest) = self.contest(track) else {
             return false;
-        }
-        let threshold = self.thresholds.last().copied().unwrap_or(f64::INFINITY);
-        let mut most = self.evidence_of(&chosen, &[], &folds) - self.words_of(&chosen) + INDISTINGUISHABLE;
-        let mut best: Option<Vec<usize>> = None;
+        };
+        let Contest { folds, chosen, .. } = contest.clone();
         let flexible: Vec<usize> = chosen.iter().copied().filter(|c| self.is_flexible(*c)).collect();
         for flexible in flexible {
             let given_up = chosen.iter().copied().filter(|c| *c != flexible).map(Some);
@@ -103,20 +121,18 @@ impl Search<'_> {
                     };
                     let set: Vec<usize> = beside.iter().copied().chain([anew]).collect();
                     let value = self.evidence_with(&beside, anew, &folds) - self.words_of(&set);
-                    if value <= most {
+                    if value <= contest.most {
                         continue;
                     }
                     self.materialise(&[anew]);
                     // What is added has to hold its own against readings without structure.
-                    if !self.holds_its_own(other, &set, &folds, threshold) {
-                        continue;
+                    if self.holds_its_own(other, &set, &contest) {
+                        contest.won_by(set, value);
                     }
-                    most = value;
-                    best = Some(set);
                 }
             }
         }
-        self.replace(track, best)
+        self.replace(track, contest.best)
     }
 
     /// Looks for two effects together in the place of one or two, and takes the best two if they say clearly more. Returns whether the search on all
@@ -137,14 +153,10 @@ impl Search<'_> {
     }
 
     fn regroup_one(&mut self, track: usize) -> bool {
-        let Track { folds, .. } = self.tracks[track].clone();
-        let chosen = self.tracks[track].chosen();
-        if !(1..=MOST_ANEW).contains(&chosen.len()) {
+        let Some(mut contest) = self.contest(track) else {
             return false;
-        }
-        let threshold = self.thresholds.last().copied().unwrap_or(f64::INFINITY);
-        let mut most = self.evidence_of(&chosen, &[], &folds) - self.words_of(&chosen) + INDISTINGUISHABLE;
-        let mut best: Option<Vec<usize>> = None;
+        };
+        let Contest { folds, chosen, .. } = contest.clone();
         let places = 0..chosen.len();
         let given_up = places
             .clone()
@@ -173,20 +185,19 @@ impl Search<'_> {
                 let Some(second) = second else { continue };
                 let set: Vec<usize> = beside.iter().copied().chain([second]).collect();
                 let value = self.evidence_with(&beside, second, &folds) - self.words_of(&set);
-                if value <= most {
+                if value <= contest.most {
                     continue;
                 }
                 self.materialise(&[second]);
                 if [first, second]
                     .into_iter()
-                    .all(|one| self.holds_its_own(one, &set, &folds, threshold))
+                    .all(|one| self.holds_its_own(one, &set, &contest))
                 {
-                    most = value;
-                    best = Some(set);
+                    contest.won_by(set, value);
                 }
             }
         }
-        self.replace(track, best)
+        self.replace(track, contest.best)
     }
 
     /// Puts a set, if there is one, in the place of what a search has taken up; it is no more certain than the least certain of that. Returns whether there
@@ -200,29 +211,55 @@ impl Search<'_> {
         true
     }
 
+    /// Opens a contest for the place of what a search has taken up; none where that is nothing, or too much to be fitted anew.
+    fn contest(&self, track: usize) -> Option<Contest> {
+        let Track { folds, .. } = self.tracks[track].clone();
+        let chosen = self.tracks[track].chosen();
+        (1..=MOST_ANEW).contains(&chosen.len()).then(|| Contest {
+            threshold: self.thresholds.last().copied().unwrap_or(f64::INFINITY),
+            most: self.evidence_of(&chosen, &[], &folds) - self.words_of(&chosen) + INDISTINGUISHABLE,
+            best: None,
+            folds,
+            chosen,
+        })
+    }
+
     /// Whether one of a set scores beside the others what readings without structure do not give.
-    fn holds_its_own(&self, one: usize, set: &[usize], folds: &[usize], threshold: f64) -> bool {
+    fn holds_its_own(&self, one: usize, set: &[usize], contest: &Contest) -> bool {
         let others: Vec<usize> = set.iter().copied().filter(|c| *c != one).collect();
-        let model = self.lean_model_of(&others, folds);
-        self.score(one, &model.gain(one), self.variance(&model)) >= threshold
+        let model = self.lean_model_of(&others, &contest.folds);
+        self.score(one, &model.gain(one), self.variance(&model)) >= contest.threshold
     }
 
     /// Effects without numbers or places of their own that explain anything beside some others, the best first; of those that do the very same to the
     /// readings one.
     fn simple_firsts(&self, base: &[usize], folds: &[usize], most: usize) -> Vec<usize> {
+        let ranked = self.ranked(base, folds, |candidate| !self.is_flexible(candidate));
+        ranked.into_iter().take(most).collect()
+    }
+
+    /// What explains anything beside some effects, the best first, as far as it is asked for; of those that do the very same to the readings one.
+    /// `asked_for` is asked of the best before the others.
+    fn ranked(
+        &self,
+        base: &[usize],
+        folds: &[usize],
+        mut asked_for: impl FnMut(usize) -> bool,
+    ) -> Vec<usize> {
         let model = self.model_of(base, folds);
         let variance = self.variance(&model);
         let gains = model.gains();
         let mut scored: Vec<(usize, f64)> = (0..self.candidates.len())
-            .filter(|c| self.is_open(*c, folds) && !base.contains(c) && !self.is_flexible(*c))
+            .filter(|c| self.is_open(*c, folds) && !base.contains(c))
             .map(|c| (c, self.score(c, &gains[c], variance)))
             .filter(|(_, score)| *score > 0.0)
             .collect();
         scored.sort_by(|a, b| b.1.total_cmp(&a.1).then(a.0.cmp(&b.0)));
+        scored.retain(|(c, _)| asked_for(*c));
         scored.dedup_by(|a, b| {
             (a.1 - b.1).abs() < SAME * b.1.abs() && gains[a.0].freedom == gains[b.0].freedom
         });
-        scored.into_iter().take(most).map(|(c, _)| c).collect()
+        scored.into_iter().map(|(c, _)| c).collect()
     }
 
     fn is_flexible(&self, candidate: usize) -> bool {
@@ -235,26 +272,16 @@ impl Search<'_> {
 
     /// The best beside some effects, each component, driver and shape once, and what does the very same to the readings once.
     fn next_best(&self, base: &[usize], but: usize, folds: &[usize]) -> Vec<usize> {
-        let model = self.model_of(base, folds);
-        let variance = self.variance(&model);
-        let gains = model.gains();
-        let mut scored: Vec<(usize, f64)> = (0..self.candidates.len())
-            .filter(|c| self.is_open(*c, folds) && !base.contains(c))
-            .map(|c| (c, self.score(c, &gains[c], variance)))
-            .filter(|(_, score)| *score > 0.0)
-            .collect();
-        scored.sort_by(|a, b| b.1.total_cmp(&a.1).then(a.0.cmp(&b.0)));
         let mut seen: HashSet<String> = HashSet::from([self.candidates[but].effect.id()]);
-        scored.retain(|(c, _)| seen.insert(self.candidates[*c].effect.id()));
-        scored.dedup_by(|a, b| {
-            (a.1 - b.1).abs() < SAME * b.1.abs() && gains[a.0].freedom == gains[b.0].freedom
+        let ranked = self.ranked(base, folds, |candidate| {
+            seen.insert(self.candidates[candidate].effect.id())
         });
         let most = if self.sees_all(folds) {
             MOST_TRIED
         } else {
             MOST_TRIED_TO_PREDICT
         };
-        scored.into_iter().take(most).map(|(c, _)| c).collect()
+        ranked.into_iter().take(most).collect()
     }
 
     /// An effect with the numbers or places that are best beside others.
