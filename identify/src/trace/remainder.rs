@@ -1,11 +1,13 @@
 //! What is left when the search has ended: whether it has structure, what it looks like, and where it lies.
 //!
-//! The detectors look at readings, not at components: a period over an axis' position in one test, a curve that differs by direction, a slope over
-//! time, a level of one run. They are tested against the same null as the search.
+//! The detectors look at readings, not at components: a wave over an axis' position in one test or one run of it, or opposite in the two directions, a
+//! curve, a feature at a place, a drift over time. They are tested against draws from the same pure error as the search.
 
 use std::ops::Range;
 
+use abbe_model::axis::{Axis, AxisKind};
 use abbe_model::effect::{Component, Driver, Effect, Shape};
+use abbe_model::session::readings::Readings;
 
 use super::columns::{Columns, Layout};
 use super::moments::Moments;
@@ -18,7 +20,7 @@ use crate::problem::Problem;
 pub struct Structure {
     /// Probability of as much in readings without structure.
     pub p_value: f64,
-    /// The share of the sum of squares, beyond noise, that the detectors find: `χ²` of the best detector less its expectation.
+    /// What the best detector takes off the sum of squares beyond what it would of noise: its `χ²` less its degrees of freedom.
     pub excess: f64,
     /// In words: which test, over what, how large.
     pub words: String,
@@ -45,144 +47,164 @@ fn detectors(problem: &Problem<'_>, columns: &Columns<'_, '_>) -> Vec<Detector> 
     let mut detectors = Vec::new();
     for (number, test) in problem.tests.iter().enumerate() {
         let Some(readings) = &test.readings else { continue };
-        let mut add = |driver: &Driver,
-                       shape: Shape,
-                       by_direction: bool,
-                       rows: Option<&Range<usize>>,
-                       words: String| {
-            let effect = Effect {
-                component: Component::TriggerDelay,
-                driver: driver.clone(),
-                shape,
-                tests: vec![test.name.clone()],
-            };
-            for coordinate in 0..readings.coordinates {
-                if let Some(layout) = columns.reading_layout(&effect, number, coordinate, by_direction, rows)
-                {
-                    let named = if readings.coordinates == 3 {
-                        format!("{words} in {}", ["x", "y", "z"][coordinate])
-                    } else {
-                        words.clone()
-                    };
-                    detectors.push(Detector { layout, words: named });
-                }
-            }
+        let mut of_test = OfTest {
+            columns,
+            number,
+            name: &test.name,
+            readings,
+            detectors: Vec::new(),
         };
         for (axis, column) in readings.positions.iter().enumerate() {
             let low = column.iter().copied().fold(f64::INFINITY, f64::min);
             let high = column.iter().copied().fold(f64::NEG_INFINITY, f64::max);
-            if high - low < 1e-6 {
-                continue;
+            if high - low >= 1e-6 {
+                of_test.over_axis(&machine.axes[axis], low, high);
             }
-            let name = &machine.axes[axis].name;
-            let driver = Driver::Axis(name.clone());
-            let rotary = machine.axes[axis].kind == abbe_model::axis::AxisKind::Rotary;
-            for half_cycles in (2..=80).chain((84..=240).step_by(4)) {
-                let period = 2.0 * (high - low) / half_cycles as f64;
-                let length = if rotary {
-                    format!("{:.1}°", period.to_degrees())
-                } else {
-                    format!("{period:.2} mm")
-                };
-                let words = format!("a wave over {name} with a period of {length} in {}", test.name);
-                add(&driver, Shape::Periodic { period }, false, None, words.clone());
-                if half_cycles <= 16 {
-                    add(
-                        &driver,
-                        Shape::Periodic { period },
-                        true,
-                        None,
-                        format!("{words}, opposite in the two directions"),
-                    );
-                }
-            }
-            // What comes and goes with time is in no mean over runs.
-            let runs = readings.runs();
-            for half_cycles in 2..=if runs.len() > 1 { 40 } else { 0 } {
-                let period = 2.0 * (high - low) / half_cycles as f64;
-                for (k, run) in runs.iter().enumerate() {
-                    let words = format!(
-                        "a wave over {name}, {half_cycles} half cycles over its way, in run {} of {}",
-                        k + 1,
-                        test.name
-                    );
-                    add(&driver, Shape::Periodic { period }, false, Some(run), words);
-                }
-            }
-            for intervals in [6, 12, 24] {
-                let shape = Shape::Curve {
-                    from: low,
-                    to: high,
-                    intervals,
-                    closed: false,
-                };
-                add(
-                    &driver,
-                    shape,
-                    false,
-                    None,
-                    format!("a curve over {name} in {}", test.name),
-                );
-            }
-            for share in [0.02, 0.06] {
-                let width = share * (high - low);
-                for k in 0..(0.5 / share) as usize {
-                    let centre = low + (high - low) * (k as f64 + 0.5) * 2.0 * share;
-                    let place = if rotary {
-                        format!("{:.1}°", centre.to_degrees())
-                    } else {
-                        format!("{centre:.1} mm")
-                    };
-                    let shape = Shape::Local {
-                        centre,
-                        width,
-                        recurs: None,
-                    };
-                    add(
-                        &driver,
-                        shape,
-                        false,
-                        None,
-                        format!("a feature at {name} = {place} in {}", test.name),
-                    );
-                }
-            }
-            add(
+        }
+        of_test.over_time(problem.origin.time_s);
+        detectors.extend(of_test.detectors);
+    }
+    detectors
+}
+
+/// The detectors of one test, as they are made.
+struct OfTest<'t, 'p, 'a> {
+    columns: &'t Columns<'p, 'a>,
+    number: usize,
+    name: &'t str,
+    readings: &'t Readings,
+    detectors: Vec<Detector>,
+}
+
+impl OfTest<'_, '_, '_> {
+    /// A shape over each coordinate of the readings.
+    fn add(&mut self, driver: &Driver, shape: Shape, words: String) {
+        self.add_confined(driver, shape, false, None, words);
+    }
+
+    /// The same with a sign that turns with the direction of travel, or in some rows only.
+    fn add_confined(
+        &mut self,
+        driver: &Driver,
+        shape: Shape,
+        by_direction: bool,
+        rows: Option<&Range<usize>>,
+        words: String,
+    ) {
+        let effect = Effect {
+            component: Component::TriggerDelay,
+            driver: driver.clone(),
+            shape,
+            tests: vec![self.name.to_string()],
+        };
+        for coordinate in 0..self.readings.coordinates {
+            let layout = self
+                .columns
+                .reading_layout(&effect, self.number, coordinate, by_direction, rows);
+            let words = if self.readings.coordinates == 3 {
+                format!("{words} in {}", ["x", "y", "z"][coordinate])
+            } else {
+                words.clone()
+            };
+            self.detectors
+                .extend(layout.map(|layout| Detector { layout, words }));
+        }
+    }
+
+    fn over_axis(&mut self, axis: &Axis, low: f64, high: f64) {
+        let (name, test) = (&axis.name, self.name);
+        let driver = Driver::Axis(name.clone());
+        self.waves(axis, &driver, high - low);
+        for intervals in [6, 12, 24] {
+            self.add(
                 &driver,
-                Shape::Backlash,
-                false,
-                None,
-                format!("a difference between the directions of {name} in {}", test.name),
+                curve(low, high, intervals),
+                format!("a curve over {name} in {test}"),
             );
         }
-        if !readings.time_s.is_empty() && readings.rows() > 1 {
-            let first = readings.time_s[0] - problem.origin.time_s;
-            let last = readings.time_s[readings.rows() - 1] - problem.origin.time_s;
-            add(
-                &Driver::Time,
-                Shape::Drift,
-                false,
-                None,
-                format!("a drift over time in {}", test.name),
-            );
-            if last > first {
-                let shape = Shape::Curve {
-                    from: first,
-                    to: last,
-                    intervals: 6,
-                    closed: false,
+        for share in [0.02, 0.06] {
+            let width = share * (high - low);
+            for k in 0..(0.5 / share) as usize {
+                let centre = low + (high - low) * (k as f64 + 0.5) * 2.0 * share;
+                let place = match axis.kind {
+                    AxisKind::Rotary => format!("{:.1}°", centre.to_degrees()),
+                    AxisKind::Linear => format!("{centre:.1} mm"),
                 };
-                add(
-                    &Driver::Time,
-                    shape,
-                    false,
-                    None,
-                    format!("a slow change over time in {}", test.name),
+                let shape = Shape::Local {
+                    centre,
+                    width,
+                    recurs: None,
+                };
+                self.add(&driver, shape, format!("a feature at {name} = {place} in {test}"));
+            }
+        }
+        self.add(
+            &driver,
+            Shape::Backlash,
+            format!("a difference between the directions of {name} in {test}"),
+        );
+    }
+
+    fn waves(&mut self, axis: &Axis, driver: &Driver, span: f64) {
+        let (name, test) = (&axis.name, self.name);
+        let wave = |half_cycles: usize| Shape::Periodic {
+            period: 2.0 * span / half_cycles as f64,
+        };
+        for half_cycles in (2..=80).chain((84..=240).step_by(4)) {
+            let period = 2.0 * span / half_cycles as f64;
+            let length = match axis.kind {
+                AxisKind::Rotary => format!("{:.1}°", period.to_degrees()),
+                AxisKind::Linear => format!("{period:.2} mm"),
+            };
+            let words = format!("a wave over {name} with a period of {length} in {test}");
+            self.add(driver, wave(half_cycles), words.clone());
+            if half_cycles <= 16 {
+                let words = format!("{words}, opposite in the two directions");
+                self.add_confined(driver, wave(half_cycles), true, None, words);
+            }
+        }
+        // What comes and goes with time is in no mean over runs.
+        let runs = self.readings.runs();
+        for half_cycles in 2..=if runs.len() > 1 { 40 } else { 0 } {
+            for (k, run) in runs.iter().enumerate() {
+                let words = format!(
+                    "a wave over {name}, {half_cycles} half cycles over its way, in run {} of {test}",
+                    k + 1
                 );
+                self.add_confined(driver, wave(half_cycles), false, Some(run), words);
             }
         }
     }
-    detectors
+
+    fn over_time(&mut self, origin_s: f64) {
+        let (readings, test) = (self.readings, self.name);
+        if readings.time_s.is_empty() || readings.rows() < 2 {
+            return;
+        }
+        let first = readings.time_s[0] - origin_s;
+        let last = readings.time_s[readings.rows() - 1] - origin_s;
+        self.add(
+            &Driver::Time,
+            Shape::Drift,
+            format!("a drift over time in {test}"),
+        );
+        if last > first {
+            self.add(
+                &Driver::Time,
+                curve(first, last, 6),
+                format!("a slow change over time in {test}"),
+            );
+        }
+    }
+}
+
+fn curve(from: f64, to: f64, intervals: usize) -> Shape {
+    Shape::Curve {
+        from,
+        to,
+        intervals,
+        closed: false,
+    }
 }
 
 /// Looks for structure in a residual, beside a model given by its orthonormal columns.
