@@ -26,7 +26,7 @@ pub struct Family {
     pub name: String,
     components: Components,
     driver: DriverChoice,
-    shape: String,
+    shape: ShapeChoice,
     #[serde(default)]
     degrees: Vec<usize>,
     #[serde(default)]
@@ -63,6 +63,25 @@ enum DriverChoice {
     Time,
     Temperature,
     Gravity,
+}
+
+#[derive(Clone, Copy, Debug, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+enum ShapeChoice {
+    Constant,
+    ConstantPerMount,
+    Harmonic,
+    HarmonicLow,
+    Power,
+    Periodic,
+    Backlash,
+    Lag,
+    ReversalSpike,
+    Drift,
+    Warmup,
+    Steps,
+    Local,
+    Curve,
 }
 
 #[derive(Deserialize)]
@@ -139,21 +158,7 @@ pub fn candidates(problem: &Problem<'_>) -> Result<Vec<Candidate>, IdentifyError
                     };
                     let cost = family.simplicity + extra + tilt_cost(problem, &component);
                     let last_resort = family.last_resort;
-                    let span = match &driver {
-                        Driver::Axis(name) => problem
-                            .session
-                            .machine
-                            .axis_index(name)
-                            .map_or(0.0, |axis| sampling.span(axis)),
-                        _ => 0.0,
-                    };
-                    let grid = match &effect.shape {
-                        // Frequencies lie half a cycle over the travel apart.
-                        Shape::Periodic { period } => 0.5 * period * period / span,
-                        Shape::Steps { .. } => span / PLACES_OF_STEPS as f64,
-                        Shape::Local { width, .. } => *width,
-                        _ => 0.0,
-                    };
+                    let grid = grid(problem, &sampling, &effect);
                     let dictionary = matches!(&effect.shape, Shape::Steps { at } if at.len() > 1);
                     candidates.push(Candidate {
                         effect,
@@ -181,6 +186,22 @@ pub fn candidates(problem: &Problem<'_>) -> Result<Vec<Candidate>, IdentifyError
         !same_error && !free && !problem.parameters.effects.contains(&candidate.effect)
     });
     Ok(candidates)
+}
+
+/// See [`Candidate::grid`].
+fn grid(problem: &Problem<'_>, sampling: &Sampling, effect: &Effect) -> f64 {
+    let axis = match &effect.driver {
+        Driver::Axis(name) => problem.session.machine.axis_index(name),
+        _ => None,
+    };
+    let span = axis.map_or(0.0, |axis| sampling.span(axis));
+    match &effect.shape {
+        // Frequencies lie half a cycle over the travel apart.
+        Shape::Periodic { period } => 0.5 * period * period / span,
+        Shape::Steps { .. } => span / PLACES_OF_STEPS as f64,
+        Shape::Local { width, .. } => *width,
+        _ => 0.0,
+    }
 }
 
 /// Whether a set-up quantity is free already, so that freeing it is no effect.

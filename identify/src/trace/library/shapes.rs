@@ -7,7 +7,7 @@ use abbe_model::effect::{Component, Driver, Shape};
 use abbe_model::instrument::SharedBy;
 
 use super::sampling::Sampling;
-use super::{Family, PLACES_OF_STEPS};
+use super::{Family, PLACES_OF_STEPS, ShapeChoice};
 use crate::problem::Problem;
 
 /// The highest harmonic that is looked for, however dense the sampling.
@@ -16,205 +16,217 @@ const HIGHEST_ORDER: usize = 120;
 const HIGHEST_ORDER_OF_POSES: usize = 40;
 /// Readings in a cycle of the shortest wave that is looked for; two would just carry it.
 const READINGS_A_CYCLE: f64 = 2.4;
+/// The most half cycles over the travel of a wave that is looked for.
+const MOST_HALF_CYCLES: usize = 240;
 
-/// Shapes of a family for a component and a driver: shape, the tests it is confined to, and what it costs beyond its family.
+/// A shape, the tests it is confined to, and what it costs beyond its family.
+type Member = (Shape, Vec<String>, f64);
+
+/// A shape in all tests that costs what its family does.
+fn plain(shape: Shape) -> Member {
+    (shape, Vec::new(), 0.0)
+}
+
+/// Shapes of a family for a component and a driver.
 pub(super) fn shapes(
     problem: &Problem<'_>,
     sampling: &Sampling,
     family: &Family,
     component: &Component,
     driver: &Driver,
-) -> Vec<(Shape, Vec<String>, f64)> {
-    let all = |shape: Shape, extra: f64| (shape, Vec::new(), extra);
+) -> Vec<Member> {
     let axis = match driver {
         Driver::Axis(name) => problem.session.machine.axis_index(name),
         _ => None,
     };
-    let rotary = axis.is_some_and(|axis| problem.session.machine.axes[axis].kind == AxisKind::Rotary);
-    let span = axis.map_or(1.0, |axis| sampling.span(axis));
-    let poses = sampling.is_poses();
-    let step = axis.map_or(0.0, |axis| sampling.step[axis]);
-    match family.shape.as_str() {
-        "constant" => vec![all(Shape::Constant, 0.0)],
-        "constant-per-mount" => mounts(problem, component)
+    let over = Over {
+        sampling,
+        axis,
+        rotary: axis.is_some_and(|axis| problem.session.machine.axes[axis].kind == AxisKind::Rotary),
+        span: axis.map_or(1.0, |axis| sampling.span(axis)),
+        step: axis.map_or(0.0, |axis| sampling.step[axis]),
+        poses: sampling.is_poses(),
+    };
+    let only_if = |seen: bool, shape: Shape| {
+        if seen { vec![plain(shape)] } else { Vec::new() }
+    };
+    match family.shape {
+        ShapeChoice::Constant => vec![plain(Shape::Constant)],
+        ShapeChoice::ConstantPerMount => mounts(problem, component)
             .into_iter()
             .map(|tests| (Shape::Constant, tests, 0.0))
             .collect(),
-        "harmonic" => {
-            let most = if poses {
-                HIGHEST_ORDER_OF_POSES
-            } else if step > 0.0 {
-                ((TAU / (READINGS_A_CYCLE * step)) as usize).clamp(1, HIGHEST_ORDER)
-            } else {
-                0
-            };
-            (1..=most)
-                .map(|order| all(Shape::Harmonic { order: order as f64 }, harmonic_cost(order)))
-                .collect()
+        ShapeChoice::Harmonic => harmonics(over.highest_order()),
+        ShapeChoice::HarmonicLow if over.rotary => harmonics(2),
+        ShapeChoice::HarmonicLow => powers(&[1, 2], half(over.span)),
+        ShapeChoice::Power => {
+            let over_axis = matches!(driver, Driver::Axis(_));
+            powers(&family.degrees, if over_axis { half(over.span) } else { 1.0 })
         }
-        "harmonic-low" => {
-            if rotary {
-                (1..=2)
-                    .map(|order| all(Shape::Harmonic { order: order as f64 }, harmonic_cost(order)))
-                    .collect()
-            } else {
-                (1..=2)
-                    .map(|degree| {
-                        all(
-                            Shape::Power {
-                                degree,
-                                scale: half(span),
-                            },
-                            0.2 * degree as f64,
-                        )
-                    })
-                    .collect()
-            }
-        }
-        "power" => family
-            .degrees
-            .iter()
-            .map(|degree| {
-                let scale = match driver {
-                    Driver::Axis(_) => half(span),
-                    _ => 1.0,
-                };
-                all(
-                    Shape::Power {
-                        degree: *degree,
-                        scale,
-                    },
-                    0.2 * *degree as f64,
-                )
-            })
-            .collect(),
-        "periodic" => {
-            // Frequencies half a cycle over the travel apart, from one cycle on.
-            if step <= 0.0 || poses {
-                return Vec::new();
-            }
-            let most = ((2.0 * span / (READINGS_A_CYCLE * step)) as usize).min(240);
-            // Over a full turn whole cycles are harmonics.
-            let turn = rotary && (span / TAU - (span / TAU).round()).abs() < 0.01;
-            (2..=most)
-                .filter(|half_cycles| !turn || half_cycles % 2 == 1)
-                .map(|half_cycles| {
-                    all(
-                        Shape::Periodic {
-                            period: 2.0 * span / half_cycles as f64,
-                        },
-                        0.5,
-                    )
-                })
-                .collect()
-        }
-        "backlash" => {
+        ShapeChoice::Periodic => over.periods(),
+        ShapeChoice::Backlash => {
             let seen = axis.is_some_and(|axis| sampling.both_directions[axis]);
-            if seen && !poses {
-                vec![all(Shape::Backlash, 0.0)]
-            } else {
-                Vec::new()
-            }
+            only_if(seen && !over.poses, Shape::Backlash)
         }
-        "lag" => {
-            if sampling.has_time && !poses {
-                vec![all(Shape::Lag, 0.0)]
-            } else {
-                Vec::new()
-            }
-        }
-        "reversal-spike" => {
-            // A run that begins where the one before it ended begins with a reversal.
-            let seen = axis
-                .is_some_and(|axis| sampling.reverses_inside_runs[axis] || sampling.both_directions[axis]);
-            if !seen || poses {
-                return Vec::new();
-            }
-            [0.002, 0.005, 0.01, 0.02, 0.05]
-                .map(|share| all(Shape::ReversalSpike { width: share * span }, 0.0))
-                .to_vec()
-        }
-        "drift" => vec![all(Shape::Drift, 0.0)],
-        "warmup" => family
+        ShapeChoice::Lag => only_if(sampling.has_time && !over.poses, Shape::Lag),
+        ShapeChoice::ReversalSpike => over.spikes(),
+        ShapeChoice::Drift => vec![plain(Shape::Drift)],
+        ShapeChoice::Warmup => family
             .tau_s
             .iter()
             .filter(|tau| **tau < 2.0 * sampling.duration_s)
-            .map(|tau| all(Shape::Warmup { tau_s: *tau }, 0.0))
+            .map(|tau| plain(Shape::Warmup { tau_s: *tau }))
             .collect(),
-        "steps" => {
-            if poses || step <= 0.0 {
-                return Vec::new();
-            }
-            let axis = axis.unwrap_or(0);
-            let places =
-                (1..PLACES_OF_STEPS).map(|k| sampling.low[axis] + span * k as f64 / PLACES_OF_STEPS as f64);
-            let singles = places
-                .clone()
-                .map(|place| all(Shape::Steps { at: vec![place] }, 0.0));
-            let dictionary = all(
-                Shape::Steps {
-                    at: places.clone().collect(),
-                },
-                0.0,
-            );
-            singles.chain([dictionary]).collect()
+        ShapeChoice::Steps => over.steps(),
+        ShapeChoice::Local => over.features(),
+        ShapeChoice::Curve => over.curves(),
+    }
+}
+
+/// Harmonics up to an order.
+fn harmonics(most: usize) -> Vec<Member> {
+    (1..=most)
+        .map(|order| {
+            let shape = Shape::Harmonic { order: order as f64 };
+            (shape, Vec::new(), harmonic_cost(order))
+        })
+        .collect()
+}
+
+fn powers(degrees: &[usize], scale: f64) -> Vec<Member> {
+    degrees
+        .iter()
+        .map(|&degree| (Shape::Power { degree, scale }, Vec::new(), 0.2 * degree as f64))
+        .collect()
+}
+
+/// What a shape is laid over: an axis as a session samples it, or another driver.
+struct Over<'s> {
+    sampling: &'s Sampling,
+    axis: Option<usize>,
+    rotary: bool,
+    /// 1 without an axis.
+    span: f64,
+    /// 0 without an axis, and for poses.
+    step: f64,
+    poses: bool,
+}
+
+impl Over<'_> {
+    /// The highest harmonic that the sampling carries.
+    fn highest_order(&self) -> usize {
+        if self.poses {
+            HIGHEST_ORDER_OF_POSES
+        } else if self.step > 0.0 {
+            ((TAU / (READINGS_A_CYCLE * self.step)) as usize).clamp(1, HIGHEST_ORDER)
+        } else {
+            0
         }
-        "local" => {
-            if poses {
-                return Vec::new();
-            }
-            let Some(axis) = axis else { return Vec::new() };
-            let turn = rotary && span > 0.99 * TAU;
-            let recurs = turn.then_some(TAU);
-            let mut grid = Vec::new();
-            for share in [0.02, 0.04, 0.08] {
-                let width = share * span;
-                let count = (1.0 / share) as usize;
-                for k in 0..count {
-                    let centre = sampling.low[axis] + span * (k as f64 + 0.5) / count as f64;
-                    grid.push(all(
-                        Shape::Local {
-                            centre,
-                            width,
-                            recurs,
-                        },
-                        0.0,
-                    ));
-                }
-            }
-            grid
+    }
+
+    /// Whether the readings cover a full turn.
+    fn is_turn(&self) -> bool {
+        self.rotary && self.span > 0.99 * TAU
+    }
+
+    /// Frequencies half a cycle over the travel apart, from one cycle on.
+    fn periods(&self) -> Vec<Member> {
+        if self.step <= 0.0 || self.poses {
+            return Vec::new();
         }
-        "curve" => {
-            let Some(axis) = axis else { return Vec::new() };
-            if poses && !rotary {
-                return Vec::new();
+        let most = ((2.0 * self.span / (READINGS_A_CYCLE * self.step)) as usize).min(MOST_HALF_CYCLES);
+        // Over full turns whole cycles are harmonics.
+        let turns = self.span / TAU;
+        let whole = self.rotary && (turns - turns.round()).abs() < 0.01;
+        (2..=most)
+            .filter(|half_cycles| !whole || half_cycles % 2 == 1)
+            .map(|half_cycles| {
+                let period = 2.0 * self.span / half_cycles as f64;
+                (Shape::Periodic { period }, Vec::new(), 0.5)
+            })
+            .collect()
+    }
+
+    fn spikes(&self) -> Vec<Member> {
+        // A run that begins where the one before it ended begins with a reversal.
+        let seen = self.axis.is_some_and(|axis| {
+            self.sampling.reverses_inside_runs[axis] || self.sampling.both_directions[axis]
+        });
+        if !seen || self.poses {
+            return Vec::new();
+        }
+        let spike = |share: f64| Shape::ReversalSpike {
+            width: share * self.span,
+        };
+        [0.002, 0.005, 0.01, 0.02, 0.05]
+            .map(|share| plain(spike(share)))
+            .to_vec()
+    }
+
+    /// A step at each place, and the dictionary of all places.
+    fn steps(&self) -> Vec<Member> {
+        let Some(axis) = self.axis.filter(|_| !self.poses && self.step > 0.0) else {
+            return Vec::new();
+        };
+        let low = self.sampling.low[axis];
+        let place = |k: usize| low + self.span * k as f64 / PLACES_OF_STEPS as f64;
+        let places: Vec<f64> = (1..PLACES_OF_STEPS).map(place).collect();
+        let singles = places.iter().map(|place| vec![*place]);
+        singles
+            .chain([places.clone()])
+            .map(|at| plain(Shape::Steps { at }))
+            .collect()
+    }
+
+    fn features(&self) -> Vec<Member> {
+        let Some(axis) = self.axis.filter(|_| !self.poses) else {
+            return Vec::new();
+        };
+        let recurs = self.is_turn().then_some(TAU);
+        let mut features = Vec::new();
+        for share in [0.02, 0.04, 0.08] {
+            let width = share * self.span;
+            let count = (1.0 / share) as usize;
+            for k in 0..count {
+                let centre = self.sampling.low[axis] + self.span * (k as f64 + 0.5) / count as f64;
+                features.push(plain(Shape::Local {
+                    centre,
+                    width,
+                    recurs,
+                }));
             }
-            let turn = rotary && span > 0.99 * TAU;
-            let (from, to) = if turn {
-                (sampling.low[axis], sampling.low[axis] + TAU)
-            } else {
-                (sampling.low[axis], sampling.high[axis])
-            };
-            // At least one reading and a half an interval.
-            [8, 16, 32, 64]
-                .into_iter()
-                .filter(|intervals| {
-                    poses && *intervals <= 16 || step > 0.0 && 1.5 * step * *intervals as f64 <= span
+        }
+        features
+    }
+
+    fn curves(&self) -> Vec<Member> {
+        let Some(axis) = self.axis.filter(|_| !self.poses || self.rotary) else {
+            return Vec::new();
+        };
+        let closed = self.is_turn();
+        let from = self.sampling.low[axis];
+        let to = if closed {
+            from + TAU
+        } else {
+            self.sampling.high[axis]
+        };
+        // At least one reading and a half an interval.
+        let carried = |intervals: usize| {
+            self.poses && intervals <= 16
+                || self.step > 0.0 && 1.5 * self.step * intervals as f64 <= self.span
+        };
+        [8, 16, 32, 64]
+            .into_iter()
+            .filter(|intervals| carried(*intervals))
+            .map(|intervals| {
+                plain(Shape::Curve {
+                    from,
+                    to,
+                    intervals,
+                    closed,
                 })
-                .map(|intervals| {
-                    all(
-                        Shape::Curve {
-                            from,
-                            to,
-                            intervals,
-                            closed: turn,
-                        },
-                        0.0,
-                    )
-                })
-                .collect()
-        }
-        _ => Vec::new(),
+            })
+            .collect()
     }
 }
 
