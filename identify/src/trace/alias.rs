@@ -4,9 +4,12 @@
 //! the residual as well within 2 of log-likelihood, whether or not the numbers and places that were chosen in its shape are held against it, and it does
 //! at least half of what the named effect did to the readings. The search names the one that is the shortest to say; the others are told, nearest first.
 
+use std::collections::HashSet;
+
 use abbe_model::effect::Shape;
 
-use super::search::Search;
+use super::score::{Gain, Trained};
+use super::search::{ALL, Search};
 
 /// Difference in `−ln P` below which two candidates cannot be told apart: 2 σ for one column.
 pub(super) const INDISTINGUISHABLE: f64 = 2.0;
@@ -42,16 +45,10 @@ pub struct Rival {
 const MOST_RIVALS: usize = 16;
 
 /// What stands highest in the place of the `k`-th taken effect, the best first: that effect, its aliases, and what loses.
-fn rivals(
-    search: &Search<'_>,
-    k: usize,
-    gains: &[super::score::Gain],
-    variance: f64,
-    aliases: &[Alias],
-) -> Vec<Rival> {
+fn rivals(search: &Search<'_>, k: usize, gains: &[Gain], variance: f64, aliases: &[Alias]) -> Vec<Rival> {
     let taken = search.taken()[k].candidate;
     let named = search.candidates[taken].effect.id();
-    let alike: std::collections::HashSet<String> = aliases
+    let alike: HashSet<String> = aliases
         .iter()
         .map(|alias| search.candidates[alias.candidate].effect.id())
         .collect();
@@ -63,7 +60,7 @@ fn rivals(
             gain.freedom > 0
                 && (*candidate == taken || !others.contains(candidate))
                 && !search.candidates[*candidate].last_resort
-                && search.is_open(*candidate, &search.tracks[super::search::ALL].folds)
+                && search.is_open(*candidate, &search.tracks[ALL].folds)
         })
         .map(|(candidate, gain)| (search.evidence_for(candidate, gain, variance), candidate))
         .collect();
@@ -87,9 +84,13 @@ fn rivals(
     rivals
 }
 
-/// The aliases of the `k`-th taken effect, nearest first, and what stands highest in its place.
-pub(super) fn aliases(search: &Search<'_>, k: usize, variance: f64) -> (Vec<Alias>, Vec<Rival>) {
-    let model = search.model_without(Some(k));
+/// The aliases of the `k`-th taken effect, nearest first, and what stands highest in its place, beside the model without it.
+pub(super) fn aliases(
+    search: &Search<'_>,
+    k: usize,
+    model: &Trained<'_>,
+    variance: f64,
+) -> (Vec<Alias>, Vec<Rival>) {
     let taken = &search.taken()[k];
     let of_named = model.gain(taken.candidate);
     let least = search.evidence_for(taken.candidate, &of_named, variance) - INDISTINGUISHABLE;
@@ -140,7 +141,7 @@ pub(super) fn aliases(search: &Search<'_>, k: usize, variance: f64) -> (Vec<Alia
     });
     // Of one name the nearest member stands for all; those that bear the winner's own name are the winner.
     let named = search.candidates[taken.candidate].effect.id();
-    let mut seen = std::collections::HashSet::from([named]);
+    let mut seen = HashSet::from([named]);
     aliases.retain(|alias| seen.insert(search.candidates[alias.candidate].effect.id()));
     let rivals = rivals(search, k, &gains, variance, &aliases);
     (aliases, rivals)

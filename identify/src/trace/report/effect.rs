@@ -1,0 +1,175 @@
+//! A found effect as it is reported: its name, the numbers of its shape, its parameters, its curve.
+
+use abbe_model::axis::AxisKind;
+use abbe_model::effect::{Driver, DriverSample, Effect, Shape};
+
+use super::{Findings, HeldOut};
+use crate::fit::{self, Fit};
+use crate::parameters::Role;
+use crate::problem::Problem;
+use crate::results::{CurvePoint, EffectName, EffectResult, ParameterResult, ShapeNumber};
+use crate::trace::library::Family;
+
+/// An effect's name as it stands in results.
+pub fn effect_name(effect: &Effect) -> EffectName {
+    EffectName {
+        component: effect.component.to_string(),
+        driver: effect.driver.to_string(),
+        shape: effect.shape.word().to_string(),
+        order: effect.shape.order(),
+        tests: effect.tests.clone(),
+    }
+}
+
+/// The `k`-th found effect: `rms_gain_um` is what it takes off the residual, `look_alikes` what the readings cannot tell from it.
+pub(super) fn result(
+    findings: &Findings<'_, '_>,
+    families: &[Family],
+    held_out: &HeldOut<'_>,
+    k: usize,
+    rms_gain_um: f64,
+    look_alikes: &[Effect],
+) -> EffectResult {
+    let (after, search) = (findings.after, findings.search);
+    let taken = search.taken()[k];
+    let candidate = &search.candidates[taken.candidate];
+    let number = k + findings.before.parameters.effects.len();
+    let (curve_at_unit, curve_unit) = curve_units(after, &candidate.effect);
+    EffectResult {
+        name: effect_name(&candidate.effect),
+        family: families
+            .get(candidate.family)
+            .map(|family| family.name.clone())
+            .unwrap_or_default(),
+        numbers: numbers_of(after, &candidate.effect),
+        parameters: parameters_of(after, findings.after_fit, number),
+        curve: curve_of(after, findings.after_fit, number),
+        curve_at_unit,
+        curve_unit,
+        p_value: taken.p_value,
+        rms_gain_um,
+        heldout_rms_um: held_out.um(k + 1),
+        aliases: look_alikes.iter().map(effect_name).collect(),
+        separated_by: None,
+        separation: None,
+    }
+}
+
+/// The parameters of the `number`-th effect.
+fn parameters_of(problem: &Problem<'_>, fit: &Fit, number: usize) -> Vec<ParameterResult> {
+    let Some(id) = problem.parameters.effect_ids.get(number) else {
+        return Vec::new();
+    };
+    let has = problem
+        .parameters
+        .list
+        .iter()
+        .any(|p| matches!(p.role, Role::Coefficient { effect, .. } if effect == number));
+    if !has {
+        return Vec::new();
+    }
+    fit::parameters(problem, fit)
+        .into_iter()
+        .filter(|p| {
+            p.id == *id
+                || p.id
+                    .strip_prefix(id.as_str())
+                    .is_some_and(|rest| rest.starts_with('.'))
+        })
+        .collect()
+}
+
+/// Points at which a curve is reported.
+const CURVE_POINTS: usize = 73;
+
+/// The points of a free curve with their band; empty for other shapes.
+fn curve_of(problem: &Problem<'_>, fit: &Fit, number: usize) -> Vec<CurvePoint> {
+    let Some(effect) = problem.parameters.effects.get(number) else {
+        return Vec::new();
+    };
+    let Shape::Curve { from, to, .. } = effect.shape else {
+        return Vec::new();
+    };
+    let places: Vec<usize> = (0..problem.parameters.list.len())
+        .filter(|j| matches!(problem.parameters.list[*j].role, Role::Coefficient { effect, .. } if effect == number))
+        .collect();
+    let Some(first) = places.first() else {
+        return Vec::new();
+    };
+    let outside = problem.parameters.list[*first].unit.per_inside;
+    let at_outside = if curve_units(problem, effect).0 == "deg" {
+        1.0_f64.to_degrees()
+    } else {
+        1.0
+    };
+    (0..CURVE_POINTS)
+        .map(|k| {
+            let q = from + (to - from) * k as f64 / (CURVE_POINTS - 1) as f64;
+            let mut basis = Vec::new();
+            effect.shape.basis(
+                &DriverSample {
+                    value: q,
+                    ..DriverSample::default()
+                },
+                &mut basis,
+            );
+            let value: f64 = basis.iter().zip(&places).map(|(b, j)| b * fit.beta[*j]).sum();
+            let variance: f64 = basis
+                .iter()
+                .zip(&places)
+                .flat_map(|(b, j)| basis.iter().zip(&places).map(move |(c, l)| (b, j, c, l)))
+                .map(|(b, j, c, l)| b * c * fit.covariance[(*j, *l)])
+                .sum();
+            CurvePoint {
+                at: q * at_outside,
+                value: value * outside,
+                u: variance.max(0.0).sqrt() * outside,
+            }
+        })
+        .collect()
+}
+
+/// Units of a curve's places and values; empty for other shapes.
+fn curve_units(problem: &Problem<'_>, effect: &Effect) -> (String, String) {
+    if !matches!(effect.shape, Shape::Curve { .. }) {
+        return (String::new(), String::new());
+    }
+    (
+        driver_unit(problem, effect).0.to_string(),
+        crate::drivers::coefficient_unit(problem.session, effect).name,
+    )
+}
+
+/// The unit in which results give places on what an effect follows, and how many of it are one inside unit.
+fn driver_unit(problem: &Problem<'_>, effect: &Effect) -> (&'static str, f64) {
+    let machine = &problem.session.machine;
+    let kind = match &effect.driver {
+        Driver::Axis(name) => machine.axis_index(name).map(|axis| machine.axes[axis].kind),
+        Driver::Time => return ("s", 1.0),
+        _ => None,
+    };
+    if kind == Some(AxisKind::Rotary) {
+        ("deg", 1.0_f64.to_degrees())
+    } else {
+        ("mm", 1.0)
+    }
+}
+
+/// The numbers and places of an effect's shape.
+fn numbers_of(problem: &Problem<'_>, effect: &Effect) -> Vec<ShapeNumber> {
+    let (unit, per_inside) = driver_unit(problem, effect);
+    let numbers = match &effect.shape {
+        Shape::Periodic { period } => vec![("period", vec![*period])],
+        Shape::ReversalSpike { width } => vec![("width", vec![*width])],
+        Shape::Warmup { tau_s } => vec![("time constant", vec![*tau_s])],
+        Shape::Local { centre, width, .. } => vec![("centre", vec![*centre]), ("width", vec![*width])],
+        Shape::Steps { at } => vec![("at", at.clone())],
+        _ => Vec::new(),
+    };
+    let number = |(name, values): (&str, Vec<f64>)| ShapeNumber {
+        name: name.to_string(),
+        values: values.into_iter().map(|value| value * per_inside).collect(),
+        unit: unit.to_string(),
+    };
+    numbers.into_iter().map(number).collect()
+}

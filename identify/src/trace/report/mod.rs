@@ -1,0 +1,247 @@
+//! From a finished search to what is reported.
+
+mod effect;
+
+use abbe_model::effect::Effect;
+
+use super::alias::{self, Alias, Rival};
+use super::library;
+use super::remainder::Structure;
+use super::search::Search;
+use super::start::Start;
+use crate::error::IdentifyError;
+use crate::fit::{self, Fit};
+use crate::heldout::rms_mm;
+use crate::problem::Problem;
+use crate::results::{EffectResult, ModelResult, Moved, ParameterResult, Remainder, TraceResult};
+pub(super) use effect::effect_name;
+
+/// Share of the structure's excess over noise that may remain for the found effects to count as the explanation.
+const EXPLAINED_SHARE: f64 = 0.5;
+
+/// What a search has come to.
+pub(super) struct Findings<'f, 'a> {
+    pub before: &'f Problem<'a>,
+    pub before_fit: &'f Fit,
+    pub after: &'f Problem<'a>,
+    pub after_fit: &'f Fit,
+    pub search: &'f Search<'f>,
+    pub start: &'f Start,
+    pub structure_before: Option<&'f Structure>,
+    pub structure_after: Option<&'f Structure>,
+    pub last_p_value: f64,
+    /// Whether the search was ended by its cap or by the user, not by the evidence.
+    pub stopped_early: bool,
+    pub candidates: usize,
+    pub candidates_seen: usize,
+}
+
+/// What is reported, and what stands behind it.
+pub(super) struct Reported {
+    pub result: TraceResult,
+    pub look_alikes: Vec<Vec<Effect>>,
+    pub rivals: Vec<Vec<Rival>>,
+}
+
+/// What is reported, and for each effect what looks like it and what stands highest in its place.
+pub(super) fn report(findings: &Findings<'_, '_>) -> Result<Reported, IdentifyError> {
+    let Findings {
+        before,
+        before_fit,
+        after,
+        after_fit,
+        search,
+        ..
+    } = findings;
+    let before_result = model_result(before, before_fit, before_fit.held_out.rms_mm);
+    let held_out = HeldOut::of(search, before_result.heldout_rms_um);
+    let mut after_result = model_result(after, after_fit, held_out.last_um() * 1e-3);
+
+    let families = library::families()?;
+    let mut effects = Vec::new();
+    let mut look_alikes: Vec<Vec<Effect>> = Vec::new();
+    let mut rivals = Vec::new();
+    let mut alias_shifts = vec![0.0_f64; before_fit.beta.len()];
+    let variance = residual_variance(findings);
+    for (k, taken) in search.taken().iter().enumerate() {
+        let model = search.model_without(Some(k));
+        let (aliases, of_effect) = alias::aliases(search, k, &model, variance);
+        rivals.push(of_effect);
+        let named = model.joined(taken.candidate).0;
+        let effect_of = |alias: &Alias| search.candidates[alias.candidate].effect.clone();
+        look_alikes.push(aliases.iter().map(effect_of).collect());
+        widen(&mut alias_shifts, &aliases, &named, findings.start);
+        let gain = model.gain(taken.candidate).gain;
+        let rms_gain_um = (gain / held_out.rows).sqrt() * before.noise.sigma_mm * 1e3;
+        effects.push(effect::result(
+            findings,
+            &families,
+            &held_out,
+            k,
+            rms_gain_um,
+            &look_alikes[k],
+        ));
+    }
+    cover(&mut after_result.parameters, after, &alias_shifts);
+    let (verdict, remainder) = verdict(findings, &effects);
+    let moved = moved(&before_result.parameters, &after_result.parameters);
+    let result = TraceResult {
+        verdict,
+        noise_um: before.noise.sigma_mm * 1e3,
+        noise_source: before.noise.source.word().to_string(),
+        noise_memory: before.noise.memory.clone(),
+        readings: before.readings(),
+        heldout_by: before.folds.kind.words().to_string(),
+        before: before_result,
+        after: after_result,
+        effects,
+        remainder,
+        residual_before: match findings.structure_before {
+            Some(structure) if structure.is_there() => structure.words.clone(),
+            Some(_) => "no structure beyond noise".to_string(),
+            None => "independent poses: structure is looked for effect by effect".to_string(),
+        },
+        moved,
+        candidates: findings.candidates,
+        candidates_seen: findings.candidates_seen,
+        unobservable: fit::unobservable(after, &after_fit.rank),
+        rejected: fit::rejected(after, after_fit),
+        warnings: before.session.warnings.clone(),
+    };
+    Ok(Reported {
+        result,
+        look_alikes,
+        rivals,
+    })
+}
+
+/// Held-out errors in µm: whitened sums of squares are turned into them by the declared model's own figure.
+struct HeldOut<'s> {
+    sums: &'s [f64],
+    /// Whitened rows.
+    rows: f64,
+    scale_um: f64,
+}
+
+impl<'s> HeldOut<'s> {
+    fn of(search: &'s Search<'_>, before_um: f64) -> HeldOut<'s> {
+        let rows = search.columns.rows().max(1) as f64;
+        let first = search.held_out.first().copied().unwrap_or(1.0);
+        HeldOut {
+            sums: &search.held_out,
+            rows,
+            scale_um: before_um / (first / rows).sqrt().max(f64::MIN_POSITIVE),
+        }
+    }
+
+    /// With so many effects.
+    fn um(&self, effects: usize) -> f64 {
+        let sum = self.sums.get(effects).or(self.sums.last());
+        (sum.copied().unwrap_or(1.0) / self.rows).sqrt() * self.scale_um
+    }
+
+    fn last_um(&self) -> f64 {
+        self.um(self.sums.len())
+    }
+}
+
+/// The variance that aliases are told apart by, in that of the noise: among poses, what the found effects leave.
+fn residual_variance(findings: &Findings<'_, '_>) -> f64 {
+    if findings.structure_after.is_some() {
+        return 1.0;
+    }
+    let residuals = findings.after_fit.residuals.iter().flatten();
+    let sigma_mm = findings.after.noise.sigma_mm;
+    let sum: f64 = residuals.map(|v| (v / sigma_mm).powi(2)).sum();
+    (sum / findings.search.columns.rows().max(1) as f64).max(1.0)
+}
+
+fn model_result(problem: &Problem<'_>, fit: &Fit, held_out_mm: f64) -> ModelResult {
+    let three = problem.coordinates() == 3;
+    let rms = rms_mm(problem, &fit.residuals) * 1e3;
+    let held = held_out_mm * 1e3;
+    let in_3d = |rms: f64| three.then(|| rms * 3.0_f64.sqrt());
+    ModelResult {
+        rms_um: rms,
+        heldout_rms_um: held,
+        rms_3d_um: in_3d(rms),
+        heldout_rms_3d_um: in_3d(held),
+        parameters: fit::parameters(problem, fit),
+    }
+}
+
+/// Lets uncertainties cover shifts of the unknowns, inside units.
+fn cover(parameters: &mut [ParameterResult], problem: &Problem<'_>, shifts: &[f64]) {
+    for (unknown, shift) in problem.parameters.list.iter().zip(shifts) {
+        if let Some(parameter) = parameters.iter_mut().find(|p| p.id == unknown.id) {
+            parameter.u = parameter.u.hypot(shift * unknown.unit.per_inside);
+        }
+    }
+}
+
+/// Adds how far the unknowns would move if an alias stood in an effect's place: the largest move of each, inside units.
+fn widen(shifts: &mut [f64], aliases: &[Alias], named: &[f64], start: &Start) {
+    let rank = start.to_unknowns.ncols();
+    let mut largest = vec![0.0_f64; shifts.len()];
+    for alias in aliases {
+        for (j, most) in largest.iter_mut().enumerate() {
+            let move_of: f64 = (0..rank)
+                .map(|k| start.to_unknowns[(j, k)] * (alias.model_coefficients[k] - named[k]))
+                .sum();
+            *most = most.max(move_of.abs());
+        }
+    }
+    for (shift, most) in shifts.iter_mut().zip(largest) {
+        *shift = shift.hypot(most);
+    }
+}
+
+fn verdict(findings: &Findings<'_, '_>, effects: &[EffectResult]) -> (String, Remainder) {
+    let Some(after) = findings.structure_after else {
+        let word = match (effects.is_empty(), findings.stopped_early) {
+            (true, _) => "clean",
+            (false, false) => "explained",
+            (false, true) => "partly-explained",
+        };
+        let remainder = Remainder {
+            structured: false,
+            p_value: findings.last_p_value,
+            place: None,
+        };
+        return (word.to_string(), remainder);
+    };
+    let structured = after.is_there();
+    let remainder = Remainder {
+        structured,
+        p_value: after.p_value,
+        place: structured.then(|| after.words.clone()),
+    };
+    let before = findings
+        .structure_before
+        .map_or(0.0, |structure| structure.excess);
+    let share = if before > 0.0 { after.excess / before } else { 0.0 };
+    let word = match (effects.is_empty(), structured) {
+        (true, false) => "clean",
+        (true, true) => "unexplained",
+        (false, false) => "explained",
+        (false, true) if share < EXPLAINED_SHARE => "partly-explained",
+        (false, true) => "unexplained",
+    };
+    (word.to_string(), remainder)
+}
+
+/// Parameters that moved by more than their uncertainty.
+fn moved(before: &[ParameterResult], after: &[ParameterResult]) -> Vec<Moved> {
+    before
+        .iter()
+        .filter_map(|b| {
+            let a = after.iter().find(|a| a.id == b.id)?;
+            ((a.value - b.value).abs() > a.u).then(|| Moved {
+                id: a.id.clone(),
+                by: a.value - b.value,
+                u: a.u,
+                unit: a.unit.clone(),
+            })
+        })
+        .collect()
+}
