@@ -4,6 +4,8 @@
 //! has left, each block with a sign of its own. Poses have no repeats to speak of; there the residual itself is drawn, each pose with a sign of its own
 //! (the wild bootstrap), which keeps the size of every pose and destroys every dependence on position.
 
+use std::collections::HashMap;
+
 use faer::Mat;
 use rand::{RngExt, SeedableRng};
 use rand_distr::StandardNormal;
@@ -36,54 +38,65 @@ pub fn draws(
     block: usize,
     seed: u64,
 ) -> Mat<f64> {
-    let rows = columns.rows();
     let mut generator = Pcg64::seed_from_u64(seed ^ 0x6e75_6c6c);
     if problem.folds.kind == FoldKind::Poses {
-        let origins = columns.origin_of_rows();
-        let mut draws = Mat::zeros(rows, count);
-        for draw in 0..count {
-            let mut signs: std::collections::HashMap<(usize, usize), f64> = std::collections::HashMap::new();
-            for (i, (test, row, _)) in origins.iter().enumerate() {
-                let sign = *signs
-                    .entry((*test, *row))
-                    .or_insert_with(|| if generator.random::<bool>() { 1.0 } else { -1.0 });
-                draws[(i, draw)] = sign * whitened[i];
-            }
-        }
-        return draws;
+        return turned(columns, whitened, count, &mut generator);
     }
     let pool = pool(problem, residuals);
-    let total: usize = pool.iter().map(Vec::len).sum();
-    let mut draws = Mat::zeros(rows, count);
+    let mut draws = Mat::zeros(columns.rows(), count);
     for draw in 0..count {
-        let mut values = Vec::with_capacity(rows);
-        while values.len() < rows {
-            if total < LEAST_POOL {
-                values.push(generator.sample(StandardNormal));
-                continue;
-            }
-            // A stretch is chosen with the chance of its length, a place in it evenly.
-            let mut place = generator.random_range(0..total);
-            let stretch = pool.iter().find(|stretch| {
-                if place < stretch.len() {
-                    true
-                } else {
-                    place -= stretch.len();
-                    false
-                }
-            });
-            let Some(stretch) = stretch else { continue };
-            let sign = if generator.random::<bool>() { 1.0 } else { -1.0 };
-            let end = (place + block).min(stretch.len());
-            values.extend(stretch[place..end].iter().map(|value| sign * value));
-        }
-        values.truncate(rows);
+        let mut values = drawn(&pool, columns.rows(), block, &mut generator);
         slowed(&mut values, &problem.noise, &mut generator);
         for (i, value) in columns.placed(&values).into_iter().enumerate() {
             draws[(i, draw)] = value;
         }
     }
     draws
+}
+
+/// The residual itself, each pose with a sign of its own.
+fn turned(columns: &Columns<'_, '_>, whitened: &[f64], count: usize, generator: &mut Pcg64) -> Mat<f64> {
+    let origins = columns.origin_of_rows();
+    let mut draws = Mat::zeros(columns.rows(), count);
+    for draw in 0..count {
+        let mut signs: HashMap<(usize, usize), f64> = HashMap::new();
+        for (i, (test, row, _)) in origins.iter().enumerate() {
+            let sign = *signs.entry((*test, *row)).or_insert_with(|| sign(generator));
+            draws[(i, draw)] = sign * whitened[i];
+        }
+    }
+    draws
+}
+
+fn sign(generator: &mut Pcg64) -> f64 {
+    if generator.random::<bool>() { 1.0 } else { -1.0 }
+}
+
+/// So many deviations from the pool, block after block, each with a sign of its own; Gaussian noise where the pool is too small.
+fn drawn(pool: &[Vec<f64>], rows: usize, block: usize, generator: &mut Pcg64) -> Vec<f64> {
+    let total: usize = pool.iter().map(Vec::len).sum();
+    if total < LEAST_POOL {
+        return (0..rows).map(|_| generator.sample(StandardNormal)).collect();
+    }
+    let mut values = Vec::with_capacity(rows + block);
+    while values.len() < rows {
+        // A stretch is chosen with the chance of its length, a place in it evenly.
+        let mut place = generator.random_range(0..total);
+        let stretch = pool.iter().find(|stretch| {
+            if place < stretch.len() {
+                true
+            } else {
+                place -= stretch.len();
+                false
+            }
+        });
+        let Some(stretch) = stretch else { continue };
+        let sign = sign(generator);
+        let end = (place + block).min(stretch.len());
+        values.extend(stretch[place..end].iter().map(|value| sign * value));
+    }
+    values.truncate(rows);
+    values
 }
 
 /// What is whitened with a memory that is not quite its own stays slow, or becomes hasty. The memory of each draw differs from the one that was found by

@@ -78,25 +78,7 @@ pub fn sharpened(
             })
         })
         .collect();
-    let mut nearest: Vec<&Composed> = composed.iter().filter(|c| c.evidence >= NEAR * best).collect();
-    nearest.sort_by(|a, b| b.evidence.total_cmp(&a.evidence));
-    nearest.truncate(most);
-    let moved: Vec<(Effect, f64)> = (nearest.par_iter())
-        .map(|composed| moved_steps(search, model, &composed.candidate))
-        .collect();
-    for (composed, (effect, gain)) in nearest.into_iter().zip(moved) {
-        let gain = Gain {
-            gain,
-            freedom: effect.shape.coefficients() + effect.shape.numbers(),
-        };
-        let evidence = search.evidence(&gain, variance);
-        if evidence >= best - BEHIND || evidence - composed.candidate.cost >= NEAR * best {
-            fresh.push(Candidate {
-                effect,
-                ..composed.candidate.clone()
-            });
-        }
-    }
+    fresh.extend(moved(search, model, composed, best, most));
     fresh.retain(|candidate| {
         let is_same = |present: usize| {
             search.candidates[present].effect == candidate.effect && search.is_own(present, &model.folds)
@@ -106,8 +88,37 @@ pub fn sharpened(
     fresh
 }
 
-/// Looks around an effect for the numbers of its shape that gain most; `None` where nothing is gained. Line search by golden section (Kiefer, Proc. Am. Math.
-/// Soc. 4 (1953) 502).
+/// What has been composed and comes near the best evidence, with its places where they gain most.
+fn moved(
+    search: &Search<'_>,
+    model: &Trained<'_>,
+    composed: &[Composed],
+    best: f64,
+    most: usize,
+) -> Vec<Candidate> {
+    let variance = search.variance(model);
+    let mut nearest: Vec<&Composed> = composed.iter().filter(|c| c.evidence >= NEAR * best).collect();
+    nearest.sort_by(|a, b| b.evidence.total_cmp(&a.evidence));
+    nearest.truncate(most);
+    nearest
+        .into_par_iter()
+        .filter_map(|composed| {
+            let (effect, gain) = moved_steps(search, model, &composed.candidate);
+            let gain = Gain {
+                gain,
+                freedom: effect.shape.coefficients() + effect.shape.numbers(),
+            };
+            let evidence = search.evidence(&gain, variance);
+            let near = evidence >= best - BEHIND || evidence - composed.candidate.cost >= NEAR * best;
+            near.then(|| Candidate {
+                effect,
+                ..composed.candidate.clone()
+            })
+        })
+        .collect()
+}
+
+/// Looks around an effect for the numbers of its shape that gain most; `None` where nothing is gained.
 pub(super) fn sharpen(
     search: &Search<'_>,
     model: &Trained<'_>,
@@ -130,24 +141,7 @@ pub(super) fn sharpen(
                 let trial = with_number(&effect, *which, value_at(share));
                 (search.gain_beside(model, &trial).unwrap_or(0.0), trial)
             };
-            let golden = 0.5 * (5.0_f64.sqrt() - 1.0);
-            let (mut a, mut b) = (0.0, 1.0);
-            let (mut c, mut d) = (b - golden * (b - a), a + golden * (b - a));
-            let (mut at_c, mut at_d) = (gain_at(c), gain_at(d));
-            for _ in 0..steps {
-                if at_c.0 > at_d.0 {
-                    (b, d) = (d, c);
-                    at_d = at_c;
-                    c = b - golden * (b - a);
-                    at_c = gain_at(c);
-                } else {
-                    (a, c) = (c, d);
-                    at_c = at_d;
-                    d = a + golden * (b - a);
-                    at_d = gain_at(d);
-                }
-            }
-            let (gain, trial) = if at_c.0 > at_d.0 { at_c } else { at_d };
+            let (gain, trial) = highest(gain_at, steps);
             if gain > best {
                 best = gain;
                 effect = trial;
@@ -155,6 +149,28 @@ pub(super) fn sharpen(
         }
     }
     (best > before * (1.0 + 1e-6)).then_some(effect)
+}
+
+/// The highest value that a line search between 0 and 1 comes to, and what has it. By golden section (Kiefer, Proc. Am. Math. Soc. 4 (1953) 502).
+fn highest<T>(value_at: impl Fn(f64) -> (f64, T), steps: usize) -> (f64, T) {
+    let golden = 0.5 * (5.0_f64.sqrt() - 1.0);
+    let (mut a, mut b) = (0.0, 1.0);
+    let (mut c, mut d) = (b - golden * (b - a), a + golden * (b - a));
+    let (mut at_c, mut at_d) = (value_at(c), value_at(d));
+    for _ in 0..steps {
+        if at_c.0 > at_d.0 {
+            (b, d) = (d, c);
+            at_d = at_c;
+            c = b - golden * (b - a);
+            at_c = value_at(c);
+        } else {
+            (a, c) = (c, d);
+            at_c = at_d;
+            d = a + golden * (b - a);
+            at_d = value_at(d);
+        }
+    }
+    if at_c.0 > at_d.0 { at_c } else { at_d }
 }
 
 /// Moves each step by parts of the grid to where all together gain most; what that is.
