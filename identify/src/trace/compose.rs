@@ -16,6 +16,8 @@ use super::visible::LEAST_VISIBLE;
 
 /// The most places of one effect: what takes more is a curve.
 const MOST_PLACES: usize = 6;
+/// The most sweeps of exchanges after a choice.
+const MOST_SWEEPS: usize = 4;
 
 /// An effect composed of places.
 #[derive(Clone, Debug)]
@@ -138,7 +140,7 @@ impl Subset<'_> {
     /// Exchanges chosen places while that gains anything; what all of them gain.
     fn splice(&self, chosen: &mut Vec<usize>) -> f64 {
         let mut gain = self.gain(chosen);
-        for _ in 0..4 {
+        for _ in 0..MOST_SWEEPS {
             let mut changed = false;
             for _ in 0..chosen.len() {
                 let out = chosen.remove(0);

@@ -271,6 +271,9 @@ fn draws_of(options: &TraceOptions) -> usize {
     options.draws.max(least - 1)
 }
 
+/// By how much estimates of a coefficient of the memory, and relatively of the size of the noise, scatter anyway.
+const SCATTER: f64 = 0.02;
+
 /// Takes size and memory of the noise from repeats, where there are enough. Returns whether that changed them by more than estimates of the noise
 /// scatter anyway.
 fn give_noise_memory(problem: &mut Problem<'_>, residuals: &[Vec<f64>]) -> bool {
@@ -295,8 +298,8 @@ fn give_noise_memory(problem: &mut Problem<'_>, residuals: &[Vec<f64>]) -> bool 
             .memory
             .iter()
             .zip(&present.memory)
-            .all(|(a, b)| (a - b).abs() < 0.02);
-    if same_memory && (noise.sigma_mm / present.sigma_mm - 1.0).abs() < 0.02 {
+            .all(|(a, b)| (a - b).abs() < SCATTER);
+    if same_memory && (noise.sigma_mm / present.sigma_mm - 1.0).abs() < SCATTER {
         return false;
     }
     problem.noise = noise;

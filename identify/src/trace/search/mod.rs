@@ -10,6 +10,7 @@ mod pool;
 
 use std::ops::Range;
 
+use super::alias::INDISTINGUISHABLE;
 use super::columns::{Columns, Layout};
 use super::compose::Composed;
 use super::library::Candidate;
@@ -63,11 +64,11 @@ pub struct Search<'s> {
     /// What is looked for.
     pub candidates: Vec<Candidate>,
     /// The candidates laid over the tests.
-    pub layouts: Vec<Layout>,
+    layouts: Vec<Layout>,
     /// All products.
     pub moments: Moments,
     /// What is known beforehand.
-    pub prior: PriorMoments,
+    prior: PriorMoments,
     /// Number of base columns that the fitted model has.
     pub rank: usize,
     /// The search on all readings, then that of each fold.
@@ -193,7 +194,7 @@ impl<'s> Search<'s> {
         chosen: &[usize],
     ) -> usize {
         let variance = self.variance(model);
-        let least = self.evidence_for(best, &gains[best], variance) - super::alias::INDISTINGUISHABLE;
+        let least = self.evidence_for(best, &gains[best], variance) - INDISTINGUISHABLE;
         let mut first = best;
         for (candidate, gain) in gains.iter().enumerate() {
             let passed_over = chosen.contains(&candidate) || !self.is_open(candidate, &model.folds);
