@@ -13,7 +13,7 @@ use pulp::NullaryFnOnce;
 use crate::expression::{Arena, Binary, Node, NodeId, Operand, Unary, operands};
 
 /// Readings in a block.
-const READINGS: usize = 64;
+const READINGS: usize = 128;
 
 /// A quantity of a block: a number a reading. Aligned so that no vector lies across two lines of the cache.
 #[derive(Clone)]
@@ -69,8 +69,10 @@ pub struct Replay<V> {
     /// What is computed, and into which register.
     steps: Vec<(Step<Register>, Register)>,
     registers: usize,
-    /// Where each output stands at the end of a block.
-    outputs: Vec<Register>,
+    /// The outputs that no step computes: uniform or given. By number, with where each stands.
+    standing: Vec<(usize, Register)>,
+    /// The others in the order of their steps: the step, and the output's number. They are handed over at once, so that their registers are free again.
+    computed: Vec<(usize, usize)>,
 }
 
 impl<V: Clone + PartialEq> Replay<V> {
@@ -124,8 +126,10 @@ impl<V: Clone + PartialEq> Replay<V> {
             uniform.push(value);
         }
         let spread = self.spread.iter().map(|place| uniform[*place]);
-        let fill = spread.chain(std::iter::repeat(0.0)).take(self.registers);
-        let mut file: Vec<Box<Block>> = fill.map(|value| Box::new(Block([value; READINGS]))).collect();
+        // One more than the registers: a step is computed there, then trades places with what it replaces.
+        let mut store = vec![Block([0.0; READINGS]); self.registers + 1];
+        store.iter_mut().zip(spread).for_each(|(block, value)| block.0.fill(value));
+        let mut file: Vec<&mut Block> = store.iter_mut().collect();
         let columns: Vec<&[f64]> = self.columns.iter().map(column).collect();
         pulp::Arch::new().dispatch(Blocks {
             replay: self,
@@ -138,33 +142,37 @@ impl<V: Clone + PartialEq> Replay<V> {
 }
 
 /// A replay over all blocks, compiled for each kind of vector instructions that the processor may have.
-struct Blocks<'r, V, P> {
+struct Blocks<'r, 'f, V, P> {
     replay: &'r Replay<V>,
     rows: usize,
     columns: &'r [&'r [f64]],
-    file: &'r mut [Box<Block>],
+    file: &'r mut Vec<&'f mut Block>,
     put: P,
 }
 
-impl<V, P: FnMut(usize, usize, &[f64])> NullaryFnOnce for Blocks<'_, V, P> {
+impl<V, P: FnMut(usize, usize, &[f64])> NullaryFnOnce for Blocks<'_, '_, V, P> {
     type Output = ();
 
     #[inline(always)]
     fn call(mut self) {
         let first = self.replay.spread.len();
-        let mut made = Box::new(Block([0.0; READINGS]));
+        let Some(mut made) = self.file.pop() else { return };
         for start in (0..self.rows).step_by(READINGS) {
             let end = (start + READINGS).min(self.rows);
             for (place, column) in self.columns.iter().enumerate() {
                 // What lies beyond the last reading is computed too and goes nowhere.
                 self.file[first + place].0[..end - start].copy_from_slice(&column[start..end]);
             }
-            for (step, to) in &self.replay.steps {
-                step.of_block(self.file, &mut made);
-                std::mem::swap(&mut self.file[*to], &mut made);
+            for (output, register) in &self.replay.standing {
+                (self.put)(*output, start, &self.file[*register].0[..end - start]);
             }
-            for (number, register) in self.replay.outputs.iter().enumerate() {
-                (self.put)(number, start, &self.file[*register].0[..end - start]);
+            let mut computed = self.replay.computed.iter().peekable();
+            for (number, (step, to)) in self.replay.steps.iter().enumerate() {
+                step.of_block(self.file, made);
+                std::mem::swap(&mut self.file[*to], &mut made);
+                while let Some((_, output)) = computed.next_if(|(of, _)| *of == number) {
+                    (self.put)(*output, start, &self.file[*to].0[..end - start]);
+                }
             }
         }
     }
@@ -172,7 +180,7 @@ impl<V, P: FnMut(usize, usize, &[f64])> NullaryFnOnce for Blocks<'_, V, P> {
 
 impl Step<Register> {
     #[inline(always)]
-    fn of_block(&self, file: &[Box<Block>], made: &mut Block) {
+    fn of_block(&self, file: &[&mut Block], made: &mut Block) {
         let [a, b, c, d] = self.of;
         let (a, b, c, d) = (&file[a].0, &file[b].0, &file[c].0, &file[d].0);
         match self.operation {
@@ -303,9 +311,9 @@ impl<V: Clone + PartialEq> Recorder<'_, V> {
         for (number, (_, step)) in steps.iter().enumerate() {
             last_read.extend(step.of.map(|operand| (operand, number)));
         }
-        last_read.extend(outputs.iter().map(|output| (*output, usize::MAX)));
         let mut free: Vec<Register> = Vec::new();
         let mut placed = Vec::with_capacity(steps.len());
+        let mut computed = Vec::new();
         for (number, (id, step)) in steps.into_iter().enumerate() {
             let of = step.of.map(|operand| register_of[&operand]);
             for (operand, register) in step.of.iter().zip(of) {
@@ -318,6 +326,11 @@ impl<V: Clone + PartialEq> Recorder<'_, V> {
                 registers - 1
             });
             register_of.insert(Operand::Node(id), to);
+            let made = (outputs.iter().enumerate()).filter(|(_, output)| **output == Operand::Node(id));
+            computed.extend(made.map(|(output, _)| (number, output)));
+            if !last_read.contains_key(&Operand::Node(id)) {
+                free.push(to);
+            }
             let operation = step.operation;
             placed.push((Step { operation, of }, to));
         }
@@ -327,7 +340,10 @@ impl<V: Clone + PartialEq> Recorder<'_, V> {
             columns,
             steps: placed,
             registers,
-            outputs: outputs.iter().map(|output| register_of[output]).collect(),
+            standing: (outputs.iter().enumerate())
+                .filter_map(|(number, output)| Some((number, *register_of.get(output)?)).filter(|(_, r)| *r < kept))
+                .collect(),
+            computed,
         }
     }
 }

@@ -199,10 +199,10 @@ impl<'a> TestModel<'a> {
 
     /// The recorded chain: the reading's coordinates, then for each of them its derivatives by the slots asked for.
     fn recording(&self, values: &SlotValues, derivatives: &[usize]) -> Arc<Replay<Quantity>> {
+        let mut carries: Vec<bool> = values.constant.iter().map(|value| *value != 0.0).collect();
+        derivatives.iter().for_each(|slot| carries[*slot] = true);
         let slots = (0..self.slots())
-            .filter(|slot| {
-                derivatives.contains(slot) || values.constant[*slot] != 0.0 || values.varies(*slot)
-            })
+            .filter(|slot| carries[*slot] || values.varies(*slot))
             .map(|slot| (slot, values.varies(slot)))
             .collect();
         let carried = Carried {
