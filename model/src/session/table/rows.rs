@@ -34,9 +34,9 @@ pub(super) struct Row {
     pub line: usize,
     /// Its cells, without the spaces around them.
     pub cells: Vec<String>,
-    /// Byte of the file at which the line begins.
-    start: usize,
-    /// The line as it stands.
+    /// The bytes of the file that the line takes, without byte-order mark and line end.
+    bytes: Range<usize>,
+    /// The line as it stands; what is not UTF-8 is replaced.
     text: String,
 }
 
@@ -46,7 +46,7 @@ impl Row {
         Row {
             line,
             cells,
-            start: 0,
+            bytes: 0..0,
             text: String::new(),
         }
     }
@@ -56,11 +56,12 @@ impl Row {
         let cell = self.cells.get(cell).filter(|cell| !cell.is_empty())?;
         let mut found = self.text.match_indices(cell.as_str());
         let (at, _) = found.next()?;
-        // The same text twice in the line leaves in doubt which one is meant.
-        match found.next() {
-            None => Some(self.start + at..self.start + at + cell.len()),
-            Some(_) => Some(self.start..self.start + self.text.len()),
+        // The same text twice in the line leaves in doubt which one is meant; what was replaced may have moved the cell.
+        if found.next().is_some() || self.text.len() != self.bytes.len() {
+            return Some(self.bytes.clone());
         }
+        let start = self.bytes.start + at;
+        Some(start..start + cell.len())
     }
 }
 
@@ -133,8 +134,7 @@ impl Rows {
     /// The next row, or `None` at the end.
     pub fn next_row(&mut self) -> Result<Option<Row>, ModelError> {
         loop {
-            let start = self.byte;
-            let Some(text) = self.next_line()? else {
+            let Some((bytes, text)) = self.next_line()? else {
                 return Ok(None);
             };
             let content = text.trim();
@@ -156,13 +156,15 @@ impl Rows {
             return Ok(Some(Row {
                 line: self.line,
                 cells,
-                start,
+                bytes,
                 text,
             }));
         }
     }
 
-    fn next_line(&mut self) -> Result<Option<String>, ModelError> {
+    /// The next line and the bytes of the file that it takes.
+    fn next_line(&mut self) -> Result<Option<(Range<usize>, String)>, ModelError> {
+        let mut start = self.byte;
         self.buffer.clear();
         let read = self
             .reader
@@ -192,7 +194,10 @@ impl Rows {
             if bytes.starts_with(b"\xff\xfe") || bytes.starts_with(b"\xfe\xff") {
                 return Err(self.fault("the file is UTF-16".into(), "save it as UTF-8"));
             }
-            bytes = bytes.strip_prefix(b"\xef\xbb\xbf").unwrap_or(bytes);
+            if let Some(behind) = bytes.strip_prefix(b"\xef\xbb\xbf") {
+                start += bytes.len() - behind.len();
+                bytes = behind;
+            }
         }
         let bytes = bytes.strip_suffix(b"\n").unwrap_or(bytes);
         let bytes = bytes.strip_suffix(b"\r").unwrap_or(bytes);
@@ -203,7 +208,8 @@ impl Rows {
             ));
         }
         // Foreign headers come in all encodings; a cell that is read as a number has to be ASCII anyhow.
-        Ok(Some(String::from_utf8_lossy(bytes).into_owned()))
+        let text = String::from_utf8_lossy(bytes).into_owned();
+        Ok(Some((start..start + bytes.len(), text)))
     }
 
     fn quoted(&self, text: &str) -> Result<Vec<String>, ModelError> {
@@ -271,6 +277,19 @@ mod tests {
             many.ends_with("data.csv:4: a row beyond 3, the most that are read"),
             "{many}"
         );
+    }
+
+    #[test]
+    fn a_cell_is_pointed_at_behind_a_byte_order_mark_and_beside_what_is_not_utf_8() {
+        let folder = tempfile::tempdir().unwrap();
+        let file = folder.path().join("data.csv");
+        std::fs::write(&file, b"\xef\xbb\xbf0,pq\r\n\xb5\xb5m,7\n").unwrap();
+        let mut rows = Rows::within(&file, &Format::default(), LIMITS).unwrap();
+        let first = rows.next_row().unwrap().unwrap();
+        assert_eq!(first.span(1), Some(5..7));
+        // The whole line, since two bytes stand where six do in the text.
+        let second = rows.next_row().unwrap().unwrap();
+        assert_eq!(second.span(1), Some(9..14));
     }
 
     #[test]
