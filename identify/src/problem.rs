@@ -5,7 +5,7 @@
 //! unknowns.
 
 use std::collections::btree_map::Entry;
-use std::collections::{BTreeMap, BTreeSet};
+use std::collections::BTreeMap;
 use std::ops::Range;
 
 use abbe_model::effect::Effect;
@@ -255,6 +255,9 @@ impl<'a> Problem<'a> {
     pub fn kept_rows(&self, block: &Block) -> Vec<usize> {
         let coordinates = self.coordinates();
         let rejected = &self.rejected[block.test];
+        if !rejected[block.rows.clone()].contains(&true) {
+            return (0..block.rows.len() * coordinates).collect();
+        }
         (0..block.rows.len() * coordinates)
             .filter(|i| {
                 let row = block.rows.start + i / coordinates;
@@ -339,7 +342,10 @@ impl<'a> Problem<'a> {
             let kept = self.kept_rows(block);
             let folds: Vec<usize> = self.folds_of(&kept, block).collect();
             let white = self.whitened(rows, &kept);
-            let present: BTreeSet<usize> = folds.iter().copied().collect();
+            let mut present = folds.clone();
+            present.dedup();
+            present.sort_unstable();
+            present.dedup();
             for fold in &present {
                 let triangle = narrow
                     .entry((block.test, *fold))

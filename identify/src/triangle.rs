@@ -4,7 +4,9 @@
 //! Comput. 34 (2012) A206), so that memory does not grow with the number of readings and two triangles of different readings merge into one.
 //! With `[J | r] = Q·[R c; 0 ρ]` the sum of squares at a step `δ` is `‖c − Rδ‖² + ρ²`.
 
-use faer::{Mat, MatRef};
+use faer::dyn_stack::{MemBuffer, MemStack};
+use faer::linalg::qr::no_pivoting::factor;
+use faer::{Mat, MatRef, Par};
 
 /// The triangle `[R c; 0 ρ]` of the rows absorbed so far.
 #[derive(Clone, Debug)]
@@ -44,9 +46,7 @@ impl Triangle {
             self.factor = stacked;
             return;
         }
-        let thin = stacked.qr();
-        let upper = thin.thin_R();
-        self.factor = Mat::from_fn(width, width, |i, j| if i <= j { upper[(i, j)] } else { 0.0 });
+        self.factor = upper(stacked);
     }
 
     /// Adds the rows of another triangle.
@@ -79,9 +79,7 @@ impl Triangle {
                 0.0
             }
         });
-        let decomposition = padded.qr();
-        let upper = decomposition.thin_R();
-        Mat::from_fn(width, width, |i, j| if i <= j { upper[(i, j)] } else { 0.0 })
+        upper(padded)
     }
 
     /// `R` (unknowns × unknowns), `c`, and the sum of squares `ρ²` that no step can remove.
@@ -93,6 +91,16 @@ impl Triangle {
         (r, c, reduced[(n, n)] * reduced[(n, n)])
     }
 
+    /// The triangle after a step `δ` that is too small for the model to bend: `[R c−Rδ; 0 ρ]`.
+    pub fn after(&self, step: &[f64]) -> Triangle {
+        let mut moved = self.clone();
+        for i in 0..moved.factor.nrows() {
+            let predicted: f64 = (0..self.columns).map(|j| self.factor[(i, j)] * step[j]).sum();
+            moved.factor[(i, self.columns)] -= predicted;
+        }
+        moved
+    }
+
     /// The sum of squares of the rows after a step `δ`.
     pub fn sum_of_squares_after(&self, step: &[f64]) -> f64 {
         (0..self.factor.nrows())
@@ -102,4 +110,22 @@ impl Triangle {
             })
             .sum()
     }
+}
+
+/// The triangle `R` of a matrix `Q·R` with at least as many rows as columns.
+///
+/// Few columns are reduced one at a time: blocks of them, with which the library's own choice begins at sixteen columns, take two to four times as long up to some forty.
+pub(crate) fn upper(mut matrix: Mat<f64>) -> Mat<f64> {
+    let (rows, columns) = (matrix.nrows(), matrix.ncols());
+    let together = if columns < 40 { 1 } else { 16 };
+    let mut reflections = Mat::zeros(together, columns);
+    let scratch = factor::qr_in_place_scratch::<f64>(rows, columns, together, Par::Seq, Default::default());
+    factor::qr_in_place(
+        matrix.as_mut(),
+        reflections.as_mut(),
+        Par::Seq,
+        MemStack::new(&mut MemBuffer::new(scratch)),
+        Default::default(),
+    );
+    Mat::from_fn(columns, columns, |i, j| if i <= j { matrix[(i, j)] } else { 0.0 })
 }

@@ -11,6 +11,7 @@ use faer::{Mat, MatRef};
 use super::linear::{Linearisation, marginal};
 use crate::error::IdentifyError;
 use crate::problem::Problem;
+use crate::triangle::upper;
 
 /// The unknowns that tests share, in the order of the columns; what is asked about stands last.
 #[derive(Clone, Debug)]
@@ -103,8 +104,7 @@ impl Shared {
             };
             stacked[(list.len() + place, place)] = 1.0 / u;
         }
-        let decomposition = stacked.qr();
-        let upper = decomposition.thin_R();
+        let upper = upper(stacked);
         Mat::from_fn(k, k, |i, j| if i <= j { upper[(m + i, m + j)] } else { 0.0 })
     }
 
@@ -141,9 +141,7 @@ pub fn sum(a: MatRef<'_, f64>, b: MatRef<'_, f64>) -> Root {
             b[(i - a.nrows(), j)]
         }
     });
-    let decomposition = stacked.qr();
-    let upper = decomposition.thin_R();
-    Mat::from_fn(k, k, |i, j| if i <= j { upper[(i, j)] } else { 0.0 })
+    upper(stacked)
 }
 
 /// The inverse of an upper triangle; a pivot of nothing yields infinity.

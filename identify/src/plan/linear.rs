@@ -12,7 +12,7 @@ use crate::fit;
 use crate::parameters::{Parameter, Role};
 use crate::problem::Problem;
 use crate::rank::Rank;
-use crate::triangle::Triangle;
+use crate::triangle::{Triangle, upper};
 
 /// A plan at its nominal state.
 pub struct Linearisation {
@@ -116,8 +116,7 @@ pub fn marginal(r: MatRef<'_, f64>, kept: &[usize], size: &[f64]) -> Mat<f64> {
             0.0
         }
     });
-    let decomposition = stacked.qr();
-    let upper = decomposition.thin_R();
+    let upper = upper(stacked);
     let first = dropped.len();
     Mat::from_fn(kept.len(), kept.len(), |i, j| {
         if i <= j {
