@@ -203,15 +203,20 @@ pub fn fit(problem: &Problem<'_>, start: Option<&[f64]>) -> Result<Fit, Identify
         basis: &rank.seen,
         last: RefCell::new((nominal, triangles)),
     };
+    let mut end = None;
     if rank.seen.ncols() > 0 {
         let scale = Scaling::Physical(vec![1.0; rank.seen.ncols()]);
         let from = start.map_or_else(
             || vec![0.0; rank.seen.ncols()],
             |beta| rank.coordinates(beta, &size),
         );
-        minimise(&seen, &from, &scale)?;
+        end = Some(seen.beta(&minimise(&seen, &from, &scale)?.x));
     }
-    let (beta, triangles) = seen.last.into_inner();
+    let (last, triangles) = seen.last.into_inner();
+    let beta = end.unwrap_or_else(|| last.clone());
+    // The iterations end within a step of the last linearisation that is too small for the model to bend.
+    let step: Vec<f64> = beta.iter().zip(&last).map(|(end, last)| end - last).collect();
+    let triangles = triangles.iter().map(|triangle| triangle.after(&step)).collect();
     finish(problem, beta, triangles, rank)
 }
 

@@ -46,6 +46,8 @@ pub struct Solution {
 
 const MOST_ITERATIONS: usize = 200;
 const SMALLEST_RELATIVE_STEP: f64 = 1e-12;
+/// A step below this does not bend the model: the square of it is below rounding.
+const STRAIGHT_RELATIVE_STEP: f64 = 1e-7;
 
 /// Minimises from a start value.
 ///
@@ -57,19 +59,18 @@ pub fn minimise(
     scaling: &Scaling,
 ) -> Result<Solution, IdentifyError> {
     let n = problem.unknowns();
+    let nothing = vec![0.0; n];
     let mut x = start.to_vec();
-    let mut current = f64::NAN;
+    let mut triangle = problem.linearise(&x)?;
+    let mut current = triangle.sum_of_squares_after(&nothing);
     let mut scale = match scaling {
         Scaling::Physical(sizes) => sizes.clone(),
         Scaling::Columns => vec![f64::INFINITY; n],
     };
     let mut damping = 0.0;
+    let mut step_before = 1.0;
     for iteration in 1..=MOST_ITERATIONS {
-        let triangle = problem.linearise(&x)?;
-        let (r, c, rest) = triangle.parts();
-        if !current.is_finite() {
-            current = c.iter().map(|v| v * v).sum::<f64>() + rest;
-        }
+        let (r, c, _) = triangle.parts();
         if let Scaling::Columns = scaling {
             for j in 0..n {
                 let norm = (0..n).map(|i| r[(i, j)].powi(2)).sum::<f64>().sqrt();
@@ -104,7 +105,8 @@ pub fn minimise(
         // A step is taken if the sum of squares falls; near the end the fall drowns in rounding and the step's size decides.
         let mut accepted = false;
         let mut smallest = false;
-        for _ in 0..60 {
+        let mut next = None;
+        for attempt in 0..60 {
             let step = step_with(damping);
             let trial: Vec<f64> = x.iter().zip(&step).map(|(a, b)| a + b).collect();
             let relative = step
@@ -122,7 +124,26 @@ pub fn minimise(
                     .abs()
                 })
                 .fold(0.0, f64::max);
-            let sum = problem.sum_of_squares(&trial);
+            // Steps shrink by about the same factor each time; what would be left to do after this one is then too small to matter.
+            let left = relative * (relative / step_before);
+            if damping == 0.0 && relative < STRAIGHT_RELATIVE_STEP && left < SMALLEST_RELATIVE_STEP {
+                let triangle = triangle.after(&step);
+                return Ok(Solution {
+                    x: trial,
+                    sum_of_squares: triangle.sum_of_squares_after(&nothing),
+                    triangle,
+                    iterations: iteration,
+                });
+            }
+            // The first step is nearly always taken, and is linearised at next.
+            let sum = if attempt == 0 {
+                next = problem.linearise(&trial).ok();
+                next.as_ref()
+                    .map_or(f64::NAN, |next| next.sum_of_squares_after(&nothing))
+            } else {
+                next = None;
+                problem.sum_of_squares(&trial)
+            };
             let close = relative < SMALLEST_RELATIVE_STEP * 100.0;
             if sum.is_finite() && (sum < current || (close && sum <= current * (1.0 + 1e-9))) {
                 x = trial;
@@ -133,9 +154,11 @@ pub fn minimise(
                 if damping < largest * largest * 1e-12 {
                     damping = 0.0;
                 }
+                step_before = relative;
                 accepted = true;
                 break;
             }
+            next = None;
             if relative < 1e-9 && damping == 0.0 {
                 // The full step is smaller than what rounding lets us judge: this is the minimum.
                 smallest = true;
@@ -148,17 +171,20 @@ pub fn minimise(
                 damping * 10.0
             };
         }
-        if smallest || n == 0 {
-            let triangle = problem.linearise(&x)?;
+        if !accepted {
+            break;
+        }
+        triangle = match next {
+            Some(next) => next,
+            None => problem.linearise(&x)?,
+        };
+        if smallest {
             return Ok(Solution {
                 x,
                 triangle,
                 sum_of_squares: current,
                 iterations: iteration,
             });
-        }
-        if !accepted {
-            break;
         }
     }
     Err(IdentifyError::NoConvergence {
