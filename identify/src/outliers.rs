@@ -58,20 +58,17 @@ fn wild_along_runs(readings: &Readings, residual: &[f64], coordinates: usize, si
             continue;
         }
         for coordinate in 0..coordinates {
-            let value = |row: usize| residual[row * coordinates + coordinate];
+            let values: Vec<f64> = (run.clone().map(|row| residual[row * coordinates + coordinate])).collect();
+            let middle: Vec<f64> = values.array_windows().map(|five| median_of_five(*five)).collect();
             let mut deviations: Vec<f64> = Vec::with_capacity(run.len());
-            for row in run.clone() {
+            for (row, value) in values.iter().enumerate() {
                 // Beside a step (backlash at a reversal) one of the two sides agrees; a wild reading agrees with neither.
-                let start = row.saturating_sub(NEIGHBOURS).max(run.start);
-                let end = (row + NEIGHBOURS + 1).min(run.end);
-                let from = |side: std::ops::Range<usize>| {
-                    let mut window = [0.0; NEIGHBOURS];
-                    let window = &mut window[..side.len()];
-                    window
-                        .iter_mut()
-                        .zip(side)
-                        .for_each(|(place, row)| *place = value(row));
-                    (window.len() >= 3).then(|| value(row) - median(window))
+                let start = row.saturating_sub(NEIGHBOURS);
+                let end = (row + NEIGHBOURS + 1).min(values.len());
+                let from = |side: std::ops::Range<usize>| match side.len() {
+                    0..3 => None,
+                    NEIGHBOURS => Some(value - middle[side.start]),
+                    _ => Some(value - median(&mut values[side].to_vec())),
                 };
                 let deviation = match (from(start..row), from(row + 1..end)) {
                     (Some(before), Some(after)) if before * after <= 0.0 => 0.0,
@@ -93,6 +90,13 @@ fn wild_along_runs(readings: &Readings, residual: &[f64], coordinates: usize, si
     wild
 }
 
+/// The median of five: that of the fifth and of the two of the first four that are neither their least nor their greatest.
+fn median_of_five([a, b, c, d, e]: [f64; NEIGHBOURS]) -> f64 {
+    let low = a.min(b).max(c.min(d));
+    let high = a.max(b).min(c.max(d));
+    low.min(high).max(low.max(high).min(e))
+}
+
 /// The median; the order of the values is lost. 0 of nothing.
 pub fn median(values: &mut [f64]) -> f64 {
     if values.is_empty() {
@@ -101,4 +105,20 @@ pub fn median(values: &mut [f64]) -> f64 {
     let middle = values.len() / 2;
     let (_, value, _) = values.select_nth_unstable_by(middle, f64::total_cmp);
     *value
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_median_of_five_is_the_third_of_them_in_order() {
+        // All orders of five numbers, equal ones among them.
+        for code in 0..5_usize.pow(5) {
+            let values: [f64; 5] = std::array::from_fn(|place| (code / 5_usize.pow(place as u32) % 5) as f64);
+            let mut sorted = values;
+            sorted.sort_by(f64::total_cmp);
+            assert_eq!(median_of_five(values), sorted[2], "{values:?}");
+        }
+    }
 }
