@@ -1,9 +1,13 @@
 //! The printed Rust against a kernel written by hand: value and eight derivatives of the chapter 5 test, one reading at a time and in
-//! columns of 1,000 (they stay in the cache). `emitted.rs` is what the printer writes; a test compares it with the printer.
+//! columns of 1,000 (they stay in the cache); and how long an equation takes to make and print. `emitted.rs` is what the printer writes; a test compares it with the printer.
 #![allow(missing_docs)]
 
 use std::hint::black_box;
+use std::path::Path;
 
+use abbe_codegen::{Equation, Language, Options};
+use abbe_model::component::ErrorName;
+use abbe_model::session::read::machine;
 use criterion::{Criterion, Throughput, criterion_group, criterion_main};
 
 #[allow(clippy::all, dead_code)]
@@ -92,5 +96,28 @@ fn kernels(criterion: &mut Criterion) {
     group.finish();
 }
 
-criterion_group!(benches, kernels);
+/// The error vector of a five-axis machine with eight location errors: derived with derivatives and printed as C.
+fn equations(criterion: &mut Criterion) {
+    let file = Path::new(env!("CARGO_MANIFEST_DIR")).join("../sessions/hermle-c600u/machine.toml");
+    let machine = machine(&file).expect("the ready machine");
+    let errors: Vec<ErrorName> = ["EY0A", "EZ0A", "EB0A", "EC0A", "EX0C", "EY0C", "EA0C", "EB0C"]
+        .iter()
+        .map(|name| ErrorName::parse(name).expect("an error"))
+        .collect();
+    let options = Options {
+        gradient: true,
+        ..Options::default()
+    };
+    let mut group = criterion.benchmark_group("equation");
+    group.sample_size(10);
+    group.bench_function("error vector with eight derivatives, as C", |bencher| {
+        bencher.iter(|| {
+            let equation = Equation::volumetric(black_box(&machine), &errors, &options).expect("an equation");
+            black_box(equation.print(Language::C).expect("C"))
+        });
+    });
+    group.finish();
+}
+
+criterion_group!(benches, kernels, equations);
 criterion_main!(benches);

@@ -1,104 +1,25 @@
-//! How long a fit takes, from a thousand readings to a million: four ball-bar tests, eight errors and twenty-eight set-up unknowns with priors;
-//! and how long a trace of the tests of chapter 5.
+//! How long a fit takes, from a thousand readings to a million: four ball-bar tests, eight errors and twenty-eight set-up unknowns with priors; how long a
+//! trace of the tests of chapter 5, and a thousand draws of their fit.
 //!
 //! `cargo bench -p abbe-identify --bench fit`; `identify/benches/peers.py` does the same with other people's tools.
 #![allow(missing_docs)]
 
-use std::fmt::Write;
 use std::hint::black_box;
-use std::path::Path;
 use std::time::Duration;
 
-use abbe_identify::fit::prepare;
-use abbe_identify::quantity::Given;
-use abbe_identify::simulate::{Simulation, simulate};
+use abbe_identify::fit::{fit, prepare, report};
+use abbe_identify::monte_carlo::MonteCarlo;
+use abbe_identify::propagation::add_monte_carlo;
 use abbe_identify::trace::{TraceOptions, trace};
-use abbe_model::session::Session;
-use abbe_model::session::read::{ReadOptions, session as read};
 use criterion::{BenchmarkId, Criterion, Throughput, criterion_group, criterion_main};
 
-fn sessions() -> std::path::PathBuf {
-    Path::new(env!("CARGO_MANIFEST_DIR")).join("../sessions/hermle-c600u")
-}
-
-/// A session with its readings, drawn with some values.
-fn drawn(plan: Session, given: &[&str]) -> Session {
-    let simulation = Simulation {
-        given: given
-            .iter()
-            .map(|text| Given::parse(text).expect("NAME=VALUEUNIT"))
-            .collect(),
-        draw_setups: true,
-        seed: 1,
-        ..Simulation::default()
-    };
-    let readings = simulate(&plan, &simulation).expect("a simulation").readings;
-    let mut session = plan;
-    for (test, readings) in session.tests.iter_mut().zip(readings) {
-        test.readings = Some(readings);
-    }
-    session
-}
-
-/// The tests of chapter 5, each set up anew, with about this many readings in all.
-fn four_tests(readings: usize) -> Session {
-    let folder = tempfile::tempdir().expect("a temporary folder");
-    let machine = sessions().join("machine.toml");
-    let machine = machine.canonicalize().expect("the ready machine");
-    std::fs::copy(machine, folder.path().join("machine.toml")).expect("a copy");
-    let mut text =
-        "[machine]\nfile = \"machine.toml\"\n[instrument]\nkind = \"ballbar\"\nnoise_um = 0.3\n".to_string();
-    let square = "sqrt(149.9946^2 - 100^2)";
-    let tests = [
-        ("A100", "A", -20.0, 70.0, 99.9881, String::new()),
-        (
-            "A150",
-            "A",
-            -20.0,
-            70.0,
-            149.9946,
-            format!("at = {{ x_mm = \"-{square}\" }}\n"),
-        ),
-        ("C100", "C", 0.0, 360.0, 99.9881, String::new()),
-        (
-            "C150",
-            "C",
-            0.0,
-            360.0,
-            149.9946,
-            format!("at = {{ z_mm = \"{square}\" }}\n"),
-        ),
-    ];
-    for (name, axis, from, to, bar, at) in tests {
-        let step = (to - from) / (readings as f64 / 16.0 - 1.0);
-        let _ = write!(
-            text,
-            "[[test]]\nname = \"{name}\"\nbar_mm = {bar}\nworkpiece_ball_mm = [0, 100, 0]\nspindle_ball_mm = [0, 0, 0]\n\
-             setup = \"{name}\"\nworkpiece_ball_u_um = [2, 2, 2]\nspindle_ball_u_um = [1, 1, 1]\nbar_u_um = 0.5\n{at}\
-             sweep = {{ axis = \"{axis}\", from_deg = {from}, to_deg = {to}, step_deg = {step}, runs = 2, both_directions = true }}\n",
-        );
-    }
-    let file = folder.path().join("session.toml");
-    std::fs::write(&file, text).expect("a file in a temporary folder");
-    let plan = read(&file, &ReadOptions::default()).expect("a valid session");
-    drawn(
-        plan,
-        &[
-            "EY0A=35.3um",
-            "EZ0A=-10um",
-            "EX0C=12um",
-            "EY0C=-20um",
-            "EB0A=-5arcsec",
-            "EC0A=8arcsec",
-        ],
-    )
-}
+mod sessions;
 
 fn fits(criterion: &mut Criterion) {
     let mut group = criterion.benchmark_group("fit");
     group.sample_size(10).measurement_time(Duration::from_secs(5));
     for readings in [1_000, 10_000, 100_000, 1_000_000] {
-        let session = four_tests(readings);
+        let session = sessions::ball_bar(4, readings);
         let (problem, fit) = prepare(&session, 1).expect("a fit");
         assert_eq!(problem.parameters.list.len(), 36);
         assert!((problem.readings() as f64 / readings as f64 - 1.0).abs() < 0.05);
@@ -115,8 +36,7 @@ fn fits(criterion: &mut Criterion) {
 fn traces(criterion: &mut Criterion) {
     let mut group = criterion.benchmark_group("trace");
     group.sample_size(10).measurement_time(Duration::from_secs(20));
-    let plan = read(&sessions().join("chapter5.toml"), &ReadOptions::default()).expect("the ready session");
-    let session = drawn(plan, &["EY0A=35.3um", "EX0C=12um", "EB0A=-5arcsec"]);
+    let session = sessions::chapter_5();
     group.bench_function("chapter 5, nothing to find", |bencher| {
         bencher.iter(|| {
             black_box(trace(black_box(&session), &TraceOptions::default(), &|_| true).expect("a trace"))
@@ -125,5 +45,29 @@ fn traces(criterion: &mut Criterion) {
     group.finish();
 }
 
-criterion_group!(benches, fits, traces);
+fn monte_carlo(criterion: &mut Criterion) {
+    let mut group = criterion.benchmark_group("Monte Carlo");
+    group.sample_size(10).measurement_time(Duration::from_secs(10));
+    let session = sessions::chapter_5();
+    let (problem, found) = prepare(&session, 1).expect("a fit");
+    let draws = MonteCarlo {
+        runs: 1_000,
+        seed: 1,
+        coverage: 0.95,
+    };
+    group.bench_function("a thousand draws of the fit of chapter 5", |bencher| {
+        bencher.iter(|| {
+            let mut result = report(&problem, &found);
+            add_monte_carlo(&problem, &found, black_box(&draws), &mut result).expect("draws");
+            black_box(result)
+        });
+    });
+    // The yardstick: to fit as often, from where the fit ended.
+    group.bench_function("one fit of chapter 5", |bencher| {
+        bencher.iter(|| black_box(fit(&problem, Some(black_box(&found.beta))).expect("a fit")));
+    });
+    group.finish();
+}
+
+criterion_group!(benches, fits, traces, monte_carlo);
 criterion_main!(benches);

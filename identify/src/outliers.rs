@@ -58,7 +58,8 @@ fn wild_along_runs(readings: &Readings, residual: &[f64], coordinates: usize, si
             continue;
         }
         for coordinate in 0..coordinates {
-            let values: Vec<f64> = (run.clone().map(|row| residual[row * coordinates + coordinate])).collect();
+            let values: Vec<f64> =
+                (run.clone().map(|row| residual[row * coordinates + coordinate])).collect();
             let middle: Vec<f64> = values.array_windows().map(|five| median_of_five(*five)).collect();
             let mut deviations: Vec<f64> = Vec::with_capacity(run.len());
             for (row, value) in values.iter().enumerate() {

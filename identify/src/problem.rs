@@ -4,8 +4,8 @@
 //! functions, whitened along the run, and absorbed into the triangle of the test and fold that they belong to, which is as wide as that test has
 //! unknowns.
 
-use std::collections::btree_map::Entry;
 use std::collections::BTreeMap;
+use std::collections::btree_map::Entry;
 use std::ops::Range;
 
 use abbe_model::effect::Effect;

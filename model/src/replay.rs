@@ -128,7 +128,10 @@ impl<V: Clone + PartialEq> Replay<V> {
         let spread = self.spread.iter().map(|place| uniform[*place]);
         // One more than the registers: a step is computed there, then trades places with what it replaces.
         let mut store = vec![Block([0.0; READINGS]); self.registers + 1];
-        store.iter_mut().zip(spread).for_each(|(block, value)| block.0.fill(value));
+        store
+            .iter_mut()
+            .zip(spread)
+            .for_each(|(block, value)| block.0.fill(value));
         let mut file: Vec<&mut Block> = store.iter_mut().collect();
         let columns: Vec<&[f64]> = self.columns.iter().map(column).collect();
         pulp::Arch::new().dispatch(Blocks {
@@ -341,7 +344,9 @@ impl<V: Clone + PartialEq> Recorder<'_, V> {
             steps: placed,
             registers,
             standing: (outputs.iter().enumerate())
-                .filter_map(|(number, output)| Some((number, *register_of.get(output)?)).filter(|(_, r)| *r < kept))
+                .filter_map(|(number, output)| {
+                    Some((number, *register_of.get(output)?)).filter(|(_, r)| *r < kept)
+                })
                 .collect(),
             computed,
         }

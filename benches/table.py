@@ -1,0 +1,104 @@
+"""Runs the benchmarks and writes their table into docs/speed.md and README.md, between `<!-- speeds -->` and `<!-- /speeds -->`.
+
+    python benches/table.py                      the release profile
+    python benches/table.py --profile checked    another profile
+    python benches/table.py --native             beside it a build for the processor at hand, in target/native
+    python benches/table.py --read               no run: what criterion found last
+
+Every figure is the median that criterion gives; a ratio is of two medians of one run. `identify/benches/peers.py` compares with other people's tools.
+"""
+
+import argparse
+import json
+import os
+import re
+import subprocess
+from pathlib import Path
+
+ROOT = Path(__file__).resolve().parents[1]
+BENCHES = [("abbe-model", "chain"), ("abbe-identify", "fit"), ("abbe-codegen", "kernel")]
+CACHE, STREAM = "value and eight derivatives, in cache", "value and eight derivatives, streaming"
+ALL = "value and all components of a five-axis machine/37 components"
+MONTE_CARLO = "Monte Carlo"
+# What, criterion's name, how many of it a figure is divided by, unit; yardstick in words, its name, and how many of it make one of ours; README too.
+LINES = [
+    ("value and eight derivatives, columns in cache", f"{CACHE}/generic chain", 1e3, "ns a reading", "kernel by hand", f"{CACHE}/by hand", 1e3, True),
+    ("the same", f"{CACHE}/generic chain", 1e3, "ns a reading", "num-dual, one reading at a time", f"{CACHE}/generic chain over num-dual, one at a time", 1e3, False),
+    ("the same, a million readings", f"{STREAM}/generic chain", 1e6, "ns a reading", "kernel by hand", f"{STREAM}/by hand", 1e6, False),
+    ("value and all 37 components of a five-axis machine", ALL, 1e3, "ns a reading", None, None, None, True),
+    ("fit of 1,000 readings, 36 unknowns", "fit/1000", 1, "s", None, None, None, False),
+    ("fit of 10,000 readings", "fit/10000", 1, "s", None, None, None, False),
+    ("fit of 100,000 readings", "fit/100000", 1, "s", None, None, None, False),
+    ("fit of 1,000,000 readings", "fit/1000000", 1, "s", None, None, None, True),
+    ("trace of 3,616 readings, whole library, 199 null draws, nothing to find", "trace/chapter 5, nothing to find", 1, "s", None, None, None, True),
+    ("a thousand draws of the fit of 3,616 readings", f"{MONTE_CARLO}/a thousand draws of the fit of chapter 5", 1, "s", "a thousand fits", f"{MONTE_CARLO}/one fit of chapter 5", 1e-3, True),
+    ("equation of the error vector with eight derivatives, as C", "equation/error vector with eight derivatives, as C", 1, "s", None, None, None, True),
+]
+
+
+def run(profile, target, flags):
+    environment = dict(os.environ, CARGO_TARGET_DIR=str(target))
+    if flags:
+        environment["RUSTFLAGS"] = flags
+    # One command: the features of what they rest on are then the same for all, and it is built once.
+    command = ["cargo", "bench", "--profile", profile]
+    for package, bench in BENCHES:
+        command += ["-p", package, "--bench", bench]
+    subprocess.run(command, cwd=ROOT, check=True, env=environment)
+
+
+def median(target, name):
+    """Seconds, or None where criterion has not run."""
+    file = target / "criterion" / name / "new" / "estimates.json"
+    return json.loads(file.read_text())["median"]["point_estimate"] * 1e-9 if file.exists() else None
+
+
+def figure(seconds, of, unit):
+    value = seconds / of * (1e9 if unit.startswith("ns") else 1)
+    return f"{value:.3g}"
+
+
+def table(target, native, short):
+    head = ["what", "Abbe", "yardstick in the same run", "ratio"] + ([] if native is None else ["built for this processor"])
+    rows = [head, ["---"] * len(head)]
+    for what, name, of, unit, yardstick, other, of_other, in_readme in LINES:
+        ours = median(target, name)
+        if ours is None or short and not in_readme:
+            continue
+        row = [what, f"{figure(ours, of, unit)} {unit}", "", ""]
+        theirs = median(target, other) if other else None
+        if theirs is not None:
+            row[2] = f"{yardstick}: {figure(theirs, of_other, unit)}"
+            row[3] = f"{(ours / of) / (theirs / of_other):.2g}"
+        if native is not None:
+            there = median(native, name)
+            row.append("" if there is None else f"{figure(there, of, unit)}; {ours / there:.2f} times as fast")
+        rows.append(row)
+    return "\n".join("| " + " | ".join(row) + " |" for row in rows)
+
+
+def fill(file, text):
+    present = file.read_text()
+    filled, count = re.subn(r"(<!-- speeds -->\n).*?(<!-- /speeds -->)", lambda m: f"{m[1]}{text}\n{m[2]}", present, flags=re.S)
+    if count != 1:
+        raise SystemExit(f"{file}: expected one pair of <!-- speeds --> and <!-- /speeds -->, found {count}")
+    file.write_text(filled)
+
+
+def main():
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--profile", default="release", help="cargo's build profile")
+    parser.add_argument("--native", action="store_true", help="beside it a build with -C target-cpu=native")
+    parser.add_argument("--read", action="store_true", help="run nothing, take what criterion found last")
+    arguments = parser.parse_args()
+    target, native = ROOT / "target", ROOT / "target" / "native" if arguments.native else None
+    if not arguments.read:
+        run(arguments.profile, target, None)
+        if native:
+            run(arguments.profile, native, "-C target-cpu=native")
+    fill(ROOT / "docs" / "speed.md", table(target, native, False))
+    fill(ROOT / "README.md", table(target, None, True))
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,119 @@
+//! How time and memory grow with readings, unknowns and candidates, with the exponents that fit them.
+//!
+//! `cargo bench -p abbe-identify --bench scaling`; memory is the greatest that the process held meanwhile less what it held before (Linux only).
+#![allow(missing_docs)]
+
+use std::hint::black_box;
+use std::time::Instant;
+
+use abbe_identify::fit::prepare;
+use abbe_identify::trace::list::entries;
+use abbe_identify::trace::{TraceOptions, trace};
+
+mod sessions;
+
+/// Peak memory so far and memory now, MB.
+fn memory_mb() -> Option<(f64, f64)> {
+    let status = std::fs::read_to_string("/proc/self/status").ok()?;
+    let of = |key: &str| -> Option<f64> {
+        let line = status.lines().find(|line| line.starts_with(key))?;
+        Some(line.split_whitespace().nth(1)?.parse::<f64>().ok()? / 1024.0)
+    };
+    Some((of("VmHWM:")?, of("VmRSS:")?))
+}
+
+/// Seconds (the least of some rounds), and by how much memory grew meanwhile, MB.
+fn measured(rounds: usize, work: impl Fn()) -> (f64, f64) {
+    // Forgets the peak of what was before.
+    let _ = std::fs::write("/proc/self/clear_refs", "5");
+    let before = memory_mb().map_or(0.0, |(_, now)| now);
+    let seconds = (0..rounds).map(|_| {
+        let start = Instant::now();
+        work();
+        start.elapsed().as_secs_f64()
+    });
+    let seconds = seconds.fold(f64::INFINITY, f64::min);
+    (seconds, memory_mb().map_or(0.0, |(peak, _)| peak - before))
+}
+
+/// Prints a curve: size, seconds, memory; and the exponents between the smallest and the largest of the upper half.
+fn curve(name: &str, points: &[(f64, f64, f64)]) {
+    println!("{name}");
+    for (size, seconds, memory) in points {
+        println!("  {size:>9} {seconds:>9.3} s {memory:>9.1} MB");
+    }
+    let upper = &points[points.len() / 2..];
+    let exponent = |of: &dyn Fn(&(f64, f64, f64)) -> f64| {
+        let points: Vec<(f64, f64)> = upper.iter().map(|p| (p.0.ln(), of(p).max(1e-3).ln())).collect();
+        let n = points.len() as f64;
+        let mean = points
+            .iter()
+            .fold((0.0, 0.0), |m, p| (m.0 + p.0 / n, m.1 + p.1 / n));
+        let sum = |f: &dyn Fn(&(f64, f64)) -> f64| points.iter().map(f).sum::<f64>();
+        sum(&|p| (p.0 - mean.0) * (p.1 - mean.1)) / sum(&|p| (p.0 - mean.0).powi(2))
+    };
+    println!(
+        "  exponents of the upper half: time {:.2}, memory {:.2}",
+        exponent(&|p| p.1),
+        exponent(&|p| p.2)
+    );
+}
+
+fn main() {
+    let mut points = Vec::new();
+    for readings in [1_000, 10_000, 100_000, 1_000_000, 10_000_000] {
+        let session = sessions::ball_bar(4, readings);
+        let rounds = if readings > 1_000_000 { 1 } else { 3 };
+        let (seconds, memory) = measured(rounds, || {
+            black_box(prepare(&session, 1).expect("a fit"));
+        });
+        points.push((readings as f64, seconds, memory));
+    }
+    curve("fit of four tests, by readings", &points);
+
+    let mut points = Vec::new();
+    for tests in [1, 4, 8, 17, 35, 70] {
+        let session = sessions::ball_bar(tests, 20_000);
+        let unknowns = prepare(&session, 1).expect("a fit").0.parameters.list.len();
+        let (seconds, memory) = measured(3, || {
+            black_box(prepare(&session, 1).expect("a fit"));
+        });
+        points.push((unknowns as f64, seconds, memory));
+    }
+    curve("fit of 20,000 readings, by unknowns", &points);
+
+    let mut points = Vec::new();
+    for readings in [1_000, 3_000, 10_000, 30_000] {
+        let session = sessions::ball_bar(4, readings);
+        let (seconds, memory) = measured(1, || {
+            black_box(trace(&session, &TraceOptions::default(), &|_| true).expect("a trace"));
+        });
+        points.push((readings as f64, seconds, memory));
+    }
+    curve("trace of four tests, nothing to find, by readings", &points);
+
+    let session = sessions::chapter_5();
+    let ids: Vec<String> = entries(&session, &TraceOptions::default())
+        .expect("the library")
+        .into_iter()
+        .map(|entry| entry.id)
+        .collect();
+    let mut points = Vec::new();
+    for wanted in [10, 100, 1_000, 5_000] {
+        // Spread over the list, so that all families have their share.
+        let mut only: Vec<String> = (0..wanted)
+            .filter_map(|k| ids.get(k * ids.len() / wanted).cloned())
+            .collect();
+        only.dedup();
+        let options = TraceOptions {
+            only,
+            ..TraceOptions::default()
+        };
+        let candidates = entries(&session, &options).expect("the library").len();
+        let (seconds, memory) = measured(1, || {
+            black_box(trace(&session, &options, &|_| true).expect("a trace"));
+        });
+        points.push((candidates as f64, seconds, memory));
+    }
+    curve("trace of chapter 5, nothing to find, by candidates", &points);
+}
