@@ -123,7 +123,7 @@ fn curve_of(problem: &Problem<'_>, fit: &Fit, number: usize) -> Vec<CurvePoint> 
             CurvePoint {
                 at: q * at_outside,
                 value: value * outside,
-                u: variance.max(0.0).sqrt() * outside,
+                u: variance.max(0.0).sqrt() * fit.birge_ratio * outside,
             }
         })
         .collect()
@@ -172,4 +172,49 @@ fn numbers_of(problem: &Problem<'_>, effect: &Effect) -> Vec<ShapeNumber> {
         unit: unit.to_string(),
     };
     numbers.into_iter().map(number).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use std::path::Path;
+
+    use abbe_model::effect::Component;
+    use abbe_model::session::read::{self, ReadOptions};
+
+    use super::*;
+    use crate::fit::{fit, prepare};
+
+    #[test]
+    fn the_band_of_a_curve_is_enlarged_as_every_uncertainty_is() {
+        let file =
+            Path::new(env!("CARGO_MANIFEST_DIR")).join("../sessions/hermle-c600u/measured/session.toml");
+        let session = read::session(&file, &ReadOptions::default()).unwrap();
+        let (mut problem, _) = prepare(&session, 1).unwrap();
+        let turn = 360_f64.to_radians();
+        problem
+            .add_effect(&Effect {
+                component: Component::parse("EZC").unwrap(),
+                driver: Driver::parse("C"),
+                shape: Shape::Curve {
+                    from: 0.0,
+                    to: turn,
+                    intervals: 6,
+                    closed: false,
+                },
+                tests: Vec::new(),
+            })
+            .unwrap();
+        let mut fit = fit(&problem, None).unwrap();
+        let number = problem.parameters.effects.len() - 1;
+        fit.birge_ratio = 1.0;
+        let by_noise = curve_of(&problem, &fit, number);
+        fit.birge_ratio = 1.5;
+        let enlarged = curve_of(&problem, &fit, number);
+        assert_eq!(by_noise.len(), CURVE_POINTS);
+        for (by_noise, enlarged) in by_noise.iter().zip(&enlarged) {
+            assert!(by_noise.u > 0.0);
+            assert!((enlarged.u / by_noise.u - 1.5).abs() < 1e-12);
+            assert_eq!(enlarged.value, by_noise.value);
+        }
+    }
 }
