@@ -271,7 +271,8 @@ fn sensitivities(problem: &Problem<'_>, beta: &[f64]) -> Vec<Sensitivities> {
         .enumerate()
         .flat_map(|(test, model)| {
             let rows = model.rows();
-            (0..rows.div_ceil(ROWS_AT_ONCE))
+            // A test without readings has a piece too: the sensitivities stand in the order of the tests.
+            (0..rows.div_ceil(ROWS_AT_ONCE).max(1))
                 .map(move |k| (test, k * ROWS_AT_ONCE..((k + 1) * ROWS_AT_ONCE).min(rows)))
         })
         .collect();
@@ -295,4 +296,32 @@ fn sensitivities(problem: &Problem<'_>, beta: &[f64]) -> Vec<Sensitivities> {
         }
     }
     tests
+}
+
+#[cfg(test)]
+mod tests {
+    use std::path::Path;
+
+    use abbe_model::session::read::{self, ReadOptions};
+
+    use super::*;
+    use crate::fit::prepare;
+
+    /// No file holds a test without readings, but a program may hand one over.
+    #[test]
+    fn sensitivities_stand_beside_their_tests_where_one_has_no_readings() {
+        let file =
+            Path::new(env!("CARGO_MANIFEST_DIR")).join("../sessions/hermle-c600u/measured/session.toml");
+        let mut session = read::session(&file, &ReadOptions::default()).unwrap();
+        let without = session.tests[1].readings.as_ref().unwrap().of_rows(&[]);
+        session.tests[1].readings = Some(without);
+        let (problem, fit) = prepare(&session, 1).unwrap();
+        let rows: Vec<usize> = problem.models.iter().map(|model| model.rows()).collect();
+        let found: Vec<usize> = sensitivities(&problem, &fit.beta)
+            .iter()
+            .map(|of_test| of_test.readings_mm.len())
+            .collect();
+        assert_eq!(found, rows);
+        assert_eq!(found[1], 0);
+    }
 }
