@@ -3,6 +3,9 @@
 //! A candidate with `k` visible columns lowers the sum of squares of whitened residuals by a `χ²ₖ` variate if it is not there. What is compared
 //! is `−ln P(χ²ₖ > gain)` less the candidate's cost in the library. The tail is computed in logarithms: at real effect sizes it underflows.
 
+use std::borrow::Cow;
+use std::ops::Range;
+
 use super::moments::{FoldMoments, Moments};
 use super::tail::{ln_chi_square_tail, most_evidence};
 use super::visible::{Visible, pseudo_inverse};
@@ -46,31 +49,28 @@ pub struct Gain {
 }
 
 /// `Xᵀ C` and `(XᵀX)⁻¹ Xᵀ C` of a candidate: among those of all candidates, or made for this one.
-enum Beside<'t> {
-    Known(MatRef<'t, f64>, MatRef<'t, f64>),
-    Fresh(Mat<f64>, Mat<f64>),
+struct Beside<'t> {
+    cross: Cow<'t, Mat<f64>>,
+    solved: Cow<'t, Mat<f64>>,
+    /// Its columns among theirs.
+    columns: Range<usize>,
 }
 
 impl Beside<'_> {
-    fn cross(&self) -> MatRef<'_, f64> {
-        match self {
-            Beside::Known(cross, _) => *cross,
-            Beside::Fresh(cross, _) => cross.as_ref(),
-        }
+    /// Of its `k`-th column.
+    fn cross(&self, k: usize) -> &[f64] {
+        self.cross.col_as_slice(self.columns.start + k)
     }
 
-    fn solved(&self) -> MatRef<'_, f64> {
-        match self {
-            Beside::Known(_, solved) => *solved,
-            Beside::Fresh(_, solved) => solved.as_ref(),
-        }
+    /// Of its `k`-th column.
+    fn solved(&self, k: usize) -> &[f64] {
+        self.solved.col_as_slice(self.columns.start + k)
     }
-}
 
-/// The entries of a column of a matrix that is stored column by column.
-fn column<'c>(matrix: &MatRef<'c, f64>, column: usize) -> &'c [f64] {
-    let column = matrix.col(column).try_as_col_major();
-    column.map_or(&[], |column| column.as_slice())
+    /// Of all its columns.
+    fn all_solved(&self) -> MatRef<'_, f64> {
+        self.solved.subcols(self.columns.start, self.columns.len())
+    }
 }
 
 fn dot(a: &[f64], b: &[f64]) -> f64 {
@@ -155,8 +155,7 @@ impl<'m> Trained<'m> {
         let mut cross = Mat::zeros(self.base.len(), count);
         for (part, sign) in &self.parts {
             for (j, to) in cross.col_iter_mut().enumerate() {
-                let of_part = part.cross.as_ref();
-                let of_part = column(&of_part, first + j);
+                let of_part = part.cross.col_as_slice(first + j);
                 to.iter_mut()
                     .zip(&self.base)
                     .for_each(|(to, base)| *to += sign * of_part[*base]);
@@ -169,27 +168,28 @@ impl<'m> Trained<'m> {
     fn beside(&self, candidate: usize) -> Beside<'_> {
         let (first, count) = (self.moments.first[candidate], self.moments.count[candidate]);
         match &self.all {
-            Some((cross, solved)) => Beside::Known(cross.subcols(first, count), solved.subcols(first, count)),
+            Some((cross, solved)) => Beside {
+                cross: Cow::Borrowed(cross),
+                solved: Cow::Borrowed(solved),
+                columns: first..first + count,
+            },
             None => {
                 let cross = self.cross(first, count);
-                let solved = &self.inverse * &cross;
-                Beside::Fresh(cross, solved)
+                Beside {
+                    solved: Cow::Owned(&self.inverse * &cross),
+                    cross: Cow::Owned(cross),
+                    columns: 0..count,
+                }
             }
         }
     }
 
     /// `D` and `g` of a candidate, and its product with itself.
     pub fn projected(&self, candidate: usize) -> (Mat<f64>, Vec<f64>, Mat<f64>) {
-        let beside = self.beside(candidate);
-        self.projected_with(candidate, beside.cross(), beside.solved())
+        self.projected_with(candidate, &self.beside(candidate))
     }
 
-    fn projected_with(
-        &self,
-        candidate: usize,
-        cross: MatRef<'_, f64>,
-        solved: MatRef<'_, f64>,
-    ) -> (Mat<f64>, Vec<f64>, Mat<f64>) {
+    fn projected_with(&self, candidate: usize, beside: &Beside<'_>) -> (Mat<f64>, Vec<f64>, Mat<f64>) {
         let (first, count) = (self.moments.first[candidate], self.moments.count[candidate]);
         let over_parts = |of: &dyn Fn(&FoldMoments) -> f64| -> f64 {
             self.parts.iter().map(|(part, sign)| sign * of(part)).sum()
@@ -210,10 +210,10 @@ impl<'m> Trained<'m> {
             }
         }
         let d = Mat::from_fn(count, count, |k, l| {
-            own[(k, l)] - dot(column(&cross, k), column(&solved, l))
+            own[(k, l)] - dot(beside.cross(k), beside.solved(l))
         });
         for k in 0..count {
-            g[k] -= dot(column(&solved, k), &self.base_y);
+            g[k] -= dot(beside.solved(k), &self.base_y);
         }
         (d, g, own)
     }
@@ -276,14 +276,14 @@ impl<'m> Trained<'m> {
                 let mut g = Vec::new();
                 for &candidate in chunk.iter().filter(|candidate| costs[**candidate].is_finite()) {
                     let beside = self.beside(candidate);
-                    let (d, _, own) = self.projected_with(candidate, beside.cross(), beside.solved());
+                    let (d, _, own) = self.projected_with(candidate, &beside);
                     let inverse = Visible::of(&d, &own);
                     let freedom = self.freedom(candidate, inverse.freedom);
                     if freedom == 0 {
                         continue;
                     }
                     let (first, count) = (self.moments.first[candidate], self.moments.count[candidate]);
-                    let modelled = &h * beside.solved();
+                    let modelled = &h * beside.all_solved();
                     for draw in 0..draws {
                         g.clear();
                         let left =
@@ -330,11 +330,8 @@ impl<'m> Trained<'m> {
             }
         }
         let beside = self.beside(candidate);
-        let solved = beside.solved();
         for k in 0..count {
-            g[k] -= (0..self.base.len())
-                .map(|i| solved[(i, k)] * gram_with[i])
-                .sum::<f64>();
+            g[k] -= dot(beside.solved(k), &gram_with);
         }
         let inverse = Visible::of(&d, &own);
         let projected = length - self.model_share(&gram_with);
@@ -360,13 +357,12 @@ impl<'m> Trained<'m> {
         let (d, g, own) = self.projected(candidate);
         let of_candidate = Visible::of(&d, &own).solve(&g);
         let beside = self.beside(candidate);
-        let solved = beside.solved();
         let of_model = (0..self.base.len())
             .map(|i| {
                 let shift: f64 = of_candidate
                     .iter()
                     .enumerate()
-                    .map(|(k, c)| solved[(i, k)] * c)
+                    .map(|(k, c)| beside.solved(k)[i] * c)
                     .sum();
                 self.coefficients[i] - shift
             })

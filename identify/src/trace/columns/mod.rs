@@ -124,10 +124,7 @@ impl<'p, 'a> Columns<'p, 'a> {
                 let factor = part.factor.as_ref().map(|factor| &factor[block.rows.clone()]);
                 for k in 0..layout.count {
                     let basis = &part.basis[k][block.rows.clone()];
-                    let Some(entries) = raw.col_mut(column + k).try_as_col_major_mut() else {
-                        continue;
-                    };
-                    let entries = entries.as_slice_mut();
+                    let entries = raw.col_as_slice_mut(column + k);
                     // One coordinate a reading and no factor is the common case, and the compiler makes vector instructions of it.
                     if let (1, Some(derivative), None) = (coordinates, derivative, factor) {
                         let terms = derivative.iter().zip(basis);
