@@ -43,6 +43,7 @@ mod supply_chain;
 mod topologies;
 mod tour;
 mod trace;
+mod trace_reported;
 mod volumetric;
 
 use std::path::{Path, PathBuf};

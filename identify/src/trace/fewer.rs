@@ -93,10 +93,8 @@ impl Search<'_> {
     }
 
     /// Gives back effects that follow one axis where they are no explanation: where curves over that axis, another in every test and in no component's name,
-    /// say as much in fewer words. One simple effect is asked only where structure remains beside it. Returns whether the search on all readings gave any
-    /// back.
-    pub fn disown(&mut self, structured: bool) -> bool {
-        let before = self.taken().len();
+    /// say as much in fewer words. One simple effect is asked only where structure remains beside it.
+    pub fn disown(&mut self, structured: bool) {
         for track in 0..self.tracks.len() {
             for driver in self.axes_followed(track) {
                 let (group, rest) = self.following(&driver, &self.tracks[track].chosen());
@@ -121,7 +119,6 @@ impl Search<'_> {
             }
         }
         self.note_held_out();
-        self.taken().len() < before
     }
 
     /// What curves over an axis say, another in every test: `None` where no test carries one. They are one choice, that of the axis.

@@ -29,11 +29,7 @@ impl<'a> Judged<'a> {
         options: &TraceOptions,
         structure_before: Option<&Structure>,
     ) -> Result<Judged<'a>, IdentifyError> {
-        let effects: Vec<Effect> = search
-            .taken()
-            .iter()
-            .map(|taken| search.candidates[taken.candidate].effect.clone())
-            .collect();
+        let effects: Vec<Effect> = taken_effects(search).cloned().collect();
         if effects.is_empty() {
             return Ok(Judged {
                 after: problem.clone(),
@@ -58,10 +54,21 @@ impl<'a> Judged<'a> {
         })
     }
 
+    /// Whether this is of what the search has taken up now, in that order. Exchanges leave the number of effects as it is, so the number says nothing.
+    pub fn is_of(&self, search: &Search<'_>) -> bool {
+        self.effects.iter().eq(taken_effects(search))
+    }
+
     /// Whether structure was looked for and found.
     pub fn is_structured(&self) -> bool {
         self.structure.as_ref().is_some_and(Structure::is_there)
     }
+}
+
+/// What a search has taken up, in its order.
+fn taken_effects<'s>(search: &'s Search<'_>) -> impl Iterator<Item = &'s Effect> {
+    let taken = search.taken().iter();
+    taken.map(|taken| &search.candidates[taken.candidate].effect)
 }
 
 /// The declared model's unknowns, and zeros for the effects' coefficients.

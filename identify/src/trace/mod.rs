@@ -253,14 +253,16 @@ fn found<'a>(
     if (poses || judged.is_structured()) && ended.is_some() && search.taken().len() < search.stop.most {
         search.bring_reserve();
         search.last_resort = true;
-        let taken = search.taken().len();
         ended = search_on(search, account);
-        if search.taken().len() != taken {
+        if !judged.is_of(search) {
             judged = judge(search)?;
         }
     }
-    if !poses && search.disown(judged.is_structured()) {
-        judged = judge(search)?;
+    if !poses {
+        search.disown(judged.is_structured());
+        if !judged.is_of(search) {
+            judged = judge(search)?;
+        }
     }
     Ok((ended, judged))
 }

@@ -1,0 +1,74 @@
+//! What a trace reports belongs together: effects, their coefficients, the errors before and after, and uncertainties that cover what looks the same.
+
+use abbe::identify::quantity::Given;
+use abbe::identify::simulate::{Simulation, simulate};
+use abbe::identify::trace::{TraceOptions, trace};
+use abbe::model::effect::{Component, Driver, Effect, Shape};
+use abbe::model::session::Session;
+use abbe::model::session::read::{self, ReadOptions};
+
+use super::ready;
+
+fn of_c(component: &str, shape: Shape) -> Effect {
+    Effect {
+        component: Component::parse(component).unwrap(),
+        driver: Driver::parse("C"),
+        shape,
+        tests: Vec::new(),
+    }
+}
+
+/// The session of chapter 5 as measured on a machine with some effects, of which it declares the first few.
+fn measured(effects: Vec<Effect>, values: &[&str], declared: usize) -> Session {
+    let plan = ready("hermle-c600u/chapter5.toml");
+    let mut session = read::session(&plan, &ReadOptions::default()).unwrap();
+    session.effects = effects;
+    let simulation = Simulation {
+        given: values.iter().map(|text| Given::parse(text).unwrap()).collect(),
+        seed: 3,
+        ..Simulation::default()
+    };
+    let simulated = simulate(&session, &simulation).unwrap();
+    for (test, readings) in session.tests.iter_mut().zip(simulated.readings) {
+        test.readings = Some(readings);
+    }
+    session.effects.truncate(declared);
+    session
+}
+
+/// Where the library is a wave and, as a last resort, a curve, a bump is first taken for the wave and then for the curve in its place.
+#[test]
+fn the_model_that_is_reported_has_the_effects_that_are_reported() {
+    let bump = Shape::Local {
+        centre: 150_f64.to_radians(),
+        width: 12_f64.to_radians(),
+        recurs: None,
+    };
+    let session = measured(vec![of_c("EZC", bump)], &["EZC~C:local=5um"], 0);
+    let options = TraceOptions {
+        only: ["EZC~C:h3", "EZC~C:curve"].map(String::from).to_vec(),
+        ..TraceOptions::default()
+    };
+    let trace = trace(&session, &options, &|_| true).unwrap();
+    let steps: Vec<&str> = trace.steps.iter().map(|step| step.id.as_str()).collect();
+    assert_eq!(steps, ["EZC~C:h3", "EZC~C:curve"]);
+    let reported: Vec<&str> = trace
+        .result
+        .effects
+        .iter()
+        .map(|e| e.name.shape.as_str())
+        .collect();
+    assert_eq!(reported, ["curve"]);
+    let shapes = |effects: &[Effect]| -> Vec<&str> { effects.iter().map(|e| e.shape.word()).collect() };
+    assert_eq!(shapes(&trace.effects), reported);
+    assert_eq!(shapes(&trace.after.parameters.effects), reported);
+    assert!(!trace.result.effects[0].curve.is_empty());
+    // The noise is 0.3 µm, and the curve takes the bump off.
+    let result = &trace.result;
+    assert!(
+        result.before.rms_um > 0.4 && result.after.rms_um < 0.32,
+        "{}",
+        result.after.rms_um
+    );
+    assert_eq!(result.verdict, "explained");
+}
