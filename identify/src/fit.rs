@@ -355,6 +355,29 @@ pub(crate) fn quantities(problem: &Problem<'_>, rank: &Rank) -> Vec<Quantity> {
     quantities
 }
 
+/// Passes on the values of quantities at other unknowns than those of a fit, in outside units, amplitude before phase. A phase is counted from that of the
+/// fit, so that none lies a turn away.
+pub(crate) fn values_at(
+    problem: &Problem<'_>,
+    fit: &Fit,
+    quantities: &[Quantity],
+    beta: &[f64],
+    mut put: impl FnMut(f64),
+) {
+    let list = &problem.parameters.list;
+    for quantity in quantities {
+        match *quantity {
+            Quantity::Unknown(j) => put(beta[j] * list[j].unit.per_inside),
+            Quantity::Harmonic(j) => {
+                put(beta[j].hypot(beta[j + 1]) * list[j].unit.per_inside);
+                let (a, b) = (fit.beta[j], fit.beta[j + 1]);
+                let off = (b * beta[j] - a * beta[j + 1]).atan2(a * beta[j] + b * beta[j + 1]);
+                put(((-b).atan2(a) + off).to_degrees());
+            }
+        }
+    }
+}
+
 /// The unknowns that are seen, in outside units; harmonics as amplitude and phase of `amplitude · cos(order · angle + phase)`.
 pub fn parameters(problem: &Problem<'_>, fit: &Fit) -> Vec<ParameterResult> {
     let list = &problem.parameters.list;
@@ -387,12 +410,12 @@ fn amplitude_and_phase(problem: &Problem<'_>, fit: &Fit, j: usize) -> [Parameter
     let along = ca * ca * cov(j, j) + 2.0 * ca * sa * cov(j, j + 1) + sa * sa * cov(j + 1, j + 1);
     let across = sa * sa * cov(j, j) - 2.0 * ca * sa * cov(j, j + 1) + ca * ca * cov(j + 1, j + 1);
     let unit = &problem.parameters.list[j].unit;
-    // Of a phase nothing more can be said than the standard deviation of a uniform one.
-    let any_phase = std::f64::consts::PI / 3.0_f64.sqrt();
     let u_phase = if amplitude > 0.0 {
-        (across.max(0.0).sqrt() / amplitude).min(any_phase)
+        (across.max(0.0).sqrt() / amplitude)
+            .to_degrees()
+            .min(any_phase_deg())
     } else {
-        any_phase
+        any_phase_deg()
     };
     [
         ParameterResult {
@@ -404,10 +427,15 @@ fn amplitude_and_phase(problem: &Problem<'_>, fit: &Fit, j: usize) -> [Parameter
         ParameterResult {
             id: format!("{id}.phase"),
             value: (-b).atan2(a).to_degrees(),
-            u: u_phase.to_degrees(),
+            u: u_phase,
             unit: "deg".to_string(),
         },
     ]
+}
+
+/// Of a phase no more can be said than the standard deviation of a uniform one, °.
+pub(crate) fn any_phase_deg() -> f64 {
+    180.0 / 3.0_f64.sqrt()
 }
 
 /// The unseen combinations, in outside units and in words.

@@ -14,7 +14,7 @@ use statrs::distribution::{Continuous, ContinuousCDF, Normal};
 use abbe_model::session::Prior;
 
 use crate::error::IdentifyError;
-use crate::fit::{Fit, Quantity, covariance, in_directions, quantities};
+use crate::fit::{Fit, Quantity, covariance, in_directions, quantities, values_at};
 use crate::least_squares::{LeastSquares, Scaling, minimise};
 use crate::monte_carlo::{self, Distribution, Draws, Function, MonteCarlo};
 use crate::problem::{Block, Problem};
@@ -144,26 +144,13 @@ impl Function for Refit<'_, '_> {
             outputs.fill(f64::NAN);
             return;
         };
-        let beta = self.beta(&z);
-        let list = &self.problem.parameters.list;
         let mut outputs = outputs.iter_mut();
-        let mut put = |value: f64| {
+        let put = |value: f64| {
             if let Some(output) = outputs.next() {
                 *output = value;
             }
         };
-        for quantity in &self.quantities {
-            match *quantity {
-                Quantity::Unknown(j) => put(beta[j] * list[j].unit.per_inside),
-                Quantity::Harmonic(j) => {
-                    put(beta[j].hypot(beta[j + 1]) * list[j].unit.per_inside);
-                    // Counted from the fit's own phase, so that no draw lies a turn away.
-                    let (a, b) = (self.fit.beta[j], self.fit.beta[j + 1]);
-                    let off = (b * beta[j] - a * beta[j + 1]).atan2(a * beta[j] + b * beta[j + 1]);
-                    put(((-b).atan2(a) + off).to_degrees());
-                }
-            }
-        }
+        values_at(self.problem, self.fit, &self.quantities, &self.beta(&z), put);
     }
 }
 

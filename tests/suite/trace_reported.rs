@@ -72,3 +72,48 @@ fn the_model_that_is_reported_has_the_effects_that_are_reported() {
     );
     assert_eq!(result.verdict, "explained");
 }
+
+/// At radius R, EAC = a cos 3C lifts the ball by a R sin C cos 3C = a R (sin 4C − sin 2C) / 2: no reading tells it from EZC of order 4 beside EZC of order 2. Where
+/// the latter is declared and the former is the truth, the named effect moves the declared one, whose uncertainty has to say so.
+#[test]
+fn the_uncertainty_of_a_declared_wave_covers_what_looks_like_the_found_effect() {
+    let waves = vec![
+        of_c("EZC", Shape::Harmonic { order: 2.0 }),
+        of_c("EAC", Shape::Harmonic { order: 3.0 }),
+    ];
+    let values = [
+        "EZC~C:h2.amplitude=1.5um",
+        "EAC~C:h3.amplitude=4arcsec",
+        "EAC~C:h3.phase=40deg",
+    ];
+    let session = measured(waves, &values, 1);
+    let result = trace(&session, &TraceOptions::default(), &|_| true)
+        .unwrap()
+        .result;
+    assert_eq!(result.effects.len(), 1);
+    let is_truth = |name: &&abbe::identify::results::EffectName| {
+        name.component == "EAC" && name.shape == "harmonic" && name.order == Some(3.0)
+    };
+    let effect = &result.effects[0];
+    assert!(
+        effect
+            .aliases
+            .iter()
+            .chain([&effect.name])
+            .any(|name| is_truth(&name))
+    );
+    let found = |id: &str| {
+        let mut parameters = result.after.parameters.iter();
+        let parameter = parameters.find(|parameter| parameter.id == id).unwrap();
+        (parameter.value, parameter.u)
+    };
+    // 4″ at 100 mm are 1.94 µm, and half of that goes to order 2.
+    let (amplitude, u) = found("EZC~C:h2.amplitude");
+    assert!((amplitude - 1.5).abs() > 0.5, "{amplitude}");
+    assert!((amplitude - 1.5).abs() < 2.0 * u && u < 2.0, "{amplitude} ± {u}");
+    let (phase, u) = found("EZC~C:h2.phase");
+    assert!(
+        phase.abs() > 5.0 && phase.abs() < 2.0 * u && u <= 103.93,
+        "{phase} ± {u}"
+    );
+}

@@ -61,7 +61,7 @@ pub(super) fn report(findings: &Findings<'_, '_>) -> Result<Reported, IdentifyEr
     let mut effects = Vec::new();
     let mut look_alikes: Vec<Vec<Effect>> = Vec::new();
     let mut rivals = Vec::new();
-    let mut alias_shifts = vec![0.0_f64; before_fit.beta.len()];
+    let mut moves = Vec::new();
     let variance = residual_variance(findings);
     for (k, taken) in search.taken().iter().enumerate() {
         let model = search.model_without(Some(k));
@@ -70,7 +70,8 @@ pub(super) fn report(findings: &Findings<'_, '_>) -> Result<Reported, IdentifyEr
         let named = model.joined(taken.candidate).0;
         let effect_of = |alias: &Alias| search.candidates[alias.candidate].effect.clone();
         look_alikes.push(aliases.iter().map(effect_of).collect());
-        widen(&mut alias_shifts, &aliases, &named, findings.start);
+        let in_its_place = |alias: &Alias| moves_by(alias, &named, findings.start);
+        moves.push(aliases.iter().map(in_its_place).collect::<Vec<_>>());
         let gain = model.gain(taken.candidate).gain;
         let rms_gain_um = (gain / held_out.rows).sqrt() * before.noise.sigma_mm * 1e3;
         effects.push(effect::result(
@@ -82,7 +83,7 @@ pub(super) fn report(findings: &Findings<'_, '_>) -> Result<Reported, IdentifyEr
             &look_alikes[k],
         ));
     }
-    cover(&mut after_result.parameters, after, &alias_shifts);
+    cover(&mut after_result.parameters, after, after_fit, &moves);
     let (verdict, remainder) = verdict(findings, &effects);
     let moved = moved(&before_result.parameters, &after_result.parameters);
     let result = TraceResult {
@@ -170,30 +171,46 @@ fn model_result(problem: &Problem<'_>, fit: &Fit, held_out_mm: f64) -> ModelResu
     }
 }
 
-/// Lets uncertainties cover shifts of the unknowns, inside units.
-fn cover(parameters: &mut [ParameterResult], problem: &Problem<'_>, shifts: &[f64]) {
-    for (unknown, shift) in problem.parameters.list.iter().zip(shifts) {
-        if let Some(parameter) = parameters.iter_mut().find(|p| p.id == unknown.id) {
-            parameter.u = parameter.u.hypot(shift * unknown.unit.per_inside);
+/// Lets uncertainties cover what aliases would move: for each effect the largest move of a parameter that one of its aliases makes in its place. `moves` are
+/// those of the declared unknowns, by effect and alias.
+fn cover(parameters: &mut [ParameterResult], problem: &Problem<'_>, fit: &Fit, moves: &[Vec<Vec<f64>>]) {
+    let quantities = fit::quantities(problem, &fit.rank);
+    let values = |beta: &[f64]| {
+        let mut values = Vec::with_capacity(parameters.len());
+        fit::values_at(problem, fit, &quantities, beta, |value| values.push(value));
+        values
+    };
+    let present = values(&fit.beta);
+    let mut squares = vec![0.0; present.len()];
+    for of_effect in moves {
+        let mut largest = vec![0.0_f64; present.len()];
+        for moves in of_effect {
+            // What was declared comes first among the unknowns.
+            let mut beta = fit.beta.clone();
+            beta.iter_mut().zip(moves).for_each(|(value, by)| *value += by);
+            for (k, moved) in values(&beta).into_iter().enumerate() {
+                largest[k] = largest[k].max((moved - present[k]).abs());
+            }
+        }
+        squares
+            .iter_mut()
+            .zip(largest)
+            .for_each(|(sum, most)| *sum += most * most);
+    }
+    for (parameter, square) in parameters.iter_mut().zip(squares) {
+        parameter.u = parameter.u.hypot(square.sqrt());
+        if parameter.id.ends_with(".phase") {
+            parameter.u = parameter.u.min(fit::any_phase_deg());
         }
     }
 }
 
-/// Adds how far the unknowns would move if an alias stood in an effect's place: the largest move of each, inside units.
-fn widen(shifts: &mut [f64], aliases: &[Alias], named: &[f64], start: &Start) {
-    let rank = start.to_unknowns.ncols();
-    let mut largest = vec![0.0_f64; shifts.len()];
-    for alias in aliases {
-        for (j, most) in largest.iter_mut().enumerate() {
-            let move_of: f64 = (0..rank)
-                .map(|k| start.to_unknowns[(j, k)] * (alias.model_coefficients[k] - named[k]))
-                .sum();
-            *most = most.max(move_of.abs());
-        }
-    }
-    for (shift, most) in shifts.iter_mut().zip(largest) {
-        *shift = shift.hypot(most);
-    }
+/// How far the declared unknowns move if an alias stands in an effect's place, inside units; `named` are the model's coefficients with that effect.
+fn moves_by(alias: &Alias, named: &[f64], start: &Start) -> Vec<f64> {
+    let by = |j: usize, k: usize| start.to_unknowns[(j, k)] * (alias.model_coefficients[k] - named[k]);
+    (0..start.to_unknowns.nrows())
+        .map(|j| (0..start.to_unknowns.ncols()).map(|k| by(j, k)).sum())
+        .collect()
 }
 
 fn verdict(findings: &Findings<'_, '_>, effects: &[EffectResult]) -> (String, Remainder) {
