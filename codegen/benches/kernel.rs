@@ -1,5 +1,6 @@
 //! The printed Rust against a kernel written by hand: value and eight derivatives of the chapter 5 test, one reading at a time and in
-//! columns of 1,000 (they stay in the cache); and how long an equation takes to make and print. `emitted.rs` is what the printer writes; a test compares it with the printer.
+//! columns of 1,000 (they stay in the cache); and how long an equation takes to make and print. `emitted.rs` is what the printer writes; a test
+//! compares it with the printer.
 #![allow(missing_docs)]
 
 use std::hint::black_box;

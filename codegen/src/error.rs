@@ -52,7 +52,8 @@ pub enum CodegenError {
     },
     /// A stated probing direction whose angle with the artefact's axis changes as the axes move.
     #[error(
-        "the first order of a distance has no short form where the angle between the stated probing `direction` and the artefact's axis changes as the axes move; `--order exact` and `--order bilinear` have one"
+        "the first order of a distance has no short form where the angle between the stated probing `direction` and the artefact's \
+         axis changes as the axes move; `--order exact` and `--order bilinear` have one"
     )]
     ObliqueProbing,
     /// An expression that has no normal form.
@@ -79,7 +80,8 @@ pub enum CodegenError {
     },
     /// An effect of more coefficients than an equation can carry.
     #[error(
-        "the effect `{effect}` has {coefficients} coefficients, more than the {most} that an equation is written with; give its shape fewer intervals, steps or powers, or name what to keep with --errors to leave it out"
+        "the effect `{effect}` has {coefficients} coefficients, more than the {most} that an equation is written with; \
+         give its shape fewer intervals, steps or powers, or name what to keep with --errors to leave it out"
     )]
     EffectTooLong {
         /// The effect.
@@ -91,7 +93,8 @@ pub enum CodegenError {
     },
     /// A program that the chain with dual numbers does not confirm; it is not written.
     #[error(
-        "the equation is not written: over {points} points it differs from the chain with dual numbers by {value:.1e} (value) and {gradient:.1e} (derivatives), relative, where 1e-12 is allowed"
+        "the equation is not written: over {points} points it differs from the chain with dual numbers by {value:.1e} (value) \
+         and {gradient:.1e} (derivatives), relative, where 1e-12 is allowed"
     )]
     Unconfirmed {
         /// Points compared.

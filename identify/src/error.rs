@@ -59,7 +59,8 @@ pub enum IdentifyError {
     },
     /// Iterations that do not end.
     #[error(
-        "no convergence after {iterations} iterations (the sum of squares stands at {sum_of_squares:e}); the start is too far off or the readings do not belong to this machine"
+        "no convergence after {iterations} iterations (the sum of squares stands at {sum_of_squares:e}); \
+         the start is too far off or the readings do not belong to this machine"
     )]
     NoConvergence {
         /// How many were made.

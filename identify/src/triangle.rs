@@ -114,7 +114,8 @@ impl Triangle {
 
 /// The triangle `R` of a matrix `Q·R` with at least as many rows as columns.
 ///
-/// Few columns are reduced one at a time: blocks of them, with which the library's own choice begins at sixteen columns, take two to four times as long up to some forty.
+/// Few columns are reduced one at a time: blocks of them, with which the library's own choice begins at sixteen columns, take two to four times as
+/// long up to some forty.
 pub(crate) fn upper(mut matrix: Mat<f64>) -> Mat<f64> {
     let (rows, columns) = (matrix.nrows(), matrix.ncols());
     let together = if columns < 40 { 1 } else { 16 };

@@ -69,7 +69,8 @@ enum Command {
     Equation(equation::EquationArguments),
     /// Print the error vector of the tool in the workpiece frame, or map it over the workspace.
     #[command(
-        after_help = "Examples:\n  abbe volumetric sessions/hermle-c600u/machine.toml --order first --errors EX0C,EY0C,EXX\n  abbe volumetric sessions/volumetric/machine.toml --map map.csv \\\n      --functions sessions/volumetric/errors.toml --compensate"
+        after_help = "Examples:\n  abbe volumetric sessions/hermle-c600u/machine.toml --order first --errors EX0C,EY0C,EXX\n  \
+                      abbe volumetric sessions/volumetric/machine.toml --map map.csv \\\n      --functions sessions/volumetric/errors.toml --compensate"
     )]
     Volumetric(equation::VolumetricArguments),
     /// Identify errors from readings, with uncertainties.

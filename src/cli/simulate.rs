@@ -15,7 +15,8 @@ use super::{CommonArguments, SessionArguments, fit, folder, output, read_session
 
 /// Examples and the names that values go by.
 pub const HELP: &str = "Values go by the names that results use, with their unit: errors by ISO 230-1 or the literature (EY0A, e_y0a), set-up \
-quantities (`bar[A100]`, `workpiece_ball.x[P1]`), coefficients of the [[effect]]s that the session declares (--effect \"EZC~C:h2.amplitude=1.5um\"). A harmonic takes amplitude and phase of \
+quantities (`bar[A100]`, `workpiece_ball.x[P1]`), coefficients of the [[effect]]s that the session declares \
+(--effect \"EZC~C:h2.amplitude=1.5um\"). A harmonic takes amplitude and phase of \
 amplitude · cos(order · angle + phase). What is not given is zero.
 
 Examples:

@@ -190,7 +190,9 @@ pub fn spectrum_plot(spectrum: &Spectrum, highest: f64, effects: &[Effect]) -> P
             @let top = y.at(stem.map_or(0.0, |(before, after)| before.max(*after)));
             path class="found-line" d=(polyline([(at, (top - 3.0).max(down + 2.0)), (at, down + 2.0)])) {}
             path class="found" d=(format!("M{} {}l-4 8h8z", place(at), UP[0])) {}
-            text class=(if at > 400.0 { "small right" } else { "small" }) x=(place(if at > 400.0 { at - 4.0 } else { at + 4.0 })) y=(place(down)) { title { (id) } (cut(id, 24)) }
+            text class=(if at > 400.0 { "small right" } else { "small" }) x=(place(if at > 400.0 { at - 4.0 } else { at + 4.0 })) y=(place(down)) {
+                title { (id) } (cut(id, 24))
+            }
         }
     };
     let mut legend = vec![("before", "before".to_string()), ("after", "after".to_string())];

@@ -1,7 +1,8 @@
 //! Reports: one HTML file that needs nothing else, and its plots by themselves. No mathematics: what is drawn was computed by `identify`.
 //!
 //! - [`document`], [`page`]: sections, and the page around them; [`provenance`]: what it takes to do the same again;
-//! - [`drawn`], [`readings`], [`curves`]: the plots of readings and of what stands behind them; [`thin`]: fewer points, no peak lost; [`embed`]: the data that the page brings along;
+//! - [`drawn`], [`readings`], [`curves`]: the plots of readings and of what stands behind them; [`thin`]: fewer points, no peak lost; [`embed`]: the
+//!   data that the page brings along;
 //! - [`fit`], [`method`], [`trace`], [`plan`], [`next`]: what a report of each command holds;
 //! - [`plot`]: the drawings.
 //!

@@ -14,7 +14,8 @@ use crate::cli::plan::improve::{RANGES, range_rows};
 pub fn method() -> Markup {
     html! {
         p {
-            "Tests of a menu are judged by what they add to the information of the plan, linearised at the nominal machine: greedily, then by exchange (Fedorov; Atkinson, \
+            "Tests of a menu are judged by what they add to the information of the plan, linearised at the nominal machine: \
+             greedily, then by exchange (Fedorov; Atkinson, \
              Donev & Tobias 2007, ch. 12). Nothing is refitted."
         }
     }

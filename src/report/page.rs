@@ -35,7 +35,10 @@ pub fn html(document: &Document, method: &Markup, provenance: &Provenance) -> St
                         @if !document.word.is_empty() { strong class=(format!("word {}", super::plot::file_name(&document.word))) { (document.word) } " " }
                         (prose(&document.verdict))
                     }
-                    nav { @for (anchor, heading, _) in &document.sections { a href=(format!("#{anchor}")) { (heading) } " " } a href="#method" { "Method and provenance" } }
+                    nav {
+                        @for (anchor, heading, _) in &document.sections { a href=(format!("#{anchor}")) { (heading) } " " }
+                        a href="#method" { "Method and provenance" }
+                    }
                 }
                 main {
                     @for (anchor, heading, contents) in &document.sections {
@@ -46,7 +49,10 @@ pub fn html(document: &Document, method: &Markup, provenance: &Provenance) -> St
                         (method)
                         (of(provenance))
                         @if !document.table.is_empty() {
-                            p class="needs-script" hidden { button id="download" type="button" { "Download all readings (CSV)" } " with deviation and residuals, none left out." }
+                            p class="needs-script" hidden {
+                                button id="download" type="button" { "Download all readings (CSV)" }
+                                " with deviation and residuals, none left out."
+                            }
                         }
                     }
                 }

@@ -25,7 +25,8 @@ const MOST_RANKED: usize = 12;
 pub fn method(result: &TraceResult) -> Markup {
     html! {
         p {
-            "The residual of the declared model is searched for " (result.candidates) " effects of the library, of which these readings can see " (result.candidates_seen)
+            "The residual of the declared model is searched for " (result.candidates) " effects of the library, of which \
+             these readings can see " (result.candidates_seen)
             ". An effect is taken up if readings without structure seldom let the whole search find as good; everything is then refitted together. Noise "
             (um(result.noise_um)) " (" (result.noise_source) "); held out: leaving out " (result.heldout_by) ", search included."
         }

@@ -149,8 +149,9 @@ fn centre(session: &Session, test: &str) -> [f64; 2] {
         .map(|mm| mm * 1e3)
 }
 
-/// A ball displaced by `t` along its path is plotted `t²/R` off the true circle; over an arc of 90° the centre follows by 1.75 times as much at most. The axes pass
-/// within 50 µm of the ball (0.044 µm), within 64 µm at the second places of Chapter 6 (0.07 µm); an angle is a difference of two centres over its lever.
+/// A ball displaced by `t` along its path is plotted `t²/R` off the true circle; over an arc of 90° the centre follows by 1.75 times as much at most.
+/// The axes pass within 50 µm of the ball (0.044 µm), within 64 µm at the second places of Chapter 6 (0.07 µm); an angle is a difference of two
+/// centres over its lever.
 #[test]
 fn the_tables_of_the_thesis_come_back_by_each_method_within_its_own_bias() {
     for (chapter, method, values) in TABLES {
@@ -269,7 +270,8 @@ fn a_start_angle_is_corrected_by_saying_where_the_ball_was_found() {
 }
 
 /// Section 4.2: the distortion is below 0.2 µm for eccentricities below 100 µm. A ball off by `t` along its path is read `t²/2R` long and plotted `t²/R` off the
-/// circle: 0.10 µm at 100 µm and R = 100 mm, 0.2 µm at 141 µm. Over a full turn the centre does not follow; over 90° it does, by 0.17 µm at 100 µm and 0.2 µm at 107 µm.
+/// circle: 0.10 µm at 100 µm and R = 100 mm, 0.2 µm at 141 µm. Over a full turn the centre does not follow; over 90° it does, by 0.17 µm at 100 µm
+/// and 0.2 µm at 107 µm.
 #[test]
 fn the_distortion_by_eccentricity_is_below_a_fifth_of_a_micrometre_up_to_141_micrometres() {
     let radius = 100.0;

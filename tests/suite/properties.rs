@@ -141,7 +141,8 @@ fn fitted(session: &Session) -> FitResult {
     result
 }
 
-/// The same fit, up to rounding: every value `within` so many of its uncertainties, since iterations end somewhere, `expected` giving what the other session should say of a value.
+/// The same fit, up to rounding: every value `within` so many of its uncertainties, since iterations end somewhere, `expected` giving what the other
+/// session should say of a value.
 #[track_caller]
 fn same(
     one: &FitResult,

@@ -73,8 +73,8 @@ fn the_model_that_is_reported_has_the_effects_that_are_reported() {
     assert_eq!(result.verdict, "explained");
 }
 
-/// At radius R, EAC = a cos 3C lifts the ball by a R sin C cos 3C = a R (sin 4C − sin 2C) / 2: no reading tells it from EZC of order 4 beside EZC of order 2. Where
-/// the latter is declared and the former is the truth, the named effect moves the declared one, whose uncertainty has to say so.
+/// At radius R, EAC = a cos 3C lifts the ball by a R sin C cos 3C = a R (sin 4C − sin 2C) / 2: no reading tells it from EZC of order 4 beside EZC of
+/// order 2. Where the latter is declared and the former is the truth, the named effect moves the declared one, whose uncertainty has to say so.
 #[test]
 fn the_uncertainty_of_a_declared_wave_covers_what_looks_like_the_found_effect() {
     let waves = vec![

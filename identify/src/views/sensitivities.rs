@@ -1,5 +1,5 @@
-//! What each single error does to each test: `∂L/∂error` along the first run (Figs. 3.7, 3.8 of the thesis are such patterns); of poses, which follow no way, its
-//! root mean square.
+//! What each single error does to each test: `∂L/∂error` along the first run (Figs. 3.7, 3.8 of the thesis are such patterns); of poses, which follow
+//! no way, its root mean square.
 
 use abbe_model::instrument::Station;
 use abbe_model::sensitivity::TestModel;

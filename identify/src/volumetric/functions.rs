@@ -155,7 +155,8 @@ struct HarmonicEntry {
 /// Several functions of one error add up.
 ///
 /// # Errors
-/// If the file cannot be read, is not of this form, holds a number beyond [`limits::LARGEST`], or names what the machine lacks: with the file, the entry and what to do.
+/// If the file cannot be read, is not of this form, holds a number beyond [`limits::LARGEST`], or names what the machine lacks: with the file, the
+/// entry and what to do.
 pub fn read(path: &Path, machine: &Machine) -> Result<Vec<ErrorFunction>, IdentifyError> {
     let fault = |message: String| IdentifyError::Request(format!("{}: {message}", path.display()));
     let text = read::text(path, "the file of error functions")?;

@@ -5,8 +5,8 @@
 //! ```
 //!
 //! with the errors `E` functions of the axes. Compensation looks for commands `q′` at which the machine with its errors is where the
-//! machine without them is at `q`: Newton's iteration on the chain, `q′ ← q′ − J⁻¹ r`, with `J` the directions in which the linear axes move the tool over
-//! the table. The errors, which change by a few parts in 10⁵ of the way, are left out of `J`, so that every step gains four digits or so.
+//! machine without them is at `q`: Newton's iteration on the chain, `q′ ← q′ − J⁻¹ r`, with `J` the directions in which the linear axes move the tool
+//! over the table. The errors, which change by a few parts in 10⁵ of the way, are left out of `J`, so that every step gains four digits or so.
 
 pub mod functions;
 

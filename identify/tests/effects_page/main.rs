@@ -1,8 +1,9 @@
 //! docs/effects.md says of each effect what it does to each kind of test and what it is mistaken for. Every cell is computed here from the
 //! exact chain, and compared.
 //!
-//! A section of the page holds a session and a table. Its columns: `effect`; `in TEST`, amplitude by order of a full turn (`±` where it changes sign with the direction);
-//! `rms in TEST`; `like, in TESTS` (`, one way`: forward runs alone; `, spindle ball known`), what explains at least 90 % of the square of what the mounts leave of the effect.
+//! A section of the page holds a session and a table. Its columns: `effect`; `in TEST`, amplitude by order of a full turn (`±` where it changes sign
+//! with the direction); `rms in TEST`; `like, in TESTS` (`, one way`: forward runs alone; `, spindle ball known`), what explains at least 90 % of the
+//! square of what the mounts leave of the effect.
 
 mod changes;
 mod page;

@@ -29,8 +29,12 @@ pub fn map(
     let inner = html! {
         @for (i, id) in ids.iter().enumerate() {
             @let at = NAMES + cell * (i as f64 + 0.5);
-            text class="right" style=(format!("font-size:{}px", place(letters))) x=(NAMES - 6.0) y=(place(at + letters * 0.35)) { title { (id) } (cut(id, MOST_LETTERS)) }
-            text style=(format!("font-size:{}px", place(letters))) transform=(format!("translate({} {}) rotate(-90)", place(at + letters * 0.35), NAMES - 6.0)) { (cut(id, MOST_LETTERS)) }
+            @let size = format!("font-size:{}px", place(letters));
+            @let line = place(at + letters * 0.35);
+            text class="right" style=(size) x=(NAMES - 6.0) y=(line) { title { (id) } (cut(id, MOST_LETTERS)) }
+            text style=(size) transform=(format!("translate({line} {}) rotate(-90)", NAMES - 6.0)) {
+                (cut(id, MOST_LETTERS))
+            }
         }
         rect class="frame" x=(NAMES) y=(NAMES) width=(place(side)) height=(place(side)) {}
         @for (i, row) in matrix.iter().enumerate() {
@@ -43,7 +47,9 @@ pub fn map(
                     } @else {
                         @let half = 0.46 * cell * value.abs().sqrt().min(1.0);
                         @if half > 0.5 {
-                            rect class=(if *value >= 0.0 { "positive" } else { "negative" }) x=(place(x - half)) y=(place(y - half)) width=(place(2.0 * half)) height=(place(2.0 * half)) rx=(if *value >= 0.0 { "0" } else { "99" }) {
+                            @let (class, corner) = if *value >= 0.0 { ("positive", "0") } else { ("negative", "99") };
+                            @let size = place(2.0 * half);
+                            rect class=(class) x=(place(x - half)) y=(place(y - half)) width=(size) height=(size) rx=(corner) {
                                 title { (ids[i]) ", " (ids[j]) ": " (super::scale::text(*value, 0.01)) }
                             }
                         }
