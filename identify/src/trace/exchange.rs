@@ -12,8 +12,10 @@ use abbe_model::effect::Shape;
 use super::alias::INDISTINGUISHABLE;
 use super::compose;
 use super::library::Candidate;
+use super::score::Trained;
 use super::search::{ALL, Search, Taken, Track};
 use super::sharpen;
+use crate::error::IdentifyError;
 
 /// The most effects whose places and periods are looked at again whenever one is added.
 const MOST_SHARPENED: usize = 4;
@@ -52,27 +54,27 @@ impl Contest {
 
 impl Search<'_> {
     /// Exchanges effects for candidates that explain clearly better what they stand for.
-    pub fn exchange(&mut self) {
+    pub fn exchange(&mut self) -> Result<(), IdentifyError> {
         for track in 0..self.tracks.len() {
             for k in 0..self.tracks[track].taken.len() {
-                self.exchange_one(track, k);
+                self.exchange_one(track, k)?;
             }
         }
-        self.note_held_out();
+        self.note_held_out()
     }
 
     /// Exchanges one effect for what explains clearly better beside the others. A change has to be worth more than what cannot be told apart, so that
     /// exchanges end.
-    fn exchange_one(&mut self, track: usize, k: usize) {
+    fn exchange_one(&mut self, track: usize, k: usize) -> Result<(), IdentifyError> {
         let Track { folds, .. } = self.tracks[track].clone();
         let mut others = self.tracks[track].chosen();
         let present = others.remove(k);
         let known = if (1..MOST_SHARPENED).contains(&others.len()) && !self.stop.in_residual_variance {
-            self.sharpen(&others, &folds)
+            self.sharpen(&others, &folds)?
         } else {
             Vec::new()
         };
-        let model = self.model_of(&others, &folds);
+        let model = self.model_of(&others, &folds)?;
         let gains = model.more_gains(known);
         let score = self.score(present, &gains[present], self.variance(&model));
         let better = self
@@ -83,24 +85,25 @@ impl Search<'_> {
             self.materialise(&[better]);
             self.tracks[track].taken[k].candidate = better;
         }
+        Ok(())
     }
 
     /// Fits effects with numbers or places of their own anew beside each of the next best, in addition to the others or in the place of one, and takes the
     /// best of these sets if it says clearly more than the present one. Returns whether the search on all readings did.
-    pub fn retune(&mut self) -> bool {
+    pub fn retune(&mut self) -> Result<bool, IdentifyError> {
         if self.stop.in_residual_variance {
-            return false;
+            return Ok(false);
         }
         let changed: Vec<bool> = (0..self.tracks.len())
             .map(|track| self.retune_one(track))
-            .collect();
-        self.note_held_out();
-        changed[ALL]
+            .collect::<Result<_, _>>()?;
+        self.note_held_out()?;
+        Ok(changed[ALL])
     }
 
-    fn retune_one(&mut self, track: usize) -> bool {
-        let Some(mut contest) = self.contest(track) else {
-            return false;
+    fn retune_one(&mut self, track: usize) -> Result<bool, IdentifyError> {
+        let Some(mut contest) = self.contest(track)? else {
+            return Ok(false);
         };
         let Contest { folds, chosen, .. } = contest.clone();
         let flexible: Vec<usize> = chosen.iter().copied().filter(|c| self.is_flexible(*c)).collect();
@@ -112,49 +115,49 @@ impl Search<'_> {
                 if given_up.is_none() && chosen.len() >= self.stop.most {
                     continue;
                 }
-                let tried = self.next_best(&base, flexible, &folds);
+                let tried = self.next_best(&base, flexible, &folds)?;
                 self.materialise(&tried);
                 for other in tried {
                     let beside: Vec<usize> = base.iter().copied().chain([other]).collect();
-                    let Some(anew) = self.anew(flexible, &beside, &folds) else {
+                    let Some(anew) = self.anew(flexible, &beside, &folds)? else {
                         continue;
                     };
                     let set: Vec<usize> = beside.iter().copied().chain([anew]).collect();
-                    let value = self.evidence_with(&beside, anew, &folds) - self.words_of(&set);
+                    let value = self.evidence_with(&beside, anew, &folds)? - self.words_of(&set);
                     if value <= contest.most {
                         continue;
                     }
                     self.materialise(&[anew]);
                     // What is added has to hold its own against readings without structure.
-                    if self.holds_its_own(other, &set, &contest) {
+                    if self.holds_its_own(other, &set, &contest)? {
                         contest.won_by(set, value);
                     }
                 }
             }
         }
-        self.replace(track, contest.best)
+        Ok(self.replace(track, contest.best))
     }
 
     /// Looks for two effects together in the place of one or two, and takes the best two if they say clearly more. Returns whether the search on all
     /// readings did.
-    pub fn regroup(&mut self) -> bool {
+    pub fn regroup(&mut self) -> Result<bool, IdentifyError> {
         if self.stop.in_residual_variance {
-            return false;
+            return Ok(false);
         }
         // Where all readings say no more in another pair, those of a fold have no reason to.
-        if !self.regroup_one(ALL) {
-            return false;
+        if !self.regroup_one(ALL)? {
+            return Ok(false);
         }
         for track in ALL + 1..self.tracks.len() {
-            self.regroup_one(track);
+            self.regroup_one(track)?;
         }
-        self.note_held_out();
-        true
+        self.note_held_out()?;
+        Ok(true)
     }
 
-    fn regroup_one(&mut self, track: usize) -> bool {
-        let Some(mut contest) = self.contest(track) else {
-            return false;
+    fn regroup_one(&mut self, track: usize) -> Result<bool, IdentifyError> {
+        let Some(mut contest) = self.contest(track)? else {
+            return Ok(false);
         };
         let Contest { folds, chosen, .. } = contest.clone();
         let places = 0..chosen.len();
@@ -172,32 +175,29 @@ impl Search<'_> {
                 .collect();
             let in_place_of_two = i != j && track == ALL;
             let count = if in_place_of_two { MOST_FIRSTS } else { FEW_FIRSTS };
-            let firsts = self.simple_firsts(&base, &folds, count);
+            let firsts = self.simple_firsts(&base, &folds, count)?;
             self.materialise(&firsts);
             for first in firsts {
                 let beside: Vec<usize> = base.iter().copied().chain([first]).collect();
                 let second = {
-                    let model = self.model_of(&beside, &folds);
+                    let model = self.model_of(&beside, &folds)?;
                     let gains = model.gains();
                     self.best_of(&model, &gains, &beside)
                         .map(|(best, _)| self.named_first(&model, &gains, best, &beside))
                 };
                 let Some(second) = second else { continue };
                 let set: Vec<usize> = beside.iter().copied().chain([second]).collect();
-                let value = self.evidence_with(&beside, second, &folds) - self.words_of(&set);
+                let value = self.evidence_with(&beside, second, &folds)? - self.words_of(&set);
                 if value <= contest.most {
                     continue;
                 }
                 self.materialise(&[second]);
-                if [first, second]
-                    .into_iter()
-                    .all(|one| self.holds_its_own(one, &set, &contest))
-                {
+                if self.holds_its_own(first, &set, &contest)? && self.holds_its_own(second, &set, &contest)? {
                     contest.won_by(set, value);
                 }
             }
         }
-        self.replace(track, contest.best)
+        Ok(self.replace(track, contest.best))
     }
 
     /// Puts a set, if there is one, in the place of what a search has taken up; it is no more certain than the least certain of that. Returns whether there
@@ -212,30 +212,39 @@ impl Search<'_> {
     }
 
     /// Opens a contest for the place of what a search has taken up; none where that is nothing, or too much to be fitted anew.
-    fn contest(&self, track: usize) -> Option<Contest> {
+    fn contest(&self, track: usize) -> Result<Option<Contest>, IdentifyError> {
         let Track { folds, .. } = self.tracks[track].clone();
         let chosen = self.tracks[track].chosen();
-        (1..=MOST_ANEW).contains(&chosen.len()).then(|| Contest {
+        if !(1..=MOST_ANEW).contains(&chosen.len()) {
+            return Ok(None);
+        }
+        Ok(Some(Contest {
             threshold: self.thresholds.last().copied().unwrap_or(f64::INFINITY),
-            most: self.evidence_of(&chosen, &[], &folds) - self.words_of(&chosen) + INDISTINGUISHABLE,
+            most: self.evidence_of(&chosen, &[], &folds)? - self.words_of(&chosen) + INDISTINGUISHABLE,
             best: None,
             folds,
             chosen,
-        })
+        }))
     }
 
     /// Whether one of a set scores beside the others what readings without structure do not give.
-    fn holds_its_own(&self, one: usize, set: &[usize], contest: &Contest) -> bool {
+    fn holds_its_own(&self, one: usize, set: &[usize], contest: &Contest) -> Result<bool, IdentifyError> {
         let others: Vec<usize> = set.iter().copied().filter(|c| *c != one).collect();
-        let model = self.lean_model_of(&others, &contest.folds);
-        self.score(one, &model.gain(one), self.variance(&model)) >= contest.threshold
+        let model = self.lean_model_of(&others, &contest.folds)?;
+        Ok(self.score(one, &model.gain(one), self.variance(&model)) >= contest.threshold)
     }
 
     /// Effects without numbers or places of their own that explain anything beside some others, the best first; of those that do the very same to the
     /// readings one.
-    fn simple_firsts(&self, base: &[usize], folds: &[usize], most: usize) -> Vec<usize> {
-        let ranked = self.ranked(base, folds, |candidate| !self.is_flexible(candidate));
-        ranked.into_iter().take(most).collect()
+    fn simple_firsts(
+        &self,
+        base: &[usize],
+        folds: &[usize],
+        most: usize,
+    ) -> Result<Vec<usize>, IdentifyError> {
+        let mut ranked = self.ranked(base, folds, |candidate| !self.is_flexible(candidate))?;
+        ranked.truncate(most);
+        Ok(ranked)
     }
 
     /// What explains anything beside some effects, the best first, as far as it is asked for; of those that do the very same to the readings one.
@@ -245,8 +254,8 @@ impl Search<'_> {
         base: &[usize],
         folds: &[usize],
         mut asked_for: impl FnMut(usize) -> bool,
-    ) -> Vec<usize> {
-        let model = self.model_of(base, folds);
+    ) -> Result<Vec<usize>, IdentifyError> {
+        let model = self.model_of(base, folds)?;
         let variance = self.variance(&model);
         let gains = model.gains();
         let mut scored: Vec<(usize, f64)> = (0..self.candidates.len())
@@ -259,7 +268,7 @@ impl Search<'_> {
         scored.dedup_by(|a, b| {
             (a.1 - b.1).abs() < SAME * b.1.abs() && gains[a.0].freedom == gains[b.0].freedom
         });
-        scored.into_iter().map(|(c, _)| c).collect()
+        Ok(scored.into_iter().map(|(c, _)| c).collect())
     }
 
     fn is_flexible(&self, candidate: usize) -> bool {
@@ -271,44 +280,55 @@ impl Search<'_> {
     }
 
     /// The best beside some effects, each component, driver and shape once, and what does the very same to the readings once.
-    fn next_best(&self, base: &[usize], but: usize, folds: &[usize]) -> Vec<usize> {
+    fn next_best(&self, base: &[usize], but: usize, folds: &[usize]) -> Result<Vec<usize>, IdentifyError> {
         let mut seen: HashSet<String> = HashSet::from([self.candidates[but].effect.id()]);
-        let ranked = self.ranked(base, folds, |candidate| {
+        let mut ranked = self.ranked(base, folds, |candidate| {
             seen.insert(self.candidates[candidate].effect.id())
-        });
+        })?;
         let most = if self.sees_all(folds) {
             MOST_TRIED
         } else {
             MOST_TRIED_TO_PREDICT
         };
-        ranked.into_iter().take(most).collect()
+        ranked.truncate(most);
+        Ok(ranked)
     }
 
     /// An effect with the numbers or places that are best beside others.
-    fn anew(&mut self, flexible: usize, beside: &[usize], folds: &[usize]) -> Option<usize> {
-        let fresh: Candidate = {
-            let model = self.lean_model_of(beside, folds);
+    fn anew(
+        &mut self,
+        flexible: usize,
+        beside: &[usize],
+        folds: &[usize],
+    ) -> Result<Option<usize>, IdentifyError> {
+        let fresh = {
+            let model = self.lean_model_of(beside, folds)?;
             let original = &self.candidates[flexible];
             if self.has_places(flexible) {
-                let id = original.effect.id();
-                let dictionary = self.candidates.iter().position(|candidate| {
-                    candidate.dictionary
-                        && candidate.effect.id() == id
-                        && matches!(candidate.effect.shape, Shape::Steps { .. })
-                })?;
-                let variance = self.variance(&model);
-                compose::composed(&model, dictionary, &self.candidates[dictionary], variance)?.candidate
+                self.composed_anew(&model, &original.effect.id())
             } else {
                 let before = model.gain(flexible).gain;
                 match sharpen::sharpen(self, &model, original, before) {
-                    Some(effect) => Candidate {
+                    Some(effect) => Some(Candidate {
                         effect,
                         ..original.clone()
-                    },
-                    None => return Some(flexible),
+                    }),
+                    None => return Ok(Some(flexible)),
                 }
             }
         };
-        self.add_tuned(fresh, folds)
+        Ok(fresh.and_then(|fresh| self.add_tuned(fresh, folds)))
+    }
+
+    /// The best that the dictionary of an effect's name holds beside a model.
+    fn composed_anew(&self, model: &Trained<'_>, id: &str) -> Option<Candidate> {
+        let dictionary = self.candidates.iter().position(|candidate| {
+            candidate.dictionary
+                && candidate.effect.id() == id
+                && matches!(candidate.effect.shape, Shape::Steps { .. })
+        })?;
+        let variance = self.variance(model);
+        let composed = compose::composed(model, dictionary, &self.candidates[dictionary], variance)?;
+        Some(composed.candidate)
     }
 }

@@ -10,6 +10,7 @@ use super::columns::Layout;
 use super::library::Candidate;
 use super::score::Gain;
 use super::search::{Search, Taken, Track};
+use crate::error::IdentifyError;
 
 /// How finely the curves without a name are divided, one after another.
 const INTERVALS: [usize; 3] = [8, 16, 32];
@@ -17,9 +18,9 @@ const INTERVALS: [usize; 3] = [8, 16, 32];
 impl Search<'_> {
     /// Puts several effects that follow one axis down to one, where that one says as much in fewer words. From three effects or places on, a free curve may
     /// be that one.
-    pub fn merge(&mut self) {
+    pub fn merge(&mut self) -> Result<(), IdentifyError> {
         if self.stop.in_residual_variance {
-            return;
+            return Ok(());
         }
         let mut merged = false;
         for track in 0..self.tracks.len() {
@@ -31,12 +32,18 @@ impl Search<'_> {
                         |left_out: &usize| whole.iter().copied().filter(|c| c != left_out).collect();
                     groups.extend(whole.iter().map(without));
                 }
-                merged |= groups.into_iter().any(|group| self.merge_group(track, &group));
+                for group in groups {
+                    if self.merge_group(track, &group)? {
+                        merged = true;
+                        break;
+                    }
+                }
             }
         }
         if merged {
-            self.note_held_out();
+            self.note_held_out()?;
         }
+        Ok(())
     }
 
     /// The axes that effects follow which a search has taken up, each once.
@@ -52,11 +59,11 @@ impl Search<'_> {
     }
 
     /// Puts a group of effects down to one, if one says as much in fewer words. Returns whether it did.
-    fn merge_group(&mut self, track: usize, group: &[usize]) -> bool {
+    fn merge_group(&mut self, track: usize, group: &[usize]) -> Result<bool, IdentifyError> {
         let columns: usize = group.iter().map(|c| self.moments.count[*c]).sum();
         let curves = group.len() > 2 || columns > 2 && self.is_composed(group);
         if group.len() < 2 && !curves {
-            return false;
+            return Ok(false);
         }
         let Track { folds, taken } = self.tracks[track].clone();
         let (grouped, kept): (Vec<Taken>, Vec<Taken>) = taken
@@ -64,7 +71,7 @@ impl Search<'_> {
             .partition(|taken| group.contains(&taken.candidate));
         let rest: Vec<usize> = kept.iter().map(|taken| taken.candidate).collect();
         if group.len() > 1 {
-            self.sharpen(&rest, &folds);
+            self.sharpen(&rest, &folds)?;
         }
         if curves {
             self.bring_reserve();
@@ -76,14 +83,14 @@ impl Search<'_> {
             .filter(is_open)
             .filter(|c| !rest.contains(c))
             .collect();
-        let Some(candidate) = self.in_fewer_words(group, &rest, &pool, &folds) else {
-            return false;
+        let Some(candidate) = self.in_fewer_words(group, &rest, &pool, &folds)? else {
+            return Ok(false);
         };
         self.materialise(&[candidate]);
         let p_value = grouped.iter().map(|taken| taken.p_value).fold(1.0, f64::min);
         self.tracks[track].taken = kept;
         self.tracks[track].taken.push(Taken { candidate, p_value });
-        true
+        Ok(true)
     }
 
     fn is_composed(&self, group: &[usize]) -> bool {
@@ -94,7 +101,7 @@ impl Search<'_> {
 
     /// Gives back effects that follow one axis where they are no explanation: where curves over that axis, another in every test and in no component's name,
     /// say as much in fewer words. One simple effect is asked only where structure remains beside it.
-    pub fn disown(&mut self, structured: bool) {
+    pub fn disown(&mut self, structured: bool) -> Result<(), IdentifyError> {
         for track in 0..self.tracks.len() {
             for driver in self.axes_followed(track) {
                 let (group, rest) = self.following(&driver, &self.tracks[track].chosen());
@@ -104,21 +111,20 @@ impl Search<'_> {
                     continue;
                 }
                 let folds = self.tracks[track].folds.clone();
-                let of_group = self.evidence_of(&group, &rest, &folds) - self.words_of(&group);
-                let of_curves =
-                    INTERVALS.map(|intervals| self.evidence_of_nameless(&driver, intervals, &rest, &folds));
-                if of_curves
-                    .into_iter()
-                    .flatten()
-                    .any(|of_curves| of_curves > of_group)
-                {
+                let of_group = self.evidence_of(&group, &rest, &folds)? - self.words_of(&group);
+                let mut of_curves = f64::NEG_INFINITY;
+                for intervals in INTERVALS {
+                    let one = self.evidence_of_nameless(&driver, intervals, &rest, &folds)?;
+                    of_curves = one.map_or(of_curves, |one| of_curves.max(one));
+                }
+                if of_curves > of_group {
                     self.tracks[track]
                         .taken
                         .retain(|taken| !group.contains(&taken.candidate));
                 }
             }
         }
-        self.note_held_out();
+        self.note_held_out()
     }
 
     /// What curves over an axis say, another in every test: `None` where no test carries one. They are one choice, that of the axis.
@@ -128,13 +134,13 @@ impl Search<'_> {
         intervals: usize,
         rest: &[usize],
         folds: &[usize],
-    ) -> Option<f64> {
+    ) -> Result<Option<f64>, IdentifyError> {
         let curves = self.nameless(driver, intervals);
         if curves.is_empty() {
-            return None;
+            return Ok(None);
         }
         self.materialise(&curves);
-        Some(self.evidence_of(&curves, rest, folds) - self.choice())
+        Ok(Some(self.evidence_of(&curves, rest, folds)? - self.choice()))
     }
 
     /// Curves over an axis, one in each test: laid over the readings when they are first asked for.
@@ -169,20 +175,36 @@ impl Search<'_> {
     }
 
     /// `−ln P` of what candidates gain together.
-    pub(super) fn evidence_of(&self, group: &[usize], rest: &[usize], folds: &[usize]) -> f64 {
+    pub(super) fn evidence_of(
+        &self,
+        group: &[usize],
+        rest: &[usize],
+        folds: &[usize],
+    ) -> Result<f64, IdentifyError> {
         let all: Vec<usize> = rest.iter().chain(group).copied().collect();
-        self.evidence_of_gain(self.lean_model_of(&all, folds).explained(), group, rest, folds)
+        self.evidence_of_gain(self.lean_model_of(&all, folds)?.explained(), group, rest, folds)
     }
 
     /// The same of some and one more, which need not have a place in the base.
-    pub(super) fn evidence_with(&self, some: &[usize], one: usize, folds: &[usize]) -> f64 {
-        let model = self.lean_model_of(some, folds);
+    pub(super) fn evidence_with(
+        &self,
+        some: &[usize],
+        one: usize,
+        folds: &[usize],
+    ) -> Result<f64, IdentifyError> {
+        let model = self.lean_model_of(some, folds)?;
         let all: Vec<usize> = some.iter().copied().chain([one]).collect();
         self.evidence_of_gain(model.explained() + model.gain(one).gain, &all, &[], folds)
     }
 
-    fn evidence_of_gain(&self, explained: f64, group: &[usize], rest: &[usize], folds: &[usize]) -> f64 {
-        let without = self.lean_model_of(rest, folds);
+    fn evidence_of_gain(
+        &self,
+        explained: f64,
+        group: &[usize],
+        rest: &[usize],
+        folds: &[usize],
+    ) -> Result<f64, IdentifyError> {
+        let without = self.lean_model_of(rest, folds)?;
         let gain = Gain {
             gain: explained - without.explained(),
             freedom: group
@@ -190,7 +212,7 @@ impl Search<'_> {
                 .map(|c| self.moments.count[*c] + self.moments.numbers[*c])
                 .sum(),
         };
-        self.evidence(&gain, self.variance(&without))
+        Ok(self.evidence(&gain, self.variance(&without)))
     }
 
     /// Which of the chosen follow a driver, and which do not.
@@ -207,16 +229,17 @@ impl Search<'_> {
         rest: &[usize],
         pool: &[usize],
         folds: &[usize],
-    ) -> Option<usize> {
-        let without = self.model_of(rest, folds);
+    ) -> Result<Option<usize>, IdentifyError> {
+        let without = self.model_of(rest, folds)?;
         let variance = self.variance(&without);
         let choice = self.choice();
-        let of_group = self.evidence_of(group, rest, folds) - self.words_of(group);
-        pool.par_iter()
+        let of_group = self.evidence_of(group, rest, folds)? - self.words_of(group);
+        let best = pool
+            .par_iter()
             .filter(|c| !group.contains(c))
             .map(|c| (*c, self.score(*c, &without.gain(*c), variance) - choice))
             .filter(|(_, one)| *one > of_group)
-            .max_by(|a, b| a.1.total_cmp(&b.1))
-            .map(|(c, _)| c)
+            .max_by(|a, b| a.1.total_cmp(&b.1));
+        Ok(best.map(|(c, _)| c))
     }
 }

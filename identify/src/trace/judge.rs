@@ -93,12 +93,5 @@ fn left_over(problem: &Problem<'_>, fit: &Fit, options: &TraceOptions) -> Result
         seed,
     );
     let prior = start.prior();
-    Ok(remainder::structure(
-        problem,
-        &columns,
-        start.model,
-        &start.residual,
-        draws,
-        &prior,
-    ))
+    remainder::structure(problem, &columns, start.model, &start.residual, draws, &prior)
 }

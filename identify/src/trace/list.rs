@@ -40,7 +40,7 @@ pub fn entries(session: &Session, options: &TraceOptions) -> Result<Vec<Entry>, 
     let moments = Moments::new(&columns, &layouts, start.model, &start.residual, none);
     let rank = moments.base();
     let folds = (0..columns.fold_rows.len()).collect();
-    let trained = Trained::new(&moments, &prior, (0..rank).collect(), folds);
+    let trained = Trained::new(&moments, &prior, (0..rank).collect(), folds)?;
     Ok(candidates
         .into_iter()
         .zip(trained.gains())

@@ -175,6 +175,8 @@ fn trace_with<'a>(
     };
     let (draws, structure_before) = rayon::join(|| null(null::BLOCK), || (!poses).then(structure_before));
 
+    let structure_before = structure_before.transpose()?;
+
     let laid = list::laid(&problem, &columns, options)?;
     let looked_for = laid.len();
     progress(Progress::Screening(looked_for));
@@ -190,9 +192,9 @@ fn trace_with<'a>(
         in_residual_variance: poses,
     };
     let plain = start.plain(&columns, &before_fit.beta, problem.noise.sigma_mm)?;
-    let mut search = Search::new(&columns, candidates, layouts, moments, prior, plain, stop);
+    let mut search = Search::new(&columns, candidates, layouts, moments, prior, plain, stop)?;
     search.reserve = reserve;
-    let gains = search.model_without(None).gains();
+    let gains = search.model_without(None)?.gains();
     let seen = gains.iter().filter(|gain| gain.freedom > 0).count();
 
     let mut account = Account {
@@ -245,7 +247,7 @@ fn found<'a>(
     account: &mut Account<'_>,
     judge: impl Fn(&Search<'_>) -> Result<Judged<'a>, IdentifyError>,
 ) -> Result<(Option<f64>, Judged<'a>), IdentifyError> {
-    let mut ended = search_on(search, account);
+    let mut ended = search_on(search, account)?;
     (account.progress)(Progress::Judging);
     let mut judged = judge(search)?;
     // Among poses structure is looked for effect by effect, and never ends.
@@ -253,13 +255,13 @@ fn found<'a>(
     if (poses || judged.is_structured()) && ended.is_some() && search.taken().len() < search.stop.most {
         search.bring_reserve();
         search.last_resort = true;
-        ended = search_on(search, account);
+        ended = search_on(search, account)?;
         if !judged.is_of(search) {
             judged = judge(search)?;
         }
     }
     if !poses {
-        search.disown(judged.is_structured());
+        search.disown(judged.is_structured())?;
         if !judged.is_of(search) {
             judged = judge(search)?;
         }

@@ -13,6 +13,7 @@ use super::columns::{Columns, Layout};
 use super::moments::Moments;
 use super::score::{PriorMoments, Trained};
 use super::tail::ln_chi_square_tail;
+use crate::error::IdentifyError;
 use crate::problem::Problem;
 
 /// Structure in a residual.
@@ -208,6 +209,9 @@ fn curve(from: f64, to: f64, intervals: usize) -> Shape {
 }
 
 /// Looks for structure in a residual, beside a model given by its orthonormal columns.
+///
+/// # Errors
+/// If products are not finite.
 pub fn structure(
     problem: &Problem<'_>,
     columns: &Columns<'_, '_>,
@@ -215,20 +219,20 @@ pub fn structure(
     residual: &[f64],
     null: faer::Mat<f64>,
     prior: &PriorMoments,
-) -> Structure {
+) -> Result<Structure, IdentifyError> {
     let detectors = detectors(problem, columns);
     if detectors.is_empty() {
-        return Structure {
+        return Ok(Structure {
             p_value: 1.0,
             excess: 0.0,
             words: "nothing to look at".to_string(),
-        };
+        });
     }
     let layouts: Vec<Layout> = detectors.iter().map(|detector| detector.layout.clone()).collect();
     let rank = model.ncols();
     let moments = Moments::new(columns, &layouts, model, residual, null);
     let folds = (0..columns.fold_rows.len()).collect();
-    let trained = Trained::new(&moments, prior, (0..rank).collect(), folds);
+    let trained = Trained::new(&moments, prior, (0..rank).collect(), folds)?;
     let mut best = (0, f64::NEG_INFINITY, 0.0);
     for (index, gain) in trained.gains().iter().enumerate() {
         if gain.freedom == 0 {
@@ -245,9 +249,9 @@ pub fn structure(
     let size_um =
         (2.0 * best.2.max(0.0) / columns.rows().max(1) as f64).sqrt() * problem.noise.sigma_mm * 1e3;
     let words = format!("{} ({size_um:.2} µm over all readings)", detectors[best.0].words);
-    Structure {
+    Ok(Structure {
         p_value,
         excess: best.2.max(0.0),
         words,
-    }
+    })
 }

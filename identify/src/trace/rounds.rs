@@ -2,6 +2,7 @@
 
 use super::search::{Round, Search};
 use super::{Progress, Step};
+use crate::error::IdentifyError;
 
 /// Up to this many effects exchanges are tried after each addition, beyond it after each eighth.
 const EXCHANGED_EACH_ROUND: usize = 14;
@@ -34,24 +35,27 @@ impl Account<'_> {
 }
 
 /// Rounds until nothing earns its place any more: the p-value of the best that was not taken. `None` if the user has seen enough.
-pub(super) fn search_on(search: &mut Search<'_>, account: &mut Account<'_>) -> Option<f64> {
+pub(super) fn search_on(
+    search: &mut Search<'_>,
+    account: &mut Account<'_>,
+) -> Result<Option<f64>, IdentifyError> {
     // Effects that are put down to one make room for others; that must end.
     for _ in 0..search.most_rounds() {
-        match search.round() {
-            Round::Done { .. } if search.retune() || search.regroup() => {}
-            Round::Done { p_value } => return Some(p_value),
+        match search.round()? {
+            Round::Done { .. } if search.retune()? || search.regroup()? => {}
+            Round::Done { p_value } => return Ok(Some(p_value)),
             Round::Added { candidate } => {
                 // Every exchange costs a model an effect; among many effects the gain is small and a sweep now and then will do.
                 let taken = search.taken().len();
                 if taken <= EXCHANGED_EACH_ROUND || taken.is_multiple_of(EXCHANGED_EACH) {
-                    search.exchange();
+                    search.exchange()?;
                 }
-                search.merge();
+                search.merge()?;
                 if !account.note(search, candidate) {
-                    return None;
+                    return Ok(None);
                 }
             }
         }
     }
-    Some(1.0)
+    Ok(Some(1.0))
 }

@@ -9,6 +9,7 @@ use std::ops::Range;
 use super::moments::{FoldMoments, Moments};
 use super::tail::{ln_chi_square_tail, most_evidence};
 use super::visible::{Visible, pseudo_inverse};
+use crate::error::IdentifyError;
 use faer::{Mat, MatRef};
 use rayon::prelude::*;
 
@@ -79,13 +80,16 @@ fn dot(a: &[f64], b: &[f64]) -> f64 {
 
 impl<'m> Trained<'m> {
     /// Trains a model that will be asked for every candidate.
+    ///
+    /// # Errors
+    /// If products are not finite.
     pub fn new(
         moments: &'m Moments,
         prior: &PriorMoments,
         base: Vec<usize>,
         folds: Vec<usize>,
-    ) -> Trained<'m> {
-        let mut trained = Trained::lean(moments, prior, base, folds);
+    ) -> Result<Trained<'m>, IdentifyError> {
+        let mut trained = Trained::lean(moments, prior, base, folds)?;
         let total = moments
             .first
             .last()
@@ -93,16 +97,19 @@ impl<'m> Trained<'m> {
         let cross = trained.cross(0, total);
         let solved = &trained.inverse * &cross;
         trained.all = Some((cross, solved));
-        trained
+        Ok(trained)
     }
 
     /// Trains a model that will be asked for few candidates.
+    ///
+    /// # Errors
+    /// If products are not finite.
     pub fn lean(
         moments: &'m Moments,
         prior: &PriorMoments,
         base: Vec<usize>,
         folds: Vec<usize>,
-    ) -> Trained<'m> {
+    ) -> Result<Trained<'m>, IdentifyError> {
         let m = base.len();
         let left_out: Vec<usize> = (0..moments.folds.len())
             .filter(|fold| !folds.contains(fold))
@@ -134,11 +141,11 @@ impl<'m> Trained<'m> {
                 base_y[i] += sign * part.base_y[*bi];
             }
         }
-        let inverse = pseudo_inverse(&gram);
+        let inverse = pseudo_inverse(&gram)?;
         let coefficients = (0..m)
             .map(|i| (0..m).map(|j| inverse[(i, j)] * base_y[j]).sum())
             .collect();
-        Trained {
+        Ok(Trained {
             moments,
             base,
             folds,
@@ -147,7 +154,7 @@ impl<'m> Trained<'m> {
             parts,
             base_y,
             coefficients,
-        }
+        })
     }
 
     /// `Xᵀ C` of consecutive candidate columns.

@@ -2,6 +2,8 @@
 
 use faer::Mat;
 
+use crate::error::IdentifyError;
+
 /// Share of a candidate's own length that has to remain beside the model for it to count as seen.
 pub const LEAST_VISIBLE: f64 = 1e-7;
 
@@ -120,11 +122,14 @@ impl Visible {
 }
 
 /// Inverse of a symmetric product, directions below rounding left out.
-pub(super) fn pseudo_inverse(gram: &Mat<f64>) -> Mat<f64> {
+///
+/// # Errors
+/// If the product has entries that are not finite.
+pub(super) fn pseudo_inverse(gram: &Mat<f64>) -> Result<Mat<f64>, IdentifyError> {
     let n = gram.nrows();
-    let Ok(eigen) = gram.self_adjoint_eigen(faer::Side::Lower) else {
-        return Mat::identity(n, n);
-    };
+    let eigen = gram
+        .self_adjoint_eigen(faer::Side::Lower)
+        .map_err(|_| IdentifyError::Decomposition)?;
     let values: Vec<f64> = eigen.S().column_vector().iter().copied().collect();
     let largest = values.iter().fold(0.0_f64, |a, b| a.max(*b));
     let u = eigen.U();
@@ -135,5 +140,31 @@ pub(super) fn pseudo_inverse(gram: &Mat<f64>) -> Mat<f64> {
             0.0
         }
     });
-    &scaled * u.transpose()
+    Ok(&scaled * u.transpose())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_inverse_undoes_the_product_on_what_is_seen() {
+        // Rank 2: the third column is the sum of the first two.
+        let columns = Mat::from_fn(4, 3, |i, j| {
+            let of = |j: usize| ((i + 1) as f64).powi(j as i32);
+            if j < 2 { of(j) } else { of(0) + of(1) }
+        });
+        let gram = columns.transpose() * &columns;
+        let inverse = pseudo_inverse(&gram).unwrap();
+        let again = &gram * &inverse * &gram;
+        for (i, j) in (0..3).flat_map(|i| (0..3).map(move |j| (i, j))) {
+            assert!((again[(i, j)] - gram[(i, j)]).abs() < 1e-9);
+        }
+    }
+
+    #[test]
+    fn entries_that_are_not_finite_are_an_error() {
+        let gram = Mat::from_fn(3, 3, |i, j| if i + j == 2 { f64::NAN } else { 1.0 });
+        assert!(matches!(pseudo_inverse(&gram), Err(IdentifyError::Decomposition)));
+    }
 }

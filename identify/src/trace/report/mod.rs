@@ -64,7 +64,7 @@ pub(super) fn report(findings: &Findings<'_, '_>) -> Result<Reported, IdentifyEr
     let mut moves = Vec::new();
     let variance = residual_variance(findings);
     for (k, taken) in search.taken().iter().enumerate() {
-        let model = search.model_without(Some(k));
+        let model = search.model_without(Some(k))?;
         let (aliases, of_effect) = alias::aliases(search, k, &model, variance);
         rivals.push(of_effect);
         let named = model.joined(taken.candidate).0;

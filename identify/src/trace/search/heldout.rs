@@ -4,6 +4,7 @@ use faer::Mat;
 use rayon::prelude::*;
 
 use super::{ALL, Search};
+use crate::error::IdentifyError;
 use crate::trace::moments::grow;
 use crate::trace::score::Trained;
 
@@ -37,28 +38,27 @@ impl Plain {
 
 impl Search<'_> {
     /// Sum of squares of held-out residuals over the variance of the noise: each fold under the model of the search that did not see it.
-    pub(super) fn held_out_now(&self) -> f64 {
+    pub(super) fn held_out_now(&self) -> Result<f64, IdentifyError> {
         let models: Vec<Trained<'_>> = self.tracks[ALL + 1..]
             .par_iter()
             .map(|track| self.lean_model_of(&track.chosen(), &track.folds))
-            .collect();
+            .collect::<Result<_, _>>()?;
         let predicted = |model: &Trained<'_>, row: usize| -> f64 {
             let along = model.base.iter().zip(&model.coefficients);
             along.map(|(column, c)| self.plain.base[(row, *column)] * c).sum()
         };
-        self.plain
-            .folds
-            .iter()
-            .enumerate()
-            .map(|(row, fold)| (self.plain.residual[row] - predicted(&models[*fold], row)).powi(2))
-            .sum()
+        let squares = self.plain.folds.iter().enumerate();
+        let squares =
+            squares.map(|(row, fold)| (self.plain.residual[row] - predicted(&models[*fold], row)).powi(2));
+        Ok(squares.sum())
     }
 
     /// Writes down the held-out error with as many effects as there are now.
-    pub(in crate::trace) fn note_held_out(&mut self) {
-        let held_out = self.held_out_now();
+    pub(in crate::trace) fn note_held_out(&mut self) -> Result<(), IdentifyError> {
+        let held_out = self.held_out_now()?;
         let taken = self.taken().len();
         self.held_out.truncate(taken);
         self.held_out.resize(taken + 1, held_out);
+        Ok(())
     }
 }

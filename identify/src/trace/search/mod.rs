@@ -16,6 +16,7 @@ use super::compose::Composed;
 use super::library::Candidate;
 use super::moments::Moments;
 use super::score::{Gain, PriorMoments, Trained};
+use crate::error::IdentifyError;
 pub use heldout::Plain;
 
 /// When the search stops.
@@ -108,6 +109,9 @@ pub enum Round {
 
 impl<'s> Search<'s> {
     /// Before the first round.
+    ///
+    /// # Errors
+    /// If products are not finite.
     pub fn new(
         columns: &'s Columns<'s, 's>,
         candidates: Vec<Candidate>,
@@ -116,7 +120,7 @@ impl<'s> Search<'s> {
         prior: PriorMoments,
         plain: Plain,
         stop: Stop,
-    ) -> Search<'s> {
+    ) -> Result<Search<'s>, IdentifyError> {
         let rank = moments.base();
         let folds = 0..columns.fold_rows.len();
         let without = |left_out: Option<usize>| Track {
@@ -144,9 +148,9 @@ impl<'s> Search<'s> {
             unseen: Vec::new(),
             stop,
         };
-        search.unseen = search.not_standing_out();
-        search.note_held_out();
-        search
+        search.unseen = search.not_standing_out()?;
+        search.note_held_out()?;
+        Ok(search)
     }
 
     /// What the search on all readings has taken up.
@@ -211,44 +215,45 @@ impl<'s> Search<'s> {
     }
 
     /// One round.
-    pub fn round(&mut self) -> Round {
-        let (p_value, threshold) = match self.best_against_null() {
-            Some(found) => found,
-            None => return Round::Done { p_value: 1.0 },
+    pub fn round(&mut self) -> Result<Round, IdentifyError> {
+        let Some((p_value, threshold)) = self.best_against_null()? else {
+            return Ok(Round::Done { p_value: 1.0 });
         };
         self.thresholds.push(threshold);
         if p_value > self.stop.significance || self.taken().len() >= self.stop.most {
-            return Round::Done { p_value };
+            return Ok(Round::Done { p_value });
         }
-        let Some(candidate) = self.pick(ALL, f64::NEG_INFINITY) else {
-            return Round::Done { p_value };
+        let Some(candidate) = self.pick(ALL, f64::NEG_INFINITY)? else {
+            return Ok(Round::Done { p_value });
         };
         let before = self.tracks.clone();
         self.take(ALL, Taken { candidate, p_value });
         for track in 1..self.tracks.len() {
-            if let Some(candidate) = self.pick(track, threshold) {
+            if let Some(candidate) = self.pick(track, threshold)? {
                 self.take(track, Taken { candidate, p_value });
             }
         }
-        let held_out = self.held_out_now();
+        let held_out = self.held_out_now()?;
         // For poses p-values say little; there an effect has to earn its place on the readings that were held out.
         if self.stop.in_residual_variance
             && held_out >= self.held_out.last().copied().unwrap_or(f64::INFINITY)
         {
             self.tracks = before;
-            return Round::Done { p_value };
+            return Ok(Round::Done { p_value });
         }
-        self.let_go(threshold);
-        self.note_held_out();
-        Round::Added { candidate }
+        self.let_go(threshold)?;
+        self.note_held_out()?;
+        Ok(Round::Added { candidate })
     }
 
     /// The p-value of the best beside what has been taken, among the best of draws without structure, and the score that those exceed with the probability
     /// of the stop.
-    fn best_against_null(&self) -> Option<(f64, f64)> {
+    fn best_against_null(&self) -> Result<Option<(f64, f64)>, IdentifyError> {
         let chosen = self.tracks[ALL].chosen();
-        let model = self.model_without(None);
-        let (_, score) = self.best_of(&model, &model.gains(), &chosen)?;
+        let model = self.model_without(None)?;
+        let Some((_, score)) = self.best_of(&model, &model.gains(), &chosen) else {
+            return Ok(None);
+        };
         let composed = self.composed(&model);
         let score = composed.iter().map(Composed::score).fold(score, f64::max);
         let costs: Vec<f64> = (0..self.candidates.len())
@@ -260,29 +265,31 @@ impl<'s> Search<'s> {
                 }
             })
             .collect();
-        let mut null = model.null_best(&costs, self.null_variance());
+        let mut null = model.null_best(&costs, self.null_variance()?);
         null.sort_by(f64::total_cmp);
         let above = null.iter().filter(|best| **best >= score).count();
         let p_value = (above + 1) as f64 / (null.len() + 1) as f64;
         let rank = ((1.0 - self.stop.significance) * null.len() as f64).ceil() as usize;
         let threshold = null.get(rank.min(null.len().saturating_sub(1)));
-        Some((p_value, threshold.copied().unwrap_or(0.0)))
+        Ok(Some((p_value, threshold.copied().unwrap_or(0.0))))
     }
 
     /// What a search would add, if it reaches a score: on all readings the simplest that cannot be told from the best; where a fold is left out, which has to
     /// be predicted and not named, the best.
-    fn pick(&mut self, track: usize, least: f64) -> Option<usize> {
+    fn pick(&mut self, track: usize, least: f64) -> Result<Option<usize>, IdentifyError> {
         let Track { folds, .. } = self.tracks[track].clone();
         let chosen = self.tracks[track].chosen();
-        let known = self.sharpen(&chosen, &folds);
-        let model = self.model_of(&chosen, &folds);
+        let known = self.sharpen(&chosen, &folds)?;
+        let model = self.model_of(&chosen, &folds)?;
         let gains = model.more_gains(known);
-        let (best, score) = self.best_of(&model, &gains, &chosen)?;
+        let Some((best, score)) = self.best_of(&model, &gains, &chosen) else {
+            return Ok(None);
+        };
         let first = || match track {
             ALL => self.named_first(&model, &gains, best, &chosen),
             _ => best,
         };
-        (score >= least).then(first)
+        Ok((score >= least).then(first))
     }
 
     fn take(&mut self, track: usize, taken: Taken) {
@@ -291,26 +298,23 @@ impl<'s> Search<'s> {
     }
 
     /// Drops what the later effects have made superfluous.
-    fn let_go(&mut self, threshold: f64) {
+    fn let_go(&mut self, threshold: f64) -> Result<(), IdentifyError> {
         let folds = self.tracks[ALL].folds.clone();
         loop {
             let chosen = self.tracks[ALL].chosen();
-            let weakest = (0..chosen.len().saturating_sub(1))
-                .map(|k| {
-                    let mut others = chosen.clone();
-                    let candidate = others.remove(k);
-                    let model = self.lean_model_of(&others, &folds);
-                    (
-                        k,
-                        self.score(candidate, &model.gain(candidate), self.variance(&model)),
-                    )
-                })
-                .min_by(|a, b| a.1.total_cmp(&b.1));
-            match weakest {
+            let scored = (0..chosen.len().saturating_sub(1)).map(|k| {
+                let mut others = chosen.clone();
+                let candidate = others.remove(k);
+                let model = self.lean_model_of(&others, &folds)?;
+                let score = self.score(candidate, &model.gain(candidate), self.variance(&model));
+                Ok((k, score))
+            });
+            let scored: Vec<(usize, f64)> = scored.collect::<Result<_, IdentifyError>>()?;
+            match scored.into_iter().min_by(|a, b| a.1.total_cmp(&b.1)) {
                 Some((k, score)) if score < threshold => {
                     self.tracks[ALL].taken.remove(k);
                 }
-                _ => return,
+                _ => return Ok(()),
             }
         }
     }

@@ -5,6 +5,7 @@ use std::ops::Range;
 use abbe_model::effect::Effect;
 
 use super::{ALL, Search};
+use crate::error::IdentifyError;
 use crate::trace::columns::Layout;
 use crate::trace::score::{Gain, Trained};
 use crate::trace::tail::ln_chi_square_tail;
@@ -26,17 +27,25 @@ impl Search<'_> {
     }
 
     /// The model with some candidates, trained on some folds.
-    pub(in crate::trace) fn model_of(&self, chosen: &[usize], folds: &[usize]) -> Trained<'_> {
+    pub(in crate::trace) fn model_of(
+        &self,
+        chosen: &[usize],
+        folds: &[usize],
+    ) -> Result<Trained<'_>, IdentifyError> {
         Trained::new(&self.moments, &self.prior, self.base_with(chosen), folds.to_vec())
     }
 
     /// The same, to be asked for few candidates.
-    pub(in crate::trace) fn lean_model_of(&self, chosen: &[usize], folds: &[usize]) -> Trained<'_> {
+    pub(in crate::trace) fn lean_model_of(
+        &self,
+        chosen: &[usize],
+        folds: &[usize],
+    ) -> Result<Trained<'_>, IdentifyError> {
         Trained::lean(&self.moments, &self.prior, self.base_with(chosen), folds.to_vec())
     }
 
     /// The model with what has been taken, less one of it, on all readings.
-    pub fn model_without(&self, left_out: Option<usize>) -> Trained<'_> {
+    pub fn model_without(&self, left_out: Option<usize>) -> Result<Trained<'_>, IdentifyError> {
         let mut chosen = self.tracks[ALL].chosen();
         if let Some(k) = left_out {
             chosen.remove(k);
@@ -97,8 +106,8 @@ impl Search<'_> {
     }
 
     /// The variance of the null draws, in the same sense.
-    pub(super) fn null_variance(&self) -> f64 {
-        self.variance(&self.lean_model_of(&[], &self.tracks[ALL].folds))
+    pub(super) fn null_variance(&self) -> Result<f64, IdentifyError> {
+        Ok(self.variance(&self.lean_model_of(&[], &self.tracks[ALL].folds)?))
     }
 
     /// `−ln P` of a gain.

@@ -3,6 +3,7 @@
 use rayon::prelude::*;
 
 use super::{Search, Trained};
+use crate::error::IdentifyError;
 use crate::trace::columns::Layout;
 use crate::trace::compose::{self, Composed};
 use crate::trace::library::Candidate;
@@ -15,9 +16,10 @@ const LEAST_PLAUSIBLE_SIGMA: f64 = 3.0;
 
 impl Search<'_> {
     /// For each candidate whether it would not stand out however large it plausibly was.
-    pub(super) fn not_standing_out(&self) -> Vec<bool> {
-        let model = self.model_without(None);
-        (0..self.candidates.len())
+    pub(super) fn not_standing_out(&self) -> Result<Vec<bool>, IdentifyError> {
+        let model = self.model_without(None)?;
+        let candidates = 0..self.candidates.len();
+        let unseen = candidates
             .into_par_iter()
             .map(|candidate| {
                 let (d, _, _) = model.projected(candidate);
@@ -26,7 +28,8 @@ impl Search<'_> {
                 let largest = (0..d.nrows()).map(|k| d[(k, k)]).fold(0.0, f64::max);
                 plausible * largest.max(0.0).sqrt() < LEAST_PLAUSIBLE_SIGMA
             })
-            .collect()
+            .collect();
+        Ok(unseen)
     }
 
     /// Whether a search that sees some folds may take a candidate up now.
@@ -59,12 +62,16 @@ impl Search<'_> {
 
     /// Adds what comes near the best, with the best numbers that it can have beside some candidates on some folds. Returns what each candidate that was there
     /// before gains beside them.
-    pub(in crate::trace) fn sharpen(&mut self, beside: &[usize], folds: &[usize]) -> Vec<Gain> {
+    pub(in crate::trace) fn sharpen(
+        &mut self,
+        beside: &[usize],
+        folds: &[usize],
+    ) -> Result<Vec<Gain>, IdentifyError> {
         if !self.candidates.iter().any(sharpen::can_be_tuned) {
-            return Vec::new();
+            return Ok(Vec::new());
         }
         let (gains, fresh) = {
-            let model = self.model_of(beside, folds);
+            let model = self.model_of(beside, folds)?;
             let gains = model.gains();
             let fresh = sharpen::sharpened(self, &model, &gains, &self.composed(&model));
             (gains, fresh)
@@ -72,7 +79,7 @@ impl Search<'_> {
         for candidate in fresh {
             self.add_tuned(candidate, folds);
         }
-        gains
+        Ok(gains)
     }
 
     /// Adds a candidate that was tuned on some folds; its number, if the data have what it follows.
@@ -94,7 +101,8 @@ impl Search<'_> {
         self.moments.append(self.columns, &self.layouts);
     }
 
-    /// How many entries of the library would stand out if they were as large as is plausible.
+    /// How many entries of the library would stand out if they were as large as is plausible. A dictionary is one of them: what is composed of it bears its
+    /// name, and its places have a price of their own. Curves of last resort, some dozens beside thousands, are not counted.
     pub(in crate::trace) fn seen_entries(&self) -> usize {
         self.unseen.iter().filter(|unseen| !**unseen).count()
     }
