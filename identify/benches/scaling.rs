@@ -61,15 +61,16 @@ fn curve(name: &str, points: &[(f64, f64, f64)]) {
 
 fn main() {
     let mut points = Vec::new();
+    // A test of a plan has a million readings at the most.
     for readings in [1_000, 10_000, 100_000, 1_000_000, 10_000_000] {
-        let session = sessions::ball_bar(4, readings);
+        let session = sessions::ball_bar(12, readings);
         let rounds = if readings > 1_000_000 { 1 } else { 3 };
         let (seconds, memory) = measured(rounds, || {
             black_box(prepare(&session, 1).expect("a fit"));
         });
         points.push((readings as f64, seconds, memory));
     }
-    curve("fit of four tests, by readings", &points);
+    curve("fit of twelve tests, by readings", &points);
 
     let mut points = Vec::new();
     for tests in [1, 4, 8, 17, 35, 70] {

@@ -230,7 +230,7 @@ fn finish(
     let whole = whole(problem, &beta, &triangles);
     let covariance = covariance(&whole, &rank.seen)?;
     let residuals = problem.residuals(&beta);
-    let held_out = held_out(problem, &beta, &triangles, &rank.seen)?;
+    let held_out = held_out(problem, &beta, &triangles, &whole, &rank.seen)?;
     let zero = vec![0.0; beta.len()];
     let chi_square: f64 = whole.sum_of_squares_after(&zero);
     let free = (problem.readings() * problem.coordinates())

@@ -1,7 +1,9 @@
 //! The error on readings that the fit did not see.
 //!
-//! One run at a time is left out, or contiguous blocks where there are no runs, or seeded folds where rows are independent poses. The
-//! triangles of the folds that remain are merged and solved anew; nothing of the left-out fold enters.
+//! One run at a time is left out, or contiguous blocks where there are no runs, or seeded folds where rows are independent poses. Nothing of the left-out
+//! fold enters: with `W` such that `WᵀAW = I` for the normal matrix `A` of all readings, `T = J·W` of the fold's rows `[J | r]` and `y` what is left to
+//! do in these directions, the step to the fit of the others is `W(I − TᵀT)⁻¹(y − Tᵀr)`, which takes a matrix no larger than the fold has rows
+//! (Woodbury). Where the others hardly see a direction any more, their triangles are merged and solved anew.
 
 use abbe_model::instrument::InstrumentKind;
 use abbe_model::session::{Session, Test};
@@ -136,8 +138,8 @@ pub fn rms_mm(problem: &Problem<'_>, residuals: &[Vec<f64>]) -> f64 {
     (sum / count.max(1) as f64).sqrt()
 }
 
-/// Leaves out one fold after another. `beta` is the fit of all readings, `triangles` those of the folds there, `basis` spans the seen
-/// directions (unknowns × rank).
+/// Leaves out one fold after another. `beta` is the fit of all readings, `triangles` those of the folds there, `whole` that of all readings and priors,
+/// `basis` spans the seen directions (unknowns × rank).
 ///
 /// # Errors
 /// If the model cannot be evaluated.
@@ -145,22 +147,24 @@ pub fn held_out(
     problem: &Problem<'_>,
     beta: &[f64],
     triangles: &[Triangle],
+    whole: &Triangle,
     basis: &Mat<f64>,
 ) -> Result<HeldOut, IdentifyError> {
-    // All folds before one, and all behind it: what a fold is left out of, in two merges.
-    let mut before = vec![problem.prior_triangle(beta)];
-    let mut behind = vec![Triangle::new(beta.len())];
-    for (first, last) in triangles.iter().zip(triangles.iter().rev()) {
-        before.push(with(&before[before.len() - 1], first));
-        behind.push(with(&behind[behind.len() - 1], last));
-    }
+    let all = Directions::of(whole, basis)?;
     let steps: Vec<Vec<f64>> = (0..triangles.len())
         .into_par_iter()
-        .map(|fold| {
-            let rest = with(&before[fold], &behind[triangles.len() - 1 - fold]);
-            step_without(&rest, beta, basis)
+        .map(|fold| match all.step_without(&triangles[fold])? {
+            Some(step) => Ok(step),
+            None => {
+                let mut rest = problem.prior_triangle(beta);
+                let others = triangles.iter().enumerate();
+                others
+                    .filter(|(other, _)| *other != fold)
+                    .for_each(|(_, triangle)| rest.merge(triangle));
+                step_without(&rest, beta, basis)
+            }
         })
-        .collect::<Result<_, _>>()?;
+        .collect::<Result<_, IdentifyError>>()?;
     let values = problem.slot_values(beta);
     let coordinates = problem.coordinates();
     let mut residuals: Vec<Vec<f64>> = vec![Vec::new(); problem.models.len()];
@@ -190,10 +194,76 @@ pub fn held_out(
     })
 }
 
-fn with(triangle: &Triangle, other: &Triangle) -> Triangle {
-    let mut sum = triangle.clone();
-    sum.merge(other);
-    sum
+/// What the others have to see of a direction, as a share of what all readings see of it, for the fit of all to lead to theirs.
+const LEAST_SHARE: f64 = 1e-6;
+
+/// The seen directions, in which the normal matrix of all readings is the identity.
+struct Directions {
+    /// `W`: unknowns × rank.
+    spread: Mat<f64>,
+    /// `y`: the step that all readings still ask for.
+    left: Mat<f64>,
+}
+
+impl Directions {
+    fn of(whole: &Triangle, basis: &Mat<f64>) -> Result<Directions, IdentifyError> {
+        let (r, c, _) = whole.parts();
+        let rank = basis.ncols();
+        if rank == 0 {
+            return Ok(Directions {
+                spread: Mat::zeros(basis.nrows(), 0),
+                left: Mat::zeros(0, 1),
+            });
+        }
+        let svd = (&r * basis)
+            .thin_svd()
+            .map_err(|_| IdentifyError::Decomposition)?;
+        let singular = svd.S().column_vector();
+        let mut spread = basis * svd.V();
+        for (k, mut column) in spread.col_iter_mut().enumerate() {
+            // A direction of nothing is none: what leaves it out solves anew.
+            column *= faer::Scale(1.0 / singular[k]);
+        }
+        let right = Mat::from_fn(c.len(), 1, |i, _| c[i]);
+        Ok(Directions {
+            left: svd.U().transpose() * right,
+            spread,
+        })
+    }
+
+    /// The step to the fit of all readings but a fold's; `None` where they hardly see a direction any more.
+    fn step_without(&self, fold: &Triangle) -> Result<Option<Vec<f64>>, IdentifyError> {
+        let rows = fold.rows();
+        let unknowns = fold.columns();
+        if rows.nrows() == 0 || self.spread.ncols() == 0 {
+            let step = &self.spread * &self.left;
+            return Ok(Some(step.col(0).iter().copied().collect()));
+        }
+        let t = rows.subcols(0, unknowns) * &self.spread;
+        let asked = &self.left - t.transpose() * rows.subcols(unknowns, 1);
+        let leverage = &t * t.transpose();
+        if !leverage.is_all_finite() {
+            return Ok(None);
+        }
+        let eigen = leverage
+            .self_adjoint_eigen(faer::Side::Lower)
+            .map_err(|_| IdentifyError::Decomposition)?;
+        let shares: Vec<f64> = eigen
+            .S()
+            .column_vector()
+            .iter()
+            .map(|share| 1.0 - share)
+            .collect();
+        if shares.iter().any(|share| *share < LEAST_SHARE) {
+            return Ok(None);
+        }
+        let mut along = eigen.U().transpose() * (&t * &asked);
+        for (k, share) in shares.iter().enumerate() {
+            along[(k, 0)] /= share;
+        }
+        let step = &self.spread * (asked + t.transpose() * (eigen.U() * along));
+        Ok(Some(step.col(0).iter().copied().collect()))
+    }
 }
 
 /// From the fit of all readings to that of the readings in `rest`: the least solution in absolute terms, so that what the remaining readings do
@@ -223,4 +293,71 @@ fn step_without(rest: &Triangle, beta: &[f64], basis: &Mat<f64>) -> Result<Vec<f
         }
     }
     Ok(step)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use rand::RngExt;
+
+    /// Rows of `[J | r]`, drawn.
+    fn drawn(rows: usize, unknowns: usize, random: &mut rand_pcg::Pcg64Mcg) -> Triangle {
+        let mut triangle = Triangle::new(unknowns);
+        let block = Mat::from_fn(rows, unknowns + 1, |_, _| random.random_range(-1.0..1.0));
+        triangle.absorb(block.as_ref());
+        triangle
+    }
+
+    #[test]
+    fn a_fold_is_left_out_as_if_the_others_were_solved_anew() {
+        let mut random = rand_pcg::Pcg64Mcg::seed_from_u64(1);
+        let unknowns = 6;
+        // Two combinations of the unknowns are not among the directions that are fitted.
+        let basis = Mat::from_fn(
+            unknowns,
+            4,
+            |i, k| if i == k { 1.0 } else { 0.1 * (i * k) as f64 },
+        );
+        let basis = basis.qr().compute_thin_Q();
+        let mut folds: Vec<Triangle> = (0..5).map(|_| drawn(9, unknowns, &mut random)).collect();
+        // The fit has ended: what is left to do lies outside the directions.
+        let merged = |folds: &[Triangle], but: usize| {
+            let mut whole = Triangle::new(unknowns);
+            let others = folds.iter().enumerate().filter(|(fold, _)| *fold != but);
+            others.for_each(|(_, fold)| whole.merge(fold));
+            whole
+        };
+        let end = Directions::of(&merged(&folds, usize::MAX), &basis).unwrap();
+        let step: Vec<f64> = (&end.spread * &end.left).col(0).iter().copied().collect();
+        folds = folds.iter().map(|fold| fold.after(&step)).collect();
+        let all = Directions::of(&merged(&folds, usize::MAX), &basis).unwrap();
+        for (number, fold) in folds.iter().enumerate() {
+            let short = all.step_without(fold).unwrap().unwrap();
+            let anew = step_without(&merged(&folds, number), &step, &basis).unwrap();
+            for (short, anew) in short.iter().zip(&anew) {
+                assert!((short - anew).abs() < 1e-12, "{short} {anew}");
+            }
+        }
+    }
+
+    #[test]
+    fn what_one_fold_alone_sees_is_not_left_to_the_short_way() {
+        let mut random = rand_pcg::Pcg64Mcg::seed_from_u64(2);
+        let unknowns = 3;
+        let mut others = Triangle::new(unknowns);
+        let block = Mat::from_fn(9, unknowns + 1, |_, j| {
+            if j == 2 {
+                0.0
+            } else {
+                random.random_range(-1.0..1.0)
+            }
+        });
+        others.absorb(block.as_ref());
+        let alone = drawn(9, unknowns, &mut random);
+        let mut whole = others.clone();
+        whole.merge(&alone);
+        let all = Directions::of(&whole, &Mat::identity(unknowns, unknowns)).unwrap();
+        assert!(all.step_without(&alone).unwrap().is_none());
+        assert!(all.step_without(&others).unwrap().is_some());
+    }
 }

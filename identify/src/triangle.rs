@@ -12,6 +12,7 @@ use faer::{Mat, MatRef, Par};
 #[derive(Clone, Debug)]
 pub struct Triangle {
     columns: usize,
+    /// Rows that are worth the triangle: not yet reduced to it as long as they are few.
     factor: Mat<f64>,
 }
 
@@ -42,11 +43,17 @@ impl Triangle {
         let mut stacked = Mat::zeros(kept + block.nrows(), width);
         stacked.get_mut(..kept, ..).copy_from(&self.factor);
         stacked.get_mut(kept.., ..).copy_from(block);
-        if stacked.nrows() <= width {
-            self.factor = stacked;
-            return;
-        }
-        self.factor = upper(stacked);
+        // Many small pieces, as folds of many tests are, are reduced a width of them at a time.
+        self.factor = if stacked.nrows() <= 2 * width {
+            stacked
+        } else {
+            upper(stacked)
+        };
+    }
+
+    /// Rows of `[J | r]` that are worth those absorbed: some × (unknowns + 1).
+    pub fn rows(&self) -> MatRef<'_, f64> {
+        self.factor.as_ref()
     }
 
     /// Adds the rows of another triangle.
