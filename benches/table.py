@@ -59,7 +59,7 @@ def figure(seconds, of, unit):
 
 
 def table(target, native, short):
-    head = ["what", "Abbe", "yardstick in the same run", "ratio"] + ([] if native is None else ["built for this processor"])
+    head = ["what", "Abbe", "yardstick in the same run", "Abbe's time over the yardstick's"] + ([] if native is None else ["built for this processor"])
     rows = [head, ["---"] * len(head)]
     for what, name, of, unit, yardstick, other, of_other, in_readme in LINES:
         ours = median(target, name)
@@ -72,7 +72,9 @@ def table(target, native, short):
             row[3] = f"{(ours / of) / (theirs / of_other):.2g}"
         if native is not None:
             there = median(native, name)
-            row.append("" if there is None else f"{figure(there, of, unit)}; {ours / there:.2f} times as fast")
+            theirs_there = median(native, other) if other else None
+            beside = "" if theirs_there is None else f"; yardstick {figure(theirs_there, of_other, unit)}"
+            row.append("" if there is None else f"{figure(there, of, unit)}, {ours / there:.2f} times as fast{beside}")
         rows.append(row)
     return "\n".join("| " + " | ".join(row) + " |" for row in rows)
 

@@ -37,10 +37,12 @@ def least(work, rounds=5):
     return min(times)
 
 
-def abbe(package, bench, name):
+def abbe(bench, name):
     """Seconds that criterion found for a benchmark, run now."""
     profile = os.environ.get("ABBE_PROFILE", "bench")
-    command = ["cargo", "bench", "-q", "--profile", profile, "-p", package, "--bench", bench, "--", "--warm-up-time", "1"]
+    # All three packages, as in benches/table.py: nothing is then built anew.
+    packages = [word for package in ("abbe-model", "abbe-identify", "abbe-codegen") for word in ("-p", package)]
+    command = ["cargo", "bench", "-q", "--profile", profile, *packages, "--bench", bench, "--", "--warm-up-time", "1"]
     command.append("^" + name + "$")
     subprocess.run(command, cwd=ROOT, check=True, capture_output=True)
     folder = ROOT / "target" / "criterion" / name
@@ -82,7 +84,7 @@ def gradient(q, errors, setup, point, spindle):
 
 
 def derivatives():
-    ours = abbe("abbe-model", "chain", "value and eight derivatives, streaming/generic chain")
+    ours = abbe("chain", "value and eight derivatives, streaming/generic chain")
     angles = np.arange(READINGS) % 1000
     q = np.array([np.sin(angles * 0.006), np.cos(angles * 0.006), np.sin(angles * 0.0015), np.cos(angles * 0.0015)])
     errors = np.array([0.01, -0.02, 1e-4, 2e-4, 0.015, -0.01, -1e-4, 3e-4])
@@ -117,7 +119,7 @@ def derivatives():
 
 
 def fits():
-    ours = abbe("abbe-identify", "fit", f"fit/{READINGS}")
+    ours = abbe("fit", f"fit/{READINGS}")
     random = np.random.default_rng(1)
     count = READINGS // 4
     reach = np.sqrt(149.9946**2 - 100.0**2)

@@ -36,27 +36,22 @@ fn measured(rounds: usize, work: impl Fn()) -> (f64, f64) {
     (seconds, memory_mb().map_or(0.0, |(peak, _)| peak - before))
 }
 
-/// Prints a curve: size, seconds, memory; and the exponents between the smallest and the largest of the upper half.
+/// Prints a curve: size, seconds, memory; and the exponents over the last decade, or as much of it as there is.
 fn curve(name: &str, points: &[(f64, f64, f64)]) {
     println!("{name}");
     for (size, seconds, memory) in points {
         println!("  {size:>9} {seconds:>9.3} s {memory:>9.1} MB");
     }
-    let upper = &points[points.len() / 2..];
-    let exponent = |of: &dyn Fn(&(f64, f64, f64)) -> f64| {
-        let points: Vec<(f64, f64)> = upper.iter().map(|p| (p.0.ln(), of(p).max(1e-3).ln())).collect();
-        let n = points.len() as f64;
-        let mean = points
-            .iter()
-            .fold((0.0, 0.0), |m, p| (m.0 + p.0 / n, m.1 + p.1 / n));
-        let sum = |f: &dyn Fn(&(f64, f64)) -> f64| points.iter().map(f).sum::<f64>();
-        sum(&|p| (p.0 - mean.0) * (p.1 - mean.1)) / sum(&|p| (p.0 - mean.0).powi(2))
-    };
-    println!(
-        "  exponents of the upper half: time {:.2}, memory {:.2}",
-        exponent(&|p| p.1),
-        exponent(&|p| p.2)
-    );
+    let Some(last) = points.last() else { return };
+    let earlier = points.iter().rev().find(|point| point.0 <= last.0 / 10.0);
+    let first = earlier.unwrap_or(&points[0]);
+    let exponent = |first_is: f64, last_is: f64| (last_is / first_is).ln() / (last.0 / first.0).ln();
+    print!("  from {} on: time {:.2}", first.0, exponent(first.1, last.1));
+    // Less is lost among what the allocator keeps.
+    if first.2 > 5.0 {
+        print!(", memory {:.2}", exponent(first.2, last.2));
+    }
+    println!();
 }
 
 fn main() {
