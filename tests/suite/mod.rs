@@ -12,7 +12,6 @@ mod faults;
 mod field_files;
 mod geometric;
 mod help;
-mod jacobians;
 mod kill;
 mod limits;
 mod measured;
@@ -40,6 +39,7 @@ mod schema;
 mod self_calibration;
 mod simulate;
 mod supply_chain;
+#[path = "../../model/tests/jacobians/topologies.rs"]
 mod topologies;
 mod tour;
 mod trace;

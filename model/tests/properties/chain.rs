@@ -89,6 +89,25 @@ proptest! {
     }
 
     #[test]
+    fn an_axis_that_is_elsewhere_errs_along_itself(drawn in machines(), table in point(), tool in point(), late in 1e-7..1e-6_f64) {
+        // Error motions in the shares of `slots_along` and a position that is off by as much: the same to first order.
+        let drawn = drawn.with(Rotation::Exact);
+        let nothing = vec![0.0; drawn.errors.len()];
+        for axis in 0..drawn.machine.axes.len() {
+            let mut moved = Drawn { errors: nothing.clone(), ..drawn.clone() };
+            for (slot, share) in drawn.machine.slots_along(axis) {
+                moved.errors[slot] = late * share;
+            }
+            let mut elsewhere = Drawn { errors: nothing.clone(), ..drawn.clone() };
+            elsewhere.positions[axis] += late;
+            let (moved, elsewhere) = (both(&moved, 1.0, table, tool), both(&elsewhere, 1.0, table, tool));
+            for (a, b) in moved.into_iter().zip(elsewhere) {
+                prop_assert!(apart(a, b) < 1e-8, "{axis}: {a:?} {b:?}");
+            }
+        }
+    }
+
+    #[test]
     fn frames_invert(drawn in machines(), table in point(), tool in point()) {
         let drawn = drawn.with(Rotation::Exact);
         let (state, bodies) = (drawn.state(), drawn.bodies(1.0));

@@ -1,7 +1,7 @@
 //! Random shapes of effects over the position of an axis, in its inside unit.
 
 use abbe_model::axis::AxisKind;
-use abbe_model::effect::{DriverSample, Shape};
+use abbe_model::effect::{Component, Driver, DriverSample, Effect, Shape};
 use proptest::collection::vec;
 use proptest::prelude::*;
 
@@ -110,4 +110,17 @@ proptest! {
             prop_assert!((here - there).abs() < 1e-9, "{shape:?}: {here} {there}");
         }
     }
+}
+
+#[test]
+fn an_effect_acts_in_the_tests_that_it_is_confined_to() {
+    let mut effect = Effect {
+        component: Component::parse("EZC").expect("a component"),
+        driver: Driver::parse("C"),
+        shape: Shape::Harmonic { order: 1.0 },
+        tests: Vec::new(),
+    };
+    assert!(effect.acts_in("one") && effect.acts_in("two"));
+    effect.tests.push("one".into());
+    assert!(effect.acts_in("one") && !effect.acts_in("two"));
 }

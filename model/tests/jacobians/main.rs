@@ -1,22 +1,23 @@
 //! Derivatives of the recorded chain against dual numbers and against central differences, over every topology, and against the closed form of the
 //! first order.
 
-use abbe::model::axis::AxisKind;
-use abbe::model::chain::{ERRORS_PER_AXIS, Machine};
-use abbe::model::component::ErrorName;
-use abbe::model::frames::Rotation;
-use abbe::model::instrument::ballbar::BallBar;
-use abbe::model::instrument::probe::Probe;
-use abbe::model::instrument::rtest::{RTest, Setting};
-use abbe::model::instrument::tracker::Tracker;
-use abbe::model::instrument::{InsideUnit, InstrumentKind, Station};
-use abbe::model::sensitivity::{SlotValues, TestModel};
-use abbe::model::session::readings::Readings;
+mod topologies;
+
+use abbe_model::axis::AxisKind;
+use abbe_model::chain::{ERRORS_PER_AXIS, Machine};
+use abbe_model::component::ErrorName;
+use abbe_model::frames::Rotation;
+use abbe_model::instrument::ballbar::BallBar;
+use abbe_model::instrument::probe::Probe;
+use abbe_model::instrument::rtest::{RTest, Setting};
+use abbe_model::instrument::tracker::Tracker;
+use abbe_model::instrument::{InsideUnit, InstrumentKind, Station};
+use abbe_model::sensitivity::{SlotValues, TestModel};
+use abbe_model::session::readings::Readings;
 use num_dual::Dual64;
 use rand::{Rng, SeedableRng};
 use rand_pcg::Pcg64;
-
-use super::topologies::{self, uniform};
+use topologies::uniform;
 
 fn ball_bar(workpiece_ball: [f64; 3], spindle_ball: [f64; 3]) -> Station<f64> {
     Station::BallBar(BallBar {

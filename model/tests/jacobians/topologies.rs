@@ -1,8 +1,8 @@
 //! Machines of every kind of chain, with random lines of their axes and random errors.
 
-use abbe::model::axis::{Axis, AxisKind};
-use abbe::model::chain::Machine;
-use abbe::model::frames::Rotation;
+use abbe_model::axis::{Axis, AxisKind};
+use abbe_model::chain::Machine;
+use abbe_model::frames::Rotation;
 use rand::{Rng, RngExt};
 
 /// Table 1.1 of the thesis, as it must read: the print doubles the `A` of [wXYbZBAt] and of [wXYbZCAt], and the `B` of [wXYbZCBt].
