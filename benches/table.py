@@ -29,7 +29,7 @@ LINES = [
     ("fit of 1,000 readings, 36 unknowns", "fit/1000", 1, "s", None, None, None, False),
     ("fit of 10,000 readings", "fit/10000", 1, "s", None, None, None, False),
     ("fit of 100,000 readings", "fit/100000", 1, "s", None, None, None, False),
-    ("fit of 1,000,000 readings", "fit/1000000", 1, "s", None, None, None, True),
+    ("fit of 1,000,000 readings, 36 unknowns", "fit/1000000", 1, "s", None, None, None, True),
     ("trace of 3,616 readings, whole library, 199 null draws, nothing to find", "trace/chapter 5, nothing to find", 1, "s", None, None, None, True),
     ("a thousand draws of the fit of 3,616 readings", f"{MONTE_CARLO}/a thousand draws of the fit of chapter 5", 1, "s", "a thousand fits", f"{MONTE_CARLO}/one fit of chapter 5", 1e-3, True),
     ("equation of the error vector with eight derivatives, as C", "equation/error vector with eight derivatives, as C", 1, "s", None, None, None, True),

@@ -22,7 +22,7 @@ fn calculated<S: Scalar>(operations: &[(u8, u16, u16)], variables: [S; VARIABLES
         // Recent places more often than old ones, else nothing grows.
         let of = |place: &u16| {
             let near = usize::from(*place) % places.len().min(24);
-            places[if *place % 2 == 0 {
+            places[if place.is_multiple_of(2) {
                 places.len() - 1 - near
             } else {
                 near % places.len()
