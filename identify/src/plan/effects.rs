@@ -253,8 +253,12 @@ fn grouped(
         };
         match groups.get_mut(&key) {
             Some(present) => {
-                let harder = |entry: &EffectDetectability| entry.detectable_searched.unwrap_or(f64::INFINITY);
-                if harder(&entry) > harder(present) {
+                // Where equally much of several is needed, or none would do, the one of which least survives, and not the one that rounding or order picks.
+                let needed = |entry: &EffectDetectability| {
+                    to_nine_digits(entry.detectable_searched.unwrap_or(f64::INFINITY))
+                };
+                let (new, old) = (needed(&entry), needed(present));
+                if new > old || new == old && entry.surviving_share < present.surviving_share {
                     *present = EffectDetectability { id: key, ..entry };
                 }
             }
