@@ -1,6 +1,7 @@
 //! Points pushed through random chains.
 
 use abbe_model::axis::AxisKind;
+use abbe_model::component::ErrorKind;
 use abbe_model::frames::{Point, Rotation};
 use nalgebra::{Isometry3, Matrix3, Point3, Rotation3, Translation3, Unit, UnitQuaternion, Vector3};
 use proptest::prelude::*;
@@ -96,6 +97,7 @@ proptest! {
         for axis in 0..drawn.machine.axes.len() {
             let mut moved = Drawn { errors: nothing.clone(), ..drawn.clone() };
             for (slot, share) in drawn.machine.slots_along(axis) {
+                prop_assert_eq!(drawn.machine.error_name(slot).kind, ErrorKind::Motion);
                 moved.errors[slot] = late * share;
             }
             let mut elsewhere = Drawn { errors: nothing.clone(), ..drawn.clone() };
