@@ -86,7 +86,17 @@ proptest! {
 
     #[test]
     fn limits_hold_on_either_side(value in -3.0..3.0_f64, limit in -3.0..3.0_f64) {
-        prop_assert!((Nominal::at_most(value, limit) - value.min(limit)).abs() < 1e-15);
-        prop_assert!((Nominal::at_least(value, limit) - value.max(limit)).abs() < 1e-15);
+        prop_assert_eq!(Nominal::at_most(value, limit), value.min(limit));
+        prop_assert_eq!(Nominal::at_least(value, limit), value.max(limit));
+        // Of symbols, which have no least and greatest, they are made of steps.
+        let arena = Arena::new();
+        let variable: Symbol<'_, ()> = arena.variable(());
+        let outputs = [variable.at_most(limit), variable.at_least(limit)].map(|symbol| symbol.operand());
+        let mut found = [f64::NAN; 2];
+        let column = [value];
+        let replay = Replay::new(&arena, &outputs, |()| true);
+        replay.run(1, |()| value, |()| &column, |output, _, block| found[output] = block[0]);
+        prop_assert!((found[0] - value.min(limit)).abs() < 1e-14, "{}", found[0]);
+        prop_assert!((found[1] - value.max(limit)).abs() < 1e-14, "{}", found[1]);
     }
 }
