@@ -233,6 +233,9 @@ impl Directions {
 
     /// The step to the fit of all readings but a fold's; `None` where they hardly see a direction any more.
     fn step_without(&self, fold: &Triangle) -> Result<Option<Vec<f64>>, IdentifyError> {
+        if !self.spread.is_all_finite() {
+            return Ok(None);
+        }
         let rows = fold.rows();
         let unknowns = fold.columns();
         if rows.nrows() == 0 || self.spread.ncols() == 0 {
@@ -242,9 +245,6 @@ impl Directions {
         let t = rows.subcols(0, unknowns) * &self.spread;
         let asked = &self.left - t.transpose() * rows.subcols(unknowns, 1);
         let leverage = &t * t.transpose();
-        if !leverage.is_all_finite() {
-            return Ok(None);
-        }
         let eigen = leverage
             .self_adjoint_eigen(faer::Side::Lower)
             .map_err(|_| IdentifyError::Decomposition)?;
@@ -319,8 +319,7 @@ mod tests {
             |i, k| if i == k { 1.0 } else { 0.1 * (i * k) as f64 },
         );
         let basis = basis.qr().compute_thin_Q();
-        let mut folds: Vec<Triangle> = (0..5).map(|_| drawn(9, unknowns, &mut random)).collect();
-        // The fit has ended: what is left to do lies outside the directions.
+        let folds: Vec<Triangle> = (0..5).map(|_| drawn(9, unknowns, &mut random)).collect();
         let merged = |folds: &[Triangle], but: usize| {
             let mut whole = Triangle::new(unknowns);
             let others = folds.iter().enumerate().filter(|(fold, _)| *fold != but);
@@ -329,13 +328,16 @@ mod tests {
         };
         let end = Directions::of(&merged(&folds, usize::MAX), &basis).unwrap();
         let step: Vec<f64> = (&end.spread * &end.left).col(0).iter().copied().collect();
-        folds = folds.iter().map(|fold| fold.after(&step)).collect();
-        let all = Directions::of(&merged(&folds, usize::MAX), &basis).unwrap();
-        for (number, fold) in folds.iter().enumerate() {
-            let short = all.step_without(fold).unwrap().unwrap();
-            let anew = step_without(&merged(&folds, number), &step, &basis).unwrap();
-            for (short, anew) in short.iter().zip(&anew) {
-                assert!((short - anew).abs() < 1e-12, "{short} {anew}");
+        let moved: Vec<Triangle> = folds.iter().map(|fold| fold.after(&step)).collect();
+        // From the end of the fit, where nothing is left to do, and from before it, where much is.
+        for (folds, beta) in [(moved, step), (folds, vec![0.0; unknowns])] {
+            let all = Directions::of(&merged(&folds, usize::MAX), &basis).unwrap();
+            for (number, fold) in folds.iter().enumerate() {
+                let short = all.step_without(fold).unwrap().unwrap();
+                let anew = step_without(&merged(&folds, number), &beta, &basis).unwrap();
+                for (short, anew) in short.iter().zip(&anew) {
+                    assert!((short - anew).abs() < 1e-12, "{short} {anew}");
+                }
             }
         }
     }
