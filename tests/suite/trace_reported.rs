@@ -117,3 +117,50 @@ fn the_uncertainty_of_a_declared_wave_covers_what_looks_like_the_found_effect() 
         "{phase} ± {u}"
     );
 }
+
+/// The same with nothing declared: both waves are found, and what looks like the one moves the other.
+#[test]
+fn the_uncertainty_of_a_found_wave_covers_what_looks_like_another_found_effect() {
+    let truth = vec![
+        of_c("EZC", Shape::Harmonic { order: 2.0 }),
+        of_c("EAC", Shape::Harmonic { order: 3.0 }),
+    ];
+    let values = [
+        "EZC~C:h2.amplitude=1.5um",
+        "EAC~C:h3.amplitude=4arcsec",
+        "EAC~C:h3.phase=40deg",
+    ];
+    let session = measured(truth, &values, 0);
+    let options = TraceOptions {
+        only: ["EZC~C:h", "EAC~C:h3"].map(String::from).to_vec(),
+        ..TraceOptions::default()
+    };
+    let result = trace(&session, &options, &|_| true).unwrap().result;
+    let named: Vec<(&str, Option<f64>)> = result
+        .effects
+        .iter()
+        .map(|effect| (effect.name.component.as_str(), effect.name.order))
+        .collect();
+    assert_eq!(named, [("EZC", Some(2.0)), ("EZC", Some(4.0))]);
+    let fourth = &result.effects[1];
+    assert!(
+        fourth
+            .aliases
+            .iter()
+            .any(|name| name.component == "EAC" && name.order == Some(3.0))
+    );
+    for parameters in [&result.after.parameters, &result.effects[0].parameters] {
+        let found = |id: &str| {
+            let parameter = parameters.iter().find(|parameter| parameter.id == id).unwrap();
+            (parameter.value, parameter.u)
+        };
+        let (amplitude, u) = found("EZC~C:h2.amplitude");
+        assert!((amplitude - 1.5).abs() > 0.5, "{amplitude}");
+        assert!((amplitude - 1.5).abs() < 2.0 * u && u < 2.0, "{amplitude} ± {u}");
+        let (phase, u) = found("EZC~C:h2.phase");
+        assert!(
+            phase.abs() > 5.0 && phase.abs() < 2.0 * u && u < 50.0,
+            "{phase} ± {u}"
+        );
+    }
+}

@@ -24,7 +24,7 @@ pub(super) struct Alias {
     pub candidate: usize,
     /// Cosine of the angle between the named effect's signature and what the alias can do, beside the model.
     pub cosine: f64,
-    /// Coefficients of the model's first base columns if the alias stands in the effect's place.
+    /// Coefficients of the model's base columns if the alias stands in the effect's place.
     pub model_coefficients: Vec<f64>,
 }
 
@@ -128,7 +128,7 @@ pub(super) fn aliases(
             (cosine >= LEAST_COSINE).then(|| Alias {
                 candidate,
                 cosine,
-                model_coefficients: model.joined(candidate).0[..search.rank].to_vec(),
+                model_coefficients: model.joined(candidate).0,
             })
         })
         .collect();

@@ -3,8 +3,8 @@
 use abbe_model::axis::AxisKind;
 use abbe_model::effect::{Driver, DriverSample, Effect, Shape};
 
-use super::{Findings, HeldOut};
-use crate::fit::{self, Fit};
+use super::{Findings, HeldOut, Moves, moved_by_aliases};
+use crate::fit::Fit;
 use crate::parameters::Role;
 use crate::problem::Problem;
 use crate::results::{CurvePoint, EffectName, EffectResult, ParameterResult, ShapeNumber};
@@ -21,19 +21,31 @@ pub fn effect_name(effect: &Effect) -> EffectName {
     }
 }
 
-/// The `k`-th found effect: `rms_gain_um` is what it takes off the residual, `look_alikes` what the readings cannot tell from it.
+/// A found effect and what is known of it.
+pub(super) struct Found<'f> {
+    /// Its place among the found effects.
+    pub number: usize,
+    /// All parameters after the search, what aliases would move covered.
+    pub parameters: &'f [ParameterResult],
+    /// How far the unknowns would move by the aliases of each found effect.
+    pub moves: &'f Moves,
+    /// What it takes off the residual, µm.
+    pub rms_gain_um: f64,
+    /// What the readings cannot tell from it.
+    pub look_alikes: &'f [Effect],
+}
+
+/// A found effect as it is reported.
 pub(super) fn result(
     findings: &Findings<'_, '_>,
     families: &[Family],
     held_out: &HeldOut<'_>,
-    k: usize,
-    rms_gain_um: f64,
-    look_alikes: &[Effect],
+    found: &Found<'_>,
 ) -> EffectResult {
     let (after, search) = (findings.after, findings.search);
-    let taken = search.taken()[k];
+    let taken = search.taken()[found.number];
     let candidate = &search.candidates[taken.candidate];
-    let number = k + findings.before.parameters.effects.len();
+    let number = found.number + findings.before.parameters.effects.len();
     let (curve_at_unit, curve_unit) = curve_units(after, &candidate.effect);
     EffectResult {
         name: effect_name(&candidate.effect),
@@ -42,48 +54,40 @@ pub(super) fn result(
             .map(|family| family.name.clone())
             .unwrap_or_default(),
         numbers: numbers_of(after, &candidate.effect),
-        parameters: parameters_of(after, findings.after_fit, number),
-        curve: curve_of(after, findings.after_fit, number),
+        parameters: parameters_of(after, found.parameters, number),
+        curve: curve_of(after, findings.after_fit, number, found.moves),
         curve_at_unit,
         curve_unit,
         p_value: taken.p_value,
-        rms_gain_um,
-        heldout_rms_um: held_out.um(k + 1),
-        aliases: look_alikes.iter().map(effect_name).collect(),
+        rms_gain_um: found.rms_gain_um,
+        heldout_rms_um: held_out.um(found.number + 1),
+        aliases: found.look_alikes.iter().map(effect_name).collect(),
         separated_by: None,
         separation: None,
     }
 }
 
-/// The parameters of the `number`-th effect.
-fn parameters_of(problem: &Problem<'_>, fit: &Fit, number: usize) -> Vec<ParameterResult> {
+/// Of all parameters those of the `number`-th effect.
+fn parameters_of(
+    problem: &Problem<'_>,
+    parameters: &[ParameterResult],
+    number: usize,
+) -> Vec<ParameterResult> {
     let Some(id) = problem.parameters.effect_ids.get(number) else {
         return Vec::new();
     };
-    let has = problem
-        .parameters
-        .list
-        .iter()
-        .any(|p| matches!(p.role, Role::Coefficient { effect, .. } if effect == number));
-    if !has {
-        return Vec::new();
-    }
-    fit::parameters(problem, fit)
-        .into_iter()
-        .filter(|p| {
-            p.id == *id
-                || p.id
-                    .strip_prefix(id.as_str())
-                    .is_some_and(|rest| rest.starts_with('.'))
-        })
-        .collect()
+    let is_own = |p: &&ParameterResult| {
+        p.id.strip_prefix(id.as_str())
+            .is_some_and(|rest| rest.is_empty() || rest.starts_with('.'))
+    };
+    parameters.iter().filter(is_own).cloned().collect()
 }
 
 /// Points at which a curve is reported.
 const CURVE_POINTS: usize = 73;
 
 /// The points of a free curve with their band; empty for other shapes.
-fn curve_of(problem: &Problem<'_>, fit: &Fit, number: usize) -> Vec<CurvePoint> {
+fn curve_of(problem: &Problem<'_>, fit: &Fit, number: usize, moves: &Moves) -> Vec<CurvePoint> {
     let Some(effect) = problem.parameters.effects.get(number) else {
         return Vec::new();
     };
@@ -113,17 +117,20 @@ fn curve_of(problem: &Problem<'_>, fit: &Fit, number: usize) -> Vec<CurvePoint> 
                 },
                 &mut basis,
             );
-            let value: f64 = basis.iter().zip(&places).map(|(b, j)| b * fit.beta[*j]).sum();
+            let value_at =
+                |beta: &[f64]| -> f64 { basis.iter().zip(&places).map(|(b, j)| b * beta[*j]).sum() };
+            let value = value_at(&fit.beta);
             let variance: f64 = basis
                 .iter()
                 .zip(&places)
                 .flat_map(|(b, j)| basis.iter().zip(&places).map(move |(c, l)| (b, j, c, l)))
                 .map(|(b, j, c, l)| b * c * fit.covariance[(*j, *l)])
                 .sum();
+            let moved = moved_by_aliases(moves, &[value], |beta| vec![value_at(beta)], &fit.beta);
             CurvePoint {
                 at: q * at_outside,
                 value: value * outside,
-                u: variance.max(0.0).sqrt() * fit.birge_ratio * outside,
+                u: (variance.max(0.0).sqrt() * fit.birge_ratio).hypot(moved[0]) * outside,
             }
         })
         .collect()
@@ -185,7 +192,7 @@ mod tests {
     use crate::fit::{fit, prepare};
 
     #[test]
-    fn the_band_of_a_curve_is_enlarged_as_every_uncertainty_is() {
+    fn the_band_of_a_curve_is_enlarged_as_every_uncertainty_is_and_covers_what_aliases_move() {
         let file =
             Path::new(env!("CARGO_MANIFEST_DIR")).join("../sessions/hermle-c600u/measured/session.toml");
         let session = read::session(&file, &ReadOptions::default()).unwrap();
@@ -207,14 +214,25 @@ mod tests {
         let mut fit = fit(&problem, None).unwrap();
         let number = problem.parameters.effects.len() - 1;
         fit.birge_ratio = 1.0;
-        let by_noise = curve_of(&problem, &fit, number);
+        let by_noise = curve_of(&problem, &fit, number, &[]);
         fit.birge_ratio = 1.5;
-        let enlarged = curve_of(&problem, &fit, number);
+        let enlarged = curve_of(&problem, &fit, number, &[]);
         assert_eq!(by_noise.len(), CURVE_POINTS);
         for (by_noise, enlarged) in by_noise.iter().zip(&enlarged) {
             assert!(by_noise.u > 0.0);
             assert!((enlarged.u / by_noise.u - 1.5).abs() < 1e-12);
             assert_eq!(enlarged.value, by_noise.value);
+        }
+
+        // Splines share out one: where an alias moves all coefficients by 1 µm, it moves the curve by that.
+        let of_curve = |j: usize| matches!(problem.parameters.list[j].role, Role::Coefficient { effect, .. } if effect == number);
+        let alias: Vec<f64> = (0..fit.beta.len())
+            .map(|j| if of_curve(j) { 1e-3 } else { 0.0 })
+            .collect();
+        let covered = curve_of(&problem, &fit, number, &[vec![alias]]);
+        for (enlarged, covered) in enlarged.iter().zip(&covered) {
+            assert!((covered.u - enlarged.u.hypot(1.0)).abs() < 1e-9);
+            assert_eq!(covered.value, enlarged.value);
         }
     }
 }

@@ -57,10 +57,9 @@ pub(super) fn report(findings: &Findings<'_, '_>) -> Result<Reported, IdentifyEr
     let held_out = HeldOut::of(search, before_result.heldout_rms_um);
     let mut after_result = model_result(after, after_fit, held_out.last_um() * 1e-3);
 
-    let families = library::families()?;
-    let mut effects = Vec::new();
     let mut look_alikes: Vec<Vec<Effect>> = Vec::new();
     let mut rivals = Vec::new();
+    let mut gains = Vec::new();
     let mut moves = Vec::new();
     let variance = residual_variance(findings);
     for (k, taken) in search.taken().iter().enumerate() {
@@ -70,20 +69,24 @@ pub(super) fn report(findings: &Findings<'_, '_>) -> Result<Reported, IdentifyEr
         let named = model.joined(taken.candidate).0;
         let effect_of = |alias: &Alias| search.candidates[alias.candidate].effect.clone();
         look_alikes.push(aliases.iter().map(effect_of).collect());
-        let in_its_place = |alias: &Alias| moves_by(alias, &named, findings.start);
+        let in_its_place = |alias: &Alias| moves_by(findings, k, &alias.model_coefficients, &named);
         moves.push(aliases.iter().map(in_its_place).collect::<Vec<_>>());
-        let gain = model.gain(taken.candidate).gain;
-        let rms_gain_um = (gain / held_out.rows).sqrt() * before.noise.sigma_mm * 1e3;
-        effects.push(effect::result(
-            findings,
-            &families,
-            &held_out,
-            k,
-            rms_gain_um,
-            &look_alikes[k],
-        ));
+        gains.push(model.gain(taken.candidate).gain);
     }
     cover(&mut after_result.parameters, after, after_fit, &moves);
+    let families = library::families()?;
+    let effects: Vec<EffectResult> = (0..moves.len())
+        .map(|k| {
+            let reported = effect::Found {
+                number: k,
+                parameters: &after_result.parameters,
+                moves: &moves,
+                rms_gain_um: (gains[k] / held_out.rows).sqrt() * before.noise.sigma_mm * 1e3,
+                look_alikes: &look_alikes[k],
+            };
+            effect::result(findings, &families, &held_out, &reported)
+        })
+        .collect();
     let (verdict, remainder) = verdict(findings, &effects);
     let moved = moved(&before_result.parameters, &after_result.parameters);
     let result = TraceResult {
@@ -171,25 +174,24 @@ fn model_result(problem: &Problem<'_>, fit: &Fit, held_out_mm: f64) -> ModelResu
     }
 }
 
-/// Lets uncertainties cover what aliases would move: for each effect the largest move of a parameter that one of its aliases makes in its place. `moves` are
-/// those of the declared unknowns, by effect and alias.
-fn cover(parameters: &mut [ParameterResult], problem: &Problem<'_>, fit: &Fit, moves: &[Vec<Vec<f64>>]) {
-    let quantities = fit::quantities(problem, &fit.rank);
-    let values = |beta: &[f64]| {
-        let mut values = Vec::with_capacity(parameters.len());
-        fit::values_at(problem, fit, &quantities, beta, |value| values.push(value));
-        values
-    };
-    let present = values(&fit.beta);
+/// How far the unknowns after the search would move, inside units: by found effect, by alias in its place, by unknown.
+type Moves = [Vec<Vec<f64>>];
+
+/// By how much some values would move, where they are such functions of the unknowns: for each effect the largest move that one of its aliases makes,
+/// as the root of the sum of squares.
+fn moved_by_aliases(
+    moves: &Moves,
+    present: &[f64],
+    values: impl Fn(&[f64]) -> Vec<f64>,
+    beta: &[f64],
+) -> Vec<f64> {
     let mut squares = vec![0.0; present.len()];
     for of_effect in moves {
         let mut largest = vec![0.0_f64; present.len()];
         for moves in of_effect {
-            // What was declared comes first among the unknowns.
-            let mut beta = fit.beta.clone();
-            beta.iter_mut().zip(moves).for_each(|(value, by)| *value += by);
-            for (k, moved) in values(&beta).into_iter().enumerate() {
-                largest[k] = largest[k].max((moved - present[k]).abs());
+            let moved: Vec<f64> = beta.iter().zip(moves).map(|(value, by)| value + by).collect();
+            for (most, (moved, present)) in largest.iter_mut().zip(values(&moved).iter().zip(present)) {
+                *most = most.max((moved - present).abs());
             }
         }
         squares
@@ -197,20 +199,52 @@ fn cover(parameters: &mut [ParameterResult], problem: &Problem<'_>, fit: &Fit, m
             .zip(largest)
             .for_each(|(sum, most)| *sum += most * most);
     }
-    for (parameter, square) in parameters.iter_mut().zip(squares) {
-        parameter.u = parameter.u.hypot(square.sqrt());
+    squares.into_iter().map(f64::sqrt).collect()
+}
+
+/// Lets uncertainties cover what aliases would move.
+fn cover(parameters: &mut [ParameterResult], problem: &Problem<'_>, fit: &Fit, moves: &Moves) {
+    let quantities = fit::quantities(problem, &fit.rank);
+    let values = |beta: &[f64]| {
+        let mut values = Vec::with_capacity(parameters.len());
+        fit::values_at(problem, fit, &quantities, beta, |value| values.push(value));
+        values
+    };
+    let moved = moved_by_aliases(moves, &values(&fit.beta), values, &fit.beta);
+    for (parameter, moved) in parameters.iter_mut().zip(moved) {
+        parameter.u = parameter.u.hypot(moved);
         if parameter.id.ends_with(".phase") {
             parameter.u = parameter.u.min(fit::any_phase_deg());
         }
     }
 }
 
-/// How far the declared unknowns move if an alias stands in an effect's place, inside units; `named` are the model's coefficients with that effect.
-fn moves_by(alias: &Alias, named: &[f64], start: &Start) -> Vec<f64> {
-    let by = |j: usize, k: usize| start.to_unknowns[(j, k)] * (alias.model_coefficients[k] - named[k]);
-    (0..start.to_unknowns.nrows())
-        .map(|j| (0..start.to_unknowns.ncols()).map(|k| by(j, k)).sum())
-        .collect()
+/// How far the unknowns move if an alias stands in the place of the `k`-th effect, inside units: `in_place` and `named` are the coefficients of the model
+/// without that effect beside the alias and beside the effect. Its own do not move: the alias has none of them.
+fn moves_by(findings: &Findings<'_, '_>, k: usize, in_place: &[f64], named: &[f64]) -> Vec<f64> {
+    let (search, to_unknowns) = (findings.search, &findings.start.to_unknowns);
+    let by: Vec<f64> = in_place.iter().zip(named).map(|(a, b)| a - b).collect();
+    let (of_declared, of_found) = by.split_at(search.rank);
+    // What was declared comes first among the unknowns, the found effects after it in their order.
+    let mut moves: Vec<f64> = (0..to_unknowns.nrows())
+        .map(|j| {
+            of_declared
+                .iter()
+                .enumerate()
+                .map(|(k, by)| to_unknowns[(j, k)] * by)
+                .sum()
+        })
+        .collect();
+    let mut of_found = of_found.iter();
+    for (l, taken) in search.taken().iter().enumerate() {
+        // Base columns are unit-length copies of the candidate's own.
+        for norm in search.norms(taken.candidate) {
+            let by = if l == k { None } else { of_found.next() };
+            moves.push(by.map_or(0.0, |by| by / norm.max(f64::MIN_POSITIVE)));
+        }
+    }
+    debug_assert_eq!(moves.len(), findings.after_fit.beta.len());
+    moves
 }
 
 fn verdict(findings: &Findings<'_, '_>, effects: &[EffectResult]) -> (String, Remainder) {
