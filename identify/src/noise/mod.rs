@@ -8,10 +8,10 @@
 mod memory;
 mod waves;
 
-use std::collections::BTreeMap;
-
 use abbe_model::session::Test;
+use statrs::distribution::{ChiSquared, ContinuousCDF};
 
+use crate::problem::Problem;
 pub use memory::Memory;
 
 /// The noise of one scalar reading.
@@ -98,21 +98,26 @@ impl PureError {
             if let Some(readings) = &test.readings {
                 let coordinates = readings.coordinates;
                 let level = without_trends(readings, residual, |row| kept(number, row));
-                let mut groups: BTreeMap<Vec<i64>, Vec<usize>> = BTreeMap::new();
                 let directions = directions(readings);
-                for row in (0..readings.rows()).filter(|row| kept(number, *row)) {
-                    let mut key: Vec<i64> = readings
-                        .positions
-                        .iter()
-                        // Positions agree to 0.1 µm or 10⁻⁶ rad.
-                        .map(|column| (column[row] * 1e4).round() as i64)
-                        .collect();
-                    if !readings.run.is_empty() {
-                        key.push(directions[row]);
-                    }
-                    groups.entry(key).or_default().push(row);
+                let columns = readings.positions.len() + 1;
+                let mut keys = Vec::with_capacity(readings.rows() * columns);
+                for row in 0..readings.rows() {
+                    // Positions agree to 0.1 µm or 10⁻⁴ rad.
+                    let positions = readings.positions.iter();
+                    keys.extend(positions.map(|column| (column[row] * 1e4).round() as i64));
+                    keys.push(if readings.run.is_empty() {
+                        0
+                    } else {
+                        directions[row]
+                    });
                 }
-                for rows in groups.values().filter(|rows| rows.len() > 1) {
+                let key = |row: usize| &keys[row * columns..(row + 1) * columns];
+                let mut order: Vec<usize> = (0..readings.rows()).filter(|row| kept(number, *row)).collect();
+                order.sort_by(|a, b| key(*a).cmp(key(*b)));
+                for rows in order
+                    .chunk_by(|a, b| key(*a) == key(*b))
+                    .filter(|rows| rows.len() > 1)
+                {
                     let count = rows.len() as f64;
                     let rescale = (count / (count - 1.0)).sqrt();
                     for coordinate in 0..coordinates {
@@ -142,6 +147,35 @@ impl PureError {
             });
         (self.freedom >= 10).then(|| (sum / count as f64).sqrt())
     }
+}
+
+/// Beyond this factor a stated noise and that of repeats disagree in what matters.
+const DISAGREEMENT: f64 = 2.0;
+/// Probability of a false word on that.
+const DISAGREEMENT_P: f64 = 0.001;
+
+/// A warning where repeated readings scatter by more than twice or less than half of what the session states, and not by chance; `residuals` are those of
+/// any model, mm, test by test.
+pub fn stated_against_repeats(problem: &Problem<'_>, residuals: &[Vec<f64>]) -> Option<String> {
+    let stated_mm = problem.session.noise_mm.filter(|sigma| *sigma > 0.0)?;
+    let pure = PureError::of(&problem.tests, residuals, |test, row| {
+        !problem.rejected[test][row]
+    });
+    let sigma_mm = pure.sigma_mm()?;
+    let resolution_mm = problem.session.resolution_mm.unwrap_or(0.0) / 12.0_f64.sqrt();
+    let ratio = sigma_mm.max(resolution_mm) / stated_mm;
+    let freedom = pure.freedom as f64;
+    let below = ChiSquared::new(freedom).ok()?.cdf(freedom * ratio * ratio);
+    let by_chance = below.min(1.0 - below) > DISAGREEMENT_P / 2.0;
+    (!by_chance && !(1.0 / DISAGREEMENT..=DISAGREEMENT).contains(&ratio)).then(|| {
+        format!(
+            "the session states a noise of {} µm, and repeated readings scatter by {:.3} µm ({} degrees of freedom): the uncertainties of a fit follow from \
+             what is stated, those of a trace from the repeats; correct `noise_um`, or leave it out",
+            stated_mm * 1e3,
+            sigma_mm * 1e3,
+            pure.freedom
+        )
+    })
 }
 
 /// The direction of travel of every axis as one number a row.

@@ -49,6 +49,54 @@ fn a_noise_that_is_no_noise() {
     }
 }
 
+/// What repeats scatter by, 0.3 µm alternately up and down by run and place, is held against what the session says.
+#[test]
+fn a_noise_that_is_not_that_of_the_repeats() {
+    let session = |noise| Case {
+        noise,
+        ..Case::default()
+    };
+    // Two runs that differ by ±0.3·√2 µm scatter by 0.3 µm.
+    let data = |case: &Case| {
+        let mut state = 7_u64;
+        let mut data = String::from("run,c_deg,length_mm\n");
+        for run in 1..=2 {
+            for angle in &case.angles {
+                // Knuth's linear congruential generator; its upper bit is as good as a coin.
+                state = state
+                    .wrapping_mul(6_364_136_223_846_793_005)
+                    .wrapping_add(1_442_695_040_888_963_407);
+                let sign = if state >> 63 == 0 { 1.0 } else { -1.0 };
+                data += &format!("{run},{angle:?},{:?}\n", case.length_mm(*angle) + 0.3e-3 * sign);
+            }
+        }
+        data
+    };
+    for (noise, told) in [
+        ("noise_um = 3", true),
+        ("noise_um = 0.03", true),
+        ("noise_um = 0.3", false),
+        ("", false),
+    ] {
+        let case = session(noise);
+        let result = fitted(&case.session(), &data(&case));
+        let warnings = result["warnings"].as_array().unwrap();
+        let is_it = |warning: &&serde_json::Value| {
+            let warning = warning.as_str().unwrap();
+            warning.starts_with("the session states a noise of")
+                && warning.contains("repeated readings scatter by 0.")
+        };
+        assert_eq!(warnings.iter().any(|w| is_it(&w)), told, "{noise}: {warnings:?}");
+        assert_eq!(
+            result["told"]
+                .as_str()
+                .unwrap()
+                .contains("the session states a noise of"),
+            told
+        );
+    }
+}
+
 /// The least and the greatest that are taken are computed with as well as any other.
 #[test]
 fn noises_at_their_limits() {

@@ -12,6 +12,7 @@ use super::start::Start;
 use crate::error::IdentifyError;
 use crate::fit::{self, Fit};
 use crate::heldout::rms_mm;
+use crate::noise;
 use crate::problem::Problem;
 use crate::results::{EffectResult, ModelResult, Moved, ParameterResult, Remainder, TraceResult};
 pub(super) use effect::effect_name;
@@ -88,6 +89,8 @@ pub(super) fn report(findings: &Findings<'_, '_>) -> Result<Reported, IdentifyEr
         })
         .collect();
     let (verdict, remainder) = verdict(findings, &effects);
+    let mut warnings = before.session.warnings.clone();
+    warnings.extend(noise::stated_against_repeats(before, &before_fit.residuals));
     let moved = moved(&before_result.parameters, &after_result.parameters);
     let result = TraceResult {
         verdict,
@@ -110,7 +113,7 @@ pub(super) fn report(findings: &Findings<'_, '_>) -> Result<Reported, IdentifyEr
         candidates_seen: findings.candidates_seen,
         unobservable: fit::unobservable(after, &after_fit.rank),
         rejected: fit::rejected(after, after_fit),
-        warnings: before.session.warnings.clone(),
+        warnings,
     };
     Ok(Reported {
         result,
