@@ -491,3 +491,58 @@ pub fn rejected(problem: &Problem<'_>, fit: &Fit) -> Vec<Rejected> {
     }
     list
 }
+
+#[cfg(test)]
+mod tests {
+    use std::path::Path;
+
+    use abbe_model::effect::{Component, Driver, Effect, Shape};
+    use abbe_model::session::read::{self, ReadOptions};
+
+    use super::*;
+
+    /// `A cos(nC + φ)` has the coefficients `A cos φ` and `−A sin φ`.
+    #[test]
+    fn a_wave_elsewhere_has_the_amplitude_and_the_phase_that_its_coefficients_say() {
+        let file =
+            Path::new(env!("CARGO_MANIFEST_DIR")).join("../sessions/hermle-c600u/measured/session.toml");
+        let session = read::session(&file, &ReadOptions::default()).unwrap();
+        let (mut problem, _) = prepare(&session, 1).unwrap();
+        problem
+            .add_effect(&Effect {
+                component: Component::parse("EZC").unwrap(),
+                driver: Driver::parse("C"),
+                shape: Shape::Harmonic { order: 3.0 },
+                tests: Vec::new(),
+            })
+            .unwrap();
+        let mut fit = fit(&problem, None).unwrap();
+        let quantities = quantities(&problem, &fit.rank);
+        let (place, j) = quantities
+            .iter()
+            .enumerate()
+            .find_map(|(place, quantity)| match quantity {
+                Quantity::Harmonic(j) => Some((place, *j)),
+                Quantity::Unknown(_) => None,
+            })
+            .unwrap();
+        let coefficients = |amplitude_um: f64, phase_deg: f64| {
+            let (sin, cos) = phase_deg.to_radians().sin_cos();
+            [1e-3 * amplitude_um * cos, -1e-3 * amplitude_um * sin]
+        };
+        for (present_deg, other_deg) in [(170.0, 200.0), (-20.0, 40.0), (80.0, -60.0), (0.0, 90.0)] {
+            fit.beta[j..j + 2].copy_from_slice(&coefficients(2.0, present_deg));
+            let mut other = fit.beta.clone();
+            other[j..j + 2].copy_from_slice(&coefficients(3.0, other_deg));
+            let mut values = Vec::new();
+            values_at(&problem, &fit, &quantities, &other, |value| values.push(value));
+            // Every wave before this one says two numbers; there is none.
+            assert!((values[place] - 3.0).abs() < 1e-12, "{}", values[place]);
+            assert!(
+                (values[place + 1] - other_deg).abs() < 1e-9,
+                "{} and {other_deg}",
+                values[place + 1]
+            );
+        }
+    }
+}

@@ -278,3 +278,66 @@ fn pilot<F: Function>(function: &F, draws: &Draws<'_>) -> Vec<Count> {
         })
         .collect()
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A triangle over 0 to 1 with its top at `m`: of the share `1 − p` that the shortest interval leaves out, `m` lies below it, so that it goes from
+    /// `m √(1 − p)` to `1 − (1 − m) √(1 − p)`. The symmetric one goes from `√(m (1 − p) / 2)` to `1 − √((1 − m) (1 − p) / 2)`.
+    #[test]
+    fn a_triangle_has_the_intervals_of_its_closed_form() {
+        const DRAWS: usize = 200_000;
+        let (m, p) = (0.25_f64, 0.95_f64);
+        let mut count = Count::over(0.5, 0.6);
+        for k in 0..DRAWS {
+            let share = (k as f64 + 0.5) / DRAWS as f64;
+            count.take(if share < m {
+                (share * m).sqrt()
+            } else {
+                1.0 - ((1.0 - share) * (1.0 - m)).sqrt()
+            });
+        }
+        let found = count.distribution(p);
+        let near = |found: f64, wanted: f64, within: f64| {
+            assert!((found - wanted).abs() < within, "{found} instead of {wanted}");
+        };
+        near(found.mean, (1.0 + m) / 3.0, 1e-6);
+        near(found.u, ((1.0 - m + m * m) / 18.0).sqrt(), 1e-5);
+        near(found.symmetric[0], (m * (1.0 - p) / 2.0).sqrt(), 1e-3);
+        near(
+            found.symmetric[1],
+            1.0 - ((1.0 - m) * (1.0 - p) / 2.0).sqrt(),
+            1e-3,
+        );
+        // Where the interval is shortest its length hardly changes with its place.
+        let root = (1.0 - p).sqrt();
+        near(found.shortest[0], m * root, 0.01);
+        near(found.shortest[1], 1.0 - (1.0 - m) * root, 0.01);
+        near(found.shortest[1] - found.shortest[0], 1.0 - root, 1e-3);
+        assert_eq!(found.counts.iter().sum::<u64>(), DRAWS as u64);
+        near(found.from, -0.1, 1e-12);
+        near(found.to, 1.1, 1e-12);
+    }
+
+    #[test]
+    fn what_lies_outside_is_counted_and_what_is_no_number_is_left_out() {
+        let mut count = Count::over(0.0, 1.0);
+        for value in [-3.0, -2.0, 0.5, 2.0, f64::NAN, f64::INFINITY] {
+            count.take(value);
+        }
+        let mut both = Count::over(0.0, 1.0);
+        both.merge(&count);
+        both.merge(&count);
+        let found = both.distribution(0.95);
+        assert_eq!(found.outside, [4, 2, 4]);
+        assert!((found.mean + 2.5 / 4.0).abs() < 1e-12);
+        // Of eight values with their twins: Σ(x − x̄)² / 7.
+        let square: f64 = [-3.0, -2.0, 0.5, 2.0]
+            .iter()
+            .map(|x: &f64| 2.0 * (x + 0.625).powi(2))
+            .sum();
+        assert!((found.u - (square / 7.0).sqrt()).abs() < 1e-12);
+        assert_eq!(found.symmetric, [f64::NEG_INFINITY, f64::INFINITY]);
+    }
+}

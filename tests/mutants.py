@@ -1,0 +1,229 @@
+"""Mutants of `model` and `identify`, many in one build.
+
+cargo-mutants builds the workspace anew for each mutant; that takes longer than the tests. Here its list of mutants is taken, a systematic sample is
+written into a copy of the workspace, each behind a question (`if crate::mutant(17) { changed body } else { body }`), the copy is built once, and each
+mutant is tried by setting ABBE_MUTANT. Tests run in stages, the cheapest first, until one fails. What has been tried before is not tried again.
+
+    git worktree add ../mutants && python tests/mutants.py --package abbe-identify --every 86 --copy ../mutants --out identify.jsonl
+"""
+
+import argparse
+import json
+import os
+import pathlib
+import re
+import signal
+import subprocess
+import sys
+import time
+
+SWITCH = """
+/// Whether the mutant of this number is asked for.
+#[doc(hidden)]
+pub fn mutant(number: usize) -> bool {
+    static ASKED: std::sync::OnceLock<usize> = std::sync::OnceLock::new();
+    *ASKED.get_or_init(|| std::env::var("ABBE_MUTANT").ok().and_then(|text| text.parse().ok()).unwrap_or(0)) == number
+}
+"""
+
+# What asks about the workspace, the compiler's products or the operating system, not about what the two crates compute.
+LEFT_OUT = ("supply_chain", "kill::", "another_build", "report_browser", "repeatability", "codes::")
+PROFILE = ["--profile", "checked"]
+
+
+def offset(text, place):
+    """Of a line and a column, both from one, the place in a text."""
+    start = 0
+    for _ in range(place["line"] - 1):
+        start = text.index("\n", start) + 1
+    return start + place["column"] - 1
+
+
+def body_of(text, function):
+    """Where the block of a function begins and ends."""
+    begin, end = offset(text, function["span"]["start"]), offset(text, function["span"]["end"])
+    name = function["function_name"].split("::")[-1].split("<")[0]
+    head = re.compile(r"\bfn\s+" + re.escape(name) + r"\b").search(text, begin, end)
+    return text.index("{", head.end()), end
+
+
+def changed(text, mutant, begin, end):
+    """The block of a function as the mutant has it."""
+    first, last = offset(text, mutant["span"]["start"]), offset(text, mutant["span"]["end"])
+    return text[begin:first] + mutant["replacement"] + text[last:end]
+
+
+def write(copy, originals, mutants):
+    """All mutants into the copy, those of one function within one another."""
+    for file, text in originals.items():
+        functions = {}
+        for mutant in (m for m in mutants if m["file"] == file):
+            functions.setdefault(body_of(text, mutant["function"]), []).append(mutant)
+        for (begin, end), group in sorted(functions.items(), reverse=True):
+            block = text[begin:end]
+            for mutant in group:
+                number = mutant["number"]
+                block = "{ if crate::mutant(%d) /*<%d*/ %s /*%d>*/ else %s }" % (
+                    number, number, changed(originals[file], mutant, begin, end), number, block)
+            text = text[:begin] + block + text[end:]
+        (copy / file).write_text(text)
+
+
+def at_fault(copy, span, mutants):
+    """The numbers of the mutants that an error of the compiler points into; all of a function where it points between them."""
+    text = (copy / span["file_name"]).read_bytes()
+    place = span["byte_start"]
+    inside = [
+        m["number"] for m in mutants if m["file"] == span["file_name"]
+        and (b := text.find(b"/*<%d*/" % m["number"])) >= 0 and b <= place < text.find(b"/*%d>*/" % m["number"])
+    ]
+    if inside:
+        # Of mutants within one another the innermost text is the one written last.
+        return [max(inside, key=lambda number: text.find(b"/*<%d*/" % number))]
+    before = [(text.rfind(b"/*<%d*/" % m["number"], 0, place + 200), m) for m in mutants if m["file"] == span["file_name"]]
+    function = max(before, key=lambda entry: entry[0])[1]["function"]
+    return [m["number"] for m in mutants if m["file"] == span["file_name"] and m["function"] == function]
+
+
+def spans_of(message):
+    for span in message["spans"]:
+        if span["is_primary"]:
+            yield span
+
+
+def leave_out_what_does_not_build(copy, originals, mutants, package):
+    """Writes the mutants and checks, again and again, until what is left builds; gives it and what was left out."""
+    out = []
+    while True:
+        write(copy, originals, mutants)
+        run = subprocess.run(["cargo", "check", "-p", package, "--message-format=json", *PROFILE], cwd=copy, capture_output=True, text=True)
+        if run.returncode == 0:
+            return mutants, out
+        faults = set()
+        for line in run.stdout.splitlines():
+            message = json.loads(line).get("message")
+            if isinstance(message, dict) and message["level"] == "error":
+                for span in spans_of(message):
+                    if any(m["file"] == span["file_name"] for m in mutants):
+                        faults.update(at_fault(copy, span, mutants))
+        if not faults:
+            sys.exit("the copy does not build for another reason:\n" + run.stderr[-3000:])
+        out += [m for m in mutants if m["number"] in faults]
+        mutants = [m for m in mutants if m["number"] not in faults]
+
+
+# Packages whose tests know of a package.
+TESTED_BY = {"abbe-model": ("model", "codegen", "identify", "."), "abbe-identify": ("identify", ".")}
+
+
+def binaries(copy, package):
+    """The test programs, those of the package first, each with the folder that its tests run in."""
+    run = subprocess.run(["cargo", "test", "--workspace", "--no-run", "--message-format=json", *PROFILE], cwd=copy, stdout=subprocess.PIPE, text=True, check=True)
+    found = []
+    for line in run.stdout.splitlines():
+        message = json.loads(line)
+        if message.get("reason") == "compiler-artifact" and message.get("executable") and message["profile"]["test"]:
+            found.append((message["executable"], str(pathlib.Path(message["manifest_path"]).parent)))
+    folders = [str((copy / folder).resolve()) for folder in TESTED_BY[package]]
+    found = [program for program in found if program[1] in folders]
+    found.sort(key=lambda program: folders.index(program[1]))
+    return found
+
+
+def run_tests(program, folder, names, number, limit):
+    """0 passed, 1 failed, 2 out of time; and what it printed."""
+    environment = dict(os.environ, ABBE_MUTANT=str(number), RUSTC_BOOTSTRAP="1", CI="true", INSTA_UPDATE="no", CARGO_MANIFEST_DIR=folder)
+    command = [program, "-Z", "unstable-options", "--fail-fast", "--report-time", "--exact", *names]
+    process = subprocess.Popen(command, cwd=folder, env=environment, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True, start_new_session=True)
+    try:
+        printed, _ = process.communicate(timeout=limit)
+        return (0 if process.returncode == 0 else 1), printed
+    except subprocess.TimeoutExpired:
+        os.killpg(process.pid, signal.SIGKILL)
+        process.wait()
+        return 2, ""
+
+
+def stages_of(programs, slowest_s):
+    """Of all tests, timed once: stages of growing cost, as (program, folder, names, seconds). Tests slower than a bound are left out."""
+    timed = []
+    for program, folder in programs:
+        listed = subprocess.run([program, "--list"], cwd=folder, capture_output=True, text=True, check=True).stdout
+        names = [line[:-6] for line in listed.splitlines() if line.endswith(": test") and not any(part in line for part in LEFT_OUT)]
+        if not names:
+            continue
+        status, printed = run_tests(program, folder, names, 0, 7200)
+        if status:
+            sys.exit("a test fails without a mutant:\n" + printed[-3000:])
+        seconds = dict(re.findall(r"^test (\S+)(?: - should panic)? \.\.\. ok <([\d.]+)s>", printed, re.M))
+        for name in names:
+            if name in seconds:
+                timed.append((float(seconds[name]), program, folder, name))
+    timed.sort()
+    stages, bound = [], 0.5
+    for seconds, _, _, name in (test for test in timed if test[0] > slowest_s):
+        print(f"left out: {name}, {seconds:.0f} s", flush=True)
+    timed = [test for test in timed if test[0] <= slowest_s]
+    while timed:
+        now = [test for test in timed if test[0] <= bound]
+        timed = [test for test in timed if test[0] > bound]
+        for program, folder in programs:
+            mine = [test for test in now if test[1] == program]
+            if mine:
+                stages.append((program, folder, [test[3] for test in mine], sum(test[0] for test in mine)))
+        bound *= 4
+    return stages
+
+
+def main():
+    ask = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    ask.add_argument("--package", required=True, choices=["abbe-model", "abbe-identify"])
+    ask.add_argument("--every", type=int, required=True, help="one mutant of so many is tried")
+    ask.add_argument("--first", type=int, default=0, help="the first one, from zero")
+    ask.add_argument("--only", help="only mutants whose names this expression finds")
+    ask.add_argument("--slowest", type=float, default=32.0, help="tests that take longer are left out, s")
+    ask.add_argument("--copy", type=pathlib.Path, required=True, help="a copy of the workspace, which is written over")
+    ask.add_argument("--out", type=pathlib.Path, required=True, help="results, a line of JSON each")
+    given = ask.parse_args()
+    copy = given.copy.resolve()
+
+    listed = subprocess.run(["cargo", "mutants", "--list", "--json", "-p", given.package], cwd=copy, capture_output=True, text=True, check=True).stdout
+    sample = [m for m in json.loads(listed) if m["function"]]
+    if given.only:
+        sample = [m for m in sample if re.search(given.only, m["name"])]
+    sample = sample[given.first::given.every]
+    for number, mutant in enumerate(sample, 1):
+        mutant["number"] = number
+    originals = {m["file"]: (copy / m["file"]).read_text() for m in sample}
+    library = copy / given.package.removeprefix("abbe-") / "src/lib.rs"
+    plain = library.read_text()
+    try:
+        if str(library.relative_to(copy)) in originals:
+            sys.exit("a mutant in lib.rs")
+        library.write_text(plain + SWITCH)
+        kept, unviable = leave_out_what_does_not_build(copy, originals, list(sample), given.package)
+        print(f"{len(sample)} mutants, {len(unviable)} do not build", flush=True)
+        stages = stages_of(binaries(copy, given.package), given.slowest)
+        for program, _, names, seconds in stages:
+            print(f"stage of {len(names)} tests, {seconds:.1f} s, in {pathlib.Path(program).name}", flush=True)
+        tried = {json.loads(line)["name"] for line in given.out.read_text().splitlines()} if given.out.exists() else set()
+        with given.out.open("a") as out:
+            for mutant in (m for m in kept if m["name"] not in tried):
+                begin, verdict, by = time.time(), "missed", ""
+                for program, folder, names, seconds in stages:
+                    status, printed = run_tests(program, folder, names, mutant["number"], 60 + 10 * seconds)
+                    if status:
+                        verdict = ["", "caught", "out of time"][status]
+                        by = " ".join(re.findall(r"^test (\S+) \.\.\. FAILED", printed, re.M)[:3])
+                        break
+                result = {"name": mutant["name"], "verdict": verdict, "by": by, "seconds": round(time.time() - begin, 1)}
+                print(json.dumps(result), file=out, flush=True)
+                print(f"{verdict:12} {mutant['name']}", flush=True)
+    finally:
+        library.write_text(plain)
+        for file, text in originals.items():
+            (copy / file).write_text(text)
+
+
+if __name__ == "__main__":
+    main()
