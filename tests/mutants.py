@@ -2,7 +2,8 @@
 
 cargo-mutants builds the workspace anew for each mutant; that takes longer than the tests. Here its list of mutants is taken, a systematic sample is
 written into a copy of the workspace, each behind a question (`if crate::mutant(17) { changed body } else { body }`), the copy is built once, and each
-mutant is tried by setting ABBE_MUTANT. Tests run in stages, the cheapest first, until one fails. What has been tried before is not tried again.
+mutant is tried by setting ABBE_MUTANT. Tests run in stages, the cheapest first and examples of the documentation last, until one fails. Mutants are tried
+in an order that is drawn, so that those tried until it is stopped are a sample too; what has been tried before is not tried again.
 
     git worktree add ../mutants && python tests/mutants.py --package abbe-identify --every 86 --copy ../mutants --out identify.jsonl
 """
@@ -11,6 +12,7 @@ import argparse
 import json
 import os
 import pathlib
+import random
 import re
 import signal
 import subprocess
@@ -144,6 +146,13 @@ def run_tests(program, folder, names, number, limit):
         return 2, ""
 
 
+def examples_fail(copy, package, number):
+    """Whether an example of the documentation does."""
+    command = ["cargo", "test", "--doc", "-p", package, *PROFILE]
+    run = subprocess.run(command, cwd=copy, env=dict(os.environ, ABBE_MUTANT=str(number)), capture_output=True)
+    return run.returncode != 0
+
+
 def stages_of(programs, slowest_s):
     """Of all tests, timed once: stages of growing cost, as (program, folder, names, seconds). Tests slower than a bound are left out."""
     timed = []
@@ -203,6 +212,7 @@ def main():
         library.write_text(plain + SWITCH)
         kept, unviable = leave_out_what_does_not_build(copy, originals, list(sample), given.package)
         print(f"{len(sample)} mutants, {len(unviable)} do not build", flush=True)
+        random.Random(1).shuffle(kept)
         stages = stages_of(binaries(copy, given.package), given.slowest)
         for program, _, names, seconds in stages:
             print(f"stage of {len(names)} tests, {seconds:.1f} s, in {pathlib.Path(program).name}", flush=True)
@@ -216,6 +226,8 @@ def main():
                         verdict = ["", "caught", "out of time"][status]
                         by = " ".join(re.findall(r"^test (\S+) \.\.\. FAILED", printed, re.M)[:3])
                         break
+                if verdict == "missed" and examples_fail(copy, given.package, mutant["number"]):
+                    verdict, by = "caught", "an example of the documentation"
                 result = {"name": mutant["name"], "verdict": verdict, "by": by, "seconds": round(time.time() - begin, 1)}
                 print(json.dumps(result), file=out, flush=True)
                 print(f"{verdict:12} {mutant['name']}", flush=True)

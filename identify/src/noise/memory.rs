@@ -214,3 +214,80 @@ fn with_trends_out(
     }
     (process, shown.map(|value| value / total))
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Autocorrelations by their own recursion: `ρ₁ = a₁/(1 − a₂)`, then `ρ_k = a₁ ρ_{k−1} + a₂ ρ_{k−2}`.
+    fn correlations(a: [f64; 2], count: usize) -> Vec<f64> {
+        let mut correlation = vec![1.0, a[0] / (1.0 - a[1])];
+        for k in 2..count {
+            correlation.push(a[0] * correlation[k - 1] + a[1] * correlation[k - 2]);
+        }
+        correlation
+    }
+
+    #[test]
+    fn coefficients_come_back_from_their_autocovariances_and_no_more_of_them() {
+        for a in [[0.8, 0.0], [1.1, -0.4], [-0.5, 0.3]] {
+            let correlation = correlations(a, MOST + 1);
+            let covariance = std::array::from_fn(|lag| 2.5 * correlation[lag]);
+            let found = autoregression(&covariance, MOST, 1e-6);
+            let wanted = if a[1] == 0.0 { &a[..1] } else { &a[..] };
+            assert_eq!(found.len(), wanted.len());
+            assert!(
+                found.iter().zip(wanted).all(|(f, w)| (f - w).abs() < 1e-12),
+                "{found:?}"
+            );
+            assert_eq!(autoregression(&covariance, 1, 1e-6).len(), 1);
+            assert!(autoregression(&covariance, MOST, 1.0).is_empty());
+        }
+    }
+
+    /// `Cov d = P Γ P` with `P = 1 − Q Qᵀ`, multiplied out; a run that is too long for a trend to matter shows the process itself.
+    #[test]
+    fn what_trends_leave_is_the_projected_covariance() {
+        let a = [1.1, -0.4];
+        let correlation = correlations(a, 60);
+        let mut wanted = [0.0; MOST + 1];
+        let lengths = BTreeMap::from([(30, 90), (47, 47), (LONG + 1, 601)]);
+        for (n, readings) in [(30_usize, 90.0), (47, 47.0)] {
+            let q = trend_terms(&(0..n).map(|t| t as f64).collect::<Vec<_>>());
+            let q = faer::Mat::from_fn(n, TERMS, |t, i| q[t][i]);
+            let p = faer::Mat::<f64>::identity(n, n) - &q * q.transpose();
+            let gamma = faer::Mat::from_fn(n, n, |t, s| correlation[t.abs_diff(s)]);
+            let left = &p * gamma * &p;
+            for (lag, wanted) in wanted.iter_mut().enumerate() {
+                let mean = (lag..n).map(|t| left[(t, t - lag)]).sum::<f64>() / (n - lag) as f64;
+                *wanted += readings * mean;
+            }
+        }
+        let (process, shown) = with_trends_out(&a, &lengths);
+        for lag in 0..=MOST {
+            assert!((process[lag] - correlation[lag]).abs() < 1e-12);
+            let wanted = (wanted[lag] + 601.0 * correlation[lag]) / 738.0;
+            assert!(
+                (shown[lag] - wanted).abs() < 1e-12,
+                "{lag}: {} {wanted}",
+                shown[lag]
+            );
+        }
+    }
+
+    /// The way back: noise of a memory, shown by runs that lost their trends, is found again with its size.
+    #[test]
+    fn memory_and_size_are_found_behind_the_trends_that_were_taken() {
+        for (a, sigma) in [(vec![0.8], 1.5), (vec![0.6, 0.25], 0.7)] {
+            let lengths = BTreeMap::from([(100, 100)]);
+            let (_, shown) = with_trends_out(&a, &lengths);
+            let seen = shown.map(|value| value * sigma * sigma);
+            let (found, variance) = without_trends_taken(&seen, MOST, 0.05, &lengths);
+            assert_eq!(found.len(), a.len(), "{found:?}");
+            for (found, wanted) in found.iter().zip(&a) {
+                assert!((found - wanted).abs() < 0.02, "{found} instead of {wanted}");
+            }
+            assert!((variance / (sigma * sigma) - 1.0).abs() < 0.05, "{variance}");
+        }
+    }
+}

@@ -264,3 +264,58 @@ fn without_trends(
     }
     level
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// With the impulse response ψ of `x_t = Σ a_k x_{t−k} + e_t` the variance of x is that of e times `Σ ψ²`.
+    #[test]
+    fn what_a_reading_adds_is_what_the_impulse_response_says() {
+        for memory in [vec![], vec![0.8], vec![1.1, -0.4], vec![0.5, 0.2, -0.3]] {
+            let mut response = vec![1.0];
+            for t in 1..2000 {
+                let terms = memory.iter().enumerate().filter(|(k, _)| *k < t);
+                response.push(terms.map(|(k, a)| a * response[t - 1 - k]).sum::<f64>());
+            }
+            let power: f64 = response.iter().map(|r| r * r).sum();
+            let noise = Noise {
+                memory,
+                ..Noise::white(2.0, NoiseSource::Stated)
+            };
+            let innovation = noise.innovation_mm();
+            assert!(
+                (innovation - 2.0 / power.sqrt()).abs() < 1e-9,
+                "{noise:?}: {innovation}"
+            );
+        }
+    }
+
+    #[test]
+    fn a_trend_is_a_parabola_and_one_cycle_and_nothing_else() {
+        let times: Vec<f64> = (0..60).map(|t| f64::from(t) * 1.5 + 7.0).collect();
+        let q = trend_terms(&times);
+        let left = |of: &dyn Fn(f64) -> f64| -> f64 {
+            let values: Vec<f64> = times.iter().map(|t| of(*t)).collect();
+            let along: [f64; TERMS] =
+                std::array::from_fn(|i| values.iter().zip(&q).map(|(value, q)| value * q[i]).sum());
+            let rest = values
+                .iter()
+                .zip(&q)
+                .map(|(value, q)| value - along.iter().zip(q).map(|(a, q)| a * q).sum::<f64>());
+            let (left, whole) = (
+                rest.map(|r| r * r).sum::<f64>(),
+                values.iter().map(|v| v * v).sum::<f64>(),
+            );
+            (left / whole).sqrt()
+        };
+        // One cycle from the first reading to the last.
+        let angle = |t: f64| std::f64::consts::TAU * (t - 7.0) / 88.5;
+        assert!(left(&|t| 3.0 - 0.2 * t + 0.01 * t * t) < 1e-12);
+        assert!(left(&|t| (angle(t) + 0.7).cos()) < 1e-12);
+        assert!(left(&|t| (4.0 * angle(t) + 0.7).cos()) > 0.9);
+        // A run of few readings loses no cycle.
+        let few = trend_terms(&times[..LEAST_RUN - 1]);
+        assert!(few.iter().all(|terms| terms[POWERS..] == [0.0, 0.0]));
+    }
+}

@@ -149,3 +149,30 @@ fn take_out(run: &mut [Option<f64>], half_cycles: usize) {
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Waves of whole cycles are orthogonal along a run: one goes, the other stays and is rescaled by `√(n/(n − 2))`.
+    #[test]
+    fn a_wave_is_taken_out_and_no_other() {
+        const N: usize = 48;
+        let wave = |half_cycles: f64, t: usize| {
+            (std::f64::consts::PI * half_cycles * t as f64 / N as f64 + 0.4).cos()
+        };
+        let mut run: Vec<Option<f64>> = (0..N).map(|t| Some(3.0 * wave(4.0, t) + wave(10.0, t))).collect();
+        take_out(&mut run, 4);
+        let rescale = (N as f64 / (N as f64 - 2.0)).sqrt();
+        for (t, left) in run.iter().enumerate() {
+            assert!((left.unwrap() - rescale * wave(10.0, t)).abs() < 1e-12);
+        }
+        // Gaps stay gaps, and half a cycle may be taken out beside them.
+        let mut run: Vec<Option<f64>> = (0..N).map(|t| (t % 5 != 0).then(|| wave(5.0, t))).collect();
+        take_out(&mut run, 5);
+        for (t, left) in run.iter().enumerate() {
+            assert_eq!(left.is_none(), t % 5 == 0);
+            assert!(left.unwrap_or(0.0).abs() < 1e-12);
+        }
+    }
+}

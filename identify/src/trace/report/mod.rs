@@ -274,14 +274,19 @@ fn verdict(findings: &Findings<'_, '_>, effects: &[EffectResult]) -> (String, Re
         .structure_before
         .map_or(0.0, |structure| structure.excess);
     let share = if before > 0.0 { after.excess / before } else { 0.0 };
-    let word = match (effects.is_empty(), structured) {
-        (true, false) => "clean",
-        (true, true) => "unexplained",
-        (false, false) => "explained",
-        (false, true) if share < EXPLAINED_SHARE => "partly-explained",
-        (false, true) => "unexplained",
-    };
+    let word = word(!effects.is_empty(), structured, share);
     (word.to_string(), remainder)
+}
+
+/// What is said of a search along runs: whether it found anything, whether structure remains, and what share of its excess over noise.
+fn word(found: bool, structured: bool, share: f64) -> &'static str {
+    match (found, structured) {
+        (false, false) => "clean",
+        (false, true) => "unexplained",
+        (true, false) => "explained",
+        (true, true) if share < EXPLAINED_SHARE => "partly-explained",
+        (true, true) => "unexplained",
+    }
 }
 
 /// Parameters that moved by more than their uncertainty.
@@ -298,4 +303,44 @@ fn moved(before: &[ParameterResult], after: &[ParameterResult]) -> Vec<Moved> {
             })
         })
         .collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_verdict_says_whether_most_of_the_structure_is_explained() {
+        for (found, structured, share, verdict) in [
+            (false, false, 0.0, "clean"),
+            (false, true, 1.0, "unexplained"),
+            (true, false, 0.9, "explained"),
+            (true, true, 0.2, "partly-explained"),
+            (true, true, 0.8, "unexplained"),
+        ] {
+            assert_eq!(word(found, structured, share), verdict);
+        }
+    }
+
+    #[test]
+    fn what_moved_by_more_than_its_uncertainty_is_told() {
+        let parameter = |id: &str, value: f64, u: f64| ParameterResult {
+            id: id.into(),
+            value,
+            u,
+            unit: "um".into(),
+        };
+        let before = [
+            parameter("EX0C", 3.0, 0.1),
+            parameter("EY0C", 3.0, 0.1),
+            parameter("EZ0A", 1.0, 0.1),
+        ];
+        let after = [parameter("EX0C", 1.0, 1.5), parameter("EY0C", 1.0, 2.5)];
+        let moved = moved(&before, &after);
+        assert_eq!(moved.len(), 1);
+        assert_eq!(
+            (moved[0].id.as_str(), moved[0].by, moved[0].u),
+            ("EX0C", -2.0, 1.5)
+        );
+    }
 }
