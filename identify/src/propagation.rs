@@ -398,3 +398,52 @@ pub fn tolerance(u: f64) -> f64 {
         0.5 * 10.0_f64.powi(power)
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use std::path::Path;
+
+    use abbe_model::session::read::{self, ReadOptions};
+
+    use super::*;
+    use crate::fit::prepare;
+
+    /// The same draw three ways: its rows taken together, its residuals alone, and their slope against differences.
+    #[test]
+    fn a_draw_has_one_sum_of_squares_and_its_slope() {
+        let file =
+            Path::new(env!("CARGO_MANIFEST_DIR")).join("../sessions/hermle-c600u/measured/session.toml");
+        let session = read::session(&file, &ReadOptions::default()).unwrap();
+        let (problem, fit) = prepare(&session, 1).unwrap();
+        let refit = Refit::new(&problem, &fit).unwrap();
+        // Deviations of a standard uncertainty, alternately up and down.
+        let signs = [1.0, -1.0, 1.0, 1.0, -1.0].iter().cycle();
+        let deviations: Vec<f64> = refit.u.iter().zip(signs).map(|(u, sign)| u * sign).collect();
+        let drawn = Drawn {
+            refit: &refit,
+            deviations: &deviations,
+        };
+        let z = drawn.refit.end.clone();
+        let nothing = vec![0.0; z.len()];
+        let whole = drawn.linearise(&z).unwrap().sum_of_squares_after(&nothing);
+        let alone = drawn.sum_of_squares(&z);
+        assert!(alone > 0.5 * problem.readings() as f64, "{alone}");
+        assert!((alone / whole - 1.0).abs() < 1e-9, "{alone} and {whole}");
+        let descent = drawn.descent(&z).unwrap();
+        for k in 0..z.len() {
+            let by = 1e-2 * refit.inverse[(k, k)].sqrt();
+            let at = |by: f64| {
+                let mut moved = z.clone();
+                moved[k] += by;
+                drawn.sum_of_squares(&moved)
+            };
+            let slope = (at(by) - at(-by)) / (2.0 * by);
+            let scale = refit.inverse[(k, k)].sqrt();
+            assert!(
+                (slope + 2.0 * descent[k]).abs() * scale < 1e-4,
+                "{k}: {slope} {}",
+                descent[k]
+            );
+        }
+    }
+}

@@ -5,6 +5,7 @@ use abbe::identify::plan::improve::{ImproveOptions, improve};
 use abbe::identify::plan::menu::{Menu, entries};
 use abbe::identify::plan::{PlanOptions, analyse, separation, states};
 use abbe::model::effect::{Component, Driver, Effect, Shape};
+use abbe::model::instrument::Station;
 use abbe::model::session::{Prior, Session};
 
 use super::plan_help::{machine, noise_um, ready, session};
@@ -140,6 +141,34 @@ fn wobble_and_axial_motion_are_told_apart_at_a_second_radius() {
         found.test.starts_with('C') && found.test.contains("radius"),
         "{found:?}"
     );
+}
+
+/// No test is proposed of which a bar's sensor would leave its travel; with more travel there are more tests.
+#[test]
+fn what_is_proposed_stays_within_the_reach_of_the_bar() {
+    let complete = states::complete(&with_setups_of_1_um(5), true).unwrap();
+    let within = |reach_mm: f64| {
+        let menu = Menu {
+            reach_mm,
+            ..Menu::short()
+        };
+        let found = entries(&complete, &menu).unwrap();
+        for entry in &found {
+            let Station::BallBar(bar) = &entry.test.station else {
+                panic!("{}", entry.name)
+            };
+            let readings = &entry.test.readings.as_ref().unwrap().observed;
+            let most = readings
+                .iter()
+                .map(|reading| (reading - bar.bar).abs())
+                .fold(0.0, f64::max);
+            assert!(most <= reach_mm, "{}: {most}", entry.name);
+        }
+        found.len()
+    };
+    let [little, usual, much] = [1e-6, 1.0, 500.0].map(within);
+    println!("{little} {usual} {much}");
+    assert!(0 < little && little <= usual && usual < much);
 }
 
 #[test]

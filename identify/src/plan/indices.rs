@@ -38,7 +38,18 @@ pub fn indices(
         });
     }
     let r = marginal(linear.whole.parts().0.as_ref(), &seen, &linear.size);
-    let scaled = Mat::from_fn(m, m, |i, j| r[(i, j)] * linear.size[seen[j]]);
+    let size: Vec<f64> = seen.iter().map(|j| linear.size[*j]).collect();
+    Ok(Indices {
+        errors,
+        g_efficiency,
+        ..of_triangle(r.as_ref(), &size, readings)?
+    })
+}
+
+/// The figures of the triangle of the errors that are seen, in inside units; `size` is the physical size of each.
+fn of_triangle(r: MatRef<'_, f64>, size: &[f64], readings: usize) -> Result<Indices, IdentifyError> {
+    let m = size.len();
+    let scaled = Mat::from_fn(m, m, |i, j| r[(i, j)] * size[j]);
     let sigma = singular_values(scaled.as_ref())?;
     let (first, last) = (sigma[0], sigma[m - 1]);
     let mean_log = sigma.iter().map(|s| s.ln()).sum::<f64>() / m as f64;
@@ -50,7 +61,6 @@ pub fn indices(
     let count = m as f64;
     Ok(Indices {
         seen: m,
-        errors,
         condition_number: first / last,
         o1: mean_log.exp() / (readings.max(1) as f64).sqrt(),
         o2: last / first,
@@ -60,11 +70,49 @@ pub fn indices(
         d_efficiency: (lambda.iter().map(|l| l.ln()).sum::<f64>() / count).exp(),
         a_efficiency: count / lambda.iter().map(|l| 1.0 / l).sum::<f64>(),
         e_efficiency: lambda.last().copied().unwrap_or(0.0),
-        g_efficiency,
+        ..Indices::default()
     })
 }
 
 fn singular_values(matrix: MatRef<'_, f64>) -> Result<Vec<f64>, IdentifyError> {
     let svd = matrix.thin_svd().map_err(|_| IdentifyError::Decomposition)?;
     Ok(svd.S().column_vector().iter().copied().collect())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn near(found: f64, wanted: f64) {
+        assert!((found - wanted).abs() < 1e-12, "{found} instead of {wanted}");
+    }
+
+    /// Singular values 8 and 2 over 16 readings.
+    #[test]
+    fn observability_indices_of_two_errors_that_do_not_disturb_one_another() {
+        let r = Mat::from_fn(2, 2, |i, j| if i == j { [4.0, 0.2][i] } else { 0.0 });
+        let found = of_triangle(r.as_ref(), &[2.0, 10.0], 16).unwrap();
+        near(found.o1, 1.0);
+        near(found.o2, 0.25);
+        near(found.o3, 2.0);
+        near(found.o4, 0.5);
+        near(found.o5, 1.6);
+        near(found.condition_number, 4.0);
+        for efficiency in [found.d_efficiency, found.a_efficiency, found.e_efficiency] {
+            near(efficiency, 1.0);
+        }
+    }
+
+    /// Two columns at an angle whose cosine is c: the eigenvalues of C are 1 ± c, whatever the lengths of the columns.
+    #[test]
+    fn efficiencies_of_two_errors_at_an_angle() {
+        let c = 0.6_f64;
+        let r = Mat::from_fn(2, 2, |i, j| {
+            [[3.0, 7.0 * c], [0.0, 7.0 * (1.0 - c * c).sqrt()]][i][j]
+        });
+        let found = of_triangle(r.as_ref(), &[1.0, 1.0], 1).unwrap();
+        near(found.d_efficiency, (1.0 - c * c).sqrt());
+        near(found.a_efficiency, 1.0 - c * c);
+        near(found.e_efficiency, 1.0 - c);
+    }
 }
