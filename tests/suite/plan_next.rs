@@ -143,6 +143,41 @@ fn wobble_and_axial_motion_are_told_apart_at_a_second_radius() {
     );
 }
 
+/// A curve is the sensitivity along a test; the largest that any test has is told beside it. A unit of a length moves a reading by its like at most, a
+/// second of arc by 5 nm a millimetre of lever.
+#[test]
+fn curves_reach_the_largest_sensitivity() {
+    let options = PlanOptions {
+        effects: false,
+        ..PlanOptions::default()
+    };
+    let plan = analyse(&with_setups_of_1_um(5), &options).unwrap();
+    let [mut lengths, mut angles] = [0, 0];
+    for error in &plan.errors {
+        let largest = error.sensitivity.largest;
+        let reached = error
+            .curves
+            .iter()
+            .filter(|curve| curve.test == error.sensitivity.largest_in)
+            .flat_map(|curve| &curve.values)
+            .fold(0.0_f64, |most, value| most.max(value.abs()));
+        // A curve is thinned.
+        assert!(
+            reached <= largest * (1.0 + 1e-9) && reached > 0.99 * largest,
+            "{}: {reached} {largest}",
+            error.id
+        );
+        if error.unit == "um" {
+            lengths += 1;
+            assert!((0.5..1.0 + 1e-9).contains(&largest), "{}: {largest}", error.id);
+        } else {
+            angles += 1;
+            assert!(largest < 0.005 * 1000.0, "{}: {largest}", error.id);
+        }
+    }
+    assert!(lengths >= 3 && angles >= 3, "{lengths} {angles}");
+}
+
 /// No test is proposed of which a bar's sensor would leave its travel; with more travel there are more tests.
 #[test]
 fn what_is_proposed_stays_within_the_reach_of_the_bar() {
@@ -163,6 +198,8 @@ fn what_is_proposed_stays_within_the_reach_of_the_bar() {
                 .map(|reading| (reading - bar.bar).abs())
                 .fold(0.0, f64::max);
             assert!(most <= reach_mm, "{}: {most}", entry.name);
+            // Only axes that do not stand at zero are told.
+            assert!(!entry.name.contains(" at 0°"), "{}", entry.name);
         }
         found.len()
     };

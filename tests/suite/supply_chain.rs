@@ -8,7 +8,7 @@ use std::process::Command;
 
 use super::workspace;
 
-/// A crate that is built for this machine, tests and build scripts included.
+/// A crate that is built for any machine, tests and build scripts included.
 struct Built {
     name: String,
     version: String,
@@ -25,6 +25,8 @@ fn built(more: &[&str]) -> Vec<Built> {
             "--locked",
             "--edges",
             "normal,build,dev",
+            "--target",
+            "all",
         ])
         .args(["--prefix", "none", "--format", "{p}\t{l}"])
         .args(more)

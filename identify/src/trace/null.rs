@@ -191,3 +191,38 @@ fn without_smooth(residual: &[f64], coordinates: usize) -> Vec<Option<f64>> {
     }
     rough
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Of three coordinates that rise at their own rates nothing is left in the middle, and of a spike all but what its neighbours differ by.
+    #[test]
+    fn what_is_smooth_goes_coordinate_by_coordinate() {
+        const ROWS: usize = 60;
+        let (spiked, coordinate) = (30, 1);
+        let residual: Vec<f64> = (0..3 * ROWS)
+            .map(|i| {
+                (i / 3) as f64 * [1.0, -2.0, 5.0][i % 3]
+                    + if i == 3 * spiked + coordinate { 1e3 } else { 0.0 }
+            })
+            .collect();
+        let rough = without_smooth(&residual, 3);
+        assert_eq!(rough.len(), residual.len());
+        for row in SMOOTHING..ROWS - SMOOTHING {
+            for k in 0..3 {
+                let left = rough[3 * row + k].unwrap();
+                let spike = if (row, k) == (spiked, coordinate) {
+                    1e3
+                } else {
+                    0.0
+                };
+                // A spike among an odd number of neighbours moves their median by one place at most.
+                assert!((left - spike).abs() <= 2.0 + 1e-9, "{row} {k}: {left}");
+                if k != coordinate {
+                    assert!(left.abs() < 1e-9);
+                }
+            }
+        }
+    }
+}
