@@ -154,7 +154,7 @@ fn curves_reach_the_largest_sensitivity() {
     let plan = analyse(&with_setups_of_1_um(5), &options).unwrap();
     let [mut lengths, mut angles] = [0, 0];
     for error in &plan.errors {
-        let largest = error.sensitivity.largest;
+        let largest = error.sensitivity.largest.abs();
         let reached = error
             .curves
             .iter()
