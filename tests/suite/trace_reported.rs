@@ -36,6 +36,20 @@ fn measured(effects: Vec<Effect>, values: &[&str], declared: usize) -> Session {
     session
 }
 
+/// EZC of order 2 and EAC of order 3, of which the first few are declared.
+fn wave_and_tilt(declared: usize) -> Session {
+    let waves = vec![
+        of_c("EZC", Shape::Harmonic { order: 2.0 }),
+        of_c("EAC", Shape::Harmonic { order: 3.0 }),
+    ];
+    let values = [
+        "EZC~C:h2.amplitude=1.5um",
+        "EAC~C:h3.amplitude=4arcsec",
+        "EAC~C:h3.phase=40deg",
+    ];
+    measured(waves, &values, declared)
+}
+
 /// Where the library is a wave and, as a last resort, a curve, a bump is first taken for the wave and then for the curve in its place.
 #[test]
 fn the_model_that_is_reported_has_the_effects_that_are_reported() {
@@ -77,16 +91,7 @@ fn the_model_that_is_reported_has_the_effects_that_are_reported() {
 /// order 2. Where the latter is declared and the former is the truth, the named effect moves the declared one, whose uncertainty has to say so.
 #[test]
 fn the_uncertainty_of_a_declared_wave_covers_what_looks_like_the_found_effect() {
-    let waves = vec![
-        of_c("EZC", Shape::Harmonic { order: 2.0 }),
-        of_c("EAC", Shape::Harmonic { order: 3.0 }),
-    ];
-    let values = [
-        "EZC~C:h2.amplitude=1.5um",
-        "EAC~C:h3.amplitude=4arcsec",
-        "EAC~C:h3.phase=40deg",
-    ];
-    let session = measured(waves, &values, 1);
+    let session = wave_and_tilt(1);
     let result = trace(&session, &TraceOptions::default(), &|_| true)
         .unwrap()
         .result;
@@ -121,16 +126,7 @@ fn the_uncertainty_of_a_declared_wave_covers_what_looks_like_the_found_effect() 
 /// The same with nothing declared: both waves are found, and what looks like the one moves the other.
 #[test]
 fn the_uncertainty_of_a_found_wave_covers_what_looks_like_another_found_effect() {
-    let truth = vec![
-        of_c("EZC", Shape::Harmonic { order: 2.0 }),
-        of_c("EAC", Shape::Harmonic { order: 3.0 }),
-    ];
-    let values = [
-        "EZC~C:h2.amplitude=1.5um",
-        "EAC~C:h3.amplitude=4arcsec",
-        "EAC~C:h3.phase=40deg",
-    ];
-    let session = measured(truth, &values, 0);
+    let session = wave_and_tilt(0);
     let options = TraceOptions {
         only: ["EZC~C:h", "EAC~C:h3"].map(String::from).to_vec(),
         ..TraceOptions::default()

@@ -170,7 +170,7 @@ pub fn stated_against_repeats(problem: &Problem<'_>, residuals: &[Vec<f64>]) -> 
     (!by_chance && !(1.0 / DISAGREEMENT..=DISAGREEMENT).contains(&ratio)).then(|| {
         format!(
             "the session states a noise of {} µm, and repeated readings scatter by {:.3} µm ({} degrees of freedom): the uncertainties of a fit follow from \
-             what is stated, those of a trace from the repeats; correct `noise_um`, or leave it out",
+             what is stated; correct `noise_um`, or leave it out",
             stated_mm * 1e3,
             sigma_mm * 1e3,
             pure.freedom
