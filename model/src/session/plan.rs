@@ -398,3 +398,20 @@ pub(super) fn axis_line(machine: &Machine, state: &[AxisPosition<f64>], axis: us
     let tip = in_r(std::array::from_fn(|i| line.origin_mm[i] + line.direction[i]));
     (origin, std::array::from_fn(|i| tip[i] - origin[i]))
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// The last step ends at the end to the last digit where the way is a whole number of steps, and short of it where it is not.
+    #[test]
+    fn steps_end_where_they_should() {
+        // Three times 0.1 is not 0.3, nor is 0.7 seven times 0.1.
+        assert_eq!(steps(0.0, 0.3, 0.1), [0.0, 0.1, 0.2, 0.3]);
+        assert_eq!(steps(0.7, 0.0, 0.1).last(), Some(&0.0));
+        assert_eq!(steps(0.0, 0.7, 0.1).last(), Some(&0.7));
+        assert_eq!(steps(1.0, -1.0, 0.75), [1.0, 0.25, -0.5]);
+        assert_eq!(steps(0.0, 1.0, 2.0), [0.0]);
+        assert_eq!(steps(2.0, 2.0, 1.0), [2.0]);
+    }
+}

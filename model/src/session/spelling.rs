@@ -1,5 +1,7 @@
 //! The name that may be meant by a misspelt one.
 
+use strsim::osa_distance;
+
 /// The nearest of the known names where one is near, and all of them.
 pub(crate) fn known_names(found: &str, known: &[&str]) -> String {
     let all = if known.is_empty() {
@@ -13,35 +15,70 @@ pub(crate) fn known_names(found: &str, known: &[&str]) -> String {
     }
 }
 
+/// How a help begins: with the known name that may be meant, or with nothing.
+pub(crate) fn meant(found: &str, known: &[impl AsRef<str>]) -> String {
+    nearest(found, known).map_or(String::new(), |near| format!("did you mean `{near}`? "))
+}
+
 /// The known name that is nearest to a misspelt one, if any is near.
-pub(crate) fn nearest<'k>(found: &str, known: &[&'k str]) -> Option<&'k str> {
-    let lower = found.to_lowercase();
+fn nearest<'k>(found: &str, known: &'k [impl AsRef<str>]) -> Option<&'k str> {
+    // No name is longer, and a key of a million letters is no slip.
+    let lower: String = found.chars().take(64).collect::<String>().to_lowercase();
     known
         .iter()
         .map(|name| {
+            let name = name.as_ref();
             let other = name.to_lowercase();
             // `c_degree` for `c_deg`: what begins alike and goes on counts as one slip.
             let begins =
                 lower.len().min(other.len()) >= 3 && (lower.starts_with(&other) || other.starts_with(&lower));
-            (if begins { 1 } else { distance(&lower, &other) }, *name)
+            (if begins { 1 } else { osa_distance(&lower, &other) }, name)
         })
         .filter(|(distance, name)| *distance <= 1 + name.len().min(lower.len()) / 4)
         .min_by_key(|(distance, _)| *distance)
         .map(|(_, name)| name)
 }
 
-/// Levenshtein's distance, over the first 64 characters.
-fn distance(a: &str, b: &str) -> usize {
-    let (a, b): (Vec<char>, Vec<char>) = (a.chars().take(64).collect(), b.chars().take(64).collect());
-    let mut row: Vec<usize> = (0..=b.len()).collect();
-    for (i, from) in a.iter().enumerate() {
-        let mut diagonal = row[0];
-        row[0] = i + 1;
-        for (j, to) in b.iter().enumerate() {
-            let replaced = diagonal + usize::from(from != to);
-            diagonal = row[j + 1];
-            row[j + 1] = replaced.min(diagonal + 1).min(row[j] + 1);
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const KEYS: [&str; 6] = ["bar_mm", "bar_u_um", "c_deg", "x", "noise_um", "sweep"];
+
+    #[test]
+    fn a_slip_is_told_from_another_name() {
+        // A letter too many, too few, another one, two that changed places, capitals: one slip each.
+        for (found, near) in [
+            ("barr_mm", "bar_mm"),
+            ("bar_m", "bar_mm"),
+            ("bat_mm", "bar_mm"),
+            ("bra_mm", "bar_mm"),
+            ("BAR_MM", "bar_mm"),
+            ("bar_u_m", "bar_u_um"),
+            ("c_degree", "c_deg"),
+            ("noise", "noise_um"),
+            ("y", "x"),
+        ] {
+            assert_eq!(nearest(found, &KEYS), Some(near), "{found}");
         }
+        // Short names allow of one slip, longer ones of one more for every four letters.
+        assert_eq!(nearest("zz", &KEYS), None);
+        assert_eq!(nearest("nosieum", &KEYS), Some("noise_um"));
+        assert_eq!(nearest("noise_abc", &KEYS), Some("noise_um"));
+        assert_eq!(nearest("no1234um", &KEYS), None);
+        assert_eq!(nearest(&"s".repeat(100_000), &KEYS), None);
+        assert_eq!(nearest("sweep", &[""; 0]), None);
     }
-    row[b.len()]
+
+    #[test]
+    fn the_help_names_what_is_known() {
+        assert_eq!(
+            known_names("swep", &["sweep", "path"]),
+            "did you mean `sweep`? (known: sweep, path)"
+        );
+        assert_eq!(known_names("at", &["sweep", "path"]), "known: sweep, path");
+        assert_eq!(known_names("at", &[]), "no key is known here");
+        assert_eq!(meant("swep", &["sweep"]), "did you mean `sweep`? ");
+        assert_eq!(meant("at", &["sweep"]), "");
+    }
 }

@@ -2,7 +2,7 @@
 
 use crate::axis::AxisKind;
 use crate::chain::Machine;
-use crate::session::spelling::nearest;
+use crate::session::spelling::meant;
 
 /// µm in mm.
 pub(crate) const MICROMETRE: f64 = 1e-3;
@@ -28,10 +28,9 @@ pub(crate) fn axis_index(machine: &Machine, name: &str) -> Option<usize> {
 /// That the machine has no such axis, with the one that may be meant.
 pub(crate) fn no_axis(machine: &Machine, name: &str) -> (String, String) {
     let names: Vec<&str> = machine.axes.iter().map(|axis| axis.name.as_str()).collect();
-    let near = nearest(name, &names).map_or(String::new(), |near| format!("did you mean `{near}`? "));
     (
         format!("the machine \"{}\" has no axis `{name}`", machine.name),
-        format!("{near}its axes are {}", names.join(", ")),
+        format!("{}its axes are {}", meant(name, &names), names.join(", ")),
     )
 }
 

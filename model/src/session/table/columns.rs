@@ -6,7 +6,7 @@ use super::Request;
 use crate::error::{ModelError, Place};
 use crate::instrument::InstrumentKind;
 use crate::session::read::quantity::{self, Unit};
-use crate::session::spelling::nearest;
+use crate::session::spelling::meant;
 
 /// A line of `[columns]`: ours = theirs.
 #[derive(Clone, Debug)]
@@ -229,10 +229,9 @@ fn unknown_column_help(request: &Request<'_>, name: &str, header: &[String], kno
     if request.instrument == InstrumentKind::RTest && r_test_columns(!request.sensors).contains(&stem) {
         return r_test_help(request).into();
     }
-    let names: Vec<&str> = known.iter().map(String::as_str).collect();
-    let near = nearest(name, &names).map_or(String::new(), |near| format!("did you mean `{near}`? "));
     format!(
-        "{near}known here: {}; a file with other names is read through [columns], ours = theirs",
+        "{}known here: {}; a file with other names is read through [columns], ours = theirs",
+        meant(name, known),
         listed(known)
     )
 }
@@ -255,12 +254,9 @@ fn mapped_columns(
             Role::of(&entry.ours, request).or_else(|| Role::of(&entry.ours.to_lowercase(), request))
         else {
             let known = known(request);
-            let names: Vec<&str> = known.iter().map(String::as_str).collect();
-            let near =
-                nearest(&entry.ours, &names).map_or(String::new(), |near| format!("did you mean `{near}`? "));
             return Err(fault(
                 format!("[columns] knows no column `{}`", entry.ours),
-                format!("{near}ours are {}", listed(&known)),
+                format!("{}ours are {}", meant(&entry.ours, &known), listed(&known)),
             ));
         };
         let index = match (&entry.theirs, header) {
@@ -282,12 +278,9 @@ fn mapped_columns(
             (Theirs::Name(name), Some(header)) => match header.iter().position(|found| found == name) {
                 Some(index) => index,
                 None => {
-                    let names: Vec<&str> = header.iter().map(String::as_str).collect();
-                    let near = nearest(name, &names)
-                        .map_or(String::new(), |near| format!("did you mean `{near}`? "));
                     return Err(fault(
                         format!("{} has no column `{name}`", file.display()),
-                        format!("{near}it has {}", listed(header)),
+                        format!("{}it has {}", meant(name, header), listed(header)),
                     ));
                 }
             },
