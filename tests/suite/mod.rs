@@ -12,6 +12,7 @@ mod faults;
 mod field_files;
 mod geometric;
 mod help;
+mod kept;
 mod kill;
 mod limits;
 mod measured;
