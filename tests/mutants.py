@@ -5,7 +5,8 @@ written into a copy of the workspace, each behind a question (`if crate::mutant(
 mutant is tried by setting ABBE_MUTANT. Tests run in stages, the cheapest first and examples of the documentation last, until one fails. Mutants are tried
 in an order that is drawn, so that those tried until it is stopped are a sample too; what has been tried before is not tried again.
 
-    git worktree add ../mutants && python tests/mutants.py --package abbe-identify --every 86 --copy ../mutants --out identify.jsonl
+    git worktree add ../mutants
+    python tests/mutants.py --sample abbe-identify=86 --sample abbe-model=45 --copy ../mutants --out mutants.jsonl
 """
 
 import argparse
@@ -93,12 +94,13 @@ def spans_of(message):
             yield span
 
 
-def leave_out_what_does_not_build(copy, originals, mutants, package):
+def leave_out_what_does_not_build(copy, originals, mutants, packages):
     """Writes the mutants and checks, again and again, until what is left builds; gives it and what was left out."""
     out = []
     while True:
         write(copy, originals, mutants)
-        run = subprocess.run(["cargo", "check", "-p", package, "--message-format=json", *PROFILE], cwd=copy, capture_output=True, text=True)
+        asked = [word for package in packages for word in ("-p", package)]
+        run = subprocess.run(["cargo", "check", *asked, "--message-format=json", *PROFILE], cwd=copy, capture_output=True, text=True)
         if run.returncode == 0:
             return mutants, out
         faults = set()
@@ -114,21 +116,18 @@ def leave_out_what_does_not_build(copy, originals, mutants, package):
         mutants = [m for m in mutants if m["number"] not in faults]
 
 
-# Packages whose tests know of a package.
+# Packages whose tests know of a package, its own first.
 TESTED_BY = {"abbe-model": ("model", "codegen", "identify", "."), "abbe-identify": ("identify", ".")}
 
 
-def binaries(copy, package):
-    """The test programs, those of the package first, each with the folder that its tests run in."""
+def binaries(copy):
+    """The test programs, each with the folder that its tests run in."""
     run = subprocess.run(["cargo", "test", "--workspace", "--no-run", "--message-format=json", *PROFILE], cwd=copy, stdout=subprocess.PIPE, text=True, check=True)
     found = []
     for line in run.stdout.splitlines():
         message = json.loads(line)
         if message.get("reason") == "compiler-artifact" and message.get("executable") and message["profile"]["test"]:
             found.append((message["executable"], str(pathlib.Path(message["manifest_path"]).parent)))
-    folders = [str((copy / folder).resolve()) for folder in TESTED_BY[package]]
-    found = [program for program in found if program[1] in folders]
-    found.sort(key=lambda program: folders.index(program[1]))
     return found
 
 
@@ -153,8 +152,8 @@ def examples_fail(copy, package, number):
     return run.returncode != 0
 
 
-def stages_of(programs, slowest_s):
-    """Of all tests, timed once: stages of growing cost, as (program, folder, names, seconds). Tests slower than a bound are left out."""
+def timed_tests(programs, slowest_s):
+    """Of all tests, run once: (seconds, program, folder, name), the cheapest first. Tests slower than a bound are left out."""
     timed = []
     for program, folder in programs:
         listed = subprocess.run([program, "--list"], cwd=folder, capture_output=True, text=True, check=True).stdout
@@ -165,14 +164,17 @@ def stages_of(programs, slowest_s):
         if status:
             sys.exit("a test fails without a mutant:\n" + printed[-3000:])
         seconds = dict(re.findall(r"^test (\S+)(?: - should panic)? \.\.\. ok <([\d.]+)s>", printed, re.M))
-        for name in names:
-            if name in seconds:
-                timed.append((float(seconds[name]), program, folder, name))
-    timed.sort()
-    stages, bound = [], 0.5
+        timed += [(float(seconds[name]), program, folder, name) for name in names if name in seconds]
     for seconds, _, _, name in (test for test in timed if test[0] > slowest_s):
         print(f"left out: {name}, {seconds:.0f} s", flush=True)
-    timed = [test for test in timed if test[0] <= slowest_s]
+    return sorted(test for test in timed if test[0] <= slowest_s)
+
+
+def stages_of(timed, folders):
+    """Of the tests in these folders, in their order: stages of growing cost, as (program, folder, names, seconds)."""
+    timed = [test for test in timed if test[2] in folders]
+    programs = sorted({test[1:3] for test in timed}, key=lambda program: folders.index(program[1]))
+    stages, bound = [], 0.5
     while timed:
         now = [test for test in timed if test[0] <= bound]
         timed = [test for test in timed if test[0] > bound]
@@ -184,11 +186,17 @@ def stages_of(programs, slowest_s):
     return stages
 
 
+def listed(copy, asked, only):
+    """A sample of cargo-mutants' list of a package, as `abbe-model=45+11` asks for: one in 45 from the eleventh, counted from zero."""
+    package, every, first = re.fullmatch(r"([\w-]+)=(\d+)(?:\+(\d+))?", asked).groups()
+    run = subprocess.run(["cargo", "mutants", "--list", "--json", "-p", package], cwd=copy, capture_output=True, text=True, check=True)
+    found = [m for m in json.loads(run.stdout) if m["function"] and (not only or re.search(only, m["name"]))]
+    return found[int(first or 0)::int(every)]
+
+
 def main():
     ask = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    ask.add_argument("--package", required=True, choices=["abbe-model", "abbe-identify"])
-    ask.add_argument("--every", type=int, required=True, help="one mutant of so many is tried")
-    ask.add_argument("--first", type=int, default=0, help="the first one, from zero")
+    ask.add_argument("--sample", required=True, action="append", metavar="PACKAGE=N[+FIRST]", help="one mutant of N of a package; may be repeated")
     ask.add_argument("--only", help="only mutants whose names this expression finds")
     ask.add_argument("--slowest", type=float, default=32.0, help="tests that take longer are left out, s")
     ask.add_argument("--copy", type=pathlib.Path, required=True, help="a copy of the workspace, which is written over")
@@ -196,45 +204,43 @@ def main():
     given = ask.parse_args()
     copy = given.copy.resolve()
 
-    listed = subprocess.run(["cargo", "mutants", "--list", "--json", "-p", given.package], cwd=copy, capture_output=True, text=True, check=True).stdout
-    sample = [m for m in json.loads(listed) if m["function"]]
-    if given.only:
-        sample = [m for m in sample if re.search(given.only, m["name"])]
-    sample = sample[given.first::given.every]
+    sample = [m for asked in given.sample for m in listed(copy, asked, given.only)]
     for number, mutant in enumerate(sample, 1):
         mutant["number"] = number
+    packages = sorted({m["package"] for m in sample})
+    libraries = [copy / package.removeprefix("abbe-") / "src/lib.rs" for package in packages]
     originals = {m["file"]: (copy / m["file"]).read_text() for m in sample}
-    library = copy / given.package.removeprefix("abbe-") / "src/lib.rs"
-    plain = library.read_text()
+    plain = {library: library.read_text() for library in libraries}
     try:
-        if str(library.relative_to(copy)) in originals:
-            sys.exit("a mutant in lib.rs")
-        library.write_text(plain + SWITCH)
-        kept, unviable = leave_out_what_does_not_build(copy, originals, list(sample), given.package)
+        for library, text in plain.items():
+            if str(library.relative_to(copy)) in originals:
+                sys.exit("a mutant in lib.rs")
+            library.write_text(text + SWITCH)
+        kept, unviable = leave_out_what_does_not_build(copy, originals, list(sample), packages)
         print(f"{len(sample)} mutants, {len(unviable)} do not build", flush=True)
         random.Random(1).shuffle(kept)
-        stages = stages_of(binaries(copy, given.package), given.slowest)
-        for program, _, names, seconds in stages:
-            print(f"stage of {len(names)} tests, {seconds:.1f} s, in {pathlib.Path(program).name}", flush=True)
+        timed = timed_tests(binaries(copy), given.slowest)
+        stages = {package: stages_of(timed, [str((copy / folder).resolve()) for folder in TESTED_BY[package]]) for package in packages}
+        for package in packages:
+            print(f"{package}: tests of {sum(stage[3] for stage in stages[package]):.0f} s in {len(stages[package])} stages", flush=True)
         tried = {json.loads(line)["name"] for line in given.out.read_text().splitlines()} if given.out.exists() else set()
         with given.out.open("a") as out:
             for mutant in (m for m in kept if m["name"] not in tried):
                 begin, verdict, by = time.time(), "missed", ""
-                for program, folder, names, seconds in stages:
+                for program, folder, names, seconds in stages[mutant["package"]]:
                     status, printed = run_tests(program, folder, names, mutant["number"], 60 + 10 * seconds)
                     if status:
                         verdict = ["", "caught", "out of time"][status]
                         by = " ".join(re.findall(r"^test (\S+) \.\.\. FAILED", printed, re.M)[:3])
                         break
-                if verdict == "missed" and examples_fail(copy, given.package, mutant["number"]):
+                if verdict == "missed" and examples_fail(copy, mutant["package"], mutant["number"]):
                     verdict, by = "caught", "an example of the documentation"
                 result = {"name": mutant["name"], "verdict": verdict, "by": by, "seconds": round(time.time() - begin, 1)}
                 print(json.dumps(result), file=out, flush=True)
                 print(f"{verdict:12} {mutant['name']}", flush=True)
     finally:
-        library.write_text(plain)
-        for file, text in originals.items():
-            (copy / file).write_text(text)
+        for file, text in (plain | {copy / file: text for file, text in originals.items()}).items():
+            file.write_text(text)
 
 
 if __name__ == "__main__":
