@@ -39,7 +39,7 @@ pub struct Improvement {
     pub steps: Vec<Step>,
     /// What the exchange changed, in words.
     pub exchanged: Vec<String>,
-    /// The best by themselves, in the order in which they were judged: by the figure, or by its gain a minute.
+    /// The best by themselves, in the order in which they were judged: by the figure, or by its gain a minute. Of tests that read alike, one.
     pub alternatives: Vec<Alternative>,
 }
 
@@ -175,7 +175,7 @@ fn best_a_minute(prepared: &Prepared, now: f64, figures: &[f64]) -> Option<usize
     (0..figures.len()).max_by(|a, b| gain(*a).total_cmp(&gain(*b)))
 }
 
-/// The entries with the least scores.
+/// The entries with the least scores, each name once.
 fn listed(
     prepared: &Prepared,
     figures: &[f64],
@@ -189,7 +189,14 @@ fn listed(
         after: reported(figures[entry], goal),
         minutes: prepared.entries[entry].entry.minutes,
     };
-    order.into_iter().take(ALTERNATIVES).map(of).collect()
+    let mut listed: Vec<Alternative> = Vec::new();
+    for alternative in order.into_iter().map(of) {
+        // Entries that are mirror images of one another read alike and are as good.
+        if listed.len() < ALTERNATIVES && !listed.iter().any(|other| other.test == alternative.test) {
+            listed.push(alternative);
+        }
+    }
+    listed
 }
 
 /// Takes each proposed test away in turn and puts the best entry in its place.
