@@ -14,7 +14,7 @@ use abbe::model::session::read::{self, ReadOptions};
 use clap::{Args, ValueEnum};
 
 use super::failure::Failure;
-use super::output;
+use super::output::{self, Outputs};
 
 /// The language of an equation.
 #[derive(Clone, Copy, ValueEnum)]
@@ -213,7 +213,7 @@ impl FormArguments {
 
 /// The session with its readings; without them where they cannot be read, which is said.
 fn read(arguments: &super::SessionArguments) -> Result<Session, Failure> {
-    let fault = match super::read_session(arguments) {
+    let fault = match read::session(&arguments.session, &arguments.options()) {
         Ok(session) => return Ok(session),
         Err(fault) => fault,
     };
@@ -229,13 +229,15 @@ fn read(arguments: &super::SessionArguments) -> Result<Session, Failure> {
             );
             Ok(session)
         }
-        Err(_) => Err(fault),
+        Err(_) => Err(fault.into()),
     }
 }
 
 /// Runs `abbe equation`.
 pub fn run(arguments: &EquationArguments) -> Result<(), Failure> {
+    let outputs = Outputs::new(&arguments.form.out)?;
     let session = read(&arguments.session)?;
+    outputs.spare_session(&session)?;
     let Some(test) = session.tests.iter().find(|test| test.name == arguments.test) else {
         let names: Vec<&str> = session.tests.iter().map(|test| test.name.as_str()).collect();
         let names = names.join(", ");
@@ -264,6 +266,9 @@ pub fn run(arguments: &EquationArguments) -> Result<(), Failure> {
 /// Runs `abbe volumetric`.
 pub fn run_volumetric(arguments: &VolumetricArguments) -> Result<(), Failure> {
     let machine = read::machine(&arguments.machine)?;
+    let outputs = Outputs::new(arguments.form.out.iter().chain(arguments.map.outputs()))?;
+    let read = std::iter::once(&arguments.machine).chain(arguments.map.functions());
+    outputs.spare(read.map(PathBuf::as_path))?;
     if arguments.map.wanted() {
         return super::map::run(&machine, &arguments.map);
     }

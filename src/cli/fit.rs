@@ -67,17 +67,21 @@ pub struct FitArguments {
 /// Runs `abbe fit`.
 pub fn run(arguments: &FitArguments) -> Result<(), Failure> {
     arguments.faces.check()?;
-    let others = [arguments.csv.as_ref(), arguments.views.as_ref()];
-    arguments.common.check(&others)?;
+    let others = [
+        arguments.csv.as_ref(),
+        arguments.views.as_ref(),
+        arguments.faces.file(),
+    ];
+    let outputs = arguments.common.outputs(&others)?;
     if !arguments.repeat.is_empty() {
         if arguments.method != Method::Full {
             return Err(Failure::Other(
                 "--repeat compares full fits; leave out `--method`, or --repeat".into(),
             ));
         }
-        return repeated::run(&arguments.session, &arguments.repeat, &arguments.common);
+        return repeated::run(&arguments.session, &arguments.repeat, &arguments.common, &outputs);
     }
-    let session = read_session(&arguments.session)?;
+    let session = read_session(&arguments.session, &outputs)?;
     if arguments.views.is_some() && arguments.method != Method::Full {
         let message = "`--views` shows what the full fit leaves over: leave `--method` out";
         return Err(Failure::Other(message.into()));

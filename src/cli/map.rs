@@ -49,6 +49,16 @@ pub struct MapArguments {
 }
 
 impl MapArguments {
+    /// The files that are written.
+    pub fn outputs(&self) -> impl Iterator<Item = &PathBuf> {
+        self.map.iter().chain(&self.json)
+    }
+
+    /// The file of the errors.
+    pub fn functions(&self) -> Option<&PathBuf> {
+        self.functions.as_ref()
+    }
+
     /// Whether a map is asked for.
     pub fn wanted(&self) -> bool {
         self.map.is_some()
@@ -60,9 +70,6 @@ pub fn run(machine: &Machine, arguments: &MapArguments) -> Result<(), Failure> {
     let (Some(path), Some(file)) = (&arguments.map, &arguments.functions) else {
         return Err(Failure::Other("--map and --functions go together".into()));
     };
-    for path in std::iter::once(path).chain(&arguments.json) {
-        output::check(path)?;
-    }
     let functions = functions::read(file, machine)?;
     let tool_mm = match arguments.tool_mm[..] {
         [] => [0.0; 3],

@@ -35,6 +35,7 @@ use abbe::model::session::read::{self, ReadOptions};
 use clap::{Args, CommandFactory, Parser, Subcommand};
 
 use failure::Failure;
+use output::Outputs;
 
 /// Geometric errors of machine tools and other serial chains: what tests can see, how large errors are, and what a model still lacks.
 #[derive(Parser)]
@@ -140,10 +141,9 @@ pub struct CommonArguments {
 }
 
 impl CommonArguments {
-    /// Refuses before the work what could not be written after it: the JSON, and other files that were asked for.
-    fn check(&self, others: &[Option<&PathBuf>]) -> Result<(), Failure> {
-        let mut files = others.iter().copied().flatten().chain(&self.json);
-        files.try_for_each(|path| output::check(path))
+    /// The JSON and the other files that were asked for. Refuses before the work what could not be written after it.
+    fn outputs(&self, others: &[Option<&PathBuf>]) -> Result<Outputs, Failure> {
+        Outputs::new(others.iter().copied().flatten().chain(&self.json))
     }
 }
 
@@ -175,7 +175,9 @@ pub fn run() -> ExitCode {
     }
 }
 
-/// Reads the session that the arguments name.
-fn read_session(arguments: &SessionArguments) -> Result<Session, Failure> {
-    Ok(read::session(&arguments.session, &arguments.options())?)
+/// Reads the session that the arguments name, which no output may replace.
+fn read_session(arguments: &SessionArguments, outputs: &Outputs) -> Result<Session, Failure> {
+    let session = read::session(&arguments.session, &arguments.options())?;
+    outputs.spare_session(&session)?;
+    Ok(session)
 }

@@ -2,7 +2,9 @@
 
 use std::fs::OpenOptions;
 use std::io::Write;
-use std::path::Path;
+use std::path::{Path, PathBuf};
+
+use abbe::model::session::Session;
 
 use super::failure::Failure;
 
@@ -76,6 +78,68 @@ pub fn check(path: &Path) -> Result<(), Failure> {
         )),
         _ => Ok(()),
     }
+}
+
+/// The files that a command is to write, looked at before the work, so that nothing is lost by it.
+pub struct Outputs(Vec<PathBuf>);
+
+impl Outputs {
+    /// # Errors
+    /// If one of them cannot come to lie where it is asked for, or two are one.
+    pub fn new<'p>(files: impl IntoIterator<Item = &'p PathBuf>) -> Result<Outputs, Failure> {
+        let mut outputs: Vec<PathBuf> = Vec::new();
+        for file in files {
+            check(file)?;
+            if !is_stream(file) && outputs.iter().any(|other| is_same(other, file)) {
+                return Err(Failure::Other(format!(
+                    "{}: two results would be written there; name another file for one of them",
+                    file.display()
+                )));
+            }
+            outputs.push(file.clone());
+        }
+        Ok(Outputs(outputs))
+    }
+
+    /// The files that are to lie in a folder.
+    pub fn in_folder<'n>(folder: &Path, names: impl Iterator<Item = &'n String>) -> Outputs {
+        Outputs(names.map(|name| folder.join(name)).collect())
+    }
+
+    /// # Errors
+    /// If one of them would replace the session, its machine or its data.
+    pub fn spare_session(&self, session: &Session) -> Result<(), Failure> {
+        self.spare(session.files.iter().map(|stamp| stamp.file.as_path()))
+    }
+
+    /// # Errors
+    /// If one of them would replace a file that is read.
+    pub fn spare<'r>(&self, read: impl IntoIterator<Item = &'r Path>) -> Result<(), Failure> {
+        for file in read {
+            if let Some(output) = self
+                .0
+                .iter()
+                .find(|output| !is_stream(output) && is_same(output, file))
+            {
+                return Err(Failure::Other(format!(
+                    "{}: cannot be written: it is one of the files that are read; name another",
+                    output.display()
+                )));
+            }
+        }
+        Ok(())
+    }
+}
+
+/// Whether two paths lead to one place, be anything there or not.
+pub fn is_same(a: &Path, b: &Path) -> bool {
+    let place = |path: &Path| {
+        path.canonicalize().ok().or_else(|| {
+            let folder = folder_of(path).canonicalize().ok()?;
+            Some(folder.join(path.file_name()?))
+        })
+    };
+    a == b || place(a).is_some_and(|a| place(b) == Some(a))
 }
 
 /// Writes a line to standard output. Where nobody reads on, that is the end of the program; where it cannot be written, an error is.

@@ -5,27 +5,34 @@ use std::path::{Path, PathBuf};
 use abbe::identify::repeated::{self, Repeated, Scatter};
 
 use super::failure::Failure;
-use super::{CommonArguments, SessionArguments, fit, output, read_session, table};
+use super::output::{self, Outputs};
+use super::{CommonArguments, SessionArguments, fit, read_session, table};
 
 /// Fits every session by itself and compares them.
-pub fn run(first: &SessionArguments, repeat: &[PathBuf], common: &CommonArguments) -> Result<(), Failure> {
+pub fn run(
+    first: &SessionArguments,
+    repeat: &[PathBuf],
+    common: &CommonArguments,
+    outputs: &Outputs,
+) -> Result<(), Failure> {
     let all: Vec<&Path> = std::iter::once(&first.session)
         .chain(repeat)
         .map(PathBuf::as_path)
         .collect();
     let mut sessions = Vec::with_capacity(all.len());
     for (place, path) in all.iter().enumerate() {
-        let twice = all[..place].iter().any(|earlier| same_file(earlier, path));
+        let twice = all[..place].iter().any(|earlier| output::is_same(earlier, path));
         if twice {
             return Err(Failure::Other(format!(
                 "{} is named twice: a session is no repeat of itself",
                 path.display()
             )));
         }
-        let session = read_session(&SessionArguments {
+        let arguments = SessionArguments {
             session: path.to_path_buf(),
             ..first.clone()
-        })?;
+        };
+        let session = read_session(&arguments, outputs)?;
         let (problem, fit) = abbe::identify::fit::prepare(&session, common.seed)?;
         let report = abbe::identify::fit::report(&problem, &fit);
         let named: Vec<String> = report
@@ -46,13 +53,6 @@ pub fn run(first: &SessionArguments, repeat: &[PathBuf], common: &CommonArgument
         output::write_json(path, &result)?;
     }
     Ok(())
-}
-
-fn same_file(a: &Path, b: &Path) -> bool {
-    match (a.canonicalize(), b.canonicalize()) {
-        (Ok(a), Ok(b)) => a == b,
-        _ => a == b,
-    }
 }
 
 fn print(result: &Repeated) {

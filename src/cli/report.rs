@@ -30,11 +30,13 @@ impl ReportArguments {
         self.report.is_some() || self.plots.is_some()
     }
 
-    /// Refuses before the work is done what could not be written after it.
+    /// The report's file.
+    pub fn file(&self) -> Option<&PathBuf> {
+        self.report.as_ref()
+    }
+
+    /// Refuses before the work is done plots that could not be written after it.
     pub fn check(&self) -> Result<(), Failure> {
-        if let Some(path) = &self.report {
-            output::check(path)?;
-        }
         if let Some(path) = &self.plots {
             folder::check(path, None)?;
         }

@@ -1,6 +1,6 @@
 //! `abbe simulate`.
 
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
 use abbe::identify::quantity::{self, Given};
 use abbe::identify::simulate::{Simulated, Simulation, simulate};
@@ -62,9 +62,13 @@ pub struct SimulateArguments {
 
 /// Runs `abbe simulate`.
 pub fn run(arguments: &SimulateArguments) -> Result<(), Failure> {
-    let session = read_session(&arguments.session)?;
+    let outputs = arguments.common.outputs(&[])?;
+    let session = read_session(&arguments.session, &outputs)?;
     let mut given = match &arguments.file {
-        Some(file) => quantity::read(file)?,
+        Some(file) => {
+            outputs.spare([file.as_path()])?;
+            quantity::read(file)?
+        }
         None => Vec::new(),
     };
     for text in arguments.errors.iter().chain(&arguments.effects) {
@@ -89,17 +93,13 @@ pub fn run(arguments: &SimulateArguments) -> Result<(), Failure> {
     };
     let simulated = simulate(&session, &simulation)?;
     let files = files(&session, &simulated, arguments)?;
-    let own_folder = session.file.parent().map(|parent| parent.join("."));
-    let same = |a: &Path, b: &Path| match (a.canonicalize(), b.canonicalize()) {
-        (Ok(a), Ok(b)) => a == b,
-        _ => false,
-    };
-    if own_folder.is_some_and(|own| same(&own, &arguments.out)) {
+    if output::is_same(output::folder_of(&session.file), &arguments.out) {
         return Err(Failure::Other(format!(
             "{}: the plan itself lies there; write its readings to another folder",
             arguments.out.display()
         )));
     }
+    output::Outputs::in_folder(&arguments.out, files.iter().map(|(name, _)| name)).spare_session(&session)?;
     folder::write(&arguments.out, &files, arguments.force, |made| {
         // What is left behind has to be a session.
         let path = made.join("session.toml");

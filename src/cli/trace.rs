@@ -50,9 +50,12 @@ pub struct TraceArguments {
 /// Runs `abbe trace`.
 pub fn run(arguments: &TraceArguments) -> Result<(), Failure> {
     arguments.faces.check()?;
-    let others = [arguments.csv.as_ref(), arguments.write.as_ref()];
-    arguments.common.check(&others)?;
-    let session = read_session(&arguments.session)?;
+    let others = [
+        arguments.csv.as_ref(),
+        arguments.write.as_ref(),
+        arguments.faces.file(),
+    ];
+    let session = read_session(&arguments.session, &arguments.common.outputs(&others)?)?;
     let options = TraceOptions {
         seed: arguments.common.seed,
         max_effects: arguments.max_effects,

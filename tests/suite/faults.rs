@@ -220,6 +220,71 @@ fn a_write_protected_file() {
 }
 
 #[test]
+fn an_output_that_would_replace_an_input() {
+    let place = Place::new();
+    place.put("errors.toml", "EC0Y = \"5 arcsec\"\n");
+    place.put("machine.toml", "chain = \"w b X t\"\n[axis.X]\n");
+    place.put(
+        "functions.toml",
+        "[[function]]\nerror = \"EXX\"\nof = \"X\"\nat_mm = [0, 1]\nvalues_um = [0, 1]\n",
+    );
+    symlink(place.at("circle.csv"), place.at("link.csv")).unwrap();
+    fs::create_dir(place.at("plans")).unwrap();
+    let outside = SESSION
+        .replace("NAME", "circle")
+        .replace("\"circle.csv\"", "\"../circle.csv\"");
+    place.put("plans/session.toml", &outside);
+    let held = |place: &Place| {
+        let files = place.names().into_iter().filter(|name| name != "plans");
+        files
+            .map(|name| (fs::read_to_string(place.at(&name)).unwrap(), name))
+            .collect::<Vec<_>>()
+    };
+    let before = held(&place);
+    for (line, name) in [
+        ("fit session.toml --json session.toml", "session.toml"),
+        ("fit session.toml --csv ./circle.csv", "./circle.csv"),
+        ("fit session.toml --report circle.csv", "circle.csv"),
+        ("fit session.toml --json link.csv", "link.csv"),
+        ("trace session.toml --quiet --write session.toml", "session.toml"),
+        ("plan session.toml --no-effects --json circle.csv", "circle.csv"),
+        (
+            "equation session.toml --test XY --out session.toml",
+            "session.toml",
+        ),
+        (
+            "simulate session.toml --out run --errors errors.toml --json errors.toml",
+            "errors.toml",
+        ),
+        (
+            "simulate plans/session.toml --allow-outside --out . --force",
+            "circle.csv",
+        ),
+        (
+            "volumetric machine.toml --map functions.toml --functions functions.toml",
+            "functions.toml",
+        ),
+        (
+            "volumetric machine.toml --map map.csv --functions functions.toml --json machine.toml",
+            "machine.toml",
+        ),
+    ] {
+        let why = format!("{name}: cannot be written: it is one of the files that are read; name another");
+        refused(&place.shell(&format!("abbe {line}")), &[&why]);
+        assert!(held(&place) == before, "{line}");
+    }
+    for line in [
+        "fit session.toml --json out --csv ./out",
+        "fit session.toml --report out --json out",
+        "volumetric machine.toml --map out --functions functions.toml --json out",
+    ] {
+        let why = "out: two results would be written there; name another file for one of them";
+        refused(&place.shell(&format!("abbe {line}")), &[why]);
+        assert!(held(&place) == before, "{line}");
+    }
+}
+
+#[test]
 fn a_folder_that_is_not_there() {
     let place = Place::new();
     let output = place.fit(&["--csv", text(&place.at("nowhere/out.csv"))]);

@@ -16,6 +16,9 @@ use crate::cli::table;
 /// The share of a range that is tried besides the whole where gain is judged by the minute.
 const HALF: f64 = 0.5;
 
+/// Tests that are proposed at most: each is sought over the whole menu, beside all before it.
+const MOST_TESTS: usize = 24;
+
 /// Whether a sweep comes back.
 #[derive(Clone, Copy, PartialEq, ValueEnum)]
 enum Directions {
@@ -172,6 +175,11 @@ impl ImproveArguments {
             )?);
         }
         let tests = self.improve.unwrap_or(1);
+        if !(1..=MOST_TESTS).contains(&tests) {
+            return Err(Failure::Other(format!(
+                "`--improve {tests}`: from 1 to {MOST_TESTS} tests are proposed"
+            )));
+        }
         let options = ImproveOptions {
             goal: Goal::WorstUncertainty,
             tests,

@@ -65,8 +65,10 @@ pub const EXAMPLES: &str = "Examples:
 /// Runs `abbe plan`.
 pub fn run(arguments: &PlanArguments) -> Result<(), Failure> {
     arguments.faces.check()?;
-    arguments.common.check(&[arguments.patterns.file()])?;
-    let mut session = read_session(&arguments.session)?;
+    let outputs = arguments
+        .common
+        .outputs(&[arguments.patterns.file(), arguments.faces.file()])?;
+    let mut session = read_session(&arguments.session, &outputs)?;
     if arguments.patterns.asked() {
         return arguments.patterns.run(&session, arguments.common.json.as_deref());
     }
