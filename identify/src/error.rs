@@ -17,6 +17,14 @@ pub enum IdentifyError {
         "the session has nothing to identify: `[unknowns] errors` is empty, no effect is declared and every set-up is known exactly"
     )]
     NoUnknowns,
+    /// Something to look for that is in no identifier of the library.
+    #[error(
+        "no effect that the library has for this session has `{text}` in its identifier, as EZC~C:h2; `abbe trace --list` shows them all"
+    )]
+    NotInTheLibrary {
+        /// What was looked for.
+        text: String,
+    },
     /// A declared effect that needs a column the data lack.
     #[error("effect `{effect}` follows {driver}, but the data of test `{test}` have no column `{column}`")]
     MissingDriver {

@@ -210,7 +210,7 @@ pub struct EffectResult {
     /// The numbers and places of its shape.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub numbers: Vec<ShapeNumber>,
-    /// Its coefficients.
+    /// Its coefficients; of a free curve those that the readings tell singly, which may be none.
     pub parameters: Vec<ParameterResult>,
     /// For a free curve: its points with their band.
     #[serde(skip_serializing_if = "Vec::is_empty")]

@@ -252,6 +252,48 @@ fn help_has_examples_and_status_0() {
     }
 }
 
+/// What is looked for and in no identifier would otherwise look as if it were not there; what is left out in vain is named.
+#[test]
+fn an_effect_that_the_library_does_not_have() {
+    let session = super::ready("hermle-c600u/measured/session.toml");
+    let asked = |words: &[&str]| abbe(&[&["trace", super::text(&session), "--quiet"], words].concat());
+    for words in [
+        &["--only", "EZB"][..],
+        &["--only", "EZC", "--only", "harmonics"],
+        &["--list", "--only", "ezc"],
+    ] {
+        let output = asked(words);
+        assert_eq!(output.status.code(), Some(1), "{words:?}");
+        let told = String::from_utf8(output.stderr).unwrap();
+        let misspelt = words[words.len() - 1];
+        holds(
+            &told,
+            &[
+                &format!("has `{misspelt}` in its identifier"),
+                "abbe trace --list",
+            ],
+        );
+    }
+    let output = asked(&["--only", "gain", "--exclude", "gravitation"]);
+    assert!(output.status.success());
+    let told = String::from_utf8(output.stdout).unwrap() + &String::from_utf8(output.stderr).unwrap();
+    holds(&told, &["nothing was left out by `gravitation`"]);
+}
+
+#[test]
+fn as_many_tests_as_nobody_would_measure() {
+    for tests in ["0", "25", "100000"] {
+        let plan = super::ready("hermle-c600u/chapter5.toml");
+        let output = abbe(&["plan", super::text(&plan), "--no-effects", "--improve", tests]);
+        assert_eq!(output.status.code(), Some(1));
+        let told = String::from_utf8(output.stderr).unwrap();
+        holds(
+            &told,
+            &[&format!("`--improve {tests}`: from 1 to 24 tests are proposed")],
+        );
+    }
+}
+
 #[test]
 fn files_that_are_none() {
     for path in ["nowhere/session.toml", "."] {

@@ -53,12 +53,16 @@ pub fn entries(session: &Session, options: &TraceOptions) -> Result<Vec<Entry>, 
 }
 
 /// The candidates that a user wants to be looked for, laid over the readings: those that the data have what they follow for, in the order of the library.
+/// An error if what is wanted is in no identifier: misspelt, it would look as if nothing were there to be found.
 pub(super) fn laid(
     problem: &Problem<'_>,
     columns: &Columns<'_, '_>,
     options: &TraceOptions,
 ) -> Result<Vec<(Candidate, Layout)>, IdentifyError> {
     let mut candidates = library::candidates(problem)?;
+    if let Some(text) = in_no_identifier(&candidates, &options.only).next() {
+        return Err(IdentifyError::NotInTheLibrary { text: text.clone() });
+    }
     candidates.retain(|candidate| wanted(options, &candidate.effect.id()));
     Ok(candidates
         .into_par_iter()
@@ -67,6 +71,25 @@ pub(super) fn laid(
             Some((candidate, layout))
         })
         .collect())
+}
+
+/// What a user wanted to leave out and is in no identifier, a warning each.
+pub(super) fn left_out_in_vain(
+    problem: &Problem<'_>,
+    options: &TraceOptions,
+) -> Result<Vec<String>, IdentifyError> {
+    let candidates = library::candidates(problem)?;
+    Ok(in_no_identifier(&candidates, &options.exclude)
+        .map(|text| format!("nothing was left out by `{text}`: no effect that the library has for this session is called so"))
+        .collect())
+}
+
+/// Of some texts those that no candidate has in its identifier.
+fn in_no_identifier<'t>(candidates: &[Candidate], texts: &'t [String]) -> impl Iterator<Item = &'t String> {
+    let ids: Vec<String> = candidates.iter().map(|candidate| candidate.effect.id()).collect();
+    texts
+        .iter()
+        .filter(move |text| !ids.iter().any(|id| id.contains(text.as_str())))
 }
 
 fn wanted(options: &TraceOptions, id: &str) -> bool {

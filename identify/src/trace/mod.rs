@@ -211,7 +211,7 @@ fn trace_with<'a>(
         effects,
         structure: structure_after,
     } = judged;
-    let reported = report::report(&report::Findings {
+    let mut reported = report::report(&report::Findings {
         before: &problem,
         before_fit: &before_fit,
         after: &after,
@@ -225,6 +225,10 @@ fn trace_with<'a>(
         candidates: looked_for,
         candidates_seen: seen,
     })?;
+    reported
+        .result
+        .warnings
+        .extend(list::left_out_in_vain(&problem, options)?);
     drop(search);
     drop(columns);
     Ok(Trace {
