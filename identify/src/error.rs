@@ -25,6 +25,11 @@ pub enum IdentifyError {
         /// What was looked for.
         text: String,
     },
+    /// What is left out is all that was to be looked for.
+    #[error(
+        "nothing is left to look for: what `--only` asks for is left out by `--exclude`, or everything is"
+    )]
+    EverythingLeftOut,
     /// A declared effect that needs a column the data lack.
     #[error("effect `{effect}` follows {driver}, but the data of test `{test}` have no column `{column}`")]
     MissingDriver {

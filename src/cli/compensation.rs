@@ -43,7 +43,7 @@ pub struct CompensationArguments {
     #[arg(long, value_enum, requires = "compensation")]
     control: Option<Control>,
     /// Points of a table, over the positions that the readings cover.
-    #[arg(long, value_name = "N", default_value_t = 37)]
+    #[arg(long, value_name = "N", default_value_t = 37, requires = "compensation")]
     points: usize,
 }
 
@@ -51,6 +51,20 @@ impl CompensationArguments {
     /// Whether tables are asked for.
     pub fn wanted(&self) -> bool {
         self.compensation.is_some()
+    }
+
+    /// Refuses before the work what could not be written after it.
+    pub fn check(&self) -> Result<(), Failure> {
+        let Some(folder) = &self.compensation else {
+            return Ok(());
+        };
+        if !(2..=MOST_POINTS).contains(&self.points) {
+            return Err(Failure::Other(format!(
+                "--points {}: from 2 to {MOST_POINTS}, which is the most that LinuxCNC and Heidenhain take",
+                self.points
+            )));
+        }
+        folder::check(folder, None).map(|_| ())
     }
 
     /// Writes the tables if they were asked for.
@@ -77,11 +91,6 @@ fn write(
     points: usize,
     folder: &std::path::Path,
 ) -> Result<(), Failure> {
-    if !(2..=MOST_POINTS).contains(&points) {
-        return Err(Failure::Other(format!(
-            "--points {points}: from 2 to {MOST_POINTS}, which is the most that LinuxCNC and Heidenhain take"
-        )));
-    }
     let mut left_out = compensation.left_out.clone();
     if control != Control::Beckhoff {
         left_out.extend(locations(compensation));

@@ -55,7 +55,12 @@ pub struct FitArguments {
     #[command(flatten)]
     draws: self_calibration::DrawArguments,
     /// Further sessions of the same plan: the scatter of their fits (Type A) beside the fits' own uncertainties (Type B).
-    #[arg(long, value_name = "SESSION", num_args = 1.., conflicts_with = "monte_carlo")]
+    #[arg(
+        long,
+        value_name = "SESSION",
+        num_args = 1..,
+        conflicts_with_all = ["monte_carlo", "csv", "views", "report", "plots", "compensation"]
+    )]
     repeat: Vec<PathBuf>,
     /// Write the result as CSV, one row a figure (not with another `--method`).
     #[arg(long, value_name = "FILE")]
@@ -67,6 +72,7 @@ pub struct FitArguments {
 /// Runs `abbe fit`.
 pub fn run(arguments: &FitArguments) -> Result<(), Failure> {
     arguments.faces.check()?;
+    arguments.compensation.check()?;
     let others = [
         arguments.csv.as_ref(),
         arguments.views.as_ref(),

@@ -15,7 +15,12 @@ use super::{output, table};
 #[derive(Args)]
 pub struct MapArguments {
     /// Write the error vector over the workspace to a CSV file instead of printing the closed form.
-    #[arg(long, value_name = "FILE.csv", requires = "functions")]
+    #[arg(
+        long,
+        value_name = "FILE.csv",
+        requires = "functions",
+        conflicts_with_all = ["language", "order", "rotation", "errors", "symbols", "gradient", "out"]
+    )]
     map: Option<PathBuf>,
     /// The errors as functions of the axes: a TOML file of constants, tables, polynomials and harmonics.
     #[arg(long, value_name = "FILE", requires = "map")]

@@ -35,7 +35,7 @@ pub struct TraceArguments {
     #[arg(long, value_name = "TEXT")]
     exclude: Vec<String>,
     /// List the library for this session, with what its readings can see, and stop.
-    #[arg(long)]
+    #[arg(long, conflicts_with_all = ["json", "csv", "write", "report", "plots", "compensation", "max_effects"])]
     list: bool,
     /// Write the session that declares the found effects.
     #[arg(long, value_name = "FILE")]
@@ -50,6 +50,7 @@ pub struct TraceArguments {
 /// Runs `abbe trace`.
 pub fn run(arguments: &TraceArguments) -> Result<(), Failure> {
     arguments.faces.check()?;
+    arguments.compensation.check()?;
     let others = [
         arguments.csv.as_ref(),
         arguments.write.as_ref(),

@@ -235,6 +235,64 @@ fn a_wrong_command_line_is_status_2() {
     }
 }
 
+/// What would be asked for and not done is refused.
+#[test]
+fn options_that_do_not_go_together() {
+    for line in [
+        "trace s.toml --list --json l.json",
+        "trace s.toml --list --csv l.csv",
+        "trace s.toml --list --write n.toml",
+        "trace s.toml --list --report r.html",
+        "trace s.toml --list --plots p",
+        "fit s.toml --repeat t.toml --csv r.csv",
+        "fit s.toml --repeat t.toml --views v.csv",
+        "fit s.toml --repeat t.toml --report r.html",
+        "fit s.toml --repeat t.toml --plots p",
+        "fit s.toml --repeat t.toml --compensation c --control linuxcnc",
+        "fit s.toml --repeat t.toml --monte-carlo 20000",
+        "plan s.toml --patterns p.csv --improve 1",
+        "plan s.toml --patterns p.csv --separate A,B",
+        "plan s.toml --patterns p.csv --range",
+        "plan s.toml --patterns p.csv --report r.html",
+        "plan s.toml --patterns p.csv --clearance-mm 1,1,1,1,1,1",
+        "plan s.toml --patterns p.csv --noise-um 1",
+        "plan s.toml --improve 1 --clearance-mm 1,1,1,1,1,1",
+        "plan s.toml --improve 1 --separate A,B",
+        "volumetric m.toml --map m.csv --functions f.toml --out x",
+        "volumetric m.toml --map m.csv --functions f.toml --as c",
+        "volumetric m.toml --map m.csv --functions f.toml --errors EXX",
+    ] {
+        let output = abbe(&line.split(' ').collect::<Vec<_>>());
+        assert_eq!(output.status.code(), Some(2), "{line}");
+        holds(
+            &String::from_utf8(output.stderr).unwrap(),
+            &["cannot be used with"],
+        );
+    }
+    for line in [
+        "fit s.toml --points 9",
+        "fit s.toml --control linuxcnc",
+        "fit s.toml --coverage 0.9",
+        "plan s.toml --bars-mm 100",
+        "plan s.toml --radii-mm 100 --range",
+        "plan s.toml --heights-mm 0",
+        "plan s.toml --feeds 2",
+        "plan s.toml --sweep-shares 0.5",
+        "plan s.toml --directions one",
+        "plan s.toml --no-follow",
+        "plan s.toml --remount-spindle-ball",
+        "plan s.toml --setup-min 5",
+        "plan s.toml --test-min 5",
+        "plan s.toml --error EY0A=1um",
+        "volumetric m.toml --map m.csv",
+        "volumetric m.toml --places 3",
+    ] {
+        let output = abbe(&line.split(' ').collect::<Vec<_>>());
+        assert_eq!(output.status.code(), Some(2), "{line}");
+        holds(&String::from_utf8(output.stderr).unwrap(), &["were not provided"]);
+    }
+}
+
 #[test]
 fn help_has_examples_and_status_0() {
     for arguments in [
@@ -272,6 +330,14 @@ fn an_effect_that_the_library_does_not_have() {
                 &format!("has `{misspelt}` in its identifier"),
                 "abbe trace --list",
             ],
+        );
+    }
+    for words in [&["--exclude", ""][..], &["--only", "EZC", "--exclude", "ZC"]] {
+        let output = asked(words);
+        assert_eq!(output.status.code(), Some(1), "{words:?}");
+        holds(
+            &String::from_utf8(output.stderr).unwrap(),
+            &["nothing is left to look for", "--exclude"],
         );
     }
     let output = asked(&["--only", "gain", "--exclude", "gravitation"]);

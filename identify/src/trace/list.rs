@@ -63,7 +63,11 @@ pub(super) fn laid(
     if let Some(text) = in_no_identifier(&candidates, &options.only).next() {
         return Err(IdentifyError::NotInTheLibrary { text: text.clone() });
     }
+    let all = candidates.len();
     candidates.retain(|candidate| wanted(options, &candidate.effect.id()));
+    if candidates.is_empty() && all > 0 {
+        return Err(IdentifyError::EverythingLeftOut);
+    }
     Ok(candidates
         .into_par_iter()
         .filter_map(|candidate| {

@@ -28,6 +28,7 @@ enum Directions {
 
 /// What a next test is sought with.
 #[derive(Args)]
+#[command(group = clap::ArgGroup::new("next_test").args(["improve", "separate"]))]
 pub struct ImproveArguments {
     /// Propose this many tests that most lower the worst uncertainty.
     #[arg(long, value_name = "TESTS", num_args = 0..=1, default_missing_value = "1", conflicts_with = "separate")]
@@ -36,37 +37,42 @@ pub struct ImproveArguments {
     #[arg(long, value_name = "A,B")]
     separate: Option<String>,
     /// Bars of the kit.
-    #[arg(long, value_name = "MM,…", value_delimiter = ',')]
+    #[arg(long, value_name = "MM,…", value_delimiter = ',', requires = "next_test")]
     bars_mm: Option<Vec<f64>>,
     /// Distances of the ball from the axis that it is mounted about.
-    #[arg(long, value_name = "MM,…", value_delimiter = ',')]
+    #[arg(long, value_name = "MM,…", value_delimiter = ',', requires = "next_test")]
     radii_mm: Option<Vec<f64>>,
     /// Heights of the ball along that axis.
-    #[arg(long, value_name = "MM,…", value_delimiter = ',')]
+    #[arg(long, value_name = "MM,…", value_delimiter = ',', requires = "next_test")]
     heights_mm: Option<Vec<f64>>,
     /// Feeds to try, as multiples of the session's; by default a second one where an effect depends on speed or time.
-    #[arg(long, value_name = "TIMES,…", value_delimiter = ',')]
+    #[arg(long, value_name = "TIMES,…", value_delimiter = ',', requires = "next_test")]
     feeds: Option<Vec<f64>>,
     /// Shares of a sweep's range to try, about its middle [default: 1; by the minute 1,0.5].
-    #[arg(long = "sweep-shares", value_name = "SHARE,…", value_delimiter = ',')]
+    #[arg(
+        long = "sweep-shares",
+        value_name = "SHARE,…",
+        value_delimiter = ',',
+        requires = "next_test"
+    )]
     ranges: Option<Vec<f64>>,
     /// Directions to try [default: both; by the minute both,one].
-    #[arg(long, value_name = "WAYS,…", value_delimiter = ',')]
+    #[arg(long, value_name = "WAYS,…", value_delimiter = ',', requires = "next_test")]
     directions: Option<Vec<Directions>>,
     /// Leave out tests in which linear axes follow: their errors are then no part of the question.
-    #[arg(long)]
+    #[arg(long, requires = "next_test")]
     no_follow: bool,
     /// Travel of the bar's sensor either way: what a test may not exceed.
     #[arg(long, value_name = "MM", default_value_t = 1.0)]
     reach_mm: f64,
     /// Every test has a spindle ball mounted for it alone.
-    #[arg(long)]
+    #[arg(long, requires = "next_test")]
     remount_spindle_ball: bool,
     /// Time that mounting a ball takes; stating it weighs gains by the minute.
-    #[arg(long, value_name = "MIN")]
+    #[arg(long, value_name = "MIN", requires = "next_test")]
     setup_min: Option<f64>,
     /// Time that preparing a test takes; stating it weighs gains by the minute.
-    #[arg(long, value_name = "MIN")]
+    #[arg(long, value_name = "MIN", requires = "next_test")]
     test_min: Option<f64>,
 }
 

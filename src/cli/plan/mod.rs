@@ -39,7 +39,7 @@ pub struct PlanArguments {
     planned: bool,
     /// Check that spindle and table stay clear when the table stands on end: diameters of spindle and table, height and width of the device,
     /// shaft from jig to ball, jig.
-    #[arg(long, value_name = "DS,DT,H,W,L,T")]
+    #[arg(long, value_name = "DS,DT,H,W,L,T", conflicts_with_all = ["improve", "separate", "range"])]
     clearance_mm: Option<String>,
     /// Leave out what undeclared effects would do.
     #[arg(long)]

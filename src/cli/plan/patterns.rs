@@ -14,7 +14,11 @@ use crate::cli::{output, table};
 #[derive(Args)]
 pub struct PatternArguments {
     /// Write what each error alone does to each reading: its trace pattern, by the exact chain.
-    #[arg(long, value_name = "FILE.csv")]
+    #[arg(
+        long,
+        value_name = "FILE.csv",
+        conflicts_with_all = ["improve", "separate", "range", "report", "plots", "clearance_mm", "noise_um", "setup_um"]
+    )]
     patterns: Option<PathBuf>,
     /// Size of an error whose pattern is wanted; may be repeated. Without it: the session's unknown errors, 10 µm and 0.01°.
     #[arg(
