@@ -62,7 +62,7 @@ pub fn evaluate<S: Scalar>(
     outputs: &[Operand],
     variable: impl Fn(&Variable) -> Value<S>,
 ) -> Result<Vec<S>, CodegenError> {
-    let mut values: Vec<Option<Value<S>>> = vec![None; arena.len()];
+    let mut values: Vec<Option<Value<S>>> = vec![None; arena.node_count()];
     let constant = |value: f64| Value::<S>::Nominal(S::Nominal::constant(value));
     let look_up = |values: &[Option<Value<S>>], operand: Operand| match operand {
         Operand::Constant(value) => constant(value.value()),

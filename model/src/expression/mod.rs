@@ -200,13 +200,8 @@ impl<V: Clone + PartialEq> Arena<V> {
     }
 
     /// How many nodes there are.
-    pub fn len(&self) -> usize {
+    pub fn node_count(&self) -> usize {
         self.nodes.borrow().len()
-    }
-
-    /// Whether nothing was recorded yet.
-    pub fn is_empty(&self) -> bool {
-        self.len() == 0
     }
 
     /// A variable by its place.
@@ -262,7 +257,7 @@ impl<V: Clone + PartialEq> Arena<V> {
 
     /// The nodes that `outputs` rest on, operands before what is made of them.
     pub fn reachable(&self, outputs: &[Operand]) -> Vec<NodeId> {
-        let mut used = vec![false; self.len()];
+        let mut used = vec![false; self.node_count()];
         for output in outputs {
             if let Operand::Node(id) = output {
                 used[id.0 as usize] = true;

@@ -158,3 +158,50 @@ impl<N: Nominal> RTest<N> {
         Point(sensors.map(|[a, b, c]| x * a + y * b + z * c))
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Each angle of the sensors turns the reading by its own matrix above, transposed, and by nothing else.
+    #[test]
+    fn sensors_that_stand_askew_turn_the_reading() {
+        let machine = Machine {
+            name: "none".into(),
+            axes: Vec::new(),
+            workpiece_side: 0,
+            rotation: Rotation::Exact,
+            gravity: [0.0, 0.0, -1.0],
+        };
+        let [x, y, z] = [0.03, -0.05, 0.07];
+        let vectors = RTest {
+            setting: Setting::Table,
+            workpiece_ball: [0.0; 3],
+            spindle_ball: [x, y, z],
+            sensors: None,
+        };
+        let directions = [[0.6, 0.8, 0.0], [0.0, 0.6, 0.8], [0.8, 0.0, 0.6]];
+        let counts = RTest {
+            sensors: Some(directions),
+            ..vectors.clone()
+        };
+        let (sin, cos) = 0.4_f64.sin_cos();
+        for (place, turned) in [
+            [x, cos * y - sin * z, sin * y + cos * z],
+            [cos * x + sin * z, y, -sin * x + cos * z],
+            [cos * x - sin * y, sin * x + cos * y, z],
+        ]
+        .into_iter()
+        .enumerate()
+        {
+            let askew = |unknown: usize| (unknown == SENSOR + place).then_some(0.4);
+            let near = |found: [f64; 3], expected: [f64; 3]| {
+                let far = (0..3).any(|i| (found[i] - expected[i]).abs() > 1e-15);
+                assert!(!far, "angle {place}: {found:?}, not {expected:?}");
+            };
+            near(vectors.read(&machine, &[], &[], askew).0, turned);
+            let counted = directions.map(|direction| (0..3).map(|i| direction[i] * turned[i]).sum());
+            near(counts.read(&machine, &[], &[], askew).0, counted);
+        }
+    }
+}
