@@ -327,3 +327,19 @@ fn warnings(parameters: &Parameters, beta: &[f64]) -> Vec<String> {
     }
     warnings
 }
+
+#[cfg(test)]
+mod tests {
+    use super::rounded;
+
+    /// The readings of a plan go to files: what a step leaves has no more decimals than the step, whatever rounding the step itself brings along.
+    #[test]
+    fn a_step_leaves_its_own_decimals() {
+        assert_eq!(rounded(100.012_349, 1e-4), 100.0123);
+        assert_eq!(rounded(-0.000_05, 1e-4), -0.0001);
+        // 1/1e-5 is no whole number, and 3 · 1e-5 not 3e-5.
+        assert_eq!(rounded(3.2e-5, 1e-5), 3e-5);
+        assert_eq!(rounded(1.0, 0.3), 0.3 * 3.0);
+        assert_eq!(rounded(7.0, 3.0), 6.0);
+    }
+}
