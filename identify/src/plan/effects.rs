@@ -23,7 +23,7 @@ use crate::drivers;
 use crate::error::IdentifyError;
 use crate::parameters::physical_size;
 use crate::problem::Problem;
-use crate::trace::columns::{Columns, Layout};
+use crate::trace::columns::{Columns, Layout, chunked};
 use crate::trace::library::{self, Candidate};
 use crate::unit::Unit;
 
@@ -40,8 +40,6 @@ const EVERY_SHORT_PERIOD: usize = 8;
 /// Coefficients of one effect beyond which it is left out: a free curve holds the constants and slopes that the unknowns hold too, so that
 /// its worst member is always hidden.
 const MOST_COEFFICIENTS: usize = 2;
-/// Columns made together.
-const CHUNK: usize = 48;
 /// Biases listed for an effect.
 const BIASES: usize = 4;
 /// Biases below this, in outside units a unit, are not listed.
@@ -269,22 +267,6 @@ fn grouped(
         }
     }
     order.into_iter().filter_map(|key| groups.remove(&key)).collect()
-}
-
-fn chunked(layouts: &[Layout]) -> Vec<std::ops::Range<usize>> {
-    let mut chunks = Vec::new();
-    let (mut start, mut width) = (0, 0);
-    for (index, layout) in layouts.iter().enumerate() {
-        if width > 0 && width + layout.count > CHUNK {
-            chunks.push(start..index);
-            (start, width) = (index, 0);
-        }
-        width += layout.count;
-    }
-    if start < layouts.len() {
-        chunks.push(start..layouts.len());
-    }
-    chunks
 }
 
 /// The hidden effects that bias each error most, by error: what a clean residual does not exclude.

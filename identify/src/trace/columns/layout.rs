@@ -221,6 +221,26 @@ impl Columns<'_, '_> {
     }
 }
 
+/// Columns that are made together.
+const CHUNK_COLUMNS: usize = 48;
+
+/// Consecutive layouts whose columns are made together: as many as fit into a chunk, and at least one.
+pub fn chunked(layouts: &[Layout]) -> Vec<Range<usize>> {
+    let mut chunks = Vec::new();
+    let (mut start, mut width) = (0, 0);
+    for (index, layout) in layouts.iter().enumerate() {
+        if width > 0 && width + layout.count > CHUNK_COLUMNS {
+            chunks.push(start..index);
+            (start, width) = (index, 0);
+        }
+        width += layout.count;
+    }
+    if start < layouts.len() {
+        chunks.push(start..layouts.len());
+    }
+    chunks
+}
+
 /// What a store holds under a key, made and kept if it was not there.
 fn cached<K: std::hash::Hash + Eq, V: Clone>(
     store: &Mutex<HashMap<K, V>>,
@@ -236,4 +256,40 @@ fn cached<K: std::hash::Hash + Eq, V: Clone>(
         store.insert(key, value.clone());
     }
     value
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Chunks are full, and nothing is in two of them or in none: what is made together bounds the memory of a screening.
+    #[test]
+    fn chunks_are_as_full_as_they_can_be() {
+        let layouts = |counts: &[usize]| -> Vec<Layout> {
+            let of_count = |&count: &usize| Layout {
+                count,
+                numbers: 0,
+                parts: Vec::new(),
+            };
+            counts.iter().map(of_count).collect()
+        };
+        let ends = |counts: &[usize]| -> Vec<usize> {
+            let chunks = chunked(&layouts(counts));
+            let starts: Vec<usize> = chunks.iter().map(|chunk| chunk.start).collect();
+            let ends: Vec<usize> = chunks.iter().map(|chunk| chunk.end).collect();
+            assert!(
+                starts
+                    .iter()
+                    .zip([0].iter().chain(&ends))
+                    .all(|(start, end)| start == end)
+            );
+            ends
+        };
+        assert_eq!(ends(&[]), [0; 0]);
+        assert_eq!(ends(&[2; 24]), [24]);
+        assert_eq!(ends(&[2; 25]), [24, 25]);
+        assert_eq!(ends(&[1, 47, 1, 46, 2]), [2, 4, 5]);
+        // A curve of many coefficients is one by itself.
+        assert_eq!(ends(&[3, 200, 3, 3]), [1, 2, 4]);
+    }
 }

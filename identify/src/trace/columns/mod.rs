@@ -16,8 +16,8 @@ use rayon::prelude::*;
 
 use crate::error::IdentifyError;
 use crate::problem::{Block, Problem};
-pub use layout::Layout;
 use layout::Moves;
+pub use layout::{Layout, chunked};
 
 /// Readings whose sensitivities are taken at once.
 const ROWS_AT_ONCE: usize = 512;

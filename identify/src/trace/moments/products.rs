@@ -7,12 +7,10 @@ use faer::{Accum, Mat, MatRef, Par};
 use rayon::prelude::*;
 
 use super::transposed_product;
-use crate::trace::columns::{Columns, Layout};
+use crate::trace::columns::{Columns, Layout, chunked};
 
 /// The most entries of columns that are kept: 320 MB.
 const MOST_KEPT: usize = 40_000_000;
-/// Candidates whose columns are made together.
-const CHUNK_COLUMNS: usize = 48;
 
 /// Consecutive candidates with their columns, where these are kept.
 pub(super) struct Block {
@@ -39,7 +37,7 @@ pub(super) fn laid(
         .filter_map(|block| block.kept.as_ref())
         .map(|kept| kept.nrows() * kept.ncols())
         .sum();
-    let blocks: Vec<(Range<usize>, bool)> = chunked(&count)
+    let blocks: Vec<(Range<usize>, bool)> = chunked(&layouts[candidates.clone()])
         .into_iter()
         .map(|chunk| {
             let entries = columns.rows() * count[chunk.clone()].iter().sum::<usize>();
@@ -194,21 +192,4 @@ fn null_product(
         );
     }
     product
-}
-
-/// Consecutive candidates whose columns together make a chunk.
-fn chunked(count: &[usize]) -> Vec<Range<usize>> {
-    let mut chunks = Vec::new();
-    let (mut start, mut width) = (0, 0);
-    for (index, columns) in count.iter().enumerate() {
-        if width > 0 && width + columns > CHUNK_COLUMNS {
-            chunks.push(start..index);
-            (start, width) = (index, 0);
-        }
-        width += columns;
-    }
-    if start < count.len() {
-        chunks.push(start..count.len());
-    }
-    chunks
 }
