@@ -39,10 +39,15 @@ fn places(u: f64) -> usize {
     (1.0 - u.log10().floor()).clamp(0.0, 12.0) as usize
 }
 
-/// A value and its uncertainty, rounded alike.
+/// A value and its uncertainty, rounded alike. What rounds to zero has no sign.
 pub fn value_and_u(value: f64, u: f64) -> (String, String) {
     let places = places(u);
-    (format!("{value:.places$}"), format!("{u:.places$}"))
+    let rounded = format!("{value:.places$}");
+    let unsigned = rounded
+        .strip_prefix('-')
+        .filter(|digits| digits.bytes().all(|digit| matches!(digit, b'0' | b'.')));
+    let value = unsigned.map_or_else(|| rounded.clone(), str::to_string);
+    (value, format!("{u:.places$}"))
 }
 
 /// A residual or a noise figure in µm.
@@ -59,4 +64,24 @@ pub fn shape_number(number: &ShapeNumber) -> String {
     };
     let values: Vec<String> = number.values.iter().map(to_four_digits).collect();
     format!("{} {} {}", number.name, values.join(", "), number.unit)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::value_and_u;
+
+    #[test]
+    fn values_have_the_places_of_their_uncertainty() {
+        for (value, u, shown) in [
+            (35.312, 0.0213, ("35.312", "0.021")),
+            (-35.38, 2.04, ("-35.4", "2.0")),
+            (-0.04, 1.0, ("0.0", "1.0")),
+            (-0.06, 1.0, ("-0.1", "1.0")),
+            (-0.4, 20.0, ("0", "20")),
+            (-1e-9, 0.0, ("0.0000", "0.0000")),
+        ] {
+            let (value, u) = value_and_u(value, u);
+            assert_eq!((value.as_str(), u.as_str()), shown);
+        }
+    }
 }
