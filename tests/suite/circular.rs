@@ -106,6 +106,38 @@ fn um(test: &Value, key: &str) -> f64 {
     test[key].as_f64().unwrap()
 }
 
+/// A chip on the ball is no error of the machine: a single reading that stands out moves no figure.
+#[test]
+fn a_wild_reading_is_left_out() {
+    let folder = tempfile::tempdir().unwrap();
+    let ellipse = |at: &At| {
+        [
+            40e-6 * RADIUS_MM * at.angle.cos(),
+            10e-6 * RADIUS_MM * at.angle.sin(),
+        ]
+    };
+    let outwards = |at: &At, mm: f64| [mm * at.angle.cos(), mm * at.angle.sin()];
+    for (chip_mm, there) in [(0.03, 137), (-0.02, 400)] {
+        let test = circle(folder.path(), &[1.0, -1.0], true, |at| {
+            let here = at.path > 0.0 && (at.angle / STEP).round() as usize == there;
+            let chip = outwards(at, if here { chip_mm } else { 0.0 });
+            let smooth = ellipse(at);
+            [smooth[0] + chip[0], smooth[1] + chip[1]]
+        });
+        for direction in test["directions"].as_array().unwrap() {
+            assert!(
+                (um(direction, "circular_deviation_um") - 3.0).abs() < 0.01,
+                "{test}"
+            );
+            assert!((um(direction, "radial_deviation_max_um") - 4.0).abs() < 0.01);
+            assert!((um(direction, "radial_deviation_min_um") - 1.0).abs() < 0.01);
+        }
+        assert!((um(&test, "bidirectional_circular_deviation_um") - 3.0).abs() < 0.01);
+        assert!(um(&test, "hysteresis_um") < 0.01, "{test}");
+        is(&test, "scale mismatch", "XY", "ratio", 30.0, 0.05);
+    }
+}
+
 #[test]
 fn every_fault_is_told_by_its_closed_form() {
     let folder = tempfile::tempdir().unwrap();
