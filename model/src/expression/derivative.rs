@@ -134,3 +134,19 @@ impl<V: Clone + PartialEq> Arena<V> {
             .collect()
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::scalar::Nominal;
+
+    /// ∂(b·exp(a·x))/∂x = b·exp(a·x)·a, ∂/∂b = exp(a·x): the same nodes, for nodes are recorded once.
+    #[test]
+    fn an_exponential_is_its_own_derivative() {
+        let arena = Arena::default();
+        let [a, b, x] = ["a", "b", "x"].map(|name| arena.variable(name));
+        let exponential = (a * x).exp();
+        let gradient = arena.gradient((b * exponential).operand(), &[x.operand(), b.operand()]);
+        assert_eq!(gradient, [(b * exponential * a).operand(), exponential.operand()]);
+    }
+}

@@ -200,7 +200,7 @@ impl<'p, 'a> Columns<'p, 'a> {
                 continue;
             }
             let white = self.problem.whitened(self.block_rows(layouts, block), kept);
-            let together = target[target.len() - 1] - target[0] + 1 == target.len();
+            let together = target.windows(2).all(|pair| pair[1] == pair[0] + 1);
             for (mut column, white) in columns.as_mut().col_iter_mut().zip(white.col_iter()).take(total) {
                 if together {
                     column.subrows_mut(target[0], target.len()).copy_from(white);
