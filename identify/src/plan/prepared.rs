@@ -5,6 +5,7 @@ use rayon::prelude::*;
 use super::information::{Root, Shared, sum};
 use super::linear::{Linearisation, merged};
 use super::menu::{Entry, Menu};
+use super::order::smallest_first;
 use crate::error::IdentifyError;
 use crate::parameters::{Parameter, Role};
 use crate::problem::Problem;
@@ -65,14 +66,15 @@ impl Prepared {
         })
     }
 
-    /// The entry after which a figure (the smaller the better) stands best, and the figures of all.
+    /// The entry after which a figure (the smaller the better) stands best, and the figures of all. Of equal ones the first of the menu, which lists
+    /// mounted balls before those that are mounted anew.
     pub fn best(&self, root: &Root, figure: &(impl Fn(&Root) -> f64 + Sync)) -> Option<(usize, Vec<f64>)> {
         let figures: Vec<f64> = self
             .entries
             .par_iter()
             .map(|ready| figure(&sum(root.as_ref(), ready.root.as_ref())))
             .collect();
-        let best = (0..figures.len()).min_by(|a, b| figures[*a].total_cmp(&figures[*b]))?;
+        let best = (0..figures.len()).min_by(|a, b| smallest_first(figures[*a], figures[*b]))?;
         Some((best, figures))
     }
 }
