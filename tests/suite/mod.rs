@@ -46,6 +46,7 @@ mod topologies;
 mod tour;
 mod trace;
 mod trace_reported;
+mod unknowns;
 mod volumetric;
 
 use std::path::{Path, PathBuf};
