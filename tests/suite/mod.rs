@@ -41,12 +41,14 @@ mod rtest_findings;
 mod schema;
 mod self_calibration;
 mod simulate;
+mod standard_output;
 mod supply_chain;
 #[path = "../../model/tests/jacobians/topologies.rs"]
 mod topologies;
 mod tour;
 mod trace;
 mod trace_reported;
+mod unknowns;
 mod volumetric;
 
 use std::path::{Path, PathBuf};

@@ -21,6 +21,7 @@ fn built(more: &[&str]) -> Vec<Built> {
         .args([
             "tree",
             "--workspace",
+            "--all-features",
             "--offline",
             "--locked",
             "--edges",
