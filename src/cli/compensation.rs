@@ -16,7 +16,7 @@ use abbe::model::chain::Machine;
 use abbe::model::component::Freedom;
 use clap::{Args, ValueEnum};
 
-use super::failure::Failure;
+use super::failure::{Failure, visible};
 use super::folder::{self, NewFile};
 
 /// Most points of a table: LinuxCNC takes 256 triplets a joint, Heidenhain 256 points a table.
@@ -68,7 +68,7 @@ impl CompensationArguments {
     }
 
     /// Writes the tables if they were asked for.
-    pub fn run(&self, problem: &Problem<'_>, fit: &Fit) -> Result<(), Failure> {
+    pub fn run(&self, problem: &Problem<'_>, fit: &Fit, tables: bool) -> Result<(), Failure> {
         let (Some(folder), Some(control)) = (&self.compensation, self.control) else {
             return Ok(());
         };
@@ -79,6 +79,7 @@ impl CompensationArguments {
             control,
             self.points,
             folder,
+            tables,
         )
     }
 }
@@ -90,6 +91,7 @@ fn write(
     control: Control,
     points: usize,
     folder: &std::path::Path,
+    tables: bool,
 ) -> Result<(), Failure> {
     let mut left_out = compensation.left_out.clone();
     if control != Control::Beckhoff {
@@ -110,6 +112,12 @@ fn write(
         )));
     }
     folder::write(folder, &files, false, |_| Ok(()))?;
+    if !tables {
+        for line in &left_out {
+            eprintln!("warning: not in the compensation tables: {}", visible(line));
+        }
+        return Ok(());
+    }
     say!("");
     for (name, _) in &files {
         say!("{}", folder.join(name).display());

@@ -264,13 +264,13 @@ pub fn run(arguments: &EquationArguments) -> Result<(), Failure> {
 }
 
 /// Runs `abbe volumetric`.
-pub fn run_volumetric(arguments: &VolumetricArguments) -> Result<(), Failure> {
+pub fn run_volumetric(arguments: &VolumetricArguments, quiet: bool) -> Result<(), Failure> {
     let machine = read::machine(&arguments.machine)?;
     let outputs = Outputs::new(arguments.form.out.iter().chain(arguments.map.outputs()))?;
     let read = std::iter::once(&arguments.machine).chain(arguments.map.functions());
     outputs.spare(read.map(PathBuf::as_path))?;
     if arguments.map.wanted() {
-        return super::map::run(&machine, &arguments.map);
+        return super::map::run(&machine, &arguments.map, outputs.tables(quiet));
     }
     let form = &arguments.form;
     let mut kept = Kept::parse(&form.errors, &[], &[])?;

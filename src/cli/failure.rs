@@ -23,6 +23,9 @@ pub enum Failure {
         /// Why.
         source: std::io::Error,
     },
+    /// Options that do not go together.
+    #[error("{0}")]
+    CommandLine(String),
     /// Anything else.
     #[error("{0}")]
     Other(String),
@@ -38,6 +41,14 @@ impl From<IdentifyError> for Failure {
 }
 
 impl Failure {
+    /// The exit status: 1 for input that cannot be used, 2 for a wrong command line.
+    pub fn status(&self) -> u8 {
+        match self {
+            Failure::CommandLine(_) => 2,
+            _ => 1,
+        }
+    }
+
     /// Writes the message to standard error.
     pub fn show(&self) {
         if let Failure::Model(ModelError::Input { place, message, help }) = self

@@ -79,9 +79,10 @@ pub fn run(arguments: &FitArguments) -> Result<(), Failure> {
         arguments.faces.file(),
     ];
     let outputs = arguments.common.outputs(&others)?;
+    let tables = outputs.tables(arguments.common.quiet);
     if !arguments.repeat.is_empty() {
         if arguments.method != Method::Full {
-            return Err(Failure::Other(
+            return Err(Failure::CommandLine(
                 "--repeat compares full fits; leave out `--method`, or --repeat".into(),
             ));
         }
@@ -90,21 +91,21 @@ pub fn run(arguments: &FitArguments) -> Result<(), Failure> {
     let session = read_session(&arguments.session, &outputs)?;
     if arguments.views.is_some() && arguments.method != Method::Full {
         let message = "`--views` shows what the full fit leaves over: leave `--method` out";
-        return Err(Failure::Other(message.into()));
+        return Err(Failure::CommandLine(message.into()));
     }
     if arguments.method != Method::Full && (arguments.csv.is_some() || arguments.compensation.wanted()) {
-        return Err(Failure::Other(
+        return Err(Failure::CommandLine(
             "--csv and --compensation go with the full fit; leave out --method, or use --json".into(),
         ));
     }
     if arguments.method == Method::SelfCalibration && arguments.faces.asked() {
-        return Err(Failure::Other(
+        return Err(Failure::CommandLine(
             "`--report` and `--plots` show the full fit and the geometric methods; leave `--method` out"
                 .to_string(),
         ));
     }
     if arguments.method == Method::SelfCalibration {
-        return self_calibration::run(&session, &arguments.draws, &arguments.common);
+        return self_calibration::run(&session, &arguments.draws, &arguments.common, tables);
     }
     let geometric = match arguments.method {
         Method::Full | Method::SelfCalibration => None,
@@ -114,7 +115,7 @@ pub fn run(arguments: &FitArguments) -> Result<(), Failure> {
     };
     if let Some(method) = geometric {
         arguments.draws.refuse()?;
-        return geometric::run(&session, method, &arguments.common, &arguments.faces);
+        return geometric::run(&session, method, &arguments.common, &arguments.faces, tables);
     }
     let draws = arguments.draws.draws(arguments.common.seed)?;
     let (problem, fit) = abbe::identify::fit::prepare(&session, arguments.common.seed)?;
@@ -125,7 +126,10 @@ pub fn run(arguments: &FitArguments) -> Result<(), Failure> {
     if let Some(draws) = &draws {
         abbe::identify::propagation::add_monte_carlo(&problem, &fit, draws, &mut result)?;
     }
-    print(&result);
+    if tables {
+        print(&result);
+    }
+    print_warnings(&result.warnings);
     if let Some(path) = &arguments.common.json {
         output::write_json(path, &result)?;
     }
@@ -139,7 +143,7 @@ pub fn run(arguments: &FitArguments) -> Result<(), Failure> {
             .faces
             .write(&document, &method, &session, arguments.common.seed)?;
     }
-    arguments.compensation.run(&problem, &fit)
+    arguments.compensation.run(&problem, &fit, tables)
 }
 
 fn print(result: &FitResult) {
@@ -186,7 +190,6 @@ fn print(result: &FitResult) {
         }
     }
     circular::print(&result.circular);
-    print_warnings(&result.warnings);
 }
 
 /// The table of identified parameters.

@@ -60,6 +60,11 @@ fn fault(folder: &Path, source: std::io::Error) -> Failure {
 
 /// Whether the folder is there; an error where nothing may be written into it. `force` is what the user said, where the command has a `--force`.
 pub fn check(folder: &Path, force: Option<bool>) -> Result<bool, Failure> {
+    if folder.as_os_str() == "-" {
+        return Err(Failure::CommandLine(
+            "`-` is standard output, which cannot take a folder of files; name a folder".into(),
+        ));
+    }
     if folder.is_file() {
         return Err(Failure::Other(format!(
             "{}: this is a file; name a folder",

@@ -13,9 +13,13 @@ pub fn run(
     method: Method,
     common: &CommonArguments,
     faces: &ReportArguments,
+    tables: bool,
 ) -> Result<(), Failure> {
     let result = geometric::compare(session, method, common.seed)?;
-    print(&result);
+    if tables {
+        print(&result);
+    }
+    fit::print_warnings(&result.warnings);
     if let Some(path) = &common.json {
         output::write_json(path, &result)?;
     }
@@ -79,7 +83,6 @@ fn print(result: &Comparison) {
         table::micrometres(result.method_rms_um),
         table::micrometres(result.rms_um)
     );
-    fit::print_warnings(&result.warnings);
 }
 
 /// Header of [`error_rows`].

@@ -71,7 +71,7 @@ impl MapArguments {
 }
 
 /// Runs `abbe volumetric --map`.
-pub fn run(machine: &Machine, arguments: &MapArguments) -> Result<(), Failure> {
+pub fn run(machine: &Machine, arguments: &MapArguments, tables: bool) -> Result<(), Failure> {
     let (Some(path), Some(file)) = (&arguments.map, &arguments.functions) else {
         return Err(Failure::Other("--map and --functions go together".into()));
     };
@@ -93,7 +93,9 @@ pub fn run(machine: &Machine, arguments: &MapArguments) -> Result<(), Failure> {
     };
     let (places, summary) = volumetric::map(&erring, &grid, arguments.compensate)?;
     output::write_whole(path, &csv(machine, &places)?)?;
-    print(&summary, functions.len(), &path.display().to_string());
+    if tables {
+        print(&summary, functions.len(), &path.display().to_string());
+    }
     if let Some(json) = &arguments.json {
         output::write_json(json, &summary)?;
     }

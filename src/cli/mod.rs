@@ -43,6 +43,9 @@ use output::Outputs;
 struct Arguments {
     #[command(subcommand)]
     command: Command,
+    /// Print no tables and no progress; warnings and errors stay.
+    #[arg(short, long, global = true)]
+    quiet: bool,
 }
 
 const EXAMPLES: &str = "Example, from nothing to a found effect:
@@ -53,7 +56,17 @@ const EXAMPLES: &str = "Example, from nothing to a found effect:
   abbe trace my/run1/session.toml --only EZC --only EAC
   abbe equation my/chapter5.toml --test C150 --order first
 
-`abbe new` lists the templates; `abbe new mine --from-code \"[wCAbYXZt]\"` lays out a machine of your own. `abbe COMMAND --help` has examples of each.";
+`abbe new` lists the templates; `abbe new mine --from-code \"[wCAbYXZt]\"` lays out a machine of your own. `abbe COMMAND --help` has examples of each.
+
+Output:
+  Results go to standard output; progress, warnings and errors go to standard error. A FILE of `-` is standard output: `--json -` writes
+  JSON there and nothing else. `--quiet` suppresses tables and progress, not warnings.
+
+Exit status:
+  0    done, whatever the verdict
+  1    the input cannot be used; the message names the file, the line and what to do
+  2    the command line is wrong
+  130  interrupted (Ctrl-C)";
 
 const COMPLETIONS: &str = "Example:
   abbe completions bash
@@ -129,11 +142,11 @@ impl SessionArguments {
 /// What every command takes.
 #[derive(Args, Clone)]
 pub struct CommonArguments {
-    /// Write the result as JSON.
+    /// Write the result as JSON; `-` writes it, and nothing else, to standard output.
     #[arg(long, value_name = "FILE")]
     json: Option<PathBuf>,
-    /// Say nothing but the result.
-    #[arg(short, long)]
+    /// Print no tables and no progress; warnings and errors stay.
+    #[arg(short, long, global = true)]
     quiet: bool,
     /// Seed of everything that is drawn: folds, null draws, simulated noise.
     #[arg(long, value_name = "N", default_value_t = 1)]
@@ -149,13 +162,13 @@ impl CommonArguments {
 
 /// Runs the command line; the exit status.
 pub fn run() -> ExitCode {
-    let arguments = Arguments::parse();
-    let outcome = match arguments.command {
+    let Arguments { command, quiet } = Arguments::parse();
+    let outcome = match command {
         Command::Equation(arguments) => equation::run(&arguments),
-        Command::Volumetric(arguments) => equation::run_volumetric(&arguments),
+        Command::Volumetric(arguments) => equation::run_volumetric(&arguments, quiet),
         Command::Fit(arguments) => fit::run(&arguments),
         Command::Plan(arguments) => plan::run(&arguments),
-        Command::New(arguments) => new::run(&arguments),
+        Command::New(arguments) => new::run(&arguments, quiet),
         Command::Completions { shell } => {
             let mut script = Vec::new();
             clap_complete::generate(shell, &mut Arguments::command(), "abbe", &mut script);
@@ -170,7 +183,7 @@ pub fn run() -> ExitCode {
         Ok(()) => ExitCode::SUCCESS,
         Err(failure) => {
             failure.show();
-            ExitCode::from(1)
+            ExitCode::from(failure.status())
         }
     }
 }

@@ -206,7 +206,7 @@ const TEMPLATES: &[Template] = &[
 ];
 
 /// Runs `abbe new`.
-pub fn run(arguments: &NewArguments) -> Result<(), Failure> {
+pub fn run(arguments: &NewArguments, quiet: bool) -> Result<(), Failure> {
     let (Some(folder), false) = (&arguments.folder, arguments.list) else {
         list();
         return Ok(());
@@ -217,6 +217,9 @@ pub fn run(arguments: &NewArguments) -> Result<(), Failure> {
         (None, None) => return Ok(()),
     };
     folder::write(folder, &files, arguments.force, |_| Ok(()))?;
+    if quiet {
+        return Ok(());
+    }
     for (name, _) in files {
         say!("{}", folder.join(name).display());
     }

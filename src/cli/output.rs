@@ -10,13 +10,17 @@ use super::failure::Failure;
 
 /// Writes a file through a temporary one beside it, so that a reader finds the old file or the whole new one, whatever happens meanwhile.
 ///
-/// What is no file (a pipe, a terminal, `/dev/stdout`) is written to as it is: nothing may take its place.
+/// What is no file (a pipe, a terminal, `/dev/stdout`) is written to as it is: nothing may take its place. `-` is standard output.
 pub fn write_whole(path: &Path, contents: &[u8]) -> Result<(), Failure> {
     let fault = |source| Failure::Write {
         path: path.display().to_string(),
         source,
     };
     check(path)?;
+    if is_standard_output(path) {
+        write_out(contents);
+        return Ok(());
+    }
     if is_stream(path) {
         let mut stream = OpenOptions::new().append(true).open(path).map_err(fault)?;
         return stream
@@ -43,9 +47,17 @@ pub fn write_whole(path: &Path, contents: &[u8]) -> Result<(), Failure> {
     Ok(())
 }
 
+/// Whether the path is `-`, which stands for standard output.
+fn is_standard_output(path: &Path) -> bool {
+    path.as_os_str() == "-"
+}
+
 /// Whether bytes go through what the path names rather than into it.
 fn is_stream(path: &Path) -> bool {
     let descriptor = ["/dev/stdout", "/dev/stderr", "/dev/fd"];
+    if is_standard_output(path) {
+        return true;
+    }
     let other = std::fs::metadata(path).is_ok_and(|found| !found.is_file() && !found.is_dir());
     other || descriptor.iter().any(|name| path.starts_with(name))
 }
@@ -66,6 +78,9 @@ pub fn check(path: &Path) -> Result<(), Failure> {
             path.display()
         )))
     };
+    if is_standard_output(path) {
+        return Ok(());
+    }
     let folder = folder_of(path);
     match std::fs::metadata(path) {
         Ok(found) if found.is_dir() => refused("this is a folder; name a file in it".into()),
@@ -85,11 +100,16 @@ pub struct Outputs(Vec<PathBuf>);
 
 impl Outputs {
     /// # Errors
-    /// If one of them cannot come to lie where it is asked for, or two are one.
+    /// If one of them cannot be written where it is asked for, two are one, or two go to standard output.
     pub fn new<'p>(files: impl IntoIterator<Item = &'p PathBuf>) -> Result<Outputs, Failure> {
         let mut outputs: Vec<PathBuf> = Vec::new();
         for file in files {
             check(file)?;
+            if is_standard_output(file) && outputs.iter().any(|other| is_standard_output(other)) {
+                return Err(Failure::CommandLine(
+                    "`-` is given for two outputs, and standard output can take one; name a file for the other".into(),
+                ));
+            }
             if !is_stream(file) && outputs.iter().any(|other| is_same(other, file)) {
                 return Err(Failure::Other(format!(
                     "{}: two results would be written there; name another file for one of them",
@@ -99,6 +119,11 @@ impl Outputs {
             outputs.push(file.clone());
         }
         Ok(Outputs(outputs))
+    }
+
+    /// Whether tables go to standard output: neither `--quiet` was given nor does one of the outputs go there.
+    pub fn tables(&self, quiet: bool) -> bool {
+        !quiet && !self.0.iter().any(|output| is_standard_output(output))
     }
 
     /// The files that are to lie in a folder.
@@ -142,10 +167,15 @@ pub fn is_same(a: &Path, b: &Path) -> bool {
     a == b || place(a).is_some_and(|a| place(b) == Some(a))
 }
 
-/// Writes a line to standard output. Where nobody reads on, that is the end of the program; where it cannot be written, an error is.
+/// Writes a line to standard output.
 pub fn line(text: std::fmt::Arguments<'_>) {
+    write_out(format!("{text}\n").as_bytes());
+}
+
+/// Writes to standard output. If the reader has closed the pipe, the program ends; if the output cannot be written, it ends with an error.
+fn write_out(contents: &[u8]) {
     let mut out = std::io::stdout().lock();
-    if let Err(fault) = writeln!(out, "{text}") {
+    if let Err(fault) = out.write_all(contents).and_then(|()| out.flush()) {
         if fault.kind() == std::io::ErrorKind::BrokenPipe {
             std::process::exit(0);
         }

@@ -48,7 +48,9 @@ pub fn run(
         ));
     }
     let result = repeated::compare(&sessions)?;
-    print(&result);
+    if outputs.tables(common.quiet) {
+        print(&result);
+    }
     if let Some(path) = &common.json {
         output::write_json(path, &result)?;
     }

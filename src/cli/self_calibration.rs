@@ -26,7 +26,7 @@ impl DrawArguments {
     pub fn refuse(&self) -> Result<(), Failure> {
         match self.monte_carlo {
             None => Ok(()),
-            Some(_) => Err(Failure::Other(
+            Some(_) => Err(Failure::CommandLine(
                 "--monte-carlo goes with the full fit and with `--method self-calibration`; leave out `--method`, or --monte-carlo"
                     .into(),
             )),
@@ -58,11 +58,19 @@ impl DrawArguments {
 }
 
 /// Runs `abbe fit --method self-calibration`.
-pub fn run(session: &Session, draws: &DrawArguments, common: &CommonArguments) -> Result<(), Failure> {
+pub fn run(
+    session: &Session,
+    draws: &DrawArguments,
+    common: &CommonArguments,
+    tables: bool,
+) -> Result<(), Failure> {
     let draws = draws.draws(common.seed)?;
     let calibration = self_calibration::calibrate(session)?;
     let result = calibration.report(session, draws.as_ref());
-    print(&result);
+    if tables {
+        print(&result);
+    }
+    fit::print_warnings(&result.warnings);
     if let Some(path) = &common.json {
         output::write_json(path, &result)?;
     }
@@ -137,7 +145,6 @@ fn print(result: &SelfCalibration) {
             .collect();
         table::print(&["quantity", "mean", "u (k=1)", "shortest", "symmetric"], &rows);
     }
-    fit::print_warnings(&result.warnings);
 }
 
 /// Functions side by side, one line an angle.

@@ -106,7 +106,12 @@ pub fn run(arguments: &SimulateArguments) -> Result<(), Failure> {
         read::session(&path, &read::ReadOptions::default())?;
         Ok(())
     })?;
-    report(&session, &simulated, arguments)
+    report(
+        &session,
+        &simulated,
+        arguments,
+        outputs.tables(arguments.common.quiet),
+    )
 }
 
 /// `session.toml` last: where it is, the rest is.
@@ -183,7 +188,12 @@ struct Value {
     unit: String,
 }
 
-fn report(session: &Session, simulated: &Simulated, arguments: &SimulateArguments) -> Result<(), Failure> {
+fn report(
+    session: &Session,
+    simulated: &Simulated,
+    arguments: &SimulateArguments,
+    tables: bool,
+) -> Result<(), Failure> {
     let report = Report {
         session: arguments.out.join("session.toml").display().to_string(),
         readings: simulated.readings.iter().map(|readings| readings.rows()).sum(),
@@ -201,6 +211,17 @@ fn report(session: &Session, simulated: &Simulated, arguments: &SimulateArgument
             .collect(),
         warnings: simulated.warnings.clone(),
     };
+    if tables {
+        print(session, &report);
+    }
+    fit::print_warnings(&report.warnings);
+    if let Some(path) = &arguments.common.json {
+        output::write_json(path, &report)?;
+    }
+    Ok(())
+}
+
+fn print(session: &Session, report: &Report) {
     say!(
         "{}: {} readings of {} tests, noise {}, seed {}",
         report.session,
@@ -226,9 +247,4 @@ fn report(session: &Session, simulated: &Simulated, arguments: &SimulateArgument
         say!("");
         table::print(&["given", "value", "unit"], &rows);
     }
-    fit::print_warnings(&report.warnings);
-    if let Some(path) = &arguments.common.json {
-        output::write_json(path, &report)?;
-    }
-    Ok(())
 }

@@ -56,7 +56,9 @@ pub fn run(arguments: &TraceArguments) -> Result<(), Failure> {
         arguments.write.as_ref(),
         arguments.faces.file(),
     ];
-    let session = read_session(&arguments.session, &arguments.common.outputs(&others)?)?;
+    let outputs = arguments.common.outputs(&others)?;
+    let tables = outputs.tables(arguments.common.quiet);
+    let session = read_session(&arguments.session, &outputs)?;
     let options = TraceOptions {
         seed: arguments.common.seed,
         max_effects: arguments.max_effects,
@@ -93,7 +95,10 @@ pub fn run(arguments: &TraceArguments) -> Result<(), Failure> {
     let mut trace = abbe::identify::trace::trace(&session, &options, &report)?;
     tell_apart(&mut trace, &Menu::short())?;
     bar.finish_and_clear();
-    print(&trace.result);
+    if tables {
+        print(&trace.result);
+    }
+    fit::print_warnings(&trace.result.warnings);
     if let Some(path) = &arguments.common.json {
         output::write_json(path, &trace.result)?;
     }
@@ -120,7 +125,7 @@ pub fn run(arguments: &TraceArguments) -> Result<(), Failure> {
             .faces
             .write(&document, &method, &session, arguments.common.seed)?;
     }
-    arguments.compensation.run(&trace.after, &trace.after_fit)
+    arguments.compensation.run(&trace.after, &trace.after_fit, tables)
 }
 
 fn progress_bar(quiet: bool) -> ProgressBar {
@@ -240,7 +245,6 @@ fn print(result: &TraceResult) {
             say!("  {}  by {by} {} (u {u})", moved.id, moved.unit);
         }
     }
-    fit::print_warnings(&result.warnings);
 }
 
 /// An effect in words.

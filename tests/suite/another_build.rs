@@ -120,10 +120,7 @@ fn measured_sessions() {
         the_same(
             &format!("{session}/measured"),
             "",
-            &[
-                vec!["fit", "session.toml"],
-                vec!["trace", "session.toml", "--quiet"],
-            ],
+            &[vec!["fit", "session.toml"], vec!["trace", "session.toml"]],
         );
     }
     the_same("r-test/measured", "", &[vec!["fit", "session.toml"]]);
@@ -162,7 +159,7 @@ fn a_wobble_that_is_planted() {
                 "--hide-effects",
             ],
             vec!["fit", "run/session.toml"],
-            vec!["trace", "run/session.toml", "--quiet", "--seed", "7"],
+            vec!["trace", "run/session.toml", "--seed", "7"],
         ],
     );
 }

@@ -314,7 +314,7 @@ fn help_has_examples_and_status_0() {
 #[test]
 fn an_effect_that_the_library_does_not_have() {
     let session = super::ready("hermle-c600u/measured/session.toml");
-    let asked = |words: &[&str]| abbe(&[&["trace", super::text(&session), "--quiet"], words].concat());
+    let asked = |words: &[&str]| abbe(&[&["trace", super::text(&session)], words].concat());
     for words in [
         &["--only", "EZB"][..],
         &["--only", "EZC", "--only", "harmonics"],

@@ -66,7 +66,7 @@ impl Place {
     }
 
     /// A shell's line in the folder, `abbe` being the program.
-    fn shell(&self, line: &str) -> Output {
+    pub fn shell(&self, line: &str) -> Output {
         let path = std::env::var("PATH").unwrap_or_default();
         let folder = Path::new(PROGRAM).parent().unwrap();
         Command::new("sh")

@@ -39,6 +39,7 @@ mod rtest_findings;
 mod schema;
 mod self_calibration;
 mod simulate;
+mod standard_output;
 mod supply_chain;
 #[path = "../../model/tests/jacobians/topologies.rs"]
 mod topologies;

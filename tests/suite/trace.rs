@@ -172,7 +172,6 @@ fn the_bundled_session_is_explained_at_the_command_line() {
     let outcome = abbe(&[
         "trace",
         text(&session),
-        "-q",
         "--json",
         text(&json),
         "--write",

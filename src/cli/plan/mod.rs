@@ -13,6 +13,7 @@ use abbe::model::session::{Prior, Session};
 use clap::Args;
 
 use super::failure::Failure;
+use super::fit::print_warnings;
 use super::report::ReportArguments;
 use super::{CommonArguments, SessionArguments, output, read_session};
 
@@ -68,9 +69,12 @@ pub fn run(arguments: &PlanArguments) -> Result<(), Failure> {
     let outputs = arguments
         .common
         .outputs(&[arguments.patterns.file(), arguments.faces.file()])?;
+    let tables = outputs.tables(arguments.common.quiet);
     let mut session = read_session(&arguments.session, &outputs)?;
     if arguments.patterns.asked() {
-        return arguments.patterns.run(&session, arguments.common.json.as_deref());
+        return arguments
+            .patterns
+            .run(&session, arguments.common.json.as_deref(), tables);
     }
     if let Some(u_um) = arguments.setup_um {
         set_priors(&mut session, positive("--setup-um", u_um)?);
@@ -92,13 +96,16 @@ pub fn run(arguments: &PlanArguments) -> Result<(), Failure> {
         reach_mm: arguments.improve.reach_mm()?,
     };
     if arguments.improve.asked() || arguments.range {
-        return next_test(arguments, &session, &options);
+        return next_test(arguments, &session, &options, tables);
     }
     let mut analysis = plan::analyse(&session, &options)?;
     if let Some(sizes) = &arguments.clearance_mm {
         analysis.warnings.extend(clearance(&session, sizes)?);
     }
-    tables::print(&analysis);
+    if tables {
+        tables::print(&analysis);
+    }
+    print_warnings(&analysis.warnings);
     if let Some(path) = &arguments.common.json {
         output::write_json(path, &analysis)?;
     }
@@ -123,12 +130,19 @@ pub struct NextTest {
     ranges: Vec<plan::range::Shrinkage>,
 }
 
-fn next_test(arguments: &PlanArguments, session: &Session, options: &PlanOptions) -> Result<(), Failure> {
+fn next_test(
+    arguments: &PlanArguments,
+    session: &Session,
+    options: &PlanOptions,
+    tables: bool,
+) -> Result<(), Failure> {
     let (complete, noise) = plan::prepared(session, options)?;
     let problem = plan::states::problem_by_test(&complete, noise)?;
     let improvement = if arguments.improve.asked() {
         let improvement = arguments.improve.run(&problem)?;
-        improve::print(&improvement);
+        if tables {
+            improve::print(&improvement);
+        }
         Some(improvement)
     } else {
         None
@@ -138,7 +152,7 @@ fn next_test(arguments: &PlanArguments, session: &Session, options: &PlanOptions
     } else {
         Vec::new()
     };
-    if arguments.range {
+    if arguments.range && tables {
         improve::print_ranges(&ranges);
     }
     let found = NextTest { improvement, ranges };

@@ -42,7 +42,7 @@ impl PatternArguments {
     }
 
     /// Writes the patterns and prints how large they are.
-    pub fn run(&self, session: &Session, json: Option<&Path>) -> Result<(), Failure> {
+    pub fn run(&self, session: &Session, json: Option<&Path>, tables: bool) -> Result<(), Failure> {
         let given: Vec<Given> = self
             .errors
             .iter()
@@ -57,44 +57,51 @@ impl PatternArguments {
         if let Some(path) = &self.patterns {
             output::write_whole(path, &csv(&found, session)?)?;
         }
-        let number = |value: f64| {
-            let rounded = format!("{value:.3}");
-            if rounded == "-0.000" {
-                "0.000".to_string()
-            } else {
-                rounded
-            }
-        };
-        let rows: Vec<Vec<String>> = found
-            .patterns
-            .iter()
-            .map(|pattern| {
-                vec![
-                    pattern.test.clone(),
-                    pattern.error.clone(),
-                    format!("{} {}", pattern.size, pattern.unit),
-                    number(pattern.largest_um),
-                    number(pattern.mean_um),
-                    number(pattern.rms_um),
-                ]
-            })
-            .collect();
-        table::print(
-            &[
-                "test",
-                "error",
-                "size",
-                "largest, µm",
-                "mean, µm",
-                "rms about it, µm",
-            ],
-            &rows,
-        );
+        if tables {
+            print(&found);
+        }
         if let Some(path) = json {
             output::write_json(path, &found.patterns)?;
         }
         Ok(())
     }
+}
+
+/// Prints how large the patterns are.
+fn print(found: &Patterns) {
+    let number = |value: f64| {
+        let rounded = format!("{value:.3}");
+        if rounded == "-0.000" {
+            "0.000".to_string()
+        } else {
+            rounded
+        }
+    };
+    let rows: Vec<Vec<String>> = found
+        .patterns
+        .iter()
+        .map(|pattern| {
+            vec![
+                pattern.test.clone(),
+                pattern.error.clone(),
+                format!("{} {}", pattern.size, pattern.unit),
+                number(pattern.largest_um),
+                number(pattern.mean_um),
+                number(pattern.rms_um),
+            ]
+        })
+        .collect();
+    table::print(
+        &[
+            "test",
+            "error",
+            "size",
+            "largest, µm",
+            "mean, µm",
+            "rms about it, µm",
+        ],
+        &rows,
+    );
 }
 
 /// A line for each reading and error: test, error and its size, run, positions of the axes, deviation.

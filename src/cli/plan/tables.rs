@@ -3,7 +3,6 @@
 use abbe::identify::plan::effects::hidden_by_error;
 use abbe::identify::plan::results::{EffectDetectability, EffectsAnalysis, ErrorAnalysis, PlanAnalysis};
 
-use crate::cli::fit::print_warnings;
 use crate::cli::table;
 
 /// Tests side by side in the table of small plots.
@@ -30,7 +29,6 @@ pub fn print(analysis: &PlanAnalysis) {
     if let Some(found) = &analysis.effects {
         effects(found);
     }
-    print_warnings(&analysis.warnings);
 }
 
 fn header(analysis: &PlanAnalysis) {

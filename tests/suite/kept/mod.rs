@@ -267,7 +267,7 @@ fn every_shape_of_an_effect() {
             "fit run/session.toml --compensation linuxcnc --control linuxcnc --points 9",
             "fit run/session.toml --compensation heidenhain --control heidenhain --points 9",
             "fit run/session.toml --compensation beckhoff --control beckhoff --points 9",
-            "trace run/session.toml --quiet --max-effects 2 --only C --json trace.json",
+            "trace run/session.toml --max-effects 2 --only C --json trace.json",
             "trace run/session.toml --list --only :h2 --only backlash --only time",
             "equation plan.toml --test C --as python --order bilinear --gradient",
         ],
@@ -282,7 +282,7 @@ fn a_trace() {
             &ready(&format!("{session}/measured")),
             &[],
             &[
-                "trace session.toml --quiet --json trace.json --csv trace.csv --write next.toml",
+                "trace session.toml --json trace.json --csv trace.csv --write next.toml",
                 "fit next.toml --json fit.json",
             ],
         );
@@ -297,7 +297,7 @@ fn an_r_test() {
         &[],
         &[
             "fit session.toml --json fit.json --views views.csv",
-            "trace session.toml --quiet --only ~C:h --only time --max-effects 2 --json trace.json",
+            "trace session.toml --only ~C:h --only time --max-effects 2 --json trace.json",
         ],
     );
 }
@@ -321,7 +321,7 @@ fn a_robot() {
             &[],
             &[
                 "fit session.toml --data DATA --json fit.json",
-                "trace session.toml --data DATA --quiet --max-effects 3 --json trace.json",
+                "trace session.toml --data DATA --max-effects 3 --json trace.json",
             ],
         );
     }

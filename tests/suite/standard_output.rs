@@ -1,0 +1,193 @@
+//! What goes to standard output: tables for people, or one document for a program and nothing else.
+
+use std::fs;
+
+use super::abbe;
+use super::faults::Place;
+use super::text;
+
+/// Commands that print a table and write JSON, on files of [`place`].
+const COMMANDS: &[&str] = &[
+    "fit session.toml",
+    "fit session.toml --repeat again/session.toml",
+    "fit hermle/session.toml --method cone",
+    "fit probe/session.toml --method self-calibration",
+    "trace session.toml --only backlash",
+    "plan session.toml --no-effects",
+    "plan session.toml --no-effects --range",
+    "plan hermle/session.toml --planned --no-effects --improve 1 --bars-mm 100 --radii-mm 100 --heights-mm 0",
+    "plan session.toml --patterns patterns.csv",
+    "simulate session.toml --out run --force --error EC0Y=5arcsec",
+    "volumetric machine.toml --map map.csv --functions functions.toml",
+];
+
+/// A folder with a small session, a repeat of it, a machine to map, and two ready sessions of other methods.
+fn place() -> Place {
+    let place = Place::new();
+    place.put("machine.toml", "chain = \"w X b Y Z t\"\n[axis.X]\ntravel_mm = [0, 9]\n[axis.Y]\ntravel_mm = [0, 9]\n[axis.Z]\ntravel_mm = [0, 9]\n");
+    place.put(
+        "functions.toml",
+        "[[function]]\nerror = \"EXX\"\nof = \"X\"\nat_mm = [0, 9]\nvalues_um = [0, 1]\n",
+    );
+    for (folder, ready) in [
+        ("hermle", "hermle-c600u/measured"),
+        ("probe", "self-calibration/measured"),
+    ] {
+        fs::create_dir(place.at(folder)).unwrap();
+        for entry in fs::read_dir(super::ready(ready)).unwrap() {
+            let path = entry.unwrap().path();
+            fs::copy(&path, place.at(folder).join(path.file_name().unwrap())).unwrap();
+        }
+    }
+    fs::create_dir(place.at("again")).unwrap();
+    for name in ["session.toml", "circle.csv"] {
+        fs::copy(place.at(name), place.at("again").join(name)).unwrap();
+    }
+    place
+}
+
+/// Standard output and standard error of a command that succeeds.
+#[track_caller]
+fn told(place: &Place, line: &str) -> (String, String) {
+    let output = place.shell(&format!("abbe {line}"));
+    let said = String::from_utf8(output.stderr).unwrap();
+    assert!(output.status.success(), "{line}: {said}");
+    (String::from_utf8(output.stdout).unwrap(), said)
+}
+
+/// The warnings and notes of a command, without its progress.
+fn warnings(said: &str) -> Vec<&str> {
+    said.lines().filter(|line| !line.starts_with("  + ")).collect()
+}
+
+#[test]
+fn json_goes_to_standard_output_and_nothing_else_does() {
+    let place = place();
+    let before = place.names();
+    for command in COMMANDS {
+        let (piped, piped_said) = told(&place, &format!("{command} --json -"));
+        let document: serde_json::Value =
+            serde_json::from_str(&piped).unwrap_or_else(|fault| panic!("{command}: {fault}\n{piped}"));
+        assert!(document.is_object() || document.is_array(), "{command}");
+        assert!(!place.at("-").exists(), "{command} makes a file named `-`");
+
+        // In a file the JSON is the same, and the terminal has the tables and the same warnings.
+        let (tables, said) = told(&place, &format!("{command} --json out.json"));
+        assert_eq!(
+            fs::read_to_string(place.at("out.json")).unwrap(),
+            piped,
+            "{command}"
+        );
+        assert!(
+            tables.lines().count() > 1 || command.starts_with("simulate"),
+            "{command}: {tables}"
+        );
+        assert_eq!(warnings(&said), warnings(&piped_said), "{command}");
+        fs::remove_file(place.at("out.json")).unwrap();
+    }
+    let made = ["map.csv", "patterns.csv", "run"];
+    let after: Vec<String> = place
+        .names()
+        .into_iter()
+        .filter(|name| !made.contains(&name.as_str()))
+        .collect();
+    assert_eq!(after, before);
+}
+
+#[test]
+fn quiet_suppresses_tables_and_not_warnings() {
+    let place = place();
+    // The noise is ten times what this session states.
+    let wrong = fs::read_to_string(place.at("session.toml"))
+        .unwrap()
+        .replace("noise_um = 0.3", "noise_um = 0.03");
+    place.put("wrong.toml", &wrong);
+    for command in COMMANDS
+        .iter()
+        .chain(&["fit wrong.toml", "fit wrong.toml --csv fit.csv"])
+    {
+        let (_, loud) = told(&place, command);
+        for quiet in [format!("{command} -q"), format!("--quiet {command}")] {
+            let (printed, said) = told(&place, &quiet);
+            assert_eq!(printed, "", "{quiet}");
+            assert_eq!(warnings(&said), warnings(&loud), "{quiet}");
+        }
+        if command.contains("wrong") {
+            assert!(loud.contains("warning"), "{command}: {loud}");
+        }
+    }
+    for command in ["new --template ur10 mine", "new --from-code [wbXYZt] other"] {
+        assert_eq!(told(&place, &format!("{command} -q")).0, "", "{command}");
+    }
+    // An equation, a schema and a list are no tables: they are what was asked for.
+    for command in [
+        "equation session.toml --test XY",
+        "schema fit",
+        "new",
+        "completions bash",
+    ] {
+        let (loud, quiet) = (told(&place, command).0, told(&place, &format!("{command} -q")).0);
+        assert!(!loud.is_empty() && loud == quiet, "{command}");
+    }
+}
+
+#[test]
+fn other_outputs_go_to_standard_output_too() {
+    let place = place();
+    for (command, first) in [
+        ("fit session.toml --csv -", "# Errors by their names"),
+        ("fit session.toml --report -", "<!DOCTYPE html>"),
+        (
+            "trace session.toml --only backlash --csv -",
+            "# Errors by their names",
+        ),
+        ("trace session.toml --only backlash --write -", "[machine]"),
+        ("plan session.toml --patterns -", "test,error,size,unit,run"),
+        ("equation session.toml --test XY --out -", "length of the bar"),
+        (
+            "volumetric machine.toml --map - --functions functions.toml",
+            "x_mm,y_mm,z_mm",
+        ),
+    ] {
+        let (printed, _) = told(&place, command);
+        assert!(printed.starts_with(first), "{command}: {printed}");
+        assert!(!place.at("-").exists(), "{command}");
+    }
+}
+
+#[test]
+fn standard_output_takes_one_output_and_no_folder() {
+    let place = place();
+    let session = place.at("session.toml");
+    let compensation = ["--compensation", "-", "--control", "linuxcnc"];
+    for (arguments, words) in [
+        (&["--json", "-", "--csv", "-"][..], "`-` is given for two outputs"),
+        (&["--json", "-", "--report", "-"], "`-` is given for two outputs"),
+        (&["--plots", "-"], "standard output, which cannot take a folder"),
+        (&compensation, "standard output, which cannot take a folder"),
+    ] {
+        let output = abbe(&[&["fit", text(&session)], arguments].concat());
+        let said = String::from_utf8(output.stderr).unwrap();
+        assert_eq!(output.status.code(), Some(2), "{arguments:?}: {said}");
+        assert!(
+            said.contains(words) && output.stdout.is_empty(),
+            "{arguments:?}: {said}"
+        );
+    }
+}
+
+#[test]
+fn the_help_and_the_readme_state_the_exit_statuses() {
+    let help = String::from_utf8(abbe(&["--help"]).stdout).unwrap();
+    let readme = fs::read_to_string(super::workspace().join("README.md")).unwrap();
+    for (status, words) in [
+        ("0", "done"),
+        ("1", "cannot be used"),
+        ("2", "command line"),
+        ("130", "interrupted"),
+    ] {
+        let stated = |line: &str| line.contains(status) && line.to_lowercase().contains(words);
+        assert!(help.lines().any(stated), "{status}: {help}");
+        assert!(readme.lines().any(stated), "{status} is not in the README");
+    }
+}
