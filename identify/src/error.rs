@@ -30,6 +30,9 @@ pub enum IdentifyError {
         "nothing is left to look for: what `--only` asks for is left out by `--exclude`, or everything is"
     )]
     EverythingLeftOut,
+    /// The caller asked for an end; a trace that has begun its search returns the effects found until then instead.
+    #[error("interrupted before there was a result")]
+    Interrupted,
     /// A declared effect that needs a column the data lack.
     #[error("effect `{effect}` follows {driver}, but the data of test `{test}` have no column `{column}`")]
     MissingDriver {

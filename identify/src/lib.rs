@@ -6,7 +6,7 @@
 //! - [`monte_carlo`], [`propagation`]: distributions by drawing; [`repeated`]: Type A beside Type B;
 //! - [`compensation`]: identified error motions as curves over their axis;
 //! - [`circular`]: ball-bar figures of ISO 230-4 and the classical diagnosis;
-//! - [`trace`]: close the loop;
+//! - [`trace`]: close the loop; [`effect_words`]: what an effect means at the machine;
 //! - [`plan`]: what tests can see before anybody measures;
 //! - [`directions`]: readings and residuals of an R-test by direction;
 //! - [`simulate`]: readings from a model; [`patterns`]: what each error alone does to a test; [`quantity`]: values with their units as people write them;
@@ -43,6 +43,7 @@ pub mod circular;
 pub mod compensation;
 pub mod directions;
 pub mod drivers;
+pub mod effect_words;
 pub mod error;
 pub mod fit;
 pub mod geometric;

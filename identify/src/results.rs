@@ -175,6 +175,8 @@ pub struct EffectName {
     /// The tests it is confined to, if it is.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub tests: Vec<String>,
+    /// What it does, in words: `C table: axial motion twice per turn`.
+    pub meaning: String,
 }
 
 /// A point of a free curve. What location errors can absorb of a curve is not in it.
@@ -227,16 +229,25 @@ pub struct EffectResult {
     pub rms_gain_um: f64,
     /// Held-out rms once it was added, µm.
     pub heldout_rms_um: f64,
-    /// What the readings cannot tell from it, nearest first.
+    /// Whether the readings single it out: no other effect of the library explains them as well in its place.
+    pub unique: bool,
+    /// Number of explanations that the readings do not separate, this effect included; 1 where it is unique.
+    pub indistinguishable: usize,
+    /// All of them in words, by part of the machine: `C table: axial motion twice per turn, or tilt about X once per turn`.
+    pub explanations: String,
+    /// The other ones, nearest first.
     pub aliases: Vec<EffectName>,
-    /// The cheapest further test that would tell it from the first of them that any test on the menu tells it from.
+    /// The first of `separating_tests`.
     pub separated_by: Option<String>,
-    /// How well that test tells them apart.
+    /// How well that test separates the effect from the nearest alias that it separates at all.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub separation: Option<SeparationResult>,
+    /// Further tests that separate the effect from its aliases: the first separates most of them, each other one most of those that are left.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub separating_tests: Vec<SeparatingTestResult>,
 }
 
-/// How well a further test tells a found effect from what looks like it.
+/// How well a further test separates a found effect from one of its aliases.
 #[derive(Clone, Debug, PartialEq, Serialize, JsonSchema)]
 pub struct SeparationResult {
     /// From what.
@@ -247,6 +258,35 @@ pub struct SeparationResult {
     pub after_sigma: f64,
     /// What the test takes, min.
     pub minutes: f64,
+}
+
+/// A further test, and which aliases it separates from a found effect.
+#[derive(Clone, Debug, PartialEq, Serialize, JsonSchema)]
+pub struct SeparatingTestResult {
+    /// In words: `C150 with the workpiece ball at radius 50 mm`.
+    pub test: String,
+    /// What it takes, min.
+    pub minutes: f64,
+    /// How many of `alternatives` it separates.
+    pub separates: usize,
+    /// Number of `alternatives`.
+    pub of: usize,
+    /// The aliases that no test before it separates, nearest first.
+    pub alternatives: Vec<AlternativeResult>,
+}
+
+/// How well a test separates a found effect from one alternative.
+#[derive(Clone, Debug, PartialEq, Serialize, JsonSchema)]
+pub struct AlternativeResult {
+    /// Component, driver, shape, order.
+    #[serde(flatten)]
+    pub name: EffectName,
+    /// Separation by the readings that there are and the tests before this one, standard deviations.
+    pub before_sigma: f64,
+    /// Separation with the test as well, standard deviations.
+    pub after_sigma: f64,
+    /// Whether that is enough: 3 standard deviations.
+    pub separated: bool,
 }
 
 /// What is left.
@@ -277,8 +317,10 @@ pub struct Moved {
 /// What `abbe trace` reports.
 #[derive(Clone, Debug, PartialEq, Serialize, JsonSchema)]
 pub struct TraceResult {
-    /// `clean`, `explained`, `partly-explained`, `unexplained`.
+    /// `clean`, `explained`, `partly-explained`, `unexplained`; `incomplete` for an interrupted trace.
     pub verdict: String,
+    /// Whether the trace was interrupted: effects may be missing.
+    pub interrupted: bool,
     /// Standard deviation of one scalar reading, µm.
     pub noise_um: f64,
     /// Where that figure comes from.

@@ -42,6 +42,16 @@ impl Shared {
         }
     }
 
+    /// Of these unknowns those in some columns, which include all that are asked about.
+    pub fn part(&self, columns: &[usize]) -> Shared {
+        Shared {
+            ids: columns.iter().map(|j| self.ids[*j].clone()).collect(),
+            size: columns.iter().map(|j| self.size[*j]).collect(),
+            per_inside: columns.iter().map(|j| self.per_inside[*j]).collect(),
+            asked: self.asked,
+        }
+    }
+
     /// The root of a whole plan, priors included. What is asked about and not seen is held at its physical size, so that a blind spot is
     /// a very large uncertainty and not a special case.
     ///

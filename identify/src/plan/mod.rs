@@ -33,4 +33,4 @@ pub mod states;
 mod sweep;
 
 pub use analysis::{BAR_TRAVEL_MM, PlanOptions, analyse, analyse_problem, prepared};
-pub use separate::{Separated, separation};
+pub use separate::{Separated, SeparatingTest, separating_tests, separation};

@@ -66,14 +66,23 @@ impl Prepared {
         })
     }
 
+    /// Some information with an entry added.
+    pub fn added(&self, root: &Root, entry: usize) -> Root {
+        sum(root.as_ref(), self.entries[entry].root.as_ref())
+    }
+
+    /// A figure of some information with each entry added.
+    pub fn figures<T: Send>(&self, root: &Root, figure: &(impl Fn(&Root) -> T + Sync)) -> Vec<T> {
+        (0..self.entries.len())
+            .into_par_iter()
+            .map(|entry| figure(&self.added(root, entry)))
+            .collect()
+    }
+
     /// The entry after which a figure (the smaller the better) stands best, and the figures of all. Of equal ones the first of the menu, which lists
     /// mounted balls before those that are mounted anew.
     pub fn best(&self, root: &Root, figure: &(impl Fn(&Root) -> f64 + Sync)) -> Option<(usize, Vec<f64>)> {
-        let figures: Vec<f64> = self
-            .entries
-            .par_iter()
-            .map(|ready| figure(&sum(root.as_ref(), ready.root.as_ref())))
-            .collect();
+        let figures = self.figures(root, figure);
         let best = (0..figures.len()).min_by(|a, b| smallest_first(figures[*a], figures[*b]))?;
         Some((best, figures))
     }

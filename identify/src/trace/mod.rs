@@ -12,6 +12,7 @@ mod compose;
 mod exchange;
 mod fewer;
 pub mod further;
+mod interrupt;
 mod judge;
 pub mod library;
 pub mod list;
@@ -38,6 +39,7 @@ use crate::noise::{NoiseSource, PureError};
 use crate::problem::Problem;
 use crate::results::TraceResult;
 use columns::{Columns, Layout};
+use interrupt::Interrupt;
 use judge::Judged;
 use library::Candidate;
 use moments::Moments;
@@ -87,6 +89,8 @@ pub enum Progress {
     Taken(usize, String, f64),
     /// The found effects are being refitted and judged.
     Judging,
+    /// Nothing new: asked often, so that an end is heeded soon.
+    Working,
 }
 
 /// Sessions along runs have few effects; more than this says that something else is meant.
@@ -127,7 +131,8 @@ pub struct Trace<'a> {
     pub result: TraceResult,
 }
 
-/// Closes the loop on a session.
+/// Closes the loop on a session. `progress` is told how far it has come and says whether to go on; where it says no, the trace ends within a fraction of a
+/// second after the fit of the declared model, with the effects found until then, and is marked as interrupted.
 ///
 /// # Errors
 /// If the session cannot be fitted.
@@ -145,12 +150,21 @@ pub fn trace<'a>(
     let first = trace_with(problem, before_fit, &residuals, options, progress)?;
     // What moved between runs was taken for noise as long as the model lacked it.
     let mut problem = first.before.clone();
-    if first.effects.is_empty() || !give_noise_memory(&mut problem, &first.after_fit.residuals) {
+    if first.result.interrupted
+        || first.effects.is_empty()
+        || !give_noise_memory(&mut problem, &first.after_fit.residuals)
+    {
         return Ok(first);
     }
     let before_fit = fit(&problem, Some(&first.before_fit.beta))?;
-    let residuals = first.after_fit.residuals;
-    trace_with(problem, before_fit, &residuals, options, progress)
+    let again = trace_with(problem, before_fit, &first.after_fit.residuals, options, progress)?;
+    if !again.result.interrupted {
+        return Ok(again);
+    }
+    // The first search is whole, if with a noise that is less well known.
+    let mut first = first;
+    first.result.mark_interrupted();
+    Ok(first)
 }
 
 /// Closes the loop with a given noise; `pure` are the residuals whose repeats show it.
@@ -161,23 +175,41 @@ fn trace_with<'a>(
     options: &TraceOptions,
     progress: &(dyn Fn(Progress) -> bool + Sync),
 ) -> Result<Trace<'a>, IdentifyError> {
+    match searched(&problem, &before_fit, pure, options, progress) {
+        Err(IdentifyError::Interrupted) => Ok(Trace::unsearched(problem, before_fit)),
+        searched => searched,
+    }
+}
+
+/// The same, and [`IdentifyError::Interrupted`] if it was interrupted before the search began.
+fn searched<'a>(
+    problem: &Problem<'a>,
+    before_fit: &Fit,
+    pure: &[Vec<f64>],
+    options: &TraceOptions,
+    progress: &(dyn Fn(Progress) -> bool + Sync),
+) -> Result<Trace<'a>, IdentifyError> {
+    let interrupt = Interrupt(progress);
+    interrupt.check()?;
     let poses = problem.folds.kind == FoldKind::Poses;
-    let columns = Columns::new(&problem, &before_fit.beta);
-    let start = Start::of(&problem, &columns, &before_fit)?;
+    let columns = Columns::new(problem, &before_fit.beta);
+    let start = Start::of(problem, &columns, before_fit)?;
+    interrupt.check()?;
     let null = |block: usize| {
         let (count, seed) = (draws_of(options), options.seed);
-        null::draws(&problem, &columns, pure, &start.residual, count, block, seed)
+        null::draws(problem, &columns, pure, &start.residual, count, block, seed)
     };
     let structure_before = || {
         let (model, prior) = (start.model.clone(), start.prior());
         let draws = null(null::SINGLE);
-        remainder::structure(&problem, &columns, model, &start.residual, draws, &prior)
+        remainder::structure(problem, &columns, model, &start.residual, draws, &prior)
     };
     let (draws, structure_before) = rayon::join(|| null(null::BLOCK), || (!poses).then(structure_before));
 
     let structure_before = structure_before.transpose()?;
+    interrupt.check()?;
 
-    let laid = list::laid(&problem, &columns, options)?;
+    let laid = list::laid(problem, &columns, options)?;
     let looked_for = laid.len();
     progress(Progress::Screening(looked_for));
     let (reserve, laid): (Vec<_>, Vec<_>) =
@@ -185,6 +217,7 @@ fn trace_with<'a>(
     let (candidates, layouts): (Vec<Candidate>, Vec<Layout>) = laid.into_iter().unzip();
     let (model, prior) = (start.model.clone(), start.prior());
     let moments = Moments::new(&columns, &layouts, model, &start.residual, draws);
+    interrupt.check()?;
     let most = if poses { MOST_OF_POSES } else { MOST_ALONG_RUNS };
     let stop = Stop {
         significance: options.significance,
@@ -194,6 +227,7 @@ fn trace_with<'a>(
     let plain = start.plain(&columns, &before_fit.beta, problem.noise.sigma_mm)?;
     let mut search = Search::new(&columns, candidates, layouts, moments, prior, plain, stop)?;
     search.reserve = reserve;
+    search.interrupt = Some(interrupt);
     let gains = search.model_without(None)?.gains();
     let seen = gains.iter().filter(|gain| gain.freedom > 0).count();
 
@@ -203,8 +237,20 @@ fn trace_with<'a>(
         progress,
     };
     let structure_before = structure_before.as_ref();
-    let judge = |search: &Search<'_>| Judged::of(&problem, &before_fit, search, options, structure_before);
-    let (ended, judged) = found(&mut search, &mut account, judge)?;
+    let judge = |search: &Search<'_>| Judged::of(problem, before_fit, search, options, structure_before);
+    let found = match found(&mut search, &mut account, judge) {
+        Err(IdentifyError::Interrupted) => {
+            search.roll_back();
+            None
+        }
+        found => Some(found?),
+    };
+    let interrupted = found.is_none();
+    let (ended, judged) = match found {
+        Some((p_value, judged)) => (Some(p_value), judged),
+        // The effects found until then are fitted; what they leave is not looked at.
+        None => (None, Judged::of(problem, before_fit, &search, options, None)?),
+    };
     let Judged {
         after,
         after_fit,
@@ -212,8 +258,8 @@ fn trace_with<'a>(
         structure: structure_after,
     } = judged;
     let mut reported = report::report(&report::Findings {
-        before: &problem,
-        before_fit: &before_fit,
+        before: problem,
+        before_fit,
         after: &after,
         after_fit: &after_fit,
         search: &search,
@@ -222,18 +268,19 @@ fn trace_with<'a>(
         structure_after: structure_after.as_ref(),
         last_p_value: ended.unwrap_or(1.0),
         stopped_early: ended.is_none() || search.taken().len() >= stop.most,
+        interrupted,
         candidates: looked_for,
         candidates_seen: seen,
     })?;
     reported
         .result
         .warnings
-        .extend(list::left_out_in_vain(&problem, options)?);
+        .extend(list::left_out_in_vain(problem, options)?);
     drop(search);
     drop(columns);
     Ok(Trace {
-        before: problem,
-        before_fit,
+        before: problem.clone(),
+        before_fit: before_fit.clone(),
         after,
         after_fit,
         effects,
@@ -246,17 +293,20 @@ fn trace_with<'a>(
 
 /// Searches and judges; where structure remains that nothing simpler explains, searches on with free curves; gives back what explains nothing. Returns how
 /// the search ended ([`search_on`]) and what it came to.
+///
+/// # Errors
+/// [`IdentifyError::Interrupted`] if the user has seen enough.
 fn found<'a>(
     search: &mut Search<'_>,
     account: &mut Account<'_>,
     judge: impl Fn(&Search<'_>) -> Result<Judged<'a>, IdentifyError>,
-) -> Result<(Option<f64>, Judged<'a>), IdentifyError> {
+) -> Result<(f64, Judged<'a>), IdentifyError> {
     let mut ended = search_on(search, account)?;
     (account.progress)(Progress::Judging);
     let mut judged = judge(search)?;
     // Among poses structure is looked for effect by effect, and never ends.
     let poses = search.stop.in_residual_variance;
-    if (poses || judged.is_structured()) && ended.is_some() && search.taken().len() < search.stop.most {
+    if (poses || judged.is_structured()) && search.taken().len() < search.stop.most {
         search.bring_reserve();
         search.last_resort = true;
         ended = search_on(search, account)?;

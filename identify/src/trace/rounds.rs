@@ -19,8 +19,8 @@ pub(super) struct Account<'t> {
 }
 
 impl Account<'_> {
-    /// Notes an addition. Returns whether more is wanted.
-    fn note(&mut self, search: &Search<'_>, candidate: usize) -> bool {
+    /// Notes an addition.
+    fn note(&mut self, search: &Search<'_>, candidate: usize) {
         let held_out = search.held_out.last().copied().unwrap_or(0.0);
         let heldout_rms_um = (held_out / search.columns.rows().max(1) as f64).sqrt() * self.noise_um;
         let id = search.candidates[candidate].effect.id();
@@ -30,20 +30,21 @@ impl Account<'_> {
             effects,
             heldout_rms_um,
         });
-        (self.progress)(Progress::Taken(effects, id, heldout_rms_um))
+        (self.progress)(Progress::Taken(effects, id, heldout_rms_um));
     }
 }
 
-/// Rounds until nothing earns its place any more: the p-value of the best that was not taken. `None` if the user has seen enough.
-pub(super) fn search_on(
-    search: &mut Search<'_>,
-    account: &mut Account<'_>,
-) -> Result<Option<f64>, IdentifyError> {
+/// Rounds until nothing earns its place any more: the p-value of the best that was not taken.
+///
+/// # Errors
+/// [`IdentifyError::Interrupted`] if the user has seen enough; [`Search::roll_back`] then leads to what was taken until then.
+pub(super) fn search_on(search: &mut Search<'_>, account: &mut Account<'_>) -> Result<f64, IdentifyError> {
     // Effects that are put down to one make room for others; that must end.
     for _ in 0..search.most_rounds() {
+        search.keep();
         match search.round()? {
             Round::Done { .. } if search.retune()? || search.regroup()? => {}
-            Round::Done { p_value } => return Ok(Some(p_value)),
+            Round::Done { p_value } => return Ok(p_value),
             Round::Added { candidate } => {
                 // Every exchange costs a model an effect; among many effects the gain is small and a sweep now and then will do.
                 let taken = search.taken().len();
@@ -51,11 +52,10 @@ pub(super) fn search_on(
                     search.exchange()?;
                 }
                 search.merge()?;
-                if !account.note(search, candidate) {
-                    return Ok(None);
-                }
+                account.note(search, candidate);
             }
         }
     }
-    Ok(Some(1.0))
+    search.keep();
+    Ok(1.0)
 }

@@ -1,9 +1,11 @@
 //! A found effect as it is reported: its name, the numbers of its shape, its parameters, its curve.
 
 use abbe_model::axis::AxisKind;
+use abbe_model::chain::Machine;
 use abbe_model::effect::{Driver, DriverSample, Effect, Shape};
 
 use super::{Findings, HeldOut, Moves, moved_by_aliases};
+use crate::effect_words::{explanations, meaning};
 use crate::fit::Fit;
 use crate::parameters::Role;
 use crate::problem::Problem;
@@ -11,13 +13,14 @@ use crate::results::{CurvePoint, EffectName, EffectResult, ParameterResult, Shap
 use crate::trace::library::Family;
 
 /// An effect's name as it stands in results.
-pub fn effect_name(effect: &Effect) -> EffectName {
+pub fn effect_name(machine: &Machine, effect: &Effect) -> EffectName {
     EffectName {
         component: effect.component.to_string(),
         driver: effect.driver.to_string(),
         shape: effect.shape.word().to_string(),
         order: effect.shape.order(),
         tests: effect.tests.clone(),
+        meaning: meaning(machine, effect).to_string(),
     }
 }
 
@@ -47,8 +50,11 @@ pub(super) fn result(
     let candidate = &search.candidates[taken.candidate];
     let number = found.number + findings.before.parameters.effects.len();
     let (curve_at_unit, curve_unit) = curve_units(after, &candidate.effect);
+    let machine = &after.session.machine;
+    let alike = std::iter::once(&candidate.effect).chain(found.look_alikes);
+    let meanings: Vec<_> = alike.map(|effect| meaning(machine, effect)).collect();
     EffectResult {
-        name: effect_name(&candidate.effect),
+        name: effect_name(machine, &candidate.effect),
         family: families
             .get(candidate.family)
             .map(|family| family.name.clone())
@@ -61,9 +67,15 @@ pub(super) fn result(
         p_value: taken.p_value,
         rms_gain_um: found.rms_gain_um,
         heldout_rms_um: held_out.um(found.number + 1),
-        aliases: found.look_alikes.iter().map(effect_name).collect(),
+        unique: found.look_alikes.is_empty(),
+        indistinguishable: meanings.len(),
+        explanations: explanations(&meanings),
+        aliases: (found.look_alikes.iter())
+            .map(|effect| effect_name(machine, effect))
+            .collect(),
         separated_by: None,
         separation: None,
+        separating_tests: Vec::new(),
     }
 }
 

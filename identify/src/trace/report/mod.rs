@@ -1,6 +1,7 @@
 //! From a finished search to what is reported.
 
 mod effect;
+mod unsearched;
 
 use abbe_model::effect::Effect;
 
@@ -16,6 +17,7 @@ use crate::noise;
 use crate::problem::Problem;
 use crate::results::{EffectResult, ModelResult, Moved, ParameterResult, Remainder, TraceResult};
 pub(super) use effect::effect_name;
+pub(super) use unsearched::unsearched;
 
 /// Share of the structure's excess over noise that may remain for the found effects to count as the explanation.
 const EXPLAINED_SHARE: f64 = 0.5;
@@ -31,8 +33,10 @@ pub(super) struct Findings<'f, 'a> {
     pub structure_before: Option<&'f Structure>,
     pub structure_after: Option<&'f Structure>,
     pub last_p_value: f64,
-    /// Whether the search was ended by its cap or by the user, not by the evidence.
+    /// Whether the search was ended by its cap or by an interruption, not by the evidence.
     pub stopped_early: bool,
+    /// Whether it was interrupted.
+    pub interrupted: bool,
     pub candidates: usize,
     pub candidates_seen: usize,
 }
@@ -92,8 +96,9 @@ pub(super) fn report(findings: &Findings<'_, '_>) -> Result<Reported, IdentifyEr
     let mut warnings = before.session.warnings.clone();
     warnings.extend(noise::stated_against_repeats(before, &before_fit.residuals));
     let moved = moved(&before_result.parameters, &after_result.parameters);
-    let result = TraceResult {
+    let mut result = TraceResult {
         verdict,
+        interrupted: false,
         noise_um: before.noise.sigma_mm * 1e3,
         noise_source: before.noise.source.word().to_string(),
         noise_memory: before.noise.memory.clone(),
@@ -115,6 +120,9 @@ pub(super) fn report(findings: &Findings<'_, '_>) -> Result<Reported, IdentifyEr
         rejected: fit::rejected(after, after_fit),
         warnings,
     };
+    if findings.interrupted {
+        result.mark_interrupted();
+    }
     Ok(Reported {
         result,
         look_alikes,
@@ -154,7 +162,7 @@ impl<'s> HeldOut<'s> {
 
 /// The variance that aliases are told apart by, in that of the noise: among poses, what the found effects leave.
 fn residual_variance(findings: &Findings<'_, '_>) -> f64 {
-    if findings.structure_after.is_some() {
+    if !findings.search.stop.in_residual_variance {
         return 1.0;
     }
     let residuals = findings.after_fit.residuals.iter().flatten();
@@ -251,6 +259,9 @@ fn moves_by(findings: &Findings<'_, '_>, k: usize, in_place: &[f64], named: &[f6
 }
 
 fn verdict(findings: &Findings<'_, '_>, effects: &[EffectResult]) -> (String, Remainder) {
+    if findings.interrupted {
+        return (String::new(), not_examined());
+    }
     let Some(after) = findings.structure_after else {
         let word = match (effects.is_empty(), findings.stopped_early) {
             (true, _) => "clean",
@@ -276,6 +287,15 @@ fn verdict(findings: &Findings<'_, '_>, effects: &[EffectResult]) -> (String, Re
     let share = if before > 0.0 { after.excess / before } else { 0.0 };
     let word = word(!effects.is_empty(), structured, share);
     (word.to_string(), remainder)
+}
+
+/// What is said of the residual of an interrupted trace.
+fn not_examined() -> Remainder {
+    Remainder {
+        structured: false,
+        p_value: 1.0,
+        place: Some("not examined: the trace was interrupted".to_string()),
+    }
 }
 
 /// What is said of a search along runs: whether it found anything, whether structure remains, and what share of its excess over noise.

@@ -13,6 +13,7 @@ use std::ops::Range;
 use super::alias::INDISTINGUISHABLE;
 use super::columns::{Columns, Layout};
 use super::compose::Composed;
+use super::interrupt::Interrupt;
 use super::library::Candidate;
 use super::moments::Moments;
 use super::score::{Gain, PriorMoments, Trained};
@@ -90,6 +91,10 @@ pub struct Search<'s> {
     plain: Plain,
     /// Entries of the library that would not stand out however large they plausibly were.
     unseen: Vec<bool>,
+    /// Asked before each model that is trained; `None` where the search is not to be interrupted.
+    pub interrupt: Option<Interrupt<'s>>,
+    /// What was taken up, and the held-out errors, when the search was last whole.
+    kept: (Vec<Track>, Vec<f64>),
     pub(super) stop: Stop,
 }
 
@@ -146,11 +151,25 @@ impl<'s> Search<'s> {
             reserve: Vec::new(),
             plain,
             unseen: Vec::new(),
+            interrupt: None,
+            kept: Default::default(),
             stop,
         };
         search.unseen = search.not_standing_out()?;
         search.note_held_out()?;
+        search.keep();
         Ok(search)
+    }
+
+    /// Remembers what has been taken up, for [`Search::roll_back`].
+    pub fn keep(&mut self) {
+        self.kept = (self.tracks.clone(), self.held_out.clone());
+    }
+
+    /// Goes back to what was last kept, where an interruption has left a round half done. From then on nothing interrupts.
+    pub fn roll_back(&mut self) {
+        (self.tracks, self.held_out) = self.kept.clone();
+        self.interrupt = None;
     }
 
     /// What the search on all readings has taken up.

@@ -32,6 +32,7 @@ impl Search<'_> {
         chosen: &[usize],
         folds: &[usize],
     ) -> Result<Trained<'_>, IdentifyError> {
+        self.interrupt.map_or(Ok(()), |interrupt| interrupt.check())?;
         Trained::new(&self.moments, &self.prior, self.base_with(chosen), folds.to_vec())
     }
 
@@ -41,6 +42,7 @@ impl Search<'_> {
         chosen: &[usize],
         folds: &[usize],
     ) -> Result<Trained<'_>, IdentifyError> {
+        self.interrupt.map_or(Ok(()), |interrupt| interrupt.check())?;
         Trained::lean(&self.moments, &self.prior, self.base_with(chosen), folds.to_vec())
     }
 

@@ -1,0 +1,66 @@
+//! Interruption of a trace: whoever waits for it can end it at any time and gets the effects found until then.
+
+use super::report::unsearched;
+use super::{Progress, Trace};
+use crate::error::IdentifyError;
+use crate::fit::Fit;
+use crate::problem::Problem;
+use crate::results::TraceResult;
+
+/// The verdict of a trace that was interrupted.
+const INCOMPLETE: &str = "incomplete";
+
+/// Asks whoever waits for a trace whether it is to go on.
+#[derive(Clone, Copy)]
+pub(super) struct Interrupt<'t>(pub &'t (dyn Fn(Progress) -> bool + Sync));
+
+impl Interrupt<'_> {
+    /// # Errors
+    /// [`IdentifyError::Interrupted`] where it is not.
+    pub fn check(&self) -> Result<(), IdentifyError> {
+        if (self.0)(Progress::Working) {
+            Ok(())
+        } else {
+            Err(IdentifyError::Interrupted)
+        }
+    }
+}
+
+impl TraceResult {
+    /// Marks a result as that of an interrupted trace: a field, the verdict, and a warning that every output shows.
+    pub(super) fn mark_interrupted(&mut self) {
+        self.interrupted = true;
+        self.verdict = INCOMPLETE.to_string();
+        self.warnings.push(format!(
+            "the trace was {}: effects may be missing from the model, and the residual was not examined for structure",
+            self.interruption()
+        ));
+    }
+
+    /// How far an interrupted trace came: `interrupted after 2 effects`.
+    pub fn interruption(&self) -> String {
+        let effects = match self.effects.len() {
+            1 => "1 effect".to_string(),
+            count => format!("{count} effects"),
+        };
+        format!("interrupted after {effects}")
+    }
+}
+
+impl<'a> Trace<'a> {
+    /// A trace that was interrupted before its search began: the declared model and nothing else.
+    pub(super) fn unsearched(problem: Problem<'a>, fit: Fit) -> Trace<'a> {
+        let result = unsearched(&problem, &fit);
+        Trace {
+            after: problem.clone(),
+            after_fit: fit.clone(),
+            before: problem,
+            before_fit: fit,
+            effects: Vec::new(),
+            look_alikes: Vec::new(),
+            rivals: Vec::new(),
+            steps: Vec::new(),
+            result,
+        }
+    }
+}

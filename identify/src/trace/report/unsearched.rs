@@ -1,0 +1,37 @@
+//! What is reported of a trace that was interrupted before its search began: the declared model.
+
+use super::{model_result, not_examined};
+use crate::fit::{self, Fit};
+use crate::noise;
+use crate::problem::Problem;
+use crate::results::TraceResult;
+
+/// The declared model alone, marked as interrupted.
+pub(in crate::trace) fn unsearched(problem: &Problem<'_>, fit: &Fit) -> TraceResult {
+    let declared = model_result(problem, fit, fit.held_out.rms_mm);
+    let remainder = not_examined();
+    let mut warnings = problem.session.warnings.clone();
+    warnings.extend(noise::stated_against_repeats(problem, &fit.residuals));
+    let mut result = TraceResult {
+        verdict: String::new(),
+        interrupted: true,
+        noise_um: problem.noise.sigma_mm * 1e3,
+        noise_source: problem.noise.source.word().to_string(),
+        noise_memory: problem.noise.memory.clone(),
+        readings: problem.readings(),
+        heldout_by: problem.folds.kind.words().to_string(),
+        before: declared.clone(),
+        after: declared,
+        effects: Vec::new(),
+        residual_before: remainder.place.clone().unwrap_or_default(),
+        remainder,
+        moved: Vec::new(),
+        candidates: 0,
+        candidates_seen: 0,
+        unobservable: fit::unobservable(problem, &fit.rank),
+        rejected: fit::rejected(problem, fit),
+        warnings,
+    };
+    result.mark_interrupted();
+    result
+}
