@@ -12,6 +12,7 @@ mod compose;
 mod exchange;
 mod fewer;
 pub mod further;
+mod implausible;
 mod judge;
 pub mod library;
 pub mod list;
@@ -38,6 +39,7 @@ use crate::noise::{NoiseSource, PureError};
 use crate::problem::Problem;
 use crate::results::TraceResult;
 use columns::{Columns, Layout};
+use implausible::Contradicted;
 use judge::Judged;
 use library::Candidate;
 use moments::Moments;
@@ -138,11 +140,16 @@ pub fn trace<'a>(
 ) -> Result<Trace<'a>, IdentifyError> {
     progress(Progress::Fitting);
     let (mut problem, mut before_fit) = prepare(session, options.seed)?;
+    let contradicted = Contradicted::of(&mut problem, &mut before_fit)?;
+    if contradicted.stops() {
+        return Ok(contradicted.stopped(problem, before_fit));
+    }
     if give_noise_memory(&mut problem, &before_fit.residuals) {
         before_fit = fit(&problem, Some(&before_fit.beta))?;
     }
     let residuals = before_fit.residuals.clone();
-    let first = trace_with(problem, before_fit, &residuals, options, progress)?;
+    let mut first = trace_with(problem, before_fit, &residuals, options, progress)?;
+    contradicted.tell(&mut first.result);
     // What moved between runs was taken for noise as long as the model lacked it.
     let mut problem = first.before.clone();
     if first.effects.is_empty() || !give_noise_memory(&mut problem, &first.after_fit.residuals) {
@@ -150,7 +157,9 @@ pub fn trace<'a>(
     }
     let before_fit = fit(&problem, Some(&first.before_fit.beta))?;
     let residuals = first.after_fit.residuals;
-    trace_with(problem, before_fit, &residuals, options, progress)
+    let mut second = trace_with(problem, before_fit, &residuals, options, progress)?;
+    contradicted.tell(&mut second.result);
+    Ok(second)
 }
 
 /// Closes the loop with a given noise; `pure` are the residuals whose repeats show it.
