@@ -25,6 +25,7 @@ mod plan_methods;
 mod plan_next;
 mod plan_rank;
 mod plan_uncertainty;
+mod plausibility;
 mod propagation;
 mod properties;
 mod recovery;

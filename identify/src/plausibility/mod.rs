@@ -52,7 +52,7 @@ pub fn examine(problem: &Problem<'_>, fit: &Fit) -> Plausibility {
     if by_residual && ratio < WORTH_A_LOOK {
         return Plausibility::default();
     }
-    let suggestions = suggest::suggestions(problem, by_residual);
+    let suggestions = suggest::suggestions(problem, &conflicts);
     if by_residual && let Some(best) = suggestions.first() {
         let rms_um = rms_mm(problem, &fit.residuals) * 1e3;
         conflicts.push(Conflict {
@@ -91,7 +91,7 @@ pub(crate) fn checked(problem: &Problem<'_>, fit: Result<Fit, IdentifyError>) ->
         Err(error) => return Err(error),
     };
     let suggestions = if problem.session.instrument.is_two_sided() {
-        suggest::suggestions(problem, false)
+        suggest::suggestions(problem, &[])
     } else {
         poses::suggestions(problem)
     };

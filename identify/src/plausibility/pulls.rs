@@ -22,6 +22,8 @@ use crate::problem::Problem;
 const SIGNIFICANCE: f64 = 1e-4;
 /// A parameter that the readings would move by less than this share of its stated uncertainty says nothing.
 const LEAST_SHARE: f64 = 0.1;
+/// More set-up parameters than this are tested one by one only.
+const MOST_TOGETHER: usize = 200;
 /// Greatest autocorrelation that is credited to noise.
 const MOST_CORRELATED: f64 = 0.95;
 
@@ -86,7 +88,11 @@ impl Pulls {
                 })
             })
             .collect();
-        let (together, freedom) = together(&covariance, &moved);
+        let (together, freedom) = if count <= MOST_TOGETHER {
+            together(&covariance, &moved)
+        } else {
+            (0.0, 0)
+        };
         Pulls {
             limit: limit(each.len()),
             each,

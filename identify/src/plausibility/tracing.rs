@@ -12,12 +12,16 @@ use crate::problem::Problem;
 /// Rounds of freeing what is contradicted: one conflict may hide behind another.
 const MOST_ROUNDS: usize = 5;
 
+/// A changed statement that makes the residual so many times smaller is the explanation.
+const STATEMENT_EXPLAINS: f64 = 5.0;
+
 /// Whether readings and session have so little in common that a search for effects makes no sense.
 pub(crate) fn is_another_session(plausibility: &Plausibility) -> bool {
     plausibility.conflicts.iter().any(|conflict| match conflict.kind {
         ConflictKind::Residual => true,
         ConflictKind::ExplainedVariance => conflict.value < conflict.stated,
-        ConflictKind::SetupParameter | ConflictKind::Setups | ConflictKind::Statement => false,
+        ConflictKind::Statement => conflict.value > STATEMENT_EXPLAINS * conflict.stated,
+        ConflictKind::SetupParameter | ConflictKind::Setups => false,
     })
 }
 
