@@ -18,6 +18,7 @@ mod map;
 mod new;
 pub mod output;
 pub mod plan;
+mod plausibility;
 mod repeated;
 mod report;
 mod schema;

@@ -14,7 +14,9 @@ use indicatif::{ProgressBar, ProgressStyle};
 
 use super::failure::Failure;
 use super::report::ReportArguments;
-use super::{CommonArguments, SessionArguments, compensation, csv, fit, output, read_session, table};
+use super::{
+    CommonArguments, SessionArguments, compensation, csv, fit, output, plausibility, read_session, table,
+};
 
 /// `abbe trace SESSION`
 #[derive(Args)]
@@ -159,6 +161,7 @@ fn list(session: &abbe::model::session::Session, options: &TraceOptions) -> Resu
 }
 
 fn print(result: &TraceResult) {
+    plausibility::print(&result.plausibility);
     say!("Verdict: {}", result.verdict);
     say!(
         "{} readings, noise {} ({}); {} of {} candidates can be seen",

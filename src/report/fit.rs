@@ -10,6 +10,7 @@ use maud::{Markup, html};
 use super::curves;
 use super::document::{Document, prose};
 use super::drawn::Drawn;
+use super::plausibility;
 use super::readings::{self, um};
 
 /// How a fit was made.
@@ -53,6 +54,7 @@ pub fn document(problem: &Problem<'_>, fit: &Fit, result: &FitResult) -> Result<
         ..Document::default()
     };
     readings::live(&mut document, &drawn, &result.parameters);
+    plausibility::section(&mut document, &result.plausibility);
     let nominal = nominal_result(&drawn);
     let fitted = ModelResult {
         rms_um: result.rms_um,

@@ -10,6 +10,7 @@ use maud::{Markup, html};
 use super::curves;
 use super::document::{Document, list, prose, table};
 use super::drawn::Drawn;
+use super::plausibility;
 use super::plot::bars::{self, Fill};
 use super::plot::lines::{ACROSS, Lines, Mark, Series, UP, span};
 use super::plot::scale::{Scale, place, polyline};
@@ -75,6 +76,7 @@ pub fn document(trace: &Trace<'_>) -> Result<Document, IdentifyError> {
         ..Document::default()
     };
     readings::live(&mut document, &drawn, &result.after.parameters);
+    plausibility::section(&mut document, &result.plausibility);
     let figures = readings::before_and_after(
         &mut document,
         &drawn,
