@@ -1,6 +1,7 @@
 //! `abbe fit --compensation`: identified errors in the forms that controls read, as far as those are publicly documented.
 //!
 //! - **LinuxCNC** `COMP_FILE` of type 0 (INI Configuration, `[JOINT_n]`): nominal, actual forward, actual reverse; the control adds nominal less actual.
+//!   It reads three numbers of a line and nothing behind them (`usrmotLoadComp` in `usrmotintf.cc`): the uncertainty stands there.
 //! - **Heidenhain** `.COM` (Technical Manual MANUALplus 620, 6.10.3): columns AXISPOS, BACKLASH, and one for each axis; points of the error curve
 //!   (Technical Manual TNC 406/306, 4-21), positive where the travel is too long (TNC 407, 1.6.3). How the file is framed is not publicly documented.
 //! - **Beckhoff** TF5280 (and ISG kernel) ISG CSV format: the errors themselves by the names of ISO 230, in mm and rad over mm and degrees.
@@ -18,6 +19,8 @@ use clap::{Args, ValueEnum};
 
 use super::failure::Failure;
 use super::folder::{self, NewFile};
+
+mod uncertainty;
 
 /// Most points of a table: LinuxCNC takes 256 triplets a joint, Heidenhain 256 points a table.
 const MOST_POINTS: usize = 256;
@@ -42,7 +45,7 @@ pub struct CompensationArguments {
     /// For which control.
     #[arg(long, value_enum, requires = "compensation")]
     control: Option<Control>,
-    /// Points of a table, over the positions that the readings cover.
+    /// Points of a table, over the positions through which the axis moved.
     #[arg(long, value_name = "N", default_value_t = 37, requires = "compensation")]
     points: usize,
 }
@@ -109,6 +112,8 @@ fn write(
             "nothing to compensate in this form: declare error motions as [[effect]], as `abbe trace --write` does, and fit again{all}"
         )));
     }
+    let mut files = files;
+    files.push(uncertainty::table(machine, compensation, points)?);
     folder::write(folder, &files, false, |_| Ok(()))?;
     say!("");
     for (name, _) in &files {
@@ -134,6 +139,10 @@ fn write(
             );
         }
     }
+    say!(
+        "  standard uncertainty (k = 1) of every point: {}",
+        uncertainty::FILE
+    );
     for line in &left_out {
         say!("  left out: {line}");
     }
@@ -188,12 +197,14 @@ fn linuxcnc(
         let mut text = String::new();
         for q in positions(curve, points) {
             let actual = |direction: f64| outside(kind, q + factor * curve.at(q, direction));
+            let u = curve.u_at(q, 1.0).max(curve.u_at(q, -1.0));
             let _ = writeln!(
                 text,
-                "{:.6} {:.6} {:.6}",
+                "{:.6} {:.6} {:.6} # u {:.6}",
                 outside(kind, q),
                 actual(1.0),
-                actual(-1.0)
+                actual(-1.0),
+                outside(kind, u)
             );
         }
         files.push((format!("{}.comp", machine.axes[axis].name), text));
@@ -247,7 +258,7 @@ fn heidenhain(
                 let value = if *column == axis {
                     curve.at(q, 1.0)
                 } else {
-                    mean(curve, q)
+                    curve.mean_at(q)
                 };
                 let _ = write!(
                     text,
@@ -318,14 +329,15 @@ fn beckhoff(
             let position = format!("{:.5}", outside(axis.kind, q));
             rows.push(
                 std::iter::once(position)
-                    .chain(curves.iter().map(|curve| format!("{:.9}", mean(curve, q))))
+                    .chain(curves.iter().map(|curve| format!("{:.9}", curve.mean_at(q))))
                     .collect(),
             );
         }
         blocks.push(format!(
-            "// Component errors of {}, mm and rad\n{}\n",
+            "// Component errors of {}, mm and rad\n{}\n{}\n",
             axis.name,
-            table(&rows)
+            table(&rows),
+            uncertainty::comments(axis.kind, &curves, points)
         ));
     }
     if blocks.is_empty() {
@@ -348,11 +360,6 @@ fn without_direction(curve: &ErrorCurve) -> String {
         "{}: what depends on the direction; the mean of both is in the table",
         curve.error
     )
-}
-
-/// The mean of both directions.
-fn mean(curve: &ErrorCurve, q: f64) -> f64 {
-    0.5 * (curve.at(q, 1.0) + curve.at(q, -1.0))
 }
 
 /// Cells aligned by spaces, as in the manual's examples.
