@@ -320,6 +320,7 @@ pub fn report(problem: &Problem<'_>, fit: &Fit) -> FitResult {
         circular: crate::circular::of_session(problem.session, problem.noise.sigma_mm, &problem.rejected),
         plausibility,
         warnings,
+        about: problem.session.about.iter().cloned().collect(),
         monte_carlo: None,
     }
 }

@@ -84,6 +84,9 @@ pub struct FitResult {
     pub plausibility: Plausibility,
     /// What a user should know.
     pub warnings: Vec<String>,
+    /// Notes of the session file's `[about]`: `serial_number`, `operator`, `date`, `comment` and others.
+    #[serde(skip_serializing_if = "BTreeMap::is_empty")]
+    pub about: BTreeMap<String, String>,
     /// The same by Monte Carlo, where it was asked for. `u` in `parameters` is then what is quoted.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub monte_carlo: Option<FitMonteCarlo>,
@@ -360,4 +363,7 @@ pub struct TraceResult {
     pub plausibility: Plausibility,
     /// What a user should know.
     pub warnings: Vec<String>,
+    /// Notes of the session file's `[about]`: `serial_number`, `operator`, `date`, `comment` and others.
+    #[serde(skip_serializing_if = "BTreeMap::is_empty")]
+    pub about: BTreeMap<String, String>,
 }

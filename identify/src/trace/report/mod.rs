@@ -121,6 +121,7 @@ pub(super) fn report(findings: &Findings<'_, '_>) -> Result<Reported, IdentifyEr
         rejected: fit::rejected(after, after_fit),
         plausibility: Plausibility::default(),
         warnings,
+        about: before.session.about.iter().cloned().collect(),
     };
     if findings.interrupted {
         result.mark_interrupted();
