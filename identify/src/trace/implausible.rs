@@ -2,9 +2,9 @@
 //! claims no effect that only stands for a wrong statement of the set-up.
 
 use super::Trace;
-use super::report::model_result;
+use super::report::unsearched;
 use crate::error::IdentifyError;
-use crate::fit::{self, Fit};
+use crate::fit::Fit;
 use crate::plausibility::{self, Plausibility, is_another_session, with_set_ups_freed};
 use crate::problem::Problem;
 use crate::results::{Remainder, TraceResult};
@@ -57,17 +57,8 @@ impl Contradicted {
 
     /// The trace that ends before its search.
     pub fn stopped<'a>(&self, problem: Problem<'a>, fit: Fit) -> Trace<'a> {
-        let model = model_result(&problem, &fit, fit.held_out.rms_mm);
         let mut result = TraceResult {
             verdict: "unexplained".to_string(),
-            noise_um: problem.noise.sigma_mm * 1e3,
-            noise_source: problem.noise.source.word().to_string(),
-            noise_memory: problem.noise.memory.clone(),
-            readings: problem.readings(),
-            heldout_by: problem.folds.kind.words().to_string(),
-            before: model.clone(),
-            after: model,
-            effects: Vec::new(),
             remainder: Remainder {
                 structured: true,
                 p_value: 0.0,
@@ -76,25 +67,9 @@ impl Contradicted {
                 ),
             },
             residual_before: "the readings contradict the session".to_string(),
-            moved: Vec::new(),
-            candidates: 0,
-            candidates_seen: 0,
-            unobservable: fit::unobservable(&problem, &fit.rank),
-            rejected: fit::rejected(&problem, &fit),
-            plausibility: Plausibility::default(),
-            warnings: problem.session.warnings.clone(),
+            ..unsearched(&problem, &fit)
         };
         self.tell(&mut result);
-        Trace {
-            before: problem.clone(),
-            before_fit: fit.clone(),
-            after: problem,
-            after_fit: fit,
-            effects: Vec::new(),
-            look_alikes: Vec::new(),
-            rivals: Vec::new(),
-            steps: Vec::new(),
-            result,
-        }
+        Trace::of_declared(problem, fit, result)
     }
 }
