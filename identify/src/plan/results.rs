@@ -215,7 +215,7 @@ pub struct EffectDetectability {
     pub family: String,
     /// Unit of its amplitude.
     pub unit: String,
-    /// Smallest amplitude that one look finds; absent where no amplitude of physical size would be found.
+    /// Smallest amplitude that one look finds, of a power at 100 mm or 180°; absent where no amplitude of physical size on the travel would be found.
     pub detectable: Option<f64>,
     /// The same when all effects are looked at.
     pub detectable_searched: Option<f64>,

@@ -290,7 +290,7 @@ fn effects(found: &EffectsAnalysis) {
     say!(
         "\nSeen: smallest amplitude found with {:.0} % power at {:.0} % significance, of one look and of a search of the whole library of {}\n\
          (Šidák, which is on the safe side); share of the signal that the fit leaves over; what it adds to the errors until it is found;\n\
-         how many alike, of the same component and driver, are not listed:",
+         how many alike, of the same component and driver, are not listed. A power has its amplitude at 100 mm, or at 180°:",
         found.power * 100.0,
         found.significance * 100.0,
         found.effects_searched

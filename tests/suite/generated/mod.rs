@@ -226,6 +226,7 @@ fn the_commands_run_one_after_the_other_on_a_generated_plan() {
     let plan = generated(code, folder.path());
     let file = plan.file.clone();
     let (run, json) = (at("run"), at("fit.json"));
+    let measured = run.join("session.toml");
     let steps: [&[&str]; 3] = [
         &["plan", text(&file), "--no-effects"],
         &[
@@ -241,7 +242,7 @@ fn the_commands_run_one_after_the_other_on_a_generated_plan() {
             "--seed",
             "4",
         ],
-        &["fit", text(&run.join("session.toml")), "--json", text(&json)],
+        &["fit", text(&measured), "--json", text(&json)],
     ];
     for arguments in steps {
         let ran = abbe(arguments);
