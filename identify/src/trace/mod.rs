@@ -139,17 +139,37 @@ pub fn trace<'a>(
     progress: &(dyn Fn(Progress) -> bool + Sync),
 ) -> Result<Trace<'a>, IdentifyError> {
     progress(Progress::Fitting);
-    let (mut problem, mut before_fit) = prepare(session, options.seed)?;
-    let contradicted = Contradicted::of(&mut problem, &mut before_fit)?;
+    let (problem, fitted) = prepare(session, options.seed)?;
+    let contradicted = Contradicted::of(&problem, &fitted)?;
     if contradicted.stops() {
-        return Ok(contradicted.stopped(problem, before_fit));
+        return Ok(contradicted.stopped(problem, fitted));
     }
+    if let Some((problem_freed, fit_freed)) = &contradicted.freed {
+        let mut found = searched(problem_freed.clone(), fit_freed.clone(), options, progress)?;
+        if contradicted.stands_beside(&problem, &fitted, &found.effects)? {
+            contradicted.tell(&mut found.result);
+            return Ok(found);
+        }
+        // The effects that were found without the set-up explain what seemed wrong with it.
+        return searched(problem, fitted, options, progress);
+    }
+    let mut found = searched(problem, fitted, options, progress)?;
+    contradicted.tell(&mut found.result);
+    Ok(found)
+}
+
+/// Searches with the noise that repeats show, and once more where the effects that are found change it.
+fn searched<'a>(
+    mut problem: Problem<'a>,
+    mut before_fit: Fit,
+    options: &TraceOptions,
+    progress: &(dyn Fn(Progress) -> bool + Sync),
+) -> Result<Trace<'a>, IdentifyError> {
     if give_noise_memory(&mut problem, &before_fit.residuals) {
         before_fit = fit(&problem, Some(&before_fit.beta))?;
     }
     let residuals = before_fit.residuals.clone();
-    let mut first = trace_with(problem, before_fit, &residuals, options, progress)?;
-    contradicted.tell(&mut first.result);
+    let first = trace_with(problem, before_fit, &residuals, options, progress)?;
     // What moved between runs was taken for noise as long as the model lacked it.
     let mut problem = first.before.clone();
     if first.effects.is_empty() || !give_noise_memory(&mut problem, &first.after_fit.residuals) {
@@ -157,9 +177,7 @@ pub fn trace<'a>(
     }
     let before_fit = fit(&problem, Some(&first.before_fit.beta))?;
     let residuals = first.after_fit.residuals;
-    let mut second = trace_with(problem, before_fit, &residuals, options, progress)?;
-    contradicted.tell(&mut second.result);
-    Ok(second)
+    trace_with(problem, before_fit, &residuals, options, progress)
 }
 
 /// Closes the loop with a given noise; `pure` are the residuals whose repeats show it.
