@@ -81,7 +81,14 @@ pub fn examine(problem: &Problem<'_>, fit: &Fit) -> Plausibility {
 /// If the fit failed, or nothing is identifiable.
 pub(crate) fn checked(problem: &Problem<'_>, fit: Result<Fit, IdentifyError>) -> Result<Fit, IdentifyError> {
     let found = match fit {
-        Ok(fit) if fit.rank.seen.ncols() > 0 || problem.parameters.list.is_empty() => return Ok(fit),
+        // Noise that is stated may well be larger than anything that the tests show.
+        Ok(fit)
+            if fit.rank.seen.ncols() > 0
+                || problem.parameters.list.is_empty()
+                || problem.noise.source == NoiseSource::Stated =>
+        {
+            return Ok(fit);
+        }
         Ok(_) => format!(
             "none of the {} parameters is identifiable: the nominal machine leaves {:.3e} µm",
             problem.parameters.list.len(),

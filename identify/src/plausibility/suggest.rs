@@ -27,9 +27,13 @@ pub(super) fn suggestions(problem: &Problem<'_>, conflicts: &[Conflict]) -> Vec<
     let by_residual = conflicts.is_empty();
     let noise = Noise::white(problem.noise.sigma_mm, NoiseSource::Stated);
     let stated = thinned(problem, MOST_READINGS);
-    let Some(base) = trial(&stated, &noise) else {
-        return Vec::new();
-    };
+    // Where even the first steps fail, anything that fits is better.
+    let base = trial(&stated, &noise).unwrap_or(Trial {
+        chi_square: f64::INFINITY,
+        freedom: 1.0,
+        rms_mm: f64::INFINITY,
+        cost: 0.0,
+    });
     let mut list = hypotheses::of_two_sides(&stated);
     let many = list.iter().filter(|one| !needs_no_parameter(one.kind)).count() > MOST_THINGS;
     list.retain(|one| {
@@ -71,7 +75,10 @@ pub(super) fn suggestions(problem: &Problem<'_>, conflicts: &[Conflict]) -> Vec<
 
 /// Whether a mistake is about something whose parameters the readings contradict.
 fn is_contradicted(hypothesis: &Hypothesis, problem: &Problem<'_>, conflicts: &[Conflict]) -> bool {
-    let group = |id: &str| id.split_once('[').map(|(_, group)| group.trim_end_matches(']').to_string());
+    let group = |id: &str| {
+        id.split_once('[')
+            .map(|(_, group)| group.trim_end_matches(']').to_string())
+    };
     let test = problem.tests.iter().find(|test| test.name == hypothesis.subject);
     conflicts.iter().any(|conflict| match (hypothesis.kind, test) {
         (SuggestionKind::OtherSession, Some(test)) => group(&conflict.subject)

@@ -1,39 +1,67 @@
 //! A trace of a session that its readings contradict: it says so first, does not search where the readings are those of another session, and
 //! claims no effect that only stands for a wrong statement of the set-up.
 
+use abbe_model::effect::Effect;
+
 use super::Trace;
 use super::report::unsearched;
 use crate::error::IdentifyError;
-use crate::fit::Fit;
-use crate::plausibility::{self, Plausibility, is_another_session, with_set_ups_freed};
+use crate::fit::{self, Fit};
+use crate::plausibility::{self, Plausibility, Pulls, is_another_session, with_set_ups_freed};
 use crate::problem::Problem;
 use crate::results::{Remainder, TraceResult};
 
 /// What the readings of a session contradict.
-pub(super) struct Contradicted {
+pub(super) struct Contradicted<'a> {
     plausibility: Plausibility,
-    /// The set-up parameters of which the search takes nothing as known.
-    freed: Vec<String>,
+    /// The identifiers of the set-up parameters whose statements are contradicted.
+    parameters: Vec<String>,
+    /// The problem that takes nothing as known of them, and its fit; `None` where there are none.
+    pub freed: Option<(Problem<'a>, Fit)>,
 }
 
-impl Contradicted {
-    /// Examines a fit, and frees the set-up parameters whose statements it contradicts.
+impl<'a> Contradicted<'a> {
+    /// Examines a fit.
     ///
     /// # Errors
-    /// If the freed problem cannot be fitted.
-    pub fn of(problem: &mut Problem<'_>, fit: &mut Fit) -> Result<Contradicted, IdentifyError> {
-        let plausibility = plausibility::examine(problem, fit);
+    /// If the problem cannot be fitted without what is known of the set-up.
+    pub fn of(problem: &Problem<'a>, fit: &Fit) -> Result<Contradicted<'a>, IdentifyError> {
         let mut contradicted = Contradicted {
-            plausibility,
-            freed: Vec::new(),
+            plausibility: plausibility::examine(problem, fit),
+            parameters: Vec::new(),
+            freed: None,
         };
+        let mut freed = problem.clone();
         if !contradicted.stops()
-            && let Some((freed, found)) = with_set_ups_freed(problem, fit)?
+            && let Some((parameters, found)) = with_set_ups_freed(&mut freed, fit)?
         {
-            contradicted.freed = freed;
-            *fit = found;
+            contradicted.parameters = parameters;
+            contradicted.freed = Some((freed, found));
         }
         Ok(contradicted)
+    }
+
+    /// Whether the set-up is still contradicted beside effects that were found without it.
+    ///
+    /// # Errors
+    /// If the model with the effects cannot be fitted.
+    pub fn stands_beside(
+        &self,
+        problem: &Problem<'a>,
+        fitted: &Fit,
+        effects: &[Effect],
+    ) -> Result<bool, IdentifyError> {
+        if effects.is_empty() {
+            return Ok(true);
+        }
+        let mut with = problem.clone();
+        for effect in effects {
+            with.add_effect(effect)?;
+        }
+        let mut start = vec![0.0; with.parameters.list.len()];
+        start[..fitted.beta.len()].copy_from_slice(&fitted.beta);
+        let found = fit::fit(&with, Some(&start))?;
+        Ok(!Pulls::of(&with, &found).contradicted().is_empty())
     }
 
     /// Whether there is nothing to search: the readings are those of another session.
@@ -44,10 +72,10 @@ impl Contradicted {
     /// Writes the conflicts into a result, in front of its other warnings.
     pub fn tell(&self, result: &mut TraceResult) {
         let mut warnings = plausibility::warnings(&self.plausibility);
-        if !self.freed.is_empty() {
+        if !self.parameters.is_empty() {
             warnings.push(format!(
                 "the search takes nothing as known of {}: no effect is claimed that only stands for a wrong statement of the set-up",
-                self.freed.join(", ")
+                self.parameters.join(", ")
             ));
         }
         warnings.append(&mut result.warnings);
@@ -56,7 +84,7 @@ impl Contradicted {
     }
 
     /// The trace that ends before its search.
-    pub fn stopped<'a>(&self, problem: Problem<'a>, fit: Fit) -> Trace<'a> {
+    pub fn stopped(&self, problem: Problem<'a>, fit: Fit) -> Trace<'a> {
         let mut result = TraceResult {
             verdict: "unexplained".to_string(),
             remainder: Remainder {

@@ -144,17 +144,37 @@ pub fn trace<'a>(
     progress: &(dyn Fn(Progress) -> bool + Sync),
 ) -> Result<Trace<'a>, IdentifyError> {
     progress(Progress::Fitting);
-    let (mut problem, mut before_fit) = prepare(session, options.seed)?;
-    let contradicted = Contradicted::of(&mut problem, &mut before_fit)?;
+    let (problem, fitted) = prepare(session, options.seed)?;
+    let contradicted = Contradicted::of(&problem, &fitted)?;
     if contradicted.stops() {
-        return Ok(contradicted.stopped(problem, before_fit));
+        return Ok(contradicted.stopped(problem, fitted));
     }
+    if let Some((problem_freed, fit_freed)) = &contradicted.freed {
+        let mut found = with_noise_of_repeats(problem_freed.clone(), fit_freed.clone(), options, progress)?;
+        if found.result.interrupted || contradicted.stands_beside(&problem, &fitted, &found.effects)? {
+            contradicted.tell(&mut found.result);
+            return Ok(found);
+        }
+        // The effects that were found without the set-up explain what seemed wrong with it.
+        return with_noise_of_repeats(problem, fitted, options, progress);
+    }
+    let mut found = with_noise_of_repeats(problem, fitted, options, progress)?;
+    contradicted.tell(&mut found.result);
+    Ok(found)
+}
+
+/// Searches with the noise that repeats show, and once more where the effects that are found change it.
+fn with_noise_of_repeats<'a>(
+    mut problem: Problem<'a>,
+    mut before_fit: Fit,
+    options: &TraceOptions,
+    progress: &(dyn Fn(Progress) -> bool + Sync),
+) -> Result<Trace<'a>, IdentifyError> {
     if give_noise_memory(&mut problem, &before_fit.residuals) {
         before_fit = fit(&problem, Some(&before_fit.beta))?;
     }
     let residuals = before_fit.residuals.clone();
-    let mut first = trace_with(problem, before_fit, &residuals, options, progress)?;
-    contradicted.tell(&mut first.result);
+    let first = trace_with(problem, before_fit, &residuals, options, progress)?;
     // What moved between runs was taken for noise as long as the model lacked it.
     let mut problem = first.before.clone();
     if first.result.interrupted
@@ -164,14 +184,14 @@ pub fn trace<'a>(
         return Ok(first);
     }
     let before_fit = fit(&problem, Some(&first.before_fit.beta))?;
-    let mut again = trace_with(problem, before_fit, &first.after_fit.residuals, options, progress)?;
-    if again.result.interrupted {
-        // The first search is whole, if with a noise that is less well known.
-        first.result.mark_interrupted();
-        return Ok(first);
+    let again = trace_with(problem, before_fit, &first.after_fit.residuals, options, progress)?;
+    if !again.result.interrupted {
+        return Ok(again);
     }
-    contradicted.tell(&mut again.result);
-    Ok(again)
+    // The first search is whole, if with a noise that is less well known.
+    let mut first = first;
+    first.result.mark_interrupted();
+    Ok(first)
 }
 
 /// Closes the loop with a given noise; `pure` are the residuals whose repeats show it.

@@ -1,159 +1,17 @@
-//! The mistakes that are tried on a session that its readings contradict: each is a session with one statement changed.
+//! Mistakes in what is stated of balls, bars and readings.
 
-use abbe_model::axis::AxisKind;
 use abbe_model::instrument::Station;
 use abbe_model::session::{Prior, Session, Test};
 
-use super::results::SuggestionKind;
+use super::super::results::SuggestionKind;
+use super::{Hypothesis, ZERO_MM, measured, with_readings};
 use crate::parameters::physical_size;
 
-/// A session with one statement changed.
-pub(super) struct Hypothesis {
-    pub kind: SuggestionKind,
-    pub subject: String,
-    pub words: String,
-    pub session: Session,
-}
-
-impl Hypothesis {
-    pub fn new(kind: SuggestionKind, subject: &str, words: String, session: Session) -> Hypothesis {
-        let subject = subject.to_string();
-        Hypothesis {
-            kind,
-            subject,
-            words,
-            session,
-        }
-    }
-}
-
-/// Coordinates of balls below this are zero, mm.
-const ZERO_MM: f64 = 1e-6;
 /// Corrections of a bar's calibration between these are plausible, mm.
 const CORRECTIONS_MM: [f64; 2] = [1e-3, 0.5];
 
-/// The mistakes that are tried where an instrument reads between table and tool.
-pub(super) fn of_two_sides(session: &Session) -> Vec<Hypothesis> {
-    let mut list = axes(session);
-    list.extend(balls(session));
-    list.extend(readings(session));
-    list.extend(setups(session));
-    list
-}
-
-/// Applies a change to the readings of every test; positions by axis, observed values in mm.
-pub(super) fn with_readings(
-    session: &Session,
-    change: impl Fn(&Test, &mut Vec<Vec<f64>>, &mut Vec<f64>),
-) -> Session {
-    let mut changed = session.clone();
-    for (test, stated) in changed.tests.iter_mut().zip(&session.tests) {
-        if let Some(readings) = &mut test.readings {
-            change(stated, &mut readings.positions, &mut readings.observed);
-        }
-    }
-    changed
-}
-
-/// Axes reversed, exchanged, or read in another unit.
-fn axes(session: &Session) -> Vec<Hypothesis> {
-    let machine = &session.machine;
-    let is_used = |axis: &usize| {
-        let readings = session.tests.iter().filter_map(|test| test.readings.as_ref());
-        let mut positions = readings.flat_map(|readings| &readings.positions[*axis]);
-        positions.any(|position| position.abs() > ZERO_MM)
-    };
-    let used: Vec<usize> = (0..machine.axes.len()).filter(is_used).collect();
-    let mut list = Vec::new();
-    for &k in &used {
-        let mut changed = session.clone();
-        changed.machine.axes[k].direction = machine.axes[k].direction.map(|along| -along);
-        let name = &machine.axes[k].name;
-        list.push(Hypothesis::new(
-            SuggestionKind::AxisReversed,
-            name,
-            format!("the direction of axis {name} is reversed"),
-            changed,
-        ));
-    }
-    let rotary: Vec<usize> = (0..machine.axes.len())
-        .filter(|k| machine.axes[*k].kind == AxisKind::Rotary)
-        .collect();
-    for (place, &first) in rotary.iter().enumerate() {
-        for &second in &rotary[place + 1..] {
-            let mut changed = session.clone();
-            changed.machine.axes.swap(first, second);
-            for test in &mut changed.tests {
-                test.at.swap(first, second);
-                if test.at_written.len() > second {
-                    test.at_written.swap(first, second);
-                }
-                if let Some(readings) = &mut test.readings {
-                    readings.positions.swap(first, second);
-                }
-            }
-            let names = [first, second].map(|k| machine.axes[k].name.as_str());
-            list.push(Hypothesis::new(
-                SuggestionKind::AxesExchanged,
-                &names.join(", "),
-                format!("axes {} and {} are exchanged in the chain", names[0], names[1]),
-                changed,
-            ));
-        }
-    }
-    for kind in [AxisKind::Rotary, AxisKind::Linear] {
-        let of_kind: Vec<usize> = used
-            .iter()
-            .copied()
-            .filter(|k| machine.axes[*k].kind == kind)
-            .collect();
-        if of_kind.is_empty() {
-            continue;
-        }
-        let names: Vec<&str> = of_kind.iter().map(|k| machine.axes[*k].name.as_str()).collect();
-        for (factor, unit) in units(kind) {
-            let changed = with_readings(session, |_, positions, _| {
-                of_kind
-                    .iter()
-                    .for_each(|k| positions[*k].iter_mut().for_each(|value| *value *= factor));
-            });
-            list.push(Hypothesis::new(
-                SuggestionKind::ColumnUnit,
-                &names.join(", "),
-                format!("the positions of {} are {unit}", names.join(", ")),
-                changed,
-            ));
-        }
-    }
-    list
-}
-
-/// Factors by which positions are off where their unit is another, and what the column then holds.
-pub(super) fn units(kind: AxisKind) -> Vec<(f64, &'static str)> {
-    match kind {
-        AxisKind::Rotary => vec![
-            (180.0 / std::f64::consts::PI, "in radians, not in degrees"),
-            (std::f64::consts::PI / 180.0, "in degrees, not in radians"),
-        ],
-        AxisKind::Linear => lengths().to_vec(),
-    }
-}
-
-/// The same for lengths.
-pub(super) fn lengths() -> [(f64, &'static str); 4] {
-    [
-        (1e3, "1,000 times too small: in m, not in mm, or in mm, not in µm"),
-        (
-            1e-3,
-            "1,000 times too large: in µm, not in mm, or in mm, not in m",
-        ),
-        (25.4, "in inches, not in mm"),
-        (1.0 / 25.4, "in mm, not in inches"),
-    ]
-}
-
 /// Balls on the other side.
-fn balls(session: &Session) -> Vec<Hypothesis> {
+pub(super) fn balls(session: &Session) -> Vec<Hypothesis> {
     let mut list = Vec::new();
     for (thing, of_workpiece) in [("workpiece ball", true), ("spindle ball", false)] {
         let group = |test: &Test| {
@@ -212,7 +70,7 @@ fn balls(session: &Session) -> Vec<Hypothesis> {
 }
 
 /// Readings of the opposite sign, and bars whose calibration was applied with the opposite sign.
-fn readings(session: &Session) -> Vec<Hypothesis> {
+pub(super) fn readings(session: &Session) -> Vec<Hypothesis> {
     let mut list = Vec::new();
     let reversed = with_readings(session, |test, _, observed| {
         let twice_mm = match &test.station {
@@ -280,7 +138,7 @@ fn readings(session: &Session) -> Vec<Hypothesis> {
 }
 
 /// Things of the set-up that are not where they are stated, and tests from another session.
-fn setups(session: &Session) -> Vec<Hypothesis> {
+pub(super) fn things(session: &Session) -> Vec<Hypothesis> {
     let unknowns = session.instrument.unknowns();
     let mut list: Vec<Hypothesis> = Vec::new();
     for test in measured(session) {
@@ -346,9 +204,4 @@ fn setups(session: &Session) -> Vec<Hypothesis> {
         ));
     }
     list
-}
-
-/// The tests with readings.
-fn measured(session: &Session) -> impl Iterator<Item = &Test> {
-    session.tests.iter().filter(|test| test.readings.is_some())
 }
