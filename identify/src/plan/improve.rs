@@ -172,7 +172,8 @@ fn gain_a_minute(prepared: &Prepared, now: f64, figures: &[f64], entry: usize) -
 /// The entry that gains most a minute.
 fn best_a_minute(prepared: &Prepared, now: f64, figures: &[f64]) -> Option<usize> {
     let gain = |entry: usize| gain_a_minute(prepared, now, figures, entry);
-    (0..figures.len()).max_by(|a, b| gain(*a).total_cmp(&gain(*b)))
+    let losses: Vec<f64> = (0..figures.len()).map(|entry| -gain(entry)).collect();
+    (0..figures.len()).min_by(|a, b| prepared.better(&losses, *a, *b))
 }
 
 /// The entries with the least scores, each name once.
@@ -183,7 +184,8 @@ fn listed(
     score: impl Fn(usize) -> f64,
 ) -> Vec<Alternative> {
     let mut order: Vec<usize> = (0..figures.len()).collect();
-    order.sort_by(|a, b| score(*a).total_cmp(&score(*b)));
+    let scores: Vec<f64> = order.iter().map(|entry| score(*entry)).collect();
+    order.sort_by(|a, b| prepared.better(&scores, *a, *b));
     let of = |entry: usize| Alternative {
         test: prepared.entries[entry].entry.name.clone(),
         after: reported(figures[entry], goal),

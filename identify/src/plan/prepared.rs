@@ -1,9 +1,11 @@
 //! A menu made ready: the information of every entry, evaluated once.
 
+use std::cmp::Ordering;
+
 use rayon::prelude::*;
 
 use super::information::{Root, Shared, sum};
-use super::linear::{Linearisation, merged};
+use super::linear::{Linearisation, merged, to_nine_digits};
 use super::menu::{Entry, Menu};
 use crate::error::IdentifyError;
 use crate::parameters::{Parameter, Role};
@@ -78,10 +80,17 @@ impl Prepared {
             .collect()
     }
 
+    /// The order of two entries by their figures, the smaller first; ties are decided by names, never by rounding.
+    pub fn better(&self, figures: &[f64], a: usize, b: usize) -> Ordering {
+        to_nine_digits(figures[a])
+            .total_cmp(&to_nine_digits(figures[b]))
+            .then_with(|| self.entries[a].entry.name.cmp(&self.entries[b].entry.name))
+    }
+
     /// The entry after which a figure (the smaller the better) stands best, and the figures of all.
     pub fn best(&self, root: &Root, figure: &(impl Fn(&Root) -> f64 + Sync)) -> Option<(usize, Vec<f64>)> {
         let figures = self.figures(root, figure);
-        let best = (0..figures.len()).min_by(|a, b| figures[*a].total_cmp(&figures[*b]))?;
+        let best = (0..figures.len()).min_by(|a, b| self.better(&figures, *a, *b))?;
         Some((best, figures))
     }
 }
