@@ -1,4 +1,4 @@
-"""Runs the benchmarks and writes their table into docs/speed.md and README.md, between `<!-- speeds -->` and `<!-- /speeds -->`.
+"""Runs the benchmarks and writes their table into docs/development/speed.md and README.md, between `<!-- speeds -->` and `<!-- /speeds -->`.
 
     python benches/table.py                      the release profile
     python benches/table.py --profile checked    another profile
@@ -98,7 +98,7 @@ def main():
         run(arguments.profile, target, None)
         if native:
             run(arguments.profile, native, "-C target-cpu=native")
-    fill(ROOT / "docs" / "speed.md", table(target, native, False))
+    fill(ROOT / "docs" / "development" / "speed.md", table(target, native, False))
     fill(ROOT / "README.md", table(target, None, True))
 
 

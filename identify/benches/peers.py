@@ -1,4 +1,4 @@
-"""The same work with other people's tools, in the same minute: ratios for docs/speed.md. `ABBE_PROFILE=checked` takes another build profile.
+"""The same work with other people's tools, in the same minute: ratios for docs/development/speed.md. `ABBE_PROFILE=checked` takes another build profile.
 
     pip install numpy scipy casadi jax
     python identify/benches/peers.py

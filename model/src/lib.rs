@@ -3,7 +3,7 @@
 //!
 //! - [`scalar`]: what a number may be; [`expression`]: a number that is not known yet;
 //! - [`frames`], [`axis`], [`chain`]: points pushed through a machine;
-//! - [`component`], [`effect`]: errors by name, and what makes them vary;
+//! - [`component`], [`effect`]: errors by name, and what makes them vary; [`pattern`]: several errors by one name;
 //! - [`instrument`]: from a state of the axes to a reading;
 //! - [`sensitivity`]: readings and their derivatives by every component; [`replay`]: over columns of readings at once;
 //! - [`session`]: machine, tests and readings as they stand in files.
@@ -66,6 +66,7 @@ pub mod error;
 pub mod expression;
 pub mod frames;
 pub mod instrument;
+pub mod pattern;
 pub mod replay;
 pub mod scalar;
 pub mod sensitivity;

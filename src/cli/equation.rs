@@ -3,12 +3,12 @@
 use std::path::PathBuf;
 
 use abbe::codegen::{Equation, Language, Options, Order, SessionTest, Symbols, Variable};
-use abbe::model::axis::AxisKind;
 use abbe::model::chain::Machine;
-use abbe::model::component::{ErrorKind, ErrorName, Freedom};
+use abbe::model::component::ErrorName;
 use abbe::model::effect::{Component, Effect};
 use abbe::model::frames::Rotation;
 use abbe::model::instrument::InstrumentUnknown;
+use abbe::model::pattern;
 use abbe::model::session::Session;
 use abbe::model::session::read::{self, ReadOptions};
 use clap::{Args, ValueEnum};
@@ -73,7 +73,7 @@ struct FormArguments {
     /// How error angles rotate; the machine's own way if not given.
     #[arg(long, value_enum)]
     rotation: Option<RotationWord>,
-    /// What to keep, by name and separated by commas; what is not named is zero. Errors as EX0C or e_x0c, of a session also unknowns of the
+    /// What to keep, by name and separated by commas; what is not named is zero. Errors as EX0C or e_x0c or by a pattern as E?0C, of a session also unknowns of the
     /// instrument, as bar or workpiece_ball.x, and effects that it declares, as EZC~C:h2. Without it a session's unknown errors and declared
     /// effects, of a machine all errors.
     #[arg(long, value_delimiter = ',', value_name = "NAMES")]
@@ -122,10 +122,29 @@ struct Kept {
 }
 
 impl Kept {
-    /// Reads names of errors, of the instrument's unknowns and of effects.
-    fn parse(names: &[String], known: &[InstrumentUnknown], effects: &[Effect]) -> Result<Kept, Failure> {
+    /// Reads names of errors, also as patterns, of the instrument's unknowns and of effects.
+    fn parse(
+        names: &[String],
+        machine: &Machine,
+        known: &[InstrumentUnknown],
+        effects: &[Effect],
+    ) -> Result<Kept, Failure> {
         let mut kept = Kept::default();
         for name in names {
+            if pattern::is_pattern(name) {
+                let found = pattern::matching(machine, name);
+                if found.is_empty() {
+                    return Err(Failure::Other(format!(
+                        "`{name}` matches no error of the machine; `?` stands for one character, `*` for any number of them"
+                    )));
+                }
+                for error in found {
+                    if !kept.errors.contains(&error) {
+                        kept.errors.push(error);
+                    }
+                }
+                continue;
+            }
             if name.contains('~') {
                 kept.effects.extend(named(name, effects)?);
                 continue;
@@ -254,7 +273,12 @@ pub fn run(arguments: &EquationArguments) -> Result<(), Failure> {
         .filter(|effect| effect.acts_in(&test.name))
         .cloned()
         .collect();
-    let mut kept = Kept::parse(&form.errors, session.instrument.unknowns(), &effects)?;
+    let mut kept = Kept::parse(
+        &form.errors,
+        &session.machine,
+        session.instrument.unknowns(),
+        &effects,
+    )?;
     if form.errors.is_empty() {
         kept.errors.clone_from(&session.unknowns);
         kept.effects = effects;
@@ -273,30 +297,10 @@ pub fn run_volumetric(arguments: &VolumetricArguments, quiet: bool) -> Result<()
         return super::map::run(&machine, &arguments.map, outputs.tables(quiet));
     }
     let form = &arguments.form;
-    let mut kept = Kept::parse(&form.errors, &[], &[])?;
+    let mut kept = Kept::parse(&form.errors, &machine, &[], &[])?;
     if form.errors.is_empty() {
-        kept.errors = errors_of(&machine);
+        kept.errors = pattern::errors(&machine);
     }
     let equation = Equation::volumetric(&machine, &kept.errors, &form.options(&kept))?;
     form.write(&equation)
-}
-
-/// Every location error and error motion that the chain applies.
-fn errors_of(machine: &Machine) -> Vec<ErrorName> {
-    let mut errors = Vec::new();
-    for axis in &machine.axes {
-        for kind in [ErrorKind::Location, ErrorKind::Motion] {
-            for freedom in Freedom::ALL {
-                // Where a linear axis lies is no error.
-                if kind == ErrorKind::Motion || axis.kind == AxisKind::Rotary || freedom.is_angle() {
-                    errors.push(ErrorName {
-                        kind,
-                        freedom,
-                        axis: axis.name.clone(),
-                    });
-                }
-            }
-        }
-    }
-    errors
 }

@@ -10,7 +10,6 @@ use super::failure::Failure;
 use super::{folder, output};
 use crate::report::document::Document;
 use crate::report::page;
-use crate::report::plot::Fonts;
 use crate::report::provenance::Provenance;
 
 /// Where a report goes.
@@ -19,9 +18,13 @@ pub struct ReportArguments {
     /// Write a report for people: one HTML file that needs nothing else.
     #[arg(long, value_name = "FILE.html")]
     report: Option<PathBuf>,
-    /// Write every plot of the report by itself, as SVG and PNG, into a folder that is new or empty.
+    /// Write every plot of the report by itself, as SVG, and as PNG if the program is built with the feature `png`, into a folder that is new or
+    /// empty.
     #[arg(long, value_name = "DIR")]
     plots: Option<PathBuf>,
+    /// Require PNG beside each SVG of `--plots`: an error if the program is built without it.
+    #[arg(long, requires = "plots")]
+    png: bool,
 }
 
 impl ReportArguments {
@@ -37,6 +40,12 @@ impl ReportArguments {
 
     /// Refuses before the work is done plots that could not be written after it.
     pub fn check(&self) -> Result<(), Failure> {
+        if self.png && !cfg!(feature = "png") {
+            return Err(Failure::CommandLine(
+                "`--png`: this program is built without PNG; build it with `cargo build --release --features png`, or leave `--png` out for SVG"
+                    .into(),
+            ));
+        }
         if let Some(path) = &self.plots {
             folder::check(path, None)?;
         }
@@ -69,14 +78,17 @@ impl ReportArguments {
 }
 
 fn write_plots(document: &Document, path: &Path) -> Result<(), Failure> {
-    let fonts = Fonts::bundled();
+    #[cfg(feature = "png")]
+    let fonts = crate::report::plot::png::Fonts::bundled();
     let mut files = Vec::new();
     for plot in &document.plots {
-        let png = plot
-            .png(&fonts)
-            .ok_or_else(|| Failure::Other(format!("the plot `{}` cannot be drawn as PNG", plot.name)))?;
         files.push((format!("{}.svg", plot.name), plot.svg().into_bytes()));
-        files.push((format!("{}.png", plot.name), png));
+        #[cfg(feature = "png")]
+        {
+            let png = crate::report::plot::png::png(plot, &fonts)
+                .ok_or_else(|| Failure::Other(format!("the plot `{}` cannot be drawn as PNG", plot.name)))?;
+            files.push((format!("{}.png", plot.name), png));
+        }
     }
     folder::write(path, &files, false, |_| Ok(()))
 }

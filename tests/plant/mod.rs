@@ -15,6 +15,7 @@
 //! ```
 #![allow(dead_code, unused_imports)] // not every test binary uses all of it
 
+pub mod chain;
 pub mod component;
 pub mod effect;
 pub mod families;

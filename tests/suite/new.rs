@@ -119,6 +119,8 @@ fn any_structural_code_is_laid_out_and_plans_at_once() {
             "{code}: {}",
             String::from_utf8_lossy(&plan.stderr)
         );
+        let told = String::from_utf8_lossy(&plan.stderr).into_owned();
+        assert!(!told.contains("warning"), "{code}: {told}");
         // Every line that says something has its reason above it or beside it.
         for file in ["machine.toml", "plan.toml"] {
             let written = std::fs::read_to_string(made.join(file)).unwrap();
@@ -132,9 +134,15 @@ fn any_structural_code_is_laid_out_and_plans_at_once() {
                 } else if line.starts_with("  \"") {
                     assert!(line.contains('#'), "{code}: {file}: {line}");
                 } else {
-                    let group = ["spindle_ball", "bar_u_um", "direction"]
-                        .iter()
-                        .any(|key| line.starts_with(key));
+                    let group = [
+                        "spindle_ball",
+                        "spindle_setup",
+                        "bar_setup",
+                        "bar_u_um",
+                        "direction",
+                    ]
+                    .iter()
+                    .any(|key| line.starts_with(key));
                     assert!(explained || group, "{code}: {file}: {line}");
                     explained = false;
                 }

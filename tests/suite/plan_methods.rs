@@ -182,7 +182,7 @@ fn a_straightness_of_x_that_repeats_biases_both_chapters_alike() {
 
 #[test]
 fn the_table_in_the_docs_is_what_is_computed() {
-    let docs = std::fs::read_to_string(super::workspace().join("docs/plan.md")).unwrap();
+    let docs = std::fs::read_to_string(super::workspace().join("docs/guide/compare-methods.md")).unwrap();
     for (column, chapter) in [4, 5, 6].into_iter().enumerate() {
         let plan = analysis(chapter, 1.0, false);
         let mut one = method(chapter, 1.0);

@@ -21,6 +21,7 @@ fn built(more: &[&str]) -> Vec<Built> {
         .args([
             "tree",
             "--workspace",
+            "--all-features",
             "--offline",
             "--locked",
             "--edges",
@@ -193,7 +194,7 @@ fn no_crate_is_built_twice_unless_it_is_said() {
 
 /// The first cell of each row of the page's tables, without its ticks.
 fn explained() -> BTreeSet<String> {
-    let page = fs::read_to_string(workspace().join("docs/dependencies.md")).unwrap();
+    let page = fs::read_to_string(workspace().join("docs/development/dependencies.md")).unwrap();
     let cells = page
         .lines()
         .filter_map(|line| line.strip_prefix("| `")?.split_once('`'));

@@ -1,6 +1,6 @@
 //! The guided tour prints what it says it prints.
 //!
-//! In each `console` block of docs/tour.md a line after `$ ` is a command, lines after `> ` go on with it, and what follows is
+//! In each `console` block of docs/guide/tour.md a line after `$ ` is a command, lines after `> ` go on with it, and what follows is
 //! what a reader sees; `…` alone in a line stands for any lines.
 #![cfg(unix)]
 
@@ -81,7 +81,7 @@ fn typed(command: &str, folder: &Path) -> (Vec<String>, bool) {
 
 #[test]
 fn the_tour_prints_what_it_shows() {
-    let document = std::fs::read_to_string(workspace().join("docs/tour.md")).unwrap();
+    let document = std::fs::read_to_string(workspace().join("docs/guide/tour.md")).unwrap();
     let steps = steps(&document);
     let commands = ["new", "plan", "simulate", "fit", "trace"];
     for command in commands.map(|command| format!("abbe {command} ")) {
@@ -95,12 +95,12 @@ fn the_tour_prints_what_it_shows() {
         let (printed, success) = typed(&command, folder.path());
         assert!(
             agrees(&shown, &printed),
-            "docs/tour.md:{line}: {command}\nprints\n{}\nand not\n{}",
+            "docs/guide/tour.md:{line}: {command}\nprints\n{}\nand not\n{}",
             printed.join("\n"),
             shown.join("\n")
         );
         let fails = shown.iter().any(|line| line.to_lowercase().starts_with("error:"));
-        assert_eq!(success, !fails, "docs/tour.md:{line}: {command}");
+        assert_eq!(success, !fails, "docs/guide/tour.md:{line}: {command}");
     }
     for file in ["trace.html", "export/next.toml"] {
         assert!(folder.path().join(file).exists(), "{file}");

@@ -3,6 +3,7 @@
 use faer::Mat;
 
 use super::linear::{Linearisation, is_wanted, marginal};
+use super::order::smallest_first;
 use super::results::{HeldBySetup, NearDependency};
 use crate::error::IdentifyError;
 use crate::parameters::{Parameter, Role};
@@ -157,7 +158,8 @@ pub fn held_by_setup(
     let mut pivots: Vec<(usize, usize)> = Vec::new();
     for error in (0..list.len()).filter(|j| is_wanted(&list[*j])) {
         let free = (0..rows.len()).filter(|i| pivots.iter().all(|(row, _)| row != i));
-        let Some(row) = free.max_by(|a, b| rows[*a][error].abs().total_cmp(&rows[*b][error].abs())) else {
+        let Some(row) = free.min_by(|a, b| smallest_first(-rows[*a][error].abs(), -rows[*b][error].abs()))
+        else {
             break;
         };
         if rows[row][error].abs() < NEGLIGIBLE {
@@ -264,14 +266,27 @@ pub fn nearly_blind(
     let unit = Mat::from_fn(n, n, |i, j| r[(i, j)] / norm[j]);
     let svd = unit.svd().map_err(|_| IdentifyError::Decomposition)?;
     let singular: Vec<f64> = svd.S().column_vector().iter().copied().collect();
+    // Equal singular values share a space of which the decomposition returns any basis: the reduced one is the same everywhere.
+    let mut directions: Vec<(f64, Vec<f64>)> = Vec::new();
+    let mut first = 0;
+    while first < n {
+        let equal = (first..n).take_while(|k| smallest_first(singular[first], singular[*k]).is_eq());
+        let equal: Vec<usize> = equal.collect();
+        let rows = equal
+            .iter()
+            .map(|k| (0..n).map(|j| svd.V()[(j, *k)]).collect())
+            .collect();
+        let condition_index = singular[0] / singular[first];
+        directions.extend(reduced(rows).into_iter().map(|row| (condition_index, row)));
+        first += equal.len().max(1);
+    }
     let mut found = Vec::new();
-    for k in 0..n {
-        let condition_index = singular[0] / singular[k];
+    for (condition_index, direction) in directions {
         if condition_index < NAMED_FROM {
             continue;
         }
         // A move along the direction, in outside units.
-        let parts: Vec<(usize, f64)> = (0..n).map(|j| (j, svd.V()[(j, k)])).collect();
+        let parts: Vec<(usize, f64)> = direction.into_iter().enumerate().collect();
         let largest = parts.iter().fold(0.0_f64, |most, (_, v)| most.max(v.abs()));
         let chosen: Vec<(usize, f64)> = parts
             .into_iter()
@@ -299,4 +314,48 @@ pub fn nearly_blind(
         });
     }
     Ok(found)
+}
+
+/// The reduced row echelon form of independent rows, pivots in the order of the columns.
+fn reduced(mut rows: Vec<Vec<f64>>) -> Vec<Vec<f64>> {
+    let width = rows.first().map_or(0, Vec::len);
+    let mut done = 0;
+    for column in 0..width {
+        let pivot = (done..rows.len())
+            .filter(|row| rows[*row][column].abs() > NEGLIGIBLE)
+            .min_by(|a, b| smallest_first(-rows[*a][column].abs(), -rows[*b][column].abs()));
+        let Some(pivot) = pivot else { continue };
+        rows.swap(done, pivot);
+        let leading = rows[done][column];
+        rows[done].iter_mut().for_each(|value| *value /= leading);
+        let pivot_row = rows[done].clone();
+        for (row, other) in rows.iter_mut().enumerate() {
+            if row != done {
+                let factor = other[column];
+                subtract(other, factor, &pivot_row);
+            }
+        }
+        done += 1;
+    }
+    rows
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn any_basis_of_a_space_reduces_to_one() {
+        let plane = [[1.0, 0.0, 2.0, -1.0], [0.0, 1.0, 0.5, 3.0]];
+        for turn in 0..16 {
+            let (sin, cos) = (0.3 + f64::from(turn)).sin_cos();
+            let mixed = |a: f64, b: f64| (0..4).map(|j| a * plane[0][j] + b * plane[1][j]).collect();
+            let rows = reduced(vec![mixed(cos, sin), mixed(-sin, cos)]);
+            for (row, expected) in rows.iter().zip(plane) {
+                for (value, expected) in row.iter().zip(expected) {
+                    assert!((value - expected).abs() < 1e-12, "{turn}: {rows:?}");
+                }
+            }
+        }
+    }
 }

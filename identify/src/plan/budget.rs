@@ -13,7 +13,8 @@
 
 use faer::Mat;
 
-use super::linear::{Linearisation, is_wanted, marginal, prior_u, to_nine_digits};
+use super::linear::{Linearisation, is_wanted, marginal, prior_u};
+use super::order::largest_first;
 use super::results::{Contribution, SharedWith};
 use crate::problem::Problem;
 
@@ -45,7 +46,7 @@ pub fn budget(problem: &Problem<'_>, linear: &Linearisation, error: usize) -> Ve
         share: noise / variance,
     });
     parts.retain(|part| part.share >= LEAST_SHARE || part.from == "noise");
-    parts.sort_by(|a, b| to_nine_digits(b.share).total_cmp(&to_nine_digits(a.share)));
+    parts.sort_by(|a, b| largest_first((a.share, &a.from), (b.share, &b.from)));
     parts
 }
 
@@ -77,8 +78,7 @@ pub fn shared_with(problem: &Problem<'_>, linear: &Linearisation, error: usize) 
         })
         .filter(|shared| shared.correlation.abs() >= LEAST_CORRELATION)
         .collect();
-    let size = |shared: &SharedWith| to_nine_digits(shared.correlation.abs());
-    shared.sort_by(|a, b| size(b).total_cmp(&size(a)));
+    shared.sort_by(|a, b| largest_first((a.correlation, &a.id), (b.correlation, &b.id)));
     shared
 }
 

@@ -17,7 +17,8 @@ use nalgebra::DMatrix;
 use rayon::prelude::*;
 
 use super::detect::{POWER, SIGNIFICANCE, corrected, noncentrality};
-use super::linear::{Linearisation, is_wanted, to_nine_digits};
+use super::linear::{Linearisation, is_wanted};
+use super::order::{largest_first, smallest_first};
 use super::results::{Bias, EffectDetectability, EffectsAnalysis};
 use crate::drivers;
 use crate::error::IdentifyError;
@@ -98,7 +99,15 @@ pub fn effects(problem: &Problem<'_>) -> Result<EffectsAnalysis, IdentifyError> 
                         cross: cross.subcols(range.start, count),
                         moved: moved.subcols(range.start, count),
                     };
-                    judge(problem, &candidates[index], name, &products, &thresholds[count])
+                    let greatest = layouts[index].greatest();
+                    judge(
+                        problem,
+                        &candidates[index],
+                        name,
+                        &products,
+                        greatest,
+                        &thresholds[count],
+                    )
                 })
                 .collect()
         })
@@ -144,12 +153,15 @@ fn judge(
     candidate: &Candidate,
     family: &str,
     products: &Products<'_>,
+    greatest: f64,
     threshold: &[f64; 2],
 ) -> EffectDetectability {
     let session = problem.session;
     let effect = &candidate.effect;
     let unit = drivers::coefficient_unit(session, effect);
+    // What moves the component by its physical size somewhere in the tests, whatever the scale of the coefficient.
     let size = match drivers::component_unit(session, &effect.component) {
+        Some(inside) if greatest > 0.0 => physical_size(inside) / greatest,
         Some(inside) => physical_size(inside),
         None => 0.1,
     };
@@ -228,8 +240,7 @@ fn biases(problem: &Problem<'_>, moved: MatRef<'_, f64>, unit: &Unit) -> Vec<Bia
         })
         .filter(|bias| bias.per_unit.abs() >= LEAST_BIAS)
         .collect();
-    let size = |bias: &Bias| to_nine_digits(bias.per_unit.abs());
-    biases.sort_by(|a, b| size(b).total_cmp(&size(a)));
+    biases.sort_by(|a, b| largest_first((a.per_unit, &a.id), (b.per_unit, &b.id)));
     biases.truncate(BIASES);
     biases
 }
@@ -252,11 +263,10 @@ fn grouped(
         match groups.get_mut(&key) {
             Some(present) => {
                 // Where equally much of several is needed, or none would do, the one of which least survives, and not the one that rounding or order picks.
-                let needed = |entry: &EffectDetectability| {
-                    to_nine_digits(entry.detectable_searched.unwrap_or(f64::INFINITY))
-                };
-                let (new, old) = (needed(&entry), needed(present));
-                if new > old || new == old && entry.surviving_share < present.surviving_share {
+                let needed = |entry: &EffectDetectability| entry.detectable_searched.unwrap_or(f64::INFINITY);
+                let harder = smallest_first(needed(present), needed(&entry))
+                    .then_with(|| smallest_first(entry.surviving_share, present.surviving_share));
+                if harder.is_lt() {
                     *present = EffectDetectability { id: key, ..entry };
                 }
             }
@@ -282,9 +292,9 @@ pub fn hidden_by_error(analysis: &EffectsAnalysis) -> BTreeMap<String, Vec<(Stri
             by_error.entry(bias.id.clone()).or_default().push(entry);
         }
     }
-    by_error.values_mut().for_each(|list| {
-        list.sort_by(|a, b| to_nine_digits(b.1.abs()).total_cmp(&to_nine_digits(a.1.abs())))
-    });
+    by_error
+        .values_mut()
+        .for_each(|list| list.sort_by(|a, b| largest_first((a.1, &a.0), (b.1, &b.0))));
     by_error
 }
 

@@ -9,6 +9,7 @@ use serde::Serialize;
 use super::goal::{Goal, asked, figure, reported};
 use super::information::{Root, Shared};
 use super::menu::Menu;
+use super::order::smallest_first;
 use super::prepared::Prepared;
 use crate::error::IdentifyError;
 use crate::problem::Problem;
@@ -172,8 +173,7 @@ fn gain_a_minute(prepared: &Prepared, now: f64, figures: &[f64], entry: usize) -
 /// The entry that gains most a minute.
 fn best_a_minute(prepared: &Prepared, now: f64, figures: &[f64]) -> Option<usize> {
     let gain = |entry: usize| gain_a_minute(prepared, now, figures, entry);
-    let losses: Vec<f64> = (0..figures.len()).map(|entry| -gain(entry)).collect();
-    (0..figures.len()).min_by(|a, b| prepared.better(&losses, *a, *b))
+    (0..figures.len()).min_by(|a, b| smallest_first(-gain(*a), -gain(*b)))
 }
 
 /// The entries with the least scores, each name once.
@@ -184,8 +184,7 @@ fn listed(
     score: impl Fn(usize) -> f64,
 ) -> Vec<Alternative> {
     let mut order: Vec<usize> = (0..figures.len()).collect();
-    let scores: Vec<f64> = order.iter().map(|entry| score(*entry)).collect();
-    order.sort_by(|a, b| prepared.better(&scores, *a, *b));
+    order.sort_by(|a, b| smallest_first(score(*a), score(*b)));
     let of = |entry: usize| Alternative {
         test: prepared.entries[entry].entry.name.clone(),
         after: reported(figures[entry], goal),

@@ -134,12 +134,3 @@ pub fn prior_u(parameter: &Parameter) -> Option<f64> {
         Prior::Known | Prior::Free => None,
     }
 }
-
-/// To nine significant digits: figures are put in order by these, so that equal ones stay in theirs whatever the rounding.
-pub(super) fn to_nine_digits(value: f64) -> f64 {
-    if value == 0.0 || !value.is_finite() {
-        return value;
-    }
-    let scale = 10.0_f64.powi(8 - value.abs().log10().floor() as i32);
-    (value * scale).round() / scale
-}

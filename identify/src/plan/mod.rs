@@ -22,6 +22,7 @@ pub mod indices;
 pub mod information;
 pub mod linear;
 pub mod menu;
+mod order;
 mod places;
 pub mod prepared;
 pub mod range;

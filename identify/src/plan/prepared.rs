@@ -1,12 +1,11 @@
 //! A menu made ready: the information of every entry, evaluated once.
 
-use std::cmp::Ordering;
-
 use rayon::prelude::*;
 
 use super::information::{Root, Shared, sum};
-use super::linear::{Linearisation, merged, to_nine_digits};
+use super::linear::{Linearisation, merged};
 use super::menu::{Entry, Menu};
+use super::order::smallest_first;
 use crate::error::IdentifyError;
 use crate::parameters::{Parameter, Role};
 use crate::problem::Problem;
@@ -80,17 +79,11 @@ impl Prepared {
             .collect()
     }
 
-    /// The order of two entries by their figures, the smaller first; ties are decided by names, never by rounding.
-    pub fn better(&self, figures: &[f64], a: usize, b: usize) -> Ordering {
-        to_nine_digits(figures[a])
-            .total_cmp(&to_nine_digits(figures[b]))
-            .then_with(|| self.entries[a].entry.name.cmp(&self.entries[b].entry.name))
-    }
-
-    /// The entry after which a figure (the smaller the better) stands best, and the figures of all.
+    /// The entry after which a figure (the smaller the better) stands best, and the figures of all. Of equal ones the first of the menu, which lists
+    /// mounted balls before those that are mounted anew.
     pub fn best(&self, root: &Root, figure: &(impl Fn(&Root) -> f64 + Sync)) -> Option<(usize, Vec<f64>)> {
         let figures = self.figures(root, figure);
-        let best = (0..figures.len()).min_by(|a, b| self.better(&figures, *a, *b))?;
+        let best = (0..figures.len()).min_by(|a, b| smallest_first(figures[*a], figures[*b]))?;
         Some((best, figures))
     }
 }

@@ -1,4 +1,4 @@
-//! docs/effects.md says of each effect what it does to each kind of test and what it is mistaken for. Every cell is computed here from the
+//! docs/reference/effects.md says of each effect what it does to each kind of test and what it is mistaken for. Every cell is computed here from the
 //! exact chain, and compared.
 //!
 //! A section of the page holds a session and a table. Its columns: `effect`; `in TEST`, amplitude by order of a full turn (`±` where it changes sign
@@ -274,7 +274,7 @@ fn computed(section: &Section) -> Vec<Vec<String>> {
 
 #[test]
 fn the_page_says_what_the_chain_does() {
-    let text = std::fs::read_to_string(workspace().join("docs/effects.md")).unwrap();
+    let text = std::fs::read_to_string(workspace().join("docs/reference/effects.md")).unwrap();
     let mut wrong = String::new();
     for section in sections(&text).iter().filter(|section| section.toml.is_some()) {
         let rows = computed(section);
@@ -287,13 +287,13 @@ fn the_page_says_what_the_chain_does() {
     }
     assert!(
         wrong.is_empty(),
-        "docs/effects.md is not what the chain does, which is{wrong}"
+        "docs/reference/effects.md is not what the chain does, which is{wrong}"
     );
 }
 
 #[test]
 fn every_entry_of_the_library_is_on_the_page() {
-    let text = std::fs::read_to_string(workspace().join("docs/effects.md")).unwrap();
+    let text = std::fs::read_to_string(workspace().join("docs/reference/effects.md")).unwrap();
     let sections = sections(&text);
     let listed = &sections
         .iter()
@@ -336,7 +336,7 @@ fn circles_follow_their_closed_forms() {
         ("workpiece_ball.x", &|t, _| -t.cos()),
         ("bar", &|_, _| -1.0),
     ];
-    let text = std::fs::read_to_string(workspace().join("docs/effects.md")).unwrap();
+    let text = std::fs::read_to_string(workspace().join("docs/reference/effects.md")).unwrap();
     let sections = sections(&text);
     let circles = sections
         .iter()

@@ -12,6 +12,8 @@ pub use shape::{Shape, ShapeFault};
 
 use std::fmt;
 
+use crate::axis::AxisKind;
+use crate::chain::Machine;
 use crate::component::ErrorName;
 
 /// What moves.
@@ -88,6 +90,19 @@ impl Driver {
             "temperature" => Driver::Temperature,
             "gravity" => Driver::Gravity,
             axis => Driver::Axis(axis.to_string()),
+        }
+    }
+
+    /// What polynomials and powers divide the driver by where a session states no `scale_…`, in the driver's inside unit: 100 mm of a linear axis,
+    /// half a turn of a rotary one, an hour, 1 °C, 1 m. Coefficients of one name are then comparable, whatever the travel of a test.
+    pub fn default_scale(&self, machine: &Machine) -> f64 {
+        match self {
+            Driver::Axis(name) => match machine.axis_index(name).map(|index| machine.axes[index].kind) {
+                Some(AxisKind::Rotary) => std::f64::consts::PI,
+                _ => 100.0,
+            },
+            Driver::Time => 3600.0,
+            Driver::Temperature | Driver::Gravity | Driver::None => 1.0,
         }
     }
 }

@@ -14,7 +14,7 @@ pub enum Shape {
     Polynomial {
         /// Highest power, at least 1.
         degree: usize,
-        /// What the driver is divided by, so that coefficients are comparable: half the travel seen.
+        /// What the driver is divided by, so that coefficients are comparable: see [`super::Driver::default_scale`].
         scale: f64,
     },
     /// The power `degree` alone, over `scale`.

@@ -327,7 +327,10 @@ fn effect_table(effects: &[&EffectDetectability]) {
     let strongest =
         |effect: &EffectDetectability| effect.biases.first().map_or(0.0, |bias| bias.per_unit.abs());
     let mut sorted: Vec<&EffectDetectability> = effects.to_vec();
-    sorted.sort_by(|a, b| strongest(b).total_cmp(&strongest(a)));
+    // Equal ones by name: rounding, which differs between processors, has no say.
+    let size =
+        |effect: &EffectDetectability| three_digits(strongest(effect)).parse().unwrap_or(f64::INFINITY);
+    sorted.sort_by(|a, b| f64::total_cmp(&size(b), &size(a)).then_with(|| a.id.cmp(&b.id)));
     let mut chosen: Vec<(&EffectDetectability, usize)> = Vec::new();
     for effect in sorted {
         match chosen

@@ -1,4 +1,4 @@
-//! Plots as SVG, in the report and each by itself, and as PNG.
+//! Plots as SVG, in the report and each by itself, and as PNG where the feature `png` is built in.
 //!
 //! The drawings are written through the same templates as the page. No plotting crate that builds with this workspace has all that is needed at once:
 //! a polar type with a magnified deviation about a nominal circle, classes that one style sheet colours on screen, in the dark and on paper, and
@@ -8,13 +8,12 @@ pub mod bars;
 pub mod chain;
 pub mod heat;
 pub mod lines;
+#[cfg(feature = "png")]
+pub mod png;
 pub mod polar;
 pub mod scale;
 
-use std::sync::Arc;
-
 use maud::{Markup, PreEscaped, html};
-use resvg::{tiny_skia, usvg};
 
 /// Colours and lines of all plots.
 pub const STYLE: &str = include_str!("plot.css");
@@ -89,43 +88,6 @@ impl Plot {
             }
         }
         .into_string()
-    }
-
-    /// By itself as PNG, twice as large as it is drawn. `None` if it cannot be drawn.
-    pub fn png(&self, fonts: &Fonts) -> Option<Vec<u8>> {
-        const TWICE: f32 = 2.0;
-        let options = usvg::Options {
-            fontdb: fonts.0.clone(),
-            font_family: FAMILY.to_string(),
-            ..usvg::Options::default()
-        };
-        let tree = usvg::Tree::from_str(&self.svg(), &options).ok()?;
-        let size = tree.size().to_int_size().scale_by(TWICE)?;
-        let mut pixels = tiny_skia::Pixmap::new(size.width(), size.height())?;
-        let twice = tiny_skia::Transform::from_scale(TWICE, TWICE);
-        resvg::render(&tree, twice, &mut pixels.as_mut());
-        pixels.encode_png().ok()
-    }
-}
-
-/// The font that PNGs are lettered with, whatever the machine has.
-const FAMILY: &str = "Ubuntu";
-
-/// The fonts of PNGs.
-pub struct Fonts(Arc<usvg::fontdb::Database>);
-
-impl Fonts {
-    /// The fonts that the program brings: a PNG is the same everywhere.
-    pub fn bundled() -> Fonts {
-        let mut fonts = usvg::fontdb::Database::new();
-        fonts.load_font_data(epaint_default_fonts::UBUNTU_LIGHT.to_vec());
-        fonts.load_font_data(epaint_default_fonts::HACK_REGULAR.to_vec());
-        let family = fonts
-            .faces()
-            .next()
-            .and_then(|face| face.families.first().map(|(name, _)| name.clone()));
-        fonts.set_sans_serif_family(family.unwrap_or_else(|| FAMILY.to_string()));
-        Fonts(Arc::new(fonts))
     }
 }
 

@@ -58,11 +58,8 @@ pub(super) fn shapes(
             .collect(),
         ShapeChoice::Harmonic => harmonics(over.highest_order()),
         ShapeChoice::HarmonicLow if over.rotary => harmonics(2),
-        ShapeChoice::HarmonicLow => powers(&[1, 2], half(over.span)),
-        ShapeChoice::Power => {
-            let over_axis = matches!(driver, Driver::Axis(_));
-            powers(&family.degrees, if over_axis { half(over.span) } else { 1.0 })
-        }
+        ShapeChoice::HarmonicLow => powers(&[1, 2], driver.default_scale(&problem.session.machine)),
+        ShapeChoice::Power => powers(&family.degrees, driver.default_scale(&problem.session.machine)),
         ShapeChoice::Periodic => over.periods(),
         ShapeChoice::Backlash => {
             let seen = axis.is_some_and(|axis| sampling.both_directions[axis]);
@@ -228,10 +225,6 @@ impl Over<'_> {
             })
             .collect()
     }
-}
-
-fn half(span: f64) -> f64 {
-    if span > 0.0 { span / 2.0 } else { 1.0 }
 }
 
 /// High orders are many, and each by itself is unlikely: the cost of naming one grows as the logarithm of the order.

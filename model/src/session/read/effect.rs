@@ -21,7 +21,13 @@ pub(super) fn effect(
     let word = word_value.text()?;
     let driver = driver(context, &mut table, &component, &word)?;
     let unit = DriverUnit::of(context, &driver);
-    let shape = shape::shape(&mut table, &word_value, &word, unit)?;
+    let shape = shape::shape(
+        &mut table,
+        &word_value,
+        &word,
+        unit,
+        driver.default_scale(context.machine),
+    )?;
     suits(context, &word_value, &shape, &driver)?;
     let tests = tests(&mut table, declared)?;
     shape

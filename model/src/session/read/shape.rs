@@ -3,7 +3,7 @@
 //! Numbers that belong to the driver carry its unit: `_mm` where it is a linear axis, `_deg` (or `_rad`) a rotary one, `_s` time,
 //! `_c` temperature, `_m` the gravity moment of a unit weight.
 
-use std::f64::consts::{PI, TAU};
+use std::f64::consts::TAU;
 
 use super::Context;
 use crate::axis::AxisKind;
@@ -57,16 +57,6 @@ impl DriverUnit {
             Driver::Time => DriverUnit::Second,
             Driver::Temperature => DriverUnit::Celsius,
             Driver::Gravity | Driver::None => DriverUnit::Metre,
-        }
-    }
-
-    /// What a polynomial divides its driver by unless it says: 100 mm, half a turn, an hour, 1 °C, 1 m.
-    fn scale(self) -> f64 {
-        match self {
-            DriverUnit::Millimetre => 100.0,
-            DriverUnit::Angle => PI,
-            DriverUnit::Second => 3600.0,
-            DriverUnit::Celsius | DriverUnit::Metre => 1.0,
         }
     }
 
@@ -188,18 +178,19 @@ fn order<'a>(table: &mut Table<'a>, value: &Value<'_>, word: &str) -> Result<Val
     })
 }
 
-/// Reads the shape that `word` names from the other keys of its table.
+/// Reads the shape that `word` names from the other keys of its table; a polynomial that states no scale has `default_scale`.
 pub(super) fn shape(
     table: &mut Table<'_>,
     value: &Value<'_>,
     word: &str,
     unit: DriverUnit,
+    default_scale: f64,
 ) -> Result<Shape, ModelError> {
     match word {
         "constant" => Ok(Shape::Constant),
         "polynomial" | "power" => {
             let degree = order(table, value, word)?.count(1, 30)?;
-            let scale = optional(table, SCALE, unit)?.unwrap_or(unit.scale());
+            let scale = optional(table, SCALE, unit)?.unwrap_or(default_scale);
             Ok(if word == "power" {
                 Shape::Power { degree, scale }
             } else {

@@ -6,6 +6,7 @@ use crate::chain::Machine;
 use crate::component::{ErrorKind, ErrorName, Freedom};
 use crate::error::ModelError;
 use crate::instrument::InstrumentKind;
+use crate::pattern;
 use crate::session::document::{Table, Value};
 
 /// The errors to be identified: those stated, or what the instrument is there for.
@@ -28,18 +29,47 @@ pub(super) fn unknowns(
             InstrumentKind::BallBar | InstrumentKind::Probe | InstrumentKind::RTest => {
                 default_unknowns(machine)
             }
-            InstrumentKind::Tracker | InstrumentKind::Socket => Vec::new(),
+            InstrumentKind::Tracker | InstrumentKind::Socket => all_location_errors(machine),
         });
     };
     let mut unknowns: Vec<ErrorName> = Vec::new();
+    // What a pattern stands for may be among the others already: each error is estimated once.
+    let mut by_pattern: Vec<ErrorName> = Vec::new();
     for item in value.list("a list of error names")? {
+        let text = item.text()?;
+        if pattern::is_pattern(&text) {
+            by_pattern.extend(matching(machine, &item, &text)?);
+            for name in &by_pattern {
+                if !unknowns.contains(name) {
+                    unknowns.push(name.clone());
+                }
+            }
+            continue;
+        }
         let name = error_name(machine, &item)?;
+        if by_pattern.contains(&name) {
+            continue;
+        }
         if unknowns.contains(&name) {
             return Err(item.error(format!("`{name}` stands twice among the unknowns"), None));
         }
         unknowns.push(name);
     }
     Ok(unknowns)
+}
+
+/// The errors that a pattern stands for.
+fn matching(machine: &Machine, item: &Value<'_>, text: &str) -> Result<Vec<ErrorName>, ModelError> {
+    let found = pattern::matching(machine, text);
+    if found.is_empty() {
+        let axes: Vec<&str> = machine.axes.iter().map(|axis| axis.name.as_str()).collect();
+        let help = format!(
+            "`?` stands for one character, `*` for any number of them, as in \"E?0C\", the location errors of C, and \"E?0J*\"; the axes are {}",
+            axes.join(", ")
+        );
+        return Err(item.error(format!("\"{text}\" matches no error of the machine"), Some(help)));
+    }
+    Ok(found)
 }
 
 /// An error of the machine by its name.
@@ -57,6 +87,21 @@ fn error_name(machine: &Machine, item: &Value<'_>) -> Result<ErrorName, ModelErr
         }
     }
     Ok(name)
+}
+
+/// All location errors of all axes, but for what moves no reading: the rotation of a linear axis about its own direction. A robot's joints have six
+/// each, more than its readings identify; the fit names the combinations.
+fn all_location_errors(machine: &Machine) -> Vec<ErrorName> {
+    let mut errors = pattern::errors(machine);
+    errors.retain(|name| {
+        let of_linear = machine
+            .axes
+            .iter()
+            .find(|axis| axis.name == name.axis && axis.kind == AxisKind::Linear);
+        let own = of_linear.is_some_and(|axis| name.freedom.index() == axis.own_freedom().index() + 3);
+        name.kind == ErrorKind::Location && !own
+    });
+    errors
 }
 
 /// The position and orientation errors of every rotary axis, in alphabetical order of the axes: its location errors without the two

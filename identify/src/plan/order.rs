@@ -1,0 +1,66 @@
+//! The order of figures that may be equal: by their first digits, then by name or by place, never by rounding.
+//!
+//! Figures that are equal in theory differ by rounding, and rounding differs between processors. A comparison "equal within a tolerance" is not
+//! transitive and sorts nothing; rounded figures are.
+
+use std::cmp::Ordering;
+
+/// Significant digits by which figures are compared.
+const DIGITS: i32 = 6;
+
+/// To six significant digits.
+pub(super) fn rounded(value: f64) -> f64 {
+    if value == 0.0 || !value.is_finite() {
+        return value;
+    }
+    let places = DIGITS - 1 - value.abs().log10().floor() as i32;
+    // A power of ten of either sign stays in range in two steps.
+    let (half, rest) = (places / 2, places - places / 2);
+    let scaled = value * 10.0_f64.powi(half) * 10.0_f64.powi(rest);
+    scaled.round() / 10.0_f64.powi(half) / 10.0_f64.powi(rest)
+}
+
+/// Smallest first.
+pub(super) fn smallest_first(a: f64, b: f64) -> Ordering {
+    // −0 and 0 are one figure.
+    (rounded(a) + 0.0).total_cmp(&(rounded(b) + 0.0))
+}
+
+/// Largest first, whatever the sign; equal ones by name.
+pub(super) fn largest_first(a: (f64, &str), b: (f64, &str)) -> Ordering {
+    smallest_first(b.0.abs(), a.0.abs()).then_with(|| a.1.cmp(b.1))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn figures_that_rounding_parts_are_put_in_order_by_name() {
+        let names = ["EX0C", "EA0C", "EY0C", "EB0C"];
+        // The same figure as four processors might have it, its sign besides.
+        let figures = [0.3, -(0.1 + 0.2), 0.3 - 1e-16, 0.300_000_000_1];
+        let mut turned: Vec<(f64, &str)> = figures.into_iter().zip(names).collect();
+        for turn in 0..4 {
+            turned.rotate_left(turn);
+            let mut sorted = turned.clone();
+            sorted.sort_by(|a, b| largest_first(*a, *b));
+            let order: Vec<&str> = sorted.iter().map(|(_, name)| *name).collect();
+            assert_eq!(order, ["EA0C", "EB0C", "EX0C", "EY0C"]);
+        }
+        assert_eq!(largest_first((0.300_01, "Z"), (0.3, "A")), Ordering::Less);
+        assert_eq!(smallest_first(0.3, 0.1 + 0.2), Ordering::Equal);
+        assert_eq!(smallest_first(0.0, -0.0), Ordering::Equal);
+        assert_eq!(smallest_first(1.0, f64::INFINITY), Ordering::Less);
+    }
+
+    #[test]
+    fn the_first_six_digits_count() {
+        for value in [1.234_565e-300, 9.999_994, 123_456.4, 7.0e300] {
+            let off = (rounded(value) / value - 1.0).abs();
+            assert!(off < 5e-6, "{value}: {off}");
+            assert_eq!(rounded(-value), -rounded(value));
+        }
+        assert_eq!(rounded(0.123_456_49), 0.123_456);
+    }
+}

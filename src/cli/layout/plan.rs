@@ -1,0 +1,263 @@
+//! `plan.toml` of a structural code: two tests of each rotary axis, a circle of each pair of linear axes.
+//!
+//! The balls are mounted once. Every test states where the axes stand that it does not move, so that the plan's coordinates are those that the
+//! operator types and the data contain.
+
+use std::fmt::Write;
+
+use abbe::model::axis::AxisKind;
+
+use super::Body;
+use super::mounts::{Mounts, Setting, Side, point_text};
+
+/// Names of the directions of R, and of the angles about them.
+const LETTERS: [&str; 3] = ["X", "Y", "Z"];
+const ANGLES: [&str; 3] = ["A", "B", "C"];
+
+const HEAD: &str = "# A plan: what would these tests identify? `abbe plan plan.toml` says it. Change it, ask again, measure when it says what you want.\n\
+    # `abbe simulate plan.toml --out run1 --error …` simulates readings; a measured test gets a line `data = \"….csv\"`.\n\n\
+    [machine]\n\
+    # The chain and its axes, beside this file.\n\
+    file = \"machine.toml\"\n\n\
+    [constants]\n\
+    # From an axis to the ball that goes round it, mm; lengths below may be written over these names.\n\
+    R = 100.0\n\
+    # Calibrated length of the bar, mm.\n\
+    R_c = 100.0\n\
+    # The same with its 50 mm extension.\n\
+    R_e = 150.0\n\n\
+    [instrument]\n\
+    # \"ballbar\"; others are \"probe\", \"tracker\", \"socket\".\n\
+    kind = \"ballbar\"\n\
+    # Standard deviation of one reading, µm.\n\
+    noise_um = 0.3\n\
+    # Resolution of a reading, µm.\n\
+    resolution_um = 0.1\n\n";
+
+/// What is known of where the balls really are.
+const PRIORS: &str = "# How well it is known where the balls really are and how long the bar really is: standard uncertainty, µm. 0 is exactly, inf not at all.\n\
+    workpiece_ball_u_um = [2, 2, 2]\n\
+    spindle_ball_u_um = [1, 1, 1]\n\
+    bar_u_um = 0.5\n";
+
+/// The text of `plan.toml`.
+pub fn text(bodies: &[Body]) -> String {
+    let pairs = pairs(bodies);
+    let mut text = HEAD.to_string();
+    unknowns(&mut text, bodies, &pairs);
+    let mut mounts = Mounts::of(bodies);
+    for turning in 0..bodies.len() {
+        if bodies[turning].kind == AxisKind::Rotary {
+            for lift in [0, 1] {
+                let setting = mounts.sweep(bodies, turning, lift);
+                sweep(&mut text, bodies, turning, lift == 1, &mounts, &setting);
+            }
+        }
+    }
+    for pair in pairs {
+        let setting = mounts.circle(bodies, pair);
+        circle(&mut text, bodies, pair, &mounts, &setting);
+    }
+    text
+}
+
+/// The errors to identify.
+fn unknowns(text: &mut String, bodies: &[Body], pairs: &[[usize; 2]]) {
+    text.push_str("[unknowns]\n# The errors to identify, by ISO 230-1: EX0C is where C lies along X, EA0C its tilt about X.\nerrors = [\n");
+    let given = given(bodies);
+    for (index, body) in bodies.iter().enumerate() {
+        if body.kind != AxisKind::Rotary {
+            continue;
+        }
+        let across = || (0..3).filter(|k| *k != body.along);
+        let name = |letter: &str| format!("E{letter}0{}", body.name);
+        let listed: Vec<String> = across()
+            .filter(|k| {
+                !given
+                    .iter()
+                    .any(|(axis, along, _)| (*axis, *along) == (index, *k))
+            })
+            .map(|k| LETTERS[k])
+            .chain(across().map(|k| ANGLES[k]))
+            .map(|letter| format!("\"{}\"", name(letter)))
+            .collect();
+        let mut left_out = String::new();
+        for (_, along, other) in given.iter().filter(|(axis, _, _)| *axis == index) {
+            let _ = write!(
+                left_out,
+                "; {own} is left out: the readings depend on its difference from E{along}0{other} only, and R lies on {name} along {along}",
+                own = name(LETTERS[*along]),
+                along = LETTERS[*along],
+                other = bodies[*other].name,
+                name = body.name,
+            );
+        }
+        let _ = writeln!(
+            text,
+            "  {},  # where {name} lies, and its tilt{left_out}",
+            listed.join(", "),
+            name = body.name
+        );
+    }
+    for [first, second] in pairs.iter().map(|pair| pair.map(|axis| &bodies[axis])) {
+        let about = ANGLES[3 - first.along - second.along];
+        let _ = writeln!(
+            text,
+            "  \"E{about}0{}\",  # squareness of {} and {}",
+            second.name, first.name, second.name
+        );
+    }
+    text.push_str("]\n");
+}
+
+/// Offsets of axes of the head that are not to be identified, each with its direction and an axis of the table: where both sides turn about axes
+/// across a direction, the readings depend on the difference of their places along it only.
+fn given(bodies: &[Body]) -> Vec<(usize, usize, usize)> {
+    let across = |side: Side, along: usize| {
+        (0..bodies.len()).filter(move |index| {
+            let body = &bodies[*index];
+            body.kind == AxisKind::Rotary && body.side() == side && body.along != along
+        })
+    };
+    // Of each side the axis nearest to the bed carries the others.
+    (0..3)
+        .filter_map(|along| {
+            let head = across(Side::Tool, along).next()?;
+            let table = across(Side::Workpiece, along).last()?;
+            Some((head, along, table))
+        })
+        .collect()
+}
+
+/// Pairs of linear axes at right angles, without those that lie parallel to one already paired.
+fn pairs(bodies: &[Body]) -> Vec<[usize; 2]> {
+    let mut first_along: Vec<usize> = Vec::new();
+    for (index, body) in bodies.iter().enumerate() {
+        let is_new = first_along.iter().all(|other| bodies[*other].along != body.along);
+        if body.kind == AxisKind::Linear && is_new {
+            first_along.push(index);
+        }
+    }
+    first_along.sort_by_key(|index| bodies[*index].along);
+    let mut pairs = Vec::new();
+    for (place, first) in first_along.iter().enumerate() {
+        for second in &first_along[place + 1..] {
+            pairs.push([*first, *second]);
+        }
+    }
+    pairs
+}
+
+fn sweep(
+    text: &mut String,
+    bodies: &[Body],
+    turning: usize,
+    extended: bool,
+    mounts: &Mounts,
+    setting: &Setting,
+) {
+    let axis = &bodies[turning];
+    let name = &axis.name;
+    let (bar, length) = if extended { ("R_e", 150) } else { ("R_c", 100) };
+    let (carried, standing) = match axis.side() {
+        Side::Workpiece => ("workpiece", "spindle"),
+        Side::Tool => ("spindle", "workpiece"),
+    };
+    let place = if extended {
+        "on the axis and beside the circle, as far as the extension reaches, so that the bar sees the tilt of the axis"
+    } else {
+        "on the axis in the plane of the circle, so that the bar sees where the axis lies"
+    };
+    let _ = write!(
+        text,
+        "\n# {name} turns the {carried} ball about the {standing} ball, which stands {place}.\n"
+    );
+    remounted(text, setting, standing);
+    let _ = write!(text, "[[test]]\nname = \"{name}{length}\"\n");
+    common(text, bodies, bar, mounts, setting, &[turning]);
+    let (from, to, step) = if axis.along == 2 {
+        (0, 360, 2)
+    } else {
+        (-90, 90, 1)
+    };
+    let _ = write!(
+        text,
+        "# The axis goes there and back; set the ends to what it can do. `runs` repeats both.\n\
+         sweep = {{ axis = \"{name}\", from_deg = {from}, to_deg = {to}, step_deg = {step}, feed_deg_min = 500, runs = 1, both_directions = true }}\n"
+    );
+}
+
+fn circle(text: &mut String, bodies: &[Body], pair: [usize; 2], mounts: &Mounts, setting: &Setting) {
+    let [a, b] = pair.map(|axis| bodies[axis].name.as_str());
+    let _ = write!(
+        text,
+        "\n# {a} and {b} move the spindle ball on a circle about the workpiece ball.\n"
+    );
+    remounted(text, setting, "spindle");
+    let _ = write!(text, "[[test]]\nname = \"{a}{b}\"\n");
+    common(text, bodies, "R_c", mounts, setting, &pair);
+    let _ = write!(
+        text,
+        "# Two linear axes, a full turn from the first towards the second and back; `runs` repeats both.\n\
+         path = {{ kind = \"circle\", plane = \"{a}{b}\", radius_mm = \"R_c\", step_deg = 2, feed_mm_min = 1000, runs = 1, both_directions = true }}\n"
+    );
+}
+
+/// Says that the machine could not bring the balls together, and that one is mounted again.
+fn remounted(text: &mut String, setting: &Setting, ball: &str) {
+    if setting.remounted_along.is_empty() {
+        return;
+    }
+    let along: Vec<&str> = setting.remounted_along.iter().map(|k| LETTERS[*k]).collect();
+    let _ = writeln!(
+        text,
+        "# No linear axis can bring the balls there along {}: the {ball} ball is mounted again for this test.",
+        along.join(" and ")
+    );
+}
+
+/// What all tests state alike: bar, balls, set-ups, what is known of them, and where the axes stand that the test does not move.
+fn common(
+    text: &mut String,
+    bodies: &[Body],
+    bar: &str,
+    mounts: &Mounts,
+    setting: &Setting,
+    moving: &[usize],
+) {
+    let _ = write!(
+        text,
+        "# Calibrated length.\n\
+         bar_mm = \"{bar}\"\n\
+         # The workpiece ball in the frame of the table, the spindle ball in that of the tool, all axes at zero.\n\
+         workpiece_ball_mm = {workpiece}\n\
+         spindle_ball_mm = {spindle}\n\
+         # Tests that name the same set-up share what is mounted once: the workpiece ball, the spindle ball, the bar. Give a test names of its own\n\
+         # where you mount one of them again.\n\
+         setup = \"P{p}\"\n\
+         spindle_setup = \"S{s}\"\n\
+         bar_setup = \"{bar}\"\n\
+         {PRIORS}",
+        workpiece = point_text(&mounts.workpiece[setting.workpiece]),
+        spindle = point_text(&mounts.spindle[setting.spindle]),
+        p = setting.workpiece + 1,
+        s = setting.spindle + 1,
+    );
+    let linear = setting
+        .at
+        .iter()
+        .map(|(name, position)| format!("{}_mm = {}", name.to_lowercase(), position.text()));
+    let rotary = bodies
+        .iter()
+        .enumerate()
+        .filter(|(index, body)| body.kind == AxisKind::Rotary && !moving.contains(index))
+        .map(|(_, body)| format!("{}_deg = 0", body.name.to_lowercase()));
+    let at: Vec<String> = linear.chain(rotary).collect();
+    if !at.is_empty() {
+        let _ = writeln!(
+            text,
+            "# Where the other axes stand, as the operator types it and the data contain it.\nat = {{ {} }}",
+            at.join(", ")
+        );
+    }
+}

@@ -1,0 +1,44 @@
+//! Plots as PNG (feature `png`): the SVG of a plot by itself, drawn by resvg and lettered with fonts that the program brings.
+
+use std::sync::Arc;
+
+use resvg::{tiny_skia, usvg};
+
+use super::Plot;
+
+/// The font that PNGs are lettered with, whatever the machine has.
+const FAMILY: &str = "Ubuntu";
+
+/// The fonts of PNGs.
+pub struct Fonts(Arc<usvg::fontdb::Database>);
+
+impl Fonts {
+    /// The fonts that the program brings: a PNG is the same everywhere.
+    pub fn bundled() -> Fonts {
+        let mut fonts = usvg::fontdb::Database::new();
+        fonts.load_font_data(epaint_default_fonts::UBUNTU_LIGHT.to_vec());
+        fonts.load_font_data(epaint_default_fonts::HACK_REGULAR.to_vec());
+        let family = fonts
+            .faces()
+            .next()
+            .and_then(|face| face.families.first().map(|(name, _)| name.clone()));
+        fonts.set_sans_serif_family(family.unwrap_or_else(|| FAMILY.to_string()));
+        Fonts(Arc::new(fonts))
+    }
+}
+
+/// A plot as PNG, twice as large as it is drawn. `None` if it cannot be drawn.
+pub fn png(plot: &Plot, fonts: &Fonts) -> Option<Vec<u8>> {
+    const TWICE: f32 = 2.0;
+    let options = usvg::Options {
+        fontdb: fonts.0.clone(),
+        font_family: FAMILY.to_string(),
+        ..usvg::Options::default()
+    };
+    let tree = usvg::Tree::from_str(&plot.svg(), &options).ok()?;
+    let size = tree.size().to_int_size().scale_by(TWICE)?;
+    let mut pixels = tiny_skia::Pixmap::new(size.width(), size.height())?;
+    let twice = tiny_skia::Transform::from_scale(TWICE, TWICE);
+    resvg::render(&tree, twice, &mut pixels.as_mut());
+    pixels.encode_png().ok()
+}

@@ -1,0 +1,98 @@
+//! Errors and set-ups that are drawn, and what the plant reads.
+
+use abbe::model::session::motion::planned_session;
+use abbe::model::session::{Prior, Session, Test};
+use rand::SeedableRng;
+use rand_distr::{Distribution, StandardNormal};
+use rand_pcg::Pcg64;
+
+use super::bar;
+use crate::plant::chain::{Chain, OutOfPlace};
+
+/// Standard deviation of drawn errors, µm and arcsec.
+const ERRORS: f64 = 20.0;
+const ARCSEC: f64 = std::f64::consts::PI / (180.0 * 3600.0);
+
+/// What is drawn of a session, by the names that results use, in µm and arcsec.
+pub struct Draw {
+    pub values: Vec<(String, f64)>,
+    pub measured: Session,
+}
+
+/// What the plant has out of place in a test.
+fn out_of_place(plan: &Session, test: &Test, values: &[(String, f64)]) -> OutOfPlace {
+    let value = |id: String| {
+        values
+            .iter()
+            .find(|(name, _)| *name == id)
+            .map_or(0.0, |(_, v)| *v)
+    };
+    let ball =
+        |ball: &str, mount: &str| ["x", "y", "z"].map(|axis| value(format!("{ball}.{axis}[{mount}]")) * 1e-3);
+    let letters = plan
+        .machine
+        .axes
+        .iter()
+        .map(|axis| axis.name.chars().next().unwrap());
+    let location = letters.map(|letter| {
+        let of = |freedom: char, size: f64| value(format!("E{freedom}0{letter}")) * size;
+        let lengths = ['X', 'Y', 'Z'].map(|freedom| of(freedom, 1e-3));
+        let angles = ['A', 'B', 'C'].map(|freedom| of(freedom, ARCSEC));
+        let [x, y, z] = lengths;
+        let [a, b, c] = angles;
+        (letter, [x, y, z, a, b, c])
+    });
+    OutOfPlace {
+        location: location.collect(),
+        workpiece_ball: ball("workpiece_ball", &test.setup),
+        spindle_ball: ball("spindle_ball", &test.spindle_setup),
+        bar: value(format!("bar[{}]", test.bar_setup)) * 1e-3,
+    }
+}
+
+/// Draws errors and set-ups, and lets the plant read; `noise_um` of white noise, rounded to the resolution where there is noise.
+pub fn draw(code: &str, plan: &Session, seed: u64, noise_um: f64) -> Draw {
+    let mut random = Pcg64::seed_from_u64(seed);
+    let mut normal = || -> f64 { StandardNormal.sample(&mut random) };
+    let mut values: Vec<(String, f64)> = Vec::new();
+    for name in &plan.unknowns {
+        values.push((name.to_string(), ERRORS * normal()));
+    }
+    for test in &plan.tests {
+        let mut ids: Vec<(String, Prior)> = Vec::new();
+        for (unknown, prior) in test.station.kind().unknowns().iter().zip(&test.priors) {
+            let group = test.group(unknown.shared_by);
+            let dot = if unknown.coordinate.is_empty() { "" } else { "." };
+            ids.push((
+                format!("{}{dot}{}[{group}]", unknown.thing, unknown.coordinate),
+                *prior,
+            ));
+        }
+        for (id, prior) in ids {
+            let Prior::Gaussian(u_mm) = prior else { continue };
+            if values.iter().all(|(name, _)| *name != id) {
+                values.push((id, u_mm * 1e3 * normal()));
+            }
+        }
+    }
+    let chain = Chain::from_code(code);
+    let mut measured = plan.clone();
+    for (test, mut readings) in measured.tests.iter_mut().zip(planned_session(plan).unwrap()) {
+        let out = out_of_place(plan, test, &values);
+        let stated = bar(test);
+        for row in 0..readings.rows() {
+            let position = |letter: char| {
+                let axis = plan.machine.axis_index(&letter.to_string()).unwrap();
+                readings.positions[axis][row]
+            };
+            let mut length = chain.reading_mm(&position, stated.workpiece_ball, stated.spindle_ball, &out);
+            if noise_um > 0.0 {
+                let resolution = plan.resolution_mm.unwrap();
+                length = ((length + noise_um * 1e-3 * normal()) / resolution).round() * resolution;
+            }
+            readings.observed[row] = length;
+        }
+        test.readings = Some(readings);
+    }
+    Draw { values, measured }
+}

@@ -1,0 +1,277 @@
+//! Plans that `abbe new --from-code` writes: what they describe, and what their fits find in readings of an independent machine.
+//!
+//! Errors and set-ups are drawn here, and the plant makes the readings. The figures in the docs are those of
+//!
+//! ```text
+//! ABBE_STUDY=100 cargo test --profile checked --test main generated -- --nocapture --test-threads 1
+//! ```
+
+mod draw;
+mod pulls;
+
+use std::path::Path;
+
+use abbe::identify::plan::{PlanOptions, analyse};
+use abbe::identify::quantity::Given;
+use abbe::identify::simulate::{Simulation, simulate};
+use abbe::model::instrument::Station;
+use abbe::model::instrument::ballbar::BallBar;
+use abbe::model::session::motion::planned_session;
+use abbe::model::session::read::{self, ReadOptions};
+use abbe::model::session::{Session, Test};
+
+use self::draw::draw;
+use super::topologies::{FIGURE_1_1, TABLE_1_1};
+use super::{abbe, text};
+use crate::plant::chain::{Chain, OutOfPlace};
+
+/// Codes that no textbook lists: rotary axes on both sides of any order, linear axes on and behind rotary ones, parallel axes, one rotary axis.
+const MIXED: [&str; 5] = [
+    "w B X b Y Z A t",
+    "w C A X b Y Z B t",
+    "w X Y Z b C B t",
+    "w C b U V W t",
+    "w Y A b X Z W C t",
+];
+
+/// The code with which the defect was found, and codes that lack linear axes.
+const OTHERS: [&str; 7] = [
+    "w b Z X Y C B t",
+    "[wCbt]",
+    "[wCbXYt]",
+    "w C b Z A t",
+    "w b Z B t",
+    "w C B A b X Y Z t",
+    "w b X Y C Z t",
+];
+
+fn codes() -> impl Iterator<Item = &'static str> {
+    TABLE_1_1.into_iter().chain(FIGURE_1_1).chain(MIXED)
+}
+
+/// The plan that the command writes for a code.
+fn generated(code: &str, folder: &Path) -> Session {
+    let made = folder.join(code.replace(' ', "-"));
+    let run = abbe(&["new", text(&made), "--from-code", code]);
+    assert!(
+        run.status.success(),
+        "{code}: {}",
+        String::from_utf8_lossy(&run.stderr)
+    );
+    read::session(&made.join("plan.toml"), &ReadOptions::default())
+        .unwrap_or_else(|fault| panic!("{code}: {fault}"))
+}
+
+fn bar(test: &Test) -> &BallBar<f64> {
+    match &test.station {
+        Station::BallBar(bar) => bar,
+        other => panic!("{}: {other:?}", test.name),
+    }
+}
+
+/// Tests that share a set-up place its ball at one point, and know it equally well; the plant finds the bar as long as it is stated throughout.
+fn check_described_once(code: &str, plan: &Session) {
+    assert!(plan.warnings.is_empty(), "{code}: {:?}", plan.warnings);
+    for (index, test) in plan.tests.iter().enumerate() {
+        for other in &plan.tests[..index] {
+            let pair = format!("{code}: {} and {}", other.name, test.name);
+            if test.setup == other.setup {
+                assert_eq!(bar(test).workpiece_ball, bar(other).workpiece_ball, "{pair}");
+            }
+            if test.spindle_setup == other.spindle_setup {
+                assert_eq!(bar(test).spindle_ball, bar(other).spindle_ball, "{pair}");
+            }
+            if test.bar_setup == other.bar_setup {
+                assert_eq!(bar(test).bar, bar(other).bar, "{pair}");
+            }
+            assert_eq!(test.priors, other.priors, "{pair}");
+        }
+    }
+    let chain = Chain::from_code(code);
+    for (test, readings) in plan.tests.iter().zip(planned_session(plan).unwrap()) {
+        let stated = bar(test);
+        let mut still = vec![true; plan.machine.axes.len()];
+        for row in 0..readings.rows() {
+            let position = |letter: char| {
+                let axis = plan.machine.axis_index(&letter.to_string()).unwrap();
+                readings.positions[axis][row]
+            };
+            for (axis, still) in still.iter_mut().enumerate() {
+                *still &= readings.positions[axis][row] == readings.positions[axis][0];
+            }
+            let none = OutOfPlace::default();
+            let length = chain.reading_mm(&position, stated.workpiece_ball, stated.spindle_ball, &none);
+            assert!(
+                (length - stated.bar).abs() < 1e-9,
+                "{code} {}: {length} at reading {row}",
+                test.name
+            );
+        }
+        // What stands still stands where the file says, and every such axis is in it.
+        let start = plan.text.find(&format!("name = \"{}\"", test.name)).unwrap();
+        let of_test = plan.text[start..].split("[[test]]").next().unwrap();
+        for (axis, still) in still.into_iter().enumerate() {
+            let name = plan.machine.axes[axis].name.to_lowercase();
+            let listed = [" ", "{ "].iter().any(|before| {
+                ["mm", "deg"].iter().any(|unit| {
+                    of_test.lines().any(|line| {
+                        line.starts_with("at = ") && line.contains(&format!("{before}{name}_{unit} = "))
+                    })
+                })
+            });
+            assert_eq!(listed, still, "{code} {}: {name}\n{of_test}", test.name);
+            if still {
+                assert_eq!(readings.positions[axis][0], test.at[axis], "{code} {}", test.name);
+            }
+        }
+    }
+}
+
+#[test]
+fn two_tests_of_one_set_up_place_a_ball_at_one_point() {
+    let folder = tempfile::tempdir().unwrap();
+    for code in codes().chain(OTHERS) {
+        let plan = generated(code, folder.path());
+        check_described_once(code, &plan);
+        let options = PlanOptions {
+            effects: false,
+            ..PlanOptions::default()
+        };
+        let analysis = analyse(&plan, &options).unwrap();
+        assert!(analysis.warnings.is_empty(), "{code}: {:?}", analysis.warnings);
+        assert!(
+            analysis.blind.is_empty(),
+            "{code}: {:?}",
+            analysis.blind.iter().map(|item| &item.why).collect::<Vec<_>>()
+        );
+    }
+}
+
+#[test]
+fn one_mount_of_each_ball_serves_a_whole_machine() {
+    let folder = tempfile::tempdir().unwrap();
+    for code in codes() {
+        let plan = generated(code, folder.path());
+        let first = &plan.tests[0];
+        let one = |test: &Test| test.setup == first.setup && test.spindle_setup == first.spindle_setup;
+        assert!(plan.tests.iter().all(one), "{code}");
+    }
+}
+
+#[test]
+fn where_no_axis_lifts_a_ball_it_is_mounted_again_and_the_plan_says_so() {
+    let folder = tempfile::tempdir().unwrap();
+    for (code, test, along) in [
+        ("[wCbt]", "C150", "Z"),
+        ("[wCbXYt]", "C150", "Z"),
+        ("w C b Z A t", "A150", "X and Y"),
+        ("w b Z B t", "B150", "Y"),
+        // A quill that the axis itself carries does not lift a ball along it.
+        ("w b X Y C Z t", "C150", "Z"),
+    ] {
+        let plan = generated(code, folder.path());
+        let said = format!("No linear axis can bring the balls there along {along}:");
+        let start = plan.text.find(&format!("name = \"{test}\"")).unwrap();
+        assert!(plan.text[..start].contains(&said), "{code}\n{}", plan.text);
+        let first = &plan.tests[0];
+        let again = plan.tests.iter().find(|other| other.name == test).unwrap();
+        assert!(
+            again.setup != first.setup || again.spindle_setup != first.spindle_setup,
+            "{code}"
+        );
+    }
+}
+
+#[test]
+fn a_generated_plan_is_simulated_as_the_plant_reads_it() {
+    let folder = tempfile::tempdir().unwrap();
+    for (number, code) in codes().chain(OTHERS).enumerate() {
+        let mut plan = generated(code, folder.path());
+        let drawn = draw(code, &plan, number as u64, 0.0);
+        plan.resolution_mm = None;
+        let given = drawn.values.iter().map(|(id, value)| Given {
+            id: id.clone(),
+            value: *value,
+            unit: if "ABC".contains(id.chars().nth(1).unwrap()) && id.starts_with('E') {
+                "arcsec".to_string()
+            } else {
+                "um".to_string()
+            },
+        });
+        let simulation = Simulation {
+            given: given.collect(),
+            noise_mm: Some(0.0),
+            ..Simulation::default()
+        };
+        let simulated = simulate(&plan, &simulation).unwrap();
+        for (test, readings) in drawn.measured.tests.iter().zip(&simulated.readings) {
+            let plant = &test.readings.as_ref().unwrap().observed;
+            assert_eq!(plant.len(), readings.observed.len());
+            for (plant, abbe) in plant.iter().zip(&readings.observed) {
+                assert!(
+                    (plant - abbe).abs() < 1e-9,
+                    "{code} {}: {plant} {abbe}",
+                    test.name
+                );
+            }
+        }
+    }
+}
+
+#[test]
+fn the_commands_run_one_after_the_other_on_a_generated_plan() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = |name: &str| folder.path().join(name);
+    let code = "w b Z X Y C B t";
+    let plan = generated(code, folder.path());
+    let file = plan.file.clone();
+    let (run, json) = (at("run"), at("fit.json"));
+    let steps: [&[&str]; 3] = [
+        &["plan", text(&file), "--no-effects"],
+        &[
+            "simulate",
+            text(&file),
+            "--out",
+            text(&run),
+            "--draw-setups",
+            "--error",
+            "EA0C=12arcsec",
+            "--error",
+            "EX0B=-9um",
+            "--seed",
+            "4",
+        ],
+        &["fit", text(&run.join("session.toml")), "--json", text(&json)],
+    ];
+    for arguments in steps {
+        let ran = abbe(arguments);
+        let told = String::from_utf8_lossy(&ran.stderr).into_owned();
+        assert!(ran.status.success(), "{arguments:?}: {told}");
+        assert!(!told.contains("warning"), "{arguments:?}: {told}");
+    }
+    let fitted: serde_json::Value = serde_json::from_str(&std::fs::read_to_string(json).unwrap()).unwrap();
+    for parameter in fitted["parameters"].as_array().unwrap() {
+        let id = parameter["id"].as_str().unwrap();
+        if !id.starts_with('E') {
+            continue;
+        }
+        let truth = match id {
+            "EA0C" => 12.0,
+            "EX0B" => -9.0,
+            _ => 0.0,
+        };
+        let (value, u) = (
+            parameter["value"].as_f64().unwrap(),
+            parameter["u"].as_f64().unwrap(),
+        );
+        assert!((value - truth).abs() < 4.5 * u, "{id}: {value} ± {u}");
+    }
+    // The data contain where the axes stand, and the ball has not moved.
+    let lifted = std::fs::read_to_string(run.join("C150.csv")).unwrap();
+    let header: Vec<&str> = lifted.lines().next().unwrap().split(',').collect();
+    let z = header.iter().position(|name| *name == "z_mm").unwrap();
+    for line in lifted.lines().skip(1) {
+        let z: f64 = line.split(',').nth(z).unwrap().parse().unwrap();
+        assert!((z - 12_500_f64.sqrt()).abs() < 1e-6, "{line}");
+    }
+}

@@ -1,0 +1,190 @@
+//! Which errors a session asks for: by name, by pattern, and where it says nothing.
+
+use std::fs;
+use std::path::Path;
+
+use abbe::model::session::Session;
+use abbe::model::session::read::{self, ReadOptions};
+
+use super::{abbe, ready, text, workspace};
+
+const POSES: &str = "[[test]]\nname = \"T\"\npath = { kind = \"list\" }\ndata = \"none.csv\"\n";
+const TARGET: &str = "target_mm = [10, 20, 30]\n";
+const BALL: &str = "socket = \"1\"\nball_mm = [10, 20, 30]\n";
+const BAR: &str = "bar_mm = 100.0\nworkpiece_ball_mm = [0, 100, 0]\nspindle_ball_mm = [0, 0, 0]\nsweep = { axis = \"C\", from_deg = 0, to_deg = 90, step_deg = 1 }\n";
+
+fn read(
+    folder: &Path,
+    machine: &str,
+    instrument: &str,
+    unknowns: &str,
+    test: &str,
+) -> Result<Session, String> {
+    let test = if test == BAR {
+        format!("[[test]]\nname = \"T\"\n{BAR}")
+    } else {
+        format!("{POSES}{test}")
+    };
+    let session =
+        format!("{machine}\n[instrument]\nkind = \"{instrument}\"\nnoise_um = 1\n\n{unknowns}\n{test}");
+    fs::write(folder.join("session.toml"), session).unwrap();
+    let options = ReadOptions {
+        read_data: false,
+        ..ReadOptions::default()
+    };
+    read::session(&folder.join("session.toml"), &options).map_err(|fault| fault.to_string())
+}
+
+fn names(session: &Session) -> Vec<String> {
+    session.unknowns.iter().map(ToString::to_string).collect()
+}
+
+/// `EX0J1` to `EC0J1`, `EX0J2` and so on.
+fn six_each(axes: &[&str]) -> Vec<String> {
+    let of = |axis: &&str| {
+        "XYZABC"
+            .chars()
+            .map(|letter| format!("E{letter}0{axis}"))
+            .collect::<Vec<_>>()
+    };
+    axes.iter().flat_map(of).collect()
+}
+
+fn robot(name: &str) -> String {
+    let file = ready(&format!("{name}/machine.toml"));
+    // The machine stands in the session itself.
+    let machine = fs::read_to_string(file)
+        .unwrap()
+        .replace("[axis.", "[machine.axis.");
+    format!("[machine]\n{machine}")
+}
+
+const TABLE: &str = "[machine]\nchain = \"w C b X t\"\n[machine.axis.C]\n[machine.axis.X]\n";
+
+#[test]
+fn a_robot_that_states_no_unknowns_has_all_location_errors_of_all_joints() {
+    let folder = tempfile::tempdir().unwrap();
+    let ur10 = ["J1", "J2", "J3", "J4", "J5", "J6"];
+    for (machine, instrument, test, joints) in [
+        ("ur10", "tracker", TARGET, &ur10[..]),
+        (
+            "kuka-iiwa14",
+            "socket",
+            BALL,
+            &["J1", "J2", "J3", "J4", "J5", "J6", "J7"],
+        ),
+    ] {
+        let machine = robot(machine);
+        for unknowns in ["", "[unknowns]\n"] {
+            let session = read(folder.path(), &machine, instrument, unknowns, test).unwrap();
+            assert_eq!(names(&session), six_each(joints));
+        }
+        // None is asked for where it says so.
+        let none = read(
+            folder.path(),
+            &machine,
+            instrument,
+            "[unknowns]\nerrors = []\n",
+            test,
+        )
+        .unwrap();
+        assert_eq!(none.unknowns, []);
+    }
+    // A linear axis has squarenesses; the rotation about its own direction moves nothing.
+    let mixed = read(folder.path(), TABLE, "tracker", "", TARGET).unwrap();
+    let mut expected = six_each(&["C"]);
+    expected.extend(["EB0X", "EC0X"].map(String::from));
+    assert_eq!(names(&mixed), expected);
+    // A ball bar sees the position and orientation errors of rotary axes.
+    let bar = read(folder.path(), TABLE, "ballbar", "", BAR).unwrap();
+    assert_eq!(names(&bar), ["EX0C", "EY0C", "EA0C", "EB0C"]);
+}
+
+#[test]
+fn the_ready_robots_ask_for_them_by_a_pattern() {
+    let ur10 = ["J1", "J2", "J3", "J4", "J5", "J6"];
+    let options = ReadOptions {
+        read_data: false,
+        ..ReadOptions::default()
+    };
+    let session = read::session(&ready("ur10/session.toml"), &options).unwrap();
+    assert_eq!(names(&session), six_each(&ur10));
+    for file in ["ur10/session.toml", "kuka-iiwa14/session.toml"] {
+        let text = fs::read_to_string(ready(file)).unwrap();
+        assert!(text.contains("errors = [\"E?0J*\"]"), "{file}");
+    }
+}
+
+#[test]
+fn a_pattern_stands_for_the_errors_that_it_matches() {
+    let folder = tempfile::tempdir().unwrap();
+    let asked = |errors: &str| {
+        let unknowns = format!("[unknowns]\nerrors = [{errors}]\n");
+        read(folder.path(), TABLE, "ballbar", &unknowns, BAR)
+    };
+    for (errors, expected) in [
+        ("\"E?0C\"", &["EX0C", "EY0C", "EZ0C", "EA0C", "EB0C", "EC0C"][..]),
+        ("\"e_?0c\"", &["EX0C", "EY0C", "EZ0C"]),
+        ("\"E?X\"", &["EXX", "EYX", "EZX", "EAX", "EBX", "ECX"]),
+        ("\"E?0X\"", &["EA0X", "EB0X", "EC0X"]),
+        // What is asked for twice is estimated once.
+        (
+            "\"EC0X\", \"E?0X\", \"EB0X\", \"EB*X\"",
+            &["EC0X", "EA0X", "EB0X", "EBX"],
+        ),
+    ] {
+        assert_eq!(names(&asked(errors).unwrap()), expected, "{errors}");
+    }
+    assert!(asked("\"EX0C\", \"EX0C\"").unwrap_err().contains("stands twice"));
+    for nothing in ["E?0B", "?0C", "EX0?C", "E?1C"] {
+        let fault = asked(&format!("\"EX0C\",\n  \"{nothing}\"")).unwrap_err();
+        for part in [
+            "session.toml:12",
+            &format!("\"{nothing}\" matches no error of the machine"),
+        ] {
+            assert!(fault.contains(part), "`{part}` is not in\n{fault}");
+        }
+    }
+}
+
+#[test]
+fn an_equation_takes_the_same_patterns() {
+    let session = workspace().join("sessions/hermle-c600u/chapter5.toml");
+    let machine = workspace().join("sessions/hermle-c600u/machine.toml");
+    let of = |errors: &str| {
+        let [first, second] = [
+            &[
+                "equation",
+                text(&session),
+                "--test",
+                "C150",
+                "--order",
+                "first",
+                "--errors",
+                errors,
+            ][..],
+            &[
+                "volumetric",
+                text(&machine),
+                "--order",
+                "first",
+                "--errors",
+                errors,
+            ],
+        ]
+        .map(|arguments| {
+            let output = abbe(arguments);
+            (
+                output.status.code(),
+                output.stdout,
+                String::from_utf8(output.stderr).unwrap(),
+            )
+        });
+        assert_eq!(first.0, second.0);
+        (first, second)
+    };
+    assert_eq!(of("E?0C"), of("EX0C,EY0C,EZ0C,EA0C,EB0C,EC0C"));
+    let ((status, _, said), _) = of("E?0B");
+    assert_eq!(status, Some(1));
+    assert!(said.contains("`E?0B` matches no error of the machine"), "{said}");
+}
