@@ -16,14 +16,14 @@ pub struct Interrupts {
 }
 
 impl Interrupts {
-    /// Heeds Ctrl-C from now on; messages go above a progress bar. Until [`Interrupts::keep_results`] it ends the program.
-    pub fn heeded(bar: ProgressBar) -> Interrupts {
+    /// Handles Ctrl-C from now on; messages go above a progress bar. Until [`Interrupts::keep_results`] it ends the program.
+    pub fn handled(bar: ProgressBar) -> Interrupts {
         let interrupts = Interrupts {
             came: Arc::new(AtomicBool::new(false)),
             at_once: Arc::new(AtomicBool::new(true)),
         };
-        let handled = interrupts.clone();
-        if ctrlc::set_handler(move || handled.handle(&bar)).is_err() {
+        let handler = interrupts.clone();
+        if ctrlc::set_handler(move || handler.handle(&bar)).is_err() {
             eprintln!("warning: Ctrl-C will end the program without a result");
         }
         interrupts

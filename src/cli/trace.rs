@@ -72,7 +72,7 @@ pub fn run(arguments: &TraceArguments) -> Result<(), Failure> {
         return list(&session, &options);
     }
     let bar = progress_bar(arguments.common.quiet);
-    let interrupts = Interrupts::heeded(bar.clone());
+    let interrupts = Interrupts::handled(bar.clone());
     let shown = Mutex::new(());
     let report = |progress: Progress| {
         if matches!(progress, Progress::Working) {

@@ -340,7 +340,7 @@ fn what_else(document: &mut Document, trace: &Trace<'_>) -> Markup {
     }
 }
 
-/// Who stands highest in an effect's place.
+/// The competing explanations of an effect.
 fn ranking(rivals: &[Rival], id: &str) -> Plot {
     let rows: Vec<(String, f64, Fill)> = rivals
         .iter()
@@ -357,14 +357,14 @@ fn ranking(rivals: &[Rival], id: &str) -> Plot {
         .collect();
     bars::bars(
         format!("ranking-{id}"),
-        format!("Who could stand in the place of {id}"),
-        "Evidence beside the rest of the model, −ln P, less the price of chosen places.".to_string(),
+        format!("Competing explanations of {id}"),
+        "Evidence beside the rest of the model, −ln P, minus the complexity penalty.".to_string(),
         "evidence, −ln P",
         &rows,
         &[
             ("key-named", "named"),
-            ("key-alias", "cannot be told from it"),
-            ("key-other", "loses"),
+            ("key-alias", "indistinguishable"),
+            ("key-other", "rejected"),
         ],
     )
 }

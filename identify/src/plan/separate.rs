@@ -11,8 +11,8 @@ use serde::Serialize;
 
 use super::goal;
 use super::information::{Root, Shared};
-use super::linear::to_nine_digits;
 use super::menu::Menu;
+use super::order::{rounded, smallest_first};
 use super::prepared::Prepared;
 use super::states;
 use crate::error::IdentifyError;
@@ -251,13 +251,13 @@ impl Contest {
         })
     }
 
-    /// The candidate test that separates most alternatives by so many standard deviations, and among those the quickest of the ones that separate them all but
-    /// as well as the best. Ties are decided by names.
+    /// The candidate test that separates most alternatives by so many standard deviations; of several the quickest whose least separation comes near the
+    /// largest. Ties are decided by names.
     fn best(&self, sigmas: &[Vec<f64>], least: f64) -> Option<usize> {
         let count = |entry: usize| sigmas[entry].iter().filter(|sigma| **sigma >= least).count();
         let worst = |entry: usize| {
             let separated = sigmas[entry].iter().filter(|sigma| **sigma >= least);
-            to_nine_digits(separated.copied().fold(f64::INFINITY, f64::min))
+            rounded(separated.copied().fold(f64::INFINITY, f64::min))
         };
         let most = (0..sigmas.len()).map(count).max().filter(|most| *most > 0)?;
         let with_most = || (0..sigmas.len()).filter(|entry| count(*entry) == most);
@@ -266,11 +266,9 @@ impl Contest {
         with_most()
             .filter(|one| worst(*one) >= AS_GOOD_AS * best)
             .min_by(|a, b| {
-                let [first, second] = [a, b].map(|one| to_nine_digits(entry(*one).minutes));
-                first
-                    .total_cmp(&second)
+                smallest_first(entry(*a).minutes, entry(*b).minutes)
                     .then(worst(*b).total_cmp(&worst(*a)))
-                    .then(entry(*a).name.cmp(&entry(*b).name))
+                    .then_with(|| entry(*a).name.cmp(&entry(*b).name))
             })
     }
 }
