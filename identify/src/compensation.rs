@@ -1,7 +1,12 @@
 //! Identified error motions as curves over their own axis: what a control compensates.
 //!
 //! `E(q) = Σ kᵢ·bᵢ(q)` over the declared effects of one error motion that follow the position of its own axis, or its direction of travel.
+//! A curve covers the positions through which its axis moved in runs that see the error: where the axis merely stood, or no reading sees the error, the
+//! curve would be extrapolated. The uncertainty at a position follows from the covariance of the coefficients, `u²(q) = b(q)ᵀ·Cov·b(q)`.
+//!
 //! What follows anything else (time, temperature, speed) no table over a position can hold; it is left out by name.
+
+mod range;
 
 use std::ops::Range;
 
@@ -19,28 +24,60 @@ pub struct ErrorCurve {
     pub error: ErrorName,
     /// Its axis, by index in the machine.
     pub axis: usize,
-    /// The positions that the readings cover, mm or rad.
+    /// The positions through which the axis moved while readings saw the error, mm or rad.
     pub range: Range<f64>,
     terms: Vec<(Effect, Vec<f64>)>,
+    /// Where the coefficients of the terms stand among the fit's parameters, one after another.
+    places: Vec<usize>,
+    /// Covariance of the coefficients, row by row, enlarged as the fit's uncertainties are; inside units.
+    covariance: Vec<Vec<f64>>,
 }
 
 impl ErrorCurve {
-    /// The error at a position (mm or rad) reached in a direction (+1 or −1), mm or rad.
-    pub fn at(&self, position: f64, direction: f64) -> f64 {
+    /// The basis functions of all terms at a position (mm or rad) reached in a direction (+1 or −1).
+    fn basis(&self, position: f64, direction: f64) -> Vec<f64> {
         let sample = DriverSample {
             value: position,
             direction,
             ..DriverSample::default()
         };
-        let mut basis = Vec::new();
-        self.terms
-            .iter()
-            .map(|(effect, coefficients)| {
-                basis.clear();
-                effect.shape.basis(&sample, &mut basis);
-                basis.iter().zip(coefficients).map(|(b, k)| b * k).sum::<f64>()
-            })
-            .sum()
+        let mut basis = Vec::with_capacity(self.places.len());
+        for (effect, _) in &self.terms {
+            effect.shape.basis(&sample, &mut basis);
+        }
+        basis
+    }
+
+    /// The error at a position (mm or rad) reached in a direction (+1 or −1), mm or rad.
+    pub fn at(&self, position: f64, direction: f64) -> f64 {
+        let coefficients = self.terms.iter().flat_map(|(_, coefficients)| coefficients);
+        let basis = self.basis(position, direction);
+        basis.iter().zip(coefficients).map(|(b, k)| b * k).sum()
+    }
+
+    /// The standard uncertainty of [`ErrorCurve::at`], mm or rad.
+    pub fn u_at(&self, position: f64, direction: f64) -> f64 {
+        self.u_of(&self.basis(position, direction))
+    }
+
+    /// The mean of both directions at a position.
+    pub fn mean_at(&self, position: f64) -> f64 {
+        0.5 * (self.at(position, 1.0) + self.at(position, -1.0))
+    }
+
+    /// The standard uncertainty of [`ErrorCurve::mean_at`].
+    pub fn u_of_mean_at(&self, position: f64) -> f64 {
+        let [there, back] = [1.0, -1.0].map(|direction| self.basis(position, direction));
+        let mean: Vec<f64> = there.iter().zip(&back).map(|(a, b)| 0.5 * (a + b)).collect();
+        self.u_of(&mean)
+    }
+
+    fn u_of(&self, basis: &[f64]) -> f64 {
+        let rows = self.covariance.iter().zip(basis);
+        let variance: f64 = rows
+            .map(|(row, b)| b * row.iter().zip(basis).map(|(c, d)| c * d).sum::<f64>())
+            .sum();
+        variance.max(0.0).sqrt()
     }
 
     /// Whether it depends on the direction of travel.
@@ -84,7 +121,7 @@ pub fn of_fit(problem: &Problem<'_>, fit: &Fit) -> Compensation {
             continue;
         };
         let id = effect.id();
-        let mut coefficients = vec![None; effect.shape.coefficients()];
+        let mut found = vec![None; effect.shape.coefficients()];
         for (j, parameter) in list.iter().enumerate() {
             if let Role::Coefficient {
                 effect: of,
@@ -93,7 +130,7 @@ pub fn of_fit(problem: &Problem<'_>, fit: &Fit) -> Compensation {
                 && of == index
                 && fit.rank.is_seen(j)
             {
-                coefficients[coefficient] = Some(fit.beta[j]);
+                found[coefficient] = Some(j);
             }
         }
         let fits_table = match &effect.shape {
@@ -115,38 +152,51 @@ pub fn of_fit(problem: &Problem<'_>, fit: &Fit) -> Compensation {
             result.left_out.push(format!("{id}: {why}"));
             continue;
         }
-        let (Some(axis), Some(coefficients)) = (
+        let (Some(axis), Some(places)) = (
             machine.axis_index(&error.axis),
-            coefficients.into_iter().collect::<Option<Vec<f64>>>(),
+            found.into_iter().collect::<Option<Vec<usize>>>(),
         ) else {
             result
                 .left_out
                 .push(format!("{id}: the readings do not tell all of it"));
             continue;
         };
-        let range = covered(problem, axis);
-        match result.curves.iter_mut().find(|curve| curve.error == *error) {
-            Some(curve) => curve.terms.push((effect.clone(), coefficients)),
-            None => result.curves.push(ErrorCurve {
-                error: error.clone(),
-                axis,
-                range,
-                terms: vec![(effect.clone(), coefficients)],
-            }),
+        let term = (effect.clone(), places.iter().map(|j| fit.beta[*j]).collect());
+        if let Some(curve) = result.curves.iter_mut().find(|curve| curve.error == *error) {
+            curve.terms.push(term);
+            curve.places.extend(places);
+            continue;
         }
+        let Some(covered) = range::covered(problem, error, axis) else {
+            let why = "its axis stands wherever readings see it, and what lies between is not measured";
+            result.left_out.push(format!("{id}: {why}"));
+            continue;
+        };
+        let kind = machine.axes[axis].kind;
+        for apart in &covered.apart {
+            result.left_out.push(format!(
+                "{error} from {:.3} to {:.3} {}: apart from the longest stretch that the axis moved over",
+                kind.outside(apart.start),
+                kind.outside(apart.end),
+                kind.unit()
+            ));
+        }
+        result.curves.push(ErrorCurve {
+            error: error.clone(),
+            axis,
+            range: covered.range,
+            terms: vec![term],
+            places,
+            covariance: Vec::new(),
+        });
+    }
+    let enlarged = fit.birge_ratio.powi(2);
+    for curve in &mut result.curves {
+        let row = |j: &usize| -> Vec<f64> {
+            let columns = curve.places.iter();
+            columns.map(|k| fit.covariance[(*j, *k)] * enlarged).collect()
+        };
+        curve.covariance = curve.places.iter().map(row).collect();
     }
     result
-}
-
-/// The positions of an axis that the readings cover.
-fn covered(problem: &Problem<'_>, axis: usize) -> Range<f64> {
-    let positions = problem
-        .tests
-        .iter()
-        .filter_map(|test| test.readings.as_ref())
-        .flat_map(|readings| readings.positions[axis].iter().copied());
-    let (least, most) = positions.fold((f64::INFINITY, f64::NEG_INFINITY), |(a, b), x| {
-        (a.min(x), b.max(x))
-    });
-    least..most
 }

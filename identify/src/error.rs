@@ -84,6 +84,14 @@ pub enum IdentifyError {
         /// Where it stands.
         sum_of_squares: f64,
     },
+    /// Readings that contradict the session.
+    #[error("{found}; {diagnosis}")]
+    Contradicted {
+        /// What was found.
+        found: String,
+        /// What may be wrong.
+        diagnosis: String,
+    },
     /// A decomposition that failed.
     #[error("a matrix of the least-squares problem has entries that are not finite")]
     Decomposition,

@@ -18,6 +18,7 @@ use crate::heldout::{HeldOut, held_out, rms_mm};
 use crate::least_squares::{LeastSquares, Scaling, minimise};
 use crate::noise::{self, Noise, NoiseSource, PureError};
 use crate::parameters::Role;
+use crate::plausibility;
 use crate::problem::Problem;
 use crate::rank::Rank;
 use crate::results::{FitResult, ParameterResult, Rejected, Unobservable};
@@ -86,7 +87,7 @@ impl LeastSquares for SeenDirections<'_, '_> {
 }
 
 /// The triangle of all readings and of what is known beforehand.
-fn whole(problem: &Problem<'_>, beta: &[f64], triangles: &[Triangle]) -> Triangle {
+pub(crate) fn whole(problem: &Problem<'_>, beta: &[f64], triangles: &[Triangle]) -> Triangle {
     let mut whole = problem.prior_triangle(beta);
     triangles.iter().for_each(|triangle| whole.merge(triangle));
     whole
@@ -127,7 +128,7 @@ pub fn prepare(session: &Session, seed: u64) -> Result<(Problem<'_>, Fit), Ident
             NoiseSource::Fit,
         );
     }
-    let mut fit = fit(&problem, None)?;
+    let mut fit = plausibility::checked(&problem, fit(&problem, None))?;
     // Noise and wild readings follow from residuals, residuals from a fit; three rounds settle both.
     for _ in 0..3 {
         let rejected = crate::outliers::wild(&problem, &fit);
@@ -143,7 +144,7 @@ pub fn prepare(session: &Session, seed: u64) -> Result<(Problem<'_>, Fit), Ident
         } else if unchanged {
             break;
         }
-        fit = self::fit(&problem, Some(&fit.beta))?;
+        fit = plausibility::checked(&problem, self::fit(&problem, Some(&fit.beta)))?;
     }
     Ok((problem, fit))
 }
@@ -296,7 +297,9 @@ pub fn report(problem: &Problem<'_>, fit: &Fit) -> FitResult {
     let rms = rms_mm(problem, &fit.residuals);
     let held = fit.held_out.rms_mm;
     let in_3d = |rms: f64| three.then(|| rms * 3.0_f64.sqrt() * 1e3);
+    let plausibility = plausibility::examine(problem, fit);
     let mut warnings = problem.session.warnings.clone();
+    warnings.extend(plausibility::warnings(&plausibility));
     warnings.extend(noise::stated_against_repeats(problem, &fit.residuals));
     warnings.extend(birge_warning(fit.birge_ratio));
     FitResult {
@@ -315,7 +318,9 @@ pub fn report(problem: &Problem<'_>, fit: &Fit) -> FitResult {
         unobservable: unobservable(problem, &fit.rank),
         rejected: rejected(problem, fit),
         circular: crate::circular::of_session(problem.session, problem.noise.sigma_mm, &problem.rejected),
+        plausibility,
         warnings,
+        about: problem.session.about.iter().cloned().collect(),
         monte_carlo: None,
     }
 }

@@ -3,6 +3,7 @@
 //! - [`least_squares`], [`triangle`], [`rank`]: the numerical core, which knows no machine;
 //! - [`parameters`], [`problem`]: a session as a least-squares problem;
 //! - [`fit`]: identify; [`heldout`]: judge on readings that the fit did not see; [`noise`]: how much is noise;
+//! - [`plausibility`]: whether readings and session belong together;
 //! - [`monte_carlo`], [`propagation`]: distributions by drawing; [`repeated`]: Type A beside Type B;
 //! - [`compensation`]: identified error motions as curves over their axis;
 //! - [`circular`]: ball-bar figures of ISO 230-4 and the classical diagnosis;
@@ -55,6 +56,7 @@ pub mod outliers;
 pub mod parameters;
 pub mod patterns;
 pub mod plan;
+pub mod plausibility;
 pub mod problem;
 pub mod propagation;
 pub mod quantity;

@@ -6,6 +6,7 @@ use schemars::JsonSchema;
 use serde::Serialize;
 
 use crate::circular::CircularTest;
+use crate::plausibility::Plausibility;
 
 /// A value with its standard uncertainty.
 #[derive(Clone, Debug, PartialEq, Serialize, JsonSchema)]
@@ -78,8 +79,14 @@ pub struct FitResult {
     /// Ball-bar figures of the tests whose path is a circle.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub circular: Vec<CircularTest>,
+    /// Statements of the session that the readings contradict, and what may be wrong.
+    #[serde(flatten)]
+    pub plausibility: Plausibility,
     /// What a user should know.
     pub warnings: Vec<String>,
+    /// Notes of the session file's `[about]`: `serial_number`, `operator`, `date`, `comment` and others.
+    #[serde(skip_serializing_if = "BTreeMap::is_empty")]
+    pub about: BTreeMap<String, String>,
     /// The same by Monte Carlo, where it was asked for. `u` in `parameters` is then what is quoted.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub monte_carlo: Option<FitMonteCarlo>,
@@ -351,6 +358,12 @@ pub struct TraceResult {
     pub unobservable: Vec<Unobservable>,
     /// Readings left out.
     pub rejected: Vec<Rejected>,
+    /// Statements of the session that the readings contradict, and what may be wrong.
+    #[serde(flatten)]
+    pub plausibility: Plausibility,
     /// What a user should know.
     pub warnings: Vec<String>,
+    /// Notes of the session file's `[about]`: `serial_number`, `operator`, `date`, `comment` and others.
+    #[serde(skip_serializing_if = "BTreeMap::is_empty")]
+    pub about: BTreeMap<String, String>,
 }

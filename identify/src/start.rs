@@ -66,7 +66,11 @@ pub fn stations(session: &Session, tests: &[&Test]) -> Vec<Station<f64>> {
 }
 
 /// The instrument's point of the tool frame in R, nominal, at every row.
-fn nominal_points(machine: &Machine, station: &Station<f64>, readings: &Readings) -> Vec<Vector3<f64>> {
+pub(crate) fn nominal_points(
+    machine: &Machine,
+    station: &Station<f64>,
+    readings: &Readings,
+) -> Vec<Vector3<f64>> {
     let none = vec![BodyErrors::<f64>::NONE; machine.axes.len()];
     let mut state = Vec::new();
     (0..readings.rows())

@@ -1,6 +1,7 @@
 //! `abbe fit --compensation`: identified errors in the forms that controls read, as far as those are publicly documented.
 //!
 //! - **LinuxCNC** `COMP_FILE` of type 0 (INI Configuration, `[JOINT_n]`): nominal, actual forward, actual reverse; the control adds nominal less actual.
+//!   It reads three numbers of a line and nothing behind them (`usrmotLoadComp` in `usrmotintf.cc`): the uncertainty stands there.
 //! - **Heidenhain** `.COM` (Technical Manual MANUALplus 620, 6.10.3): columns AXISPOS, BACKLASH, and one for each axis; points of the error curve
 //!   (Technical Manual TNC 406/306, 4-21), positive where the travel is too long (TNC 407, 1.6.3). How the file is framed is not publicly documented.
 //! - **Beckhoff** TF5280 (and ISG kernel) ISG CSV format: the errors themselves by the names of ISO 230, in mm and rad over mm and degrees.
@@ -18,6 +19,8 @@ use clap::{Args, ValueEnum};
 
 use super::failure::{Failure, visible};
 use super::folder::{self, NewFile};
+
+mod uncertainty;
 
 /// Most points of a table: LinuxCNC takes 256 triplets a joint, Heidenhain 256 points a table.
 const MOST_POINTS: usize = 256;
@@ -42,7 +45,7 @@ pub struct CompensationArguments {
     /// For which control.
     #[arg(long, value_enum, requires = "compensation")]
     control: Option<Control>,
-    /// Points of a table, over the positions that the readings cover.
+    /// Points of a table, over the positions through which the axis moved.
     #[arg(long, value_name = "N", default_value_t = 37, requires = "compensation")]
     points: usize,
 }
@@ -111,6 +114,8 @@ fn write(
             "nothing to compensate in this form: declare error motions as [[effect]], as `abbe trace --write` does, and fit again{all}"
         )));
     }
+    let mut files = files;
+    files.push(uncertainty::table(machine, compensation, points)?);
     folder::write(folder, &files, false, |_| Ok(()))?;
     if !tables {
         for line in &left_out {
@@ -142,15 +147,27 @@ fn write(
             );
         }
     }
+    say!(
+        "  standard uncertainty (k = 1) of every point: {}",
+        uncertainty::FILE
+    );
     for line in &left_out {
         say!("  left out: {line}");
     }
     Ok(())
 }
 
-/// Positions over the covered range, equidistant, inside units.
-fn positions(curve: &ErrorCurve, points: usize) -> impl Iterator<Item = f64> {
-    let (from, to) = (curve.range.start, curve.range.end);
+/// Positions that all of these curves cover, equidistant, inside units.
+fn positions<'c>(
+    curves: impl IntoIterator<Item = &'c ErrorCurve>,
+    points: usize,
+) -> impl Iterator<Item = f64> {
+    let ranges = curves.into_iter().map(|curve| &curve.range);
+    let (from, to) = ranges.fold((f64::NEG_INFINITY, f64::INFINITY), |(from, to), range| {
+        (from.max(range.start), to.min(range.end))
+    });
+    // Curves that have no position in common have no table.
+    let points = if from < to { points } else { 0 };
     (0..points).map(move |k| from + (to - from) * k as f64 / (points - 1) as f64)
 }
 
@@ -194,14 +211,16 @@ fn linuxcnc(
         };
         let kind = machine.axes[axis].kind;
         let mut text = String::new();
-        for q in positions(curve, points) {
+        for q in positions([curve], points) {
             let actual = |direction: f64| outside(kind, q + factor * curve.at(q, direction));
+            let u = curve.u_at(q, 1.0).max(curve.u_at(q, -1.0));
             let _ = writeln!(
                 text,
-                "{:.6} {:.6} {:.6}",
+                "{:.6} {:.6} {:.6} # u {:.6}",
                 outside(kind, q),
                 actual(1.0),
-                actual(-1.0)
+                actual(-1.0),
+                outside(kind, u)
             );
         }
         files.push((format!("{}.comp", machine.axes[axis].name), text));
@@ -227,9 +246,9 @@ fn heidenhain(
                 )),
             }
         }
-        let Some((first, _, _)) = columns.first() else {
+        if columns.is_empty() {
             continue;
-        };
+        }
         let kind = machine.axes[axis].kind;
         let own = columns.iter().find(|(_, column, _)| *column == axis);
         let backlash = own.filter(|(curve, ..)| curve.is_directional());
@@ -246,7 +265,7 @@ fn heidenhain(
             let _ = write!(text, " {:>12}", machine.axes[*column].name);
         }
         text.push('\n');
-        for q in positions(first, points) {
+        for q in positions(columns.iter().map(|(curve, ..)| *curve), points) {
             let _ = write!(text, "{:>12.5}", outside(kind, q));
             if let Some((curve, _, factor)) = backlash {
                 let _ = write!(text, " {:>12.6}", outside(kind, factor * curve.at(q, -1.0)));
@@ -255,7 +274,7 @@ fn heidenhain(
                 let value = if *column == axis {
                     curve.at(q, 1.0)
                 } else {
-                    mean(curve, q)
+                    curve.mean_at(q)
                 };
                 let _ = write!(
                     text,
@@ -306,7 +325,9 @@ fn beckhoff(
             .iter()
             .filter(|curve| curve.axis == index)
             .collect();
-        let Some(first) = curves.first() else { continue };
+        if curves.is_empty() {
+            continue;
+        }
         if !letter(&axis.name) {
             left_out.push(format!(
                 "error motions of {}: the format knows axes X, Y, Z, A, B, C",
@@ -322,18 +343,19 @@ fn beckhoff(
                 .chain(curves.iter().map(|curve| curve.error.to_string()))
                 .collect::<Vec<_>>(),
         ];
-        for q in positions(first, points) {
+        for q in positions(curves.iter().copied(), points) {
             let position = format!("{:.5}", outside(axis.kind, q));
             rows.push(
                 std::iter::once(position)
-                    .chain(curves.iter().map(|curve| format!("{:.9}", mean(curve, q))))
+                    .chain(curves.iter().map(|curve| format!("{:.9}", curve.mean_at(q))))
                     .collect(),
             );
         }
         blocks.push(format!(
-            "// Component errors of {}, mm and rad\n{}\n",
+            "// Component errors of {}, mm and rad\n{}\n{}\n",
             axis.name,
-            table(&rows)
+            table(&rows),
+            uncertainty::comments(axis.kind, &curves, points)
         ));
     }
     if blocks.is_empty() {
@@ -356,11 +378,6 @@ fn without_direction(curve: &ErrorCurve) -> String {
         "{}: what depends on the direction; the mean of both is in the table",
         curve.error
     )
-}
-
-/// The mean of both directions.
-fn mean(curve: &ErrorCurve, q: f64) -> f64 {
-    0.5 * (curve.at(q, 1.0) + curve.at(q, -1.0))
 }
 
 /// Cells aligned by spaces, as in the manual's examples.

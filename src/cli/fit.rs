@@ -8,8 +8,8 @@ use clap::{Args, ValueEnum};
 use super::failure::{Failure, visible};
 use super::report::ReportArguments;
 use super::{
-    CommonArguments, SessionArguments, circular, compensation, csv, geometric, output, read_session,
-    repeated, self_calibration, table, views,
+    CommonArguments, SessionArguments, circular, compensation, csv, geometric, output, plausibility,
+    read_session, repeated, self_calibration, table, views,
 };
 
 /// Examples of `abbe fit`.
@@ -147,6 +147,7 @@ pub fn run(arguments: &FitArguments) -> Result<(), Failure> {
 }
 
 fn print(result: &FitResult) {
+    plausibility::print(&result.plausibility);
     say!(
         "{} readings, noise {} ({})",
         result.readings,

@@ -5,7 +5,7 @@ macro_rules! say {
     ($($text:tt)*) => { $crate::cli::output::line(format_args!($($text)*)) };
 }
 
-mod circular;
+pub mod circular;
 mod compensation;
 mod csv;
 mod equation;
@@ -19,6 +19,7 @@ mod map;
 mod new;
 pub mod output;
 pub mod plan;
+mod plausibility;
 mod repeated;
 mod report;
 mod schema;

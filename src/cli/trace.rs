@@ -15,7 +15,8 @@ use super::failure::Failure;
 use super::interrupt::Interrupts;
 use super::report::ReportArguments;
 use super::{
-    CommonArguments, SessionArguments, compensation, csv, fit, output, read_session, table, uniqueness,
+    CommonArguments, SessionArguments, compensation, csv, fit, output, plausibility, read_session, table,
+    uniqueness,
 };
 
 /// `abbe trace SESSION`
@@ -174,6 +175,7 @@ fn list(session: &abbe::model::session::Session, options: &TraceOptions) -> Resu
 }
 
 fn print(result: &TraceResult) {
+    plausibility::print(&result.plausibility);
     say!("Verdict: {}", result.verdict);
     if let Some(headline) = uniqueness::headline(result) {
         say!("{headline}");

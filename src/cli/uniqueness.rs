@@ -46,19 +46,29 @@ pub fn standing(effect: &EffectResult, screened: usize) -> String {
     }
 }
 
-/// The first explanations, and how many more there are.
+/// The first explanations, and how many more there are. A part of the machine that is the same as before is not named again.
 fn in_short(effect: &EffectResult) -> String {
     let others = effect.aliases.iter().map(|alias| alias.meaning.as_str());
-    let mut named: Vec<&str> = std::iter::once(effect.name.meaning.as_str())
+    let mut part = "";
+    let mut named: Vec<String> = Vec::new();
+    for meaning in std::iter::once(effect.name.meaning.as_str())
         .chain(others)
-        .collect();
-    let more = named.len().saturating_sub(MOST_NAMED);
-    named.truncate(MOST_NAMED);
-    match more {
-        0 => named.join(", or "),
-        1 => format!("{}, or 1 other", named.join(", or ")),
-        more => format!("{}, or {more} others", named.join(", or ")),
+        .take(MOST_NAMED)
+    {
+        match meaning.split_once(": ") {
+            Some((same, what)) if same == part => named.push(what.to_string()),
+            split => {
+                part = split.map_or("", |(part, _)| part);
+                named.push(meaning.to_string());
+            }
+        }
     }
+    match effect.indistinguishable.saturating_sub(MOST_NAMED) {
+        0 => {}
+        1 => named.push("1 other".to_string()),
+        more => named.push(format!("{more} others")),
+    }
+    named.join(", or ")
 }
 
 /// For each proposed test a sentence that says which of the aliases it separates.

@@ -1,6 +1,7 @@
 //! The report of `abbe trace`.
 
 use abbe::identify::IdentifyError;
+use abbe::identify::plan::menu;
 use abbe::identify::results::{EffectName, EffectResult, TraceResult};
 use abbe::identify::trace::Trace;
 use abbe::identify::trace::alias::Rival;
@@ -10,6 +11,7 @@ use maud::{Markup, html};
 use super::curves;
 use super::document::{Document, list, prose, table};
 use super::drawn::Drawn;
+use super::plausibility;
 use super::plot::bars::{self, Fill};
 use super::plot::lines::{ACROSS, Lines, Mark, Series, UP, span};
 use super::plot::scale::{Scale, place, polyline};
@@ -80,6 +82,7 @@ pub fn document(trace: &Trace<'_>) -> Result<Document, IdentifyError> {
         ..Document::default()
     };
     readings::live(&mut document, &drawn, &result.after.parameters);
+    plausibility::section(&mut document, &result.plausibility);
     let figures = readings::before_and_after(
         &mut document,
         &drawn,
@@ -120,7 +123,7 @@ pub fn document(trace: &Trace<'_>) -> Result<Document, IdentifyError> {
     document.section("Residuals", section);
     let section = what_else(&mut document, trace);
     document.section("What else it could be", section);
-    document.section("What to measure next", next(result));
+    document.section("What to measure next", next(result, menu::is_offered(problem)));
     let section = curves::patterns(&mut document, problem, &trace.after_fit.beta)?;
     document.section("What each error does to each test", section);
     let section = readings::machine(&mut document, problem);
@@ -369,7 +372,7 @@ fn ranking(rivals: &[Rival], id: &str) -> Plot {
     )
 }
 
-fn next(result: &TraceResult) -> Markup {
+fn next(result: &TraceResult, offered: bool) -> Markup {
     let mut tests: Vec<String> = Vec::new();
     for (number, effect) in result.effects.iter().enumerate() {
         let sentences = uniqueness::tests(effect, name).into_iter();
@@ -381,7 +384,7 @@ fn next(result: &TraceResult) -> Markup {
         @if tests.is_empty() {
             p {
                 "Nothing that was found has another explanation that a further test could separate from it. "
-                @if !result.unobservable.is_empty() {
+                @if offered && !result.unobservable.is_empty() {
                     (prose("`abbe plan SESSION --improve 1` names the cheapest test that sees what these readings do not."))
                 }
             }

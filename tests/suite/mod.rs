@@ -29,6 +29,7 @@ mod plan_next;
 mod plan_powers;
 mod plan_rank;
 mod plan_uncertainty;
+mod plausibility;
 mod propagation;
 mod properties;
 mod recovery;

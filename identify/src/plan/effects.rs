@@ -158,7 +158,7 @@ fn judge(
 ) -> EffectDetectability {
     let session = problem.session;
     let effect = &candidate.effect;
-    let unit = drivers::coefficient_unit(session, effect);
+    let unit = drivers::coefficient_unit(session, effect, 0);
     // What moves the component by its physical size somewhere in the tests, whatever the scale of the coefficient.
     let size = match drivers::component_unit(session, &effect.component) {
         Some(inside) if greatest > 0.0 => physical_size(inside) / greatest,

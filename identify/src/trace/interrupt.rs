@@ -50,7 +50,13 @@ impl TraceResult {
 impl<'a> Trace<'a> {
     /// A trace that was interrupted before its search began: the declared model and nothing else.
     pub(super) fn unsearched(problem: Problem<'a>, fit: Fit) -> Trace<'a> {
-        let result = unsearched(&problem, &fit);
+        let mut result = unsearched(&problem, &fit);
+        result.mark_interrupted();
+        Trace::of_declared(problem, fit, result)
+    }
+
+    /// The declared model and nothing else, with its result.
+    pub(super) fn of_declared(problem: Problem<'a>, fit: Fit, result: TraceResult) -> Trace<'a> {
         Trace {
             after: problem.clone(),
             after_fit: fit.clone(),

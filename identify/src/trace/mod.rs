@@ -12,6 +12,7 @@ mod compose;
 mod exchange;
 mod fewer;
 pub mod further;
+mod implausible;
 mod interrupt;
 mod judge;
 pub mod library;
@@ -39,6 +40,7 @@ use crate::noise::{NoiseSource, PureError};
 use crate::problem::Problem;
 use crate::results::TraceResult;
 use columns::{Columns, Layout};
+use implausible::Contradicted;
 use interrupt::Interrupt;
 use judge::Judged;
 use library::Candidate;
@@ -143,11 +145,16 @@ pub fn trace<'a>(
 ) -> Result<Trace<'a>, IdentifyError> {
     progress(Progress::Fitting);
     let (mut problem, mut before_fit) = prepare(session, options.seed)?;
+    let contradicted = Contradicted::of(&mut problem, &mut before_fit)?;
+    if contradicted.stops() {
+        return Ok(contradicted.stopped(problem, before_fit));
+    }
     if give_noise_memory(&mut problem, &before_fit.residuals) {
         before_fit = fit(&problem, Some(&before_fit.beta))?;
     }
     let residuals = before_fit.residuals.clone();
-    let first = trace_with(problem, before_fit, &residuals, options, progress)?;
+    let mut first = trace_with(problem, before_fit, &residuals, options, progress)?;
+    contradicted.tell(&mut first.result);
     // What moved between runs was taken for noise as long as the model lacked it.
     let mut problem = first.before.clone();
     if first.result.interrupted
@@ -157,14 +164,14 @@ pub fn trace<'a>(
         return Ok(first);
     }
     let before_fit = fit(&problem, Some(&first.before_fit.beta))?;
-    let again = trace_with(problem, before_fit, &first.after_fit.residuals, options, progress)?;
-    if !again.result.interrupted {
-        return Ok(again);
+    let mut again = trace_with(problem, before_fit, &first.after_fit.residuals, options, progress)?;
+    if again.result.interrupted {
+        // The first search is whole, if with a noise that is less well known.
+        first.result.mark_interrupted();
+        return Ok(first);
     }
-    // The first search is whole, if with a noise that is less well known.
-    let mut first = first;
-    first.result.mark_interrupted();
-    Ok(first)
+    contradicted.tell(&mut again.result);
+    Ok(again)
 }
 
 /// Closes the loop with a given noise; `pure` are the residuals whose repeats show it.

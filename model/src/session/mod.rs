@@ -12,6 +12,7 @@ mod reach;
 pub mod read;
 pub mod readings;
 pub mod rewrite;
+mod runs;
 pub mod schema;
 mod spelling;
 pub mod stamp;
@@ -59,6 +60,9 @@ pub struct Session {
     pub socket_distances: Vec<SocketDistance>,
     /// What a user should know although the session can be used.
     pub warnings: Vec<String>,
+    /// What `[about]` says of the measurement, by name in the order of the file: `serial_number`, `operator`, `date`, `comment` and others.
+    /// No calculation uses it; reports and results repeat it.
+    pub about: Vec<(String, String)>,
 }
 
 /// One test.

@@ -197,64 +197,6 @@ pub(crate) fn beyond_travel(machine: &Machine, readings: &Readings) -> Option<St
         })
 }
 
-/// What of a test's runs its data lack, if any: fewer traversals in a direction than the movement states. Data without a `run` column tell nothing.
-pub(crate) fn missing_runs(motion: Option<&Motion>, readings: &Readings) -> Option<String> {
-    let (Motion::Sweep {
-        runs,
-        both_directions,
-        ..
-    }
-    | Motion::Circle {
-        runs,
-        both_directions,
-        ..
-    }
-    | Motion::Follow {
-        runs,
-        both_directions,
-        ..
-    }) = motion?
-    else {
-        return None;
-    };
-    if readings.run.is_empty() {
-        return None;
-    }
-    // How far a run goes on in the direction of the first: along an axis, or round by the area that it sweeps.
-    let on = |run: &std::ops::Range<usize>| match motion? {
-        Motion::Sweep { axis, from, to, .. } | Motion::Follow { axis, from, to, .. } => {
-            let positions = &readings.positions[*axis][run.clone()];
-            Some((positions.last()? - positions.first()?) * (to - from))
-        }
-        Motion::Circle {
-            first,
-            second,
-            from,
-            to,
-            ..
-        } => {
-            let [x, y] = [*first, *second].map(|axis| &readings.positions[axis][run.clone()]);
-            let area = |k: usize| (x[k] - x[0]) * (y[k + 1] - y[0]) - (x[k + 1] - x[0]) * (y[k] - y[0]);
-            Some((0..x.len() - 1).map(area).sum::<f64>() * (to - from))
-        }
-        Motion::List => None,
-    };
-    let found: Vec<f64> = readings.runs().iter().filter_map(on).collect();
-    let forward = found.iter().filter(|on| **on > 0.0).count();
-    let backward = found.iter().filter(|on| **on < 0.0).count();
-    let enough = if *both_directions {
-        forward >= *runs && backward >= *runs
-    } else {
-        found.len() >= *runs
-    };
-    (!enough).then(|| {
-        format!(
-            "the data hold {forward} runs forward and {backward} backward where the session states runs = {runs}, both_directions = \
-             {both_directions}"
-        )
-    })
-}
-
 /// The axes that a movement names.
 pub(crate) fn moved(motion: Option<&Motion>) -> Vec<usize> {
     match motion {

@@ -2,6 +2,7 @@
 
 use super::Test;
 use super::readings::Readings;
+use crate::axis::AxisKind;
 use crate::chain::{BodyErrors, Machine};
 use crate::instrument::Station;
 
@@ -19,8 +20,108 @@ pub(crate) fn bar_mm(station: &Station<f64>) -> f64 {
     }
 }
 
-/// That the nominal distance between the balls, by the median over the readings, is the length of the bar.
+/// That the instrument nominally reaches: the distance between the balls is the bar's length, the stylus stands before its artefact, the ball lies in
+/// its nest. Where a single slip in the positions of an axis (its sign, its unit) would account for it, the help names that slip.
 pub(crate) fn check(machine: &Machine, test: &Test, readings: &Readings) -> Result<(), (String, String)> {
+    let Err((message, help)) = reaches(machine, test, readings) else {
+        return Ok(());
+    };
+    let help = match slips(machine, test, readings) {
+        found if found.is_empty() => help,
+        found => format!("it would reach if {}; {help}", found.join(", or if ")),
+    };
+    Err((message, help))
+}
+
+/// What a slip does to the positions of an axis, and how it is called.
+type Slip = (f64, &'static str);
+
+const SIGN: &str = "with the opposite sign (check its `direction` and its column)";
+/// Slips that are tried on linear axes. A sign error looks like a unit error: positions are off by a factor.
+const LINEAR: [Slip; 7] = [
+    (-1.0, SIGN),
+    (1e3, "in m rather than mm"),
+    (1e-3, "in µm rather than mm"),
+    (25.4, "in inches rather than mm"),
+    (0.0254, "in mil rather than mm"),
+    (1.0 / 25.4, "in mm rather than inches"),
+    (1.0 / 0.0254, "in mm rather than mil"),
+];
+/// Slips that are tried on rotary axes.
+const ROTARY: [Slip; 3] = [
+    (-1.0, SIGN),
+    (180.0 / std::f64::consts::PI, "in radians rather than degrees"),
+    (std::f64::consts::PI / 180.0, "in degrees rather than radians"),
+];
+
+/// Most readings that slips are tried on.
+const MOST_TRIED: usize = 500;
+
+/// The slips, of one axis or of all axes of a kind, after whose correction the instrument reaches.
+fn slips(machine: &Machine, test: &Test, readings: &Readings) -> Vec<String> {
+    let rows: Vec<usize> = (0..readings.rows())
+        .step_by(readings.rows().div_ceil(MOST_TRIED).max(1))
+        .collect();
+    let readings = readings.of_rows(&rows);
+    let matters = |axis: usize| readings.positions[axis].iter().any(|q| *q != 0.0);
+    let mut found: Vec<(f64, String)> = Vec::new();
+    for (kind, slips) in [(AxisKind::Linear, &LINEAR[..]), (AxisKind::Rotary, &ROTARY[..])] {
+        let axes: Vec<usize> = (0..machine.axes.len())
+            .filter(|axis| machine.axes[*axis].kind == kind && matters(*axis))
+            .collect();
+        let together = (axes.len() > 1).then(|| axes.clone());
+        let groups = axes.iter().map(|axis| vec![*axis]).chain(together);
+        for group in groups.collect::<Vec<_>>() {
+            let names: Vec<&str> = group
+                .iter()
+                .map(|axis| machine.axes[*axis].name.as_str())
+                .collect();
+            for (factor, words) in slips {
+                let mut corrected = readings.clone();
+                for axis in &group {
+                    for position in &mut corrected.positions[*axis] {
+                        *position *= factor;
+                    }
+                }
+                if reaches(machine, test, &corrected).is_ok() {
+                    let said = format!("the positions of {} were taken {words}", names.join(" and "));
+                    found.push((misfit(machine, test, &corrected), said));
+                }
+            }
+        }
+    }
+    // A scale that all but stops an axis lets a bar reach in many a set-up: only what fits as well as the best counts.
+    let best = found
+        .iter()
+        .map(|(misfit, _)| *misfit)
+        .fold(f64::INFINITY, f64::min);
+    found.retain(|(misfit, _)| *misfit <= ALIKE * best + MISFIT_MM);
+    found.into_iter().map(|(_, said)| said).collect()
+}
+
+/// Slips whose misfits differ by less than this factor and this length, mm, fit alike.
+const ALIKE: f64 = 2.0;
+const MISFIT_MM: f64 = 0.05;
+
+/// How far the instrument nominally is from reaching, mm: rms over the readings.
+fn misfit(machine: &Machine, test: &Test, readings: &Readings) -> f64 {
+    let none = vec![BodyErrors::<f64>::NONE; machine.axes.len()];
+    let mut state = Vec::new();
+    let mut sum = 0.0;
+    for row in 0..readings.rows() {
+        readings.state(machine, row, &mut state);
+        let reading = test.station.read::<f64>(machine, &state, &none, |_| None);
+        let nominal = bar_mm(&test.station);
+        sum += reading
+            .coordinates()
+            .iter()
+            .map(|x| (x - nominal).powi(2))
+            .sum::<f64>();
+    }
+    (sum / readings.rows().max(1) as f64).sqrt()
+}
+
+fn reaches(machine: &Machine, test: &Test, readings: &Readings) -> Result<(), (String, String)> {
     let bar = match &test.station {
         Station::BallBar(bar) => bar,
         Station::Probe(_) => return check_touch(machine, test, readings),

@@ -1,6 +1,7 @@
 //! What a user can get wrong in a session, one test each, by what is read: the message names the file, the line and the way out.
 
 mod document;
+mod foreign;
 mod hostile;
 mod instrument;
 mod machine;

@@ -14,6 +14,7 @@ use crate::error::IdentifyError;
 use crate::fit::{self, Fit};
 use crate::heldout::rms_mm;
 use crate::noise;
+use crate::plausibility::Plausibility;
 use crate::problem::Problem;
 use crate::results::{EffectResult, ModelResult, Moved, ParameterResult, Remainder, TraceResult};
 pub(super) use effect::effect_name;
@@ -118,7 +119,9 @@ pub(super) fn report(findings: &Findings<'_, '_>) -> Result<Reported, IdentifyEr
         candidates_seen: findings.candidates_seen,
         unobservable: fit::unobservable(after, &after_fit.rank),
         rejected: fit::rejected(after, after_fit),
+        plausibility: Plausibility::default(),
         warnings,
+        about: before.session.about.iter().cloned().collect(),
     };
     if findings.interrupted {
         result.mark_interrupted();
@@ -171,7 +174,7 @@ fn residual_variance(findings: &Findings<'_, '_>) -> f64 {
     (sum / findings.search.columns.rows().max(1) as f64).max(1.0)
 }
 
-fn model_result(problem: &Problem<'_>, fit: &Fit, held_out_mm: f64) -> ModelResult {
+pub(super) fn model_result(problem: &Problem<'_>, fit: &Fit, held_out_mm: f64) -> ModelResult {
     let three = problem.coordinates() == 3;
     let rms = rms_mm(problem, &fit.residuals) * 1e3;
     let held = held_out_mm * 1e3;

@@ -1,20 +1,21 @@
-//! What is reported of a trace that was interrupted before its search began: the declared model.
+//! What is reported of a trace without a search: the declared model.
 
 use super::{model_result, not_examined};
 use crate::fit::{self, Fit};
 use crate::noise;
+use crate::plausibility::Plausibility;
 use crate::problem::Problem;
 use crate::results::TraceResult;
 
-/// The declared model alone, marked as interrupted.
+/// The declared model alone, without a verdict.
 pub(in crate::trace) fn unsearched(problem: &Problem<'_>, fit: &Fit) -> TraceResult {
     let declared = model_result(problem, fit, fit.held_out.rms_mm);
     let remainder = not_examined();
     let mut warnings = problem.session.warnings.clone();
     warnings.extend(noise::stated_against_repeats(problem, &fit.residuals));
-    let mut result = TraceResult {
+    TraceResult {
         verdict: String::new(),
-        interrupted: true,
+        interrupted: false,
         noise_um: problem.noise.sigma_mm * 1e3,
         noise_source: problem.noise.source.word().to_string(),
         noise_memory: problem.noise.memory.clone(),
@@ -30,8 +31,8 @@ pub(in crate::trace) fn unsearched(problem: &Problem<'_>, fit: &Fit) -> TraceRes
         candidates_seen: 0,
         unobservable: fit::unobservable(problem, &fit.rank),
         rejected: fit::rejected(problem, fit),
+        about: problem.session.about.iter().cloned().collect(),
+        plausibility: Plausibility::default(),
         warnings,
-    };
-    result.mark_interrupted();
-    result
+    }
 }

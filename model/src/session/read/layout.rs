@@ -2,9 +2,9 @@
 
 use crate::error::ModelError;
 use crate::session::document::{Table, Value};
-use crate::session::table::{Format, Mapped, Theirs};
+use crate::session::table::{Format, Mapped, Theirs, encoding};
 
-/// `[format]`: separator, decimal, header; sheet of a spreadsheet; direction in a ball-bar file.
+/// `[format]`: separator, decimal, header, encoding, lines above the header; sheet of a spreadsheet; direction in a ball-bar file.
 pub(super) fn format(mut table: Table<'_>) -> Result<Format, ModelError> {
     let mut format = Format::default();
     if let Some(value) = table.take("separator") {
@@ -21,7 +21,24 @@ pub(super) fn format(mut table: Table<'_>) -> Result<Format, ModelError> {
         format.sheet = Some(value.text()?);
     }
     if let Some(value) = table.take("anticlockwise") {
-        format.anticlockwise = Some(value.text()?);
+        // Files number directions, or say whether one is meant.
+        format.anticlockwise = Some(match value.truth() {
+            Ok(truth) => truth.to_string(),
+            Err(_) if value.as_text().is_none() => value.count(0, 1_000_000)?.to_string(),
+            Err(_) => value.text()?.trim().to_string(),
+        });
+    }
+    if let Some(value) = table.take("encoding") {
+        let name = value.text()?;
+        let Some(encoding) = encoding::of_name(&name) else {
+            let message = format!("`encoding` is \"{name}\", which no encoding is called");
+            let help = "common are \"utf-8\", \"latin1\", \"utf-16le\", \"utf-16be\"; others go by their name in the WHATWG Encoding Standard, as \"shift_jis\"";
+            return Err(value.error(message, Some(help.into())));
+        };
+        format.encoding = Some(encoding);
+    }
+    if let Some(value) = table.take("skip_lines") {
+        format.skip_lines = value.count(0, 1_000_000)?;
     }
     if format.decimal == format.separator
         && let Some(value) = decimal

@@ -134,6 +134,7 @@ pub fn session(path: &Path, options: &ReadOptions) -> Result<Session, ModelError
     } = session_machine(path, options, &mut root)?;
     let constants = constants(&mut root)?;
     let instrument = Instrument::read(&mut root)?;
+    let about = about(&mut root)?;
     let unknowns = unknowns::unknowns(&machine, instrument.kind, &mut root)?;
 
     let format = match root.take("format") {
@@ -193,6 +194,7 @@ pub fn session(path: &Path, options: &ReadOptions) -> Result<Session, ModelError
         tests,
         socket_distances,
         warnings,
+        about,
         machine,
     })
 }
@@ -255,6 +257,28 @@ fn constants(root: &mut Table<'_>) -> Result<Vec<(String, f64)>, ModelError> {
         constants.push((name, entry.number()?));
     }
     Ok(constants)
+}
+
+/// `[about]`: notes that reports repeat.
+fn about(root: &mut Table<'_>) -> Result<Vec<(String, String)>, ModelError> {
+    let Some(value) = root.take("about") else {
+        return Ok(Vec::new());
+    };
+    let notes = value.table("[about]".into())?.take_all()?;
+    notes
+        .into_iter()
+        .map(|note| {
+            let control = note.key.chars().any(char::is_control);
+            if control || note.key.trim().is_empty() {
+                let message = "a note of [about] has a name that cannot be shown";
+                let help = "as in `serial_number`, `operator`, `date`, `comment`";
+                return Err(note
+                    .source
+                    .error(note.key_span.clone(), message, Some(help.into())));
+            }
+            Ok((note.key.clone(), note.note()?))
+        })
+        .collect()
 }
 
 /// What `kind` of an instrument may be.

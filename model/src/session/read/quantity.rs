@@ -6,6 +6,8 @@ use crate::session::spelling::meant;
 
 /// µm in mm.
 pub(crate) const MICROMETRE: f64 = 1e-3;
+/// An inch in mm (exact since 1959).
+const INCH: f64 = 25.4;
 
 /// `linear` or `rotary`.
 pub(crate) fn kind_word(kind: AxisKind) -> &'static str {
@@ -39,9 +41,8 @@ pub(crate) fn axis_position(machine: &Machine, name: &str) -> Option<(usize, Uni
     let (axis, unit) = name.rsplit_once('_')?;
     let axis = axis_index(machine, axis)?;
     let unit = match (machine.axes[axis].kind, unit) {
-        (AxisKind::Linear, "mm") | (AxisKind::Rotary, "rad") => Unit::Times(1.0),
-        (AxisKind::Linear, "um") => Unit::Times(MICROMETRE),
-        (AxisKind::Linear, "m") => Unit::Times(1e3),
+        (AxisKind::Linear, unit) => Unit::of_length(unit)?,
+        (AxisKind::Rotary, "rad") => Unit::Times(1.0),
         (AxisKind::Rotary, "deg") => Unit::Degrees,
         _ => return None,
     };
@@ -66,12 +67,14 @@ impl Unit {
         }
     }
 
-    /// A length's unit: `mm`, `um`, `m`.
+    /// A length's unit: `mm`, `um`, `m`, `in`, `mil` (a thousandth of an inch).
     pub fn of_length(unit: &str) -> Option<Unit> {
         match unit {
             "mm" => Some(Unit::Times(1.0)),
             "um" => Some(Unit::Times(MICROMETRE)),
             "m" => Some(Unit::Times(1e3)),
+            "in" => Some(Unit::Times(INCH)),
+            "mil" => Some(Unit::Times(INCH * 1e-3)),
             _ => None,
         }
     }

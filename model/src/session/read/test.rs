@@ -12,7 +12,7 @@ use crate::session::expression::Length;
 use crate::session::motion::{self, Motion};
 use crate::session::readings::Readings;
 use crate::session::table::{self, Request};
-use crate::session::{Test, reach};
+use crate::session::{Test, reach, runs};
 
 /// The name of a test, unlike every other.
 pub(super) fn name(table: &mut Table<'_>, declared: &[Declared]) -> Result<String, ModelError> {
@@ -129,7 +129,8 @@ pub(super) fn tests(
         bar_mm: reach::bar_mm(&test.station),
         sensors: matches!(&test.station, Station::RTest(rtest) if rtest.sensors.is_some()),
         format,
-        columns: columns.as_deref(),
+        // An empty table names no column: the file has our names.
+        columns: columns.as_deref().filter(|columns| !columns.is_empty()),
         at: &test.at,
         at_listed: &listed,
         moved: &motion::moved(test.motion.as_ref()),
@@ -143,7 +144,13 @@ pub(super) fn tests(
         test.readings = Some(readings);
         return Ok(vec![test]);
     }
-    for (socket, readings) in table::read(&file, &request)? {
+    let (by_socket, doubts) = table::read(&file, &request)?;
+    warnings.extend(
+        doubts
+            .into_iter()
+            .map(|doubt| format!("test \"{name}\": {doubt}")),
+    );
+    for (socket, readings) in by_socket {
         check_readings(context, &test, &readings, warnings).map_err(here)?;
         let Some(socket) = socket else {
             test.readings = Some(readings);
@@ -176,7 +183,7 @@ fn check_readings(
     reach::check_lengths(test, readings)?;
     let doubts = [
         motion::beyond_travel(context.machine, readings),
-        motion::missing_runs(test.motion.as_ref(), readings),
+        runs::unlike_stated(test.motion.as_ref(), readings),
     ];
     warnings.extend(
         doubts

@@ -2,7 +2,10 @@
 
 use std::path::Path;
 
-use super::Request;
+use super::encoding::name_of;
+use super::required::required;
+use super::rows::Row;
+use super::{Request, number};
 use crate::error::{ModelError, Place};
 use crate::instrument::InstrumentKind;
 use crate::session::read::quantity::{self, Unit};
@@ -110,7 +113,7 @@ pub(crate) fn r_test_columns(sensors: bool) -> [&'static str; 3] {
 }
 
 /// What an R-test's columns need to be, where they are the other kind's.
-fn r_test_help(request: &Request<'_>) -> &'static str {
+pub(super) fn r_test_help(request: &Request<'_>) -> &'static str {
     if request.sensors {
         "the test says how the sensors stand: it needs what they count, `du_um`, `dv_um` and `dw_um`; without `sensor_angles_deg` and \
          `sensor_directions` it takes `dx_um`, `dy_um` and `dz_um`"
@@ -121,7 +124,7 @@ fn r_test_help(request: &Request<'_>) -> &'static str {
 }
 
 /// Every name that a column may have in this test.
-fn known(request: &Request<'_>) -> Vec<String> {
+pub(super) fn known(request: &Request<'_>) -> Vec<String> {
     let mut known: Vec<String> = ["time_s", "run"].map(str::to_string).to_vec();
     for axis in &request.machine.axes {
         let unit = axis.kind.unit();
@@ -140,7 +143,7 @@ fn known(request: &Request<'_>) -> Vec<String> {
     known
 }
 
-fn listed(names: &[String]) -> String {
+pub(super) fn listed(names: &[String]) -> String {
     const MOST: usize = 40;
     let mut text = names.iter().take(MOST).cloned().collect::<Vec<_>>().join(", ");
     if names.len() > MOST {
@@ -149,17 +152,17 @@ fn listed(names: &[String]) -> String {
     text
 }
 
-/// The columns to be read, from the header (or the first row's length without one).
+/// The columns to be read: of the first row, which is the header where the file has one.
 pub(super) fn columns(
     request: &Request<'_>,
     file: &Path,
-    line: usize,
-    header: Option<&[String]>,
-    width: usize,
+    first: &Row,
+    header: Option<&Row>,
 ) -> Result<Vec<Column>, ModelError> {
-    let columns = match &request.columns {
-        Some(mapped) => mapped_columns(request, file, mapped, header, width)?,
-        None => own_columns(request, file, line, header)?,
+    let line = first.line;
+    let columns = match request.columns {
+        Some(mapped) => mapped_columns(request, file, mapped, header, first)?,
+        None => own_columns(request, file, line, header.map(|row| row.cells.as_slice()))?,
     };
     for (index, column) in columns.iter().enumerate() {
         if let Some(other) = columns[..index]
@@ -173,7 +176,13 @@ pub(super) fn columns(
             });
         }
     }
-    required(request, file, line, &columns, header)?;
+    required(
+        request,
+        file,
+        line,
+        &columns,
+        header.map(|row| row.cells.as_slice()),
+    )?;
     Ok(columns)
 }
 
@@ -221,9 +230,7 @@ fn unknown_column_help(request: &Request<'_>, name: &str, header: &[String], kno
         );
     }
     if name.parse::<f64>().is_ok() {
-        return "a number where a name is expected: a file without a header declares `[format] header = false` \
-                and numbers its columns in [columns]"
-            .into();
+        return NO_HEADER.into();
     }
     let stem = name.rsplit_once('_').map_or(name, |(stem, _)| stem);
     if request.instrument == InstrumentKind::RTest && r_test_columns(!request.sensors).contains(&stem) {
@@ -236,14 +243,18 @@ fn unknown_column_help(request: &Request<'_>, name: &str, header: &[String], kno
     )
 }
 
+/// What to do with a file whose first row names nothing.
+const NO_HEADER: &str = "a number where a name is expected: a file without a header declares `[format] header = false` and numbers its columns in \
+                         [columns], as in `length_mm = 3`; lines above the header are passed over with `skip_lines`";
+
 fn mapped_columns(
     request: &Request<'_>,
     file: &Path,
     mapped: &[Mapped],
-    header: Option<&[String]>,
-    width: usize,
+    header: Option<&Row>,
+    first: &Row,
 ) -> Result<Vec<Column>, ModelError> {
-    let mut columns = Vec::new();
+    let mut columns: Vec<Column> = Vec::new();
     for entry in mapped {
         let fault = |message: String, help: String| ModelError::Input {
             place: entry.place.clone(),
@@ -259,131 +270,107 @@ fn mapped_columns(
                 format!("{}ours are {}", meant(&entry.ours, &known), listed(&known)),
             ));
         };
-        let index = match (&entry.theirs, header) {
-            (Theirs::Number(number), _) => {
-                if *number > width {
-                    return Err(fault(
-                        format!("column {number} of {}, which has {width}", file.display()),
-                        "columns are numbered from 1".into(),
-                    ));
-                }
-                number - 1
-            }
-            (Theirs::Name(name), None) => {
-                return Err(fault(
-                    format!("column `{name}` of a file declared to have no header"),
-                    "give its number, counted from 1".into(),
-                ));
-            }
-            (Theirs::Name(name), Some(header)) => match header.iter().position(|found| found == name) {
-                Some(index) => index,
-                None => {
-                    return Err(fault(
-                        format!("{} has no column `{name}`", file.display()),
-                        format!("{}it has {}", meant(name, header), listed(header)),
-                    ));
-                }
-            },
-        };
+        let index = match &entry.theirs {
+            Theirs::Number(number) => number_in(*number, file, first.cells.len()),
+            Theirs::Name(name) => name_in(name, request, file, header),
+        }
+        .map_err(|(message, help)| fault(message, help))?;
+        if let Some(other) = columns.iter().position(|column| column.index == index) {
+            return Err(fault(
+                format!(
+                    "[columns] reads column {} of {} twice: as `{}` and as `{}`",
+                    index + 1,
+                    file.display(),
+                    mapped[other].ours,
+                    entry.ours
+                ),
+                "a column holds one thing: name another column for one of them, or leave it out".into(),
+            ));
+        }
         let name = match &entry.theirs {
             Theirs::Name(name) => name.clone(),
             Theirs::Number(_) => entry.ours.clone(),
         };
         columns.push(Column { role, index, name });
     }
-    Ok(columns)
+    match header {
+        Some(header) if are_readings(request, mapped, &columns, header) => Err(ModelError::Input {
+            place: Place::line(file, header.line),
+            message: "the first row holds numbers where a header is expected; it would not be read".into(),
+            help: Some(
+                "a file without a header declares `[format] header = false`; lines above the header are passed over with `skip_lines`"
+                    .into(),
+            ),
+        }),
+        _ => Ok(columns),
+    }
 }
 
-fn required(
+/// Whether what stands for a header is a row of readings: columns are called by number alone, and all of them hold numbers.
+fn are_readings(request: &Request<'_>, mapped: &[Mapped], columns: &[Column], header: &Row) -> bool {
+    let mut of_numbers = columns
+        .iter()
+        .filter(|column| column.role != Role::Socket)
+        .peekable();
+    of_numbers.peek().is_some()
+        && mapped
+            .iter()
+            .all(|entry| matches!(entry.theirs, Theirs::Number(_)))
+        && of_numbers.all(|column| number(&header.cells[column.index], &request.format).is_ok())
+}
+
+/// The place of a column by its number; a message and what to do where there is none.
+fn number_in(number: usize, file: &Path, width: usize) -> Result<usize, (String, String)> {
+    if number > width {
+        let message = format!("column {number} of {}, which has {width}", file.display());
+        return Err((message, "columns are numbered from 1".into()));
+    }
+    Ok(number - 1)
+}
+
+/// The place of a column by its name in the header; a message and what to do where there is none, or more than one.
+fn name_in(
+    name: &str,
     request: &Request<'_>,
     file: &Path,
-    line: usize,
-    columns: &[Column],
-    header: Option<&[String]>,
-) -> Result<(), ModelError> {
-    let has = |wanted: &dyn Fn(Role) -> bool| columns.iter().any(|column| wanted(column.role));
-    let found = || match header {
-        Some(header) => format!("; found: {}", listed(header)),
-        None => String::new(),
+    header: Option<&Row>,
+) -> Result<usize, (String, String)> {
+    let Some(row) = header else {
+        return Err((
+            format!("column `{name}` of a file declared to have no header"),
+            "give its number, counted from 1".into(),
+        ));
     };
-    let missing = |what: String, help: String| {
-        Err(ModelError::Input {
-            place: Place::line(file, line),
-            message: format!("no column {what}{}", found()),
-            help: Some(help),
-        })
-    };
-    match request.instrument {
-        InstrumentKind::BallBar => {
-            if !has(&|role| matches!(role, Role::Length(_) | Role::Deviation(_))) {
-                return missing(
-                    "with what the bar read".into(),
-                    "a ball bar needs `length_mm`, or `deviation_um` from `bar_mm`".into(),
-                );
+    let header = &row.cells;
+    let found: Vec<usize> = (0..header.len()).filter(|index| header[*index] == name).collect();
+    match found[..] {
+        [index] => Ok(index),
+        [] => {
+            let mut help = format!("{}it has {}", meant(name, header), listed(header));
+            if header.iter().all(|cell| number(cell, &request.format).is_ok()) {
+                help = NO_HEADER.into();
+            } else if let Some(encoding) = row.encoding {
+                help.push_str(&format!(
+                    "; the header was read as {}: if names look garbled, declare what it is written in, as `[format] encoding = \"utf-8\"`",
+                    name_of(encoding)
+                ));
             }
+            Err((format!("{} has no column `{name}`", file.display()), help))
         }
-        InstrumentKind::Probe => {
-            if !has(&|role| matches!(role, Role::Length(_) | Role::Outward(_))) {
-                return missing(
-                    "with what the probe read".into(),
-                    "a probe needs `distance_mm` to the surface, or `deviation_um`, by how much further out it was met"
-                        .into(),
-                );
-            }
-        }
-        InstrumentKind::Tracker => {
-            for (index, name) in ["px_mm", "py_mm", "pz_mm"].into_iter().enumerate() {
-                if !has(&|role| matches!(role, Role::Coordinate(i, _) if i == index)) {
-                    return missing(
-                        format!("`{name}`"),
-                        "a tracker needs px_mm, py_mm and pz_mm".into(),
-                    );
-                }
-            }
-        }
-        InstrumentKind::RTest => {
-            for (index, name) in r_test_columns(request.sensors).into_iter().enumerate() {
-                if !has(&|role| matches!(role, Role::Coordinate(i, _) if i == index)) {
-                    return missing(format!("`{name}_um`"), r_test_help(request).into());
-                }
-            }
-        }
-        InstrumentKind::Socket => {
-            if request.socket.is_none() && !has(&|role| role == Role::Socket) {
-                return missing(
-                    "`socket`".into(),
-                    "add the column, or `socket = \"…\"` to the test if all its poses are of one".into(),
-                );
-            }
-        }
-    }
-    for (index, axis) in request.machine.axes.iter().enumerate() {
-        let stated = request.at_listed.get(index).copied().unwrap_or(false);
-        if stated || has(&|role| matches!(role, Role::Axis(i, _) if i == index)) {
-            continue;
-        }
-        let name = axis.column("");
-        if request.moved.contains(&index) {
-            return missing(
-                format!("`{name}`, though axis `{}` moves in this test", axis.name),
-                "add its positions to the data".into(),
-            );
-        }
-        if request.instrument != InstrumentKind::BallBar {
-            return missing(
-                format!("`{name}`"),
+        [first, ..] => {
+            let numbers: Vec<String> = found.iter().map(|index| (index + 1).to_string()).collect();
+            Err((
                 format!(
-                    "add the positions of axis `{}` to the data, or where it stands: `at = {{ {name} = 0 }}`",
-                    axis.name
+                    "{} has {} columns called `{name}`: {}",
+                    file.display(),
+                    found.len(),
+                    numbers.join(", ")
                 ),
-            );
+                format!(
+                    "give the number of the one that is meant, counted from 1, as {}",
+                    first + 1
+                ),
+            ))
         }
     }
-    if !has(&|role| matches!(role, Role::Axis(..))) {
-        return missing(
-            "with the position of an axis".into(),
-            format!("known here: {}", listed(&known(request))),
-        );
-    }
-    Ok(())
 }

@@ -5,10 +5,15 @@
 
 mod ballbar_xml;
 mod columns;
+mod duplicates;
+pub(crate) mod encoding;
+mod required;
 mod rows;
 mod sheet;
 
 use std::path::Path;
+
+use encoding_rs::Encoding;
 
 pub(crate) use ballbar_xml::{is_xml, read as read_xml};
 pub(crate) use columns::{Mapped, Theirs, r_test_columns};
@@ -36,6 +41,10 @@ pub(crate) struct Format {
     pub sheet: Option<String>,
     /// How a ball-bar file in XML calls the direction from the first axis of the plane towards the second.
     pub anticlockwise: Option<String>,
+    /// The encoding of the text, where it is stated.
+    pub encoding: Option<&'static Encoding>,
+    /// Lines (of a spreadsheet: rows) above the header.
+    pub skip_lines: usize,
 }
 
 impl Default for Format {
@@ -46,6 +55,8 @@ impl Default for Format {
             header: true,
             sheet: None,
             anticlockwise: None,
+            encoding: None,
+            skip_lines: 0,
         }
     }
 }
@@ -80,12 +91,12 @@ const MOST_SOCKETS: usize = 1000;
 /// Readings of one data file: one for each socket that it names, else one.
 pub(crate) type BySocket = Vec<(Option<String>, Readings)>;
 
-/// Reads a data file.
+/// Reads a data file. Beside the readings: what a user should know of the file.
 ///
 /// # Errors
 /// Anything that is not a finite number where one is expected, with file, line and column; missing or unknown columns; time that
 /// runs backwards; fewer than two readings.
-pub(crate) fn read(file: &Path, request: &Request<'_>) -> Result<BySocket, ModelError> {
+pub(crate) fn read(file: &Path, request: &Request<'_>) -> Result<(BySocket, Vec<String>), ModelError> {
     let (stamp, mut rows) = if sheet::is_spreadsheet(file) {
         let (stamp, rows) = sheet::rows(file, &request.format)?;
         (stamp, Source::Sheet(rows.into_iter()))
@@ -102,8 +113,8 @@ pub(crate) fn read(file: &Path, request: &Request<'_>) -> Result<BySocket, Model
         return Err(empty("no header and no readings"));
     };
     let width = first.cells.len();
-    let header = request.format.header.then(|| first.cells.clone());
-    let columns = columns::columns(request, file, first.line, header.as_deref(), width)?;
+    let header = request.format.header.then_some(&first);
+    let columns = columns::columns(request, file, &first, header)?;
     let mut filled = Filled::new(request, stamp, columns);
     if header.is_none() {
         filled.push(&first)?;
@@ -114,6 +125,7 @@ pub(crate) fn read(file: &Path, request: &Request<'_>) -> Result<BySocket, Model
         }
         filled.push(&row)?;
     }
+    let warning = filled.without_duplicates();
     match filled.readings.line.len() {
         0 => Err(empty("a header without readings")),
         1 => Err(ModelError::Input {
@@ -121,7 +133,7 @@ pub(crate) fn read(file: &Path, request: &Request<'_>) -> Result<BySocket, Model
             message: "one reading; nothing can be fitted to a single reading".into(),
             help: Some("a test needs at least two readings, and as many as its unknowns in all".into()),
         }),
-        _ => Ok(filled.by_socket()),
+        _ => Ok((filled.by_socket(), warning.into_iter().collect())),
     }
 }
 
@@ -164,6 +176,8 @@ struct Filled<'a> {
     /// The socket of each row, as an index into `sockets`.
     socket: Vec<usize>,
     sockets: Vec<String>,
+    /// A number for the cells of each row, all columns of the file included.
+    cells: Vec<u64>,
 }
 
 impl<'a> Filled<'a> {
@@ -180,7 +194,19 @@ impl<'a> Filled<'a> {
             },
             socket: Vec::new(),
             sockets: Vec::new(),
+            cells: Vec::new(),
         }
+    }
+
+    /// Drops rows that are copies of earlier ones; says which.
+    fn without_duplicates(&mut self) -> Option<String> {
+        let kept = duplicates::kept(&self.readings, &self.cells)?;
+        let said = duplicates::said(&self.readings, &kept);
+        self.readings = self.readings.of_rows(&kept);
+        if !self.socket.is_empty() {
+            self.socket = kept.iter().map(|row| self.socket[*row]).collect();
+        }
+        Some(said)
     }
 
     fn push(&mut self, row: &rows::Row) -> Result<(), ModelError> {
@@ -239,6 +265,7 @@ impl<'a> Filled<'a> {
                 Role::Socket => {}
             }
         }
+        self.cells.push(duplicates::number_of(&row.cells));
         readings.line.push(row.line);
         readings.observed.extend(&observed[..readings.coordinates]);
         Ok(())

@@ -5,7 +5,9 @@ use std::io::{BufRead, BufReader, Read};
 use std::ops::Range;
 use std::path::{Path, PathBuf};
 
-use super::Format;
+use encoding_rs::{Encoding, UTF_8, UTF_16BE, UTF_16LE};
+
+use super::{Format, encoding};
 use crate::error::{ModelError, Place};
 use crate::session::stamp::Stamp;
 
@@ -36,8 +38,10 @@ pub(super) struct Row {
     pub cells: Vec<String>,
     /// The bytes of the file that the line takes, without byte-order mark and line end.
     bytes: Range<usize>,
-    /// The line as it stands; what is not UTF-8 is replaced.
+    /// The line as it stands.
     text: String,
+    /// What it is encoded in, where it is not plain ASCII.
+    pub encoding: Option<&'static Encoding>,
 }
 
 impl Row {
@@ -48,6 +52,7 @@ impl Row {
             cells,
             bytes: 0..0,
             text: String::new(),
+            encoding: None,
         }
     }
 
@@ -56,7 +61,7 @@ impl Row {
         let cell = self.cells.get(cell).filter(|cell| !cell.is_empty())?;
         let mut found = self.text.match_indices(cell.as_str());
         let (at, _) = found.next()?;
-        // The same text twice in the line leaves in doubt which one is meant; what was replaced may have moved the cell.
+        // The same text twice in the line leaves in doubt which one is meant; another encoding may have moved the cell.
         if found.next().is_some() || self.text.len() != self.bytes.len() {
             return Some(self.bytes.clone());
         }
@@ -69,6 +74,10 @@ impl Row {
 pub(super) struct Rows {
     file: PathBuf,
     separator: u8,
+    /// As stated or as the byte order mark says; `None`: UTF-8, or Latin-1 from the first line that is not.
+    encoding: Option<&'static Encoding>,
+    /// Lines of the file that are still to be passed over.
+    skip: usize,
     reader: BufReader<File>,
     stamp: Stamp,
     limits: Limits,
@@ -116,6 +125,8 @@ impl Rows {
         Ok(Rows {
             file: file.to_path_buf(),
             separator: format.separator,
+            encoding: format.encoding,
+            skip: format.skip_lines,
             stamp: Stamp::of(file, &found),
             limits,
             reader: BufReader::with_capacity(1 << 16, opened),
@@ -134,9 +145,14 @@ impl Rows {
     /// The next row, or `None` at the end.
     pub fn next_row(&mut self) -> Result<Option<Row>, ModelError> {
         loop {
-            let Some((bytes, text)) = self.next_line()? else {
+            let Some(bytes) = self.next_line()? else {
                 return Ok(None);
             };
+            if self.skip > 0 {
+                self.skip -= 1;
+                continue;
+            }
+            let text = self.decoded()?;
             let content = text.trim();
             if content.is_empty() || content.starts_with('#') {
                 continue;
@@ -157,59 +173,110 @@ impl Rows {
                 line: self.line,
                 cells,
                 bytes,
+                encoding: (!text.is_ascii()).then_some(self.encoding.unwrap_or(UTF_8)),
                 text,
             }));
         }
     }
 
-    /// The next line and the bytes of the file that it takes.
-    fn next_line(&mut self) -> Result<Option<(Range<usize>, String)>, ModelError> {
+    /// Reads the next line into the buffer, without byte order mark and line end; the bytes of the file that it takes.
+    fn next_line(&mut self) -> Result<Option<Range<usize>>, ModelError> {
         let mut start = self.byte;
         self.buffer.clear();
-        let read = self
-            .reader
-            .by_ref()
-            .take(LONGEST_LINE)
-            .read_until(b'\n', &mut self.buffer)
-            .map_err(|cause| self.fault(format!("the data file cannot be read: {cause}"), "try again"))?;
+        self.until_line_end()?;
+        let mut read = self.buffer.len();
         if read == 0 {
             self.stamp.check(self.reader.get_ref())?;
             return Ok(None);
         }
         self.line += 1;
+        if self.line == 1 {
+            let (found, mark) = encoding::of_start(&self.buffer, self.encoding);
+            self.encoding = found;
+            // Only now is it known where the line ends.
+            if self.is_wide() {
+                self.until_line_end()?;
+                read = self.buffer.len();
+            }
+            start += mark;
+            self.buffer.drain(..mark);
+        }
         self.byte += read;
         // A pipe does not say how much there is to come.
         if self.byte as u64 > self.limits.bytes {
             let most = self.limits.bytes;
             return Err(self.fault(format!("more than {most} bytes, the most that are read"), SPLIT));
         }
-        if read as u64 == LONGEST_LINE && self.buffer.last() != Some(&b'\n') {
+        if self.buffer.len() as u64 >= LONGEST_LINE && !self.ends_with(b'\n') {
             return Err(self.fault(
                 format!("a line of more than {LONGEST_LINE} bytes"),
                 "a data file has a line for each reading; is it one?",
             ));
         }
-        let mut bytes = self.buffer.as_slice();
-        if self.line == 1 {
-            if bytes.starts_with(b"\xff\xfe") || bytes.starts_with(b"\xfe\xff") {
-                return Err(self.fault("the file is UTF-16".into(), "save it as UTF-8"));
-            }
-            if let Some(behind) = bytes.strip_prefix(b"\xef\xbb\xbf") {
-                start += bytes.len() - behind.len();
-                bytes = behind;
+        for end in [b'\n', b'\r'] {
+            if self.ends_with(end) {
+                let unit = if self.is_wide() { 2 } else { 1 };
+                self.buffer.truncate(self.buffer.len() - unit);
             }
         }
-        let bytes = bytes.strip_suffix(b"\n").unwrap_or(bytes);
-        let bytes = bytes.strip_suffix(b"\r").unwrap_or(bytes);
-        if bytes.contains(&b'\r') {
+        Ok(Some(start..start + self.buffer.len()))
+    }
+
+    /// Reads on until the buffer ends with a line end, as the encoding writes it, or holds the longest line.
+    fn until_line_end(&mut self) -> Result<(), ModelError> {
+        while !self.ends_with(b'\n') && (self.buffer.len() as u64) < LONGEST_LINE {
+            let room = LONGEST_LINE - self.buffer.len() as u64;
+            let cut_short = self.encoding == Some(UTF_16LE) && self.buffer.last() == Some(&b'\n');
+            let mut part = self.reader.by_ref().take(if cut_short { 1 } else { room });
+            let read = part
+                .read_until(b'\n', &mut self.buffer)
+                .map_err(|cause| self.fault(format!("the data file cannot be read: {cause}"), "try again"))?;
+            if read == 0 {
+                return Ok(());
+            }
+        }
+        Ok(())
+    }
+
+    /// Whether a character takes two bytes.
+    fn is_wide(&self) -> bool {
+        self.encoding
+            .is_some_and(|encoding| encoding == UTF_16LE || encoding == UTF_16BE)
+    }
+
+    /// Whether the buffer ends with this character.
+    fn ends_with(&self, character: u8) -> bool {
+        let bytes = &self.buffer;
+        match self.encoding {
+            Some(encoding) if encoding == UTF_16LE => {
+                bytes.len().is_multiple_of(2) && bytes.ends_with(&[character, 0])
+            }
+            Some(encoding) if encoding == UTF_16BE => {
+                bytes.len().is_multiple_of(2) && bytes.ends_with(&[0, character])
+            }
+            _ => bytes.last() == Some(&character),
+        }
+    }
+
+    /// The buffer as text.
+    fn decoded(&mut self) -> Result<String, ModelError> {
+        let (text, found) = encoding::decode(&self.buffer, self.encoding).map_err(|encoding| {
+            let name = encoding::name_of(encoding);
+            let help = "declare what the file is written in, as `[format] encoding = \"latin1\"`";
+            self.fault(format!("the line is not valid {name}"), help)
+        })?;
+        let text = text.into_owned();
+        if text.contains('\r') {
             return Err(self.fault(
                 "a carriage return within a line".into(),
                 "save the file with lines that end in LF or CRLF",
             ));
         }
-        // Foreign headers come in all encodings; a cell that is read as a number has to be ASCII anyhow.
-        let text = String::from_utf8_lossy(bytes).into_owned();
-        Ok(Some((start..start + bytes.len(), text)))
+        // One line that is not UTF-8 tells of all that follow.
+        if found != UTF_8 {
+            self.encoding = Some(found);
+        }
+        Ok(text)
     }
 
     fn quoted(&self, text: &str) -> Result<Vec<String>, ModelError> {
@@ -245,76 +312,4 @@ impl Rows {
 }
 
 #[cfg(test)]
-mod tests {
-    use super::*;
-
-    /// Reads a file with small limits; the number of rows, or the message.
-    fn read(text: &str, limits: Limits, meanwhile: impl Fn(&Path)) -> Result<usize, String> {
-        let folder = tempfile::tempdir().unwrap();
-        let file = folder.path().join("data.csv");
-        std::fs::write(&file, text).unwrap();
-        let mut rows = Rows::within(&file, &Format::default(), limits).map_err(|fault| fault.to_string())?;
-        meanwhile(&file);
-        let mut count = 0;
-        while rows.next_row().map_err(|fault| fault.to_string())?.is_some() {
-            count += 1;
-        }
-        Ok(count)
-    }
-
-    #[test]
-    fn a_file_at_its_limits_is_read_and_one_beyond_them_is_refused() {
-        let limits = Limits { bytes: 12, rows: 3 };
-        let still = |_: &Path| {};
-        assert_eq!(read("1,2\n3,4\n5,6\n", limits, still), Ok(3));
-        let long = read("1,2\n3,4\n5,67\n", limits, still).unwrap_err();
-        assert!(
-            long.ends_with("a data file of 13 bytes; 12 is the most that is read"),
-            "{long}"
-        );
-        let many = read("1\n2\n3\n4\n", limits, still).unwrap_err();
-        assert!(
-            many.ends_with("data.csv:4: a row beyond 3, the most that are read"),
-            "{many}"
-        );
-    }
-
-    #[test]
-    fn a_cell_is_pointed_at_behind_a_byte_order_mark_and_beside_what_is_not_utf_8() {
-        let folder = tempfile::tempdir().unwrap();
-        let file = folder.path().join("data.csv");
-        std::fs::write(&file, b"\xef\xbb\xbf0,pq\r\n\xb5\xb5m,7\n").unwrap();
-        let mut rows = Rows::within(&file, &Format::default(), LIMITS).unwrap();
-        let first = rows.next_row().unwrap().unwrap();
-        assert_eq!(first.span(1), Some(5..7));
-        // The whole line, since two bytes stand where six do in the text.
-        let second = rows.next_row().unwrap().unwrap();
-        assert_eq!(second.span(1), Some(9..14));
-    }
-
-    #[test]
-    fn a_file_that_changes_while_it_is_read_is_refused() {
-        let append = |file: &Path| {
-            let mut open = std::fs::OpenOptions::new().append(true).open(file).unwrap();
-            std::io::Write::write_all(&mut open, b"5,6\n").unwrap();
-        };
-        let changed = read("1,2\n3,4\n", LIMITS, append).unwrap_err();
-        assert!(
-            changed.ends_with("the file changed while it was read"),
-            "{changed}"
-        );
-        let cut = |file: &Path| std::fs::write(file, "1,2\n").unwrap();
-        let changed = read("1,2\n3,4\n", LIMITS, cut).unwrap_err();
-        assert!(
-            changed.ends_with("the file changed while it was read"),
-            "{changed}"
-        );
-    }
-
-    #[cfg(unix)]
-    #[test]
-    fn a_file_that_vanishes_while_it_is_read_is_read_to_its_end() {
-        let gone = |file: &Path| std::fs::remove_file(file).unwrap();
-        assert_eq!(read("1,2\n3,4\n", LIMITS, gone), Ok(2));
-    }
-}
+mod tests;

@@ -173,6 +173,7 @@ fn cells(book: &mut Sheets<BufReader<File>>, name: &str) -> Result<Vec<Placed>, 
 
 /// Cells as rows of one width, without comments and empty rows; a message and what to do where they lie too far apart.
 fn by_row(mut cells: Vec<Placed>, format: &Format) -> Result<Vec<Row>, (String, String)> {
+    cells.retain(|(row, ..)| *row as usize >= format.skip_lines);
     let columns = || cells.iter().map(|(_, column, _)| *column);
     let (Some(left), Some(right)) = (columns().min(), columns().max()) else {
         return Ok(Vec::new());

@@ -5,9 +5,11 @@ use std::fs::File;
 use std::io::Read;
 use std::path::Path;
 
+use encoding_rs::Encoding;
 use quick_xml::Reader;
 use quick_xml::events::{BytesStart, Event};
 
+use super::super::encoding;
 use crate::error::{ModelError, Place};
 use crate::session::stamp::Stamp;
 
@@ -47,8 +49,8 @@ struct Open {
     waiting: Vec<usize>,
 }
 
-/// A file as it was, and its text: UTF-8, or UTF-16 with its mark.
-fn decoded(file: &Path) -> Result<(Stamp, String), ModelError> {
+/// A file as it was, and its text.
+fn decoded(file: &Path, stated: Option<&'static Encoding>) -> Result<(Stamp, String), ModelError> {
     let fault = |message: String| ModelError::Input {
         place: Place::file(file),
         message,
@@ -68,19 +70,10 @@ fn decoded(file: &Path) -> Result<(Stamp, String), ModelError> {
         )));
     }
     stamp.check(&opened)?;
-    let wide = |of: fn([u8; 2]) -> u16| -> String {
-        let units: Vec<u16> = bytes[2..]
-            .chunks_exact(2)
-            .map(|pair| of([pair[0], pair[1]]))
-            .collect();
-        String::from_utf16_lossy(&units)
-    };
-    let text = match bytes.as_slice() {
-        [0xff, 0xfe, ..] => wide(u16::from_le_bytes),
-        [0xfe, 0xff, ..] => wide(u16::from_be_bytes),
-        // Names and numbers are ASCII; what else the file holds is not read.
-        bytes => String::from_utf8_lossy(bytes.strip_prefix(b"\xef\xbb\xbf").unwrap_or(bytes)).into_owned(),
-    };
+    let (encoding, mark) = encoding::of_start(&bytes, stated);
+    let (text, _) = encoding::decode(&bytes[mark..], encoding)
+        .map_err(|encoding| fault(format!("the file is not valid {}", encoding::name_of(encoding))))?;
+    let text = text.into_owned();
     Ok((stamp, text))
 }
 
@@ -88,8 +81,11 @@ fn decoded(file: &Path) -> Result<(Stamp, String), ModelError> {
 ///
 /// # Errors
 /// If it is no XML.
-pub(super) fn parse(file: &Path) -> Result<(Stamp, Contents), ModelError> {
-    let (stamp, text) = decoded(file)?;
+pub(super) fn parse(
+    file: &Path,
+    encoding: Option<&'static Encoding>,
+) -> Result<(Stamp, Contents), ModelError> {
+    let (stamp, text) = decoded(file, encoding)?;
     let mut reader = Reader::from_str(&text);
     let mut contents = Contents::default();
     let mut open: Vec<Open> = Vec::new();

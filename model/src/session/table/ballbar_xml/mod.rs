@@ -7,10 +7,11 @@
 //! other. Everything else in the file is named in a warning, not interpreted.
 
 mod contents;
+mod direction;
 
 use std::path::Path;
 
-use contents::{READINGS, Run};
+use contents::READINGS;
 
 use super::columns::{Role, Theirs};
 use super::{Request, number};
@@ -18,16 +19,6 @@ use crate::error::{ModelError, Place};
 use crate::session::motion::Motion;
 use crate::session::readings::Readings;
 use crate::session::{Test, plan};
-
-const CLOCKWISE: [&str; 3] = ["CW", "CLOCKWISE", "CLOCK_WISE"];
-const ANTICLOCKWISE: [&str; 6] = [
-    "CCW",
-    "ACW",
-    "ANTICLOCKWISE",
-    "COUNTERCLOCKWISE",
-    "ANTI_CLOCKWISE",
-    "COUNTER_CLOCKWISE",
-];
 
 /// Whether a file is one of these, by its name.
 pub(crate) fn is_xml(file: &Path) -> bool {
@@ -47,7 +38,7 @@ pub(crate) fn read(
     test: &Test,
 ) -> Result<(Readings, Vec<String>), ModelError> {
     let role = value_role(file, request)?;
-    let (stamp, contents) = contents::parse(file)?;
+    let (stamp, contents) = contents::parse(file, request.format.encoding)?;
     let fault = |line: usize, message: String, help: String| ModelError::Input {
         place: if line == 0 {
             Place::file(file)
@@ -102,8 +93,9 @@ pub(crate) fn read(
         coordinates: 1,
         ..Readings::default()
     };
-    for (index, run) in contents.runs.iter().enumerate() {
-        let forward = forward(run, request).map_err(|(message, help)| fault(run.line, message, help))?;
+    let directions = direction::of_runs(&contents.runs, request.format.anticlockwise.as_deref())
+        .map_err(|(line, message, help)| fault(line, message, help))?;
+    for (index, (run, forward)) in contents.runs.iter().zip(directions).enumerate() {
         let part = |c: char| c.is_whitespace() || c == ';' || (c == ',' && request.format.decimal != b',');
         let numbers: Vec<&str> = run.text.split(part).filter(|word| !word.is_empty()).collect();
         let count = numbers.len();
@@ -193,28 +185,5 @@ fn value_role(file: &Path, request: &Request<'_>) -> Result<Role, ModelError> {
             entry.place.clone(),
             format!("READINGS cannot be `{}`", entry.ours),
         )),
-    }
-}
-
-/// Whether a run goes from the first axis of the plane towards the second.
-fn forward(run: &Run, request: &Request<'_>) -> Result<bool, (String, String)> {
-    let known = "words that speak for themselves are CW, CCW, CLOCKWISE, ANTICLOCKWISE, COUNTERCLOCKWISE; for others say \
-                 `[format] anticlockwise = \"…\"`, which word means from the first axis of the plane towards the second";
-    let Some(direction) = &run.direction else {
-        return Err(("READINGS without a RUN_DIRECTION".into(), known.into()));
-    };
-    if let Some(word) = &request.format.anticlockwise {
-        return Ok(direction == word);
-    }
-    let word = direction.to_uppercase().replace([' ', '-'], "_");
-    if ANTICLOCKWISE.contains(&word.as_str()) {
-        Ok(true)
-    } else if CLOCKWISE.contains(&word.as_str()) {
-        Ok(false)
-    } else {
-        Err((
-            format!("RUN_DIRECTION is `{direction}`, which is not known"),
-            known.into(),
-        ))
     }
 }

@@ -1,0 +1,128 @@
+//! The positions over which an error motion was seen while its axis moved: beyond them a curve would be extrapolated.
+
+use std::ops::Range;
+
+use abbe_model::axis::AxisKind;
+use abbe_model::component::ErrorName;
+use abbe_model::sensitivity::SlotValues;
+
+use crate::problem::Problem;
+
+/// A reading that sees an error with less than this share of the best one's sensitivity does not see it.
+const SEEN: f64 = 0.01;
+/// Stretches that lie further apart than this many of their steps are two.
+const APART: f64 = 1.5;
+
+/// A stretch that an axis moved over, and the longest step in it.
+#[derive(Clone, Debug, PartialEq)]
+struct Stretch {
+    range: Range<f64>,
+    step: f64,
+}
+
+/// Where the axis of an error moved, in runs that see the error.
+pub(super) struct Covered {
+    /// The longest stretch, mm or rad.
+    pub range: Range<f64>,
+    /// Others that lie apart from it.
+    pub apart: Vec<Range<f64>>,
+}
+
+/// Where an axis moved while readings saw its error; `None` where it stood.
+pub(super) fn covered(problem: &Problem<'_>, error: &ErrorName, axis: usize) -> Option<Covered> {
+    let machine = &problem.session.machine;
+    let slot = machine.error_slot(error)?;
+    let sensitivity: Vec<Vec<f64>> = problem
+        .models
+        .iter()
+        .map(|model| {
+            if !model.effective_slots().contains(&slot) {
+                return vec![0.0; model.rows()];
+            }
+            let values = SlotValues::zero(model.slots());
+            let found = model.sensitivities(&values, &[slot], 0..model.rows());
+            let derivatives = found.derivatives.first().map_or(&[][..], Vec::as_slice);
+            let coordinates = model.coordinates().max(1);
+            let length = |of_row: &[f64]| of_row.iter().map(|d| d * d).sum::<f64>().sqrt();
+            derivatives.chunks(coordinates).map(length).collect()
+        })
+        .collect();
+    let best = sensitivity.iter().flatten().copied().fold(0.0, f64::max);
+    if best <= 0.0 {
+        return None;
+    }
+    // Positions in a file are rounded; a change below this is no movement.
+    let still = match machine.axes[axis].kind {
+        AxisKind::Linear => 1e-6,
+        AxisKind::Rotary => 1e-9,
+    };
+    let mut stretches = Vec::new();
+    for (test, sensitivity) in problem.tests.iter().zip(&sensitivity) {
+        let Some(readings) = &test.readings else { continue };
+        let positions = &readings.positions[axis];
+        for run in readings.runs() {
+            let seen: Vec<usize> = run.filter(|row| sensitivity[*row] >= SEEN * best).collect();
+            let mut moved: Option<Stretch> = None;
+            for pair in seen.windows(2) {
+                let (a, b) = (positions[pair[0]], positions[pair[1]]);
+                // Where readings between do not see the error, the axis still moved through.
+                if (b - a).abs() <= still {
+                    continue;
+                }
+                let stretch = moved.get_or_insert(Stretch {
+                    range: a.min(b)..a.max(b),
+                    step: 0.0,
+                });
+                stretch.range = stretch.range.start.min(a.min(b))..stretch.range.end.max(a.max(b));
+                stretch.step = stretch.step.max((b - a).abs());
+            }
+            stretches.extend(moved);
+        }
+    }
+    let mut merged = merged(stretches);
+    merged.sort_by(|a, b| {
+        let length = |stretch: &Stretch| stretch.range.end - stretch.range.start;
+        length(b).total_cmp(&length(a))
+    });
+    let mut ranges = merged.into_iter().map(|stretch| stretch.range);
+    Some(Covered {
+        range: ranges.next()?,
+        apart: ranges.collect(),
+    })
+}
+
+/// Stretches that touch as one.
+fn merged(mut stretches: Vec<Stretch>) -> Vec<Stretch> {
+    stretches.sort_by(|a, b| a.range.start.total_cmp(&b.range.start));
+    let mut merged: Vec<Stretch> = Vec::new();
+    for next in stretches {
+        match merged.last_mut() {
+            Some(last) if next.range.start - last.range.end <= APART * last.step.max(next.step) => {
+                last.range.end = last.range.end.max(next.range.end);
+                last.step = last.step.max(next.step);
+            }
+            _ => merged.push(next),
+        }
+    }
+    merged
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn stretches_that_touch_are_one() {
+        let stretch = |start: f64, end: f64| Stretch {
+            range: start..end,
+            step: 5.0,
+        };
+        let found = merged(vec![
+            stretch(5.0, 100.0),
+            stretch(300.0, 350.0),
+            stretch(-100.0, 0.0),
+            stretch(-50.0, 20.0),
+        ]);
+        assert_eq!(found, [stretch(-100.0, 100.0), stretch(300.0, 350.0)]);
+    }
+}

@@ -1,0 +1,275 @@
+//! Whether readings and session belong together.
+//!
+//! A session states where things are: directions and order of axes, balls, bars, units of columns. Readings that contradict a statement are told by name,
+//! with the mistake that would explain them:
+//!
+//! - set-up parameters far from their stated values, each (`pulls`) and all together;
+//! - a residual of a hundred times the noise in every test;
+//! - poses of which the model explains less than 99 % of the variance (`poses`).
+//!
+//! What may be wrong is found by refitting the session with one statement changed at a time (`hypotheses`, `suggest`).
+
+mod hypotheses;
+mod poses;
+mod pulls;
+mod results;
+mod suggest;
+mod tracing;
+mod trial;
+
+use abbe_model::session::Prior;
+
+pub use pulls::{Pull, Pulls};
+pub use results::{Conflict, ConflictKind, Plausibility, Suggestion, SuggestionKind};
+pub(crate) use tracing::{is_another_session, with_set_ups_freed};
+
+use crate::error::IdentifyError;
+use crate::fit::Fit;
+use crate::heldout::rms_mm;
+use crate::noise::NoiseSource;
+use crate::problem::Problem;
+
+/// Share of the variance of the measured positions that a model of poses explains at least.
+const LEAST_EXPLAINED: f64 = 0.99;
+/// Below this share, mistakes that explain more are looked for.
+const WELL_EXPLAINED: f64 = 0.9999;
+/// A residual of so many times the noise in every test is that of another session.
+const ANOTHER_SESSION: f64 = 100.0;
+/// A residual of so many times the noise is worth a look at the session.
+const WORTH_A_LOOK: f64 = 5.0;
+/// Set-up parameters that are named in words; the others are counted.
+const MOST_NAMED: usize = 3;
+
+/// What the readings contradict, and what may be wrong.
+pub fn examine(problem: &Problem<'_>, fit: &Fit) -> Plausibility {
+    if !problem.session.instrument.is_two_sided() {
+        return of_poses(problem, fit);
+    }
+    let mut conflicts: Vec<Conflict> = residual(problem, fit).into_iter().collect();
+    conflicts.extend(set_ups(problem, &Pulls::of(problem, fit)));
+    let by_residual = conflicts.is_empty();
+    let ratio = rms_mm(problem, &fit.residuals) / problem.noise.sigma_mm;
+    if by_residual && ratio < WORTH_A_LOOK {
+        return Plausibility::default();
+    }
+    let suggestions = suggest::suggestions(problem, &conflicts);
+    if by_residual && let Some(best) = suggestions.first() {
+        let rms_um = rms_mm(problem, &fit.residuals) * 1e3;
+        conflicts.push(Conflict {
+            kind: ConflictKind::Statement,
+            subject: "session".to_string(),
+            value: rms_um,
+            stated: best.rms_um,
+            unit: "um".to_string(),
+            pull: None,
+            words: format!(
+                "the session leaves a residual of {rms_um:.3} µm; with one statement changed it leaves {:.3} µm",
+                best.rms_um
+            ),
+        });
+    }
+    Plausibility {
+        conflicts,
+        suggestions,
+        explained_variance: None,
+    }
+}
+
+/// The fit as it is, unless it cannot be one of these readings: then why, with what may be wrong.
+///
+/// # Errors
+/// If the fit failed, or nothing is identifiable.
+pub(crate) fn checked(problem: &Problem<'_>, fit: Result<Fit, IdentifyError>) -> Result<Fit, IdentifyError> {
+    let found = match fit {
+        Ok(fit) if fit.rank.seen.ncols() > 0 || problem.parameters.list.is_empty() => return Ok(fit),
+        Ok(_) => format!(
+            "none of the {} parameters is identifiable: the nominal machine leaves {:.3e} µm",
+            problem.parameters.list.len(),
+            problem.noise.sigma_mm * 1e3
+        ),
+        Err(error @ IdentifyError::NoConvergence { .. }) => error.to_string(),
+        Err(error) => return Err(error),
+    };
+    let suggestions = if problem.session.instrument.is_two_sided() {
+        suggest::suggestions(problem, &[])
+    } else {
+        poses::suggestions(problem)
+    };
+    let diagnosis = match in_words(&suggestions) {
+        Some(words) => words,
+        None => {
+            "check the units, signs and order of the columns, and whether the data belong to this machine"
+                .to_string()
+        }
+    };
+    Err(IdentifyError::Contradicted { found, diagnosis })
+}
+
+/// What a user should know, one warning a conflict; set-up parameters share one.
+pub fn warnings(plausibility: &Plausibility) -> Vec<String> {
+    let is_parameter = |conflict: &&Conflict| conflict.kind == ConflictKind::SetupParameter;
+    let conflicts = &plausibility.conflicts;
+    let mut told: Vec<String> = (conflicts.iter())
+        .filter(|conflict| !is_parameter(conflict))
+        .map(|conflict| conflict.words.clone())
+        .collect();
+    let parameters: Vec<&str> = (conflicts.iter().filter(is_parameter))
+        .map(|conflict| conflict.words.as_str())
+        .collect();
+    if !parameters.is_empty() {
+        let named = parameters[..parameters.len().min(MOST_NAMED)].join("; ");
+        let others = match parameters.len().saturating_sub(MOST_NAMED) {
+            0 => String::new(),
+            n => format!("; and {n} more"),
+        };
+        told.push(format!(
+            "the readings contradict the stated set-up: {named}{others}"
+        ));
+    }
+    if let (Some(last), Some(words)) = (told.last_mut(), in_words(&plausibility.suggestions)) {
+        *last = format!("{last}; {words}");
+    }
+    told
+}
+
+/// What may be wrong, in a sentence.
+pub fn in_words(suggestions: &[Suggestion]) -> Option<String> {
+    let words: Vec<&str> = suggestions
+        .iter()
+        .map(|suggestion| suggestion.words.as_str())
+        .collect();
+    (!words.is_empty()).then(|| format!("this would be explained if {}", words.join(", or if ")))
+}
+
+/// A residual of a hundred times the noise in every test.
+fn residual(problem: &Problem<'_>, fit: &Fit) -> Option<Conflict> {
+    let noise = problem.noise.sigma_mm;
+    if problem.noise.source == NoiseSource::Fit || noise <= 0.0 {
+        return None;
+    }
+    let coordinates = problem.coordinates();
+    let of_test = |number: usize| {
+        let rejected = &problem.rejected[number];
+        let kept = fit.residuals[number]
+            .iter()
+            .enumerate()
+            .filter(|(i, _)| !rejected[i / coordinates]);
+        let (sum, count) = kept.fold((0.0, 0_usize), |(sum, count), (_, value)| {
+            (sum + value * value, count + 1)
+        });
+        (count > 0).then(|| (sum / count as f64).sqrt())
+    };
+    let least = (0..problem.tests.len())
+        .filter_map(of_test)
+        .fold(f64::INFINITY, f64::min);
+    (least.is_finite() && least >= ANOTHER_SESSION * noise).then(|| Conflict {
+        kind: ConflictKind::Residual,
+        subject: "session".to_string(),
+        value: rms_mm(problem, &fit.residuals) * 1e3,
+        stated: noise * 1e3,
+        unit: "um".to_string(),
+        pull: None,
+        words: format!(
+            "the residual of every test is at least {:.0} times the noise of {:.3} µm: the readings do not belong to this session",
+            least / noise,
+            noise * 1e3
+        ),
+    })
+}
+
+/// Set-up parameters that contradict their statements, or all of them together.
+fn set_ups(problem: &Problem<'_>, pulls: &Pulls) -> Vec<Conflict> {
+    let conflicts: Vec<Conflict> = (pulls.contradicted().into_iter())
+        .map(|pull| {
+            let parameter = &problem.parameters.list[pull.parameter];
+            let outside = |value: f64| value * parameter.unit.per_inside;
+            Conflict {
+                kind: ConflictKind::SetupParameter,
+                subject: parameter.id.clone(),
+                value: outside(pull.estimate),
+                stated: outside(pull.stated_u),
+                unit: parameter.unit.name.clone(),
+                pull: Some(pull.pull),
+                words: format!(
+                    "{} is {:.1} {} off where u = {} {} is stated ({:.1} standard deviations)",
+                    parameter.id,
+                    outside(pull.estimate),
+                    symbol(&parameter.unit.name),
+                    outside(pull.stated_u),
+                    symbol(&parameter.unit.name),
+                    pull.pull.abs()
+                ),
+            }
+        })
+        .collect();
+    if !conflicts.is_empty() || !pulls.contradicted_together() {
+        return conflicts;
+    }
+    vec![Conflict {
+        kind: ConflictKind::Setups,
+        subject: "session".to_string(),
+        value: pulls.together,
+        stated: pulls.freedom as f64,
+        unit: "1".to_string(),
+        pull: None,
+        words: format!(
+            "the set-up parameters together lie too far from their stated values (χ² = {:.1} with {} degrees of freedom)",
+            pulls.together, pulls.freedom
+        ),
+    }]
+}
+
+/// A unit as it is printed.
+fn symbol(unit: &str) -> &str {
+    match unit {
+        "um" => "µm",
+        "arcsec" => "″",
+        other => other,
+    }
+}
+
+/// Poses: what the model explains of the spread of the measured positions.
+fn of_poses(problem: &Problem<'_>, fit: &Fit) -> Plausibility {
+    let three = problem.coordinates() as f64;
+    let Some(spread) = poses::spread_mm2(problem) else {
+        return Plausibility::default();
+    };
+    let left = three * rms_mm(problem, &fit.residuals).powi(2);
+    let explained = 1.0 - left / spread;
+    let suggestions = if explained < WELL_EXPLAINED {
+        poses::suggestions(problem)
+    } else {
+        Vec::new()
+    };
+    let little = explained < LEAST_EXPLAINED;
+    let conflicts = if little || !suggestions.is_empty() {
+        vec![Conflict {
+            kind: ConflictKind::ExplainedVariance,
+            subject: "session".to_string(),
+            value: explained,
+            stated: LEAST_EXPLAINED,
+            unit: "1".to_string(),
+            pull: None,
+            words: format!(
+                "the model explains {:.2} % of the variance of the measured positions: the 3-vector residual is {:.3} mm, the positions scatter by {:.3} mm",
+                100.0 * explained,
+                left.sqrt(),
+                spread.sqrt()
+            ),
+        }]
+    } else {
+        Vec::new()
+    };
+    Plausibility {
+        conflicts,
+        suggestions,
+        explained_variance: Some(explained),
+    }
+}
+
+/// Whether any set-up parameter has a stated uncertainty.
+fn has_priors(problem: &Problem<'_>) -> bool {
+    let list = &problem.parameters.list;
+    list.iter()
+        .any(|parameter| matches!(parameter.prior, Prior::Gaussian(_)))
+}

@@ -1,0 +1,185 @@
+//! Poses of a robot: how much of the variance of the measured positions the model explains, and which column may be misread.
+
+use abbe_model::axis::AxisKind;
+use abbe_model::instrument::Station;
+use abbe_model::session::Session;
+use nalgebra::Vector3;
+use rayon::prelude::*;
+
+use super::hypotheses::{Hypothesis, lengths, units, with_readings};
+use super::results::{Suggestion, SuggestionKind};
+use super::trial::{thinned, trial};
+use crate::noise::{Noise, NoiseSource};
+use crate::problem::Problem;
+use crate::start::nominal_points;
+
+/// Poses that are refitted with each mistake.
+const MOST_POSES: usize = 300;
+/// How many times smaller a mistake has to make the residual of the nominal machine.
+const LOWERED: f64 = 5.0;
+/// Mistakes that leave no more than this many times what the best leaves are listed too.
+const NOT_SEPARABLE: f64 = 1.5;
+/// The most that are listed.
+const MOST_LISTED: usize = 5;
+/// Any noise will do where residuals are compared, mm.
+const NOISE_MM: f64 = 1.0;
+
+/// Mean square of the distances of the positions from their mean, mm²: of those measured, or, where a ball sits in sockets, of those that the ball would
+/// take if the positions of the axes were combined at random. `None` if they do not scatter.
+pub(super) fn spread_mm2(problem: &Problem<'_>) -> Option<f64> {
+    let (mut sum, mut count) = (0.0, 0_usize);
+    let mut groups: Vec<&str> = problem.tests.iter().map(|test| test.setup.as_str()).collect();
+    groups.sort_unstable();
+    groups.dedup();
+    for group in groups {
+        let mut points: Vec<Vector3<f64>> = Vec::new();
+        for (number, test) in problem.tests.iter().enumerate() {
+            let Some(readings) = test.readings.as_ref().filter(|_| test.setup == group) else {
+                continue;
+            };
+            let kept = |row: &usize| !problem.rejected[number][*row];
+            if let Station::Socket(_) = test.station {
+                let mut mixed = readings.clone();
+                for (axis, column) in mixed.positions.iter_mut().enumerate() {
+                    let by = (axis * 7 + 1) % column.len().max(1);
+                    column.rotate_left(by);
+                }
+                points.extend(nominal_points(&problem.session.machine, &test.station, &mixed));
+            } else {
+                let measured = readings.observed.chunks_exact(3).map(Vector3::from_row_slice);
+                let measured: Vec<Vector3<f64>> = measured.collect();
+                points.extend((0..readings.rows()).filter(kept).map(|row| measured[row]));
+            }
+        }
+        let mean = points.iter().sum::<Vector3<f64>>() / points.len().max(1) as f64;
+        sum += points
+            .iter()
+            .map(|point| (point - mean).norm_squared())
+            .sum::<f64>();
+        count += points.len();
+    }
+    let spread = sum / count.max(1) as f64;
+    (spread > 0.0 && spread.is_finite()).then_some(spread)
+}
+
+/// The mistakes with which the nominal machine fits poses far better, the best first.
+pub(super) fn suggestions(problem: &Problem<'_>) -> Vec<Suggestion> {
+    let noise = Noise::white(NOISE_MM, NoiseSource::Stated);
+    let mut nominal = thinned(problem, MOST_POSES);
+    nominal.unknowns.clear();
+    nominal.effects.clear();
+    let base_mm = trial(&nominal, &noise).map_or(f64::INFINITY, |found| found.rms_mm);
+    let mut tried: Vec<(f64, Hypothesis)> = of_poses(&nominal)
+        .into_par_iter()
+        .filter_map(|hypothesis| {
+            let rms_mm = trial(&hypothesis.session, &noise)?.rms_mm;
+            Some((rms_mm, hypothesis))
+        })
+        .collect();
+    // Readings that are scaled leave a residual that is scaled with them: compare shares of the spread.
+    let share = |rms_mm: f64, session: &Session| {
+        let spread = Problem::new(session, noise.clone(), 1)
+            .ok()
+            .and_then(|problem| spread_mm2(&problem));
+        rms_mm / spread.unwrap_or(1.0).sqrt()
+    };
+    let base = share(base_mm, &nominal);
+    tried
+        .iter_mut()
+        .for_each(|(rms_mm, hypothesis)| *rms_mm = share(*rms_mm, &hypothesis.session));
+    tried.retain(|(left, _)| *left * LOWERED < base);
+    tried.sort_by(|a, b| a.0.total_cmp(&b.0));
+    let best = tried.first().map_or(0.0, |(left, _)| *left);
+    (tried.into_iter())
+        .take_while(|(left, _)| *left <= best * NOT_SEPARABLE)
+        .take(MOST_LISTED)
+        .map(|(_, hypothesis)| Suggestion {
+            kind: hypothesis.kind,
+            subject: hypothesis.subject,
+            rms_um: trial(&hypothesis.session, &noise).map_or(0.0, |found| found.rms_mm * 1e3),
+            words: hypothesis.words,
+        })
+        .collect()
+}
+
+/// The mistakes that are tried on poses.
+fn of_poses(session: &Session) -> Vec<Hypothesis> {
+    let machine = &session.machine;
+    let mut list = Vec::new();
+    let tracked = session
+        .tests
+        .iter()
+        .any(|test| matches!(test.station, Station::Tracker(_)));
+    if tracked {
+        for (factor, unit) in lengths() {
+            let changed = with_readings(session, |_, _, observed| {
+                observed.iter_mut().for_each(|value| *value *= factor);
+            });
+            list.push(Hypothesis::new(
+                SuggestionKind::ColumnUnit,
+                "px, py, pz",
+                format!("the measured positions are {unit}"),
+                changed,
+            ));
+        }
+        let mirrored = with_readings(session, |_, _, observed| {
+            observed.iter_mut().step_by(3).for_each(|value| *value = -*value);
+        });
+        let words = "the measured positions are left-handed: one of px, py, pz has the opposite sign, or two are exchanged";
+        list.push(Hypothesis::new(
+            SuggestionKind::ColumnSign,
+            "px, py, pz",
+            words.to_string(),
+            mirrored,
+        ));
+    }
+    let scaled = |axes: &[usize], factor: f64| {
+        with_readings(session, |_, positions, _| {
+            for axis in axes {
+                positions[*axis].iter_mut().for_each(|value| *value *= factor);
+            }
+        })
+    };
+    for kind in [AxisKind::Rotary, AxisKind::Linear] {
+        let axes: Vec<usize> = (0..machine.axes.len())
+            .filter(|k| machine.axes[*k].kind == kind)
+            .collect();
+        let mut sets: Vec<Vec<usize>> = vec![axes.clone()];
+        if axes.len() > 1 {
+            sets.extend(axes.iter().map(|axis| vec![*axis]));
+        }
+        for set in sets.iter().filter(|set| !set.is_empty()) {
+            let names: Vec<&str> = set.iter().map(|k| machine.axes[*k].name.as_str()).collect();
+            let names = names.join(", ");
+            for (factor, unit) in units(kind) {
+                let words = format!("the positions of {names} are {unit}");
+                list.push(Hypothesis::new(
+                    SuggestionKind::ColumnUnit,
+                    &names,
+                    words,
+                    scaled(set, factor),
+                ));
+            }
+            let words = format!("the positions of {names} have the opposite sign");
+            list.push(Hypothesis::new(
+                SuggestionKind::ColumnSign,
+                &names,
+                words,
+                scaled(set, -1.0),
+            ));
+        }
+        for (place, &first) in axes.iter().enumerate() {
+            for &second in &axes[place + 1..] {
+                let changed = with_readings(session, |_, positions, _| positions.swap(first, second));
+                let names = [first, second].map(|k| machine.axes[k].name.as_str());
+                list.push(Hypothesis::new(
+                    SuggestionKind::ColumnsExchanged,
+                    &names.join(", "),
+                    format!("the columns of {} and {} are exchanged", names[0], names[1]),
+                    changed,
+                ));
+            }
+        }
+    }
+    list
+}

@@ -1,0 +1,195 @@
+//! Pulls of set-up parameters: how far the readings move them from where they are stated.
+//!
+//! With `P` the variances that are stated, `V` the covariance after the fit, and `A = V⁻¹ − P⁻¹` what the readings say, the estimate is
+//! `m = V A θ + V Jᵀ W ε`. If the session is right, θ scatters by `P` and ε by `κ` times the variance that the fit assumes, so that
+//!
+//! ```text
+//! Cov m = (P − 2 V + V P⁻¹ V) + κ (V − V P⁻¹ V),    for κ = 1:  P − V
+//! ```
+//!
+//! Errors of the machine have no prior and do not enter: the estimate is unbiased in them. A pull is `m / √(Cov m)`, standard normal whatever the
+//! number of readings. Readings whose noise is serially correlated count less: `κ` is the excess of their χ² times `(1 + ρ)/(1 − ρ)`.
+
+use abbe_model::session::Prior;
+use faer::{Mat, Side};
+use statrs::distribution::{ChiSquared, ContinuousCDF, Normal};
+
+use crate::fit::Fit;
+use crate::parameters::Role;
+use crate::problem::Problem;
+
+/// Probability that a session that is right is said to be contradicted, once for the largest pull and once for all set-up parameters together.
+const SIGNIFICANCE: f64 = 1e-4;
+/// A parameter that the readings would move by less than this share of its stated uncertainty says nothing.
+const LEAST_SHARE: f64 = 0.1;
+/// More set-up parameters than this are tested one by one only.
+const MOST_TOGETHER: usize = 200;
+/// Greatest autocorrelation that is credited to noise.
+const MOST_CORRELATED: f64 = 0.95;
+
+/// One set-up parameter with a stated uncertainty.
+#[derive(Clone, Debug)]
+pub struct Pull {
+    /// Index of the parameter.
+    pub parameter: usize,
+    /// Its estimate, mm or rad.
+    pub estimate: f64,
+    /// Its stated standard uncertainty, mm or rad.
+    pub stated_u: f64,
+    /// Estimate over the standard deviation that it has if the session is right.
+    pub pull: f64,
+}
+
+/// The pulls of a fit.
+#[derive(Clone, Debug, Default)]
+pub struct Pulls {
+    /// Of every set-up parameter that the readings tell something of.
+    pub each: Vec<Pull>,
+    /// Absolute pull above which a parameter contradicts its statement (Bonferroni over `each`).
+    pub limit: f64,
+    /// χ² of all set-up parameters in the directions that the readings determine, and how many these are.
+    pub together: f64,
+    /// Degrees of freedom of `together`.
+    pub freedom: usize,
+}
+
+impl Pulls {
+    /// Of a fit.
+    pub fn of(problem: &Problem<'_>, fit: &Fit) -> Pulls {
+        let (places, prior): (Vec<usize>, Vec<f64>) = (problem.parameters.list.iter().enumerate())
+            .filter_map(|(j, parameter)| match (parameter.role, parameter.prior) {
+                (Role::Setup, Prior::Gaussian(u)) if fit.rank.is_seen(j) => Some((j, u)),
+                _ => None,
+            })
+            .unzip();
+        let count = places.len();
+        if count == 0 {
+            return Pulls::default();
+        }
+        let kappa = excess(problem, fit);
+        // Everything in units of the stated uncertainties: P is the unit matrix.
+        let v = Mat::from_fn(count, count, |i, k| {
+            fit.covariance[(places[i], places[k])] / (prior[i] * prior[k])
+        });
+        let squared = &v * &v;
+        let covariance = Mat::from_fn(count, count, |i, k| {
+            let of_prior = f64::from(u8::from(i == k)) - 2.0 * v[(i, k)] + squared[(i, k)];
+            of_prior + kappa * (v[(i, k)] - squared[(i, k)])
+        });
+        let moved: Vec<f64> = (0..count).map(|i| fit.beta[places[i]] / prior[i]).collect();
+        let each: Vec<Pull> = (0..count)
+            .filter_map(|i| {
+                let deviation = covariance[(i, i)].max(0.0).sqrt();
+                (deviation >= LEAST_SHARE).then(|| Pull {
+                    parameter: places[i],
+                    estimate: fit.beta[places[i]],
+                    stated_u: prior[i],
+                    pull: moved[i] / deviation,
+                })
+            })
+            .collect();
+        let (together, freedom) = if count <= MOST_TOGETHER {
+            together(&covariance, &moved)
+        } else {
+            (0.0, 0)
+        };
+        Pulls {
+            limit: limit(each.len()),
+            each,
+            together,
+            freedom,
+        }
+    }
+
+    /// The parameters that contradict their statements, the largest pull first.
+    pub fn contradicted(&self) -> Vec<&Pull> {
+        let mut list: Vec<&Pull> = (self.each.iter())
+            .filter(|pull| pull.pull.abs() > self.limit)
+            .collect();
+        list.sort_by(|a, b| b.pull.abs().total_cmp(&a.pull.abs()));
+        list
+    }
+
+    /// Whether all set-up parameters together contradict their statements.
+    pub fn contradicted_together(&self) -> bool {
+        let law = ChiSquared::new(self.freedom as f64);
+        self.freedom > 0 && law.is_ok_and(|law| law.sf(self.together) < SIGNIFICANCE)
+    }
+
+    /// The largest pull, absolute; 0 of none.
+    pub fn largest(&self) -> f64 {
+        self.each.iter().fold(0.0, |most, pull| most.max(pull.pull.abs()))
+    }
+}
+
+/// The absolute pull that one of so many exceeds with the probability [`SIGNIFICANCE`].
+fn limit(count: usize) -> f64 {
+    let tail = SIGNIFICANCE / (2.0 * count.max(1) as f64);
+    -Normal::standard().inverse_cdf(tail)
+}
+
+/// χ² of estimates (in stated uncertainties) in those directions along which the readings, not the priors, decide where they lie; and how many these are.
+fn together(covariance: &Mat<f64>, moved: &[f64]) -> (f64, usize) {
+    let Ok(decomposed) = covariance.self_adjoint_eigen(Side::Lower) else {
+        return (0.0, 0);
+    };
+    let (vectors, values) = (decomposed.U(), decomposed.S().column_vector());
+    let (mut sum, mut freedom) = (0.0, 0);
+    for k in 0..moved.len() {
+        if values[k] > 0.5 {
+            let along: f64 = moved
+                .iter()
+                .enumerate()
+                .map(|(i, value)| vectors[(i, k)] * value)
+                .sum();
+            sum += along * along / values[k];
+            freedom += 1;
+        }
+    }
+    (sum, freedom)
+}
+
+/// By how much the noise of an average exceeds what the fit assumes: the readings' own χ² over their degrees of freedom, where that is above 1, times
+/// what the autocorrelation of the residual along a run adds.
+fn excess(problem: &Problem<'_>, fit: &Fit) -> f64 {
+    let coordinates = problem.coordinates();
+    let (mut squares, mut count, mut products, mut pairs) = (0.0, 0_usize, 0.0, 0.0);
+    for (number, test) in problem.tests.iter().enumerate() {
+        let Some(readings) = &test.readings else { continue };
+        let (residual, rejected) = (&fit.residuals[number], &problem.rejected[number]);
+        for run in readings.runs() {
+            for row in run.clone().filter(|row| !rejected[*row]) {
+                for i in row * coordinates..(row + 1) * coordinates {
+                    squares += residual[i] * residual[i];
+                    count += 1;
+                    if row > run.start && !rejected[row - 1] {
+                        products += residual[i] * residual[i - coordinates];
+                        pairs += 0.5 * (residual[i].powi(2) + residual[i - coordinates].powi(2));
+                    }
+                }
+            }
+        }
+    }
+    let free =
+        (0..problem.parameters.list.len()).filter(|j| problem.parameters.list[*j].prior == Prior::Free);
+    let freedom = count.saturating_sub(free.count()).max(1) as f64;
+    let ratio = (squares / freedom / problem.noise.sigma_mm.powi(2)).max(1.0);
+    let poses = problem.folds.kind == crate::heldout::FoldKind::Poses;
+    if poses || pairs <= 0.0 || !problem.noise.memory.is_empty() {
+        return ratio;
+    }
+    let correlation = (products / pairs).clamp(0.0, MOST_CORRELATED);
+    ratio * (1.0 + correlation) / (1.0 - correlation)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Quantiles of the standard normal distribution, from tables: 1 − 10⁻⁴/2 and, over 19 parameters, 1 − 10⁻⁴/38.
+    #[test]
+    fn the_limit_is_bonferronis() {
+        assert!((limit(1) - 3.8906).abs() < 1e-3, "{}", limit(1));
+        assert!((limit(19) - 4.557).abs() < 5e-3, "{}", limit(19));
+    }
+}

@@ -1,0 +1,93 @@
+//! What is reported of a session that its readings contradict, as it stands in JSON.
+
+use schemars::JsonSchema;
+use serde::Serialize;
+
+/// What the readings contradict, and what may be wrong.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, JsonSchema)]
+pub struct Plausibility {
+    /// Statements of the session that the readings contradict, the worst first.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub conflicts: Vec<Conflict>,
+    /// What would remove the conflicts, the most probable first. Those listed are not separable by these readings.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub suggestions: Vec<Suggestion>,
+    /// For poses: share of the variance of the measured positions that the model explains.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub explained_variance: Option<f64>,
+}
+
+/// In what respect readings contradict a session.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, JsonSchema)]
+#[serde(rename_all = "kebab-case")]
+pub enum ConflictKind {
+    /// The estimate of a set-up parameter lies too many standard deviations from the stated value.
+    SetupParameter,
+    /// All set-up parameters together lie too far from their stated values.
+    Setups,
+    /// The residual of every test is at least a hundred times the noise.
+    Residual,
+    /// The model explains too little of the variance of the measured positions.
+    ExplainedVariance,
+    /// The session with one of the suggestions fits far better.
+    Statement,
+}
+
+/// One statement that the readings contradict.
+#[derive(Clone, Debug, PartialEq, Serialize, JsonSchema)]
+pub struct Conflict {
+    /// In what respect.
+    pub kind: ConflictKind,
+    /// The set-up parameter, or `session`.
+    pub subject: String,
+    /// What was found: the estimate of the set-up parameter, χ² of all of them, the residual, or the share of the variance; in `unit`.
+    pub value: f64,
+    /// What it is compared with, in `unit`: the stated standard uncertainty, the degrees of freedom, the noise, or the least share.
+    pub stated: f64,
+    /// Unit of `value` and `stated`; `1` for none.
+    pub unit: String,
+    /// For a set-up parameter: the pull, that is the estimate over its standard deviation if the session is right.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub pull: Option<f64>,
+    /// In words.
+    pub words: String,
+}
+
+/// What may be wrong with a session.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, JsonSchema)]
+#[serde(rename_all = "kebab-case")]
+pub enum SuggestionKind {
+    /// The direction of an axis is reversed.
+    AxisReversed,
+    /// Two axes are exchanged in the chain.
+    AxesExchanged,
+    /// A ball lies on the other side.
+    BallMirrored,
+    /// The deviations have the opposite sign.
+    DeviationSign,
+    /// The correction of a bar's calibration has the opposite sign.
+    BarCalibrationSign,
+    /// A ball, a bar or another thing of the set-up is not where, or not as long as, it is stated.
+    WrongSetup,
+    /// The readings of a test were taken with another set-up or in another session.
+    OtherSession,
+    /// A column has another unit.
+    ColumnUnit,
+    /// A column has the opposite sign.
+    ColumnSign,
+    /// Two columns are exchanged.
+    ColumnsExchanged,
+}
+
+/// A change of the session that removes the conflicts.
+#[derive(Clone, Debug, PartialEq, Serialize, JsonSchema)]
+pub struct Suggestion {
+    /// What may be wrong.
+    pub kind: SuggestionKind,
+    /// The axes, the test, the column or the thing of the set-up.
+    pub subject: String,
+    /// Residual over scalar readings with the change, µm.
+    pub rms_um: f64,
+    /// In words.
+    pub words: String,
+}

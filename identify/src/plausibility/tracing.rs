@@ -1,0 +1,56 @@
+//! What a search for effects does about a session that its readings contradict.
+
+use abbe_model::session::Prior;
+
+use super::has_priors;
+use super::pulls::Pulls;
+use super::results::{ConflictKind, Plausibility};
+use crate::error::IdentifyError;
+use crate::fit::{Fit, fit};
+use crate::problem::Problem;
+
+/// Rounds of freeing what is contradicted: one conflict may hide behind another.
+const MOST_ROUNDS: usize = 5;
+
+/// A changed statement that makes the residual so many times smaller is the explanation.
+const STATEMENT_EXPLAINS: f64 = 5.0;
+
+/// Whether readings and session have so little in common that a search for effects makes no sense.
+pub(crate) fn is_another_session(plausibility: &Plausibility) -> bool {
+    plausibility.conflicts.iter().any(|conflict| match conflict.kind {
+        ConflictKind::Residual => true,
+        ConflictKind::ExplainedVariance => conflict.value < conflict.stated,
+        ConflictKind::Statement => conflict.value > STATEMENT_EXPLAINS * conflict.stated,
+        ConflictKind::SetupParameter | ConflictKind::Setups => false,
+    })
+}
+
+/// Frees the set-up parameters whose statements the readings contradict, as if nothing were known of them, so that no effect is claimed that only stands
+/// for a wrong statement. Returns their identifiers and the fit; `None` where nothing is contradicted.
+///
+/// # Errors
+/// If the freed problem cannot be fitted.
+pub(crate) fn with_set_ups_freed(
+    problem: &mut Problem<'_>,
+    before: &Fit,
+) -> Result<Option<(Vec<String>, Fit)>, IdentifyError> {
+    if !has_priors(problem) {
+        return Ok(None);
+    }
+    let mut freed: Vec<String> = Vec::new();
+    let mut found = before.clone();
+    for _ in 0..MOST_ROUNDS {
+        let pulls = Pulls::of(problem, &found);
+        let contradicted: Vec<usize> = pulls.contradicted().iter().map(|pull| pull.parameter).collect();
+        if contradicted.is_empty() {
+            break;
+        }
+        for j in contradicted {
+            let parameter = &mut problem.parameters.list[j];
+            parameter.prior = Prior::Gaussian(parameter.size);
+            freed.push(parameter.id.clone());
+        }
+        found = fit(problem, Some(&found.beta))?;
+    }
+    Ok((!freed.is_empty()).then_some((freed, found)))
+}

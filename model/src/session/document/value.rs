@@ -1,0 +1,216 @@
+//! A value of a TOML file, with its key and its place.
+
+use std::ops::Range;
+
+use toml::Spanned;
+use toml::de::{DeTable, DeValue};
+
+use super::{MOST_ITEMS, Source, Table};
+use crate::error::ModelError;
+use crate::session::limits;
+
+/// A value with its key.
+pub(crate) struct Value<'a> {
+    /// The file.
+    pub source: &'a Source,
+    /// The key it belongs to.
+    pub key: String,
+    /// Where the key stands.
+    pub key_span: Range<usize>,
+    /// Where the value stands.
+    pub span: Range<usize>,
+    pub(super) value: DeValue<'a>,
+}
+
+impl<'a> Value<'a> {
+    /// An error at the value.
+    pub fn error(&self, message: impl Into<String>, help: Option<String>) -> ModelError {
+        self.source.error(self.span.clone(), message, help)
+    }
+
+    /// An error that says what the value is and what it should be.
+    pub fn unlike(&self, wanted: &str) -> ModelError {
+        let found = match &self.value {
+            DeValue::String(text) => format!("the text \"{text}\""),
+            DeValue::Integer(_) | DeValue::Float(_) => "a number".to_string(),
+            DeValue::Boolean(truth) => truth.to_string(),
+            DeValue::Datetime(_) => "a date".to_string(),
+            DeValue::Array(items) => format!("a list of {}", items.len()),
+            DeValue::Table(_) => "a table".to_string(),
+        };
+        self.error(format!("`{}` is {found}; {wanted} is expected", self.key), None)
+    }
+
+    /// A text.
+    pub fn text(&self) -> Result<String, ModelError> {
+        match &self.value {
+            DeValue::String(text) => match text.chars().find(|c| c.is_control() && *c != '\t') {
+                None => Ok(text.to_string()),
+                Some(control) => Err(self.error(
+                    format!(
+                        "`{}` holds the control character U+{:04X}",
+                        self.key, control as u32
+                    ),
+                    Some("names are shown as they are: leave it out".into()),
+                )),
+            },
+            _ => Err(self.unlike("a text in quotes")),
+        }
+    }
+
+    /// The text, where it is one.
+    pub fn as_text(&self) -> Option<&str> {
+        self.value.as_str()
+    }
+
+    /// What is written there, as a text: a note may be a number or a date.
+    pub fn note(&self) -> Result<String, ModelError> {
+        match &self.value {
+            DeValue::Integer(number) => Ok(number.as_str().to_string()),
+            DeValue::Float(number) => Ok(number.as_str().to_string()),
+            DeValue::Boolean(truth) => Ok(truth.to_string()),
+            DeValue::Datetime(date) => Ok(date.to_string()),
+            DeValue::String(text) => match text.chars().find(|c| c.is_control() && !matches!(c, '\t' | '\n'))
+            {
+                // A comment may have several lines.
+                None => Ok(text.trim().to_string()),
+                Some(_) => self.text(),
+            },
+            DeValue::Array(_) | DeValue::Table(_) => Err(self.unlike("a text in quotes, a number or a date")),
+        }
+    }
+
+    /// Whether it is a list.
+    pub fn is_list(&self) -> bool {
+        self.value.is_array()
+    }
+
+    /// true or false.
+    pub fn truth(&self) -> Result<bool, ModelError> {
+        self.value.as_bool().ok_or_else(|| self.unlike("true or false"))
+    }
+
+    /// A number within [`limits::LARGEST`], perhaps infinite, never NaN.
+    pub fn number_or_inf(&self, wanted: &str) -> Result<f64, ModelError> {
+        let number = match &self.value {
+            DeValue::Integer(integer) => {
+                i64::from_str_radix(&integer.as_str().replace('_', ""), integer.radix())
+                    .map(|integer| integer as f64)
+                    // What is too large for a whole number is a number all the same.
+                    .or_else(|_| integer.as_str().replace('_', "").parse())
+                    .ok()
+            }
+            DeValue::Float(float) => float.as_str().replace('_', "").parse().ok(),
+            _ => None,
+        };
+        match number {
+            Some(number) if f64::is_nan(number) => {
+                Err(self.error(format!("`{}` is NaN; {wanted} is expected", self.key), None))
+            }
+            Some(number) => match limits::too_large(number) {
+                Some(fault) => Err(self.error(format!("`{}` is {fault}", self.key), None)),
+                None => Ok(number),
+            },
+            None => Err(self.unlike(wanted)),
+        }
+    }
+
+    /// A finite number.
+    pub fn number(&self) -> Result<f64, ModelError> {
+        let number = self.number_or_inf("a number")?;
+        if number.is_finite() {
+            Ok(number)
+        } else {
+            Err(self.error(format!("`{}` is infinite; a number is expected", self.key), None))
+        }
+    }
+
+    /// A finite number above zero.
+    pub fn positive(&self) -> Result<f64, ModelError> {
+        let number = self.number()?;
+        if number > 0.0 {
+            Ok(number)
+        } else {
+            Err(self.error(format!("`{}` is {number}; it has to be above 0", self.key), None))
+        }
+    }
+
+    /// A whole number of at least `least` and at most `most`.
+    pub fn count(&self, least: usize, most: usize) -> Result<usize, ModelError> {
+        let number = self.number()?;
+        if number.fract() == 0.0 && number >= least as f64 && number <= most as f64 {
+            Ok(number as usize)
+        } else {
+            Err(self.error(
+                format!(
+                    "`{}` is {number}; a whole number from {least} to {most} is expected",
+                    self.key
+                ),
+                None,
+            ))
+        }
+    }
+
+    /// The items of a list, each under the list's key.
+    pub fn list(self, wanted: &str) -> Result<Vec<Value<'a>>, ModelError> {
+        if !self.value.is_array() {
+            return Err(self.unlike(wanted));
+        }
+        let (source, key, span) = (self.source, self.key, self.span);
+        let DeValue::Array(items) = self.value else {
+            return Ok(Vec::new());
+        };
+        if items.len() > MOST_ITEMS {
+            let message = format!("`{key}` is a list of {}; {MOST_ITEMS} are the most", items.len());
+            return Err(source.error(span, message, None));
+        }
+        Ok(items
+            .into_iter()
+            .map(|item: Spanned<DeValue<'a>>| Value {
+                source,
+                key: key.clone(),
+                key_span: item.span(),
+                span: item.span(),
+                value: item.into_inner(),
+            })
+            .collect())
+    }
+
+    /// Exactly three items of a list.
+    pub fn three(self, wanted: &str) -> Result<[Value<'a>; 3], ModelError> {
+        let (source, key, span) = (self.source, self.key.clone(), self.span.clone());
+        let items = self.list(wanted)?;
+        let count = items.len();
+        items.try_into().map_err(|_| {
+            let message = format!("`{key}` is a list of {count}; {wanted} is expected");
+            source.error(span, message, None)
+        })
+    }
+
+    /// Three finite numbers.
+    pub fn vector(self) -> Result<[f64; 3], ModelError> {
+        let items = self.three("a list of three numbers")?;
+        let mut vector = [0.0; 3];
+        for (place, item) in vector.iter_mut().zip(&items) {
+            *place = item.number()?;
+        }
+        Ok(vector)
+    }
+
+    /// A table, called `name` in messages.
+    pub fn table(self, name: String) -> Result<Table<'a>, ModelError> {
+        if !self.value.is_table() {
+            return Err(self.unlike("a table"));
+        }
+        // A header `[name]` is what a message about the table should point at.
+        let span = if self.key_span.start < self.span.start {
+            self.key_span.clone()
+        } else {
+            self.span.clone()
+        };
+        match self.value {
+            DeValue::Table(table) => Ok(Table::new(self.source, name, span, table)),
+            _ => Ok(Table::new(self.source, name, span, DeTable::new())),
+        }
+    }
+}

@@ -1,0 +1,88 @@
+//! Whether the runs of measured data are those that the session states.
+
+use std::ops::Range;
+
+use super::motion::Motion;
+use super::readings::Readings;
+
+/// A run of which less than this share of its way leads on goes there and back.
+const ONE_WAY: f64 = 0.5;
+
+/// What the runs of a test's data lack, or have beyond what its movement states, if anything. Data without a `run` column tell nothing.
+pub(crate) fn unlike_stated(motion: Option<&Motion>, readings: &Readings) -> Option<String> {
+    let (Motion::Sweep {
+        runs,
+        both_directions,
+        ..
+    }
+    | Motion::Circle {
+        runs,
+        both_directions,
+        ..
+    }
+    | Motion::Follow {
+        runs,
+        both_directions,
+        ..
+    }) = motion?
+    else {
+        return None;
+    };
+    if readings.run.is_empty() {
+        return None;
+    }
+    let (mut forward, mut backward, mut turning) = (0, 0, Vec::new());
+    for run in readings.runs() {
+        let (net, whole) = way(motion?, readings, &run);
+        if whole > 0.0 && net.abs() < ONE_WAY * whole {
+            turning.push(readings.run[run.start].to_string());
+        } else if net > 0.0 {
+            forward += 1;
+        } else if net < 0.0 {
+            backward += 1;
+        }
+    }
+    let states = format!("the session states runs = {runs}, both_directions = {both_directions}");
+    if !turning.is_empty() {
+        let numbers = turning.join(", ");
+        return Some(match turning.len() {
+            1 => format!(
+                "run {numbers} goes there and back under one number: `run` numbers each traversal in one direction; {states}"
+            ),
+            _ => format!(
+                "runs {numbers} go there and back under one number each: `run` numbers each traversal in one direction; {states}"
+            ),
+        });
+    }
+    let enough = forward >= *runs && (backward >= *runs || !both_directions);
+    let only_forward = *both_directions || backward == 0;
+    (!(enough && only_forward)).then(|| {
+        let plural = if forward == 1 { "" } else { "s" };
+        format!("the data hold {forward} run{plural} forward and {backward} backward where {states}")
+    })
+}
+
+/// How far a run goes on in the direction of the movement, and how far it goes in all: along an axis, or round by the area that it sweeps.
+fn way(motion: &Motion, readings: &Readings, run: &Range<usize>) -> (f64, f64) {
+    let sum = |steps: &mut dyn Iterator<Item = f64>| {
+        steps.fold((0.0, 0.0), |(net, whole), step| (net + step, whole + step.abs()))
+    };
+    match motion {
+        Motion::Sweep { axis, from, to, .. } | Motion::Follow { axis, from, to, .. } => {
+            let positions = &readings.positions[*axis][run.clone()];
+            sum(&mut positions.windows(2).map(|pair| (pair[1] - pair[0]) * (to - from)))
+        }
+        Motion::Circle {
+            first,
+            second,
+            from,
+            to,
+            ..
+        } => {
+            let [x, y] = [*first, *second].map(|axis| &readings.positions[axis][run.clone()]);
+            let area = |k: usize| (x[k] - x[0]) * (y[k + 1] - y[0]) - (x[k + 1] - x[0]) * (y[k] - y[0]);
+            sum(&mut (0..x.len() - 1).map(|k| area(k) * (to - from)))
+        }
+        Motion::List => (0.0, 0.0),
+    }
+}

@@ -1,0 +1,91 @@
+//! Rows that a file holds twice: copies by a slip of export or editing, not repeats of a measurement.
+//!
+//! A row is a copy where every cell is that of an earlier row: that of the time as well, where the file has one. Without a time column the run number is
+//! asked: where a state recurs within a run and every reading of it is the same to the last digit, whole rows were copied; where some of them differ, they are
+//! repeats, and equal ones are a matter of the resolution. A file with neither column does not tell, and is taken as it is.
+
+use std::collections::HashMap;
+use std::hash::{DefaultHasher, Hash, Hasher};
+use std::ops::Range;
+
+use crate::session::readings::Readings;
+
+/// Most lines that a message lists.
+const MOST_LISTED: usize = 8;
+
+/// A number that two rows share only if all their cells are the same.
+pub(super) fn number_of(cells: &[String]) -> u64 {
+    let mut hasher = DefaultHasher::new();
+    cells.hash(&mut hasher);
+    hasher.finish()
+}
+
+/// The rows without copies; `None` where there are none. `cells` has a number for the cells of each row.
+pub(super) fn kept(readings: &Readings, cells: &[u64]) -> Option<Vec<usize>> {
+    let closing = closing(readings);
+    if readings.time_s.is_empty() && (readings.run.is_empty() || has_repeats(readings, cells, &closing)) {
+        return None;
+    }
+    let mut first: HashMap<u64, usize> = HashMap::with_capacity(cells.len());
+    let kept: Vec<usize> = (0..cells.len())
+        .filter(|&row| {
+            let original = *first.entry(cells[row]).or_insert(row);
+            original == row || closing.get(&row) == Some(&original)
+        })
+        .collect();
+    (kept.len() < cells.len()).then_some(kept)
+}
+
+/// In words.
+pub(super) fn said(readings: &Readings, kept: &[usize]) -> String {
+    let mut kept = kept.iter().peekable();
+    let copies: Vec<usize> = (0..readings.line.len())
+        .filter(|row| kept.next_if_eq(&row).is_none())
+        .map(|row| readings.line[row])
+        .collect();
+    let mut lines: Vec<String> = copies.iter().take(MOST_LISTED).map(usize::to_string).collect();
+    if copies.len() > MOST_LISTED {
+        lines.push("…".into());
+    }
+    let (count, are, copies_of, they) = match copies.len() {
+        1 => ("1 row".to_string(), "is", "a copy of an earlier row", "it is"),
+        many => (
+            format!("{many} rows"),
+            "are",
+            "copies of earlier rows",
+            "they are",
+        ),
+    };
+    format!(
+        "{}: {count} {are} {copies_of} in every column (line {}); {they} left out, not taken as repeats",
+        readings.file.display(),
+        lines.join(", ")
+    )
+}
+
+/// Whether a state recurs within a run with another reading.
+fn has_repeats(readings: &Readings, cells: &[u64], closing: &HashMap<usize, usize>) -> bool {
+    let mut seen: HashMap<(i64, Vec<u64>), u64> = HashMap::new();
+    (0..cells.len())
+        .filter(|row| !closing.contains_key(row))
+        .any(|row| {
+            let state = readings.positions.iter().map(|axis| axis[row].to_bits());
+            let before = seen
+                .entry((readings.run[row], state.collect()))
+                .or_insert(cells[row]);
+            *before != cells[row]
+        })
+}
+
+/// The last row of each run that ends where it began, with the row that it began with: it may read the same there. A time tells them apart.
+fn closing(readings: &Readings) -> HashMap<usize, usize> {
+    if !readings.time_s.is_empty() {
+        return HashMap::new();
+    }
+    let closes = |run: &Range<usize>| {
+        let mut axes = readings.positions.iter();
+        axes.all(|axis| axis[run.start] == axis[run.end - 1])
+    };
+    let runs = readings.runs().into_iter();
+    runs.filter(closes).map(|run| (run.end - 1, run.start)).collect()
+}

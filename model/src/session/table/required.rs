@@ -1,0 +1,103 @@
+//! The columns that an instrument cannot do without.
+
+use std::path::Path;
+
+use super::Request;
+use super::columns::{Column, Role, known, listed, r_test_columns, r_test_help};
+use crate::error::{ModelError, Place};
+use crate::instrument::InstrumentKind;
+
+/// An error where one of them is not there.
+pub(super) fn required(
+    request: &Request<'_>,
+    file: &Path,
+    line: usize,
+    columns: &[Column],
+    header: Option<&[String]>,
+) -> Result<(), ModelError> {
+    let has = |wanted: &dyn Fn(Role) -> bool| columns.iter().any(|column| wanted(column.role));
+    let found = || match header {
+        Some(header) => format!("; found: {}", listed(header)),
+        None => String::new(),
+    };
+    let missing = |what: String, help: String| {
+        Err(ModelError::Input {
+            place: Place::line(file, line),
+            message: format!("no column {what}{}", found()),
+            help: Some(help),
+        })
+    };
+    match request.instrument {
+        InstrumentKind::BallBar => {
+            if !has(&|role| matches!(role, Role::Length(_) | Role::Deviation(_))) {
+                return missing(
+                    "with what the bar read".into(),
+                    "a ball bar needs `length_mm`, or `deviation_um` from `bar_mm`".into(),
+                );
+            }
+        }
+        InstrumentKind::Probe => {
+            if !has(&|role| matches!(role, Role::Length(_) | Role::Outward(_))) {
+                return missing(
+                    "with what the probe read".into(),
+                    "a probe needs `distance_mm` to the surface, or `deviation_um`, by how much further out it was met"
+                        .into(),
+                );
+            }
+        }
+        InstrumentKind::Tracker => {
+            for (index, name) in ["px_mm", "py_mm", "pz_mm"].into_iter().enumerate() {
+                if !has(&|role| matches!(role, Role::Coordinate(i, _) if i == index)) {
+                    return missing(
+                        format!("`{name}`"),
+                        "a tracker needs px_mm, py_mm and pz_mm".into(),
+                    );
+                }
+            }
+        }
+        InstrumentKind::RTest => {
+            for (index, name) in r_test_columns(request.sensors).into_iter().enumerate() {
+                if !has(&|role| matches!(role, Role::Coordinate(i, _) if i == index)) {
+                    return missing(format!("`{name}_um`"), r_test_help(request).into());
+                }
+            }
+        }
+        InstrumentKind::Socket => {
+            if request.socket.is_none() && !has(&|role| role == Role::Socket) {
+                return missing(
+                    "`socket`".into(),
+                    "add the column, or `socket = \"…\"` to the test if all its poses are of one".into(),
+                );
+            }
+        }
+    }
+    for (index, axis) in request.machine.axes.iter().enumerate() {
+        let stated = request.at_listed.get(index).copied().unwrap_or(false);
+        if stated || has(&|role| matches!(role, Role::Axis(i, _) if i == index)) {
+            continue;
+        }
+        let name = axis.column("");
+        if request.moved.contains(&index) {
+            return missing(
+                format!("`{name}`, though axis `{}` moves in this test", axis.name),
+                "add its positions to the data".into(),
+            );
+        }
+        if request.instrument != InstrumentKind::BallBar {
+            return missing(
+                format!("`{name}`"),
+                format!(
+                    "add the positions of axis `{}` to the data, or where it stands: `at = {{ {name} = 0 }}`",
+                    axis.name
+                ),
+            );
+        }
+    }
+    if !has(&|role| matches!(role, Role::Axis(..))) {
+        return missing(
+            "with the position of an axis".into(),
+            format!("known here: {}", listed(&known(request))),
+        );
+    }
+    Ok(())
+}
