@@ -13,6 +13,10 @@ pub fn headline(result: &TraceResult) -> Option<String> {
     match result.effects.as_slice() {
         [] => None,
         [one] => Some(format!("{}: {}", standing(one, screened), in_short(one))),
+        all if all.iter().all(|effect| effect.unique) => Some(format!(
+            "{} effects, each unique among {screened} candidates screened",
+            all.len()
+        )),
         few if few.len() <= MOST_LISTED => {
             let each = few.iter().enumerate();
             let each: Vec<String> = each
