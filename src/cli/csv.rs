@@ -122,6 +122,10 @@ pub fn write_fit(path: &Path, result: &FitResult) -> Result<(), Failure> {
 /// Writes what `abbe trace` found.
 pub fn write_trace(path: &Path, result: &TraceResult) -> Result<(), Failure> {
     let mut rows = Rows::default();
+    if result.interrupted {
+        let meaning = format!("{}: the result is incomplete", result.interruption());
+        rows.row(["search", "interrupted", &meaning, "", "", ""].map(str::to_string));
+    }
     for (name, model) in [("before", &result.before), ("after", &result.after)] {
         rows.figure(name, "rms", "", model.rms_um, "um");
         rows.figure(name, "held out", "", model.heldout_rms_um, "um");

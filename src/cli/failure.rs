@@ -26,10 +26,16 @@ pub enum Failure {
     /// Options that do not go together.
     #[error("{0}")]
     CommandLine(String),
+    /// The user interrupted the work; what there was by then has been written.
+    #[error("{0}")]
+    Interrupted(String),
     /// Anything else.
     #[error("{0}")]
     Other(String),
 }
+
+/// Exit status of a program that was interrupted, as shells give it.
+pub const INTERRUPTED: u8 = 130;
 
 impl From<IdentifyError> for Failure {
     fn from(error: IdentifyError) -> Self {
@@ -41,16 +47,21 @@ impl From<IdentifyError> for Failure {
 }
 
 impl Failure {
-    /// The exit status: 1 for input that cannot be used, 2 for a wrong command line.
+    /// The exit status: 1 for input that cannot be used, 2 for a wrong command line, 130 for an interruption.
     pub fn status(&self) -> u8 {
         match self {
             Failure::CommandLine(_) => 2,
+            Failure::Interrupted(_) => INTERRUPTED,
             _ => 1,
         }
     }
 
     /// Writes the message to standard error.
     pub fn show(&self) {
+        if let Failure::Interrupted(message) = self {
+            eprintln!("{message}");
+            return;
+        }
         if let Failure::Model(ModelError::Input { place, message, help }) = self
             && let Some(span) = &place.span
             && let Ok(source) = std::fs::read_to_string(&place.file)

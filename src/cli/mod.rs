@@ -13,6 +13,7 @@ mod failure;
 mod fit;
 mod folder;
 pub mod geometric;
+mod interrupt;
 mod layout;
 mod map;
 mod new;
@@ -26,6 +27,7 @@ mod self_calibration;
 mod simulate;
 pub mod table;
 pub mod trace;
+pub mod uniqueness;
 mod views;
 
 use std::path::PathBuf;

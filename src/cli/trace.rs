@@ -1,7 +1,6 @@
 //! `abbe trace`.
 
-use std::sync::atomic::{AtomicBool, Ordering};
-use std::sync::{Arc, Mutex};
+use std::sync::Mutex;
 use std::time::Duration;
 
 use abbe::identify::plan::menu::Menu;
@@ -13,9 +12,11 @@ use clap::Args;
 use indicatif::{ProgressBar, ProgressStyle};
 
 use super::failure::Failure;
+use super::interrupt::Interrupts;
 use super::report::ReportArguments;
 use super::{
     CommonArguments, SessionArguments, compensation, csv, fit, output, plausibility, read_session, table,
+    uniqueness,
 };
 
 /// `abbe trace SESSION`
@@ -72,14 +73,14 @@ pub fn run(arguments: &TraceArguments) -> Result<(), Failure> {
         return list(&session, &options);
     }
     let bar = progress_bar(arguments.common.quiet);
-    // Ctrl-C ends the search, not the program: what was found so far is judged and reported.
-    let interrupted = Arc::new(AtomicBool::new(false));
-    let flag = interrupted.clone();
-    if ctrlc::set_handler(move || flag.store(true, Ordering::Relaxed)).is_err() {
-        eprintln!("warning: Ctrl-C will end the program without a result");
-    }
+    let interrupts = Interrupts::handled(bar.clone());
     let shown = Mutex::new(());
     let report = |progress: Progress| {
+        if matches!(progress, Progress::Working) {
+            // Asked often, from many threads: nothing to show.
+            interrupts.keep_results();
+            return !interrupts.came();
+        }
         let _one_at_a_time = shown.lock();
         match progress {
             Progress::Fitting => bar.set_message("fitting the declared model"),
@@ -91,11 +92,14 @@ pub fn run(arguments: &TraceArguments) -> Result<(), Failure> {
                 }
             }
             Progress::Judging => bar.set_message("refitting and judging"),
+            Progress::Working => {}
         }
-        !interrupted.load(Ordering::Relaxed)
+        !interrupts.came()
     };
     let mut trace = abbe::identify::trace::trace(&session, &options, &report)?;
-    tell_apart(&mut trace, &Menu::short())?;
+    bar.set_message("weighing further tests");
+    tell_apart(&mut trace, &Menu::short(), &report)?;
+    interrupts.end_at_once();
     bar.finish_and_clear();
     if tables {
         print(&trace.result);
@@ -107,7 +111,11 @@ pub fn run(arguments: &TraceArguments) -> Result<(), Failure> {
     if let Some(path) = &arguments.write {
         let data = arguments.session.data.as_deref();
         let text = rewrite::moved(&session.text, &session.file, output::folder_of(path), data)?;
-        let next = write::with_effects(&text, &trace.effects, &session.machine);
+        let mut next = write::with_effects(&text, &trace.effects, &session.machine);
+        if trace.result.interrupted {
+            let interruption = trace.result.interruption();
+            next = format!("# The trace was {interruption}: effects may be missing.\n{next}");
+        }
         output::write_whole(path, next.as_bytes())?;
         let [own, there] = [&session.file, path].map(|file| output::folder_of(file).canonicalize().ok());
         if own != there {
@@ -126,6 +134,12 @@ pub fn run(arguments: &TraceArguments) -> Result<(), Failure> {
         arguments
             .faces
             .write(&document, &method, &session, arguments.common.seed)?;
+    }
+    if trace.result.interrupted {
+        if arguments.compensation.wanted() {
+            eprintln!("warning: no compensation tables are written: effects may be missing from the model");
+        }
+        return Err(Failure::Interrupted(trace.result.interruption()));
     }
     arguments.compensation.run(&trace.after, &trace.after_fit, tables)
 }
@@ -163,6 +177,9 @@ fn list(session: &abbe::model::session::Session, options: &TraceOptions) -> Resu
 fn print(result: &TraceResult) {
     plausibility::print(&result.plausibility);
     say!("Verdict: {}", result.verdict);
+    if let Some(headline) = uniqueness::headline(result) {
+        say!("{headline}");
+    }
     say!(
         "{} readings, noise {} ({}); {} of {} candidates can be seen",
         result.readings,
@@ -195,6 +212,7 @@ fn print(result: &TraceResult) {
     say!("held out: leaving out {}", result.heldout_by);
     for (number, effect) in result.effects.iter().enumerate() {
         say!("\n{}. {}  ({})", number + 1, name(&effect.name), effect.family);
+        say!("   {}", effect.name.meaning);
         for number in &effect.numbers {
             say!("   {}", table::shape_number(number));
         }
@@ -207,27 +225,12 @@ fn print(result: &TraceResult) {
             table::micrometres(effect.rms_gain_um),
             effect.p_value
         );
-        if !effect.aliases.is_empty() {
-            let names: Vec<String> = effect.aliases.iter().take(8).map(name).collect();
-            let more = effect.aliases.len().saturating_sub(8);
-            let more = if more > 0 {
-                format!(" and {more} more")
-            } else {
-                String::new()
-            };
-            say!("   the readings cannot tell it from {}{more}", names.join("; "));
+        say!("   {}", uniqueness::standing(effect, result.candidates_seen));
+        for alias in &effect.aliases {
+            say!("     or {}  ({})", alias.meaning, name(alias));
         }
-        if let Some(test) = &effect.separated_by {
-            match &effect.separation {
-                Some(from) => say!(
-                    "   {test} would tell it from {}: by {:.1} standard deviations instead of {:.1}, in {:.0} min",
-                    name(&from.from),
-                    from.after_sigma,
-                    from.before_sigma,
-                    from.minutes
-                ),
-                None => say!("   told apart by {test}"),
-            }
+        for sentence in uniqueness::tests(effect, name) {
+            say!("   {sentence}");
         }
     }
     if result.remainder.structured {

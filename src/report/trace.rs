@@ -2,7 +2,7 @@
 
 use abbe::identify::IdentifyError;
 use abbe::identify::plan::menu;
-use abbe::identify::results::{EffectResult, TraceResult};
+use abbe::identify::results::{EffectName, EffectResult, TraceResult};
 use abbe::identify::trace::Trace;
 use abbe::identify::trace::alias::Rival;
 use abbe::identify::views::{spectrum, views};
@@ -19,6 +19,7 @@ use super::plot::{Plot, cut};
 use super::readings::{self, um, unit, value_and_u};
 use crate::cli::table::shape_number;
 use crate::cli::trace::name;
+use crate::cli::uniqueness;
 
 /// Effects whose rivals are drawn.
 const MOST_RANKED: usize = 12;
@@ -52,6 +53,7 @@ fn sentence(result: &TraceResult) -> String {
             um(result.before.heldout_rms_um),
             um(result.noise_um)
         ),
+        "incomplete" => format!("The trace was {}: {figures}", result.interruption()),
         "explained" => format!("{count} for what the declared model left: {figures}"),
         "partly-explained" => {
             format!("{count} for a part of what the declared model left: {figures}")
@@ -73,7 +75,10 @@ pub fn document(trace: &Trace<'_>) -> Result<Document, IdentifyError> {
     let mut document = Document {
         title: format!("Trace of {}", problem.session.machine.name),
         word: result.verdict.clone(),
-        verdict: sentence(result),
+        verdict: match uniqueness::headline(result) {
+            Some(headline) => format!("{} {}.", sentence(result), capital(&headline)),
+            None => sentence(result),
+        },
         ..Document::default()
     };
     readings::live(&mut document, &drawn, &result.after.parameters);
@@ -136,7 +141,12 @@ fn effects(document: &mut Document, trace: &Trace<'_>) -> Markup {
     let rows: Vec<Vec<String>> = result.effects.iter().enumerate().map(row).collect();
     html! {
         @if result.effects.is_empty() { p { "No effect was taken up." } }
-        @if !rows.is_empty() { (table(&["", "effect", "found", "explains, rms", "p ≤", "family"], &rows)) }
+        @if !rows.is_empty() {
+            (table(&["", "effect", "in words", "found", "explains, rms", "p ≤", "explanations", "family"], &rows))
+        }
+        @for (number, effect) in result.effects.iter().enumerate().filter(|(_, effect)| !effect.unique) {
+            (alternatives(number, effect, result))
+        }
         @if result.remainder.structured {
             p { "Structure remains (p ≤ " (format!("{:.3}", result.remainder.p_value)) "): " (result.remainder.place.as_deref().unwrap_or("")) "." }
         }
@@ -165,6 +175,7 @@ fn row((number, effect): (usize, &EffectResult)) -> Vec<String> {
     vec![
         (number + 1).to_string(),
         name(&effect.name),
+        effect.name.meaning.clone(),
         if effect.curve.is_empty() {
             values.join(", ")
         } else {
@@ -172,8 +183,32 @@ fn row((number, effect): (usize, &EffectResult)) -> Vec<String> {
         },
         um(effect.rms_gain_um),
         format!("{:.3}", effect.p_value),
+        if effect.unique {
+            "unique".to_string()
+        } else {
+            format!("1 of {}", effect.indistinguishable)
+        },
         effect.family.clone(),
     ]
+}
+
+/// What the readings do not separate from a found effect, and the tests that would.
+fn alternatives(number: usize, effect: &EffectResult, result: &TraceResult) -> Markup {
+    let named = |effect: &EffectName| format!("{} ({})", effect.meaning, name(effect));
+    let all = std::iter::once(&effect.name).chain(&effect.aliases).map(named);
+    html! {
+        h3 { (number + 1) ". " (uniqueness::standing(effect, result.candidates_seen)) }
+        (list(all))
+        @for sentence in uniqueness::tests(effect, name) { p { (capital(&sentence)) "." } }
+    }
+}
+
+/// With a capital letter.
+fn capital(words: &str) -> String {
+    let mut letters = words.chars();
+    letters.next().map_or(String::new(), |first| {
+        first.to_uppercase().chain(letters).collect()
+    })
 }
 
 /// Free curves with their band.
@@ -299,15 +334,8 @@ fn what_else(document: &mut Document, trace: &Trace<'_>) -> Markup {
     let shown = document.show(plots);
     let correlations = readings::correlations(document, &trace.after, &trace.after_fit);
     html! {
-        @for (number, effect) in result.effects.iter().enumerate().filter(|(_, effect)| !effect.aliases.is_empty()) {
-            p {
-                (number + 1) ". " (name(&effect.name)) ": the readings cannot tell it from "
-                @for (k, alias) in effect.aliases.iter().enumerate() { @if k > 0 { "; " } (name(alias)) }
-                "."
-            }
-        }
-        @if result.effects.iter().all(|effect| effect.aliases.is_empty()) && !result.effects.is_empty() {
-            p { "Nothing in the library looks the same as what was found." }
+        @if result.effects.iter().all(|effect| effect.unique) && !result.effects.is_empty() {
+            p { "No other candidate of the library explains as much in the place of what was found." }
         }
         (shown)
         (correlations)
@@ -315,7 +343,7 @@ fn what_else(document: &mut Document, trace: &Trace<'_>) -> Markup {
     }
 }
 
-/// Who stands highest in an effect's place.
+/// The competing explanations of an effect.
 fn ranking(rivals: &[Rival], id: &str) -> Plot {
     let rows: Vec<(String, f64, Fill)> = rivals
         .iter()
@@ -332,38 +360,30 @@ fn ranking(rivals: &[Rival], id: &str) -> Plot {
         .collect();
     bars::bars(
         format!("ranking-{id}"),
-        format!("Who could stand in the place of {id}"),
-        "Evidence beside the rest of the model, −ln P, less the price of chosen places.".to_string(),
+        format!("Competing explanations of {id}"),
+        "Evidence beside the rest of the model, −ln P, minus the complexity penalty.".to_string(),
         "evidence, −ln P",
         &rows,
         &[
             ("key-named", "named"),
-            ("key-alias", "cannot be told from it"),
-            ("key-other", "loses"),
+            ("key-alias", "indistinguishable"),
+            ("key-other", "rejected"),
         ],
     )
 }
 
 fn next(result: &TraceResult, offered: bool) -> Markup {
-    let tests = result.effects.iter().filter_map(|effect| {
-        let test = effect.separated_by.as_ref()?;
-        Some(match &effect.separation {
-            Some(from) => format!(
-                "{test} would tell {} from {}: by {:.1} standard deviations instead of {:.1}, in {:.0} min.",
-                name(&effect.name),
-                name(&from.from),
-                from.after_sigma,
-                from.before_sigma,
-                from.minutes
-            ),
-            None => format!("{} is told apart by {test}.", name(&effect.name)),
-        })
-    });
-    let tests: Vec<String> = tests.collect();
+    let mut tests: Vec<String> = Vec::new();
+    for (number, effect) in result.effects.iter().enumerate() {
+        let sentences = uniqueness::tests(effect, name).into_iter();
+        tests.extend(
+            sentences.map(|sentence| format!("{}. {}: {sentence}.", number + 1, effect.name.meaning)),
+        );
+    }
     html! {
         @if tests.is_empty() {
             p {
-                "No further test on the menu is needed to tell what was found from what looks like it. "
+                "Nothing that was found has another explanation that a further test could separate from it. "
                 @if offered && !result.unobservable.is_empty() {
                     (prose("`abbe plan SESSION --improve 1` names the cheapest test that sees what these readings do not."))
                 }

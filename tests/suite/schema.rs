@@ -331,6 +331,7 @@ fn results_hold_and_have_the_fields_of_the_design() {
             "unobservable",
             "rejected",
             "warnings",
+            "interrupted",
         ],
     );
     for model in ["before", "after"] {
@@ -350,13 +351,22 @@ fn results_hold_and_have_the_fields_of_the_design() {
             "aliases",
             "separated_by",
         ],
-        &["family", "heldout_rms_um", "separation"],
+        &[
+            "family",
+            "heldout_rms_um",
+            "separation",
+            "meaning",
+            "unique",
+            "indistinguishable",
+            "explanations",
+            "separating_tests",
+        ],
     );
     has_exactly(&effect["parameters"][0], &["id", "value", "u", "unit"], &[]);
     has_exactly(
         &schema("trace")["$defs"]["EffectName"]["properties"],
         &["component", "driver", "shape", "order"],
-        &["tests"],
+        &["tests", "meaning"],
     );
     has_exactly(&trace["remainder"], &["structured", "p_value", "where"], &[]);
 }

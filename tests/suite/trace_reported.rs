@@ -1,13 +1,19 @@
 //! What a trace reports belongs together: effects, their coefficients, the errors before and after, and uncertainties that cover what looks the same.
 
+use abbe::identify::fit::fit;
+use abbe::identify::noise::Noise;
+use abbe::identify::plan::menu::{Menu, entries};
+use abbe::identify::problem::Problem;
 use abbe::identify::quantity::Given;
+use abbe::identify::results::EffectName;
 use abbe::identify::simulate::{Simulation, simulate};
+use abbe::identify::trace::further::tell_apart;
 use abbe::identify::trace::{TraceOptions, trace};
 use abbe::model::effect::{Component, Driver, Effect, Shape};
 use abbe::model::session::Session;
 use abbe::model::session::read::{self, ReadOptions};
 
-use super::ready;
+use super::{abbe, ready, text};
 
 fn of_c(component: &str, shape: Shape) -> Effect {
     Effect {
@@ -159,4 +165,147 @@ fn the_uncertainty_of_a_found_wave_covers_what_looks_like_another_found_effect()
             "{phase} ± {u}"
         );
     }
+}
+
+/// The readings of a session replaced by those of a machine that has one effect and nothing else.
+fn as_with_effect(session: &Session, noise: &Noise, effect: &Effect, coefficients: &[f64]) -> Session {
+    let mut problem = Problem::new(session, noise.clone(), 1).unwrap();
+    problem.add_effect(effect).unwrap();
+    let mut beta = vec![0.0; problem.parameters.list.len()];
+    let first = beta.len() - coefficients.len();
+    beta[first..].copy_from_slice(coefficients);
+    let residuals = problem.residuals(&beta);
+    let mut changed = session.clone();
+    for (test, residuals) in changed.tests.iter_mut().zip(residuals) {
+        let readings = test.readings.as_mut().unwrap();
+        assert_eq!(readings.observed.len(), residuals.len());
+        for (observed, residual) in readings.observed.iter_mut().zip(residuals) {
+            *observed -= residual;
+        }
+    }
+    changed
+}
+
+/// What another effect, refitted in its place with everything else, leaves of it, standard deviations.
+fn left_by(session: &Session, noise: &Noise, alternative: &Effect) -> f64 {
+    let mut problem = Problem::new(session, noise.clone(), 1).unwrap();
+    problem.add_effect(alternative).unwrap();
+    let fit = fit(&problem, None).unwrap();
+    problem.sum_of_squares(&fit.beta).sqrt()
+}
+
+/// What the bundled session shows has other explanations. Each is told, in words, with how well a further test separates it: as well as a refit of the readings
+/// with that test added says.
+#[test]
+fn each_explanation_is_told_with_how_well_a_further_test_separates_it() {
+    let file = ready("hermle-c600u/measured/session.toml");
+    let session = read::session(&file, &ReadOptions::default()).unwrap();
+    let mut trace = trace(&session, &TraceOptions::default(), &|_| true).unwrap();
+    let menu = Menu {
+        thin: 1,
+        ..Menu::short()
+    };
+    tell_apart(&mut trace, &menu, &|_| true).unwrap();
+    let effect = &trace.result.effects[0];
+    assert!(!effect.unique && effect.indistinguishable == effect.aliases.len() + 1);
+    assert!(effect.aliases.len() > 4, "{:?}", effect.aliases);
+    assert_eq!(effect.name.meaning, "C table: axial motion twice per turn");
+    for alias in &effect.aliases {
+        let what = alias.meaning.split_once(": ").unwrap().1;
+        assert!(
+            effect.explanations.contains(what),
+            "{}: {what}",
+            effect.explanations
+        );
+    }
+
+    // The first test answers for all aliases, nearest first, each other one for those that are left.
+    let tests = &effect.separating_tests;
+    let named: Vec<&EffectName> = tests[0].alternatives.iter().map(|one| &one.name).collect();
+    assert_eq!(named, effect.aliases.iter().collect::<Vec<_>>());
+    for pair in tests.windows(2) {
+        assert_eq!(pair[1].of, pair[0].of - pair[0].separates);
+    }
+    for test in tests {
+        assert_eq!(test.of, test.alternatives.len());
+        let separated = test
+            .alternatives
+            .iter()
+            .filter(|one| one.after_sigma >= 3.0)
+            .count();
+        assert!(separated == test.separates && separated > 0, "{test:?}");
+    }
+    assert_eq!(effect.separated_by.as_ref(), Some(&tests[0].test));
+
+    let noise = &trace.after.noise;
+    let found = &trace.effects[0];
+    let coefficients = &trace.after_fit.beta[trace.after_fit.beta.len() - 2..];
+    let alternatives = &trace.look_alikes[0];
+    let menu = menu.for_effects(std::iter::once(found).chain(alternatives));
+    let proposed = entries(&session, &menu).unwrap();
+    let proposed = proposed.iter().find(|entry| entry.name == tests[0].test).unwrap();
+    let mut longer = session.clone();
+    longer.tests.push(proposed.test.clone());
+    let [before, after] =
+        [&session, &longer].map(|session| as_with_effect(session, noise, found, coefficients));
+    for (one, alternative) in tests[0].alternatives.iter().zip(alternatives) {
+        let [before, after] = [&before, &after].map(|session| left_by(session, noise, alternative));
+        let alike = |told: f64, refitted: f64| (told - refitted).abs() < 0.05 * refitted + 0.05;
+        assert!(
+            alike(one.before_sigma, before) && alike(one.after_sigma, after),
+            "{one:?}: refitted {before} and {after}"
+        );
+    }
+}
+
+#[test]
+fn an_effect_without_an_alternative_is_unique() {
+    let file = ready("hermle-c600u/measured/session.toml");
+    let session = read::session(&file, &ReadOptions::default()).unwrap();
+    let options = TraceOptions {
+        only: vec!["EZC~C:h".to_string()],
+        ..TraceOptions::default()
+    };
+    let mut trace = trace(&session, &options, &|_| true).unwrap();
+    tell_apart(&mut trace, &Menu::short(), &|_| true).unwrap();
+    let effect = &trace.result.effects[0];
+    assert!(effect.unique && effect.indistinguishable == 1 && effect.aliases.is_empty());
+    assert_eq!(effect.explanations, effect.name.meaning);
+    assert!(effect.separating_tests.is_empty() && effect.separated_by.is_none());
+}
+
+/// The second line says whether there is another explanation, before any figure.
+#[test]
+fn the_line_below_the_verdict_says_whether_an_effect_is_unique() {
+    let session = ready("hermle-c600u/measured/session.toml");
+    let output = |only: &[&str]| {
+        let outcome = abbe(&[&["trace", text(&session)], only].concat());
+        assert!(outcome.status.success());
+        String::from_utf8(outcome.stdout).unwrap()
+    };
+    let all = output(&[]);
+    let mut lines = all.lines();
+    assert_eq!(lines.next(), Some("Verdict: explained"));
+    let second = lines.next().unwrap();
+    let count = second
+        .strip_prefix("1 of ")
+        .and_then(|rest| rest.split_once(' '))
+        .unwrap();
+    assert!(count.0.parse::<usize>().unwrap() > 5, "{second}");
+    assert!(
+        count
+            .1
+            .starts_with("indistinguishable explanations: C table: axial motion twice per turn, or "),
+        "{second}"
+    );
+    let told = all.lines().filter(|line| line.starts_with("     or ")).count();
+    assert_eq!(told + 1, count.0.parse::<usize>().unwrap());
+    assert!(all.contains(" separates it from "), "{all}");
+    let one = output(&["--only", "EZC~C:h"]);
+    let second = one.lines().nth(1).unwrap();
+    assert!(
+        second.starts_with("unique among ")
+            && second.ends_with(" candidates screened: C table: axial motion twice per turn"),
+        "{second}"
+    );
 }

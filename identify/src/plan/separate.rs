@@ -11,8 +11,8 @@ use serde::Serialize;
 
 use super::goal;
 use super::information::{Root, Shared};
-use super::order::{rounded, smallest_first};
 use super::menu::Menu;
+use super::order::{rounded, smallest_first};
 use super::prepared::Prepared;
 use super::states;
 use crate::error::IdentifyError;
@@ -251,8 +251,8 @@ impl Contest {
         })
     }
 
-    /// The candidate test that separates most alternatives by so many standard deviations, and among those the quickest of the ones that separate them all but
-    /// as well as the best. Ties are decided by names.
+    /// The candidate test that separates most alternatives by so many standard deviations; of several the quickest whose least separation comes near the
+    /// largest. Ties are decided by names.
     fn best(&self, sigmas: &[Vec<f64>], least: f64) -> Option<usize> {
         let count = |entry: usize| sigmas[entry].iter().filter(|sigma| **sigma >= least).count();
         let worst = |entry: usize| {
@@ -268,7 +268,7 @@ impl Contest {
             .min_by(|a, b| {
                 smallest_first(entry(*a).minutes, entry(*b).minutes)
                     .then(worst(*b).total_cmp(&worst(*a)))
-                    .then(entry(*a).name.cmp(&entry(*b).name))
+                    .then_with(|| entry(*a).name.cmp(&entry(*b).name))
             })
     }
 }

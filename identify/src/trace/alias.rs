@@ -4,6 +4,7 @@
 //! the residual as well within 2 of log-likelihood, whether or not the numbers and places that were chosen in its shape are held against it, and it does
 //! at least half of what the named effect did to the readings. The search names the one that is the shortest to say; the others are told, nearest first.
 
+use std::cmp::Ordering;
 use std::collections::HashSet;
 
 use abbe_model::effect::Shape;
@@ -44,6 +45,21 @@ pub struct Rival {
 /// How many rivals are kept.
 const MOST_RIVALS: usize = 16;
 
+/// To six decimals: lists are in the order of these, so that rounding decides no tie.
+fn to_six_decimals(value: f64) -> f64 {
+    (value * 1e6).round() / 1e6
+}
+
+/// The order of two candidates that are equally good: by what they cost, then by name, then by their place in the library.
+fn simplest_first(search: &Search<'_>, a: usize, b: usize) -> Ordering {
+    let [first, second] = [a, b].map(|candidate| &search.candidates[candidate]);
+    first
+        .length()
+        .total_cmp(&second.length())
+        .then_with(|| first.effect.id().cmp(&second.effect.id()))
+        .then(a.cmp(&b))
+}
+
 /// What stands highest in the place of the `k`-th taken effect, the best first: that effect, its aliases, and what loses.
 fn rivals(search: &Search<'_>, k: usize, gains: &[Gain], variance: f64, aliases: &[Alias]) -> Vec<Rival> {
     let taken = search.taken()[k].candidate;
@@ -62,9 +78,12 @@ fn rivals(search: &Search<'_>, k: usize, gains: &[Gain], variance: f64, aliases:
                 && !search.candidates[*candidate].last_resort
                 && search.is_open(*candidate, &search.tracks[ALL].folds)
         })
-        .map(|(candidate, gain)| (search.evidence_for(candidate, gain, variance), candidate))
+        .map(|(candidate, gain)| {
+            let evidence = search.evidence_for(candidate, gain, variance);
+            (to_six_decimals(evidence), candidate)
+        })
         .collect();
-    standing.sort_by(|a, b| b.0.total_cmp(&a.0));
+    standing.sort_by(|a, b| b.0.total_cmp(&a.0).then_with(|| simplest_first(search, a.1, b.1)));
     let mut rivals: Vec<Rival> = Vec::new();
     for (evidence, candidate) in standing {
         let id = search.candidates[candidate].effect.id();
@@ -133,11 +152,9 @@ pub(super) fn aliases(
         })
         .collect();
     aliases.sort_by(|a, b| {
-        let length = |alias: &Alias| search.candidates[alias.candidate].length();
-        b.cosine
-            .partial_cmp(&a.cosine)
-            .unwrap_or(std::cmp::Ordering::Equal)
-            .then(length(a).total_cmp(&length(b)))
+        to_six_decimals(b.cosine)
+            .total_cmp(&to_six_decimals(a.cosine))
+            .then_with(|| simplest_first(search, a.candidate, b.candidate))
     });
     // Of one name the nearest member stands for all; those that bear the winner's own name are the winner.
     let named = search.candidates[taken.candidate].effect.id();
