@@ -16,8 +16,9 @@ use abbe::model::chain::Machine;
 use abbe::model::component::Freedom;
 use clap::{Args, ValueEnum};
 
-use super::failure::{Failure, visible};
+use super::failure::Failure;
 use super::folder::{self, NewFile};
+use super::message::{Kind, tell};
 
 /// Most points of a table: LinuxCNC takes 256 triplets a joint, Heidenhain 256 points a table.
 const MOST_POINTS: usize = 256;
@@ -114,7 +115,7 @@ fn write(
     folder::write(folder, &files, false, |_| Ok(()))?;
     if !tables {
         for line in &left_out {
-            eprintln!("warning: not in the compensation tables: {}", visible(line));
+            tell(Kind::Warning, &format!("not in the compensation tables: {line}"));
         }
         return Ok(());
     }

@@ -15,6 +15,7 @@ mod folder;
 pub mod geometric;
 mod layout;
 mod map;
+mod message;
 mod new;
 pub mod output;
 pub mod plan;

@@ -5,6 +5,7 @@ use super::{Session, Test, plan};
 use crate::chain::Machine;
 use crate::error::ModelError;
 use crate::instrument::Station;
+use crate::words::counted;
 
 /// Most readings of one planned test.
 pub const MOST_READINGS: usize = 1_000_000;
@@ -249,8 +250,9 @@ pub(crate) fn missing_runs(motion: Option<&Motion>, readings: &Readings) -> Opti
     };
     (!enough).then(|| {
         format!(
-            "the data hold {forward} runs forward and {backward} backward where the session states runs = {runs}, both_directions = \
-             {both_directions}"
+            "the data hold {} forward and {backward} backward where the session states runs = {runs}, both_directions = \
+             {both_directions}",
+            counted(forward, "run")
         )
     })
 }
