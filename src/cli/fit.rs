@@ -29,7 +29,7 @@ pub const HELP: &str = "Examples:
 enum Method {
     /// All unknowns of the session at once, by least squares on the chain.
     Full,
-    /// Position errors from the centre of one circle for each axis (thesis, Section 4.2), beside the full fit.
+    /// Position errors from the centre of one circle for each axis (Jiang 2014, Section 4.2), beside the full fit.
     Circle,
     /// Orientation errors from the cone of the bar with its extension (Sections 4.2.1, 5.2), beside the full fit.
     Cone,
