@@ -25,7 +25,7 @@ fn run(place: &Place, arguments: &[&str], environment: &[(&str, &str)]) -> Outpu
 fn place() -> Place {
     let place = Place::new();
     let session = fs::read_to_string(place.at("session.toml")).unwrap();
-    place.put("key.toml", &session.replace("noise_um", "noise_um"));
+    place.put("key.toml", &session.replace("noise_um", "noise_umm"));
     place.put("loud.toml", &session.replace("noise_um = 0.3", "noise_um = 0.03"));
     place
 }
@@ -72,7 +72,7 @@ fn messages_have_one_form() {
     // The line that is meant is shown.
     let said = String::from_utf8(run(&place, &["fit", "key.toml"], &[]).stderr).unwrap();
     assert!(
-        said.contains("key.toml:8") && said.contains("noise_um = 0.3"),
+        said.contains("key.toml:8") && said.contains("noise_umm = 0.3"),
         "{said}"
     );
 }
