@@ -12,6 +12,7 @@ use faer::Mat;
 use statrs::distribution::{Continuous, ContinuousCDF, Normal};
 
 use abbe_model::session::Prior;
+use abbe_model::words::counted;
 
 use crate::error::IdentifyError;
 use crate::fit::{Fit, Quantity, covariance, in_directions, quantities, values_at};
@@ -287,9 +288,9 @@ pub fn add_monte_carlo(
     let unconverged = distributions.iter().map(|d| d.outside[2]).max().unwrap_or(0);
     if unconverged * 2 > draws.runs {
         return Err(IdentifyError::Request(format!(
-            "{unconverged} of {} draws cannot be fitted: the set-ups' uncertainties reach beyond what the model can be evaluated at; state smaller \
+            "{unconverged} of {} cannot be fitted: the set-ups' uncertainties reach beyond what the model can be evaluated at; state smaller \
              ones, or fit without --monte-carlo",
-            draws.runs
+            counted(draws.runs, "draw")
         )));
     }
     let parameters: Vec<DrawnParameter> = result
@@ -314,8 +315,8 @@ pub fn add_monte_carlo(
     }
     if unconverged > 0 {
         result.warnings.push(format!(
-            "{unconverged} of {} draws could not be fitted and are in no figure",
-            draws.runs
+            "{unconverged} of {} could not be fitted and are in no figure",
+            counted(draws.runs, "draw")
         ));
     }
     result.monte_carlo = Some(FitMonteCarlo {

@@ -6,7 +6,7 @@
 //! - [`component`], [`effect`]: errors by name, and what makes them vary; [`pattern`]: several errors by one name;
 //! - [`instrument`]: from a state of the axes to a reading;
 //! - [`sensitivity`]: readings and their derivatives by every component; [`replay`]: over columns of readings at once;
-//! - [`session`]: machine, tests and readings as they stand in files.
+//! - [`session`]: machine, tests and readings as they stand in files; [`words`]: counts in messages.
 //!
 //! A chain over plain numbers and over dual ones: what a ball bar reads, and how that changes with a location error of C, ∂L/∂EX0C = −R·sin C/L₀.
 //!
@@ -71,5 +71,6 @@ pub mod replay;
 pub mod scalar;
 pub mod sensitivity;
 pub mod session;
+pub mod words;
 
 pub use error::ModelError;

@@ -17,8 +17,9 @@ use abbe::model::chain::Machine;
 use abbe::model::component::Freedom;
 use clap::{Args, ValueEnum};
 
-use super::failure::{Failure, visible};
+use super::failure::Failure;
 use super::folder::{self, NewFile};
+use super::message::{Kind, tell};
 
 mod uncertainty;
 
@@ -119,7 +120,7 @@ fn write(
     folder::write(folder, &files, false, |_| Ok(()))?;
     if !tables {
         for line in &left_out {
-            eprintln!("warning: not in the compensation tables: {}", visible(line));
+            tell(Kind::Warning, &format!("not in the compensation tables: {line}"));
         }
         return Ok(());
     }

@@ -14,6 +14,7 @@ use abbe::model::session::read::{self, ReadOptions};
 use clap::{Args, ValueEnum};
 
 use super::failure::Failure;
+use super::message::{Kind, tell};
 use super::output::{self, Outputs};
 
 /// The language of an equation.
@@ -242,9 +243,10 @@ fn read(arguments: &super::SessionArguments) -> Result<Session, Failure> {
     };
     match read::session(&arguments.session, &plan_only) {
         Ok(session) => {
-            eprintln!("note: {fault}");
-            eprintln!(
-                "note: the equation does without readings; of a test without a planned movement every axis that it does not hold is taken to move"
+            tell(Kind::Note, &fault.to_string());
+            tell(
+                Kind::Note,
+                "the equation does without readings; of a test without a planned movement every axis that it does not hold is taken to move",
             );
             Ok(session)
         }

@@ -3,6 +3,8 @@
 use abbe::identify::IdentifyError;
 use abbe::model::ModelError;
 
+use super::message::{Kind, lines, tell, visible};
+
 /// Why a command could not do its work.
 #[derive(Debug, thiserror::Error)]
 pub enum Failure {
@@ -62,47 +64,40 @@ impl Failure {
             eprintln!("{message}");
             return;
         }
-        if let Failure::Model(ModelError::Input { place, message, help }) = self
+        if let Failure::Model(ModelError::Input { place, message, .. }) = self
             && let Some(span) = &place.span
             && let Ok(source) = std::fs::read_to_string(&place.file)
             && span.end <= source.len()
         {
-            use ariadne::{Config, IndexType, Label, Report, ReportKind, Source};
+            use ariadne::{Color, Config, IndexType, Label, Report, ReportKind, Source};
             let name = place.file.display().to_string();
             let source = visible(&source);
-            let mut report = Report::build(ReportKind::Error, (name.clone(), span.clone()))
-                .with_config(
-                    Config::default()
-                        .with_index_type(IndexType::Byte)
-                        .with_color(false),
-                )
-                .with_message(visible(&format!("{place}: {message}")))
-                .with_label(Label::new((name.clone(), span.clone())).with_message("here"));
-            if let Some(help) = help {
-                report = report.with_help(visible(help));
-            }
-            if report.finish().eprint((name, Source::from(source))).is_ok() {
+            let config = Config::default().with_index_type(IndexType::Byte);
+            let label = Label::new((name.clone(), span.clone()))
+                .with_message("here")
+                .with_color(Color::Red);
+            let report = Report::build(ReportKind::Error, (name.clone(), span.clone()))
+                .with_config(config)
+                .with_label(label)
+                .finish();
+            let mut excerpt = Vec::new();
+            if report.write((name, Source::from(source)), &mut excerpt).is_ok() {
+                tell(Kind::Error, &format!("{place}: {message}"));
+                // Its first line is its own `Error:`.
+                let first = excerpt.iter().position(|byte| *byte == b'\n').unwrap_or(0);
+                lines(excerpt.get(first + 1..).unwrap_or_default());
+                self.help();
                 return;
             }
         }
-        eprintln!("error: {}", visible(&self.to_string()));
-        if let Failure::Model(ModelError::Input { help: Some(help), .. }) = self {
-            eprintln!("  help: {}", visible(help));
-        }
+        tell(Kind::Error, &self.to_string());
+        self.help();
     }
-}
 
-/// The text without what would steer a terminal: of a control character `?` is shown, one for each of its bytes, so that places stay.
-pub fn visible(text: &str) -> String {
-    let mut shown = String::with_capacity(text.len());
-    for c in text.chars() {
-        if c == '\r' {
-            shown.push(' ');
-        } else if c.is_control() && !matches!(c, '\n' | '\t') {
-            shown.extend(std::iter::repeat_n('?', c.len_utf8()));
-        } else {
-            shown.push(c);
+    /// What to do, where the error knows.
+    fn help(&self) {
+        if let Failure::Model(ModelError::Input { help: Some(help), .. }) = self {
+            tell(Kind::Help, help);
         }
     }
-    shown
 }

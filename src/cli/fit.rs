@@ -3,9 +3,11 @@
 use std::path::PathBuf;
 
 use abbe::identify::results::{FitMonteCarlo, FitResult, ParameterResult, Unobservable, Verdict};
+use abbe::model::words::counted;
 use clap::{Args, ValueEnum};
 
-use super::failure::{Failure, visible};
+use super::failure::Failure;
+use super::message::{Kind, tell};
 use super::report::ReportArguments;
 use super::{
     CommonArguments, SessionArguments, circular, compensation, csv, geometric, output, plausibility,
@@ -27,7 +29,7 @@ pub const HELP: &str = "Examples:
 enum Method {
     /// All unknowns of the session at once, by least squares on the chain.
     Full,
-    /// Position errors from the centre of one circle for each axis (thesis, Section 4.2), beside the full fit.
+    /// Position errors from the centre of one circle for each axis (Jiang 2014, Section 4.2), beside the full fit.
     Circle,
     /// Orientation errors from the cone of the bar with its extension (Sections 4.2.1, 5.2), beside the full fit.
     Cone,
@@ -149,8 +151,8 @@ pub fn run(arguments: &FitArguments) -> Result<(), Failure> {
 fn print(result: &FitResult) {
     plausibility::print(&result.plausibility);
     say!(
-        "{} readings, noise {} ({})",
-        result.readings,
+        "{}, noise {} ({})",
+        counted(result.readings, "reading"),
         table::micrometres(result.noise_um),
         result.noise_source
     );
@@ -245,11 +247,11 @@ fn print_drawn(drawn: &FitMonteCarlo) {
     );
     let off = |verdict: Verdict| drawn.parameters.iter().filter(|p| p.verdict == verdict).count();
     say!(
-        "\nMonte Carlo, {} runs, seed {}: {} of {} parameters agree with the GUM within the tolerance of JCGM 101, 8.1; {} differ",
-        drawn.runs,
+        "\nMonte Carlo, {}, seed {}: {} of {} agree with the GUM within the tolerance of JCGM 101, 8.1; {} differ",
+        counted(drawn.runs, "run"),
         drawn.seed,
         off(Verdict::Agree),
-        drawn.parameters.len(),
+        counted(drawn.parameters.len(), "parameter"),
         off(Verdict::Differ)
     );
 }
@@ -276,6 +278,6 @@ pub fn print_unobservable(unobservable: &[Unobservable]) {
 /// Named warnings, on standard error.
 pub fn print_warnings(warnings: &[String]) {
     for warning in warnings {
-        eprintln!("warning: {}", visible(warning));
+        tell(Kind::Warning, warning);
     }
 }

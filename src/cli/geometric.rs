@@ -2,6 +2,7 @@
 
 use abbe::identify::geometric::{self, Comparison, ComparisonRow, Method};
 use abbe::model::session::Session;
+use abbe::model::words::counted;
 
 use super::failure::Failure;
 use super::report::ReportArguments;
@@ -34,8 +35,8 @@ pub fn run(
 
 fn print(result: &Comparison) {
     say!(
-        "{} readings, noise {} ({})",
-        result.readings,
+        "{}, noise {} ({})",
+        counted(result.readings, "reading"),
         table::micrometres(result.noise_um),
         result.noise_source
     );

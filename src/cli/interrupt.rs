@@ -6,6 +6,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use indicatif::ProgressBar;
 
 use super::failure::INTERRUPTED;
+use super::message::{Kind, tell};
 
 /// What interruptions there were, and what one does now.
 #[derive(Clone)]
@@ -24,7 +25,7 @@ impl Interrupts {
         };
         let handler = interrupts.clone();
         if ctrlc::set_handler(move || handler.handle(&bar)).is_err() {
-            eprintln!("warning: Ctrl-C will end the program without a result");
+            tell(Kind::Warning, "Ctrl-C will end the program without a result");
         }
         interrupts
     }

@@ -6,6 +6,7 @@ use abbe::identify::volumetric::{self, Erring, Place, Summary, functions};
 use abbe::model::axis::AxisKind;
 use abbe::model::chain::Machine;
 use abbe::model::session::limits::LARGEST;
+use abbe::model::words::counted;
 use clap::Args;
 
 use super::failure::Failure;
@@ -203,7 +204,11 @@ fn csv(machine: &Machine, places: &[Place]) -> Result<Vec<u8>, Failure> {
 }
 
 fn print(summary: &Summary, functions: usize, path: &str) {
-    say!("{path}: {} places, {functions} error functions", summary.places);
+    say!(
+        "{path}: {}, {}",
+        counted(summary.places, "place"),
+        counted(functions, "error function")
+    );
     let at: Vec<String> = summary
         .largest_at
         .iter()

@@ -16,6 +16,7 @@ pub mod geometric;
 mod interrupt;
 mod layout;
 mod map;
+mod message;
 mod new;
 pub mod output;
 pub mod plan;
@@ -62,8 +63,9 @@ const EXAMPLES: &str = "Example, from nothing to a found effect:
 `abbe new` lists the templates; `abbe new mine --from-code \"[wCAbYXZt]\"` lays out a machine of your own. `abbe COMMAND --help` has examples of each.
 
 Output:
-  Results go to standard output; progress, warnings and errors go to standard error. A FILE of `-` is standard output: `--json -` writes
-  JSON there and nothing else. `--quiet` suppresses tables and progress, not warnings.
+  Results go to standard output; progress, warnings and errors go to standard error. A FILE of
+  `-` is standard output: `--json -` writes JSON there and nothing else. `--quiet` suppresses
+  tables and progress, not warnings.
 
 Exit status:
   0    done, whatever the verdict

@@ -7,6 +7,7 @@ use std::path::{Path, PathBuf};
 use abbe::model::session::Session;
 
 use super::failure::Failure;
+use super::message::{Kind, tell};
 
 /// Writes a file through a temporary one beside it, so that a reader finds the old file or the whole new one, whatever happens meanwhile.
 ///
@@ -179,7 +180,10 @@ fn write_out(contents: &[u8]) {
         if fault.kind() == std::io::ErrorKind::BrokenPipe {
             std::process::exit(0);
         }
-        eprintln!("error: standard output: cannot be written: {fault}");
+        tell(
+            Kind::Error,
+            &format!("standard output: cannot be written: {fault}"),
+        );
         std::process::exit(1);
     }
 }

@@ -3,6 +3,7 @@
 use std::path::{Path, PathBuf};
 
 use abbe::identify::repeated::{self, Repeated, Scatter};
+use abbe::model::words::counted;
 
 use super::failure::Failure;
 use super::output::{self, Outputs};
@@ -59,8 +60,8 @@ pub fn run(
 
 fn print(result: &Repeated) {
     say!(
-        "{} sessions of one plan, each fitted by itself\n",
-        result.sessions.len()
+        "{} of one plan, each fitted by itself\n",
+        counted(result.sessions.len(), "session")
     );
     let rows: Vec<Vec<String>> = result
         .parameters

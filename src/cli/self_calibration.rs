@@ -2,6 +2,7 @@
 
 use abbe::identify::self_calibration::{self, FunctionResult, MonteCarlo, SelfCalibration};
 use abbe::model::session::Session;
+use abbe::model::words::counted;
 use clap::Args;
 
 use super::failure::Failure;
@@ -79,21 +80,21 @@ pub fn run(
 
 fn print(result: &SelfCalibration) {
     say!(
-        "{} readings, noise {} ({}), residual {}",
-        result.readings,
+        "{}, noise {} ({}), residual {}",
+        counted(result.readings, "reading"),
         table::micrometres(result.noise_um),
         result.noise_source,
         table::micrometres(result.rms_um)
     );
     say!(
-        "{} values of four functions, rank {} before boundary conditions",
-        result.values,
+        "{} of four functions, rank {} before boundary conditions",
+        counted(result.values, "value"),
         result.rank_before
     );
     say!(
-        "{} unknowns under {} conditions, rank {}",
-        result.unknowns,
-        result.conditions.len(),
+        "{} under {}, rank {}",
+        counted(result.unknowns, "unknown"),
+        counted(result.conditions.len(), "condition"),
         result.rank
     );
     for condition in &result.conditions {
@@ -119,8 +120,8 @@ fn print(result: &SelfCalibration) {
     fit::print_unobservable(&result.unobservable);
     if let Some(drawn) = &result.monte_carlo {
         say!(
-            "\nMonte Carlo, {} runs, seed {}; intervals of {} % in µm:",
-            drawn.runs,
+            "\nMonte Carlo, {}, seed {}; intervals of {} % in µm:",
+            counted(drawn.runs, "run"),
             drawn.seed,
             drawn.coverage * 100.0
         );

@@ -6,6 +6,7 @@ use abbe::identify::quantity::{self, Given};
 use abbe::identify::simulate::{Simulated, Simulation, simulate};
 use abbe::model::session::limits::{LARGEST, LEAST_UM};
 use abbe::model::session::{Session, read, rewrite, write};
+use abbe::model::words::counted;
 use clap::Args;
 use schemars::JsonSchema;
 use serde::Serialize;
@@ -223,10 +224,10 @@ fn report(
 
 fn print(session: &Session, report: &Report) {
     say!(
-        "{}: {} readings of {} tests, noise {}, seed {}",
+        "{}: {} of {}, noise {}, seed {}",
         report.session,
-        report.readings,
-        session.tests.len(),
+        counted(report.readings, "reading"),
+        counted(session.tests.len(), "test"),
         table::micrometres(report.noise_um),
         report.seed
     );

@@ -8,6 +8,7 @@ use abbe::identify::results::{EffectName, ModelResult, TraceResult};
 use abbe::identify::trace::further::tell_apart;
 use abbe::identify::trace::{Progress, TraceOptions, library};
 use abbe::model::session::{rewrite, write};
+use abbe::model::words::counted;
 use clap::Args;
 use indicatif::{ProgressBar, ProgressStyle};
 
@@ -84,9 +85,12 @@ pub fn run(arguments: &TraceArguments) -> Result<(), Failure> {
         let _one_at_a_time = shown.lock();
         match progress {
             Progress::Fitting => bar.set_message("fitting the declared model"),
-            Progress::Screening(candidates) => bar.set_message(format!("screening {candidates} candidates")),
+            Progress::Screening(candidates) => {
+                bar.set_message(format!("screening {}", counted(candidates, "candidate")))
+            }
             Progress::Taken(number, id, rms_um) => {
-                bar.set_message(format!("{number} effects, held out {rms_um:.2} µm: {id}"));
+                let effects = counted(number, "effect");
+                bar.set_message(format!("{effects}, held out {rms_um:.2} µm: {id}"));
                 if !arguments.common.quiet {
                     bar.suspend(|| eprintln!("  + {id:<28} held out {rms_um:.3} µm"));
                 }
@@ -119,10 +123,11 @@ pub fn run(arguments: &TraceArguments) -> Result<(), Failure> {
         output::write_whole(path, next.as_bytes())?;
         let [own, there] = [&session.file, path].map(|file| output::folder_of(file).canonicalize().ok());
         if own != there {
-            eprintln!(
-                "note: {} names its machine and data where they are; commands read it with --allow-outside",
+            let note = format!(
+                "{} names its machine and data where they are; commands read it with --allow-outside",
                 path.display()
             );
+            tell(Kind::Note, &note);
         }
     }
     if let Some(path) = &arguments.csv {
@@ -162,7 +167,8 @@ fn list(session: &abbe::model::session::Session, options: &TraceOptions) -> Resu
     for (number, family) in families.iter().enumerate() {
         let of_family: Vec<_> = entries.iter().filter(|entry| entry.family == number).collect();
         let seen = of_family.iter().filter(|entry| entry.seen).count();
-        say!("{}: {} candidates, {seen} seen", family.name, of_family.len());
+        let candidates = counted(of_family.len(), "candidate");
+        say!("{}: {candidates}, {seen} seen", family.name);
         for entry in of_family {
             say!(
                 "  {} {}",
@@ -181,12 +187,12 @@ fn print(result: &TraceResult) {
         say!("{headline}");
     }
     say!(
-        "{} readings, noise {} ({}); {} of {} candidates can be seen",
-        result.readings,
+        "{}, noise {} ({}); {} of {} can be seen",
+        counted(result.readings, "reading"),
         table::micrometres(result.noise_um),
         result.noise_source,
         result.candidates_seen,
-        result.candidates
+        counted(result.candidates, "candidate")
     );
     say!("The declared model leaves: {}", result.residual_before);
     say!("");

@@ -6,6 +6,7 @@ use abbe::identify::plan::menu;
 use abbe::identify::problem::Problem;
 use abbe::identify::results::{FitResult, ModelResult};
 use abbe::identify::views::{spectrum, views};
+use abbe::model::words::counted;
 use maud::{Markup, html};
 
 use super::document::{Document, prose};
@@ -45,10 +46,10 @@ pub fn document(problem: &Problem<'_>, fit: &Fit, result: &FitResult) -> Result<
     let mut document = Document {
         title: format!("Fit of {}", problem.session.machine.name),
         verdict: format!(
-            "{} of {} unknowns or combinations of them are identified from {} readings; they leave {} ({} held out). {excess}",
+            "{} of {} unknowns or combinations of them are identified from {}; they leave {} ({} held out). {excess}",
             result.rank,
             result.unknowns,
-            result.readings,
+            counted(result.readings, "reading"),
             um(result.rms_um),
             um(result.heldout_rms_um),
         ),

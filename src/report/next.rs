@@ -3,6 +3,7 @@
 use abbe::identify::plan::improve::{Improvement, Step};
 use abbe::identify::plan::range::Shrinkage;
 use abbe::identify::problem::Problem;
+use abbe::model::words::counted;
 use maud::{Markup, html};
 
 use super::document::{Document, list, table};
@@ -27,7 +28,10 @@ pub fn document(problem: &Problem<'_>, improvement: Option<&Improvement>, ranges
         title: format!("Next test for {}", problem.session.machine.name),
         verdict: match improvement {
             Some(found) => verdict(found),
-            None => format!("How far the sweeps of {} tests can shrink.", ranges.len()),
+            None => format!(
+                "How far the sweeps of {} can shrink.",
+                counted(ranges.len(), "test")
+            ),
         },
         ..Document::default()
     };
@@ -47,8 +51,8 @@ pub fn document(problem: &Problem<'_>, improvement: Option<&Improvement>, ranges
 fn verdict(found: &Improvement) -> String {
     match found.steps.as_slice() {
         [] => format!(
-            "None of {} tests on the menu improves the {}, {}.",
-            found.menu_entries,
+            "None of {} on the menu improves the {}, {}.",
+            counted(found.menu_entries, "test"),
             found.figure,
             digits(found.before)
         ),

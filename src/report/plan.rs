@@ -4,6 +4,7 @@ use abbe::identify::IdentifyError;
 use abbe::identify::plan::menu;
 use abbe::identify::plan::results::{ErrorAnalysis, PlanAnalysis};
 use abbe::identify::problem::Problem;
+use abbe::model::words::counted;
 use maud::{Markup, html};
 
 use super::curves;
@@ -34,10 +35,10 @@ pub fn document(problem: &Problem<'_>, analysis: &PlanAnalysis) -> Result<Docume
     let mut document = Document {
         title: format!("Plan for {}", problem.session.machine.name),
         verdict: format!(
-            "{seen} of {} errors would be identified by {} readings in {} tests{}.",
-            analysis.errors.len(),
-            analysis.readings,
-            analysis.tests.len(),
+            "{seen} of {} would be identified by {} in {}{}.",
+            counted(analysis.errors.len(), "error"),
+            counted(analysis.readings, "reading"),
+            counted(analysis.tests.len(), "test"),
             analysis
                 .moving_min
                 .map_or(String::new(), |min| format!(", {min:.0} min of movement")),

@@ -19,6 +19,7 @@ mod kept;
 mod kill;
 mod limits;
 mod measured;
+mod messages;
 mod new;
 mod nist;
 mod patterns;

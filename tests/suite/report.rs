@@ -314,13 +314,8 @@ fn plots_come_all_or_none_and_as_png_where_that_is_built_in() {
             assert_eq!(png[..8], [0x89, b'P', b'N', b'G', 13, 10, 26, 10]);
         }
     }
-    let asked = [
-        "fit",
-        text(&session),
-        "--plots",
-        text(&folder.path().join("asked")),
-        "--png",
-    ];
+    let wanted = folder.path().join("asked");
+    let asked = ["fit", text(&session), "--plots", text(&wanted), "--png"];
     let output = abbe(&asked);
     let message = String::from_utf8_lossy(&output.stderr).into_owned();
     if cfg!(feature = "png") {

@@ -27,7 +27,7 @@ fn place() -> Place {
     place.put("machine.toml", "chain = \"w X b Y Z t\"\n[axis.X]\ntravel_mm = [0, 9]\n[axis.Y]\ntravel_mm = [0, 9]\n[axis.Z]\ntravel_mm = [0, 9]\n");
     place.put(
         "functions.toml",
-        "[[function]]\nerror = \"EXX\"\nof = \"X\"\nat_mm = [0, 9]\nvalues_um = [0, 1]\n",
+        "[[function]]\nerror = \"EXX\"\ntable = { at_mm = [0, 9], um = [0, 1] }\n",
     );
     for (folder, ready) in [
         ("hermle", "hermle-c600u/measured"),
@@ -143,7 +143,10 @@ fn other_outputs_go_to_standard_output_too() {
         ),
         ("trace session.toml --only backlash --write -", "[machine]"),
         ("plan session.toml --patterns -", "test,error,size,unit,run"),
-        ("equation session.toml --test XY --out -", "length of the bar"),
+        (
+            "equation session.toml --test XY --out -",
+            "Length read by a ball bar",
+        ),
         (
             "volumetric machine.toml --map - --functions functions.toml",
             "x_mm,y_mm,z_mm",

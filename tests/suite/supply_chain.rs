@@ -209,3 +209,36 @@ fn the_page_names_every_direct_dependency_and_no_other() {
     let direct: BTreeSet<String> = listed.filter(|name| !name.starts_with("abbe")).collect();
     assert_eq!(explained(), direct);
 }
+
+#[test]
+fn licences_citation_and_changelog_are_in_the_project() {
+    let read = |name: &str| fs::read_to_string(workspace().join(name)).unwrap_or_default();
+    assert!(read("LICENSE-MIT").contains("Permission is hereby granted"));
+    assert!(read("LICENSE-APACHE").contains("Version 2.0, January 2004"));
+    let changelog = read("CHANGELOG.md");
+    assert!(changelog.contains("## [Unreleased]"), "{changelog}");
+    let citation = read("CITATION.cff");
+    let version = format!("\nversion: {}\n", env!("CARGO_PKG_VERSION"));
+    assert!(
+        citation.starts_with("cff-version: 1.2.0") && citation.contains(&version),
+        "{citation}"
+    );
+}
+
+/// A page that relies on the thesis says once which it is.
+#[test]
+fn the_thesis_is_cited_in_full_once_a_page() {
+    let mut pages = vec![workspace().join("README.md")];
+    let docs = fs::read_dir(workspace().join("docs")).unwrap();
+    pages.extend(
+        docs.map(|entry| entry.unwrap().path())
+            .filter(|path| path.extension().is_some_and(|e| e == "md")),
+    );
+    let full = "Xiaogeng Jiang, *Characterising Geometric Errors in Rotary Axes of 5-axis Machine Tools*, PhD thesis, University of Birmingham, 2014";
+    for page in pages {
+        let text = fs::read_to_string(&page).unwrap();
+        let times = text.matches(full).count();
+        let relies = text.replace(full, "").to_lowercase().contains("thesis");
+        assert_eq!(times, usize::from(relies), "{}", page.display());
+    }
+}

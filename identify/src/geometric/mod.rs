@@ -24,6 +24,7 @@ use crate::error::IdentifyError;
 use crate::parameters::Role;
 use crate::problem::{Block, Problem};
 use abbe_model::session::Prior;
+use abbe_model::words::counted;
 
 /// Which tests a method takes, and what it makes of them.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -129,8 +130,8 @@ impl Estimator {
                 .map(|k| problem.parameters.list[errors[k]].id.as_str())
                 .collect();
             return Err(no(format!(
-                "the centres of {} tests do not tell {} apart",
-                tests.len(),
+                "the centres of {} do not tell {} apart",
+                counted(tests.len(), "test"),
                 hidden.join(", ")
             )));
         }

@@ -4,6 +4,7 @@ use std::ops::Range;
 
 use super::motion::Motion;
 use super::readings::Readings;
+use crate::words::counted;
 
 /// A run of which less than this share of its way leads on goes there and back.
 const ONE_WAY: f64 = 0.5;
@@ -57,8 +58,10 @@ pub(crate) fn unlike_stated(motion: Option<&Motion>, readings: &Readings) -> Opt
     let enough = forward >= *runs && (backward >= *runs || !both_directions);
     let only_forward = *both_directions || backward == 0;
     (!(enough && only_forward)).then(|| {
-        let plural = if forward == 1 { "" } else { "s" };
-        format!("the data hold {forward} run{plural} forward and {backward} backward where {states}")
+        format!(
+            "the data hold {} forward and {backward} backward where {states}",
+            counted(forward, "run")
+        )
     })
 }
 

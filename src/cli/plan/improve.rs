@@ -7,6 +7,7 @@ use abbe::identify::plan::menu::Menu;
 use abbe::identify::plan::range::Shrinkage;
 use abbe::identify::problem::Problem;
 use abbe::identify::trace::library;
+use abbe::model::words::counted;
 use clap::{Args, ValueEnum};
 
 use super::tables::three_digits;
@@ -236,8 +237,8 @@ fn add(problem: &mut Problem<'_>, id: &str) -> Result<(), IdentifyError> {
 /// Prints what is proposed.
 pub fn print(found: &Improvement) {
     say!(
-        "{} entries on the menu; {} now: {}",
-        found.menu_entries,
+        "{} on the menu; {} now: {}",
+        counted(found.menu_entries, "entry"),
         found.figure,
         three_digits(found.before)
     );

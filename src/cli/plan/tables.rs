@@ -2,6 +2,7 @@
 
 use abbe::identify::plan::effects::hidden_by_error;
 use abbe::identify::plan::results::{EffectDetectability, EffectsAnalysis, ErrorAnalysis, PlanAnalysis};
+use abbe::model::words::counted;
 
 use crate::cli::table;
 
@@ -36,8 +37,8 @@ fn header(analysis: &PlanAnalysis) {
         .moving_min
         .map_or(String::new(), |min| format!(", {min:.1} min of movement"));
     say!(
-        "{} readings in {}, {}{moving}, noise {}",
-        analysis.readings,
+        "{} in {}, {}{moving}, noise {}",
+        counted(analysis.readings, "reading"),
         counted(analysis.tests.len(), "test"),
         counted(analysis.setups, "set-up"),
         table::micrometres(analysis.noise_um)
@@ -47,12 +48,6 @@ fn header(analysis: &PlanAnalysis) {
         analysis.rank,
         analysis.unknowns
     );
-}
-
-/// `1 test`, `4 tests`.
-fn counted(count: usize, thing: &str) -> String {
-    let plural = if count == 1 { "" } else { "s" };
-    format!("{count} {thing}{plural}")
 }
 
 /// A number with three digits.
@@ -240,9 +235,9 @@ fn correlation(analysis: &PlanAnalysis) {
 fn indices(analysis: &PlanAnalysis) {
     let indices = &analysis.indices;
     say!(
-        "\nInformation on {} of {} errors, set-ups unknown within what is known of them:",
+        "\nInformation on {} of {}, set-ups unknown within what is known of them:",
         indices.seen,
-        indices.errors
+        counted(indices.errors, "error")
     );
     say!(
         "  condition number {}; O1 {}  O2 {}  O3 {}  O4 {}  O5 {}",

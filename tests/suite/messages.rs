@@ -1,0 +1,151 @@
+//! Messages on standard error: one form, colour on a terminal alone, and counts that agree in number.
+
+use std::fs;
+use std::path::Path;
+use std::process::{Command, Output};
+
+use super::faults::Place;
+
+const PROGRAM: &str = env!("CARGO_BIN_EXE_abbe");
+
+fn run(place: &Place, arguments: &[&str], environment: &[(&str, &str)]) -> Output {
+    Command::new(PROGRAM)
+        .args(arguments)
+        .current_dir(place.0.path())
+        .env_remove("NO_COLOR")
+        .env_remove("CLICOLOR_FORCE")
+        .env_remove("CLICOLOR")
+        .env("TERM", "xterm")
+        .envs(environment.iter().copied())
+        .output()
+        .unwrap()
+}
+
+/// Sessions that are refused at a line, refused as a whole, and warned of.
+fn place() -> Place {
+    let place = Place::new();
+    let session = fs::read_to_string(place.at("session.toml")).unwrap();
+    place.put("key.toml", &session.replace("noise_um", "noise_umm"));
+    place.put("loud.toml", &session.replace("noise_um = 0.3", "noise_um = 0.03"));
+    place
+}
+
+const MESSAGES: &[(&[&str], &[&str])] = &[
+    (
+        &["fit", "key.toml"],
+        &["error: ", "help: did you mean `noise_um`?"],
+    ),
+    (&["fit", "nowhere.toml"], &["error: "]),
+    (&["fit", "session.toml", "--plots", "-"], &["error: "]),
+    (&["fot"], &["error: "]),
+    (&["fit", "loud.toml", "-q"], &["warning: "]),
+];
+
+/// Text without its colours: `ESC [ … m`.
+fn plain(text: &str) -> String {
+    let mut pieces = text.split('\u{1b}');
+    let first = pieces.next().unwrap_or_default().to_string();
+    pieces.fold(first, |all, piece| {
+        let (code, rest) = piece.split_once('m').expect("a colour ends with m");
+        assert!(code.starts_with('['), "{code}");
+        all + rest
+    })
+}
+
+#[test]
+fn messages_have_one_form() {
+    let place = place();
+    for (arguments, starts) in MESSAGES {
+        let output = run(&place, arguments, &[]);
+        let said = String::from_utf8(output.stderr).unwrap();
+        assert!(said.starts_with(starts[0]), "{arguments:?}: {said}");
+        for start in *starts {
+            assert!(
+                said.lines().any(|line| line.starts_with(start)),
+                "{start}: {said}"
+            );
+        }
+        for other in ["Error:", "Help:", "Warning:"] {
+            assert!(!said.contains(other), "{arguments:?}: {said}");
+        }
+    }
+    // The line that is meant is shown.
+    let said = String::from_utf8(run(&place, &["fit", "key.toml"], &[]).stderr).unwrap();
+    assert!(
+        said.contains("key.toml:8") && said.contains("noise_umm = 0.3"),
+        "{said}"
+    );
+}
+
+#[test]
+fn colour_is_for_terminals_and_no_color_is_respected() {
+    let place = place();
+    for (arguments, starts) in MESSAGES {
+        let piped = String::from_utf8(run(&place, arguments, &[]).stderr).unwrap();
+        assert!(!piped.contains('\u{1b}'), "{arguments:?}: {piped}");
+        let forced = run(&place, arguments, &[("CLICOLOR_FORCE", "1")]);
+        let forced = String::from_utf8(forced.stderr).unwrap();
+        let word = starts[0].trim_end();
+        let coloured = forced.lines().next().unwrap_or_default();
+        assert!(coloured.starts_with('\u{1b}'), "{arguments:?}: {forced}");
+        assert!(plain(coloured).starts_with(word), "{arguments:?}: {forced}");
+        assert_eq!(plain(&forced), piped, "{arguments:?}");
+        let off = run(&place, arguments, &[("NO_COLOR", "1")]);
+        assert_eq!(String::from_utf8(off.stderr).unwrap(), piped, "{arguments:?}");
+    }
+}
+
+/// `script` (util-linux) gives the program a terminal.
+#[test]
+#[cfg(target_os = "linux")]
+fn a_terminal_has_colour() {
+    if !Path::new("/usr/bin/script").exists() {
+        println!("a_terminal_has_colour: skipped, there is no /usr/bin/script");
+        return;
+    }
+    let place = place();
+    let on_terminal = |environment: &[(&str, &str)]| {
+        let output = Command::new("/usr/bin/script")
+            .args(["-qec", &format!("{PROGRAM} fit key.toml"), "/dev/null"])
+            .current_dir(place.0.path())
+            .env_remove("NO_COLOR")
+            .env("TERM", "xterm")
+            .envs(environment.iter().copied())
+            .output()
+            .unwrap();
+        String::from_utf8(output.stdout).unwrap()
+    };
+    let said = on_terminal(&[]);
+    assert!(
+        said.starts_with('\u{1b}') && plain(&said).starts_with("error: "),
+        "{said}"
+    );
+    let said = on_terminal(&[("NO_COLOR", "1")]);
+    assert!(said.starts_with("error: ") && !said.contains('\u{1b}'), "{said}");
+}
+
+#[test]
+fn one_test_and_two_tests() {
+    let place = Place::new();
+    let simulate = |out: &str, session: &str| {
+        let output = run(&place, &["simulate", session, "--out", out], &[]);
+        let said = String::from_utf8_lossy(&output.stderr).into_owned();
+        assert!(output.status.success(), "{said}");
+        String::from_utf8(output.stdout).unwrap()
+    };
+    let one = fs::read_to_string(place.at("session.toml")).unwrap();
+    let test = &one[one.find("[[test]]").unwrap()..];
+    place.put(
+        "two.toml",
+        &format!("{one}\n{}", test.replace("\"XY\"", "\"again\"")),
+    );
+    assert!(simulate("a", "session.toml").contains("90 readings of 1 test,"));
+    assert!(simulate("b", "two.toml").contains("180 readings of 2 tests,"));
+    let planned = run(&place, &["plan", "session.toml", "--no-effects"], &[]);
+    let planned = String::from_utf8(planned.stdout).unwrap();
+    assert!(
+        planned.starts_with("90 readings in 1 test, 1 set-up,"),
+        "{planned}"
+    );
+    assert!(planned.contains("of 1 error,"), "{planned}");
+}
