@@ -17,7 +17,7 @@ use crate::error::IdentifyError;
 use crate::heldout::{HeldOut, held_out, rms_mm};
 use crate::least_squares::{LeastSquares, Scaling, minimise};
 use crate::noise::{self, Noise, NoiseSource, PureError};
-use crate::parameters::Role;
+use crate::parameters::{Role, pivot_preference};
 use crate::problem::Problem;
 use crate::rank::Rank;
 use crate::results::{FitResult, ParameterResult, Rejected, Unobservable};
@@ -197,7 +197,12 @@ pub fn fit(problem: &Problem<'_>, start: Option<&[f64]>) -> Result<Fit, Identify
         .collect();
     let nominal = vec![0.0; unknowns];
     let triangles = problem.triangles(&nominal)?;
-    let rank = Rank::decide(whole(problem, &nominal, &triangles).parts().0.as_ref(), &size)?;
+    let preference = pivot_preference(&problem.parameters.list);
+    let rank = Rank::decide(
+        whole(problem, &nominal, &triangles).parts().0.as_ref(),
+        &size,
+        &preference,
+    )?;
     let seen = SeenDirections {
         problem,
         basis: &rank.seen,
@@ -444,12 +449,12 @@ pub fn unobservable(problem: &Problem<'_>, rank: &Rank) -> Vec<Unobservable> {
     let list = &problem.parameters.list;
     rank.unseen
         .iter()
-        .map(|row| {
-            let outside: Vec<(usize, f64)> = row
-                .iter()
-                .enumerate()
-                .filter(|(_, value)| **value != 0.0)
-                .map(|(j, value)| (j, value * list[j].size * list[j].unit.per_inside))
+        .zip(&rank.pivots)
+        .map(|(row, pivot)| {
+            let others = (0..row.len()).filter(|j| j != pivot && row[*j] != 0.0);
+            let outside: Vec<(usize, f64)> = std::iter::once(*pivot)
+                .chain(others)
+                .map(|j| (j, row[j] * list[j].size * list[j].unit.per_inside))
                 .collect();
             let leading = outside.first().map_or(1.0, |(_, value)| *value);
             let combination: BTreeMap<String, f64> = outside

@@ -11,11 +11,16 @@
 //! Other errors have no spread of their own. What they cost is correlation: if error `j` were known, the variance of error `i` would fall by
 //! the share `ρ_ij²`; if all others were, to the reciprocal of `i`'s own entry in the information on the errors.
 
+use std::cmp::Reverse;
+
 use faer::Mat;
 
-use super::linear::{Linearisation, is_wanted, marginal, prior_u, to_nine_digits};
+use super::linear::{Linearisation, is_wanted, marginal, prior_u};
 use super::results::{Contribution, SharedWith};
+use crate::error::IdentifyError;
+use crate::parameters::natural;
 use crate::problem::Problem;
+use crate::rank::magnitude;
 
 /// Shares of the variance below this are not listed.
 const LEAST_SHARE: f64 = 1e-4;
@@ -45,7 +50,8 @@ pub fn budget(problem: &Problem<'_>, linear: &Linearisation, error: usize) -> Ve
         share: noise / variance,
     });
     parts.retain(|part| part.share >= LEAST_SHARE || part.from == "noise");
-    parts.sort_by(|a, b| to_nine_digits(b.share).total_cmp(&to_nine_digits(a.share)));
+    // Equal parts stand in the order of their names.
+    parts.sort_by_cached_key(|part| (Reverse(magnitude(part.share)), natural(&part.from)));
     parts
 }
 
@@ -77,8 +83,7 @@ pub fn shared_with(problem: &Problem<'_>, linear: &Linearisation, error: usize) 
         })
         .filter(|shared| shared.correlation.abs() >= LEAST_CORRELATION)
         .collect();
-    let size = |shared: &SharedWith| to_nine_digits(shared.correlation.abs());
-    shared.sort_by(|a, b| size(b).total_cmp(&size(a)));
+    shared.sort_by_cached_key(|shared| (Reverse(magnitude(shared.correlation)), natural(&shared.id)));
     shared
 }
 
@@ -92,10 +97,13 @@ pub fn correlation(covariance: &Mat<f64>, i: usize, j: usize) -> f64 {
     }
 }
 
-/// The standard uncertainty of each wanted error if all other wanted errors were known, inside units.
-pub fn others_known(linear: &Linearisation, wanted: &[usize]) -> Vec<f64> {
-    let r = marginal(linear.whole.parts().0.as_ref(), wanted, &linear.size);
-    (0..wanted.len())
+/// The conditional standard uncertainty of each wanted error, all other wanted errors known, inside units.
+///
+/// # Errors
+/// If the decomposition fails.
+pub fn others_known(linear: &Linearisation, wanted: &[usize]) -> Result<Vec<f64>, IdentifyError> {
+    let r = marginal(linear.whole.parts().0.as_ref(), wanted, &linear.size)?;
+    Ok((0..wanted.len())
         .map(|j| 1.0 / (0..=j).map(|i| r[(i, j)].powi(2)).sum::<f64>().sqrt())
-        .collect()
+        .collect())
 }

@@ -10,6 +10,7 @@ use abbe_model::effect::Shape;
 
 use super::score::{Gain, Trained};
 use super::search::{ALL, Search};
+use crate::parameters::natural;
 
 /// Difference in `−ln P` below which two candidates cannot be told apart: 2 σ for one column.
 pub(super) const INDISTINGUISHABLE: f64 = 2.0;
@@ -64,7 +65,9 @@ fn rivals(search: &Search<'_>, k: usize, gains: &[Gain], variance: f64, aliases:
         })
         .map(|(candidate, gain)| (search.evidence_for(candidate, gain, variance), candidate))
         .collect();
-    standing.sort_by(|a, b| b.0.total_cmp(&a.0));
+    // Evidence that rounding tells apart is equal; equal ones stand in the order of the library.
+    let evidence = |standing: &(f64, usize)| (standing.0 * 1e5).round();
+    standing.sort_by(|a, b| evidence(b).total_cmp(&evidence(a)));
     let mut rivals: Vec<Rival> = Vec::new();
     for (evidence, candidate) in standing {
         let id = search.candidates[candidate].effect.id();
@@ -134,10 +137,13 @@ pub(super) fn aliases(
         .collect();
     aliases.sort_by(|a, b| {
         let length = |alias: &Alias| search.candidates[alias.candidate].length();
-        b.cosine
-            .partial_cmp(&a.cosine)
-            .unwrap_or(std::cmp::Ordering::Equal)
+        let name = |alias: &Alias| natural(&search.candidates[alias.candidate].effect.id());
+        // Cosines that rounding tells apart are equal.
+        let cosine = |alias: &Alias| (alias.cosine * 1e6).round();
+        cosine(b)
+            .total_cmp(&cosine(a))
             .then(length(a).total_cmp(&length(b)))
+            .then_with(|| name(a).cmp(&name(b)))
     });
     // Of one name the nearest member stands for all; those that bear the winner's own name are the winner.
     let named = search.candidates[taken.candidate].effect.id();
