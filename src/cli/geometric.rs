@@ -30,10 +30,9 @@ pub fn run(
 
 fn print(result: &Comparison) {
     say!(
-        "{} readings, noise {} ({})",
+        "{} readings, {}",
         result.readings,
-        table::micrometres(result.noise_um),
-        result.noise_source
+        fit::noise(result.noise_um, &result.noise_source)
     );
     say!("\nWhere the axes pass the standing ball, from their nominal places:");
     let rows: Vec<Vec<String>> = result

@@ -71,10 +71,9 @@ pub fn run(session: &Session, draws: &DrawArguments, common: &CommonArguments) -
 
 fn print(result: &SelfCalibration) {
     say!(
-        "{} readings, noise {} ({}), residual {}",
+        "{} readings, {}, residual {}",
         result.readings,
-        table::micrometres(result.noise_um),
-        result.noise_source,
+        fit::noise(result.noise_um, &result.noise_source),
         table::micrometres(result.rms_um)
     );
     say!(

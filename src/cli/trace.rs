@@ -153,13 +153,24 @@ fn list(session: &abbe::model::session::Session, options: &TraceOptions) -> Resu
     Ok(())
 }
 
+/// What uncertainties follow from, in words: the residual of a model is not called noise.
+fn noise(result: &TraceResult) -> String {
+    if result.noise_source != "residual" || result.effects.is_empty() {
+        return fit::noise(result.noise_um, &result.noise_source);
+    }
+    format!(
+        "residual of the declared model {}, with the effects {} (no noise stated, no repeats)",
+        table::micrometres(result.before.noise_um),
+        table::micrometres(result.after.noise_um)
+    )
+}
+
 fn print(result: &TraceResult) {
     say!("Verdict: {}", result.verdict);
     say!(
-        "{} readings, noise {} ({}); {} of {} candidates can be seen",
+        "{} readings, {}; {} of {} candidates can be seen",
         result.readings,
-        table::micrometres(result.noise_um),
-        result.noise_source,
+        noise(result),
         result.candidates_seen,
         result.candidates
     );

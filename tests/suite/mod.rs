@@ -18,6 +18,7 @@ mod limits;
 mod measured;
 mod new;
 mod nist;
+mod one_answer;
 mod patterns;
 mod plan_command;
 mod plan_help;

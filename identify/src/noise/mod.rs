@@ -41,8 +41,8 @@ pub enum NoiseSource {
     Stated,
     /// Repeated readings.
     Repeats,
-    /// What the fit leaves over.
-    Fit,
+    /// The residual of the model itself: noise and everything that the model lacks.
+    Residual,
 }
 
 impl NoiseSource {
@@ -51,7 +51,7 @@ impl NoiseSource {
         match self {
             NoiseSource::Stated => "stated",
             NoiseSource::Repeats => "repeats",
-            NoiseSource::Fit => "fit",
+            NoiseSource::Residual => "residual",
         }
     }
 }
