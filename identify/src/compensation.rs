@@ -190,7 +190,7 @@ pub fn of_fit(problem: &Problem<'_>, fit: &Fit) -> Compensation {
             covariance: Vec::new(),
         });
     }
-    let enlarged = fit.birge_ratio.powi(2);
+    let enlarged = fit.u_enlargement.powi(2);
     for curve in &mut result.curves {
         let row = |j: &usize| -> Vec<f64> {
             let columns = curve.places.iter();

@@ -7,7 +7,7 @@
 use std::cell::RefCell;
 use std::collections::BTreeMap;
 
-use abbe_model::effect::Shape;
+use abbe_model::effect::{Effect, Shape};
 use abbe_model::session::Session;
 use abbe_model::session::limits::LEAST_UM;
 use faer::Mat;
@@ -17,7 +17,7 @@ use crate::error::IdentifyError;
 use crate::heldout::{HeldOut, held_out, rms_mm};
 use crate::least_squares::{LeastSquares, Scaling, minimise};
 use crate::noise::{self, Noise, NoiseSource, PureError};
-use crate::parameters::Role;
+use crate::parameters::{Role, pivot_preference};
 use crate::plausibility;
 use crate::problem::Problem;
 use crate::rank::Rank;
@@ -39,14 +39,20 @@ pub struct Fit {
     pub residuals: Vec<Vec<f64>>,
     /// On readings that were left out.
     pub held_out: HeldOut,
-    /// `√(χ²/ν)` where it is significantly above 1, else 1.
+    /// The Birge ratio `√(χ²/ν)`: residual over noise; below 1 where readings scatter less than the noise says.
     pub birge_ratio: f64,
+    /// By how much uncertainties are enlarged: the Birge ratio where it is significantly above 1, else 1.
+    pub u_enlargement: f64,
 }
 
 /// Guess of the noise from which iterations start where nothing is known: 1 µm.
 const FIRST_GUESS_MM: f64 = 1e-3;
 /// Least noise that is estimated: readings that repeat exactly, as computed ones do, are still rounded.
 const LEAST_NOISE_MM: f64 = LEAST_UM * 1e-3;
+/// How many times noise and outliers are found anew at most.
+const ROUNDS: usize = 6;
+/// Relative change of the noise from which on it is found.
+const SETTLED: f64 = 1e-4;
 /// Probability below which χ² is taken to say that the residual holds more than noise.
 const BIRGE_SIGNIFICANCE: f64 = 1e-3;
 
@@ -109,41 +115,54 @@ pub fn in_directions(triangle: &Triangle, basis: &Mat<f64>) -> Triangle {
     result
 }
 
-/// A session as a problem, with the noise that the session states, that its repeats show, or that its fit leaves over, and with its wild readings left
-/// out.
+/// A session as a problem, with the noise that the session states, that its repeats show, or that its fit leaves over, and with its outliers excluded.
 ///
 /// # Errors
 /// See [`Problem::new`]; also if the iterations do not end.
 pub fn prepare(session: &Session, seed: u64) -> Result<(Problem<'_>, Fit), IdentifyError> {
+    prepare_with(session, &[], seed)
+}
+
+/// The same of a session that declares some more effects: noise, outliers and rank are those of the fit of that session, figure for figure.
+///
+/// # Errors
+/// See [`prepare`].
+pub fn prepare_with<'a>(
+    session: &'a Session,
+    effects: &[Effect],
+    seed: u64,
+) -> Result<(Problem<'a>, Fit), IdentifyError> {
     let stated = session.noise_mm.filter(|sigma| *sigma > 0.0);
     let floor = session.resolution_mm.unwrap_or(0.0) / 12.0_f64.sqrt();
     let first = match stated {
         Some(sigma) => Noise::white(sigma, NoiseSource::Stated),
-        None => Noise::white(FIRST_GUESS_MM.max(floor), NoiseSource::Fit),
+        None => Noise::white(FIRST_GUESS_MM.max(floor), NoiseSource::Residual),
     };
     let mut problem = Problem::new(session, first, seed)?;
+    for effect in effects {
+        problem.add_effect(effect)?;
+    }
     if stated.is_none() {
         problem.noise = Noise::white(
             nominal_residual_mm(&problem)?.max(floor).max(LEAST_NOISE_MM),
-            NoiseSource::Fit,
+            NoiseSource::Residual,
         );
     }
     let mut fit = plausibility::checked(&problem, fit(&problem, None))?;
-    // Noise and wild readings follow from residuals, residuals from a fit; three rounds settle both.
-    for _ in 0..3 {
+    // Noise and outliers follow from residuals, residuals from a fit; a few rounds settle both. What is returned is always a fit with the noise returned.
+    for _ in 0..ROUNDS {
         let rejected = crate::outliers::wild(&problem, &fit);
         let unchanged = rejected == problem.rejected;
         problem.rejected = rejected;
-        if stated.is_none() {
-            let noise = estimated_noise(&problem, &fit, floor);
-            let settled = (noise.sigma_mm / problem.noise.sigma_mm - 1.0).abs() < 1e-3;
-            problem.noise = noise;
-            if settled && unchanged {
-                break;
-            }
-        } else if unchanged {
+        let noise = match stated {
+            Some(_) => problem.noise.clone(),
+            None => estimated_noise(&problem, &fit, floor),
+        };
+        let settled = (noise.sigma_mm / problem.noise.sigma_mm - 1.0).abs() < SETTLED;
+        if settled && unchanged {
             break;
         }
+        problem.noise = noise;
         fit = plausibility::checked(&problem, self::fit(&problem, Some(&fit.beta)))?;
     }
     Ok((problem, fit))
@@ -181,7 +200,7 @@ fn estimated_noise(problem: &Problem<'_>, fit: &Fit, floor: f64) -> Noise {
     let count = (problem.readings() * problem.coordinates()) as f64;
     let freedom = (count - fit.rank.seen.ncols() as f64).max(1.0);
     let sigma = rms_mm(problem, &fit.residuals) * (count / freedom).sqrt();
-    Noise::white(sigma.max(floor).max(LEAST_NOISE_MM), NoiseSource::Fit)
+    Noise::white(sigma.max(floor).max(LEAST_NOISE_MM), NoiseSource::Residual)
 }
 
 /// Fits a problem, from the nominal machine or from an earlier fit's unknowns.
@@ -198,7 +217,12 @@ pub fn fit(problem: &Problem<'_>, start: Option<&[f64]>) -> Result<Fit, Identify
         .collect();
     let nominal = vec![0.0; unknowns];
     let triangles = problem.triangles(&nominal)?;
-    let rank = Rank::decide(whole(problem, &nominal, &triangles).parts().0.as_ref(), &size)?;
+    let preference = pivot_preference(&problem.parameters.list);
+    let rank = Rank::decide(
+        whole(problem, &nominal, &triangles).parts().0.as_ref(),
+        &size,
+        &preference,
+    )?;
     let seen = SeenDirections {
         problem,
         basis: &rank.seen,
@@ -234,7 +258,8 @@ fn finish(
     let held_out = held_out(problem, &beta, &triangles, &whole, &rank.seen)?;
     let zero = vec![0.0; beta.len()];
     let chi_square: f64 = whole.sum_of_squares_after(&zero);
-    let free = (problem.readings() * problem.coordinates())
+    // What is known beforehand counts as observed: it has its rows in χ².
+    let free = (problem.readings() * problem.coordinates() + problem.prior_rows())
         .saturating_sub(rank.seen.ncols())
         .max(1) as f64;
     Ok(Fit {
@@ -244,12 +269,13 @@ fn finish(
         triangles,
         residuals,
         held_out,
-        birge_ratio: birge_ratio(chi_square, free),
+        birge_ratio: (chi_square / free).sqrt(),
+        u_enlargement: u_enlargement(chi_square, free),
     })
 }
 
-/// `√(χ²/ν)` where it is significantly above 1, else 1: by how much uncertainties are enlarged.
-pub(crate) fn birge_ratio(chi_square: f64, free: f64) -> f64 {
+/// By how much uncertainties are enlarged: the Birge ratio `√(χ²/ν)` where it is significantly above 1, else 1.
+pub(crate) fn u_enlargement(chi_square: f64, free: f64) -> f64 {
     let significance = ChiSquared::new(free).map(|law| law.sf(chi_square)).unwrap_or(1.0);
     if significance < BIRGE_SIGNIFICANCE {
         (chi_square / free).sqrt().max(1.0)
@@ -259,12 +285,12 @@ pub(crate) fn birge_ratio(chi_square: f64, free: f64) -> f64 {
 }
 
 /// What a user should know where uncertainties are enlarged.
-pub(crate) fn birge_warning(ratio: f64) -> Option<String> {
-    (ratio > 1.0).then(|| {
+pub(crate) fn enlargement_warning(enlargement: f64) -> Option<String> {
+    (enlargement > 1.0).then(|| {
         format!(
-            "the residual exceeds the noise (χ² is {:.2} times its degrees of freedom); uncertainties are enlarged by {ratio:.2}; \
+            "the residual exceeds the noise (χ² is {:.2} times its degrees of freedom); uncertainties are enlarged by {enlargement:.2}; \
              `abbe trace` looks for the cause",
-            ratio.powi(2)
+            enlargement.powi(2)
         )
     })
 }
@@ -301,7 +327,7 @@ pub fn report(problem: &Problem<'_>, fit: &Fit) -> FitResult {
     let mut warnings = problem.session.warnings.clone();
     warnings.extend(plausibility::warnings(&plausibility));
     warnings.extend(noise::stated_against_repeats(problem, &fit.residuals));
-    warnings.extend(birge_warning(fit.birge_ratio));
+    warnings.extend(enlargement_warning(fit.u_enlargement));
     FitResult {
         noise_um: problem.noise.sigma_mm * 1e3,
         noise_source: problem.noise.source.word().to_string(),
@@ -314,6 +340,7 @@ pub fn report(problem: &Problem<'_>, fit: &Fit) -> FitResult {
         rank: fit.rank.seen.ncols(),
         unknowns: fit.beta.len(),
         birge_ratio: fit.birge_ratio,
+        u_enlargement: fit.u_enlargement,
         parameters: parameters(problem, fit),
         unobservable: unobservable(problem, &fit.rank),
         rejected: rejected(problem, fit),
@@ -387,7 +414,7 @@ pub(crate) fn values_at(
 /// The unknowns that are seen, in outside units; harmonics as amplitude and phase of `amplitude · cos(order · angle + phase)`.
 pub fn parameters(problem: &Problem<'_>, fit: &Fit) -> Vec<ParameterResult> {
     let list = &problem.parameters.list;
-    let u_inside = |j: usize| fit.covariance[(j, j)].max(0.0).sqrt() * fit.birge_ratio;
+    let u_inside = |j: usize| fit.covariance[(j, j)].max(0.0).sqrt() * fit.u_enlargement;
     let mut results = Vec::new();
     for quantity in quantities(problem, &fit.rank) {
         match quantity {
@@ -406,7 +433,7 @@ pub fn parameters(problem: &Problem<'_>, fit: &Fit) -> Vec<ParameterResult> {
 fn amplitude_and_phase(problem: &Problem<'_>, fit: &Fit, j: usize) -> [ParameterResult; 2] {
     let id = problem.parameters.list[j].id.trim_end_matches(".cos");
     let (a, b) = (fit.beta[j], fit.beta[j + 1]);
-    let cov = |p: usize, q: usize| fit.covariance[(p, q)] * fit.birge_ratio.powi(2);
+    let cov = |p: usize, q: usize| fit.covariance[(p, q)] * fit.u_enlargement.powi(2);
     let amplitude = a.hypot(b);
     let (ca, sa) = if amplitude > 0.0 {
         (a / amplitude, b / amplitude)
@@ -449,12 +476,12 @@ pub fn unobservable(problem: &Problem<'_>, rank: &Rank) -> Vec<Unobservable> {
     let list = &problem.parameters.list;
     rank.unseen
         .iter()
-        .map(|row| {
-            let outside: Vec<(usize, f64)> = row
-                .iter()
-                .enumerate()
-                .filter(|(_, value)| **value != 0.0)
-                .map(|(j, value)| (j, value * list[j].size * list[j].unit.per_inside))
+        .zip(&rank.pivots)
+        .map(|(row, pivot)| {
+            let others = (0..row.len()).filter(|j| j != pivot && row[*j] != 0.0);
+            let outside: Vec<(usize, f64)> = std::iter::once(*pivot)
+                .chain(others)
+                .map(|j| (j, row[j] * list[j].size * list[j].unit.per_inside))
                 .collect();
             let leading = outside.first().map_or(1.0, |(_, value)| *value);
             let combination: BTreeMap<String, f64> = outside
@@ -501,7 +528,7 @@ pub fn rejected(problem: &Problem<'_>, fit: &Fit) -> Vec<Rejected> {
 mod tests {
     use std::path::Path;
 
-    use abbe_model::effect::{Component, Driver, Effect, Shape};
+    use abbe_model::effect::{Component, Driver};
     use abbe_model::session::read::{self, ReadOptions};
 
     use super::*;

@@ -363,6 +363,18 @@ impl<'a> Problem<'a> {
         Ok(narrow)
     }
 
+    /// How many statements are known beforehand: the rows of [`Problem::prior_triangle`].
+    pub fn prior_rows(&self) -> usize {
+        let gaussian = |prior: &Prior| matches!(prior, Prior::Gaussian(_));
+        let list = &self.parameters.list;
+        let distances = self.session.socket_distances.iter();
+        let told = distances.filter(|distance| {
+            let mut ends = distance.between.iter();
+            ends.all(|name| self.socket(name).is_some())
+        });
+        list.iter().filter(|parameter| gaussian(&parameter.prior)).count() + told.count()
+    }
+
     /// What is known beforehand, as rows: Gaussian priors and distances between sockets.
     pub fn prior_triangle(&self, beta: &[f64]) -> Triangle {
         self.prior_triangle_about(beta, |_| 0.0, |_| 0.0)

@@ -50,7 +50,7 @@ struct Refit<'p, 'a> {
 impl<'p, 'a> Refit<'p, 'a> {
     fn new(problem: &'p Problem<'a>, fit: &'p Fit) -> Result<Self, IdentifyError> {
         // Where χ² says that uncertainties are too small, they are enlarged here as they are in the fit.
-        let enlarged = fit.birge_ratio;
+        let enlarged = fit.u_enlargement;
         let mut u = Vec::new();
         let mut starts = Vec::new();
         for residuals in &fit.residuals {

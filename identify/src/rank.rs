@@ -1,39 +1,52 @@
-//! What the readings can see, decided against noise.
+//! Numerical rank of the readings, decided against noise, and the null space in one canonical form.
 //!
 //! With the whitened Jacobian in physical units (1 mm, 0.01 rad) a singular value `s` says that a move by the physical size along its direction
-//! changes the readings by `s` standard deviations in all. A direction with `s < 1` is not seen: even a gross error along it drowns. No
+//! changes the readings by `s` standard deviations in all. A direction with `s < 1` is not identifiable: even a gross error along it drowns. No
 //! tolerance on floating-point numbers is involved; exact null directions of a nominal geometry come out at 10⁻¹⁰ and lower.
+//!
+//! The null space is reported in reduced row echelon form (`echelon`), which depends on the space and on a fixed order of preference of the
+//! parameters alone, not on the basis that a decomposition happens to return. That order ([`Rank::decide`]) is a matter of names, so that neither
+//! rounding nor the order of declarations in a session decides anything.
 
+use faer::prelude::Solve;
 use faer::{Mat, MatRef};
 
 use crate::error::IdentifyError;
 
-/// Singular value, in standard deviations a physical size, below which a direction is not seen.
+/// Singular value, in standard deviations a physical size, below which a direction is not identifiable.
 pub const LEAST_SEEN: f64 = 1.0;
 
-/// The seen and the unseen directions of a problem.
+/// The identifiable and the null directions of a problem.
 #[derive(Clone, Debug)]
 pub struct Rank {
     /// Singular values in descending order, standard deviations a physical size.
     pub singular_values: Vec<f64>,
-    /// Columns span what is seen: unknowns × rank, in inside units (mm, rad), each column one physical size long.
+    /// Columns span what is identifiable: parameters × rank, in internal units (mm, rad), each column one physical size long.
     pub seen: Mat<f64>,
-    /// Null combinations, sparse, in scaled unknowns: one row a combination, each with 1 at its leading unknown.
+    /// Null-space combinations in scaled parameters, in reduced row echelon form: one row a combination, with 1 at its pivot and 0 at the pivots of
+    /// the other rows.
     pub unseen: Vec<Vec<f64>>,
+    /// The pivot of each of these rows, in the order of preference.
+    pub pivots: Vec<usize>,
+    /// Orthonormal columns that span the null space, in scaled parameters: parameters × (parameters − rank).
+    pub null_space: Mat<f64>,
 }
 
 impl Rank {
-    /// From `R` (whitened, priors included) and the physical size of each unknown.
+    /// From `R` (whitened, priors included) and the physical size of each parameter. `preference` holds every parameter once, those first that lead a
+    /// null-space combination rather than others: see [`crate::parameters::pivot_preference`].
     ///
     /// # Errors
     /// If `R` has entries that are not finite.
-    pub fn decide(r: MatRef<'_, f64>, size: &[f64]) -> Result<Rank, IdentifyError> {
+    pub fn decide(r: MatRef<'_, f64>, size: &[f64], preference: &[usize]) -> Result<Rank, IdentifyError> {
         let n = size.len();
         if n == 0 {
             return Ok(Rank {
                 singular_values: Vec::new(),
                 seen: Mat::zeros(0, 0),
                 unseen: Vec::new(),
+                pivots: Vec::new(),
+                null_space: Mat::zeros(0, 0),
             });
         }
         let scaled = Mat::from_fn(n, n, |i, j| r[(i, j)] * size[j]);
@@ -45,11 +58,9 @@ impl Rank {
             .filter(|s| **s >= LEAST_SEEN && **s > rounding)
             .count();
         let v = svd.V();
-        let mut unseen = sparse_rows((rank..n).map(|k| (0..n).map(|j| v[(j, k)]).collect()).collect());
-        for row in &mut unseen {
-            prune(row, scaled.as_ref());
-        }
-        // Full rank: the unknowns themselves, so that nothing is mixed.
+        let null_space = Mat::from_fn(n, n - rank, |j, k| v[(j, rank + k)]);
+        let (unseen, pivots) = combinations(null_space.as_ref(), scaled.as_ref(), preference, LEAST_PIVOT);
+        // Full rank: the parameters themselves, so that nothing is mixed.
         let seen = if rank == n {
             Mat::from_fn(n, n, |i, j| if i == j { size[i] } else { 0.0 })
         } else {
@@ -59,10 +70,12 @@ impl Rank {
             singular_values,
             seen,
             unseen,
+            pivots,
+            null_space,
         })
     }
 
-    /// The seen coordinates of unknowns in inside units; the least-squares ones where the unknowns hold unseen parts. `size` as in
+    /// The identifiable coordinates of parameters in internal units; the least-squares ones where the parameters hold null-space parts. `size` as in
     /// [`Rank::decide`].
     pub fn coordinates(&self, beta: &[f64], size: &[f64]) -> Vec<f64> {
         // The columns of `seen` over `size` are orthonormal.
@@ -75,15 +88,30 @@ impl Rank {
             .collect()
     }
 
-    /// Whether an unknown takes part in no unseen combination.
+    /// Whether a parameter takes part in no null-space combination.
     pub fn is_seen(&self, unknown: usize) -> bool {
         self.unseen.iter().all(|row| row[unknown] == 0.0)
     }
 }
 
-/// Leaves out the least coefficients one by one as long as what remains is still not seen: a combination that hides within the noise owes
-/// its small coefficients to the noise.
-fn prune(row: &mut [f64], scaled: MatRef<'_, f64>) {
+/// The combinations of a null space in its canonical form (see [`echelon`]) without what they owe to the noise, and the pivot of each. `scaled` is the whitened
+/// triangle in scaled parameters.
+pub fn combinations(
+    null_space: MatRef<'_, f64>,
+    scaled: MatRef<'_, f64>,
+    preference: &[usize],
+    least: f64,
+) -> (Vec<Vec<f64>>, Vec<usize>) {
+    let (mut rows, pivots) = echelon(null_space, preference, least);
+    for (row, pivot) in rows.iter_mut().zip(&pivots) {
+        prune(row, *pivot, scaled, preference);
+    }
+    (rows, pivots)
+}
+
+/// Drops the least coefficients one by one as long as what remains is still not identifiable: a combination that hides within the noise owes
+/// its small coefficients to the noise. Coefficients of one size are tried in the order of preference, the last first.
+fn prune(row: &mut [f64], pivot: usize, scaled: MatRef<'_, f64>, preference: &[usize]) {
     let signal = |row: &[f64]| -> f64 {
         let change: f64 = (0..scaled.nrows())
             .map(|i| {
@@ -97,10 +125,14 @@ fn prune(row: &mut [f64], scaled: MatRef<'_, f64>) {
     };
     // What is named is an approximate direction; twice the limit still drowns.
     let limit = 2.0 * signal(row).max(LEAST_SEEN);
-    let mut order: Vec<usize> = (0..row.len())
-        .filter(|j| row[*j] != 0.0 && row[*j].abs() < PRUNED)
+    let largest = row.iter().fold(0.0_f64, |most, value| most.max(value.abs()));
+    let mut order: Vec<usize> = preference
+        .iter()
+        .rev()
+        .copied()
+        .filter(|j| *j != pivot && row[*j] != 0.0 && row[*j].abs() < PRUNED * largest)
         .collect();
-    order.sort_by(|a, b| row[*a].abs().total_cmp(&row[*b].abs()));
+    order.sort_by_key(|j| magnitude(row[*j]));
     for j in order {
         let kept = std::mem::take(&mut row[j]);
         if signal(row) > limit {
@@ -109,56 +141,197 @@ fn prune(row: &mut [f64], scaled: MatRef<'_, f64>) {
     }
 }
 
-/// Coefficients that may be pruned: below this, relative to 1.
+/// How large a number is, in steps of 10⁻⁴ of itself: numbers that differ by rounding alone are alike. For lists that are put in order by figures which may
+/// be equal; a stable sort then leaves equal ones in the order of their names.
+pub fn magnitude(value: f64) -> i64 {
+    (value.abs().max(f64::MIN_POSITIVE).ln() * 1e4).round() as i64
+}
+
+/// Coefficients that may be pruned: below this, relative to the largest of the combination.
 const PRUNED: f64 = 0.02;
 
-/// Coefficients below this, relative to 1, are rounding.
+/// Coefficients below this, relative to the largest of the combination, are rounding.
 const NEGLIGIBLE: f64 = 1e-5;
 
-/// Turns an orthonormal basis into a sparse one of the same span: Gauss–Jordan with the largest remaining entry as pivot, then each row
-/// divided by its largest entry.
-fn sparse_rows(mut rows: Vec<Vec<f64>>) -> Vec<Vec<f64>> {
-    let count = rows.len();
+/// A parameter is a pivot if its part in the null space that the pivots before it have left is at least this share of the largest such part. The share is
+/// large enough for the elimination to be stable, and no round ratio of lengths: parts of a geometry stated in round numbers are equal to it by no
+/// coincidence, so that rounding cannot decide.
+pub const LEAST_PIVOT: f64 = 0.0937;
+
+/// The reduced row echelon form of a space, and the pivot of each row, in the order of preference; a row has 1 at its own pivot, 0 at the others, and 0 where
+/// rounding is all there is. `space` holds orthonormal columns (parameters × dimension). The form is the same for every such basis of one space: the part
+/// of a parameter is the distance of its unit vector's projection from those of the pivots before it, which no rotation of the basis changes.
+///
+/// A parameter is passed over whose part is smaller than `least` times the largest part that remains.
+pub fn echelon(space: MatRef<'_, f64>, preference: &[usize], least: f64) -> (Vec<Vec<f64>>, Vec<usize>) {
+    let (n, dimension) = (space.nrows(), space.ncols());
+    // What is left of each parameter's projection: one row each.
+    let mut left: Vec<Vec<f64>> = (0..n)
+        .map(|j| (0..dimension).map(|k| space[(j, k)]).collect())
+        .collect();
     let mut pivots: Vec<usize> = Vec::new();
-    for step in 0..count {
-        let (mut best, mut row, mut column) = (0.0, step, 0);
-        for (i, candidate) in rows.iter().enumerate().skip(step) {
-            for (j, value) in candidate.iter().enumerate() {
-                // Ties are broken by position, so that the result does not depend on rounding.
-                if !pivots.contains(&j) && value.abs() > best * (1.0 + 1e-9) {
-                    (best, row, column) = (value.abs(), i, j);
+    while pivots.len() < dimension {
+        let length = |j: usize| left[j].iter().map(|v| v * v).sum::<f64>().sqrt();
+        let free = |j: &usize| !pivots.contains(j);
+        let largest = (0..n).filter(free).map(length).fold(0.0, f64::max);
+        let next = preference
+            .iter()
+            .copied()
+            .filter(free)
+            .find(|j| length(*j) >= least * largest);
+        let Some(pivot) = next.filter(|_| largest > NEGLIGIBLE) else {
+            break;
+        };
+        let along = length(pivot);
+        let unit: Vec<f64> = left[pivot].iter().map(|v| v / along).collect();
+        for row in &mut left {
+            let share: f64 = row.iter().zip(&unit).map(|(v, u)| v * u).sum();
+            row.iter_mut().zip(&unit).for_each(|(v, u)| *v -= share * u);
+        }
+        pivots.push(pivot);
+    }
+    // An earlier pivot may have been passed over until those before it had taken what was larger.
+    pivots.sort_by_key(|pivot| preference.iter().position(|j| j == pivot));
+    // With P the rows of the basis at the pivots, the form is (basis · P⁻¹)ᵀ.
+    let count = pivots.len();
+    if count == 0 || count < dimension {
+        return (Vec::new(), Vec::new());
+    }
+    let at_pivots = Mat::from_fn(count, dimension, |i, k| space[(pivots[i], k)]);
+    let inverse = at_pivots
+        .partial_piv_lu()
+        .solve(Mat::<f64>::identity(count, count));
+    let form = space * inverse;
+    let rows = (0..count)
+        .map(|i| {
+            let largest = (0..n).fold(0.0_f64, |most, j| most.max(form[(j, i)].abs()));
+            (0..n)
+                .map(|j| match pivots.iter().position(|pivot| *pivot == j) {
+                    Some(place) => f64::from(u8::from(place == i)),
+                    None if form[(j, i)].abs() < NEGLIGIBLE * largest => 0.0,
+                    None => form[(j, i)],
+                })
+                .collect()
+        })
+        .collect();
+    (rows, pivots)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A rotation in the plane of two columns.
+    fn rotated(space: &Mat<f64>, a: usize, b: usize, angle: f64) -> Mat<f64> {
+        let (sin, cos) = angle.sin_cos();
+        Mat::from_fn(space.nrows(), space.ncols(), |i, k| {
+            if k == a {
+                cos * space[(i, a)] - sin * space[(i, b)]
+            } else if k == b {
+                sin * space[(i, a)] + cos * space[(i, b)]
+            } else {
+                space[(i, k)]
+            }
+        })
+    }
+
+    /// Five parameters of which no reading tells `x0 − x1`, `x1 + 2 x2 − x3` and `x4`: whatever basis of that space is given, and whatever rounding of
+    /// 10⁻¹⁰ it carries, the combinations are the same, and those that the equations say.
+    #[test]
+    fn a_null_space_has_one_form_whatever_its_basis() {
+        let raw = [
+            [1.0, -1.0, 0.0, 0.0, 0.0],
+            [0.0, 1.0, 2.0, -1.0, 0.0],
+            [0.0, 0.0, 0.0, 0.0, 1.0],
+        ];
+        // Gram–Schmidt.
+        let mut orthonormal: Vec<Vec<f64>> = Vec::new();
+        for vector in raw {
+            let mut vector = vector.to_vec();
+            for other in &orthonormal {
+                let along: f64 = vector.iter().zip(other).map(|(a, b)| a * b).sum();
+                vector.iter_mut().zip(other).for_each(|(v, o)| *v -= along * o);
+            }
+            let length = vector.iter().map(|v| v * v).sum::<f64>().sqrt();
+            orthonormal.push(vector.iter().map(|v| v / length).collect());
+        }
+        let space = Mat::from_fn(5, 3, |i, k| orthonormal[k][i]);
+        for (preference, wanted) in [
+            // Pivots x0, x1, x4: in terms of x2 and x3.
+            (
+                [0, 1, 2, 3, 4],
+                vec![
+                    (0, vec![1.0, 0.0, 2.0, -1.0, 0.0]),
+                    (1, vec![0.0, 1.0, 2.0, -1.0, 0.0]),
+                    (4, vec![0.0, 0.0, 0.0, 0.0, 1.0]),
+                ],
+            ),
+            // Pivots x4, x3, x0: in terms of x1 and x2.
+            (
+                [4, 3, 0, 1, 2],
+                vec![
+                    (4, vec![0.0, 0.0, 0.0, 0.0, 1.0]),
+                    (3, vec![0.0, -1.0, -2.0, 1.0, 0.0]),
+                    (0, vec![1.0, -1.0, 0.0, 0.0, 0.0]),
+                ],
+            ),
+        ] {
+            for (angle, other) in [(0.0, 0.0), (0.3, 1.1), (2.0, -0.7), (std::f64::consts::PI, 0.5)] {
+                let basis = rotated(&rotated(&space, 0, 1, angle), 1, 2, other);
+                let noisy = Mat::from_fn(5, 3, |i, k| basis[(i, k)] + 1e-11 * ((7 * i + 3 * k) % 5) as f64);
+                let (rows, pivots) = echelon(noisy.as_ref(), &preference, LEAST_PIVOT);
+                assert_eq!(pivots, wanted.iter().map(|(pivot, _)| *pivot).collect::<Vec<_>>());
+                for (row, (_, wanted)) in rows.iter().zip(&wanted) {
+                    for (value, wanted) in row.iter().zip(wanted) {
+                        assert!((value - wanted).abs() < 1e-8, "{row:?} {wanted:?}");
+                        assert_eq!(*value == 0.0, *wanted == 0.0, "{row:?}");
+                    }
                 }
             }
         }
-        if best == 0.0 {
-            break;
-        }
-        rows.swap(step, row);
-        let pivot = rows[step][column];
-        rows[step].iter_mut().for_each(|value| *value /= pivot);
-        let pivot_row = rows[step].clone();
-        for (i, other) in rows.iter_mut().enumerate() {
-            let factor = other[column];
-            if i != step && factor != 0.0 {
-                other
-                    .iter_mut()
-                    .zip(&pivot_row)
-                    .for_each(|(value, p)| *value -= factor * p);
+    }
+
+    /// Readings of nine parameters that see five combinations: what is not identifiable is the same, name by name, in whatever order the parameters are
+    /// declared and with rounding of 10⁻¹¹ in every entry.
+    #[test]
+    fn a_null_space_does_not_depend_on_the_order_of_declarations() {
+        const N: usize = 9;
+        let seen = |i: usize, j: usize| [1.0, -1.0, 2.0, 0.0, 0.5][(3 * i + 2 * j + i * j) % 5] * 1e4;
+        let order = |turn: usize| (0..N).map(move |j| (4 * j + turn) % N).collect::<Vec<usize>>();
+        let told = |turn: usize| {
+            let order = order(turn);
+            let r = Mat::from_fn(N, N, |i, j| {
+                let exact = if i < 5 { seen(i, order[j]) } else { 0.0 };
+                exact * (1.0 + 1e-15 * ((5 * i + 3 * j + turn) % 7) as f64)
+            });
+            // Preferred by name: parameter 0 first.
+            let mut preference: Vec<usize> = (0..N).collect();
+            preference.sort_by_key(|j| order[*j]);
+            let rank = Rank::decide(r.as_ref(), &[1.0; N], &preference).unwrap();
+            let rows: Vec<Vec<f64>> = (rank.unseen.iter())
+                .map(|row| {
+                    let mut by_name = vec![0.0; N];
+                    order
+                        .iter()
+                        .zip(row)
+                        .for_each(|(name, value)| by_name[*name] = *value);
+                    by_name
+                })
+                .collect();
+            let pivots: Vec<usize> = rank.pivots.iter().map(|pivot| order[*pivot]).collect();
+            (rows, pivots)
+        };
+        let (rows, pivots) = told(0);
+        assert!(pivots.is_sorted() && !pivots.is_empty(), "{pivots:?}");
+        for turn in 1..N {
+            let (others, of_others) = told(turn);
+            assert_eq!(of_others, pivots);
+            for (row, other) in rows.iter().zip(&others) {
+                for (a, b) in row.iter().zip(other) {
+                    assert!((a - b).abs() < 1e-9, "{row:?} {other:?}");
+                    assert_eq!(*a == 0.0, *b == 0.0);
+                }
             }
         }
-        pivots.push(column);
     }
-    for row in &mut rows {
-        let largest = row
-            .iter()
-            .fold(0.0_f64, |a, b| if b.abs() > a.abs() { *b } else { a });
-        for value in row.iter_mut() {
-            *value /= largest;
-            if value.abs() < NEGLIGIBLE {
-                *value = 0.0;
-            }
-        }
-    }
-    rows.sort_by_key(|row| row.iter().position(|value| *value != 0.0));
-    rows
 }

@@ -48,7 +48,8 @@ pub struct Rejected {
 pub struct FitResult {
     /// Standard deviation of one scalar reading, µm.
     pub noise_um: f64,
-    /// Where that figure comes from: `stated`, `repeats` or `fit`.
+    /// Where that figure comes from: `stated` by the session, `repeats` (repeated readings), or `residual` where there is neither: the residual of the
+    /// declared model, which holds what the model lacks beside noise.
     pub noise_source: String,
     /// Number of readings that count.
     pub readings: usize,
@@ -68,8 +69,10 @@ pub struct FitResult {
     pub rank: usize,
     /// Number of unknowns.
     pub unknowns: usize,
-    /// By how much the uncertainties are enlarged because the residual exceeds the noise; 1 where it does not.
+    /// The Birge ratio `√(χ²/ν)`, priors counted as observations: the residual over the noise. Below 1 where readings scatter less than `noise_um` says.
     pub birge_ratio: f64,
+    /// By how much the uncertainties are enlarged: the Birge ratio where it is significantly above 1 (p < 0.001), else 1.
+    pub u_enlargement: f64,
     /// What was identified.
     pub parameters: Vec<ParameterResult>,
     /// What cannot be.
@@ -163,6 +166,8 @@ pub struct ModelResult {
     /// The same on readings that neither fit nor search saw.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub heldout_rms_3d_um: Option<f64>,
+    /// Standard deviation of one scalar reading that the uncertainties follow from, µm. Where the source is `residual`, that of this model.
+    pub noise_um: f64,
     /// What was identified.
     pub parameters: Vec<ParameterResult>,
 }
@@ -328,9 +333,10 @@ pub struct TraceResult {
     pub verdict: String,
     /// Whether the trace was interrupted: effects may be missing.
     pub interrupted: bool,
-    /// Standard deviation of one scalar reading, µm.
+    /// Standard deviation of one scalar reading with the effects that were found, µm: that of `after`.
     pub noise_um: f64,
-    /// Where that figure comes from.
+    /// Where that figure comes from: `stated` by the session, `repeats` (repeated readings), or `residual` where there is neither: the residual of the
+    /// model with its effects, which holds what that model lacks beside noise.
     pub noise_source: String,
     /// Autoregressive coefficients of the noise along a run; empty for white noise.
     pub noise_memory: Vec<f64>,

@@ -151,10 +151,9 @@ pub fn run(arguments: &FitArguments) -> Result<(), Failure> {
 fn print(result: &FitResult) {
     plausibility::print(&result.plausibility);
     say!(
-        "{}, noise {} ({})",
+        "{}, {}",
         counted(result.readings, "reading"),
-        table::micrometres(result.noise_um),
-        result.noise_source
+        noise(result.noise_um, &result.noise_source)
     );
     say!(
         "residual {}, held out {} (leaving out {})",
@@ -193,6 +192,15 @@ fn print(result: &FitResult) {
         }
     }
     circular::print(&result.circular);
+}
+
+/// What uncertainties follow from, in words: the residual of a model is not called noise.
+pub fn noise(noise_um: f64, source: &str) -> String {
+    let figure = table::micrometres(noise_um);
+    match source {
+        "residual" => format!("residual of the declared model {figure} (no noise stated, no repeats)"),
+        other => format!("noise {figure} ({other})"),
+    }
 }
 
 /// The table of identified parameters.

@@ -35,10 +35,9 @@ pub fn run(
 
 fn print(result: &Comparison) {
     say!(
-        "{}, noise {} ({})",
+        "{}, {}",
         counted(result.readings, "reading"),
-        table::micrometres(result.noise_um),
-        result.noise_source
+        fit::noise(result.noise_um, &result.noise_source)
     );
     say!("\nWhere the axes pass the standing ball, from their nominal places:");
     let rows: Vec<Vec<String>> = result

@@ -80,10 +80,9 @@ pub fn run(
 
 fn print(result: &SelfCalibration) {
     say!(
-        "{}, noise {} ({}), residual {}",
+        "{}, {}, residual {}",
         counted(result.readings, "reading"),
-        table::micrometres(result.noise_um),
-        result.noise_source,
+        fit::noise(result.noise_um, &result.noise_source),
         table::micrometres(result.rms_um)
     );
     say!(

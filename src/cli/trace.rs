@@ -180,6 +180,18 @@ fn list(session: &abbe::model::session::Session, options: &TraceOptions) -> Resu
     Ok(())
 }
 
+/// What uncertainties follow from, in words: the residual of a model is not called noise.
+fn noise(result: &TraceResult) -> String {
+    if result.noise_source != "residual" || result.effects.is_empty() {
+        return fit::noise(result.noise_um, &result.noise_source);
+    }
+    format!(
+        "residual of the declared model {}, with the effects {} (no noise stated, no repeats)",
+        table::micrometres(result.before.noise_um),
+        table::micrometres(result.after.noise_um)
+    )
+}
+
 fn print(result: &TraceResult) {
     plausibility::print(&result.plausibility);
     say!("Verdict: {}", result.verdict);
@@ -187,10 +199,9 @@ fn print(result: &TraceResult) {
         say!("{headline}");
     }
     say!(
-        "{}, noise {} ({}); {} of {} can be seen",
+        "{}, {}; {} of {} can be seen",
         counted(result.readings, "reading"),
-        table::micrometres(result.noise_um),
-        result.noise_source,
+        noise(result),
         result.candidates_seen,
         counted(result.candidates, "candidate")
     );

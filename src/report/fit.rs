@@ -12,7 +12,7 @@ use maud::{Markup, html};
 use super::document::{Document, prose};
 use super::drawn::Drawn;
 use super::plausibility;
-use super::readings::{self, um};
+use super::readings::{self, sentence_of_noise, um};
 use super::{circular, curves};
 
 /// How a fit was made.
@@ -20,7 +20,7 @@ pub fn method(result: &FitResult) -> Markup {
     html! {
         p {
             "Least squares on the kinematic chain, all unknowns at once, in the directions that the readings see; covariance by the law of propagation \
-             of uncertainty (JCGM 100, JCGM 102). Noise " (um(result.noise_um)) " (" (result.noise_source) "); held out: leaving out " (result.heldout_by) "."
+             of uncertainty (JCGM 100, JCGM 102). " (sentence_of_noise(result.noise_um, &result.noise_source)) "; held out: leaving out " (result.heldout_by) "."
         }
     }
 }
@@ -33,12 +33,12 @@ pub fn document(problem: &Problem<'_>, fit: &Fit, result: &FitResult) -> Result<
     let views = views(problem, fit, None)?;
     let drawn = Drawn::new(problem, &views);
     let spectra = spectrum::spectra(problem, &views);
-    let excess = if result.noise_source == "fit" {
-        "The noise was taken from this very fit and cannot say whether the model lacks anything; `abbe trace` looks for that.".to_string()
-    } else if result.birge_ratio > 1.0 {
+    let excess = if result.noise_source == "residual" {
+        "The uncertainties follow from this very residual, which cannot say whether the model lacks anything; `abbe trace` looks for that.".to_string()
+    } else if result.u_enlargement > 1.0 {
         format!(
             "The residual is {:.2} times what noise would leave: something is missing from the model, and `abbe trace` looks for it.",
-            result.birge_ratio
+            result.u_enlargement
         )
     } else {
         "The residual is what noise would leave.".to_string()
@@ -63,6 +63,7 @@ pub fn document(problem: &Problem<'_>, fit: &Fit, result: &FitResult) -> Result<
         heldout_rms_um: result.heldout_rms_um,
         rms_3d_um: result.rms_3d_um,
         heldout_rms_3d_um: result.heldout_rms_3d_um,
+        noise_um: result.noise_um,
         parameters: Vec::new(),
     };
     let section = readings::before_and_after(
@@ -108,7 +109,7 @@ pub fn document(problem: &Problem<'_>, fit: &Fit, result: &FitResult) -> Result<
         "What to measure next",
         html! {
             p {
-                @if result.birge_ratio > 1.0 { (prose("First `abbe trace` on the same session. ")) }
+                @if result.u_enlargement > 1.0 { (prose("First `abbe trace` on the same session. ")) }
                 @if !menu::is_offered(problem) {
                     @if !result.unobservable.is_empty() {
                         "A test that makes the rest identifiable has to move what these tests leave standing: "
@@ -139,6 +140,7 @@ fn nominal_result(drawn: &Drawn<'_>) -> ModelResult {
         heldout_rms_um: rms_um,
         rms_3d_um,
         heldout_rms_3d_um: rms_3d_um,
+        noise_um: drawn.problem.noise.sigma_mm * 1e3,
         parameters: Vec::new(),
     }
 }

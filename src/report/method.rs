@@ -7,15 +7,15 @@ use maud::{Markup, html};
 use super::document::{Document, list, table};
 use super::plot::Plot;
 use super::plot::bars::{Row, Value, values};
-use super::readings::{self, typeset, um, unit, value_and_u};
+use super::readings::{self, sentence_of_noise, typeset, um, unit, value_and_u};
 use crate::cli::geometric::{error_header, error_rows};
 
 /// How the errors were found.
 pub fn method(result: &Comparison) -> Markup {
     html! {
         p {
-            "The method of the literature (" (result.method) ") and the full least-squares fit on the same readings; noise " (um(result.noise_um)) " ("
-            (result.noise_source) "). Bias: both on noise-free readings that were simulated with the full fit's errors, less those errors."
+            "The method of the literature (" (result.method) ") and the full least-squares fit on the same readings. "
+            (sentence_of_noise(result.noise_um, &result.noise_source)) ". Bias: both on noise-free readings that were simulated with the full fit's errors, less those errors."
         }
     }
 }

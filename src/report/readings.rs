@@ -20,6 +20,17 @@ const MOST_ROWS: usize = 30;
 /// The most rows of a map of correlations.
 const MOST_CORRELATED: usize = 40;
 
+/// What a result calls its noise, in words: the residual of a model is not called noise.
+pub fn sentence_of_noise(noise_um: f64, source: &str) -> String {
+    match source {
+        "residual" => format!(
+            "No noise is stated and no repeats show it: uncertainties follow from the residual of the model, {}",
+            um(noise_um)
+        ),
+        other => format!("Noise {} ({other})", um(noise_um)),
+    }
+}
+
 /// A residual figure as words.
 pub fn um(value: f64) -> String {
     crate::cli::table::micrometres(value)

@@ -16,7 +16,7 @@ use super::plot::bars::{self, Fill};
 use super::plot::lines::{ACROSS, Lines, Mark, Series, UP, span};
 use super::plot::scale::{Scale, place, polyline};
 use super::plot::{Plot, cut};
-use super::readings::{self, um, unit, value_and_u};
+use super::readings::{self, sentence_of_noise, um, unit, value_and_u};
 use crate::cli::table::shape_number;
 use crate::cli::trace::name;
 use crate::cli::uniqueness;
@@ -30,18 +30,21 @@ pub fn method(result: &TraceResult) -> Markup {
         p {
             "The residual of the declared model is searched for " (result.candidates) " effects of the library, of which \
              these readings can see " (result.candidates_seen)
-            ". An effect is taken up if readings without structure seldom let the whole search find as good; everything is then refitted together. Noise "
-            (um(result.noise_um)) " (" (result.noise_source) "); held out: leaving out " (result.heldout_by) ", search included."
+            ". An effect is taken up if readings without structure seldom let the whole search find as good; everything is then refitted together. "
+            (sentence_of_noise(result.noise_um, &result.noise_source)) "; held out: leaving out " (result.heldout_by) ", search included."
         }
     }
 }
 
 fn sentence(result: &TraceResult) -> String {
+    let noise = match result.noise_source.as_str() {
+        "residual" => String::new(),
+        _ => format!("; the noise is {}", um(result.noise_um)),
+    };
     let figures = format!(
-        "held-out residual {} before, {} after; the noise is {}.",
+        "held-out residual {} before, {} after{noise}.",
         um(result.before.heldout_rms_um),
-        um(result.after.heldout_rms_um),
-        um(result.noise_um)
+        um(result.after.heldout_rms_um)
     );
     let count = match result.effects.len() {
         1 => "One effect of the library accounts".to_string(),
@@ -49,9 +52,9 @@ fn sentence(result: &TraceResult) -> String {
     };
     match result.verdict.as_str() {
         "clean" => format!(
-            "The declared model leaves nothing beyond noise: {} held out, noise {}.",
+            "The declared model leaves nothing beyond noise: {} held out{}.",
             um(result.before.heldout_rms_um),
-            um(result.noise_um)
+            noise.replace("; the noise is", ", noise")
         ),
         "incomplete" => format!("The trace was {}: {figures}", result.interruption()),
         "explained" => format!("{count} for what the declared model left: {figures}"),

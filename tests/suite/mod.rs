@@ -22,6 +22,7 @@ mod measured;
 mod messages;
 mod new;
 mod nist;
+mod one_answer;
 mod patterns;
 mod plan_command;
 mod plan_help;

@@ -296,6 +296,7 @@ fn results_hold_and_have_the_fields_of_the_design() {
             "rank",
             "unknowns",
             "birge_ratio",
+            "u_enlargement",
             "circular",
             "rejected",
             "warnings",
@@ -335,7 +336,11 @@ fn results_hold_and_have_the_fields_of_the_design() {
         ],
     );
     for model in ["before", "after"] {
-        has_exactly(&trace[model], &["rms_um", "heldout_rms_um", "parameters"], &[]);
+        has_exactly(
+            &trace[model],
+            &["rms_um", "heldout_rms_um", "parameters"],
+            &["noise_um"],
+        );
     }
     let effect = &trace["effects"][0];
     has_exactly(

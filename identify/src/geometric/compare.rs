@@ -114,10 +114,10 @@ pub fn compare(session: &Session, method: Method, seed: u64) -> Result<Compariso
             id: parameter.id.clone(),
             unit: parameter.unit.name.clone(),
             value: place.map(|k| estimate.values[k] * outside),
-            u: place.map(|k| estimate.covariance[(k, k)].max(0.0).sqrt() * full.birge_ratio * outside),
+            u: place.map(|k| estimate.covariance[(k, k)].max(0.0).sqrt() * full.u_enlargement * outside),
             bias: place.map(|k| (again.values[k] - known[p]) * outside),
             full_value: seen.map(|()| full.beta[p] * outside),
-            full_u: seen.map(|()| full.covariance[(p, p)].max(0.0).sqrt() * full.birge_ratio * outside),
+            full_u: seen.map(|()| full.covariance[(p, p)].max(0.0).sqrt() * full.u_enlargement * outside),
             full_bias: seen.map(|()| (full_again[p] - known[p]) * outside),
         });
     }
@@ -139,7 +139,7 @@ pub fn compare(session: &Session, method: Method, seed: u64) -> Result<Compariso
         (sum / f64::from(count.max(1))).sqrt() * 1e3
     };
     let mut warnings = session.warnings.clone();
-    warnings.extend(fit::birge_warning(full.birge_ratio));
+    warnings.extend(fit::enlargement_warning(full.u_enlargement));
     if !problem.parameters.effects.is_empty() {
         warnings.push(format!(
             "the {} method knows nothing of the declared effects: what they move is in its errors",
@@ -154,7 +154,7 @@ pub fn compare(session: &Session, method: Method, seed: u64) -> Result<Compariso
         rms_um: crate::heldout::rms_mm(&problem, &full.residuals) * 1e3,
         method_rms_um: rms_um(&by_method),
         nominal_rms_um: rms_um(&vec![0.0; list.len()]),
-        centres: centres(&problem, &estimator, &estimate, full.birge_ratio),
+        centres: centres(&problem, &estimator, &estimate, full.u_enlargement),
         errors,
         warnings,
     })
@@ -201,7 +201,7 @@ fn centres(
     problem: &Problem<'_>,
     estimator: &Estimator,
     estimate: &Estimate,
-    birge_ratio: f64,
+    u_enlargement: f64,
 ) -> Vec<CentreResult> {
     let list = &problem.parameters.list;
     let declared: Vec<usize> = (0..list.len()).filter(|p| list[*p].role == Role::Error).collect();
@@ -216,7 +216,7 @@ fn centres(
         .map(|(place, ((test, layout), centre))| {
             let u = |which: usize| {
                 let row = 2 * place + which;
-                estimate.centre_covariance[(row, row)].max(0.0).sqrt() * birge_ratio * 1e3
+                estimate.centre_covariance[(row, row)].max(0.0).sqrt() * u_enlargement * 1e3
             };
             let share = |p: usize| {
                 let scale = 1e3 / list[p].unit.per_inside;

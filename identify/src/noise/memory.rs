@@ -4,7 +4,8 @@ use std::collections::BTreeMap;
 
 use abbe_model::session::Test;
 
-use super::{PureError, TERMS, trend_terms};
+use super::PureError;
+use super::trends::{TERMS, trend_terms};
 
 impl PureError {
     /// How the deviations remember each other along runs: autoregressive coefficients by Yule–Walker, of the least order up to three whose successor
@@ -24,7 +25,9 @@ impl PureError {
         tests: &[&Test],
         kept: impl Fn(usize, usize) -> bool,
     ) -> Option<Memory> {
+        // Deviations as the trends have left them: what these take of the noise depends on its memory.
         let mut covariance = [0.0; MOST + 1];
+        let mut enlarged = 0.0;
         let mut pairs = [0_usize; MOST + 1];
         let mut lengths: BTreeMap<usize, usize> = BTreeMap::new();
         for (number, test) in tests.iter().enumerate() {
@@ -40,8 +43,11 @@ impl PureError {
                             && kept(number, row)
                             && kept(number, row - lag)
                         {
-                            covariance[lag] += now * before;
+                            covariance[lag] += now * before / self.for_trends[number].powi(2);
                             pairs[lag] += 1;
+                            if lag == 0 {
+                                enlarged += now * before;
+                            }
                         }
                     }
                 }
@@ -66,7 +72,7 @@ impl PureError {
         Some(Memory {
             sum_u: if coefficients.is_empty() { 0.0 } else { sum_u },
             coefficients,
-            inflation: (variance / seen[0]).sqrt(),
+            inflation: (variance * pairs[0] as f64 / enlarged).sqrt(),
         })
     }
 }
@@ -109,7 +115,7 @@ pub struct Memory {
     pub coefficients: Vec<f64>,
     /// Standard uncertainty of their sum.
     pub sum_u: f64,
-    /// By how much the noise is larger than its deviations from trends show.
+    /// By how much the noise is larger than its deviations show, which are enlarged as if they were white.
     pub inflation: f64,
 }
 
@@ -180,7 +186,7 @@ fn with_trends_out(
     for (&n, &readings) in lengths {
         let weight = readings as f64;
         total += weight;
-        if !(MOST + 3..=LONG).contains(&n) {
+        if !(MOST + 1..=LONG).contains(&n) {
             (0..=MOST).for_each(|lag| shown[lag] += weight * process[lag]);
             continue;
         }

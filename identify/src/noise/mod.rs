@@ -1,18 +1,25 @@
 //! How much of a reading is noise: its size and its memory.
 //!
 //! Readings at the same test, direction and position in repeated runs differ by noise alone (pure error: Box, Hunter & Hunter, Statistics for
-//! Experimenters, ch. 10). What they differ by from their mean, rescaled by `√(R/(R−1))`, needs no model of the structure. A parabola and one cycle
-//! are taken out of every run first: drift and warming up are structure and would be taken for slow noise, and a ball that has moved from one run to the
-//! next leaves a cycle along each turn.
+//! Experimenters, ch. 10). What they differ by from their mean needs no model of the structure. A trend is taken out of every run first: drift and warming
+//! up are structure and would be taken for slow noise, and a ball that has moved from one run to the next leaves a cycle along each turn. A long run loses
+//! a parabola and one cycle, a short one fewer terms.
+//!
+//! Means and trends take degrees of freedom. With `P` the projector that takes the trends out of the runs and `M` the one that takes the means out of the
+//! groups of repeats, the deviations of noise of variance σ² have the expected sum of squares `σ²·tr(M·P)`; that trace, and not the number of
+//! deviations, is what their sum of squares is divided by.
 
 mod memory;
+mod trends;
 mod waves;
 
 use abbe_model::session::Test;
+use abbe_model::session::readings::Readings;
 use statrs::distribution::{ChiSquared, ContinuousCDF};
 
 use crate::problem::Problem;
 pub use memory::Memory;
+use trends::Trends;
 
 /// The noise of one scalar reading.
 #[derive(Clone, Debug, PartialEq)]
@@ -34,8 +41,8 @@ pub enum NoiseSource {
     Stated,
     /// Repeated readings.
     Repeats,
-    /// What the fit leaves over.
-    Fit,
+    /// The residual of the model itself: noise and everything that the model lacks.
+    Residual,
 }
 
 impl NoiseSource {
@@ -44,7 +51,7 @@ impl NoiseSource {
         match self {
             NoiseSource::Stated => "stated",
             NoiseSource::Repeats => "repeats",
-            NoiseSource::Fit => "fit",
+            NoiseSource::Residual => "residual",
         }
     }
 }
@@ -78,74 +85,143 @@ impl Noise {
     }
 }
 
-/// Readings that differ by noise alone: the residuals (rows × coordinates, mm) less their mean over repeats, rescaled; `None` for readings without a
-/// partner.
+/// Readings that differ by noise alone: the residuals (rows × coordinates, mm) less the trend of their run and less their mean over repeats, rescaled for what
+/// these take of the noise; `None` for readings without a partner.
 pub struct PureError {
-    /// For each test, one value a scalar reading.
+    /// For each test, one value a scalar reading. The mean square of a test's has the variance of white noise as its expectation.
     pub deviations: Vec<Vec<Option<f64>>>,
-    /// Degrees of freedom.
+    /// Degrees of freedom that means and trends have left, rounded down.
     pub freedom: usize,
+    /// Degrees of freedom of each test.
+    of_tests: Vec<f64>,
+    /// By how much the deviations of each test are enlarged for the trends.
+    for_trends: Vec<f64>,
 }
 
 impl PureError {
     /// From residuals of any model (a model that is wrong alike in all repeats does no harm). `kept(test, row)` leaves rejected readings out.
     pub fn of(tests: &[&Test], residuals: &[Vec<f64>], kept: impl Fn(usize, usize) -> bool) -> PureError {
-        let mut deviations = Vec::new();
-        let mut freedom = 0;
-        for (number, test) in tests.iter().enumerate() {
-            let residual = &residuals[number];
-            let mut deviation = vec![None; residual.len()];
-            if let Some(readings) = &test.readings {
-                let coordinates = readings.coordinates;
-                let level = without_trends(readings, residual, |row| kept(number, row));
-                let directions = directions(readings);
-                let columns = readings.positions.len() + 1;
-                let mut keys = Vec::with_capacity(readings.rows() * columns);
-                for row in 0..readings.rows() {
-                    // Positions agree to 0.1 µm or 10⁻⁴ rad.
-                    let positions = readings.positions.iter();
-                    keys.extend(positions.map(|column| (column[row] * 1e4).round() as i64));
-                    keys.push(if readings.run.is_empty() {
-                        0
-                    } else {
-                        directions[row]
-                    });
-                }
-                let key = |row: usize| &keys[row * columns..(row + 1) * columns];
-                let mut order: Vec<usize> = (0..readings.rows()).filter(|row| kept(number, *row)).collect();
-                order.sort_by(|a, b| key(*a).cmp(key(*b)));
-                for rows in order
-                    .chunk_by(|a, b| key(*a) == key(*b))
-                    .filter(|rows| rows.len() > 1)
-                {
-                    let count = rows.len() as f64;
-                    let rescale = (count / (count - 1.0)).sqrt();
-                    for coordinate in 0..coordinates {
-                        let at = |row: &usize| level[row * coordinates + coordinate];
-                        let mean = rows.iter().map(at).sum::<f64>() / count;
-                        for row in rows {
-                            deviation[row * coordinates + coordinate] = Some((at(row) - mean) * rescale);
-                        }
-                    }
-                    freedom += (rows.len() - 1) * coordinates;
-                }
+        let readings: Vec<Option<&Readings>> = tests.iter().map(|test| test.readings.as_ref()).collect();
+        PureError::of_readings(&readings, residuals, kept)
+    }
+
+    fn of_readings(
+        tests: &[Option<&Readings>],
+        residuals: &[Vec<f64>],
+        kept: impl Fn(usize, usize) -> bool,
+    ) -> PureError {
+        let mut pure = PureError {
+            deviations: Vec::new(),
+            freedom: 0,
+            of_tests: Vec::new(),
+            for_trends: Vec::new(),
+        };
+        for (number, (readings, residual)) in tests.iter().zip(residuals).enumerate() {
+            let (mut deviation, mut freedom, mut enlarged) = (vec![None; residual.len()], 0.0, 1.0);
+            if let Some(readings) = readings {
+                (freedom, enlarged) = deviations(readings, residual, |row| kept(number, row), &mut deviation);
             }
-            deviations.push(deviation);
+            pure.deviations.push(deviation);
+            pure.of_tests.push(freedom);
+            pure.for_trends.push(enlarged);
         }
-        PureError { deviations, freedom }
+        pure.count();
+        pure
+    }
+
+    fn count(&mut self) {
+        // Rounding of a trace does not take a degree of freedom.
+        self.freedom = (self.of_tests.iter().sum::<f64>() + 1e-6).floor() as usize;
     }
 
     /// The standard deviation, mm, if there are at least ten degrees of freedom.
     pub fn sigma_mm(&self) -> Option<f64> {
-        let (sum, count) = self
-            .deviations
-            .iter()
-            .flatten()
-            .flatten()
-            .fold((0.0, 0_usize), |(sum, count), value| {
+        let (mut sum, mut freedom) = (0.0, 0.0);
+        for (deviations, of_test) in self.deviations.iter().zip(&self.of_tests) {
+            let values = deviations.iter().flatten();
+            let (squares, count) = values.fold((0.0, 0_usize), |(sum, count), value| {
                 (sum + value * value, count + 1)
             });
-        (self.freedom >= 10).then(|| (sum / count as f64).sqrt())
+            if count > 0 {
+                sum += of_test * squares / count as f64;
+                freedom += of_test;
+            }
+        }
+        (self.freedom >= 10).then(|| (sum / freedom).sqrt())
+    }
+}
+
+/// Puts the deviations of a test's repeats in their places; returns their degrees of freedom, and by how much they are enlarged for the trends. There are
+/// none where the trends leave nothing.
+fn deviations(
+    readings: &Readings,
+    residual: &[f64],
+    kept: impl Fn(usize) -> bool,
+    deviation: &mut [Option<f64>],
+) -> (f64, f64) {
+    let coordinates = readings.coordinates;
+    let trends = Trends::of(readings, &kept);
+    let level = trends.taken_out(residual, coordinates);
+    let keys = Keys::of(readings);
+    let mut order: Vec<usize> = (0..readings.rows()).filter(|row| kept(*row)).collect();
+    order.sort_by(|a, b| keys.of_row(*a).cmp(keys.of_row(*b)));
+    // Over one coordinate: the trace, what is expected of the squares of deviations rescaled for the means alone, and how many there are.
+    let (mut freedom, mut expected, mut count) = (0.0, 0.0, 0_usize);
+    for rows in order
+        .chunk_by(|a, b| keys.of_row(*a) == keys.of_row(*b))
+        .filter(|rows| rows.len() > 1)
+    {
+        let repeats = rows.len() as f64;
+        let square = repeats / (repeats - 1.0);
+        let of_group = trends.freedom_of(rows);
+        freedom += of_group;
+        expected += of_group * square;
+        count += rows.len();
+        for coordinate in 0..coordinates {
+            let at = |row: &usize| level[row * coordinates + coordinate];
+            let mean = rows.iter().map(at).sum::<f64>() / repeats;
+            for row in rows {
+                deviation[row * coordinates + coordinate] = Some((at(row) - mean) * square.sqrt());
+            }
+        }
+    }
+    if expected < LEAST_LEFT * count as f64 {
+        deviation.fill(None);
+        return (0.0, 1.0);
+    }
+    let enlarged = (count as f64 / expected).sqrt();
+    deviation
+        .iter_mut()
+        .flatten()
+        .for_each(|value| *value *= enlarged);
+    (freedom * coordinates as f64, enlarged)
+}
+
+/// Share of the deviations' variance that trends have to leave for it to say anything.
+const LEAST_LEFT: f64 = 0.05;
+
+/// Where a reading was taken, as numbers that are equal for repeats: positions and directions of travel.
+struct Keys {
+    columns: usize,
+    keys: Vec<i64>,
+}
+
+impl Keys {
+    fn of(readings: &Readings) -> Keys {
+        let directions = directions(readings);
+        let columns = readings.positions.len() + 1;
+        let mut keys = Vec::with_capacity(readings.rows() * columns);
+        for (row, direction) in directions.iter().enumerate() {
+            // Positions agree to 0.1 µm or 10⁻⁴ rad.
+            let positions = readings.positions.iter();
+            keys.extend(positions.map(|column| (column[row] * 1e4).round() as i64));
+            keys.push(if readings.run.is_empty() { 0 } else { *direction });
+        }
+        Keys { columns, keys }
+    }
+
+    fn of_row(&self, row: usize) -> &[i64] {
+        &self.keys[row * self.columns..(row + 1) * self.columns]
     }
 }
 
@@ -179,7 +255,7 @@ pub fn stated_against_repeats(problem: &Problem<'_>, residuals: &[Vec<f64>]) -> 
 }
 
 /// The direction of travel of every axis as one number a row.
-fn directions(readings: &abbe_model::session::readings::Readings) -> Vec<i64> {
+fn directions(readings: &Readings) -> Vec<i64> {
     let mut code = vec![0_i64; readings.rows()];
     for axis in 0..readings.positions.len() {
         let samples = readings.axis_samples(axis, abbe_model::axis::AxisKind::Rotary);
@@ -190,83 +266,11 @@ fn directions(readings: &abbe_model::session::readings::Readings) -> Vec<i64> {
     code
 }
 
-/// Coefficients of the trend that is taken out of a run: constant, slope, curvature, and one cycle over the run.
-const TERMS: usize = 5;
-/// How many of them are powers of time.
-const POWERS: usize = 3;
-/// The fewest readings of a run whose waves are looked at.
-const LEAST_RUN: usize = 24;
-
-/// The terms of a trend, orthonormal over given times (Gram–Schmidt, twice); those that the times are too few for are zero.
-fn trend_terms(times: &[f64]) -> Vec<[f64; TERMS]> {
-    let n = times.len() as f64;
-    let middle = times.iter().sum::<f64>() / n;
-    let half = times
-        .iter()
-        .map(|t| (t - middle).abs())
-        .fold(f64::MIN_POSITIVE, f64::max);
-    let term = |t: &f64, i: usize| -> f64 {
-        let time = (t - middle) / half;
-        let (sin, cos) = (std::f64::consts::PI * time).sin_cos();
-        match i {
-            0..POWERS => time.powi(i as i32),
-            _ if times.len() < LEAST_RUN => 0.0,
-            POWERS => cos,
-            _ => sin,
-        }
-    };
-    let mut q: Vec<[f64; TERMS]> = times
-        .iter()
-        .map(|t| std::array::from_fn(|i| term(t, i)))
-        .collect();
-    for i in 0..TERMS {
-        for j in (0..i).chain(0..i) {
-            let along: f64 = q.iter().map(|row| row[i] * row[j]).sum();
-            q.iter_mut().for_each(|row| row[i] -= along * row[j]);
-        }
-        let length = q.iter().map(|row| row[i] * row[i]).sum::<f64>().sqrt();
-        let scale = if length > 1e-9 { 1.0 / length } else { 0.0 };
-        q.iter_mut().for_each(|row| row[i] *= scale);
-    }
-    q
-}
-
-/// Residuals less the trend of each run (and coordinate).
-fn without_trends(
-    readings: &abbe_model::session::readings::Readings,
-    residual: &[f64],
-    kept: impl Fn(usize) -> bool,
-) -> Vec<f64> {
-    let coordinates = readings.coordinates;
-    let mut level = residual.to_vec();
-    if readings.run.is_empty() {
-        return level;
-    }
-    for run in readings.runs() {
-        let rows: Vec<usize> = run.filter(|row| kept(*row)).collect();
-        if rows.len() <= POWERS {
-            continue;
-        }
-        let times: Vec<f64> = rows.iter().map(|row| *row as f64).collect();
-        let q = trend_terms(&times);
-        for coordinate in 0..coordinates {
-            let at = |row: usize| row * coordinates + coordinate;
-            let along: [f64; TERMS] = std::array::from_fn(|i| {
-                rows.iter()
-                    .zip(&q)
-                    .map(|(row, q)| residual[at(*row)] * q[i])
-                    .sum()
-            });
-            for (row, q) in rows.iter().zip(&q) {
-                level[at(*row)] -= along.iter().zip(q).map(|(a, q)| a * q).sum::<f64>();
-            }
-        }
-    }
-    level
-}
-
 #[cfg(test)]
 mod tests {
+    use rand::{RngExt, SeedableRng};
+    use rand_distr::StandardNormal;
+
     use super::*;
 
     /// With the impulse response ψ of `x_t = Σ a_k x_{t−k} + e_t` the variance of x is that of e times `Σ ψ²`.
@@ -291,31 +295,122 @@ mod tests {
         }
     }
 
+    /// A test of runs over the same places, one after another.
+    fn repeated(places: usize, runs: usize) -> Readings {
+        let rows = || (0..runs).flat_map(|run| (0..places).map(move |place| (run, place)));
+        Readings {
+            run: rows().map(|(run, _)| run as i64).collect(),
+            positions: vec![rows().map(|(_, place)| 0.1 * place as f64).collect()],
+            coordinates: 1,
+            ..Readings::default()
+        }
+    }
+
+    /// Sessions of a study, as `ABBE_STUDY` says.
+    fn sessions() -> usize {
+        let stated = std::env::var("ABBE_STUDY")
+            .ok()
+            .and_then(|text| text.parse().ok());
+        stated.filter(|count| *count > 1).unwrap_or(200)
+    }
+
+    /// White noise of 0.5 µm over structure and over runs that lie apart by what a ball moves: the mean of σ² over many sessions is its truth, and their
+    /// scatter that of χ² with the degrees of freedom that are left, `(R − 1)(n − K)` a test of R runs of n readings which lose K terms each.
     #[test]
-    fn a_trend_is_a_parabola_and_one_cycle_and_nothing_else() {
-        let times: Vec<f64> = (0..60).map(|t| f64::from(t) * 1.5 + 7.0).collect();
-        let q = trend_terms(&times);
-        let left = |of: &dyn Fn(f64) -> f64| -> f64 {
-            let values: Vec<f64> = times.iter().map(|t| of(*t)).collect();
-            let along: [f64; TERMS] =
-                std::array::from_fn(|i| values.iter().zip(&q).map(|(value, q)| value * q[i]).sum());
-            let rest = values
-                .iter()
-                .zip(&q)
-                .map(|(value, q)| value - along.iter().zip(q).map(|(a, q)| a * q).sum::<f64>());
-            let (left, whole) = (
-                rest.map(|r| r * r).sum::<f64>(),
-                values.iter().map(|v| v * v).sum::<f64>(),
-            );
-            (left / whole).sqrt()
+    fn the_noise_of_repeats_is_that_of_the_readings_in_short_runs_and_long_ones() {
+        const SIGMA: f64 = 0.5e-3;
+        const TESTS: usize = 4;
+        let sessions = sessions();
+        let mut generator = rand_pcg::Pcg64::seed_from_u64(19);
+        for (places, terms) in [(9_usize, 1), (13, 2), (37, 5), (100, 5)] {
+            for runs in [2_usize, 3, 6] {
+                let readings = repeated(places, runs);
+                let tests = [Some(&readings); TESTS];
+                let freedom = TESTS * (runs - 1) * (places - terms);
+                let (mut sum, mut squares) = (0.0, 0.0);
+                for _ in 0..sessions {
+                    let residuals: Vec<Vec<f64>> = (0..TESTS)
+                        .map(|_| {
+                            let apart: Vec<f64> =
+                                (0..runs).map(|_| generator.sample(StandardNormal)).collect();
+                            (0..runs * places)
+                                .map(|row| {
+                                    let noise: f64 = generator.sample(StandardNormal);
+                                    let structure = (1.0 + (row % places) as f64).ln();
+                                    SIGMA * (noise + 3.0 * structure + 5.0 * apart[row / places])
+                                })
+                                .collect()
+                        })
+                        .collect();
+                    let pure = PureError::of_readings(&tests, &residuals, |_, _| true);
+                    assert_eq!(pure.freedom, freedom);
+                    let variance = (pure.sigma_mm().unwrap() / SIGMA).powi(2);
+                    sum += variance;
+                    squares += variance * variance;
+                }
+                let (count, freedom) = (sessions as f64, freedom as f64);
+                let mean = sum / count;
+                let scatter = (squares / count - mean * mean) * count / (count - 1.0);
+                let expected = 2.0 / freedom;
+                println!(
+                    "{places} readings, {runs} runs: σ² {mean:.4} ± {:.4} of the true one",
+                    (scatter / count).sqrt()
+                );
+                assert!(
+                    (mean - 1.0).abs() < 4.0 * (expected / count).sqrt(),
+                    "{places} readings, {runs} runs: {mean}"
+                );
+                assert!(
+                    (scatter / expected - 1.0).abs() < 5.0 * (2.0 / count + 12.0 / (freedom * count)).sqrt(),
+                    "{places} readings, {runs} runs: {scatter} instead of {expected}"
+                );
+            }
+        }
+    }
+
+    /// The degrees of freedom against the trace of both projectors multiplied out, where they do not commute: a run that comes to its places three times, one
+    /// that comes once, and readings that are left out.
+    #[test]
+    fn degrees_of_freedom_are_the_trace_of_both_projectors() {
+        let places: Vec<usize> = (0..36).map(|row| row % 12).chain(0..12).collect();
+        let readings = Readings {
+            run: (0..48).map(|row| i64::from(row >= 36)).collect(),
+            positions: vec![places.iter().map(|place| (*place as f64).sin()).collect()],
+            coordinates: 1,
+            ..Readings::default()
         };
-        // One cycle from the first reading to the last.
-        let angle = |t: f64| std::f64::consts::TAU * (t - 7.0) / 88.5;
-        assert!(left(&|t| 3.0 - 0.2 * t + 0.01 * t * t) < 1e-12);
-        assert!(left(&|t| (angle(t) + 0.7).cos()) < 1e-12);
-        assert!(left(&|t| (4.0 * angle(t) + 0.7).cos()) > 0.9);
-        // A run of few readings loses no cycle.
-        let few = trend_terms(&times[..LEAST_RUN - 1]);
-        assert!(few.iter().all(|terms| terms[POWERS..] == [0.0, 0.0]));
+        let kept = |row: usize| row % 11 != 5;
+        let directions = directions(&readings);
+        let rows: Vec<usize> = (0..48).filter(|row| kept(*row)).collect();
+        let group = |row: usize| (places[row], directions[row]);
+        let (mut means, mut trends) = (
+            faer::Mat::<f64>::identity(48, 48),
+            faer::Mat::<f64>::identity(48, 48),
+        );
+        for run in [0..36_usize, 36..48] {
+            let of_run: Vec<usize> = run.filter(|row| kept(*row)).collect();
+            let times: Vec<f64> = of_run.iter().map(|row| *row as f64).collect();
+            let q = trends::trend_terms(&times);
+            for (t, a) in of_run.iter().zip(&q) {
+                for (s, b) in of_run.iter().zip(&q) {
+                    trends[(*t, *s)] -= a.iter().zip(b).map(|(a, b)| a * b).sum::<f64>();
+                }
+            }
+        }
+        for t in 0..48 {
+            let repeats: Vec<usize> = rows.iter().copied().filter(|s| group(*s) == group(t)).collect();
+            if kept(t) && repeats.len() > 1 {
+                repeats
+                    .iter()
+                    .for_each(|s| means[(t, *s)] -= 1.0 / repeats.len() as f64);
+            } else {
+                means[(t, t)] = 0.0;
+            }
+        }
+        let product = means * trends;
+        let wanted: f64 = (0..48).map(|t| product[(t, t)]).sum();
+        let mut deviation = vec![None; 48];
+        let (freedom, _) = deviations(&readings, &[0.0; 48], kept, &mut deviation);
+        assert!((freedom - wanted).abs() < 1e-9, "{freedom} {wanted}");
     }
 }

@@ -8,7 +8,8 @@ use std::ops::Range;
 use abbe_model::session::Test;
 use statrs::function::gamma::gamma_ur;
 
-use super::{LEAST_RUN, Memory, PureError};
+use super::trends::LEAST_RUN;
+use super::{Memory, PureError};
 use crate::outliers::median;
 
 /// Half cycles along a run where the bands may begin that are looked at in deviations, and how many half cycles wide they are.
@@ -49,12 +50,22 @@ impl PureError {
                 let Some(band) = self.band(&runs, &memory) else {
                     break;
                 };
+                let independent: Vec<f64> = (self.deviations.iter().zip(&self.of_tests))
+                    .map(|(deviations, freedom)| freedom / deviations.iter().flatten().count().max(1) as f64)
+                    .collect();
                 for run in &runs {
                     // Half cycles overlap: every second one of a band holds all of it.
                     for half_cycles in band.clone().step_by(2) {
-                        take_out(&mut self.deviations[run.test][run.rows.clone()], half_cycles);
+                        if take_out(&mut self.deviations[run.test][run.rows.clone()], half_cycles) {
+                            // Of deviations that repeats hold more than once, their share of two degrees of freedom.
+                            self.of_tests[run.test] -= 2.0 * independent[run.test];
+                        }
                     }
                 }
+                self.of_tests
+                    .iter_mut()
+                    .for_each(|freedom| *freedom = freedom.max(0.0));
+                self.count();
                 let Some(of_rest) = self.memory_up_to(1, tests, &kept) else {
                     return self;
                 };
@@ -119,7 +130,8 @@ impl PureError {
 }
 
 /// Takes a wave of so many half cycles out of the deviations of a run, by least squares; what is left is rescaled for what the wave took of the noise.
-fn take_out(run: &mut [Option<f64>], half_cycles: usize) {
+/// Returns whether there was anything to take it from.
+fn take_out(run: &mut [Option<f64>], half_cycles: usize) -> bool {
     let step = std::f64::consts::PI * half_cycles as f64 / run.len() as f64;
     let (mut cc, mut cs, mut ss, mut cy, mut sy) = (0.0, 0.0, 0.0, 0.0, 0.0);
     for (t, value) in run.iter().enumerate() {
@@ -134,7 +146,7 @@ fn take_out(run: &mut [Option<f64>], half_cycles: usize) {
     }
     let determinant = cc * ss - cs * cs;
     if determinant <= 1e-6 * cc * ss {
-        return;
+        return false;
     }
     let (a, b) = (
         (ss * cy - cs * sy) / determinant,
@@ -148,6 +160,7 @@ fn take_out(run: &mut [Option<f64>], half_cycles: usize) {
             *value = (*value - a * c - b * s) * rescale;
         }
     }
+    true
 }
 
 #[cfg(test)]

@@ -88,7 +88,7 @@ pub fn analyse_problem(problem: &Problem<'_>, travel_mm: f64) -> Result<PlanAnal
     let linear = Linearisation::of(problem, &nominal)?;
     let wanted: Vec<usize> = (0..list.len()).filter(|j| is_wanted(&list[*j])).collect();
     let found = sensitivity::sensitivities(problem, &nominal, &linear.covariance)?;
-    let others_known = budget::others_known(&linear, &wanted);
+    let others_known = budget::others_known(&linear, &wanted)?;
     let errors = wanted
         .iter()
         .zip(others_known)

@@ -8,7 +8,7 @@ use super::results::{HeldBySetup, NearDependency};
 use crate::error::IdentifyError;
 use crate::parameters::{Parameter, Role};
 use crate::problem::Problem;
-use crate::rank::Rank;
+use crate::rank::{Rank, combinations};
 use crate::results::Unobservable;
 
 /// Coefficients below this, relative to the largest, are rounding.
@@ -16,6 +16,8 @@ const NEGLIGIBLE: f64 = 1e-5;
 /// Condition index from which a dependency is named: moderate from 10, strong from 30 (Belsley, Kuh & Welsch, Regression Diagnostics,
 /// 1980, ch. 3).
 const NAMED_FROM: f64 = 10.0;
+/// Share of the largest part in the null space that an error needs to lead a combination with set-up quantities.
+const LEAST_ERROR: f64 = 1.37e-3;
 /// Things that a combination names in words.
 const MOST_NAMED: usize = 5;
 /// The verb of a combination that no reading sees.
@@ -103,8 +105,9 @@ pub fn blind(problem: &Problem<'_>, rank: &Rank) -> Vec<Unobservable> {
     let list = &problem.parameters.list;
     rank.unseen
         .iter()
-        .map(|row| {
-            let combination = outside(problem, row);
+        .zip(&rank.pivots)
+        .map(|(row, pivot)| {
+            let combination = outside(problem, row, *pivot);
             let why = match combination.as_slice() {
                 [(id, _)] => {
                     let (thing, group) = called(list, id);
@@ -121,18 +124,18 @@ pub fn blind(problem: &Problem<'_>, rank: &Rank) -> Vec<Unobservable> {
         .collect()
 }
 
-/// A row over scaled unknowns in outside units, its first entry 1.
-fn outside(problem: &Problem<'_>, row: &[f64]) -> Vec<(String, f64)> {
+/// A row over scaled unknowns in outside units: its pivot first, with 1, then the others in the order of the unknowns.
+fn outside(problem: &Problem<'_>, row: &[f64], pivot: usize) -> Vec<(String, f64)> {
     let list = &problem.parameters.list;
     let largest = row.iter().fold(0.0_f64, |most, value| most.max(value.abs()));
-    let entries: Vec<(String, f64)> = row
-        .iter()
-        .zip(list)
-        .filter(|(value, _)| value.abs() > NEGLIGIBLE * largest)
-        .map(|(value, parameter)| {
+    let others = (0..row.len()).filter(|j| *j != pivot && row[*j].abs() > NEGLIGIBLE * largest);
+    let entries: Vec<(String, f64)> = std::iter::once(pivot)
+        .chain(others)
+        .map(|j| {
+            let parameter = &list[j];
             (
                 parameter.id.clone(),
-                value * parameter.size * parameter.unit.per_inside,
+                row[j] * parameter.size * parameter.unit.per_inside,
             )
         })
         .collect();
@@ -153,34 +156,19 @@ pub fn held_by_setup(
     linear: &Linearisation,
 ) -> Result<Vec<HeldBySetup>, IdentifyError> {
     let list = &problem.parameters.list;
-    let alone = Rank::decide(linear.readings.parts().0.as_ref(), &linear.size)?;
-    let mut rows = alone.unseen;
-    let mut pivots: Vec<(usize, usize)> = Vec::new();
-    for error in (0..list.len()).filter(|j| is_wanted(&list[*j])) {
-        let free = (0..rows.len()).filter(|i| pivots.iter().all(|(row, _)| row != i));
-        let Some(row) = free.min_by(|a, b| smallest_first(-rows[*a][error].abs(), -rows[*b][error].abs()))
-        else {
-            break;
-        };
-        if rows[row][error].abs() < NEGLIGIBLE {
-            continue;
-        }
-        let pivot = rows[row][error];
-        rows[row].iter_mut().for_each(|value| *value /= pivot);
-        let pivot_row = rows[row].clone();
-        for (i, other) in rows.iter_mut().enumerate().filter(|(i, _)| *i != row) {
-            let factor = other[error];
-            let _ = i;
-            subtract(other, factor, &pivot_row);
-        }
-        pivots.push((row, error));
-    }
-    let setups: Vec<Vec<f64>> = (0..rows.len())
-        .filter(|i| pivots.iter().all(|(row, _)| row != i))
-        .map(|i| rows[i].clone())
-        .collect();
+    let r = linear.readings.parts().0;
+    let alone = Rank::decide(r.as_ref(), &linear.size, &linear.preference)?;
+    let (errors, setups): (Vec<usize>, Vec<usize>) =
+        (linear.preference.iter()).partition(|j| is_wanted(&list[**j]));
+    let order = [errors, setups].concat();
+    let scaled = Mat::from_fn(r.nrows(), r.ncols(), |i, j| r[(i, j)] * linear.size[j]);
+    let (rows, pivots) = combinations(alone.null_space.as_ref(), scaled.as_ref(), &order, LEAST_ERROR);
+    let (of_errors, of_setups): (Vec<usize>, Vec<usize>) =
+        (0..rows.len()).partition(|row| is_wanted(&list[pivots[*row]]));
+    let setups: Vec<Vec<f64>> = of_setups.iter().map(|row| rows[*row].clone()).collect();
     let mut held = Vec::new();
-    for (row, error) in pivots {
+    for row in of_errors {
+        let error = pivots[row];
         // What is not seen even with the priors is blind, and named there.
         let sparse = sparser(rows[row].clone(), &setups);
         let setup_only =
@@ -188,11 +176,7 @@ pub fn held_by_setup(
         if !linear.rank.is_seen(error) || !setup_only {
             continue;
         }
-        let mut combination = outside(problem, &sparse);
-        // The error first, then what it hides behind, in the order of the unknowns.
-        combination.sort_by_key(|(id, _)| *id != list[error].id);
-        let leading = combination[0].1;
-        combination.iter_mut().for_each(|(_, value)| *value /= leading);
+        let combination = outside(problem, &sparse, error);
         if combination.len() < 2 {
             continue;
         }
@@ -252,7 +236,7 @@ pub fn nearly_blind(
         .copied()
         .filter(|j| linear.rank.is_seen(*j))
         .collect();
-    let r = marginal(linear.whole.parts().0.as_ref(), &seen, &linear.size);
+    let r = marginal(linear.whole.parts().0.as_ref(), &seen, &linear.size)?;
     let n = seen.len();
     let norm: Vec<f64> = (0..n)
         .map(|j| {

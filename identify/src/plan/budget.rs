@@ -16,6 +16,7 @@ use faer::Mat;
 use super::linear::{Linearisation, is_wanted, marginal, prior_u};
 use super::order::largest_first;
 use super::results::{Contribution, SharedWith};
+use crate::error::IdentifyError;
 use crate::problem::Problem;
 
 /// Shares of the variance below this are not listed.
@@ -92,10 +93,13 @@ pub fn correlation(covariance: &Mat<f64>, i: usize, j: usize) -> f64 {
     }
 }
 
-/// The standard uncertainty of each wanted error if all other wanted errors were known, inside units.
-pub fn others_known(linear: &Linearisation, wanted: &[usize]) -> Vec<f64> {
-    let r = marginal(linear.whole.parts().0.as_ref(), wanted, &linear.size);
-    (0..wanted.len())
+/// The conditional standard uncertainty of each wanted error, all other wanted errors known, inside units.
+///
+/// # Errors
+/// If the decomposition fails.
+pub fn others_known(linear: &Linearisation, wanted: &[usize]) -> Result<Vec<f64>, IdentifyError> {
+    let r = marginal(linear.whole.parts().0.as_ref(), wanted, &linear.size)?;
+    Ok((0..wanted.len())
         .map(|j| 1.0 / (0..=j).map(|i| r[(i, j)].powi(2)).sum::<f64>().sqrt())
-        .collect()
+        .collect())
 }

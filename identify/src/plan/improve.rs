@@ -34,7 +34,7 @@ pub struct Improvement {
     pub menu_entries: usize,
     /// The figure before.
     pub before: f64,
-    /// The errors and their standard uncertainties before, outside units.
+    /// The errors and their standard uncertainties before, outside units; infinite (`null` in JSON) where an error is not identifiable.
     pub uncertainties_before: Vec<(String, f64)>,
     /// The tests, in the order in which they are taken up.
     pub steps: Vec<Step>,
@@ -57,7 +57,7 @@ pub struct Step {
     pub new_setup: bool,
     /// Blind spots that it opens.
     pub opens: Vec<String>,
-    /// The errors and their standard uncertainties with it, outside units.
+    /// The errors and their standard uncertainties with it, outside units; infinite (`null` in JSON) where an error is not identifiable.
     pub uncertainties: Vec<(String, f64)>,
     /// Centre of the workpiece ball in the table frame, mm.
     pub workpiece_ball_mm: [f64; 3],
@@ -106,7 +106,6 @@ pub fn improve(
     let prepared = Prepared::new(problem, &nominal, entries, menu, &asked)?;
     let shared = &prepared.shared;
     let figure = |root: &Root| figure(shared, root, &options.goal);
-    let before = figure(&prepared.base);
     let mut chosen: Vec<usize> = Vec::new();
     let mut alternatives = Vec::new();
     for place in 0..options.tests {
@@ -137,9 +136,15 @@ pub fn improve(
     } else {
         exchange(&prepared, &mut chosen, &figure)
     };
-    let outside = |value: f64| reported(value, &options.goal);
+    // An uncertainty that is that of the physical size is none.
+    let outside = |root: &Root| match options.goal {
+        Goal::WorstUncertainty => named_uncertainties(shared, root)
+            .into_iter()
+            .fold(0.0, |worst: f64, (_, u)| worst.max(u)),
+        Goal::Separation { .. } => reported(figure(root), &options.goal),
+    };
     let steps = (0..chosen.len())
-        .map(|k| step(&prepared, &chosen[..=k], &outside, &figure))
+        .map(|k| step(&prepared, &chosen[..=k], &outside))
         .collect();
     Ok(Improvement {
         figure: match options.goal {
@@ -147,7 +152,7 @@ pub fn improve(
             Goal::Separation { .. } => "separation, standard deviations".to_string(),
         },
         menu_entries: prepared.entries.len(),
-        before: outside(before),
+        before: outside(&prepared.base),
         uncertainties_before: named_uncertainties(shared, &prepared.base),
         steps,
         exchanged,
@@ -240,19 +245,13 @@ fn exchange(
     words
 }
 
-fn step(
-    prepared: &Prepared,
-    chosen: &[usize],
-    outside: &impl Fn(f64) -> f64,
-    figure: &impl Fn(&Root) -> f64,
-) -> Step {
+fn step(prepared: &Prepared, chosen: &[usize], outside: &impl Fn(&Root) -> f64) -> Step {
     let shared = &prepared.shared;
     let entry = &prepared.entries[chosen[chosen.len() - 1]].entry;
     let root = prepared.with(chosen);
     let before = prepared.with(&chosen[..chosen.len() - 1]);
     let first = shared.ids.len() - shared.asked;
-    let blind =
-        |u: &[f64], j: usize| u[j] > BLIND_SHARE * shared.size[first + j] * shared.per_inside[first + j];
+    let blind = |u: &[f64], j: usize| is_blind(shared, u, j);
     let (u_before, u_after) = (shared.uncertainties(&before), shared.uncertainties(&root));
     let opens = (0..shared.asked)
         .filter(|j| blind(&u_before, *j) && !blind(&u_after, *j))
@@ -264,7 +263,7 @@ fn step(
     };
     Step {
         test: entry.name.clone(),
-        after: outside(figure(&root)),
+        after: outside(&root),
         minutes: entry.minutes,
         new_setup: entry.new_setup,
         opens,
@@ -275,11 +274,25 @@ fn step(
     }
 }
 
+/// Whether an uncertainty, the `j`-th of what is asked about, is that of a parameter which no reading tells and which is held at its physical size instead.
+fn is_blind(shared: &Shared, u: &[f64], j: usize) -> bool {
+    let place = shared.ids.len() - shared.asked + j;
+    u[j] > BLIND_SHARE * shared.size[place] * shared.per_inside[place]
+}
+
+/// What is asked about, with its uncertainties: infinite where the figure would be that of the physical size at which [`Shared`] holds what is not
+/// identifiable.
 fn named_uncertainties(shared: &Shared, root: &Root) -> Vec<(String, f64)> {
     let first = shared.ids.len() - shared.asked;
-    shared.ids[first..]
-        .iter()
-        .cloned()
-        .zip(shared.uncertainties(root))
+    let u = shared.uncertainties(root);
+    (0..shared.asked)
+        .map(|j| {
+            let told = if is_blind(shared, &u, j) {
+                f64::INFINITY
+            } else {
+                u[j]
+            };
+            (shared.ids[first + j].clone(), told)
+        })
         .collect()
 }

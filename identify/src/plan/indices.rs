@@ -37,7 +37,7 @@ pub fn indices(
             ..Indices::default()
         });
     }
-    let r = marginal(linear.whole.parts().0.as_ref(), &seen, &linear.size);
+    let r = marginal(linear.whole.parts().0.as_ref(), &seen, &linear.size)?;
     let size: Vec<f64> = seen.iter().map(|j| linear.size[*j]).collect();
     Ok(Indices {
         errors,

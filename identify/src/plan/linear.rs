@@ -9,9 +9,9 @@ use faer::{Mat, MatRef};
 
 use crate::error::IdentifyError;
 use crate::fit;
-use crate::parameters::{Parameter, Role};
+use crate::parameters::{Parameter, Role, pivot_preference};
 use crate::problem::Problem;
-use crate::rank::Rank;
+use crate::rank::{LEAST_SEEN, Rank};
 use crate::triangle::{Triangle, upper};
 
 /// A plan at its nominal state.
@@ -30,6 +30,8 @@ pub struct Linearisation {
     pub covariance: Mat<f64>,
     /// Physical size of each unknown.
     pub size: Vec<f64>,
+    /// The parameters in the order in which they are preferred as pivots: see [`pivot_preference`].
+    pub preference: Vec<usize>,
 }
 
 impl Linearisation {
@@ -48,7 +50,8 @@ impl Linearisation {
             .collect();
         let readings = merged(Triangle::new(size.len()), tests.iter());
         let whole = merged(prior.clone(), std::iter::once(&readings));
-        let rank = Rank::decide(whole.parts().0.as_ref(), &size)?;
+        let preference = pivot_preference(&problem.parameters.list);
+        let rank = Rank::decide(whole.parts().0.as_ref(), &size, &preference)?;
         let covariance = fit::covariance(&whole, &rank.seen)?;
         Ok(Linearisation {
             tests,
@@ -58,6 +61,7 @@ impl Linearisation {
             rank,
             covariance,
             size,
+            preference,
         })
     }
 
@@ -80,7 +84,7 @@ impl Linearisation {
             .filter(|(test, _)| !left_out.contains(test))
             .map(|(_, t)| t);
         let whole = merged(self.prior.clone(), kept);
-        let rank = Rank::decide(whole.parts().0.as_ref(), &self.size)?;
+        let rank = Rank::decide(whole.parts().0.as_ref(), &self.size, &self.preference)?;
         let covariance = fit::covariance(&whole, &rank.seen)?;
         Ok((rank, covariance))
     }
@@ -100,31 +104,37 @@ pub fn is_wanted(parameter: &Parameter) -> bool {
 /// The square-root information on `kept` unknowns once the others are unknown too: the lower right block of the triangle of
 /// `[R_dropped R_kept]` (the Schur complement, without squaring).
 ///
-/// A dropped unknown of which nothing is known beforehand is held at its physical size (1 mm, 0.01 rad): a thousandth of that is seen,
-/// and a column of zeros would take a row of information along.
-pub fn marginal(r: MatRef<'_, f64>, kept: &[usize], size: &[f64]) -> Mat<f64> {
-    let n = size.len();
-    let dropped: Vec<usize> = (0..n).filter(|j| !kept.contains(j)).collect();
-    let order: Vec<usize> = dropped.iter().chain(kept).copied().collect();
-    let rows = (r.nrows() + dropped.len()).max(n);
-    let stacked = Mat::from_fn(rows, n, |i, j| {
-        if i < r.nrows() {
-            r[(i, order[j])]
-        } else if i - r.nrows() < dropped.len() && i - r.nrows() == j {
-            1.0 / size[order[j]]
-        } else {
-            0.0
-        }
+/// Directions of the dropped unknowns of which `r` tells less than one standard deviation a physical size stay at their nominal values, as in a fit (see
+/// [`crate::rank`]): a column of zeros would take a row of information along. Nothing is added to what `r` says.
+///
+/// # Errors
+/// If `r` has entries that are not finite.
+pub fn marginal(r: MatRef<'_, f64>, kept: &[usize], size: &[f64]) -> Result<Mat<f64>, IdentifyError> {
+    let dropped: Vec<usize> = (0..size.len()).filter(|j| !kept.contains(j)).collect();
+    let mut rows = Mat::from_fn(r.nrows().max(kept.len()), kept.len(), |i, j| {
+        if i < r.nrows() { r[(i, kept[j])] } else { 0.0 }
     });
-    let upper = upper(stacked);
-    let first = dropped.len();
-    Mat::from_fn(kept.len(), kept.len(), |i, j| {
-        if i <= j {
-            upper[(first + i, first + j)]
-        } else {
-            0.0
-        }
-    })
+    if !dropped.is_empty() && r.nrows() > 0 {
+        let scaled = Mat::from_fn(rows.nrows(), dropped.len(), |i, j| {
+            if i < r.nrows() {
+                r[(i, dropped[j])] * size[dropped[j]]
+            } else {
+                0.0
+            }
+        });
+        let svd = scaled.thin_svd().map_err(|_| IdentifyError::Decomposition)?;
+        let singular: Vec<f64> = svd.S().column_vector().iter().copied().collect();
+        let rounding = singular.first().copied().unwrap_or(0.0) * 1e-13 * size.len() as f64;
+        // What the dropped unknowns can explain is taken out of every column.
+        let told = singular
+            .iter()
+            .filter(|s| **s >= LEAST_SEEN && **s > rounding)
+            .count();
+        let directions = svd.U().subcols(0, told);
+        let along = directions.transpose() * &rows;
+        rows -= directions * along;
+    }
+    Ok(upper(rows))
 }
 
 /// The prior standard uncertainty of a set-up quantity, inside unit.
@@ -132,5 +142,30 @@ pub fn prior_u(parameter: &Parameter) -> Option<f64> {
     match parameter.prior {
         Prior::Gaussian(u) => Some(u),
         Prior::Known | Prior::Free => None,
+    }
+}
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A reading of 0.1 µm sees an error and a ball together, and the ball is known to 300 µm: that is what is known of the error, all other errors being known,
+    /// for there is none. A ball that nobody has placed and no reading sees takes nothing away.
+    #[test]
+    fn what_is_dropped_is_known_by_its_prior_and_no_better() {
+        let r = Mat::from_fn(3, 3, |i, j| {
+            [[1e4, 1e4, 0.0], [0.0, 1.0 / 0.3, 0.0], [0.0; 3]][i][j]
+        });
+        let left = marginal(r.as_ref(), &[0], &[1.0; 3]).unwrap();
+        let u = 1.0 / left[(0, 0)].abs();
+        assert!((u / 0.3_f64.hypot(1e-4) - 1.0).abs() < 1e-9, "{u}");
+        // Nothing dropped but that ball: the readings themselves.
+        let both = marginal(r.as_ref(), &[0, 1], &[1.0; 3]).unwrap();
+        let information = both.transpose() * &both;
+        let whole = r.transpose() * &r;
+        for i in 0..2 {
+            for j in 0..2 {
+                assert!((information[(i, j)] / whole[(i, j)] - 1.0).abs() < 1e-12);
+            }
+        }
     }
 }

@@ -43,7 +43,7 @@ pub struct Calibration {
     /// Standard uncertainty of a reading, mm.
     pub sigma_mm: f64,
     /// `√(χ²/ν)` where a stated uncertainty is significantly less than the readings scatter, else 1; the solution's uncertainties are enlarged by it.
-    pub birge_ratio: f64,
+    pub u_enlargement: f64,
     /// The columns of the equations that the conditions leave free.
     pub free: Vec<usize>,
     /// Whether the session states it; else it is what the solution leaves over.
@@ -70,8 +70,8 @@ pub fn calibrate(session: &Session) -> Result<Calibration, IdentifyError> {
     let left = solve(&free_radius, &reduction, stated.unwrap_or(FIRST_GUESS_MM))?;
     let square = left.rms_mm.powi(2) * equations.rows.len() as f64;
     let freedom = left.freedom as f64;
-    let (sigma_mm, birge_ratio) = match stated {
-        Some(sigma) => (sigma, crate::fit::birge_ratio(square / sigma.powi(2), freedom)),
+    let (sigma_mm, u_enlargement) = match stated {
+        Some(sigma) => (sigma, crate::fit::u_enlargement(square / sigma.powi(2), freedom)),
         None if left.freedom == 0 => {
             return Err(IdentifyError::Request(
                 "self-calibration: the session states no `noise_um`, and there are no more readings than unknowns to tell it from; \
@@ -84,13 +84,13 @@ pub fn calibrate(session: &Session) -> Result<Calibration, IdentifyError> {
             ((square / freedom).sqrt().max(floor).max(1e-9), 1.0)
         }
     };
-    let solution = solve(&equations, &reduction, sigma_mm * birge_ratio)?;
+    let solution = solve(&equations, &reduction, sigma_mm * u_enlargement)?;
     Ok(Calibration {
         rank_before: rank_before(&equations)?,
         conditions,
         solution,
         sigma_mm,
-        birge_ratio,
+        u_enlargement,
         sigma_stated: stated.is_some(),
         free: reduction.free,
         equations,

@@ -8,6 +8,7 @@ use serde::Serialize;
 use super::position::{self, Position};
 use super::{Calibration, Function, MonteCarlo, Reference};
 use crate::monte_carlo::Distribution;
+use crate::noise::NoiseSource;
 use crate::results::{ParameterResult, Unobservable};
 
 /// Bins of a histogram in a report.
@@ -91,7 +92,7 @@ pub struct SelfCalibration {
     pub readings: usize,
     /// Standard uncertainty of a reading, µm.
     pub noise_um: f64,
-    /// `stated`, or `fit` where it is what the solution leaves over.
+    /// `stated`, or `residual` where it is what the solution leaves over.
     pub noise_source: String,
     /// Root mean square of what the solution leaves over, µm.
     pub rms_um: f64,
@@ -132,7 +133,7 @@ impl Calibration {
     pub fn report(&self, session: &Session, draws: Option<&MonteCarlo>) -> SelfCalibration {
         let axis = session.machine.axes[self.equations.axis].name.clone();
         let mut warnings = session.warnings.clone();
-        warnings.extend(crate::fit::birge_warning(self.birge_ratio));
+        warnings.extend(crate::fit::enlargement_warning(self.u_enlargement));
         if !session.effects.is_empty() {
             warnings.push(
                 "self-calibration knows nothing of the declared effects: what they move is in its functions"
@@ -176,7 +177,13 @@ impl Calibration {
             method: "self-calibration".into(),
             readings: self.equations.rows.len(),
             noise_um: self.sigma_mm * 1e3,
-            noise_source: if self.sigma_stated { "stated" } else { "fit" }.into(),
+            noise_source: if self.sigma_stated {
+                NoiseSource::Stated
+            } else {
+                NoiseSource::Residual
+            }
+            .word()
+            .into(),
             rms_um: self.solution.rms_mm * 1e3,
             values: columns,
             rank_before: self.rank_before,

@@ -64,7 +64,9 @@ pub fn solve(equations: &Equations, reduction: &Reduction, sigma_mm: f64) -> Res
     });
     let mut triangle = Triangle::new(unknowns);
     triangle.absorb(white.as_ref());
-    let rank = Rank::decide(triangle.parts().0.as_ref(), &vec![1.0; unknowns])?;
+    // The unknowns stand in the order of their functions and angles.
+    let preference: Vec<usize> = (0..unknowns).collect();
+    let rank = Rank::decide(triangle.parts().0.as_ref(), &vec![1.0; unknowns], &preference)?;
     let of_free = crate::fit::covariance(&triangle, &rank.seen)?;
 
     let outputs = columns + usize::from(radius);

@@ -6,9 +6,10 @@ use super::columns::Columns;
 use super::remainder::{self, Structure};
 use super::search::Search;
 use super::start::Start;
-use super::{TraceOptions, draws_of, null};
+use super::{SCATTER, TraceOptions, draws_of, null};
 use crate::error::IdentifyError;
-use crate::fit::{Fit, fit};
+use crate::fit::{Fit, fit, prepare_with};
+use crate::noise::NoiseSource;
 use crate::problem::Problem;
 
 /// The model with what the search has taken, refitted, and what it leaves.
@@ -38,11 +39,13 @@ impl<'a> Judged<'a> {
                 structure: structure_before.cloned(),
             });
         }
-        let mut after = problem.clone();
-        for effect in &effects {
-            after.add_effect(effect)?;
+        // Noise, outliers and rank are found anew, as the fit of a session that declares these effects finds them: what the declared model left over
+        // was not noise.
+        let (mut after, mut after_fit) = prepare_with(problem.session, &effects, options.seed)?;
+        if shows_its_own_noise(problem, &after) {
+            after.noise = problem.noise.clone();
+            after_fit = fit(&after, Some(&after_fit.beta))?;
         }
-        let after_fit = fit(&after, Some(&start_of(&after, before_fit)))?;
         let structure = structure_before
             .map(|_| left_over(&after, &after_fit, options))
             .transpose()?;
@@ -71,11 +74,11 @@ fn taken_effects<'s>(search: &'s Search<'_>) -> impl Iterator<Item = &'s Effect>
     taken.map(|taken| &search.candidates[taken.candidate].effect)
 }
 
-/// The declared model's unknowns, and zeros for the effects' coefficients.
-fn start_of(after: &Problem<'_>, before: &Fit) -> Vec<f64> {
-    let mut start = vec![0.0; after.parameters.list.len()];
-    start[..before.beta.len()].copy_from_slice(&before.beta);
-    start
+/// Whether the noise of the search is not what a fit would take, but what repeats show along runs: autocorrelated, or of another size.
+fn shows_its_own_noise(search: &Problem<'_>, fit: &Problem<'_>) -> bool {
+    let (of_search, of_fit) = (&search.noise, &fit.noise);
+    let of_one_size = (of_search.sigma_mm / of_fit.sigma_mm - 1.0).abs() < SCATTER;
+    of_search.source == NoiseSource::Repeats && !(of_search.memory.is_empty() && of_one_size)
 }
 
 /// What a fit leaves, beside its model.

@@ -1,6 +1,7 @@
 //! What the commands answer stays what it was: everything that they print and write on small sessions, kept in `snapshots/kept__*`.
 //!
-//! That an answer is right is shown elsewhere; here a change of any figure is noticed, wanted or not. Numbers may differ as those of two builds do: by
+//! That an answer is right is shown elsewhere; here a change of any figure is noticed, wanted or not. Answers are the same on every processor, which
+//! `ABBE_RUNNER` checks by running the command under an emulator. Numbers may differ as those of two builds do: by
 //! rounding, or by one in the last place that is printed. A change that is wanted is taken over with `cargo insta accept`.
 
 use std::ffi::OsStr;
@@ -128,6 +129,18 @@ fn told(file: &Path) -> String {
     lines
 }
 
+/// The command `abbe`, as what `ABBE_RUNNER` names runs it: `ABBE_RUNNER="qemu-x86_64 -cpu Nehalem"` answers as a processor without AVX does.
+fn command_of_abbe() -> Command {
+    let runner = std::env::var("ABBE_RUNNER").unwrap_or_default();
+    let mut words = runner.split_whitespace();
+    let Some(program) = words.next() else {
+        return Command::new(env!("CARGO_BIN_EXE_abbe"));
+    };
+    let mut command = Command::new(program);
+    command.args(words).arg(env!("CARGO_BIN_EXE_abbe"));
+    command
+}
+
 /// Runs commands one after another in a folder with copies of a folder's files, and holds what they print and write to what is kept. `DATA` among
 /// their words stands for the folder of public data.
 #[track_caller]
@@ -152,7 +165,7 @@ fn kept(name: &str, folder_of_input: &Path, changed: &[(&str, String)], commands
     let wants_data = commands.iter().any(|command| command.contains("DATA"));
     let public = wants_data.then(|| data(name, "").expect("the caller looked for it"));
     for command in commands {
-        let output = Command::new(env!("CARGO_BIN_EXE_abbe"))
+        let output = command_of_abbe()
             .args(command.split_whitespace().map(|word| match word {
                 "DATA" => public.as_deref().map_or(OsStr::new(word), Path::as_os_str),
                 other => OsStr::new(other),

@@ -80,6 +80,12 @@ fn a_noise_that_is_not_that_of_the_repeats() {
     ] {
         let case = session(noise);
         let result = fitted(&case.session(), &data(&case));
+        // The Birge ratio says by how much readings scatter less than is stated as well; nothing is made smaller for it.
+        if noise == "noise_um = 3" {
+            let ratio = result["birge_ratio"].as_f64().unwrap();
+            assert!((ratio - 0.1).abs() < 0.005, "{ratio}");
+            assert_eq!(result["u_enlargement"], 1.0);
+        }
         let warnings = result["warnings"].as_array().unwrap();
         let is_it = |warning: &&serde_json::Value| {
             let warning = warning.as_str().unwrap();
@@ -177,6 +183,7 @@ fn a_prior_that_the_readings_contradict() {
     let wanted = -50.0 * from_readings / (from_prior + from_readings);
     assert!((value - wanted).abs() < 0.01, "{value} {wanted}");
     assert!(result["birge_ratio"].as_f64().unwrap() > 10.0);
+    assert_eq!(result["u_enlargement"], result["birge_ratio"]);
     assert!(
         result["told"]
             .as_str()

@@ -142,7 +142,7 @@ fn curve_of(problem: &Problem<'_>, fit: &Fit, number: usize, moves: &Moves) -> V
             CurvePoint {
                 at: q * at_outside,
                 value: value * outside,
-                u: (variance.max(0.0).sqrt() * fit.birge_ratio).hypot(moved[0]) * outside,
+                u: (variance.max(0.0).sqrt() * fit.u_enlargement).hypot(moved[0]) * outside,
             }
         })
         .collect()
@@ -227,9 +227,9 @@ mod tests {
             .unwrap();
         let mut fit = fit(&problem, None).unwrap();
         let number = problem.parameters.effects.len() - 1;
-        fit.birge_ratio = 1.0;
+        fit.u_enlargement = 1.0;
         let by_noise = curve_of(&problem, &fit, number, &[]);
-        fit.birge_ratio = 1.5;
+        fit.u_enlargement = 1.5;
         let enlarged = curve_of(&problem, &fit, number, &[]);
         assert_eq!(by_noise.len(), CURVE_POINTS);
         for (by_noise, enlarged) in by_noise.iter().zip(&enlarged) {

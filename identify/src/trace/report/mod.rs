@@ -59,7 +59,7 @@ pub(super) fn report(findings: &Findings<'_, '_>) -> Result<Reported, IdentifyEr
         search,
         ..
     } = findings;
-    let before_result = model_result(before, before_fit, before_fit.held_out.rms_mm);
+    let before_result = before_result(findings);
     let held_out = HeldOut::of(search, before_result.heldout_rms_um);
     let mut after_result = model_result(after, after_fit, held_out.last_um() * 1e-3);
 
@@ -100,10 +100,10 @@ pub(super) fn report(findings: &Findings<'_, '_>) -> Result<Reported, IdentifyEr
     let mut result = TraceResult {
         verdict,
         interrupted: false,
-        noise_um: before.noise.sigma_mm * 1e3,
-        noise_source: before.noise.source.word().to_string(),
-        noise_memory: before.noise.memory.clone(),
-        readings: before.readings(),
+        noise_um: after.noise.sigma_mm * 1e3,
+        noise_source: after.noise.source.word().to_string(),
+        noise_memory: after.noise.memory.clone(),
+        readings: after.readings(),
         heldout_by: before.folds.kind.words().to_string(),
         before: before_result,
         after: after_result,
@@ -169,9 +169,29 @@ fn residual_variance(findings: &Findings<'_, '_>) -> f64 {
         return 1.0;
     }
     let residuals = findings.after_fit.residuals.iter().flatten();
-    let sigma_mm = findings.after.noise.sigma_mm;
+    // Evidence is counted in the noise that the search went by.
+    let sigma_mm = findings.before.noise.sigma_mm;
     let sum: f64 = residuals.map(|v| (v / sigma_mm).powi(2)).sum();
     (sum / findings.search.columns.rows().max(1) as f64).max(1.0)
+}
+
+/// The declared model, on the readings that count after the search as well.
+fn before_result(findings: &Findings<'_, '_>) -> ModelResult {
+    let (before, fit, after) = (findings.before, findings.before_fit, findings.after);
+    let result = model_result(before, fit, fit.held_out.rms_mm);
+    if before.rejected == after.rejected {
+        return result;
+    }
+    let [rms_um, heldout_rms_um] =
+        [&fit.residuals, &fit.held_out.residuals].map(|residuals| rms_mm(after, residuals) * 1e3);
+    let in_3d = |rms: f64| result.rms_3d_um.map(|_| rms * 3.0_f64.sqrt());
+    ModelResult {
+        rms_um,
+        heldout_rms_um,
+        rms_3d_um: in_3d(rms_um),
+        heldout_rms_3d_um: in_3d(heldout_rms_um),
+        ..result
+    }
 }
 
 pub(super) fn model_result(problem: &Problem<'_>, fit: &Fit, held_out_mm: f64) -> ModelResult {
@@ -184,6 +204,7 @@ pub(super) fn model_result(problem: &Problem<'_>, fit: &Fit, held_out_mm: f64) -
         heldout_rms_um: held,
         rms_3d_um: in_3d(rms),
         heldout_rms_3d_um: in_3d(held),
+        noise_um: problem.noise.sigma_mm * 1e3,
         parameters: fit::parameters(problem, fit),
     }
 }

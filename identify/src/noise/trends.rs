@@ -1,0 +1,170 @@
+//! The trend that is taken out of every run before repeats are compared.
+
+use abbe_model::session::readings::Readings;
+
+/// Coefficients of the trend of a long run: constant, slope, curvature, and one cycle over the run.
+pub(super) const TERMS: usize = 5;
+/// How many of them are powers of time.
+const POWERS: usize = 3;
+/// The fewest readings of a run whose waves are looked at.
+pub(super) const LEAST_RUN: usize = 24;
+/// Readings of a run for each of its powers: shorter runs lose fewer terms.
+const READINGS_A_POWER: usize = 5;
+/// The fewest readings of a run that loses its mean.
+const LEAST_TREND: usize = 4;
+
+/// How many powers of time are taken out of a run of so many readings: 1 from 4 readings on, 2 from 10, 3 from 15.
+fn powers(readings: usize) -> usize {
+    match readings {
+        0..LEAST_TREND => 0,
+        _ => (readings / READINGS_A_POWER).clamp(1, POWERS),
+    }
+}
+
+/// The terms of a trend, orthonormal over given times (Gram–Schmidt, twice); those that the times are too few for are zero.
+pub(super) fn trend_terms(times: &[f64]) -> Vec<[f64; TERMS]> {
+    let n = times.len() as f64;
+    let powers = powers(times.len());
+    let middle = times.iter().sum::<f64>() / n;
+    let half = times
+        .iter()
+        .map(|t| (t - middle).abs())
+        .fold(f64::MIN_POSITIVE, f64::max);
+    let term = |t: &f64, i: usize| -> f64 {
+        let time = (t - middle) / half;
+        let (sin, cos) = (std::f64::consts::PI * time).sin_cos();
+        match i {
+            0..POWERS if i < powers => time.powi(i as i32),
+            0..POWERS => 0.0,
+            _ if times.len() < LEAST_RUN => 0.0,
+            POWERS => cos,
+            _ => sin,
+        }
+    };
+    let mut q: Vec<[f64; TERMS]> = times
+        .iter()
+        .map(|t| std::array::from_fn(|i| term(t, i)))
+        .collect();
+    for i in 0..TERMS {
+        for j in (0..i).chain(0..i) {
+            let along: f64 = q.iter().map(|row| row[i] * row[j]).sum();
+            q.iter_mut().for_each(|row| row[i] -= along * row[j]);
+        }
+        let length = q.iter().map(|row| row[i] * row[i]).sum::<f64>().sqrt();
+        let scale = if length > 1e-9 { 1.0 / length } else { 0.0 };
+        q.iter_mut().for_each(|row| row[i] *= scale);
+    }
+    q
+}
+
+/// The trends of the runs of a test.
+pub(super) struct Trends {
+    /// The run of each row.
+    run: Vec<usize>,
+    /// The terms of that run's trend at each row; zero for rows that do not count.
+    terms: Vec<[f64; TERMS]>,
+    /// The rows of each run that count.
+    rows: Vec<Vec<usize>>,
+}
+
+impl Trends {
+    /// Of the rows that count. Readings without runs have no trend.
+    pub fn of(readings: &Readings, kept: impl Fn(usize) -> bool) -> Trends {
+        let mut trends = Trends {
+            run: vec![0; readings.rows()],
+            terms: vec![[0.0; TERMS]; readings.rows()],
+            rows: Vec::new(),
+        };
+        if readings.run.is_empty() {
+            return trends;
+        }
+        for (number, run) in readings.runs().into_iter().enumerate() {
+            trends.run[run.clone()].fill(number);
+            let rows: Vec<usize> = run.filter(|row| kept(*row)).collect();
+            if !rows.is_empty() {
+                let times: Vec<f64> = rows.iter().map(|row| *row as f64).collect();
+                for (row, terms) in rows.iter().zip(trend_terms(&times)) {
+                    trends.terms[*row] = terms;
+                }
+            }
+            trends.rows.push(rows);
+        }
+        trends
+    }
+
+    /// Residuals less the trend of each run (and coordinate).
+    pub fn taken_out(&self, residual: &[f64], coordinates: usize) -> Vec<f64> {
+        let mut level = residual.to_vec();
+        for rows in &self.rows {
+            for coordinate in 0..coordinates {
+                let at = |row: usize| row * coordinates + coordinate;
+                let along: [f64; TERMS] = std::array::from_fn(|i| {
+                    rows.iter()
+                        .map(|row| residual[at(*row)] * self.terms[*row][i])
+                        .sum()
+                });
+                for row in rows {
+                    let terms = along.iter().zip(&self.terms[*row]);
+                    level[at(*row)] -= terms.map(|(a, q)| a * q).sum::<f64>();
+                }
+            }
+        }
+        level
+    }
+
+    /// What a group of repeats contributes to the trace of `M·P`: `Σ_t P_tt − (1/R)·Σ_ts P_ts` over its R rows, with `P_ts = δ_ts − Σ_i q_ti q_si` for rows of
+    /// one run and `δ_ts` for others.
+    pub fn freedom_of(&self, group: &[usize]) -> f64 {
+        let repeats = group.len() as f64;
+        let mut own = 0.0;
+        // Σ_ts of the trends' part: for each run the squared length of the sum of its rows' terms.
+        let mut sums: Vec<(usize, [f64; TERMS])> = Vec::new();
+        for row in group {
+            let terms = &self.terms[*row];
+            own += terms.iter().map(|q| q * q).sum::<f64>();
+            match sums.iter_mut().find(|(run, _)| *run == self.run[*row]) {
+                Some((_, sum)) => sum.iter_mut().zip(terms).for_each(|(sum, q)| *sum += q),
+                None => sums.push((self.run[*row], *terms)),
+            }
+        }
+        let together: f64 = sums.iter().flat_map(|(_, sum)| sum).map(|q| q * q).sum();
+        (repeats - own) - (repeats - together) / repeats
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_trend_is_a_parabola_and_one_cycle_and_nothing_else() {
+        let times: Vec<f64> = (0..60).map(|t| f64::from(t) * 1.5 + 7.0).collect();
+        let q = trend_terms(&times);
+        let left = |of: &dyn Fn(f64) -> f64| -> f64 {
+            let values: Vec<f64> = times.iter().map(|t| of(*t)).collect();
+            let along: [f64; TERMS] =
+                std::array::from_fn(|i| values.iter().zip(&q).map(|(value, q)| value * q[i]).sum());
+            let rest = values
+                .iter()
+                .zip(&q)
+                .map(|(value, q)| value - along.iter().zip(q).map(|(a, q)| a * q).sum::<f64>());
+            let (left, whole) = (
+                rest.map(|r| r * r).sum::<f64>(),
+                values.iter().map(|v| v * v).sum::<f64>(),
+            );
+            (left / whole).sqrt()
+        };
+        // One cycle from the first reading to the last.
+        let angle = |t: f64| std::f64::consts::TAU * (t - 7.0) / 88.5;
+        assert!(left(&|t| 3.0 - 0.2 * t + 0.01 * t * t) < 1e-12);
+        assert!(left(&|t| (angle(t) + 0.7).cos()) < 1e-12);
+        assert!(left(&|t| (4.0 * angle(t) + 0.7).cos()) > 0.9);
+        // A run of few readings loses no cycle, and one of fewer still no parabola, no slope, nothing.
+        for (readings, terms) in [(23, 3), (15, 3), (14, 2), (10, 2), (9, 1), (4, 1), (3, 0), (1, 0)] {
+            let few = trend_terms(&times[..readings]);
+            let count: f64 = few.iter().flatten().map(|q| q * q).sum();
+            assert!((count - f64::from(terms)).abs() < 1e-12, "{readings}: {count}");
+            assert!(few.iter().all(|q| q[terms as usize..].iter().all(|q| *q == 0.0)));
+        }
+    }
+}
