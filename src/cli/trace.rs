@@ -14,6 +14,7 @@ use indicatif::{ProgressBar, ProgressStyle};
 
 use super::failure::Failure;
 use super::interrupt::Interrupts;
+use super::message::{Kind, tell};
 use super::report::ReportArguments;
 use super::{
     CommonArguments, SessionArguments, compensation, csv, fit, output, plausibility, read_session, table,

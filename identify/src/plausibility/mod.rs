@@ -151,7 +151,7 @@ pub fn in_words(suggestions: &[Suggestion]) -> Option<String> {
 /// A residual of a hundred times the noise in every test.
 fn residual(problem: &Problem<'_>, fit: &Fit) -> Option<Conflict> {
     let noise = problem.noise.sigma_mm;
-    if problem.noise.source == NoiseSource::Fit || noise <= 0.0 {
+    if problem.noise.source == NoiseSource::Residual || noise <= 0.0 {
         return None;
     }
     let coordinates = problem.coordinates();

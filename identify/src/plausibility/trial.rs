@@ -5,6 +5,7 @@ use abbe_model::session::{Prior, Session};
 use crate::fit::{in_directions, whole};
 use crate::heldout::rms_mm;
 use crate::noise::Noise;
+use crate::parameters::pivot_preference;
 use crate::problem::Problem;
 use crate::rank::Rank;
 
@@ -36,13 +37,14 @@ pub(super) fn trial(session: &Session, noise: &Noise) -> Option<Trial> {
     let problem = Problem::new(session, noise.clone(), 1).ok()?;
     let list = &problem.parameters.list;
     let size: Vec<f64> = list.iter().map(|parameter| parameter.size).collect();
+    let preference = pivot_preference(list);
     let mut beta = vec![0.0; list.len()];
     let mut rank: Option<Rank> = None;
     for _ in 0..STEPS {
         let whole = whole(&problem, &beta, &problem.triangles(&beta).ok()?);
         let rank = match &mut rank {
             Some(rank) => rank,
-            none => none.insert(Rank::decide(whole.parts().0.as_ref(), &size).ok()?),
+            none => none.insert(Rank::decide(whole.parts().0.as_ref(), &size, &preference).ok()?),
         };
         let (r, c, _) = in_directions(&whole, &rank.seen).parts();
         let mut step = vec![0.0; c.len()];
