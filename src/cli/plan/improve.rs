@@ -9,7 +9,7 @@ use abbe::identify::problem::Problem;
 use abbe::identify::trace::library;
 use clap::{Args, ValueEnum};
 
-use super::tables::three_digits;
+use super::digits::three_digits;
 use crate::cli::failure::Failure;
 use crate::cli::table;
 

@@ -3,6 +3,7 @@
 use abbe::identify::plan::effects::hidden_by_error;
 use abbe::identify::plan::results::{EffectDetectability, EffectsAnalysis, ErrorAnalysis, PlanAnalysis};
 
+use super::digits::three_digits;
 use crate::cli::fit::print_warnings;
 use crate::cli::table;
 
@@ -55,18 +56,6 @@ fn header(analysis: &PlanAnalysis) {
 fn counted(count: usize, thing: &str) -> String {
     let plural = if count == 1 { "" } else { "s" };
     format!("{count} {thing}{plural}")
-}
-
-/// A number with three digits.
-pub fn three_digits(value: f64) -> String {
-    if !value.is_finite() {
-        return "∞".to_string();
-    }
-    if value == 0.0 {
-        return "0".to_string();
-    }
-    let places = (2.0 - value.abs().max(1e-9).log10().floor()).clamp(0.0, 5.0) as usize;
-    format!("{value:.places$}")
 }
 
 fn optional(value: Option<f64>) -> String {
