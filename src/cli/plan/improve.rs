@@ -10,7 +10,7 @@ use abbe::identify::trace::library;
 use abbe::model::words::counted;
 use clap::{Args, ValueEnum};
 
-use super::tables::three_digits;
+use super::digits::three_digits;
 use crate::cli::failure::Failure;
 use crate::cli::table;
 

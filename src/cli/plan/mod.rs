@@ -1,5 +1,6 @@
 //! `abbe plan`.
 
+mod digits;
 pub mod improve;
 mod patterns;
 mod tables;

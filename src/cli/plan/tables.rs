@@ -4,6 +4,7 @@ use abbe::identify::plan::effects::hidden_by_error;
 use abbe::identify::plan::results::{EffectDetectability, EffectsAnalysis, ErrorAnalysis, PlanAnalysis};
 use abbe::model::words::counted;
 
+use super::digits::three_digits;
 use crate::cli::table;
 
 /// Tests side by side in the table of small plots.
@@ -50,16 +51,6 @@ fn header(analysis: &PlanAnalysis) {
     );
 }
 
-/// A number with three digits.
-pub fn three_digits(value: f64) -> String {
-    if !value.is_finite() {
-        return "∞".to_string();
-    }
-    if value == 0.0 {
-        return "0".to_string();
-    }
-    let places = (2.0 - value.abs().max(1e-9).log10().floor()).clamp(0.0, 5.0) as usize;
-    format!("{value:.places$}")
 }
 
 fn optional(value: Option<f64>) -> String {
