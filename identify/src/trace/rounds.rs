@@ -19,31 +19,54 @@ pub(super) struct Account<'t> {
 }
 
 impl Account<'_> {
-    /// Notes an addition. Returns whether more is wanted.
-    fn note(&mut self, search: &Search<'_>, candidate: usize) -> bool {
+    /// Notes additions that are claimed. Returns whether more is wanted.
+    fn note(&mut self, search: &Search<'_>, added: impl Iterator<Item = usize>) -> bool {
         let held_out = search.held_out.last().copied().unwrap_or(0.0);
         let heldout_rms_um = (held_out / search.columns.rows().max(1) as f64).sqrt() * self.noise_um;
-        let id = search.candidates[candidate].effect.id();
         let effects = search.taken().len();
-        self.steps.push(Step {
-            id: id.clone(),
-            effects,
-            heldout_rms_um,
-        });
-        (self.progress)(Progress::Taken(effects, id, heldout_rms_um))
+        let mut wanted = true;
+        for candidate in added {
+            let id = search.candidates[candidate].effect.id();
+            self.steps.push(Step {
+                id: id.clone(),
+                effects,
+                heldout_rms_um,
+            });
+            wanted &= (self.progress)(Progress::Taken(effects, id, heldout_rms_um));
+        }
+        wanted
+    }
+
+    /// Whether more is wanted while nothing is claimed.
+    fn is_more_wanted(&self, search: &Search<'_>) -> bool {
+        (self.progress)(Progress::Screening(search.candidates.len()))
     }
 }
 
-/// Rounds until nothing earns its place any more: the p-value of the best that was not taken. `None` if the user has seen enough.
+/// How many additions in a row may fail to lower the held-out error before they are withdrawn: of two effects that undo part of each other the first alone
+/// explains little.
+const UNCLAIMED_IN_A_ROW: usize = 2;
+
+/// Rounds until nothing earns its place any more, or until additions do not lower the held-out error: the p-value of the best that was not taken. `None` if
+/// the user has seen enough. What remains is what is claimed.
 pub(super) fn search_on(
     search: &mut Search<'_>,
     account: &mut Account<'_>,
 ) -> Result<Option<f64>, IdentifyError> {
+    let ended = rounds(search, account)?;
+    search.withdraw_unclaimed();
+    Ok(ended)
+}
+
+fn rounds(search: &mut Search<'_>, account: &mut Account<'_>) -> Result<Option<f64>, IdentifyError> {
+    // Additions since the last that was claimed.
+    let mut unclaimed = Vec::new();
     // Effects that are put down to one make room for others; that must end.
     for _ in 0..search.most_rounds() {
+        let mut ended = None;
         match search.round()? {
-            Round::Done { .. } if search.retune()? || search.regroup()? => {}
-            Round::Done { p_value } => return Ok(Some(p_value)),
+            Round::Done { .. } if search.retune()? || search.regroup()? => unclaimed.push(None),
+            Round::Done { p_value } => ended = Some(p_value),
             Round::Added { candidate } => {
                 // Every exchange costs a model an effect; among many effects the gain is small and a sweep now and then will do.
                 let taken = search.taken().len();
@@ -51,10 +74,23 @@ pub(super) fn search_on(
                     search.exchange()?;
                 }
                 search.merge()?;
-                if !account.note(search, candidate) {
-                    return Ok(None);
-                }
+                unclaimed.push(Some(candidate));
             }
+        }
+        let wanted = if search.claim() {
+            account.note(search, unclaimed.drain(..).flatten())
+        } else {
+            account.is_more_wanted(search)
+        };
+        if ended.is_some() {
+            return Ok(ended);
+        }
+        if !wanted {
+            return Ok(None);
+        }
+        if unclaimed.len() >= UNCLAIMED_IN_A_ROW {
+            // No p-value tells how many more would be added.
+            return Ok(Some(1.0));
         }
     }
     Ok(Some(1.0))

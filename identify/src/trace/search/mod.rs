@@ -17,7 +17,8 @@ use super::library::Candidate;
 use super::moments::Moments;
 use super::score::{Gain, PriorMoments, Trained};
 use crate::error::IdentifyError;
-pub use heldout::Plain;
+use heldout::Standing;
+pub use heldout::{Plain, Unclaimed};
 
 /// When the search stops.
 #[derive(Clone, Copy, Debug)]
@@ -88,6 +89,13 @@ pub struct Search<'s> {
     pub reserve: Vec<(Candidate, Layout)>,
     /// What held-out errors are of.
     plain: Plain,
+    /// Sums of squares of held-out residuals over the variance of the noise, by unit: now, and under the declared model.
+    units_now: Vec<f64>,
+    declared_units: Vec<f64>,
+    /// What is claimed: additions that lowered the held-out error by more than the standard error of the fall.
+    claimed: Standing,
+    /// What scored better than readings without structure and was not claimed, in the order in which it was added.
+    pub unclaimed: Vec<Unclaimed>,
     /// Entries of the library that would not stand out however large they plausibly were.
     unseen: Vec<bool>,
     pub(super) stop: Stop,
@@ -145,11 +153,17 @@ impl<'s> Search<'s> {
             last_resort: false,
             reserve: Vec::new(),
             plain,
+            units_now: Vec::new(),
+            declared_units: Vec::new(),
+            claimed: Standing::default(),
+            unclaimed: Vec::new(),
             unseen: Vec::new(),
             stop,
         };
         search.unseen = search.not_standing_out()?;
         search.note_held_out()?;
+        search.declared_units = search.units_now.clone();
+        search.claimed = search.standing();
         Ok(search)
     }
 
