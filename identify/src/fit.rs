@@ -14,7 +14,7 @@ use faer::Mat;
 use statrs::distribution::{ChiSquared, ContinuousCDF};
 
 use crate::error::IdentifyError;
-use crate::heldout::{HeldOut, held_out, rms_mm};
+use crate::heldout::{HeldOut, held_out, mislabelled_runs, rms_mm};
 use crate::least_squares::{LeastSquares, Scaling, minimise};
 use crate::noise::{self, Noise, NoiseSource, PureError};
 use crate::parameters::Role;
@@ -298,6 +298,7 @@ pub fn report(problem: &Problem<'_>, fit: &Fit) -> FitResult {
     let in_3d = |rms: f64| three.then(|| rms * 3.0_f64.sqrt() * 1e3);
     let mut warnings = problem.session.warnings.clone();
     warnings.extend(noise::stated_against_repeats(problem, &fit.residuals));
+    warnings.extend(mislabelled_runs(&problem.tests));
     warnings.extend(birge_warning(fit.birge_ratio));
     FitResult {
         noise_um: problem.noise.sigma_mm * 1e3,

@@ -58,6 +58,8 @@ const BLOCKS_A_TEST: usize = 5;
 const FOLDS_OF_POSES: usize = 10;
 /// The most folds of runs: more cost time and say no more. Where the run column changes from reading to reading, each reading would be a fold.
 const MOST_FOLDS_OF_RUNS: usize = 64;
+/// Into how many folds they are grouped where there are more.
+const FOLDS_OF_MANY_RUNS: usize = 32;
 
 impl Folds {
     /// The folds of a session.
@@ -99,7 +101,7 @@ impl Folds {
         } else {
             FoldKind::RunGroups
         };
-        let groups = (MOST_FOLDS_OF_RUNS / readings.len().max(1)).max(2);
+        let groups = (FOLDS_OF_MANY_RUNS / readings.len().max(1)).max(2);
         let mut count = 0;
         let of_row = readings
             .iter()
