@@ -14,7 +14,7 @@ use faer::Mat;
 use statrs::distribution::{ChiSquared, ContinuousCDF};
 
 use crate::error::IdentifyError;
-use crate::heldout::{HeldOut, held_out, rms_mm};
+use crate::heldout::{HeldOut, held_out, mislabelled_runs, rms_mm};
 use crate::least_squares::{LeastSquares, Scaling, minimise};
 use crate::noise::{self, Noise, NoiseSource, PureError};
 use crate::parameters::{Role, pivot_preference};
@@ -327,6 +327,7 @@ pub fn report(problem: &Problem<'_>, fit: &Fit) -> FitResult {
     let mut warnings = problem.session.warnings.clone();
     warnings.extend(plausibility::warnings(&plausibility));
     warnings.extend(noise::stated_against_repeats(problem, &fit.residuals));
+    warnings.extend(mislabelled_runs(&problem.tests));
     warnings.extend(enlargement_warning(fit.u_enlargement));
     FitResult {
         noise_um: problem.noise.sigma_mm * 1e3,

@@ -58,6 +58,8 @@ pub struct Block {
 /// Triangles over the tests' own unknowns, by test and fold.
 type Narrow = BTreeMap<(usize, usize), Triangle>;
 
+/// Mean number of readings below which runs are not evaluated one by one.
+const SHORT_RUN: usize = 8;
 /// How many blocks one thread takes at a time.
 const BLOCKS_A_STRETCH: usize = 16;
 
@@ -140,7 +142,12 @@ impl<'a> Problem<'a> {
         let mut blocks = Vec::new();
         for (test, plan) in self.tests.iter().enumerate() {
             let Some(readings) = &plan.readings else { continue };
-            for run in readings.runs() {
+            let mut runs = readings.runs();
+            // Many short runs take long one by one; only a whitening filter has to keep them apart.
+            if self.noise.memory.is_empty() && readings.rows() < SHORT_RUN * runs.len() {
+                runs = std::iter::once(0..readings.rows()).collect();
+            }
+            for run in runs {
                 // A whitening filter must not be cut; without one, blocks are what the triangle absorbs at once.
                 let most = if self.noise.memory.is_empty() {
                     (BLOCK_ROWS / self.coordinates()).max(1)

@@ -301,6 +301,20 @@ pub struct AlternativeResult {
     pub separated: bool,
 }
 
+/// A candidate that is not claimed although it scores better than the null distribution of the search.
+#[derive(Clone, Debug, PartialEq, Serialize, JsonSchema)]
+pub struct RejectedCandidate {
+    /// Component, driver, shape, order.
+    #[serde(flatten)]
+    pub name: EffectName,
+    /// Probability that the whole search finds as good in readings without structure.
+    pub p_value: f64,
+    /// By how much it lowered the held-out rms, µm; negative if the held-out rms rose.
+    pub heldout_fall_um: f64,
+    /// Standard error of that fall, µm, from paired differences over runs, blocks or poses.
+    pub u_heldout_fall_um: f64,
+}
+
 /// What is left.
 #[derive(Clone, Debug, PartialEq, Serialize, JsonSchema)]
 pub struct Remainder {
@@ -354,6 +368,10 @@ pub struct TraceResult {
     pub remainder: Remainder,
     /// What the residual of the declared model looks like, in words.
     pub residual_before: String,
+    /// Candidates that score better than the null distribution of the search and are not claimed, because the held-out error does not fall by more than the
+    /// standard error of the fall.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub rejected_candidates: Vec<RejectedCandidate>,
     /// Parameters that moved by more than their uncertainty: that was the bias.
     pub moved: Vec<Moved>,
     /// How many candidates were looked for, and how many of them these readings can see.

@@ -251,6 +251,15 @@ fn print(result: &TraceResult) {
             say!("   {sentence}");
         }
     }
+    for rejected in &result.rejected_candidates {
+        say!(
+            "\nNot claimed: {} (p ≤ {:.3}); the held-out rms falls by {:.4} µm, with a standard error of {:.4} µm",
+            name(&rejected.name),
+            rejected.p_value,
+            rejected.heldout_fall_um,
+            rejected.u_heldout_fall_um
+        );
+    }
     if result.remainder.structured {
         say!(
             "\nStructure remains (p ≤ {:.3}): {}",

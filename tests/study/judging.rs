@@ -152,8 +152,20 @@ pub fn tell(outcome: &Outcome, mark: &str) -> String {
         })
         .collect();
     let result = &outcome.result;
+    let not_claimed: Vec<String> = result
+        .rejected_candidates
+        .iter()
+        .map(|rejected| {
+            let (fall, u) = (rejected.heldout_fall_um, rejected.u_heldout_fall_um);
+            let name = short(&rejected.name);
+            format!(
+                "\n        REJECTED {name} (p {:.3}, held out falls by {fall:.5} ± {u:.5})",
+                rejected.p_value
+            )
+        })
+        .collect();
     format!(
-        "{mark:<5} #{} {:?} {noise} {}\n        {} noise {:.3} memory {:?} rejected {} held out {:.3} -> {:.3}, remainder p {:.3} {:?}, {:.2} s\n        {}",
+        "{mark:<5} #{} {:?} {noise} {}\n        {} noise {:.3} memory {:?} rejected {} held out {:.3} -> {:.3}, remainder p {:.3} {:?}, {:.2} s\n        {}{}",
         outcome.number,
         outcome.kind,
         truth.join(" + "),
@@ -166,6 +178,7 @@ pub fn tell(outcome: &Outcome, mark: &str) -> String {
         result.remainder.p_value,
         result.remainder.place,
         outcome.seconds,
-        found.join("\n        ")
+        found.join("\n        "),
+        not_claimed.concat()
     )
 }

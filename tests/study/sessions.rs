@@ -104,14 +104,17 @@ pub struct Outcome {
     pub seconds: f64,
 }
 
-/// Runs a study: for each number the kind, the noise and the effects; one session after the other, each on all cores.
+/// Runs a study: for each number the kind, the noise and the effects. `ABBE_STUDY_FIRST` is added to every number, so that a rule is chosen on other
+/// sessions than those that judge it.
 pub fn run(
     numbers: std::ops::Range<usize>,
     make: impl Fn(usize) -> (Kind, Noise, Vec<Injected>) + Sync,
 ) -> Vec<Outcome> {
     let only = number("ABBE_STUDY_ONLY");
+    let first = number("ABBE_STUDY_FIRST").unwrap_or(0);
     numbers
         .into_par_iter()
+        .map(|session| session + first)
         .filter(|session| only.is_none_or(|only| only == *session))
         .map(|number| {
             let (kind, noise, effects) = make(number);

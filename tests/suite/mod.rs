@@ -3,6 +3,7 @@
 mod another_build;
 mod bad_input;
 mod circular;
+mod claims;
 mod codes;
 mod compensation;
 mod data;

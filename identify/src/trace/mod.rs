@@ -19,6 +19,7 @@ pub mod library;
 pub mod list;
 mod moments;
 mod null;
+mod paired;
 mod remainder;
 mod report;
 mod rounds;
@@ -343,6 +344,7 @@ fn found<'a>(
     }
     if !poses {
         search.disown(judged.is_structured())?;
+        search.withdraw_all_unless_better()?;
         if !judged.is_of(search) {
             judged = judge(search)?;
         }

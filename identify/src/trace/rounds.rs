@@ -19,32 +19,47 @@ pub(super) struct Account<'t> {
 }
 
 impl Account<'_> {
-    /// Notes an addition.
-    fn note(&mut self, search: &Search<'_>, candidate: usize) {
+    /// Notes additions that are claimed.
+    fn note(&mut self, search: &Search<'_>, added: impl Iterator<Item = usize>) {
         let held_out = search.held_out.last().copied().unwrap_or(0.0);
         let heldout_rms_um = (held_out / search.columns.rows().max(1) as f64).sqrt() * self.noise_um;
-        let id = search.candidates[candidate].effect.id();
         let effects = search.taken().len();
-        self.steps.push(Step {
-            id: id.clone(),
-            effects,
-            heldout_rms_um,
-        });
-        (self.progress)(Progress::Taken(effects, id, heldout_rms_um));
+        for candidate in added {
+            let id = search.candidates[candidate].effect.id();
+            self.steps.push(Step {
+                id: id.clone(),
+                effects,
+                heldout_rms_um,
+            });
+            (self.progress)(Progress::Taken(effects, id, heldout_rms_um));
+        }
     }
 }
 
-/// Rounds until nothing earns its place any more: the p-value of the best that was not taken.
+/// How many additions in a row may fail to lower the held-out error before they are withdrawn: of two effects that undo part of each other the first alone
+/// explains little.
+const UNCLAIMED_IN_A_ROW: usize = 2;
+
+/// Rounds until no candidate is significant, or until additions do not lower the held-out error: the p-value of the best that was not added. What remains
+/// is what is claimed.
 ///
 /// # Errors
-/// [`IdentifyError::Interrupted`] if the user has seen enough; [`Search::roll_back`] then leads to what was taken until then.
+/// [`IdentifyError::Interrupted`] if the user has seen enough; [`Search::roll_back`] then leads to what was claimed until then.
 pub(super) fn search_on(search: &mut Search<'_>, account: &mut Account<'_>) -> Result<f64, IdentifyError> {
+    let p_value = rounds(search, account)?;
+    search.withdraw_unclaimed();
+    Ok(p_value)
+}
+
+fn rounds(search: &mut Search<'_>, account: &mut Account<'_>) -> Result<f64, IdentifyError> {
+    // Additions since the last that was claimed.
+    let mut unclaimed = Vec::new();
     // Effects that are put down to one make room for others; that must end.
     for _ in 0..search.most_rounds() {
-        search.keep();
+        let mut ended = None;
         match search.round()? {
-            Round::Done { .. } if search.retune()? || search.regroup()? => {}
-            Round::Done { p_value } => return Ok(p_value),
+            Round::Done { .. } if search.retune()? || search.regroup()? => unclaimed.push(None),
+            Round::Done { p_value } => ended = Some(p_value),
             Round::Added { candidate } => {
                 // Every exchange costs a model an effect; among many effects the gain is small and a sweep now and then will do.
                 let taken = search.taken().len();
@@ -52,10 +67,19 @@ pub(super) fn search_on(search: &mut Search<'_>, account: &mut Account<'_>) -> R
                     search.exchange()?;
                 }
                 search.merge()?;
-                account.note(search, candidate);
+                unclaimed.push(Some(candidate));
             }
         }
+        if search.claim() {
+            account.note(search, unclaimed.drain(..).flatten());
+        }
+        if let Some(p_value) = ended {
+            return Ok(p_value);
+        }
+        if unclaimed.len() >= UNCLAIMED_IN_A_ROW {
+            // No p-value tells how many more would be added.
+            return Ok(1.0);
+        }
     }
-    search.keep();
     Ok(1.0)
 }

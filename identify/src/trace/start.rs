@@ -69,6 +69,7 @@ impl Start {
                 .map(|i| rows[(i, unknowns)] / sigma_mm)
                 .collect(),
             folds: columns.plain_folds(),
+            units: columns.plain_units(),
             sigma_mm,
         })
     }

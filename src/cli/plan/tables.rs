@@ -51,8 +51,6 @@ fn header(analysis: &PlanAnalysis) {
     );
 }
 
-}
-
 fn optional(value: Option<f64>) -> String {
     value.map_or("—".to_string(), three_digits)
 }

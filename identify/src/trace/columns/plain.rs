@@ -4,7 +4,9 @@ use faer::Mat;
 
 use super::{Columns, Layout};
 use crate::error::IdentifyError;
+use crate::heldout::FoldKind;
 use crate::problem::Block;
+use crate::trace::paired::Units;
 
 impl Columns<'_, '_> {
     /// The rows of layouts that count, in mm, not whitened, block after block.
@@ -33,6 +35,21 @@ impl Columns<'_, '_> {
             .iter()
             .flat_map(|block| self.counting(block).into_iter().map(move |i| fold(block, i)))
             .collect()
+    }
+
+    /// The independent units that held-out errors are paired over: poses where folds are made of them, else folds (runs or blocks), each of which belongs to
+    /// one test. The rows are those of [`Columns::plain_rows`].
+    pub fn plain_units(&self) -> Units {
+        let coordinates = self.problem.coordinates();
+        let rows = self.blocks.iter().flat_map(|block| {
+            let reading = move |i: usize| (block.test, block.rows.start + i / coordinates);
+            self.counting(block).into_iter().map(reading)
+        });
+        if self.problem.folds.kind == FoldKind::Poses {
+            return Units::of(rows.map(|(test, row)| (0, (test, row))));
+        }
+        let fold = |test: usize, row: usize| self.problem.folds.of_row[test][row];
+        Units::of(rows.map(|(test, row)| (test, (fold(test, row), 0)))).divided()
     }
 
     /// The scalar rows of a block whose readings count.

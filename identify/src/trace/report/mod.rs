@@ -1,6 +1,7 @@
 //! From a finished search to what is reported.
 
 mod effect;
+mod rejected;
 mod unsearched;
 
 use abbe_model::effect::Effect;
@@ -12,7 +13,7 @@ use super::search::Search;
 use super::start::Start;
 use crate::error::IdentifyError;
 use crate::fit::{self, Fit};
-use crate::heldout::rms_mm;
+use crate::heldout::{mislabelled_runs, rms_mm};
 use crate::noise;
 use crate::plausibility::Plausibility;
 use crate::problem::Problem;
@@ -96,6 +97,7 @@ pub(super) fn report(findings: &Findings<'_, '_>) -> Result<Reported, IdentifyEr
     let (verdict, remainder) = verdict(findings, &effects);
     let mut warnings = before.session.warnings.clone();
     warnings.extend(noise::stated_against_repeats(before, &before_fit.residuals));
+    warnings.extend(mislabelled_runs(&before.tests));
     let moved = moved(&before_result.parameters, &after_result.parameters);
     let mut result = TraceResult {
         verdict,
@@ -111,9 +113,15 @@ pub(super) fn report(findings: &Findings<'_, '_>) -> Result<Reported, IdentifyEr
         remainder,
         residual_before: match findings.structure_before {
             Some(structure) if structure.is_there() => structure.words.clone(),
+            // Detectors look at one test at a time; the search adds up what all tests show of one effect.
+            Some(_) if !search.taken().is_empty() => {
+                "structure that no single test shows beyond noise; the search over all tests finds it"
+                    .to_string()
+            }
             Some(_) => "no structure beyond noise".to_string(),
             None => "independent poses: structure is looked for effect by effect".to_string(),
         },
+        rejected_candidates: rejected::candidates(&before.session.machine, search, &held_out),
         moved,
         candidates: findings.candidates,
         candidates_seen: findings.candidates_seen,

@@ -24,6 +24,7 @@ pub(in crate::trace) fn unsearched(problem: &Problem<'_>, fit: &Fit) -> TraceRes
         before: declared.clone(),
         after: declared,
         effects: Vec::new(),
+        rejected_candidates: Vec::new(),
         residual_before: remainder.place.clone().unwrap_or_default(),
         remainder,
         moved: Vec::new(),

@@ -18,7 +18,8 @@ use super::library::Candidate;
 use super::moments::Moments;
 use super::score::{Gain, PriorMoments, Trained};
 use crate::error::IdentifyError;
-pub use heldout::Plain;
+use heldout::Standing;
+pub use heldout::{Plain, Unclaimed};
 
 /// When the search stops.
 #[derive(Clone, Copy, Debug)]
@@ -89,12 +90,17 @@ pub struct Search<'s> {
     pub reserve: Vec<(Candidate, Layout)>,
     /// What held-out errors are of.
     plain: Plain,
+    /// Sums of squares of held-out residuals over the variance of the noise, by unit: now, and under the declared model.
+    units_now: Vec<f64>,
+    declared_units: Vec<f64>,
+    /// What is claimed: additions that lowered the held-out error by more than the standard error of the fall.
+    claimed: Standing,
+    /// What scored better than readings without structure and was not claimed, in the order in which it was added.
+    pub unclaimed: Vec<Unclaimed>,
     /// Entries of the library that would not stand out however large they plausibly were.
     unseen: Vec<bool>,
     /// Asked before each model that is trained; `None` where the search is not to be interrupted.
     pub interrupt: Option<Interrupt<'s>>,
-    /// What was taken up, and the held-out errors, when the search was last whole.
-    kept: (Vec<Track>, Vec<f64>),
     pub(super) stop: Stop,
 }
 
@@ -150,26 +156,19 @@ impl<'s> Search<'s> {
             last_resort: false,
             reserve: Vec::new(),
             plain,
+            units_now: Vec::new(),
+            declared_units: Vec::new(),
+            claimed: Standing::default(),
+            unclaimed: Vec::new(),
             unseen: Vec::new(),
             interrupt: None,
-            kept: Default::default(),
             stop,
         };
         search.unseen = search.not_standing_out()?;
         search.note_held_out()?;
-        search.keep();
+        search.declared_units = search.units_now.clone();
+        search.claimed = search.standing();
         Ok(search)
-    }
-
-    /// Remembers what has been taken up, for [`Search::roll_back`].
-    pub fn keep(&mut self) {
-        self.kept = (self.tracks.clone(), self.held_out.clone());
-    }
-
-    /// Goes back to what was last kept, where an interruption has left a round half done. From then on nothing interrupts.
-    pub fn roll_back(&mut self) {
-        (self.tracks, self.held_out) = self.kept.clone();
-        self.interrupt = None;
     }
 
     /// What the search on all readings has taken up.

@@ -1,0 +1,127 @@
+//! What a trace claims: an effect that scores better than readings without structure *and* lowers the error on held-out readings by more than the standard
+//! error of the fall. Nothing else, whatever the run column says.
+
+use abbe::identify::results::{EffectName, TraceResult};
+use abbe::identify::trace::{TraceOptions, trace};
+use abbe::model::session::Session;
+use abbe::model::session::read::{self, ReadOptions};
+use rand::SeedableRng;
+use rand::seq::SliceRandom;
+use rand_pcg::Pcg64Mcg;
+
+use crate::plant::{AxisName, Component, Driver, Freedom, Injected, Kind, Noise, Recipe, Shape};
+
+fn session_of(recipe: &Recipe) -> Session {
+    let folder = tempfile::tempdir().unwrap();
+    recipe.draw().write(folder.path()).unwrap();
+    read::session(&folder.path().join("session.toml"), &ReadOptions::default()).unwrap()
+}
+
+fn traced(session: &Session, significance: f64) -> TraceResult {
+    let options = TraceOptions {
+        significance,
+        ..TraceOptions::default()
+    };
+    trace(session, &options, &|_| true).unwrap().result
+}
+
+/// What the lines of one result say has to agree.
+fn assert_consistent(result: &TraceResult, what: &str) {
+    let found = !result.effects.is_empty();
+    let named = matches!(result.verdict.as_str(), "explained" | "partly-explained");
+    assert!(found || !named, "{what}: {}", result.verdict);
+    assert_eq!(
+        result.verdict == "clean",
+        !found && !result.remainder.structured,
+        "{what}"
+    );
+    if found {
+        assert_ne!(result.residual_before, "no structure beyond noise", "{what}");
+        let (before, after) = (result.before.heldout_rms_um, result.after.heldout_rms_um);
+        assert!(after < before, "{what}: {before} {after}");
+    } else {
+        let (before, after) = (result.before.heldout_rms_um, result.after.heldout_rms_um);
+        assert!((after / before - 1.0).abs() < 1e-9, "{what}: {before} {after}");
+    }
+    for rejected in &result.rejected_candidates {
+        assert!(
+            rejected.heldout_fall_um <= rejected.u_heldout_fall_um,
+            "{what}: {rejected:?}"
+        );
+    }
+}
+
+/// White noise of 0.20 µm and nothing else. At a level of significance at which the null distribution lets candidates through, the held-out error has to
+/// stop them.
+#[test]
+fn noise_that_passes_the_null_does_not_pass_the_held_out_readings() {
+    let mut rejected = 0;
+    for seed in [1, 2, 3] {
+        let recipe = Recipe::new(Kind::Rotary, seed).noise(Noise::White { sigma_um: 0.20 });
+        let result = traced(&session_of(&recipe), 0.6);
+        assert!(result.effects.is_empty(), "{seed}: {:?}", result.effects[0].name);
+        assert_consistent(&result, &format!("seed {seed}"));
+        rejected += result.rejected_candidates.len();
+    }
+    assert!(rejected > 0, "no candidate was let through");
+}
+
+/// How the run column of a test may be wrong.
+const MISLABELLED: [&str; 4] = ["shuffled", "all one", "alternating", "one each"];
+
+fn mislabel(session: &mut Session, how: &str) {
+    let mut random = Pcg64Mcg::seed_from_u64(3);
+    for readings in session.tests.iter_mut().filter_map(|test| test.readings.as_mut()) {
+        let numbers = 0..readings.run.len() as i64;
+        match how {
+            "shuffled" => readings.run.shuffle(&mut random),
+            "all one" => readings.run.fill(1),
+            "alternating" => readings.run = numbers.map(|row| 1 + row % 2).collect(),
+            _ => readings.run = numbers.collect(),
+        }
+    }
+}
+
+/// The verdict does not depend on the numbers of the runs, and a column that numbers no traversals is named.
+#[test]
+fn mislabelled_runs_yield_no_false_claim_and_hide_no_effect() {
+    let wobble = Injected::new(
+        Component::Motion(Freedom::Z, AxisName::C),
+        Driver::Axis(AxisName::C),
+        Shape::Harmonic {
+            order: 3,
+            phase_deg: 20.0,
+        },
+        1.0,
+    );
+    let is_wobble =
+        |name: &EffectName| name.component == "EZC" && name.shape == "harmonic" && name.order == Some(3.0);
+    for effects in [vec![], vec![wobble]] {
+        let recipe = Recipe {
+            effects,
+            ..Recipe::new(Kind::Rotary, 11)
+        };
+        let session = session_of(&recipe);
+        for how in MISLABELLED {
+            let mut session = session.clone();
+            mislabel(&mut session, how);
+            let result = traced(&session, TraceOptions::default().significance);
+            let what = format!("{how}, {} effects: {}", recipe.effects.len(), result.verdict);
+            println!("{what}");
+            assert_consistent(&result, &what);
+            assert_eq!(result.effects.len(), recipe.effects.len(), "{what}");
+            if let Some(effect) = result.effects.first() {
+                let alike = is_wobble(&effect.name) || effect.aliases.iter().any(is_wobble);
+                assert!(alike, "{what}: {:?}", effect.name);
+                assert_eq!(result.verdict, "explained", "{what}");
+            } else {
+                assert_eq!(result.verdict, "clean", "{what}");
+            }
+            let named = result
+                .warnings
+                .iter()
+                .any(|warning| warning.contains("`run` column"));
+            assert_eq!(named, how != "all one", "{what}: {:?}", result.warnings);
+        }
+    }
+}
