@@ -123,7 +123,7 @@ fn given(bodies: &[Body]) -> Vec<(usize, usize, usize)> {
     (0..3)
         .filter_map(|along| {
             let head = across(Side::Tool, along).next()?;
-            let table = across(Side::Workpiece, along).last()?;
+            let table = across(Side::Workpiece, along).next_back()?;
             Some((head, along, table))
         })
         .collect()
