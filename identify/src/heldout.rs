@@ -5,167 +5,15 @@
 //! do in these directions, the step to the fit of the others is `W(I − TᵀT)⁻¹(y − Tᵀr)`, which takes a matrix no larger than the fold has rows
 //! (Woodbury). Where the others hardly see a direction any more, their triangles are merged and solved anew.
 
-use std::collections::BTreeSet;
+mod folds;
 
-use abbe_model::instrument::InstrumentKind;
-use abbe_model::session::{Session, Test};
 use faer::Mat;
-use rand::SeedableRng;
-use rand::seq::SliceRandom;
 use rayon::prelude::*;
 
 use crate::error::IdentifyError;
 use crate::problem::Problem;
 use crate::triangle::Triangle;
-
-/// How readings are grouped for judging.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum FoldKind {
-    /// Each run of each test.
-    Runs,
-    /// Groups of consecutive runs of each test, where there are very many runs.
-    RunGroups,
-    /// Five contiguous blocks of each test.
-    Blocks,
-    /// Ten seeded folds of poses.
-    Poses,
-}
-
-impl FoldKind {
-    /// In words.
-    pub fn words(self) -> &'static str {
-        match self {
-            FoldKind::Runs => "one run at a time",
-            FoldKind::RunGroups => "one group of consecutive runs of a test at a time",
-            FoldKind::Blocks => "one of five contiguous blocks of each test at a time",
-            FoldKind::Poses => "one of ten seeded folds of poses at a time",
-        }
-    }
-}
-
-/// Which readings are left out together.
-#[derive(Clone, Debug)]
-pub struct Folds {
-    /// How they were made.
-    pub kind: FoldKind,
-    /// Number of folds.
-    pub count: usize,
-    /// The fold of each row of each test.
-    pub of_row: Vec<Vec<usize>>,
-}
-
-const BLOCKS_A_TEST: usize = 5;
-const FOLDS_OF_POSES: usize = 10;
-/// The most folds of runs: more cost time and say no more. Where the run column changes from reading to reading, each reading would be a fold.
-const MOST_FOLDS_OF_RUNS: usize = 64;
-/// Into how many folds they are grouped where there are more.
-const FOLDS_OF_MANY_RUNS: usize = 32;
-
-impl Folds {
-    /// The folds of a session.
-    pub fn of(session: &Session, tests: &[&Test], seed: u64) -> Folds {
-        let readings: Vec<_> = tests.iter().filter_map(|test| test.readings.as_ref()).collect();
-        let poses = matches!(
-            session.instrument,
-            InstrumentKind::Tracker | InstrumentKind::Socket
-        ) && readings.iter().all(|r| r.run.is_empty());
-        if poses {
-            let total: usize = readings.iter().map(|r| r.rows()).sum();
-            let folds = FOLDS_OF_POSES.min(total.max(1));
-            let mut order: Vec<usize> = (0..total).collect();
-            order.shuffle(&mut rand_pcg::Pcg64::seed_from_u64(seed));
-            let mut fold_of = vec![0; total];
-            for (place, row) in order.into_iter().enumerate() {
-                fold_of[row] = place % folds;
-            }
-            let mut start = 0;
-            let of_row = readings
-                .iter()
-                .map(|r| {
-                    let rows = fold_of[start..start + r.rows()].to_vec();
-                    start += r.rows();
-                    rows
-                })
-                .collect();
-            return Folds {
-                kind: FoldKind::Poses,
-                count: folds,
-                of_row,
-            };
-        }
-        let runs: Vec<_> = readings.iter().map(|r| r.runs()).collect();
-        let kind = if runs.iter().any(|runs| runs.len() < 2) {
-            FoldKind::Blocks
-        } else if runs.iter().map(Vec::len).sum::<usize>() <= MOST_FOLDS_OF_RUNS {
-            FoldKind::Runs
-        } else {
-            FoldKind::RunGroups
-        };
-        let groups = (FOLDS_OF_MANY_RUNS / readings.len().max(1)).max(2);
-        let mut count = 0;
-        let of_row = readings
-            .iter()
-            .zip(runs)
-            .map(|(r, runs)| {
-                let mut rows = vec![0; r.rows()];
-                let parts: Vec<std::ops::Range<usize>> = match kind {
-                    FoldKind::Runs => runs,
-                    FoldKind::RunGroups => {
-                        let groups = groups.min(runs.len());
-                        let first = |k: usize| {
-                            runs.get(k * runs.len() / groups)
-                                .map_or(r.rows(), |run| run.start)
-                        };
-                        (0..groups).map(|k| first(k)..first(k + 1)).collect()
-                    }
-                    _ => {
-                        let blocks = BLOCKS_A_TEST.min(r.rows().max(1));
-                        (0..blocks)
-                            .map(|k| k * r.rows() / blocks..(k + 1) * r.rows() / blocks)
-                            .collect()
-                    }
-                };
-                for part in parts {
-                    rows[part].fill(count);
-                    count += 1;
-                }
-                rows
-            })
-            .collect();
-        Folds { kind, count, of_row }
-    }
-}
-
-/// Runs of fewer readings than this on average are no traversals, if their numbers come back.
-const SHORT_RUN: f64 = 4.0;
-/// The fewest readings of a test whose run column is judged.
-const LEAST_READINGS: usize = 24;
-
-/// A warning for each test whose run column does not number traversals: the number changes from reading to reading.
-pub fn mislabelled_runs(tests: &[&Test]) -> Vec<String> {
-    let warning = |test: &&Test| {
-        let readings = test.readings.as_ref()?;
-        let runs = readings.runs();
-        let numbers: BTreeSet<i64> = runs
-            .iter()
-            .map(|run| readings.run.get(run.start).copied().unwrap_or(0))
-            .collect();
-        let length = readings.rows() as f64 / runs.len().max(1) as f64;
-        let come_back = numbers.len() < runs.len();
-        let one_each = length < 1.5;
-        let wrong = readings.rows() >= LEAST_READINGS && length < SHORT_RUN && (come_back || one_each);
-        wrong.then(|| {
-            format!(
-                "the `run` column of test {} changes {} times in {} readings, and a run is one traversal in one direction: directions of travel, repeats and \
-                 held-out runs cannot be taken from it; number the traversals, in the order in which they were measured",
-                test.name,
-                runs.len() - 1,
-                readings.rows()
-            )
-        })
-    };
-    tests.iter().filter_map(warning).collect()
-}
+pub use folds::{FoldKind, Folds, mislabelled_runs};
 
 /// The error on left-out readings.
 #[derive(Clone, Debug)]
@@ -351,7 +199,7 @@ fn step_without(rest: &Triangle, beta: &[f64], basis: &Mat<f64>) -> Result<Vec<f
 #[cfg(test)]
 mod tests {
     use super::*;
-    use rand::RngExt;
+    use rand::{RngExt, SeedableRng};
 
     /// Rows of `[J | r]`, drawn.
     fn drawn(rows: usize, unknowns: usize, random: &mut rand_pcg::Pcg64Mcg) -> Triangle {

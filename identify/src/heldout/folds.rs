@@ -1,0 +1,225 @@
+//! Which readings are left out together: runs, groups of runs, blocks, or folds of poses.
+
+use std::collections::BTreeSet;
+
+use abbe_model::instrument::InstrumentKind;
+use abbe_model::session::{Session, Test};
+use rand::SeedableRng;
+use rand::seq::SliceRandom;
+
+/// How readings are grouped for judging.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum FoldKind {
+    /// Each run of each test.
+    Runs,
+    /// Groups of consecutive runs of each test, where there are very many runs.
+    RunGroups,
+    /// Five contiguous blocks of each test.
+    Blocks,
+    /// Ten seeded folds of poses.
+    Poses,
+}
+
+impl FoldKind {
+    /// In words.
+    pub fn words(self) -> &'static str {
+        match self {
+            FoldKind::Runs => "one run at a time",
+            FoldKind::RunGroups => "one group of consecutive runs of a test at a time",
+            FoldKind::Blocks => "one of five contiguous blocks of each test at a time",
+            FoldKind::Poses => "one of ten seeded folds of poses at a time",
+        }
+    }
+}
+
+/// Which readings are left out together.
+#[derive(Clone, Debug)]
+pub struct Folds {
+    /// How they were made.
+    pub kind: FoldKind,
+    /// Number of folds.
+    pub count: usize,
+    /// The fold of each row of each test.
+    pub of_row: Vec<Vec<usize>>,
+}
+
+const BLOCKS_A_TEST: usize = 5;
+const FOLDS_OF_POSES: usize = 10;
+/// The most folds of runs: more cost time and say no more. Where the run column changes from reading to reading, each reading would be a fold.
+const MOST_FOLDS_OF_RUNS: usize = 64;
+/// Into how many folds they are grouped where there are more.
+const FOLDS_OF_MANY_RUNS: usize = 32;
+
+impl Folds {
+    /// The folds of a session.
+    pub fn of(session: &Session, tests: &[&Test], seed: u64) -> Folds {
+        let readings: Vec<_> = tests.iter().filter_map(|test| test.readings.as_ref()).collect();
+        let poses = matches!(
+            session.instrument,
+            InstrumentKind::Tracker | InstrumentKind::Socket
+        ) && readings.iter().all(|r| r.run.is_empty());
+        if poses {
+            let total: usize = readings.iter().map(|r| r.rows()).sum();
+            let folds = FOLDS_OF_POSES.min(total.max(1));
+            let mut order: Vec<usize> = (0..total).collect();
+            order.shuffle(&mut rand_pcg::Pcg64::seed_from_u64(seed));
+            let mut fold_of = vec![0; total];
+            for (place, row) in order.into_iter().enumerate() {
+                fold_of[row] = place % folds;
+            }
+            let mut start = 0;
+            let of_row = readings
+                .iter()
+                .map(|r| {
+                    let rows = fold_of[start..start + r.rows()].to_vec();
+                    start += r.rows();
+                    rows
+                })
+                .collect();
+            return Folds {
+                kind: FoldKind::Poses,
+                count: folds,
+                of_row,
+            };
+        }
+        let runs: Vec<_> = readings.iter().map(|r| r.runs()).collect();
+        let kind = if runs.iter().any(|runs| runs.len() < 2) {
+            FoldKind::Blocks
+        } else if runs.iter().map(Vec::len).sum::<usize>() <= MOST_FOLDS_OF_RUNS {
+            FoldKind::Runs
+        } else {
+            FoldKind::RunGroups
+        };
+        let groups = (FOLDS_OF_MANY_RUNS / readings.len().max(1)).max(2);
+        let mut count = 0;
+        let of_row = readings
+            .iter()
+            .zip(runs)
+            .map(|(r, runs)| {
+                let mut rows = vec![0; r.rows()];
+                let parts: Vec<std::ops::Range<usize>> = match kind {
+                    FoldKind::Runs => runs,
+                    FoldKind::RunGroups => {
+                        let groups = groups.min(runs.len());
+                        let first = |k: usize| {
+                            runs.get(k * runs.len() / groups)
+                                .map_or(r.rows(), |run| run.start)
+                        };
+                        (0..groups).map(|k| first(k)..first(k + 1)).collect()
+                    }
+                    _ => {
+                        let blocks = BLOCKS_A_TEST.min(r.rows().max(1));
+                        (0..blocks)
+                            .map(|k| k * r.rows() / blocks..(k + 1) * r.rows() / blocks)
+                            .collect()
+                    }
+                };
+                for part in parts {
+                    rows[part].fill(count);
+                    count += 1;
+                }
+                rows
+            })
+            .collect();
+        Folds { kind, count, of_row }
+    }
+}
+
+/// Runs of fewer readings than this on average are no traversals, if their numbers come back.
+const SHORT_RUN: f64 = 4.0;
+/// The fewest readings of a test whose run column is judged.
+const LEAST_READINGS: usize = 24;
+
+/// A warning for each test whose run column does not number traversals: the number changes from reading to reading.
+pub fn mislabelled_runs(tests: &[&Test]) -> Vec<String> {
+    let warning = |test: &&Test| {
+        let readings = test.readings.as_ref()?;
+        let runs = readings.runs();
+        let numbers: BTreeSet<i64> = runs
+            .iter()
+            .map(|run| readings.run.get(run.start).copied().unwrap_or(0))
+            .collect();
+        let length = readings.rows() as f64 / runs.len().max(1) as f64;
+        let come_back = numbers.len() < runs.len();
+        let one_each = length < 1.5;
+        let wrong = readings.rows() >= LEAST_READINGS && length < SHORT_RUN && (come_back || one_each);
+        wrong.then(|| {
+            format!(
+                "the `run` column of test {} changes {} times in {} readings, and a run is one traversal in one direction: directions of travel, repeats and \
+                 held-out runs cannot be taken from it; number the traversals, in the order in which they were measured",
+                test.name,
+                runs.len() - 1,
+                readings.rows()
+            )
+        })
+    };
+    tests.iter().filter_map(warning).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use std::path::Path;
+
+    use abbe_model::session::read::{self, ReadOptions};
+
+    use super::*;
+
+    /// The bundled session (four tests of four runs) with another run column.
+    fn numbered(number: impl Fn(usize, i64) -> i64) -> Session {
+        let file =
+            Path::new(env!("CARGO_MANIFEST_DIR")).join("../sessions/hermle-c600u/measured/session.toml");
+        let mut session = read::session(&file, &ReadOptions::default()).unwrap();
+        for readings in session.tests.iter_mut().filter_map(|test| test.readings.as_mut()) {
+            for (row, run) in readings.run.iter_mut().enumerate() {
+                *run = number(row, *run);
+            }
+        }
+        session
+    }
+
+    fn folds(session: &Session) -> Folds {
+        let tests: Vec<&Test> = session.tests.iter().collect();
+        Folds::of(session, &tests, 1)
+    }
+
+    #[test]
+    fn runs_are_folds_until_there_are_very_many() {
+        let as_measured = folds(&numbered(|_, run| run));
+        assert_eq!((as_measured.kind, as_measured.count), (FoldKind::Runs, 16));
+        assert_eq!(folds(&numbered(|_, _| 1)).kind, FoldKind::Blocks);
+        for session in [
+            numbered(|row, _| row as i64),
+            numbered(|row, _| row as i64 % 2),
+            numbered(|row, _| row as i64 / 10),
+        ] {
+            let folds = folds(&session);
+            assert_eq!(
+                (folds.kind, folds.count),
+                (FoldKind::RunGroups, FOLDS_OF_MANY_RUNS)
+            );
+            // Each fold is a stretch of one test, no run is divided, and none is empty.
+            let mut next = 0;
+            for (test, fold_of) in session.tests.iter().zip(&folds.of_row) {
+                assert!(fold_of.is_sorted());
+                assert_eq!(fold_of[0], next);
+                next = fold_of[fold_of.len() - 1] + 1;
+                for run in test.readings.as_ref().unwrap().runs() {
+                    assert_eq!(fold_of[run.start], fold_of[run.end - 1]);
+                }
+            }
+            assert_eq!(next, folds.count);
+        }
+    }
+
+    #[test]
+    fn a_run_column_that_numbers_no_traversals_is_named() {
+        let warnings = |session: &Session| mislabelled_runs(&session.tests.iter().collect::<Vec<_>>()).len();
+        assert_eq!(warnings(&numbered(|_, run| run)), 0);
+        assert_eq!(warnings(&numbered(|_, _| 1)), 0);
+        // Forward runs are 1 and backward runs 2, and short runs are numbered on and on.
+        assert_eq!(warnings(&numbered(|_, run| run % 2)), 0);
+        assert_eq!(warnings(&numbered(|row, _| row as i64 / 3)), 0);
+        assert_eq!(warnings(&numbered(|row, _| row as i64)), 4);
+        assert_eq!(warnings(&numbered(|row, _| row as i64 % 4)), 4);
+    }
+}
