@@ -54,6 +54,7 @@ pub mod outliers;
 pub mod parameters;
 pub mod patterns;
 pub mod plan;
+mod preference;
 pub mod problem;
 pub mod propagation;
 pub mod quantity;

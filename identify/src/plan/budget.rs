@@ -18,7 +18,7 @@ use faer::Mat;
 use super::linear::{Linearisation, is_wanted, marginal, prior_u};
 use super::results::{Contribution, SharedWith};
 use crate::error::IdentifyError;
-use crate::parameters::natural;
+use crate::preference::natural;
 use crate::problem::Problem;
 use crate::rank::magnitude;
 

@@ -10,7 +10,7 @@ use abbe_model::effect::Shape;
 
 use super::score::{Gain, Trained};
 use super::search::{ALL, Search};
-use crate::parameters::natural;
+use crate::preference::natural;
 
 /// Difference in `−ln P` below which two candidates cannot be told apart: 2 σ for one column.
 pub(super) const INDISTINGUISHABLE: f64 = 2.0;
