@@ -57,6 +57,7 @@ pub mod parameters;
 pub mod patterns;
 pub mod plan;
 pub mod plausibility;
+mod preference;
 pub mod problem;
 pub mod propagation;
 pub mod quantity;

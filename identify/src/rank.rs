@@ -34,7 +34,7 @@ pub struct Rank {
 
 impl Rank {
     /// From `R` (whitened, priors included) and the physical size of each parameter. `preference` holds every parameter once, those first that lead a
-    /// null-space combination rather than others: see [`crate::parameters::pivot_preference`].
+    /// null-space combination rather than others: see `pivot_preference`.
     ///
     /// # Errors
     /// If `R` has entries that are not finite.

@@ -163,8 +163,10 @@ pub fn held_by_setup(
     let order = [errors, setups].concat();
     let scaled = Mat::from_fn(r.nrows(), r.ncols(), |i, j| r[(i, j)] * linear.size[j]);
     let (rows, pivots) = combinations(alone.null_space.as_ref(), scaled.as_ref(), &order, LEAST_ERROR);
-    let (of_errors, of_setups): (Vec<usize>, Vec<usize>) =
+    let (mut of_errors, of_setups): (Vec<usize>, Vec<usize>) =
         (0..rows.len()).partition(|row| is_wanted(&list[pivots[*row]]));
+    // Listed as the errors are declared.
+    of_errors.sort_by_key(|row| pivots[*row]);
     let setups: Vec<Vec<f64>> = of_setups.iter().map(|row| rows[*row].clone()).collect();
     let mut held = Vec::new();
     for row in of_errors {

@@ -32,9 +32,11 @@ pub struct Improvement {
     pub figure: String,
     /// Number of entries looked at.
     pub menu_entries: usize,
-    /// The figure before.
+    /// The figure before; infinite (`null` in JSON) where an error is not identifiable.
+    #[schemars(with = "Option<f64>")]
     pub before: f64,
     /// The errors and their standard uncertainties before, outside units; infinite (`null` in JSON) where an error is not identifiable.
+    #[schemars(with = "Vec<(String, Option<f64>)>")]
     pub uncertainties_before: Vec<(String, f64)>,
     /// The tests, in the order in which they are taken up.
     pub steps: Vec<Step>,
@@ -50,6 +52,7 @@ pub struct Step {
     /// In words.
     pub test: String,
     /// The figure with it.
+    #[schemars(with = "Option<f64>")]
     pub after: f64,
     /// What it takes, min.
     pub minutes: f64,
@@ -58,6 +61,7 @@ pub struct Step {
     /// Blind spots that it opens.
     pub opens: Vec<String>,
     /// The errors and their standard uncertainties with it, outside units; infinite (`null` in JSON) where an error is not identifiable.
+    #[schemars(with = "Vec<(String, Option<f64>)>")]
     pub uncertainties: Vec<(String, f64)>,
     /// Centre of the workpiece ball in the table frame, mm.
     pub workpiece_ball_mm: [f64; 3],

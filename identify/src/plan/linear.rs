@@ -9,7 +9,8 @@ use faer::{Mat, MatRef};
 
 use crate::error::IdentifyError;
 use crate::fit;
-use crate::parameters::{Parameter, Role, pivot_preference};
+use crate::parameters::{Parameter, Role};
+use crate::preference::pivot_preference;
 use crate::problem::Problem;
 use crate::rank::{LEAST_SEEN, Rank};
 use crate::triangle::{Triangle, upper};
@@ -30,7 +31,7 @@ pub struct Linearisation {
     pub covariance: Mat<f64>,
     /// Physical size of each unknown.
     pub size: Vec<f64>,
-    /// The parameters in the order in which they are preferred as pivots: see [`pivot_preference`].
+    /// The parameters in the order in which they are preferred as pivots.
     pub preference: Vec<usize>,
 }
 

@@ -5,7 +5,7 @@ use abbe_model::session::{Prior, Session};
 use crate::fit::{in_directions, whole};
 use crate::heldout::rms_mm;
 use crate::noise::Noise;
-use crate::parameters::pivot_preference;
+use crate::preference::pivot_preference;
 use crate::problem::Problem;
 use crate::rank::Rank;
 

@@ -129,7 +129,8 @@ fn told(file: &Path) -> String {
     lines
 }
 
-/// The command `abbe`, as what `ABBE_RUNNER` names runs it: `ABBE_RUNNER="qemu-x86_64 -cpu Nehalem"` answers as a processor without AVX does.
+/// The command `abbe`, as what `ABBE_RUNNER` names runs it: `ABBE_RUNNER="qemu-x86_64 -cpu Nehalem"` answers as a processor without AVX does, and
+/// `-cpu Haswell,-pcid,-x2apic,-tsc-deadline,-hle,-invpcid,-rtm` as one with AVX2 and without AVX-512 (of what it lacks the emulator warns in the answer).
 fn command_of_abbe() -> Command {
     let runner = std::env::var("ABBE_RUNNER").unwrap_or_default();
     let mut words = runner.split_whitespace();

@@ -1,0 +1,91 @@
+//! Which parameters lead a null-space combination: an order by kind and name.
+
+use crate::parameters::{Parameter, Role};
+
+/// The order in which parameters are preferred as pivots of null-space combinations (see [`crate::rank`]): a pivot leads its combination, and is what one
+/// would hold at nominal to estimate the rest.
+///
+/// Location errors come first, coefficients of effects next, set-up quantities last: each combination says of one error of the machine what it is confounded
+/// with, and an error that is confounded with the set-up is stated in terms of it, not the set-up in terms of the machine. Within each kind the order is that of the
+/// identifiers, numbers in them by their values (`EA0J2` before `EA0J10`): not that of declarations, so that a session says the same however it lists them.
+pub fn pivot_preference(list: &[Parameter]) -> Vec<usize> {
+    let kind = |parameter: &Parameter| match parameter.role {
+        Role::Error => 0,
+        Role::Coefficient { .. } => 1,
+        Role::Setup => 2,
+    };
+    let mut order: Vec<usize> = (0..list.len()).collect();
+    order.sort_by_cached_key(|j| (kind(&list[*j]), natural(&list[*j].id)));
+    order
+}
+
+/// An identifier in pieces that compare as people count: text as text, digits as the number they make.
+pub fn natural(id: &str) -> Vec<(u64, String)> {
+    let mut pieces: Vec<(u64, String)> = Vec::new();
+    let mut rest = id;
+    while let Some(first) = rest.chars().next() {
+        let digits = first.is_ascii_digit();
+        let end = rest
+            .find(|c: char| c.is_ascii_digit() != digits)
+            .unwrap_or(rest.len());
+        let (piece, after) = rest.split_at(end);
+        pieces.push((
+            if digits {
+                piece.parse().unwrap_or(u64::MAX)
+            } else {
+                0
+            },
+            piece.to_string(),
+        ));
+        rest = after;
+    }
+    pieces
+}
+
+#[cfg(test)]
+mod tests {
+    use abbe_model::instrument::InsideUnit;
+    use abbe_model::session::Prior;
+
+    use super::*;
+    use crate::unit::Unit;
+
+    #[test]
+    fn pivots_are_preferred_by_kind_and_name_and_not_by_declaration() {
+        let parameter = |id: &str, role: Role| Parameter {
+            id: id.to_string(),
+            unit: Unit::of(InsideUnit::Millimetre),
+            size: 1.0,
+            prior: Prior::Free,
+            role,
+        };
+        let coefficient = Role::Coefficient {
+            effect: 0,
+            coefficient: 0,
+        };
+        let mut list = vec![
+            parameter("bar[A]", Role::Setup),
+            parameter("EX0J10", Role::Error),
+            parameter("EX0J2", Role::Error),
+            parameter("EZC~C:h2.sin", coefficient),
+            parameter("EA0J2", Role::Error),
+            parameter("EZC~C:h2.cos", coefficient),
+        ];
+        let wanted = [
+            "EA0J2",
+            "EX0J2",
+            "EX0J10",
+            "EZC~C:h2.cos",
+            "EZC~C:h2.sin",
+            "bar[A]",
+        ];
+        for _ in 0..list.len() {
+            list.rotate_left(1);
+            let names: Vec<&str> = pivot_preference(&list)
+                .iter()
+                .map(|j| list[*j].id.as_str())
+                .collect();
+            assert_eq!(names, wanted);
+        }
+    }
+}
