@@ -37,7 +37,8 @@ pub fn entries(session: &Session, options: &TraceOptions) -> Result<Vec<Entry>, 
     let laid = laid(&problem, &columns, options)?;
     let (candidates, layouts): (Vec<Candidate>, Vec<Layout>) = laid.into_iter().unzip();
     let none = Mat::zeros(columns.rows(), 0);
-    let moments = Moments::new(&columns, &layouts, start.model, &start.residual, none);
+    let moments = Moments::new(&columns, &layouts, start.model, &start.residual, none, &|| true)
+        .ok_or(IdentifyError::Interrupted)?;
     let rank = moments.base();
     let folds = (0..columns.fold_rows.len()).collect();
     let trained = Trained::new(&moments, &prior, (0..rank).collect(), folds)?;

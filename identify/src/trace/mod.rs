@@ -244,8 +244,9 @@ fn searched<'a>(
         laid.into_iter().partition(|(candidate, _)| candidate.last_resort);
     let (candidates, layouts): (Vec<Candidate>, Vec<Layout>) = laid.into_iter().unzip();
     let (model, prior) = (start.model.clone(), start.prior());
-    let moments = Moments::new(&columns, &layouts, model, &start.residual, draws);
-    interrupt.check()?;
+    let go_on = || interrupt.check().is_ok();
+    let moments = Moments::new(&columns, &layouts, model, &start.residual, draws, &go_on)
+        .ok_or(IdentifyError::Interrupted)?;
     let most = if poses { MOST_OF_POSES } else { MOST_ALONG_RUNS };
     let stop = Stop {
         significance: options.significance,

@@ -244,7 +244,8 @@ pub fn structure(
     }
     let layouts: Vec<Layout> = detectors.iter().map(|detector| detector.layout.clone()).collect();
     let rank = model.ncols();
-    let moments = Moments::new(columns, &layouts, model, residual, null);
+    let moments =
+        Moments::new(columns, &layouts, model, residual, null, &|| true).ok_or(IdentifyError::Interrupted)?;
     let folds = (0..columns.fold_rows.len()).collect();
     let trained = Trained::new(&moments, prior, (0..rank).collect(), folds)?;
     let mut best = (0, f64::NEG_INFINITY, 0.0);

@@ -129,14 +129,15 @@ pub(super) fn transposed_product(a: MatRef<'_, f64>, b: MatRef<'_, f64>) -> Mat<
 }
 
 impl Moments {
-    /// From the orthonormal model columns (rows × rank), the residual and null draws (rows × draws).
+    /// From the orthonormal model columns (rows × rank), the residual and null draws (rows × draws). `go_on` is asked now and then; `None` where it says no.
     pub fn new(
         columns: &Columns<'_, '_>,
         layouts: &[Layout],
         model: Mat<f64>,
         residual: &[f64],
         null: Mat<f64>,
-    ) -> Moments {
+        go_on: &(dyn Fn() -> bool + Sync),
+    ) -> Option<Moments> {
         let mut first = Vec::with_capacity(layouts.len());
         let mut total = 0;
         for layout in layouts {
@@ -146,7 +147,8 @@ impl Moments {
         let count: Vec<usize> = layouts.iter().map(|layout| layout.count).collect();
         let rank = model.ncols();
         let side = beside(&model, residual);
-        let (blocks, products) = laid(columns, layouts, 0..layouts.len(), &[], &side, &null);
+        let all = 0..layouts.len();
+        let (blocks, products) = laid(columns, layouts, all, &[], (&side, &null), go_on)?;
         let folds = (columns.fold_rows.iter().zip(products.side).zip(products.own))
             .map(|((range, product), own)| {
                 let part = side.as_ref().subrows(range.start, range.len());
@@ -163,7 +165,7 @@ impl Moments {
             .collect::<Vec<_>>();
         let null_base = transposed_product(model.as_ref(), null.as_ref());
         let whole = FoldMoments::sum(&folds);
-        Moments {
+        Some(Moments {
             folds,
             whole,
             null_cross: products.null,
@@ -175,7 +177,7 @@ impl Moments {
             base_columns: model,
             residual: residual.to_vec(),
             null,
-        }
+        })
     }
 
     /// Number of base columns so far.
@@ -226,14 +228,17 @@ impl Moments {
         let rank = self.base();
         let side = beside(&self.base_columns, &self.residual);
         let candidates = self.count.len()..layouts.len();
-        let (fresh, products) = laid(
+        let beside = (&side, &self.null);
+        let Some((fresh, products)) = laid(
             columns,
             layouts,
             candidates.clone(),
             &self.blocks,
-            &side,
-            &self.null,
-        );
+            beside,
+            &|| true,
+        ) else {
+            return;
+        };
         let draws = self.null.ncols();
         let total = self.null_cross.ncols();
         let mut added = 0;

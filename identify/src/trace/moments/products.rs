@@ -19,15 +19,15 @@ pub(super) struct Block {
 }
 
 /// Lays candidates out block by block and multiplies each block while it is at hand; columns are kept as long as they find room beside those that are
-/// kept already.
+/// kept already. `go_on` is asked before each block; `None` where it says no.
 pub(super) fn laid(
     columns: &Columns<'_, '_>,
     layouts: &[Layout],
     candidates: Range<usize>,
     present: &[Block],
-    side: &Mat<f64>,
-    null: &Mat<f64>,
-) -> (Vec<Block>, Products) {
+    (side, null): (&Mat<f64>, &Mat<f64>),
+    go_on: &(dyn Fn() -> bool + Sync),
+) -> Option<(Vec<Block>, Products)> {
     let count: Vec<usize> = layouts[candidates.clone()]
         .iter()
         .map(|layout| layout.count)
@@ -46,9 +46,12 @@ pub(super) fn laid(
             (candidates.start + chunk.start..candidates.start + chunk.end, room)
         })
         .collect();
-    let (blocks, products): (Vec<Block>, Vec<Products>) = blocks
+    let made: Option<Vec<(Block, Products)>> = blocks
         .into_par_iter()
         .map(|(candidates, room)| {
+            if !go_on() {
+                return None;
+            }
             let layouts = &layouts[candidates.clone()];
             let all = filled(columns, layouts);
             let products = Products {
@@ -57,11 +60,12 @@ pub(super) fn laid(
                 null: null_product(columns, layouts, null, all.as_ref()),
             };
             let kept = room.then_some(all);
-            (Block { candidates, kept }, products)
+            Some((Block { candidates, kept }, products))
         })
-        .unzip();
+        .collect();
+    let (blocks, products): (Vec<Block>, Vec<Products>) = made?.into_iter().unzip();
     let products = Products::joined(products, columns.fold_rows.len(), side.ncols(), null.ncols());
-    (blocks, products)
+    Some((blocks, products))
 }
 
 /// For each fold `sideᵀ · candidates` of everything that has been laid out; what is not kept is laid out once more.
