@@ -106,6 +106,100 @@ fn um(test: &Value, key: &str) -> f64 {
     test[key].as_f64().unwrap()
 }
 
+/// A cubic of one axis is no cyclic error of the other; a screw's pitch still is one.
+#[test]
+fn a_cubic_is_not_called_cyclic() {
+    let folder = tempfile::tempdir().unwrap();
+    for axis in 0..2 {
+        for noise in [0.0, 0.1e-3] {
+            let mut drawn = 12345_u64;
+            let drawn = std::cell::RefCell::new(&mut drawn);
+            let test = circle(folder.path(), &[1.0, -1.0], true, |at| {
+                // A plain congruential generator: noise that nothing else in the workspace makes.
+                let mut state = drawn.borrow_mut();
+                **state = state
+                    .wrapping_mul(6364136223846793005)
+                    .wrapping_add(1442695040888963407);
+                let random = ((**state >> 33) as f64 / (1_u64 << 31) as f64 - 0.5) * 3.46 * noise;
+                let q = [at.angle.cos(), at.angle.sin()];
+                let mut off = [random * q[0], random * q[1]];
+                off[axis] += 4e-3 * q[axis].powi(3);
+                off
+            });
+            for name in ["X", "Y"] {
+                assert!(fault(&test, "cyclic error", name).is_none(), "{test}");
+                assert!(fault(&test, "reversal spike", name).is_none(), "{test}");
+            }
+            is(&test, "third-order positioning", "XY", "sum", 4.0, 0.1);
+            // cos⁴θ is ⅜ + ½cos 2θ + ⅛cos 4θ: the rest stands where a linear error does, 4 µm over 100 mm by one axis.
+            let sign = if axis == 0 { 1.0 } else { -1.0 };
+            is(&test, "scale mismatch", "XY", "ratio", sign * 40.0, 0.5);
+            let told = test["not_told"].to_string();
+            assert!(
+                told.contains("third-order error of X cannot be told from one of Y"),
+                "{told}"
+            );
+        }
+    }
+    let test = circle(folder.path(), &[1.0, -1.0], true, |at| {
+        [0.0, 2e-3 * at.angle.cos().powi(3)]
+    });
+    is(&test, "third-order straightness", "XY", "difference", 2.0, 0.05);
+}
+
+/// Signs in the diagnosis are those of the effects of the same name, whichever way the axes count and whichever side they move.
+#[test]
+fn figures_have_the_signs_of_error_motions() {
+    let folder = tempfile::tempdir().unwrap();
+    for (number, (chain, x, y)) in [
+        ("w b Y X Z t", -1, 1),
+        ("w b Y X Z t", 1, -1),
+        ("w X b Y Z t", -1, 1),
+        ("w X b Y Z t", 1, -1),
+        ("w X Y b Z t", -1, -1),
+    ]
+    .into_iter()
+    .enumerate()
+    {
+        let plan = folder.path().join("plan.toml");
+        let text_of = format!(
+            "[machine]\nchain = \"{chain}\"\naxis.X = {{ direction = [{x}, 0, 0] }}\naxis.Y = {{ direction = [0, {y}, 0] }}\naxis.Z = {{}}\n\
+             [instrument]\nkind = \"ballbar\"\nnoise_um = 0.05\n[unknowns]\nerrors = [\"EC0Y\"]\n\
+             [[effect]]\ncomponent = \"EXX\"\nshape = \"backlash\"\n[[effect]]\ncomponent = \"EYX\"\ndriver = \"X\"\nshape = \"backlash\"\n\
+             [[effect]]\ncomponent = \"EXY\"\ndriver = \"Y\"\nshape = \"power\"\norder = 2\n\
+             [[test]]\nname = \"XY\"\nbar_mm = 100\nworkpiece_ball_mm = [0, 0, 0]\nspindle_ball_mm = [0, 0, 0]\nworkpiece_ball_u_um = inf\n\
+             path = {{ kind = \"circle\", plane = \"XY\", radius_mm = 100, step_deg = 1 }}\n"
+        );
+        std::fs::write(&plan, text_of).unwrap();
+        let out = folder.path().join(format!("run{number}"));
+        let run = abbe(&[
+            "simulate",
+            text(&plan),
+            "--out",
+            text(&out),
+            "--error",
+            "EC0Y=4arcsec",
+            "--effect",
+            "EXX~X:backlash=4um",
+            "--effect",
+            "EYX~X:backlash=3um",
+            "--effect",
+            "EXY~Y:power2=5um",
+        ]);
+        assert!(run.status.success(), "{}", String::from_utf8_lossy(&run.stderr));
+        let test = figures(&out.join("session.toml"))[0].clone();
+        for (name, axes, id, expected) in [
+            ("backlash", "X", "X+", 4.0),
+            ("backlash", "X", "X-", 4.0),
+            ("lateral play", "X", "play", 3.0),
+            ("straightness", "Y", "sagitta", 5.0),
+            ("squareness", "XY", "angle", 4.0 * PI / 0.648),
+        ] {
+            is(&test, name, axes, id, expected, 0.15);
+        }
+    }
+}
+
 /// A chip on the ball is no error of the machine: a single reading that stands out moves no figure.
 #[test]
 fn a_wild_reading_is_left_out() {

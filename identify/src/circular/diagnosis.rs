@@ -1,5 +1,9 @@
 //! The classical diagnosis: which faults of two linear axes make up the deviation of a circle.
 //!
+//! Figures have the signs of the error motions `E` of ISO 230-1, along R: `backlash` of X has the sign of the effect `EXX~X:backlash`, whichever way X counts.
+//! What only a difference or a sum of both axes shows (scale mismatch, servo mismatch, third-order positioning) is counted along the travel of the axes: positive
+//! where an axis travels too far, or lags.
+//!
 //! The terms of [`super::terms`] are fitted together by least squares with radius and centre, which the set-up takes up. Reversal spikes
 //! and cyclic errors have a width and a pitch that are searched for; they are taken in only where chance would not give as good a one in
 //! a thousand circles. A share is the range of a fault's own `δL` over the sum of all ranges.
@@ -13,7 +17,7 @@ use super::fault::Fault;
 use super::path::{Moves, Path};
 use super::regression::Regression;
 use super::results::{CircularTest, Diagnosis};
-use super::search::{cyclic, spikes};
+use super::search::{cyclic, is_third_order, is_told, spikes, third_order};
 use super::terms::Rows;
 use crate::results::ParameterResult;
 
@@ -60,10 +64,22 @@ impl Model {
                 "no diagnosis: the readings cannot tell the faults apart".into(),
             ));
         };
+        // Errors of third order are in the model while spikes and cyclic errors are searched for, and stay where they stand out beside those.
+        let found = third_order(&rows, &names);
+        take_up(&rows, &mut faults, &mut regression, found);
         let found = spikes(path, &rows, &names, &faults, &regression);
         take_up(&rows, &mut faults, &mut regression, found);
         let found = cyclic(&rows, &names, &faults, &regression);
         take_up(&rows, &mut faults, &mut regression, found);
+        let stays = |fault: &Fault| !is_third_order(fault) || is_told(&rows, &faults, fault, &regression);
+        let kept: Vec<bool> = faults.iter().map(stays).collect();
+        if kept.contains(&false) {
+            let mut kept = kept.into_iter();
+            faults.retain(|_| kept.next().unwrap_or(true));
+            if let Some(without) = solve(&rows, &faults) {
+                regression = without;
+            }
+        }
         Ok(Model {
             names,
             rows,
@@ -102,6 +118,12 @@ pub(super) fn add(machine: &Machine, path: &Path, noise_mm: f64, result: &mut Ci
             let sigma = scatter(&model.rows, &model.regression, noise_mm);
             report(&model.rows, &model.faults, &model.regression, sigma, result);
             limits(path, &model.regression, sigma, &model.names, result);
+            if model.faults.iter().any(is_third_order) {
+                result.not_told.push(format!(
+                    "a third-order error of {} cannot be told from one of {}: the figure is that of both together",
+                    model.names[0], model.names[1]
+                ));
+            }
         }
         Err(why) => result.not_told.extend(why),
     }
@@ -140,7 +162,7 @@ fn standard(path: &Path, rows: &Rows, names: &[String; 2], radius_mm: f64) -> Ve
             .figure("over_diameter", &[(0, 2.0)], 1e3, "um"),
         Fault::new("squareness", plane.clone(), vec![rows.squareness()]).figure(
             "angle",
-            &[(0, 1.0)],
+            &[(0, path.signs.squareness())],
             ppm,
             "um/m",
         ),
@@ -162,15 +184,16 @@ fn standard(path: &Path, rows: &Rows, names: &[String; 2], radius_mm: f64) -> Ve
     }
     for axis in 0..2 {
         let name = &names[axis];
+        let (own, across) = (path.signs.error(axis, axis), path.signs.error(axis, 1 - axis));
         faults.push(
             Fault::new("backlash", name.clone(), rows.backlash(axis).to_vec())
-                .figure(format!("{name}+"), &[(0, 1.0), (1, 1.0)], 1e3, "um")
-                .figure(format!("{name}-"), &[(0, 1.0), (1, -1.0)], 1e3, "um"),
+                .figure(format!("{name}+"), &[(0, own), (1, own)], 1e3, "um")
+                .figure(format!("{name}-"), &[(0, own), (1, -own)], 1e3, "um"),
         );
         faults.push(
             Fault::new("straightness", name.clone(), vec![rows.straightness(axis)]).figure(
                 "sagitta",
-                &[(0, 1.0)],
+                &[(0, across)],
                 1e3,
                 "um",
             ),
@@ -179,7 +202,7 @@ fn standard(path: &Path, rows: &Rows, names: &[String; 2], radius_mm: f64) -> Ve
             faults.push(
                 Fault::new("lateral play", name.clone(), vec![rows.lateral(axis)]).figure(
                     "play",
-                    &[(0, 1.0)],
+                    &[(0, across)],
                     1e3,
                     "um",
                 ),

@@ -33,6 +33,43 @@ pub(super) enum Moves {
     Rotary(usize),
 }
 
+/// How two linear axes count, as factors between what the path shows (the tool against the workpiece, as the axes count) and the error motions
+/// `E` of the axes' bodies along R.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct Signs {
+    /// +1 where the body of the axis moves along R for an increasing command, −1 where it moves against R.
+    direction: [f64; 2],
+    /// +1 on the tool's side, −1 on the workpiece's.
+    side: [f64; 2],
+}
+
+impl Signs {
+    fn of(machine: &Machine, moves: &Moves) -> Signs {
+        match moves {
+            Moves::Linear { axes, .. } => Signs {
+                direction: axes.map(|axis| machine.axes[axis].principal().map_or(1.0, |(_, sign)| sign)),
+                side: axes.map(|axis| if axis < machine.workpiece_side { -1.0 } else { 1.0 }),
+            },
+            Moves::Rotary(_) => Signs {
+                direction: [1.0; 2],
+                side: [1.0; 2],
+            },
+        }
+    }
+
+    /// Of an error of axis `of` along axis `along`: a deviation `δ` of the path along `along` is an error motion of `factor·δ`.
+    pub fn error(&self, of: usize, along: usize) -> f64 {
+        self.side[of] * self.side[along] * self.direction[along]
+    }
+
+    /// Of the angle between the two axes.
+    pub fn squareness(&self) -> f64 {
+        (0..2)
+            .map(|axis| self.side[axis] * self.direction[axis])
+            .product()
+    }
+}
+
 /// One run in one direction.
 #[derive(Clone, Debug)]
 pub(super) struct Run {
@@ -57,6 +94,8 @@ pub(super) struct Path {
     pub left_out: Vec<bool>,
     /// Of the two linear axes: where they stand and travel.
     pub samples: [Vec<DriverSample<f64>>; 2],
+    /// Of the two linear axes: whether they count along or against R, and on which side they move.
+    pub signs: Signs,
     /// Speed along the path, mm/s, where the data have time and linear axes move.
     pub feed_mm_s: Option<f64>,
 }
@@ -95,6 +134,7 @@ impl Path {
             Moves::Linear { axes, .. } => axes.map(|axis| readings.axis_samples(axis, AxisKind::Linear)),
             Moves::Rotary(_) => [Vec::new(), Vec::new()],
         };
+        let signs = Signs::of(machine, &moves);
         let feed_mm_s = feed(&samples, !readings.time_s.is_empty());
         Some(Path {
             moves,
@@ -109,6 +149,7 @@ impl Path {
             nominal_mm,
             left_out: vec![false; readings.rows()],
             samples,
+            signs,
             feed_mm_s,
         })
     }

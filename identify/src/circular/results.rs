@@ -60,11 +60,13 @@ pub struct DirectionFigures {
 /// One classical fault.
 #[derive(Clone, Debug, PartialEq, Serialize, JsonSchema)]
 pub struct Diagnosis {
-    /// `backlash`, `squareness`, `scale mismatch`, `servo mismatch`, `straightness`, `cyclic error`, `reversal spike`, `lateral play`.
+    /// `backlash`, `squareness`, `scale mismatch`, `servo mismatch`, `straightness`, `cyclic error`, `reversal spike`, `lateral play`,
+    /// `third-order positioning`, `third-order straightness`.
     pub fault: String,
     /// The axis, or the two axes.
     pub axes: String,
-    /// Its figures.
+    /// Its figures. Those of one axis have the sign of that axis' error motion along R, as the effect of the same name has: `backlash` of X that of
+    /// `EXX~X:backlash`, `lateral play` that of `EYX~X:backlash`, `straightness` that of `EYX~X:power2`, `squareness` of X and Y that of `EC0Y`.
     pub values: Vec<ParameterResult>,
     /// What it does to the path, greatest less least, µm.
     pub circularity_um: f64,

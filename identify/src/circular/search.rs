@@ -14,8 +14,56 @@ use crate::results::ParameterResult;
 
 /// Probability with which chance may yield a spike or a cyclic error.
 const CHANCE: f64 = 1e-3;
+/// Below this, 2 nm, no bar reads and the terms are no longer right: they are of first order, and 20 µm across a radius of 100 mm are 2 nm along it.
+const LEAST_MM: f64 = 2e-6;
 /// Widths of reversal spikes that are tried, degrees of the path.
 const SPIKE_WIDTHS_DEG: [f64; 6] = [0.5, 1.0, 2.0, 3.0, 5.0, 8.0];
+
+/// How the faults of third order are called.
+const THIRD_ORDER: [&str; 2] = ["third-order positioning", "third-order straightness"];
+
+/// Whether a fault is one of third order.
+pub(super) fn is_third_order(fault: &Fault) -> bool {
+    THIRD_ORDER.contains(&fault.fault)
+}
+
+/// Errors that grow with the third power of the position: with radius, centre and scale they leave `cos 4θ` and `sin 4θ`, which a cyclic error of few
+/// periods would stand in for.
+pub(super) fn third_order(rows: &Rows, names: &[String; 2]) -> Vec<Fault> {
+    let figures = ["sum", "difference"];
+    let columns = rows.third_order().into_iter().zip(THIRD_ORDER).zip(figures);
+    columns
+        .map(|((column, name), figure)| {
+            Fault::new(name, names.concat(), vec![column]).figure(figure, &[(0, 1.0)], 1e3, "um")
+        })
+        .collect()
+}
+
+/// Whether a fault of one column stands out of the noise beside all the others.
+pub(super) fn is_told(rows: &Rows, faults: &[Fault], fault: &Fault, regression: &Regression) -> bool {
+    let before = faults.iter().take_while(|other| !std::ptr::eq(*other, fault));
+    let place = rows.setup().len() + before.map(|other| other.columns.len()).sum::<usize>();
+    let u = regression.u(&[(place, 1.0)], 1.0);
+    u > 0.0
+        && is_significant(
+            (regression.beta[place] / u).powi(2),
+            unit_of_gain(rows, regression),
+            1,
+            2,
+        )
+}
+
+/// The variance in which a gain is counted: that of what is left over, enlarged for the correlation of neighbours.
+fn unit_of_gain(rows: &Rows, regression: &Regression) -> f64 {
+    let (variance, r) = variance_and_correlation(rows, regression);
+    variance.max(LEAST_MM * LEAST_MM) * (1.0 + r) / (1.0 - r)
+}
+
+/// Whether chance would seldom give so large a gain, by this many columns, in this many looks.
+fn is_significant(gain: f64, unit: f64, columns: usize, looks: usize) -> bool {
+    let chance = ChiSquared::new(columns as f64).map_or(1.0, |chi| chi.sf(gain / unit));
+    unit > 0.0 && chance * looks as f64 <= CHANCE
+}
 
 /// Reversal spikes of each axis, at the width that explains most.
 pub(super) fn spikes(
@@ -26,8 +74,7 @@ pub(super) fn spikes(
     regression: &Regression,
 ) -> Vec<Fault> {
     let mut basis = Orthonormal::of(&columns(rows, faults));
-    let (variance, r) = variance_and_correlation(rows, regression);
-    let unit = variance * (1.0 + r) / (1.0 - r);
+    let unit = unit_of_gain(rows, regression);
     let step = path.arc() / (rows.count() as f64 / path.runs.len() as f64);
     let mut found = Vec::new();
     for axis in 0..2 {
@@ -43,8 +90,7 @@ pub(super) fn spikes(
             })
             .max_by(|a, b| a.0.total_cmp(&b.0));
         let Some((gain, width)) = best else { continue };
-        let chance = ChiSquared::new(2.0).map_or(1.0, |chi| chi.sf(gain / unit)) * (2 * tried.len()) as f64;
-        if chance > CHANCE || unit <= 0.0 {
+        if !is_significant(gain, unit, 2, 2 * tried.len()) {
             continue;
         }
         let name = &names[axis];
@@ -65,8 +111,7 @@ pub(super) fn cyclic(
     regression: &Regression,
 ) -> Vec<Fault> {
     let mut basis = Orthonormal::of(&columns(rows, faults));
-    let (variance, r) = variance_and_correlation(rows, regression);
-    let unit = variance * (1.0 + r) / (1.0 - r);
+    let unit = unit_of_gain(rows, regression);
     let mut found = Vec::new();
     for axis in 0..2 {
         let q = &rows.q[axis];

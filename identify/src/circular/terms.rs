@@ -10,6 +10,8 @@
 //! backlash         δᵢ = −½Bᵢ·dᵢ               −½Bᵢ·dᵢ·uᵢ              Bᵢ = mean + slope·uᵢ: one at either end
 //! lateral play     δⱼ = −½Pᵢ·dᵢ               −½Pᵢ·dᵢ·uⱼ
 //! straightness     δⱼ = κᵢ·qᵢ²                κᵢR²·uᵢ²·uⱼ             κᵢR²: sagitta over the diameter
+//! third order      δᵢ = cᵢ·(qᵢ/R)³            ⅛(c₁ + c₂)·cos 4θ           beside radius and scale, which take up the rest
+//!                  δⱼ = kᵢ·(qᵢ/R)³            ⅛(k₁ − k₂)·sin 4θ           beside squareness
 //! reversal spike   δL = H·exp(−φ/w)           φ: angle of the path since axis i turned round
 //! cyclic error     δᵢ = A·cos(2πqᵢ/p + …)     uᵢ·…
 //! ```
@@ -151,6 +153,25 @@ impl Rows {
     /// u²·(the other u), of the sagitta of an axis.
     pub fn straightness(&self, axis: usize) -> Vec<f64> {
         self.column(|i| self.u[axis][i].powi(2) * self.u[1 - axis][i])
+    }
+
+    /// ⅛cos 4θ and ⅛sin 4θ, of errors that grow with the third power of the position.
+    pub fn third_order(&self) -> [Vec<f64>; 2] {
+        // cos 2θ = u₁² − u₂², sin 2θ = 2u₁u₂.
+        let double = |i: usize| {
+            let (u, v) = (self.u[0][i], self.u[1][i]);
+            (u * u - v * v, 2.0 * u * v)
+        };
+        [
+            self.column(|i| {
+                let (cos, sin) = double(i);
+                0.125 * (cos * cos - sin * sin)
+            }),
+            self.column(|i| {
+                let (cos, sin) = double(i);
+                0.25 * cos * sin
+            }),
+        ]
     }
 
     /// exp(−φ/w) after each reversal at the positive and at the negative end.
