@@ -1,6 +1,5 @@
 //! What the drivers of effects do in a test, and the basis functions of shapes over them.
 
-use abbe_model::axis::AxisKind;
 use abbe_model::chain::Machine;
 use abbe_model::effect::{Component, Driver, DriverSample, Effect, Shape};
 use abbe_model::instrument::InsideUnit;
@@ -162,21 +161,20 @@ pub fn component_unit(session: &Session, component: &Component) -> Option<Inside
     }
 }
 
-/// The unit in which the coefficients of an effect are reported.
-pub fn coefficient_unit(session: &Session, effect: &Effect) -> Unit {
+/// The unit in which coefficient `k` of an effect is reported.
+pub fn coefficient_unit(session: &Session, effect: &Effect, k: usize) -> Unit {
     let Some(inside) = component_unit(session, &effect.component) else {
         return Unit {
             name: "ms".to_string(),
             per_inside: 1e3,
         };
     };
-    let same_kind = match &effect.driver {
-        Driver::Axis(name) => session.machine.axis_index(name).is_some_and(|axis| {
-            (session.machine.axes[axis].kind == AxisKind::Rotary) == (inside == InsideUnit::Radian)
-        }),
-        _ => false,
+    let machine = &session.machine;
+    let driver_axis = match &effect.driver {
+        Driver::Axis(name) => machine.axis_index(name).map(|axis| machine.axes[axis].kind),
+        _ => None,
     };
-    Unit::of_coefficient(inside, &effect.driver, &effect.shape, same_kind)
+    Unit::of_coefficient(inside, &effect.driver, driver_axis, &effect.shape, k)
 }
 
 /// The axis that a component belongs to.

@@ -284,12 +284,11 @@ impl Parameters {
                 }
             }
         }
-        let unit = drivers::coefficient_unit(session, effect);
         for (k, name) in effect.shape.coefficient_names().into_iter().enumerate() {
             let dot = if name.is_empty() { "" } else { "." };
             self.push(Parameter {
                 id: format!("{id}{dot}{name}"),
-                unit: unit.clone(),
+                unit: drivers::coefficient_unit(session, effect, k),
                 size: if greatest[k] > 0.0 {
                     size / greatest[k]
                 } else {

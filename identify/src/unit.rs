@@ -1,5 +1,6 @@
 //! Units outside the program: µm, arcsec, and what effects' coefficients come in.
 
+use abbe_model::axis::AxisKind;
 use abbe_model::effect::{Driver, Shape};
 use abbe_model::instrument::InsideUnit;
 
@@ -29,24 +30,98 @@ impl Unit {
         }
     }
 
-    /// The unit of an effect's coefficient. `same_kind`: component and driver are both lengths or both angles.
-    pub fn of_coefficient(component: InsideUnit, driver: &Driver, shape: &Shape, same_kind: bool) -> Unit {
+    /// The unit of coefficient `k` of an effect. `driver_axis`: the kind of the axis that the effect follows, where it follows one.
+    ///
+    /// | shape | unit of a coefficient, for a component in µm |
+    /// |---|---|
+    /// | lag | ms over an axis of the component's own kind; µm/(mm/s) or µm/(rad/s) over one of the other |
+    /// | drift | µm/h |
+    /// | polynomial, power over temperature or gravity at their scale of 1 K, 1 m | µm/K, µm/K², …; µm/m, µm/m², … |
+    /// | every other | µm: the value where the basis function is 1, as at the scale of a polynomial |
+    pub fn of_coefficient(
+        component: InsideUnit,
+        driver: &Driver,
+        driver_axis: Option<AxisKind>,
+        shape: &Shape,
+        k: usize,
+    ) -> Unit {
         let plain = Unit::of(component);
         let per = |what: &str| Unit {
             name: format!("{}/{what}", plain.name),
             per_inside: plain.per_inside,
         };
-        match (shape, driver) {
-            (Shape::Lag, _) if same_kind => Unit {
-                name: "ms".to_string(),
-                per_inside: 1e3,
+        let per_power = |what: &str, degree: usize| match degree {
+            1 => per(what),
+            _ => per(&format!("{what}^{degree}")),
+        };
+        let degree = match shape {
+            Shape::Polynomial { scale, .. } if *scale == 1.0 => Some(k + 1),
+            Shape::Power { degree, scale } if *scale == 1.0 => Some(*degree),
+            _ => None,
+        };
+        match (shape, driver, degree) {
+            (Shape::Lag, ..) => match (component, driver_axis) {
+                (InsideUnit::Millimetre, Some(AxisKind::Linear))
+                | (InsideUnit::Radian, Some(AxisKind::Rotary)) => Unit {
+                    name: "ms".to_string(),
+                    per_inside: 1e3,
+                },
+                (_, Some(AxisKind::Linear)) => per("(mm/s)"),
+                _ => per("(rad/s)"),
             },
-            (Shape::Lag, Driver::Axis(_)) if component == InsideUnit::Radian => per("(mm/s)"),
-            (Shape::Lag, _) => per("(rad/s)"),
-            (Shape::Drift, _) => per("h"),
-            (Shape::Polynomial { .. } | Shape::Power { .. }, Driver::Gravity) => per("m"),
-            (Shape::Polynomial { .. } | Shape::Power { .. }, Driver::Temperature) => per("K"),
+            (Shape::Drift, ..) => per("h"),
+            (_, Driver::Gravity, Some(degree)) => per_power("m", degree),
+            (_, Driver::Temperature, Some(degree)) => per_power("K", degree),
             _ => plain,
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_shape_over_every_driver_has_the_unit_of_its_basis() {
+        use InsideUnit::{Millimetre, Radian, Ratio};
+        let axis = |name: &str| Driver::Axis(name.to_string());
+        let name = |component, driver: &Driver, kind, shape: &Shape, k| {
+            Unit::of_coefficient(component, driver, kind, shape, k).name
+        };
+        let cubic = |scale: f64| Shape::Polynomial { degree: 3, scale };
+        let square = |scale: f64| Shape::Power { degree: 2, scale };
+        for (k, unit) in ["um/K", "um/K^2", "um/K^3"].into_iter().enumerate() {
+            assert_eq!(name(Millimetre, &Driver::Temperature, None, &cubic(1.0), k), unit);
+        }
+        assert_eq!(
+            name(Radian, &Driver::Gravity, None, &square(1.0), 0),
+            "arcsec/m^2"
+        );
+        assert_eq!(name(Radian, &Driver::Gravity, None, &cubic(1.0), 0), "arcsec/m");
+        // At another scale the coefficient is the component's value there.
+        assert_eq!(
+            name(Millimetre, &Driver::Temperature, None, &square(5.0), 0),
+            "um"
+        );
+        let linear = Some(AxisKind::Linear);
+        let rotary = Some(AxisKind::Rotary);
+        assert_eq!(name(Millimetre, &axis("X"), linear, &cubic(100.0), 2), "um");
+        // A polynomial over an axis at a scale of 1 mm is still a value there, not a slope.
+        assert_eq!(name(Millimetre, &axis("X"), linear, &cubic(1.0), 1), "um");
+        assert_eq!(name(Millimetre, &Driver::Time, None, &cubic(3600.0), 1), "um");
+        assert_eq!(name(Millimetre, &Driver::Time, None, &Shape::Drift, 0), "um/h");
+        assert_eq!(name(Ratio, &Driver::Time, None, &Shape::Drift, 0), "um/m/h");
+        assert_eq!(name(Millimetre, &axis("X"), linear, &Shape::Lag, 0), "ms");
+        assert_eq!(name(Radian, &axis("C"), rotary, &Shape::Lag, 0), "ms");
+        assert_eq!(name(Radian, &axis("X"), linear, &Shape::Lag, 0), "arcsec/(mm/s)");
+        assert_eq!(name(Millimetre, &axis("C"), rotary, &Shape::Lag, 0), "um/(rad/s)");
+        assert_eq!(name(Ratio, &axis("X"), linear, &Shape::Lag, 0), "um/m/(mm/s)");
+        for shape in [
+            Shape::Backlash,
+            Shape::Harmonic { order: 2.0 },
+            Shape::Warmup { tau_s: 60.0 },
+        ] {
+            assert_eq!(name(Radian, &axis("C"), rotary, &shape, 0), "arcsec");
         }
     }
 }

@@ -27,7 +27,10 @@ pub fn um(value: f64) -> String {
 
 /// A unit as people write it.
 pub fn unit(name: &str) -> String {
-    name.replace("um", "µm").replace("deg", "°")
+    name.replace("um", "µm")
+        .replace("deg", "°")
+        .replace("^2", "²")
+        .replace("^3", "³")
 }
 
 /// Cells as they are printed, with a minus that is one before numbers.

@@ -148,7 +148,7 @@ fn judge(
 ) -> EffectDetectability {
     let session = problem.session;
     let effect = &candidate.effect;
-    let unit = drivers::coefficient_unit(session, effect);
+    let unit = drivers::coefficient_unit(session, effect, 0);
     let size = match drivers::component_unit(session, &effect.component) {
         Some(inside) => physical_size(inside),
         None => 0.1,

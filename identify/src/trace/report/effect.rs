@@ -143,7 +143,7 @@ fn curve_units(problem: &Problem<'_>, effect: &Effect) -> (String, String) {
     }
     (
         driver_unit(problem, effect).0.to_string(),
-        crate::drivers::coefficient_unit(problem.session, effect).name,
+        crate::drivers::coefficient_unit(problem.session, effect, 0).name,
     )
 }
 
@@ -153,6 +153,8 @@ fn driver_unit(problem: &Problem<'_>, effect: &Effect) -> (&'static str, f64) {
     let kind = match &effect.driver {
         Driver::Axis(name) => machine.axis_index(name).map(|axis| machine.axes[axis].kind),
         Driver::Time => return ("s", 1.0),
+        Driver::Temperature => return ("K", 1.0),
+        Driver::Gravity => return ("m", 1.0),
         _ => None,
     };
     if kind == Some(AxisKind::Rotary) {
