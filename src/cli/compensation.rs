@@ -149,9 +149,17 @@ fn write(
     Ok(())
 }
 
-/// Positions over the covered range, equidistant, inside units.
-fn positions(curve: &ErrorCurve, points: usize) -> impl Iterator<Item = f64> {
-    let (from, to) = (curve.range.start, curve.range.end);
+/// Positions that all of these curves cover, equidistant, inside units.
+fn positions<'c>(
+    curves: impl IntoIterator<Item = &'c ErrorCurve>,
+    points: usize,
+) -> impl Iterator<Item = f64> {
+    let ranges = curves.into_iter().map(|curve| &curve.range);
+    let (from, to) = ranges.fold((f64::NEG_INFINITY, f64::INFINITY), |(from, to), range| {
+        (from.max(range.start), to.min(range.end))
+    });
+    // Curves that have no position in common have no table.
+    let points = if from < to { points } else { 0 };
     (0..points).map(move |k| from + (to - from) * k as f64 / (points - 1) as f64)
 }
 
@@ -195,7 +203,7 @@ fn linuxcnc(
         };
         let kind = machine.axes[axis].kind;
         let mut text = String::new();
-        for q in positions(curve, points) {
+        for q in positions([curve], points) {
             let actual = |direction: f64| outside(kind, q + factor * curve.at(q, direction));
             let u = curve.u_at(q, 1.0).max(curve.u_at(q, -1.0));
             let _ = writeln!(
@@ -230,9 +238,9 @@ fn heidenhain(
                 )),
             }
         }
-        let Some((first, _, _)) = columns.first() else {
+        if columns.is_empty() {
             continue;
-        };
+        }
         let kind = machine.axes[axis].kind;
         let own = columns.iter().find(|(_, column, _)| *column == axis);
         let backlash = own.filter(|(curve, ..)| curve.is_directional());
@@ -249,7 +257,7 @@ fn heidenhain(
             let _ = write!(text, " {:>12}", machine.axes[*column].name);
         }
         text.push('\n');
-        for q in positions(first, points) {
+        for q in positions(columns.iter().map(|(curve, ..)| *curve), points) {
             let _ = write!(text, "{:>12.5}", outside(kind, q));
             if let Some((curve, _, factor)) = backlash {
                 let _ = write!(text, " {:>12.6}", outside(kind, factor * curve.at(q, -1.0)));
@@ -309,7 +317,9 @@ fn beckhoff(
             .iter()
             .filter(|curve| curve.axis == index)
             .collect();
-        let Some(first) = curves.first() else { continue };
+        if curves.is_empty() {
+            continue;
+        }
         if !letter(&axis.name) {
             left_out.push(format!(
                 "error motions of {}: the format knows axes X, Y, Z, A, B, C",
@@ -325,7 +335,7 @@ fn beckhoff(
                 .chain(curves.iter().map(|curve| curve.error.to_string()))
                 .collect::<Vec<_>>(),
         ];
-        for q in positions(first, points) {
+        for q in positions(curves.iter().copied(), points) {
             let position = format!("{:.5}", outside(axis.kind, q));
             rows.push(
                 std::iter::once(position)

@@ -127,9 +127,15 @@ fn tables_read_back_are_the_curves_with_the_opposite_sign() {
     ];
     for (axis, error) in expected {
         let table = std::fs::read_to_string(out.join(format!("{axis}.comp"))).unwrap();
-        let rows: Vec<Vec<f64>> = table.lines().map(numbers).collect();
+        // Behind the three numbers that the control reads stands the uncertainty.
+        let rows: Vec<Vec<f64>> = table
+            .lines()
+            .map(|line| numbers(&line.replace("# u", "")))
+            .collect();
         assert_eq!(rows.len(), 41);
-        assert!(rows.iter().all(|row| row.len() == 3) && rows.windows(2).all(|pair| pair[0][0] < pair[1][0]));
+        // A polynomial is known where it is zero.
+        assert!(rows.iter().all(|row| (0.0..1e-3).contains(&row[3])) && rows[0][3] > 0.0);
+        assert!(rows.iter().all(|row| row.len() == 4) && rows.windows(2).all(|pair| pair[0][0] < pair[1][0]));
         for row in rows {
             for (column, direction) in [(1, 1.0), (2, -1.0)] {
                 let correction = row[0] - row[column];
@@ -176,6 +182,10 @@ fn tables_read_back_are_the_curves_with_the_opposite_sign() {
         "{said}"
     );
     let file = std::fs::read_to_string(out.join("volcomp.csv")).unwrap();
+    assert!(
+        file.contains("// standard uncertainty (k = 1), mm and rad: position, EXX, EYX"),
+        "{file}"
+    );
     let blocks: Vec<Vec<&str>> = file
         .split("#\n")
         .map(|block| block.lines().filter(|line| !line.starts_with("//")).collect())
@@ -270,4 +280,113 @@ fn what_has_no_curve_makes_no_table() {
     let run = abbe(&few);
     assert_eq!(run.status.code(), Some(1));
     assert!(String::from_utf8_lossy(&run.stderr).contains("--points 1: from 2 to 256"));
+}
+
+/// A session in which X moves over ±100 mm in one test and merely stands at −300 mm in another; EXX is a polynomial over X.
+fn standing_apart(folder: &Path, seed: u64) -> std::path::PathBuf {
+    let plan = folder.join("plan.toml");
+    let text_of = "[machine]\nchain = \"w C b X Y Z t\"\naxis.C = { origin_mm = [-300, 0, 0] }\naxis.X = {}\naxis.Y = {}\naxis.Z = {}\n\
+        [instrument]\nkind = \"ballbar\"\nnoise_um = 0.3\n[unknowns]\nerrors = [\"EC0Y\"]\n\
+        [[effect]]\ncomponent = \"EXX\"\nshape = \"polynomial\"\norder = 2\n\
+        [[test]]\nname = \"XY\"\nbar_mm = 100\nworkpiece_ball_mm = [0, 0, 0]\nspindle_ball_mm = [0, 0, 0]\n\
+        path = { kind = \"circle\", plane = \"XY\", radius_mm = 100, step_deg = 2 }\n\
+        [[test]]\nname = \"C\"\nbar_mm = 100\nworkpiece_ball_mm = [-200, 0, 0]\nspindle_ball_mm = [0, 0, 0]\nat = { x_mm = -300, y_mm = 0, z_mm = 0 }\n\
+        sweep = { axis = \"C\", from_deg = 0, to_deg = 300, step_deg = 5 }\n";
+    std::fs::write(&plan, text_of).unwrap();
+    let out = folder.join(format!("run{seed}"));
+    let seed = seed.to_string();
+    let run = abbe(&[
+        "simulate",
+        text(&plan),
+        "--out",
+        text(&out),
+        "--seed",
+        &seed,
+        "--effect",
+        "EXX~X:p2.1=6um",
+        "--effect",
+        "EXX~X:p2.2=8um",
+    ]);
+    assert!(run.status.success(), "{}", String::from_utf8_lossy(&run.stderr));
+    out.join("session.toml")
+}
+
+/// The rows of a table of uncertainties: error, position, direction, value, u.
+fn points(out: &Path) -> Vec<(String, f64, String, f64, f64)> {
+    let mut reader = csv::Reader::from_path(out.join("uncertainty.csv")).unwrap();
+    let rows = reader.records().map(Result::unwrap);
+    rows.map(|row| {
+        let number = |k: usize| row[k].parse::<f64>().unwrap();
+        assert_eq!((&row[2], &row[6]), ("mm", "um"));
+        (
+            row[0].to_string(),
+            number(1),
+            row[3].to_string(),
+            number(4),
+            number(5),
+        )
+    })
+    .collect()
+}
+
+#[test]
+fn a_table_ends_where_its_axis_stopped_and_says_how_sure_it_is() {
+    let folder = tempfile::tempdir().unwrap();
+    let mut pulls = Vec::new();
+    for seed in 0..6 {
+        let session = standing_apart(folder.path(), seed);
+        let out = folder.path().join(format!("tables{seed}"));
+        tables(&session, &out, "linuxcnc");
+        let table = std::fs::read_to_string(out.join("X.comp")).unwrap();
+        let at: Vec<f64> = table
+            .lines()
+            .map(|line| numbers(&line.replace("# u", ""))[0])
+            .collect();
+        // The circle leads X from −100 to 100 mm; at −300 mm it stands.
+        assert!(
+            (at[0] + 100.0).abs() < 1.5 && (at[40] - 100.0).abs() < 1.5,
+            "{at:?}"
+        );
+        let found = points(&out);
+        assert_eq!(found.len(), 41);
+        for (error, position, direction, value, u) in found {
+            assert_eq!((error.as_str(), direction.as_str()), ("EXX", "both"));
+            let q = position / 100.0;
+            assert!(u > 0.0 || q == 0.0, "{position}");
+            // One point at each end of each session is a pull of its own.
+            if (q.abs() - 1.0).abs() < 0.02 {
+                pulls.push((value - (6.0 * q + 8.0 * q * q)) / u);
+            }
+        }
+    }
+    let rms = (pulls.iter().map(|pull| pull * pull).sum::<f64>() / pulls.len() as f64).sqrt();
+    assert_eq!(pulls.len(), 12);
+    assert!((0.4..1.7).contains(&rms), "{pulls:?}");
+}
+
+#[test]
+fn an_axis_that_merely_stands_has_no_table() {
+    let folder = tempfile::tempdir().unwrap();
+    let session = standing_apart(folder.path(), 7);
+    let text_of = std::fs::read_to_string(&session).unwrap();
+    let tests: Vec<usize> = text_of.match_indices("[[test]]").map(|(at, _)| at).collect();
+    let only_c = format!("{}{}", &text_of[..tests[0]], &text_of[tests[1]..]);
+    std::fs::write(&session, only_c.replace("order = 2", "order = 1")).unwrap();
+    let out = folder.path().join("none");
+    let run = abbe(&[
+        "fit",
+        text(&session),
+        "--compensation",
+        text(&out),
+        "--control",
+        "linuxcnc",
+    ]);
+    let said = String::from_utf8_lossy(&run.stderr).into_owned();
+    assert_eq!(run.status.code(), Some(1), "{said}");
+    assert!(
+        said.contains("nothing to compensate")
+            && said.contains("EXX~X:p1: its axis stands wherever readings see it"),
+        "{said}"
+    );
+    assert!(!out.exists());
 }

@@ -42,7 +42,7 @@ pub(super) fn table(
             &[("both", 1.0)]
         };
         for (word, direction) in directions {
-            for q in positions(curve, points) {
+            for q in positions([curve], points) {
                 rows.push(vec![
                     curve.error.to_string(),
                     format!("{:.6}", outside(kind, q)),
@@ -67,8 +67,7 @@ pub(super) fn comments(kind: AxisKind, curves: &[&ErrorCurve], points: usize) ->
         "// standard uncertainty (k = 1), mm and rad: position, {}",
         names.join(", ")
     )];
-    let first = curves.first().into_iter();
-    lines.extend(first.flat_map(|first| positions(first, points)).map(|q| {
+    lines.extend(positions(curves.iter().copied(), points).map(|q| {
         let values: Vec<String> = curves
             .iter()
             .map(|curve| format!("{:.9}", curve.u_of_mean_at(q)))
