@@ -316,6 +316,7 @@ pub fn report(problem: &Problem<'_>, fit: &Fit) -> FitResult {
         rejected: rejected(problem, fit),
         circular: crate::circular::of_session(problem.session, problem.noise.sigma_mm, &problem.rejected),
         warnings,
+        about: problem.session.about.iter().cloned().collect(),
         monte_carlo: None,
     }
 }

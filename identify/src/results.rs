@@ -80,6 +80,9 @@ pub struct FitResult {
     pub circular: Vec<CircularTest>,
     /// What a user should know.
     pub warnings: Vec<String>,
+    /// Notes of the session file's `[about]`: `serial_number`, `operator`, `date`, `comment` and others.
+    #[serde(skip_serializing_if = "BTreeMap::is_empty")]
+    pub about: BTreeMap<String, String>,
     /// The same by Monte Carlo, where it was asked for. `u` in `parameters` is then what is quoted.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub monte_carlo: Option<FitMonteCarlo>,
@@ -311,4 +314,7 @@ pub struct TraceResult {
     pub rejected: Vec<Rejected>,
     /// What a user should know.
     pub warnings: Vec<String>,
+    /// Notes of the session file's `[about]`: `serial_number`, `operator`, `date`, `comment` and others.
+    #[serde(skip_serializing_if = "BTreeMap::is_empty")]
+    pub about: BTreeMap<String, String>,
 }

@@ -5,7 +5,7 @@ macro_rules! say {
     ($($text:tt)*) => { $crate::cli::output::line(format_args!($($text)*)) };
 }
 
-mod circular;
+pub mod circular;
 mod compensation;
 mod csv;
 mod equation;

@@ -2,15 +2,16 @@
 
 use abbe::identify::IdentifyError;
 use abbe::identify::fit::Fit;
+use abbe::identify::plan::menu;
 use abbe::identify::problem::Problem;
 use abbe::identify::results::{FitResult, ModelResult};
 use abbe::identify::views::{spectrum, views};
 use maud::{Markup, html};
 
-use super::curves;
 use super::document::{Document, prose};
 use super::drawn::Drawn;
 use super::readings::{self, um};
+use super::{circular, curves};
 
 /// How a fit was made.
 pub fn method(result: &FitResult) -> Markup {
@@ -87,6 +88,9 @@ pub fn document(problem: &Problem<'_>, fit: &Fit, result: &FitResult) -> Result<
     document.section("Parameters", section);
     let section = readings::residuals(&mut document, &drawn, &spectra);
     document.section("Residuals", section);
+    if !result.circular.is_empty() {
+        document.section("Ball-bar figures", circular::section(&result.circular));
+    }
     let correlations = readings::correlations(&mut document, problem, fit);
     document.section(
         "What else it could be",
@@ -102,11 +106,16 @@ pub fn document(problem: &Problem<'_>, fit: &Fit, result: &FitResult) -> Result<
         html! {
             p {
                 @if result.birge_ratio > 1.0 { (prose("First `abbe trace` on the same session. ")) }
-                @if result.unobservable.is_empty() {
-                    (prose("Every unknown is seen; `abbe plan SESSION --improve 1` names the test that lowers the uncertainties most."))
+                @if !menu::is_offered(problem) {
+                    @if !result.unobservable.is_empty() {
+                        "A test that makes the rest identifiable has to move what these tests leave standing: "
+                        (result.unobservable.len()) (if result.unobservable.len() == 1 { " combination" } else { " combinations" }) " of parameters."
+                    }
+                } @else if result.unobservable.is_empty() {
+                    (prose("Every parameter is identifiable; `abbe plan SESSION --improve 1` names the test that lowers the uncertainties most."))
                 } @else {
-                    (prose("`abbe plan SESSION --improve 1` names the cheapest test that sees what these readings do not: "))
-                    (result.unobservable.len()) " combinations."
+                    (prose("`abbe plan SESSION --improve 1` names the cheapest test that makes identifiable what these readings do not: "))
+                    (result.unobservable.len()) (if result.unobservable.len() == 1 { " combination." } else { " combinations." })
                 }
             }
             (readings::warnings(&result.rejected, &result.warnings))

@@ -8,6 +8,7 @@
 //!
 //! Everything goes through templates that escape; only drawings of this module and the page's own style and script are taken as they are.
 
+pub mod circular;
 pub mod curves;
 pub mod document;
 pub mod drawn;

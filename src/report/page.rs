@@ -35,6 +35,11 @@ pub fn html(document: &Document, method: &Markup, provenance: &Provenance) -> St
                         @if !document.word.is_empty() { strong class=(format!("word {}", super::plot::file_name(&document.word))) { (document.word) } " " }
                         (prose(&document.verdict))
                     }
+                    @if !provenance.about.is_empty() {
+                        dl class="about" {
+                            @for (name, note) in &provenance.about { dt { (words(name)) } dd { (note) } }
+                        }
+                    }
                     nav {
                         @for (anchor, heading, _) in &document.sections { a href=(format!("#{anchor}")) { (heading) } " " }
                         a href="#method" { "Method and provenance" }
@@ -83,6 +88,11 @@ fn style() -> String {
     format!(
         ":root{{color-scheme:light dark;{light}}}\n@media screen and (prefers-color-scheme:dark){{:root{{{dark}}}}}\n{PAGE_STYLE}{STYLE}"
     )
+}
+
+/// The name of a note in words: `serial_number` is the serial number.
+fn words(name: &str) -> String {
+    name.replace('_', " ")
 }
 
 fn of(provenance: &Provenance) -> Markup {

@@ -1,6 +1,7 @@
 //! The report of `abbe plan`.
 
 use abbe::identify::IdentifyError;
+use abbe::identify::plan::menu;
 use abbe::identify::plan::results::{ErrorAnalysis, PlanAnalysis};
 use abbe::identify::problem::Problem;
 use maud::{Markup, html};
@@ -58,7 +59,7 @@ pub fn document(problem: &Problem<'_>, analysis: &PlanAnalysis) -> Result<Docume
     document.section("What each error does to each test", section);
     let section = what_else(&mut document, analysis);
     document.section("What else it could be", section);
-    document.section("What to measure next", next(analysis));
+    document.section("What to measure next", next(analysis, menu::is_offered(problem)));
     let section = readings::machine(&mut document, problem);
     document.section("Machine", section);
     Ok(document)
@@ -167,15 +168,17 @@ fn what_else(document: &mut Document, analysis: &PlanAnalysis) -> Markup {
     }
 }
 
-fn next(analysis: &PlanAnalysis) -> Markup {
+fn next(analysis: &PlanAnalysis, offered: bool) -> Markup {
     html! {
         @if !analysis.without.is_empty() {
             h3 { "What each test contributes" }
             (list(analysis.without.iter().map(|without| without.why.clone())))
         }
-        p {
+        @if offered {
+            p {
             (prose("`abbe plan SESSION --improve 1` names the test that lowers the uncertainties most for its time, `--separate A,B` the one that tells two \
                     effects apart."))
+            }
         }
         @if !analysis.warnings.is_empty() { h3 { "Warnings" } (list(analysis.warnings.iter().cloned())) }
     }

@@ -23,6 +23,8 @@ pub struct Provenance {
     pub seed: u64,
     /// The inputs.
     pub inputs: Vec<Input>,
+    /// Notes of the session file's `[about]`, by name.
+    pub about: Vec<(String, String)>,
 }
 
 impl Provenance {
@@ -51,6 +53,7 @@ impl Provenance {
                 .join(" "),
             seed,
             inputs,
+            about: session.about.clone(),
         })
     }
 }

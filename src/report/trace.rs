@@ -1,6 +1,7 @@
 //! The report of `abbe trace`.
 
 use abbe::identify::IdentifyError;
+use abbe::identify::plan::menu;
 use abbe::identify::results::{EffectResult, TraceResult};
 use abbe::identify::trace::Trace;
 use abbe::identify::trace::alias::Rival;
@@ -115,7 +116,7 @@ pub fn document(trace: &Trace<'_>) -> Result<Document, IdentifyError> {
     document.section("Residuals", section);
     let section = what_else(&mut document, trace);
     document.section("What else it could be", section);
-    document.section("What to measure next", next(result));
+    document.section("What to measure next", next(result, menu::is_offered(problem)));
     let section = curves::patterns(&mut document, problem, &trace.after_fit.beta)?;
     document.section("What each error does to each test", section);
     let section = readings::machine(&mut document, problem);
@@ -341,7 +342,7 @@ fn ranking(rivals: &[Rival], id: &str) -> Plot {
     )
 }
 
-fn next(result: &TraceResult) -> Markup {
+fn next(result: &TraceResult, offered: bool) -> Markup {
     let tests = result.effects.iter().filter_map(|effect| {
         let test = effect.separated_by.as_ref()?;
         Some(match &effect.separation {
@@ -361,7 +362,7 @@ fn next(result: &TraceResult) -> Markup {
         @if tests.is_empty() {
             p {
                 "No further test on the menu is needed to tell what was found from what looks like it. "
-                @if !result.unobservable.is_empty() {
+                @if offered && !result.unobservable.is_empty() {
                     (prose("`abbe plan SESSION --improve 1` names the cheapest test that sees what these readings do not."))
                 }
             }

@@ -289,3 +289,151 @@ fn ball_bar_xml_reads_as_its_rows() {
         "{message}"
     );
 }
+
+/// The direction of a run as files say it: whatever is stated for other words, CCW and CW speak for themselves; numbers and truth values are the stated one
+/// or the other. A session that runs forward only is told of runs backward.
+#[test]
+fn the_direction_of_a_run_is_read_as_it_is_meant() {
+    let folder = tempfile::tempdir().unwrap();
+    let folder = folder.path();
+    let tests = circles(folder);
+    let expected = fit(&folder.join("session.toml"));
+    let (test, _, rows) = &tests[0];
+    let run = |_: usize, direction: &str, readings: &str| {
+        format!("<RUN><RUN_DIRECTION>{direction}</RUN_DIRECTION><READINGS>{readings}</READINGS></RUN>\n")
+    };
+    let good = xml(rows, &run);
+    let session = |more: &str, both: bool| {
+        let data = format!(
+            "data = \"{test}.b5r\"\n{more}\ncolumns = {{ deviation_um = \"READINGS\" }}\n\
+             path = {{ kind = \"circle\", plane = \"XY\", radius_mm = 100, step_deg = 1, both_directions = {both} }}\n"
+        );
+        rewritten(folder, "directions.toml", |session| {
+            session.replace(&format!("data = \"{test}.csv\""), &data)
+        })
+    };
+    let g = |fit: &Value| fit["circular"][0]["diagnosis"].clone();
+    let figure = |of: &Value, fault: &str, id: &str| {
+        let found = of
+            .as_array()
+            .unwrap()
+            .iter()
+            .find(|found| found["fault"] == fault && found["axes"] != "X");
+        let values = found.unwrap()["values"].as_array().unwrap();
+        values.iter().find(|value| value["id"] == id).unwrap()["value"]
+            .as_f64()
+            .unwrap()
+    };
+    for (words, more) in [
+        (["CCW", "CW"], "format = { anticlockwise = \"0\" }"),
+        (["ccw", "Clockwise"], ""),
+        (["0", "1"], "format = { anticlockwise = 0 }"),
+        (["True", "FALSE"], "format = { anticlockwise = true }"),
+        (["false", "true"], "format = { anticlockwise = \"0\" }"),
+    ] {
+        let file = good
+            .replace(">CCW<", ">+<")
+            .replace(">CW<", &format!(">{}<", words[1]))
+            .replace(">+<", &format!(">{}<", words[0]));
+        std::fs::write(folder.join(format!("{test}.b5r")), file).unwrap();
+        let read = fit(&session(more, true));
+        // Backlash of Y, 4 µm, has the sign of the direction; a wrong one would turn it.
+        let values = [&read, &expected].map(|fit| figure(&g(fit), "backlash", "Y+"));
+        assert!(
+            (values[0] - values[1]).abs() < 0.01 && values[0] > 3.0,
+            "{words:?} {more}: {values:?}"
+        );
+        let warnings = read["warnings"].to_string();
+        assert!(!warnings.contains("forward"), "{warnings}");
+        let warnings = fit(&session(more, false))["warnings"].to_string();
+        assert!(
+            warnings.contains("backward where the session states runs = 1, both_directions = false"),
+            "{warnings}"
+        );
+    }
+    let three = good
+        .replacen(">CCW<", ">2<", 1)
+        .replace(">CCW<", ">0<")
+        .replace(">CW<", ">1<");
+    std::fs::write(folder.join(format!("{test}.b5r")), three).unwrap();
+    let said = told(&session("format = { anticlockwise = \"0\" }", true));
+    assert!(
+        said.contains("RUN_DIRECTION is `") && said.contains("the other one in this file"),
+        "{said}"
+    );
+}
+
+/// Notes of the measurement, and the ball-bar figures, stand in the report; the notes in JSON as well.
+#[test]
+fn notes_and_ball_bar_figures_are_in_the_report() {
+    let folder = tempfile::tempdir().unwrap();
+    let folder = folder.path();
+    circles(folder);
+    let notes = "[about]\nserial_number = \"4711\"\noperator = \"N. N. <nn@example.org>\"\ndate = 2026-11-22\ncomment = \"after the repair\"\n";
+    let session = rewritten(folder, "about.toml", |session| {
+        session.replacen("[[test]]", &format!("{notes}[[test]]"), 1)
+    });
+    let read = fit(&session);
+    assert_eq!(read["about"]["serial_number"], "4711");
+    assert_eq!(read["about"]["date"], "2026-11-22");
+    assert!(fit(&folder.join("session.toml")).get("about").is_none());
+    for command in ["fit", "trace"] {
+        let (report, json) = (folder.join("report.html"), folder.join("about-again.json"));
+        let mut arguments = vec![
+            command,
+            text(&session),
+            "--report",
+            text(&report),
+            "--json",
+            text(&json),
+        ];
+        if command == "trace" {
+            arguments.extend(["--quiet", "--max-effects", "1", "--only", "EYY~Y:backlash"]);
+        }
+        let run = abbe(&arguments);
+        assert!(run.status.success(), "{}", String::from_utf8_lossy(&run.stderr));
+        let found: Value = serde_json::from_slice(&std::fs::read(&json).unwrap()).unwrap();
+        assert_eq!(found["about"]["comment"], "after the repair", "{command}");
+        let page = std::fs::read_to_string(&report).unwrap();
+        for part in [
+            "<dt>serial number</dt><dd>4711</dd>",
+            "N. N. &lt;nn@example.org&gt;",
+            "2026-11-22",
+            "after the repair",
+        ] {
+            assert!(page.contains(part), "{command}: {part}");
+        }
+        if command == "fit" {
+            for part in [
+                "Ball-bar figures",
+                "circular error (G)",
+                "bidirectional circular error (G(b))",
+                "mean bidirectional radial error (D)",
+                "backlash Y+",
+            ] {
+                assert!(page.contains(part), "{part}");
+            }
+            let g = read["circular"][0]["bidirectional_circular_deviation_um"]
+                .as_f64()
+                .unwrap();
+            assert!(page.contains(&format!("<td>{g:.2}</td>")), "{g}");
+        }
+    }
+}
+
+/// A report offers `--improve` where it is taken, and nowhere else: another instrument than a ball bar, or no rotary axis, is refused.
+#[test]
+fn a_report_offers_no_command_that_is_refused() {
+    let folder = tempfile::tempdir().unwrap();
+    let report = folder.path().join("report.html");
+    let offers = |session: &Path| {
+        let run = abbe(&["fit", text(session), "--report", text(&report)]);
+        assert!(run.status.success(), "{}", String::from_utf8_lossy(&run.stderr));
+        std::fs::read_to_string(&report).unwrap().contains("--improve")
+    };
+    assert!(offers(&super::ready("hermle-c600u/measured/session.toml")));
+    let r_test = super::ready("r-test/measured/session.toml");
+    assert!(!offers(&r_test));
+    let run = abbe(&["plan", text(&r_test), "--no-effects", "--improve", "1"]);
+    assert_eq!(run.status.code(), Some(1), "what is not offered is refused");
+}

@@ -4,6 +4,7 @@
 //! demands), or lets the linear axes keep the bar radial, tangential or axial. A part of the range, or one direction, never sees more than
 //! the whole: they are tried where gain is judged by the minute. What an axis' travel forbids, or a bar cannot reach, is not on the menu.
 
+use abbe_model::axis::AxisKind;
 use abbe_model::effect::{Component, Driver, Effect, Shape};
 use abbe_model::instrument::Station;
 use abbe_model::session::{Session, Test};
@@ -12,6 +13,8 @@ use rayon::prelude::*;
 use super::drafts::{Draft, drafts};
 use super::states;
 use crate::error::IdentifyError;
+use crate::parameters::Role;
+use crate::problem::Problem;
 
 /// What may be varied. Lengths in mm, times in min.
 #[derive(Clone, Debug)]
@@ -106,6 +109,24 @@ pub struct Entry {
     pub new_setup: bool,
     /// What it takes, min.
     pub minutes: f64,
+}
+
+/// Whether tests can be proposed for a problem: it has errors to identify, the instrument is a ball bar, and a rotary axis can be swept.
+pub fn is_offered(problem: &Problem<'_>) -> bool {
+    let session = problem.session;
+    let has_errors = problem
+        .parameters
+        .list
+        .iter()
+        .any(|parameter| parameter.role == Role::Error);
+    let last = session.tests.last().map(|test| &test.station);
+    has_errors
+        && matches!(last, Some(Station::BallBar(_)))
+        && session
+            .machine
+            .axes
+            .iter()
+            .any(|axis| axis.kind == AxisKind::Rotary)
 }
 
 /// The entries that a session's machine can do. The session is complete (see [`states::complete`]).

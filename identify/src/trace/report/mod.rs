@@ -114,6 +114,7 @@ pub(super) fn report(findings: &Findings<'_, '_>) -> Result<Reported, IdentifyEr
         unobservable: fit::unobservable(after, &after_fit.rank),
         rejected: fit::rejected(after, after_fit),
         warnings,
+        about: before.session.about.iter().cloned().collect(),
     };
     Ok(Reported {
         result,
