@@ -327,7 +327,7 @@ fn runs_that_the_data_lack_are_said() {
     let sweep = "sweep = { axis = \"C\", from_deg = 0, to_deg = 270, step_deg = 90, runs = 2, both_directions = true }";
     let circle = "path = { kind = \"circle\", plane = \"XY\", radius_mm = 100, step_deg = 90, runs = 2, both_directions = true }";
     for (movement, columns) in [(sweep, "c_deg"), (circle, "x_mm,y_mm")] {
-        let said = |runs: &[bool]| {
+        let warnings_of = |movement: &str, runs: &[bool], apart: bool| {
             let folder = tempfile::tempdir().unwrap();
             let mut data = format!("run,{columns},length_mm\n");
             for (run, forward) in runs.iter().enumerate() {
@@ -337,7 +337,7 @@ fn runs_that_the_data_lack_are_said() {
                         "c_deg" => (90 * k).to_string(),
                         _ => ["100,0", "0,100", "-100,0", "0,-100"][k].to_string(),
                     };
-                    data += &format!("{},{at},100\n", run + 1);
+                    data += &format!("{},{at},100\n", if apart { run + 1 } else { 1 });
                 }
             }
             fs::write(folder.path().join("t.csv"), data).unwrap();
@@ -355,7 +355,31 @@ fn runs_that_the_data_lack_are_said() {
             fs::write(&path, text).unwrap();
             read::session(&path, &ReadOptions::default()).unwrap().warnings
         };
+        let forward_only = movement.replace("both_directions = true", "both_directions = false");
+        let said = |runs: &[bool]| warnings_of(movement, runs, true);
+        let one_way = |runs: &[bool]| warnings_of(&forward_only, runs, true);
+        let unseparated = || warnings_of(movement, &[true, false], false);
         assert!(said(&[true, false, true, false]).is_empty(), "{movement}");
+        // One direction is stated, and the other one was run as well, or instead.
+        for (runs, found) in [
+            (&[true, true, false][..], "2 runs forward and 1 backward"),
+            (&[false, false][..], "0 runs forward and 2 backward"),
+        ] {
+            let warnings = one_way(runs);
+            assert_eq!(warnings.len(), 1, "{movement}: {warnings:?}");
+            assert!(
+                warnings[0].contains(found) && warnings[0].contains("both_directions = false"),
+                "{warnings:?}"
+            );
+        }
+        assert!(one_way(&[true, true]).is_empty());
+        // Runs that are not numbered apart are not counted as none.
+        let warnings = unseparated();
+        assert_eq!(warnings.len(), 1, "{movement}: {warnings:?}");
+        assert!(
+            warnings[0].contains("run 1 goes there and back under one number"),
+            "{warnings:?}"
+        );
         for (runs, found) in [
             (&[true, false, true][..], "2 runs forward and 1 backward"),
             (&[true, true, true, true][..], "4 runs forward and 0 backward"),

@@ -403,9 +403,6 @@ fn notes_and_ball_bar_figures_are_in_the_report() {
         ] {
             assert!(page.contains(part), "{command}: {part}");
         }
-        // Nothing is offered that would be refused: `--improve` sweeps rotary axes for errors that are asked for.
-        let plan = abbe(&["plan", text(&session), "--no-effects", "--improve", "1"]);
-        assert_eq!(page.contains("--improve 1"), plan.status.success(), "{command}");
         if command == "fit" {
             for part in [
                 "Ball-bar figures",
@@ -422,4 +419,21 @@ fn notes_and_ball_bar_figures_are_in_the_report() {
             assert!(page.contains(&format!("<td>{g:.2}</td>")), "{g}");
         }
     }
+}
+
+/// A report offers `--improve` where it is taken, and nowhere else: another instrument than a ball bar, or no rotary axis, is refused.
+#[test]
+fn a_report_offers_no_command_that_is_refused() {
+    let folder = tempfile::tempdir().unwrap();
+    let report = folder.path().join("report.html");
+    let offers = |session: &Path| {
+        let run = abbe(&["fit", text(session), "--report", text(&report)]);
+        assert!(run.status.success(), "{}", String::from_utf8_lossy(&run.stderr));
+        std::fs::read_to_string(&report).unwrap().contains("--improve")
+    };
+    assert!(offers(&super::ready("hermle-c600u/measured/session.toml")));
+    let r_test = super::ready("r-test/measured/session.toml");
+    assert!(!offers(&r_test));
+    let run = abbe(&["plan", text(&r_test), "--no-effects", "--improve", "1"]);
+    assert_eq!(run.status.code(), Some(1), "what is not offered is refused");
 }

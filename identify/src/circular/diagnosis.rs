@@ -64,20 +64,18 @@ impl Model {
                 "no diagnosis: the readings cannot tell the faults apart".into(),
             ));
         };
-        let found = third_order(&rows, &names, &faults, &regression);
+        // Errors of third order are in the model while spikes and cyclic errors are searched for, and stay where they stand out beside those.
+        let found = third_order(&rows, &names);
         take_up(&rows, &mut faults, &mut regression, found);
         let found = spikes(path, &rows, &names, &faults, &regression);
         take_up(&rows, &mut faults, &mut regression, found);
         let found = cyclic(&rows, &names, &faults, &regression);
         take_up(&rows, &mut faults, &mut regression, found);
-        // A spike or a cyclic error may have looked like one of these before it was found.
-        let mut kept = faults
-            .iter()
-            .map(|fault| !is_third_order(fault) || is_told(&rows, &faults, fault, &regression));
-        let kept: Vec<bool> = kept.by_ref().collect();
+        let stays = |fault: &Fault| !is_third_order(fault) || is_told(&rows, &faults, fault, &regression);
+        let kept: Vec<bool> = faults.iter().map(stays).collect();
         if kept.contains(&false) {
-            let mut keep = kept.into_iter();
-            faults.retain(|_| keep.next().unwrap_or(true));
+            let mut kept = kept.into_iter();
+            faults.retain(|_| kept.next().unwrap_or(true));
             if let Some(without) = solve(&rows, &faults) {
                 regression = without;
             }

@@ -14,6 +14,8 @@ use crate::results::ParameterResult;
 
 /// Probability with which chance may yield a spike or a cyclic error.
 const CHANCE: f64 = 1e-3;
+/// Below this, 2 nm, no bar reads and the terms are no longer right: they are of first order, and 20 µm across a radius of 100 mm are 2 nm along it.
+const LEAST_MM: f64 = 2e-6;
 /// Widths of reversal spikes that are tried, degrees of the path.
 const SPIKE_WIDTHS_DEG: [f64; 6] = [0.5, 1.0, 2.0, 3.0, 5.0, 8.0];
 
@@ -27,22 +29,12 @@ pub(super) fn is_third_order(fault: &Fault) -> bool {
 
 /// Errors that grow with the third power of the position: with radius, centre and scale they leave `cos 4θ` and `sin 4θ`, which a cyclic error of few
 /// periods would stand in for.
-pub(super) fn third_order(
-    rows: &Rows,
-    names: &[String; 2],
-    faults: &[Fault],
-    regression: &Regression,
-) -> Vec<Fault> {
-    let mut basis = Orthonormal::of(&columns(rows, faults));
-    let unit = unit_of_gain(rows, regression);
+pub(super) fn third_order(rows: &Rows, names: &[String; 2]) -> Vec<Fault> {
     let figures = ["sum", "difference"];
-    let found = rows.third_order().into_iter().zip(THIRD_ORDER).zip(figures);
-    found
-        .filter_map(|((column, name), figure)| {
-            let gain = basis.gain(&regression.residual, vec![column.clone()]);
-            is_significant(gain, unit, 1, 2).then(|| {
-                Fault::new(name, names.concat(), vec![column]).figure(figure, &[(0, 1.0)], 1e3, "um")
-            })
+    let columns = rows.third_order().into_iter().zip(THIRD_ORDER).zip(figures);
+    columns
+        .map(|((column, name), figure)| {
+            Fault::new(name, names.concat(), vec![column]).figure(figure, &[(0, 1.0)], 1e3, "um")
         })
         .collect()
 }
@@ -64,7 +56,7 @@ pub(super) fn is_told(rows: &Rows, faults: &[Fault], fault: &Fault, regression: 
 /// The variance in which a gain is counted: that of what is left over, enlarged for the correlation of neighbours.
 fn unit_of_gain(rows: &Rows, regression: &Regression) -> f64 {
     let (variance, r) = variance_and_correlation(rows, regression);
-    variance * (1.0 + r) / (1.0 - r)
+    variance.max(LEAST_MM * LEAST_MM) * (1.0 + r) / (1.0 - r)
 }
 
 /// Whether chance would seldom give so large a gain, by this many columns, in this many looks.

@@ -77,7 +77,9 @@ pub enum Driver {
     Time,
     /// A temperature column, °C above the session's mean.
     Temperature,
-    /// The moment that a unit weight at the tool point exerts about the component's own axis, in m.
+    /// The moment that a unit weight exerts about the component's own axis, in m. For an axis on the tool's side the weight hangs at the instrument's
+    /// point in the tool frame (spindle ball, stylus, target); for an axis on the workpiece's side at the instrument's point in the table frame (workpiece
+    /// ball, point of the artefact), not at the centre of mass of table and workpiece.
     Gravity,
 }
 
