@@ -1,4 +1,4 @@
-//! Rounds of the search until nothing earns its place any more, and an account of them for those who wait.
+//! Rounds of the search until no addition is significant or lowers the held-out error any more, and an account of them for those who wait.
 
 use super::search::{Round, Search};
 use super::{Progress, Step};
@@ -47,8 +47,8 @@ impl Account<'_> {
 /// explains little.
 const UNCLAIMED_IN_A_ROW: usize = 2;
 
-/// Rounds until nothing earns its place any more, or until additions do not lower the held-out error: the p-value of the best that was not taken. `None` if
-/// the user has seen enough. What remains is what is claimed.
+/// Rounds until no addition is significant, or until additions do not lower the held-out error: the p-value of the best that was not added. `None` if the user
+/// has seen enough. What remains is what is claimed.
 pub(super) fn search_on(
     search: &mut Search<'_>,
     account: &mut Account<'_>,
