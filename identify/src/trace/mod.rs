@@ -3,6 +3,8 @@
 //! 1. Noise first: size and memory from repeats ([`crate::noise`]), wild readings left out by name ([`crate::outliers`]).
 //! 2. The library of effects ([`library`]) is laid over the session (`columns`) and multiplied once with model, residual and null draws (`moments`).
 //! 3. The search (`search`) adds, lets go and exchanges effects; its p-values come from the same search on readings without structure (`null`).
+//!    An effect is claimed where its p-value is below the level of significance and the held-out error falls by more than the standard error of the fall,
+//!    which follows from paired differences over runs, blocks or poses (`paired`).
 //! 4. Everything is refitted together (`judge`), and reported before and after (`report`) on readings that neither fit nor search saw.
 //! 5. For each effect, what would look the same ([`alias`]); for the rest, whether it has structure (`remainder`).
 

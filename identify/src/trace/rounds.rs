@@ -1,4 +1,4 @@
-//! Rounds of the search until nothing earns its place any more, and an account of them for those who wait.
+//! Rounds of the search until no addition is significant or lowers the held-out error any more, and an account of them for those who wait.
 
 use super::search::{Round, Search};
 use super::{Progress, Step};
