@@ -27,11 +27,16 @@ pub(super) fn kept(readings: &Readings, cells: &[u64]) -> Option<Vec<usize>> {
         return None;
     }
     let mut first: HashMap<u64, usize> = HashMap::with_capacity(cells.len());
+    let original: Vec<usize> = (0..cells.len())
+        .map(|row| *first.entry(cells[row]).or_insert(row))
+        .collect();
+    // Rows that come again in the opposite order are a way back, whose readings happen to be the same.
+    let backward = |row: usize| original[row - 1] < row - 1 && original[row] < original[row - 1];
+    if readings.time_s.is_empty() && (1..cells.len()).any(backward) {
+        return None;
+    }
     let kept: Vec<usize> = (0..cells.len())
-        .filter(|&row| {
-            let original = *first.entry(cells[row]).or_insert(row);
-            original == row || closing.get(&row) == Some(&original)
-        })
+        .filter(|row| original[*row] == *row || closing.get(row) == Some(&original[*row]))
         .collect();
     (kept.len() < cells.len()).then_some(kept)
 }
