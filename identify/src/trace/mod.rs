@@ -277,6 +277,8 @@ fn searched<'a>(
         found => Some(found?),
     };
     let interrupted = found.is_none();
+    // What the search came to is reported whole.
+    search.interrupt = None;
     let (ended, judged) = match found {
         Some((p_value, judged)) => (Some(p_value), judged),
         // The effects found until then are fitted; what they leave is not looked at.
