@@ -4,9 +4,9 @@
 use std::io::{BufRead, BufReader, Read};
 use std::os::unix::process::ExitStatusExt;
 use std::path::Path;
-use std::process::{Child, Command, ExitStatus, Stdio};
+use std::process::{Child, ChildStderr, Command, ExitStatus, Stdio};
 use std::sync::atomic::{AtomicUsize, Ordering};
-use std::time::Duration;
+use std::time::{Duration, Instant};
 
 use abbe::identify::results::TraceResult;
 use abbe::identify::trace::{Progress, Trace, TraceOptions, trace};
@@ -35,23 +35,24 @@ fn interrupt(child: &Child) {
     assert!(sent.unwrap().success());
 }
 
-/// Interrupts so many times, from when the search has found its first effect; what the program says.
-fn interrupted_in_the_search(arguments: &[&str], times: usize) -> (ExitStatus, String, String) {
-    let mut child = start(arguments);
+/// What a program says until its search has found the first effect, and its messages from then on.
+fn until_the_first_effect(child: &mut Child) -> (BufReader<ChildStderr>, String) {
     let mut messages = BufReader::new(child.stderr.take().unwrap());
     let mut said = String::new();
-    while !said.contains("\n  + ") && !said.starts_with("  + ") {
+    while !said.lines().any(|line| line.starts_with("  + ")) {
         assert!(
             messages.read_line(&mut said).unwrap() > 0,
             "no effect is found: {said}"
         );
     }
-    for time in 0..times {
-        if time > 0 {
-            std::thread::sleep(Duration::from_millis(10));
-        }
-        interrupt(&child);
-    }
+    (messages, said)
+}
+
+/// Interrupts a program when its search has found the first effect; what it says.
+fn interrupted_in_the_search(arguments: &[&str]) -> (ExitStatus, String, String) {
+    let mut child = start(arguments);
+    let (mut messages, mut said) = until_the_first_effect(&mut child);
+    interrupt(&child);
     messages.read_to_string(&mut said).unwrap();
     let mut result = String::new();
     child.stdout.take().unwrap().read_to_string(&mut result).unwrap();
@@ -64,21 +65,18 @@ fn an_interrupted_trace_exits_with_130_and_every_output_says_so() {
     let at = |name: &str| folder.path().join(name);
     let [json, csv, next, report] = ["t.json", "t.csv", "next.toml", "t.html"].map(at);
     let session = ready("hermle-c600u/measured/session.toml");
-    let (status, result, said) = interrupted_in_the_search(
-        &[
-            "trace",
-            text(&session),
-            "--json",
-            text(&json),
-            "--csv",
-            text(&csv),
-            "--write",
-            text(&next),
-            "--report",
-            text(&report),
-        ],
-        1,
-    );
+    let (status, result, said) = interrupted_in_the_search(&[
+        "trace",
+        text(&session),
+        "--json",
+        text(&json),
+        "--csv",
+        text(&csv),
+        "--write",
+        text(&next),
+        "--report",
+        text(&report),
+    ]);
     assert_eq!(status.code(), Some(INTERRUPTED), "{said}");
     assert!(result.starts_with("Verdict: incomplete\n"), "{result}");
     assert!(said.contains("interrupted after 1 effect\n"), "{said}");
@@ -104,15 +102,32 @@ fn an_interrupted_trace_exits_with_130_and_every_output_says_so() {
     assert!(read(&report).contains("interrupted after 1 effect"));
 }
 
+/// A pipe that nobody reads holds the program where it writes its results: there a second Ctrl-C comes.
 #[test]
 fn a_second_interruption_ends_the_program_at_once() {
     let folder = tempfile::tempdir().unwrap();
-    let json = folder.path().join("trace.json");
+    let pipe = folder.path().join("trace.json");
+    assert!(Command::new("mkfifo").arg(&pipe).status().unwrap().success());
     let session = ready("hermle-c600u/measured/session.toml");
-    let (status, result, said) =
-        interrupted_in_the_search(&["trace", text(&session), "--json", text(&json)], 2);
-    assert_eq!(status.code(), Some(INTERRUPTED), "{said}");
-    assert!(result.is_empty() && !json.exists(), "{result}");
+    let mut child = start(&["trace", text(&session), "--json", text(&pipe)]);
+    let mut messages = until_the_first_effect(&mut child).0;
+    interrupt(&child);
+    let mut result = BufReader::new(child.stdout.take().unwrap());
+    let mut verdict = String::new();
+    result.read_line(&mut verdict).unwrap();
+    assert_eq!(verdict, "Verdict: incomplete\n");
+    interrupt(&child);
+    let began = Instant::now();
+    while child.try_wait().unwrap().is_none() {
+        if began.elapsed() > Duration::from_secs(20) {
+            child.kill().unwrap();
+        }
+        std::thread::sleep(Duration::from_millis(10));
+    }
+    let mut said = String::new();
+    messages.read_to_string(&mut said).unwrap();
+    assert_eq!(child.wait().unwrap().code(), Some(INTERRUPTED), "{said}");
+    assert!(said.contains("interrupted; nothing more is written"), "{said}");
 }
 
 /// A fit has nothing to hand over before it ends: the signal ends the program, as it does any other, and nothing is written.
