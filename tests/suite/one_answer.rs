@@ -70,7 +70,6 @@ fn among_poses() {
             text(&session),
             "--data",
             text(&folder),
-            "--quiet",
             "--max-effects",
             "2",
             "--write",
@@ -145,7 +144,6 @@ fn along_runs_without_repeats() {
         &[
             "trace",
             text(&session),
-            "--quiet",
             "--max-effects",
             "1",
             "--write",

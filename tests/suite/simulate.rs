@@ -145,7 +145,7 @@ fn what_the_plan_says_stays_and_what_has_to_change_changes() {
     let out = folder.path().join("deep/er/out");
     let told = simulated(&plan, &out, &["--noise-um", "0.5"]);
     assert!(
-        told.contains("146 readings of 1 tests") && told.contains("noise 0.500 µm"),
+        told.contains("146 readings of 1 test,") && told.contains("noise 0.500 µm"),
         "{told}"
     );
     let text = fs::read_to_string(out.join("session.toml")).unwrap();

@@ -25,6 +25,8 @@ use crate::results::ParameterResult;
 const WILD: f64 = 6.0;
 /// An arc shorter than this is not taken apart.
 const SHORTEST_ARC_DEG: f64 = 180.0;
+/// Arc of a full circle.
+const FULL_CIRCLE_DEG: f64 = 360.0;
 
 /// A circle taken apart.
 struct Model {
@@ -64,9 +66,12 @@ impl Model {
                 "no diagnosis: the readings cannot tell the faults apart".into(),
             ));
         };
-        // Errors of third order are in the model while spikes and cyclic errors are searched for, and stay where they stand out beside those.
-        let found = third_order(&rows, &names);
-        take_up(&rows, &mut faults, &mut regression, found);
+        // Errors of third order are in the model while spikes and cyclic errors are searched for, and stay where they stand out beside those. Over part of a
+        // circle they are nearly collinear with scale and straightness.
+        if arc_deg > FULL_CIRCLE_DEG * 0.99 {
+            let found = third_order(&rows, &names);
+            take_up(&rows, &mut faults, &mut regression, found);
+        }
         let found = spikes(path, &rows, &names, &faults, &regression);
         take_up(&rows, &mut faults, &mut regression, found);
         let found = cyclic(&rows, &names, &faults, &regression);
