@@ -22,7 +22,6 @@ fn built(more: &[&str]) -> Vec<Built> {
             "tree",
             "--workspace",
             "--all-features",
-            "--offline",
             "--locked",
             "--edges",
             "normal,build,dev",
