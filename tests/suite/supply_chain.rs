@@ -246,7 +246,12 @@ fn the_thesis_is_cited_in_full_once_a_page() {
         let text = fs::read_to_string(&page).unwrap();
         let text = text.split_whitespace().collect::<Vec<_>>().join(" ");
         let times = text.matches(full).count();
-        let relies = text.replace(full, "").to_lowercase().contains("thesis");
-        assert_eq!(times, usize::from(relies), "{}", page.display());
+        let rest = text.replace(full, "");
+        let relies = rest.to_lowercase().contains("thesis") || rest.contains("Jiang");
+        assert!(
+            times == 1 || times == 0 && !relies,
+            "{}: {times} times",
+            page.display()
+        );
     }
 }
