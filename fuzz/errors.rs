@@ -6,7 +6,7 @@ use std::fs;
 use std::path::PathBuf;
 
 use abbe_identify::quantity::{self, Given};
-use abbe_identify::volumetric::{self, Erring, functions};
+use abbe_identify::volumetric::{self, MachineWithErrors, functions};
 use abbe_model::axis::AxisKind;
 use abbe_model::chain::Machine;
 use abbe_model::session::limits::LARGEST;
@@ -38,7 +38,7 @@ fn as_file<T>(input: &[u8], work: impl FnOnce(&PathBuf, &Machine) -> T) -> T {
 pub fn functions(input: &[u8]) {
     as_file(input, |file, machine| match functions::read(file, machine) {
         Ok(functions) => {
-            let erring = Erring {
+            let erring = MachineWithErrors {
                 machine,
                 functions: &functions,
                 tool_mm: [0.0, 0.0, -120.0],

@@ -9,7 +9,7 @@ use abbe_model::axis::AxisKind;
 use abbe_model::chain::{AxisPosition, Machine};
 use abbe_model::component::ErrorName;
 use abbe_model::effect::{Component, Driver, DriverSample, Effect, Shape};
-use abbe_model::instrument::{InsideUnit, InstrumentUnknown};
+use abbe_model::instrument::{InstrumentUnknown, InternalUnit};
 use abbe_model::scalar::Nominal;
 
 use crate::error::CodegenError;
@@ -96,7 +96,7 @@ pub struct Coefficient {
     /// Its place among the coefficients of the effect.
     pub place: usize,
     /// The unit of what moves; none of a delay.
-    pub component: Option<InsideUnit>,
+    pub component: Option<InternalUnit>,
     /// Whether component and driver are both lengths or both angles.
     pub same_kind: bool,
 }
@@ -117,17 +117,17 @@ impl Coefficient {
                 return Err(CodegenError::Twice { name: effect.id() });
             }
             let count = effect.shape.coefficients();
-            if count > MOST_COEFFICIENTS {
+            if count > MAX_COEFFICIENTS {
                 return Err(CodegenError::EffectTooLong {
                     effect: effect.id(),
                     coefficients: count,
-                    most: MOST_COEFFICIENTS,
+                    most: MAX_COEFFICIENTS,
                 });
             }
             let component = unit_of_component(effect, machine, unknowns)?;
             let same_kind = match &effect.driver {
                 Driver::Axis(name) => {
-                    kind_of(machine, effect, name)? == (component == Some(InsideUnit::Radian))
+                    kind_of(machine, effect, name)? == (component == Some(InternalUnit::Radian))
                 }
                 _ => false,
             };
@@ -168,31 +168,31 @@ impl Coefficient {
         };
         match (&self.effect.shape, component) {
             (Shape::Lag, _) if self.same_kind => "s",
-            (Shape::Lag, InsideUnit::Millimetre) => "mm·s/rad",
-            (Shape::Lag, InsideUnit::Radian) => "rad·s/mm",
-            (Shape::Lag, InsideUnit::Ratio) => "1/rate",
-            (Shape::Drift, InsideUnit::Millimetre) => "mm/h",
-            (Shape::Drift, InsideUnit::Radian) => "rad/h",
-            (Shape::Drift, InsideUnit::Ratio) => "1/h",
-            (_, InsideUnit::Millimetre) => "mm",
-            (_, InsideUnit::Radian) => "rad",
-            (_, InsideUnit::Ratio) => "1",
+            (Shape::Lag, InternalUnit::Millimetre) => "mm·s/rad",
+            (Shape::Lag, InternalUnit::Radian) => "rad·s/mm",
+            (Shape::Lag, InternalUnit::Ratio) => "1/rate",
+            (Shape::Drift, InternalUnit::Millimetre) => "mm/h",
+            (Shape::Drift, InternalUnit::Radian) => "rad/h",
+            (Shape::Drift, InternalUnit::Ratio) => "1/h",
+            (_, InternalUnit::Millimetre) => "mm",
+            (_, InternalUnit::Radian) => "rad",
+            (_, InternalUnit::Ratio) => "1",
         }
     }
 }
 
 /// Coefficients of one effect that can still be read, and that a compiler takes in one function.
-const MOST_COEFFICIENTS: usize = 40;
+const MAX_COEFFICIENTS: usize = 40;
 
 fn unit_of_component(
     effect: &Effect,
     machine: &Machine,
     unknowns: &[InstrumentUnknown],
-) -> Result<Option<InsideUnit>, CodegenError> {
+) -> Result<Option<InternalUnit>, CodegenError> {
     match &effect.component {
         Component::Axis(name) => match machine.axis_index(&name.axis) {
-            Some(_) if name.freedom.is_angle() => Ok(Some(InsideUnit::Radian)),
-            Some(_) => Ok(Some(InsideUnit::Millimetre)),
+            Some(_) if name.freedom.is_angle() => Ok(Some(InternalUnit::Radian)),
+            Some(_) => Ok(Some(InternalUnit::Millimetre)),
             None => Err(no_axis(machine, effect, &name.axis)),
         },
         Component::Instrument { thing, coordinate } => {

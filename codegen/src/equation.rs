@@ -8,12 +8,12 @@ use abbe_model::frames::Rotation;
 use abbe_model::instrument::Station;
 
 use crate::check::{Check, Deviation};
+use crate::collect::sum;
 use crate::effect::Coefficient;
 use crate::error::CodegenError;
-use crate::first::FirstOrder;
+use crate::first_order::FirstOrder;
 use crate::forms::{self, Written};
-use crate::layout::sum;
-use crate::normal::Ring;
+use crate::normal_form::Ring;
 use crate::polynomial::Polynomial;
 use crate::print::terms_of;
 use crate::program::{Input, Label, Naming, Program, Tree};
@@ -82,12 +82,12 @@ pub enum Form {
         complete: bool,
     },
     /// The value without errors and a coefficient for each error, with the layout of each.
-    First(FirstOrder, FirstLayout),
+    First(FirstOrder, FirstOrderLayout),
 }
 
 /// The first-order form as it is written.
 #[derive(Clone, Debug, PartialEq)]
-pub struct FirstLayout {
+pub struct FirstOrderLayout {
     /// The coordinates without errors; of a length its square.
     pub nominal: Vec<Tree>,
     /// Sign of `L₀` and what is added to it, where that is read without errors.
@@ -98,12 +98,12 @@ pub struct FirstLayout {
     pub factors: Vec<Option<(Tree, Tree)>>,
 }
 
-impl FirstLayout {
+impl FirstOrderLayout {
     /// With `length` in the place of the root that it is.
-    pub(crate) fn with_named_length(&self, length: &Tree) -> FirstLayout {
+    pub(crate) fn with_named_length(&self, length: &Tree) -> FirstOrderLayout {
         let root = Tree::Unary(Unary::Sqrt, Box::new(self.nominal[0].clone()));
         let named = |trees: &Vec<Tree>| trees.iter().map(|tree| tree.replaced(&root, length)).collect();
-        FirstLayout {
+        FirstOrderLayout {
             coefficients: self.coefficients.iter().map(named).collect(),
             ..self.clone()
         }
@@ -434,7 +434,7 @@ fn inputs(arena: &Arena, machine: &Machine, parameters: &[Variable]) -> Vec<Inpu
                 AxisKind::Rotary => {
                     inputs.push(Input::Sine(position.clone()));
                     inputs.push(Input::Cosine(position.clone()));
-                    if arena.holds_itself(&position) {
+                    if arena.is_own_symbol(&position) {
                         inputs.push(Input::Plain(position));
                     }
                 }

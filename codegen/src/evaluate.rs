@@ -64,23 +64,23 @@ pub fn evaluate<S: Scalar>(
 ) -> Result<Vec<S>, CodegenError> {
     let mut values: Vec<Option<Value<S>>> = vec![None; arena.node_count()];
     let constant = |value: f64| Value::<S>::Nominal(S::Nominal::constant(value));
-    let look_up = |values: &[Option<Value<S>>], operand: Operand| match operand {
+    let normal_form_of = |values: &[Option<Value<S>>], operand: Operand| match operand {
         Operand::Constant(value) => constant(value.value()),
         Operand::Node(id) => values[id.index()].unwrap_or_else(|| constant(f64::NAN)),
     };
     for id in arena.reachable(outputs) {
         let value = match arena.node(id) {
             Node::Variable(place) => variable(&arena.variable_at(place)),
-            Node::Unary(op, a) => look_up(&values, a)
+            Node::Unary(op, a) => normal_form_of(&values, a)
                 .unary(op)
                 .ok_or(CodegenError::FunctionOfError { function: op })?,
-            Node::Binary(op, a, b) => look_up(&values, a).binary(op, look_up(&values, b)),
+            Node::Binary(op, a, b) => normal_form_of(&values, a).binary(op, normal_form_of(&values, b)),
         };
         values[id.index()] = Some(value);
     }
     Ok(outputs
         .iter()
-        .map(|output| look_up(&values, *output).scalar())
+        .map(|output| normal_form_of(&values, *output).scalar())
         .collect())
 }
 

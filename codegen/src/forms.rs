@@ -3,11 +3,11 @@
 use abbe_model::instrument::Station;
 use abbe_model::scalar::Nominal;
 
-use crate::equation::{FirstLayout, Form};
+use crate::collect::{Layout, product, sum};
+use crate::equation::{FirstOrderLayout, Form};
 use crate::error::CodegenError;
-use crate::first::{Column, FirstOrder};
-use crate::layout::{Layout, product, sum};
-use crate::normal::Ring;
+use crate::first_order::{Column, FirstOrder};
+use crate::normal_form::Ring;
 use crate::polynomial::Polynomial;
 use crate::program::{Input, Tree};
 use crate::run::Run;
@@ -121,7 +121,7 @@ pub(crate) fn first<'a>(
     };
     let layout = Layout { ring: &ring, inputs };
     let lay_out = |polynomials: &[Polynomial]| polynomials.iter().map(|p| layout.group(p)).collect();
-    let laid_out = FirstLayout {
+    let laid_out = FirstOrderLayout {
         nominal: lay_out(&form.nominal),
         beside_length: form
             .beside_length

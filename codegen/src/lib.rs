@@ -30,14 +30,14 @@
 //! ```
 
 pub mod check;
+mod collect;
 pub mod effect;
 pub mod equation;
 pub mod error;
 pub mod evaluate;
-pub mod first;
+pub mod first_order;
 mod forms;
-mod layout;
-pub mod normal;
+pub mod normal_form;
 pub mod polynomial;
 pub mod print;
 pub mod program;
@@ -53,7 +53,7 @@ pub use effect::{Coefficient, Followed};
 pub use equation::{Equation, Form, Kind, Options, Order};
 pub use error::CodegenError;
 pub use evaluate::Value;
-pub use normal::Ring;
+pub use normal_form::Ring;
 pub use polynomial::Polynomial;
 pub use print::Language;
 pub use session::SessionTest;

@@ -17,7 +17,7 @@ use crate::symbol::{NodeId, VariableId};
 pub enum Atom {
     /// A length, a position, an error.
     Variable(VariableId),
-    /// A root, by its place in the [`crate::normal::Ring`].
+    /// A root, by its place in the [`crate::normal_form::Ring`].
     Root(usize),
     /// The sine of a variable.
     Sin(VariableId),
@@ -238,7 +238,7 @@ impl Sub<&Polynomial> for &Polynomial {
 
 impl Mul<&Polynomial> for &Polynomial {
     type Output = Polynomial;
-    /// The product of polynomials without sines and roots; [`crate::normal::Ring::product`] applies their rules.
+    /// The product of polynomials without sines and roots; [`crate::normal_form::Ring::product`] applies their rules.
     fn mul(self, other: &Polynomial) -> Polynomial {
         self.product(other, |_| false)
     }

@@ -9,7 +9,7 @@
 
 use abbe_model::frames::Point;
 use abbe_model::instrument::Station;
-use abbe_model::instrument::probe::Sight;
+use abbe_model::instrument::probe::ProbeGeometry;
 use abbe_model::scalar::Scalar;
 
 use crate::program::Label;
@@ -38,7 +38,7 @@ pub(crate) const QUADRATIC: [Label; 3] = [Label::Scalar("a"), Label::Scalar("b")
 
 impl Touch {
     /// From stylus and step as the artefact sees them, and the vectors on the way there.
-    pub(crate) fn of(sight: &Sight<Symbol<'_>>, vectors: &[NamedVector]) -> Self {
+    pub(crate) fn of(sight: &ProbeGeometry<Symbol<'_>>, vectors: &[NamedVector]) -> Self {
         Touch {
             quadratic: sight.quadratic().map(Symbol::operand),
             radius: sight.radius.operand(),
@@ -60,7 +60,7 @@ impl Touch {
 
 impl<S: Scalar> Run<'_, S> {
     /// What a probe's reading is made of; none of any other subject.
-    pub(crate) fn sight(&self) -> Option<Sight<S>> {
+    pub(crate) fn sight(&self) -> Option<ProbeGeometry<S>> {
         match &self.subject {
             Subject::Station(Station::Probe(probe)) => {
                 Some(probe.sight(self.machine, &self.state, &self.errors, |slot| self.unknown(slot)))
@@ -71,8 +71,8 @@ impl<S: Scalar> Run<'_, S> {
 }
 
 /// The same with the six coordinates of stylus and step replaced.
-pub(crate) fn with_groups<S: Scalar>(sight: &Sight<S>, groups: &[S]) -> Sight<S> {
-    Sight {
+pub(crate) fn with_groups<S: Scalar>(sight: &ProbeGeometry<S>, groups: &[S]) -> ProbeGeometry<S> {
+    ProbeGeometry {
         stylus: Point(std::array::from_fn(|i| groups[i])),
         step: Point(std::array::from_fn(|i| groups[i + 3])),
         ..*sight

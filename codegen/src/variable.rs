@@ -2,7 +2,7 @@
 
 use abbe_model::axis::AxisKind;
 use abbe_model::component::{ErrorKind, ErrorName};
-use abbe_model::instrument::{InsideUnit, InstrumentUnknown};
+use abbe_model::instrument::{InstrumentUnknown, InternalUnit};
 
 use crate::effect::{Coefficient, Followed};
 
@@ -56,17 +56,17 @@ impl Variable {
     pub fn is_angle(&self) -> bool {
         match self {
             Variable::Length(_) | Variable::Driver(_) => false,
-            Variable::Coefficient(coefficient) => coefficient.component == Some(InsideUnit::Radian),
+            Variable::Coefficient(coefficient) => coefficient.component == Some(InternalUnit::Radian),
             Variable::Position { kind, .. } => *kind == AxisKind::Rotary,
             Variable::Error(name) => name.freedom.is_angle(),
-            Variable::Unknown(unknown) => unknown.unit == InsideUnit::Radian,
+            Variable::Unknown(unknown) => unknown.unit == InternalUnit::Radian,
         }
     }
 
     /// The unit that its values are in.
     pub fn unit(&self) -> &'static str {
         match self {
-            Variable::Unknown(unknown) if unknown.unit == InsideUnit::Ratio => "1",
+            Variable::Unknown(unknown) if unknown.unit == InternalUnit::Ratio => "1",
             Variable::Driver(followed) => followed.unit(),
             Variable::Coefficient(coefficient) => coefficient.unit(),
             _ if self.is_angle() => "rad",

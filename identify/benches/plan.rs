@@ -7,9 +7,9 @@ use std::hint::black_box;
 use std::path::Path;
 use std::time::Duration;
 
-use abbe_identify::plan::goal::Goal;
+use abbe_identify::plan::candidate_tests::CandidateTests;
+use abbe_identify::plan::criterion::Goal;
 use abbe_identify::plan::improve::{ImproveOptions, improve};
-use abbe_identify::plan::menu::Menu;
 use abbe_identify::plan::{PlanOptions, analyse, prepared, states};
 use abbe_model::session::Session;
 use abbe_model::session::read::{ReadOptions, session as read};
@@ -91,7 +91,7 @@ fn plans(criterion: &mut Criterion) {
         tests: 1,
         by_minute: false,
     };
-    let menu = Menu::default();
+    let menu = CandidateTests::default();
     let entries = improve(&problem, &menu, &next).expect("a proposal").menu_entries;
     group.bench_function(format!("improve/{entries} entries"), |bench| {
         bench.iter(|| improve(black_box(&problem), &menu, &next).expect("a proposal"));

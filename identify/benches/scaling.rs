@@ -7,7 +7,7 @@ use std::hint::black_box;
 use std::time::Instant;
 
 use abbe_identify::fit::prepare;
-use abbe_identify::trace::list::entries;
+use abbe_identify::trace::screening::entries;
 use abbe_identify::trace::{TraceOptions, trace};
 
 mod sessions;

@@ -105,7 +105,7 @@ pub fn of_fit(problem: &Problem<'_>, fit: &Fit) -> Compensation {
     let machine = &problem.session.machine;
     let list = &problem.parameters.list;
     for (j, parameter) in list.iter().enumerate() {
-        if parameter.role != Role::Error || !fit.rank.is_seen(j) {
+        if parameter.role != Role::Error || !fit.rank.is_identifiable(j) {
             continue;
         }
         match ErrorName::parse(&parameter.id) {
@@ -128,7 +128,7 @@ pub fn of_fit(problem: &Problem<'_>, fit: &Fit) -> Compensation {
                 coefficient,
             } = parameter.role
                 && of == index
-                && fit.rank.is_seen(j)
+                && fit.rank.is_identifiable(j)
             {
                 found[coefficient] = Some(j);
             }

@@ -25,7 +25,7 @@ const ON_THE_AXIS_MM: f64 = 1e-6;
 
 /// A vector, mm, in the frames in which it is looked at.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct View {
+pub struct DirectionFrame {
     /// In the frame that carries the sensors.
     pub sensors: [f64; 3],
     /// Along X, Y, Z of R.
@@ -36,18 +36,18 @@ pub struct View {
 
 /// One reading of a test in its views.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Viewed {
+pub struct DirectionComponents {
     /// What was read.
-    pub reading: View,
+    pub reading: DirectionFrame,
     /// What the fit leaves of it.
-    pub residual: View,
+    pub residual: DirectionFrame,
 }
 
 /// The views of every reading, test by test. Sensors are turned back by their directions and by the ω₁, φ₁, θ₁ that the fit finds.
 ///
 /// # Errors
 /// If the session's instrument is no R-test.
-pub fn views(problem: &Problem<'_>, fit: &Fit) -> Result<Vec<Vec<Viewed>>, IdentifyError> {
+pub fn views(problem: &Problem<'_>, fit: &Fit) -> Result<Vec<Vec<DirectionComponents>>, IdentifyError> {
     let machine = &problem.session.machine;
     let values = problem.slot_values(&fit.beta);
     let mut all = Vec::with_capacity(problem.tests.len());
@@ -68,7 +68,7 @@ pub fn views(problem: &Problem<'_>, fit: &Fit) -> Result<Vec<Vec<Viewed>>, Ident
                 let frames = Frames::at(machine, rtest, &state, turning);
                 let seen = |read: &[f64]| frames.view(rtest, &orientation, read);
                 let three = 3 * row..3 * row + 3;
-                Viewed {
+                DirectionComponents {
                     reading: seen(&readings.observed[three.clone()]),
                     residual: seen(&fit.residuals[number][three]),
                 }
@@ -134,7 +134,7 @@ impl Frames {
         }
     }
 
-    fn view(&self, rtest: &RTest<f64>, orientation: &Orientation<f64>, read: &[f64]) -> View {
+    fn view(&self, rtest: &RTest<f64>, orientation: &Orientation<f64>, read: &[f64]) -> DirectionFrame {
         let read = Vector3::from_row_slice(read);
         let nominal = match rtest.sensors {
             None => read,
@@ -146,7 +146,7 @@ impl Frames {
         };
         let sensors = orientation.to_machine(Point(nominal.into())).0;
         let wise = self.carrier * Vector3::from(sensors);
-        View {
+        DirectionFrame {
             sensors,
             wise: wise.into(),
             turning: self.turning.map(|rows| (rows * wise).into()),

@@ -2,7 +2,7 @@
 
 use abbe_model::chain::Machine;
 use abbe_model::effect::{Component, Driver, DriverSample, Effect, Shape};
-use abbe_model::instrument::InsideUnit;
+use abbe_model::instrument::InternalUnit;
 use abbe_model::sensitivity::TestModel;
 use abbe_model::session::readings::Readings;
 use abbe_model::session::{Session, Test};
@@ -144,12 +144,12 @@ pub fn component_slots(
 }
 
 /// The inside unit of a component.
-pub fn component_unit(session: &Session, component: &Component) -> Option<InsideUnit> {
+pub fn component_unit(session: &Session, component: &Component) -> Option<InternalUnit> {
     match component {
         Component::Axis(name) => Some(if name.freedom.is_angle() {
-            InsideUnit::Radian
+            InternalUnit::Radian
         } else {
-            InsideUnit::Millimetre
+            InternalUnit::Millimetre
         }),
         Component::Instrument { thing, coordinate } => session
             .instrument
@@ -166,7 +166,7 @@ pub fn coefficient_unit(session: &Session, effect: &Effect, k: usize) -> Unit {
     let Some(inside) = component_unit(session, &effect.component) else {
         return Unit {
             name: "ms".to_string(),
-            per_inside: 1e3,
+            display_per_internal: 1e3,
         };
     };
     let machine = &session.machine;

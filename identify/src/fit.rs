@@ -9,7 +9,7 @@ use std::collections::BTreeMap;
 
 use abbe_model::effect::{Effect, Shape};
 use abbe_model::session::Session;
-use abbe_model::session::limits::LEAST_UM;
+use abbe_model::session::limits::MIN_UM;
 use faer::Mat;
 use statrs::distribution::{ChiSquared, ContinuousCDF};
 
@@ -49,7 +49,7 @@ pub struct Fit {
 /// Guess of the noise from which iterations start where nothing is known: 1 µm.
 const FIRST_GUESS_MM: f64 = 1e-3;
 /// Least noise that is estimated: readings that repeat exactly, as computed ones do, are still rounded.
-const LEAST_NOISE_MM: f64 = LEAST_UM * 1e-3;
+const MIN_NOISE_MM: f64 = MIN_UM * 1e-3;
 /// How many times noise and outliers are found anew at most.
 const ROUNDS: usize = 6;
 /// Relative change of the noise from which on it is found.
@@ -58,14 +58,14 @@ const SETTLED: f64 = 1e-4;
 const BIRGE_SIGNIFICANCE: f64 = 1e-3;
 
 /// A session as a problem in the directions that are seen.
-struct SeenDirections<'p, 'a> {
+struct IdentifiableDirections<'p, 'a> {
     problem: &'p Problem<'a>,
     basis: &'p Mat<f64>,
     /// The last linearisation: the unknowns, and the triangles of the folds there.
     last: RefCell<(Vec<f64>, Vec<Triangle>)>,
 }
 
-impl SeenDirections<'_, '_> {
+impl IdentifiableDirections<'_, '_> {
     fn beta(&self, z: &[f64]) -> Vec<f64> {
         (0..self.basis.nrows())
             .map(|j| (0..z.len()).map(|k| self.basis[(j, k)] * z[k]).sum())
@@ -73,7 +73,7 @@ impl SeenDirections<'_, '_> {
     }
 }
 
-impl LeastSquares for SeenDirections<'_, '_> {
+impl LeastSquares for IdentifiableDirections<'_, '_> {
     fn unknowns(&self) -> usize {
         self.basis.ncols()
     }
@@ -145,14 +145,14 @@ pub fn prepare_with<'a>(
     }
     if stated.is_none() {
         problem.noise = Noise::white(
-            nominal_residual_mm(&problem)?.max(floor).max(LEAST_NOISE_MM),
+            nominal_residual_mm(&problem)?.max(floor).max(MIN_NOISE_MM),
             NoiseSource::Residual,
         );
     }
     let mut fit = plausibility::checked(&problem, fit(&problem, None))?;
     // Noise and outliers follow from residuals, residuals from a fit; a few rounds settle both. What is returned is always a fit with the noise returned.
     for _ in 0..ROUNDS {
-        let rejected = crate::outliers::wild(&problem, &fit);
+        let rejected = crate::outliers::reject(&problem, &fit);
         let unchanged = rejected == problem.rejected;
         problem.rejected = rejected;
         let noise = match stated {
@@ -196,12 +196,12 @@ fn estimated_noise(problem: &Problem<'_>, fit: &Fit, floor: f64) -> Noise {
         !problem.rejected[test][row]
     });
     if let Some(sigma) = pure.sigma_mm() {
-        return Noise::white(sigma.max(floor).max(LEAST_NOISE_MM), NoiseSource::Repeats);
+        return Noise::white(sigma.max(floor).max(MIN_NOISE_MM), NoiseSource::Repeats);
     }
     let count = (problem.readings() * problem.coordinates()) as f64;
     let freedom = (count - fit.rank.seen.ncols() as f64).max(1.0);
     let sigma = rms_mm(problem, &fit.residuals) * (count / freedom).sqrt();
-    Noise::white(sigma.max(floor).max(LEAST_NOISE_MM), NoiseSource::Residual)
+    Noise::white(sigma.max(floor).max(MIN_NOISE_MM), NoiseSource::Residual)
 }
 
 /// Fits a problem, from the nominal machine or from an earlier fit's unknowns.
@@ -224,7 +224,7 @@ pub fn fit(problem: &Problem<'_>, start: Option<&[f64]>) -> Result<Fit, Identify
         &size,
         &preference,
     )?;
-    let seen = SeenDirections {
+    let seen = IdentifiableDirections {
         problem,
         basis: &rank.seen,
         last: RefCell::new((nominal, triangles)),
@@ -376,13 +376,13 @@ pub(crate) fn quantities(problem: &Problem<'_>, rank: &Rank) -> Vec<Quantity> {
         {
             let effect = &problem.parameters.effects[effect];
             let pair = matches!(effect.shape, Shape::Harmonic { .. } | Shape::Periodic { .. });
-            if pair && rank.is_seen(j) && rank.is_seen(j + 1) {
+            if pair && rank.is_identifiable(j) && rank.is_identifiable(j + 1) {
                 quantities.push(Quantity::Harmonic(j));
                 j += 2;
                 continue;
             }
         }
-        if rank.is_seen(j) {
+        if rank.is_identifiable(j) {
             quantities.push(Quantity::Unknown(j));
         }
         j += 1;
@@ -402,9 +402,9 @@ pub(crate) fn values_at(
     let list = &problem.parameters.list;
     for quantity in quantities {
         match *quantity {
-            Quantity::Unknown(j) => put(beta[j] * list[j].unit.per_inside),
+            Quantity::Unknown(j) => put(beta[j] * list[j].unit.display_per_internal),
             Quantity::Harmonic(j) => {
-                put(beta[j].hypot(beta[j + 1]) * list[j].unit.per_inside);
+                put(beta[j].hypot(beta[j + 1]) * list[j].unit.display_per_internal);
                 let (a, b) = (fit.beta[j], fit.beta[j + 1]);
                 let off = (b * beta[j] - a * beta[j + 1]).atan2(a * beta[j] + b * beta[j + 1]);
                 put(((-b).atan2(a) + off).to_degrees());
@@ -423,8 +423,8 @@ pub fn parameters(problem: &Problem<'_>, fit: &Fit) -> Vec<ParameterResult> {
             Quantity::Harmonic(j) => results.extend(amplitude_and_phase(problem, fit, j)),
             Quantity::Unknown(j) => results.push(ParameterResult {
                 id: list[j].id.clone(),
-                value: fit.beta[j] * list[j].unit.per_inside,
-                u: u_inside(j) * list[j].unit.per_inside,
+                value: fit.beta[j] * list[j].unit.display_per_internal,
+                u: u_inside(j) * list[j].unit.display_per_internal,
                 unit: list[j].unit.name.clone(),
             }),
         }
@@ -455,8 +455,8 @@ fn amplitude_and_phase(problem: &Problem<'_>, fit: &Fit, j: usize) -> [Parameter
     [
         ParameterResult {
             id: format!("{id}.amplitude"),
-            value: amplitude * unit.per_inside,
-            u: along.max(0.0).sqrt() * unit.per_inside,
+            value: amplitude * unit.display_per_internal,
+            u: along.max(0.0).sqrt() * unit.display_per_internal,
             unit: unit.name.clone(),
         },
         ParameterResult {
@@ -483,7 +483,7 @@ pub fn unobservable(problem: &Problem<'_>, rank: &Rank) -> Vec<Unobservable> {
             let others = (0..row.len()).filter(|j| j != pivot && row[*j] != 0.0);
             let outside: Vec<(usize, f64)> = std::iter::once(*pivot)
                 .chain(others)
-                .map(|j| (j, row[j] * list[j].size * list[j].unit.per_inside))
+                .map(|j| (j, row[j] * list[j].size * list[j].unit.display_per_internal))
                 .collect();
             let leading = outside.first().map_or(1.0, |(_, value)| *value);
             let combination: BTreeMap<String, f64> = outside

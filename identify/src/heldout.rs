@@ -96,7 +96,7 @@ pub fn held_out(
 }
 
 /// What the others have to see of a direction, as a share of what all readings see of it, for the fit of all to lead to theirs.
-const LEAST_SHARE: f64 = 1e-6;
+const MIN_SHARE: f64 = 1e-6;
 
 /// The seen directions, in which the normal matrix of all readings is the identity.
 struct Directions {
@@ -155,7 +155,7 @@ impl Directions {
             .iter()
             .map(|share| 1.0 - share)
             .collect();
-        if shares.iter().any(|share| *share < LEAST_SHARE) {
+        if shares.iter().any(|share| *share < MIN_SHARE) {
             return Ok(None);
         }
         let mut along = eigen.U().transpose() * (&t * &asked);

@@ -44,7 +44,7 @@ pub struct Solution {
     pub iterations: usize,
 }
 
-const MOST_ITERATIONS: usize = 200;
+const MAX_ITERATIONS: usize = 200;
 const SMALLEST_RELATIVE_STEP: f64 = 1e-12;
 /// A step below this does not bend the model: the square of it is below rounding.
 const STRAIGHT_RELATIVE_STEP: f64 = 1e-7;
@@ -69,7 +69,7 @@ pub fn minimise(
     };
     let mut damping = 0.0;
     let mut step_before = 1.0;
-    for iteration in 1..=MOST_ITERATIONS {
+    for iteration in 1..=MAX_ITERATIONS {
         let (r, c, _) = triangle.parts();
         if let Scaling::Columns = scaling {
             for j in 0..n {
@@ -188,7 +188,7 @@ pub fn minimise(
         }
     }
     Err(IdentifyError::NoConvergence {
-        iterations: MOST_ITERATIONS,
+        iterations: MAX_ITERATIONS,
         sum_of_squares: current,
     })
 }

@@ -14,13 +14,13 @@ use crate::problem::Problem;
 /// Neighbours on either side that the median is taken of.
 const NEIGHBOURS: usize = 5;
 /// How many robust standard deviations make a reading wild along a run: expected once in 10⁷ Gaussian readings.
-const WILD_ALONG_RUN: f64 = 5.3;
+const OUTLIER_ALONG_RUN: f64 = 5.3;
 /// How many times the median length of the residual makes a pose wild: once in 10⁹ if the three coordinates are Gaussian, and far beyond what
 /// unmodelled structure, which is bounded, was seen to reach.
-const WILD_POSE: f64 = 5.0;
+const OUTLIER_POSE: f64 = 5.0;
 
 /// Which readings of the problem are wild, by test and row.
-pub fn wild(problem: &Problem<'_>, fit: &Fit) -> Vec<Vec<bool>> {
+pub fn reject(problem: &Problem<'_>, fit: &Fit) -> Vec<Vec<bool>> {
     let coordinates = problem.coordinates();
     if problem.folds.kind == FoldKind::Poses {
         let lengths: Vec<Vec<f64>> = fit
@@ -34,7 +34,7 @@ pub fn wild(problem: &Problem<'_>, fit: &Fit) -> Vec<Vec<bool>> {
             })
             .collect();
         let mut all: Vec<f64> = lengths.iter().flatten().copied().collect();
-        let limit = WILD_POSE * median(&mut all);
+        let limit = OUTLIER_POSE * median(&mut all);
         return lengths
             .iter()
             .map(|test| test.iter().map(|length| *length > limit).collect())
@@ -45,14 +45,14 @@ pub fn wild(problem: &Problem<'_>, fit: &Fit) -> Vec<Vec<bool>> {
         .par_iter()
         .zip(&fit.residuals)
         .map(|(test, residual)| match &test.readings {
-            Some(readings) => wild_along_runs(readings, residual, coordinates, problem.noise.sigma_mm),
+            Some(readings) => reject_along_runs(readings, residual, coordinates, problem.noise.sigma_mm),
             None => Vec::new(),
         })
         .collect()
 }
 
-fn wild_along_runs(readings: &Readings, residual: &[f64], coordinates: usize, sigma_mm: f64) -> Vec<bool> {
-    let mut wild = vec![false; readings.rows()];
+fn reject_along_runs(readings: &Readings, residual: &[f64], coordinates: usize, sigma_mm: f64) -> Vec<bool> {
+    let mut reject = vec![false; readings.rows()];
     for run in readings.runs() {
         if run.len() < 2 * NEIGHBOURS + 1 {
             continue;
@@ -84,11 +84,11 @@ fn wild_along_runs(readings: &Readings, residual: &[f64], coordinates: usize, si
             // 1.4826: the standard deviation of a Gaussian in median absolute deviations.
             let spread = (1.4826 * median(&mut sizes)).max(sigma_mm);
             for (row, deviation) in run.clone().zip(&deviations) {
-                wild[row] |= deviation.abs() > WILD_ALONG_RUN * spread;
+                reject[row] |= deviation.abs() > OUTLIER_ALONG_RUN * spread;
             }
         }
     }
-    wild
+    reject
 }
 
 /// The median of five: that of the fifth and of the two of the first four that are neither their least nor their greatest.

@@ -4,7 +4,7 @@ use std::collections::BTreeSet;
 use std::sync::Arc;
 
 use abbe_model::effect::{Component, Driver, Effect};
-use abbe_model::instrument::InsideUnit;
+use abbe_model::instrument::InternalUnit;
 use abbe_model::sensitivity::{SlotValues, TestModel};
 use abbe_model::session::{Prior, Session, Test};
 
@@ -56,7 +56,7 @@ pub struct Part {
 
 /// What moves the readings of one test: a test of many has few of the session's unknowns.
 #[derive(Clone, Debug, Default)]
-pub struct Own {
+pub struct InstrumentParameter {
     /// The slots that some unknown moves.
     pub slots: Vec<usize>,
     /// The unknowns.
@@ -65,9 +65,9 @@ pub struct Own {
     pub movers: Vec<Vec<(usize, Option<Arc<Vec<f64>>>)>>,
 }
 
-impl Own {
+impl InstrumentParameter {
     /// From what moves what in the test.
-    pub fn of(parts: &[Part]) -> Own {
+    pub fn of(parts: &[Part]) -> InstrumentParameter {
         let sorted = |numbers: &mut dyn Iterator<Item = usize>| {
             let numbers: BTreeSet<usize> = numbers.collect();
             numbers.into_iter().collect::<Vec<usize>>()
@@ -80,7 +80,7 @@ impl Own {
             let unknown = unknowns.partition_point(|unknown| *unknown < part.parameter);
             movers[slot].push((unknown, part.basis.clone()));
         }
-        Own {
+        InstrumentParameter {
             slots,
             unknowns,
             movers,
@@ -102,11 +102,11 @@ pub struct Parameters {
 }
 
 /// The physical size of a component.
-pub fn physical_size(unit: InsideUnit) -> f64 {
+pub fn physical_size(unit: InternalUnit) -> f64 {
     match unit {
-        InsideUnit::Millimetre => 1.0,
-        InsideUnit::Radian => 0.01,
-        InsideUnit::Ratio => 0.01,
+        InternalUnit::Millimetre => 1.0,
+        InternalUnit::Radian => 0.01,
+        InternalUnit::Ratio => 0.01,
     }
 }
 
@@ -133,9 +133,9 @@ impl Parameters {
                 )));
             };
             let unit = if name.freedom.is_angle() {
-                InsideUnit::Radian
+                InternalUnit::Radian
             } else {
-                InsideUnit::Millimetre
+                InternalUnit::Millimetre
             };
             let index = parameters.push(Parameter {
                 id,

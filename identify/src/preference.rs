@@ -44,7 +44,7 @@ pub fn natural(id: &str) -> Vec<(u64, String)> {
 
 #[cfg(test)]
 mod tests {
-    use abbe_model::instrument::InsideUnit;
+    use abbe_model::instrument::InternalUnit;
     use abbe_model::session::Prior;
 
     use super::*;
@@ -54,7 +54,7 @@ mod tests {
     fn pivots_are_preferred_by_kind_and_name_and_not_by_declaration() {
         let parameter = |id: &str, role: Role| Parameter {
             id: id.to_string(),
-            unit: Unit::of(InsideUnit::Millimetre),
+            unit: Unit::of(InternalUnit::Millimetre),
             size: 1.0,
             prior: Prior::Free,
             role,

@@ -20,7 +20,7 @@ use crate::drivers::Origin;
 use crate::error::IdentifyError;
 use crate::heldout::Folds;
 use crate::noise::Noise;
-use crate::parameters::{Own, Parameters};
+use crate::parameters::{InstrumentParameter, Parameters};
 use crate::triangle::{BLOCK_ROWS, Triangle};
 
 /// A session with readings, its unknowns, and how its readings are weighted.
@@ -43,7 +43,7 @@ pub struct Problem<'a> {
     /// Which readings are left out together when the model is judged.
     pub folds: Folds,
     /// What moves the readings of each test.
-    own: Vec<Own>,
+    own: Vec<InstrumentParameter>,
 }
 
 /// Consecutive rows of one run of one test.
@@ -61,7 +61,7 @@ type Narrow = BTreeMap<(usize, usize), Triangle>;
 /// Mean number of readings below which runs are not evaluated one by one.
 const SHORT_RUN: usize = 8;
 /// How many blocks one thread takes at a time.
-const BLOCKS_A_STRETCH: usize = 16;
+const BLOCKS_PER_SEGMENT: usize = 16;
 
 impl<'a> Problem<'a> {
     /// From a session, with its declared unknowns and effects.
@@ -120,7 +120,12 @@ impl<'a> Problem<'a> {
     }
 
     fn update_own(&mut self) {
-        self.own = self.parameters.parts.iter().map(|parts| Own::of(parts)).collect();
+        self.own = self
+            .parameters
+            .parts
+            .iter()
+            .map(|parts| InstrumentParameter::of(parts))
+            .collect();
     }
 
     /// Number of readings that count.
@@ -321,7 +326,7 @@ impl<'a> Problem<'a> {
     pub fn triangles(&self, beta: &[f64]) -> Result<Vec<Triangle>, IdentifyError> {
         let values = self.slot_values(beta);
         // Stretches of fixed length, so that the sums do not depend on the number of threads.
-        let stretches: Vec<Narrow> = (self.blocks().par_chunks(BLOCKS_A_STRETCH))
+        let stretches: Vec<Narrow> = (self.blocks().par_chunks(BLOCKS_PER_SEGMENT))
             .map(|blocks| self.narrow_triangles(&values, blocks))
             .collect::<Result<_, IdentifyError>>()?;
         let mut narrow = Narrow::new();

@@ -25,7 +25,7 @@ use crate::triangle::{BLOCK_ROWS, Triangle};
 /// Steps with the fit's own curvature before a draw is fitted with its own.
 const FEW_STEPS: usize = 8;
 /// Expected fall of the sum of squares below which a draw's fit is at its end: a hundredth of a standard uncertainty.
-const SMALLEST_FALL: f64 = 1e-4;
+const MIN_DECREASE: f64 = 1e-4;
 
 /// From the inputs' deviations to what the fit reports.
 struct Refit<'p, 'a> {
@@ -110,7 +110,7 @@ impl<'p, 'a> Refit<'p, 'a> {
                 .collect();
             let fall: f64 = step.iter().zip(&descent).map(|(s, d)| s * d).sum();
             z.iter_mut().zip(&step).for_each(|(z, step)| *z += step);
-            if fall < SMALLEST_FALL {
+            if fall < MIN_DECREASE {
                 return Ok(z);
             }
             if !fall.is_finite() {

@@ -100,7 +100,8 @@ impl Given {
     /// # Errors
     /// If the two units measure different things.
     pub fn inside(&self, unit: &Unit) -> Result<f64, IdentifyError> {
-        self.in_unit(&unit.name).map(|value| value / unit.per_inside)
+        self.in_unit(&unit.name)
+            .map(|value| value / unit.display_per_internal)
     }
 
     /// The value in another unit.

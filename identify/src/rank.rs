@@ -14,7 +14,7 @@ use faer::{Mat, MatRef};
 use crate::error::IdentifyError;
 
 /// Singular value, in standard deviations a physical size, below which a direction is not identifiable.
-pub const LEAST_SEEN: f64 = 1.0;
+pub const MIN_IDENTIFIABLE: f64 = 1.0;
 
 /// The identifiable and the null directions of a problem.
 #[derive(Clone, Debug)]
@@ -55,11 +55,11 @@ impl Rank {
         let rounding = singular_values[0] * 1e-13 * n as f64;
         let rank = singular_values
             .iter()
-            .filter(|s| **s >= LEAST_SEEN && **s > rounding)
+            .filter(|s| **s >= MIN_IDENTIFIABLE && **s > rounding)
             .count();
         let v = svd.V();
         let null_space = Mat::from_fn(n, n - rank, |j, k| v[(j, rank + k)]);
-        let (unseen, pivots) = combinations(null_space.as_ref(), scaled.as_ref(), preference, LEAST_PIVOT);
+        let (unseen, pivots) = combinations(null_space.as_ref(), scaled.as_ref(), preference, MIN_PIVOT);
         // Full rank: the parameters themselves, so that nothing is mixed.
         let seen = if rank == n {
             Mat::from_fn(n, n, |i, j| if i == j { size[i] } else { 0.0 })
@@ -89,7 +89,7 @@ impl Rank {
     }
 
     /// Whether a parameter takes part in no null-space combination.
-    pub fn is_seen(&self, unknown: usize) -> bool {
+    pub fn is_identifiable(&self, unknown: usize) -> bool {
         self.unseen.iter().all(|row| row[unknown] == 0.0)
     }
 }
@@ -124,7 +124,7 @@ fn prune(row: &mut [f64], pivot: usize, scaled: MatRef<'_, f64>, preference: &[u
         change.sqrt() / row.iter().map(|v| v * v).sum::<f64>().sqrt()
     };
     // What is named is an approximate direction; twice the limit still drowns.
-    let limit = 2.0 * signal(row).max(LEAST_SEEN);
+    let limit = 2.0 * signal(row).max(MIN_IDENTIFIABLE);
     let largest = row.iter().fold(0.0_f64, |most, value| most.max(value.abs()));
     let mut order: Vec<usize> = preference
         .iter()
@@ -156,7 +156,7 @@ const NEGLIGIBLE: f64 = 1e-5;
 /// A parameter is a pivot if its part in the null space that the pivots before it have left is at least this share of the largest such part. The share is
 /// large enough for the elimination to be stable, and no round ratio of lengths: parts of a geometry stated in round numbers are equal to it by no
 /// coincidence, so that rounding cannot decide.
-pub const LEAST_PIVOT: f64 = 0.0937;
+pub const MIN_PIVOT: f64 = 0.0937;
 
 /// The reduced row echelon form of a space, and the pivot of each row, in the order of preference; a row has 1 at its own pivot, 0 at the others, and 0 where
 /// rounding is all there is. `space` holds orthonormal columns (parameters × dimension). The form is the same for every such basis of one space: the part
@@ -279,7 +279,7 @@ mod tests {
             for (angle, other) in [(0.0, 0.0), (0.3, 1.1), (2.0, -0.7), (std::f64::consts::PI, 0.5)] {
                 let basis = rotated(&rotated(&space, 0, 1, angle), 1, 2, other);
                 let noisy = Mat::from_fn(5, 3, |i, k| basis[(i, k)] + 1e-11 * ((7 * i + 3 * k) % 5) as f64);
-                let (rows, pivots) = echelon(noisy.as_ref(), &preference, LEAST_PIVOT);
+                let (rows, pivots) = echelon(noisy.as_ref(), &preference, MIN_PIVOT);
                 assert_eq!(pivots, wanted.iter().map(|(pivot, _)| *pivot).collect::<Vec<_>>());
                 for (row, (_, wanted)) in rows.iter().zip(&wanted) {
                     for (value, wanted) in row.iter().zip(wanted) {

@@ -65,7 +65,7 @@ pub struct Repeated {
     /// Parameter by parameter.
     pub parameters: Vec<RepeatedParameter>,
     /// Sessions that are off the others by more than the fits' uncertainties explain, the clearest first.
-    pub deviating: Vec<Deviating>,
+    pub deviating: Vec<DeviatingSession>,
 }
 
 /// One parameter over the sessions, in `unit`.
@@ -109,7 +109,7 @@ pub enum Scatter {
 
 /// A session that is off the mean of the others.
 #[derive(Clone, Debug, PartialEq, Serialize)]
-pub struct Deviating {
+pub struct DeviatingSession {
     /// The session's file.
     pub session: String,
     /// The parameter.
@@ -158,8 +158,8 @@ pub fn compare(sessions: &[Session]) -> Result<Repeated, IdentifyError> {
             .push(over_sessions(parameter, &values, SIGNIFICANCE / count));
         if sessions.len() > 2 {
             let significance = SIGNIFICANCE / (count * sessions.len() as f64);
-            for (k, by, u, p_value) in off_the_others(&values, significance) {
-                result.deviating.push(Deviating {
+            for (k, by, u, p_value) in deviating_from_others(&values, significance) {
+                result.deviating.push(DeviatingSession {
                     session: sessions[k].name.clone(),
                     id: parameter.id.clone(),
                     by,
@@ -170,7 +170,7 @@ pub fn compare(sessions: &[Session]) -> Result<Repeated, IdentifyError> {
             }
         }
     }
-    let sigma = |deviating: &Deviating| (deviating.by / deviating.u).abs();
+    let sigma = |deviating: &DeviatingSession| (deviating.by / deviating.u).abs();
     result.deviating.sort_by(|a, b| sigma(b).total_cmp(&sigma(a)));
     Ok(result)
 }
@@ -256,7 +256,7 @@ fn over_sessions(parameter: &ParameterResult, values: &[(f64, f64)], significanc
 
 /// The values that are off the mean of the rest, the clearest taken out before the next is looked for: place, by how much, with what standard
 /// uncertainty, with what probability.
-fn off_the_others(values: &[(f64, f64)], significance: f64) -> Vec<(usize, f64, f64, f64)> {
+fn deviating_from_others(values: &[(f64, f64)], significance: f64) -> Vec<(usize, f64, f64, f64)> {
     let normal = Normal::standard();
     let mut rest: Vec<usize> = (0..values.len()).collect();
     let mut found = Vec::new();

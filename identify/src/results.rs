@@ -329,7 +329,7 @@ pub struct Remainder {
 
 /// A parameter that moved by more than its uncertainty between before and after.
 #[derive(Clone, Debug, PartialEq, Serialize, JsonSchema)]
-pub struct Moved {
+pub struct ChangedParameter {
     /// The parameter.
     pub id: String,
     /// After less before.
@@ -353,7 +353,7 @@ pub struct TraceResult {
     /// model with its effects, which holds what that model lacks beside noise.
     pub noise_source: String,
     /// Autoregressive coefficients of the noise along a run; empty for white noise.
-    pub noise_memory: Vec<f64>,
+    pub noise_ar_coefficients: Vec<f64>,
     /// Number of readings that count.
     pub readings: usize,
     /// What is left out at a time for the held-out figures.
@@ -373,7 +373,7 @@ pub struct TraceResult {
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub rejected_candidates: Vec<RejectedCandidate>,
     /// Parameters that moved by more than their uncertainty: that was the bias.
-    pub moved: Vec<Moved>,
+    pub moved: Vec<ChangedParameter>,
     /// How many candidates were looked for, and how many of them these readings can see.
     pub candidates: usize,
     /// See `candidates`.

@@ -159,7 +159,11 @@ pub fn simulate(session: &Session, simulation: &Simulation) -> Result<Simulated,
         .filter(|(_, value)| **value != 0.0)
         .map(|(parameter, value)| {
             let unit = &parameter.unit;
-            (parameter.id.clone(), value * unit.per_inside, unit.name.clone())
+            (
+                parameter.id.clone(),
+                value * unit.display_per_internal,
+                unit.name.clone(),
+            )
         })
         .collect();
     Ok(Simulated {

@@ -2,7 +2,7 @@
 
 use abbe_model::axis::AxisKind;
 use abbe_model::effect::{Driver, Shape};
-use abbe_model::instrument::InsideUnit;
+use abbe_model::instrument::InternalUnit;
 
 /// A unit that results are reported in.
 #[derive(Clone, Debug, PartialEq)]
@@ -10,7 +10,7 @@ pub struct Unit {
     /// As it stands in results: `um`, `arcsec`, `um/h`.
     pub name: String,
     /// How many of it make one inside unit (mm, rad, …).
-    pub per_inside: f64,
+    pub display_per_internal: f64,
 }
 
 /// Arcseconds in a radian.
@@ -18,15 +18,15 @@ pub const ARCSEC: f64 = 180.0 * 3600.0 / std::f64::consts::PI;
 
 impl Unit {
     /// The unit of a component.
-    pub fn of(inside: InsideUnit) -> Unit {
-        let (name, per_inside) = match inside {
-            InsideUnit::Millimetre => ("um", 1e3),
-            InsideUnit::Radian => ("arcsec", ARCSEC),
-            InsideUnit::Ratio => ("um/m", 1e6),
+    pub fn of(inside: InternalUnit) -> Unit {
+        let (name, display_per_internal) = match inside {
+            InternalUnit::Millimetre => ("um", 1e3),
+            InternalUnit::Radian => ("arcsec", ARCSEC),
+            InternalUnit::Ratio => ("um/m", 1e6),
         };
         Unit {
             name: name.to_string(),
-            per_inside,
+            display_per_internal,
         }
     }
 
@@ -39,7 +39,7 @@ impl Unit {
     /// | polynomial, power over temperature or gravity at their scale of 1 K, 1 m | µm/K, µm/K², …; µm/m, µm/m², … |
     /// | every other | µm: the value where the basis function is 1, as at the scale of a polynomial |
     pub fn of_coefficient(
-        component: InsideUnit,
+        component: InternalUnit,
         driver: &Driver,
         driver_axis: Option<AxisKind>,
         shape: &Shape,
@@ -48,7 +48,7 @@ impl Unit {
         let plain = Unit::of(component);
         let per = |what: &str| Unit {
             name: format!("{}/{what}", plain.name),
-            per_inside: plain.per_inside,
+            display_per_internal: plain.display_per_internal,
         };
         let per_power = |what: &str, degree: usize| match degree {
             1 => per(what),
@@ -61,10 +61,10 @@ impl Unit {
         };
         match (shape, driver, degree) {
             (Shape::Lag, ..) => match (component, driver_axis) {
-                (InsideUnit::Millimetre, Some(AxisKind::Linear))
-                | (InsideUnit::Radian, Some(AxisKind::Rotary)) => Unit {
+                (InternalUnit::Millimetre, Some(AxisKind::Linear))
+                | (InternalUnit::Radian, Some(AxisKind::Rotary)) => Unit {
                     name: "ms".to_string(),
-                    per_inside: 1e3,
+                    display_per_internal: 1e3,
                 },
                 (_, Some(AxisKind::Linear)) => per("(mm/s)"),
                 _ => per("(rad/s)"),
@@ -83,7 +83,7 @@ mod tests {
 
     #[test]
     fn every_shape_over_every_driver_has_the_unit_of_its_basis() {
-        use InsideUnit::{Millimetre, Radian, Ratio};
+        use InternalUnit::{Millimetre, Radian, Ratio};
         let axis = |name: &str| Driver::Axis(name.to_string());
         let name = |component, driver: &Driver, kind, shape: &Shape, k| {
             Unit::of_coefficient(component, driver, kind, shape, k).name

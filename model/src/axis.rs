@@ -1,6 +1,6 @@
 //! One axis of a machine: what turns or slides, about or along which line.
 
-use crate::frames::{Coordinate, Point, Turn, cross_nominal, turn_about_nominal};
+use crate::frames::{Coordinate, Point, SinCos, cross_nominal, turn_about_nominal};
 use crate::scalar::{Nominal, Scalar};
 
 /// Whether an axis slides or turns.
@@ -104,10 +104,10 @@ impl Axis {
 
     /// `Rot(d, q) · point`, for a point given from the axis' origin.
     #[inline(always)]
-    pub fn rotate<S: Scalar>(&self, turn: Turn<S::Nominal>, point: Point<S>) -> Point<S> {
+    pub fn rotate<S: Scalar>(&self, turn: SinCos<S::Nominal>, point: Point<S>) -> Point<S> {
         if let Some((coordinate, sign)) = self.principal() {
             let sin = if sign > 0.0 { turn.sin } else { -turn.sin };
-            return turn_about_nominal(coordinate, Turn { sin, cos: turn.cos }, point);
+            return turn_about_nominal(coordinate, SinCos { sin, cos: turn.cos }, point);
         }
         // Rodrigues: p cos q + (d × p) sin q + d (d·p)(1 − cos q).
         let [dx, dy, dz] = self.direction.map(S::Nominal::constant);

@@ -14,7 +14,7 @@ use crate::axis::{Axis, AxisKind};
 use crate::code::StructuralCode;
 use crate::component::{ErrorKind, ErrorName};
 use crate::error::ModelError;
-use crate::frames::{Point, Rotation, SmallMotion, Turn, cross_nominal};
+use crate::frames::{Point, Rotation, SinCos, SmallMotion, cross_nominal};
 use crate::scalar::{Nominal, Scalar};
 
 /// Errors an axis can have: six location errors, then six error motions.
@@ -41,15 +41,15 @@ pub struct AxisPosition<N> {
     /// mm or radians.
     pub value: N,
     /// Sine and cosine of a rotary axis; of no meaning for a linear one.
-    pub turn: Turn<N>,
+    pub turn: SinCos<N>,
 }
 
 impl<N: Nominal> AxisPosition<N> {
     /// The position of an axis of this kind.
     pub fn new(kind: AxisKind, value: N) -> Self {
         let turn = match kind {
-            AxisKind::Rotary => Turn::by(value),
-            AxisKind::Linear => Turn {
+            AxisKind::Rotary => SinCos::by(value),
+            AxisKind::Linear => SinCos {
                 sin: N::constant(0.0),
                 cos: N::constant(1.0),
             },
@@ -390,7 +390,7 @@ fn pull<S: Scalar>(
         point = motion.pull(point);
     }
     if axis.kind == AxisKind::Rotary {
-        let back = Turn {
+        let back = SinCos {
             sin: -position.turn.sin,
             cos: position.turn.cos,
         };

@@ -5,7 +5,7 @@
 use crate::error::ModelError;
 
 /// Most axes of a chain.
-const MOST_AXES: usize = 64;
+const MAX_AXES: usize = 64;
 
 /// The axes of a structural code, as written.
 ///
@@ -53,9 +53,9 @@ impl StructuralCode {
         if beds != 1 {
             return Err(fault(format!("it holds {beds} beds `b` where one is needed")));
         }
-        if between.len() > MOST_AXES {
+        if between.len() > MAX_AXES {
             return Err(fault(format!(
-                "{} bodies; {MOST_AXES} axes are the most",
+                "{} bodies; {MAX_AXES} axes are the most",
                 between.len()
             )));
         }

@@ -73,18 +73,18 @@ impl Coordinate {
 
 /// Sine and cosine of an angle, taken once and used often.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Turn<S> {
+pub struct SinCos<S> {
     /// The sine.
     pub sin: S,
     /// The cosine.
     pub cos: S,
 }
 
-impl<N: Nominal> Turn<N> {
+impl<N: Nominal> SinCos<N> {
     /// The turn by a nominal angle in radians.
     pub fn by(angle_rad: N) -> Self {
         let (sin, cos) = angle_rad.sin_cos();
-        Turn { sin, cos }
+        SinCos { sin, cos }
     }
 }
 
@@ -103,12 +103,12 @@ pub enum Rotation {
 #[derive(Clone, Copy, Debug)]
 pub struct SmallMotion<S> {
     translation: Point<S>,
-    form: SmallTurns<S>,
+    form: SmallAngles<S>,
 }
 
 #[derive(Clone, Copy, Debug)]
-enum SmallTurns<S> {
-    Exact([Turn<S>; 3]),
+enum SmallAngles<S> {
+    Exact([SinCos<S>; 3]),
     SmallAngle([S; 3]),
 }
 
@@ -117,11 +117,11 @@ impl<S: Scalar> SmallMotion<S> {
     pub fn new(six: [S; 6], rotation: Rotation) -> Self {
         let [x, y, z, a, b, c] = six;
         let form = match rotation {
-            Rotation::Exact => SmallTurns::Exact([a, b, c].map(|angle| {
+            Rotation::Exact => SmallAngles::Exact([a, b, c].map(|angle| {
                 let (sin, cos) = angle.sin_cos();
-                Turn { sin, cos }
+                SinCos { sin, cos }
             })),
-            Rotation::SmallAngle => SmallTurns::SmallAngle([a, b, c]),
+            Rotation::SmallAngle => SmallAngles::SmallAngle([a, b, c]),
         };
         SmallMotion {
             translation: Point([x, y, z]),
@@ -139,12 +139,12 @@ impl<S: Scalar> SmallMotion<S> {
     #[inline(always)]
     pub fn rotate(&self, direction: Point<S>) -> Point<S> {
         match &self.form {
-            SmallTurns::Exact([a, b, c]) => {
+            SmallAngles::Exact([a, b, c]) => {
                 let about_z = turn_about(Coordinate::Z, *c, direction);
                 let about_y = turn_about(Coordinate::Y, *b, about_z);
                 turn_about(Coordinate::X, *a, about_y)
             }
-            SmallTurns::SmallAngle(angles) => direction.plus(cross(*angles, direction)),
+            SmallAngles::SmallAngle(angles) => direction.plus(cross(*angles, direction)),
         }
     }
 
@@ -157,17 +157,17 @@ impl<S: Scalar> SmallMotion<S> {
     /// The inverse of [`SmallMotion::rotate`].
     #[inline(always)]
     pub fn rotate_back(&self, direction: Point<S>) -> Point<S> {
-        let back = |turn: &Turn<S>| Turn {
+        let back = |turn: &SinCos<S>| SinCos {
             sin: -turn.sin,
             cos: turn.cos,
         };
         match &self.form {
-            SmallTurns::Exact([a, b, c]) => {
+            SmallAngles::Exact([a, b, c]) => {
                 let about_x = turn_about(Coordinate::X, back(a), direction);
                 let about_y = turn_about(Coordinate::Y, back(b), about_x);
                 turn_about(Coordinate::Z, back(c), about_y)
             }
-            SmallTurns::SmallAngle(angles) => direction.minus(cross(*angles, direction)),
+            SmallAngles::SmallAngle(angles) => direction.minus(cross(*angles, direction)),
         }
     }
 }
@@ -197,7 +197,7 @@ pub fn cross_nominal<S: Scalar>(omega: [S; 3], direction: [f64; 3]) -> Point<S> 
 
 /// A turn about a coordinate axis by an error angle.
 #[inline(always)]
-pub fn turn_about<S: Scalar>(axis: Coordinate, turn: Turn<S>, point: Point<S>) -> Point<S> {
+pub fn turn_about<S: Scalar>(axis: Coordinate, turn: SinCos<S>, point: Point<S>) -> Point<S> {
     let (first, second) = axis.others();
     let (u, v) = (point.0[first], point.0[second]);
     let mut turned = point;
@@ -208,7 +208,11 @@ pub fn turn_about<S: Scalar>(axis: Coordinate, turn: Turn<S>, point: Point<S>) -
 
 /// A turn about a coordinate axis by a nominal angle.
 #[inline(always)]
-pub fn turn_about_nominal<S: Scalar>(axis: Coordinate, turn: Turn<S::Nominal>, point: Point<S>) -> Point<S> {
+pub fn turn_about_nominal<S: Scalar>(
+    axis: Coordinate,
+    turn: SinCos<S::Nominal>,
+    point: Point<S>,
+) -> Point<S> {
     let (first, second) = axis.others();
     let (u, v) = (point.0[first], point.0[second]);
     let mut turned = point;

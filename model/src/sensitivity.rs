@@ -12,7 +12,7 @@ use std::sync::{Arc, Mutex, PoisonError};
 use crate::axis::AxisKind;
 use crate::chain::{AxisPosition, Machine};
 use crate::expression::{Arena, Operand, Symbol};
-use crate::frames::Turn;
+use crate::frames::SinCos;
 use crate::instrument::Station;
 use crate::replay::Replay;
 use crate::scalar::Nominal;
@@ -78,14 +78,14 @@ enum Quantity {
 
 /// What a recording depends on: which slots there are, whether they vary, and which of them derivatives are taken by.
 #[derive(Clone, Debug, PartialEq, Eq, Hash)]
-struct Carried {
+struct CarriedComponent {
     slots: Vec<(usize, bool)>,
     derivatives: Vec<usize>,
 }
 
 /// Where an axis stands, row by row.
 #[derive(Clone, Debug)]
-enum Course {
+enum DriverCourse {
     /// The same at every row.
     Still(AxisPosition<f64>),
     /// Positions, and sines and cosines of a rotary axis, taken once.
@@ -96,17 +96,17 @@ enum Course {
     },
 }
 
-impl Course {
-    fn new(kind: AxisKind, positions: &[f64]) -> Course {
+impl DriverCourse {
+    fn new(kind: AxisKind, positions: &[f64]) -> DriverCourse {
         let first = positions.first().copied().unwrap_or(0.0);
         if positions.iter().all(|position| *position == first) {
-            return Course::Still(AxisPosition::new(kind, first));
+            return DriverCourse::Still(AxisPosition::new(kind, first));
         }
         let (sine, cosine) = match kind {
             AxisKind::Rotary => positions.iter().map(|position| position.sin_cos()).unzip(),
             AxisKind::Linear => (Vec::new(), Vec::new()),
         };
-        Course::Moving {
+        DriverCourse::Moving {
             position: positions.to_vec(),
             sine,
             cosine,
@@ -115,19 +115,19 @@ impl Course {
 
     fn at(&self, row: usize) -> AxisPosition<f64> {
         match self {
-            Course::Still(position) => *position,
-            Course::Moving {
+            DriverCourse::Still(position) => *position,
+            DriverCourse::Moving {
                 position,
                 sine,
                 cosine,
             } => AxisPosition {
                 value: position[row],
                 turn: match sine.get(row) {
-                    Some(sin) => Turn {
+                    Some(sin) => SinCos {
                         sin: *sin,
                         cos: cosine[row],
                     },
-                    None => Turn { sin: 0.0, cos: 1.0 },
+                    None => SinCos { sin: 0.0, cos: 1.0 },
                 },
             },
         }
@@ -139,9 +139,9 @@ impl Course {
 pub struct TestModel<'a> {
     machine: &'a Machine,
     station: Station<f64>,
-    courses: Vec<Course>,
+    courses: Vec<DriverCourse>,
     rows: usize,
-    recorded: Arc<Mutex<HashMap<Carried, Arc<Replay<Quantity>>>>>,
+    recorded: Arc<Mutex<HashMap<CarriedComponent, Arc<Replay<Quantity>>>>>,
 }
 
 impl<'a> TestModel<'a> {
@@ -152,7 +152,7 @@ impl<'a> TestModel<'a> {
             machine,
             station,
             courses: axes
-                .map(|(axis, positions)| Course::new(axis.kind, positions))
+                .map(|(axis, positions)| DriverCourse::new(axis.kind, positions))
                 .collect(),
             rows: readings.rows(),
             recorded: Arc::default(),
@@ -205,7 +205,7 @@ impl<'a> TestModel<'a> {
             .filter(|slot| carries[*slot] || values.varies(*slot))
             .map(|slot| (slot, values.varies(slot)))
             .collect();
-        let carried = Carried {
+        let carried = CarriedComponent {
             slots,
             derivatives: derivatives.to_vec(),
         };
@@ -221,27 +221,27 @@ impl<'a> TestModel<'a> {
         }
     }
 
-    fn record(&self, carried: &Carried) -> Replay<Quantity> {
+    fn record(&self, carried: &CarriedComponent) -> Replay<Quantity> {
         let arena = Arena::new();
         let constant = Symbol::constant;
         let state: Vec<AxisPosition<Symbol<'_, Quantity>>> =
             (self.machine.axes.iter().zip(&self.courses).enumerate())
                 .map(|(index, (axis, course))| match course {
-                    Course::Still(position) => AxisPosition {
+                    DriverCourse::Still(position) => AxisPosition {
                         value: constant(position.value),
-                        turn: Turn {
+                        turn: SinCos {
                             sin: constant(position.turn.sin),
                             cos: constant(position.turn.cos),
                         },
                     },
-                    Course::Moving { .. } => AxisPosition {
+                    DriverCourse::Moving { .. } => AxisPosition {
                         value: arena.variable(Quantity::Position(index)),
                         turn: match axis.kind {
-                            AxisKind::Rotary => Turn {
+                            AxisKind::Rotary => SinCos {
                                 sin: arena.variable(Quantity::Sine(index)),
                                 cos: arena.variable(Quantity::Cosine(index)),
                             },
-                            AxisKind::Linear => Turn {
+                            AxisKind::Linear => SinCos {
                                 sin: constant(0.0),
                                 cos: constant(1.0),
                             },
@@ -295,12 +295,12 @@ impl<'a> TestModel<'a> {
             .map(|(slot, _)| (*slot, values.column(*slot, rows.clone())))
             .collect();
         let course = |axis: usize| match &self.courses[axis] {
-            Course::Moving {
+            DriverCourse::Moving {
                 position,
                 sine,
                 cosine,
             } => [position, sine, cosine].map(|column| column.as_slice()),
-            Course::Still(_) => [&[][..]; 3],
+            DriverCourse::Still(_) => [&[][..]; 3],
         };
         recording.run(
             rows.len(),

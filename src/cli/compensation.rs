@@ -24,7 +24,7 @@ use super::message::{Kind, tell};
 mod uncertainty;
 
 /// Most points of a table: LinuxCNC takes 256 triplets a joint, Heidenhain 256 points a table.
-const MOST_POINTS: usize = 256;
+const MAX_POINTS: usize = 256;
 
 /// Whose table.
 #[derive(Clone, Copy, PartialEq, Eq, ValueEnum)]
@@ -62,9 +62,9 @@ impl CompensationArguments {
         let Some(folder) = &self.compensation else {
             return Ok(());
         };
-        if !(2..=MOST_POINTS).contains(&self.points) {
+        if !(2..=MAX_POINTS).contains(&self.points) {
             return Err(Failure::Other(format!(
-                "--points {}: from 2 to {MOST_POINTS}, which is the most that LinuxCNC and Heidenhain take",
+                "--points {}: from 2 to {MAX_POINTS}, which is the most that LinuxCNC and Heidenhain take",
                 self.points
             )));
         }

@@ -19,7 +19,7 @@ use super::output::{self, Outputs};
 
 /// The language of an equation.
 #[derive(Clone, Copy, ValueEnum)]
-enum As {
+enum OutputForm {
     Text,
     Latex,
     Typst,
@@ -29,16 +29,16 @@ enum As {
     Matlab,
 }
 
-impl As {
+impl OutputForm {
     fn language(self) -> Language {
         match self {
-            As::Text => Language::Text,
-            As::Latex => Language::Latex,
-            As::Typst => Language::Typst,
-            As::Rust => Language::Rust,
-            As::C => Language::C,
-            As::Python => Language::Python,
-            As::Matlab => Language::Matlab,
+            OutputForm::Text => Language::Text,
+            OutputForm::Latex => Language::Latex,
+            OutputForm::Typst => Language::Typst,
+            OutputForm::Rust => Language::Rust,
+            OutputForm::C => Language::C,
+            OutputForm::Python => Language::Python,
+            OutputForm::Matlab => Language::Matlab,
         }
     }
 }
@@ -67,7 +67,7 @@ enum SymbolsWord {
 struct FormArguments {
     /// The language.
     #[arg(long = "as", value_enum, default_value = "text")]
-    language: As,
+    language: OutputForm,
     /// How far it goes in the errors: all terms, products of two, or a coefficient for each.
     #[arg(long, value_enum, default_value = "exact")]
     order: OrderWord,
@@ -258,7 +258,7 @@ fn read(arguments: &super::SessionArguments) -> Result<Session, Failure> {
 pub fn run(arguments: &EquationArguments) -> Result<(), Failure> {
     let outputs = Outputs::new(&arguments.form.out)?;
     let session = read(&arguments.session)?;
-    outputs.spare_session(&session)?;
+    outputs.refuse_overwrite_of_session(&session)?;
     let Some(test) = session.tests.iter().find(|test| test.name == arguments.test) else {
         let names: Vec<&str> = session.tests.iter().map(|test| test.name.as_str()).collect();
         let names = names.join(", ");
@@ -294,7 +294,7 @@ pub fn run_volumetric(arguments: &VolumetricArguments, quiet: bool) -> Result<()
     let machine = read::machine(&arguments.machine)?;
     let outputs = Outputs::new(arguments.form.out.iter().chain(arguments.map.outputs()))?;
     let read = std::iter::once(&arguments.machine).chain(arguments.map.functions());
-    outputs.spare(read.map(PathBuf::as_path))?;
+    outputs.refuse_overwrite(read.map(PathBuf::as_path))?;
     if arguments.map.wanted() {
         return super::map::run(&machine, &arguments.map, outputs.tables(quiet));
     }

@@ -10,8 +10,8 @@ use super::failure::Failure;
 use super::message::{Kind, tell};
 use super::report::ReportArguments;
 use super::{
-    CommonArguments, SessionArguments, circular, compensation, csv, geometric, output, plausibility,
-    read_session, repeated, self_calibration, table, views,
+    CommonArguments, SessionArguments, circular, compensation, csv, directions, geometric, output,
+    plausibility, read_session, repeated, self_calibration, table,
 };
 
 /// Examples of `abbe fit`.
@@ -122,7 +122,7 @@ pub fn run(arguments: &FitArguments) -> Result<(), Failure> {
     let draws = arguments.draws.draws(arguments.common.seed)?;
     let (problem, fit) = abbe::identify::fit::prepare(&session, arguments.common.seed)?;
     if let Some(path) = &arguments.views {
-        views::write(&problem, &fit, path)?;
+        directions::write(&problem, &fit, path)?;
     }
     let mut result = abbe::identify::fit::report(&problem, &fit);
     if let Some(draws) = &draws {

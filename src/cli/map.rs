@@ -2,7 +2,7 @@
 
 use std::path::PathBuf;
 
-use abbe::identify::volumetric::{self, Erring, Place, Summary, functions};
+use abbe::identify::volumetric::{self, MachineWithErrors, Place, Summary, functions};
 use abbe::model::axis::AxisKind;
 use abbe::model::chain::Machine;
 use abbe::model::session::limits::LARGEST;
@@ -87,7 +87,7 @@ pub fn run(machine: &Machine, arguments: &MapArguments, tables: bool) -> Result<
         }
     };
     let grid = grid(machine, arguments)?;
-    let erring = Erring {
+    let erring = MachineWithErrors {
         machine,
         functions: &functions,
         tool_mm,
@@ -105,11 +105,11 @@ pub fn run(machine: &Machine, arguments: &MapArguments, tables: bool) -> Result<
 
 /// Positions of each axis, mm or rad.
 fn grid(machine: &Machine, arguments: &MapArguments) -> Result<Vec<Vec<f64>>, Failure> {
-    if arguments.places > volumetric::MOST_POINTS {
+    if arguments.places > volumetric::MAX_POINTS {
         return Err(Failure::Other(format!(
             "--places {}: a map has at most {} places",
             arguments.places,
-            volumetric::MOST_POINTS
+            volumetric::MAX_POINTS
         )));
     }
     let mut wanted: Vec<Option<(char, f64)>> = vec![None; machine.axes.len()];
@@ -126,7 +126,7 @@ fn grid(machine: &Machine, arguments: &MapArguments) -> Result<Vec<Vec<f64>>, Fa
             return Err(fault());
         }
         let most = if sign == ':' {
-            volumetric::MOST_POINTS as f64
+            volumetric::MAX_POINTS as f64
         } else {
             LARGEST
         };

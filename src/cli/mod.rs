@@ -8,13 +8,14 @@ macro_rules! say {
 pub mod circular;
 mod compensation;
 mod csv;
+mod directions;
 mod equation;
 mod failure;
 mod fit;
 mod folder;
+mod from_code;
 pub mod geometric;
 mod interrupt;
-mod layout;
 mod map;
 mod message;
 mod new;
@@ -29,7 +30,6 @@ mod simulate;
 pub mod table;
 pub mod trace;
 pub mod uniqueness;
-mod views;
 
 use std::path::PathBuf;
 use std::process::ExitCode;
@@ -196,6 +196,6 @@ pub fn run() -> ExitCode {
 /// Reads the session that the arguments name, which no output may replace.
 fn read_session(arguments: &SessionArguments, outputs: &Outputs) -> Result<Session, Failure> {
     let session = read::session(&arguments.session, &arguments.options())?;
-    outputs.spare_session(&session)?;
+    outputs.refuse_overwrite_of_session(&session)?;
     Ok(session)
 }

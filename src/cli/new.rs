@@ -5,7 +5,7 @@ use std::path::PathBuf;
 use clap::Args;
 
 use super::failure::Failure;
-use super::{folder, layout};
+use super::{folder, from_code};
 
 /// Examples of `abbe new`.
 pub const HELP: &str = "Examples:
@@ -213,7 +213,7 @@ pub fn run(arguments: &NewArguments, quiet: bool) -> Result<(), Failure> {
     };
     let files = match (&arguments.template, &arguments.from_code) {
         (Some(name), _) => template(name)?,
-        (None, Some(code)) => layout::files(code)?,
+        (None, Some(code)) => from_code::files(code)?,
         (None, None) => return Ok(()),
     };
     folder::write(folder, &files, arguments.force, |_| Ok(()))?;

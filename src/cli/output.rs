@@ -134,13 +134,13 @@ impl Outputs {
 
     /// # Errors
     /// If one of them would replace the session, its machine or its data.
-    pub fn spare_session(&self, session: &Session) -> Result<(), Failure> {
-        self.spare(session.files.iter().map(|stamp| stamp.file.as_path()))
+    pub fn refuse_overwrite_of_session(&self, session: &Session) -> Result<(), Failure> {
+        self.refuse_overwrite(session.files.iter().map(|stamp| stamp.file.as_path()))
     }
 
     /// # Errors
     /// If one of them would replace a file that is read.
-    pub fn spare<'r>(&self, read: impl IntoIterator<Item = &'r Path>) -> Result<(), Failure> {
+    pub fn refuse_overwrite<'r>(&self, read: impl IntoIterator<Item = &'r Path>) -> Result<(), Failure> {
         for file in read {
             if let Some(output) = self
                 .0

@@ -20,7 +20,7 @@ pub struct DrawArguments {
 }
 
 /// Fewest runs of which 95 % intervals mean anything (JCGM 101, 7.2.2 asks for 200 of them at the ends: 10⁴).
-const FEWEST_RUNS: u64 = 10_000;
+const MIN_RUNS: u64 = 10_000;
 
 impl DrawArguments {
     /// That nothing is to be drawn.
@@ -39,9 +39,9 @@ impl DrawArguments {
         let Some(runs) = self.monte_carlo else {
             return Ok(None);
         };
-        if runs < FEWEST_RUNS {
+        if runs < MIN_RUNS {
             return Err(Failure::Other(format!(
-                "--monte-carlo {runs}: {FEWEST_RUNS} runs are the fewest whose intervals mean anything"
+                "--monte-carlo {runs}: {MIN_RUNS} runs are the fewest whose intervals mean anything"
             )));
         }
         if !(self.coverage > 0.5 && self.coverage < 0.9999) {

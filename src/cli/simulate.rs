@@ -4,7 +4,7 @@ use std::path::PathBuf;
 
 use abbe::identify::quantity::{self, Given};
 use abbe::identify::simulate::{Simulated, Simulation, simulate};
-use abbe::model::session::limits::{LARGEST, LEAST_UM};
+use abbe::model::session::limits::{LARGEST, MIN_UM};
 use abbe::model::session::{Session, read, rewrite, write};
 use abbe::model::words::counted;
 use clap::Args;
@@ -67,7 +67,7 @@ pub fn run(arguments: &SimulateArguments) -> Result<(), Failure> {
     let session = read_session(&arguments.session, &outputs)?;
     let mut given = match &arguments.file {
         Some(file) => {
-            outputs.spare([file.as_path()])?;
+            outputs.refuse_overwrite([file.as_path()])?;
             quantity::read(file)?
         }
         None => Vec::new(),
@@ -80,10 +80,10 @@ pub fn run(arguments: &SimulateArguments) -> Result<(), Failure> {
     }
     if let Some(noise) = arguments.noise_um
         && noise != 0.0
-        && !(LEAST_UM..=LARGEST).contains(&noise)
+        && !(MIN_UM..=LARGEST).contains(&noise)
     {
         return Err(Failure::Other(format!(
-            "--noise-um {noise}: a standard deviation in µm is a number that is not negative: 0, or {LEAST_UM:e} to {LARGEST:e}"
+            "--noise-um {noise}: a standard deviation in µm is a number that is not negative: 0, or {MIN_UM:e} to {LARGEST:e}"
         )));
     }
     let simulation = Simulation {
@@ -100,7 +100,8 @@ pub fn run(arguments: &SimulateArguments) -> Result<(), Failure> {
             arguments.out.display()
         )));
     }
-    output::Outputs::in_folder(&arguments.out, files.iter().map(|(name, _)| name)).spare_session(&session)?;
+    output::Outputs::in_folder(&arguments.out, files.iter().map(|(name, _)| name))
+        .refuse_overwrite_of_session(&session)?;
     folder::write(&arguments.out, &files, arguments.force, |made| {
         // What is left behind has to be a session.
         let path = made.join("session.toml");

@@ -3,9 +3,9 @@
 use std::sync::Mutex;
 use std::time::Duration;
 
-use abbe::identify::plan::menu::Menu;
+use abbe::identify::plan::candidate_tests::CandidateTests;
 use abbe::identify::results::{EffectName, ModelResult, TraceResult};
-use abbe::identify::trace::further::tell_apart;
+use abbe::identify::trace::separating_tests::separate_aliases;
 use abbe::identify::trace::{Progress, TraceOptions, library};
 use abbe::model::session::{rewrite, write};
 use abbe::model::words::counted;
@@ -89,7 +89,7 @@ pub fn run(arguments: &TraceArguments) -> Result<(), Failure> {
             Progress::Screening(candidates) => {
                 bar.set_message(format!("screening {}", counted(candidates, "candidate")))
             }
-            Progress::Taken(number, id, rms_um) => {
+            Progress::SelectedEffect(number, id, rms_um) => {
                 let effects = counted(number, "effect");
                 bar.set_message(format!("{effects}, held out {rms_um:.2} µm: {id}"));
                 if !arguments.common.quiet {
@@ -103,7 +103,7 @@ pub fn run(arguments: &TraceArguments) -> Result<(), Failure> {
     };
     let mut trace = abbe::identify::trace::trace(&session, &options, &report)?;
     bar.set_message("weighing further tests");
-    tell_apart(&mut trace, &Menu::short(), &report)?;
+    separate_aliases(&mut trace, &CandidateTests::short(), &report)?;
     interrupts.end_at_once();
     bar.finish_and_clear();
     if tables {
@@ -164,7 +164,7 @@ fn progress_bar(quiet: bool) -> ProgressBar {
 
 fn list(session: &abbe::model::session::Session, options: &TraceOptions) -> Result<(), Failure> {
     let families = library::families()?;
-    let entries = abbe::identify::trace::list::entries(session, options)?;
+    let entries = abbe::identify::trace::screening::entries(session, options)?;
     for (number, family) in families.iter().enumerate() {
         let of_family: Vec<_> = entries.iter().filter(|entry| entry.family == number).collect();
         let seen = of_family.iter().filter(|entry| entry.seen).count();

@@ -3,9 +3,9 @@
 use abbe::identify::results::{EffectName, EffectResult, SeparatingTestResult, TraceResult};
 
 /// Explanations that the headline names.
-const MOST_NAMED: usize = 3;
+const MAX_NAMED: usize = 3;
 /// Effects that the headline goes through one by one.
-const MOST_LISTED: usize = 4;
+const MAX_LISTED: usize = 4;
 
 /// What stands below the verdict; `None` without an effect.
 pub fn headline(result: &TraceResult) -> Option<String> {
@@ -17,7 +17,7 @@ pub fn headline(result: &TraceResult) -> Option<String> {
             "{} effects, each unique among {screened} candidates screened",
             all.len()
         )),
-        few if few.len() <= MOST_LISTED => {
+        few if few.len() <= MAX_LISTED => {
             let each = few.iter().enumerate();
             let each: Vec<String> = each
                 .map(|(k, effect)| format!("effect {} is {}", k + 1, standing(effect, screened)))
@@ -57,7 +57,7 @@ fn in_short(effect: &EffectResult) -> String {
     let mut named: Vec<String> = Vec::new();
     for meaning in std::iter::once(effect.name.meaning.as_str())
         .chain(others)
-        .take(MOST_NAMED)
+        .take(MAX_NAMED)
     {
         match meaning.split_once(": ") {
             Some((same, what)) if same == part => named.push(what.to_string()),
@@ -67,7 +67,7 @@ fn in_short(effect: &EffectResult) -> String {
             }
         }
     }
-    match effect.indistinguishable.saturating_sub(MOST_NAMED) {
+    match effect.indistinguishable.saturating_sub(MAX_NAMED) {
         0 => {}
         1 => named.push("1 other".to_string()),
         more => named.push(format!("{more} others")),

@@ -3,26 +3,26 @@
 use abbe::identify::IdentifyError;
 use abbe::identify::heldout::FoldKind;
 use abbe::identify::problem::Problem;
-use abbe::identify::views::lengths;
-use abbe::identify::views::sensitivities::{self, Sensitivity, TestSensitivities};
-use abbe::identify::views::spectrum::Spectrum;
+use abbe::identify::series::lengths;
+use abbe::identify::series::sensitivities::{self, Sensitivity, TestSensitivities};
+use abbe::identify::series::spectrum::Spectrum;
 use abbe::model::effect::{Effect, Shape};
 use maud::{Markup, html};
 
+use super::decimate;
 use super::document::Document;
-use super::drawn::{Drawn, MOST_TESTS};
 use super::plot::bars::{Fill, bars};
 use super::plot::lines::{ACROSS, Lines, Mark, Series, UP, span};
 use super::plot::polar::{Round, Trace, drawing};
 use super::plot::scale::{Scale, place, polyline, text};
 use super::plot::{Plot, cut};
+use super::plots::{Drawn, MAX_TESTS};
 use super::readings::unit;
-use super::thin;
 
 /// Strips of a plot over time.
 const TIME_STRIPS: usize = 240;
 /// Strips of a test at least.
-const LEAST_STRIPS: usize = 12;
+const MIN_STRIPS: usize = 12;
 
 /// How many readings have how long a residual.
 pub fn histogram(drawn: &Drawn<'_>, words: [&str; 2]) -> Plot {
@@ -108,9 +108,9 @@ pub fn over_time(drawn: &Drawn<'_>) -> Plot {
     let classes: Vec<[String; 2]> = (0..tests.len())
         .map(|test| ["before", "after"].map(|when| format!("{when} of-test-{test}")))
         .collect();
-    let strips = (TIME_STRIPS / tests.len().max(1)).max(LEAST_STRIPS);
+    let strips = (TIME_STRIPS / tests.len().max(1)).max(MIN_STRIPS);
     let of = |time: &[f64], values: &[f64]| -> Vec<(f64, f64)> {
-        let strips = thin::strips(time, values, strips);
+        let strips = decimate::strips(time, values, strips);
         strips
             .into_iter()
             .flat_map(|(at, low, high)| [(at, low), (at, high)])
@@ -186,8 +186,8 @@ pub fn spectrum_plot(spectrum: &Spectrum, highest: f64, effects: &[Effect]) -> P
     let over = html! {
         @for (number, (order, id)) in found.iter().enumerate() {
             @let (at, down) = (x.at(*order), UP[1] + 12.0 + 12.0 * (number % 3) as f64);
-            @let stem = spectrum.before_um.iter().zip(&spectrum.after_um).nth((order.round() as usize).saturating_sub(1));
-            @let top = y.at(stem.map_or(0.0, |(before, after)| before.max(*after)));
+            @let id_stem = spectrum.before_um.iter().zip(&spectrum.after_um).nth((order.round() as usize).saturating_sub(1));
+            @let top = y.at(id_stem.map_or(0.0, |(before, after)| before.max(*after)));
             path class="found-line" d=(polyline([(at, (top - 3.0).max(down + 2.0)), (at, down + 2.0)])) {}
             path class="found" d=(format!("M{} {}l-4 8h8z", place(at), UP[0])) {}
             text class=(if at > 400.0 { "small right" } else { "small" }) x=(place(if at > 400.0 { at - 4.0 } else { at + 4.0 })) y=(place(down)) {
@@ -242,7 +242,7 @@ pub fn patterns(
     }
     let mut plots = Vec::new();
     let found = sensitivities::sensitivities(problem, beta)?;
-    for test in found.iter().take(MOST_TESTS * problem.coordinates()) {
+    for test in found.iter().take(MAX_TESTS * problem.coordinates()) {
         if test.columns.is_empty() {
             continue;
         }
@@ -260,7 +260,7 @@ pub fn patterns(
 
 /// How far each error moves the readings of poses, unit by unit, the greatest first.
 fn over_poses(found: &[Sensitivity]) -> Vec<Plot> {
-    const MOST: usize = 40;
+    const MAX: usize = 40;
     let mut units: Vec<&str> = found.iter().map(|error| error.unit.as_str()).collect();
     units.sort_unstable();
     units.dedup();
@@ -271,8 +271,8 @@ fn over_poses(found: &[Sensitivity]) -> Vec<Plot> {
             let mut rows: Vec<(String, f64, Fill)> =
                 own.map(|error| (error.id.clone(), error.values[0], Fill::Named)).collect();
             rows.sort_by(|a, b| b.1.total_cmp(&a.1));
-            let left = rows.len().saturating_sub(MOST);
-            rows.truncate(MOST);
+            let left = rows.len().saturating_sub(MAX);
+            rows.truncate(MAX);
             let caption = match left {
                 0 => "Root mean square over all poses of the length by which a unit moves a reading.".to_string(),
                 left => format!("Root mean square over all poses of the length by which a unit moves a reading; {left} that move it less are left out."),

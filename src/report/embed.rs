@@ -3,15 +3,15 @@
 use std::fmt::Write as _;
 use std::io::Write as _;
 
-use abbe::identify::views::Cause;
+use abbe::identify::series::Cause;
 use base64::Engine;
 use base64::engine::general_purpose::STANDARD;
 use serde_json::{Value, json};
 
-use super::drawn::{Column, Drawn, axes_of};
+use super::plots::{Column, Drawn, axes_of};
 
 /// The most errors and effects that get a slider.
-pub const MOST_SLIDERS: usize = 40;
+pub const MAX_SLIDERS: usize = 40;
 
 /// Numbers in two bytes each: `offset + scale · k`, `k` from −32767 to 32767.
 fn quantised(values: impl Iterator<Item = f64> + Clone) -> Value {
@@ -38,7 +38,7 @@ fn quantised(values: impl Iterator<Item = f64> + Clone) -> Value {
 }
 
 /// The shares that get a slider, the largest first: their places.
-pub fn sliders(drawn: &Drawn<'_>) -> Vec<usize> {
+pub fn slider_parameters(drawn: &Drawn<'_>) -> Vec<usize> {
     let mut chosen: Vec<(f64, usize)> = (0..drawn.views.shares.len())
         .filter(|k| {
             let cause = drawn.views.shares[*k].cause;
@@ -48,14 +48,14 @@ pub fn sliders(drawn: &Drawn<'_>) -> Vec<usize> {
         .filter(|(weight, _)| *weight > 0.0)
         .collect();
     chosen.sort_by(|a, b| b.0.total_cmp(&a.0));
-    chosen.truncate(MOST_SLIDERS);
+    chosen.truncate(MAX_SLIDERS);
     chosen.into_iter().map(|(_, k)| k).collect()
 }
 
 /// What the page moves and shows under the pointer.
 pub fn data(drawn: &Drawn<'_>) -> Value {
     let coordinates = drawn.views.coordinates;
-    let sliders = sliders(drawn);
+    let slider_parameters = slider_parameters(drawn);
     let tests: Vec<Value> = drawn
         .tests()
         .map(|(number, test)| {
@@ -90,7 +90,7 @@ pub fn data(drawn: &Drawn<'_>) -> Value {
                     json!({
                         "run": ordinal, "number": stretch.run, "forward": stretch.forward, "n": rows.len(), "along": along, "line": lines,
                         "deviation": scalars(&test.deviation_um), "before": scalars(&test.before_um), "after": scalars(&test.after_um),
-                        "shares": sliders.iter().map(|s| scalars(&test.shares_um[*s])).collect::<Vec<_>>(),
+                        "shares": slider_parameters.iter().map(|s| scalars(&test.shares_um[*s])).collect::<Vec<_>>(),
                     })
                 })
                 .collect();

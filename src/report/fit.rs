@@ -2,16 +2,16 @@
 
 use abbe::identify::IdentifyError;
 use abbe::identify::fit::Fit;
-use abbe::identify::plan::menu;
+use abbe::identify::plan::candidate_tests;
 use abbe::identify::problem::Problem;
 use abbe::identify::results::{FitResult, ModelResult};
-use abbe::identify::views::{spectrum, views};
+use abbe::identify::series::{spectrum, views};
 use abbe::model::words::counted;
 use maud::{Markup, html};
 
 use super::document::{Document, prose};
-use super::drawn::Drawn;
 use super::plausibility;
+use super::plots::Drawn;
 use super::readings::{self, sentence_of_noise, um};
 use super::{circular, curves};
 
@@ -110,7 +110,7 @@ pub fn document(problem: &Problem<'_>, fit: &Fit, result: &FitResult) -> Result<
         html! {
             p {
                 @if result.u_enlargement > 1.0 { (prose("First `abbe trace` on the same session. ")) }
-                @if !menu::is_offered(problem) {
+                @if !candidate_tests::has_candidates(problem) {
                     @if !result.unobservable.is_empty() {
                         "A test that makes the rest identifiable has to move what these tests leave standing: "
                         (result.unobservable.len()) (if result.unobservable.len() == 1 { " combination" } else { " combinations" }) " of parameters."

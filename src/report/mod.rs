@@ -10,17 +10,17 @@
 
 pub mod circular;
 pub mod curves;
+pub mod decimate;
 pub mod document;
-pub mod drawn;
 pub mod embed;
 pub mod fit;
 pub mod method;
-pub mod next;
+pub mod next_test;
 pub mod page;
 pub mod plan;
 pub mod plausibility;
 pub mod plot;
+pub mod plots;
 pub mod provenance;
 pub mod readings;
-pub mod thin;
 pub mod trace;

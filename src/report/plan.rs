@@ -1,7 +1,7 @@
 //! The report of `abbe plan`.
 
 use abbe::identify::IdentifyError;
-use abbe::identify::plan::menu;
+use abbe::identify::plan::candidate_tests;
 use abbe::identify::plan::results::{ErrorAnalysis, PlanAnalysis};
 use abbe::identify::problem::Problem;
 use abbe::model::words::counted;
@@ -14,7 +14,7 @@ use super::plot::bars::{self, Fill};
 use super::readings::{self, um, unit, value_and_u};
 
 /// Rows of a table at most; the JSON holds all.
-const MOST_ROWS: usize = 30;
+const MAX_ROWS: usize = 30;
 
 /// How a plan is judged.
 pub fn method(analysis: &PlanAnalysis) -> Markup {
@@ -58,9 +58,12 @@ pub fn document(problem: &Problem<'_>, analysis: &PlanAnalysis) -> Result<Docume
     let beta = vec![0.0; problem.parameters.list.len()];
     let section = curves::patterns(&mut document, problem, &beta)?;
     document.section("What each error does to each test", section);
-    let section = what_else(&mut document, analysis);
+    let section = other_explanations(&mut document, analysis);
     document.section("What else it could be", section);
-    document.section("What to measure next", next(analysis, menu::is_offered(problem)));
+    document.section(
+        "What to measure next",
+        next(analysis, candidate_tests::has_candidates(problem)),
+    );
     let section = readings::machine(&mut document, problem);
     document.section("Machine", section);
     Ok(document)
@@ -84,7 +87,7 @@ fn uncertainties(errors: &[ErrorAnalysis]) -> Vec<Plot> {
                         (format!("{}, others known", error.id), known, Fill::Alias),
                     ]
                 })
-                .take(2 * MOST_ROWS)
+                .take(2 * MAX_ROWS)
                 .collect();
             bars::bars(
                 format!("uncertainty-{}", name.replace('/', "-per-")),
@@ -125,7 +128,7 @@ fn row(error: &ErrorAnalysis) -> Vec<String> {
     ]
 }
 
-fn what_else(document: &mut Document, analysis: &PlanAnalysis) -> Markup {
+fn other_explanations(document: &mut Document, analysis: &PlanAnalysis) -> Markup {
     let ids = &analysis.correlation.ids;
     let shown = if ids.len() > 1 && ids.len() <= 60 {
         document.show([readings::map(ids, &analysis.correlation.matrix)])
@@ -137,7 +140,7 @@ fn what_else(document: &mut Document, analysis: &PlanAnalysis) -> Markup {
             .effects
             .iter()
             .filter(|effect| effect.verdict == "hidden" && !effect.biases.is_empty())
-            .take(MOST_ROWS)
+            .take(MAX_ROWS)
             .map(|effect| {
                 let biases = effect.biases.iter().take(2);
                 let biases: Vec<String> = biases
@@ -158,9 +161,9 @@ fn what_else(document: &mut Document, analysis: &PlanAnalysis) -> Markup {
             h3 { "Held by what is known of the set-up, not by readings" }
             (list(analysis.held_by_setup.iter().map(|held| held.why.clone())))
         }
-        @if !analysis.nearly_blind.is_empty() {
+        @if !analysis.nearly_collinear.is_empty() {
             h3 { "Told apart, but badly" }
-            (list(analysis.nearly_blind.iter().map(|near| near.why.clone())))
+            (list(analysis.nearly_collinear.iter().map(|near| near.why.clone())))
         }
         @if let Some(hidden) = hidden.filter(|hidden| !hidden.is_empty()) {
             h3 { "Effects that would hide, and what they bias" }

@@ -3,22 +3,22 @@
 use abbe::identify::fit::Fit;
 use abbe::identify::problem::Problem;
 use abbe::identify::results::{ModelResult, ParameterResult, Rejected, Unobservable};
-use abbe::identify::views::spectrum::Spectrum;
-use abbe::identify::views::{Cause, Views, correlation};
+use abbe::identify::series::spectrum::Spectrum;
+use abbe::identify::series::{Cause, SessionSeries, correlation};
 use maud::{Markup, html};
 use serde_json::json;
 
 use super::curves;
 use super::document::{Document, list, table};
-use super::drawn::{Drawn, MOST_TESTS};
 use super::embed;
 use super::plot::bars::{self, Row, Value};
 use super::plot::{Plot, chain, heat};
+use super::plots::{Drawn, MAX_TESTS};
 
 /// The most unknowns of one unit in one plot.
-const MOST_ROWS: usize = 30;
+const MAX_ROWS: usize = 30;
 /// The most rows of a map of correlations.
-const MOST_CORRELATED: usize = 40;
+const MAX_CORRELATED: usize = 40;
 
 /// What a result calls its noise, in words: the residual of a model is not called noise.
 pub fn sentence_of_noise(noise_um: f64, source: &str) -> String {
@@ -65,7 +65,7 @@ pub fn value_and_u(value: f64, u: f64) -> (String, String) {
 /// What the page moves: the data, and a slider for each error and effect.
 pub fn live(document: &mut Document, drawn: &Drawn<'_>, parameters: &[ParameterResult]) {
     let mut data = embed::data(drawn);
-    let sliders: Vec<serde_json::Value> = embed::sliders(drawn)
+    let slider_parameters: Vec<serde_json::Value> = embed::slider_parameters(drawn)
         .into_iter()
         .map(|k| {
             let share = &drawn.views.shares[k];
@@ -87,7 +87,7 @@ pub fn live(document: &mut Document, drawn: &Drawn<'_>, parameters: &[ParameterR
             json!({"id": share.id, "words": words})
         })
         .collect();
-    data["sliders"] = sliders.into();
+    data["sliders"] = slider_parameters.into();
     document.data = data;
     document.table = embed::table(drawn);
 }
@@ -128,10 +128,10 @@ pub fn before_and_after(
 }
 
 /// What is said where tests are not drawn one by one.
-pub fn left_out_note(views: &Views) -> Markup {
+pub fn left_out_note(views: &SessionSeries) -> Markup {
     html! {
-        @if views.tests.len() > MOST_TESTS {
-            p class="note" { "The first " (MOST_TESTS) " of " (views.tests.len()) " tests are drawn one by one; the readings of all are in the data." }
+        @if views.tests.len() > MAX_TESTS {
+            p class="note" { "The first " (MAX_TESTS) " of " (views.tests.len()) " tests are drawn one by one; the readings of all are in the data." }
         }
     }
 }
@@ -152,9 +152,9 @@ pub fn traces(document: &mut Document, drawn: &Drawn<'_>) -> Markup {
             } @else {
                 "Observed less what the nominal machine and set-up would read. "
             }
-            "The sliders take each error and effect out of the readings by its share J·β, which was computed beforehand and is linear; all shares and the \
+            "The slider_parameters take each error and effect out of the readings by its share J·β, which was computed beforehand and is linear; all shares and the \
              residual together miss the readings by at most " (format!("{:.3}", drawn.views.second_order_um)) " µm. "
-            @if drawn.views.shares.len() > embed::MOST_SLIDERS { "Only the " (embed::MOST_SLIDERS) " with the largest shares have one. " }
+            @if drawn.views.shares.len() > embed::MAX_SLIDERS { "Only the " (embed::MAX_SLIDERS) " with the largest shares have one. " }
             "Points are thinned for drawing so that no peak is lost."
         }
         (shown)
@@ -187,8 +187,8 @@ pub fn parameters(
                 after: Some(value(p)),
             })
             .collect();
-        let parts = rows.len().div_ceil(MOST_ROWS);
-        for (number, rows) in rows.chunks(MOST_ROWS).enumerate() {
+        let parts = rows.len().div_ceil(MAX_ROWS);
+        for (number, rows) in rows.chunks(MAX_ROWS).enumerate() {
             let of = if parts > 1 {
                 format!(" ({} of {parts})", number + 1)
             } else {
@@ -246,7 +246,7 @@ pub fn residuals(document: &mut Document, drawn: &Drawn<'_>, spectra: &[Spectrum
     plots.extend(
         spectra
             .iter()
-            .take(2 * MOST_TESTS)
+            .take(2 * MAX_TESTS)
             .map(|spectrum| curves::spectrum_plot(spectrum, highest, effects)),
     );
     document.show(plots)
@@ -256,11 +256,11 @@ pub fn residuals(document: &mut Document, drawn: &Drawn<'_>, spectra: &[Spectrum
 pub fn correlations(document: &mut Document, problem: &Problem<'_>, fit: &Fit) -> Markup {
     let (mut ids, mut matrix) = correlation(problem, fit);
     let all = ids.len();
-    ids.truncate(MOST_CORRELATED);
-    matrix.truncate(MOST_CORRELATED);
+    ids.truncate(MAX_CORRELATED);
+    matrix.truncate(MAX_CORRELATED);
     let matrix: Vec<Vec<Option<f64>>> = matrix
         .into_iter()
-        .map(|row| row.into_iter().take(MOST_CORRELATED).map(Some).collect())
+        .map(|row| row.into_iter().take(MAX_CORRELATED).map(Some).collect())
         .collect();
     if ids.len() < 2 {
         return html! { p { "Fewer than two errors are identified." } };
@@ -268,7 +268,7 @@ pub fn correlations(document: &mut Document, problem: &Problem<'_>, fit: &Fit) -
     let shown = document.show([map(&ids, &matrix)]);
     html! {
         (shown)
-        @if all > MOST_CORRELATED { p class="note" { "The first " (MOST_CORRELATED) " of " (all) " are drawn." } }
+        @if all > MAX_CORRELATED { p class="note" { "The first " (MAX_CORRELATED) " of " (all) " are drawn." } }
     }
 }
 

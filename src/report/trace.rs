@@ -1,28 +1,28 @@
 //! The report of `abbe trace`.
 
 use abbe::identify::IdentifyError;
-use abbe::identify::plan::menu;
+use abbe::identify::plan::candidate_tests;
 use abbe::identify::results::{EffectName, EffectResult, TraceResult};
+use abbe::identify::series::{spectrum, views};
 use abbe::identify::trace::Trace;
-use abbe::identify::trace::alias::Rival;
-use abbe::identify::views::{spectrum, views};
+use abbe::identify::trace::alias::CompetingEffect;
 use maud::{Markup, html};
 
 use super::curves;
 use super::document::{Document, list, prose, table};
-use super::drawn::Drawn;
 use super::plausibility;
 use super::plot::bars::{self, Fill};
 use super::plot::lines::{ACROSS, Lines, Mark, Series, UP, span};
 use super::plot::scale::{Scale, place, polyline};
 use super::plot::{Plot, cut};
+use super::plots::Drawn;
 use super::readings::{self, sentence_of_noise, um, unit, value_and_u};
 use crate::cli::table::shape_number;
 use crate::cli::trace::name;
 use crate::cli::uniqueness;
 
 /// Effects whose rivals are drawn.
-const MOST_RANKED: usize = 12;
+const MAX_RANKED: usize = 12;
 
 /// How a trace was made.
 pub fn method(result: &TraceResult) -> Markup {
@@ -124,9 +124,12 @@ pub fn document(trace: &Trace<'_>) -> Result<Document, IdentifyError> {
     );
     let section = readings::residuals(&mut document, &drawn, &spectra);
     document.section("Residuals", section);
-    let section = what_else(&mut document, trace);
+    let section = other_explanations(&mut document, trace);
     document.section("What else it could be", section);
-    document.section("What to measure next", next(result, menu::is_offered(problem)));
+    document.section(
+        "What to measure next",
+        next(result, candidate_tests::has_candidates(problem)),
+    );
     let section = curves::patterns(&mut document, problem, &trace.after_fit.beta)?;
     document.section("What each error does to each test", section);
     let section = readings::machine(&mut document, problem);
@@ -325,14 +328,14 @@ fn convergence(trace: &Trace<'_>) -> Plot {
     .plot()
 }
 
-fn what_else(document: &mut Document, trace: &Trace<'_>) -> Markup {
+fn other_explanations(document: &mut Document, trace: &Trace<'_>) -> Markup {
     let result = &trace.result;
     let plots: Vec<Plot> = trace
-        .rivals
+        .competing_effects
         .iter()
         .zip(&trace.effects)
-        .take(MOST_RANKED)
-        .map(|(rivals, effect)| ranking(rivals, &effect.id()))
+        .take(MAX_RANKED)
+        .map(|(competing_effects, effect)| ranking(competing_effects, &effect.id()))
         .collect();
     let shown = document.show(plots);
     let correlations = readings::correlations(document, &trace.after, &trace.after_fit);
@@ -347,8 +350,8 @@ fn what_else(document: &mut Document, trace: &Trace<'_>) -> Markup {
 }
 
 /// The competing explanations of an effect.
-fn ranking(rivals: &[Rival], id: &str) -> Plot {
-    let rows: Vec<(String, f64, Fill)> = rivals
+fn ranking(competing_effects: &[CompetingEffect], id: &str) -> Plot {
+    let rows: Vec<(String, f64, Fill)> = competing_effects
         .iter()
         .map(|rival| {
             let fill = if rival.named {

@@ -23,10 +23,10 @@ pub(super) const WEAK_U: f64 = 1000.0;
 const SEEN_SHARE: f64 = 1e-3;
 
 /// Changes of a reading below this are rounding errors of the difference, µm.
-const LEAST_CHANGE_UM: f64 = 1e-7;
+const MIN_CHANGE_UM: f64 = 1e-7;
 
 /// A signature of fewer standard deviations per unit of amplitude is a rounding error.
-const LEAST_SIGNATURE: f64 = 1e-6;
+const MIN_SIGNATURE: f64 = 1e-6;
 
 /// The oracle of one kind of session.
 #[derive(Clone, Debug)]
@@ -124,7 +124,7 @@ impl Oracle {
                     }
                 }
                 let norm = rest.norm();
-                if norm > SEEN_SHARE * length && norm > LEAST_SIGNATURE {
+                if norm > SEEN_SHARE * length && norm > MIN_SIGNATURE {
                     basis.push(rest / norm);
                 }
             }
@@ -328,11 +328,7 @@ fn sensitivity(plan: &Plan, component: Component) -> Vec<f64> {
                 plan.machine.reading_mm(&instant.commanded, stated, &displacement)
             };
             let change = (at(step) - at(-step)) * 0.5e3;
-            if change.abs() < LEAST_CHANGE_UM {
-                0.0
-            } else {
-                change
-            }
+            if change.abs() < MIN_CHANGE_UM { 0.0 } else { change }
         })
         .collect()
 }

@@ -171,7 +171,7 @@ pub fn tell(outcome: &Outcome, mark: &str) -> String {
         truth.join(" + "),
         result.verdict,
         result.noise_um,
-        result.noise_memory,
+        result.noise_ar_coefficients,
         result.rejected.len(),
         result.before.heldout_rms_um,
         result.after.heldout_rms_um,

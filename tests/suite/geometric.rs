@@ -130,7 +130,10 @@ fn by(session: &Session, method: Method) -> [f64; 8] {
             .iter()
             .position(|p| problem.parameters.list[*p].id == id);
         place.map_or(f64::NAN, |k| {
-            estimate.values[k] * problem.parameters.list[estimator.errors[k]].unit.per_inside
+            estimate.values[k]
+                * problem.parameters.list[estimator.errors[k]]
+                    .unit
+                    .display_per_internal
         })
     })
 }
@@ -349,7 +352,9 @@ fn uncertainties_of_the_cone_cover_what_noise_and_set_ups_do() {
                 .iter()
                 .position(|p| problem.parameters.list[*p].id == *id)
                 .unwrap();
-            let unit = problem.parameters.list[estimator.errors[place]].unit.per_inside;
+            let unit = problem.parameters.list[estimator.errors[place]]
+                .unit
+                .display_per_internal;
             let u = estimate.covariance[(place, place)].sqrt() * unit;
             squares[k] += ((estimate.values[place] * unit - truth[k]) / u).powi(2) / DRAWS as f64;
         }
@@ -378,7 +383,7 @@ fn one_command_shows_both_on_the_same_readings() {
             .iter()
             .position(|p| p.id == row.id)
             .unwrap();
-        let unit = problem.parameters.list[place].unit.per_inside;
+        let unit = problem.parameters.list[place].unit.display_per_internal;
         assert!((row.full_value.unwrap() - full.beta[place] * unit).abs() < 1e-9);
         // The full fit uses every reading for every error: it knows no less.
         assert!(row.full_u.unwrap() <= row.u.unwrap() * 1.001, "{row:?}");

@@ -75,14 +75,14 @@ fn start(place: &Place, command: &str) -> Child {
 }
 
 /// What lies there only because the program was killed: temporary files and folders, by the beginning of their names.
-fn left_over(name: &str) -> bool {
+fn remaining_structure(name: &str) -> bool {
     name.split('/')
         .any(|part| part.starts_with(".tmp") || part.starts_with(".abbe-"))
 }
 
 /// Each file is the old or the new one; how many are new.
 fn whole(found: &Files, old: &Files, new: &Files, command: &str) -> usize {
-    for (name, bytes) in found.iter().filter(|(name, _)| !left_over(name)) {
+    for (name, bytes) in found.iter().filter(|(name, _)| !remaining_structure(name)) {
         assert!(
             old.get(name) == Some(bytes) || new.get(name) == Some(bytes),
             "{command}: {name} is neither the old file nor the whole new one ({} bytes)",
@@ -124,7 +124,7 @@ fn a_program_that_is_killed_leaves_old_files_or_whole_new_ones() {
             .filter(|(name, bytes)| old.get(*name) != Some(*bytes))
             .count();
         assert!(
-            written >= outputs.len() && !new.keys().any(|name| left_over(name)),
+            written >= outputs.len() && !new.keys().any(|name| remaining_structure(name)),
             "{command}: {:?}",
             new.keys()
         );

@@ -7,7 +7,7 @@ mod claims;
 mod codes;
 mod compensation;
 mod data;
-mod effect_words;
+mod effect_description;
 mod equation_command;
 mod equation_effects;
 mod faults;

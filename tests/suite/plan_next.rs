@@ -1,8 +1,8 @@
 //! The next test: better than the published methods, and what tells two effects apart.
 
-use abbe::identify::plan::goal::Goal;
+use abbe::identify::plan::candidate_tests::{CandidateTests, entries};
+use abbe::identify::plan::criterion::Goal;
 use abbe::identify::plan::improve::{ImproveOptions, improve};
-use abbe::identify::plan::menu::{Menu, entries};
 use abbe::identify::plan::{PlanOptions, analyse, separation, states};
 use abbe::model::effect::{Component, Driver, Effect, Shape};
 use abbe::model::instrument::Station;
@@ -52,10 +52,10 @@ fn one_test_more_than_chapter_5_beats_the_best_published_method_by_a_third() {
     };
     for follow in [true, false] {
         // Like the published methods, every test has a spindle ball of its own; no linear axis follows where its errors would enter.
-        let menu = Menu {
+        let menu = CandidateTests {
             keep_spindle_ball: false,
             follow,
-            ..Menu::default()
+            ..CandidateTests::default()
         };
         let found = improve(&problem, &menu, &options).unwrap();
         let after = found.steps[0].after;
@@ -97,9 +97,9 @@ fn a_blind_spot_is_opened() {
     };
     let found = improve(
         &problem,
-        &Menu {
+        &CandidateTests {
             thin: 4,
-            ..Menu::default()
+            ..CandidateTests::default()
         },
         &options,
     )
@@ -122,7 +122,7 @@ fn wobble_and_axial_motion_are_told_apart_at_a_second_radius() {
         tests: Vec::new(),
     };
     let beta = vec![0.0; problem.parameters.list.len()];
-    let menu = Menu::short();
+    let menu = CandidateTests::short();
     // 1.5 µm of EZC order 2 against EAC order 1, which at one radius is the same.
     let found = separation(
         &problem,
@@ -183,9 +183,9 @@ fn curves_reach_the_largest_sensitivity() {
 fn what_is_proposed_stays_within_the_reach_of_the_bar() {
     let complete = states::complete(&with_setups_of_1_um(5), true).unwrap();
     let within = |reach_mm: f64| {
-        let menu = Menu {
+        let menu = CandidateTests {
             reach_mm,
-            ..Menu::short()
+            ..CandidateTests::short()
         };
         let found = entries(&complete, &menu).unwrap();
         for entry in &found {
@@ -212,14 +212,14 @@ fn what_is_proposed_stays_within_the_reach_of_the_bar() {
 fn by_the_minute_a_short_test_is_taken() {
     let complete = states::complete(&with_setups_of_1_um(5), true).unwrap();
     let problem = states::problem_by_test(&complete, noise_um(0.3)).unwrap();
-    let menu = Menu {
+    let menu = CandidateTests {
         bars_mm: vec![100.0, 150.0],
         radii_mm: vec![100.0],
         heights_mm: vec![0.0],
         standing_deg: vec![0.0],
         ranges: vec![1.0, 0.5],
         both_directions: vec![true, false],
-        ..Menu::default()
+        ..CandidateTests::default()
     };
     let proposed = |by_minute| {
         let options = ImproveOptions {

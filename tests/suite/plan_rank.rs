@@ -39,7 +39,7 @@ fn rank(height: f64, spindles: &[(&str, [f64; 3])]) -> (usize, Vec<String>) {
     let unseen = ids
         .iter()
         .enumerate()
-        .filter(|(j, _)| !linear.rank.is_seen(*j))
+        .filter(|(j, _)| !linear.rank.is_identifiable(*j))
         .map(|(_, id)| id.clone());
     (linear.rank.seen.ncols(), unseen.collect())
 }
@@ -83,7 +83,7 @@ fn seen_by_itself(orders: std::ops::RangeInclusive<usize>) -> (usize, usize, Vec
     let seen = ids
         .iter()
         .enumerate()
-        .filter(|(j, _)| linear.rank.is_seen(*j))
+        .filter(|(j, _)| linear.rank.is_identifiable(*j))
         .map(|(_, id)| id.clone())
         .collect();
     (linear.rank.seen.ncols(), ids.len(), seen)

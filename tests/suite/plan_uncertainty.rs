@@ -71,7 +71,9 @@ fn linear_step(problem: &Problem<'_>, basis: &Mat<f64>) -> Vec<f64> {
 fn squares(code: &str, first_seed: usize, whole_fit: bool) -> Vec<(String, f64)> {
     let plan = plan(code);
     let (ids, linear) = linearised(&plan);
-    let seen: Vec<usize> = (0..ids.len()).filter(|j| linear.rank.is_seen(*j)).collect();
+    let seen: Vec<usize> = (0..ids.len())
+        .filter(|j| linear.rank.is_identifiable(*j))
+        .collect();
     let of_fit = |number: usize| -> Vec<f64> {
         let mut random = rand_pcg::Pcg64::seed_from_u64((first_seed + number) as u64);
         let given = plan

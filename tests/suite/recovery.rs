@@ -51,8 +51,8 @@ fn measured(plan: &Session, simulation: &Simulation) -> (Session, Vec<(String, f
 fn found(problem: &Problem<'_>, fit: &Fit, id: &str) -> (f64, f64) {
     let list = &problem.parameters.list;
     let place = list.iter().position(|parameter| parameter.id == id).unwrap();
-    assert!(fit.rank.is_seen(place), "{id} is not seen");
-    let outside = list[place].unit.per_inside;
+    assert!(fit.rank.is_identifiable(place), "{id} is not seen");
+    let outside = list[place].unit.display_per_internal;
     (
         fit.beta[place] * outside,
         fit.covariance[(place, place)].sqrt() * outside,

@@ -3,7 +3,7 @@
 use std::path::Path;
 
 use abbe::identify::plan::states;
-use abbe::identify::views::{Cause, sensitivities, views};
+use abbe::identify::series::{Cause, sensitivities, views};
 use abbe::model::session::Session;
 use abbe::model::session::read::{self, ReadOptions};
 
@@ -197,16 +197,21 @@ fn a_share_is_what_the_readings_lose_without_it() {
 fn a_trace_tells_how_it_came_to_its_effects_and_who_else_could_stand_there() {
     let session = session(&ready("hermle-c600u/measured/session.toml"));
     let trace = abbe::identify::trace::trace(&session, &Default::default(), &|_| true).unwrap();
-    let [rivals] = trace.rivals.as_slice() else {
-        panic!("one effect was put in, {} were found", trace.rivals.len());
+    let [competing_effects] = trace.competing_effects.as_slice() else {
+        panic!(
+            "one effect was put in, {} were found",
+            trace.competing_effects.len()
+        );
     };
-    let of = |id: &str| rivals.iter().find(|rival| rival.id == id).unwrap();
+    let of = |id: &str| competing_effects.iter().find(|rival| rival.id == id).unwrap();
     assert!(of("EZC~C:h2").named && !of("EZC~C:h2").alias);
     for id in ["EAC~C:h1", "EBC~C:h1"] {
         assert!(of(id).alias && !of(id).named, "{id}");
     }
-    assert!(rivals.is_sorted_by(|a, b| a.evidence >= b.evidence));
-    let beaten = rivals.iter().filter(|rival| !rival.named && !rival.alias);
+    assert!(competing_effects.is_sorted_by(|a, b| a.evidence >= b.evidence));
+    let beaten = competing_effects
+        .iter()
+        .filter(|rival| !rival.named && !rival.alias);
     for rival in beaten {
         assert!(rival.evidence < of("EZC~C:h2").evidence - 2.0, "{}", rival.id);
     }
@@ -342,7 +347,7 @@ fn plots_come_all_or_none_and_as_png_where_that_is_built_in() {
 }
 
 /// A bound of the size of a page.
-const MOST_BYTES: usize = 3_000_000;
+const MAX_BYTES: usize = 3_000_000;
 
 #[test]
 fn a_report_of_6000_readings_is_under_3_mb() {
@@ -364,7 +369,7 @@ fn a_report_of_6000_readings_is_under_3_mb() {
             .success()
     );
     let bytes = std::fs::metadata(&report).unwrap().len() as usize;
-    assert!(bytes < MOST_BYTES, "{bytes} bytes");
+    assert!(bytes < MAX_BYTES, "{bytes} bytes");
 }
 
 #[test]
@@ -387,7 +392,7 @@ fn a_report_of_11911_poses_is_under_3_mb_and_names_its_inputs() {
     ]);
     assert!(output.status.success());
     let page = std::fs::read_to_string(&report).unwrap();
-    assert!(page.len() < MOST_BYTES, "{} bytes", page.len());
+    assert!(page.len() < MAX_BYTES, "{} bytes", page.len());
     for input in [
         "sessions/ur10/session.toml",
         "sessions/ur10/machine.toml",

@@ -322,7 +322,7 @@ fn results_hold_and_have_the_fields_of_the_design() {
         &["verdict", "noise_um", "before", "after", "effects", "remainder"],
         &[
             "noise_source",
-            "noise_memory",
+            "noise_ar_coefficients",
             "readings",
             "heldout_by",
             "residual_before",

@@ -2,12 +2,12 @@
 
 use abbe::identify::fit::fit;
 use abbe::identify::noise::Noise;
-use abbe::identify::plan::menu::{Menu, entries};
+use abbe::identify::plan::candidate_tests::{CandidateTests, entries};
 use abbe::identify::problem::Problem;
 use abbe::identify::quantity::Given;
 use abbe::identify::results::EffectName;
 use abbe::identify::simulate::{Simulation, simulate};
-use abbe::identify::trace::further::tell_apart;
+use abbe::identify::trace::separating_tests::separate_aliases;
 use abbe::identify::trace::{TraceOptions, trace};
 use abbe::model::effect::{Component, Driver, Effect, Shape};
 use abbe::model::session::Session;
@@ -201,11 +201,11 @@ fn each_explanation_is_told_with_how_well_a_further_test_separates_it() {
     let file = ready("hermle-c600u/measured/session.toml");
     let session = read::session(&file, &ReadOptions::default()).unwrap();
     let mut trace = trace(&session, &TraceOptions::default(), &|_| true).unwrap();
-    let menu = Menu {
+    let menu = CandidateTests {
         thin: 1,
-        ..Menu::short()
+        ..CandidateTests::short()
     };
-    tell_apart(&mut trace, &menu, &|_| true).unwrap();
+    separate_aliases(&mut trace, &menu, &|_| true).unwrap();
     let effect = &trace.result.effects[0];
     assert!(!effect.unique && effect.indistinguishable == effect.aliases.len() + 1);
     assert!(effect.aliases.len() > 4, "{:?}", effect.aliases);
@@ -240,7 +240,7 @@ fn each_explanation_is_told_with_how_well_a_further_test_separates_it() {
     let noise = &trace.after.noise;
     let found = &trace.effects[0];
     let coefficients = &trace.after_fit.beta[trace.after_fit.beta.len() - 2..];
-    let alternatives = &trace.look_alikes[0];
+    let alternatives = &trace.alias_effects[0];
     let menu = menu.for_effects(std::iter::once(found).chain(alternatives));
     let proposed = entries(&session, &menu).unwrap();
     let proposed = proposed.iter().find(|entry| entry.name == tests[0].test).unwrap();
@@ -267,7 +267,7 @@ fn an_effect_without_an_alternative_is_unique() {
         ..TraceOptions::default()
     };
     let mut trace = trace(&session, &options, &|_| true).unwrap();
-    tell_apart(&mut trace, &Menu::short(), &|_| true).unwrap();
+    separate_aliases(&mut trace, &CandidateTests::short(), &|_| true).unwrap();
     let effect = &trace.result.effects[0];
     assert!(effect.unique && effect.indistinguishable == 1 && effect.aliases.is_empty());
     assert_eq!(effect.explanations, effect.name.meaning);

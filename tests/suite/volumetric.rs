@@ -1,6 +1,6 @@
 //! The volumetric error and its compensation, against plain matrices and over every topology.
 
-use abbe::identify::volumetric::{self, Erring, ErrorFunction, Form, functions};
+use abbe::identify::volumetric::{self, ErrorFunction, Form, MachineWithErrors, functions};
 use abbe::model::axis::AxisKind;
 use abbe::model::chain::{ERRORS_PER_AXIS, Machine};
 use nalgebra::{Isometry3, Point3, Rotation3, Translation3, UnitQuaternion, Vector3};
@@ -62,7 +62,7 @@ fn the_33_errors_of_the_ready_machine_move_the_tool_as_matrices_do() {
     kinds.dedup();
     assert_eq!(kinds.len(), 33);
     let tool = [10.0, -20.0, -120.0];
-    let erring = Erring {
+    let erring = MachineWithErrors {
         machine: &machine,
         functions: &functions,
         tool_mm: tool,
@@ -131,7 +131,7 @@ fn every_topology_is_compensated() {
                 form,
             });
         }
-        let erring = Erring {
+        let erring = MachineWithErrors {
             machine: &machine,
             functions: &functions,
             tool_mm: [0.0, 0.0, -100.0],

@@ -2,17 +2,17 @@
 
 use std::collections::HashMap;
 
-use crate::equation::{Equation, FirstLayout, Form, Kind, Order};
-use crate::first::{Column, FirstOrder};
-use crate::layout::{product, sum};
-use crate::print::{exact, touch, words};
+use crate::collect::{product, sum};
+use crate::equation::{Equation, FirstOrderLayout, Form, Kind, Order};
+use crate::first_order::{Column, FirstOrder};
+use crate::print::{exact, notes, touch};
 use crate::program::{Input, Label, Naming, Program, Step, Tree};
 use crate::symbol::{Binary, Operand, Unary};
 use crate::variable::Variable;
 
 /// The left-hand side of a row.
 #[derive(Clone, Debug, PartialEq)]
-pub(crate) enum Left {
+pub(crate) enum LeftSide {
     /// A named quantity.
     Named(Label),
     /// Its square.
@@ -26,17 +26,17 @@ pub(crate) enum Left {
 /// One equation.
 #[derive(Clone, Debug)]
 pub(crate) struct Row {
-    pub(crate) left: Left,
+    pub(crate) left: LeftSide,
     /// `≈` in the place of `=`.
     pub(crate) approximate: bool,
     pub(crate) right: Tree,
     /// A word on it, such as "not seen".
-    pub(crate) remark: Option<Remark>,
+    pub(crate) remark: Option<NoteKind>,
 }
 
 /// A word on a coefficient.
 #[derive(Clone, Debug, PartialEq)]
-pub(crate) enum Remark {
+pub(crate) enum NoteKind {
     /// Identically zero.
     NotSeen,
     /// A fixed multiple of another parameter's.
@@ -78,7 +78,7 @@ impl Article {
             .filter(|(place, input)| told(*place, input))
             .map(|(_, input)| match input {
                 Input::Plain(variable) => {
-                    (input.clone(), words::meaning(equation, variable), variable.unit())
+                    (input.clone(), notes::meaning(equation, variable), variable.unit())
                 }
                 Input::Sine(variable) | Input::Cosine(variable) => (
                     input.clone(),
@@ -101,7 +101,7 @@ fn uses(sections: &[Section], place: usize) -> bool {
     rows.into_iter().any(|row| row.right.holds(place))
 }
 
-pub(crate) fn row(left: Left, right: Tree) -> Row {
+pub(crate) fn row(left: LeftSide, right: Tree) -> Row {
     Row {
         left,
         approximate: false,
@@ -153,7 +153,7 @@ fn groups(equation: &Equation, trees: &[Tree], complete: bool) -> (Program, Vec<
     if equation.kind != Kind::Length {
         let rows = trees.iter().enumerate().map(|(place, tree)| Row {
             approximate: !complete,
-            ..row(Left::Output(place), tree.clone())
+            ..row(LeftSide::Output(place), tree.clone())
         });
         let section = Section {
             heading: what_is_read(equation).to_string(),
@@ -167,7 +167,7 @@ fn groups(equation: &Equation, trees: &[Tree], complete: bool) -> (Program, Vec<
     let rows = labels
         .into_iter()
         .zip(trees)
-        .map(|(label, tree)| row(Left::Named(label), tree.clone()));
+        .map(|(label, tree)| row(LeftSide::Named(label), tree.clone()));
     let length = with_bar_unknowns(equation, &program, norm_of_steps(0));
     let sections = vec![
         Section {
@@ -178,7 +178,7 @@ fn groups(equation: &Equation, trees: &[Tree], complete: bool) -> (Program, Vec<
             heading: what_is_read(equation).to_string(),
             rows: vec![Row {
                 approximate: !complete,
-                ..row(Left::Output(0), length)
+                ..row(LeftSide::Output(0), length)
             }],
         },
     ];
@@ -219,7 +219,11 @@ const L_0: Label = Label::Scalar("L_0");
 const S: Label = Label::Scalar("S");
 
 /// The value without errors, the sum, and the table of coefficients.
-fn first_order(equation: &Equation, first: &FirstOrder, layout: &FirstLayout) -> (Program, Vec<Section>) {
+fn first_order(
+    equation: &Equation,
+    first: &FirstOrder,
+    layout: &FirstOrderLayout,
+) -> (Program, Vec<Section>) {
     let is_length = matches!(equation.kind, Kind::Length | Kind::Distance);
     let program = naming(equation, if is_length { vec![L_0, S] } else { Vec::new() });
     let (l_0, s) = (Tree::Step(0), Tree::Step(1));
@@ -227,15 +231,18 @@ fn first_order(equation: &Equation, first: &FirstOrder, layout: &FirstLayout) ->
     let layout = named.as_ref().unwrap_or(layout);
     let mut sum_rows = Vec::new();
     if is_length {
-        sum_rows.push(row(Left::Square(L_0), layout.nominal[0].clone()));
-        sum_rows.push(row(Left::Named(S), sum(terms(equation, first, layout, 0, true))));
+        sum_rows.push(row(LeftSide::Square(L_0), layout.nominal[0].clone()));
+        sum_rows.push(row(
+            LeftSide::Named(S),
+            sum(terms(equation, first, layout, 0, true)),
+        ));
         let slope = binary(Binary::Div, s, l_0.clone());
         let mut all = terms_of(&layout.without_errors(l_0.clone()));
         all.push((false, slope));
         all.extend(terms(equation, first, layout, 0, false));
         sum_rows.push(Row {
             approximate: true,
-            ..row(Left::Output(0), sum(all))
+            ..row(LeftSide::Output(0), sum(all))
         });
     } else {
         for (place, nominal) in layout.nominal.iter().enumerate() {
@@ -246,7 +253,7 @@ fn first_order(equation: &Equation, first: &FirstOrder, layout: &FirstLayout) ->
             all.extend(terms(equation, first, layout, place, false));
             sum_rows.push(Row {
                 approximate: true,
-                ..row(Left::Output(place), sum(all))
+                ..row(LeftSide::Output(place), sum(all))
             });
         }
     }
@@ -254,8 +261,8 @@ fn first_order(equation: &Equation, first: &FirstOrder, layout: &FirstLayout) ->
     for (sensitivity, coefficients) in first.sensitivities.iter().zip(&layout.coefficients) {
         let remark = match &sensitivity.column {
             Column::Distinct => None,
-            Column::Zero => Some(Remark::NotSeen),
-            Column::Multiple { of, .. } => Some(Remark::MultipleOf(of.clone())),
+            Column::Zero => Some(NoteKind::NotSeen),
+            Column::Multiple { of, .. } => Some(NoteKind::MultipleOf(of.clone())),
         };
         let zero = |tree: &Tree| *tree == Tree::Number(0.0);
         let all_zero = coefficients.iter().all(zero);
@@ -271,7 +278,7 @@ fn first_order(equation: &Equation, first: &FirstOrder, layout: &FirstLayout) ->
             };
             table.push(Row {
                 remark: remark.clone(),
-                ..row(Left::Slope(place, sensitivity.parameter.clone()), right)
+                ..row(LeftSide::Slope(place, sensitivity.parameter.clone()), right)
             });
         }
     }
@@ -317,7 +324,7 @@ fn order_words(order: Order) -> &'static str {
 fn terms(
     equation: &Equation,
     first: &FirstOrder,
-    layout: &FirstLayout,
+    layout: &FirstOrderLayout,
     coordinate: usize,
     over_length: bool,
 ) -> Vec<(bool, Tree)> {

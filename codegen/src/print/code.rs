@@ -5,12 +5,12 @@ use std::ops::Range;
 
 use crate::equation::{Equation, Kind};
 use crate::print::dialect::{self, Dialect};
-use crate::print::words;
+use crate::print::notes;
 use crate::program::{Input, Label, Program};
 use crate::variable::{Symbols, Variable, identifier};
 
 /// Words that are no names in Rust, C, Python or MATLAB, or that the printed code uses itself.
-const TAKEN: &[&str] = &[
+const RESERVED_WORDS: &[&str] = &[
     "as",
     "and",
     "assert",
@@ -146,7 +146,7 @@ pub(crate) const GROUPS: [&str; 3] = ["lengths", "axes", "errors"];
 impl<'e> Code<'e> {
     pub(crate) fn new(equation: &'e Equation, gradient: bool) -> Self {
         let program = equation.program(gradient);
-        let mut taken: HashSet<String> = TAKEN.iter().map(|word| (*word).to_string()).collect();
+        let mut taken: HashSet<String> = RESERVED_WORDS.iter().map(|word| (*word).to_string()).collect();
         let mut name = |wanted: String| {
             let mut free = wanted.clone();
             let mut number = 2;
@@ -235,14 +235,14 @@ impl<'e> Code<'e> {
         let at =
             |group: &str, number: usize| format!("{group}{}{}{}", brackets[0], number + first, brackets[1]);
         let equation = self.equation;
-        let mut lines = words::title(equation);
+        let mut lines = notes::title(equation);
         lines.push(String::new());
         lines.push("Arguments in order:".to_string());
         for (group, places) in GROUPS.iter().zip(&self.groups) {
             for (number, place) in places.clone().enumerate() {
                 let input = &self.program.inputs[place];
                 let (unit, meaning) = match input {
-                    Input::Plain(variable) => (variable.unit(), words::meaning(equation, variable)),
+                    Input::Plain(variable) => (variable.unit(), notes::meaning(equation, variable)),
                     Input::Sine(variable) => ("1", format!("sine of the {}", variable.meaning())),
                     Input::Cosine(variable) => ("1", format!("cosine of the {}", variable.meaning())),
                 };
@@ -285,7 +285,7 @@ impl<'e> Code<'e> {
             operations.quotients,
             operations.roots,
         ));
-        lines.extend(words::notes(equation));
+        lines.extend(notes::notes(equation));
         lines
     }
 }

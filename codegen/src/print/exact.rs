@@ -5,7 +5,7 @@
 //! ```
 
 use crate::equation::{Equation, Kind};
-use crate::print::article::{Left, Row, Section, norm_of_steps, row, what_is_read, with_bar_unknowns};
+use crate::print::article::{LeftSide, Row, Section, norm_of_steps, row, what_is_read, with_bar_unknowns};
 use crate::program::{Label, Naming, Program, Step, Tree};
 use crate::symbol::{Binary, Operand, Symbol};
 use crate::touch::{self, Touch};
@@ -68,7 +68,7 @@ pub(crate) fn sections(equation: &Equation) -> (Program, Vec<Section>) {
     let followers = equation.followers.iter().zip(followers);
     let followers = followers.map(|((variable, _), tree)| {
         let label = Label::Quantity(variable.clone());
-        row(Left::Named(label.clone()), value_of(&program, &label, tree))
+        row(LeftSide::Named(label.clone()), value_of(&program, &label, tree))
     });
     let followers: Vec<Row> = followers.collect();
     let mut vectors = forth
@@ -94,21 +94,21 @@ pub(crate) fn sections(equation: &Equation) -> (Program, Vec<Section>) {
     let mut read = Section {
         heading: what_is_read(equation).to_string(),
         rows: outputs
-            .map(|(place, tree)| row(Left::Output(place), tree.clone()))
+            .map(|(place, tree)| row(LeftSide::Output(place), tree.clone()))
             .collect(),
     };
     if equation.kind == Kind::Distance {
         let between = touch::QUADRATIC.into_iter().chain([touch::STEP_LENGTH]);
         let between = between.filter_map(|label| {
             let own = program.steps.iter().find(|step| step.label == label)?;
-            Some(row(Left::Named(label), own.value.clone()))
+            Some(row(LeftSide::Named(label), own.value.clone()))
         });
         read.rows.splice(0..0, between.collect::<Vec<Row>>());
     }
     let back: Vec<Section> = vectors.collect();
     let slopes = equation.parameters.iter().zip(slopes);
     let slopes: Vec<Row> = slopes
-        .map(|(parameter, tree)| row(Left::Slope(0, parameter.clone()), tree.clone()))
+        .map(|(parameter, tree)| row(LeftSide::Slope(0, parameter.clone()), tree.clone()))
         .collect();
     if let (Kind::Length, Some(bar)) = (equation.kind, forth.last()) {
         // The norm of the bar by the names of its own coordinates, whichever of them are aliases.
@@ -125,13 +125,16 @@ pub(crate) fn sections(equation: &Equation) -> (Program, Vec<Section>) {
             .position(|step| step.label == Label::Scalar("d"));
         read.rows = match named {
             Some(place) => vec![
-                row(Left::Named(Label::Scalar("d")), norm),
+                row(LeftSide::Named(Label::Scalar("d")), norm),
                 row(
-                    Left::Output(0),
+                    LeftSide::Output(0),
                     with_bar_unknowns(equation, &program, Tree::Step(place)),
                 ),
             ],
-            None => vec![row(Left::Output(0), with_bar_unknowns(equation, &program, norm))],
+            None => vec![row(
+                LeftSide::Output(0),
+                with_bar_unknowns(equation, &program, norm),
+            )],
         };
     }
     sections.push(read);
@@ -149,7 +152,7 @@ pub(crate) fn sections(equation: &Equation) -> (Program, Vec<Section>) {
 fn component(program: &Program, vector: &NamedVector, trees: &[Tree], coordinate: usize) -> Row {
     let label = vector.label(coordinate);
     let right = value_of(program, &label, &trees[coordinate]);
-    row(Left::Named(label), as_quotient(right))
+    row(LeftSide::Named(label), as_quotient(right))
 }
 
 /// How a name is computed: by its own step or, where it has none, as it stands.

@@ -4,9 +4,9 @@ use std::f64::consts::{PI, TAU};
 use std::fmt::Write;
 
 use crate::equation::{Equation, Kind};
-use crate::print::article::{Article, Left, Remark, Row, terms_of};
+use crate::print::article::{Article, LeftSide, NoteKind, Row, terms_of};
 use crate::print::dialect::{self, Dialect};
-use crate::print::words;
+use crate::print::notes;
 use crate::program::{Input, Label, Program};
 use crate::symbol::Unary;
 use crate::variable::{Symbols, Variable};
@@ -62,8 +62,8 @@ impl Dialect for Latex<'_> {
     fn call(&self, function: Unary, argument: &str) -> String {
         match function {
             Unary::Sqrt => format!("\\sqrt{{{argument}}}"),
-            Unary::Sin => format!("\\sin {}", of_turn(self, argument)),
-            Unary::Cos => format!("\\cos {}", of_turn(self, argument)),
+            Unary::Sin => format!("\\sin {}", of_sin_cos(self, argument)),
+            Unary::Cos => format!("\\cos {}", of_sin_cos(self, argument)),
             Unary::Exp => format!("\\exp({argument})"),
             Unary::Signum => format!("\\operatorname{{sgn}}({argument})"),
             Unary::Step => format!("\\operatorname{{step}}({argument})"),
@@ -85,7 +85,7 @@ impl Dialect for Latex<'_> {
 }
 
 /// The argument of a sine or cosine: in parentheses where it is more than one name.
-pub(crate) fn of_turn(dialect: &impl Dialect, argument: &str) -> String {
+pub(crate) fn of_sin_cos(dialect: &impl Dialect, argument: &str) -> String {
     if argument.contains([' ', '^']) || argument.starts_with(dialect.minus()) {
         dialect.group(argument)
     } else {
@@ -215,7 +215,7 @@ pub(crate) fn print(equation: &Equation) -> String {
     let article = Article::new(equation);
     let symbols = equation.options.symbols;
     let mut page = String::new();
-    for line in words::title(equation) {
+    for line in notes::title(equation) {
         let _ = writeln!(page, "% {line}");
     }
     page.push_str("% Needs \\usepackage{amsmath}.\n\\begingroup\\allowdisplaybreaks\n");
@@ -253,7 +253,7 @@ pub(crate) fn print(equation: &Equation) -> String {
         page.push_str("\\end{tabular}\n");
     }
     page.push('\n');
-    for note in words::notes_spelt(equation, &escape, &|of| format!("${}$", variable(of, symbols))) {
+    for note in notes::notes_spelt(equation, &escape, &|of| format!("${}$", variable(of, symbols))) {
         let _ = writeln!(page, "{note}");
     }
     page
@@ -262,10 +262,10 @@ pub(crate) fn print(equation: &Equation) -> String {
 fn write_row(equation: &Equation, program: &Program, row: &Row, symbols: Symbols) -> String {
     let spelling = Latex { program, symbols };
     let left = match &row.left {
-        Left::Named(name) => label(name, symbols),
-        Left::Square(name) => format!("{}^2", label(name, symbols)),
-        Left::Output(place) => output(equation.kind, *place),
-        Left::Slope(place, parameter) => format!(
+        LeftSide::Named(name) => label(name, symbols),
+        LeftSide::Square(name) => format!("{}^2", label(name, symbols)),
+        LeftSide::Output(place) => output(equation.kind, *place),
+        LeftSide::Slope(place, parameter) => format!(
             "\\frac{{\\partial {}}}{{\\partial {}}}",
             output(equation.kind, *place),
             variable(parameter, symbols)
@@ -275,8 +275,8 @@ fn write_row(equation: &Equation, program: &Program, row: &Row, symbols: Symbols
     let lines = dialect::lines(&terms_of(&row.right), &spelling, WIDTH, visible);
     let remark = match &row.remark {
         None => String::new(),
-        Some(Remark::NotSeen) => " \\quad\\text{(not seen)}".to_string(),
-        Some(Remark::MultipleOf(other)) => {
+        Some(NoteKind::NotSeen) => " \\quad\\text{(not seen)}".to_string(),
+        Some(NoteKind::MultipleOf(other)) => {
             format!(" \\quad\\text{{(multiple of ${}$)}}", variable(other, symbols))
         }
     };

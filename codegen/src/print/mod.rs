@@ -10,12 +10,12 @@ pub mod dialect;
 mod exact;
 mod latex;
 mod matlab;
+mod notes;
 mod python;
 mod rust;
 mod text;
 mod touch;
 mod typst;
-mod words;
 
 pub(crate) use article::terms_of;
 

@@ -4,9 +4,9 @@ use std::f64::consts::{PI, TAU};
 use std::fmt::Write;
 
 use crate::equation::{Equation, Kind};
-use crate::print::article::{Article, Left, Remark, terms_of};
+use crate::print::article::{Article, LeftSide, NoteKind, terms_of};
 use crate::print::dialect::{self, Dialect};
-use crate::print::words;
+use crate::print::notes;
 use crate::program::{Input, Label, Program};
 use crate::symbol::Unary;
 use crate::variable::{Symbols, Variable};
@@ -118,14 +118,14 @@ pub(crate) fn print(equation: &Equation) -> String {
         program: &article.program,
         symbols,
     };
-    let mut page = words::title(equation).join("\n") + "\n";
+    let mut page = notes::title(equation).join("\n") + "\n";
     for section in &article.sections {
         let _ = writeln!(page, "\n{}", section.heading);
-        let left = |left: &Left| match left {
-            Left::Named(name) => label(name, symbols),
-            Left::Square(name) => format!("{}²", label(name, symbols)),
-            Left::Output(place) => output(equation.kind, *place),
-            Left::Slope(place, parameter) => {
+        let left = |left: &LeftSide| match left {
+            LeftSide::Named(name) => label(name, symbols),
+            LeftSide::Square(name) => format!("{}²", label(name, symbols)),
+            LeftSide::Output(place) => output(equation.kind, *place),
+            LeftSide::Slope(place, parameter) => {
                 format!("∂{}/∂{}", output(equation.kind, *place), parameter.text(symbols))
             }
         };
@@ -145,8 +145,8 @@ pub(crate) fn print(equation: &Equation) -> String {
             );
             match &row.remark {
                 None => page.push('\n'),
-                Some(Remark::NotSeen) => page.push_str("   (not seen)\n"),
-                Some(Remark::MultipleOf(other)) => {
+                Some(NoteKind::NotSeen) => page.push_str("   (not seen)\n"),
+                Some(NoteKind::MultipleOf(other)) => {
                     let _ = writeln!(page, "   (a fixed multiple of that of {})", other.text(symbols));
                 }
             }
@@ -166,7 +166,7 @@ pub(crate) fn print(equation: &Equation) -> String {
         let _ = writeln!(page, "  {names}{gap} {unit:<4} {meaning}");
     }
     page.push('\n');
-    page.push_str(&words::notes(equation).join("\n"));
+    page.push_str(&notes::notes(equation).join("\n"));
     page.push('\n');
     page
 }

@@ -1,8 +1,10 @@
 //! The bilinear form of a probe's reading for a reader: the groups of stylus and step, and the distance over them.
 
+use crate::collect::sum;
 use crate::equation::Equation;
-use crate::layout::sum;
-use crate::print::article::{Left, Row, Section, as_it_stands, binary, naming, row, terms_of, what_is_read};
+use crate::print::article::{
+    LeftSide, Row, Section, as_it_stands, binary, naming, row, terms_of, what_is_read,
+};
 use crate::program::{Label, Program, Tree};
 use crate::symbol::{Binary, Unary};
 use crate::touch::{self, Touch};
@@ -46,7 +48,7 @@ pub(crate) fn groups(
         sections.push(Section {
             heading: vector.meaning.clone(),
             rows: rows
-                .map(|(label, tree)| row(Left::Named(label), tree.clone()))
+                .map(|(label, tree)| row(LeftSide::Named(label), tree.clone()))
                 .collect(),
         });
     }
@@ -58,7 +60,7 @@ pub(crate) fn groups(
     let mut rows: Vec<Row> = touch::QUADRATIC
         .into_iter()
         .zip(quadratic)
-        .map(|(label, tree)| row(Left::Named(label), tree))
+        .map(|(label, tree)| row(LeftSide::Named(label), tree))
         .collect();
     if let Some(step) = way {
         let squares = (0..3)
@@ -66,19 +68,21 @@ pub(crate) fn groups(
             .map(|i| Tree::Step(STEP + i))
             .map(|part| (false, binary(Binary::Mul, part.clone(), part)));
         let length = Tree::Unary(Unary::Sqrt, Box::new(sum(squares.collect())));
-        rows.push(row(Left::Named(touch::STEP_LENGTH), length));
+        rows.push(row(LeftSide::Named(touch::STEP_LENGTH), length));
         let named = coordinates(step).into_iter().zip(step_trees);
         sections.insert(
             0,
             Section {
                 heading: step.meaning.clone(),
-                rows: named.map(|(label, tree)| row(Left::Named(label), tree)).collect(),
+                rows: named
+                    .map(|(label, tree)| row(LeftSide::Named(label), tree))
+                    .collect(),
             },
         );
     }
     rows.push(Row {
         approximate: !complete,
-        ..row(Left::Output(0), distance_of_steps(6, way.is_some()))
+        ..row(LeftSide::Output(0), distance_of_steps(6, way.is_some()))
     });
     sections.push(Section {
         heading: what_is_read(equation).to_string(),

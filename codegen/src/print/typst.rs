@@ -4,10 +4,10 @@ use std::f64::consts::{PI, TAU};
 use std::fmt::Write;
 
 use crate::equation::{Equation, Kind};
-use crate::print::article::{Article, Left, Remark, Row, terms_of};
+use crate::print::article::{Article, LeftSide, NoteKind, Row, terms_of};
 use crate::print::dialect::{self, Dialect};
-use crate::print::latex::{capital, of_turn};
-use crate::print::words;
+use crate::print::latex::{capital, of_sin_cos};
+use crate::print::notes;
 use crate::program::{Input, Label, Program};
 use crate::symbol::Unary;
 use crate::variable::{Symbols, Variable};
@@ -50,8 +50,8 @@ impl Dialect for Typst<'_> {
     fn call(&self, function: Unary, argument: &str) -> String {
         match function {
             Unary::Sqrt => format!("sqrt({argument})"),
-            Unary::Sin => format!("sin {}", of_turn(self, argument)),
-            Unary::Cos => format!("cos {}", of_turn(self, argument)),
+            Unary::Sin => format!("sin {}", of_sin_cos(self, argument)),
+            Unary::Cos => format!("cos {}", of_sin_cos(self, argument)),
             Unary::Exp => format!("exp \\({argument}\\)"),
             Unary::Signum => format!("\"sgn\" \\({argument}\\)"),
             Unary::Step => format!("\"step\" \\({argument}\\)"),
@@ -155,7 +155,7 @@ pub(crate) fn print(equation: &Equation) -> String {
     let article = Article::new(equation);
     let symbols = equation.options.symbols;
     let mut page = String::new();
-    for line in words::title(equation) {
+    for line in notes::title(equation) {
         let _ = writeln!(page, "// {line}");
     }
     for section in &article.sections {
@@ -179,7 +179,7 @@ pub(crate) fn print(equation: &Equation) -> String {
         let _ = writeln!(page, "  [${names}$], [{}], [{}],", escape(unit), escape(meaning));
     }
     page.push_str(")\n\n");
-    for note in words::notes_spelt(equation, &escape, &|of| format!("${}$", variable(of, symbols))) {
+    for note in notes::notes_spelt(equation, &escape, &|of| format!("${}$", variable(of, symbols))) {
         let _ = writeln!(page, "{note}");
     }
     page
@@ -188,10 +188,10 @@ pub(crate) fn print(equation: &Equation) -> String {
 fn write_row(equation: &Equation, program: &Program, row: &Row, symbols: Symbols) -> String {
     let spelling = Typst { program, symbols };
     let left = match &row.left {
-        Left::Named(name) => label(name, symbols),
-        Left::Square(name) => format!("{}^2", label(name, symbols)),
-        Left::Output(place) => output(equation.kind, *place),
-        Left::Slope(place, parameter) => format!(
+        LeftSide::Named(name) => label(name, symbols),
+        LeftSide::Square(name) => format!("{}^2", label(name, symbols)),
+        LeftSide::Output(place) => output(equation.kind, *place),
+        LeftSide::Slope(place, parameter) => format!(
             "frac(partial {}, partial {})",
             output(equation.kind, *place),
             variable(parameter, symbols)
@@ -201,8 +201,8 @@ fn write_row(equation: &Equation, program: &Program, row: &Row, symbols: Symbols
     let lines = dialect::lines(&terms_of(&row.right), &spelling, WIDTH, visible);
     let remark = match &row.remark {
         None => String::new(),
-        Some(Remark::NotSeen) => " quad #[(not seen)]".to_string(),
-        Some(Remark::MultipleOf(other)) => {
+        Some(NoteKind::NotSeen) => " quad #[(not seen)]".to_string(),
+        Some(NoteKind::MultipleOf(other)) => {
             format!(" quad #[(multiple of ${}$)]", variable(other, symbols))
         }
     };

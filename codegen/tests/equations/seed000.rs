@@ -368,7 +368,7 @@ fn the_first_order_term_for_term() {
     let multiples: Vec<bool> = first
         .sensitivities
         .iter()
-        .map(|s| matches!(s.column, abbe_codegen::first::Column::Multiple { .. }))
+        .map(|s| matches!(s.column, abbe_codegen::first_order::Column::Multiple { .. }))
         .collect();
     assert_eq!(multiples, [false, false, true, true, false, false, false, false]);
 }

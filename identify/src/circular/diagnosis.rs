@@ -17,12 +17,12 @@ use super::fault::Fault;
 use super::path::{Moves, Path};
 use super::regression::Regression;
 use super::results::{CircularTest, Diagnosis};
-use super::search::{cyclic, is_third_order, is_told, spikes, third_order};
+use super::search::{cyclic, is_separable, is_third_order, spikes, third_order};
 use super::terms::Rows;
 use crate::results::ParameterResult;
 
 /// A single reading beyond this many standard deviations is wild.
-const WILD: f64 = 6.0;
+const OUTLIER_SIGMA: f64 = 6.0;
 /// An arc shorter than this is not taken apart.
 const SHORTEST_ARC_DEG: f64 = 180.0;
 /// Arc of a full circle.
@@ -70,13 +70,14 @@ impl Model {
         // circle they are nearly collinear with scale and straightness.
         if arc_deg > FULL_CIRCLE_DEG * 0.99 {
             let found = third_order(&rows, &names);
-            take_up(&rows, &mut faults, &mut regression, found);
+            add_faults(&rows, &mut faults, &mut regression, found);
         }
         let found = spikes(path, &rows, &names, &faults, &regression);
-        take_up(&rows, &mut faults, &mut regression, found);
+        add_faults(&rows, &mut faults, &mut regression, found);
         let found = cyclic(&rows, &names, &faults, &regression);
-        take_up(&rows, &mut faults, &mut regression, found);
-        let stays = |fault: &Fault| !is_third_order(fault) || is_told(&rows, &faults, fault, &regression);
+        add_faults(&rows, &mut faults, &mut regression, found);
+        let stays =
+            |fault: &Fault| !is_third_order(fault) || is_separable(&rows, &faults, fault, &regression);
         let kept: Vec<bool> = faults.iter().map(stays).collect();
         if kept.contains(&false) {
             let mut kept = kept.into_iter();
@@ -95,14 +96,14 @@ impl Model {
 }
 
 /// The wild readings of a circle: single ones that stand out of what the diagnosis leaves over; `None` where there is no diagnosis.
-pub(super) fn wild(machine: &Machine, path: &Path) -> Option<Vec<bool>> {
+pub(super) fn reject_outliers(machine: &Machine, path: &Path) -> Option<Vec<bool>> {
     let model = Model::of(machine, path).ok()?;
     let residual = &model.regression.residual;
     let mut sizes: Vec<f64> = residual.iter().map(|r| r.abs()).collect();
     sizes.sort_by(f64::total_cmp);
     // Of a normal distribution the median size is 0.6745 σ.
-    let limit = WILD * sizes[sizes.len() / 2] / 0.6745;
-    let mut wild = path.left_out.clone();
+    let limit = OUTLIER_SIGMA * sizes[sizes.len() / 2] / 0.6745;
+    let mut reject_outliers = path.left_out.clone();
     for (i, value) in residual.iter().enumerate() {
         let neighbours = [i.checked_sub(1), Some(i + 1)];
         let alone = neighbours
@@ -110,10 +111,10 @@ pub(super) fn wild(machine: &Machine, path: &Path) -> Option<Vec<bool>> {
             .filter_map(|j| residual.get(j?))
             .all(|other| other.abs() < 0.5 * value.abs());
         if value.abs() > limit && alone {
-            wild[model.rows.row[i]] = true;
+            reject_outliers[model.rows.row[i]] = true;
         }
     }
-    Some(wild)
+    Some(reject_outliers)
 }
 
 /// Adds the diagnosis to a result, and what the test cannot tell.
@@ -135,7 +136,7 @@ pub(super) fn add(machine: &Machine, path: &Path, noise_mm: f64, result: &mut Ci
 }
 
 /// Takes further faults into the model, where the readings can tell them from the others.
-fn take_up(rows: &Rows, faults: &mut Vec<Fault>, regression: &mut Regression, found: Vec<Fault>) {
+fn add_faults(rows: &Rows, faults: &mut Vec<Fault>, regression: &mut Regression, found: Vec<Fault>) {
     if found.is_empty() {
         return;
     }

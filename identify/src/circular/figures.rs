@@ -132,7 +132,7 @@ impl Trace {
 }
 
 /// A path about the centre of its least-squares circle.
-struct Around {
+struct SpokeAngles {
     /// Distance from the centre less the nominal length, mm.
     deviations_mm: Vec<f64>,
     /// Radius of the circle less the nominal length, mm.
@@ -140,7 +140,7 @@ struct Around {
 }
 
 /// Takes out the centre. What a rotary axis turns need not read a radius; there it is the first harmonic of the reading.
-fn about(path: &Path, trace: &Trace) -> Around {
+fn about(path: &Path, trace: &Trace) -> SpokeAngles {
     let mean = |values: &mut dyn Iterator<Item = f64>| values.sum::<f64>() / trace.0.len() as f64;
     let nominal = mean(&mut trace.0.iter().map(|p| p[2]));
     let radial = matches!(path.moves, Moves::Linear { radial: true, .. });
@@ -157,13 +157,13 @@ fn about(path: &Path, trace: &Trace) -> Around {
         .then(|| circle::through(&points))
         .flatten();
     let Some(circle) = found else {
-        return Around {
+        return SpokeAngles {
             deviations_mm: trace.0.iter().map(|p| p[1]).collect(),
             radius_mm: mean(&mut trace.0.iter().map(|p| p[1])),
         };
     };
     let distance = |p: &[f64; 2]| (p[0] - circle.centre[0]).hypot(p[1] - circle.centre[1]);
-    Around {
+    SpokeAngles {
         deviations_mm: points
             .iter()
             .zip(&trace.0)

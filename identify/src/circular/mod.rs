@@ -27,7 +27,8 @@ pub fn of_session(session: &Session, noise_mm: f64, left_out: &[Vec<bool>]) -> V
         .zip(left_out)
         .filter_map(|(test, left_out)| {
             let mut path = path::Path::of(&session.machine, test)?;
-            path.left_out = diagnosis::wild(&session.machine, &path).unwrap_or_else(|| left_out.clone());
+            path.left_out =
+                diagnosis::reject_outliers(&session.machine, &path).unwrap_or_else(|| left_out.clone());
             let mut result = figures::figures(&session.machine, test, &path);
             diagnosis::add(&session.machine, &path, noise_mm, &mut result);
             Some(result)

@@ -13,7 +13,7 @@ use abbe_model::session::Test;
 use crate::circle;
 
 /// Readings that a run needs.
-const LEAST_READINGS: usize = 8;
+const MIN_READINGS: usize = 8;
 /// How far positions may lie off a circle, as a share of its radius.
 const OFF_CIRCLE: f64 = 1e-3;
 /// How much the nominal length may differ from the radius where the bar lies in the plane of the circle, as a share.
@@ -122,7 +122,7 @@ impl Path {
                     angle[row] -= ((angle[row] - angle[row - 1]) / TAU).round() * TAU;
                 }
             }
-            if rows.len() >= LEAST_READINGS {
+            if rows.len() >= MIN_READINGS {
                 let direction = (angle[rows.end - 1] - angle[rows.start]).signum();
                 runs.push(Run { rows, direction });
             }

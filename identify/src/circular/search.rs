@@ -15,7 +15,7 @@ use crate::results::ParameterResult;
 /// Probability with which chance may yield a spike or a cyclic error.
 const CHANCE: f64 = 1e-3;
 /// Below this, 2 nm, no bar reads and the terms are no longer right: they are of first order, and 20 µm across a radius of 100 mm are 2 nm along it.
-const LEAST_MM: f64 = 2e-6;
+const MIN_MM: f64 = 2e-6;
 /// Widths of reversal spikes that are tried, degrees of the path.
 const SPIKE_WIDTHS_DEG: [f64; 6] = [0.5, 1.0, 2.0, 3.0, 5.0, 8.0];
 
@@ -40,7 +40,7 @@ pub(super) fn third_order(rows: &Rows, names: &[String; 2]) -> Vec<Fault> {
 }
 
 /// Whether a fault of one column stands out of the noise beside all the others.
-pub(super) fn is_told(rows: &Rows, faults: &[Fault], fault: &Fault, regression: &Regression) -> bool {
+pub(super) fn is_separable(rows: &Rows, faults: &[Fault], fault: &Fault, regression: &Regression) -> bool {
     let before = faults.iter().take_while(|other| !std::ptr::eq(*other, fault));
     let place = rows.setup().len() + before.map(|other| other.columns.len()).sum::<usize>();
     let u = regression.u(&[(place, 1.0)], 1.0);
@@ -56,7 +56,7 @@ pub(super) fn is_told(rows: &Rows, faults: &[Fault], fault: &Fault, regression: 
 /// The variance in which a gain is counted: that of what is left over, enlarged for the correlation of neighbours.
 fn unit_of_gain(rows: &Rows, regression: &Regression) -> f64 {
     let (variance, r) = variance_and_correlation(rows, regression);
-    variance.max(LEAST_MM * LEAST_MM) * (1.0 + r) / (1.0 - r)
+    variance.max(MIN_MM * MIN_MM) * (1.0 + r) / (1.0 - r)
 }
 
 /// Whether chance would seldom give so large a gain, by this many columns, in this many looks.

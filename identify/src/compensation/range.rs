@@ -9,9 +9,9 @@ use abbe_model::sensitivity::SlotValues;
 use crate::problem::Problem;
 
 /// A reading that sees an error with less than this share of the best one's sensitivity does not see it.
-const SEEN: f64 = 0.01;
+const MOVED_SHARE: f64 = 0.01;
 /// Stretches that lie further apart than this many of their steps are two.
-const APART: f64 = 1.5;
+const GAP_STEPS: f64 = 1.5;
 
 /// A stretch that an axis moved over, and the longest step in it.
 #[derive(Clone, Debug, PartialEq)]
@@ -61,7 +61,9 @@ pub(super) fn covered(problem: &Problem<'_>, error: &ErrorName, axis: usize) -> 
         let Some(readings) = &test.readings else { continue };
         let positions = &readings.positions[axis];
         for run in readings.runs() {
-            let seen: Vec<usize> = run.filter(|row| sensitivity[*row] >= SEEN * best).collect();
+            let seen: Vec<usize> = run
+                .filter(|row| sensitivity[*row] >= MOVED_SHARE * best)
+                .collect();
             let mut moved: Option<Stretch> = None;
             for pair in seen.windows(2) {
                 let (a, b) = (positions[pair[0]], positions[pair[1]]);
@@ -97,7 +99,7 @@ fn merged(mut stretches: Vec<Stretch>) -> Vec<Stretch> {
     let mut merged: Vec<Stretch> = Vec::new();
     for next in stretches {
         match merged.last_mut() {
-            Some(last) if next.range.start - last.range.end <= APART * last.step.max(next.step) => {
+            Some(last) if next.range.start - last.range.end <= GAP_STEPS * last.step.max(next.step) => {
                 last.range.end = last.range.end.max(next.range.end);
                 last.step = last.step.max(next.step);
             }

@@ -93,7 +93,7 @@ pub fn compare(session: &Session, method: Method, seed: u64) -> Result<Compariso
     // Known errors: the full fit's, set-ups and effects left out.
     let mut known = vec![0.0; list.len()];
     for (p, parameter) in list.iter().enumerate() {
-        if parameter.role == Role::Error && full.rank.is_seen(p) {
+        if parameter.role == Role::Error && full.rank.is_identifiable(p) {
             known[p] = full.beta[p];
         }
     }
@@ -107,9 +107,9 @@ pub fn compare(session: &Session, method: Method, seed: u64) -> Result<Compariso
         if parameter.role != Role::Error {
             continue;
         }
-        let outside = parameter.unit.per_inside;
+        let outside = parameter.unit.display_per_internal;
         let place = estimator.errors.iter().position(|error| *error == p);
-        let seen = full.rank.is_seen(p).then_some(());
+        let seen = full.rank.is_identifiable(p).then_some(());
         errors.push(ComparisonRow {
             id: parameter.id.clone(),
             unit: parameter.unit.name.clone(),
@@ -219,7 +219,7 @@ fn centres(
                 estimate.centre_covariance[(row, row)].max(0.0).sqrt() * u_enlargement * 1e3
             };
             let share = |p: usize| {
-                let scale = 1e3 / list[p].unit.per_inside;
+                let scale = 1e3 / list[p].unit.display_per_internal;
                 [0, 1].map(|which| estimator.shares[(2 * place + which, p)] * scale)
             };
             CentreResult {

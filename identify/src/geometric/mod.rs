@@ -49,7 +49,7 @@ impl Method {
 }
 
 /// Height of a cone, and distance of two planes, below which they are none, mm.
-const LEAST_LEVER_MM: f64 = 1.0;
+const MIN_LEVER_MM: f64 = 1.0;
 
 /// A method made ready: its tests, its errors, and how the errors follow from the centres.
 #[derive(Clone, Debug)]
@@ -203,7 +203,7 @@ impl Estimator {
 
 /// The tests of a method.
 fn chosen(method: Method, circles: Vec<(usize, Layout)>) -> Vec<(usize, Layout)> {
-    let plane = |layout: &Layout| layout.height_mm.abs() < LEAST_LEVER_MM;
+    let plane = |layout: &Layout| layout.height_mm.abs() < MIN_LEVER_MM;
     let of = |axis: usize| circles.iter().filter(move |(_, layout)| layout.axis == axis);
     let taken = |(_, layout): &&(usize, Layout)| {
         let planes = || {
@@ -216,12 +216,11 @@ fn chosen(method: Method, circles: Vec<(usize, Layout)>) -> Vec<(usize, Layout)>
                 let nearest = planes()
                     .map(|other| other.plane_mm.abs())
                     .fold(f64::INFINITY, f64::min);
-                plane(layout) && layout.plane_mm.abs() <= nearest + LEAST_LEVER_MM
+                plane(layout) && layout.plane_mm.abs() <= nearest + MIN_LEVER_MM
             }
             Method::Cone => planes().next().is_some() && of(layout.axis).any(|(_, other)| !plane(other)),
             Method::TwoPlane => {
-                plane(layout)
-                    && planes().any(|other| (other.plane_mm - layout.plane_mm).abs() > LEAST_LEVER_MM)
+                plane(layout) && planes().any(|other| (other.plane_mm - layout.plane_mm).abs() > MIN_LEVER_MM)
             }
         }
     };

@@ -43,10 +43,10 @@ pub struct Folds {
     pub of_row: Vec<Vec<usize>>,
 }
 
-const BLOCKS_A_TEST: usize = 5;
+const BLOCKS_PER_TEST: usize = 5;
 const FOLDS_OF_POSES: usize = 10;
 /// The most folds of runs: more cost time and say no more. Where the run column changes from reading to reading, each reading would be a fold.
-const MOST_FOLDS_OF_RUNS: usize = 64;
+const MAX_FOLDS_OF_RUNS: usize = 64;
 /// Into how many folds they are grouped where there are more.
 const FOLDS_OF_MANY_RUNS: usize = 32;
 
@@ -85,7 +85,7 @@ impl Folds {
         let runs: Vec<_> = readings.iter().map(|r| r.runs()).collect();
         let kind = if runs.iter().any(|runs| runs.len() < 2) {
             FoldKind::Blocks
-        } else if runs.iter().map(Vec::len).sum::<usize>() <= MOST_FOLDS_OF_RUNS {
+        } else if runs.iter().map(Vec::len).sum::<usize>() <= MAX_FOLDS_OF_RUNS {
             FoldKind::Runs
         } else {
             FoldKind::RunGroups
@@ -108,7 +108,7 @@ impl Folds {
                         (0..groups).map(|k| first(k)..first(k + 1)).collect()
                     }
                     _ => {
-                        let blocks = BLOCKS_A_TEST.min(r.rows().max(1));
+                        let blocks = BLOCKS_PER_TEST.min(r.rows().max(1));
                         (0..blocks)
                             .map(|k| k * r.rows() / blocks..(k + 1) * r.rows() / blocks)
                             .collect()
@@ -128,7 +128,7 @@ impl Folds {
 /// Runs of fewer readings than this on average are no traversals, if their numbers come back.
 const SHORT_RUN: f64 = 4.0;
 /// The fewest readings of a test whose run column is judged.
-const LEAST_READINGS: usize = 24;
+const MIN_READINGS: usize = 24;
 
 /// A warning for each test whose run column does not number traversals: the number changes from reading to reading.
 pub fn mislabelled_runs(tests: &[&Test]) -> Vec<String> {
@@ -142,7 +142,7 @@ pub fn mislabelled_runs(tests: &[&Test]) -> Vec<String> {
         let length = readings.rows() as f64 / runs.len().max(1) as f64;
         let come_back = numbers.len() < runs.len();
         let one_each = length < 1.5;
-        let wrong = readings.rows() >= LEAST_READINGS && length < SHORT_RUN && (come_back || one_each);
+        let wrong = readings.rows() >= MIN_READINGS && length < SHORT_RUN && (come_back || one_each);
         wrong.then(|| {
             format!(
                 "the `run` column of test {} changes {} times in {} readings, and a run is one traversal in one direction: directions of travel, repeats and \

@@ -9,7 +9,7 @@
 //! groups of repeats, the deviations of noise of variance σ² have the expected sum of squares `σ²·tr(M·P)`; that trace, and not the number of
 //! deviations, is what their sum of squares is divided by.
 
-mod memory;
+mod autocorrelation;
 mod trends;
 mod waves;
 
@@ -18,7 +18,7 @@ use abbe_model::session::readings::Readings;
 use statrs::distribution::{ChiSquared, ContinuousCDF};
 
 use crate::problem::Problem;
-pub use memory::Memory;
+pub use autocorrelation::Autocorrelation;
 use trends::Trends;
 
 /// The noise of one scalar reading.
@@ -29,7 +29,7 @@ pub struct Noise {
     /// Autoregressive coefficients along a run; empty for white noise.
     pub memory: Vec<f64>,
     /// Standard uncertainty of the sum of these coefficients: how slow noise is, which decides how large it is where it is slow.
-    pub memory_u: f64,
+    pub ar_sum_u: f64,
     /// Where the size comes from.
     pub source: NoiseSource,
 }
@@ -62,7 +62,7 @@ impl Noise {
         Noise {
             sigma_mm,
             memory: Vec::new(),
-            memory_u: 0.0,
+            ar_sum_u: 0.0,
             source,
         }
     }
@@ -185,7 +185,7 @@ fn deviations(
             }
         }
     }
-    if expected < LEAST_LEFT * count as f64 {
+    if expected < MIN_LEFT * count as f64 {
         deviation.fill(None);
         return (0.0, 1.0);
     }
@@ -198,7 +198,7 @@ fn deviations(
 }
 
 /// Share of the deviations' variance that trends have to leave for it to say anything.
-const LEAST_LEFT: f64 = 0.05;
+const MIN_LEFT: f64 = 0.05;
 
 /// Where a reading was taken, as numbers that are equal for repeats: positions and directions of travel.
 struct Keys {

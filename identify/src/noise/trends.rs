@@ -7,17 +7,17 @@ pub(super) const TERMS: usize = 5;
 /// How many of them are powers of time.
 const POWERS: usize = 3;
 /// The fewest readings of a run whose waves are looked at.
-pub(super) const LEAST_RUN: usize = 24;
+pub(super) const MIN_RUN: usize = 24;
 /// Readings of a run for each of its powers: shorter runs lose fewer terms.
-const READINGS_A_POWER: usize = 5;
+const READINGS_PER_POWER: usize = 5;
 /// The fewest readings of a run that loses its mean.
-const LEAST_TREND: usize = 4;
+const MIN_TREND: usize = 4;
 
 /// How many powers of time are taken out of a run of so many readings: 1 from 4 readings on, 2 from 10, 3 from 15.
 fn powers(readings: usize) -> usize {
     match readings {
-        0..LEAST_TREND => 0,
-        _ => (readings / READINGS_A_POWER).clamp(1, POWERS),
+        0..MIN_TREND => 0,
+        _ => (readings / READINGS_PER_POWER).clamp(1, POWERS),
     }
 }
 
@@ -36,7 +36,7 @@ pub(super) fn trend_terms(times: &[f64]) -> Vec<[f64; TERMS]> {
         match i {
             0..POWERS if i < powers => time.powi(i as i32),
             0..POWERS => 0.0,
-            _ if times.len() < LEAST_RUN => 0.0,
+            _ if times.len() < MIN_RUN => 0.0,
             POWERS => cos,
             _ => sin,
         }

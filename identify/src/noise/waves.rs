@@ -8,8 +8,8 @@ use std::ops::Range;
 use abbe_model::session::Test;
 use statrs::function::gamma::gamma_ur;
 
-use super::trends::LEAST_RUN;
-use super::{Memory, PureError};
+use super::trends::MIN_RUN;
+use super::{Autocorrelation, PureError};
 use crate::outliers::median;
 
 /// Half cycles along a run where the bands may begin that are looked at in deviations, and how many half cycles wide they are.
@@ -18,9 +18,9 @@ const WIDTHS: [usize; 3] = [1, 4, 8];
 /// Half cycles up to which the level is taken that a band has to stand out from.
 const HIGHEST: usize = 100;
 /// The most bands that are taken out of a test.
-const MOST_BANDS: usize = 4;
+const MAX_BANDS: usize = 4;
 /// Probability that anything is taken out of a test's noise.
-const BAND_BY_CHANCE: f64 = 1e-4;
+const BAND_SIGNIFICANCE: f64 = 1e-4;
 
 /// Rows of a test that were read in one go.
 #[derive(Clone)]
@@ -33,7 +33,7 @@ impl PureError {
     /// The same less waves along runs that no memory explains: what comes and goes from run to run is structure, and would be taken for noise. A band is taken
     /// out of all tests, or of one, where the periodogram of their whitened deviations, summed over runs, stands out from the median of all ordinates.
     pub fn without_waves(mut self, tests: &[&Test], kept: impl Fn(usize, usize) -> bool) -> PureError {
-        let Some(mut memory) = self.memory_up_to(1, tests, &kept) else {
+        let Some(mut memory) = self.autocorrelation_up_to(1, tests, &kept) else {
             return self;
         };
         let of_tests: Vec<Vec<Run>> = tests
@@ -41,12 +41,12 @@ impl PureError {
             .enumerate()
             .map(|(test, of)| {
                 let runs = of.readings.iter().flat_map(|readings| readings.runs());
-                let long = runs.filter(|run| run.len() >= LEAST_RUN);
+                let long = runs.filter(|run| run.len() >= MIN_RUN);
                 long.map(|rows| Run { test, rows }).collect()
             })
             .collect();
         for runs in std::iter::once(of_tests.concat()).chain(of_tests) {
-            for _ in 0..MOST_BANDS {
+            for _ in 0..MAX_BANDS {
                 let Some(band) = self.band(&runs, &memory) else {
                     break;
                 };
@@ -66,7 +66,7 @@ impl PureError {
                     .iter_mut()
                     .for_each(|freedom| *freedom = freedom.max(0.0));
                 self.count();
-                let Some(of_rest) = self.memory_up_to(1, tests, &kept) else {
+                let Some(of_rest) = self.autocorrelation_up_to(1, tests, &kept) else {
                     return self;
                 };
                 memory = of_rest;
@@ -76,7 +76,7 @@ impl PureError {
     }
 
     /// The band, in half cycles, that stands out most in runs, if any does.
-    fn band(&self, runs: &[Run], memory: &Memory) -> Option<Range<usize>> {
+    fn band(&self, runs: &[Run], memory: &Autocorrelation) -> Option<Range<usize>> {
         let shortest = runs.iter().map(|run| run.rows.len()).min()?;
         let whitened: Vec<Vec<f64>> = runs
             .iter()
@@ -124,7 +124,7 @@ impl PureError {
                 (first + begin..first + begin + band.len(), by_chance)
             })
             .min_by(|a, b| a.1.total_cmp(&b.1))
-            .filter(|(_, by_chance)| *by_chance < BAND_BY_CHANCE / looks)
+            .filter(|(_, by_chance)| *by_chance < BAND_SIGNIFICANCE / looks)
             .map(|(band, _)| band)
     }
 }

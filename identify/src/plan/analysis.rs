@@ -6,7 +6,7 @@ use abbe_model::session::Session;
 
 use super::linear::{Linearisation, is_wanted};
 use super::results::{Correlation, ErrorAnalysis, PlanAnalysis, TestSummary, WithoutTest};
-use super::{blind, budget, effects, indices, sensitivity, states};
+use super::{budget, effects, identifiability, indices, sensitivity, states};
 use crate::error::IdentifyError;
 use crate::noise::{Noise, NoiseSource};
 use crate::problem::Problem;
@@ -39,7 +39,7 @@ impl Default for PlanOptions {
 /// Travel of a ball bar's sensor either way.
 pub const BAR_TRAVEL_MM: f64 = 1.0;
 /// A variance that grows less than this without a test is not worth a word.
-const WORTH_SAYING: f64 = 1.5;
+const REPORT_RATIO: f64 = 1.5;
 
 /// Analyses a plan, or the states of a measured session.
 ///
@@ -88,20 +88,20 @@ pub fn analyse_problem(problem: &Problem<'_>, travel_mm: f64) -> Result<PlanAnal
     let linear = Linearisation::of(problem, &nominal)?;
     let wanted: Vec<usize> = (0..list.len()).filter(|j| is_wanted(&list[*j])).collect();
     let found = sensitivity::sensitivities(problem, &nominal, &linear.covariance)?;
-    let others_known = budget::others_known(&linear, &wanted)?;
+    let conditional_u = budget::conditional_u(&linear, &wanted)?;
     let errors = wanted
         .iter()
-        .zip(others_known)
-        .map(|(&j, others_known)| {
+        .zip(conditional_u)
+        .map(|(&j, conditional_u)| {
             let unit = &list[j].unit;
             let u = linear.u(j);
             ErrorAnalysis {
                 id: list[j].id.clone(),
                 unit: unit.name.clone(),
-                u: u.map(|u| u * unit.per_inside),
+                u: u.map(|u| u * unit.display_per_internal),
                 sensitivity: sensitivity::reported(problem, &found, j),
                 budget: u.map_or(Vec::new(), |_| budget::budget(problem, &linear, j)),
-                u_others_known: u.map(|u| others_known.min(u) * unit.per_inside),
+                u_others_known: u.map(|u| conditional_u.min(u) * unit.display_per_internal),
                 shared_with: u.map_or(Vec::new(), |_| budget::shared_with(problem, &linear, j)),
                 curves: sensitivity::curves(problem, &found, j),
             }
@@ -131,9 +131,9 @@ pub fn analyse_problem(problem: &Problem<'_>, travel_mm: f64) -> Result<PlanAnal
         moving_min: tests.iter().map(|test| test.moving_min).sum(),
         tests,
         errors,
-        blind: blind::blind(problem, &linear.rank),
-        held_by_setup: blind::held_by_setup(problem, &linear)?,
-        nearly_blind: blind::nearly_blind(problem, &linear, &wanted)?,
+        blind: identifiability::unidentifiable(problem, &linear.rank),
+        held_by_setup: identifiability::held_by_setup(problem, &linear)?,
+        nearly_collinear: identifiability::nearly_collinear(problem, &linear, &wanted)?,
         correlation: correlation(problem, &linear, &wanted),
         indices: indices::indices(
             &linear,
@@ -179,7 +179,7 @@ fn summary(problem: &Problem<'_>, number: usize) -> TestSummary {
 }
 
 fn correlation(problem: &Problem<'_>, linear: &Linearisation, wanted: &[usize]) -> Correlation {
-    let both_seen = |i: usize, j: usize| linear.rank.is_seen(i) && linear.rank.is_seen(j);
+    let both_seen = |i: usize, j: usize| linear.rank.is_identifiable(i) && linear.rank.is_identifiable(j);
     Correlation {
         ids: wanted
             .iter()
@@ -210,10 +210,10 @@ fn without(
             let (rank, covariance) = linear.without(&[test])?;
             let variance_inflation: Vec<(String, Option<f64>)> = wanted
                 .iter()
-                .filter(|j| linear.rank.is_seen(**j))
+                .filter(|j| linear.rank.is_identifiable(**j))
                 .map(|&j| {
                     let grown = covariance[(j, j)] / linear.covariance[(j, j)];
-                    (list[j].id.clone(), rank.is_seen(j).then_some(grown))
+                    (list[j].id.clone(), rank.is_identifiable(j).then_some(grown))
                 })
                 .collect();
             let all: Vec<&str> = variance_inflation
@@ -224,7 +224,7 @@ fn without(
             let much: Vec<String> = variance_inflation
                 .iter()
                 .filter_map(|(id, f)| {
-                    f.filter(|f| *f >= WORTH_SAYING)
+                    f.filter(|f| *f >= REPORT_RATIO)
                         .map(|f| format!("{id} {f:.1} times"))
                 })
                 .collect();

@@ -14,22 +14,22 @@
 use faer::Mat;
 
 use super::linear::{Linearisation, is_wanted, marginal, prior_u};
-use super::order::largest_first;
-use super::results::{Contribution, SharedWith};
+use super::ranking::largest_first;
+use super::results::{Contribution, CorrelatedWith};
 use crate::error::IdentifyError;
 use crate::problem::Problem;
 
 /// Shares of the variance below this are not listed.
-const LEAST_SHARE: f64 = 1e-4;
+const MIN_SHARE: f64 = 1e-4;
 /// Correlations below this are not listed.
-const LEAST_CORRELATION: f64 = 0.1;
+const MIN_CORRELATION: f64 = 0.1;
 
 /// The parts of an error's uncertainty, the largest first.
 pub fn budget(problem: &Problem<'_>, linear: &Linearisation, error: usize) -> Vec<Contribution> {
     let list = &problem.parameters.list;
     let covariance = &linear.covariance;
     let variance = covariance[(error, error)];
-    let scale = list[error].unit.per_inside;
+    let scale = list[error].unit.display_per_internal;
     let mut parts = Vec::new();
     for (s, parameter) in list.iter().enumerate() {
         let Some(u) = prior_u(parameter) else { continue };
@@ -46,7 +46,7 @@ pub fn budget(problem: &Problem<'_>, linear: &Linearisation, error: usize) -> Ve
         u: noise.sqrt() * scale,
         share: noise / variance,
     });
-    parts.retain(|part| part.share >= LEAST_SHARE || part.from == "noise");
+    parts.retain(|part| part.share >= MIN_SHARE || part.from == "noise");
     parts.sort_by(|a, b| largest_first((a.share, &a.from), (b.share, &b.from)));
     parts
 }
@@ -66,18 +66,20 @@ fn noise_variance(linear: &Linearisation, error: usize) -> f64 {
 }
 
 /// The other errors that share an error's variance, the most correlated first.
-pub fn shared_with(problem: &Problem<'_>, linear: &Linearisation, error: usize) -> Vec<SharedWith> {
-    let mut shared: Vec<SharedWith> = problem
+pub fn shared_with(problem: &Problem<'_>, linear: &Linearisation, error: usize) -> Vec<CorrelatedWith> {
+    let mut shared: Vec<CorrelatedWith> = problem
         .parameters
         .list
         .iter()
         .enumerate()
-        .filter(|(other, parameter)| *other != error && is_wanted(parameter) && linear.rank.is_seen(*other))
-        .map(|(other, parameter)| SharedWith {
+        .filter(|(other, parameter)| {
+            *other != error && is_wanted(parameter) && linear.rank.is_identifiable(*other)
+        })
+        .map(|(other, parameter)| CorrelatedWith {
             id: parameter.id.clone(),
             correlation: correlation(&linear.covariance, error, other),
         })
-        .filter(|shared| shared.correlation.abs() >= LEAST_CORRELATION)
+        .filter(|shared| shared.correlation.abs() >= MIN_CORRELATION)
         .collect();
     shared.sort_by(|a, b| largest_first((a.correlation, &a.id), (b.correlation, &b.id)));
     shared
@@ -97,7 +99,7 @@ pub fn correlation(covariance: &Mat<f64>, i: usize, j: usize) -> f64 {
 ///
 /// # Errors
 /// If the decomposition fails.
-pub fn others_known(linear: &Linearisation, wanted: &[usize]) -> Result<Vec<f64>, IdentifyError> {
+pub fn conditional_u(linear: &Linearisation, wanted: &[usize]) -> Result<Vec<f64>, IdentifyError> {
     let r = marginal(linear.whole.parts().0.as_ref(), wanted, &linear.size)?;
     Ok((0..wanted.len())
         .map(|j| 1.0 / (0..=j).map(|i| r[(i, j)].powi(2)).sum::<f64>().sqrt())

@@ -16,9 +16,9 @@ use faer::{Mat, MatRef};
 use nalgebra::DMatrix;
 use rayon::prelude::*;
 
-use super::detect::{POWER, SIGNIFICANCE, corrected, noncentrality};
+use super::detectability::{POWER, SIGNIFICANCE, corrected, noncentrality};
 use super::linear::{Linearisation, is_wanted};
-use super::order::{largest_first, smallest_first};
+use super::ranking::{largest_first, smallest_first};
 use super::results::{Bias, EffectDetectability, EffectsAnalysis};
 use crate::drivers;
 use crate::error::IdentifyError;
@@ -29,7 +29,7 @@ use crate::trace::library::{self, Candidate};
 use crate::unit::Unit;
 
 /// Share of the signal below which an effect counts as hidden.
-const HIDDEN_BELOW: f64 = 0.01;
+const CONFOUNDED_BELOW: f64 = 0.01;
 /// Harmonics up to this order are looked at one by one; of the higher ones those of [`HIGH_ORDERS`].
 const LOW_ORDERS: f64 = 12.0;
 /// Higher orders that stand for those between them.
@@ -40,11 +40,11 @@ const LONG_PERIODS: usize = 24;
 const EVERY_SHORT_PERIOD: usize = 8;
 /// Coefficients of one effect beyond which it is left out: a free curve holds the constants and slopes that the unknowns hold too, so that
 /// its worst member is always hidden.
-const MOST_COEFFICIENTS: usize = 2;
+const MAX_COEFFICIENTS: usize = 2;
 /// Biases listed for an effect.
 const BIASES: usize = 4;
 /// Biases below this, in outside units a unit, are not listed.
-const LEAST_BIAS: f64 = 1e-3;
+const MIN_BIAS: f64 = 1e-3;
 
 /// What the effects of the library would do to a plan.
 ///
@@ -61,7 +61,7 @@ pub fn effects(problem: &Problem<'_>) -> Result<EffectsAnalysis, IdentifyError> 
     let mut periods: HashMap<String, usize> = HashMap::new();
     let (candidates, layouts): (Vec<Candidate>, Vec<Layout>) = all
         .into_iter()
-        .filter(|candidate| is_looked_at(&candidate.effect, &mut periods))
+        .filter(|candidate| is_screened(&candidate.effect, &mut periods))
         .filter_map(|candidate| {
             columns
                 .layout(&candidate.effect)
@@ -69,7 +69,7 @@ pub fn effects(problem: &Problem<'_>) -> Result<EffectsAnalysis, IdentifyError> 
         })
         .unzip();
     let significance_corrected = corrected(searched);
-    let thresholds: Vec<[f64; 2]> = (0..=MOST_COEFFICIENTS)
+    let thresholds: Vec<[f64; 2]> = (0..=MAX_COEFFICIENTS)
         .map(|k| {
             [
                 noncentrality(k.max(1), SIGNIFICANCE),
@@ -122,8 +122,8 @@ pub fn effects(problem: &Problem<'_>) -> Result<EffectsAnalysis, IdentifyError> 
 }
 
 /// Whether an effect is judged; `periods` counts those of one component and driver, the longest first.
-fn is_looked_at(effect: &Effect, periods: &mut HashMap<String, usize>) -> bool {
-    if effect.shape.coefficients() > MOST_COEFFICIENTS {
+fn is_screened(effect: &Effect, periods: &mut HashMap<String, usize>) -> bool {
+    if effect.shape.coefficients() > MAX_COEFFICIENTS {
         return false;
     }
     match &effect.shape {
@@ -146,7 +146,7 @@ struct Products<'m> {
 }
 
 /// Phases whose information differs by less than this share of the strongest one's are as weak as each other.
-const EQUALLY_WEAK: f64 = 1e-6;
+const EQUAL_WITHIN: f64 = 1e-6;
 
 fn judge(
     problem: &Problem<'_>,
@@ -174,7 +174,7 @@ fn judge(
     let strongest = eigen.eigenvalues.max().max(0.0);
     // Where several phases are equally weak, the one of which least survives, and not the one that rounding picks.
     let equally_weak: Vec<usize> = (0..eigen.eigenvalues.len())
-        .filter(|k| eigen.eigenvalues[*k] <= weakest + EQUALLY_WEAK * strongest)
+        .filter(|k| eigen.eigenvalues[*k] <= weakest + EQUAL_WITHIN * strongest)
         .collect();
     let phases = eigen.eigenvectors.select_columns(&equally_weak);
     let whole = (phases.transpose() * &own * &phases)
@@ -188,16 +188,16 @@ fn judge(
     };
     let amplitude = |threshold: f64| {
         let amplitude = (threshold / weakest).sqrt();
-        (amplitude <= size).then_some(amplitude * unit.per_inside)
+        (amplitude <= size).then_some(amplitude * unit.display_per_internal)
     };
     let detectable = amplitude(threshold[0]);
     let largest_own = own.clone().symmetric_eigen().eigenvalues.max();
-    let hidden = surviving_share < HIDDEN_BELOW || detectable.is_none();
+    let hidden = surviving_share < CONFOUNDED_BELOW || detectable.is_none();
     let verdict = if largest_own * size * size < 1.0 {
         "none"
     } else if !hidden {
         "seen"
-    } else if strongest > HIDDEN_BELOW * largest_own {
+    } else if strongest > CONFOUNDED_BELOW * largest_own {
         "hidden at one phase"
     } else {
         "hidden"
@@ -234,11 +234,11 @@ fn biases(problem: &Problem<'_>, moved: MatRef<'_, f64>, unit: &Unit) -> Vec<Bia
             };
             Bias {
                 id: parameter.id.clone(),
-                per_unit: worst * parameter.unit.per_inside / unit.per_inside,
+                per_unit: worst * parameter.unit.display_per_internal / unit.display_per_internal,
                 unit: per(&parameter.unit.name, &unit.name),
             }
         })
-        .filter(|bias| bias.per_unit.abs() >= LEAST_BIAS)
+        .filter(|bias| bias.per_unit.abs() >= MIN_BIAS)
         .collect();
     biases.sort_by(|a, b| largest_first((a.per_unit, &a.id), (b.per_unit, &b.id)));
     biases.truncate(BIASES);
@@ -280,7 +280,7 @@ fn grouped(
 }
 
 /// The hidden effects that bias each error most, by error: what a clean residual does not exclude.
-pub fn hidden_by_error(analysis: &EffectsAnalysis) -> BTreeMap<String, Vec<(String, f64, String)>> {
+pub fn confounded_by_error(analysis: &EffectsAnalysis) -> BTreeMap<String, Vec<(String, f64, String)>> {
     let mut by_error: BTreeMap<String, Vec<(String, f64, String)>> = BTreeMap::new();
     for effect in analysis
         .effects

@@ -6,11 +6,11 @@
 use schemars::JsonSchema;
 use serde::Serialize;
 
-use super::goal::{Goal, asked, figure, reported};
+use super::candidate_information::Prepared;
+use super::candidate_tests::CandidateTests;
+use super::criterion::{Goal, asked, figure, reported};
 use super::information::{Root, Shared};
-use super::menu::Menu;
-use super::order::smallest_first;
-use super::prepared::Prepared;
+use super::ranking::smallest_first;
 use crate::error::IdentifyError;
 use crate::problem::Problem;
 
@@ -83,9 +83,9 @@ pub struct Alternative {
 }
 
 /// An uncertainty of this share of the physical size is that of a blind spot.
-const BLIND_SHARE: f64 = 0.1;
+const UNIDENTIFIABLE_SHARE: f64 = 0.1;
 /// Gain below which an exchange is not made.
-const LEAST_GAIN: f64 = 1e-6;
+const MIN_GAIN: f64 = 1e-6;
 /// Alternatives that are listed.
 const ALTERNATIVES: usize = 5;
 /// Rounds of exchange at most.
@@ -97,11 +97,11 @@ const ROUNDS: usize = 10;
 /// If there is nothing to propose or the model cannot be evaluated.
 pub fn improve(
     problem: &Problem<'_>,
-    menu: &Menu,
+    menu: &CandidateTests,
     options: &ImproveOptions,
 ) -> Result<Improvement, IdentifyError> {
     let list = &problem.parameters.list;
-    let entries = super::menu::entries(problem.session, menu)?;
+    let entries = super::candidate_tests::entries(problem.session, menu)?;
     let nominal = vec![0.0; list.len()];
     let asked = asked(problem, &options.goal);
     if asked.is_empty() {
@@ -165,7 +165,7 @@ pub fn improve(
 }
 
 fn is_no_gain(before: f64, after: f64) -> bool {
-    before - after <= LEAST_GAIN * before.abs()
+    before - after <= MIN_GAIN * before.abs()
 }
 
 /// By how much an entry lowers the logarithm of the figure a minute.
@@ -255,10 +255,10 @@ fn step(prepared: &Prepared, chosen: &[usize], outside: &impl Fn(&Root) -> f64) 
     let root = prepared.with(chosen);
     let before = prepared.with(&chosen[..chosen.len() - 1]);
     let first = shared.ids.len() - shared.asked;
-    let blind = |u: &[f64], j: usize| is_blind(shared, u, j);
+    let unidentifiable = |u: &[f64], j: usize| is_unidentifiable(shared, u, j);
     let (u_before, u_after) = (shared.uncertainties(&before), shared.uncertainties(&root));
     let opens = (0..shared.asked)
-        .filter(|j| blind(&u_before, *j) && !blind(&u_after, *j))
+        .filter(|j| unidentifiable(&u_before, *j) && !unidentifiable(&u_after, *j))
         .map(|j| shared.ids[first + j].clone())
         .collect();
     let (workpiece_ball_mm, spindle_ball_mm, bar_mm) = match &entry.test.station {
@@ -279,9 +279,9 @@ fn step(prepared: &Prepared, chosen: &[usize], outside: &impl Fn(&Root) -> f64) 
 }
 
 /// Whether an uncertainty, the `j`-th of what is asked about, is that of a parameter which no reading tells and which is held at its physical size instead.
-fn is_blind(shared: &Shared, u: &[f64], j: usize) -> bool {
+fn is_unidentifiable(shared: &Shared, u: &[f64], j: usize) -> bool {
     let place = shared.ids.len() - shared.asked + j;
-    u[j] > BLIND_SHARE * shared.size[place] * shared.per_inside[place]
+    u[j] > UNIDENTIFIABLE_SHARE * shared.size[place] * shared.display_per_internal[place]
 }
 
 /// What is asked about, with its uncertainties: infinite where the figure would be that of the physical size at which [`Shared`] holds what is not
@@ -291,7 +291,7 @@ fn named_uncertainties(shared: &Shared, root: &Root) -> Vec<(String, f64)> {
     let u = shared.uncertainties(root);
     (0..shared.asked)
         .map(|j| {
-            let told = if is_blind(shared, &u, j) {
+            let told = if is_unidentifiable(shared, &u, j) {
                 f64::INFINITY
             } else {
                 u[j]

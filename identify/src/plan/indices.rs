@@ -27,7 +27,7 @@ pub fn indices(
     let seen: Vec<usize> = wanted
         .iter()
         .copied()
-        .filter(|j| linear.rank.is_seen(*j))
+        .filter(|j| linear.rank.is_identifiable(*j))
         .collect();
     let m = seen.len();
     if m == 0 {

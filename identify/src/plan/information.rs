@@ -21,7 +21,7 @@ pub struct Shared {
     /// Physical sizes, inside units.
     pub size: Vec<f64>,
     /// Outside units in an inside unit.
-    pub per_inside: Vec<f64>,
+    pub display_per_internal: Vec<f64>,
     /// How many of the last columns are asked about.
     pub asked: usize,
 }
@@ -37,7 +37,7 @@ impl Shared {
         Shared {
             ids: order.iter().map(|j| list[*j].id.clone()).collect(),
             size: order.iter().map(|j| list[*j].size).collect(),
-            per_inside: order.iter().map(|j| list[*j].unit.per_inside).collect(),
+            display_per_internal: order.iter().map(|j| list[*j].unit.display_per_internal).collect(),
             asked: asked.len(),
         }
     }
@@ -47,7 +47,7 @@ impl Shared {
         Shared {
             ids: columns.iter().map(|j| self.ids[*j].clone()).collect(),
             size: columns.iter().map(|j| self.size[*j]).collect(),
-            per_inside: columns.iter().map(|j| self.per_inside[*j]).collect(),
+            display_per_internal: columns.iter().map(|j| self.display_per_internal[*j]).collect(),
             asked: self.asked,
         }
     }
@@ -119,14 +119,14 @@ impl Shared {
     }
 
     /// The root on what is asked about, the others being unknown too.
-    pub fn asked_block<'r>(&self, root: &'r Root) -> MatRef<'r, f64> {
+    pub fn criterion_block<'r>(&self, root: &'r Root) -> MatRef<'r, f64> {
         let first = self.ids.len() - self.asked;
         root.as_ref().submatrix(first, first, self.asked, self.asked)
     }
 
     /// Standard uncertainties of what is asked about, outside units.
     pub fn uncertainties(&self, root: &Root) -> Vec<f64> {
-        let block = self.asked_block(root);
+        let block = self.criterion_block(root);
         let inverse = inverted(block);
         let first = self.ids.len() - self.asked;
         (0..self.asked)
@@ -135,7 +135,7 @@ impl Shared {
                     .map(|j| inverse[(i, j)].powi(2))
                     .sum::<f64>()
                     .sqrt();
-                row * self.per_inside[first + i]
+                row * self.display_per_internal[first + i]
             })
             .collect()
     }

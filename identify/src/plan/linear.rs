@@ -12,7 +12,7 @@ use crate::fit;
 use crate::parameters::{Parameter, Role};
 use crate::preference::pivot_preference;
 use crate::problem::Problem;
-use crate::rank::{LEAST_SEEN, Rank};
+use crate::rank::{MIN_IDENTIFIABLE, Rank};
 use crate::triangle::{Triangle, upper};
 
 /// A plan at its nominal state.
@@ -69,7 +69,7 @@ impl Linearisation {
     /// Standard uncertainty of an unknown, inside unit; `None` where it takes part in an unseen combination.
     pub fn u(&self, unknown: usize) -> Option<f64> {
         self.rank
-            .is_seen(unknown)
+            .is_identifiable(unknown)
             .then(|| self.covariance[(unknown, unknown)].max(0.0).sqrt())
     }
 
@@ -129,7 +129,7 @@ pub fn marginal(r: MatRef<'_, f64>, kept: &[usize], size: &[f64]) -> Result<Mat<
         // What the dropped unknowns can explain is taken out of every column.
         let told = singular
             .iter()
-            .filter(|s| **s >= LEAST_SEEN && **s > rounding)
+            .filter(|s| **s >= MIN_IDENTIFIABLE && **s > rounding)
             .count();
         let directions = svd.U().subcols(0, told);
         let along = directions.transpose() * &rows;

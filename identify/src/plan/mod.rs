@@ -10,22 +10,22 @@
 //! - [`results`]: what is reported, as it stands in JSON.
 
 mod analysis;
-pub mod blind;
+mod ball_positions;
 pub mod budget;
+pub mod candidate_information;
+mod candidate_layout;
+pub mod candidate_tests;
 pub mod clearance;
-pub mod detect;
-mod drafts;
+pub mod criterion;
+pub mod detectability;
 pub mod effects;
-pub mod goal;
+pub mod identifiability;
 pub mod improve;
 pub mod indices;
 pub mod information;
 pub mod linear;
-pub mod menu;
-mod order;
-mod places;
-pub mod prepared;
 pub mod range;
+mod ranking;
 pub mod results;
 pub mod sensitivity;
 pub mod separate;
@@ -33,4 +33,4 @@ pub mod states;
 mod sweep;
 
 pub use analysis::{BAR_TRAVEL_MM, PlanOptions, analyse, analyse_problem, prepared};
-pub use separate::{Separated, SeparatingTest, separating_tests, separation};
+pub use separate::{SeparatingTest, SeparationAnalysis, separating_tests, separation};

@@ -41,7 +41,7 @@ pub fn shrinkages(problem: &Problem<'_>) -> Result<Vec<Shrinkage>, IdentifyError
     let nominal = vec![0.0; problem.parameters.list.len()];
     let linear = Linearisation::of(problem, &nominal)?;
     let wanted: Vec<usize> = (0..problem.parameters.list.len())
-        .filter(|j| is_wanted(&problem.parameters.list[*j]) && linear.rank.is_seen(*j))
+        .filter(|j| is_wanted(&problem.parameters.list[*j]) && linear.rank.is_identifiable(*j))
         .collect();
     let mut found = Vec::new();
     for test in 0..problem.tests.len() {
@@ -72,7 +72,14 @@ pub fn shrinkages(problem: &Problem<'_>) -> Result<Vec<Shrinkage>, IdentifyError
             let covariance = fit::covariance(&whole, &rank.seen)?;
             let ratios = wanted.iter().map(|&j| {
                 let ratio = (covariance[(j, j)] / linear.covariance[(j, j)]).sqrt();
-                (if rank.is_seen(j) { ratio } else { f64::INFINITY }, j)
+                (
+                    if rank.is_identifiable(j) {
+                        ratio
+                    } else {
+                        f64::INFINITY
+                    },
+                    j,
+                )
             });
             Ok(ratios.fold((0.0, 0), |most, next| if next.0 > most.0 { next } else { most }))
         };

@@ -29,7 +29,7 @@ pub struct PlanAnalysis {
     /// Errors that readings alone cannot tell from set-up quantities.
     pub held_by_setup: Vec<HeldBySetup>,
     /// Errors that are told apart, but badly.
-    pub nearly_blind: Vec<NearDependency>,
+    pub nearly_collinear: Vec<NearDependency>,
     /// Correlation of the errors.
     pub correlation: Correlation,
     /// Scalar figures of merit.
@@ -75,7 +75,7 @@ pub struct ErrorAnalysis {
     /// What `u` would be if all other errors were known.
     pub u_others_known: Option<f64>,
     /// Other errors, and the share of the variance that would go if each were known: the squared correlation.
-    pub shared_with: Vec<SharedWith>,
+    pub shared_with: Vec<CorrelatedWith>,
     /// Sensitivity along the first run of each test.
     pub curves: Vec<Curve>,
 }
@@ -104,7 +104,7 @@ pub struct Contribution {
 
 /// Another error that shares the variance of an error.
 #[derive(Clone, Debug, Serialize, JsonSchema)]
-pub struct SharedWith {
+pub struct CorrelatedWith {
     /// The other error.
     pub id: String,
     /// The correlation, −1 to 1; its square is the share of the variance that would go if the other error were known.

@@ -20,7 +20,7 @@ pub struct Sensitivities {
     pub g_efficiency: f64,
 }
 
-struct OfBlock {
+struct BlockSensitivity {
     test: usize,
     largest: Vec<f64>,
     squares: Vec<f64>,
@@ -41,7 +41,7 @@ pub fn sensitivities(
 ) -> Result<Sensitivities, IdentifyError> {
     let values = problem.slot_values(beta);
     let unknowns = beta.len();
-    let parts: Vec<OfBlock> = problem
+    let parts: Vec<BlockSensitivity> = problem
         .blocks()
         .par_iter()
         .map(|block| {
@@ -86,7 +86,7 @@ fn of_block(
     rows: &Mat<f64>,
     unknowns: usize,
     covariance: &Mat<f64>,
-) -> OfBlock {
+) -> BlockSensitivity {
     let coordinates = problem.coordinates();
     let first_run = problem.tests[block.test]
         .readings
@@ -128,7 +128,7 @@ fn of_block(
     let leverages = (0..white.nrows())
         .map(|i| (0..unknowns).map(|j| spread[(i, j)] * white[(i, j)]).sum::<f64>())
         .collect::<Vec<f64>>();
-    OfBlock {
+    BlockSensitivity {
         test: block.test,
         largest,
         squares,
@@ -169,5 +169,5 @@ const NOTHING: f64 = 1e-9;
 
 /// From mm of reading an inside unit to µm a unit outside.
 fn outside(problem: &Problem<'_>, unknown: usize) -> f64 {
-    1e3 / problem.parameters.list[unknown].unit.per_inside
+    1e3 / problem.parameters.list[unknown].unit.display_per_internal
 }

@@ -9,11 +9,11 @@ use faer::Mat;
 use schemars::JsonSchema;
 use serde::Serialize;
 
-use super::goal;
+use super::candidate_information::Prepared;
+use super::candidate_tests::CandidateTests;
+use super::criterion;
 use super::information::{Root, Shared};
-use super::menu::Menu;
-use super::order::{rounded, smallest_first};
-use super::prepared::Prepared;
+use super::ranking::{rounded, smallest_first};
 use super::states;
 use crate::error::IdentifyError;
 use crate::parameters::Role;
@@ -21,17 +21,17 @@ use crate::problem::Problem;
 use crate::triangle::upper;
 
 /// Relative gain below which a test adds nothing.
-const LEAST_GAIN: f64 = 1e-6;
+const MIN_GAIN: f64 = 1e-6;
 /// Share of the best separation that a quicker test must reach to be preferred.
-const AS_GOOD_AS: f64 = 0.9;
+const EQUIVALENT_SHARE: f64 = 0.9;
 /// Standard deviations from which on two effects count as separated.
 pub const SEPARATED_SIGMA: f64 = 3.0;
 /// Tests that are proposed at most.
-const MOST_TESTS: usize = 3;
+const MAX_TESTS: usize = 3;
 
 /// A test that separates an effect from one that looks like it.
 #[derive(Clone, Debug, PartialEq, Serialize, JsonSchema)]
-pub struct Separated {
+pub struct SeparationAnalysis {
     /// In words: `C150 with the workpiece ball at radius 50 mm`.
     pub test: String,
     /// Separation by the readings that there are, standard deviations.
@@ -89,8 +89,8 @@ pub fn separation(
     found: &Effect,
     coefficients: &[f64],
     alias: &Effect,
-    menu: &Menu,
-) -> Result<Option<Separated>, IdentifyError> {
+    menu: &CandidateTests,
+) -> Result<Option<SeparationAnalysis>, IdentifyError> {
     let contest = Contest::new(
         problem,
         beta,
@@ -107,7 +107,7 @@ pub fn separation(
     };
     let entry = &contest.prepared.entries[best].entry;
     let after = sigmas[best][0];
-    Ok((after > before * (1.0 + LEAST_GAIN)).then(|| Separated {
+    Ok((after > before * (1.0 + MIN_GAIN)).then(|| SeparationAnalysis {
         test: entry.name.clone(),
         before,
         after,
@@ -126,7 +126,7 @@ pub fn separating_tests(
     found: &Effect,
     coefficients: &[f64],
     alternatives: &[Effect],
-    menu: &Menu,
+    menu: &CandidateTests,
 ) -> Result<Vec<SeparatingTest>, IdentifyError> {
     if alternatives.is_empty() {
         return Ok(Vec::new());
@@ -135,7 +135,7 @@ pub fn separating_tests(
     let mut left: Vec<usize> = (0..alternatives.len()).collect();
     let mut root = contest.prepared.base.clone();
     let mut tests: Vec<SeparatingTest> = Vec::new();
-    while !left.is_empty() && tests.len() < MOST_TESTS {
+    while !left.is_empty() && tests.len() < MAX_TESTS {
         let before: Vec<f64> = left.iter().map(|one| contest.sigma(&root, *one)).collect();
         let sigmas = contest.with_each(&root, &left);
         let Some(best) = contest.best(&sigmas, SEPARATED_SIGMA) else {
@@ -182,7 +182,7 @@ impl Contest {
         found: &Effect,
         coefficients: &[f64],
         alternatives: &[Effect],
-        menu: &Menu,
+        menu: &CandidateTests,
     ) -> Result<Contest, IdentifyError> {
         let mut all = problem.clone();
         states::fold_by_test(&mut all);
@@ -206,7 +206,7 @@ impl Contest {
         let menu = &menu
             .clone()
             .for_effects(std::iter::once(found).chain(alternatives));
-        let entries = super::menu::entries(all.session, menu)?;
+        let entries = super::candidate_tests::entries(all.session, menu)?;
         let prepared = Prepared::new(&all, &values, entries, menu, &asked)?;
         // An alternative that is part of the model stays in it, whichever one is weighed.
         let is_added = |effect: usize| effect >= known && Some(effect) != found_at;
@@ -241,7 +241,7 @@ impl Contest {
     fn sigma(&self, root: &Root, alternative: usize) -> f64 {
         let (columns, shared) = &self.pairs[alternative];
         let stays = Mat::from_fn(root.nrows(), columns.len(), |i, j| root[(i, columns[j])]);
-        goal::separation(shared, &upper(stays), &self.coefficients)
+        criterion::separation(shared, &upper(stays), &self.coefficients)
     }
 
     /// The same with each candidate test added, for some alternatives: by test, by alternative.
@@ -264,7 +264,7 @@ impl Contest {
         let best = with_most().map(worst).fold(0.0, f64::max);
         let entry = |entry: usize| &self.prepared.entries[entry].entry;
         with_most()
-            .filter(|one| worst(*one) >= AS_GOOD_AS * best)
+            .filter(|one| worst(*one) >= EQUIVALENT_SHARE * best)
             .min_by(|a, b| {
                 smallest_first(entry(*a).minutes, entry(*b).minutes)
                     .then(worst(*b).total_cmp(&worst(*a)))

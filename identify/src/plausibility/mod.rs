@@ -12,10 +12,10 @@
 mod hypotheses;
 mod poses;
 mod pulls;
+mod quick_fit;
 mod results;
 mod suggest;
 mod tracing;
-mod trial;
 
 use abbe_model::session::Prior;
 
@@ -30,15 +30,15 @@ use crate::noise::NoiseSource;
 use crate::problem::Problem;
 
 /// Share of the variance of the measured positions that a model of poses explains at least.
-const LEAST_EXPLAINED: f64 = 0.99;
+const MIN_EXPLAINED: f64 = 0.99;
 /// Below this share, mistakes that explain more are looked for.
 const WELL_EXPLAINED: f64 = 0.9999;
 /// A residual of so many times the noise in every test is that of another session.
 const ANOTHER_SESSION: f64 = 100.0;
 /// A residual of so many times the noise is worth a look at the session.
-const WORTH_A_LOOK: f64 = 5.0;
+const CHECK_ABOVE_SIGMA: f64 = 5.0;
 /// Set-up parameters that are named in words; the others are counted.
-const MOST_NAMED: usize = 3;
+const MAX_NAMED: usize = 3;
 
 /// What the readings contradict, and what may be wrong.
 pub fn examine(problem: &Problem<'_>, fit: &Fit) -> Plausibility {
@@ -49,7 +49,7 @@ pub fn examine(problem: &Problem<'_>, fit: &Fit) -> Plausibility {
     conflicts.extend(set_ups(problem, &Pulls::of(problem, fit)));
     let by_residual = conflicts.is_empty();
     let ratio = rms_mm(problem, &fit.residuals) / problem.noise.sigma_mm;
-    if by_residual && ratio < WORTH_A_LOOK {
+    if by_residual && ratio < CHECK_ABOVE_SIGMA {
         return Plausibility::default();
     }
     let suggestions = suggest::suggestions(problem, &conflicts);
@@ -124,8 +124,8 @@ pub fn warnings(plausibility: &Plausibility) -> Vec<String> {
         .map(|conflict| conflict.words.as_str())
         .collect();
     if !parameters.is_empty() {
-        let named = parameters[..parameters.len().min(MOST_NAMED)].join("; ");
-        let others = match parameters.len().saturating_sub(MOST_NAMED) {
+        let named = parameters[..parameters.len().min(MAX_NAMED)].join("; ");
+        let others = match parameters.len().saturating_sub(MAX_NAMED) {
             0 => String::new(),
             n => format!("; and {n} more"),
         };
@@ -189,7 +189,7 @@ fn set_ups(problem: &Problem<'_>, pulls: &Pulls) -> Vec<Conflict> {
     let conflicts: Vec<Conflict> = (pulls.contradicted().into_iter())
         .map(|pull| {
             let parameter = &problem.parameters.list[pull.parameter];
-            let outside = |value: f64| value * parameter.unit.per_inside;
+            let outside = |value: f64| value * parameter.unit.display_per_internal;
             Conflict {
                 kind: ConflictKind::SetupParameter,
                 subject: parameter.id.clone(),
@@ -248,13 +248,13 @@ fn of_poses(problem: &Problem<'_>, fit: &Fit) -> Plausibility {
     } else {
         Vec::new()
     };
-    let little = explained < LEAST_EXPLAINED;
+    let little = explained < MIN_EXPLAINED;
     let conflicts = if little || !suggestions.is_empty() {
         vec![Conflict {
             kind: ConflictKind::ExplainedVariance,
             subject: "session".to_string(),
             value: explained,
-            stated: LEAST_EXPLAINED,
+            stated: MIN_EXPLAINED,
             unit: "1".to_string(),
             pull: None,
             words: format!(

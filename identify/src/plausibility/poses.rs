@@ -7,20 +7,20 @@ use nalgebra::Vector3;
 use rayon::prelude::*;
 
 use super::hypotheses::{Hypothesis, lengths, units, with_readings};
+use super::quick_fit::{thinned, trial};
 use super::results::{Suggestion, SuggestionKind};
-use super::trial::{thinned, trial};
 use crate::noise::{Noise, NoiseSource};
 use crate::problem::Problem;
 use crate::start::nominal_points;
 
 /// Poses that are refitted with each mistake.
-const MOST_POSES: usize = 300;
+const MAX_POSES: usize = 300;
 /// How many times smaller a mistake has to make the residual of the nominal machine.
 const LOWERED: f64 = 5.0;
 /// Mistakes that leave no more than this many times what the best leaves are listed too.
 const NOT_SEPARABLE: f64 = 1.5;
 /// The most that are listed.
-const MOST_LISTED: usize = 5;
+const MAX_LISTED: usize = 5;
 /// Any noise will do where residuals are compared, mm.
 const NOISE_MM: f64 = 1.0;
 
@@ -65,7 +65,7 @@ pub(super) fn spread_mm2(problem: &Problem<'_>) -> Option<f64> {
 /// The mistakes with which the nominal machine fits poses far better, the best first.
 pub(super) fn suggestions(problem: &Problem<'_>) -> Vec<Suggestion> {
     let noise = Noise::white(NOISE_MM, NoiseSource::Stated);
-    let mut nominal = thinned(problem, MOST_POSES);
+    let mut nominal = thinned(problem, MAX_POSES);
     nominal.unknowns.clear();
     nominal.effects.clear();
     let base_mm = trial(&nominal, &noise).map_or(f64::INFINITY, |found| found.rms_mm);
@@ -92,7 +92,7 @@ pub(super) fn suggestions(problem: &Problem<'_>) -> Vec<Suggestion> {
     let best = tried.first().map_or(0.0, |(left, _)| *left);
     (tried.into_iter())
         .take_while(|(left, _)| *left <= best * NOT_SEPARABLE)
-        .take(MOST_LISTED)
+        .take(MAX_LISTED)
         .map(|(_, hypothesis)| Suggestion {
             kind: hypothesis.kind,
             subject: hypothesis.subject,

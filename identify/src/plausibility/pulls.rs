@@ -21,11 +21,11 @@ use crate::problem::Problem;
 /// Probability that a session that is right is said to be contradicted, once for the largest pull and once for all set-up parameters together.
 const SIGNIFICANCE: f64 = 1e-4;
 /// A parameter that the readings would move by less than this share of its stated uncertainty says nothing.
-const LEAST_SHARE: f64 = 0.1;
+const MIN_SHARE: f64 = 0.1;
 /// More set-up parameters than this are tested one by one only.
-const MOST_TOGETHER: usize = 200;
+const MAX_TESTED_JOINTLY: usize = 200;
 /// Greatest autocorrelation that is credited to noise.
-const MOST_CORRELATED: f64 = 0.95;
+const MAX_CORRELATED: f64 = 0.95;
 
 /// One set-up parameter with a stated uncertainty.
 #[derive(Clone, Debug)]
@@ -58,7 +58,7 @@ impl Pulls {
     pub fn of(problem: &Problem<'_>, fit: &Fit) -> Pulls {
         let (places, prior): (Vec<usize>, Vec<f64>) = (problem.parameters.list.iter().enumerate())
             .filter_map(|(j, parameter)| match (parameter.role, parameter.prior) {
-                (Role::Setup, Prior::Gaussian(u)) if fit.rank.is_seen(j) => Some((j, u)),
+                (Role::Setup, Prior::Gaussian(u)) if fit.rank.is_identifiable(j) => Some((j, u)),
                 _ => None,
             })
             .unzip();
@@ -80,7 +80,7 @@ impl Pulls {
         let each: Vec<Pull> = (0..count)
             .filter_map(|i| {
                 let deviation = covariance[(i, i)].max(0.0).sqrt();
-                (deviation >= LEAST_SHARE).then(|| Pull {
+                (deviation >= MIN_SHARE).then(|| Pull {
                     parameter: places[i],
                     estimate: fit.beta[places[i]],
                     stated_u: prior[i],
@@ -88,7 +88,7 @@ impl Pulls {
                 })
             })
             .collect();
-        let (together, freedom) = if count <= MOST_TOGETHER {
+        let (together, freedom) = if count <= MAX_TESTED_JOINTLY {
             together(&covariance, &moved)
         } else {
             (0.0, 0)
@@ -178,7 +178,7 @@ fn excess(problem: &Problem<'_>, fit: &Fit) -> f64 {
     if poses || pairs <= 0.0 || !problem.noise.memory.is_empty() {
         return ratio;
     }
-    let correlation = (products / pairs).clamp(0.0, MOST_CORRELATED);
+    let correlation = (products / pairs).clamp(0.0, MAX_CORRELATED);
     ratio * (1.0 + correlation) / (1.0 - correlation)
 }
 

@@ -3,21 +3,21 @@
 use rayon::prelude::*;
 
 use super::hypotheses::{self, Hypothesis};
+use super::quick_fit::{Trial, thinned, trial};
 use super::results::{Conflict, Suggestion, SuggestionKind};
-use super::trial::{Trial, thinned, trial};
 use crate::noise::{Noise, NoiseSource};
 use crate::problem::Problem;
 
 /// Readings that are refitted with each mistake.
-const MOST_READINGS: usize = 1500;
+const MAX_READINGS: usize = 1500;
 /// By how much a mistake has to raise twice the logarithm of the evidence: odds of 20,000 to 1.
-const LEAST_RISE: f64 = 20.0;
+const MIN_RISE: f64 = 20.0;
 /// Mistakes whose evidence is within this of the best (odds of 150 to 1) are listed too.
 const NOT_SEPARABLE: f64 = 10.0;
 /// The most that are listed.
-const MOST_LISTED: usize = 5;
+const MAX_LISTED: usize = 5;
 /// Up to so many things of the set-up all of them are tried, beyond it those whose parameters are contradicted.
-const MOST_THINGS: usize = 40;
+const MAX_HYPOTHESES: usize = 40;
 /// By how much a mistake has to lower χ² for it to be suggested on the residual alone.
 const LOWERED: f64 = 4.0;
 
@@ -26,7 +26,7 @@ const LOWERED: f64 = 4.0;
 pub(super) fn suggestions(problem: &Problem<'_>, conflicts: &[Conflict]) -> Vec<Suggestion> {
     let by_residual = conflicts.is_empty();
     let noise = Noise::white(problem.noise.sigma_mm, NoiseSource::Stated);
-    let stated = thinned(problem, MOST_READINGS);
+    let stated = thinned(problem, MAX_READINGS);
     // Where even the first steps fail, anything that fits is better.
     let base = trial(&stated, &noise).unwrap_or(Trial {
         chi_square: f64::INFINITY,
@@ -35,7 +35,7 @@ pub(super) fn suggestions(problem: &Problem<'_>, conflicts: &[Conflict]) -> Vec<
         cost: 0.0,
     });
     let mut list = hypotheses::of_two_sides(&stated);
-    let many = list.iter().filter(|one| !needs_no_parameter(one.kind)).count() > MOST_THINGS;
+    let many = list.iter().filter(|one| !needs_no_parameter(one.kind)).count() > MAX_HYPOTHESES;
     list.retain(|one| {
         needs_no_parameter(one.kind) || !(by_residual || many && !is_contradicted(one, problem, conflicts))
     });
@@ -62,13 +62,13 @@ pub(super) fn suggestions(problem: &Problem<'_>, conflicts: &[Conflict]) -> Vec<
             };
             (found.score(scale), suggestion)
         })
-        .filter(|(score, _)| *score < base.score(scale) - LEAST_RISE)
+        .filter(|(score, _)| *score < base.score(scale) - MIN_RISE)
         .collect();
     scored.sort_by(|a, b| a.0.total_cmp(&b.0));
     let best = scored.first().map_or(0.0, |(score, _)| *score);
     (scored.into_iter())
         .take_while(|(score, _)| *score <= best + NOT_SEPARABLE)
-        .take(MOST_LISTED)
+        .take(MAX_LISTED)
         .map(|(_, suggestion)| suggestion)
         .collect()
 }

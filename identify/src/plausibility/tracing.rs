@@ -10,7 +10,7 @@ use crate::fit::{Fit, fit};
 use crate::problem::Problem;
 
 /// Rounds of freeing what is contradicted: one conflict may hide behind another.
-const MOST_ROUNDS: usize = 5;
+const MAX_ROUNDS: usize = 5;
 
 /// A changed statement that makes the residual so many times smaller is the explanation.
 const STATEMENT_EXPLAINS: f64 = 5.0;
@@ -39,7 +39,7 @@ pub(crate) fn with_set_ups_freed(
     }
     let mut freed: Vec<String> = Vec::new();
     let mut found = before.clone();
-    for _ in 0..MOST_ROUNDS {
+    for _ in 0..MAX_ROUNDS {
         let pulls = Pulls::of(problem, &found);
         let contradicted: Vec<usize> = pulls.contradicted().iter().map(|pull| pull.parameter).collect();
         if contradicted.is_empty() {

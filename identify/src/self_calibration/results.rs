@@ -249,7 +249,7 @@ impl Calibration {
         }
     }
 
-    fn position(&self) -> Located {
+    fn position(&self) -> AxisPositionEstimate {
         let turns = self.turns();
         let (first, second) = (self.values_mm(Function::First), self.values_mm(Function::Second));
         let sense = self.equations.sense;
@@ -267,7 +267,7 @@ impl Calibration {
         });
         let count = 2 * turns.len();
         let mean_square = (0..count).map(|k| covariance[(k, k)]).sum::<f64>() / count as f64;
-        Located {
+        AxisPositionEstimate {
             centres_mm: [found.circle, found.turn],
             u_mm: [[u[0], u[1]], [u[2], u[3]]],
             radius_mm: found.radius,
@@ -275,7 +275,7 @@ impl Calibration {
         }
     }
 
-    fn error_motions(&self, position: &Located, axis: &str) -> Vec<FunctionResult> {
+    fn error_motions(&self, position: &AxisPositionEstimate, axis: &str) -> Vec<FunctionResult> {
         let [a, b] = position.centres_mm[0];
         let sense = self.equations.sense;
         let turns = self.turns();
@@ -361,7 +361,7 @@ impl Calibration {
 }
 
 /// The axis' position by circle and by turn.
-struct Located {
+struct AxisPositionEstimate {
     centres_mm: [[f64; 2]; 2],
     u_mm: [[f64; 2]; 2],
     radius_mm: f64,

@@ -82,7 +82,7 @@ pub fn solve(equations: &Equations, reduction: &Reduction, sigma_mm: f64) -> Res
         .map(|i| (0..inputs.len()).map(|j| estimator[(i, j)] * inputs[j]).sum())
         .collect();
     let seen = (0..outputs)
-        .map(|i| (0..unknowns).all(|k| spread[(i, k)] == 0.0 || rank.is_seen(k)))
+        .map(|i| (0..unknowns).all(|k| spread[(i, k)] == 0.0 || rank.is_identifiable(k)))
         .collect();
 
     let residual = |(row, observed): (&Vec<f64>, &f64)| {

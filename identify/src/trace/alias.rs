@@ -9,14 +9,14 @@ use std::collections::HashSet;
 
 use abbe_model::effect::Shape;
 
-use super::score::{Gain, Trained};
+use super::score::{Gain, TrainedModel};
 use super::search::{ALL, Search};
 
 /// Difference in `−ln P` below which two candidates cannot be told apart: 2 σ for one column.
 pub(super) const INDISTINGUISHABLE: f64 = 2.0;
 /// Least cosine between the named effect's signature and what an alias can do: at least half of it. What is nearer than the evidence can tell is an
 /// alias however small the angle; what explains as much of something else is none.
-const LEAST_COSINE: f64 = std::f64::consts::FRAC_1_SQRT_2;
+const MIN_COSINE: f64 = std::f64::consts::FRAC_1_SQRT_2;
 
 /// An alias of a taken effect.
 #[derive(Clone, Debug)]
@@ -31,7 +31,7 @@ pub(super) struct Alias {
 
 /// A candidate in a named effect's place.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Rival {
+pub struct CompetingEffect {
     /// Its identifier; one member stands for all of a name.
     pub id: String,
     /// `−ln P` of its gain in that place, less the price of its places.
@@ -43,7 +43,7 @@ pub struct Rival {
 }
 
 /// How many rivals are kept.
-const MOST_RIVALS: usize = 16;
+const MAX_COMPETING: usize = 16;
 
 /// To six decimals: lists are in the order of these, so that rounding decides no tie.
 fn to_six_decimals(value: f64) -> f64 {
@@ -61,7 +61,13 @@ fn simplest_first(search: &Search<'_>, a: usize, b: usize) -> Ordering {
 }
 
 /// What stands highest in the place of the `k`-th taken effect, the best first: that effect, its aliases, and what loses.
-fn rivals(search: &Search<'_>, k: usize, gains: &[Gain], variance: f64, aliases: &[Alias]) -> Vec<Rival> {
+fn competing_effects(
+    search: &Search<'_>,
+    k: usize,
+    gains: &[Gain],
+    variance: f64,
+    aliases: &[Alias],
+) -> Vec<CompetingEffect> {
     let taken = search.taken()[k].candidate;
     let named = search.candidates[taken].effect.id();
     let alike: HashSet<String> = aliases
@@ -84,32 +90,32 @@ fn rivals(search: &Search<'_>, k: usize, gains: &[Gain], variance: f64, aliases:
         })
         .collect();
     standing.sort_by(|a, b| b.0.total_cmp(&a.0).then_with(|| simplest_first(search, a.1, b.1)));
-    let mut rivals: Vec<Rival> = Vec::new();
+    let mut competing_effects: Vec<CompetingEffect> = Vec::new();
     for (evidence, candidate) in standing {
         let id = search.candidates[candidate].effect.id();
-        if rivals.iter().any(|rival| rival.id == id) {
+        if competing_effects.iter().any(|rival| rival.id == id) {
             continue;
         }
-        if rivals.len() == MOST_RIVALS {
+        if competing_effects.len() == MAX_COMPETING {
             break;
         }
-        rivals.push(Rival {
+        competing_effects.push(CompetingEffect {
             named: id == named,
             alias: alike.contains(&id),
             id,
             evidence,
         });
     }
-    rivals
+    competing_effects
 }
 
 /// The aliases of the `k`-th taken effect, nearest first, and what stands highest in its place, beside the model without it.
 pub(super) fn aliases(
     search: &Search<'_>,
     k: usize,
-    model: &Trained<'_>,
+    model: &TrainedModel<'_>,
     variance: f64,
-) -> (Vec<Alias>, Vec<Rival>) {
+) -> (Vec<Alias>, Vec<CompetingEffect>) {
     let taken = &search.taken()[k];
     let of_named = model.gain(taken.candidate);
     let least = search.evidence_for(taken.candidate, &of_named, variance) - INDISTINGUISHABLE;
@@ -143,8 +149,8 @@ pub(super) fn aliases(
                     || no_more_said(*candidate) && gain.gain / variance >= least_gain)
         })
         .filter_map(|(candidate, _)| {
-            let cosine = model.imitated(candidate, &signature).sqrt();
-            (cosine >= LEAST_COSINE).then(|| Alias {
+            let cosine = model.explained_by_signature(candidate, &signature).sqrt();
+            (cosine >= MIN_COSINE).then(|| Alias {
                 candidate,
                 cosine,
                 model_coefficients: model.joined(candidate).0,
@@ -160,6 +166,6 @@ pub(super) fn aliases(
     let named = search.candidates[taken.candidate].effect.id();
     let mut seen = HashSet::from([named]);
     aliases.retain(|alias| seen.insert(search.candidates[alias.candidate].effect.id()));
-    let rivals = rivals(search, k, &gains, variance, &aliases);
-    (aliases, rivals)
+    let competing_effects = competing_effects(search, k, &gains, variance, &aliases);
+    (aliases, competing_effects)
 }

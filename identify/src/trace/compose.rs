@@ -9,26 +9,26 @@ use faer::Mat;
 use faer::prelude::Solve;
 use statrs::function::gamma::ln_gamma;
 
+use super::chi_square_tail::ln_chi_square_tail;
 use super::library::Candidate;
-use super::score::Trained;
-use super::tail::ln_chi_square_tail;
-use super::visible::LEAST_VISIBLE;
+use super::observable::MIN_VISIBLE;
+use super::score::TrainedModel;
 
 /// The most places of one effect: what takes more is a curve.
-const MOST_PLACES: usize = 6;
+const MAX_PLACES: usize = 6;
 /// The most sweeps of exchanges after a choice.
-const MOST_SWEEPS: usize = 4;
+const MAX_SWEEPS: usize = 4;
 
 /// An effect composed of places.
 #[derive(Clone, Debug)]
-pub struct Composed {
+pub struct StepTable {
     /// As a candidate, with the price of the choice.
     pub candidate: Candidate,
     /// `−ln P` of its gain, less that price.
     pub evidence: f64,
 }
 
-impl Composed {
+impl StepTable {
     /// What it is compared by.
     pub fn score(&self) -> f64 {
         self.evidence - self.candidate.cost
@@ -37,11 +37,11 @@ impl Composed {
 
 /// The best that can be composed of a dictionary beside a model: of two places or more, for one alone is an entry of the library by itself.
 pub fn composed(
-    model: &Trained<'_>,
+    model: &TrainedModel<'_>,
     number: usize,
     dictionary: &Candidate,
     variance: f64,
-) -> Option<Composed> {
+) -> Option<StepTable> {
     let Shape::Steps { at } = &dictionary.effect.shape else {
         return None;
     };
@@ -52,8 +52,8 @@ pub fn composed(
         own: &own,
     };
     let mut chosen: Vec<usize> = Vec::new();
-    let mut best: Option<Composed> = None;
-    while chosen.len() < MOST_PLACES {
+    let mut best: Option<StepTable> = None;
+    while chosen.len() < MAX_PLACES {
         let Some((place, _)) = subset.best_addition(&chosen) else {
             break;
         };
@@ -81,7 +81,7 @@ pub fn composed(
                 dictionary: false,
                 ..dictionary.clone()
             };
-            best = Some(Composed { candidate, evidence });
+            best = Some(StepTable { candidate, evidence });
         }
     }
     best
@@ -125,7 +125,7 @@ impl Subset<'_> {
                 |column: usize| -> f64 { (0..n).map(|i| self.d[(chosen[i], j)] * solved[(i, column)]).sum() };
             let left = self.d[(j, j)] - with(j);
             // A place that is all but a sum of the others adds rounding, not evidence.
-            if left <= LEAST_VISIBLE.sqrt() * self.own[(j, j)] {
+            if left <= MIN_VISIBLE.sqrt() * self.own[(j, j)] {
                 continue;
             }
             let along = self.g[j] - with(m);
@@ -140,7 +140,7 @@ impl Subset<'_> {
     /// Exchanges chosen places while that gains anything; what all of them gain.
     fn splice(&self, chosen: &mut Vec<usize>) -> f64 {
         let mut gain = self.gain(chosen);
-        for _ in 0..MOST_SWEEPS {
+        for _ in 0..MAX_SWEEPS {
             let mut changed = false;
             for _ in 0..chosen.len() {
                 let out = chosen.remove(0);

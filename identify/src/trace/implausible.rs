@@ -4,7 +4,7 @@
 use abbe_model::effect::Effect;
 
 use super::Trace;
-use super::report::unsearched;
+use super::result::unsearched;
 use crate::error::IdentifyError;
 use crate::fit::{self, Fit};
 use crate::plausibility::{self, Plausibility, Pulls, is_another_session, with_set_ups_freed};
@@ -45,7 +45,7 @@ impl<'a> Contradicted<'a> {
     ///
     /// # Errors
     /// If the model with the effects cannot be fitted.
-    pub fn stands_beside(
+    pub fn contradicted_by(
         &self,
         problem: &Problem<'a>,
         fitted: &Fit,

@@ -1,6 +1,6 @@
 //! Interruption of a trace: whoever waits for it can end it at any time and gets the effects found until then.
 
-use super::report::unsearched;
+use super::result::unsearched;
 use super::{Progress, Trace};
 use crate::error::IdentifyError;
 use crate::fit::Fit;
@@ -63,8 +63,8 @@ impl<'a> Trace<'a> {
             before: problem,
             before_fit: fit,
             effects: Vec::new(),
-            look_alikes: Vec::new(),
-            rivals: Vec::new(),
+            alias_effects: Vec::new(),
+            competing_effects: Vec::new(),
             steps: Vec::new(),
             result,
         }

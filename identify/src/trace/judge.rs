@@ -13,7 +13,7 @@ use crate::noise::NoiseSource;
 use crate::problem::Problem;
 
 /// The model with what the search has taken, refitted, and what it leaves.
-pub(super) struct Judged<'a> {
+pub(super) struct RefittedModel<'a> {
     pub after: Problem<'a>,
     pub after_fit: Fit,
     pub effects: Vec<Effect>,
@@ -21,7 +21,7 @@ pub(super) struct Judged<'a> {
     pub structure: Option<Structure>,
 }
 
-impl<'a> Judged<'a> {
+impl<'a> RefittedModel<'a> {
     /// Of what a search has taken; `structure_before` is what the declared model leaves.
     pub fn of(
         problem: &Problem<'a>,
@@ -29,10 +29,10 @@ impl<'a> Judged<'a> {
         search: &Search<'_>,
         options: &TraceOptions,
         structure_before: Option<&Structure>,
-    ) -> Result<Judged<'a>, IdentifyError> {
+    ) -> Result<RefittedModel<'a>, IdentifyError> {
         let effects: Vec<Effect> = taken_effects(search).cloned().collect();
         if effects.is_empty() {
-            return Ok(Judged {
+            return Ok(RefittedModel {
                 after: problem.clone(),
                 after_fit: before_fit.clone(),
                 effects,
@@ -42,14 +42,14 @@ impl<'a> Judged<'a> {
         // Noise, outliers and rank are found anew, as the fit of a session that declares these effects finds them: what the declared model left over
         // was not noise.
         let (mut after, mut after_fit) = prepare_with(problem.session, &effects, options.seed)?;
-        if shows_its_own_noise(problem, &after) {
+        if noise_is_from_residual(problem, &after) {
             after.noise = problem.noise.clone();
             after_fit = fit(&after, Some(&after_fit.beta))?;
         }
         let structure = structure_before
-            .map(|_| left_over(&after, &after_fit, options))
+            .map(|_| remaining_structure(&after, &after_fit, options))
             .transpose()?;
-        Ok(Judged {
+        Ok(RefittedModel {
             after,
             after_fit,
             effects,
@@ -64,7 +64,7 @@ impl<'a> Judged<'a> {
 
     /// Whether structure was looked for and found.
     pub fn is_structured(&self) -> bool {
-        self.structure.as_ref().is_some_and(Structure::is_there)
+        self.structure.as_ref().is_some_and(Structure::is_significant)
     }
 }
 
@@ -75,14 +75,18 @@ fn taken_effects<'s>(search: &'s Search<'_>) -> impl Iterator<Item = &'s Effect>
 }
 
 /// Whether the noise of the search is not what a fit would take, but what repeats show along runs: autocorrelated, or of another size.
-fn shows_its_own_noise(search: &Problem<'_>, fit: &Problem<'_>) -> bool {
+fn noise_is_from_residual(search: &Problem<'_>, fit: &Problem<'_>) -> bool {
     let (of_search, of_fit) = (&search.noise, &fit.noise);
     let of_one_size = (of_search.sigma_mm / of_fit.sigma_mm - 1.0).abs() < SCATTER;
     of_search.source == NoiseSource::Repeats && !(of_search.memory.is_empty() && of_one_size)
 }
 
 /// What a fit leaves, beside its model.
-fn left_over(problem: &Problem<'_>, fit: &Fit, options: &TraceOptions) -> Result<Structure, IdentifyError> {
+fn remaining_structure(
+    problem: &Problem<'_>,
+    fit: &Fit,
+    options: &TraceOptions,
+) -> Result<Structure, IdentifyError> {
     let columns = Columns::new(problem, &fit.beta);
     let start = Start::of(problem, &columns, fit)?;
     let (count, seed) = (draws_of(options), options.seed.wrapping_add(1));

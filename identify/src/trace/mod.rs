@@ -9,29 +9,29 @@
 //! 5. For each effect, what would look the same ([`alias`]); for the rest, whether it has structure (`remainder`).
 
 pub mod alias;
+mod chi_square_tail;
 pub(crate) mod columns;
 mod compose;
-mod exchange;
-mod fewer;
-pub mod further;
+mod description_length;
 mod implausible;
 mod interrupt;
 mod judge;
 pub mod library;
-pub mod list;
 mod moments;
 mod null;
+mod observable;
 mod paired;
+mod refine;
 mod remainder;
-mod report;
+mod result;
 mod rounds;
 mod score;
+pub mod screening;
 mod search;
-mod sharpen;
+pub mod separating_tests;
 mod start;
-mod tail;
-mod trial;
-mod visible;
+mod swap;
+mod tuning;
 
 use abbe_model::effect::Effect;
 use abbe_model::session::Session;
@@ -45,7 +45,7 @@ use crate::results::TraceResult;
 use columns::{Columns, Layout};
 use implausible::Contradicted;
 use interrupt::Interrupt;
-use judge::Judged;
+use judge::RefittedModel;
 use library::Candidate;
 use moments::Moments;
 use rounds::{Account, search_on};
@@ -91,7 +91,7 @@ pub enum Progress {
     /// The library is being multiplied with the readings: how many candidates.
     Screening(usize),
     /// An effect was taken: its number, its identifier, the held-out rms in µm.
-    Taken(usize, String, f64),
+    SelectedEffect(usize, String, f64),
     /// The found effects are being refitted and judged.
     Judging,
     /// Nothing new: asked often, so that an end is heeded soon.
@@ -99,9 +99,9 @@ pub enum Progress {
 }
 
 /// Sessions along runs have few effects; more than this says that something else is meant.
-const MOST_ALONG_RUNS: usize = 12;
+const MAX_ALONG_RUNS: usize = 12;
 /// Poses of a robot have many.
-const MOST_OF_POSES: usize = 200;
+const MAX_OF_POSES: usize = 200;
 
 /// One addition of a search.
 #[derive(Clone, Debug, PartialEq)]
@@ -127,9 +127,9 @@ pub struct Trace<'a> {
     /// The found effects.
     pub effects: Vec<Effect>,
     /// For each of them what the readings cannot tell from it, nearest first.
-    pub look_alikes: Vec<Vec<Effect>>,
+    pub alias_effects: Vec<Vec<Effect>>,
     /// For each of them what stands highest in its place, the best first.
-    pub rivals: Vec<Vec<alias::Rival>>,
+    pub competing_effects: Vec<Vec<alias::CompetingEffect>>,
     /// How the search came to them.
     pub steps: Vec<Step>,
     /// As it is reported.
@@ -154,7 +154,7 @@ pub fn trace<'a>(
     }
     if let Some((problem_freed, fit_freed)) = &contradicted.freed {
         let mut found = with_noise_of_repeats(problem_freed.clone(), fit_freed.clone(), options, progress)?;
-        if found.result.interrupted || contradicted.stands_beside(&problem, &fitted, &found.effects)? {
+        if found.result.interrupted || contradicted.contradicted_by(&problem, &fitted, &found.effects)? {
             contradicted.tell(&mut found.result);
             return Ok(found);
         }
@@ -173,7 +173,7 @@ fn with_noise_of_repeats<'a>(
     options: &TraceOptions,
     progress: &(dyn Fn(Progress) -> bool + Sync),
 ) -> Result<Trace<'a>, IdentifyError> {
-    if give_noise_memory(&mut problem, &before_fit.residuals) {
+    if give_noise_autocorrelation(&mut problem, &before_fit.residuals) {
         before_fit = fit(&problem, Some(&before_fit.beta))?;
     }
     let residuals = before_fit.residuals.clone();
@@ -182,7 +182,7 @@ fn with_noise_of_repeats<'a>(
     let mut problem = first.before.clone();
     if first.result.interrupted
         || first.effects.is_empty()
-        || !give_noise_memory(&mut problem, &first.after_fit.residuals)
+        || !give_noise_autocorrelation(&mut problem, &first.after_fit.residuals)
     {
         return Ok(first);
     }
@@ -239,7 +239,7 @@ fn searched<'a>(
     let structure_before = structure_before.transpose()?;
     interrupt.check()?;
 
-    let laid = list::laid(problem, &columns, options)?;
+    let laid = screening::laid(problem, &columns, options)?;
     let looked_for = laid.len();
     progress(Progress::Screening(looked_for));
     let (reserve, laid): (Vec<_>, Vec<_>) =
@@ -249,7 +249,7 @@ fn searched<'a>(
     let go_on = || interrupt.check().is_ok();
     let moments = Moments::new(&columns, &layouts, model, &start.residual, draws, &go_on)
         .ok_or(IdentifyError::Interrupted)?;
-    let most = if poses { MOST_OF_POSES } else { MOST_ALONG_RUNS };
+    let most = if poses { MAX_OF_POSES } else { MAX_ALONG_RUNS };
     let stop = Stop {
         significance: options.significance,
         most: options.max_effects.unwrap_or(most),
@@ -268,7 +268,8 @@ fn searched<'a>(
         progress,
     };
     let structure_before = structure_before.as_ref();
-    let judge = |search: &Search<'_>| Judged::of(problem, before_fit, search, options, structure_before);
+    let judge =
+        |search: &Search<'_>| RefittedModel::of(problem, before_fit, search, options, structure_before);
     let found = match found(&mut search, &mut account, judge) {
         Err(IdentifyError::Interrupted) => {
             search.roll_back();
@@ -282,15 +283,18 @@ fn searched<'a>(
     let (ended, judged) = match found {
         Some((p_value, judged)) => (Some(p_value), judged),
         // The effects found until then are fitted; what they leave is not looked at.
-        None => (None, Judged::of(problem, before_fit, &search, options, None)?),
+        None => (
+            None,
+            RefittedModel::of(problem, before_fit, &search, options, None)?,
+        ),
     };
-    let Judged {
+    let RefittedModel {
         after,
         after_fit,
         effects,
         structure: structure_after,
     } = judged;
-    let mut reported = report::report(&report::Findings {
+    let mut reported = result::report(&result::TraceFindings {
         before: problem,
         before_fit,
         after: &after,
@@ -308,7 +312,7 @@ fn searched<'a>(
     reported
         .result
         .warnings
-        .extend(list::left_out_in_vain(problem, options)?);
+        .extend(screening::unused_exclusions(problem, options)?);
     drop(search);
     drop(columns);
     Ok(Trace {
@@ -317,8 +321,8 @@ fn searched<'a>(
         after,
         after_fit,
         effects,
-        look_alikes: reported.look_alikes,
-        rivals: reported.rivals,
+        alias_effects: reported.alias_effects,
+        competing_effects: reported.competing_effects,
         steps: account.steps,
         result: reported.result,
     })
@@ -332,15 +336,15 @@ fn searched<'a>(
 fn found<'a>(
     search: &mut Search<'_>,
     account: &mut Account<'_>,
-    judge: impl Fn(&Search<'_>) -> Result<Judged<'a>, IdentifyError>,
-) -> Result<(f64, Judged<'a>), IdentifyError> {
+    judge: impl Fn(&Search<'_>) -> Result<RefittedModel<'a>, IdentifyError>,
+) -> Result<(f64, RefittedModel<'a>), IdentifyError> {
     let mut ended = search_on(search, account)?;
     (account.progress)(Progress::Judging);
     let mut judged = judge(search)?;
     // Among poses structure is looked for effect by effect, and never ends.
     let poses = search.stop.in_residual_variance;
     if (poses || judged.is_structured()) && search.taken().len() < search.stop.most {
-        search.bring_reserve();
+        search.add_reserve_candidates();
         search.last_resort = true;
         ended = search_on(search, account)?;
         if !judged.is_of(search) {
@@ -348,7 +352,7 @@ fn found<'a>(
         }
     }
     if !poses {
-        search.disown(judged.is_structured())?;
+        search.withdraw(judged.is_structured())?;
         search.withdraw_all_unless_better()?;
         if !judged.is_of(search) {
             judged = judge(search)?;
@@ -368,7 +372,7 @@ const SCATTER: f64 = 0.02;
 
 /// Takes size and memory of the noise from repeats, where there are enough. Returns whether that changed them by more than estimates of the noise
 /// scatter anyway.
-fn give_noise_memory(problem: &mut Problem<'_>, residuals: &[Vec<f64>]) -> bool {
+fn give_noise_autocorrelation(problem: &mut Problem<'_>, residuals: &[Vec<f64>]) -> bool {
     if problem.folds.kind == FoldKind::Poses {
         return false;
     }
@@ -379,7 +383,7 @@ fn give_noise_memory(problem: &mut Problem<'_>, residuals: &[Vec<f64>]) -> bool 
     };
     let mut noise = problem.noise.clone();
     noise.memory = memory.coefficients;
-    noise.memory_u = memory.sum_u;
+    noise.ar_sum_u = memory.sum_u;
     if let Some(sigma) = pure.sigma_mm() {
         noise.sigma_mm = sigma * memory.inflation;
         noise.source = NoiseSource::Repeats;

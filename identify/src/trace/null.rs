@@ -24,7 +24,7 @@ pub const SINGLE: usize = 1;
 /// The largest sum of the coefficients of a draw's memory.
 const SLOWEST: f64 = 0.98;
 /// The fewest deviations that are worth drawing from; below, Gaussian noise is drawn.
-const LEAST_POOL: usize = 200;
+const MIN_POOL: usize = 200;
 /// Readings on either side over which a residual without repeats is smoothed to take out structure.
 const SMOOTHING: usize = 7;
 
@@ -46,7 +46,7 @@ pub fn draws(
     let mut draws = Mat::zeros(columns.rows(), count);
     for draw in 0..count {
         let mut values = drawn(&pool, columns.rows(), block, &mut generator);
-        slowed(&mut values, &problem.noise, &mut generator);
+        with_noise_spectrum(&mut values, &problem.noise, &mut generator);
         for (i, value) in columns.placed(&values).into_iter().enumerate() {
             draws[(i, draw)] = value;
         }
@@ -75,7 +75,7 @@ fn sign(generator: &mut Pcg64) -> f64 {
 /// So many deviations from the pool, block after block, each with a sign of its own; Gaussian noise where the pool is too small.
 fn drawn(pool: &[Vec<f64>], rows: usize, block: usize, generator: &mut Pcg64) -> Vec<f64> {
     let total: usize = pool.iter().map(Vec::len).sum();
-    if total < LEAST_POOL {
+    if total < MIN_POOL {
         return (0..rows).map(|_| generator.sample(StandardNormal)).collect();
     }
     let mut values = Vec::with_capacity(rows + block);
@@ -101,14 +101,14 @@ fn drawn(pool: &[Vec<f64>], rows: usize, block: usize, generator: &mut Pcg64) ->
 
 /// What is whitened with a memory that is not quite its own stays slow, or becomes hasty. The memory of each draw differs from the one that was found by
 /// as much as that may be wrong: with `A` the polynomial of the found one and `A*` that of the draw, `A* w = A ε`.
-fn slowed(values: &mut [f64], noise: &Noise, generator: &mut Pcg64) {
-    if noise.memory.is_empty() || noise.memory_u <= 0.0 {
+fn with_noise_spectrum(values: &mut [f64], noise: &Noise, generator: &mut Pcg64) {
+    if noise.memory.is_empty() || noise.ar_sum_u <= 0.0 {
         return;
     }
     let standard: f64 = generator.sample(StandardNormal);
     let sum: f64 = noise.memory.iter().sum();
     let mut own = noise.memory.clone();
-    own[0] += (noise.memory_u * standard).min(SLOWEST - sum);
+    own[0] += (noise.ar_sum_u * standard).min(SLOWEST - sum);
     let drawn = values.to_vec();
     for t in 0..values.len() {
         let mut value = drawn[t];
@@ -125,7 +125,7 @@ fn slowed(values: &mut [f64], noise: &Noise, generator: &mut Pcg64) {
 fn pool(problem: &Problem<'_>, residuals: &[Vec<f64>]) -> Vec<Vec<f64>> {
     let kept = |test: usize, row: usize| !problem.rejected[test][row];
     let pure = PureError::of(&problem.tests, residuals, kept).without_waves(&problem.tests, kept);
-    let repeats = pure.freedom >= LEAST_POOL;
+    let repeats = pure.freedom >= MIN_POOL;
     let coordinates = problem.coordinates();
     let mut stretches = Vec::new();
     for block in problem.blocks() {

@@ -7,9 +7,9 @@
 use std::collections::BTreeMap;
 
 /// Degrees of freedom below which the scatter of whole folds says little; folds are then divided into blocks.
-const LEAST_FREEDOM: usize = 6;
+const MIN_FREEDOM: usize = 6;
 /// The fewest rows of a block: many times the length over which noise is autocorrelated.
-const LEAST_BLOCK: usize = 16;
+const MIN_BLOCK: usize = 16;
 
 /// Which unit each row belongs to, and which stratum each unit belongs to.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -38,15 +38,15 @@ impl Units {
     pub fn divided(self) -> Units {
         let strata = self.stratum.iter().max().map_or(0, |last| last + 1);
         let freedom = self.stratum.len().saturating_sub(strata);
-        if freedom >= LEAST_FREEDOM || self.stratum.is_empty() {
+        if freedom >= MIN_FREEDOM || self.stratum.is_empty() {
             return self;
         }
-        let wanted = (LEAST_FREEDOM + strata).div_ceil(self.stratum.len());
+        let wanted = (MIN_FREEDOM + strata).div_ceil(self.stratum.len());
         let mut rows = vec![0; self.stratum.len()];
         self.of_row.iter().for_each(|unit| rows[*unit] += 1);
         let mut seen = vec![0; self.stratum.len()];
         let parts = self.of_row.iter().map(|unit| {
-            let blocks = wanted.min(rows[*unit] / LEAST_BLOCK).max(1);
+            let blocks = wanted.min(rows[*unit] / MIN_BLOCK).max(1);
             let block = seen[*unit] * blocks / rows[*unit];
             seen[*unit] += 1;
             (self.stratum[*unit], (*unit, block))
@@ -64,18 +64,18 @@ impl Units {
     }
 
     /// From the sums of squares by unit under one model to those under another.
-    pub fn fall(&self, before: &[f64], after: &[f64]) -> Fall {
+    pub fn decrease(&self, before: &[f64], after: &[f64]) -> HeldOutDecrease {
         let differences = before.iter().zip(after).map(|(before, after)| before - after);
         let mut strata: BTreeMap<usize, Vec<f64>> = BTreeMap::new();
         for (stratum, difference) in self.stratum.iter().zip(differences) {
             strata.entry(*stratum).or_default().push(difference);
         }
-        let mut fall = Fall::default();
+        let mut decrease = HeldOutDecrease::default();
         let mut variance = 0.0;
         for differences in strata.values() {
             let count = differences.len() as f64;
             let sum: f64 = differences.iter().sum();
-            fall.by += sum;
+            decrease.by += sum;
             variance += match differences[..] {
                 // One unit alone has no scatter: its whole difference is its uncertainty.
                 [alone] => alone * alone,
@@ -85,28 +85,28 @@ impl Units {
                 }
             };
         }
-        fall.standard_error = variance.sqrt();
-        fall
+        decrease.standard_error = variance.sqrt();
+        decrease
     }
 }
 
 /// The fall of a sum of squares of held-out residuals over the variance of the noise.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct Fall {
+pub struct HeldOutDecrease {
     /// How much lower the sum is; negative if it has risen.
     pub by: f64,
     /// Standard error of that, from the paired differences of the units.
     pub standard_error: f64,
 }
 
-impl Fall {
+impl HeldOutDecrease {
     /// Whether the held-out error falls by more than the standard error of the fall.
     pub fn is_significant(self) -> bool {
         self.by > self.standard_error
     }
 
     /// Whether it rises by more than that.
-    pub fn is_a_rise(self) -> bool {
+    pub fn is_increase(self) -> bool {
         -self.by > self.standard_error
     }
 }
@@ -125,14 +125,14 @@ mod tests {
         let units = Units::of(rows.into_iter());
         let before = [110.0, 111.0, 112.0, 50.0, 50.0, 50.0];
         let after = [100.0, 100.0, 100.0, 50.0, 50.0, 50.0];
-        let fall = units.fall(&before, &after);
-        assert_eq!(fall.by, 33.0);
+        let decrease = units.decrease(&before, &after);
+        assert_eq!(decrease.by, 33.0);
         // Σ (d − mean)² n/(n − 1) of 10, 11, 12.
-        assert!((fall.standard_error - 3.0_f64.sqrt()).abs() < 1e-12);
-        assert!(fall.is_significant() && !fall.is_a_rise());
-        assert!(units.fall(&after, &before).is_a_rise());
-        let same = units.fall(&before, &before);
-        assert!(!same.is_significant() && !same.is_a_rise());
+        assert!((decrease.standard_error - 3.0_f64.sqrt()).abs() < 1e-12);
+        assert!(decrease.is_significant() && !decrease.is_increase());
+        assert!(units.decrease(&after, &before).is_increase());
+        let same = units.decrease(&before, &before);
+        assert!(!same.is_significant() && !same.is_increase());
     }
 
     /// The standard error is that of the sum: over many drawn sets of units the fall scatters by as much as it says.
@@ -151,9 +151,9 @@ mod tests {
                     test + (1.0 + test) * standard
                 })
                 .collect();
-            let fall = units.fall(&differences, &[0.0; 16]);
-            squares += (fall.by - 24.0).powi(2);
-            variances += fall.standard_error.powi(2);
+            let decrease = units.decrease(&differences, &[0.0; 16]);
+            squares += (decrease.by - 24.0).powi(2);
+            variances += decrease.standard_error.powi(2);
         }
         // 4 · (1 + 4 + 9 + 16); the sampling error of a variance of so many sets is 2 %.
         for variance in [squares, variances] {
@@ -166,7 +166,7 @@ mod tests {
         let few = Units::of((0..200).map(|row| (0, row / 100)));
         assert_eq!(few.stratum.len(), 2);
         let divided = few.divided();
-        assert!(divided.stratum.len() > LEAST_FREEDOM, "{}", divided.stratum.len());
+        assert!(divided.stratum.len() > MIN_FREEDOM, "{}", divided.stratum.len());
         assert!(divided.stratum.iter().all(|stratum| *stratum == 0));
         // Blocks are stretches of consecutive rows of one fold.
         assert!(divided.of_row.is_sorted());

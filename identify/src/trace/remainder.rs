@@ -9,10 +9,10 @@ use abbe_model::axis::{Axis, AxisKind};
 use abbe_model::effect::{Component, Driver, Effect, Shape};
 use abbe_model::session::readings::Readings;
 
+use super::chi_square_tail::ln_chi_square_tail;
 use super::columns::{Columns, Layout};
 use super::moments::Moments;
-use super::score::{PriorMoments, Trained};
-use super::tail::ln_chi_square_tail;
+use super::score::{PriorMoments, TrainedModel};
 use crate::error::IdentifyError;
 use crate::problem::Problem;
 
@@ -32,7 +32,7 @@ const STRUCTURED: f64 = 0.01;
 
 impl Structure {
     /// Whether there is any beyond noise.
-    pub fn is_there(&self) -> bool {
+    pub fn is_significant(&self) -> bool {
         self.p_value <= STRUCTURED
     }
 }
@@ -48,7 +48,7 @@ fn detectors(problem: &Problem<'_>, columns: &Columns<'_, '_>) -> Vec<Detector> 
     let mut detectors = Vec::new();
     for (number, test) in problem.tests.iter().enumerate() {
         let Some(readings) = &test.readings else { continue };
-        let mut of_test = OfTest {
+        let mut of_test = TestResidual {
             columns,
             number,
             name: &test.name,
@@ -69,7 +69,7 @@ fn detectors(problem: &Problem<'_>, columns: &Columns<'_, '_>) -> Vec<Detector> 
 }
 
 /// The detectors of one test, as they are made.
-struct OfTest<'t, 'p, 'a> {
+struct TestResidual<'t, 'p, 'a> {
     columns: &'t Columns<'p, 'a>,
     number: usize,
     name: &'t str,
@@ -77,7 +77,7 @@ struct OfTest<'t, 'p, 'a> {
     detectors: Vec<Detector>,
 }
 
-impl OfTest<'_, '_, '_> {
+impl TestResidual<'_, '_, '_> {
     /// A shape over each coordinate of the readings.
     fn add(&mut self, driver: &Driver, shape: Shape, words: String) {
         self.add_confined(driver, shape, false, None, words);
@@ -167,7 +167,7 @@ impl OfTest<'_, '_, '_> {
         // What comes and goes with time is in no mean over runs.
         let runs = self.readings.runs();
         let most = if runs.len() > 1 {
-            MOST_HALF_CYCLES_OF_A_RUN
+            MAX_HALF_CYCLES_OF_A_RUN
         } else {
             0
         };
@@ -206,7 +206,7 @@ impl OfTest<'_, '_, '_> {
 }
 
 /// The most half cycles that are looked for in one run.
-const MOST_HALF_CYCLES_OF_A_RUN: usize = 40;
+const MAX_HALF_CYCLES_OF_A_RUN: usize = 40;
 
 /// The most half cycles that so many readings show: 2.4 readings a cycle, as for the candidates of the library.
 fn most_half_cycles(readings: usize) -> usize {
@@ -247,7 +247,7 @@ pub fn structure(
     let moments =
         Moments::new(columns, &layouts, model, residual, null, &|| true).ok_or(IdentifyError::Interrupted)?;
     let folds = (0..columns.fold_rows.len()).collect();
-    let trained = Trained::new(&moments, prior, (0..rank).collect(), folds)?;
+    let trained = TrainedModel::new(&moments, prior, (0..rank).collect(), folds)?;
     let mut best = (0, f64::NEG_INFINITY, 0.0);
     for (index, gain) in trained.gains().iter().enumerate() {
         if gain.freedom == 0 {

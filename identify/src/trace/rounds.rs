@@ -5,8 +5,8 @@ use super::{Progress, Step};
 use crate::error::IdentifyError;
 
 /// Up to this many effects exchanges are tried after each addition, beyond it after each eighth.
-const EXCHANGED_EACH_ROUND: usize = 14;
-const EXCHANGED_EACH: usize = 8;
+const SWAP_EVERY_ROUND_UP_TO: usize = 14;
+const SWAP_EVERY: usize = 8;
 
 /// What is told of a search as it goes.
 pub(super) struct Account<'t> {
@@ -31,7 +31,7 @@ impl Account<'_> {
                 effects,
                 heldout_rms_um,
             });
-            (self.progress)(Progress::Taken(effects, id, heldout_rms_um));
+            (self.progress)(Progress::SelectedEffect(effects, id, heldout_rms_um));
         }
     }
 }
@@ -58,12 +58,12 @@ fn rounds(search: &mut Search<'_>, account: &mut Account<'_>) -> Result<f64, Ide
     for _ in 0..search.most_rounds() {
         let mut ended = None;
         match search.round()? {
-            Round::Done { .. } if search.retune()? || search.regroup()? => unclaimed.push(None),
+            Round::Done { .. } if search.retune_all()? || search.merge_groups()? => unclaimed.push(None),
             Round::Done { p_value } => ended = Some(p_value),
             Round::Added { candidate } => {
                 // Every exchange costs a model an effect; among many effects the gain is small and a sweep now and then will do.
                 let taken = search.taken().len();
-                if taken <= EXCHANGED_EACH_ROUND || taken.is_multiple_of(EXCHANGED_EACH) {
+                if taken <= SWAP_EVERY_ROUND_UP_TO || taken.is_multiple_of(SWAP_EVERY) {
                     search.exchange()?;
                 }
                 search.merge()?;

@@ -6,15 +6,15 @@
 use std::borrow::Cow;
 use std::ops::Range;
 
+use super::chi_square_tail::{ln_chi_square_tail, most_evidence};
 use super::moments::{FoldMoments, Moments};
-use super::tail::{ln_chi_square_tail, most_evidence};
-use super::visible::{Visible, pseudo_inverse};
+use super::observable::{Visible, pseudo_inverse};
 use crate::error::IdentifyError;
 use faer::{Mat, MatRef};
 use rayon::prelude::*;
 
 /// A model over the base: which base columns it has, and which folds it is trained on.
-pub struct Trained<'m> {
+pub struct TrainedModel<'m> {
     moments: &'m Moments,
     /// The base columns it has.
     pub base: Vec<usize>,
@@ -50,14 +50,14 @@ pub struct Gain {
 }
 
 /// `Xᵀ C` and `(XᵀX)⁻¹ Xᵀ C` of a candidate: among those of all candidates, or made for this one.
-struct Beside<'t> {
+struct GivenModel<'t> {
     cross: Cow<'t, Mat<f64>>,
     solved: Cow<'t, Mat<f64>>,
     /// Its columns among theirs.
     columns: Range<usize>,
 }
 
-impl Beside<'_> {
+impl GivenModel<'_> {
     /// Of its `k`-th column.
     fn cross(&self, k: usize) -> &[f64] {
         self.cross.col_as_slice(self.columns.start + k)
@@ -78,7 +78,7 @@ fn dot(a: &[f64], b: &[f64]) -> f64 {
     a.iter().zip(b).map(|(a, b)| a * b).sum()
 }
 
-impl<'m> Trained<'m> {
+impl<'m> TrainedModel<'m> {
     /// Trains a model that will be asked for every candidate.
     ///
     /// # Errors
@@ -88,8 +88,8 @@ impl<'m> Trained<'m> {
         prior: &PriorMoments,
         base: Vec<usize>,
         folds: Vec<usize>,
-    ) -> Result<Trained<'m>, IdentifyError> {
-        let mut trained = Trained::lean(moments, prior, base, folds)?;
+    ) -> Result<TrainedModel<'m>, IdentifyError> {
+        let mut trained = TrainedModel::projection(moments, prior, base, folds)?;
         let total = moments
             .first
             .last()
@@ -104,12 +104,12 @@ impl<'m> Trained<'m> {
     ///
     /// # Errors
     /// If products are not finite.
-    pub fn lean(
+    pub fn projection(
         moments: &'m Moments,
         prior: &PriorMoments,
         base: Vec<usize>,
         folds: Vec<usize>,
-    ) -> Result<Trained<'m>, IdentifyError> {
+    ) -> Result<TrainedModel<'m>, IdentifyError> {
         let m = base.len();
         let left_out: Vec<usize> = (0..moments.folds.len())
             .filter(|fold| !folds.contains(fold))
@@ -145,7 +145,7 @@ impl<'m> Trained<'m> {
         let coefficients = (0..m)
             .map(|i| (0..m).map(|j| inverse[(i, j)] * base_y[j]).sum())
             .collect();
-        Ok(Trained {
+        Ok(TrainedModel {
             moments,
             base,
             folds,
@@ -172,17 +172,17 @@ impl<'m> Trained<'m> {
     }
 
     /// `Xᵀ C` and `(XᵀX)⁻¹ Xᵀ C` of a candidate.
-    fn beside(&self, candidate: usize) -> Beside<'_> {
+    fn beside(&self, candidate: usize) -> GivenModel<'_> {
         let (first, count) = (self.moments.first[candidate], self.moments.count[candidate]);
         match &self.all {
-            Some((cross, solved)) => Beside {
+            Some((cross, solved)) => GivenModel {
                 cross: Cow::Borrowed(cross),
                 solved: Cow::Borrowed(solved),
                 columns: first..first + count,
             },
             None => {
                 let cross = self.cross(first, count);
-                Beside {
+                GivenModel {
                     solved: Cow::Owned(&self.inverse * &cross),
                     cross: Cow::Owned(cross),
                     columns: 0..count,
@@ -196,7 +196,7 @@ impl<'m> Trained<'m> {
         self.projected_with(candidate, &self.beside(candidate))
     }
 
-    fn projected_with(&self, candidate: usize, beside: &Beside<'_>) -> (Mat<f64>, Vec<f64>, Mat<f64>) {
+    fn projected_with(&self, candidate: usize, beside: &GivenModel<'_>) -> (Mat<f64>, Vec<f64>, Mat<f64>) {
         let (first, count) = (self.moments.first[candidate], self.moments.count[candidate]);
         let over_parts = |of: &dyn Fn(&FoldMoments) -> f64| -> f64 {
             self.parts.iter().map(|(part, sign)| sign * of(part)).sum()
@@ -317,7 +317,7 @@ impl<'m> Trained<'m> {
 
     /// The share of a signature in the base (coefficients over base columns that are not in this model) that a candidate can imitate, beside the
     /// model: `cos²` of the angle between the two.
-    pub fn imitated(&self, candidate: usize, signature: &[(usize, f64)]) -> f64 {
+    pub fn explained_by_signature(&self, candidate: usize, signature: &[(usize, f64)]) -> f64 {
         let (d, _, own) = self.projected(candidate);
         let (first, count) = (self.moments.first[candidate], self.moments.count[candidate]);
         let mut g = vec![0.0; count];

@@ -170,9 +170,9 @@ fn parse(text: &str, machine: &Machine) -> Result<Vec<ErrorFunction>, String> {
     for (id, quantity) in &file.constant {
         let (slot, over, angle) = placed(machine, id)?;
         let unit = Unit::of(if angle {
-            abbe_model::instrument::InsideUnit::Radian
+            abbe_model::instrument::InternalUnit::Radian
         } else {
-            abbe_model::instrument::InsideUnit::Millimetre
+            abbe_model::instrument::InternalUnit::Millimetre
         });
         let given = Given::of(id, quantity).map_err(|fault| fault.to_string())?;
         functions.push(ErrorFunction {
@@ -304,7 +304,7 @@ fn position(
     kind: AxisKind,
     mm: Option<Vec<f64>>,
     deg: Option<Vec<f64>>,
-    stem: &str,
+    id_stem: &str,
 ) -> Result<Option<Vec<f64>>, String> {
     let (right, wrong) = match kind {
         AxisKind::Linear => (mm, deg),
@@ -314,14 +314,14 @@ fn position(
         ),
     };
     if wrong.is_some() {
-        return Err(format!("`{stem}_{}` is meant over this axis", unit_word(kind)));
+        return Err(format!("`{id_stem}_{}` is meant over this axis", unit_word(kind)));
     }
     moderate(right.as_deref().unwrap_or_default())?;
     Ok(right)
 }
 
 fn values(angle: bool, um: Option<Vec<f64>>, arcsec: Option<Vec<f64>>) -> Result<Vec<f64>, String> {
-    let (right, wrong, per_inside, word) = if angle {
+    let (right, wrong, display_per_internal, word) = if angle {
         (arcsec, um, ARCSEC, "arcsec")
     } else {
         (um, arcsec, 1e3, "um")
@@ -331,7 +331,10 @@ fn values(angle: bool, um: Option<Vec<f64>>, arcsec: Option<Vec<f64>>) -> Result
         _ => return Err(format!("the values of this error are in `{word}`")),
     };
     moderate(&values)?;
-    Ok(values.into_iter().map(|value| value / per_inside).collect())
+    Ok(values
+        .into_iter()
+        .map(|value| value / display_per_internal)
+        .collect())
 }
 
 /// That numbers are numbers within the limits of all files.

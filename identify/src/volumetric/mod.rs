@@ -24,15 +24,15 @@ pub use functions::{ErrorFunction, Form};
 use crate::error::IdentifyError;
 
 /// Most points of a map.
-pub const MOST_POINTS: usize = 1_000_000;
+pub const MAX_POINTS: usize = 1_000_000;
 /// Most steps of a compensation.
-const MOST_STEPS: usize = 20;
+const MAX_STEPS: usize = 20;
 /// Residual at which a compensation has ended, mm.
 const SETTLED_MM: f64 = 1e-10;
 
 /// A machine with errors.
 #[derive(Clone, Debug)]
-pub struct Erring<'a> {
+pub struct MachineWithErrors<'a> {
     /// The machine.
     pub machine: &'a Machine,
     /// Its errors.
@@ -63,7 +63,7 @@ pub struct Compensated {
     pub error_mm: [f64; 3],
 }
 
-impl Erring<'_> {
+impl MachineWithErrors<'_> {
     /// The tool point in the table frame, with errors or without.
     fn point(&self, positions: &[f64], with_errors: bool, only: Option<usize>) -> Vector3<f64> {
         let machine = self.machine;
@@ -144,7 +144,7 @@ impl Erring<'_> {
             )));
         };
         let mut commands = positions.to_vec();
-        for _ in 0..MOST_STEPS {
+        for _ in 0..MAX_STEPS {
             let residual = self.point(&commands, true, None) - wanted;
             if residual.norm() <= SETTLED_MM {
                 return Ok(Compensated {
@@ -158,7 +158,7 @@ impl Erring<'_> {
             }
         }
         Err(IdentifyError::Request(format!(
-            "compensation: no settling within {MOST_STEPS} steps; the errors are not small"
+            "compensation: no settling within {MAX_STEPS} steps; the errors are not small"
         )))
     }
 }
@@ -210,16 +210,16 @@ pub struct Summary {
 /// # Errors
 /// If the grid has too many places, an error is beyond all limits, or a compensation fails.
 pub fn map(
-    erring: &Erring<'_>,
+    erring: &MachineWithErrors<'_>,
     grid: &[Vec<f64>],
     compensate: bool,
 ) -> Result<(Vec<Place>, Summary), IdentifyError> {
     let total = grid
         .iter()
         .try_fold(1_usize, |total, axis| total.checked_mul(axis.len()));
-    let Some(total) = total.filter(|total| *total > 0 && *total <= MOST_POINTS) else {
+    let Some(total) = total.filter(|total| *total > 0 && *total <= MAX_POINTS) else {
         return Err(IdentifyError::Request(format!(
-            "a map has at least one and at most {MOST_POINTS} places"
+            "a map has at least one and at most {MAX_POINTS} places"
         )));
     };
     let places: Vec<(Place, Vec<f64>)> = (0..total)

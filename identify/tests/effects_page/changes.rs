@@ -84,7 +84,7 @@ pub fn changes(mut session: Session, effects: &[Effect]) -> Changes {
                 } else {
                     1.0
                 };
-                beta[place] = STEP * unit / parameter.unit.per_inside;
+                beta[place] = STEP * unit / parameter.unit.display_per_internal;
                 let with = read(&beta);
                 beta[place] = 0.0;
                 found.extend(

@@ -23,14 +23,14 @@ const ORDERS: usize = 24;
 /// What is less than this share of the greatest amplitude of a test is left out.
 const SHOWN: f64 = 0.2;
 /// Orders shown before `…`.
-const MOST_SHOWN: usize = 3;
+const MAX_SHOWN: usize = 3;
 /// Shares of the square that count as the same and as alike.
 const SAME: f64 = 0.9999;
 const ALIKE: f64 = 0.9;
 /// Least change that is one, µm a unit.
 const NOTHING: f64 = 2e-3;
 /// Aliases shown before `…`.
-const MOST_ALIASES: usize = 6;
+const MAX_ALIASES: usize = 6;
 
 fn workspace() -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR"))
@@ -102,11 +102,11 @@ fn orders(changes: &Changes, effect: usize, test: usize) -> String {
     let mut parts = Vec::new();
     for coordinate in 0..=coordinates.unwrap_or(0) {
         let own: Vec<_> = waves.iter().filter(|wave| wave.0 == coordinate).collect();
-        let shown = own.iter().take(MOST_SHOWN);
+        let shown = own.iter().take(MAX_SHOWN);
         let mut text: Vec<String> = shown
             .map(|(_, sign, order, amplitude)| format!("{sign}{order}: {}", number(*amplitude)))
             .collect();
-        if own.len() > MOST_SHOWN {
+        if own.len() > MAX_SHOWN {
             text.push("…".into());
         }
         let letter = if coordinates == Some(2) {
@@ -198,11 +198,11 @@ fn like(own: usize, ids: &[String], seen: &[bool], taken: &[Share], between: &[V
         found.push((true, "at one phase set-up".into()));
     }
     found.sort_by_key(|(alike, _)| *alike);
-    let more = found.len() > MOST_ALIASES;
+    let more = found.len() > MAX_ALIASES;
     let mut found: Vec<String> = found
         .into_iter()
         .map(|(_, text)| text)
-        .take(MOST_ALIASES)
+        .take(MAX_ALIASES)
         .collect();
     if more {
         found.push("…".into());

@@ -23,7 +23,7 @@ use std::f64::consts::{PI, TAU};
 use super::{DriverSample, Shape};
 use crate::scalar::Nominal;
 
-const SECONDS_AN_HOUR: f64 = 3600.0;
+const SECONDS_PER_HOUR: f64 = 3600.0;
 
 impl Shape {
     /// The basis functions at one reading, pushed onto `basis` in the order of the coefficients.
@@ -59,7 +59,7 @@ impl Shape {
             Shape::ReversalSpike { width } => {
                 basis.push(sample.direction * (-sample.since_reversal / constant(*width)).exp());
             }
-            Shape::Drift => basis.push(q / constant(SECONDS_AN_HOUR)),
+            Shape::Drift => basis.push(q / constant(SECONDS_PER_HOUR)),
             Shape::Warmup { tau_s } => basis.push(constant(1.0) - (-q / constant(*tau_s)).exp()),
             Shape::Steps { at } => basis.extend(at.iter().map(|position| (q - constant(*position)).step())),
             Shape::Local {

@@ -233,7 +233,7 @@ impl<V: Clone + PartialEq> Arena<V> {
     }
 
     /// Whether anything but a sine or a cosine is taken of a variable.
-    pub fn holds_itself(&self, variable: &V) -> bool {
+    pub fn is_own_symbol(&self, variable: &V) -> bool {
         let nodes = self.nodes.borrow();
         let variables = self.variables.borrow();
         let itself = |operand: Operand| {

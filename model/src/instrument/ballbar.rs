@@ -3,7 +3,7 @@
 //! The reading uses the stated length of the bar: a bar that is `δ` longer than stated reads `L − δ`. A sensor whose gain is off by
 //! `k` adds `k·(L − L_bar)`.
 
-use super::{InsideUnit, InstrumentUnknown, SharedBy, displaced};
+use super::{InstrumentUnknown, InternalUnit, SharedBy, displaced};
 use crate::chain::{AxisPosition, BodyErrors, Machine};
 use crate::frames::Point;
 use crate::scalar::Scalar;
@@ -17,7 +17,7 @@ pub const UNKNOWNS: [InstrumentUnknown; 8] = [
     InstrumentUnknown::length("spindle_ball", "y", SharedBy::SpindleSetup),
     InstrumentUnknown::length("spindle_ball", "z", SharedBy::SpindleSetup),
     InstrumentUnknown::length("bar", "", SharedBy::BarSetup),
-    InstrumentUnknown::new("gain", "", InsideUnit::Ratio, SharedBy::Session),
+    InstrumentUnknown::new("gain", "", InternalUnit::Ratio, SharedBy::Session),
 ];
 
 /// Place of the bar's length among [`UNKNOWNS`].

@@ -130,7 +130,7 @@ pub struct InstrumentUnknown {
     /// Its coordinate, `x` … `c`, `omega`, `phi`, `theta`, or empty.
     pub coordinate: &'static str,
     /// The unit inside.
-    pub unit: InsideUnit,
+    pub unit: InternalUnit,
     /// Which tests share it.
     pub shared_by: SharedBy,
 }
@@ -139,7 +139,7 @@ impl InstrumentUnknown {
     const fn new(
         thing: &'static str,
         coordinate: &'static str,
-        unit: InsideUnit,
+        unit: InternalUnit,
         shared_by: SharedBy,
     ) -> InstrumentUnknown {
         InstrumentUnknown {
@@ -151,17 +151,17 @@ impl InstrumentUnknown {
     }
 
     const fn length(thing: &'static str, coordinate: &'static str, shared_by: SharedBy) -> InstrumentUnknown {
-        InstrumentUnknown::new(thing, coordinate, InsideUnit::Millimetre, shared_by)
+        InstrumentUnknown::new(thing, coordinate, InternalUnit::Millimetre, shared_by)
     }
 
     const fn angle(thing: &'static str, coordinate: &'static str, shared_by: SharedBy) -> InstrumentUnknown {
-        InstrumentUnknown::new(thing, coordinate, InsideUnit::Radian, shared_by)
+        InstrumentUnknown::new(thing, coordinate, InternalUnit::Radian, shared_by)
     }
 }
 
 /// Unit of a quantity inside the program.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
-pub enum InsideUnit {
+pub enum InternalUnit {
     /// mm; printed in µm.
     Millimetre,
     /// rad; printed in arcsec.

@@ -54,7 +54,7 @@ pub struct Probe<N> {
 
 /// What decides a reading, seen from the artefact's axis and across it.
 #[derive(Clone, Copy, Debug)]
-pub struct Sight<S> {
+pub struct ProbeGeometry<S> {
     /// The stylus, mm: `v⊥`.
     pub stylus: Point<S>,
     /// A step of the probe on its way to the surface, mm: `u⊥` times the step's length.
@@ -65,7 +65,7 @@ pub struct Sight<S> {
     pub step_length: Option<S>,
 }
 
-impl<S: Scalar> Sight<S> {
+impl<S: Scalar> ProbeGeometry<S> {
     /// `A`, `B` and `C`, for a step of any length.
     pub fn quadratic(&self) -> [S; 3] {
         let (v, u) = (self.stylus, self.step);
@@ -124,7 +124,7 @@ impl<N: Nominal> Probe<N> {
         state: &[AxisPosition<N>],
         errors: &[BodyErrors<S>],
         unknown: impl Fn(usize) -> Option<S>,
-    ) -> Sight<S> {
+    ) -> ProbeGeometry<S> {
         let stylus = machine.tool_point(state, errors, displaced(self.stylus, STYLUS, &unknown));
         let (step, step_length) = self.step_at(machine, state);
         let ahead = machine.table_point(state, errors, stylus.plus(step));
@@ -142,7 +142,7 @@ impl<N: Nominal> Probe<N> {
                 radius = radius + larger;
             }
         }
-        Sight {
+        ProbeGeometry {
             stylus: across(from_artefact, axis),
             step: across(direction, axis),
             radius,

@@ -13,7 +13,7 @@
 
 use super::{InstrumentUnknown, SharedBy, displaced};
 use crate::chain::{AxisPosition, BodyErrors, Machine};
-use crate::frames::{Coordinate, Point, Rotation, Turn, turn_about};
+use crate::frames::{Coordinate, Point, Rotation, SinCos, turn_about};
 use crate::scalar::{Nominal, Scalar};
 
 /// Both points, then ω₁, φ₁ and θ₁ of the nest.
@@ -73,9 +73,9 @@ pub struct RTest<N> {
 /// ```
 #[derive(Clone, Copy, Debug)]
 pub struct Orientation<S> {
-    omega: Turn<S>,
-    phi: Turn<S>,
-    theta: Turn<S>,
+    omega: SinCos<S>,
+    phi: SinCos<S>,
+    theta: SinCos<S>,
 }
 
 impl<S: Scalar> Orientation<S> {
@@ -85,9 +85,9 @@ impl<S: Scalar> Orientation<S> {
         let [omega, phi, theta] = angles.map(|angle| match rotation {
             Rotation::Exact => {
                 let (sin, cos) = angle.sin_cos();
-                Turn { sin, cos }
+                SinCos { sin, cos }
             }
-            Rotation::SmallAngle => Turn {
+            Rotation::SmallAngle => SinCos {
                 sin: angle,
                 cos: S::constant(1.0),
             },
@@ -97,7 +97,7 @@ impl<S: Scalar> Orientation<S> {
 
     /// `R · v`: from the sensors' coordinates to those of the frame that carries them.
     pub fn to_machine(&self, sensors: Point<S>) -> Point<S> {
-        let [omega, phi, theta] = [self.omega, self.phi, self.theta].map(|turn| Turn {
+        let [omega, phi, theta] = [self.omega, self.phi, self.theta].map(|turn| SinCos {
             sin: -turn.sin,
             cos: turn.cos,
         });

@@ -11,16 +11,16 @@ use std::path::{Path, PathBuf};
 use toml::de::DeTable;
 
 use super::spelling::known_names;
-use super::stamp::Stamp;
+use super::stamp::FileStamp;
 use crate::error::{ModelError, Place};
 pub(crate) use value::Value;
 
 /// Most bytes of a machine or session file.
-const MOST_BYTES: u64 = 8 << 20;
+const MAX_BYTES: u64 = 8 << 20;
 /// How deep the parser of TOML goes.
-const DEEPEST: usize = 80;
+const MAX_DEPTH: usize = 80;
 /// Most items of a list or a table of names: far more than anybody measures, few enough to be compared with each other.
-const MOST_ITEMS: usize = 1000;
+const MAX_ITEMS: usize = 1000;
 
 /// A file's text with its name.
 pub(crate) struct Source {
@@ -31,7 +31,7 @@ pub(crate) struct Source {
     /// Bytes of the file before the text: those of a byte order mark.
     pub skipped: usize,
     /// The file as it was; `None` for a text that was read from none.
-    pub stamp: Option<Stamp>,
+    pub stamp: Option<FileStamp>,
 }
 
 impl Source {
@@ -54,16 +54,16 @@ impl Source {
             fault(format!("{what} cannot be read: {cause}"), help)
         };
         let opened = File::open(file).map_err(unreadable)?;
-        let stamp = Stamp::of(file, &opened.metadata().map_err(unreadable)?);
+        let stamp = FileStamp::of(file, &opened.metadata().map_err(unreadable)?);
         let mut bytes = Vec::new();
         // A pipe does not say how much there is to come.
         (&opened)
-            .take(MOST_BYTES + 1)
+            .take(MAX_BYTES + 1)
             .read_to_end(&mut bytes)
             .map_err(unreadable)?;
-        if bytes.len() as u64 > MOST_BYTES {
+        if bytes.len() as u64 > MAX_BYTES {
             return Err(fault(
-                format!("{what} has more than {MOST_BYTES} bytes, the most that is read"),
+                format!("{what} has more than {MAX_BYTES} bytes, the most that is read"),
                 "readings belong in CSV files named by `data`",
             ));
         }
@@ -101,7 +101,7 @@ impl Source {
                 fault.span().unwrap_or(0..0),
                 format!("not valid TOML: {}", fault.message()),
                 fault.message().contains("recursion").then(|| {
-                    format!("tables, lists and the parts of a key go {DEEPEST} levels deep at most")
+                    format!("tables, lists and the parts of a key go {MAX_DEPTH} levels deep at most")
                 }),
             )
         })?;
@@ -184,10 +184,10 @@ impl<'a> Table<'a> {
     }
 
     /// Every entry, in the order of the file: for tables whose keys are names.
-    pub fn take_all(&mut self) -> Result<Vec<Value<'a>>, ModelError> {
-        if self.entries.len() > MOST_ITEMS {
+    pub fn remaining_values(&mut self) -> Result<Vec<Value<'a>>, ModelError> {
+        if self.entries.len() > MAX_ITEMS {
             let message = format!(
-                "{} has {} entries; {MOST_ITEMS} are the most",
+                "{} has {} entries; {MAX_ITEMS} are the most",
                 self.called(),
                 self.entries.len()
             );

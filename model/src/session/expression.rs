@@ -24,9 +24,9 @@ pub enum Length {
 }
 
 /// Most characters of an expression.
-const MOST_CHARACTERS: usize = 400;
+const MAX_CHARACTERS: usize = 400;
 /// Most nested parentheses, signs and roots.
-const DEEPEST: usize = 40;
+const MAX_DEPTH: usize = 40;
 
 impl Length {
     /// The value over any nominal type, `constant` giving that of a named constant.
@@ -70,9 +70,9 @@ impl Length {
     /// Says what was found where, or which constant is not among the `known` ones.
     pub fn parse(text: &str, known: &[&str]) -> Result<Length, String> {
         let characters: Vec<char> = text.chars().collect();
-        if characters.len() > MOST_CHARACTERS {
+        if characters.len() > MAX_CHARACTERS {
             return Err(format!(
-                "an expression of {} characters; {MOST_CHARACTERS} is the most",
+                "an expression of {} characters; {MAX_CHARACTERS} is the most",
                 characters.len()
             ));
         }
@@ -154,7 +154,7 @@ impl Reader<'_> {
         if !self.accept('^') {
             return Ok(base);
         }
-        if base.size() > MOST_CHARACTERS {
+        if base.size() > MAX_CHARACTERS {
             return Err("squares of squares beyond all use".into());
         }
         if self.accept('2')
@@ -236,8 +236,8 @@ impl Reader<'_> {
 
     fn deeper(&mut self) -> Result<(), String> {
         self.depth += 1;
-        if self.depth > DEEPEST {
-            return Err(format!("an expression nested deeper than {DEEPEST}"));
+        if self.depth > MAX_DEPTH {
+            return Err(format!("an expression nested deeper than {MAX_DEPTH}"));
         }
         Ok(())
     }

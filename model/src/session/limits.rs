@@ -5,7 +5,7 @@
 pub const LARGEST: f64 = 1e12;
 
 /// The least standard deviation or step other than zero, µm: a millionth of what any sensor resolves.
-pub const LEAST_UM: f64 = 1e-6;
+pub const MIN_UM: f64 = 1e-6;
 
 /// What is wrong with a number that is larger than [`LARGEST`].
 pub fn too_large(number: f64) -> Option<String> {
@@ -15,6 +15,5 @@ pub fn too_large(number: f64) -> Option<String> {
 
 /// What is wrong with a standard deviation or step in µm that is neither zero nor at least [`LEAST_UM`].
 pub fn too_small_um(number: f64) -> Option<String> {
-    (number > 0.0 && number < LEAST_UM)
-        .then(|| format!("{number:e} µm; {LEAST_UM:e} µm is the least besides 0"))
+    (number > 0.0 && number < MIN_UM).then(|| format!("{number:e} µm; {MIN_UM:e} µm is the least besides 0"))
 }

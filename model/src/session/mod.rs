@@ -27,7 +27,7 @@ use crate::effect::Effect;
 use crate::instrument::rtest::Setting;
 use crate::instrument::{InstrumentKind, SharedBy, Station};
 use readings::Readings;
-use stamp::Stamp;
+use stamp::FileStamp;
 
 /// A session, checked. Lengths in mm, angles in rad.
 #[derive(Clone, Debug)]
@@ -39,7 +39,7 @@ pub struct Session {
     /// What stands in the machine's file, where the session names one.
     pub machine_text: Option<String>,
     /// Every file that was read: the session, its machine, its data.
-    pub files: Vec<Stamp>,
+    pub files: Vec<FileStamp>,
     /// The machine.
     pub machine: Machine,
     /// Named lengths in the order of the file, mm.

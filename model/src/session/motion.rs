@@ -7,7 +7,7 @@ use crate::error::ModelError;
 use crate::instrument::Station;
 
 /// Most readings of one planned test.
-pub const MOST_READINGS: usize = 1_000_000;
+pub const MAX_READINGS: usize = 1_000_000;
 
 /// Pause between the tests of a planned session, s.
 const BETWEEN_TESTS_S: f64 = 120.0;

@@ -15,7 +15,7 @@ use crate::instrument::ballbar::BallBar;
 const BETWEEN_RUNS_S: f64 = 3.0;
 /// Steps in a millimetre to which planned positions are rounded: far finer than a control resolves and far coarser than a solve rounds, so that an axis that
 /// need not move does not.
-const STEPS_IN_A_MM: f64 = 1e10;
+const STEPS_PER_MM: f64 = 1e10;
 /// How far the balls may miss the path that was asked for, mm.
 const MISSED_MM: f64 = 1e-6;
 
@@ -92,7 +92,7 @@ pub(super) fn states(machine: &Machine, test: &Test, motion: &Motion) -> Result<
                 let wanted = offset_vector(machine, &bar, &at, *axis, *offset)?;
                 let (mut state, missed) = placed(machine, &bar, &at, &linear, wanted);
                 for axis in &linear {
-                    state[*axis] = (state[*axis] * STEPS_IN_A_MM).round() / STEPS_IN_A_MM + 0.0;
+                    state[*axis] = (state[*axis] * STEPS_PER_MM).round() / STEPS_PER_MM + 0.0;
                 }
                 if missed > MISSED_MM {
                     return Err((

@@ -7,10 +7,10 @@ use crate::chain::{BodyErrors, Machine};
 use crate::instrument::Station;
 
 /// A ball bar's sensor moves a millimetre or two, those of an R-test a few; beyond this something else than an error of the machine is wrong, mm.
-const MOST_MM: f64 = 5.0;
+const MAX_MM: f64 = 5.0;
 
 /// Balls that lie nearer to each other than this lie in one place, mm.
-const LEAST_MM: f64 = 1e-6;
+const MIN_MM: f64 = 1e-6;
 
 /// The calibrated length of a ball bar; 0 for other instruments.
 pub(crate) fn bar_mm(station: &Station<f64>) -> f64 {
@@ -55,12 +55,12 @@ const ROTARY: [Slip; 3] = [
 ];
 
 /// Most readings that slips are tried on.
-const MOST_TRIED: usize = 500;
+const MAX_TRIED: usize = 500;
 
 /// The slips, of one axis or of all axes of a kind, after whose correction the instrument reaches.
 fn slips(machine: &Machine, test: &Test, readings: &Readings) -> Vec<String> {
     let rows: Vec<usize> = (0..readings.rows())
-        .step_by(readings.rows().div_ceil(MOST_TRIED).max(1))
+        .step_by(readings.rows().div_ceil(MAX_TRIED).max(1))
         .collect();
     let readings = readings.of_rows(&rows);
     let matters = |axis: usize| readings.positions[axis].iter().any(|q| *q != 0.0);
@@ -135,7 +135,7 @@ fn reaches(machine: &Machine, test: &Test, readings: &Readings) -> Result<(), (S
         readings.state(machine, row, &mut state);
         let length = bar.read::<f64>(machine, &state, &none, |_| None);
         // A length has no direction there, so that no error moves it one way or the other.
-        if length < LEAST_MM {
+        if length < MIN_MM {
             return Err((
                 format!(
                     "test \"{}\", reading {}: the two balls nominally lie in one place, and the bar is {:e} mm long",
@@ -149,7 +149,7 @@ fn reaches(machine: &Machine, test: &Test, readings: &Readings) -> Result<(), (S
         off.push(length - bar.bar);
     }
     let nominal = bar.bar + median(&mut off);
-    if (nominal - bar.bar).abs() <= MOST_MM {
+    if (nominal - bar.bar).abs() <= MAX_MM {
         return Ok(());
     }
     Err((
@@ -174,11 +174,11 @@ fn check_touch(machine: &Machine, test: &Test, readings: &Readings) -> Result<()
         readings.state(machine, row, &mut state);
         let reading = test.station.read::<f64>(machine, &state, &none, |_| None);
         let distance = reading.coordinates()[0];
-        if distance.abs() <= MOST_MM {
+        if distance.abs() <= MAX_MM {
             continue;
         }
         let found = if distance.is_finite() {
-            format!("stands {distance:.3} mm before the artefact's nominal surface; {MOST_MM} mm is the most")
+            format!("stands {distance:.3} mm before the artefact's nominal surface; {MAX_MM} mm is the most")
         } else {
             "looks past the artefact, or stands on its axis without a `direction`".into()
         };
@@ -200,10 +200,10 @@ fn check_nest(machine: &Machine, test: &Test, readings: &Readings) -> Result<(),
         readings.state(machine, row, &mut state);
         let reading = test.station.read::<f64>(machine, &state, &none, |_| None);
         let apart = reading.coordinates().iter().map(|x| x * x).sum::<f64>().sqrt();
-        if apart > MOST_MM {
+        if apart > MAX_MM {
             return Err((
                 format!(
-                    "test \"{}\", reading {}: the master ball nominally lies {apart:.3} mm from the centre of the sensors; {MOST_MM} mm is the most",
+                    "test \"{}\", reading {}: the master ball nominally lies {apart:.3} mm from the centre of the sensors; {MAX_MM} mm is the most",
                     test.name,
                     row + 1
                 ),
@@ -225,7 +225,7 @@ pub(crate) fn check_lengths(test: &Test, readings: &Readings) -> Result<(), (Str
     };
     let mut off: Vec<f64> = readings.observed.iter().map(|length| length - bar.bar).collect();
     let read = bar.bar + median(&mut off);
-    if (read - bar.bar).abs() <= MOST_MM {
+    if (read - bar.bar).abs() <= MAX_MM {
         return Ok(());
     }
     Err((
@@ -242,12 +242,12 @@ pub(crate) fn check_lengths(test: &Test, readings: &Readings) -> Result<(), (Str
 fn check_sensors(test: &Test, readings: &Readings) -> Result<(), (String, String)> {
     let mut sizes: Vec<f64> = readings.observed.iter().map(|value| value.abs()).collect();
     let read = median(&mut sizes);
-    if read <= MOST_MM {
+    if read <= MAX_MM {
         return Ok(());
     }
     Err((
         format!(
-            "test \"{}\": the sensors read {read:.3} mm (median of {} values); {MOST_MM} mm is the most",
+            "test \"{}\": the sensors read {read:.3} mm (median of {} values); {MAX_MM} mm is the most",
             test.name,
             sizes.len()
         ),

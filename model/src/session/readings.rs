@@ -5,7 +5,7 @@ use std::path::PathBuf;
 use crate::axis::AxisKind;
 use crate::chain::{AxisPosition, Machine};
 use crate::effect::DriverSample;
-use crate::session::stamp::Stamp;
+use crate::session::stamp::FileStamp;
 
 /// The readings of one test, one row a reading, in mm, rad, s, °C.
 #[derive(Clone, Debug, Default)]
@@ -13,7 +13,7 @@ pub struct Readings {
     /// The file they were read from.
     pub file: PathBuf,
     /// That file as it was; `None` for readings that come from no file.
-    pub stamp: Option<Stamp>,
+    pub stamp: Option<FileStamp>,
     /// Line of each row in that file, from 1.
     pub line: Vec<usize>,
     /// Which traversal each row belongs to, as numbered in the file; empty where there is no such column.

@@ -77,7 +77,7 @@ pub fn moved(
         let named = PathBuf::from(name.text()?);
         if named.is_relative() {
             let target = parent(file).join(named);
-            edits.push((name.span.clone(), quoted(&seen_from(folder, &target)?)));
+            edits.push((name.span.clone(), quoted(&relative_path(folder, &target)?)));
         }
     }
     edits.sort_by_key(|(span, _)| span.start);
@@ -97,7 +97,7 @@ fn parent(file: &Path) -> &Path {
 }
 
 /// The name of a file from a folder; the whole name where they share no folder but the root.
-fn seen_from(folder: &Path, file: &Path) -> Result<String, ModelError> {
+fn relative_path(folder: &Path, file: &Path) -> Result<String, ModelError> {
     let whole = |path: &Path| {
         path.canonicalize().map_err(|cause| ModelError::Output {
             file: path.to_path_buf(),

@@ -8,7 +8,7 @@ use crate::error::{ModelError, Place};
 
 /// A file as it was when it was opened.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub struct Stamp {
+pub struct FileStamp {
     /// The file as the user or a session named it.
     pub file: PathBuf,
     bytes: u64,
@@ -16,9 +16,9 @@ pub struct Stamp {
     regular: bool,
 }
 
-impl Stamp {
-    pub(crate) fn of(file: &Path, found: &Metadata) -> Stamp {
-        Stamp {
+impl FileStamp {
+    pub(crate) fn of(file: &Path, found: &Metadata) -> FileStamp {
+        FileStamp {
             file: file.to_path_buf(),
             bytes: found.len(),
             modified: found.modified().ok(),
@@ -34,7 +34,7 @@ impl Stamp {
     /// An error unless the open file still is what it was when it was opened.
     pub(crate) fn check(&self, opened: &File) -> Result<(), ModelError> {
         match opened.metadata() {
-            Ok(found) if Stamp::of(&self.file, &found) == *self || !self.regular => Ok(()),
+            Ok(found) if FileStamp::of(&self.file, &found) == *self || !self.regular => Ok(()),
             _ => Err(ModelError::Input {
                 place: Place::file(&self.file),
                 message: "the file changed while it was read".into(),
@@ -50,7 +50,7 @@ impl Stamp {
                 Some("it is no file but a pipe or a device, which can be read only once".into())
             }
             Err(cause) => Some(format!("it is no longer there: {cause}")),
-            Ok(found) if Stamp::of(&self.file, &found) == *self => None,
+            Ok(found) if FileStamp::of(&self.file, &found) == *self => None,
             Ok(_) => Some("it has changed since it was read".into()),
         }
     }

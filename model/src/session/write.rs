@@ -159,9 +159,9 @@ fn effect_table(effect: &Effect, machine: &Machine) -> String {
     };
     line("shape", quoted(word));
     let unit = unit(&effect.driver, machine);
-    let mut quantity = |stem: &str, value: f64| {
+    let mut quantity = |id_stem: &str, value: f64| {
         let (suffix, number) = in_unit(unit, value);
-        line(&format!("{stem}_{suffix}"), number);
+        line(&format!("{id_stem}_{suffix}"), number);
     };
     match &effect.shape {
         Shape::Constant | Shape::Backlash | Shape::Lag | Shape::Drift => {}

@@ -11,7 +11,7 @@ use abbe_model::instrument::ballbar::BallBar;
 use abbe_model::instrument::probe::Probe;
 use abbe_model::instrument::rtest::{RTest, Setting};
 use abbe_model::instrument::tracker::Tracker;
-use abbe_model::instrument::{InsideUnit, InstrumentKind, Station};
+use abbe_model::instrument::{InstrumentKind, InternalUnit, Station};
 use abbe_model::sensitivity::{SlotValues, TestModel};
 use abbe_model::session::readings::Readings;
 use num_dual::Dual64;
@@ -95,7 +95,7 @@ fn errors(slots: usize, machine: &Machine, kind: InstrumentKind, random: &mut im
 fn is_angle(machine: &Machine, kind: InstrumentKind, slot: usize) -> bool {
     match slot.checked_sub(machine.error_slots()) {
         None => slot % ERRORS_PER_AXIS % 6 >= 3,
-        Some(place) => kind.unknowns()[place].unit == InsideUnit::Radian,
+        Some(place) => kind.unknowns()[place].unit == InternalUnit::Radian,
     }
 }
 

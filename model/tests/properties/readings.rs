@@ -5,7 +5,7 @@ use abbe_model::instrument::ballbar::BallBar;
 use abbe_model::instrument::rtest::{RTest, Setting};
 use abbe_model::instrument::socket::Socket;
 use abbe_model::instrument::tracker::Tracker;
-use abbe_model::instrument::{InsideUnit, Station};
+use abbe_model::instrument::{InternalUnit, Station};
 use abbe_model::sensitivity::{SlotValues, TestModel};
 use abbe_model::session::readings::Readings;
 use proptest::collection::vec;
@@ -71,8 +71,8 @@ fn tests() -> impl Strategy<Value = DrawnTest> {
         values
             .constant
             .extend(unknowns.map(|(unknown, size)| match unknown.unit {
-                InsideUnit::Millimetre => 0.1 * size,
-                InsideUnit::Radian | InsideUnit::Ratio => 1e-3 * size,
+                InternalUnit::Millimetre => 0.1 * size,
+                InternalUnit::Radian | InternalUnit::Ratio => 1e-3 * size,
             }));
         DrawnTest {
             drawn,

@@ -31,7 +31,7 @@ pub(super) fn table(
     let mut rows = Vec::new();
     for curve in &compensation.curves {
         let kind = machine.axes[curve.axis].kind;
-        let (unit, per_inside) = if curve.error.freedom.is_angle() {
+        let (unit, display_per_internal) = if curve.error.freedom.is_angle() {
             ("arcsec", ARCSEC)
         } else {
             ("um", 1e3)
@@ -48,8 +48,8 @@ pub(super) fn table(
                     format!("{:.6}", outside(kind, q)),
                     kind.unit().to_string(),
                     word.to_string(),
-                    format!("{:.6}", curve.at(q, *direction) * per_inside),
-                    format!("{:.6}", curve.u_at(q, *direction) * per_inside),
+                    format!("{:.6}", curve.at(q, *direction) * display_per_internal),
+                    format!("{:.6}", curve.u_at(q, *direction) * display_per_internal),
                     unit.to_string(),
                 ]);
             }

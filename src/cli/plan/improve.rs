@@ -1,9 +1,9 @@
 //! `abbe plan --improve`, `--separate`, `--range`.
 
 use abbe::identify::IdentifyError;
-use abbe::identify::plan::goal::Goal;
+use abbe::identify::plan::candidate_tests::CandidateTests;
+use abbe::identify::plan::criterion::Goal;
 use abbe::identify::plan::improve::{ImproveOptions, Improvement, improve};
-use abbe::identify::plan::menu::Menu;
 use abbe::identify::plan::range::Shrinkage;
 use abbe::identify::problem::Problem;
 use abbe::identify::trace::library;
@@ -18,7 +18,7 @@ use crate::cli::table;
 const HALF: f64 = 0.5;
 
 /// Tests that are proposed at most: each is sought over the whole menu, beside all before it.
-const MOST_TESTS: usize = 24;
+const MAX_TESTS: usize = 24;
 
 /// Whether a sweep comes back.
 #[derive(Clone, Copy, PartialEq, ValueEnum)]
@@ -93,10 +93,10 @@ impl ImproveArguments {
         self.setup_min.is_some() || self.test_min.is_some()
     }
 
-    fn menu(&self) -> Result<Menu, Failure> {
-        let mut menu = Menu {
+    fn menu(&self) -> Result<CandidateTests, Failure> {
+        let mut menu = CandidateTests {
             reach_mm: self.reach_mm()?,
-            ..Menu::default()
+            ..CandidateTests::default()
         };
         let checked = |flag: &str, list: &[f64], least: f64| match list
             .iter()
@@ -182,9 +182,9 @@ impl ImproveArguments {
             )?);
         }
         let tests = self.improve.unwrap_or(1);
-        if !(1..=MOST_TESTS).contains(&tests) {
+        if !(1..=MAX_TESTS).contains(&tests) {
             return Err(Failure::Other(format!(
-                "`--improve {tests}`: from 1 to {MOST_TESTS} tests are proposed"
+                "`--improve {tests}`: from 1 to {MAX_TESTS} tests are proposed"
             )));
         }
         let options = ImproveOptions {
@@ -214,11 +214,11 @@ fn add(problem: &mut Problem<'_>, id: &str) -> Result<(), IdentifyError> {
     }
     let candidates = library::candidates(problem)?;
     let Some(candidate) = candidates.iter().find(|candidate| candidate.effect.id() == id) else {
-        let stem = id.split(':').next().unwrap_or(id);
+        let id_stem = id.split(':').next().unwrap_or(id);
         let mut alike: Vec<String> = candidates
             .iter()
             .map(|c| c.effect.id())
-            .filter(|other| other.starts_with(stem))
+            .filter(|other| other.starts_with(id_stem))
             .collect();
         alike.dedup();
         alike.truncate(6);

@@ -9,7 +9,7 @@ use abbe::identify::plan::clearance::Clearance;
 use abbe::identify::plan::{self, PlanOptions};
 use abbe::model::instrument::Station;
 use abbe::model::instrument::rtest::Setting;
-use abbe::model::session::limits::{LARGEST, LEAST_UM};
+use abbe::model::session::limits::{LARGEST, MIN_UM};
 use abbe::model::session::{Prior, Session};
 use clap::Args;
 
@@ -161,8 +161,9 @@ fn next_test(
         output::write_json(path, &found)?;
     }
     if arguments.faces.asked() {
-        let document = crate::report::next::document(&problem, found.improvement.as_ref(), &found.ranges);
-        let method = crate::report::next::method();
+        let document =
+            crate::report::next_test::document(&problem, found.improvement.as_ref(), &found.ranges);
+        let method = crate::report::next_test::method();
         arguments
             .faces
             .write(&document, &method, session, arguments.common.seed)?;
@@ -230,22 +231,22 @@ fn clearance(session: &Session, sizes: &str) -> Result<Vec<String>, Failure> {
 
 /// A length in µm that has to be positive, in mm.
 fn positive(flag: &str, um: f64) -> Result<f64, Failure> {
-    if (LEAST_UM..=LARGEST).contains(&um) {
+    if (MIN_UM..=LARGEST).contains(&um) {
         Ok(um * 1e-3)
     } else {
         Err(Failure::Other(format!(
-            "`{flag} {um}`: it has to be a positive number of µm, {LEAST_UM:e} to {LARGEST:e}"
+            "`{flag} {um}`: it has to be a positive number of µm, {MIN_UM:e} to {LARGEST:e}"
         )))
     }
 }
 
 /// Gives every set-up length that is known within an uncertainty this one.
 fn set_priors(session: &mut Session, u_mm: f64) {
-    use abbe::model::instrument::InsideUnit;
+    use abbe::model::instrument::InternalUnit;
     for test in &mut session.tests {
         let unknowns = test.station.kind().unknowns();
         for (prior, unknown) in test.priors.iter_mut().zip(unknowns) {
-            if matches!(prior, Prior::Gaussian(_)) && unknown.unit == InsideUnit::Millimetre {
+            if matches!(prior, Prior::Gaussian(_)) && unknown.unit == InternalUnit::Millimetre {
                 *prior = Prior::Gaussian(u_mm);
             }
         }

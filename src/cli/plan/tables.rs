@@ -1,6 +1,6 @@
 //! What a plan's analysis looks like on a screen.
 
-use abbe::identify::plan::effects::hidden_by_error;
+use abbe::identify::plan::effects::confounded_by_error;
 use abbe::identify::plan::results::{EffectDetectability, EffectsAnalysis, ErrorAnalysis, PlanAnalysis};
 use abbe::model::words::counted;
 
@@ -16,7 +16,7 @@ const CONTRIBUTIONS: usize = 3;
 /// Effects listed on the screen in each table.
 const EFFECTS: usize = 16;
 /// Hidden effects named beside each error.
-const CULPRITS: usize = 3;
+const LIMITING_PARAMETERS: usize = 3;
 
 /// Prints everything.
 pub fn print(analysis: &PlanAnalysis) {
@@ -24,7 +24,7 @@ pub fn print(analysis: &PlanAnalysis) {
     errors(&analysis.errors);
     budget(&analysis.errors);
     plots(analysis);
-    blind_spots(analysis);
+    print_unidentifiable(analysis);
     correlation(analysis);
     indices(analysis);
     tests(analysis);
@@ -173,7 +173,7 @@ pub fn small_plot(values: &[f64], most: f64) -> String {
         .collect()
 }
 
-fn blind_spots(analysis: &PlanAnalysis) {
+fn print_unidentifiable(analysis: &PlanAnalysis) {
     let list = |title: &str, lines: Vec<&String>| {
         if !lines.is_empty() {
             say!("\n{title}");
@@ -190,7 +190,7 @@ fn blind_spots(analysis: &PlanAnalysis) {
     );
     list(
         "Nearly blind:",
-        analysis.nearly_blind.iter().map(|item| &item.why).collect(),
+        analysis.nearly_collinear.iter().map(|item| &item.why).collect(),
     );
 }
 
@@ -281,19 +281,19 @@ fn effects(found: &EffectsAnalysis) {
     );
     effect_table(&seen);
     say!(
-        "\nHidden: under 1 % of the signal survives the fit. A clean residual does not exclude these, and they bias:"
+        "\nHidden: under 1 % of the signal fraction_left the fit. A clean residual does not exclude these, and they bias:"
     );
     effect_table(&hidden);
     say!("\nWhat may hide in each error, the strongest first:");
-    let by_error = hidden_by_error(found);
+    let by_error = confounded_by_error(found);
     let width = by_error.keys().map(|id| id.chars().count()).max().unwrap_or(0);
-    for (error, culprits) in &by_error {
-        let words: Vec<String> = culprits
+    for (error, limiting) in &by_error {
+        let words: Vec<String> = limiting
             .iter()
-            .take(CULPRITS)
+            .take(LIMITING_PARAMETERS)
             .map(|(id, per_unit, unit)| format!("{id} {} {unit}", three_digits(*per_unit)))
             .collect();
-        let more = match culprits.len().saturating_sub(CULPRITS) {
+        let more = match limiting.len().saturating_sub(LIMITING_PARAMETERS) {
             0 => String::new(),
             more => format!(", {more} more"),
         };
@@ -302,8 +302,8 @@ fn effects(found: &EffectsAnalysis) {
 }
 
 /// What an effect acts on and what it follows: `EZC~C` of `EZC~C:h2`.
-fn stem(id: &str) -> &str {
-    id.split_once(':').map_or(id, |(stem, _)| stem)
+fn id_stem(id: &str) -> &str {
+    id.split_once(':').map_or(id, |(id_stem, _)| id_stem)
 }
 
 /// A table of effects: of those with the same component and driver the one that biases most, the others counted.
@@ -319,7 +319,7 @@ fn effect_table(effects: &[&EffectDetectability]) {
     for effect in sorted {
         match chosen
             .iter_mut()
-            .find(|(first, _)| stem(&first.id) == stem(&effect.id))
+            .find(|(first, _)| id_stem(&first.id) == id_stem(&effect.id))
         {
             Some((_, alike)) => *alike += 1,
             None => chosen.push((effect, 0)),
@@ -340,7 +340,7 @@ fn effect_table(effects: &[&EffectDetectability]) {
                 optional(effect.detectable),
                 optional(effect.detectable_searched),
                 effect.unit.clone(),
-                survives(effect.surviving_share),
+                fraction_left(effect.surviving_share),
                 if biases.is_empty() {
                     "none".into()
                 } else {
@@ -362,7 +362,7 @@ fn effect_table(effects: &[&EffectDetectability]) {
 }
 
 /// A share in per cent.
-fn survives(share: f64) -> String {
+fn fraction_left(share: f64) -> String {
     if share < 1e-4 {
         "< 0.01 %".to_string()
     } else {

@@ -11,7 +11,7 @@ const WIDTH: f64 = 560.0;
 /// Room for names.
 const NAMES: f64 = 180.0;
 /// Letters that fit there.
-const MOST_LETTERS: usize = 25;
+const MAX_LETTERS: usize = 25;
 const ROW: f64 = 21.0;
 
 /// A value with its standard uncertainty.
@@ -74,10 +74,10 @@ pub fn values(
         path class="nominal" d=(format!("M{} 8V{down}", place(x.at(0.0)))) {}
         @for (number, row) in rows.iter().enumerate() {
             @let y = 10.0 + ROW * (number as f64 + 0.5);
-            text class="right" x=(NAMES - 10.0) y=(y + 4.0) { title { (row.name) } (cut(&row.name, MOST_LETTERS)) }
-            @if let Some(before) = row.before { (whisker(&x, y - 3.5, before, ["before", words[0]], unit)) }
+            text class="right" x=(NAMES - 10.0) y=(y + 4.0) { title { (row.name) } (cut(&row.name, MAX_LETTERS)) }
+            @if let Some(before) = row.before { (error_bar(&x, y - 3.5, before, ["before", words[0]], unit)) }
             @if let Some(after) = row.after {
-                (whisker(&x, if row.before.is_some() { y + 3.5 } else { y }, after, ["after", words[1]], unit))
+                (error_bar(&x, if row.before.is_some() { y + 3.5 } else { y }, after, ["after", words[1]], unit))
             }
         }
         (keys)
@@ -85,7 +85,7 @@ pub fn values(
     Plot::still(name, title, caption, [WIDTH, end + 10.0], inner)
 }
 
-fn whisker(x: &Scale, y: f64, value: Value, [class, word]: [&str; 2], unit: &str) -> Markup {
+fn error_bar(x: &Scale, y: f64, value: Value, [class, word]: [&str; 2], unit: &str) -> Markup {
     let at = |v: f64| place(x.at(v));
     html! {
         g {
@@ -139,7 +139,7 @@ pub fn bars(
         path class="nominal" d=(format!("M{} 8V{down}", place(x.at(0.0)))) {}
         @for (number, (name, value, fill)) in rows.iter().enumerate() {
             @let y = 10.0 + ROW * number as f64;
-            text class="right" x=(NAMES - 10.0) y=(y + 15.0) { title { (name) } (cut(name, MOST_LETTERS)) }
+            text class="right" x=(NAMES - 10.0) y=(y + 15.0) { title { (name) } (cut(name, MAX_LETTERS)) }
             rect class=(fill.class()) x=(place(x.at(value.min(0.0)))) y=(y + 4.0) width=(place((x.at(*value) - x.at(0.0)).abs())) height="13" {
                 title { (name) ": " (text(*value, x.step / 10.0)) }
             }

@@ -11,7 +11,7 @@ const WIDTH: f64 = 560.0;
 const BODY: f64 = 92.0;
 const HIGH: f64 = 74.0;
 const GAP: f64 = 24.0;
-const A_ROW: usize = 5;
+const AXES_PER_ROW: usize = 5;
 
 enum Body<'m> {
     Workpiece,
@@ -38,12 +38,12 @@ pub fn plot(machine: &Machine, errors: &[String]) -> Plot {
     };
     let most_lines = machine.axes.iter().map(|axis| of(axis).len()).max().unwrap_or(0);
     let row_height = HIGH + 26.0 + 14.0 * most_lines as f64;
-    let rows = bodies.len().div_ceil(A_ROW);
+    let rows = bodies.len().div_ceil(AXES_PER_ROW);
     let inner = html! {
         @for (number, body) in bodies.iter().enumerate() {
-            @let x = 4.0 + (number % A_ROW) as f64 * (BODY + GAP - 4.0);
-            @let y = 6.0 + (number / A_ROW) as f64 * row_height;
-            @if !number.is_multiple_of(A_ROW) {
+            @let x = 4.0 + (number % AXES_PER_ROW) as f64 * (BODY + GAP - 4.0);
+            @let y = 6.0 + (number / AXES_PER_ROW) as f64 * row_height;
+            @if !number.is_multiple_of(AXES_PER_ROW) {
                 path class="link" d=(format!("M{} {}h{}", x - (GAP - 4.0), y + HIGH / 2.0, GAP - 4.0)) {}
             }
             @match body {

@@ -10,7 +10,7 @@ const WIDTH: f64 = 560.0;
 /// Room for names on the left and above.
 const NAMES: f64 = 150.0;
 /// Letters that fit there.
-const MOST_LETTERS: usize = 21;
+const MAX_LETTERS: usize = 21;
 /// A square that is larger than this holds its number.
 const NUMBERED: f64 = 34.0;
 
@@ -31,9 +31,9 @@ pub fn map(
             @let at = NAMES + cell * (i as f64 + 0.5);
             @let size = format!("font-size:{}px", place(letters));
             @let line = place(at + letters * 0.35);
-            text class="right" style=(size) x=(NAMES - 6.0) y=(line) { title { (id) } (cut(id, MOST_LETTERS)) }
+            text class="right" style=(size) x=(NAMES - 6.0) y=(line) { title { (id) } (cut(id, MAX_LETTERS)) }
             text style=(size) transform=(format!("translate({line} {}) rotate(-90)", NAMES - 6.0)) {
-                (cut(id, MOST_LETTERS))
+                (cut(id, MAX_LETTERS))
             }
         }
         rect class="frame" x=(NAMES) y=(NAMES) width=(place(side)) height=(place(side)) {}

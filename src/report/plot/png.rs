@@ -29,16 +29,16 @@ impl Fonts {
 
 /// A plot as PNG, twice as large as it is drawn. `None` if it cannot be drawn.
 pub fn png(plot: &Plot, fonts: &Fonts) -> Option<Vec<u8>> {
-    const TWICE: f32 = 2.0;
+    const PIXELS_PER_UNIT: f32 = 2.0;
     let options = usvg::Options {
         fontdb: fonts.0.clone(),
         font_family: FAMILY.to_string(),
         ..usvg::Options::default()
     };
     let tree = usvg::Tree::from_str(&plot.svg(), &options).ok()?;
-    let size = tree.size().to_int_size().scale_by(TWICE)?;
+    let size = tree.size().to_int_size().scale_by(PIXELS_PER_UNIT)?;
     let mut pixels = tiny_skia::Pixmap::new(size.width(), size.height())?;
-    let twice = tiny_skia::Transform::from_scale(TWICE, TWICE);
+    let twice = tiny_skia::Transform::from_scale(PIXELS_PER_UNIT, PIXELS_PER_UNIT);
     resvg::render(&tree, twice, &mut pixels.as_mut());
     pixels.encode_png().ok()
 }

@@ -12,7 +12,7 @@ use super::{codes, generated};
 /// Sessions of each code where `ABBE_STUDY` says nothing else.
 const FEW: usize = 3;
 /// Probability below which a mean or a spread of pulls is not put down to chance: of some 400 figures one in 250 suites.
-const LEAST_P: f64 = 1e-5;
+const MIN_P: f64 = 1e-5;
 
 /// Pulls of every error over sessions: estimate less truth over stated standard uncertainty.
 fn pulls(code: &str, plan: &Session, seeds: std::ops::Range<u64>) -> Vec<(String, Vec<f64>)> {
@@ -65,9 +65,9 @@ fn errors_are_found_within_their_uncertainties_on_every_code() {
             let sum: f64 = pulls.iter().map(|pull| pull * pull).sum();
             let p_mean = 2.0 * Normal::standard().sf(mean.abs() * n.sqrt());
             let p_squares = 2.0 * squares.sf(sum).min(squares.cdf(sum));
-            assert!(p_mean > LEAST_P, "{code} {id}: mean {mean:.3} over {sessions}");
+            assert!(p_mean > MIN_P, "{code} {id}: mean {mean:.3} over {sessions}");
             assert!(
-                p_squares > LEAST_P,
+                p_squares > MIN_P,
                 "{code} {id}: rms {:.3} over {sessions}",
                 (sum / n).sqrt()
             );

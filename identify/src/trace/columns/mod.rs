@@ -2,7 +2,7 @@
 //!
 //! The chain is evaluated once, for the sensitivities of every component; hundreds of candidates cost no further kinematics.
 
-mod layout;
+mod basis;
 mod plain;
 
 use std::collections::{BTreeSet, HashMap};
@@ -16,8 +16,8 @@ use rayon::prelude::*;
 
 use crate::error::IdentifyError;
 use crate::problem::{Block, Problem};
-use layout::Moves;
-pub use layout::{Layout, chunked};
+use basis::Moves;
+pub use basis::{Layout, chunked};
 
 /// Readings whose sensitivities are taken at once.
 const ROWS_AT_ONCE: usize = 512;

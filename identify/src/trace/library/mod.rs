@@ -16,7 +16,7 @@ use shapes::shapes;
 const LIBRARY: &str = include_str!("library.toml");
 
 /// Intervals of the travel between the places where steps are looked for.
-const PLACES_OF_STEPS: usize = 40;
+const STEP_POSITIONS: usize = 40;
 
 /// A family of effects, as it stands in the library.
 #[derive(Clone, Debug, Deserialize)]
@@ -110,7 +110,7 @@ pub struct Candidate {
 
 impl Candidate {
     /// A curve that no component's name stands for: what names are weighed against, and nothing that is looked for.
-    pub fn nameless(effect: Effect) -> Candidate {
+    pub fn test_curve(effect: Effect) -> Candidate {
         Candidate {
             effect,
             family: usize::MAX,
@@ -198,7 +198,7 @@ fn grid(problem: &Problem<'_>, sampling: &Sampling, effect: &Effect) -> f64 {
     match &effect.shape {
         // Frequencies lie half a cycle over the travel apart.
         Shape::Periodic { period } => 0.5 * period * period / span,
-        Shape::Steps { .. } => span / PLACES_OF_STEPS as f64,
+        Shape::Steps { .. } => span / STEP_POSITIONS as f64,
         Shape::Local { width, .. } => *width,
         _ => 0.0,
     }

@@ -7,7 +7,7 @@ use abbe_model::effect::{Component, Driver, Shape};
 use abbe_model::instrument::SharedBy;
 
 use super::sampling::Sampling;
-use super::{Family, PLACES_OF_STEPS, ShapeChoice};
+use super::{Family, STEP_POSITIONS, ShapeChoice};
 use crate::problem::Problem;
 
 /// The highest harmonic that is looked for, however dense the sampling.
@@ -15,9 +15,9 @@ const HIGHEST_ORDER: usize = 120;
 /// The highest harmonic for poses, which sample an axis at random: an independent search found nothing real above it.
 const HIGHEST_ORDER_OF_POSES: usize = 40;
 /// Readings in a cycle of the shortest wave that is looked for; two would just carry it.
-const READINGS_A_CYCLE: f64 = 2.4;
+const READINGS_PER_CYCLE: f64 = 2.4;
 /// The most half cycles over the travel of a wave that is looked for.
-const MOST_HALF_CYCLES: usize = 240;
+const MAX_HALF_CYCLES: usize = 240;
 
 /// A shape, the tests it is confined to, and what it costs beyond its family.
 type Member = (Shape, Vec<String>, f64);
@@ -39,7 +39,7 @@ pub(super) fn shapes(
         Driver::Axis(name) => problem.session.machine.axis_index(name),
         _ => None,
     };
-    let over = Over {
+    let over = FamilyScope {
         sampling,
         axis,
         rotary: axis.is_some_and(|axis| problem.session.machine.axes[axis].kind == AxisKind::Rotary),
@@ -98,7 +98,7 @@ fn powers(degrees: &[usize], scale: f64) -> Vec<Member> {
 }
 
 /// What a shape is laid over: an axis as a session samples it, or another driver.
-struct Over<'s> {
+struct FamilyScope<'s> {
     sampling: &'s Sampling,
     axis: Option<usize>,
     rotary: bool,
@@ -109,20 +109,20 @@ struct Over<'s> {
     poses: bool,
 }
 
-impl Over<'_> {
+impl FamilyScope<'_> {
     /// The highest harmonic that the sampling carries.
     fn highest_order(&self) -> usize {
         if self.poses {
             HIGHEST_ORDER_OF_POSES
         } else if self.step > 0.0 {
-            ((TAU / (READINGS_A_CYCLE * self.step)) as usize).clamp(1, HIGHEST_ORDER)
+            ((TAU / (READINGS_PER_CYCLE * self.step)) as usize).clamp(1, HIGHEST_ORDER)
         } else {
             0
         }
     }
 
     /// Whether the readings cover a full turn.
-    fn is_turn(&self) -> bool {
+    fn is_sin_cos(&self) -> bool {
         self.rotary && self.span > 0.99 * TAU
     }
 
@@ -131,7 +131,7 @@ impl Over<'_> {
         if self.step <= 0.0 || self.poses {
             return Vec::new();
         }
-        let most = ((2.0 * self.span / (READINGS_A_CYCLE * self.step)) as usize).min(MOST_HALF_CYCLES);
+        let most = ((2.0 * self.span / (READINGS_PER_CYCLE * self.step)) as usize).min(MAX_HALF_CYCLES);
         // Over full turns whole cycles are harmonics.
         let turns = self.span / TAU;
         let whole = self.rotary && (turns - turns.round()).abs() < 0.01;
@@ -166,8 +166,8 @@ impl Over<'_> {
             return Vec::new();
         };
         let low = self.sampling.low[axis];
-        let place = |k: usize| low + self.span * k as f64 / PLACES_OF_STEPS as f64;
-        let places: Vec<f64> = (1..PLACES_OF_STEPS).map(place).collect();
+        let place = |k: usize| low + self.span * k as f64 / STEP_POSITIONS as f64;
+        let places: Vec<f64> = (1..STEP_POSITIONS).map(place).collect();
         let singles = places.iter().map(|place| vec![*place]);
         singles
             .chain([places.clone()])
@@ -179,7 +179,7 @@ impl Over<'_> {
         let Some(axis) = self.axis.filter(|_| !self.poses) else {
             return Vec::new();
         };
-        let recurs = self.is_turn().then_some(TAU);
+        let recurs = self.is_sin_cos().then_some(TAU);
         let mut features = Vec::new();
         for share in [0.02, 0.04, 0.08] {
             let width = share * self.span;
@@ -200,7 +200,7 @@ impl Over<'_> {
         let Some(axis) = self.axis.filter(|_| !self.poses || self.rotary) else {
             return Vec::new();
         };
-        let closed = self.is_turn();
+        let closed = self.is_sin_cos();
         let from = self.sampling.low[axis];
         let to = if closed {
             from + TAU

@@ -105,8 +105,8 @@ pub struct Moments {
 }
 
 /// Rows and columns by which room is made.
-const ROOM_ROWS: usize = 32;
-const ROOM_COLUMNS: usize = 128;
+const BUFFER_ROWS: usize = 32;
+const BUFFER_COLUMNS: usize = 128;
 
 /// Enlarges a matrix, with room for more: candidates and effects come one after another, and what is large is not copied each time.
 pub(super) fn grow(
@@ -116,8 +116,8 @@ pub(super) fn grow(
     value: impl FnMut(usize, usize) -> f64,
 ) {
     matrix.reserve(
-        rows.next_multiple_of(ROOM_ROWS),
-        columns.next_multiple_of(ROOM_COLUMNS),
+        rows.next_multiple_of(BUFFER_ROWS),
+        columns.next_multiple_of(BUFFER_COLUMNS),
     );
     matrix.resize_with(rows, columns, value);
 }
@@ -219,7 +219,7 @@ impl Moments {
             let with_y = |j: usize| range.clone().map(|i| fresh[(i, j)] * self.residual[i]).sum();
             moments.extend_base(&gram, &products[fold], (0..added).map(with_y));
         }
-        self.sum_up(next, total);
+        self.accumulate_totals(next, total);
         places
     }
 
@@ -257,14 +257,14 @@ impl Moments {
             moments.cross_y.extend((0..added).map(|k| product[(rank, k)]));
             moments.own.extend(own);
         }
-        self.sum_up(rank, total + added);
+        self.accumulate_totals(rank, total + added);
         grow(&mut self.null_cross, draws, total + added, |d, j| {
             of_null[(d, j - total)]
         });
     }
 
     /// Extends the products over all folds to what each fold has now: so many base columns and candidate columns.
-    fn sum_up(&mut self, base: usize, total: usize) {
+    fn accumulate_totals(&mut self, base: usize, total: usize) {
         let (folds, whole) = (&self.folds, &mut self.whole);
         grow(&mut whole.base, base, base, |i, j| {
             folds.iter().map(|fold| fold.base[(i, j)]).sum()

@@ -10,7 +10,7 @@ use super::transposed_product;
 use crate::trace::columns::{Columns, Layout, chunked};
 
 /// The most entries of columns that are kept: 320 MB.
-const MOST_KEPT: usize = 40_000_000;
+const MAX_KEPT: usize = 40_000_000;
 
 /// Consecutive candidates with their columns, where these are kept.
 pub(super) struct Block {
@@ -41,7 +41,7 @@ pub(super) fn laid(
         .into_iter()
         .map(|chunk| {
             let entries = columns.rows() * count[chunk.clone()].iter().sum::<usize>();
-            let room = kept + entries <= MOST_KEPT;
+            let room = kept + entries <= MAX_KEPT;
             kept += if room { entries } else { 0 };
             (candidates.start + chunk.start..candidates.start + chunk.end, room)
         })
@@ -55,8 +55,8 @@ pub(super) fn laid(
             let layouts = &layouts[candidates.clone()];
             let all = filled(columns, layouts);
             let products = Products {
-                side: side_by_fold(columns, layouts, side.as_ref(), all.as_ref()),
-                own: own_by_fold(columns, layouts, all.as_ref()),
+                side: cross_by_fold(columns, layouts, side.as_ref(), all.as_ref()),
+                own: gram_by_fold(columns, layouts, all.as_ref()),
                 null: null_product(columns, layouts, null, all.as_ref()),
             };
             let kept = room.then_some(all);
@@ -81,7 +81,9 @@ pub(super) fn with_side(
             let layouts = &layouts[block.candidates.clone()];
             let anew = block.kept.is_none().then(|| filled(columns, layouts));
             let all = block.kept.as_ref().or(anew.as_ref());
-            all.map_or_else(Vec::new, |all| side_by_fold(columns, layouts, side, all.as_ref()))
+            all.map_or_else(Vec::new, |all| {
+                cross_by_fold(columns, layouts, side, all.as_ref())
+            })
         })
         .collect();
     joined_by_fold(&parts, columns.fold_rows.len(), side.ncols())
@@ -143,7 +145,7 @@ fn joined<'p>(rows: usize, parts: impl Iterator<Item = &'p Mat<f64>> + Clone) ->
 }
 
 /// For each fold `sideᵀ · candidates`: zero without a look where none of the candidates moves anything.
-fn side_by_fold(
+fn cross_by_fold(
     columns: &Columns<'_, '_>,
     layouts: &[Layout],
     side: MatRef<'_, f64>,
@@ -159,7 +161,7 @@ fn side_by_fold(
 }
 
 /// For each fold each candidate's product with itself.
-fn own_by_fold(columns: &Columns<'_, '_>, layouts: &[Layout], all: MatRef<'_, f64>) -> Vec<Vec<Mat<f64>>> {
+fn gram_by_fold(columns: &Columns<'_, '_>, layouts: &[Layout], all: MatRef<'_, f64>) -> Vec<Vec<Mat<f64>>> {
     let moved = columns.moved_rows(layouts).into_iter();
     moved
         .map(|rows| {

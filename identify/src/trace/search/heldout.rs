@@ -4,11 +4,11 @@
 use faer::Mat;
 use rayon::prelude::*;
 
-use super::{ALL, Search, Taken, Track};
+use super::{ALL, Search, SearchBranch, SelectedEffect};
 use crate::error::IdentifyError;
 use crate::trace::moments::grow;
-use crate::trace::paired::{Fall, Units};
-use crate::trace::score::Trained;
+use crate::trace::paired::{HeldOutDecrease, Units};
+use crate::trace::score::TrainedModel;
 
 /// Readings as they are, not whitened: what held-out errors are of. In units of the noise.
 pub struct Plain {
@@ -42,38 +42,38 @@ impl Plain {
 
 /// What the searches have added and what that leaves on held-out readings.
 #[derive(Clone, Debug, Default)]
-pub struct Standing {
+pub struct HeldOutState {
     /// The effects of every search.
-    tracks: Vec<Track>,
+    tracks: Vec<SearchBranch>,
     /// [`Search::held_out`].
     held_out: Vec<f64>,
     /// Sums of squares of held-out residuals over the variance of the noise, by unit.
     units: Vec<f64>,
 }
 
-impl Standing {
-    fn effects(&self) -> &[Taken] {
+impl HeldOutState {
+    fn effects(&self) -> &[SelectedEffect] {
         self.tracks.first().map_or(&[], |all| &all.taken)
     }
 }
 
 /// An effect that scores better than readings without structure, and that was not claimed.
 #[derive(Clone, Copy, Debug)]
-pub struct Unclaimed {
+pub struct RejectedByHeldOut {
     /// The effect.
-    pub taken: Taken,
+    pub taken: SelectedEffect,
     /// What it did to the held-out error.
-    pub fall: Fall,
+    pub fall: HeldOutDecrease,
 }
 
 impl Search<'_> {
     /// Sums of squares of held-out residuals over the variance of the noise, by unit: each fold under the model of the search that did not see it.
     fn held_out_by_unit(&self) -> Result<Vec<f64>, IdentifyError> {
-        let models: Vec<Trained<'_>> = self.tracks[ALL + 1..]
+        let models: Vec<TrainedModel<'_>> = self.tracks[ALL + 1..]
             .par_iter()
             .map(|track| self.lean_model_of(&track.chosen(), &track.folds))
             .collect::<Result<_, _>>()?;
-        let predicted = |model: &Trained<'_>, row: usize| -> f64 {
+        let predicted = |model: &TrainedModel<'_>, row: usize| -> f64 {
             let along = model.base.iter().zip(&model.coefficients);
             along.map(|(column, c)| self.plain.base[(row, *column)] * c).sum()
         };
@@ -99,8 +99,8 @@ impl Search<'_> {
     }
 
     /// What the searches have added now.
-    pub(super) fn standing(&self) -> Standing {
-        Standing {
+    pub(super) fn standing(&self) -> HeldOutState {
+        HeldOutState {
             tracks: self.tracks.clone(),
             held_out: self.held_out.clone(),
             units: self.units_now.clone(),
@@ -115,7 +115,7 @@ impl Search<'_> {
         let claimed = if added {
             fall.is_significant()
         } else {
-            !fall.is_a_rise() && self.is_better_than_none()
+            !fall.is_increase() && self.lowers_heldout_error()
         };
         if claimed {
             self.claimed = self.standing();
@@ -127,17 +127,17 @@ impl Search<'_> {
     }
 
     /// How far the held-out error has fallen since effects were claimed last.
-    pub(in crate::trace) fn fall_since_claimed(&self) -> Fall {
-        self.plain.units.fall(&self.claimed.units, &self.units_now)
+    pub(in crate::trace) fn fall_since_claimed(&self) -> HeldOutDecrease {
+        self.plain.units.decrease(&self.claimed.units, &self.units_now)
     }
 
     /// How far the held-out error is below that of the declared model.
-    pub(in crate::trace) fn fall_since_declared(&self) -> Fall {
-        self.plain.units.fall(&self.declared_units, &self.units_now)
+    pub(in crate::trace) fn fall_since_declared(&self) -> HeldOutDecrease {
+        self.plain.units.decrease(&self.declared_units, &self.units_now)
     }
 
     /// Whether nothing was added, or the held-out error is below that of the declared model by more than the standard error of the fall.
-    fn is_better_than_none(&self) -> bool {
+    fn lowers_heldout_error(&self) -> bool {
         self.taken().is_empty() || self.fall_since_declared().is_significant()
     }
 
@@ -156,7 +156,7 @@ impl Search<'_> {
                 .iter()
                 .any(|u| u.taken.candidate == taken.candidate);
             if !claimed.contains(&taken.candidate) && !known {
-                self.unclaimed.push(Unclaimed { taken, fall });
+                self.unclaimed.push(RejectedByHeldOut { taken, fall });
             }
         }
         self.restore();
@@ -169,7 +169,7 @@ impl Search<'_> {
     }
 
     fn restore(&mut self) {
-        let Standing {
+        let HeldOutState {
             tracks,
             held_out,
             units,
@@ -181,8 +181,8 @@ impl Search<'_> {
 
     /// Withdraws all effects where together they do not lower the held-out error of the declared model by more than the standard error of the fall.
     pub(in crate::trace) fn withdraw_all_unless_better(&mut self) -> Result<(), IdentifyError> {
-        if !self.is_better_than_none() {
-            self.claimed = Standing::default();
+        if !self.lowers_heldout_error() {
+            self.claimed = HeldOutState::default();
             self.claimed.tracks = self.tracks.clone();
             self.claimed
                 .tracks

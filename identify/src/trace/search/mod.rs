@@ -1,7 +1,7 @@
 //! The search: project out what the model has, score every candidate, add the best, refit all together, let what has lost its place go, exchange
 //! what something else explains better, until the best that is left is no better than the best on readings without structure.
 //!
-//! It runs on all readings, and beside that once for each fold on the readings outside that fold alone ([`Track`]): each chooses for itself, and uses
+//! It runs on all readings, and beside that once for each fold on the readings outside that fold alone ([`SearchBranch`]): each chooses for itself, and uses
 //! numbers and places only that it has tuned itself. So the error on held-out readings is that of a search that never saw them.
 
 mod heldout;
@@ -12,14 +12,14 @@ use std::ops::Range;
 
 use super::alias::INDISTINGUISHABLE;
 use super::columns::{Columns, Layout};
-use super::compose::Composed;
+use super::compose::StepTable;
 use super::interrupt::Interrupt;
 use super::library::Candidate;
 use super::moments::Moments;
-use super::score::{Gain, PriorMoments, Trained};
+use super::score::{Gain, PriorMoments, TrainedModel};
 use crate::error::IdentifyError;
-use heldout::Standing;
-pub use heldout::{Plain, Unclaimed};
+use heldout::HeldOutState;
+pub use heldout::{Plain, RejectedByHeldOut};
 
 /// When the search stops.
 #[derive(Clone, Copy, Debug)]
@@ -34,7 +34,7 @@ pub struct Stop {
 
 /// An effect that a search has taken up.
 #[derive(Clone, Copy, Debug)]
-pub struct Taken {
+pub struct SelectedEffect {
     /// Index of the candidate.
     pub candidate: usize,
     /// Probability that the search finds as good on readings without structure.
@@ -43,14 +43,14 @@ pub struct Taken {
 
 /// One of the searches: on all readings, or on all but one fold.
 #[derive(Clone, Debug)]
-pub struct Track {
+pub struct SearchBranch {
     /// The folds that it sees, ascending.
     pub folds: Vec<usize>,
     /// What it has taken up.
-    pub taken: Vec<Taken>,
+    pub taken: Vec<SelectedEffect>,
 }
 
-impl Track {
+impl SearchBranch {
     /// The candidates that it has taken up.
     pub fn chosen(&self) -> Vec<usize> {
         self.taken.iter().map(|taken| taken.candidate).collect()
@@ -75,7 +75,7 @@ pub struct Search<'s> {
     /// Number of base columns that the fitted model has.
     pub rank: usize,
     /// The search on all readings, then that of each fold.
-    pub tracks: Vec<Track>,
+    pub tracks: Vec<SearchBranch>,
     /// For each candidate the folds whose readings its numbers and places were tuned on; none for an entry of the library.
     tuned_on: Vec<Vec<usize>>,
     /// Where the columns of every candidate that was ever taken up stand in the base.
@@ -94,9 +94,9 @@ pub struct Search<'s> {
     units_now: Vec<f64>,
     declared_units: Vec<f64>,
     /// What is claimed: additions that lowered the held-out error by more than the standard error of the fall.
-    claimed: Standing,
+    claimed: HeldOutState,
     /// What scored better than readings without structure and was not claimed, in the order in which it was added.
-    pub unclaimed: Vec<Unclaimed>,
+    pub unclaimed: Vec<RejectedByHeldOut>,
     /// Entries of the library that would not stand out however large they plausibly were.
     unseen: Vec<bool>,
     /// Asked before each model that is trained; `None` where the search is not to be interrupted.
@@ -134,7 +134,7 @@ impl<'s> Search<'s> {
     ) -> Result<Search<'s>, IdentifyError> {
         let rank = moments.base();
         let folds = 0..columns.fold_rows.len();
-        let without = |left_out: Option<usize>| Track {
+        let without = |left_out: Option<usize>| SearchBranch {
             folds: folds.clone().filter(|fold| Some(*fold) != left_out).collect(),
             taken: Vec::new(),
         };
@@ -158,13 +158,13 @@ impl<'s> Search<'s> {
             plain,
             units_now: Vec::new(),
             declared_units: Vec::new(),
-            claimed: Standing::default(),
+            claimed: HeldOutState::default(),
             unclaimed: Vec::new(),
             unseen: Vec::new(),
             interrupt: None,
             stop,
         };
-        search.unseen = search.not_standing_out()?;
+        search.unseen = search.not_detectable()?;
         search.note_held_out()?;
         search.declared_units = search.units_now.clone();
         search.claimed = search.standing();
@@ -172,12 +172,12 @@ impl<'s> Search<'s> {
     }
 
     /// What the search on all readings has taken up.
-    pub fn taken(&self) -> &[Taken] {
+    pub fn taken(&self) -> &[SelectedEffect] {
         &self.tracks[ALL].taken
     }
 
     /// Whether folds are all that there are.
-    pub(super) fn sees_all(&self, folds: &[usize]) -> bool {
+    pub(super) fn identifies_all(&self, folds: &[usize]) -> bool {
         folds.len() == self.tracks[ALL].folds.len()
     }
 
@@ -189,7 +189,7 @@ impl<'s> Search<'s> {
     /// The best beside a model of what has been chosen, of what each would gain there.
     pub(super) fn best_of(
         &self,
-        model: &Trained<'_>,
+        model: &TrainedModel<'_>,
         gains: &[Gain],
         chosen: &[usize],
     ) -> Option<(usize, f64)> {
@@ -210,7 +210,7 @@ impl<'s> Search<'s> {
     /// The simplest of the candidates that the readings cannot tell from the best one.
     pub(super) fn named_first(
         &self,
-        model: &Trained<'_>,
+        model: &TrainedModel<'_>,
         gains: &[Gain],
         best: usize,
         chosen: &[usize],
@@ -245,10 +245,10 @@ impl<'s> Search<'s> {
             return Ok(Round::Done { p_value });
         };
         let before = self.tracks.clone();
-        self.take(ALL, Taken { candidate, p_value });
+        self.add(ALL, SelectedEffect { candidate, p_value });
         for track in 1..self.tracks.len() {
             if let Some(candidate) = self.pick(track, threshold)? {
-                self.take(track, Taken { candidate, p_value });
+                self.add(track, SelectedEffect { candidate, p_value });
             }
         }
         let held_out = self.held_out_now()?;
@@ -259,7 +259,7 @@ impl<'s> Search<'s> {
             self.tracks = before;
             return Ok(Round::Done { p_value });
         }
-        self.let_go(threshold)?;
+        self.remove_insignificant(threshold)?;
         self.note_held_out()?;
         Ok(Round::Added { candidate })
     }
@@ -273,7 +273,7 @@ impl<'s> Search<'s> {
             return Ok(None);
         };
         let composed = self.composed(&model);
-        let score = composed.iter().map(Composed::score).fold(score, f64::max);
+        let score = composed.iter().map(StepTable::score).fold(score, f64::max);
         let costs: Vec<f64> = (0..self.candidates.len())
             .map(|c| {
                 if self.is_open(c, &model.folds) {
@@ -295,9 +295,9 @@ impl<'s> Search<'s> {
     /// What a search would add, if it reaches a score: on all readings the simplest that cannot be told from the best; where a fold is left out, which has to
     /// be predicted and not named, the best.
     fn pick(&mut self, track: usize, least: f64) -> Result<Option<usize>, IdentifyError> {
-        let Track { folds, .. } = self.tracks[track].clone();
+        let SearchBranch { folds, .. } = self.tracks[track].clone();
         let chosen = self.tracks[track].chosen();
-        let known = self.sharpen(&chosen, &folds)?;
+        let known = self.refine(&chosen, &folds)?;
         let model = self.model_of(&chosen, &folds)?;
         let gains = model.more_gains(known);
         let Some((best, score)) = self.best_of(&model, &gains, &chosen) else {
@@ -310,13 +310,13 @@ impl<'s> Search<'s> {
         Ok((score >= least).then(first))
     }
 
-    fn take(&mut self, track: usize, taken: Taken) {
+    fn add(&mut self, track: usize, taken: SelectedEffect) {
         self.materialise(&[taken.candidate]);
         self.tracks[track].taken.push(taken);
     }
 
     /// Drops what the later effects have made superfluous.
-    fn let_go(&mut self, threshold: f64) -> Result<(), IdentifyError> {
+    fn remove_insignificant(&mut self, threshold: f64) -> Result<(), IdentifyError> {
         let folds = self.tracks[ALL].folds.clone();
         loop {
             let chosen = self.tracks[ALL].chosen();

@@ -6,10 +6,10 @@ use abbe_model::effect::Effect;
 
 use super::{ALL, Search};
 use crate::error::IdentifyError;
+use crate::trace::chi_square_tail::ln_chi_square_tail;
 use crate::trace::columns::Layout;
-use crate::trace::score::{Gain, Trained};
-use crate::trace::tail::ln_chi_square_tail;
-use crate::trace::trial::Trial;
+use crate::trace::score::{Gain, TrainedModel};
+use crate::trace::tuning::Trial;
 
 impl Search<'_> {
     /// Where a candidate's columns stand in the base; nowhere before it was ever taken up.
@@ -31,9 +31,9 @@ impl Search<'_> {
         &self,
         chosen: &[usize],
         folds: &[usize],
-    ) -> Result<Trained<'_>, IdentifyError> {
+    ) -> Result<TrainedModel<'_>, IdentifyError> {
         self.interrupt.map_or(Ok(()), |interrupt| interrupt.check())?;
-        Trained::new(&self.moments, &self.prior, self.base_with(chosen), folds.to_vec())
+        TrainedModel::new(&self.moments, &self.prior, self.base_with(chosen), folds.to_vec())
     }
 
     /// The same, to be asked for few candidates.
@@ -41,13 +41,13 @@ impl Search<'_> {
         &self,
         chosen: &[usize],
         folds: &[usize],
-    ) -> Result<Trained<'_>, IdentifyError> {
+    ) -> Result<TrainedModel<'_>, IdentifyError> {
         self.interrupt.map_or(Ok(()), |interrupt| interrupt.check())?;
-        Trained::lean(&self.moments, &self.prior, self.base_with(chosen), folds.to_vec())
+        TrainedModel::projection(&self.moments, &self.prior, self.base_with(chosen), folds.to_vec())
     }
 
     /// The model with what has been taken, less one of it, on all readings.
-    pub fn model_without(&self, left_out: Option<usize>) -> Result<Trained<'_>, IdentifyError> {
+    pub fn model_without(&self, left_out: Option<usize>) -> Result<TrainedModel<'_>, IdentifyError> {
         let mut chosen = self.tracks[ALL].chosen();
         if let Some(k) = left_out {
             chosen.remove(k);
@@ -89,7 +89,7 @@ impl Search<'_> {
     }
 
     /// The variance that gains are measured in.
-    pub fn variance(&self, model: &Trained<'_>) -> f64 {
+    pub fn variance(&self, model: &TrainedModel<'_>) -> f64 {
         if !self.stop.in_residual_variance {
             return 1.0;
         }
@@ -131,13 +131,13 @@ impl Search<'_> {
     }
 
     /// Any effect on trial beside a model; `None` where the data lack what it follows.
-    pub(in crate::trace) fn trial(&self, model: &Trained<'_>, effect: &Effect) -> Option<Trial> {
+    pub(in crate::trace) fn trial(&self, model: &TrainedModel<'_>, effect: &Effect) -> Option<Trial> {
         let layout = self.columns.layout_uncached(effect)?;
         Some(Trial::new(self.columns, &self.moments, &layout, model))
     }
 
     /// What any effect would gain beside a model, on the folds that it is trained on; `None` where the data lack what it follows.
-    pub fn gain_beside(&self, model: &Trained<'_>, effect: &Effect) -> Option<f64> {
+    pub fn gain_beside(&self, model: &TrainedModel<'_>, effect: &Effect) -> Option<f64> {
         Some(self.trial(model, effect)?.gain(model))
     }
 }

@@ -2,21 +2,21 @@
 
 use rayon::prelude::*;
 
-use super::{Search, Trained};
+use super::{Search, TrainedModel};
 use crate::error::IdentifyError;
 use crate::trace::columns::Layout;
-use crate::trace::compose::{self, Composed};
+use crate::trace::compose::{self, StepTable};
 use crate::trace::library::Candidate;
+use crate::trace::refine;
 use crate::trace::score::Gain;
-use crate::trace::sharpen;
 
 /// By how many standard deviations an effect as large as is plausible has to change the readings, all together and beyond what the model absorbs, to be
 /// looked for.
-const LEAST_PLAUSIBLE_SIGMA: f64 = 3.0;
+const MIN_PLAUSIBLE_SIGMA: f64 = 3.0;
 
 impl Search<'_> {
     /// For each candidate whether it would not stand out however large it plausibly was.
-    pub(super) fn not_standing_out(&self) -> Result<Vec<bool>, IdentifyError> {
+    pub(super) fn not_detectable(&self) -> Result<Vec<bool>, IdentifyError> {
         let model = self.model_without(None)?;
         let candidates = 0..self.candidates.len();
         let unseen = candidates
@@ -26,7 +26,7 @@ impl Search<'_> {
                 let effect = &self.candidates[candidate].effect;
                 let plausible = self.columns.plausible(effect, &self.layouts[candidate]);
                 let largest = (0..d.nrows()).map(|k| d[(k, k)]).fold(0.0, f64::max);
-                plausible * largest.max(0.0).sqrt() < LEAST_PLAUSIBLE_SIGMA
+                plausible * largest.max(0.0).sqrt() < MIN_PLAUSIBLE_SIGMA
             })
             .collect();
         Ok(unseen)
@@ -49,7 +49,7 @@ impl Search<'_> {
     }
 
     /// What can be composed of the library's dictionaries beside a model.
-    pub(super) fn composed(&self, model: &Trained<'_>) -> Vec<Composed> {
+    pub(super) fn composed(&self, model: &TrainedModel<'_>) -> Vec<StepTable> {
         let variance = self.variance(model);
         (0..self.candidates.len())
             .into_par_iter()
@@ -62,18 +62,18 @@ impl Search<'_> {
 
     /// Adds what comes near the best, with the best numbers that it can have beside some candidates on some folds. Returns what each candidate that was there
     /// before gains beside them.
-    pub(in crate::trace) fn sharpen(
+    pub(in crate::trace) fn refine(
         &mut self,
         beside: &[usize],
         folds: &[usize],
     ) -> Result<Vec<Gain>, IdentifyError> {
-        if !self.candidates.iter().any(sharpen::can_be_tuned) {
+        if !self.candidates.iter().any(refine::can_be_tuned) {
             return Ok(Vec::new());
         }
         let (gains, fresh) = {
             let model = self.model_of(beside, folds)?;
             let gains = model.gains();
-            let fresh = sharpen::sharpened(self, &model, &gains, &self.composed(&model));
+            let fresh = refine::refined(self, &model, &gains, &self.composed(&model));
             (gains, fresh)
         };
         for candidate in fresh {
@@ -108,7 +108,7 @@ impl Search<'_> {
     }
 
     /// Adds the candidates of last resort to those whose products are made.
-    pub fn bring_reserve(&mut self) {
+    pub fn add_reserve_candidates(&mut self) {
         let reserve = std::mem::take(&mut self.reserve);
         self.append(reserve, &[]);
     }

@@ -5,7 +5,7 @@ use std::ops::Range;
 use toml::Spanned;
 use toml::de::{DeTable, DeValue};
 
-use super::{MOST_ITEMS, Source, Table};
+use super::{MAX_ITEMS, Source, Table};
 use crate::error::ModelError;
 use crate::session::limits;
 
@@ -160,8 +160,8 @@ impl<'a> Value<'a> {
         let DeValue::Array(items) = self.value else {
             return Ok(Vec::new());
         };
-        if items.len() > MOST_ITEMS {
-            let message = format!("`{key}` is a list of {}; {MOST_ITEMS} are the most", items.len());
+        if items.len() > MAX_ITEMS {
+            let message = format!("`{key}` is a list of {}; {MAX_ITEMS} are the most", items.len());
             return Err(source.error(span, message, None));
         }
         Ok(items

@@ -60,7 +60,7 @@ pub(super) fn from_table(mut table: Table<'_>) -> Result<Machine, ModelError> {
 
     let mut tables = Vec::new();
     if let Some(value) = table.take("axis") {
-        for entry in value.table("[axis]".into())?.take_all()? {
+        for entry in value.table("[axis]".into())?.remaining_values()? {
             let name = entry.key.clone();
             if !code.axes().any(|axis| *axis == name) {
                 let known: Vec<&str> = code.axes().map(String::as_str).collect();

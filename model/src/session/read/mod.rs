@@ -1,7 +1,8 @@
 //! Machine and session files.
 
+mod data_folder;
 mod effect;
-mod layout;
+mod format;
 mod machine;
 mod movement;
 pub(crate) mod quantity;
@@ -10,7 +11,6 @@ mod shape;
 mod station;
 mod test;
 mod unknowns;
-mod within;
 
 use std::path::{Path, PathBuf};
 
@@ -19,7 +19,7 @@ pub use machine::machine;
 use super::document::{Source, Table, Value};
 use super::expression::Length;
 use super::limits;
-use super::stamp::Stamp;
+use super::stamp::FileStamp;
 use super::table::{Format, Mapped};
 use super::{Session, Test};
 use crate::chain::Machine;
@@ -138,11 +138,11 @@ pub fn session(path: &Path, options: &ReadOptions) -> Result<Session, ModelError
     let unknowns = unknowns::unknowns(&machine, instrument.kind, &mut root)?;
 
     let format = match root.take("format") {
-        Some(value) => layout::format(value.table("[format]".into())?)?,
+        Some(value) => format::format(value.table("[format]".into())?)?,
         None => Format::default(),
     };
     let columns = match root.take("columns") {
-        Some(value) => Some(layout::columns(value.table("[columns]".into())?)?),
+        Some(value) => Some(format::columns(value.table("[columns]".into())?)?),
         None => None,
     };
     let context = Context {
@@ -167,7 +167,7 @@ pub fn session(path: &Path, options: &ReadOptions) -> Result<Session, ModelError
     };
     let socket_distances = setups::socket_distances(instrument.kind, &tests, &mut root, options.read_data)?;
     root.finish()?;
-    let mut files: Vec<Stamp> = Vec::new();
+    let mut files: Vec<FileStamp> = Vec::new();
     let of_tests = tests
         .iter()
         .filter_map(|test| test.readings.as_ref()?.stamp.as_ref());
@@ -227,7 +227,7 @@ fn session_machine(path: &Path, options: &ReadOptions, root: &mut Table<'_>) -> 
         );
         return Err(file.error(message, Some("its name is relative to the session file".into())));
     }
-    within::check(path, options, &file, &found)?;
+    data_folder::check(path, options, &file, &found)?;
     table.finish()?;
     let source = machine::source(&found)?;
     Ok(Bodies {
@@ -241,7 +241,7 @@ fn constants(root: &mut Table<'_>) -> Result<Vec<(String, f64)>, ModelError> {
         return Ok(Vec::new());
     };
     let mut constants = Vec::new();
-    for entry in value.table("[constants]".into())?.take_all()? {
+    for entry in value.table("[constants]".into())?.remaining_values()? {
         let name = entry.key.clone();
         let mut letters = name.chars();
         let valid = letters.next().is_some_and(|c| c.is_alphabetic() || c == '_')
@@ -264,7 +264,7 @@ fn about(root: &mut Table<'_>) -> Result<Vec<(String, String)>, ModelError> {
     let Some(value) = root.take("about") else {
         return Ok(Vec::new());
     };
-    let notes = value.table("[about]".into())?.take_all()?;
+    let notes = value.table("[about]".into())?.remaining_values()?;
     notes
         .into_iter()
         .map(|note| {

@@ -5,7 +5,7 @@ use crate::axis::AxisKind;
 use crate::error::ModelError;
 use crate::instrument::Station;
 use crate::session::document::{Table, Value};
-use crate::session::motion::{FollowOffset, MOST_READINGS, Motion, programmed_over_path_feed};
+use crate::session::motion::{FollowOffset, MAX_READINGS, Motion, programmed_over_path_feed};
 
 /// Feed of a linear axis or a circle where none is stated, mm/s: 1000 mm/min.
 const DEFAULT_FEED_MM_S: f64 = 1000.0 / 60.0;
@@ -20,7 +20,7 @@ pub(super) fn sweep(
 ) -> Result<Motion, ModelError> {
     let mut table = value.table("`sweep`".into())?;
     let (axis, kind) = moved_axis(context, &mut table)?;
-    let way = Way::read(&mut table, kind, true)?;
+    let way = Abscissa::read(&mut table, kind, true)?;
     let speed = speed(context, &mut table, axis, station)?;
     let (runs, both_directions) = repeats(&mut table, way.steps())?;
     table.finish()?;
@@ -87,7 +87,7 @@ fn circle(context: &Context<'_>, mut table: Table<'_>) -> Result<Motion, ModelEr
         Some(value) => context.point(value)?.1,
         None => [0.0; 3],
     };
-    let way = Way::read(&mut table, AxisKind::Rotary, false)?;
+    let way = Abscissa::read(&mut table, AxisKind::Rotary, false)?;
     let speed = match table.take("feed_mm_min") {
         Some(value) => value.positive()? / 60.0,
         None => DEFAULT_FEED_MM_S,
@@ -146,7 +146,7 @@ fn follow(context: &Context<'_>, mut table: Table<'_>, station: &Station<f64>) -
         // Nothing of a fixed length lies between the points.
         _ => FollowOffset::None,
     };
-    let way = Way::read(&mut table, kind, false)?;
+    let way = Abscissa::read(&mut table, kind, false)?;
     let speed = match table.take("programmed_feed_mm_min") {
         Some(feed) => programmed_speed(context, &mut table, axis, station, &feed)?,
         None => speed(context, &mut table, axis, station)?,
@@ -176,15 +176,15 @@ fn moved_axis(context: &Context<'_>, table: &mut Table<'_>) -> Result<(usize, Ax
 }
 
 /// From, to and step of a movement, in the unit inside.
-struct Way {
+struct Abscissa {
     from: f64,
     to: f64,
     step: f64,
 }
 
-impl Way {
+impl Abscissa {
     /// Reads `from_…`, `to_…` and `step_…`; a full turn where the ends may be left out and are.
-    fn read(table: &mut Table<'_>, kind: AxisKind, ends_needed: bool) -> Result<Way, ModelError> {
+    fn read(table: &mut Table<'_>, kind: AxisKind, ends_needed: bool) -> Result<Abscissa, ModelError> {
         let from = end(table, kind, ["from_mm", "from_deg"])?;
         let to = end(table, kind, ["to_mm", "to_deg"])?;
         let step = end(table, kind, ["step_mm", "step_deg"])?;
@@ -217,9 +217,9 @@ impl Way {
         if from == to {
             return Err(table.error(format!("{} ends where it begins", table.called()), None));
         }
-        let way = Way { from, to, step };
-        if way.steps() > MOST_READINGS as f64 {
-            let message = format!("{:.2e} steps; {MOST_READINGS} readings is the most", way.steps());
+        let way = Abscissa { from, to, step };
+        if way.steps() > MAX_READINGS as f64 {
+            let message = format!("{:.2e} steps; {MAX_READINGS} readings is the most", way.steps());
             return Err(stepped.error(message, Some("take a larger step".into())));
         }
         if way.steps() < 1.0 {
@@ -270,7 +270,7 @@ fn speed(
         (AxisKind::Rotary, None, None) => Ok(DEFAULT_TURN_RAD_S),
         (AxisKind::Rotary, Some(feed), None) => {
             let feed_mm_s = feed.positive()? / 60.0;
-            Ok(feed_mm_s / carried_radius(context, axis, station, &feed)?)
+            Ok(feed_mm_s / radius_on_axis(context, axis, station, &feed)?)
         }
     }
 }
@@ -293,12 +293,12 @@ fn programmed_speed(
             ));
         }
     }
-    let radius = carried_radius(context, axis, station, feed)?;
+    let radius = radius_on_axis(context, axis, station, feed)?;
     Ok(feed_mm_s / programmed_over_path_feed(radius) / radius)
 }
 
 /// How far from a rotary axis the ball lies that it carries, mm.
-fn carried_radius(
+fn radius_on_axis(
     context: &Context<'_>,
     axis: usize,
     station: &Station<f64>,
@@ -334,10 +334,10 @@ fn repeats(table: &mut Table<'_>, steps: f64) -> Result<(usize, bool), ModelErro
     };
     let runs = match table.take("runs") {
         Some(value) => {
-            let runs = value.count(1, MOST_READINGS)?;
-            if runs as f64 * (steps + 1.0) * 2.0 > MOST_READINGS as f64 {
+            let runs = value.count(1, MAX_READINGS)?;
+            if runs as f64 * (steps + 1.0) * 2.0 > MAX_READINGS as f64 {
                 return Err(value.error(
-                    format!("{runs} runs of {steps:.0} steps; {MOST_READINGS} readings is the most"),
+                    format!("{runs} runs of {steps:.0} steps; {MAX_READINGS} readings is the most"),
                     None,
                 ));
             }

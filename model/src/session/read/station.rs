@@ -213,7 +213,7 @@ fn sensors(table: &mut Table<'_>) -> Result<Option<[[f64; 3]; 3]>, ModelError> {
             let [a, b, c] = rows;
             let normal = crate::frames::cross(a, Point(b)).0;
             let volume: f64 = (0..3).map(|i| normal[i] * c[i]).sum();
-            if volume.abs() < LEAST_VOLUME {
+            if volume.abs() < MIN_VOLUME {
                 let message = format!(
                     "the three `sensor_directions` lie almost in a plane (their triple product is {volume:.3}; 1 at right angles)"
                 );
@@ -226,7 +226,7 @@ fn sensors(table: &mut Table<'_>) -> Result<Option<[[f64; 3]; 3]>, ModelError> {
 }
 
 /// Least triple product of three unit directions that still tell three coordinates: below it one of them is read with twenty times the noise.
-const LEAST_VOLUME: f64 = 0.05;
+const MIN_VOLUME: f64 = 0.05;
 
 fn tracker(context: &Context<'_>, table: &mut Table<'_>) -> Result<SetUp, ModelError> {
     let target = table.need("target_mm", "the target in the tool frame")?;

@@ -3,7 +3,7 @@
 use std::path::{Path, PathBuf};
 
 use super::station::{self, SetUp};
-use super::{Context, Declared, layout, movement, quantity, within};
+use super::{Context, Declared, data_folder, format, movement, quantity};
 use crate::axis::AxisKind;
 use crate::error::ModelError;
 use crate::instrument::{InstrumentKind, Station};
@@ -57,17 +57,17 @@ pub(super) fn tests(
         InstrumentKind::BallBar => group("bar_setup", name)?,
         _ => name.to_string(),
     };
-    let Standing {
+    let HeldOutState {
         mut at,
         written: at_written,
         listed,
     } = at(context, &mut table)?;
     let format = match table.take("format") {
-        Some(value) => layout::format(value.table(format!("[test.format] of \"{name}\""))?)?,
+        Some(value) => format::format(value.table(format!("[test.format] of \"{name}\""))?)?,
         None => context.format.clone(),
     };
     let columns = match table.take("columns") {
-        Some(value) => Some(layout::columns(
+        Some(value) => Some(format::columns(
             value.table(format!("[test.columns] of \"{name}\""))?,
         )?),
         None => context.columns.clone(),
@@ -195,7 +195,7 @@ fn check_readings(
 }
 
 /// Where the axes of a test stand, axis by axis.
-struct Standing {
+struct HeldOutState {
     at: Vec<f64>,
     /// As written, for linear axes stated in mm.
     written: Vec<Option<Length>>,
@@ -204,10 +204,10 @@ struct Standing {
 }
 
 /// `at = { x_mm = 0, … }`.
-fn at(context: &Context<'_>, table: &mut Table<'_>) -> Result<Standing, ModelError> {
+fn at(context: &Context<'_>, table: &mut Table<'_>) -> Result<HeldOutState, ModelError> {
     let machine = context.machine;
     let axes = machine.axes.len();
-    let mut standing = Standing {
+    let mut standing = HeldOutState {
         at: vec![0.0; axes],
         written: vec![None; axes],
         listed: vec![false; axes],
@@ -215,7 +215,7 @@ fn at(context: &Context<'_>, table: &mut Table<'_>) -> Result<Standing, ModelErr
     let Some(value) = table.take("at") else {
         return Ok(standing);
     };
-    for entry in value.table("`at`".into())?.take_all()? {
+    for entry in value.table("`at`".into())?.remaining_values()? {
         let Some((axis, unit)) = quantity::axis_position(machine, &entry.key) else {
             let known: Vec<String> = machine.axes.iter().map(|axis| axis.column("")).collect();
             let message = format!("`at` knows no position `{}`", entry.key);
@@ -245,7 +245,7 @@ fn data_file(context: &Context<'_>, data: &Value<'_>) -> Result<PathBuf, ModelEr
         .as_ref()
         .map(|folder| folder.join(&named));
     if let Some(found) = elsewhere.iter().chain([&beside]).find(|file| file.exists()) {
-        within::check(context.file, context.options, data, found)?;
+        data_folder::check(context.file, context.options, data, found)?;
         return Ok(found.clone());
     }
     let (looked, help) = match &elsewhere {

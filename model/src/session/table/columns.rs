@@ -144,9 +144,9 @@ pub(super) fn known(request: &Request<'_>) -> Vec<String> {
 }
 
 pub(super) fn listed(names: &[String]) -> String {
-    const MOST: usize = 40;
-    let mut text = names.iter().take(MOST).cloned().collect::<Vec<_>>().join(", ");
-    if names.len() > MOST {
+    const MAX: usize = 40;
+    let mut text = names.iter().take(MAX).cloned().collect::<Vec<_>>().join(", ");
+    if names.len() > MAX {
         text.push_str(", …");
     }
     text
@@ -232,8 +232,8 @@ fn unknown_column_help(request: &Request<'_>, name: &str, header: &[String], kno
     if name.parse::<f64>().is_ok() {
         return NO_HEADER.into();
     }
-    let stem = name.rsplit_once('_').map_or(name, |(stem, _)| stem);
-    if request.instrument == InstrumentKind::RTest && r_test_columns(!request.sensors).contains(&stem) {
+    let id_stem = name.rsplit_once('_').map_or(name, |(id_stem, _)| id_stem);
+    if request.instrument == InstrumentKind::RTest && r_test_columns(!request.sensors).contains(&id_stem) {
         return r_test_help(request).into();
     }
     format!(

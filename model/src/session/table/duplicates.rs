@@ -11,7 +11,7 @@ use std::ops::Range;
 use crate::session::readings::Readings;
 
 /// Most lines that a message lists.
-const MOST_LISTED: usize = 8;
+const MAX_LISTED: usize = 8;
 
 /// A number that two rows share only if all their cells are the same.
 pub(super) fn number_of(cells: &[String]) -> u64 {
@@ -48,8 +48,8 @@ pub(super) fn said(readings: &Readings, kept: &[usize]) -> String {
         .filter(|row| kept.next_if_eq(&row).is_none())
         .map(|row| readings.line[row])
         .collect();
-    let mut lines: Vec<String> = copies.iter().take(MOST_LISTED).map(usize::to_string).collect();
-    if copies.len() > MOST_LISTED {
+    let mut lines: Vec<String> = copies.iter().take(MAX_LISTED).map(usize::to_string).collect();
+    if copies.len() > MAX_LISTED {
         lines.push("…".into());
     }
     let (count, are, copies_of, they) = match copies.len() {

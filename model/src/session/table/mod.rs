@@ -26,7 +26,7 @@ use crate::error::{ModelError, Place};
 use crate::instrument::InstrumentKind;
 use crate::session::limits;
 use crate::session::readings::Readings;
-use crate::session::stamp::Stamp;
+use crate::session::stamp::FileStamp;
 
 /// How a file writes its rows.
 #[derive(Clone, Debug, PartialEq)]
@@ -86,7 +86,7 @@ pub(crate) struct Request<'a> {
 }
 
 /// Most sockets that a file names.
-const MOST_SOCKETS: usize = 1000;
+const MAX_SOCKETS: usize = 1000;
 
 /// Readings of one data file: one for each socket that it names, else one.
 pub(crate) type BySocket = Vec<(Option<String>, Readings)>;
@@ -181,7 +181,7 @@ struct Filled<'a> {
 }
 
 impl<'a> Filled<'a> {
-    fn new(request: &'a Request<'a>, stamp: Stamp, columns: Vec<Column>) -> Self {
+    fn new(request: &'a Request<'a>, stamp: FileStamp, columns: Vec<Column>) -> Self {
         Filled {
             request,
             columns,
@@ -300,8 +300,8 @@ fn socket_index(sockets: &mut Vec<String>, name: &str, place: Place) -> Result<u
         message,
         help: Some(help.into()),
     };
-    if sockets.len() == MOST_SOCKETS {
-        let message = format!("more than {MOST_SOCKETS} sockets in column `socket`");
+    if sockets.len() == MAX_SOCKETS {
+        let message = format!("more than {MAX_SOCKETS} sockets in column `socket`");
         return Err(fault(
             message,
             "a socket has many poses; is the column the socket's name?",

@@ -9,7 +9,7 @@ use encoding_rs::{Encoding, UTF_8, UTF_16BE, UTF_16LE};
 
 use super::{Format, encoding};
 use crate::error::{ModelError, Place};
-use crate::session::stamp::Stamp;
+use crate::session::stamp::FileStamp;
 
 /// Most bytes of one line.
 const LONGEST_LINE: u64 = 1 << 20;
@@ -79,7 +79,7 @@ pub(super) struct Rows {
     /// Lines of the file that are still to be passed over.
     skip: usize,
     reader: BufReader<File>,
-    stamp: Stamp,
+    stamp: FileStamp,
     limits: Limits,
     line: usize,
     rows: usize,
@@ -127,7 +127,7 @@ impl Rows {
             separator: format.separator,
             encoding: format.encoding,
             skip: format.skip_lines,
-            stamp: Stamp::of(file, &found),
+            stamp: FileStamp::of(file, &found),
             limits,
             reader: BufReader::with_capacity(1 << 16, opened),
             line: 0,
@@ -138,7 +138,7 @@ impl Rows {
     }
 
     /// The file as it was when it was opened.
-    pub fn stamp(&self) -> &Stamp {
+    pub fn stamp(&self) -> &FileStamp {
         &self.stamp
     }
 

@@ -14,7 +14,7 @@ use zip::ZipArchive;
 use super::Format;
 use super::rows::Row;
 use crate::error::{ModelError, Place};
-use crate::session::stamp::Stamp;
+use crate::session::stamp::FileStamp;
 
 /// Whether a file is a spreadsheet, by its name.
 pub(super) fn is_spreadsheet(file: &Path) -> bool {
@@ -28,16 +28,16 @@ pub(super) fn is_spreadsheet(file: &Path) -> bool {
 }
 
 /// Most bytes of a spreadsheet.
-const MOST_BYTES: u64 = 64 << 20;
+const MAX_BYTES: u64 = 64 << 20;
 /// Most bytes of what is packed in it, which is held in memory.
-const MOST_UNPACKED: u64 = 256 << 20;
+const MAX_UNPACKED: u64 = 256 << 20;
 /// Most columns that cells lie in.
-const MOST_COLUMNS: u32 = 1000;
+const MAX_COLUMNS: u32 = 1000;
 /// Most cells of the rectangle around all that is filled.
-const MOST_CELLS: usize = 20_000_000;
+const MAX_CELLS: usize = 20_000_000;
 
 /// The rows of a sheet, and the file as it was.
-pub(super) fn rows(file: &Path, format: &Format) -> Result<(Stamp, Vec<Row>), ModelError> {
+pub(super) fn rows(file: &Path, format: &Format) -> Result<(FileStamp, Vec<Row>), ModelError> {
     let fault = |message: String, help: String| ModelError::Input {
         place: Place::file(file),
         message,
@@ -53,22 +53,22 @@ pub(super) fn rows(file: &Path, format: &Format) -> Result<(Stamp, Vec<Row>), Mo
     if !found.is_file() {
         return Err(broken(std::io::Error::other("it is no file").into()));
     }
-    if found.len() > MOST_BYTES {
+    if found.len() > MAX_BYTES {
         return Err(fault(
             format!(
-                "a spreadsheet of {} bytes; {MOST_BYTES} is the most that is read",
+                "a spreadsheet of {} bytes; {MAX_BYTES} is the most that is read",
                 found.len()
             ),
             "export it as CSV".into(),
         ));
     }
-    if unpacks_beyond(file, MOST_UNPACKED) {
+    if unpacks_beyond(file, MAX_UNPACKED) {
         return Err(fault(
-            format!("a spreadsheet that unpacks to more than {MOST_UNPACKED} bytes, the most that is read"),
+            format!("a spreadsheet that unpacks to more than {MAX_UNPACKED} bytes, the most that is read"),
             "export it as CSV".into(),
         ));
     }
-    let stamp = Stamp::of(file, &found);
+    let stamp = FileStamp::of(file, &found);
     let mut book = guarded(|| open_workbook_auto(file)).map_err(broken)?;
     let names = book.sheet_names();
     let wanted: Vec<String> = match &format.sheet {
@@ -179,9 +179,9 @@ fn by_row(mut cells: Vec<Placed>, format: &Format) -> Result<Vec<Row>, (String, 
         return Ok(Vec::new());
     };
     let help = "clear what lies beside the table, or export it as CSV";
-    if right - left >= MOST_COLUMNS {
+    if right - left >= MAX_COLUMNS {
         let message = format!(
-            "cells from column {} to column {}; {MOST_COLUMNS} columns are the most",
+            "cells from column {} to column {}; {MAX_COLUMNS} columns are the most",
             left + 1,
             u64::from(right) + 1
         );
@@ -196,8 +196,8 @@ fn by_row(mut cells: Vec<Placed>, format: &Format) -> Result<Vec<Row>, (String, 
         if matches!(first, Some((_, _, Data::String(text))) if text.trim_start().starts_with('#')) {
             continue;
         }
-        if (rows.len() + 1) * width > MOST_CELLS {
-            let message = format!("more than {MOST_CELLS} cells in the rectangle around all that are filled");
+        if (rows.len() + 1) * width > MAX_CELLS {
+            let message = format!("more than {MAX_CELLS} cells in the rectangle around all that are filled");
             return Err((message, help.into()));
         }
         let mut texts = vec![String::new(); width];

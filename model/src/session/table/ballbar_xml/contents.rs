@@ -11,12 +11,12 @@ use quick_xml::events::{BytesStart, Event};
 
 use super::super::encoding;
 use crate::error::{ModelError, Place};
-use crate::session::stamp::Stamp;
+use crate::session::stamp::FileStamp;
 
 /// Most bytes of a file.
-const MOST_BYTES: u64 = 64 << 20;
+const MAX_BYTES: u64 = 64 << 20;
 /// Most elements within one another.
-const DEEPEST: usize = 100;
+const MAX_DEPTH: usize = 100;
 /// The element that holds the numbers of a run.
 pub(super) const READINGS: &str = "READINGS";
 const DIRECTION: &str = "RUN_DIRECTION";
@@ -50,7 +50,7 @@ struct Open {
 }
 
 /// A file as it was, and its text.
-fn decoded(file: &Path, stated: Option<&'static Encoding>) -> Result<(Stamp, String), ModelError> {
+fn decoded(file: &Path, stated: Option<&'static Encoding>) -> Result<(FileStamp, String), ModelError> {
     let fault = |message: String| ModelError::Input {
         place: Place::file(file),
         message,
@@ -58,15 +58,15 @@ fn decoded(file: &Path, stated: Option<&'static Encoding>) -> Result<(Stamp, Str
     };
     let unreadable = |cause: std::io::Error| fault(format!("the data file cannot be read: {cause}"));
     let opened = File::open(file).map_err(unreadable)?;
-    let stamp = Stamp::of(file, &opened.metadata().map_err(unreadable)?);
+    let stamp = FileStamp::of(file, &opened.metadata().map_err(unreadable)?);
     let mut bytes = Vec::new();
     (&opened)
-        .take(MOST_BYTES + 1)
+        .take(MAX_BYTES + 1)
         .read_to_end(&mut bytes)
         .map_err(unreadable)?;
-    if bytes.len() as u64 > MOST_BYTES {
+    if bytes.len() as u64 > MAX_BYTES {
         return Err(fault(format!(
-            "more than {MOST_BYTES} bytes, the most that are read of a ball-bar file in XML"
+            "more than {MAX_BYTES} bytes, the most that are read of a ball-bar file in XML"
         )));
     }
     stamp.check(&opened)?;
@@ -84,7 +84,7 @@ fn decoded(file: &Path, stated: Option<&'static Encoding>) -> Result<(Stamp, Str
 pub(super) fn parse(
     file: &Path,
     encoding: Option<&'static Encoding>,
-) -> Result<(Stamp, Contents), ModelError> {
+) -> Result<(FileStamp, Contents), ModelError> {
     let (stamp, text) = decoded(file, encoding)?;
     let mut reader = Reader::from_str(&text);
     let mut contents = Contents::default();
@@ -112,8 +112,8 @@ pub(super) fn parse(
                 let unclosed = open.last().map_or("", |element| element.name.as_str());
                 return Err(broken(format!("it ends within <{unclosed}>")));
             }
-            Ok(Event::Start(_)) if open.len() == DEEPEST => {
-                return Err(broken(format!("elements nested deeper than {DEEPEST}")));
+            Ok(Event::Start(_)) if open.len() == MAX_DEPTH => {
+                return Err(broken(format!("elements nested deeper than {MAX_DEPTH}")));
             }
             Ok(Event::Start(start)) => open.push(opened(&start, line, &mut contents, &broken)?),
             Ok(Event::Empty(start)) => {

@@ -1,0 +1,237 @@
+//! Polynomials as a person would write them: collected by error, then by the turns of the axes, lengths in parentheses.
+
+use std::collections::HashMap;
+
+use abbe_model::scalar::Nominal;
+use num_rational::BigRational;
+use num_traits::{One, Signed, ToPrimitive};
+
+use crate::normal_form::Ring;
+use crate::polynomial::{Atom, Monomial, Polynomial};
+use crate::program::{Input, Naming, Program, Tree};
+use crate::symbol::{Arena, Binary, Operand, Symbol, Unary};
+
+/// A term with its sign: true for minus.
+type Term = (bool, Tree);
+
+/// Lays polynomials of a ring out over the inputs of a program.
+pub(crate) struct Layout<'r, 'a> {
+    pub(crate) ring: &'r Ring<'a>,
+    pub(crate) inputs: &'r [Input],
+}
+
+impl Layout<'_, '_> {
+    /// The polynomial: what holds no error first, then error by error, then their products.
+    pub(crate) fn group(&self, polynomial: &Polynomial) -> Tree {
+        sum(self.group_terms(polynomial))
+    }
+
+    fn group_terms(&self, polynomial: &Polynomial) -> Vec<Term> {
+        let collected = polynomial.collect(|atom| self.ring.is_small(atom));
+        let mut keys: Vec<&Monomial> = collected.keys().collect();
+        keys.sort_by_key(|key| (key.degree(|_| true), (*key).clone()));
+        let mut terms = Vec::new();
+        for key in keys {
+            let coefficient = &collected[key];
+            if key.powers().is_empty() {
+                terms.extend(self.coefficient_terms(coefficient));
+                continue;
+            }
+            let turns = coefficient.contains(is_sin_cos);
+            let (minus, mut factors) = if turns {
+                let (minus, factor) = as_factor(self.coefficient_terms(coefficient));
+                (minus, factor.into_iter().collect())
+            } else {
+                self.length_factors(coefficient)
+            };
+            factors.extend(self.powers(key));
+            terms.push((minus, product(factors)));
+        }
+        terms
+    }
+
+    /// A polynomial in lengths and turns: turn by turn.
+    fn coefficient_terms(&self, polynomial: &Polynomial) -> Vec<Term> {
+        let turns = polynomial.collect(is_sin_cos);
+        let mut terms = Vec::new();
+        for (turn, lengths) in &turns {
+            if turn.powers().is_empty() {
+                terms.extend(self.length_terms(lengths));
+                continue;
+            }
+            let (minus, mut factors) = self.length_factors(lengths);
+            factors.extend(self.powers(turn));
+            terms.push((minus, product(factors)));
+        }
+        positive_first(terms)
+    }
+
+    /// Lengths as terms: several that share a factor are one, with the factor before the parentheses.
+    fn length_terms(&self, polynomial: &Polynomial) -> Vec<Term> {
+        if polynomial.len() > 1 && !common(polynomial).powers().is_empty() {
+            let (minus, factors) = self.length_factors(polynomial);
+            return vec![(minus, product(factors))];
+        }
+        positive_first(polynomial.terms().map(|term| self.length_term(term)).collect())
+    }
+
+    /// Lengths as factors of a product: `R`, or `D` and `(H − Z_CA)`, the first term positive and the sign outside. None for 1.
+    fn length_factors(&self, polynomial: &Polynomial) -> (bool, Vec<Tree>) {
+        let shared = common(polynomial);
+        let rest = polynomial
+            .terms()
+            .filter_map(|(monomial, coefficient)| Some((monomial.divided_by(&shared)?, coefficient)));
+        let terms: Vec<Term> = rest.map(|(m, c)| self.length_term((&m, c))).collect();
+        let (minus, inner) = as_factor(terms);
+        let mut factors = Vec::new();
+        // A number stands before the letters.
+        if let Some(number @ Tree::Number(_)) = &inner {
+            factors.push(number.clone());
+        }
+        factors.extend(self.powers(&shared));
+        factors.extend(inner.filter(|inner| !matches!(inner, Tree::Number(_))));
+        (minus, factors)
+    }
+
+    fn length_term(&self, (monomial, coefficient): (&Monomial, &BigRational)) -> Term {
+        let size = coefficient.abs();
+        let mut factors = Vec::new();
+        if !size.is_one() || monomial.powers().is_empty() {
+            factors.push(Tree::Number(size.to_f64().unwrap_or(f64::NAN)));
+        }
+        factors.extend(self.powers(monomial));
+        (coefficient.is_negative(), product(factors))
+    }
+
+    fn powers(&self, monomial: &Monomial) -> Vec<Tree> {
+        let power = |(atom, power): &(Atom, u32)| {
+            let atom = self.atom(*atom);
+            let rest = std::iter::repeat_n(atom.clone(), *power as usize - 1);
+            rest.fold(atom, |square, again| binary(Binary::Mul, square, again))
+        };
+        monomial.powers().iter().map(power).collect()
+    }
+
+    fn atom(&self, atom: Atom) -> Tree {
+        let place = |input: Input| self.inputs.iter().position(|known| *known == input);
+        match atom {
+            Atom::Variable(id) => {
+                let variable = self.ring.variable(id).clone();
+                place(Input::Plain(variable)).map_or(Tree::Number(f64::NAN), Tree::Input)
+            }
+            Atom::Sin(id) | Atom::Cos(id) => {
+                let variable = self.ring.variable(id).clone();
+                let (turn, function) = match atom {
+                    Atom::Sin(_) => (Input::Sine(variable), Unary::Sin),
+                    _ => (Input::Cosine(variable), Unary::Cos),
+                };
+                match place(turn) {
+                    Some(place) => Tree::Input(place),
+                    None => Tree::Unary(function, Box::new(self.atom(Atom::Variable(id)))),
+                }
+            }
+            Atom::Function(id) => {
+                let arena = self.ring.arena();
+                let function = [Operand::Node(id)];
+                let inputs = self.inputs.to_vec();
+                let program = Program::of(arena, inputs, &function, &HashMap::new(), Naming::Labelled);
+                program
+                    .outputs
+                    .into_iter()
+                    .next()
+                    .unwrap_or(Tree::Number(f64::NAN))
+            }
+            Atom::Root(root) => Tree::Unary(Unary::Sqrt, Box::new(self.group(self.ring.radicand(root)))),
+        }
+    }
+}
+
+/// What coefficients are collected by before their lengths.
+fn is_sin_cos(atom: Atom) -> bool {
+    matches!(atom, Atom::Sin(_) | Atom::Cos(_) | Atom::Function(_))
+}
+
+fn binary(op: Binary, a: Tree, b: Tree) -> Tree {
+    Tree::Binary(op, Box::new(a), Box::new(b))
+}
+
+fn negative(tree: Tree) -> Tree {
+    Tree::Unary(Unary::Neg, Box::new(tree))
+}
+
+/// `a·b·c`; 1 where there is nothing.
+pub(crate) fn product(factors: Vec<Tree>) -> Tree {
+    let product = factors.into_iter().reduce(|a, b| binary(Binary::Mul, a, b));
+    product.unwrap_or(Tree::Number(1.0))
+}
+
+/// `a + b − c`; 0 where there is nothing.
+pub(crate) fn sum(terms: Vec<Term>) -> Tree {
+    let mut terms = terms.into_iter();
+    let Some((minus, first)) = terms.next() else {
+        return Tree::Number(0.0);
+    };
+    let first = if minus { negative(first) } else { first };
+    terms.fold(first, |sum, (minus, term)| {
+        binary(if minus { Binary::Sub } else { Binary::Add }, sum, term)
+    })
+}
+
+/// What all terms have as a factor.
+fn common(polynomial: &Polynomial) -> Monomial {
+    let mut monomials = polynomial.terms().map(|(monomial, _)| monomial.clone());
+    let first = monomials.next().unwrap_or_default();
+    monomials.fold(first, |shared, monomial| shared.shared_with(&monomial))
+}
+
+/// A sum that can start without a minus does.
+fn positive_first(mut terms: Vec<Term>) -> Vec<Term> {
+    if let Some(first) = terms.iter().position(|(minus, _)| !minus) {
+        let first = terms.remove(first);
+        terms.insert(0, first);
+    }
+    terms
+}
+
+/// A sum as a factor: its sign where all or the first of its terms carry one, and the factor unless it is 1.
+fn as_factor(terms: Vec<Term>) -> (bool, Option<Tree>) {
+    let minus = terms.first().is_some_and(|(minus, _)| *minus);
+    let terms: Vec<Term> = terms.into_iter().map(|(m, tree)| (m != minus, tree)).collect();
+    match sum(terms) {
+        Tree::Number(1.0) => (minus, None),
+        factor => (minus, Some(factor)),
+    }
+}
+
+impl Tree {
+    /// The expression in an arena; `inputs` are the operands of a program's inputs.
+    pub(crate) fn symbol<'a>(&self, arena: &'a Arena, inputs: &[Operand]) -> Symbol<'a> {
+        match self {
+            Tree::Number(value) => arena.symbol(Operand::constant(*value)),
+            Tree::Input(place) | Tree::Step(place) => arena.symbol(inputs[*place]),
+            Tree::Unary(function, a) => {
+                let a = a.symbol(arena, inputs);
+                match function {
+                    Unary::Neg => -a,
+                    Unary::Sqrt => a.sqrt(),
+                    Unary::Sin => a.sin_cos().0,
+                    Unary::Cos => a.sin_cos().1,
+                    Unary::Exp => a.exp(),
+                    Unary::Signum => a.signum(),
+                    Unary::Step => a.step(),
+                    Unary::Floor => a.floor(),
+                    Unary::Round => a.round(),
+                }
+            }
+            Tree::Binary(op, a, b) => {
+                let (a, b) = (a.symbol(arena, inputs), b.symbol(arena, inputs));
+                match op {
+                    Binary::Add => a + b,
+                    Binary::Sub => a - b,
+                    Binary::Mul => a * b,
+                    Binary::Div => a / b,
+                }
+            }
+        }
+    }
+}

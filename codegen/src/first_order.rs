@@ -1,0 +1,294 @@
+//! First order: the reading without errors, and a coefficient for each error.
+//!
+//! For a ball bar with the nominal vector `b₀`, its length `L₀ = ‖b₀‖` and `∂b/∂eᵢ = bᵢ`:
+//!
+//! ```text
+//! L ≈ L₀ + Σ (b₀·bᵢ / L₀) eᵢ
+//! ```
+
+use crate::error::CodegenError;
+use crate::normal_form::Ring;
+use crate::polynomial::{Monomial, Polynomial};
+use crate::symbol::Operand;
+use crate::variable::Variable;
+
+/// The first-order form of a reading.
+#[derive(Clone, Debug, PartialEq)]
+pub struct FirstOrder {
+    /// The coordinates without errors; for a length its square `L₀²`.
+    pub nominal: Vec<Polynomial>,
+    /// One for each parameter.
+    pub sensitivities: Vec<Sensitivity>,
+    /// What is read without errors where that is not `L₀` itself.
+    pub beside_length: Option<AlternativeLength>,
+}
+
+/// `±L₀ + offset`: what a probe reads without errors.
+#[derive(Clone, Debug, PartialEq)]
+pub struct AlternativeLength {
+    /// 1 or −1.
+    pub sign: f64,
+    /// What is added.
+    pub offset: Polynomial,
+}
+
+/// How the coordinates of a reading answer to one parameter.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Sensitivity {
+    /// The error or instrument unknown.
+    pub parameter: Variable,
+    /// The coefficient in each coordinate, or the numerator over L₀ of one.
+    pub coefficients: Vec<Polynomial>,
+    /// Whether the coefficient is divided by L₀.
+    pub over_length: bool,
+    /// What the column is worth.
+    pub column: Column,
+}
+
+/// What a reading's column of sensitivities is worth.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Column {
+    /// It is not zero, and no multiple of an earlier one.
+    Distinct,
+    /// Identically zero: the reading does not see the parameter.
+    Zero,
+    /// A fixed multiple of an earlier column, wherever the axes stand: the readings cannot tell the two apart.
+    Multiple {
+        /// The earlier parameter.
+        of: Variable,
+        /// The factor: numerator and denominator, which is 1 where the one divides the other.
+        factor: (Polynomial, Polynomial),
+    },
+}
+
+impl FirstOrder {
+    /// Of a bar vector in a ring of first order; `unknowns` are the error of the bar and of its sensor's gain, as far as they are carried.
+    pub(crate) fn of_length(
+        ring: &mut Ring<'_>,
+        vector: [Operand; 3],
+        stated: Operand,
+        unknowns: [Option<Operand>; 2],
+        parameters: &[Variable],
+    ) -> Result<Self, CodegenError> {
+        let [x, y, z] = vector.map(|component| ring.normal_form(component));
+        let vector = [x?, y?, z?];
+        let nominal = vector.each_ref().map(|component| without_errors(ring, component));
+        let square = dot(ring, &nominal, &nominal);
+        let length = ring.root(square.clone());
+        let stated = ring.normal_form(stated)?;
+        let [bar, gain] = unknowns.map(|unknown| unknown.unwrap_or(Operand::constant(0.0)));
+        let (bar, gain) = (ring.normal_form(bar)?, ring.normal_form(gain)?);
+        let beyond = &length - &stated;
+        let mut sensitivities = Vec::new();
+        for parameter in parameters {
+            let of_bar = coefficient_of(ring, &bar, parameter);
+            let of_gain = coefficient_of(ring, &gain, parameter);
+            let (coefficient, over_length) = if of_bar.is_zero() && of_gain.is_zero() {
+                let slope = vector
+                    .each_ref()
+                    .map(|component| coefficient_of(ring, component, parameter));
+                (dot(ring, &nominal, &slope), true)
+            } else {
+                (&ring.product(&beyond, &of_gain) - &of_bar, false)
+            };
+            sensitivities.push(Sensitivity {
+                parameter: parameter.clone(),
+                coefficients: vec![coefficient],
+                over_length,
+                column: Column::Distinct,
+            });
+        }
+        let mut form = FirstOrder {
+            nominal: vec![square],
+            sensitivities,
+            beside_length: None,
+        };
+        form.mark(ring);
+        Ok(form)
+    }
+
+    /// Of a probe that goes straight to the artefact's axis: the distance from there less the radius. That errors turn its way
+    /// across the axis counts in the second order only.
+    pub(crate) fn of_way_to_the_axis(
+        ring: &mut Ring<'_>,
+        stylus: [Operand; 3],
+        radius: Operand,
+        parameters: &[Variable],
+    ) -> Result<Self, CodegenError> {
+        let none = Operand::constant(0.0);
+        let mut form = FirstOrder::of_length(ring, stylus, none, [Some(radius), None], parameters)?;
+        let radius = ring.normal_form(radius)?;
+        form.beside_length = Some(AlternativeLength {
+            sign: 1.0,
+            offset: -&without_errors(ring, &radius),
+        });
+        Ok(form)
+    }
+
+    /// Of a probe that goes in a stated direction. With `w = v₀ + d₀·u₀` from the axis to where it touches and `L₀ = √(b₀² − a₀·c₀)`, half
+    /// of what the artefact cuts out of its way,
+    ///
+    /// ```text
+    /// d₀ = −(b₀ + L₀)/a₀,   ∂d/∂eᵢ = (w·(vᵢ + d₀·uᵢ) − r₀·rᵢ)/L₀
+    /// ```
+    pub(crate) fn of_stated_way(
+        ring: &mut Ring<'_>,
+        [stylus, step]: [[Operand; 3]; 2],
+        radius: Operand,
+        parameters: &[Variable],
+    ) -> Result<Self, CodegenError> {
+        let mut vector = |components: [Operand; 3]| -> Result<[Polynomial; 3], CodegenError> {
+            let [x, y, z] = components.map(|component| ring.normal_form(component));
+            Ok([x?, y?, z?])
+        };
+        let (v, u) = (vector(stylus)?, vector(step)?);
+        let r = ring.normal_form(radius)?;
+        let nominal = |vector: &[Polynomial; 3]| vector.each_ref().map(|part| without_errors(ring, part));
+        let (v_0, u_0, r_0) = (nominal(&v), nominal(&u), without_errors(ring, &r));
+        // A unit vector in floating point is one but for its rounding.
+        if !dot(ring, &u_0, &u_0).is_about(1.0) {
+            return Err(CodegenError::ObliqueProbing);
+        }
+        let b = dot(ring, &v_0, &u_0);
+        let c = &dot(ring, &v_0, &v_0) - &ring.product(&r_0, &r_0);
+        let square = &ring.product(&b, &b) - &c;
+        let d_0 = -&(&b + &ring.root(square.clone()));
+        let along = |start: &[Polynomial; 3], way: &[Polynomial; 3]| -> [Polynomial; 3] {
+            std::array::from_fn(|i| &start[i] + &ring.product(&d_0, &way[i]))
+        };
+        let w = along(&v_0, &u_0);
+        let sensitivity = |parameter: &Variable| {
+            let slope = |form: &Polynomial| coefficient_of(ring, form, parameter);
+            let moved = along(&v.each_ref().map(slope), &u.each_ref().map(slope));
+            let coefficient = &dot(ring, &w, &moved) - &ring.product(&r_0, &slope(&r));
+            Sensitivity {
+                parameter: parameter.clone(),
+                coefficients: vec![coefficient],
+                over_length: true,
+                column: Column::Distinct,
+            }
+        };
+        let mut form = FirstOrder {
+            sensitivities: parameters.iter().map(sensitivity).collect(),
+            nominal: vec![square],
+            beside_length: Some(AlternativeLength {
+                sign: -1.0,
+                offset: -&b,
+            }),
+        };
+        form.mark(ring);
+        Ok(form)
+    }
+
+    /// Of coordinates in a ring of first order.
+    pub(crate) fn of_coordinates(
+        ring: &mut Ring<'_>,
+        coordinates: &[Operand],
+        parameters: &[Variable],
+    ) -> Result<Self, CodegenError> {
+        let forms = coordinates
+            .iter()
+            .map(|coordinate| ring.normal_form(*coordinate))
+            .collect::<Result<Vec<_>, _>>()?;
+        let sensitivities = parameters
+            .iter()
+            .map(|parameter| Sensitivity {
+                parameter: parameter.clone(),
+                coefficients: forms
+                    .iter()
+                    .map(|form| coefficient_of(ring, form, parameter))
+                    .collect(),
+                over_length: false,
+                column: Column::Distinct,
+            })
+            .collect();
+        let mut form = FirstOrder {
+            nominal: forms.iter().map(|form| without_errors(ring, form)).collect(),
+            sensitivities,
+            beside_length: None,
+        };
+        form.mark(ring);
+        Ok(form)
+    }
+
+    /// Marks zero columns and fixed multiples of earlier ones.
+    fn mark(&mut self, ring: &Ring<'_>) {
+        // A constant L₀ is a fixed factor like any other.
+        let fixed = self.nominal.len() == 1 && !self.nominal[0].contains(|atom| ring.moves(atom));
+        for place in 0..self.sensitivities.len() {
+            let (earlier, rest) = self.sensitivities.split_at_mut(place);
+            let this = &mut rest[0];
+            if this.coefficients.iter().all(Polynomial::is_zero) {
+                this.column = Column::Zero;
+                continue;
+            }
+            let candidates = earlier.iter().filter(|other| {
+                other.column == Column::Distinct && (fixed || other.over_length == this.over_length)
+            });
+            for other in candidates {
+                if let Some(factor) = fixed_factor(ring, &this.coefficients, &other.coefficients) {
+                    this.column = Column::Multiple {
+                        of: other.parameter.clone(),
+                        factor,
+                    };
+                    break;
+                }
+            }
+        }
+    }
+}
+
+/// The part without errors.
+fn without_errors(ring: &Ring<'_>, form: &Polynomial) -> Polynomial {
+    form.filtered(|monomial| monomial.degree(|atom| ring.is_small(atom)) == 0)
+}
+
+/// The coefficient of a parameter in a form of first order.
+fn coefficient_of(ring: &Ring<'_>, form: &Polynomial, parameter: &Variable) -> Polynomial {
+    let Some(atom) = ring.atom_of(parameter) else {
+        return Polynomial::default();
+    };
+    let mut collected = form.collect(|other| other == atom);
+    collected.remove(&Monomial(vec![(atom, 1)])).unwrap_or_default()
+}
+
+fn dot(ring: &Ring<'_>, a: &[Polynomial; 3], b: &[Polynomial; 3]) -> Polynomial {
+    let products = (0..3).map(|i| ring.product(&a[i], &b[i]));
+    products.fold(Polynomial::default(), |sum, product| &sum + &product)
+}
+
+/// `a/b` where it is the same wherever the axes stand: all minors of the coefficients by motion vanish.
+fn fixed_factor(ring: &Ring<'_>, a: &[Polynomial], b: &[Polynomial]) -> Option<(Polynomial, Polynomial)> {
+    let by_motion = |column: &[Polynomial]| {
+        let mut parts = Vec::new();
+        for (coordinate, polynomial) in column.iter().enumerate() {
+            for (motion, lengths) in polynomial.collect(|atom| ring.moves(atom)) {
+                parts.push(((coordinate, motion), lengths));
+            }
+        }
+        parts
+    };
+    let (a, b) = (by_motion(a), by_motion(b));
+    let same = a.len() == b.len() && a.iter().zip(&b).all(|(a, b)| a.0 == b.0);
+    let (first_a, first_b) = (&a.first()?.1, &b.first()?.1);
+    let proportional = same
+        && a.iter()
+            .zip(&b)
+            .all(|((_, x), (_, y))| ring.product(x, first_b) == ring.product(first_a, y));
+    proportional.then(|| match quotient(ring, first_a, first_b) {
+        Some(quotient) => (quotient, Polynomial::constant(1.0)),
+        None => (first_a.clone(), first_b.clone()),
+    })
+}
+
+/// `a/b` where it is a polynomial: each term of `a` by the first of `b`, as far as they divide, and the product proves it.
+fn quotient(ring: &Ring<'_>, a: &Polynomial, b: &Polynomial) -> Option<Polynomial> {
+    let (b_first, b_factor) = b.terms().next()?;
+    let mut quotient = Polynomial::default();
+    for (monomial, factor) in a.terms() {
+        if let Some(monomial) = monomial.divided_by(b_first) {
+            quotient.insert(monomial, factor / b_factor);
+        }
+    }
+    (ring.product(&quotient, b) == *a).then_some(quotient)
+}

@@ -1,0 +1,312 @@
+//! From an expression graph to its normal form, whole or up to an order in the errors.
+
+use std::collections::{BTreeSet, HashMap};
+
+use num_rational::BigRational;
+
+use crate::error::CodegenError;
+use crate::polynomial::{Atom, Monomial, Polynomial};
+use crate::symbol::{Arena, Binary, Node, NodeId, Operand, Unary, VariableId, operands};
+use crate::variable::Variable;
+
+/// The ring that normal forms live in: the arena's variables, and the roots that were met.
+#[derive(Debug)]
+pub struct Ring<'a> {
+    arena: &'a Arena,
+    variables: Vec<Variable>,
+    order: Option<u32>,
+    roots: Vec<Polynomial>,
+    known: HashMap<NodeId, Polynomial>,
+}
+
+impl<'a> Ring<'a> {
+    /// The ring of whole expressions.
+    pub fn exact(arena: &'a Arena) -> Self {
+        Ring {
+            arena,
+            variables: arena.variables(),
+            order: None,
+            roots: Vec::new(),
+            known: HashMap::new(),
+        }
+    }
+
+    /// The ring of expressions up to `order` in errors and instrument unknowns: `sin e` is `e`, `cos e` is `1 − e²/2`.
+    ///
+    /// # Errors
+    /// If the order is above 2.
+    pub fn truncated(arena: &'a Arena, order: u32) -> Result<Self, CodegenError> {
+        if order > 2 {
+            return Err(CodegenError::OrderTooHigh { order });
+        }
+        Ok(Ring {
+            order: Some(order),
+            ..Ring::exact(arena)
+        })
+    }
+
+    /// The arena.
+    pub fn arena(&self) -> &'a Arena {
+        self.arena
+    }
+
+    /// A variable by its place.
+    pub fn variable(&self, id: VariableId) -> &Variable {
+        &self.variables[id.0 as usize]
+    }
+
+    /// What is under a root.
+    pub fn radicand(&self, root: usize) -> &Polynomial {
+        &self.roots[root]
+    }
+
+    /// Whether an atom is an error or an instrument unknown, or a sine or cosine of one.
+    pub fn is_small(&self, atom: Atom) -> bool {
+        match atom {
+            Atom::Variable(id) | Atom::Sin(id) | Atom::Cos(id) => self.variable(id).is_small(),
+            Atom::Root(_) | Atom::Function(_) => false,
+        }
+    }
+
+    /// Whether an atom follows the position of an axis.
+    pub fn moves(&self, atom: Atom) -> bool {
+        match atom {
+            Atom::Variable(id) | Atom::Sin(id) | Atom::Cos(id) => self.variable(id).moves(),
+            Atom::Function(id) => {
+                let variables = self.arena.variables_of(&[Operand::Node(id)]);
+                variables
+                    .into_iter()
+                    .any(|variable| self.variable(variable).moves())
+            }
+            Atom::Root(root) => self.roots[root].contains(|inner| self.moves(inner)),
+        }
+    }
+
+    /// The atom of a variable, if the arena knows it.
+    pub fn atom_of(&self, variable: &Variable) -> Option<Atom> {
+        let place = self.variables.iter().position(|known| known == variable)?;
+        Some(Atom::Variable(VariableId(place as u32)))
+    }
+
+    /// Whether two expressions are equal, decided by their normal forms. Of functions that the form does not look into, an exponential or
+    /// the cosine of a multiple, equal terms prove equality and different terms prove nothing.
+    ///
+    /// # Errors
+    /// If one of them is no polynomial.
+    pub fn equal(&mut self, a: Operand, b: Operand) -> Result<bool, CodegenError> {
+        Ok(self.normal_form(a)? == self.normal_form(b)?)
+    }
+
+    /// The normal form of an expression.
+    ///
+    /// # Errors
+    /// If it is no polynomial: a quotient of expressions, a root of errors, a function of errors other than the sine or cosine of one.
+    pub fn normal_form(&mut self, operand: Operand) -> Result<Polynomial, CodegenError> {
+        let mut wanted = BTreeSet::new();
+        let mut pending = vec![operand];
+        while let Some(next) = pending.pop() {
+            if let Operand::Node(id) = next
+                && !self.known.contains_key(&id)
+                && wanted.insert(id)
+                && !self.is_function(id)
+            {
+                pending.extend(operands(self.arena.node(id)));
+            }
+        }
+        for id in wanted {
+            let form = self.of_node(id)?;
+            self.known.insert(id, form);
+        }
+        Ok(self.normal_form_of(operand))
+    }
+
+    /// Takes nominal expressions as they are, to be neither looked into nor multiplied out.
+    pub(crate) fn keep(&mut self, whole: &[Operand]) {
+        for operand in whole {
+            if let Operand::Node(id) = operand {
+                self.known.insert(*id, Polynomial::atom(Atom::Function(*id)));
+            }
+        }
+    }
+
+    /// Whether a node is a function that the form does not look into.
+    fn is_function(&self, id: NodeId) -> bool {
+        match self.arena.node(id) {
+            Node::Unary(Unary::Sin | Unary::Cos, a) => {
+                let of_variable = matches!(self.arena.node_of(a), Some(Node::Variable(_)));
+                // An angle that effects make up is small; in a truncated ring its sine and cosine are series.
+                !(of_variable || self.order.is_some() && self.contains_errors(a))
+            }
+            Node::Unary(function, _) => !matches!(function, Unary::Neg | Unary::Sqrt),
+            Node::Variable(_) | Node::Binary(..) => false,
+        }
+    }
+
+    fn normal_form_of(&self, operand: Operand) -> Polynomial {
+        match operand {
+            Operand::Constant(constant) => Polynomial::constant(constant.value()),
+            Operand::Node(id) => self.known.get(&id).cloned().unwrap_or_default(),
+        }
+    }
+
+    fn of_node(&mut self, id: NodeId) -> Result<Polynomial, CodegenError> {
+        let no = |what: &str| CodegenError::NoPolynomial {
+            what: what.to_string(),
+        };
+        if self.is_function(id) {
+            return if self.order.is_some() && self.contains_errors(Operand::Node(id)) {
+                Err(no("a function of errors"))
+            } else {
+                Ok(Polynomial::atom(Atom::Function(id)))
+            };
+        }
+        Ok(match self.arena.node(id) {
+            Node::Variable(variable) => {
+                let atom = Atom::Variable(variable);
+                if self.order == Some(0) && self.is_small(atom) {
+                    Polynomial::default()
+                } else {
+                    Polynomial::atom(atom)
+                }
+            }
+            Node::Unary(Unary::Neg, a) => -&self.normal_form_of(a),
+            Node::Unary(function @ (Unary::Sin | Unary::Cos), a) => match self.arena.node_of(a) {
+                Some(Node::Variable(variable)) => self.turn(function, variable),
+                _ => self.series(function, &self.normal_form_of(a))?,
+            },
+            Node::Unary(Unary::Sqrt, a) => {
+                let radicand = self.normal_form_of(a);
+                if radicand.contains(|atom| self.is_small(atom)) {
+                    return Err(no("a root of errors"));
+                }
+                self.root(radicand)
+            }
+            Node::Unary(..) => return Err(no("a function")),
+            Node::Binary(op, a, b) => {
+                let (x, y) = (self.normal_form_of(a), self.normal_form_of(b));
+                match op {
+                    Binary::Add => &x + &y,
+                    Binary::Sub => &x - &y,
+                    Binary::Mul => self.product(&x, &y),
+                    Binary::Div => {
+                        let divisor = BigRational::from_float(b.known().unwrap_or(0.0));
+                        let zero = BigRational::from_integer(0.into());
+                        let divisor = divisor.filter(|divisor| *divisor != zero);
+                        let divisor = divisor.ok_or_else(|| no("a quotient of expressions"))?;
+                        x.scaled(&divisor.recip())
+                    }
+                }
+            }
+        })
+    }
+
+    /// Whether an expression holds an error, an instrument unknown or a coefficient of an effect.
+    fn contains_errors(&self, operand: Operand) -> bool {
+        let variables = self.arena.variables_of(&[operand]);
+        variables
+            .into_iter()
+            .any(|variable| self.variable(variable).is_small())
+    }
+
+    /// The sine or cosine of a sum of errors in a truncated ring: `x` or `1 − x²/2`.
+    fn series(&self, function: Unary, angle: &Polynomial) -> Result<Polynomial, CodegenError> {
+        let mut terms = angle.terms();
+        if !terms.all(|(monomial, _)| monomial.degree(|atom| self.is_small(atom)) > 0) {
+            return Err(CodegenError::NoPolynomial {
+                what: "a sine of an error and what is none".to_string(),
+            });
+        }
+        if function == Unary::Sin {
+            return Ok(angle.clone());
+        }
+        let half = BigRational::new(1.into(), 2.into());
+        Ok(&Polynomial::constant(1.0) - &self.product(angle, angle).scaled(&half))
+    }
+
+    /// The sine or cosine of a variable, as a series where it is an error and the ring is truncated.
+    fn turn(&self, function: Unary, variable: VariableId) -> Polynomial {
+        let itself = Polynomial::atom(Atom::Variable(variable));
+        match (self.order, self.variable(variable).is_small(), function) {
+            (Some(0), true, Unary::Sin) => Polynomial::default(),
+            (Some(_), true, Unary::Sin) => itself,
+            (Some(2), true, _) => {
+                let square = self.product(&itself, &itself);
+                let half = BigRational::new(1.into(), 2.into());
+                &Polynomial::constant(1.0) - &square.scaled(&half)
+            }
+            (Some(_), true, _) => Polynomial::constant(1.0),
+            (_, _, Unary::Sin) => Polynomial::atom(Atom::Sin(variable)),
+            _ => Polynomial::atom(Atom::Cos(variable)),
+        }
+    }
+
+    /// The root of an expression without errors, one atom for each radicand.
+    pub fn root(&mut self, radicand: Polynomial) -> Polynomial {
+        if radicand.is_zero() {
+            return radicand;
+        }
+        let place = self.roots.iter().position(|known| *known == radicand);
+        let place = place.unwrap_or_else(|| {
+            self.roots.push(radicand);
+            self.roots.len() - 1
+        });
+        Polynomial::atom(Atom::Root(place))
+    }
+
+    /// The product in normal form, up to the ring's order.
+    pub fn product(&self, a: &Polynomial, b: &Polynomial) -> Polynomial {
+        let beyond = |monomial: &Monomial| {
+            self.order
+                .is_some_and(|order| monomial.degree(|atom| self.is_small(atom)) > order)
+        };
+        let mut pending: Vec<(Monomial, BigRational)> = a.product(b, beyond).0.into_iter().collect();
+        let mut product = Polynomial::default();
+        while let Some((mut monomial, coefficient)) = pending.pop() {
+            let Some(place) = squared(&monomial) else {
+                product.insert(monomial, coefficient);
+                continue;
+            };
+            let (atom, power) = monomial.0[place];
+            if power == 2 {
+                monomial.0.remove(place);
+            } else {
+                monomial.0[place].1 = power - 2;
+            }
+            let square = match atom {
+                Atom::Root(root) => self.roots[root].clone(),
+                // Nothing is known of the square of a function; `squared` names none.
+                Atom::Function(_) => continue,
+                Atom::Sin(variable) | Atom::Cos(variable) | Atom::Variable(variable) => {
+                    let cosine = Polynomial::atom(Atom::Cos(variable));
+                    &Polynomial::constant(1.0) - &cosine.product(&cosine, |_| false)
+                }
+            };
+            let mut rest = Polynomial::default();
+            rest.insert(monomial, coefficient);
+            pending.extend(rest.product(&square, beyond).0);
+        }
+        product
+    }
+
+    /// The errors and instrument unknowns among `parameters` that none of the forms contains.
+    pub fn absent<'v>(&self, forms: &[Polynomial], parameters: &'v [Variable]) -> Vec<&'v Variable> {
+        let contains = |variable: &Variable| {
+            let Some(Atom::Variable(id)) = self.atom_of(variable) else {
+                return false;
+            };
+            let own = |atom: Atom| match atom {
+                Atom::Variable(own) | Atom::Sin(own) | Atom::Cos(own) => own == id,
+                Atom::Function(node) => self.arena.variables_of(&[Operand::Node(node)]).contains(&id),
+                Atom::Root(_) => false,
+            };
+            forms.iter().any(|form| form.contains(own))
+        };
+        parameters.iter().filter(|variable| !contains(variable)).collect()
+    }
+}
+
+/// The place of a sine or root that a rule applies to.
+fn squared(monomial: &Monomial) -> Option<usize> {
+    let mut powers = monomial.0.iter();
+    powers.position(|(atom, power)| *power >= 2 && matches!(atom, Atom::Sin(_) | Atom::Root(_)))
+}

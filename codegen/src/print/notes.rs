@@ -1,0 +1,161 @@
+//! Sentences about an equation that every printer needs.
+
+use abbe_model::frames::Rotation;
+
+use crate::effect::Followed;
+use crate::equation::{Equation, Form, Kind, Order};
+use crate::first_order::Column;
+use crate::variable::Variable;
+
+/// What it is: two lines.
+pub(crate) fn title(equation: &Equation) -> Vec<String> {
+    let what = match equation.kind {
+        Kind::Length => "Length read by a ball bar",
+        Kind::Distance => "Distance from a probe to the surface of its artefact",
+        Kind::Coordinates => "Coordinates read by the instrument",
+        Kind::Volumetric => "Error vector of the tool in the table frame",
+    };
+    let order = match equation.options.order {
+        Order::Exact => "exact in the errors",
+        Order::Bilinear => "up to products of two errors",
+        Order::First => "first order in the errors",
+    };
+    let order = match &equation.form {
+        Form::Groups { complete: true, .. } => "up to products of two errors, which is all there is",
+        _ => order,
+    };
+    let rotation = match (equation.options.order, equation.machine.rotation) {
+        (Order::First, _) => "",
+        (_, Rotation::Exact) => ", exact rotations Rx·Ry·Rz",
+        (_, Rotation::SmallAngle) => ", small-angle rotations I + [θ]×",
+    };
+    let code = equation.machine.code();
+    let name = match &equation.machine.name {
+        name if *name == code || name.is_empty() => String::new(),
+        name => format!("{name}, "),
+    };
+    vec![
+        format!("{what}: {name}{code}; {order}{rotation}."),
+        format!("Written by Abbe {}.", env!("CARGO_PKG_VERSION")),
+    ]
+}
+
+/// What it was checked against, what it leaves out, what it does not contain, in plain text.
+pub(crate) fn notes(equation: &Equation) -> Vec<String> {
+    let symbols = equation.options.symbols;
+    notes_spelt(equation, &str::to_string, &|variable| variable.text(symbols))
+}
+
+/// The same, `escape` spelling the words and `name` the names.
+pub(crate) fn notes_spelt(
+    equation: &Equation,
+    escape: &dyn Fn(&str) -> String,
+    name: &dyn Fn(&Variable) -> String,
+) -> Vec<String> {
+    let check = &equation.check;
+    let of = match equation.options.order {
+        Order::Exact => "the chain",
+        Order::Bilinear => "the second-order series of the chain",
+        Order::First => "the first-order series of the chain",
+    };
+    let mut notes = vec![escape(&format!(
+        "Checked against {of} with dual numbers at {} points, errors to ±10 mm and ±0.1 rad: largest relative difference {:.0e} (value), {:.0e} (gradient).",
+        check.points, check.value, check.gradient
+    ))];
+    if !equation.deviations.is_empty() {
+        let found = equation.deviations.iter().map(|deviation| {
+            format!(
+                "{} µm at errors of ±{} µm and ±{}°",
+                two_digits(deviation.largest_um),
+                deviation.shift_um,
+                deviation.tilt_deg,
+            )
+        });
+        let found = found.collect::<Vec<_>>().join(", ");
+        let over = range(equation);
+        notes.push(escape(&format!(
+            "Largest deviation from the exact chain{over}: {found}."
+        )));
+    }
+    if !equation.absent.is_empty() {
+        let names: Vec<String> = equation.absent.iter().map(name).collect();
+        notes.push(format!("Not contained: {}.", names.join(", ")));
+    }
+    if let Form::First(first, _) = &equation.form {
+        for sensitivity in &first.sensitivities {
+            if let Column::Multiple { of, .. } = &sensitivity.column {
+                notes.push(format!(
+                    "{} {} {}{}",
+                    name(&sensitivity.parameter),
+                    escape("cannot be told from"),
+                    name(of),
+                    escape(": a fixed multiple wherever the axes stand.")
+                ));
+            }
+        }
+    }
+    notes
+}
+
+/// Where a truncation was judged: the ranges of the moving axes, and lengths that the session does not state.
+fn range(equation: &Equation) -> String {
+    let degrees = |angle: f64| two_places(angle.to_degrees());
+    let axes = equation
+        .range
+        .iter()
+        .filter_map(|(variable, [low, high])| match variable {
+            Variable::Position { axis, .. } if variable.is_angle() => {
+                Some(format!("{axis} {}° to {}°", degrees(*low), degrees(*high)))
+            }
+            Variable::Position { axis, .. } => Some(format!(
+                "{axis} {} mm to {} mm",
+                two_places(*low),
+                two_places(*high)
+            )),
+            Variable::Driver(Followed::Direction(_)) => None,
+            Variable::Driver(followed) => Some(format!(
+                "{} {low} {unit} to {high} {unit}",
+                followed.text(),
+                low = two_places(*low),
+                high = two_places(*high),
+                unit = followed.unit()
+            )),
+            Variable::Length(name) if equation.kind == Kind::Volumetric => {
+                Some(format!("{name} {} mm", two_places(*low)))
+            }
+            _ => None,
+        });
+    let axes: Vec<String> = axes.collect();
+    if axes.is_empty() {
+        String::new()
+    } else {
+        format!(" over {}", axes.join(", "))
+    }
+}
+
+/// A number rounded to two decimals, without those that say nothing.
+fn two_places(value: f64) -> String {
+    let rounded = (value * 100.0).round() / 100.0;
+    format!("{}", rounded + 0.0).replace('-', "−")
+}
+
+/// A positive number with two digits that count; what is less than a millionth is rounding.
+fn two_digits(value: f64) -> String {
+    if value < 1e-6 {
+        return "less than 0.000001".to_string();
+    }
+    let exponent = value.abs().log10().floor();
+    let decimals = (1.0 - exponent).max(0.0) as usize;
+    format!("{value:.decimals$}")
+}
+
+/// What a variable stands for: in the error vector of the tool its lengths are the coordinates of a point.
+pub(crate) fn meaning(equation: &Equation, variable: &Variable) -> String {
+    match variable {
+        Variable::Length(name) if equation.kind == Kind::Volumetric => {
+            let coordinate = name.split('_').next().unwrap_or_default();
+            format!("{coordinate} of the tool point in the tool frame")
+        }
+        other => other.meaning(),
+    }
+}

@@ -1,0 +1,137 @@
+//! Where a menu puts the carried ball, and where the axes that do not sweep stand.
+
+use abbe_model::instrument::Station;
+use abbe_model::session::Session;
+
+use super::candidate_tests::CandidateTests;
+
+/// A ball nearer than this to one that is mounted already is that one, mm.
+const SAME_PLACE_MM: f64 = 0.5;
+
+/// A place of the carried ball: where, and under which set-up.
+pub(super) struct Place {
+    /// Centre, mm.
+    pub ball: [f64; 3],
+    /// The set-up that it has in the session; empty where it is mounted anew.
+    pub setup: String,
+    /// Whether it is mounted anew.
+    pub new: bool,
+}
+
+/// Where the carried ball may be: as it is mounted in the session, or anew about each rotary axis of its side.
+pub(super) fn places(
+    session: &Session,
+    menu: &CandidateTests,
+    rotary: &[usize],
+    on_table: bool,
+) -> Vec<Place> {
+    let machine = &session.machine;
+    let mut places: Vec<Place> = Vec::new();
+    for test in &session.tests {
+        let Station::BallBar(bar) = &test.station else {
+            continue;
+        };
+        let (ball, setup) = if on_table {
+            (bar.workpiece_ball, test.setup.clone())
+        } else {
+            (bar.spindle_ball, test.spindle_setup.clone())
+        };
+        if on_table && !places.iter().any(|place| place.setup == setup) {
+            places.push(Place {
+                ball,
+                setup,
+                new: false,
+            });
+        }
+    }
+    for &about in rotary
+        .iter()
+        .filter(|axis| (**axis < machine.workpiece_side) == on_table)
+    {
+        let axis = &machine.axes[about];
+        let across = across(axis.direction);
+        let carries_table = on_table && about == 0;
+        for &radius in &menu.radii_mm {
+            for &height in &menu.heights_mm {
+                let both = if carries_table || height == 0.0 {
+                    &[1.0][..]
+                } else {
+                    &[1.0, -1.0][..]
+                };
+                for sign in both {
+                    let up = if axis.direction[2] < 0.0 { -1.0 } else { 1.0 };
+                    let ball: [f64; 3] = std::array::from_fn(|i| {
+                        axis.origin_mm[i] + up * sign * height * axis.direction[i] + radius * across[i]
+                    });
+                    let taken = places
+                        .iter()
+                        .any(|place| distance(place.ball, ball) < SAME_PLACE_MM);
+                    if !taken {
+                        places.push(Place {
+                            ball,
+                            setup: String::new(),
+                            new: true,
+                        });
+                    }
+                }
+            }
+        }
+    }
+    places
+}
+
+/// A unit vector square to an axis: R's Y where it can be, else Z.
+fn across(direction: [f64; 3]) -> [f64; 3] {
+    let start = if direction[1].abs() < 0.5 {
+        [0.0, 1.0, 0.0]
+    } else {
+        [0.0, 0.0, 1.0]
+    };
+    let along: f64 = (0..3).map(|i| start[i] * direction[i]).sum();
+    let rest: [f64; 3] = std::array::from_fn(|i| start[i] - along * direction[i]);
+    let length = norm(rest);
+    rest.map(|x| x / length)
+}
+
+/// The positions of all axes with the other rotary ones where the menu has them stand.
+pub(super) fn standings(
+    session: &Session,
+    menu: &CandidateTests,
+    rotary: &[usize],
+    swept: usize,
+) -> Vec<Vec<f64>> {
+    let machine = &session.machine;
+    let mut all = vec![vec![0.0; machine.axes.len()]];
+    for &other in rotary.iter().filter(|axis| **axis != swept) {
+        let mut more = Vec::new();
+        for at in &all {
+            for degrees in &menu.standing_deg {
+                let position = degrees.to_radians();
+                let [low, high] = machine.axes[other]
+                    .travel
+                    .unwrap_or([f64::NEG_INFINITY, f64::INFINITY]);
+                if position >= low - 1e-9 && position <= high + 1e-9 {
+                    let mut at = at.clone();
+                    at[other] = position;
+                    more.push(at);
+                }
+            }
+        }
+        all = more;
+    }
+    all
+}
+
+/// `a · b`.
+pub(super) fn dot(a: [f64; 3], b: [f64; 3]) -> f64 {
+    (0..3).map(|i| a[i] * b[i]).sum()
+}
+
+/// `√(a · a)`.
+pub(super) fn norm(a: [f64; 3]) -> f64 {
+    dot(a, a).sqrt()
+}
+
+fn distance(a: [f64; 3], b: [f64; 3]) -> f64 {
+    norm(std::array::from_fn(|i| a[i] - b[i]))
+}

@@ -1,0 +1,147 @@
+//! A menu made ready: the information of every entry, evaluated once.
+
+use rayon::prelude::*;
+
+use super::candidate_tests::{CandidateTests, Entry};
+use super::information::{Root, Shared, sum};
+use super::linear::{Linearisation, merged};
+use super::ranking::smallest_first;
+use crate::error::IdentifyError;
+use crate::parameters::{Parameter, Role};
+use crate::problem::Problem;
+use crate::triangle::Triangle;
+
+/// A menu made ready: the information of every entry on the shared unknowns.
+pub struct Prepared {
+    /// The shared unknowns.
+    pub shared: Shared,
+    /// The plan's own information.
+    pub base: Root,
+    /// The entries.
+    pub entries: Vec<CandidateInformation>,
+}
+
+/// An entry with its information.
+pub struct CandidateInformation {
+    /// The entry; its name says what is left mounted.
+    pub entry: Entry,
+    /// Its information.
+    pub root: Root,
+}
+
+impl Prepared {
+    /// The menu of a problem whose folds are its tests, at the unknowns' values `beta`. `asked` are the unknowns that the goal is about.
+    ///
+    /// # Errors
+    /// If the model cannot be evaluated.
+    pub fn new(
+        problem: &Problem<'_>,
+        beta: &[f64],
+        entries: Vec<Entry>,
+        menu: &CandidateTests,
+        asked: &[usize],
+    ) -> Result<Prepared, IdentifyError> {
+        let list = &problem.parameters.list;
+        let kept: Vec<usize> = (0..list.len())
+            .filter(|j| !asked.contains(j) && may_be_shared(problem, &list[*j]))
+            .collect();
+        let shared = Shared::of(problem, &kept, asked);
+        let linear = Linearisation::of(problem, beta)?;
+        let base = shared.root_of(problem, &linear)?;
+        let ready: Vec<Vec<CandidateInformation>> = entries
+            .into_par_iter()
+            .map(|entry| ready(problem, &shared, entry, menu))
+            .collect::<Result<_, IdentifyError>>()?;
+        Ok(Prepared {
+            shared,
+            base,
+            entries: ready.into_iter().flatten().collect(),
+        })
+    }
+
+    /// The plan with some entries added.
+    pub fn with(&self, entries: &[usize]) -> Root {
+        entries.iter().fold(self.base.clone(), |root, entry| {
+            sum(root.as_ref(), self.entries[*entry].root.as_ref())
+        })
+    }
+
+    /// Some information with an entry added.
+    pub fn added(&self, root: &Root, entry: usize) -> Root {
+        sum(root.as_ref(), self.entries[entry].root.as_ref())
+    }
+
+    /// A figure of some information with each entry added.
+    pub fn figures<T: Send>(&self, root: &Root, figure: &(impl Fn(&Root) -> T + Sync)) -> Vec<T> {
+        (0..self.entries.len())
+            .into_par_iter()
+            .map(|entry| figure(&self.added(root, entry)))
+            .collect()
+    }
+
+    /// The entry after which a figure (the smaller the better) stands best, and the figures of all. Of equal ones the first of the menu, which lists
+    /// mounted balls before those that are mounted anew.
+    pub fn best(&self, root: &Root, figure: &(impl Fn(&Root) -> f64 + Sync)) -> Option<(usize, Vec<f64>)> {
+        let figures = self.figures(root, figure);
+        let best = (0..figures.len()).min_by(|a, b| smallest_first(figures[*a], figures[*b]))?;
+        Some((best, figures))
+    }
+}
+
+/// Whether a new test can share an unknown: errors and effects, a mounted workpiece ball, the spindle ball of the last test, the sensor.
+fn may_be_shared(problem: &Problem<'_>, parameter: &Parameter) -> bool {
+    if parameter.role != Role::Setup {
+        return true;
+    }
+    let last = problem
+        .tests
+        .last()
+        .map_or("", |test| test.spindle_setup.as_str());
+    parameter.id.starts_with("workpiece_ball.")
+        || (parameter.id.starts_with("spindle_ball.") && parameter.id.ends_with(&format!("[{last}]")))
+        || !parameter.id.contains('[')
+}
+
+/// The information of an entry, with a spindle ball mounted for it and, where the menu allows it, with the one that is left mounted. The
+/// readings are the same.
+fn ready(
+    problem: &Problem<'_>,
+    shared: &Shared,
+    entry: Entry,
+    menu: &CandidateTests,
+) -> Result<Vec<CandidateInformation>, IdentifyError> {
+    let mut session = problem.session.clone();
+    session.tests = vec![entry.test.clone()];
+    session.effects = Vec::new();
+    session.socket_distances = Vec::new();
+    let mut noise = problem.noise.clone();
+    noise.sigma_mm /= (menu.thin.max(1) as f64).sqrt();
+    let mut alone = Problem::new(&session, noise, 0)?;
+    alone.origin = problem.origin;
+    for effect in &problem.parameters.effects {
+        alone.add_effect(effect)?;
+    }
+    let nominal = vec![0.0; alone.parameters.list.len()];
+    let triangle = merged(Triangle::new(nominal.len()), alone.triangles(&nominal)?.iter());
+    let r = triangle.parts().0;
+    let mut ready = Vec::new();
+    let last = problem.tests.last().filter(|last| {
+        menu.keep_spindle_ball && last.station.tool_point_mm() == entry.test.station.tool_point_mm()
+    });
+    if let Some(last) = last {
+        let [own, left] = [&entry.test.spindle_setup, &last.spindle_setup].map(|setup| format!("[{setup}]"));
+        let root = shared.root_of_test(&alone, r.as_ref(), |id| match id.strip_suffix(&own) {
+            Some(id_stem) if id.starts_with("spindle_ball.") => format!("{id_stem}{left}"),
+            _ => id.to_string(),
+        });
+        let mut entry = entry.clone();
+        entry.test.spindle_setup = last.spindle_setup.clone();
+        entry
+            .name
+            .push_str(&format!(", spindle ball left as in {}", last.name));
+        ready.push(CandidateInformation { entry, root });
+    }
+    let root = shared.root_of_test(&alone, r.as_ref(), str::to_string);
+    ready.insert(0, CandidateInformation { entry, root });
+    Ok(ready)
+}

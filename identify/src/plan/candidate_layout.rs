@@ -1,0 +1,318 @@
+//! The choices of a menu laid out as tests: where the ball is, which axis sweeps, where the others stand, which bar, on which side.
+
+use abbe_model::axis::AxisKind;
+use abbe_model::instrument::Station;
+use abbe_model::instrument::ballbar::{BAR, BallBar};
+use abbe_model::session::expression::Length;
+use abbe_model::session::motion::{FollowOffset, Motion};
+use abbe_model::session::{Prior, Session, Test, placing};
+
+use super::ball_positions::{Place, dot, norm, places, standings};
+use super::candidate_tests::CandidateTests;
+use super::sweep::{Sweep, sweep_of};
+
+/// Least radius about a swept axis that a test is made at, mm: nearer, the bar hardly moves.
+const MIN_RADIUS_MM: f64 = 10.0;
+/// Shortest bar with which linear axes follow, mm: the shortest of the kits, less what calibration may take off. Nearer, the cups touch.
+const MIN_FOLLOWING_MM: f64 = 49.0;
+
+/// An entry before its states are planned.
+pub(super) struct Draft {
+    /// The test, without its states.
+    pub test: Test,
+    /// In words.
+    pub name: String,
+    /// Whether a ball has to be mounted anew.
+    pub new_setup: bool,
+}
+
+/// Everything that the menu's choices come to, before travel and reach are checked.
+pub(super) fn drafts(session: &Session, menu: &CandidateTests, last: &Test) -> Vec<Draft> {
+    let machine = &session.machine;
+    let rotary: Vec<usize> = (0..machine.axes.len())
+        .filter(|axis| machine.axes[*axis].kind == AxisKind::Rotary)
+        .collect();
+    let mut drafts = Vec::new();
+    for &axis in &rotary {
+        let whole = sweep_of(session, axis);
+        let sweeps: Vec<Sweep> = menu
+            .ranges
+            .iter()
+            .flat_map(|share| menu.both_directions.iter().map(|both| whole.part(*share, *both)))
+            .collect();
+        let on_table = axis < machine.workpiece_side;
+        for place in places(session, menu, &rotary, on_table) {
+            for at in standings(session, menu, &rotary, axis) {
+                for (sweep, &feed) in sweeps
+                    .iter()
+                    .flat_map(|sweep| menu.feeds.iter().map(|feed| (*sweep, feed)))
+                {
+                    let place = &place;
+                    let mut at = at.clone();
+                    at[axis] = sweep.from;
+                    let base = Base {
+                        session,
+                        last,
+                        axis,
+                        sweep,
+                        feed,
+                        on_table,
+                        place,
+                        at: &at,
+                    };
+                    drafts.extend(
+                        menu.bars_mm
+                            .iter()
+                            .flat_map(|nominal| base.on_axis(menu, *nominal)),
+                    );
+                    let upright = at.iter().enumerate().all(|(k, q)| k == axis || *q == 0.0);
+                    if let Some(nominal) = following_bar(menu).filter(|_| menu.follow && upright) {
+                        drafts.extend(base.following(menu, nominal));
+                    }
+                }
+            }
+        }
+    }
+    drafts
+}
+
+/// The bar for tests in which linear axes follow, where its length changes nothing but how far the balls are apart: the shortest that keeps
+/// them 100 mm apart, else the longest that keeps their cups apart.
+fn following_bar(menu: &CandidateTests) -> Option<f64> {
+    let bars = || {
+        menu.bars_mm
+            .iter()
+            .copied()
+            .filter(|bar| *bar >= MIN_FOLLOWING_MM)
+    };
+    bars()
+        .filter(|bar| *bar >= 99.0)
+        .min_by(f64::total_cmp)
+        .or_else(|| bars().max_by(f64::total_cmp))
+}
+
+struct Base<'b> {
+    session: &'b Session,
+    last: &'b Test,
+    axis: usize,
+    sweep: Sweep,
+    /// Times the speed of the sweep.
+    feed: f64,
+    on_table: bool,
+    place: &'b Place,
+    at: &'b [f64],
+}
+
+impl Base<'_> {
+    /// The bar of the kit as the session has calibrated it, if it has.
+    fn length(&self, nominal: f64) -> f64 {
+        let bars = self.session.tests.iter().filter_map(|test| match &test.station {
+            Station::BallBar(bar) => Some(bar.bar),
+            _ => None,
+        });
+        bars.into_iter()
+            .find(|bar| (bar - nominal).abs() <= 1.0)
+            .unwrap_or(nominal)
+    }
+
+    fn station(&self, nominal: f64) -> BallBar<f64> {
+        let mut bar = match &self.last.station {
+            Station::BallBar(bar) => bar.clone(),
+            _ => BallBar {
+                workpiece_ball: [0.0; 3],
+                spindle_ball: [0.0; 3],
+                bar: 0.0,
+            },
+        };
+        bar.bar = self.length(nominal);
+        if self.on_table {
+            bar.workpiece_ball = self.place.ball;
+        } else {
+            bar.spindle_ball = self.place.ball;
+        }
+        bar
+    }
+
+    fn draft(&self, nominal: f64, station: BallBar<f64>, at: Vec<f64>, motion: Motion, words: &str) -> Draft {
+        let machine = &self.session.machine;
+        let axis = &machine.axes[self.axis];
+        let (origin, along) = placing::axis_line(machine, &at, self.axis);
+        let (workpiece, spindle) = placing::balls(machine, &station, &at);
+        let carried = if self.on_table { workpiece } else { spindle };
+        let from: [f64; 3] = std::array::from_fn(|i| carried[i] - origin[i]);
+        let height = dot(from, along);
+        let radius = (dot(from, from) - height * height).max(0.0).sqrt();
+        let ball = if self.on_table {
+            "workpiece ball"
+        } else {
+            "spindle ball"
+        };
+        let mut name = format!(
+            "{}{nominal:.0} with the {ball} at radius {radius:.0} mm",
+            axis.name
+        );
+        if height.abs() >= 0.5 {
+            name.push_str(&format!(", height {height:.0} mm").replace('-', "−"));
+        }
+        for (k, other) in machine.axes.iter().enumerate() {
+            if k != self.axis && other.kind == AxisKind::Rotary && at[k] != 0.0 {
+                name.push_str(&format!(", {} at {:.0}°", other.name, at[k].to_degrees()).replace('-', "−"));
+            }
+        }
+        name.push_str(words);
+        if self.sweep.is_part || !self.sweep.both_directions {
+            let [from, to] = [self.sweep.from, self.sweep.to].map(f64::to_degrees);
+            let ways = if self.sweep.both_directions {
+                "both ways"
+            } else {
+                "one way"
+            };
+            name.push_str(&format!(", swept {from:.0} … {to:.0}° {ways}").replace('-', "−"));
+        }
+        if self.feed != 1.0 {
+            name.push_str(&format!(", at {} times the feed", self.feed));
+        }
+        if !self.place.new {
+            name.push_str(&format!(" ({ball} as in {})", self.place.setup));
+        }
+        let geometry = Station::BallBar(BallBar {
+            workpiece_ball: station.workpiece_ball.map(Length::Number),
+            spindle_ball: station.spindle_ball.map(Length::Number),
+            bar: Length::Number(station.bar),
+        });
+        let unique = "proposed".to_string();
+        let setup = match (self.on_table, self.place.new) {
+            (true, false) => self.place.setup.clone(),
+            (true, true) => unique.clone(),
+            (false, _) => self.last.setup.clone(),
+        };
+        let priors = self.priors(nominal);
+        let test = Test {
+            name: unique.clone(),
+            station: Station::BallBar(station),
+            geometry,
+            priors,
+            setup,
+            spindle_setup: unique.clone(),
+            bar_setup: unique,
+            socket: None,
+            motion: Some(motion),
+            at_written: vec![None; at.len()],
+            at,
+            readings: None,
+        };
+        Draft {
+            test,
+            name,
+            new_setup: self.place.new,
+        }
+    }
+
+    /// What is known of the set-up: as in the session's tests; of the bar, as of the same bar there.
+    fn priors(&self, nominal: f64) -> Vec<Prior> {
+        let mut priors = self.last.priors.clone();
+        let same_bar = self.session.tests.iter().find(|test| match &test.station {
+            Station::BallBar(bar) => (bar.bar - nominal).abs() <= 1.0,
+            _ => false,
+        });
+        if let Some(test) = same_bar {
+            priors[BAR] = test.priors[BAR];
+        }
+        priors
+    }
+
+    /// The other ball on the swept axis: at the foot of the circle where the bar is as long as the radius, else beside it.
+    fn on_axis(&self, menu: &CandidateTests, nominal: f64) -> Vec<Draft> {
+        let machine = &self.session.machine;
+        let station = self.station(nominal);
+        let (origin, along) = placing::axis_line(machine, self.at, self.axis);
+        let (workpiece, spindle) = placing::balls(machine, &station, self.at);
+        let carried = if self.on_table { workpiece } else { spindle };
+        let from: [f64; 3] = std::array::from_fn(|i| carried[i] - origin[i]);
+        let height = dot(from, along);
+        let radial: [f64; 3] = std::array::from_fn(|i| from[i] - height * along[i]);
+        let radius = norm(radial);
+        if radius < MIN_RADIUS_MM || station.bar < radius - menu.reach_mm {
+            return Vec::new();
+        }
+        let beside = if (station.bar - radius).abs() <= menu.reach_mm {
+            vec![0.0]
+        } else {
+            let beside = (station.bar.powi(2) - radius.powi(2)).sqrt();
+            vec![beside, -beside]
+        };
+        let outward = self.outward();
+        beside
+            .into_iter()
+            .filter_map(|beside| {
+                // From the carried ball to the other one.
+                let across: [f64; 3] = std::array::from_fn(|i| beside * along[i] - radial[i]);
+                let wanted = if self.on_table { across } else { across.map(|x| -x) };
+                if outward.is_some_and(|outward| dot(wanted, outward) < -MIN_RADIUS_MM) {
+                    return None;
+                }
+                let at = placing::standing(machine, &station, self.at, wanted)?;
+                let motion = Motion::Sweep {
+                    axis: self.axis,
+                    from: self.sweep.from,
+                    to: self.sweep.to,
+                    step: self.sweep.step * menu.thin.max(1) as f64,
+                    speed: self.sweep.speed * self.feed,
+                    runs: self.sweep.runs,
+                    both_directions: self.sweep.both_directions,
+                };
+                let words = if beside == 0.0 {
+                    String::new()
+                } else {
+                    let side = if beside > 0.0 { "+" } else { "−" };
+                    format!(
+                        ", other ball {side}{:.0} mm along {}",
+                        beside.abs(),
+                        machine.axes[self.axis].name
+                    )
+                };
+                Some(self.draft(nominal, station.clone(), at, motion, &words))
+            })
+            .collect()
+    }
+
+    /// Where the table's axis stands on end and carries the ball itself, the way out of the table: no other ball lies below it.
+    fn outward(&self) -> Option<[f64; 3]> {
+        let machine = &self.session.machine;
+        let table = machine
+            .axes
+            .first()
+            .filter(|axis| self.on_table && axis.kind == AxisKind::Rotary)?;
+        let up = table.direction[2];
+        (self.axis == 0 && up.abs() > 0.9).then(|| {
+            let (_, along) = placing::axis_line(machine, self.at, 0);
+            along.map(|x| x * up.signum())
+        })
+    }
+
+    /// The linear axes keep the bar radial, tangential or axial.
+    fn following(&self, menu: &CandidateTests, nominal: f64) -> Vec<Draft> {
+        let offsets = [
+            (FollowOffset::Radial, "radial"),
+            (FollowOffset::Tangential, "tangential"),
+            (FollowOffset::Axial, "axial"),
+        ];
+        offsets
+            .into_iter()
+            .map(|(offset, word)| {
+                let motion = Motion::Follow {
+                    axis: self.axis,
+                    from: self.sweep.from,
+                    to: self.sweep.to,
+                    step: self.sweep.step * menu.thin.max(1) as f64,
+                    speed: self.sweep.speed * self.feed,
+                    runs: self.sweep.runs,
+                    both_directions: self.sweep.both_directions,
+                    offset,
+                };
+                let words = format!(", linear axes following with the bar {word}");
+                self.draft(nominal, self.station(nominal), self.at.to_vec(), motion, &words)
+            })
+            .collect()
+    }
+}

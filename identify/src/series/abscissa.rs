@@ -1,0 +1,207 @@
+//! What a test goes along: the angle about which its trace is drawn, or the axis that moves most.
+
+use std::ops::Range;
+
+use abbe_model::axis::AxisKind;
+use abbe_model::chain::Machine;
+use abbe_model::session::readings::Readings;
+
+use crate::circle;
+
+/// Positions nearer than this are one: mm or rad.
+const STANDS: f64 = 1e-6;
+/// More stretches than one in this many readings: no traversals, but poses.
+const MIN_STRETCH: usize = 10;
+
+/// What a test goes along.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Abscissa {
+    /// `C`, or `XY` for the angle about the middle of a circle.
+    pub name: String,
+    /// Whether it is an angle.
+    pub is_angle: bool,
+    /// The axis, where it is one.
+    pub axis: Option<usize>,
+    /// Row by row: degrees, or mm.
+    pub values: Vec<f64>,
+    /// All axes that move: their places among the machine's.
+    pub moving: Vec<usize>,
+}
+
+/// Consecutive readings of one run in one direction.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Stretch {
+    /// The number of the run in the file, or 1.
+    pub run: i64,
+    /// Its rows.
+    pub rows: Range<usize>,
+    /// Whether the way's values grow; `None` for poses.
+    pub forward: Option<bool>,
+}
+
+fn range(values: &[f64]) -> f64 {
+    let low = values.iter().copied().fold(f64::INFINITY, f64::min);
+    let high = values.iter().copied().fold(f64::NEG_INFINITY, f64::max);
+    (high - low).max(0.0)
+}
+
+impl Abscissa {
+    /// Of a test's readings: the rotary axis that turns most; else the angle about the circle of two linear axes; else the linear axis that
+    /// moves most; else the number of the reading.
+    pub fn of(machine: &Machine, readings: &Readings) -> Abscissa {
+        let moving: Vec<usize> = (0..machine.axes.len())
+            .filter(|axis| range(&readings.positions[*axis]) > STANDS)
+            .collect();
+        let most = |kind: AxisKind| {
+            moving
+                .iter()
+                .copied()
+                .filter(|axis| machine.axes[*axis].kind == kind)
+                .max_by(|a, b| range(&readings.positions[*a]).total_cmp(&range(&readings.positions[*b])))
+        };
+        if let Some(axis) = most(AxisKind::Rotary) {
+            return Abscissa {
+                name: machine.axes[axis].name.clone(),
+                is_angle: true,
+                axis: Some(axis),
+                values: readings.positions[axis].iter().map(|q| q.to_degrees()).collect(),
+                moving,
+            };
+        }
+        // The names in their order: X to the right, Y up.
+        let mut pair = moving.clone();
+        pair.sort_by(|a, b| machine.axes[*a].name.cmp(&machine.axes[*b].name));
+        if let &[first, second] = pair.as_slice()
+            && let Some(values) = about_a_circle(&readings.positions[first], &readings.positions[second])
+        {
+            return Abscissa {
+                name: format!("{}{}", machine.axes[first].name, machine.axes[second].name),
+                is_angle: true,
+                axis: None,
+                values,
+                moving,
+            };
+        }
+        if let Some(axis) = most(AxisKind::Linear) {
+            return Abscissa {
+                name: machine.axes[axis].name.clone(),
+                is_angle: false,
+                axis: Some(axis),
+                values: readings.positions[axis].clone(),
+                moving,
+            };
+        }
+        Abscissa {
+            name: "reading".to_string(),
+            is_angle: false,
+            axis: None,
+            values: (0..readings.rows()).map(|row| row as f64 + 1.0).collect(),
+            moving,
+        }
+    }
+
+    /// The stretches of one direction of each run; for `poses`, and where the direction changes at every other reading, whole runs without one.
+    pub fn stretches(&self, readings: &Readings, poses: bool) -> Vec<Stretch> {
+        let runs = readings.runs();
+        let number = |row: usize| readings.run.get(row).copied().unwrap_or(1);
+        let whole = |rows: &Range<usize>| Stretch {
+            run: number(rows.start),
+            rows: rows.clone(),
+            forward: None,
+        };
+        if poses {
+            return runs.iter().map(whole).collect();
+        }
+        let mut stretches = Vec::new();
+        for run in &runs {
+            let mut parts: Vec<Stretch> = Vec::new();
+            for row in run.start + 1..run.end {
+                let step = self.values[row] - self.values[row - 1];
+                if step.abs() <= STANDS {
+                    continue;
+                }
+                let forward = Some(step > 0.0);
+                match parts.last_mut() {
+                    Some(last) if last.forward != forward => {
+                        last.rows.end = row;
+                        parts.push(Stretch {
+                            run: number(run.start),
+                            rows: row..run.end,
+                            forward,
+                        });
+                    }
+                    Some(_) => {}
+                    None => parts.push(Stretch {
+                        run: number(run.start),
+                        rows: run.clone(),
+                        forward,
+                    }),
+                }
+            }
+            if parts.is_empty() || parts.len() > 1 + run.len() / MIN_STRETCH {
+                stretches.push(whole(run));
+            } else {
+                stretches.extend(parts);
+            }
+        }
+        stretches
+    }
+}
+
+/// The unwrapped angle (degrees) about the circle that two axes go along; `None` where they go along none.
+fn about_a_circle(first: &[f64], second: &[f64]) -> Option<Vec<f64>> {
+    let points: Vec<[f64; 2]> = first.iter().zip(second).map(|(x, y)| [*x, *y]).collect();
+    let circle = circle::through(&points)?;
+    let off = points
+        .iter()
+        .map(|p| ((p[0] - circle.centre[0]).hypot(p[1] - circle.centre[1]) - circle.radius).abs())
+        .fold(0.0, f64::max);
+    if off > 0.01 * circle.radius {
+        return None;
+    }
+    let mut turns = 0.0;
+    let mut last: Option<f64> = None;
+    let angles = points.iter().map(|p| {
+        let angle = (p[1] - circle.centre[1])
+            .atan2(p[0] - circle.centre[0])
+            .to_degrees();
+        if let Some(before) = last {
+            turns -= ((angle - before) / 360.0).round() * 360.0;
+        }
+        last = Some(angle);
+        angle + turns
+    });
+    Some(angles.collect())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_circle_of_two_axes_is_an_angle_that_goes_on() {
+        let wanted: Vec<f64> = (0..=72).map(|k| 10.0 * f64::from(k)).collect();
+        let at = |k: &f64| k.to_radians();
+        let x: Vec<f64> = wanted.iter().map(|k| 5.0 + 100.0 * at(k).cos()).collect();
+        let y: Vec<f64> = wanted.iter().map(|k| -7.0 + 100.0 * at(k).sin()).collect();
+        let found = about_a_circle(&x, &y).unwrap();
+        for (found, wanted) in found.iter().zip(&wanted) {
+            assert!((found - wanted).abs() < 1e-9, "{found} {wanted}");
+        }
+        assert_eq!(about_a_circle(&wanted, &wanted), None);
+    }
+
+    #[test]
+    fn a_run_there_and_back_has_two_stretches() {
+        let machine = Machine::from_code("wCbt").unwrap();
+        let there = (0..=20).chain((0..20).rev()).map(f64::from);
+        let positions: Vec<f64> = there.map(f64::to_radians).collect();
+        let readings = Readings {
+            positions: vec![positions],
+            ..Readings::default()
+        };
+        let stretches = Abscissa::of(&machine, &readings).stretches(&readings, false);
+        let found: Vec<_> = stretches.iter().map(|s| (s.rows.clone(), s.forward)).collect();
+        assert_eq!(found, [(0..21, Some(true)), (21..41, Some(false))]);
+    }
+}

@@ -1,0 +1,142 @@
+//! The spectrum of a residual by order over an angle.
+//!
+//! For each order `h` by itself, what `a + b·cos hφ + c·sin hφ` explains beyond the constant, as the amplitude `√(2·S/n)` of a wave with that sum of
+//! squares `S` over `n` readings: over whole turns the amplitude of the Fourier series, over a part of a turn never more than the residual holds.
+
+use abbe_model::axis::AxisKind;
+use faer::Mat;
+use faer::prelude::Solve;
+use rayon::prelude::*;
+
+use super::SessionSeries;
+use crate::problem::Problem;
+
+/// The highest order: what is higher is seldom geometry.
+pub const HIGHEST_ORDER: usize = 40;
+
+/// A spectrum of the residuals before and after.
+#[derive(Clone, Debug)]
+pub struct Spectrum {
+    /// The test, or `all poses`.
+    pub of: String,
+    /// The axis, or `XY` for a circle of two.
+    pub over: String,
+    /// Amplitude of orders 1, 2, … of the residual before, µm; for three coordinates the length of the three amplitudes.
+    pub before_um: Vec<f64>,
+    /// The same after.
+    pub after_um: Vec<f64>,
+}
+
+/// The amplitude of each order from 1 in values over an angle in degrees; `coordinates` values a reading.
+pub fn amplitudes(angle_deg: &[f64], values: &[f64], coordinates: usize) -> Vec<f64> {
+    (1..=HIGHEST_ORDER)
+        .into_par_iter()
+        .map(|order| {
+            let basis: Vec<[f64; 3]> = angle_deg
+                .iter()
+                .map(|angle| {
+                    let (sin, cos) = (order as f64 * angle.to_radians()).sin_cos();
+                    [1.0, cos, sin]
+                })
+                .collect();
+            explained(&basis, values, coordinates)
+        })
+        .collect()
+}
+
+fn explained(basis: &[[f64; 3]], values: &[f64], coordinates: usize) -> f64 {
+    let count = basis.len().max(1) as f64;
+    let gram = Mat::from_fn(3, 3, |i, j| {
+        // Over a short arc the three functions are nearly one: a trace of the diagonal keeps the solution small.
+        let ridge = if i == j { 1e-9 * count } else { 0.0 };
+        basis.iter().map(|row| row[i] * row[j]).sum::<f64>() + ridge
+    });
+    let sides = Mat::from_fn(3, coordinates, |i, c| {
+        basis
+            .iter()
+            .zip(values.chunks(coordinates))
+            .map(|(row, reading)| row[i] * reading[c])
+            .sum::<f64>()
+    });
+    let solution = gram.partial_piv_lu().solve(&sides);
+    let sum: f64 = (0..coordinates)
+        .map(|c| {
+            let all: f64 = (0..3).map(|i| sides[(i, c)] * solution[(i, c)]).sum();
+            all - sides[(0, c)].powi(2) / count
+        })
+        .sum();
+    (2.0 * sum.max(0.0) / count).sqrt()
+}
+
+/// The spectra of a session: of each test over the angle it goes along; of poses over every rotary axis.
+pub fn spectra(problem: &Problem<'_>, views: &SessionSeries) -> Vec<Spectrum> {
+    let machine = &problem.session.machine;
+    let coordinates = views.coordinates;
+    let of = |of: &str, over: &str, angle: &[f64], before: &[f64], after: &[f64]| Spectrum {
+        of: of.to_string(),
+        over: over.to_string(),
+        before_um: amplitudes(angle, before, coordinates),
+        after_um: amplitudes(angle, after, coordinates),
+    };
+    if coordinates == 1 {
+        return views
+            .tests
+            .iter()
+            .filter(|test| test.way.is_angle)
+            .map(|test| {
+                of(
+                    &test.name,
+                    &test.way.name,
+                    &test.way.values,
+                    &test.before_um,
+                    &test.after_um,
+                )
+            })
+            .collect();
+    }
+    let joined = |of: &dyn Fn(usize) -> Vec<f64>| (0..views.tests.len()).flat_map(of).collect::<Vec<f64>>();
+    let before = joined(&|test| views.tests[test].before_um.clone());
+    let after = joined(&|test| views.tests[test].after_um.clone());
+    let rotary = (0..machine.axes.len()).filter(|axis| machine.axes[*axis].kind == AxisKind::Rotary);
+    rotary
+        .map(|axis| {
+            let angle = joined(&|test| {
+                let readings = problem.tests[test].readings.as_ref();
+                readings.map_or(Vec::new(), |r| {
+                    r.positions[axis].iter().map(|q| q.to_degrees()).collect()
+                })
+            });
+            of("all poses", &machine.axes[axis].name, &angle, &before, &after)
+        })
+        .collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_wave_over_whole_turns_has_its_amplitude_at_its_order_alone() {
+        let angle: Vec<f64> = (0..720).map(f64::from).collect();
+        let values: Vec<f64> = angle
+            .iter()
+            .map(|a| 3.0 + 1.5 * (2.0 * a.to_radians() + 1.0).cos())
+            .collect();
+        for (k, found) in amplitudes(&angle, &values, 1).into_iter().enumerate() {
+            let wanted = if k + 1 == 2 { 1.5 } else { 0.0 };
+            assert!((found - wanted).abs() < 1e-6, "order {}: {found}", k + 1);
+        }
+    }
+
+    #[test]
+    fn over_a_short_arc_no_order_claims_more_than_there_is() {
+        let angle: Vec<f64> = (0..50).map(|k| 0.5 * f64::from(k)).collect();
+        let values: Vec<f64> = angle.iter().map(|a| (0.7 * a).sin()).collect();
+        let most = 2.0_f64.sqrt() * (values.iter().map(|v| v * v).sum::<f64>() / 50.0).sqrt();
+        assert!(
+            amplitudes(&angle, &values, 1)
+                .iter()
+                .all(|found| *found <= most + 1e-9)
+        );
+    }
+}

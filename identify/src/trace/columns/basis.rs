@@ -1,0 +1,295 @@
+//! An effect laid over the tests: what it moves, and the basis functions that it moves it by.
+
+use std::collections::HashMap;
+use std::ops::Range;
+use std::sync::{Arc, Mutex};
+
+use abbe_model::effect::{Component, Driver, DriverSample, Effect, Shape};
+use abbe_model::instrument::InternalUnit;
+
+use super::Columns;
+use crate::drivers;
+
+/// An effect laid over the tests.
+#[derive(Clone, Debug)]
+pub struct Layout {
+    /// Number of columns.
+    pub count: usize,
+    /// How many numbers of its shape are chosen to fit: each may gain what a column may.
+    pub numbers: usize,
+    /// What it moves in each test: nothing in those in which it does not act.
+    pub(super) parts: Vec<Vec<Part>>,
+}
+
+impl Layout {
+    /// Whether anything moves in a test.
+    pub(super) fn acts_in(&self, test: usize) -> bool {
+        !self.parts[test].is_empty()
+    }
+
+    /// The greatest absolute value of its basis functions.
+    pub fn greatest(&self) -> f64 {
+        let parts = self.parts.iter().flatten();
+        let factors = |part: &Part| {
+            part.factor
+                .as_ref()
+                .map_or(1.0, |f| f.iter().fold(0.0_f64, |a, b| a.max(b.abs())))
+        };
+        parts
+            .map(|part| {
+                factors(part)
+                    * part
+                        .basis
+                        .iter()
+                        .flat_map(|basis| basis.iter())
+                        .fold(0.0_f64, |a, b| a.max(b.abs()))
+            })
+            .fold(0.0, f64::max)
+    }
+}
+
+/// One thing that an effect moves in a test.
+#[derive(Clone, Debug)]
+pub(super) struct Part {
+    pub moves: Moves,
+    /// By how much of the basis functions in each row; 1 where there is none.
+    pub factor: Option<Arc<Vec<f64>>>,
+    /// Function by function, one value a row.
+    pub basis: Arc<Vec<Vec<f64>>>,
+}
+
+/// What a part of a layout moves.
+#[derive(Clone, Copy, Debug)]
+pub(super) enum Moves {
+    /// A component, through its sensitivity.
+    Slot(usize),
+    /// One coordinate of the reading itself.
+    Reading(usize),
+}
+
+impl Columns<'_, '_> {
+    /// Lays an effect over the tests; `None` where the data lack what it follows.
+    pub fn layout(&self, effect: &Effect) -> Option<Layout> {
+        self.lay(effect, true)
+    }
+
+    /// The same for an effect that is tried once: its basis functions are not kept.
+    pub fn layout_uncached(&self, effect: &Effect) -> Option<Layout> {
+        self.lay(effect, false)
+    }
+
+    fn lay(&self, effect: &Effect, keep: bool) -> Option<Layout> {
+        let session = self.problem.session;
+        let mut parts = Vec::new();
+        for (number, test) in self.problem.tests.iter().enumerate() {
+            let mut of_test = Vec::new();
+            if effect.acts_in(&test.name) {
+                let readings = test.readings.as_ref()?;
+                let axis = drivers::component_axis(session, &effect.component);
+                let (follows, samples) = self.followed(number, &effect.driver, axis)?;
+                let make = || Arc::new(drivers::basis_columns(&effect.shape, &samples));
+                let basis = if keep {
+                    cached(
+                        &self.bases,
+                        (number, format!("{follows} {:?}", effect.shape)),
+                        make,
+                    )
+                } else {
+                    make()
+                };
+                for (slot, factor) in drivers::component_slots(session, test, readings, &effect.component) {
+                    if self.place[number].contains_key(&slot) {
+                        of_test.push(Part {
+                            moves: Moves::Slot(slot),
+                            factor: factor.map(Arc::new),
+                            basis: basis.clone(),
+                        });
+                    }
+                }
+            }
+            parts.push(of_test);
+        }
+        Some(Layout {
+            count: effect.shape.coefficients(),
+            numbers: effect.shape.numbers(),
+            parts,
+        })
+    }
+
+    /// What a driver does in a test, and the name that the stores have for it: the moment of gravity is another about each axis.
+    fn followed(
+        &self,
+        test: usize,
+        driver: &Driver,
+        axis: Option<usize>,
+    ) -> Option<(String, Arc<Vec<DriverSample<f64>>>)> {
+        let readings = self.problem.tests[test].readings.as_ref()?;
+        let name = match driver {
+            Driver::Gravity => format!("gravity {axis:?}"),
+            other => other.to_string(),
+        };
+        let samples = cached(&self.samples, (test, name.clone()), || {
+            let (machine, model) = (&self.problem.session.machine, &self.problem.models[test]);
+            drivers::samples(machine, model, readings, &self.problem.origin, driver, axis).map(Arc::new)
+        })?;
+        Some((name, samples))
+    }
+
+    /// Lays a shape over one coordinate of the readings of one test, whatever component would cause it; `by_direction` turns its sign with the
+    /// direction of travel, `rows` confines it. `None` where the data lack what it follows.
+    pub fn reading_layout(
+        &self,
+        effect: &Effect,
+        test: usize,
+        coordinate: usize,
+        by_direction: bool,
+        rows: Option<&Range<usize>>,
+    ) -> Option<Layout> {
+        let (_, samples) = self.followed(test, &effect.driver, None)?;
+        let basis = Arc::new(drivers::basis_columns(&effect.shape, &samples));
+        let factor = (by_direction || rows.is_some()).then(|| {
+            let turned = |sample: &DriverSample<f64>| if by_direction { sample.direction } else { 1.0 };
+            let inside = |row: usize| rows.is_none_or(|rows| rows.contains(&row));
+            let factor = |(row, sample)| if inside(row) { turned(sample) } else { 0.0 };
+            Arc::new(samples.iter().enumerate().map(factor).collect())
+        });
+        let mut parts = vec![Vec::new(); self.problem.tests.len()];
+        parts[test].push(Part {
+            moves: Moves::Reading(coordinate),
+            factor,
+            basis,
+        });
+        Some(Layout {
+            count: effect.shape.coefficients(),
+            numbers: 0,
+            parts,
+        })
+    }
+
+    /// A free curve over an axis in each test in which it moves, in the readings themselves, whatever component would cause it; none where the readings are
+    /// too few for that many intervals.
+    pub fn curves_of_tests(&self, driver: &Driver, intervals: usize) -> Vec<(Effect, Layout)> {
+        let Driver::Axis(name) = driver else {
+            return Vec::new();
+        };
+        let Some(axis) = self.problem.session.machine.axis_index(name) else {
+            return Vec::new();
+        };
+        let mut layouts = Vec::new();
+        for (number, test) in self.problem.tests.iter().enumerate() {
+            let Some(readings) = &test.readings else { continue };
+            let column = &readings.positions[axis];
+            let low = column.iter().copied().fold(f64::INFINITY, f64::min);
+            let high = column.iter().copied().fold(f64::NEG_INFINITY, f64::max);
+            let longest = readings.runs().iter().map(|run| run.len()).max().unwrap_or(0);
+            if high - low < 1e-6 || 2 * longest < 3 * intervals {
+                continue;
+            }
+            let effect = Effect {
+                component: Component::TriggerDelay,
+                driver: driver.clone(),
+                shape: Shape::Curve {
+                    from: low,
+                    to: high,
+                    intervals,
+                    closed: false,
+                },
+                tests: vec![test.name.clone()],
+            };
+            for coordinate in 0..self.problem.coordinates() {
+                let layout = self.reading_layout(&effect, number, coordinate, false, None);
+                layouts.extend(layout.map(|layout| (effect.clone(), layout)));
+            }
+        }
+        layouts
+    }
+
+    /// The greatest coefficient that an effect may plausibly have, in inside units: 0.1 mm and 1 mrad on a machine tool, ten times as much on the
+    /// robots and long chains that trackers and sockets measure.
+    pub fn plausible(&self, effect: &Effect, layout: &Layout) -> f64 {
+        let machine_tool = self.problem.session.instrument.is_two_sided();
+        let scale = if machine_tool { 1.0 } else { 10.0 };
+        let most = match drivers::component_unit(self.problem.session, &effect.component) {
+            Some(InternalUnit::Millimetre) => 0.1 * scale,
+            Some(InternalUnit::Radian) => 1e-3 * scale,
+            Some(InternalUnit::Ratio) => 0.1,
+            // The factor of a delay is the speed; a tenth of a second is long.
+            None => return 0.1,
+        };
+        let greatest = layout.greatest();
+        if greatest > 0.0 { most / greatest } else { 0.0 }
+    }
+}
+
+/// Columns that are made together.
+const CHUNK_COLUMNS: usize = 48;
+
+/// Consecutive layouts whose columns are made together: as many as fit into a chunk, and at least one.
+pub fn chunked(layouts: &[Layout]) -> Vec<Range<usize>> {
+    let mut chunks = Vec::new();
+    let (mut start, mut width) = (0, 0);
+    for (index, layout) in layouts.iter().enumerate() {
+        if width > 0 && width + layout.count > CHUNK_COLUMNS {
+            chunks.push(start..index);
+            (start, width) = (index, 0);
+        }
+        width += layout.count;
+    }
+    if start < layouts.len() {
+        chunks.push(start..layouts.len());
+    }
+    chunks
+}
+
+/// What a store holds under a key, made and kept if it was not there.
+fn cached<K: std::hash::Hash + Eq, V: Clone>(
+    store: &Mutex<HashMap<K, V>>,
+    key: K,
+    make: impl FnOnce() -> V,
+) -> V {
+    let found = store.lock().ok().and_then(|store| store.get(&key).cloned());
+    if let Some(value) = found {
+        return value;
+    }
+    let value = make();
+    if let Ok(mut store) = store.lock() {
+        store.insert(key, value.clone());
+    }
+    value
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Chunks are full, and nothing is in two of them or in none: what is made together bounds the memory of a screening.
+    #[test]
+    fn chunks_are_as_full_as_they_can_be() {
+        let layouts = |counts: &[usize]| -> Vec<Layout> {
+            let of_count = |&count: &usize| Layout {
+                count,
+                numbers: 0,
+                parts: Vec::new(),
+            };
+            counts.iter().map(of_count).collect()
+        };
+        let ends = |counts: &[usize]| -> Vec<usize> {
+            let chunks = chunked(&layouts(counts));
+            let starts: Vec<usize> = chunks.iter().map(|chunk| chunk.start).collect();
+            let ends: Vec<usize> = chunks.iter().map(|chunk| chunk.end).collect();
+            assert!(
+                starts
+                    .iter()
+                    .zip([0].iter().chain(&ends))
+                    .all(|(start, end)| start == end)
+            );
+            ends
+        };
+        assert_eq!(ends(&[]), [0; 0]);
+        assert_eq!(ends(&[2; 24]), [24]);
+        assert_eq!(ends(&[2; 25]), [24, 25]);
+        assert_eq!(ends(&[1, 47, 1, 46, 2]), [2, 4, 5]);
+        // A curve of many coefficients is one by itself.
+        assert_eq!(ends(&[3, 200, 3, 3]), [1, 2, 4]);
+    }
+}

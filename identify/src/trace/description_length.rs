@@ -1,0 +1,247 @@
+//! Fewer words: several effects that follow one axis are put down to one that says as much, or are given back where they explain nothing.
+//!
+//! A group of effects is worth what it explains together, `−ln P(χ²)`, less what it takes to say it: each effect's cost, and `ln n` for having been chosen
+//! among the `n` entries of the library that the session can see.
+
+use abbe_model::effect::{Driver, Shape};
+use rayon::prelude::*;
+
+use super::columns::Layout;
+use super::library::Candidate;
+use super::score::Gain;
+use super::search::{Search, SearchBranch, SelectedEffect};
+use crate::error::IdentifyError;
+
+/// How finely the curves without a name are divided, one after another.
+const INTERVALS: [usize; 3] = [8, 16, 32];
+
+impl Search<'_> {
+    /// Puts several effects that follow one axis down to one, where that one says as much in fewer words. From three effects or places on, a free curve may
+    /// be that one.
+    pub fn merge(&mut self) -> Result<(), IdentifyError> {
+        if self.stop.in_residual_variance {
+            return Ok(());
+        }
+        let mut merged = false;
+        for track in 0..self.tracks.len() {
+            for driver in self.axes_followed(track) {
+                let whole = self.following(&driver, &self.tracks[track].chosen()).0;
+                let mut groups = vec![whole.clone()];
+                if whole.len() > 2 {
+                    let without =
+                        |left_out: &usize| whole.iter().copied().filter(|c| c != left_out).collect();
+                    groups.extend(whole.iter().map(without));
+                }
+                for group in groups {
+                    if self.merge_group(track, &group)? {
+                        merged = true;
+                        break;
+                    }
+                }
+            }
+        }
+        if merged {
+            self.note_held_out()?;
+        }
+        Ok(())
+    }
+
+    /// The axes that effects follow which a search has taken up, each once.
+    fn axes_followed(&self, track: usize) -> Vec<Driver> {
+        let mut drivers: Vec<Driver> = Vec::new();
+        for candidate in self.tracks[track].chosen() {
+            let driver = &self.candidates[candidate].effect.driver;
+            if matches!(driver, Driver::Axis(_)) && !drivers.contains(driver) {
+                drivers.push(driver.clone());
+            }
+        }
+        drivers
+    }
+
+    /// Puts a group of effects down to one, if one says as much in fewer words. Returns whether it did.
+    fn merge_group(&mut self, track: usize, group: &[usize]) -> Result<bool, IdentifyError> {
+        let columns: usize = group.iter().map(|c| self.moments.count[*c]).sum();
+        let curves = group.len() > 2 || columns > 2 && self.is_composed(group);
+        if group.len() < 2 && !curves {
+            return Ok(false);
+        }
+        let SearchBranch { folds, taken } = self.tracks[track].clone();
+        let (grouped, kept): (Vec<SelectedEffect>, Vec<SelectedEffect>) = taken
+            .into_iter()
+            .partition(|taken| group.contains(&taken.candidate));
+        let rest: Vec<usize> = kept.iter().map(|taken| taken.candidate).collect();
+        if group.len() > 1 {
+            self.refine(&rest, &folds)?;
+        }
+        if curves {
+            self.add_reserve_candidates();
+        }
+        let is_open = |c: &usize| {
+            self.is_open(*c, &folds) || curves && self.candidates[*c].last_resort && self.is_own(*c, &folds)
+        };
+        let pool: Vec<usize> = (0..self.candidates.len())
+            .filter(is_open)
+            .filter(|c| !rest.contains(c))
+            .collect();
+        let Some(candidate) = self.shorter_description(group, &rest, &pool, &folds)? else {
+            return Ok(false);
+        };
+        self.materialise(&[candidate]);
+        let p_value = grouped.iter().map(|taken| taken.p_value).fold(1.0, f64::min);
+        self.tracks[track].taken = kept;
+        self.tracks[track]
+            .taken
+            .push(SelectedEffect { candidate, p_value });
+        Ok(true)
+    }
+
+    fn is_composed(&self, group: &[usize]) -> bool {
+        let composed =
+            |c: &usize| matches!(&self.candidates[*c].effect.shape, Shape::Steps { at } if at.len() > 2);
+        group.iter().any(composed)
+    }
+
+    /// Gives back effects that follow one axis where they are no explanation: where curves over that axis, another in every test and in no component's name,
+    /// say as much in fewer words. One simple effect is asked only where structure remains beside it.
+    pub fn withdraw(&mut self, structured: bool) -> Result<(), IdentifyError> {
+        for track in 0..self.tracks.len() {
+            for driver in self.axes_followed(track) {
+                let (group, rest) = self.following(&driver, &self.tracks[track].chosen());
+                let is_curve = |c: &usize| matches!(self.candidates[*c].effect.shape, Shape::Curve { .. });
+                let few = group.len() < 2 && !self.is_composed(&group) && !structured;
+                if few || group.iter().all(is_curve) {
+                    continue;
+                }
+                let folds = self.tracks[track].folds.clone();
+                let of_group = self.evidence_of(&group, &rest, &folds)? - self.description_length(&group);
+                let mut of_curves = f64::NEG_INFINITY;
+                for intervals in INTERVALS {
+                    let one = self.evidence_of_test_curves(&driver, intervals, &rest, &folds)?;
+                    of_curves = one.map_or(of_curves, |one| of_curves.max(one));
+                }
+                if of_curves > of_group {
+                    self.tracks[track]
+                        .taken
+                        .retain(|taken| !group.contains(&taken.candidate));
+                }
+            }
+        }
+        self.note_held_out()
+    }
+
+    /// What curves over an axis say, another in every test: `None` where no test carries one. They are one choice, that of the axis.
+    fn evidence_of_test_curves(
+        &mut self,
+        driver: &Driver,
+        intervals: usize,
+        rest: &[usize],
+        folds: &[usize],
+    ) -> Result<Option<f64>, IdentifyError> {
+        let curves = self.test_curve(driver, intervals);
+        if curves.is_empty() {
+            return Ok(None);
+        }
+        self.materialise(&curves);
+        Ok(Some(self.evidence_of(&curves, rest, folds)? - self.choice()))
+    }
+
+    /// Curves over an axis, one in each test: laid over the readings when they are first asked for.
+    fn test_curve(&mut self, driver: &Driver, intervals: usize) -> Vec<usize> {
+        let fresh = self.columns.curves_of_tests(driver, intervals);
+        let effects: Vec<_> = fresh.iter().map(|(effect, _)| effect.clone()).collect();
+        let present: Vec<usize> = (0..self.candidates.len())
+            .filter(|c| effects.contains(&self.candidates[*c].effect))
+            .collect();
+        if !present.is_empty() {
+            return present;
+        }
+        let first = self.candidates.len();
+        let test_curve: Vec<(Candidate, Layout)> = fresh
+            .into_iter()
+            .map(|(effect, layout)| (Candidate::test_curve(effect), layout))
+            .collect();
+        self.append(test_curve, &[]);
+        (first..self.candidates.len()).collect()
+    }
+
+    /// What it costs to have chosen one entry of the library.
+    fn choice(&self) -> f64 {
+        (self.seen_entries().max(1) as f64).ln()
+    }
+
+    pub(super) fn description_length(&self, group: &[usize]) -> f64 {
+        group
+            .iter()
+            .map(|c| self.candidates[*c].length() + self.choice())
+            .sum()
+    }
+
+    /// `−ln P` of what candidates gain together.
+    pub(super) fn evidence_of(
+        &self,
+        group: &[usize],
+        rest: &[usize],
+        folds: &[usize],
+    ) -> Result<f64, IdentifyError> {
+        let all: Vec<usize> = rest.iter().chain(group).copied().collect();
+        self.evidence_of_gain(self.lean_model_of(&all, folds)?.explained(), group, rest, folds)
+    }
+
+    /// The same of some and one more, which need not have a place in the base.
+    pub(super) fn evidence_with(
+        &self,
+        some: &[usize],
+        one: usize,
+        folds: &[usize],
+    ) -> Result<f64, IdentifyError> {
+        let model = self.lean_model_of(some, folds)?;
+        let all: Vec<usize> = some.iter().copied().chain([one]).collect();
+        self.evidence_of_gain(model.explained() + model.gain(one).gain, &all, &[], folds)
+    }
+
+    fn evidence_of_gain(
+        &self,
+        explained: f64,
+        group: &[usize],
+        rest: &[usize],
+        folds: &[usize],
+    ) -> Result<f64, IdentifyError> {
+        let without = self.lean_model_of(rest, folds)?;
+        let gain = Gain {
+            gain: explained - without.explained(),
+            freedom: group
+                .iter()
+                .map(|c| self.moments.count[*c] + self.moments.numbers[*c])
+                .sum(),
+        };
+        Ok(self.evidence(&gain, self.variance(&without)))
+    }
+
+    /// Which of the chosen follow a driver, and which do not.
+    fn following(&self, driver: &Driver, chosen: &[usize]) -> (Vec<usize>, Vec<usize>) {
+        chosen
+            .iter()
+            .partition(|candidate| self.candidates[**candidate].effect.driver == *driver)
+    }
+
+    /// The one of a pool that says more than a group, if there is one.
+    fn shorter_description(
+        &self,
+        group: &[usize],
+        rest: &[usize],
+        pool: &[usize],
+        folds: &[usize],
+    ) -> Result<Option<usize>, IdentifyError> {
+        let without = self.model_of(rest, folds)?;
+        let variance = self.variance(&without);
+        let choice = self.choice();
+        let of_group = self.evidence_of(group, rest, folds)? - self.description_length(group);
+        let best = pool
+            .par_iter()
+            .filter(|c| !group.contains(c))
+            .map(|c| (*c, self.score(*c, &without.gain(*c), variance) - choice))
+            .filter(|(_, one)| *one > of_group)
+            .max_by(|a, b| a.1.total_cmp(&b.1));
+        Ok(best.map(|(c, _)| c))
+    }
+}

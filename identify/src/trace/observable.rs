@@ -1,0 +1,170 @@
+//! What of a candidate the readings see: the inverse of its projected product on the directions that are left beside a model.
+
+use faer::Mat;
+
+use crate::error::IdentifyError;
+
+/// Share of a candidate's own length that has to remain beside the model for it to count as seen.
+pub const MIN_VISIBLE: f64 = 1e-7;
+
+/// `gᵀ D⁻¹ g` on the directions that are seen.
+pub fn quadratic_gain(d: &Mat<f64>, own: &Mat<f64>, g: &[f64]) -> f64 {
+    Visible::of(d, own).quadratic(g)
+}
+
+/// The inverse of a candidate's projected product on the directions that are seen.
+pub(super) struct Visible {
+    vectors: Mat<f64>,
+    values: Vec<f64>,
+    scale: Vec<f64>,
+    /// Number of directions that are seen.
+    pub freedom: usize,
+}
+
+impl Visible {
+    pub fn of(d: &Mat<f64>, own: &Mat<f64>) -> Visible {
+        let n = d.nrows();
+        let scale: Vec<f64> = (0..n)
+            .map(|k| {
+                if own[(k, k)] > 0.0 {
+                    1.0 / own[(k, k)].sqrt()
+                } else {
+                    0.0
+                }
+            })
+            .collect();
+        let scaled = Mat::from_fn(n, n, |i, j| d[(i, j)] * scale[i] * scale[j]);
+        if n == 1 {
+            let seen = scaled[(0, 0)] > MIN_VISIBLE;
+            let values = vec![if seen { 1.0 / scaled[(0, 0)] } else { 0.0 }];
+            return Visible {
+                vectors: Mat::identity(1, 1),
+                values,
+                scale,
+                freedom: usize::from(seen),
+            };
+        }
+        if n == 2 {
+            return Visible::of_two(scaled, scale);
+        }
+        let Ok(eigen) = scaled.self_adjoint_eigen(faer::Side::Lower) else {
+            return Visible {
+                vectors: Mat::identity(n, n),
+                values: vec![0.0; n],
+                scale,
+                freedom: 0,
+            };
+        };
+        let values: Vec<f64> = eigen
+            .S()
+            .column_vector()
+            .iter()
+            .map(|value| if *value > MIN_VISIBLE { 1.0 / value } else { 0.0 })
+            .collect();
+        let freedom = values.iter().filter(|value| **value > 0.0).count();
+        Visible {
+            vectors: eigen.U().to_owned(),
+            values,
+            scale,
+            freedom,
+        }
+    }
+
+    /// Of two columns, as sine and cosine have: by one rotation (Jacobi; Golub & Van Loan 8.5).
+    fn of_two(scaled: Mat<f64>, scale: Vec<f64>) -> Visible {
+        let (a, b, c) = (scaled[(0, 0)], scaled[(1, 0)], scaled[(1, 1)]);
+        let tangent = if b == 0.0 {
+            0.0
+        } else {
+            let tau = (c - a) / (2.0 * b);
+            tau.signum() / (tau.abs() + 1.0_f64.hypot(tau))
+        };
+        let cos = 1.0 / 1.0_f64.hypot(tangent);
+        let sin = tangent * cos;
+        let values = vec![a - tangent * b, c + tangent * b].into_iter();
+        let values: Vec<f64> = values
+            .map(|value| if value > MIN_VISIBLE { 1.0 / value } else { 0.0 })
+            .collect();
+        Visible {
+            vectors: Mat::from_fn(2, 2, |i, k| match (i, k) {
+                (0, 1) => sin,
+                (1, 0) => -sin,
+                _ => cos,
+            }),
+            freedom: values.iter().filter(|value| **value > 0.0).count(),
+            values,
+            scale,
+        }
+    }
+
+    pub fn quadratic(&self, g: &[f64]) -> f64 {
+        let n = g.len();
+        (0..n)
+            .filter(|k| self.values[*k] > 0.0)
+            .map(|k| {
+                let along: f64 = (0..n).map(|i| self.vectors[(i, k)] * g[i] * self.scale[i]).sum();
+                along * along * self.values[k]
+            })
+            .sum()
+    }
+
+    pub fn solve(&self, g: &[f64]) -> Vec<f64> {
+        let n = g.len();
+        let mut solution = vec![0.0; n];
+        for k in (0..n).filter(|k| self.values[*k] > 0.0) {
+            let along: f64 = (0..n).map(|i| self.vectors[(i, k)] * g[i] * self.scale[i]).sum();
+            for i in 0..n {
+                solution[i] += self.vectors[(i, k)] * self.scale[i] * along * self.values[k];
+            }
+        }
+        solution
+    }
+}
+
+/// Inverse of a symmetric product, directions below rounding left out.
+///
+/// # Errors
+/// If the product has entries that are not finite.
+pub(super) fn pseudo_inverse(gram: &Mat<f64>) -> Result<Mat<f64>, IdentifyError> {
+    let n = gram.nrows();
+    let eigen = gram
+        .self_adjoint_eigen(faer::Side::Lower)
+        .map_err(|_| IdentifyError::Decomposition)?;
+    let values: Vec<f64> = eigen.S().column_vector().iter().copied().collect();
+    let largest = values.iter().fold(0.0_f64, |a, b| a.max(*b));
+    let u = eigen.U();
+    let scaled = Mat::from_fn(n, n, |i, k| {
+        if values[k] > largest * 1e-12 {
+            u[(i, k)] / values[k]
+        } else {
+            0.0
+        }
+    });
+    Ok(&scaled * u.transpose())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_inverse_undoes_the_product_on_what_is_seen() {
+        // Rank 2: the third column is the sum of the first two.
+        let columns = Mat::from_fn(4, 3, |i, j| {
+            let of = |j: usize| ((i + 1) as f64).powi(j as i32);
+            if j < 2 { of(j) } else { of(0) + of(1) }
+        });
+        let gram = columns.transpose() * &columns;
+        let inverse = pseudo_inverse(&gram).unwrap();
+        let again = &gram * &inverse * &gram;
+        for (i, j) in (0..3).flat_map(|i| (0..3).map(move |j| (i, j))) {
+            assert!((again[(i, j)] - gram[(i, j)]).abs() < 1e-9);
+        }
+    }
+
+    #[test]
+    fn entries_that_are_not_finite_are_an_error() {
+        let gram = Mat::from_fn(3, 3, |i, j| if i + j == 2 { f64::NAN } else { 1.0 });
+        assert!(matches!(pseudo_inverse(&gram), Err(IdentifyError::Decomposition)));
+    }
+}

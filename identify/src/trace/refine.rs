@@ -1,0 +1,240 @@
+//! Shapes with a number in them (a period, a time constant, a place, a width): the library holds a grid, here the grid is left.
+//!
+//! It is left before candidates are compared with each other: between grid points one component may do better than another that at its own best
+//! explains more. So every component that comes near the best is given its own best numbers first.
+
+use std::collections::HashMap;
+use std::ops::Range;
+
+use abbe_model::effect::{Effect, Shape};
+use rayon::prelude::*;
+
+use super::compose::StepTable;
+use super::library::Candidate;
+use super::score::{Gain, TrainedModel};
+use super::search::Search;
+
+/// Steps of a line search, each to 0.62 of the interval: to name a period, and to predict a fold.
+const STEPS: usize = 12;
+const STEPS_TO_PREDICT: usize = 6;
+/// The share of the best evidence that a candidate has to have on the grid to be sharpened: a bump between two grid points loses a third.
+const NEAR: f64 = 0.5;
+/// The most candidates that are sharpened at a time: enough to name one of them, and where one fold is left out, to predict that.
+const MAX: usize = 10;
+const MAX_TO_PREDICT: usize = 2;
+/// What a composed effect may lack of the best evidence and still be told as what it might be.
+const BEHIND: f64 = 4.0;
+
+/// Whether a candidate has numbers or places that can be chosen better than the library's grid has them.
+pub(super) fn can_be_tuned(candidate: &Candidate) -> bool {
+    candidate.dictionary || brackets(candidate).is_some()
+}
+
+/// Candidates with the best numbers that they can have beside a model, of those that come near the best; with what has been composed. `gains` are those of
+/// all candidates beside the model.
+pub fn refined(
+    search: &Search<'_>,
+    model: &TrainedModel<'_>,
+    gains: &[Gain],
+    composed: &[StepTable],
+) -> Vec<Candidate> {
+    let variance = search.variance(model);
+    let most = if search.identifies_all(&model.folds) {
+        MAX
+    } else {
+        MAX_TO_PREDICT
+    };
+    let mut nearest: HashMap<String, (usize, f64)> = HashMap::new();
+    let mut best = 0.0_f64;
+    for (candidate, gain) in gains.iter().enumerate() {
+        if gain.freedom == 0 || !search.is_open(candidate, &model.folds) {
+            continue;
+        }
+        let evidence = search.evidence(gain, variance);
+        best = best.max(evidence);
+        let effect = &search.candidates[candidate].effect;
+        if brackets(&search.candidates[candidate]).is_none() {
+            continue;
+        }
+        let place = nearest.entry(effect.id()).or_insert((candidate, evidence));
+        if evidence > place.1 {
+            *place = (candidate, evidence);
+        }
+    }
+    let mut near: Vec<(usize, f64)> = nearest
+        .into_values()
+        .filter(|(_, evidence)| *evidence >= NEAR * best)
+        .collect();
+    near.sort_by(|a, b| b.1.total_cmp(&a.1).then(a.0.cmp(&b.0)));
+    near.truncate(most);
+    let mut fresh: Vec<Candidate> = near
+        .into_par_iter()
+        .filter_map(|(candidate, _)| {
+            let original = &search.candidates[candidate];
+            let effect = refine(search, model, original, gains[candidate].gain)?;
+            Some(Candidate {
+                effect,
+                ..original.clone()
+            })
+        })
+        .collect();
+    fresh.extend(moved(search, model, composed, best, most));
+    fresh.retain(|candidate| {
+        let is_same = |present: usize| {
+            search.candidates[present].effect == candidate.effect && search.is_own(present, &model.folds)
+        };
+        !(0..search.candidates.len()).any(is_same)
+    });
+    fresh
+}
+
+/// What has been composed and comes near the best evidence, with its places where they gain most.
+fn moved(
+    search: &Search<'_>,
+    model: &TrainedModel<'_>,
+    composed: &[StepTable],
+    best: f64,
+    most: usize,
+) -> Vec<Candidate> {
+    let variance = search.variance(model);
+    let mut nearest: Vec<&StepTable> = composed.iter().filter(|c| c.evidence >= NEAR * best).collect();
+    nearest.sort_by(|a, b| b.evidence.total_cmp(&a.evidence));
+    nearest.truncate(most);
+    nearest
+        .into_par_iter()
+        .filter_map(|composed| {
+            let (effect, gain) = moved_steps(search, model, &composed.candidate);
+            let gain = Gain {
+                gain,
+                freedom: effect.shape.coefficients() + effect.shape.numbers(),
+            };
+            let evidence = search.evidence(&gain, variance);
+            let near = evidence >= best - BEHIND || evidence - composed.candidate.cost >= NEAR * best;
+            near.then(|| Candidate {
+                effect,
+                ..composed.candidate.clone()
+            })
+        })
+        .collect()
+}
+
+/// Looks around an effect for the numbers of its shape that gain most; `None` where nothing is gained.
+pub(super) fn refine(
+    search: &Search<'_>,
+    model: &TrainedModel<'_>,
+    original: &Candidate,
+    before: f64,
+) -> Option<Effect> {
+    let mut effect = original.effect.clone();
+    let brackets = brackets(original)?;
+    let mut best = before;
+    let steps = if search.identifies_all(&model.folds) {
+        STEPS
+    } else {
+        STEPS_TO_PREDICT
+    };
+    // Numbers of one shape are looked for in turn.
+    for _ in 0..brackets.len() {
+        for (which, low, high) in &brackets {
+            let value_at = |share: f64| low + (high - low) * share;
+            let gain_at = |share: f64| {
+                let trial = with_number(&effect, *which, value_at(share));
+                (search.gain_beside(model, &trial).unwrap_or(0.0), trial)
+            };
+            let (gain, trial) = highest(gain_at, steps);
+            if gain > best {
+                best = gain;
+                effect = trial;
+            }
+        }
+    }
+    (best > before * (1.0 + 1e-6)).then_some(effect)
+}
+
+/// The highest value that a line search between 0 and 1 comes to, and what has it. By golden section (Kiefer, Proc. Am. Math. Soc. 4 (1953) 502).
+fn highest<T>(value_at: impl Fn(f64) -> (f64, T), steps: usize) -> (f64, T) {
+    let golden = 0.5 * (5.0_f64.sqrt() - 1.0);
+    let (mut a, mut b) = (0.0, 1.0);
+    let (mut c, mut d) = (b - golden * (b - a), a + golden * (b - a));
+    let (mut at_c, mut at_d) = (value_at(c), value_at(d));
+    for _ in 0..steps {
+        if at_c.0 > at_d.0 {
+            (b, d) = (d, c);
+            at_d = at_c;
+            c = b - golden * (b - a);
+            at_c = value_at(c);
+        } else {
+            (a, c) = (c, d);
+            at_c = at_d;
+            d = a + golden * (b - a);
+            at_d = value_at(d);
+        }
+    }
+    if at_c.0 > at_d.0 { at_c } else { at_d }
+}
+
+/// Moves each step by parts of the grid to where all together gain most; what that is.
+fn moved_steps(search: &Search<'_>, model: &TrainedModel<'_>, candidate: &Candidate) -> (Effect, f64) {
+    let original = &candidate.effect;
+    let (Shape::Steps { at }, Some(mut present)) = (&original.shape, search.trial(model, original)) else {
+        return (original.clone(), 0.0);
+    };
+    let mut best = present.gain(model);
+    let mut places = at.clone();
+    let with = |places: &[f64]| Effect {
+        shape: Shape::Steps { at: places.to_vec() },
+        ..original.clone()
+    };
+    let trained: Vec<Range<usize>> = (model.folds.iter())
+        .map(|fold| search.columns.fold_rows[*fold].clone())
+        .collect();
+    for _ in 0..2 {
+        for k in 0..places.len() {
+            let middle = places[k];
+            for part in -3..=3 {
+                let place = middle + candidate.grid * f64::from(part) / 4.0;
+                let Some(moved) = search.trial(model, &with(&[place])) else {
+                    continue;
+                };
+                let gain = present.gain_with(k, &moved, &trained, model);
+                if gain > best * (1.0 + 1e-9) {
+                    best = gain;
+                    places[k] = place;
+                    present.exchange(k, &moved, &trained);
+                }
+            }
+        }
+    }
+    places.sort_by(f64::total_cmp);
+    (with(&places), best)
+}
+
+/// The numbers of a shape with the interval around each that the grid leaves open.
+fn brackets(candidate: &Candidate) -> Option<Vec<(usize, f64, f64)>> {
+    match &candidate.effect.shape {
+        Shape::Periodic { period } => {
+            let near = candidate.grid / period;
+            Some(vec![(0, period / (1.0 + near), period / (1.0 - near.min(0.5)))])
+        }
+        Shape::Warmup { tau_s } => Some(vec![(0, tau_s * 0.5, tau_s * 2.0)]),
+        Shape::ReversalSpike { width } => Some(vec![(0, width * 0.4, width * 2.5)]),
+        Shape::Local { centre, width, .. } => Some(vec![
+            (0, centre - width, centre + width),
+            (1, width * 0.5, width * 2.0),
+        ]),
+        _ => None,
+    }
+}
+
+fn with_number(effect: &Effect, which: usize, value: f64) -> Effect {
+    let mut changed = effect.clone();
+    match (&mut changed.shape, which) {
+        (Shape::Periodic { period }, _) => *period = value,
+        (Shape::Warmup { tau_s }, _) => *tau_s = value,
+        (Shape::ReversalSpike { width }, _) => *width = value,
+        (Shape::Local { centre, .. }, 0) => *centre = value,
+        (Shape::Local { width, .. }, _) => *width = value,
+        _ => {}
+    }
+    changed
+}

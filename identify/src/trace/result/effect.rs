@@ -1,0 +1,255 @@
+//! A found effect as it is reported: its name, the numbers of its shape, its parameters, its curve.
+
+use abbe_model::axis::AxisKind;
+use abbe_model::chain::Machine;
+use abbe_model::effect::{Driver, DriverSample, Effect, Shape};
+
+use super::{HeldOut, Moves, TraceFindings, alias_shifts};
+use crate::effect_description::{explanations, meaning};
+use crate::fit::Fit;
+use crate::parameters::Role;
+use crate::problem::Problem;
+use crate::results::{CurvePoint, EffectName, EffectResult, ParameterResult, ShapeNumber};
+use crate::trace::library::Family;
+
+/// An effect's name as it stands in results.
+pub fn effect_name(machine: &Machine, effect: &Effect) -> EffectName {
+    EffectName {
+        component: effect.component.to_string(),
+        driver: effect.driver.to_string(),
+        shape: effect.shape.word().to_string(),
+        order: effect.shape.order(),
+        tests: effect.tests.clone(),
+        meaning: meaning(machine, effect).to_string(),
+    }
+}
+
+/// A found effect and what is known of it.
+pub(super) struct Found<'f> {
+    /// Its place among the found effects.
+    pub number: usize,
+    /// All parameters after the search, what aliases would move covered.
+    pub parameters: &'f [ParameterResult],
+    /// How far the unknowns would move by the aliases of each found effect.
+    pub moves: &'f Moves,
+    /// What it takes off the residual, µm.
+    pub rms_gain_um: f64,
+    /// What the readings cannot tell from it.
+    pub alias_effects: &'f [Effect],
+}
+
+/// A found effect as it is reported.
+pub(super) fn result(
+    findings: &TraceFindings<'_, '_>,
+    families: &[Family],
+    held_out: &HeldOut<'_>,
+    found: &Found<'_>,
+) -> EffectResult {
+    let (after, search) = (findings.after, findings.search);
+    let taken = search.taken()[found.number];
+    let candidate = &search.candidates[taken.candidate];
+    let number = found.number + findings.before.parameters.effects.len();
+    let (curve_at_unit, curve_unit) = curve_units(after, &candidate.effect);
+    let machine = &after.session.machine;
+    let alike = std::iter::once(&candidate.effect).chain(found.alias_effects);
+    let meanings: Vec<_> = alike.map(|effect| meaning(machine, effect)).collect();
+    EffectResult {
+        name: effect_name(machine, &candidate.effect),
+        family: families
+            .get(candidate.family)
+            .map(|family| family.name.clone())
+            .unwrap_or_default(),
+        numbers: numbers_of(after, &candidate.effect),
+        parameters: parameters_of(after, found.parameters, number),
+        curve: curve_of(after, findings.after_fit, number, found.moves),
+        curve_at_unit,
+        curve_unit,
+        p_value: taken.p_value,
+        rms_gain_um: found.rms_gain_um,
+        heldout_rms_um: held_out.um(found.number + 1),
+        unique: found.alias_effects.is_empty(),
+        indistinguishable: meanings.len(),
+        explanations: explanations(&meanings),
+        aliases: (found.alias_effects.iter())
+            .map(|effect| effect_name(machine, effect))
+            .collect(),
+        separated_by: None,
+        separation: None,
+        separating_tests: Vec::new(),
+    }
+}
+
+/// Of all parameters those of the `number`-th effect.
+fn parameters_of(
+    problem: &Problem<'_>,
+    parameters: &[ParameterResult],
+    number: usize,
+) -> Vec<ParameterResult> {
+    let Some(id) = problem.parameters.effect_ids.get(number) else {
+        return Vec::new();
+    };
+    let is_own = |p: &&ParameterResult| {
+        p.id.strip_prefix(id.as_str())
+            .is_some_and(|rest| rest.is_empty() || rest.starts_with('.'))
+    };
+    parameters.iter().filter(is_own).cloned().collect()
+}
+
+/// Points at which a curve is reported.
+const CURVE_POINTS: usize = 73;
+
+/// The points of a free curve with their band; empty for other shapes.
+fn curve_of(problem: &Problem<'_>, fit: &Fit, number: usize, moves: &Moves) -> Vec<CurvePoint> {
+    let Some(effect) = problem.parameters.effects.get(number) else {
+        return Vec::new();
+    };
+    let Shape::Curve { from, to, .. } = effect.shape else {
+        return Vec::new();
+    };
+    let places: Vec<usize> = (0..problem.parameters.list.len())
+        .filter(|j| matches!(problem.parameters.list[*j].role, Role::Coefficient { effect, .. } if effect == number))
+        .collect();
+    let Some(first) = places.first() else {
+        return Vec::new();
+    };
+    let outside = problem.parameters.list[*first].unit.display_per_internal;
+    let at_outside = if curve_units(problem, effect).0 == "deg" {
+        1.0_f64.to_degrees()
+    } else {
+        1.0
+    };
+    (0..CURVE_POINTS)
+        .map(|k| {
+            let q = from + (to - from) * k as f64 / (CURVE_POINTS - 1) as f64;
+            let mut basis = Vec::new();
+            effect.shape.basis(
+                &DriverSample {
+                    value: q,
+                    ..DriverSample::default()
+                },
+                &mut basis,
+            );
+            let value_at =
+                |beta: &[f64]| -> f64 { basis.iter().zip(&places).map(|(b, j)| b * beta[*j]).sum() };
+            let value = value_at(&fit.beta);
+            let variance: f64 = basis
+                .iter()
+                .zip(&places)
+                .flat_map(|(b, j)| basis.iter().zip(&places).map(move |(c, l)| (b, j, c, l)))
+                .map(|(b, j, c, l)| b * c * fit.covariance[(*j, *l)])
+                .sum();
+            let moved = alias_shifts(moves, &[value], |beta| vec![value_at(beta)], &fit.beta);
+            CurvePoint {
+                at: q * at_outside,
+                value: value * outside,
+                u: (variance.max(0.0).sqrt() * fit.u_enlargement).hypot(moved[0]) * outside,
+            }
+        })
+        .collect()
+}
+
+/// Units of a curve's places and values; empty for other shapes.
+fn curve_units(problem: &Problem<'_>, effect: &Effect) -> (String, String) {
+    if !matches!(effect.shape, Shape::Curve { .. }) {
+        return (String::new(), String::new());
+    }
+    (
+        driver_unit(problem, effect).0.to_string(),
+        crate::drivers::coefficient_unit(problem.session, effect, 0).name,
+    )
+}
+
+/// The unit in which results give places on what an effect follows, and how many of it are one inside unit.
+fn driver_unit(problem: &Problem<'_>, effect: &Effect) -> (&'static str, f64) {
+    let machine = &problem.session.machine;
+    let kind = match &effect.driver {
+        Driver::Axis(name) => machine.axis_index(name).map(|axis| machine.axes[axis].kind),
+        Driver::Time => return ("s", 1.0),
+        Driver::Temperature => return ("K", 1.0),
+        Driver::Gravity => return ("m", 1.0),
+        _ => None,
+    };
+    if kind == Some(AxisKind::Rotary) {
+        ("deg", 1.0_f64.to_degrees())
+    } else {
+        ("mm", 1.0)
+    }
+}
+
+/// The numbers and places of an effect's shape.
+fn numbers_of(problem: &Problem<'_>, effect: &Effect) -> Vec<ShapeNumber> {
+    let (unit, display_per_internal) = driver_unit(problem, effect);
+    let numbers = match &effect.shape {
+        Shape::Periodic { period } => vec![("period", vec![*period])],
+        Shape::ReversalSpike { width } => vec![("width", vec![*width])],
+        Shape::Warmup { tau_s } => vec![("time constant", vec![*tau_s])],
+        Shape::Local { centre, width, .. } => vec![("centre", vec![*centre]), ("width", vec![*width])],
+        Shape::Steps { at } => vec![("at", at.clone())],
+        _ => Vec::new(),
+    };
+    let number = |(name, values): (&str, Vec<f64>)| ShapeNumber {
+        name: name.to_string(),
+        values: values
+            .into_iter()
+            .map(|value| value * display_per_internal)
+            .collect(),
+        unit: unit.to_string(),
+    };
+    numbers.into_iter().map(number).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use std::path::Path;
+
+    use abbe_model::effect::Component;
+    use abbe_model::session::read::{self, ReadOptions};
+
+    use super::*;
+    use crate::fit::{fit, prepare};
+
+    #[test]
+    fn the_band_of_a_curve_is_enlarged_as_every_uncertainty_is_and_covers_what_aliases_move() {
+        let file =
+            Path::new(env!("CARGO_MANIFEST_DIR")).join("../sessions/hermle-c600u/measured/session.toml");
+        let session = read::session(&file, &ReadOptions::default()).unwrap();
+        let (mut problem, _) = prepare(&session, 1).unwrap();
+        let turn = 360_f64.to_radians();
+        problem
+            .add_effect(&Effect {
+                component: Component::parse("EZC").unwrap(),
+                driver: Driver::parse("C"),
+                shape: Shape::Curve {
+                    from: 0.0,
+                    to: turn,
+                    intervals: 6,
+                    closed: false,
+                },
+                tests: Vec::new(),
+            })
+            .unwrap();
+        let mut fit = fit(&problem, None).unwrap();
+        let number = problem.parameters.effects.len() - 1;
+        fit.u_enlargement = 1.0;
+        let by_noise = curve_of(&problem, &fit, number, &[]);
+        fit.u_enlargement = 1.5;
+        let enlarged = curve_of(&problem, &fit, number, &[]);
+        assert_eq!(by_noise.len(), CURVE_POINTS);
+        for (by_noise, enlarged) in by_noise.iter().zip(&enlarged) {
+            assert!(by_noise.u > 0.0);
+            assert!((enlarged.u / by_noise.u - 1.5).abs() < 1e-12);
+            assert_eq!(enlarged.value, by_noise.value);
+        }
+
+        // Splines share out one: where an alias moves all coefficients by 1 µm, it moves the curve by that.
+        let of_curve = |j: usize| matches!(problem.parameters.list[j].role, Role::Coefficient { effect, .. } if effect == number);
+        let alias: Vec<f64> = (0..fit.beta.len())
+            .map(|j| if of_curve(j) { 1e-3 } else { 0.0 })
+            .collect();
+        let covered = curve_of(&problem, &fit, number, &[vec![alias]]);
+        for (enlarged, covered) in enlarged.iter().zip(&covered) {
+            assert!((covered.u - enlarged.u.hypot(1.0)).abs() < 1e-9);
+            assert_eq!(covered.value, enlarged.value);
+        }
+    }
+}

@@ -1,0 +1,398 @@
+//! From a finished search to what is reported.
+
+mod effect;
+mod rejected;
+mod unsearched;
+
+use abbe_model::effect::Effect;
+
+use super::alias::{self, Alias, CompetingEffect};
+use super::library;
+use super::remainder::Structure;
+use super::search::Search;
+use super::start::Start;
+use crate::error::IdentifyError;
+use crate::fit::{self, Fit};
+use crate::heldout::{mislabelled_runs, rms_mm};
+use crate::noise;
+use crate::plausibility::Plausibility;
+use crate::problem::Problem;
+use crate::results::{ChangedParameter, EffectResult, ModelResult, ParameterResult, Remainder, TraceResult};
+pub(super) use effect::effect_name;
+pub(super) use unsearched::unsearched;
+
+/// Share of the structure's excess over noise that may remain for the found effects to count as the explanation.
+const EXPLAINED_SHARE: f64 = 0.5;
+
+/// What a search has come to.
+pub(super) struct TraceFindings<'f, 'a> {
+    pub before: &'f Problem<'a>,
+    pub before_fit: &'f Fit,
+    pub after: &'f Problem<'a>,
+    pub after_fit: &'f Fit,
+    pub search: &'f Search<'f>,
+    pub start: &'f Start,
+    pub structure_before: Option<&'f Structure>,
+    pub structure_after: Option<&'f Structure>,
+    pub last_p_value: f64,
+    /// Whether the search was ended by its cap or by an interruption, not by the evidence.
+    pub stopped_early: bool,
+    /// Whether it was interrupted.
+    pub interrupted: bool,
+    pub candidates: usize,
+    pub candidates_seen: usize,
+}
+
+/// What is reported, and what stands behind it.
+pub(super) struct ReportedEffect {
+    pub result: TraceResult,
+    pub alias_effects: Vec<Vec<Effect>>,
+    pub competing_effects: Vec<Vec<CompetingEffect>>,
+}
+
+/// What is reported, and for each effect what looks like it and what stands highest in its place.
+pub(super) fn report(findings: &TraceFindings<'_, '_>) -> Result<ReportedEffect, IdentifyError> {
+    let TraceFindings {
+        before,
+        before_fit,
+        after,
+        after_fit,
+        search,
+        ..
+    } = findings;
+    let before_result = before_result(findings);
+    let held_out = HeldOut::of(search, before_result.heldout_rms_um);
+    let mut after_result = model_result(after, after_fit, held_out.last_um() * 1e-3);
+
+    let mut alias_effects: Vec<Vec<Effect>> = Vec::new();
+    let mut competing_effects = Vec::new();
+    let mut gains = Vec::new();
+    let mut moves = Vec::new();
+    let variance = residual_variance(findings);
+    for (k, taken) in search.taken().iter().enumerate() {
+        let model = search.model_without(Some(k))?;
+        let (aliases, of_effect) = alias::aliases(search, k, &model, variance);
+        competing_effects.push(of_effect);
+        let named = model.joined(taken.candidate).0;
+        let effect_of = |alias: &Alias| search.candidates[alias.candidate].effect.clone();
+        alias_effects.push(aliases.iter().map(effect_of).collect());
+        let in_its_place = |alias: &Alias| moves_by(findings, k, &alias.model_coefficients, &named);
+        moves.push(aliases.iter().map(in_its_place).collect::<Vec<_>>());
+        gains.push(model.gain(taken.candidate).gain);
+    }
+    cover(&mut after_result.parameters, after, after_fit, &moves);
+    let families = library::families()?;
+    let effects: Vec<EffectResult> = (0..moves.len())
+        .map(|k| {
+            let reported = effect::Found {
+                number: k,
+                parameters: &after_result.parameters,
+                moves: &moves,
+                rms_gain_um: (gains[k] / held_out.rows).sqrt() * before.noise.sigma_mm * 1e3,
+                alias_effects: &alias_effects[k],
+            };
+            effect::result(findings, &families, &held_out, &reported)
+        })
+        .collect();
+    let (verdict, remainder) = verdict(findings, &effects);
+    let mut warnings = before.session.warnings.clone();
+    warnings.extend(noise::stated_against_repeats(before, &before_fit.residuals));
+    warnings.extend(mislabelled_runs(&before.tests));
+    let moved = moved(&before_result.parameters, &after_result.parameters);
+    let mut result = TraceResult {
+        verdict,
+        interrupted: false,
+        noise_um: after.noise.sigma_mm * 1e3,
+        noise_source: after.noise.source.word().to_string(),
+        noise_ar_coefficients: after.noise.memory.clone(),
+        readings: after.readings(),
+        heldout_by: before.folds.kind.words().to_string(),
+        before: before_result,
+        after: after_result,
+        effects,
+        remainder,
+        residual_before: match findings.structure_before {
+            Some(structure) if structure.is_significant() => structure.words.clone(),
+            // Detectors look at one test at a time; the search adds up what all tests show of one effect.
+            Some(_) if !search.taken().is_empty() => {
+                "structure that no single test shows beyond noise; the search over all tests finds it"
+                    .to_string()
+            }
+            Some(_) => "no structure beyond noise".to_string(),
+            None => "independent poses: structure is looked for effect by effect".to_string(),
+        },
+        rejected_candidates: rejected::candidates(&before.session.machine, search, &held_out),
+        moved,
+        candidates: findings.candidates,
+        candidates_seen: findings.candidates_seen,
+        unobservable: fit::unobservable(after, &after_fit.rank),
+        rejected: fit::rejected(after, after_fit),
+        plausibility: Plausibility::default(),
+        warnings,
+        about: before.session.about.iter().cloned().collect(),
+    };
+    if findings.interrupted {
+        result.mark_interrupted();
+    }
+    Ok(ReportedEffect {
+        result,
+        alias_effects,
+        competing_effects,
+    })
+}
+
+/// Held-out errors in µm: whitened sums of squares are turned into them by the declared model's own figure.
+struct HeldOut<'s> {
+    sums: &'s [f64],
+    /// Whitened rows.
+    rows: f64,
+    scale_um: f64,
+}
+
+impl<'s> HeldOut<'s> {
+    fn of(search: &'s Search<'_>, before_um: f64) -> HeldOut<'s> {
+        let rows = search.columns.rows().max(1) as f64;
+        let first = search.held_out.first().copied().unwrap_or(1.0);
+        HeldOut {
+            sums: &search.held_out,
+            rows,
+            scale_um: before_um / (first / rows).sqrt().max(f64::MIN_POSITIVE),
+        }
+    }
+
+    /// With so many effects.
+    fn um(&self, effects: usize) -> f64 {
+        let sum = self.sums.get(effects).or(self.sums.last());
+        (sum.copied().unwrap_or(1.0) / self.rows).sqrt() * self.scale_um
+    }
+
+    fn last_um(&self) -> f64 {
+        self.um(self.sums.len())
+    }
+}
+
+/// The variance that aliases are told apart by, in that of the noise: among poses, what the found effects leave.
+fn residual_variance(findings: &TraceFindings<'_, '_>) -> f64 {
+    if !findings.search.stop.in_residual_variance {
+        return 1.0;
+    }
+    let residuals = findings.after_fit.residuals.iter().flatten();
+    // Evidence is counted in the noise that the search went by.
+    let sigma_mm = findings.before.noise.sigma_mm;
+    let sum: f64 = residuals.map(|v| (v / sigma_mm).powi(2)).sum();
+    (sum / findings.search.columns.rows().max(1) as f64).max(1.0)
+}
+
+/// The declared model, on the readings that count after the search as well.
+fn before_result(findings: &TraceFindings<'_, '_>) -> ModelResult {
+    let (before, fit, after) = (findings.before, findings.before_fit, findings.after);
+    let result = model_result(before, fit, fit.held_out.rms_mm);
+    if before.rejected == after.rejected {
+        return result;
+    }
+    let [rms_um, heldout_rms_um] =
+        [&fit.residuals, &fit.held_out.residuals].map(|residuals| rms_mm(after, residuals) * 1e3);
+    let in_3d = |rms: f64| result.rms_3d_um.map(|_| rms * 3.0_f64.sqrt());
+    ModelResult {
+        rms_um,
+        heldout_rms_um,
+        rms_3d_um: in_3d(rms_um),
+        heldout_rms_3d_um: in_3d(heldout_rms_um),
+        ..result
+    }
+}
+
+pub(super) fn model_result(problem: &Problem<'_>, fit: &Fit, held_out_mm: f64) -> ModelResult {
+    let three = problem.coordinates() == 3;
+    let rms = rms_mm(problem, &fit.residuals) * 1e3;
+    let held = held_out_mm * 1e3;
+    let in_3d = |rms: f64| three.then(|| rms * 3.0_f64.sqrt());
+    ModelResult {
+        rms_um: rms,
+        heldout_rms_um: held,
+        rms_3d_um: in_3d(rms),
+        heldout_rms_3d_um: in_3d(held),
+        noise_um: problem.noise.sigma_mm * 1e3,
+        parameters: fit::parameters(problem, fit),
+    }
+}
+
+/// How far the unknowns after the search would move, inside units: by found effect, by alias in its place, by unknown.
+type Moves = [Vec<Vec<f64>>];
+
+/// By how much some values would move, where they are such functions of the unknowns: for each effect the largest move that one of its aliases makes,
+/// as the root of the sum of squares.
+fn alias_shifts(
+    moves: &Moves,
+    present: &[f64],
+    values: impl Fn(&[f64]) -> Vec<f64>,
+    beta: &[f64],
+) -> Vec<f64> {
+    let mut squares = vec![0.0; present.len()];
+    for of_effect in moves {
+        let mut largest = vec![0.0_f64; present.len()];
+        for moves in of_effect {
+            let moved: Vec<f64> = beta.iter().zip(moves).map(|(value, by)| value + by).collect();
+            for (most, (moved, present)) in largest.iter_mut().zip(values(&moved).iter().zip(present)) {
+                *most = most.max((moved - present).abs());
+            }
+        }
+        squares
+            .iter_mut()
+            .zip(largest)
+            .for_each(|(sum, most)| *sum += most * most);
+    }
+    squares.into_iter().map(f64::sqrt).collect()
+}
+
+/// Lets uncertainties cover what aliases would move.
+fn cover(parameters: &mut [ParameterResult], problem: &Problem<'_>, fit: &Fit, moves: &Moves) {
+    let quantities = fit::quantities(problem, &fit.rank);
+    let values = |beta: &[f64]| {
+        let mut values = Vec::with_capacity(parameters.len());
+        fit::values_at(problem, fit, &quantities, beta, |value| values.push(value));
+        values
+    };
+    let moved = alias_shifts(moves, &values(&fit.beta), values, &fit.beta);
+    for (parameter, moved) in parameters.iter_mut().zip(moved) {
+        parameter.u = parameter.u.hypot(moved);
+        if parameter.id.ends_with(".phase") {
+            parameter.u = parameter.u.min(fit::any_phase_deg());
+        }
+    }
+}
+
+/// How far the unknowns move if an alias stands in the place of the `k`-th effect, inside units: `in_place` and `named` are the coefficients of the model
+/// without that effect beside the alias and beside the effect. Its own do not move: the alias has none of them.
+fn moves_by(findings: &TraceFindings<'_, '_>, k: usize, in_place: &[f64], named: &[f64]) -> Vec<f64> {
+    let (search, to_unknowns) = (findings.search, &findings.start.to_unknowns);
+    let by: Vec<f64> = in_place.iter().zip(named).map(|(a, b)| a - b).collect();
+    let (of_declared, of_found) = by.split_at(search.rank);
+    // What was declared comes first among the unknowns, the found effects after it in their order.
+    let mut moves: Vec<f64> = (0..to_unknowns.nrows())
+        .map(|j| {
+            of_declared
+                .iter()
+                .enumerate()
+                .map(|(k, by)| to_unknowns[(j, k)] * by)
+                .sum()
+        })
+        .collect();
+    let mut of_found = of_found.iter();
+    for (l, taken) in search.taken().iter().enumerate() {
+        // Base columns are unit-length copies of the candidate's own.
+        for norm in search.norms(taken.candidate) {
+            let by = if l == k { None } else { of_found.next() };
+            moves.push(by.map_or(0.0, |by| by / norm.max(f64::MIN_POSITIVE)));
+        }
+    }
+    debug_assert_eq!(moves.len(), findings.after_fit.beta.len());
+    moves
+}
+
+fn verdict(findings: &TraceFindings<'_, '_>, effects: &[EffectResult]) -> (String, Remainder) {
+    if findings.interrupted {
+        return (String::new(), not_examined());
+    }
+    let Some(after) = findings.structure_after else {
+        let word = match (effects.is_empty(), findings.stopped_early) {
+            (true, _) => "clean",
+            (false, false) => "explained",
+            (false, true) => "partly-explained",
+        };
+        let remainder = Remainder {
+            structured: false,
+            p_value: findings.last_p_value,
+            place: None,
+        };
+        return (word.to_string(), remainder);
+    };
+    let structured = after.is_significant();
+    let remainder = Remainder {
+        structured,
+        p_value: after.p_value,
+        place: structured.then(|| after.words.clone()),
+    };
+    let before = findings
+        .structure_before
+        .map_or(0.0, |structure| structure.excess);
+    let share = if before > 0.0 { after.excess / before } else { 0.0 };
+    let word = word(!effects.is_empty(), structured, share);
+    (word.to_string(), remainder)
+}
+
+/// What is said of the residual of an interrupted trace.
+fn not_examined() -> Remainder {
+    Remainder {
+        structured: false,
+        p_value: 1.0,
+        place: Some("not examined: the trace was interrupted".to_string()),
+    }
+}
+
+/// What is said of a search along runs: whether it found anything, whether structure remains, and what share of its excess over noise.
+fn word(found: bool, structured: bool, share: f64) -> &'static str {
+    match (found, structured) {
+        (false, false) => "clean",
+        (false, true) => "unexplained",
+        (true, false) => "explained",
+        (true, true) if share < EXPLAINED_SHARE => "partly-explained",
+        (true, true) => "unexplained",
+    }
+}
+
+/// Parameters that moved by more than their uncertainty.
+fn moved(before: &[ParameterResult], after: &[ParameterResult]) -> Vec<ChangedParameter> {
+    before
+        .iter()
+        .filter_map(|b| {
+            let a = after.iter().find(|a| a.id == b.id)?;
+            ((a.value - b.value).abs() > a.u).then(|| ChangedParameter {
+                id: a.id.clone(),
+                by: a.value - b.value,
+                u: a.u,
+                unit: a.unit.clone(),
+            })
+        })
+        .collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_verdict_says_whether_most_of_the_structure_is_explained() {
+        for (found, structured, share, verdict) in [
+            (false, false, 0.0, "clean"),
+            (false, true, 1.0, "unexplained"),
+            (true, false, 0.9, "explained"),
+            (true, true, 0.2, "partly-explained"),
+            (true, true, 0.8, "unexplained"),
+        ] {
+            assert_eq!(word(found, structured, share), verdict);
+        }
+    }
+
+    #[test]
+    fn what_moved_by_more_than_its_uncertainty_is_told() {
+        let parameter = |id: &str, value: f64, u: f64| ParameterResult {
+            id: id.into(),
+            value,
+            u,
+            unit: "um".into(),
+        };
+        let before = [
+            parameter("EX0C", 3.0, 0.1),
+            parameter("EY0C", 3.0, 0.1),
+            parameter("EZ0A", 1.0, 0.1),
+        ];
+        let after = [parameter("EX0C", 1.0, 1.5), parameter("EY0C", 1.0, 2.5)];
+        let moved = moved(&before, &after);
+        assert_eq!(moved.len(), 1);
+        assert_eq!(
+            (moved[0].id.as_str(), moved[0].by, moved[0].u),
+            ("EX0C", -2.0, 1.5)
+        );
+    }
+}

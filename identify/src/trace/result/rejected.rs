@@ -1,0 +1,37 @@
+//! Candidates that the search added and that are not claimed.
+
+use abbe_model::chain::Machine;
+
+use super::{HeldOut, effect_name};
+use crate::results::RejectedCandidate;
+use crate::trace::paired::HeldOutDecrease;
+use crate::trace::search::Search;
+
+/// Candidates that score better than the null distribution of the search and did not lower the held-out error by more than the standard error of the fall.
+pub(super) fn candidates(
+    machine: &Machine,
+    search: &Search<'_>,
+    held_out: &HeldOut<'_>,
+) -> Vec<RejectedCandidate> {
+    let rejected = search.unclaimed.iter().map(|unclaimed| {
+        let (heldout_fall_um, u_heldout_fall_um) = held_out.decrease_um(unclaimed.fall);
+        RejectedCandidate {
+            name: effect_name(machine, &search.candidates[unclaimed.taken.candidate].effect),
+            p_value: unclaimed.taken.p_value,
+            heldout_fall_um,
+            u_heldout_fall_um,
+        }
+    });
+    rejected.collect()
+}
+
+impl HeldOut<'_> {
+    /// A fall of the sum of squares as a fall of the rms, with its standard error: `Δ(rms²) = 2 rms Δrms`.
+    fn decrease_um(&self, fall: HeldOutDecrease) -> (f64, f64) {
+        let by_um = |by: f64| {
+            let squares_um = by / self.rows * self.scale_um * self.scale_um;
+            squares_um / (2.0 * self.last_um()).max(f64::MIN_POSITIVE)
+        };
+        (by_um(fall.by), by_um(fall.standard_error))
+    }
+}

@@ -1,0 +1,39 @@
+//! What is reported of a trace without a search: the declared model.
+
+use super::{model_result, not_examined};
+use crate::fit::{self, Fit};
+use crate::noise;
+use crate::plausibility::Plausibility;
+use crate::problem::Problem;
+use crate::results::TraceResult;
+
+/// The declared model alone, without a verdict.
+pub(in crate::trace) fn unsearched(problem: &Problem<'_>, fit: &Fit) -> TraceResult {
+    let declared = model_result(problem, fit, fit.held_out.rms_mm);
+    let remainder = not_examined();
+    let mut warnings = problem.session.warnings.clone();
+    warnings.extend(noise::stated_against_repeats(problem, &fit.residuals));
+    TraceResult {
+        verdict: String::new(),
+        interrupted: false,
+        noise_um: problem.noise.sigma_mm * 1e3,
+        noise_source: problem.noise.source.word().to_string(),
+        noise_ar_coefficients: problem.noise.memory.clone(),
+        readings: problem.readings(),
+        heldout_by: problem.folds.kind.words().to_string(),
+        before: declared.clone(),
+        after: declared,
+        effects: Vec::new(),
+        rejected_candidates: Vec::new(),
+        residual_before: remainder.place.clone().unwrap_or_default(),
+        remainder,
+        moved: Vec::new(),
+        candidates: 0,
+        candidates_seen: 0,
+        unobservable: fit::unobservable(problem, &fit.rank),
+        rejected: fit::rejected(problem, fit),
+        about: problem.session.about.iter().cloned().collect(),
+        plausibility: Plausibility::default(),
+        warnings,
+    }
+}

@@ -1,0 +1,106 @@
+//! The library as a session sees it: every entry that can be laid over the readings, and whether they show it beside the declared unknowns.
+
+use abbe_model::session::Session;
+use faer::Mat;
+use rayon::prelude::*;
+
+use super::TraceOptions;
+use super::columns::{Columns, Layout};
+use super::library::{self, Candidate};
+use super::moments::Moments;
+use super::score::TrainedModel;
+use super::start::Start;
+use crate::error::IdentifyError;
+use crate::fit::prepare;
+use crate::problem::Problem;
+
+/// An entry of the library.
+#[derive(Clone, Debug)]
+pub struct Entry {
+    /// Its identifier.
+    pub id: String,
+    /// Index of its family.
+    pub family: usize,
+    /// Whether the session's readings can see it beside the declared unknowns.
+    pub seen: bool,
+}
+
+/// The entries that a session has what they follow for, in the order of the library.
+///
+/// # Errors
+/// If the session cannot be fitted.
+pub fn entries(session: &Session, options: &TraceOptions) -> Result<Vec<Entry>, IdentifyError> {
+    let (problem, fit) = prepare(session, options.seed)?;
+    let columns = Columns::new(&problem, &fit.beta);
+    let start = Start::of(&problem, &columns, &fit)?;
+    let prior = start.prior();
+    let laid = laid(&problem, &columns, options)?;
+    let (candidates, layouts): (Vec<Candidate>, Vec<Layout>) = laid.into_iter().unzip();
+    let none = Mat::zeros(columns.rows(), 0);
+    let moments = Moments::new(&columns, &layouts, start.model, &start.residual, none, &|| true)
+        .ok_or(IdentifyError::Interrupted)?;
+    let rank = moments.base();
+    let folds = (0..columns.fold_rows.len()).collect();
+    let trained = TrainedModel::new(&moments, &prior, (0..rank).collect(), folds)?;
+    Ok(candidates
+        .into_iter()
+        .zip(trained.gains())
+        .map(|(candidate, gain)| Entry {
+            id: candidate.effect.id(),
+            family: candidate.family,
+            seen: gain.freedom > 0,
+        })
+        .collect())
+}
+
+/// The candidates that a user wants to be looked for, laid over the readings: those that the data have what they follow for, in the order of the library.
+/// An error if what is wanted is in no identifier: misspelt, it would look as if nothing were there to be found.
+pub(super) fn laid(
+    problem: &Problem<'_>,
+    columns: &Columns<'_, '_>,
+    options: &TraceOptions,
+) -> Result<Vec<(Candidate, Layout)>, IdentifyError> {
+    let mut candidates = library::candidates(problem)?;
+    if let Some(text) = matching_no_candidate(&candidates, &options.only).next() {
+        return Err(IdentifyError::NotInTheLibrary { text: text.clone() });
+    }
+    let all = candidates.len();
+    candidates.retain(|candidate| wanted(options, &candidate.effect.id()));
+    if candidates.is_empty() && all > 0 {
+        return Err(IdentifyError::EverythingLeftOut);
+    }
+    Ok(candidates
+        .into_par_iter()
+        .filter_map(|candidate| {
+            let layout = columns.layout(&candidate.effect)?;
+            Some((candidate, layout))
+        })
+        .collect())
+}
+
+/// What a user wanted to leave out and is in no identifier, a warning each.
+pub(super) fn unused_exclusions(
+    problem: &Problem<'_>,
+    options: &TraceOptions,
+) -> Result<Vec<String>, IdentifyError> {
+    let candidates = library::candidates(problem)?;
+    Ok(matching_no_candidate(&candidates, &options.exclude)
+        .map(|text| format!("nothing was left out by `{text}`: no effect that the library has for this session is called so"))
+        .collect())
+}
+
+/// Of some texts those that no candidate has in its identifier.
+fn matching_no_candidate<'t>(
+    candidates: &[Candidate],
+    texts: &'t [String],
+) -> impl Iterator<Item = &'t String> {
+    let ids: Vec<String> = candidates.iter().map(|candidate| candidate.effect.id()).collect();
+    texts
+        .iter()
+        .filter(move |text| !ids.iter().any(|id| id.contains(text.as_str())))
+}
+
+fn wanted(options: &TraceOptions, id: &str) -> bool {
+    let matches = |patterns: &[String]| patterns.iter().any(|pattern| id.contains(pattern.as_str()));
+    (options.only.is_empty() || matches(&options.only)) && !matches(&options.exclude)
+}

@@ -1,0 +1,108 @@
+//! Further tests that separate a found effect from its aliases.
+
+use abbe_model::effect::Effect;
+
+use super::interrupt::Interrupt;
+use super::result::effect_name;
+use super::{Progress, Trace};
+use crate::error::IdentifyError;
+use crate::parameters::Role;
+use crate::plan::candidate_tests::CandidateTests;
+use crate::plan::separate::{Alternative, SeparatingTest, separating_tests};
+use crate::results::{AlternativeResult, EffectResult, SeparatingTestResult, SeparationResult};
+
+/// Aliases that are weighed against an effect, the nearest first: each takes columns of its own.
+const MAX_COMPARED_TESTS: usize = 24;
+
+/// Fills in, for each found effect, the tests on the menu that separate it from its aliases. Without a menu for the session's instrument nothing is filled
+/// in. Where `progress` says that no more is wanted, the trace is marked as interrupted, with the tests that were found until then.
+///
+/// # Errors
+/// If an effect cannot be laid over the session.
+pub fn separate_aliases(
+    trace: &mut Trace<'_>,
+    menu: &CandidateTests,
+    progress: &(dyn Fn(Progress) -> bool + Sync),
+) -> Result<(), IdentifyError> {
+    if trace.result.interrupted {
+        return Ok(());
+    }
+    let interrupt = Interrupt(progress);
+    for k in 0..trace.effects.len() {
+        match interrupt.check().and_then(|()| tests_for(trace, k, menu)) {
+            Ok(tests) => fill_in(
+                &mut trace.result.effects[k],
+                &trace.alias_effects[k],
+                trace.after.session,
+                tests,
+            ),
+            Err(IdentifyError::Request(_)) => break,
+            Err(IdentifyError::Interrupted) => break,
+            Err(error) => return Err(error),
+        }
+    }
+    if interrupt.check().is_err() {
+        trace.result.mark_interrupted();
+    }
+    Ok(())
+}
+
+/// The tests that separate the `k`-th found effect from its aliases.
+fn tests_for(
+    trace: &Trace<'_>,
+    k: usize,
+    menu: &CandidateTests,
+) -> Result<Vec<SeparatingTest>, IdentifyError> {
+    let number = trace.before.parameters.effects.len() + k;
+    let is_own = |role: &Role| matches!(role, Role::Coefficient { effect, .. } if *effect == number);
+    let parameters = trace.after.parameters.list.iter().zip(&trace.after_fit.beta);
+    let coefficients: Vec<f64> = parameters
+        .filter(|(parameter, _)| is_own(&parameter.role))
+        .map(|(_, value)| *value)
+        .collect();
+    let aliases = &trace.alias_effects[k];
+    let weighed = &aliases[..aliases.len().min(MAX_COMPARED_TESTS)];
+    let beta = &trace.after_fit.beta;
+    separating_tests(
+        &trace.after,
+        beta,
+        &trace.effects[k],
+        &coefficients,
+        weighed,
+        menu,
+    )
+}
+
+/// Puts tests into an effect's result.
+fn fill_in(
+    effect: &mut EffectResult,
+    aliases: &[Effect],
+    session: &abbe_model::session::Session,
+    tests: Vec<SeparatingTest>,
+) {
+    let name = |one: &Alternative| effect_name(&session.machine, &aliases[one.number]);
+    if let Some(first) = tests.first() {
+        effect.separated_by = Some(first.test.clone());
+        let nearest = first.alternatives.iter().find(|one| one.is_separated());
+        effect.separation = nearest.map(|one| SeparationResult {
+            from: name(one),
+            before_sigma: one.before,
+            after_sigma: one.after,
+            minutes: first.minutes,
+        });
+    }
+    let alternative = |one: &Alternative| AlternativeResult {
+        name: name(one),
+        before_sigma: one.before,
+        after_sigma: one.after,
+        separated: one.is_separated(),
+    };
+    let result = |test: &SeparatingTest| SeparatingTestResult {
+        test: test.test.clone(),
+        minutes: test.minutes,
+        separates: test.separates(),
+        of: test.alternatives.len(),
+        alternatives: test.alternatives.iter().map(alternative).collect(),
+    };
+    effect.separating_tests = tests.iter().map(result).collect();
+}
