@@ -29,7 +29,7 @@ pub struct ErrorCurve {
     terms: Vec<(Effect, Vec<f64>)>,
     /// Where the coefficients of the terms stand among the fit's parameters, one after another.
     places: Vec<usize>,
-    /// Covariance of the coefficients, row by row, enlarged as the fit's uncertainties are; inside units.
+    /// Covariance of the coefficients, row by row, enlarged as the fit's uncertainties are; internal units.
     covariance: Vec<Vec<f64>>,
 }
 

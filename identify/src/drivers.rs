@@ -143,7 +143,7 @@ pub fn component_slots(
     }
 }
 
-/// The inside unit of a component.
+/// The internal unit of a component.
 pub fn component_unit(session: &Session, component: &Component) -> Option<InternalUnit> {
     match component {
         Component::Axis(name) => Some(if name.freedom.is_angle() {

@@ -25,7 +25,7 @@ use crate::rank::Rank;
 use crate::results::{FitResult, ParameterResult, Rejected, Unobservable};
 use crate::triangle::Triangle;
 
-/// What a fit found, inside units.
+/// What a fit found, internal units.
 #[derive(Clone, Debug)]
 pub struct Fit {
     /// Every unknown; those in unseen combinations hold the part that is seen.
@@ -116,7 +116,7 @@ pub fn in_directions(triangle: &Triangle, basis: &Mat<f64>) -> Triangle {
     result
 }
 
-/// A session as a problem, with the noise that the session states, that its repeats show, or that its fit leaves over, and with its outliers excluded.
+/// A session as a problem, with the noise that the session states, that its repeats show, or that the residual of its fit gives, and with its outliers excluded.
 ///
 /// # Errors
 /// See [`Problem::new`]; also if the iterations do not end.
@@ -169,7 +169,7 @@ pub fn prepare_with<'a>(
     Ok((problem, fit))
 }
 
-/// What the nominal machine leaves over, mm, once the set-ups are fitted to it (linearised): noise for a first decision on what is seen. The
+/// What the nominal machine leaves as residual, mm, once the set-ups are fitted to it (linearised): noise for a first decision on what is seen. The
 /// machine's errors stay out of it: among sockets, shrinking the machine to nothing would explain every reading.
 fn nominal_residual_mm(problem: &Problem<'_>) -> Result<f64, IdentifyError> {
     let list = &problem.parameters.list;
@@ -495,7 +495,7 @@ pub fn unobservable(problem: &Problem<'_>, rank: &Rank) -> Vec<Unobservable> {
                 [(first, _), rest @ ..] => {
                     let others: Vec<&str> = rest.iter().map(|(j, _)| list[*j].id.as_str()).collect();
                     format!(
-                        "{} cannot be told from {}: moved together in this proportion they change no reading",
+                        "{} is confounded with {}: null-space direction, in this proportion they leave every reading unchanged",
                         list[*first].id,
                         others.join(", ")
                     )

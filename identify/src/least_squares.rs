@@ -46,7 +46,7 @@ pub struct Solution {
 
 const MAX_ITERATIONS: usize = 200;
 const SMALLEST_RELATIVE_STEP: f64 = 1e-12;
-/// A step below this does not bend the model: the square of it is below rounding.
+/// A step below this does not make the model nonlinear: the square of it is below rounding.
 const STRAIGHT_RELATIVE_STEP: f64 = 1e-7;
 
 /// Minimises from a start value.

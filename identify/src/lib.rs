@@ -1,4 +1,4 @@
-//! Identification: from readings to errors with honest uncertainties, and from what is left over to the effect that the model lacks.
+//! Identification: from readings to errors with honest uncertainties, and from the residual to the effect that the model lacks.
 //!
 //! - [`least_squares`], [`triangle`], [`rank`]: the numerical core, which knows no machine;
 //! - [`parameters`], [`problem`]: a session as a least-squares problem;

@@ -63,7 +63,7 @@ fn reject_along_runs(readings: &Readings, residual: &[f64], coordinates: usize, 
             let middle: Vec<f64> = values.array_windows().map(|five| median_of_five(*five)).collect();
             let mut deviations: Vec<f64> = Vec::with_capacity(run.len());
             for (row, value) in values.iter().enumerate() {
-                // Beside a step (backlash at a reversal) one of the two sides agrees; a wild reading agrees with neither.
+                // Beside a step (backlash at a reversal) one of the two sides agrees; an outlier agrees with neither.
                 let start = row.saturating_sub(NEIGHBOURS);
                 let end = (row + NEIGHBOURS + 1).min(values.len());
                 let from = |side: std::ops::Range<usize>| match side.len() {

@@ -35,7 +35,7 @@ pub struct Parameter {
     pub id: String,
     /// Unit outside.
     pub unit: Unit,
-    /// Physical size, inside units: 1 mm, 0.01 rad, or what moves the component by that much.
+    /// Physical size, internal units: 1 mm, 0.01 rad, or what moves the component by that much.
     pub size: f64,
     /// What is known before.
     pub prior: Prior,
@@ -306,7 +306,7 @@ impl Parameters {
         Ok(())
     }
 
-    /// The components of every test at the unknowns' values (inside units).
+    /// The components of every test at the unknowns' values (internal units).
     pub fn slot_values(&self, models: &[TestModel<'_>], beta: &[f64]) -> Vec<SlotValues> {
         self.parts
             .iter()

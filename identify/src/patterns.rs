@@ -28,7 +28,7 @@ pub struct Pattern {
     pub unit: String,
     /// The largest deviation along the path, µm.
     pub largest_um: f64,
-    /// Their mean, µm: what a circle's radius takes up.
+    /// Their mean, µm: what a circle's radius absorbs.
     pub mean_um: f64,
     /// Their rms about the mean, µm.
     pub rms_um: f64,

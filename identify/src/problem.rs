@@ -173,7 +173,7 @@ impl<'a> Problem<'a> {
         blocks
     }
 
-    /// The components of every test at the unknowns' values (inside units).
+    /// The components of every test at the unknowns' values (internal units).
     pub fn slot_values(&self, beta: &[f64]) -> Vec<SlotValues> {
         self.parameters.slot_values(&self.models, beta)
     }
@@ -319,7 +319,7 @@ impl<'a> Problem<'a> {
         white
     }
 
-    /// The triangle of each fold at the unknowns' values, in inside units of the unknowns.
+    /// The triangle of each fold at the unknowns' values, in internal units of the unknowns.
     ///
     /// # Errors
     /// If the model yields a number that is not finite.

@@ -9,7 +9,7 @@ use abbe_model::instrument::InternalUnit;
 pub struct Unit {
     /// As it stands in results: `um`, `arcsec`, `um/h`.
     pub name: String,
-    /// How many of it make one inside unit (mm, rad, …).
+    /// How many of it make one internal unit (mm, rad, …).
     pub display_per_internal: f64,
 }
 

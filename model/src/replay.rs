@@ -4,7 +4,7 @@
 //! the rest every step is done for a block of readings before the next one: a loop of fixed length over plain arrays, which the compiler turns into vector
 //! instructions, and beside which looking the step up costs little. The block's intermediate results stay in the processor's first cache.
 //!
-//! Products that only one sum or difference uses are taken up by it: `a·b + c·d` is one step.
+//! Products that only one sum or difference uses are absorbed by it: `a·b + c·d` is one step.
 
 use std::collections::{HashMap, HashSet};
 
@@ -216,7 +216,7 @@ struct Recorder<'a, V> {
     arena: &'a Arena<V>,
     uniform: Vec<Uniform<V>>,
     uniform_of: HashMap<Operand, usize>,
-    /// For each use of an operand, whether a sum or difference makes it, which could take up a product.
+    /// For each use of an operand, whether a sum or difference makes it, which could absorb a product.
     uses: HashMap<Operand, Vec<bool>>,
     varying: HashSet<NodeId>,
 }
@@ -254,7 +254,7 @@ impl<V: Clone + PartialEq> Recorder<'_, V> {
         }
     }
 
-    /// The step that computes a node; `None` for a variable, and for a product that another step takes up.
+    /// The step that computes a node; `None` for a variable, and for a product that another step absorbs.
     fn step(&self, id: NodeId) -> Option<Step<Operand>> {
         if self.product(Operand::Node(id)).is_some() {
             return None;

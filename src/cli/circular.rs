@@ -56,7 +56,7 @@ pub fn print(tests: &[CircularTest]) {
             let rows: Vec<Vec<String>> = test.diagnosis.iter().flat_map(fault_rows).collect();
             table::print(&FAULTS, &rows);
             if let Some(rms) = test.diagnosis_rms_um {
-                say!("  left over: {} rms", table::micrometres(rms));
+                say!("  residual: {} rms", table::micrometres(rms));
             }
         }
         for line in &test.not_told {

@@ -158,7 +158,7 @@ fn write(
     Ok(())
 }
 
-/// Positions that all of these curves cover, equidistant, inside units.
+/// Positions that all of these curves cover, equidistant, internal units.
 fn positions<'c>(
     curves: impl IntoIterator<Item = &'c ErrorCurve>,
     points: usize,

@@ -92,7 +92,7 @@ pub fn run(arguments: &FitArguments) -> Result<(), Failure> {
     }
     let session = read_session(&arguments.session, &outputs)?;
     if arguments.views.is_some() && arguments.method != Method::Full {
-        let message = "`--views` shows what the full fit leaves over: leave `--method` out";
+        let message = "`--views` shows what the full fit leaves as residual: leave `--method` out";
         return Err(Failure::CommandLine(message.into()));
     }
     if arguments.method != Method::Full && (arguments.csv.is_some() || arguments.compensation.wanted()) {
@@ -169,7 +169,7 @@ fn print(result: &FitResult) {
         );
     }
     say!(
-        "{} of {} unknowns or combinations of them are seen",
+        "{} of {} parameters identifiable (rank)",
         result.rank,
         result.unknowns
     );
@@ -180,7 +180,7 @@ fn print(result: &FitResult) {
     }
     print_unobservable(&result.unobservable);
     if !result.rejected.is_empty() {
-        say!("\nLeft out as wild:");
+        say!("\nExcluded as outliers:");
         for reading in &result.rejected {
             say!(
                 "  {} {}:{}  residual {}",

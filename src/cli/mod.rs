@@ -110,10 +110,10 @@ enum Command {
     /// Describe a file or a result as JSON Schema.
     #[command(after_help = schema::HELP)]
     Schema(schema::SchemaArguments),
-    /// Draw readings from a plan with given errors.
+    /// Simulate readings from a plan with given errors.
     #[command(after_help = simulate::HELP)]
     Simulate(Box<simulate::SimulateArguments>),
-    /// Close the loop: trace what the fit leaves over to the effect that the model lacks.
+    /// Find the unmodelled effect behind the residual.
     #[command(
         after_help = "Example:\n  abbe trace sessions/hermle-c600u/measured/session.toml --json trace.json --csv trace.csv"
     )]

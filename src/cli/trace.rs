@@ -30,7 +30,7 @@ pub struct TraceArguments {
     common: CommonArguments,
     #[command(flatten)]
     faces: ReportArguments,
-    /// The most effects to take up; as many as earn their place if not given.
+    /// Maximum number of effects (default: until the held-out error stops improving).
     #[arg(long, value_name = "N")]
     max_effects: Option<usize>,
     /// Look only for effects whose identifier contains this (`EZC`, `~time`, `:h2`); may be repeated.

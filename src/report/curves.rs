@@ -225,7 +225,7 @@ pub fn spectrum_plot(spectrum: &Spectrum, highest: f64, effects: &[Effect]) -> P
     .plot()
 }
 
-/// What one error at a time does to each test: 10 µm and 0.01° (Table 3.1 of the thesis), 5 µm a division (its Figs. 3.7, 3.8); coordinates of a vector
+/// What one error at a time does to each test: 10 µm and 0.01° (Table 3.1 of the thesis), 5 µm per division (its Figs. 3.7, 3.8); coordinates of a vector
 /// as curves, and among poses by how much.
 ///
 /// # Errors
@@ -322,7 +322,7 @@ fn small_circles(test: &TestSensitivities, columns: &[Sensitivity], um: f64) -> 
         format!("patterns-{}", test.test),
         format!("{}: the trace of one error at a time", test.test),
         format!(
-            "{} µm a division; first order. What no reading of the test changes with is left out.",
+            "{} µm per division; first order. What no reading of the test changes with is left out.",
             text(um, um)
         ),
         [round.side * across as f64, high * rows as f64 + 6.0],
@@ -354,7 +354,7 @@ fn curves(test: &TestSensitivities, columns: &[Sensitivity]) -> Plot {
     Lines {
         name: format!("sensitivity-{name}"),
         title: what,
-        caption: "µm of reading for a unit of each error, along the first run.".to_string(),
+        caption: "µm of reading per unit of each error, along the first run.".to_string(),
         x: (
             x,
             format!(
@@ -365,7 +365,7 @@ fn curves(test: &TestSensitivities, columns: &[Sensitivity]) -> Plot {
         ),
         y: (
             Scale::rounded(values[0].min(0.0), values[1].max(0.0), UP, 6),
-            "µm a unit".to_string(),
+            "µm per unit".to_string(),
         ),
         series: columns
             .iter()

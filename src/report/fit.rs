@@ -99,7 +99,7 @@ pub fn document(problem: &Problem<'_>, fit: &Fit, result: &FitResult) -> Result<
     document.section(
         "What else it could be",
         html! {
-            p { "Errors that are strongly correlated are told apart only by small differences; what is not told apart at all is no number." }
+            p { "Errors that are strongly correlated are separated only by small differences; a confounded combination is not returned as a number." }
             (correlations)
             (readings::unobservable(&result.unobservable))
         },

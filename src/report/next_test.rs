@@ -51,7 +51,7 @@ pub fn document(problem: &Problem<'_>, improvement: Option<&Improvement>, ranges
 fn verdict(found: &Improvement) -> String {
     match found.steps.as_slice() {
         [] => format!(
-            "None of {} on the menu improves the {}, {}.",
+            "None of {} candidate tests improves the {}, {}.",
             counted(found.menu_entries, "test"),
             found.figure,
             digits(found.before)
@@ -59,8 +59,8 @@ fn verdict(found: &Improvement) -> String {
         [.., last] => format!(
             "{} the {} from {} to {}.",
             match found.steps.len() {
-                1 => format!("One test of {} on the menu takes", found.menu_entries),
-                many => format!("{many} tests of {} on the menu take", found.menu_entries),
+                1 => format!("One test of {} candidate tests takes", found.menu_entries),
+                many => format!("{many} tests of {} candidate tests take", found.menu_entries),
             },
             found.figure,
             digits(found.before),
@@ -80,10 +80,7 @@ fn proposed(document: &mut Document, found: &Improvement) -> Markup {
     let shown = document.show([bars(
         "next-test".to_string(),
         "The plan with each proposed test".to_string(),
-        format!(
-            "{}; tests are taken up one after another.",
-            sentence(&found.figure)
-        ),
+        format!("{}; tests are added one after another.", sentence(&found.figure)),
         &found.figure,
         &bar_rows,
         &[],

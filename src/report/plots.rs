@@ -116,7 +116,7 @@ impl<'d> Drawn<'d> {
         rows.iter().map(|row| (abscissa[*row], values[*row])).collect()
     }
 
-    /// The trace of a test about the nominal circle, with this round number of µm a division.
+    /// The trace of a test about the nominal circle, with this round number of µm per division.
     fn circle(&self, number: usize, column: Column, name: &str, title: String, um: Option<f64>) -> Plot {
         let test = &self.views.tests[number];
         let values = column.of(test);

@@ -81,7 +81,7 @@ pub fn live(document: &mut Document, drawn: &Drawn<'_>, parameters: &[ParameterR
             });
             let words = match share.cause {
                 Cause::Setup => "set-up: balls and bar".to_string(),
-                Cause::Unseen => "not told apart, together".to_string(),
+                Cause::Unseen => "confounded, together".to_string(),
                 Cause::Error | Cause::Effect => format!("{}{}", share.id, value.unwrap_or_default()),
             };
             json!({"id": share.id, "words": words})
@@ -294,7 +294,7 @@ pub fn machine(document: &mut Document, problem: &Problem<'_>) -> Markup {
     document.show([chain::plot(&problem.session.machine, &errors)])
 }
 
-/// What cannot be told apart.
+/// What is confounded.
 pub fn unobservable(items: &[Unobservable]) -> Markup {
     html! {
         @if !items.is_empty() {
@@ -318,7 +318,7 @@ pub fn warnings(rejected: &[Rejected], warnings: &[String]) -> Markup {
         })
         .collect();
     html! {
-        @if !rows.is_empty() { h3 { "Left out as wild" } (table(&["test", "file", "line", "residual"], &rows)) }
+        @if !rows.is_empty() { h3 { "Excluded as outliers" } (table(&["test", "file", "line", "residual"], &rows)) }
         @if !warnings.is_empty() { h3 { "Warnings" } (list(warnings.iter().cloned())) }
     }
 }

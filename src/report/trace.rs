@@ -30,7 +30,7 @@ pub fn method(result: &TraceResult) -> Markup {
         p {
             "The residual of the declared model is searched for " (result.candidates) " effects of the library, of which \
              these readings can see " (result.candidates_seen)
-            ". An effect is taken up if readings without structure seldom let the whole search find as good; everything is then refitted together. "
+            ". An effect is added if readings without structure seldom let the whole search find as good; everything is then refitted together. "
             (sentence_of_noise(result.noise_um, &result.noise_source)) "; held out: leaving out " (result.heldout_by) ", search included."
         }
     }
@@ -146,7 +146,7 @@ fn effects(document: &mut Document, trace: &Trace<'_>) -> Markup {
     };
     let rows: Vec<Vec<String>> = result.effects.iter().enumerate().map(row).collect();
     html! {
-        @if result.effects.is_empty() { p { "No effect was taken up." } }
+        @if result.effects.is_empty() { p { "No effect was added." } }
         @if !rows.is_empty() {
             (table(&["", "effect", "in words", "found", "explains, rms", "p ≤", "explanations", "family"], &rows))
         }

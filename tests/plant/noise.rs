@@ -1,4 +1,4 @@
-//! What the sensor adds: white or serially correlated noise, wild readings, rows that are missing.
+//! What the sensor adds: white or serially correlated noise, outliers, rows that are missing.
 
 use rand::{Rng, RngExt};
 use rand_distr::{Distribution, StandardNormal};

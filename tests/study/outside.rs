@@ -39,7 +39,7 @@ fn what_the_library_lacks_gets_no_confident_name() {
 }
 
 /// A wave whose size swells and fades is a hump in the spectrum of what repeats differ by, not noise with a memory (session 41: sixth order under white noise with
-/// wild readings).
+/// outliers).
 #[test]
 fn a_wave_that_swells_and_fades_is_not_taken_for_noise() {
     for outcome in &run(41..42, strange) {

@@ -44,7 +44,7 @@ fn both_of_a_pair_are_found() {
 }
 
 /// Two compliances of which each undoes part of the other: neither shows much alone (session 43). A ball that drifts leaves another cycle in every run, which is
-/// structure and no memory of the noise (session 60).
+/// structure and no autocorrelation of the noise (session 60).
 #[test]
 fn pairs_that_hide_each_other_or_look_like_slow_noise_are_found() {
     for number in [43, 60] {

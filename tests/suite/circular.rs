@@ -136,7 +136,7 @@ fn a_cubic_is_not_called_cyclic() {
             is(&test, "scale mismatch", "XY", "ratio", sign * 40.0, 0.5);
             let told = test["not_told"].to_string();
             assert!(
-                told.contains("third-order error of X cannot be told from one of Y"),
+                told.contains("third-order error of X is confounded with one of Y"),
                 "{told}"
             );
         }

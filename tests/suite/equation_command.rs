@@ -146,7 +146,7 @@ fn the_error_vector_in_every_language() {
         "∂Δ.y/∂e_x0c = s_c\n",
         "∂Δ.x/∂e_xx  = c_c   (a fixed multiple of that of e_x0c)",
         "∂Δ.z/∂e_zc  = −1\n",
-        "e_xx cannot be told from e_x0c",
+        "e_xx is confounded with e_x0c",
     ] {
         assert!(first.contains(line), "`{line}` is not in\n{first}");
     }

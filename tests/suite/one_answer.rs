@@ -83,7 +83,7 @@ fn among_poses() {
         &at("fit.json"),
     );
     of_one_model(&trace, &fit);
-    // What is left over is not called noise, by neither, and it is that of the effects.
+    // The residual is not called noise, by neither, and it is that of the effects.
     assert_eq!(trace["noise_source"], "residual");
     let [before, after] = ["before", "after"].map(|model| number(&trace[model]["noise_um"]));
     assert!(

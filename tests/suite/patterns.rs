@@ -8,7 +8,7 @@ use super::{abbe, ready, text};
 const R: f64 = 100.0;
 const BARS: [f64; 2] = [99.9881, 149.9946];
 
-/// `ΔL·L₀` of a unit of the error for the ball at (0, R, 0), the spindle ball at (−D, 0, 0), C at 0 (first order of Eqs. 3.20, 3.21).
+/// `ΔL·L₀` for one unit of the error for the ball at (0, R, 0), the spindle ball at (−D, 0, 0), C at 0 (first order of Eqs. 3.20, 3.21).
 fn numerator(error: &str, a: f64, d: f64) -> f64 {
     match error {
         "EY0A" => R * a.cos(),

@@ -37,7 +37,7 @@ fn the_screen_and_the_json_say_the_same() {
     }
     assert!(screen.contains("A150 contributes all of EB0A, EC0A"));
     assert!(
-        screen.contains("EC0A cannot be told from y of the spindle ball in A150: 1 arcsec : −0.54 um"),
+        screen.contains("EC0A is confounded with y of the spindle ball in A150: 1 arcsec : −0.54 um"),
         "{screen}"
     );
     assert!(
@@ -97,7 +97,7 @@ fn what_cannot_be_asked_is_said_and_fails() {
         (vec!["plan", &session, "--improve", "--bars-mm", "0"], "no length"),
         (
             vec!["plan", &session, "--improve", "--bars-mm", "20"],
-            "nothing on the menu",
+            "no candidate test",
         ),
         (vec!["plan", &session, "--clearance-mm", "1,2"], "six lengths"),
         (

@@ -55,7 +55,7 @@ fn rho(analysis: &PlanAnalysis, a: &str, b: &str) -> f64 {
     analysis.correlation.matrix[place(a)][place(b)].unwrap()
 }
 
-/// Bias of an error, in its unit a unit of an effect, with its sign.
+/// Bias of an error, in its unit per unit of an effect, with its sign.
 fn bias(analysis: &PlanAnalysis, effect: &str, error: &str) -> f64 {
     let effects = &analysis.effects.as_ref().unwrap().effects;
     let found = effects

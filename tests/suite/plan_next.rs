@@ -133,7 +133,7 @@ fn wobble_and_axial_motion_are_told_apart_at_a_second_radius() {
         &menu,
     )
     .unwrap()
-    .expect("something on the menu");
+    .expect("a candidate test");
     println!("{found:?}");
     assert!(found.before < 3.0, "{found:?}");
     assert!(found.after > 20.0 * found.before.max(1.0), "{found:?}");

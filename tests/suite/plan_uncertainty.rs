@@ -18,7 +18,7 @@ use super::topologies::{FIGURE_1_1, TABLE_1_1};
 
 /// Simulated fits a topology.
 const FITS: usize = 500;
-/// Spread of the errors that are drawn, µm and arcsec. What one linear step leaves over of them is a few hundredths of a µm.
+/// Spread of the errors that are drawn, µm and arcsec. Their nonlinearity in one linear step is a few hundredths of a µm.
 const ERRORS_UM: f64 = 10.0;
 
 /// Every rotary axis swept twice: the other ball at the foot of the circle, and beside it.

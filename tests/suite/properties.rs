@@ -133,7 +133,7 @@ fn test(number: usize, station: Station<f64>, readings: Readings, axes: usize) -
     }
 }
 
-/// What a fit says of a session, in outside units; wild readings are not what these sessions are about.
+/// What a fit says of a session, in outside units; outliers are not what these sessions are about.
 fn fitted(session: &Session) -> FitResult {
     let (problem, fit) = prepare(session, 1).unwrap();
     let result = report(&problem, &fit);

@@ -87,7 +87,7 @@ pub(crate) fn notes_spelt(
                 notes.push(format!(
                     "{} {} {}{}",
                     name(&sensitivity.parameter),
-                    escape("cannot be told from"),
+                    escape("is confounded with"),
                     name(of),
                     escape(": a fixed multiple wherever the axes stand.")
                 ));

@@ -320,7 +320,7 @@ fn an_effect_that_is_a_location_error_is_marked() {
     let errors: Vec<ErrorName> = ErrorName::parse("EX0C").into_iter().collect();
     let equation = Equation::of(&machine, &Bar, &errors, &options).expect("an equation");
     let text = equation.print(Language::Text).expect("a text");
-    assert!(text.contains("k_1 cannot be told from e_x0c"), "{text}");
+    assert!(text.contains("k_1 is confounded with e_x0c"), "{text}");
 }
 
 #[test]

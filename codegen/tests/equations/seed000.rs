@@ -364,7 +364,7 @@ fn the_first_order_term_for_term() {
         .map(|v| v.text(abbe_codegen::Symbols::Iso))
         .collect();
     assert_eq!(unseen, ["EA0C"]);
-    // θ_z0a and e_y0a cannot be told apart by this test, nor can θ_y0a and e_z0a.
+    // θ_z0a and e_y0a are confounded in this test, and so are θ_y0a and e_z0a.
     let multiples: Vec<bool> = first
         .sensitivities
         .iter()

@@ -4,11 +4,11 @@
 //! What only a difference or a sum of both axes shows (scale mismatch, servo mismatch, third-order positioning) is counted along the travel of the axes: positive
 //! where an axis travels too far, or lags.
 //!
-//! The terms of [`super::terms`] are fitted together by least squares with radius and centre, which the set-up takes up. Reversal spikes
+//! The terms of [`super::terms`] are fitted together by least squares with radius and centre, which the set-up absorbs. Reversal spikes
 //! and cyclic errors have a width and a pitch that are searched for; they are taken in only where chance would not give as good a one in
 //! a thousand circles. A share is the range of a fault's own `δL` over the sum of all ranges.
 //!
-//! Uncertainties follow from the noise, or from what is left over where that is more; where neighbouring readings err alike with the
+//! Uncertainties follow from the noise, or from the residual where that is more; where neighbouring readings err alike with the
 //! correlation r, they are enlarged by √((1 + r)/(1 − r)).
 
 use abbe_model::chain::Machine;
@@ -95,7 +95,7 @@ impl Model {
     }
 }
 
-/// The wild readings of a circle: single ones that stand out of what the diagnosis leaves over; `None` where there is no diagnosis.
+/// The outliers of a circle: single ones that stand out of the residual of the diagnosis; `None` where there is no diagnosis.
 pub(super) fn reject_outliers(machine: &Machine, path: &Path) -> Option<Vec<bool>> {
     let model = Model::of(machine, path).ok()?;
     let residual = &model.regression.residual;
@@ -126,7 +126,7 @@ pub(super) fn add(machine: &Machine, path: &Path, noise_mm: f64, result: &mut Ci
             limits(path, &model.regression, sigma, &model.names, result);
             if model.faults.iter().any(is_third_order) {
                 result.not_told.push(format!(
-                    "a third-order error of {} cannot be told from one of {}: the figure is that of both together",
+                    "a third-order error of {} is confounded with one of {}: the figure is that of both together",
                     model.names[0], model.names[1]
                 ));
             }
@@ -306,7 +306,7 @@ fn report(rows: &Rows, faults: &[Fault], regression: &Regression, sigma: f64, re
     result.diagnosis_rms_um = Some((regression.sum_of_squares() / rows.count() as f64).sqrt() * 1e3);
 }
 
-/// What cannot be told from these readings.
+/// What these readings confound.
 fn limits(path: &Path, regression: &Regression, sigma: f64, names: &[String; 2], result: &mut CircularTest) {
     let (radius_um, u) = (regression.beta[0] * 1e3, regression.u(&[(0, 1e3)], sigma));
     result.not_told.push(format!(
@@ -315,14 +315,14 @@ fn limits(path: &Path, regression: &Regression, sigma: f64, names: &[String; 2],
         names[0], names[1]
     ));
     if !path.both_directions() {
-        let why = "one direction only: servo mismatch is in the squareness, lateral play in radius and scale, and neither is told apart";
+        let why = "one direction only: servo mismatch is in the squareness, lateral play in radius and scale, and neither is separable";
         result.not_told.push(why.into());
     } else if path.feed_mm_s.is_none() {
         let why = "no time in the data: servo mismatch is given as a lag in µm at this feed, not in ms";
         result.not_told.push(why.into());
     }
     result.not_told.push(
-        "straightness cannot be told from a positioning error of the other axis that grows with the square"
+        "straightness is confounded with a positioning error of the other axis that grows with the square"
             .into(),
     );
 }

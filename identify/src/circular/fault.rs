@@ -2,7 +2,7 @@
 
 use crate::results::ParameterResult;
 
-/// A value of a fault: its name, a weight for each of its columns, what one inside unit (mm) is in its unit.
+/// A value of a fault: its name, a weight for each of its columns, what one internal unit (mm) is in its unit.
 pub(super) struct Figure {
     pub name: String,
     pub weights: Vec<(usize, f64)>,

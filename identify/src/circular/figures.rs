@@ -152,7 +152,7 @@ fn about(path: &Path, trace: &Trace) -> SpokeAngles {
             [length * p[0].cos(), length * p[0].sin()]
         })
         .collect();
-    // The centre of a short arc cannot be told from its radius.
+    // The centre of a short arc is confounded with its radius.
     let found = (path.arc() >= PI * 0.99)
         .then(|| circle::through(&points))
         .flatten();

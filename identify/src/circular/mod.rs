@@ -19,7 +19,7 @@ use abbe_model::session::Session;
 
 /// The figures of every ball-bar test whose path is a circle, and of every one in which a rotary axis turns.
 ///
-/// `noise_mm` is the standard deviation of a reading; `left_out[test][row]` names wild readings. A circle of linear axes is judged by its own
+/// `noise_mm` is the standard deviation of a reading; `left_out[test][row]` names outliers. A circle of linear axes is judged by its own
 /// diagnosis instead: what the fit of a machine without these faults calls wild may be a spike.
 pub fn of_session(session: &Session, noise_mm: f64, left_out: &[Vec<bool>]) -> Vec<CircularTest> {
     let measured = session.tests.iter().filter(|test| test.readings.is_some());

@@ -13,12 +13,12 @@ pub(super) struct Regression {
     pub beta: Vec<f64>,
     /// `(XᵀX)⁻¹`.
     pub inverse: Mat<f64>,
-    /// What is left over, row by row.
+    /// The residual, row by row.
     pub residual: Vec<f64>,
 }
 
 impl Regression {
-    /// Solves; `None` where the columns cannot be told apart.
+    /// Solves; `None` where the columns are confounded.
     pub fn solve(columns: &[Vec<f64>], y: &[f64]) -> Option<Regression> {
         let n = columns.len();
         if y.len() <= n {

@@ -34,7 +34,7 @@ pub struct CircularTest {
     /// What the path is made of, the greatest share first; of circles of two linear axes.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub diagnosis: Vec<Diagnosis>,
-    /// What the diagnosis leaves over, rms, µm.
+    /// The residual of the diagnosis, rms, µm.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub diagnosis_rms_um: Option<f64>,
     /// What this test cannot tell, in words.

@@ -1,6 +1,6 @@
 //! Faults with a number that has to be searched for: the width of a reversal spike, the pitch of a cyclic error.
 //!
-//! One is taken for found where `P(χ² ≥ gain / s²)` times the number of looks is below one in a thousand, `s²` the variance of what is left over, enlarged
+//! One is taken for found where `P(χ² ≥ gain / s²)` times the number of looks is below one in a thousand, `s²` the variance of the residual, enlarged
 //! for the correlation of neighbours.
 
 use statrs::distribution::{ChiSquared, ContinuousCDF};
@@ -53,7 +53,7 @@ pub(super) fn is_separable(rows: &Rows, faults: &[Fault], fault: &Fault, regress
         )
 }
 
-/// The variance in which a gain is counted: that of what is left over, enlarged for the correlation of neighbours.
+/// The variance in which a gain is counted: that of the residual, enlarged for the correlation of neighbours.
 fn unit_of_gain(rows: &Rows, regression: &Regression) -> f64 {
     let (variance, r) = variance_and_correlation(rows, regression);
     variance.max(MIN_MM * MIN_MM) * (1.0 + r) / (1.0 - r)

@@ -10,7 +10,7 @@
 //! backlash         δᵢ = −½Bᵢ·dᵢ               −½Bᵢ·dᵢ·uᵢ              Bᵢ = mean + slope·uᵢ: one at either end
 //! lateral play     δⱼ = −½Pᵢ·dᵢ               −½Pᵢ·dᵢ·uⱼ
 //! straightness     δⱼ = κᵢ·qᵢ²                κᵢR²·uᵢ²·uⱼ             κᵢR²: sagitta over the diameter
-//! third order      δᵢ = cᵢ·(qᵢ/R)³            ⅛(c₁ + c₂)·cos 4θ           beside radius and scale, which take up the rest
+//! third order      δᵢ = cᵢ·(qᵢ/R)³            ⅛(c₁ + c₂)·cos 4θ           beside radius and scale, which absorb the rest
 //!                  δⱼ = kᵢ·(qᵢ/R)³            ⅛(k₁ − k₂)·sin 4θ           beside squareness
 //! reversal spike   δL = H·exp(−φ/w)           φ: angle of the path since axis i turned round
 //! cyclic error     δᵢ = A·cos(2πqᵢ/p + …)     uᵢ·…
@@ -118,7 +118,7 @@ impl Rows {
         (0..self.count()).map(of).collect()
     }
 
-    /// Mean radius and centre: what the set-up takes up.
+    /// Mean radius and centre: what the set-up absorbs.
     pub fn setup(&self) -> Vec<Vec<f64>> {
         vec![vec![1.0; self.count()], self.u[0].clone(), self.u[1].clone()]
     }

@@ -95,7 +95,7 @@ pub fn correlation(covariance: &Mat<f64>, i: usize, j: usize) -> f64 {
     }
 }
 
-/// The conditional standard uncertainty of each wanted error, all other wanted errors known, inside units.
+/// The conditional standard uncertainty of each wanted error, all other wanted errors known, internal units.
 ///
 /// # Errors
 /// If the decomposition fails.

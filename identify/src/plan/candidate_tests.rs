@@ -2,7 +2,7 @@
 //!
 //! An entry sweeps one rotary axis while the other ball stands on that axis (at the foot of the circle or beside it, as the bar's length
 //! demands), or lets the linear axes keep the bar radial, tangential or axial. A part of the range, or one direction, never sees more than
-//! the whole: they are tried where gain is judged by the minute. What an axis' travel forbids, or a bar cannot reach, is not on the menu.
+//! the whole: they are tried where gain is judged by the minute. What an axis' travel forbids, or a bar cannot reach, is not among the candidate tests.
 
 use abbe_model::axis::AxisKind;
 use abbe_model::effect::{Component, Driver, Effect, Shape};
@@ -150,7 +150,7 @@ pub fn entries(session: &Session, menu: &CandidateTests) -> Result<Vec<Entry>, I
         .collect();
     if entries.is_empty() {
         return Err(IdentifyError::Request(
-            "nothing on the menu can be made on this machine: no bar reaches, or the travel is too short"
+            "no candidate test can be made on this machine: no bar reaches, or the travel is too short"
                 .to_string(),
         ));
     }

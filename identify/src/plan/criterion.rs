@@ -12,7 +12,7 @@ use crate::problem::Problem;
 pub enum Goal {
     /// The least worst standard uncertainty of the errors, 1 µm weighing as much as 1″.
     WorstUncertainty,
-    /// The greatest distance in standard deviations between an effect of these coefficients (inside units; none: of one outside unit, at
+    /// The greatest distance in standard deviations between an effect of these coefficients (internal units; none: of one outside unit, at
     /// the worst phase) and the best that everything else, the other effect included, can make of it.
     Separation {
         /// The effect that is there.

@@ -4,7 +4,7 @@
 //!
 //! ```text
 //! S = CᵀC − CᵀX·Cov·XᵀC      information on the effect beside the unknowns: what is left of it in the residual
-//! B = Cov·XᵀC                what an undeclared effect adds to the unknowns, a unit of each coefficient
+//! B = Cov·XᵀC                what an undeclared effect adds to the unknowns, per unit of each coefficient
 //! ```
 //!
 //! An effect of several coefficients (cosine and sine) is judged at its worst phase.

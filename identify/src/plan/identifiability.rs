@@ -1,4 +1,4 @@
-//! Blind spots by name: what no reading sees, what only the set-up's priors hold, and what is told apart badly.
+//! Blind spots by name: what no reading sees, what only the set-up's priors hold, and what is nearly collinear.
 
 use faer::Mat;
 
@@ -21,7 +21,7 @@ const MIN_ERROR: f64 = 1.37e-3;
 /// Things that a combination names in words.
 const MAX_NAMED: usize = 5;
 /// The verb of a combination that no reading sees.
-const CONFOUNDED: &str = "cannot be told from";
+const CONFOUNDED: &str = "is confounded with";
 /// Share of the largest coefficient below which an unknown is left out of a near dependency.
 const MIN_PART: f64 = 0.1;
 
@@ -46,7 +46,7 @@ fn called<'i>(list: &[Parameter], id: &'i str) -> (String, Option<&'i str>) {
     )
 }
 
-/// A combination in words: what cannot be told from what, and in which proportion, with units where they differ. One thing in several tests is
+/// A combination in words: what is confounded with what, and in which proportion, with units where they differ. One thing in several tests is
 /// named once, and of a long combination only the first.
 fn describe(list: &[Parameter], combination: &[(String, f64)], verb: &str) -> String {
     let unit_of = |id: &str| {
@@ -294,7 +294,7 @@ pub fn nearly_collinear(
         let why = describe(
             list,
             &combination,
-            &format!("is badly told (condition index {condition_index:.0}) from"),
+            &format!("is nearly collinear (condition index {condition_index:.0}) with"),
         );
         found.push(NearDependency {
             condition_index,

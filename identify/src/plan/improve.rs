@@ -38,7 +38,7 @@ pub struct Improvement {
     /// The errors and their standard uncertainties before, outside units; infinite (`null` in JSON) where an error is not identifiable.
     #[schemars(with = "Vec<(String, Option<f64>)>")]
     pub uncertainties_before: Vec<(String, f64)>,
-    /// The tests, in the order in which they are taken up.
+    /// The tests, in the order in which they are added.
     pub steps: Vec<Step>,
     /// What the exchange changed, in words.
     pub exchanged: Vec<String>,

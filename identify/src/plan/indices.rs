@@ -46,7 +46,7 @@ pub fn indices(
     })
 }
 
-/// The figures of the triangle of the errors that are seen, in inside units; `size` is the physical size of each.
+/// The figures of the triangle of the errors that are seen, in internal units; `size` is the physical size of each.
 fn of_triangle(r: MatRef<'_, f64>, size: &[f64], readings: usize) -> Result<Indices, IdentifyError> {
     let m = size.len();
     let scaled = Mat::from_fn(m, m, |i, j| r[(i, j)] * size[j]);

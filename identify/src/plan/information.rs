@@ -18,9 +18,9 @@ use crate::triangle::upper;
 pub struct Shared {
     /// Their identifiers.
     pub ids: Vec<String>,
-    /// Physical sizes, inside units.
+    /// Physical sizes, internal units.
     pub size: Vec<f64>,
-    /// Outside units in an inside unit.
+    /// Outside units in an internal unit.
     pub display_per_internal: Vec<f64>,
     /// How many of the last columns are asked about.
     pub asked: usize,

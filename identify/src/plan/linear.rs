@@ -27,7 +27,7 @@ pub struct Linearisation {
     pub whole: Triangle,
     /// What is seen and what is not.
     pub rank: Rank,
-    /// Covariance of the unknowns, seen part, inside units.
+    /// Covariance of the unknowns, seen part, internal units.
     pub covariance: Mat<f64>,
     /// Physical size of each unknown.
     pub size: Vec<f64>,
@@ -66,7 +66,7 @@ impl Linearisation {
         })
     }
 
-    /// Standard uncertainty of an unknown, inside unit; `None` where it takes part in an unseen combination.
+    /// Standard uncertainty of an unknown, internal unit; `None` where it takes part in an unseen combination.
     pub fn u(&self, unknown: usize) -> Option<f64> {
         self.rank
             .is_identifiable(unknown)
@@ -138,7 +138,7 @@ pub fn marginal(r: MatRef<'_, f64>, kept: &[usize], size: &[f64]) -> Result<Mat<
     Ok(upper(rows))
 }
 
-/// The prior standard uncertainty of a set-up quantity, inside unit.
+/// The prior standard uncertainty of a set-up quantity, internal unit.
 pub fn prior_u(parameter: &Parameter) -> Option<f64> {
     match parameter.prior {
         Prior::Gaussian(u) => Some(u),

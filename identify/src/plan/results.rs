@@ -28,7 +28,7 @@ pub struct PlanAnalysis {
     pub blind: Vec<Unobservable>,
     /// Errors that readings alone cannot tell from set-up quantities.
     pub held_by_setup: Vec<HeldBySetup>,
-    /// Errors that are told apart, but badly.
+    /// Errors that are nearly collinear.
     pub nearly_collinear: Vec<NearDependency>,
     /// Correlation of the errors.
     pub correlation: Correlation,
@@ -80,7 +80,7 @@ pub struct ErrorAnalysis {
     pub curves: Vec<Curve>,
 }
 
-/// µm of reading a unit of an error.
+/// µm of reading per unit of an error.
 #[derive(Clone, Debug, Serialize, JsonSchema)]
 pub struct Sensitivity {
     /// The largest over all readings, its sign kept.
@@ -116,7 +116,7 @@ pub struct CorrelatedWith {
 pub struct Curve {
     /// The test.
     pub test: String,
-    /// Length of reading (for three coordinates: length of the vector) a unit of the error, evenly thinned.
+    /// Length of reading (for three coordinates: length of the vector) per unit of the error, evenly thinned.
     pub values: Vec<f64>,
 }
 
@@ -219,11 +219,11 @@ pub struct EffectDetectability {
     pub detectable: Option<f64>,
     /// The same when all effects are looked at.
     pub detectable_searched: Option<f64>,
-    /// Share of its signal (sum of squares) that the fit of the unknowns leaves over, 0 to 1.
+    /// Share of its signal (sum of squares) that remains after the fit of the parameters, 0 to 1.
     pub surviving_share: f64,
     /// `seen`, `hidden` (under a hundredth survives), `none` (these tests do not change with it).
     pub verdict: String,
-    /// The errors it biases, the strongest first, in their unit a unit of the effect.
+    /// The errors it biases, the strongest first, in their unit per unit of the effect.
     pub biases: Vec<Bias>,
 }
 
@@ -232,7 +232,7 @@ pub struct EffectDetectability {
 pub struct Bias {
     /// The error.
     pub id: String,
-    /// Units of the error a unit of the effect; of cosine and sine at the worst phase, without a sign.
+    /// Units of the error per unit of the effect; of cosine and sine at the worst phase, without a sign.
     pub per_unit: f64,
     /// The unit: `um/um`, `arcsec/um`, …
     pub unit: String,

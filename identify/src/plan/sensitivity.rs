@@ -10,7 +10,7 @@ use crate::problem::{Block, Problem};
 /// Points of a curve at most.
 const CURVE_POINTS: usize = 60;
 
-/// Sensitivities of every unknown, inside units (mm of reading a mm or rad), and the leverages of readings.
+/// Sensitivities of every unknown, internal units (mm of reading a mm or rad), and the leverages of readings.
 pub struct Sensitivities {
     /// By unknown: the largest with its sign, the test where, and the root mean square.
     pub summary: Vec<(f64, usize, f64)>,
@@ -139,7 +139,7 @@ fn of_block(
     }
 }
 
-/// The summary of an unknown in outside units: µm of reading a unit of it.
+/// The summary of an unknown in outside units: µm of reading per unit of it.
 pub fn reported(problem: &Problem<'_>, found: &Sensitivities, unknown: usize) -> Sensitivity {
     let (largest, test, rms) = found.summary[unknown];
     let scale = outside(problem, unknown);
@@ -167,7 +167,7 @@ pub fn curves(problem: &Problem<'_>, found: &Sensitivities, unknown: usize) -> V
 /// Sensitivities below this are rounding, mm a mm or rad.
 const NOTHING: f64 = 1e-9;
 
-/// From mm of reading an inside unit to µm a unit outside.
+/// From mm of reading an internal unit to µm per unit outside.
 fn outside(problem: &Problem<'_>, unknown: usize) -> f64 {
     1e3 / problem.parameters.list[unknown].unit.display_per_internal
 }

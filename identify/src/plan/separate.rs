@@ -78,8 +78,8 @@ impl Alternative {
     }
 }
 
-/// For a found effect and one that looks like it, the entry of a menu that separates them best; `None` where none on the menu adds to what
-/// the readings tell. `coefficients` are those of the found effect, inside units.
+/// For a found effect and one that looks like it, the candidate test that separates them best; `None` where no candidate test adds to what
+/// the readings tell. `coefficients` are those of the found effect, internal units.
 ///
 /// # Errors
 /// If an effect cannot be laid over the session, or there is no menu for its instrument.
@@ -116,7 +116,7 @@ pub fn separation(
 }
 
 /// For a found effect and its alternatives, tests of a menu that separate it from them: the first separates most of them, each further one most of those that
-/// are left. Empty where no test separates any. `coefficients` are those of the found effect, inside units.
+/// are left. Empty where no test separates any. `coefficients` are those of the found effect, internal units.
 ///
 /// # Errors
 /// If an effect cannot be laid over the session, or there is no menu for its instrument.

@@ -1,6 +1,6 @@
 //! What has to be agreed upon before the functions have values: the boundary conditions of the method.
 //!
-//! A shift `(a, b)` of the machine's coordinates changes no reading: `E_radial` and `W_radial` take up `a·(1 − cos θ) + b·sin θ`, the table's
+//! A shift `(a, b)` of the machine's coordinates changes no reading: `E_radial` and `W_radial` absorb `a·(1 − cos θ) + b·sin θ`, the table's
 //! displacements its opposite. The first four conditions refer every function to its value at 0; the other two settle the shift.
 
 use std::f64::consts::{FRAC_PI_2, PI, TAU};

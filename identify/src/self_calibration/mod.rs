@@ -46,14 +46,14 @@ pub struct Calibration {
     pub u_enlargement: f64,
     /// The columns of the equations that the conditions leave free.
     pub free: Vec<usize>,
-    /// Whether the session states it; else it is what the solution leaves over.
+    /// Whether the session states it; else it is the residual of the solution.
     pub sigma_stated: bool,
 }
 
 /// Guess of the noise from which the rank is decided where nothing is known, mm.
 const FIRST_GUESS_MM: f64 = 1e-3;
 
-/// Solves the equations of a session. The uncertainty of a reading is the session's `noise_um`, or what the solution leaves over.
+/// Solves the equations of a session. The uncertainty of a reading is the session's `noise_um`, or the residual of the solution.
 ///
 /// # Errors
 /// See [`Equations::of`] and [`conditions`]; also if the session states no noise and the readings leave nothing over to tell it from.
@@ -62,7 +62,7 @@ pub fn calibrate(session: &Session) -> Result<Calibration, IdentifyError> {
     let conditions = conditions(&equations, &session.machine.axes[equations.axis].name)?;
     let reduction = reduce(equations.columns(), &conditions);
     let stated = session.noise_mm.filter(|sigma| *sigma > 0.0);
-    // What is left over tells of the noise only with the radius as an unknown: referred to one reading, all rows have that reading's noise.
+    // The residual tells of the noise only with the radius as an unknown: referred to one reading, all rows have that reading's noise.
     let free_radius = Equations {
         reference: Reference::Estimated,
         ..equations.clone()

@@ -92,9 +92,9 @@ pub struct SelfCalibration {
     pub readings: usize,
     /// Standard uncertainty of a reading, µm.
     pub noise_um: f64,
-    /// `stated`, or `residual` where it is what the solution leaves over.
+    /// `stated`, or `residual` where it is the residual of the solution.
     pub noise_source: String,
-    /// Root mean square of what the solution leaves over, µm.
+    /// Root mean square of the residual of the solution, µm.
     pub rms_um: f64,
     /// Values that the functions have in all.
     pub values: usize,

@@ -37,7 +37,7 @@ pub enum Cause {
 /// What takes a part in the deviation of readings.
 #[derive(Clone, Debug)]
 pub struct Share {
-    /// `EY0A`, `EZC~C:h2`, `set-up`, `not told apart`.
+    /// `EY0A`, `EZC~C:h2`, `set-up`, `confounded`.
     pub id: String,
     /// What it belongs to.
     pub cause: Cause,
@@ -78,7 +78,7 @@ pub struct SessionSeries {
 }
 
 impl SessionSeries {
-    /// Root mean square of what the model before leaves over the scalar readings that count, µm.
+    /// Root mean square of the residual of the model before over the scalar readings that count, µm.
     pub fn rms_before_um(&self, problem: &Problem<'_>) -> f64 {
         let before: Vec<Vec<f64>> = self.tests.iter().map(|test| test.before_um.clone()).collect();
         rms_mm(problem, &before)
@@ -91,7 +91,7 @@ impl SessionSeries {
     }
 }
 
-/// The shares of a fit: each identified error, each effect, the set-up, and what is not told apart.
+/// The shares of a fit: each identified error, each effect, the set-up, and what is confounded.
 fn shares(problem: &Problem<'_>, fit: &Fit) -> Vec<Share> {
     let mut shares: Vec<Share> = Vec::new();
     let mut add =
@@ -106,7 +106,7 @@ fn shares(problem: &Problem<'_>, fit: &Fit) -> Vec<Share> {
     for (j, parameter) in problem.parameters.list.iter().enumerate() {
         match parameter.role {
             Role::Setup => add("set-up", Cause::Setup, j),
-            _ if !fit.rank.is_identifiable(j) => add("not told apart", Cause::Unseen, j),
+            _ if !fit.rank.is_identifiable(j) => add("confounded", Cause::Unseen, j),
             Role::Error => add(&parameter.id, Cause::Error, j),
             Role::Coefficient { effect, .. } => {
                 add(&problem.parameters.effect_ids[effect], Cause::Effect, j);
@@ -203,7 +203,7 @@ pub fn lengths(values: &[f64], coordinates: usize) -> Vec<f64> {
     values.chunks(coordinates).map(length).collect()
 }
 
-/// Correlation of the identified errors and effects' coefficients, by identifier: row by row. Unknowns of the set-up and what is not told apart are
+/// Correlation of the identified errors and effects' coefficients, by identifier: row by row. Unknowns of the set-up and what is confounded are
 /// left out.
 pub fn correlation(problem: &Problem<'_>, fit: &Fit) -> (Vec<String>, Vec<Vec<f64>>) {
     let list = &problem.parameters.list;

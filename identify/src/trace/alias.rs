@@ -12,7 +12,7 @@ use abbe_model::effect::Shape;
 use super::score::{Gain, TrainedModel};
 use super::search::{ALL, Search};
 
-/// Difference in `−ln P` below which two candidates cannot be told apart: 2 σ for one column.
+/// Difference in `−ln P` below which two candidates are confounded: 2 σ for one column.
 pub(super) const INDISTINGUISHABLE: f64 = 2.0;
 /// Least cosine between the named effect's signature and what an alias can do: at least half of it. What is nearer than the evidence can tell is an
 /// alias however small the angle; what explains as much of something else is none.

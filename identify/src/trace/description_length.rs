@@ -1,4 +1,4 @@
-//! Fewer words: several effects that follow one axis are put down to one that says as much, or are given back where they explain nothing.
+//! Description length: several effects that follow one axis are attributed to one that says as much, or are given back where they explain nothing.
 //!
 //! A group of effects is worth what it explains together, `−ln P(χ²)`, less what it takes to say it: each effect's cost, and `ln n` for having been chosen
 //! among the `n` entries of the library that the session can see.
@@ -16,7 +16,7 @@ use crate::error::IdentifyError;
 const INTERVALS: [usize; 3] = [8, 16, 32];
 
 impl Search<'_> {
-    /// Puts several effects that follow one axis down to one, where that one says as much in fewer words. From three effects or places on, a free curve may
+    /// Puts several effects that follow one axis down to one, where that one explains as much with a shorter description. From three effects or places on, a free curve may
     /// be that one.
     pub fn merge(&mut self) -> Result<(), IdentifyError> {
         if self.stop.in_residual_variance {
@@ -46,7 +46,7 @@ impl Search<'_> {
         Ok(())
     }
 
-    /// The axes that effects follow which a search has taken up, each once.
+    /// The axes that effects follow which a search has added, each once.
     fn axes_followed(&self, track: usize) -> Vec<Driver> {
         let mut drivers: Vec<Driver> = Vec::new();
         for candidate in self.tracks[track].chosen() {
@@ -58,7 +58,7 @@ impl Search<'_> {
         drivers
     }
 
-    /// Puts a group of effects down to one, if one says as much in fewer words. Returns whether it did.
+    /// Puts a group of effects down to one, if one explains as much with a shorter description. Returns whether it did.
     fn merge_group(&mut self, track: usize, group: &[usize]) -> Result<bool, IdentifyError> {
         let columns: usize = group.iter().map(|c| self.moments.count[*c]).sum();
         let curves = group.len() > 2 || columns > 2 && self.is_composed(group);
@@ -102,7 +102,7 @@ impl Search<'_> {
     }
 
     /// Gives back effects that follow one axis where they are no explanation: where curves over that axis, another in every test and in no component's name,
-    /// say as much in fewer words. One simple effect is asked only where structure remains beside it.
+    /// say as much with a shorter description. One simple effect is asked only where structure remains beside it.
     pub fn withdraw(&mut self, structured: bool) -> Result<(), IdentifyError> {
         for track in 0..self.tracks.len() {
             for driver in self.axes_followed(track) {

@@ -39,7 +39,7 @@ impl<'a> RefittedModel<'a> {
                 structure: structure_before.cloned(),
             });
         }
-        // Noise, outliers and rank are found anew, as the fit of a session that declares these effects finds them: what the declared model left over
+        // Noise, outliers and rank are found anew, as the fit of a session that declares these effects finds them: what remained of the declared model
         // was not noise.
         let (mut after, mut after_fit) = prepare_with(problem.session, &effects, options.seed)?;
         if noise_is_from_residual(problem, &after) {
@@ -57,7 +57,7 @@ impl<'a> RefittedModel<'a> {
         })
     }
 
-    /// Whether this is of what the search has taken up now, in that order. Exchanges leave the number of effects as it is, so the number says nothing.
+    /// Whether this is of what the search has added now, in that order. Exchanges leave the number of effects as it is, so the number says nothing.
     pub fn is_of(&self, search: &Search<'_>) -> bool {
         self.effects.iter().eq(taken_effects(search))
     }
@@ -68,7 +68,7 @@ impl<'a> RefittedModel<'a> {
     }
 }
 
-/// What a search has taken up, in its order.
+/// What a search has added, in its order.
 fn taken_effects<'s>(search: &'s Search<'_>) -> impl Iterator<Item = &'s Effect> {
     let taken = search.taken().iter();
     taken.map(|taken| &search.candidates[taken.candidate].effect)

@@ -1,8 +1,8 @@
-//! Close the loop: from what a fitted model leaves over to the effect that it lacks.
+//! Find the unmodelled effect behind the residual of a fitted model.
 //!
-//! 1. Noise first: size and memory from repeats ([`crate::noise`]), wild readings left out by name ([`crate::outliers`]).
+//! 1. Noise first: size and memory from repeats ([`crate::noise`]), outliers left out by name ([`crate::outliers`]).
 //! 2. The library of effects ([`library`]) is laid over the session (`columns`) and multiplied once with model, residual and null draws (`moments`).
-//! 3. The search (`search`) adds, lets go and exchanges effects; its p-values come from the same search on readings without structure (`null`).
+//! 3. The search (`search`) adds, removes and exchanges effects; its p-values come from the same search on readings without structure (`null`).
 //!    An effect is claimed where its p-value is below the level of significance and the held-out error falls by more than the standard error of the fall,
 //!    which follows from paired differences over runs, blocks or poses (`paired`).
 //! 4. Everything is refitted together (`judge`), and reported before and after (`report`) on readings that neither fit nor search saw.
@@ -57,7 +57,7 @@ use start::Start;
 pub struct TraceOptions {
     /// Seed of folds and null draws.
     pub seed: u64,
-    /// The most effects; `None` for as many as earn their place.
+    /// The most effects; `None` for default: until the held-out error stops improving.
     pub max_effects: Option<usize>,
     /// If not empty, only candidates whose identifier contains one of these.
     pub only: Vec<String>,
@@ -370,7 +370,7 @@ fn draws_of(options: &TraceOptions) -> usize {
 /// By how much estimates of a coefficient of the memory, and relatively of the size of the noise, scatter anyway.
 const SCATTER: f64 = 0.02;
 
-/// Takes size and memory of the noise from repeats, where there are enough. Returns whether that changed them by more than estimates of the noise
+/// Takes size and autocorrelation of the noise from repeats, where there are enough. Returns whether that changed them by more than estimates of the noise
 /// scatter anyway.
 fn give_noise_autocorrelation(problem: &mut Problem<'_>, residuals: &[Vec<f64>]) -> bool {
     if problem.folds.kind == FoldKind::Poses {

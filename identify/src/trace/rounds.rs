@@ -54,7 +54,7 @@ pub(super) fn search_on(search: &mut Search<'_>, account: &mut Account<'_>) -> R
 fn rounds(search: &mut Search<'_>, account: &mut Account<'_>) -> Result<f64, IdentifyError> {
     // Additions since the last that was claimed.
     let mut unclaimed = Vec::new();
-    // Effects that are put down to one make room for others; that must end.
+    // Effects that are attributed to one make room for others; that must end.
     for _ in 0..search.most_rounds() {
         let mut ended = None;
         match search.round()? {

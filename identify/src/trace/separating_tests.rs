@@ -14,7 +14,7 @@ use crate::results::{AlternativeResult, EffectResult, SeparatingTestResult, Sepa
 /// Aliases that are weighed against an effect, the nearest first: each takes columns of its own.
 const MAX_COMPARED_TESTS: usize = 24;
 
-/// Fills in, for each found effect, the tests on the menu that separate it from its aliases. Without a menu for the session's instrument nothing is filled
+/// Fills in, for each found effect, the tests among the candidate tests that separate it from its aliases. Without a menu for the session's instrument nothing is filled
 /// in. Where `progress` says that no more is wanted, the trace is marked as interrupted, with the tests that were found until then.
 ///
 /// # Errors

@@ -19,7 +19,7 @@ pub(super) struct Start {
     pub model: Mat<f64>,
     /// One a row.
     pub residual: Vec<f64>,
-    /// Orthonormal coordinates to unknowns in inside units: unknowns × rank.
+    /// Orthonormal coordinates to unknowns in internal units: unknowns × rank.
     pub to_unknowns: Mat<f64>,
     prior_rows: Mat<f64>,
     prior_residual: Vec<f64>,

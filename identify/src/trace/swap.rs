@@ -30,16 +30,16 @@ const MAX_RESTARTS: usize = 3;
 /// Relative difference of scores below which two candidates do the same.
 const SAME: f64 = 1e-6;
 
-/// Sets of effects against what a search has taken up.
+/// Sets of effects against what a search has added.
 #[derive(Clone)]
 struct Contest {
     /// The folds that the search sees.
     folds: Vec<usize>,
-    /// What it has taken up.
+    /// What it has added.
     chosen: Vec<usize>,
     /// The score that readings without structure hardly reach.
     threshold: f64,
-    /// What a set has to say more than: what the best so far says, and for what was there what cannot be told apart.
+    /// What a set has to say more than: what the best so far says, and for what was there what is confounded.
     most: f64,
     /// The best that does.
     best: Option<Vec<usize>>,
@@ -63,7 +63,7 @@ impl Search<'_> {
         self.note_held_out()
     }
 
-    /// Exchanges one effect for what explains clearly better beside the others. A change has to be worth more than what cannot be told apart, so that
+    /// Exchanges one effect for what explains clearly better beside the others. A change has to be worth more than what is confounded, so that
     /// exchanges end.
     fn exchange_one(&mut self, track: usize, k: usize) -> Result<(), IdentifyError> {
         let SearchBranch { folds, .. } = self.tracks[track].clone();
@@ -206,7 +206,7 @@ impl Search<'_> {
         Ok(self.replace(track, contest.best))
     }
 
-    /// Puts a set, if there is one, in the place of what a search has taken up; it is no more certain than the least certain of that. Returns whether there
+    /// Puts a set, if there is one, in the place of what a search has added; it is no more certain than the least certain of that. Returns whether there
     /// was one.
     fn replace(&mut self, track: usize, set: Option<Vec<usize>>) -> bool {
         let Some(set) = set else { return false };
@@ -217,7 +217,7 @@ impl Search<'_> {
         true
     }
 
-    /// Opens a contest for the place of what a search has taken up; none where that is nothing, or too much to be fitted anew.
+    /// Opens a contest for the place of what a search has added; none where that is nothing, or too much to be fitted anew.
     fn contest(&self, track: usize) -> Result<Option<Contest>, IdentifyError> {
         let SearchBranch { folds, .. } = self.tracks[track].clone();
         let chosen = self.tracks[track].chosen();

@@ -25,7 +25,7 @@ const MOUNTED: [&str; 9] = [
 /// Share of a unit by which a coefficient is changed: so little that its square is nothing.
 const STEP: f64 = 0.01;
 
-/// What rounding and second order leave of a change that is none, µm a unit.
+/// What rounding and second order leave of a change that is none, µm per unit.
 const ROUNDED: f64 = 1e-5;
 
 /// Where a scalar reading stands.
@@ -36,7 +36,7 @@ pub struct At {
     pub coordinate: usize,
 }
 
-/// Changes of all readings of a session, µm a unit, a column a coefficient.
+/// Changes of all readings of a session, µm per unit, a column a coefficient.
 pub struct Changes {
     pub session: Session,
     pub at: Vec<At>,
@@ -137,7 +137,7 @@ impl Changes {
         self.effects[effect].select_rows(&rows)
     }
 
-    /// The greatest rms over phases, µm a unit.
+    /// The greatest rms over phases, µm per unit.
     pub fn rms(&self, effect: usize, wanted: impl Fn(&At) -> bool) -> f64 {
         let change = self.of(effect, wanted);
         let rows = change.nrows() as f64;
@@ -170,7 +170,7 @@ impl Changes {
         (taken, between)
     }
 
-    /// Amplitude by order of a test whose runs are full turns in equal steps: `[same, opposite]` in both directions, µm a unit, the
+    /// Amplitude by order of a test whose runs are full turns in equal steps: `[same, opposite]` in both directions, µm per unit, the
     /// greatest over phases.
     pub fn orders(&self, effect: usize, test: usize, coordinate: usize, most: usize) -> [Vec<f64>; 2] {
         let run = |run: usize| {

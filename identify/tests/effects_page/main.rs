@@ -27,7 +27,7 @@ const MAX_SHOWN: usize = 3;
 /// Shares of the square that count as the same and as alike.
 const SAME: f64 = 0.9999;
 const ALIKE: f64 = 0.9;
-/// Least change that is one, µm a unit.
+/// Least change that is one, µm per unit.
 const NOTHING: f64 = 2e-3;
 /// Aliases shown before `…`.
 const MAX_ALIASES: usize = 6;
@@ -319,7 +319,7 @@ fn every_entry_of_the_library_is_on_the_page() {
     }
 }
 
-/// Closed forms of a circle of X and Y with radius R at feed v: δL at path angle θ in direction s, µm a unit.
+/// Closed forms of a circle of X and Y with radius R at feed v: δL at path angle θ in direction s, µm per unit.
 #[test]
 fn circles_follow_their_closed_forms() {
     const R: f64 = 100.0;

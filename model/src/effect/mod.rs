@@ -95,7 +95,7 @@ impl Driver {
         }
     }
 
-    /// What polynomials and powers divide the driver by where a session states no `scale_…`, in the driver's inside unit: 100 mm of a linear axis,
+    /// What polynomials and powers divide the driver by where a session states no `scale_…`, in the driver's internal unit: 100 mm of a linear axis,
     /// half a turn of a rotary one, an hour, 1 °C, 1 m. Coefficients of one name are then comparable, whatever the travel of a test.
     pub fn default_scale(&self, machine: &Machine) -> f64 {
         match self {

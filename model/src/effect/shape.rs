@@ -5,7 +5,7 @@
 //!
 //! [`super::basis`] has the basis functions.
 
-/// How a component follows its driver. Positions, periods and widths are in the driver's inside unit: mm, rad, s, °C, m.
+/// How a component follows its driver. Positions, periods and widths are in the driver's internal unit: mm, rad, s, °C, m.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Shape {
     /// Does not vary: a PIGE.

@@ -1,4 +1,4 @@
-//! Random shapes of effects over the position of an axis, in its inside unit.
+//! Random shapes of effects over the position of an axis, in its internal unit.
 
 use abbe_model::axis::AxisKind;
 use abbe_model::effect::{Component, Driver, DriverSample, Effect, Shape};

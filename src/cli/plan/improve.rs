@@ -237,13 +237,13 @@ fn add(problem: &mut Problem<'_>, id: &str) -> Result<(), IdentifyError> {
 /// Prints what is proposed.
 pub fn print(found: &Improvement) {
     say!(
-        "{} on the menu; {} now: {}",
+        "{} candidate tests; {} now: {}",
         counted(found.menu_entries, "entry"),
         found.figure,
         three_digits(found.before)
     );
     if found.steps.is_empty() {
-        say!("none on the menu improves it");
+        say!("no candidate test improves it");
         return;
     }
     for (number, step) in found.steps.iter().enumerate() {
@@ -262,7 +262,7 @@ pub fn print(found: &Improvement) {
             step.bar_mm
         );
         if !step.opens.is_empty() {
-            say!("   opens the blind spots {}", step.opens.join(", "));
+            say!("   makes identifiable {}", step.opens.join(", "));
         }
     }
     say!("");

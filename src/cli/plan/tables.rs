@@ -45,7 +45,7 @@ fn header(analysis: &PlanAnalysis) {
         table::micrometres(analysis.noise_um)
     );
     say!(
-        "{} of {} unknowns or combinations of them are seen",
+        "{} of {} parameters identifiable (rank)",
         analysis.rank,
         analysis.unknowns
     );
@@ -58,7 +58,7 @@ fn optional(value: Option<f64>) -> String {
 fn errors(errors: &[ErrorAnalysis]) {
     say!(
         "\nPredicted standard uncertainty, what noise and set-up contribute, and what it would be if all other errors were known;\n\
-         sensitivity of a reading, µm a unit of the error (largest, rms, the test in which it is largest):"
+         sensitivity of a reading, µm per unit of the error (largest, rms, the test in which it is largest):"
     );
     let rows: Vec<Vec<String>> = errors
         .iter()
@@ -273,7 +273,7 @@ fn effects(found: &EffectsAnalysis) {
     );
     say!(
         "\nSeen: smallest amplitude found with {:.0} % power at {:.0} % significance, of one look and of a search of the whole library of {}\n\
-         (Šidák, which is on the safe side); share of the signal that the fit leaves over; what it adds to the errors until it is found;\n\
+         (Šidák, which is on the safe side); share of the signal that remains in the residual; what it adds to the errors until it is found;\n\
          how many alike, of the same component and driver, are not listed. A power has its amplitude at 100 mm, or at 180°:",
         found.power * 100.0,
         found.significance * 100.0,

@@ -101,7 +101,7 @@ fn error_bar(x: &Scale, y: f64, value: Value, [class, word]: [&str; 2], unit: &s
 pub enum Fill {
     /// What was named.
     Named,
-    /// What cannot be told from it.
+    /// What is confounded with it.
     Alias,
     /// Anything else.
     Other,

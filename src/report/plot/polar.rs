@@ -57,7 +57,7 @@ impl Round {
     }
 }
 
-/// The round number of µm a division at which everything stays within the circles.
+/// The round number of µm per division at which everything stays within the circles.
 pub fn division_um<'p>(points: impl IntoIterator<Item = &'p (f64, f64)>) -> f64 {
     let most = points.into_iter().map(|(_, um)| um.abs()).fold(0.0, f64::max);
     round_up(most / DIVISIONS)
@@ -147,7 +147,7 @@ pub fn plot(
     let (keys, down) = legend(&entries, 10.0, round.side + 32.0, round.side - 20.0);
     let inner = html! {
         (drawing(round, division, traces))
-        text x="10" y=(round.side + 12.0) { tspan class="division" { (text(division, division)) } " µm a division; angle of " (over) }
+        text x="10" y=(round.side + 12.0) { tspan class="division" { (text(division, division)) } " µm per division; angle of " (over) }
         (keys)
     };
     Plot::still(name, title, caption, [round.side, down + 10.0], inner)

@@ -11,7 +11,7 @@ use super::{codes, generated};
 
 /// Sessions of each code where `ABBE_STUDY` says nothing else.
 const FEW: usize = 3;
-/// Probability below which a mean or a spread of pulls is not put down to chance: of some 400 figures one in 250 suites.
+/// Probability below which a mean or a spread of pulls is not attributed to chance: of some 400 figures one in 250 suites.
 const MIN_P: f64 = 1e-5;
 
 /// Pulls of every error over sessions: estimate less truth over stated standard uncertainty.

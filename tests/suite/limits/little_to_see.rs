@@ -21,7 +21,7 @@ fn exactly_collinear_columns() {
     for (error, ball) in [("EX0C", "spindle_ball.x[C]"), ("EY0C", "spindle_ball.y[C]")] {
         let said = whys
             .iter()
-            .any(|why| why.starts_with(&format!("{error} cannot be told from {ball}")));
+            .any(|why| why.starts_with(&format!("{error} is confounded with {ball}")));
         assert!(said, "{whys:?}");
     }
     assert!(

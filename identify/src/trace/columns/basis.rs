@@ -204,7 +204,7 @@ impl Columns<'_, '_> {
         layouts
     }
 
-    /// The greatest coefficient that an effect may plausibly have, in inside units: 0.1 mm and 1 mrad on a machine tool, ten times as much on the
+    /// The greatest coefficient that an effect may plausibly have, in internal units: 0.1 mm and 1 mrad on a machine tool, ten times as much on the
     /// robots and long chains that trackers and sockets measure.
     pub fn plausible(&self, effect: &Effect, layout: &Layout) -> f64 {
         let machine_tool = self.problem.session.instrument.is_two_sided();

@@ -159,7 +159,7 @@ fn curve_units(problem: &Problem<'_>, effect: &Effect) -> (String, String) {
     )
 }
 
-/// The unit in which results give places on what an effect follows, and how many of it are one inside unit.
+/// The unit in which results give places on what an effect follows, and how many of it are one internal unit.
 fn driver_unit(problem: &Problem<'_>, effect: &Effect) -> (&'static str, f64) {
     let machine = &problem.session.machine;
     let kind = match &effect.driver {

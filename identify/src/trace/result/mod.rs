@@ -171,7 +171,7 @@ impl<'s> HeldOut<'s> {
     }
 }
 
-/// The variance that aliases are told apart by, in that of the noise: among poses, what the found effects leave.
+/// The variance that aliases are separated by, in that of the noise: among poses, what the found effects leave.
 fn residual_variance(findings: &TraceFindings<'_, '_>) -> f64 {
     if !findings.search.stop.in_residual_variance {
         return 1.0;
@@ -217,7 +217,7 @@ pub(super) fn model_result(problem: &Problem<'_>, fit: &Fit, held_out_mm: f64) -
     }
 }
 
-/// How far the unknowns after the search would move, inside units: by found effect, by alias in its place, by unknown.
+/// How far the unknowns after the search would move, internal units: by found effect, by alias in its place, by unknown.
 type Moves = [Vec<Vec<f64>>];
 
 /// By how much some values would move, where they are such functions of the unknowns: for each effect the largest move that one of its aliases makes,
@@ -262,7 +262,7 @@ fn cover(parameters: &mut [ParameterResult], problem: &Problem<'_>, fit: &Fit, m
     }
 }
 
-/// How far the unknowns move if an alias stands in the place of the `k`-th effect, inside units: `in_place` and `named` are the coefficients of the model
+/// How far the unknowns move if an alias stands in the place of the `k`-th effect, internal units: `in_place` and `named` are the coefficients of the model
 /// without that effect beside the alias and beside the effect. Its own do not move: the alias has none of them.
 fn moves_by(findings: &TraceFindings<'_, '_>, k: usize, in_place: &[f64], named: &[f64]) -> Vec<f64> {
     let (search, to_unknowns) = (findings.search, &findings.start.to_unknowns);

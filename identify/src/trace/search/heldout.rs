@@ -12,7 +12,7 @@ use crate::trace::score::TrainedModel;
 
 /// Readings as they are, not whitened: what held-out errors are of. In units of the noise.
 pub struct Plain {
-    /// The base: rows × columns, extended as candidates are taken up.
+    /// The base: rows × columns, extended as candidates are added.
     pub base: Mat<f64>,
     /// The residual.
     pub residual: Vec<f64>,

@@ -32,7 +32,7 @@ pub struct Stop {
     pub in_residual_variance: bool,
 }
 
-/// An effect that a search has taken up.
+/// An effect that a search has added.
 #[derive(Clone, Copy, Debug)]
 pub struct SelectedEffect {
     /// Index of the candidate.
@@ -46,12 +46,12 @@ pub struct SelectedEffect {
 pub struct SearchBranch {
     /// The folds that it sees, ascending.
     pub folds: Vec<usize>,
-    /// What it has taken up.
+    /// What it has added.
     pub taken: Vec<SelectedEffect>,
 }
 
 impl SearchBranch {
-    /// The candidates that it has taken up.
+    /// The candidates that it has added.
     pub fn chosen(&self) -> Vec<usize> {
         self.taken.iter().map(|taken| taken.candidate).collect()
     }
@@ -78,7 +78,7 @@ pub struct Search<'s> {
     pub tracks: Vec<SearchBranch>,
     /// For each candidate the folds whose readings its numbers and places were tuned on; none for an entry of the library.
     tuned_on: Vec<Vec<usize>>,
-    /// Where the columns of every candidate that was ever taken up stand in the base.
+    /// Where the columns of every candidate that was ever added stand in the base.
     materialised: Vec<(usize, Range<usize>)>,
     /// Sum of squares of held-out residuals over the variance of the noise, before and after each addition.
     pub held_out: Vec<f64>,
@@ -111,7 +111,7 @@ pub enum Round {
         /// Its candidate.
         candidate: usize,
     },
-    /// Nothing that is left earns its place; the best that there was, and its p-value.
+    /// No remaining candidate is significant; the best that there was, and its p-value.
     Done {
         /// The p-value of the best that was not taken.
         p_value: f64,
@@ -171,7 +171,7 @@ impl<'s> Search<'s> {
         Ok(search)
     }
 
-    /// What the search on all readings has taken up.
+    /// What the search on all readings has added.
     pub fn taken(&self) -> &[SelectedEffect] {
         &self.tracks[ALL].taken
     }
@@ -181,7 +181,7 @@ impl<'s> Search<'s> {
         folds.len() == self.tracks[ALL].folds.len()
     }
 
-    /// Enough for every effect that may be taken up, and some that were put down to one.
+    /// Enough for every effect that may be added, and some that were attributed to one.
     pub fn most_rounds(&self) -> usize {
         self.stop.most.saturating_add(self.stop.most / 2).max(1)
     }
@@ -252,7 +252,7 @@ impl<'s> Search<'s> {
             }
         }
         let held_out = self.held_out_now()?;
-        // For poses p-values say little; there an effect has to earn its place on the readings that were held out.
+        // For poses p-values say little; there an effect has to be significant on the readings that were held out.
         if self.stop.in_residual_variance
             && held_out >= self.held_out.last().copied().unwrap_or(f64::INFINITY)
         {
@@ -292,7 +292,7 @@ impl<'s> Search<'s> {
         Ok(Some((p_value, threshold.copied().unwrap_or(0.0))))
     }
 
-    /// What a search would add, if it reaches a score: on all readings the simplest that cannot be told from the best; where a fold is left out, which has to
+    /// What a search would add, if it reaches a score: on all readings the simplest among those that are indistinguishable from the best; where a fold is left out, which has to
     /// be predicted and not named, the best.
     fn pick(&mut self, track: usize, least: f64) -> Result<Option<usize>, IdentifyError> {
         let SearchBranch { folds, .. } = self.tracks[track].clone();

@@ -12,7 +12,7 @@ use crate::trace::score::{Gain, TrainedModel};
 use crate::trace::tuning::Trial;
 
 impl Search<'_> {
-    /// Where a candidate's columns stand in the base; nowhere before it was ever taken up.
+    /// Where a candidate's columns stand in the base; nowhere before it was ever added.
     pub fn places(&self, candidate: usize) -> Range<usize> {
         self.materialised
             .iter()

@@ -1,4 +1,4 @@
-//! What a search may take up: entries of the library that the readings would show, and what it has tuned itself.
+//! What a search may add: entries of the library that the readings would show, and what it has tuned itself.
 
 use rayon::prelude::*;
 

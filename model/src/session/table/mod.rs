@@ -156,7 +156,7 @@ fn wrong_width(file: &Path, row: &rows::Row, width: usize, format: &Format) -> M
     let found = row.cells.len();
     let cells = |n: usize| format!("{n} cell{}", if n == 1 { "" } else { "s" });
     let help = if format.separator == b',' && found > width {
-        "a decimal comma in a file separated by commas cannot be told from a separator: export it with another \
+        "a decimal comma in a file separated by commas is indistinguishable from a separator: export it with another \
          separator and declare `[format] separator = \";\", decimal = \",\"`"
     } else {
         "complete the row or remove it"
