@@ -1,13 +1,13 @@
 //! Effects that a trace has found, each beside its competing explanations.
 
-use abbe::identify::results::{EffectName, EffectResult, TraceResult};
+use abbe::identify::results::{EffectName, EffectResult, SeparatingTestResult, TraceResult};
 use abbe::identify::trace::Trace;
 use abbe::identify::trace::alias::CompetingEffect;
 use abbe::model::words::counted;
 use maud::{Markup, html};
 
-use super::document::{Document, list, table};
-use super::format::{integer, typeset, um, unit, value_and_u};
+use super::document::{Document, capitalised, list};
+use super::format::{integer, um, unit, value_and_u};
 use super::plot::bars::{self, Fill};
 use super::plot::lines::{ACROSS, Lines, Mark, Series, UP, span};
 use super::plot::scale::{Scale, coordinate, polyline};
@@ -99,7 +99,7 @@ fn block(
     };
     let [left, right] = [document.show(left), document.show(right)];
     html! {
-        div class="effect" {
+        div class="halves" {
             div {
                 dl {
                     dt { "Effect" } dd { (name(&effect.name)) }
@@ -155,46 +155,64 @@ fn alternatives(effect: &EffectResult, screened: usize) -> Markup {
         };
     }
     let tests = &effect.separating_tests;
-    let cell = |alias: &EffectName, test: usize| -> String {
-        let alternatives = &tests[test].alternatives;
-        alternatives
-            .iter()
-            .find(|one| &one.name == alias)
-            .map_or("–".to_string(), |one| {
-                let outcome = if one.separated {
-                    "separated"
-                } else {
-                    "not separated"
-                };
-                format!("{outcome}: {:.1} → {:.1} σ", one.before_sigma, one.after_sigma)
-            })
-    };
-    let mut rows = vec![vec![effect.name.meaning.clone(), name(&effect.name)]];
-    rows[0].extend(tests.iter().map(|_| "selected".to_string()));
-    for alias in &effect.aliases {
-        let mut row = vec![alias.meaning.clone(), name(alias)];
-        row.extend((0..tests.len()).map(|test| cell(alias, test)));
-        rows.push(row);
-    }
-    let numbered: Vec<String> = (1..=tests.len())
-        .map(|number| format!("with test {number}"))
-        .collect();
-    let header: Vec<&str> = ["explanation", "effect"]
-        .into_iter()
-        .chain(numbered.iter().map(String::as_str))
-        .collect();
     html! {
-        h4 { (super::document::capitalised(&uniqueness::standing(effect, screened))) }
-        (table(&header, &typeset(rows)))
+        h4 { (capitalised(&uniqueness::standing(effect, screened))) }
+        div class="scroll" {
+            table {
+                thead {
+                    tr {
+                        th class="word-column" { "explanation" }
+                        @for number in 1..=tests.len() { th class="word-column" { "with test " (number) } }
+                    }
+                }
+                tbody {
+                    (explanation(&effect.name, &vec!["selected".to_string(); tests.len()]))
+                    @for alias in &effect.aliases {
+                        (explanation(alias, &tests.iter().map(|test| separation(alias, test)).collect::<Vec<_>>()))
+                    }
+                }
+            }
+        }
         @if tests.is_empty() {
             p { "No proposed test separates these explanations." }
         } @else {
-            p class="note" { "Separation from the selected effect in standard deviations: with the present readings → with the test. At 3 σ the test separates." }
             @for (number, test) in tests.iter().enumerate() {
                 p { b { "Test " (number + 1) ": " } (test.test) " (" (format!("{:.0}", test.duration_min)) " min)." }
             }
+            p class="note" {
+                "Separation from the selected effect in standard deviations: by the present readings → with the test. A test separates from 3 σ on."
+            }
         }
     }
+}
+
+/// A row of the table of explanations: the effect, and what each test achieves.
+fn explanation(effect: &EffectName, outcomes: &[String]) -> Markup {
+    html! {
+        tr {
+            td class="word-column long" { (effect.meaning) br; span class="note" { (name(effect)) } }
+            @for outcome in outcomes { td class="word-column" { (outcome) } }
+        }
+    }
+}
+
+/// Separation of the selected effect from an alternative by a test.
+fn separation(alias: &EffectName, test: &SeparatingTestResult) -> String {
+    let found = test
+        .alternatives
+        .iter()
+        .find(|alternative| &alternative.name == alias);
+    found.map_or("separated before".to_string(), |alternative| {
+        let sign = if alternative.separated {
+            "✓"
+        } else {
+            "✗ not separated:"
+        };
+        format!(
+            "{sign} {:.1} → {:.1} σ",
+            alternative.before_sigma, alternative.after_sigma
+        )
+    })
 }
 
 /// Nonparametric curve with a band of ± 2 u.

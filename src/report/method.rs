@@ -75,7 +75,7 @@ fn plots(result: &Comparison) -> Vec<Plot> {
                 format!("errors-{name}"),
                 format!("Errors by both methods, {}", unit(name)),
                 "Whiskers: ± 2 u. An error that a method does not identify has no mark.".to_string(),
-                &unit(name),
+                &format!("value, {}", unit(name)),
                 [&result.method, "full fit"],
                 &rows,
             )

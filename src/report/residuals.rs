@@ -43,14 +43,13 @@ pub fn section(
     overview.push(curves::over_time(session));
     let overview = document.show(overview);
     html! {
-        (test_table(session, models))
         @for block in &open { (block) }
         @if !unaffected.is_empty() {
             (folded(&unaffected_heading(&unaffected), &html! { @for (_, block) in &unaffected { (block) } }))
         }
         (omitted_tests(session))
         h3 { "All tests" }
-        (overview)
+        div class="halves" { div { (test_table(session, models)) } div { (overview) } }
     }
 }
 

@@ -95,9 +95,12 @@ fn plots(
     name: &str,
     title: &str,
 ) -> Markup {
-    let mut units: Vec<&str> = values.iter().map(|value| value.unit.as_str()).collect();
-    units.sort_unstable();
-    units.dedup();
+    let mut units: Vec<&str> = Vec::new();
+    for value in values {
+        if !units.contains(&value.unit.as_str()) {
+            units.push(&value.unit);
+        }
+    }
     let bar = |parameter: &ParameterResult| Value {
         value: parameter.value,
         u: parameter.u,
@@ -124,7 +127,7 @@ fn plots(
                 format!("{name}-{}-{}", unit_name.replace('/', "-per-"), number + 1),
                 format!("{title} in {}{part}", unit(unit_name)),
                 "Whiskers: ± 2 u.".to_string(),
-                &unit(unit_name),
+                &format!("value, {}", unit(unit_name)),
                 ["before", "after"],
                 rows,
             ));
