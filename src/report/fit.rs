@@ -36,41 +36,19 @@ pub fn document(problem: &Problem<'_>, fit: &Fit, result: &FitResult) -> Result<
     let spectra = spectrum::spectra(problem, &series);
     let mut document = Document {
         title: format!("Fit of {}", problem.session.machine.name),
-<<<<<<< HEAD
         verdict: verdict(result),
         figures: figures(problem, result),
         warnings: result.warnings.clone(),
-=======
-        verdict: format!(
-            "{} of {} unknowns or combinations of them are identified from {}; they leave {} ({} held out). {excess}",
-            result.rank,
-            result.parameter_count,
-            counted(result.readings, "reading"),
-            um(result.rms_um),
-            um(result.heldout_rms_um),
-        ),
->>>>>>> json
         ..Document::default()
     };
     readings::add_data(&mut document, &session, &result.parameters);
     plausibility::section(&mut document, &result.plausibility);
-<<<<<<< HEAD
     let section = values::section(&mut document, problem, &result.parameters, None);
     document.section("Values", section);
     let before = if session.is_polar() {
         "nominal machine and set-up"
     } else {
         "nominal machine, fitted set-up"
-=======
-    let nominal = nominal_result(&drawn);
-    let fitted = ModelResult {
-        rms_um: result.rms_um,
-        heldout_rms_um: result.heldout_rms_um,
-        rms_3d_um: result.rms_3d_um,
-        heldout_rms_3d_um: result.heldout_rms_3d_um,
-        noise_um: result.noise_um,
-        ..ModelResult::default()
->>>>>>> json
     };
     let section = residuals::section(&mut document, &session, &spectra, [before, "fit"]);
     document.section("Residuals", section);
@@ -88,39 +66,13 @@ pub fn document(problem: &Problem<'_>, fit: &Fit, result: &FitResult) -> Result<
         "Correlation and confounding",
         html! { (section) (readings::confounded(&result.unobservable)) (readings::outliers(&result.outliers)) },
     );
-<<<<<<< HEAD
     let section = curves::sensitivities(&mut document, problem, &fit.beta)?;
     document.section("Sensitivity of each test", section);
-=======
-    let patterns = curves::patterns(&mut document, problem, &fit.beta)?;
-    document.section(
-        "What to measure next",
-        html! {
-            p {
-                @if result.u_enlargement > 1.0 { (prose("First `abbe trace` on the same session. ")) }
-                @if !candidate_tests::has_candidates(problem) {
-                    @if !result.unobservable.is_empty() {
-                        "A test that makes the rest identifiable has to move what these tests leave standing: "
-                        (result.unobservable.len()) (if result.unobservable.len() == 1 { " combination" } else { " combinations" }) " of parameters."
-                    }
-                } @else if result.unobservable.is_empty() {
-                    (prose("Every parameter is identifiable; `abbe plan SESSION --improve 1` names the test that lowers the uncertainties most."))
-                } @else {
-                    (prose("`abbe plan SESSION --improve 1` names the cheapest test that makes identifiable what these readings do not: "))
-                    (result.unobservable.len()) (if result.unobservable.len() == 1 { " combination." } else { " combinations." })
-                }
-            }
-            (readings::warnings(&result.outliers, &result.warnings))
-        },
-    );
-    document.section("What each error does to each test", patterns);
->>>>>>> json
     let section = readings::machine(&mut document, problem);
     document.section("Machine", section);
     Ok(document)
 }
 
-<<<<<<< HEAD
 /// Verdict in two sentences: identifiability, and agreement of residual and noise.
 fn verdict(result: &FitResult) -> String {
     let identifiable = match result.parameter_count.saturating_sub(result.rank) {
@@ -194,18 +146,5 @@ fn next(result: &FitResult, has_candidates: bool) -> Markup {
             },
             (false, false) => p { (remaining) ". A further test has to move axes that these tests leave at rest." },
         }
-=======
-/// The deviation of the nominal machine as a model; nothing was fitted, so held out is no different.
-fn nominal_result(drawn: &Drawn<'_>) -> ModelResult {
-    let rms_um = drawn.views.rms_before_um(drawn.problem);
-    let rms_3d_um = (drawn.views.coordinates == 3).then(|| rms_um * 3.0_f64.sqrt());
-    ModelResult {
-        rms_um,
-        heldout_rms_um: rms_um,
-        rms_3d_um,
-        heldout_rms_3d_um: rms_3d_um,
-        noise_um: drawn.problem.noise.sigma_mm * 1e3,
-        ..ModelResult::default()
->>>>>>> json
     }
 }
