@@ -173,7 +173,7 @@ impl<'d> SessionPlots<'d> {
             })
             .collect();
         let um = um.unwrap_or_else(|| division_um(traversals.iter().flat_map(|traversal| &traversal.points)));
-        let caption = "Magnified. The black circle is zero.".to_string();
+        let caption = "Magnified about the nominal circle.".to_string();
         let mut plot = polar::plot(
             format!("{name}-{}", test.name),
             title,

@@ -198,10 +198,10 @@ fn changes(result: &TraceResult) -> Markup {
 fn next(result: &TraceResult, has_candidates: bool) -> Markup {
     let mut tests: Vec<String> = Vec::new();
     for (number, effect) in result.effects.iter().enumerate() {
-        let sentences = uniqueness::tests(effect, name).into_iter();
-        tests.extend(
-            sentences.map(|sentence| format!("{}. {}: {sentence}.", number + 1, effect.name.meaning)),
-        );
+        let sentences = uniqueness::tests(effect, name).join("; ");
+        if !sentences.is_empty() {
+            tests.push(format!("{}. {}: {sentences}.", number + 1, effect.name.meaning));
+        }
     }
     html! {
         @if !tests.is_empty() {

@@ -7,9 +7,9 @@ use super::scale::{Scale, coordinate, text};
 use super::{Plot, WIDTH, legend, shortened};
 
 /// Width of the names, SVG units.
-const NAMES: f64 = 176.0;
+const NAMES: f64 = 184.0;
 /// Longest name, characters.
-const MAX_NAME: usize = 24;
+const MAX_NAME: usize = 23;
 /// Height of a row, SVG units.
 const ROW: f64 = 21.0;
 

@@ -178,7 +178,7 @@ pub fn legend(entries: &[(&str, String)], x: f64, y: f64, width: f64) -> (Markup
     let mut placed = Vec::new();
     let (mut left, mut baseline) = (x, y);
     for (class, label) in entries {
-        let needed = 26.0 + 7.2 * label.chars().count() as f64;
+        let needed = 26.0 + 7.8 * label.chars().count() as f64;
         if left > x && left + needed > x + width {
             left = x;
             baseline += 17.0;
