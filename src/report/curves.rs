@@ -12,7 +12,7 @@ use maud::{Markup, html};
 
 use super::decimate;
 use super::document::Document;
-use super::format::unit;
+use super::format::{unit, units};
 use super::plot::bars::{Fill, bars};
 use super::plot::lines::{ACROSS, Lines, Mark, Series, UP, span};
 use super::plot::polar::{PolarSize, Traversal, drawing};
@@ -269,10 +269,7 @@ pub fn sensitivities(
 /// RMS sensitivity of the readings of separate poses to each error, by unit, in descending order.
 fn pose_sensitivities(found: &[Sensitivity]) -> Vec<Plot> {
     const MAX: usize = 40;
-    let mut units: Vec<&str> = found.iter().map(|error| error.unit.as_str()).collect();
-    units.sort_unstable();
-    units.dedup();
-    units
+    units(found.iter().map(|error| error.unit.as_str()))
         .into_iter()
         .map(|name| {
             let own = found.iter().filter(|error| error.unit == name);

@@ -91,8 +91,7 @@ fn verdict(result: &FitResult) -> String {
         "The noise is estimated from the residual, so that the residual cannot test the model. `abbe trace` searches for unmodelled effects.".to_string()
     } else if result.u_enlargement > 1.0 {
         format!(
-            "The residual exceeds the noise by a factor of {0:.2}: the model lacks an effect. The uncertainties are enlarged by {0:.2}. \
-             `abbe trace` searches for the effect.",
+            "The residual exceeds the noise by a factor of {:.2}: the model lacks an effect.",
             result.u_enlargement
         )
     } else {
@@ -118,9 +117,9 @@ fn figures(problem: &Problem<'_>, result: &FitResult) -> Vec<KeyFigure> {
         summary::held_out(&quality, None),
         summary::rank(result.rank, result.parameter_count),
     ];
-    let length = result
-        .rms_3d_um
-        .map_or(String::new(), |rms| format!("vector: {}", um(rms)));
+    let length = result.rms_3d_um.map_or("scalar readings".to_string(), |rms| {
+        format!("vector: {}", um(rms))
+    });
     figures.push(KeyFigure::new("Residual rms", um(result.rms_um), length));
     figures.push(summary::readings(problem, result.readings, result.outliers.len()));
     figures

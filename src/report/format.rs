@@ -14,6 +14,17 @@ pub fn unit(name: &str) -> String {
         .replace("^3", "³")
 }
 
+/// Distinct units in the order of their first appearance.
+pub fn units<'n>(names: impl Iterator<Item = &'n str>) -> Vec<&'n str> {
+    let mut distinct: Vec<&str> = Vec::new();
+    for name in names {
+        if !distinct.contains(&name) {
+            distinct.push(name);
+        }
+    }
+    distinct
+}
+
 /// Table cells with a minus sign in place of a hyphen before numbers.
 pub fn typeset(rows: Vec<Vec<String>>) -> Vec<Vec<String>> {
     let word = |word: &str| match word.strip_prefix('-') {

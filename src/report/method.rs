@@ -5,7 +5,7 @@ use abbe::identify::problem::Problem;
 use maud::{Markup, html};
 
 use super::document::{Document, table};
-use super::format::{noise_sentence, typeset, um, unit, value_and_u};
+use super::format::{noise_sentence, typeset, um, unit, units, value_and_u};
 use super::plot::Plot;
 use super::plot::bars::{Row, Value, values};
 use super::readings;
@@ -55,10 +55,7 @@ pub fn document(problem: &Problem<'_>, result: &Comparison) -> Document {
 
 fn plots(result: &Comparison) -> Vec<Plot> {
     let value = |value: Option<f64>, u: Option<f64>| Some(Value { value: value?, u: u? });
-    let mut units: Vec<&str> = result.errors.iter().map(|row| row.unit.as_str()).collect();
-    units.sort_unstable();
-    units.dedup();
-    units
+    units(result.errors.iter().map(|row| row.unit.as_str()))
         .into_iter()
         .map(|name| {
             let rows: Vec<Row> = result
@@ -113,6 +110,6 @@ fn centres(result: &Comparison) -> Markup {
         .collect();
     html! {
         p { "Position of each axis relative to the stationary ball, as deviation from nominal." }
-        (table(&["test", "centre", "µm", "u (k=1)", "radius, mm", "cone height, mm"], &rows))
+        (table(&["test", "centre", "µm", "u (k\u{a0}=\u{a0}1)", "radius, mm", "cone height, mm"], &rows))
     }
 }

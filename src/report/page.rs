@@ -2,7 +2,7 @@
 
 use maud::{DOCTYPE, Markup, PreEscaped, html};
 
-use super::document::{Document, list, prose, table};
+use super::document::{Document, capitalised, list, prose, table};
 use super::embed;
 use super::plot::{DARK, LIGHT, STYLE};
 use super::provenance::Provenance;
@@ -93,8 +93,8 @@ fn summary(document: &Document) -> Markup {
         }
         @match document.warnings.as_slice() {
             [] => {}
-            [one] => p class="warning" { strong { "Warning: " } (prose(one)) },
-            many => div class="warning" { strong { (many.len()) " warnings" } (list(many.iter().cloned())) },
+            [one] => p class="warning" { strong { "Warning: " } (prose(&capitalised(one))) },
+            many => div class="warning" { strong { (many.len()) " warnings" } (list(many.iter().map(|one| capitalised(one)))) },
         }
     }
 }

@@ -8,8 +8,8 @@ use abbe::model::words::counted;
 use maud::{Markup, html};
 
 use super::curves;
-use super::document::{Document, KeyFigure, capitalised, list, prose, table};
-use super::format::{integer, um, unit, value_and_u};
+use super::document::{Document, KeyFigure, capitalised, folded, list, prose, table};
+use super::format::{integer, typeset, um, unit, units, value_and_u};
 use super::plot::Plot;
 use super::plot::bars::{self, Fill};
 use super::{readings, summary};
@@ -56,7 +56,7 @@ pub fn document(problem: &Problem<'_>, analysis: &PlanAnalysis) -> Result<Docume
         "Predicted uncertainty",
         html! {
             (table(
-                &["error", "u (k = 1)", "unit", "conditional u", "largest sensitivity", "largest contributions to the variance"],
+                &["error", "u (k\u{a0}=\u{a0}1)", "unit", "conditional u", "largest sensitivity", "largest contributions to the variance"],
                 &rows,
             ))
             p class="note" { "Conditional u: standard uncertainty if all other errors were known." }
@@ -145,10 +145,7 @@ fn limit(analysis: &PlanAnalysis) -> String {
 
 /// Plots of the predicted standard uncertainties, one for each unit.
 fn uncertainties(errors: &[ErrorAnalysis]) -> Vec<Plot> {
-    let mut units: Vec<&str> = errors.iter().map(|error| error.unit.as_str()).collect();
-    units.sort_unstable();
-    units.dedup();
-    units
+    units(errors.iter().map(|error| error.unit.as_str()))
         .into_iter()
         .map(|name| {
             let rows: Vec<(String, f64, Fill)> = errors
@@ -168,7 +165,7 @@ fn uncertainties(errors: &[ErrorAnalysis]) -> Vec<Plot> {
                 format!("uncertainty-{}", name.replace('/', "-per-")),
                 format!("Predicted standard uncertainty, {}", unit(name)),
                 "Conditional: if all other errors were known.".to_string(),
-                &format!("u (k = 1), {}", unit(name)),
+                &format!("u (k\u{a0}=\u{a0}1), {}", unit(name)),
                 &rows,
                 &[("key-named", "predicted"), ("key-alias", "conditional")],
             )
@@ -240,7 +237,10 @@ fn confounding(document: &mut Document, analysis: &PlanAnalysis) -> Markup {
         }
         @if let Some(confounded) = confounded.filter(|rows| !rows.is_empty()) {
             h3 { "Effects confounded with errors" }
-            (table(&["effect", "share of the signal in the residual", "bias per unit of the effect"], &confounded))
+            (folded(
+                &counted(confounded.len(), "effect"),
+                &table(&["effect", "share of the signal in the residual", "bias per unit of the effect"], &typeset(confounded)),
+            ))
         }
     }
 }

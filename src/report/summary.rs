@@ -53,7 +53,7 @@ pub fn chi_square(model: &Quality<'_>, before: Option<&Quality<'_>>) -> KeyFigur
         );
     }
     let freedom = format!(
-        "χ² = {}, ν = {}; expected: 1",
+        "χ²\u{a0}=\u{a0}{}, ν\u{a0}=\u{a0}{}; expected:\u{a0}1",
         integer(model.chi_square.round() as usize),
         integer(model.degrees_of_freedom)
     );

@@ -7,7 +7,7 @@ use abbe::model::words::counted;
 use maud::{Markup, html};
 
 use super::document::{Document, folded, table};
-use super::format::{unit, value_and_u};
+use super::format::{unit, units, value_and_u};
 use super::plot::Plot;
 use super::plot::bars::{self, Row, Value};
 
@@ -75,8 +75,8 @@ fn value_table(values: &[&ParameterResult], before: Option<&[ParameterResult]>) 
     let mut header = vec![
         "parameter",
         "value",
-        "u (k = 1)",
-        "U = 2u",
+        "u (k\u{a0}=\u{a0}1)",
+        "U\u{a0}=\u{a0}2u",
         "unit",
         "significant",
         "meaning",
@@ -95,18 +95,12 @@ fn plots(
     name: &str,
     title: &str,
 ) -> Markup {
-    let mut units: Vec<&str> = Vec::new();
-    for value in values {
-        if !units.contains(&value.unit.as_str()) {
-            units.push(&value.unit);
-        }
-    }
     let bar = |parameter: &ParameterResult| Value {
         value: parameter.value,
         u: parameter.u,
     };
     let mut plots: Vec<Plot> = Vec::new();
-    for unit_name in units {
+    for unit_name in units(values.iter().map(|value| value.unit.as_str())) {
         let rows: Vec<Row> = values
             .iter()
             .filter(|parameter| parameter.unit == unit_name)

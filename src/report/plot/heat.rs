@@ -5,8 +5,8 @@ use maud::html;
 use super::scale::coordinate;
 use super::{Plot, WIDTH, shortened};
 
-/// Width of the names on the left, and height of those above, SVG units.
-const NAMES: f64 = 148.0;
+/// Width of a character of a name, SVG units.
+const CHARACTER: f64 = 7.2;
 /// Longest name, characters.
 const MAX_NAME: usize = 21;
 /// Cells wider than this contain the number, SVG units.
@@ -20,24 +20,30 @@ pub fn map(
     ids: &[String],
     matrix: &[Vec<Option<f64>>],
 ) -> Plot {
-    let cell = ((WIDTH - NAMES - 10.0) / ids.len().max(1) as f64).min(44.0);
+    let longest = ids
+        .iter()
+        .map(|id| id.chars().count().min(MAX_NAME))
+        .max()
+        .unwrap_or_default();
+    let names = 12.0 + CHARACTER * longest as f64;
+    let cell = ((WIDTH - names - 10.0) / ids.len().max(1) as f64).min(44.0);
     let side = cell * ids.len() as f64;
     let font_px = 11.0_f64.min(cell * 0.95);
     let inner = html! {
         @for (i, id) in ids.iter().enumerate() {
-            @let at = NAMES + cell * (i as f64 + 0.5);
+            @let at = names + cell * (i as f64 + 0.5);
             @let size = format!("font-size:{}px", coordinate(font_px));
             @let line = coordinate(at + font_px * 0.35);
-            text class="right" style=(size) x=(NAMES - 6.0) y=(line) { title { (id) } (shortened(id, MAX_NAME)) }
-            text style=(size) transform=(format!("translate({line} {}) rotate(-90)", NAMES - 6.0)) {
+            text class="right" style=(size) x=(names - 6.0) y=(line) { title { (id) } (shortened(id, MAX_NAME)) }
+            text style=(size) transform=(format!("translate({line} {}) rotate(-90)", names - 6.0)) {
                 (shortened(id, MAX_NAME))
             }
         }
-        rect class="frame" x=(NAMES) y=(NAMES) width=(coordinate(side)) height=(coordinate(side)) {}
+        rect class="frame" x=(names) y=(names) width=(coordinate(side)) height=(coordinate(side)) {}
         @for (i, row) in matrix.iter().enumerate() {
             @for (j, value) in row.iter().enumerate() {
                 @if let Some(value) = value {
-                    @let (x, y) = (NAMES + cell * (j as f64 + 0.5), NAMES + cell * (i as f64 + 0.5));
+                    @let (x, y) = (names + cell * (j as f64 + 0.5), names + cell * (i as f64 + 0.5));
                     @let numbered = cell > MIN_NUMBERED && i < j;
                     @if numbered {
                         text class="small middle" x=(coordinate(x)) y=(coordinate(y + 4.0)) { (super::scale::text(*value, 0.01)) }
@@ -54,10 +60,10 @@ pub fn map(
                 }
             }
         }
-        rect class="positive" x=(NAMES) y=(NAMES + side + 14.0) width="12" height="12" {}
-        text x=(NAMES + 18.0) y=(NAMES + side + 24.0) { "positive (square)" }
-        rect class="negative" x=(NAMES + 160.0) y=(NAMES + side + 14.0) width="12" height="12" rx="6" {}
-        text x=(NAMES + 178.0) y=(NAMES + side + 24.0) { "negative (round)" }
+        rect class="positive" x=(names) y=(names + side + 14.0) width="12" height="12" {}
+        text x=(names + 18.0) y=(names + side + 24.0) { "positive (square)" }
+        rect class="negative" x=(names + 160.0) y=(names + side + 14.0) width="12" height="12" rx="6" {}
+        text x=(names + 178.0) y=(names + side + 24.0) { "negative (round)" }
     };
-    Plot::new(name, title, caption, [WIDTH, NAMES + side + 36.0], inner)
+    Plot::new(name, title, caption, [WIDTH, names + side + 36.0], inner)
 }

@@ -6,11 +6,11 @@ use super::scale::{Scale, coordinate, dots, polyline, text};
 use super::{Plot, WIDTH, legend};
 
 /// Height of a plot without its legend, SVG units.
-pub const HEIGHT: f64 = 250.0;
+pub const HEIGHT: f64 = 254.0;
 const LEFT: f64 = 62.0;
 const RIGHT: f64 = 16.0;
 const TOP: f64 = 12.0;
-const BOTTOM: f64 = 42.0;
+const BOTTOM: f64 = 45.0;
 
 /// Horizontal coordinates of the frame.
 pub const ACROSS: [f64; 2] = [LEFT, WIDTH - RIGHT];
@@ -89,7 +89,7 @@ pub fn frame(x: &Scale, y: &Scale, x_label: &str, y_label: &str) -> Markup {
             text class="small soft middle" x=(at) y=(UP[0] + 16.0) { (text(value, x.step)) }
         }
         rect class="frame" x=(ACROSS[0]) y=(UP[1]) width=(ACROSS[1] - ACROSS[0]) height=(UP[0] - UP[1]) {}
-        text class="middle" x=((ACROSS[0] + ACROSS[1]) / 2.0) y=(UP[0] + 34.0) { (x_label) }
+        text class="middle" x=((ACROSS[0] + ACROSS[1]) / 2.0) y=(UP[0] + 36.0) { (x_label) }
         text class="middle" transform=(format!("translate(14 {}) rotate(-90)", (UP[0] + UP[1]) / 2.0)) { (y_label) }
     }
 }
