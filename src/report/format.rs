@@ -5,11 +5,20 @@ pub fn um(value: f64) -> String {
     crate::cli::table::micrometres(value)
 }
 
-/// A unit with its symbol: `um` becomes µm, `arcsec` becomes ″.
-pub fn unit(name: &str) -> String {
-    name.replace("um", "µm")
-        .replace("arcsec", "″")
-        .replace("deg", "°")
+/// A unit, or a text with units, with its symbols: `um` becomes µm, `arcsec` becomes ″, `deg` becomes °.
+pub fn unit(text: &str) -> String {
+    let symbol = |word: &str| match word {
+        "um" => "µm".to_string(),
+        "arcsec" => "″".to_string(),
+        "deg" => "°".to_string(),
+        other => other.to_string(),
+    };
+    text.split_inclusive(|c: char| !c.is_alphanumeric())
+        .map(|part| match part.char_indices().last() {
+            Some((end, last)) if !last.is_alphanumeric() => symbol(&part[..end]) + &part[end..],
+            _ => symbol(part),
+        })
+        .collect::<String>()
         .replace("^2", "²")
         .replace("^3", "³")
 }
@@ -85,6 +94,7 @@ mod tests {
     fn units_have_their_symbols() {
         assert_eq!(unit("um"), "µm");
         assert_eq!(unit("arcsec/um"), "″/µm");
-        assert_eq!(unit("deg"), "°");
+        assert_eq!(unit("deg/mm^2"), "°/mm²");
+        assert_eq!(unit("minimum, um or arcsec"), "minimum, µm or ″");
     }
 }

@@ -7,7 +7,7 @@ use abbe::model::words::counted;
 use maud::{Markup, html};
 
 use super::document::{Document, capitalised, list, table};
-use super::format::typeset;
+use super::format::{typeset, unit};
 use super::plot::bars::{Fill, bars};
 use super::readings;
 use crate::cli::plan::improve::{RANGES, range_rows};
@@ -49,22 +49,27 @@ pub fn document(problem: &Problem<'_>, improvement: Option<&Improvement>, ranges
 fn verdict(found: &Improvement) -> String {
     match found.steps.as_slice() {
         [] => format!(
-            "None of {} improves the {}, {}.",
+            "None of {} reduces the {}, {}.",
             counted(found.menu_entries, "candidate test"),
-            found.figure,
+            name_of(&found.figure),
             digits(found.before)
         ),
         [.., last] => format!(
             "{} the {} from {} to {}.",
             match found.steps.len() {
-                1 => format!("One test of {} candidate tests takes", found.menu_entries),
-                many => format!("{many} tests of {} candidate tests take", found.menu_entries),
+                1 => format!("1 of {} candidate tests reduces", found.menu_entries),
+                many => format!("{many} of {} candidate tests reduce", found.menu_entries),
             },
-            found.figure,
+            name_of(&found.figure),
             digits(found.before),
             digits(last.after)
         ),
     }
+}
+
+/// The figure of merit without its units: they differ between the errors.
+fn name_of(figure: &str) -> &str {
+    figure.split(',').next().unwrap_or(figure)
 }
 
 fn proposed(document: &mut Document, found: &Improvement) -> Markup {
@@ -80,9 +85,9 @@ fn proposed(document: &mut Document, found: &Improvement) -> Markup {
         "Plan with each proposed test".to_string(),
         format!(
             "{}. The tests are added one after another.",
-            capitalised(&found.figure)
+            capitalised(&unit(&found.figure))
         ),
-        &found.figure,
+        &unit(&found.figure),
         &bar_rows,
         &[],
     )]);
@@ -101,14 +106,14 @@ fn proposed(document: &mut Document, found: &Improvement) -> Markup {
     html! {
         @if !rows.is_empty() {
             (table(
-                &["number", "figure with it", "duration, min", "workpiece ball, mm", "spindle ball, mm", "bar, mm", "makes identifiable", "test"],
+                &["number", "figure of merit", "duration, min", "workpiece ball, mm", "spindle ball, mm", "bar, mm", "makes identifiable", "test"],
                 &rows,
             ))
         }
         (shown)
         @if !others.is_empty() {
             h3 { "Best single tests" }
-            (table(&["test", "figure", "duration, min"], &others))
+            (table(&["test", "figure of merit", "duration, min"], &others))
         }
         @if !found.exchanged.is_empty() {
             h3 { "Exchanges" }
@@ -157,7 +162,7 @@ fn uncertainties(found: &Improvement) -> Markup {
 fn shrinkages(ranges: &[Shrinkage]) -> Markup {
     html! {
         p { "The smallest range about the centre of each sweep at which no standard uncertainty doubles." }
-        (table(&RANGES, &typeset(range_rows(ranges))))
+        (table(&RANGES, &typeset(range_rows(ranges)).into_iter().map(|row| row.iter().map(|cell| unit(cell)).collect()).collect::<Vec<_>>()))
     }
 }
 

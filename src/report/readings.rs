@@ -53,17 +53,26 @@ pub fn add_data(document: &mut Document, session: &SessionPlots<'_>, parameters:
 
 /// Deviations from nominal with switches and sliders. Tests that the model does not change are folded.
 pub fn traces(document: &mut Document, session: &SessionPlots<'_>) -> Markup {
-    let mut open = Vec::new();
-    let mut unaffected = Vec::new();
-    for (number, test) in session.tests() {
-        let polar = session.polar_deviation(number);
-        let figures = document.show(polar.into_iter().chain(session.deviations(number)));
-        if session.is_affected(number) {
-            open.push(figures);
+    let (affected, unaffected): (Vec<usize>, Vec<usize>) = session
+        .tests()
+        .map(|(number, _)| number)
+        .partition(|number| session.is_affected(*number));
+    let mut of_tests = |numbers: &[usize]| {
+        let plots: Vec<Vec<Plot>> = numbers
+            .iter()
+            .map(|number| {
+                let polar = session.polar_deviation(*number).into_iter();
+                polar.chain(session.deviations(*number)).collect()
+            })
+            .collect();
+        if session.is_polar() {
+            let rows: Vec<Markup> = plots.into_iter().map(|plots| document.show(plots)).collect();
+            html! { @for row in &rows { (row) } }
         } else {
-            unaffected.push((test.name.clone(), figures));
+            document.show(plots.into_iter().flatten())
         }
-    }
+    };
+    let [open, folded_tests] = [of_tests(&affected), of_tests(&unaffected)];
     let reference = if session.series.coordinates == 3 {
         "the nominal machine with the fitted set-up"
     } else {
@@ -78,10 +87,8 @@ pub fn traces(document: &mut Document, session: &SessionPlots<'_>) -> Markup {
             @if session.series.shares.len() > embed::MAX_SLIDERS { "The " (embed::MAX_SLIDERS) " largest contributions have a slider. " }
             "The plots show a part of the readings; all extremes are included."
         }
-        @for figures in &open { (figures) }
-        @if !unaffected.is_empty() {
-            (folded(&unaffected_heading(&unaffected), &html! { @for (_, figures) in &unaffected { (figures) } }))
-        }
+        (open)
+        @if !unaffected.is_empty() { (folded(&unaffected_heading(session, &unaffected), &folded_tests)) }
         (omitted_tests(session))
     }
 }

@@ -20,45 +20,55 @@ pub fn section(
     spectra: &[Spectrum],
     models: [&str; 2],
 ) -> Markup {
-    let is_polar = session.is_polar() && session.tests().any(|(_, test)| test.way.is_angle);
     let maximum = spectra
         .iter()
         .flat_map(|spectrum| spectrum.before_um.iter().chain(&spectrum.after_um))
         .copied()
         .fold(0.0, f64::max);
-    let mut open = Vec::new();
-    let mut unaffected = Vec::new();
-    for (number, test) in session.tests() {
-        let block = block(document, session, number, spectra, maximum, models);
-        if session.is_affected(number) {
-            open.push(block);
+    let (affected, unaffected): (Vec<usize>, Vec<usize>) = session
+        .tests()
+        .map(|(number, _)| number)
+        .partition(|number| session.is_affected(*number));
+    let is_polar = session.is_polar() && session.tests().any(|(_, test)| test.way.is_angle);
+    let mut of_tests = |numbers: &[usize]| {
+        if is_polar {
+            let blocks: Vec<Markup> = numbers
+                .iter()
+                .map(|number| block(document, session, *number, spectra, maximum, models))
+                .collect();
+            html! { @for block in &blocks { (block) } }
         } else {
-            unaffected.push((test.name.clone(), block));
+            let plots = numbers
+                .iter()
+                .flat_map(|number| straight(session, *number, spectra, maximum));
+            document.show(plots.collect::<Vec<_>>())
         }
-    }
-    let mut overview: Vec<Plot> = Vec::new();
-    if !is_polar {
-        overview.push(curves::histogram(session, models));
-    }
-    overview.push(curves::over_time(session));
-    let overview = document.show(overview);
+    };
+    let [open, folded_tests] = [of_tests(&affected), of_tests(&unaffected)];
+    let over_time = curves::over_time(session);
     html! {
-        @for block in &open { (block) }
-        @if !unaffected.is_empty() {
-            (folded(&unaffected_heading(&unaffected), &html! { @for (_, block) in &unaffected { (block) } }))
-        }
+        (open)
+        @if !unaffected.is_empty() { (folded(&unaffected_heading(session, &unaffected), &folded_tests)) }
         (omitted_tests(session))
         h3 { "All tests" }
-        div class="halves" { div { (test_table(session, models)) } div { (overview) } }
+        @if is_polar {
+            div class="halves" { div { (test_table(session, models)) } div { (document.show([over_time])) } }
+        } @else {
+            (test_table(session, models))
+            (document.show([curves::histogram(session, models), over_time]))
+        }
     }
 }
 
 /// Heading of the folded tests: their number and names.
-pub fn unaffected_heading<T>(tests: &[(String, T)]) -> String {
-    let names: Vec<&str> = tests.iter().map(|(name, _)| name.as_str()).collect();
+pub fn unaffected_heading(session: &SessionPlots<'_>, numbers: &[usize]) -> String {
+    let names: Vec<&str> = numbers
+        .iter()
+        .map(|number| session.series.tests[*number].name.as_str())
+        .collect();
     format!(
         "{} without a change of the residual: {}",
-        counted(tests.len(), "test"),
+        counted(names.len(), "test"),
         names.join(", ")
     )
 }
@@ -72,20 +82,26 @@ fn block(
     maximum_um: f64,
     models: [&str; 2],
 ) -> Markup {
+    let straight = straight(session, number, spectra, maximum_um);
+    let shown = match session.polar_residuals(number, models) {
+        Some(polar) => document.show_beside(polar, straight),
+        None => document.show(straight),
+    };
+    html! { h3 { (session.series.tests[number].name) } (shown) }
+}
+
+/// Plots of one test with straight axes: residuals, and their spectra on one scale.
+fn straight(session: &SessionPlots<'_>, number: usize, spectra: &[Spectrum], maximum_um: f64) -> Vec<Plot> {
     let name = &session.series.tests[number].name;
     let effects = &session.problem.parameters.effects;
-    let mut straight = session.residuals(number);
-    straight.extend(
+    let mut plots = session.residuals(number);
+    plots.extend(
         spectra
             .iter()
             .filter(|spectrum| &spectrum.of == name)
             .map(|spectrum| curves::spectrum_plot(spectrum, maximum_um, effects)),
     );
-    let shown = match session.polar_residuals(number, models) {
-        Some(polar) => document.show_beside(polar, straight),
-        None => document.show(straight),
-    };
-    html! { h3 { (name) } (shown) }
+    plots
 }
 
 /// Readings and RMS residuals of every test.

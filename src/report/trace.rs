@@ -2,12 +2,14 @@
 
 use abbe::identify::IdentifyError;
 use abbe::identify::plan::candidate_tests;
-use abbe::identify::results::{ModelResult, TraceResult};
+use abbe::identify::problem::Problem;
+use abbe::identify::results::{ChangedParameter, ModelResult, TraceResult};
 use abbe::identify::series::{spectrum, views};
 use abbe::identify::trace::Trace;
+use abbe::model::words::counted;
 use maud::{Markup, html};
 
-use super::document::{Document, KeyFigure, capitalised, list, prose};
+use super::document::{Document, KeyFigure, capitalised, folded, list, prose};
 use super::format::{integer, noise_sentence, unit, value_and_u};
 use super::plots::SessionPlots;
 use super::summary::{self, Quality};
@@ -79,7 +81,7 @@ pub fn document(trace: &Trace<'_>) -> Result<Document, IdentifyError> {
         &result.after.parameters,
         Some(&result.before.parameters),
     );
-    document.section("Values", html! { (section) (changes(result)) });
+    document.section("Values", html! { (section) (changes(problem, result)) });
     let section = residuals::section(
         &mut document,
         &session,
@@ -177,19 +179,24 @@ fn figures(trace: &Trace<'_>) -> Vec<KeyFigure> {
 }
 
 /// Parameters that changed when the effects were added: the bias of the declared model.
-fn changes(result: &TraceResult) -> Markup {
-    let changes = result.changed_parameters.iter().map(|parameter| {
+fn changes(problem: &Problem<'_>, result: &TraceResult) -> Markup {
+    let sentence = |parameter: &ChangedParameter| {
         let (change, u) = value_and_u(parameter.change, parameter.u);
         format!(
             "{} changed by {change} {} (u = {u}).",
             parameter.id,
             unit(&parameter.unit)
         )
-    });
+    };
+    let (setup, values): (Vec<_>, Vec<_>) =
+        (result.changed_parameters.iter()).partition(|parameter| values::is_setup(problem, &parameter.id));
     html! {
         @if !result.changed_parameters.is_empty() {
             h3 { "Changes by more than the standard uncertainty when the effects were added" }
-            (list(changes))
+            @if !values.is_empty() { (list(values.into_iter().map(sentence))) }
+            @if !setup.is_empty() {
+                (folded(&counted(setup.len(), "set-up parameter"), &list(setup.into_iter().map(sentence))))
+            }
         }
     }
 }

@@ -21,13 +21,8 @@ pub fn section(
     after: &[ParameterResult],
     before: Option<&[ParameterResult]>,
 ) -> Markup {
-    let is_setup = |value: &ParameterResult| {
-        let list = &problem.parameters.list;
-        list.iter()
-            .any(|parameter| parameter.role == Role::Setup && parameter.id == value.id)
-    };
     let (setup, values): (Vec<&ParameterResult>, Vec<&ParameterResult>) =
-        after.iter().partition(|value| is_setup(value));
+        after.iter().partition(|value| is_setup(problem, &value.id));
     let shown = plots(document, &values, before, "parameters", "Values");
     let shown_setup = plots(document, &setup, before, "setup", "Set-up parameters");
     html! {
@@ -40,6 +35,13 @@ pub fn section(
             ))
         }
     }
+}
+
+/// Whether a parameter belongs to the set-up.
+pub fn is_setup(problem: &Problem<'_>, id: &str) -> bool {
+    let list = &problem.parameters.list;
+    list.iter()
+        .any(|parameter| parameter.role == Role::Setup && parameter.id == id)
 }
 
 /// Finds the value of the same parameter in another model.

@@ -47,6 +47,13 @@ pub fn plot(machine: &Machine, errors: &[String]) -> Plot {
         .unwrap_or(0);
     let row_height = HEIGHT + 26.0 + 14.0 * max_lines as f64;
     let rows = bodies.len().div_ceil(BODIES_PER_ROW);
+    let last_lines = bodies[(rows - 1) * BODIES_PER_ROW..]
+        .iter()
+        .map(|body| match body {
+            Body::Axis(axis) => errors_of(axis).len(),
+            _ => 0,
+        });
+    let last_height = HEIGHT + 8.0 + 14.0 * last_lines.max().unwrap_or(0) as f64;
     let inner = html! {
         @for (number, body) in bodies.iter().enumerate() {
             @let x = 4.0 + (number % BODIES_PER_ROW) as f64 * (BODY + GAP);
@@ -72,7 +79,7 @@ pub fn plot(machine: &Machine, errors: &[String]) -> Plot {
         format!("{}: {}", machine.name, machine.code()),
         "Kinematic chain from the workpiece over the bed to the tool, with the estimated errors beneath each axis. d: direction, o: origin in mm; both in \
          the reference frame, all axes at zero.",
-        [WIDTH, 6.0 + rows as f64 * row_height],
+        [WIDTH, 6.0 + (rows - 1) as f64 * row_height + last_height],
         inner,
     )
 }
