@@ -7,7 +7,7 @@ use abbe::model::words::counted;
 use maud::{Markup, html};
 
 use super::document::{Document, capitalised, list};
-use super::format::{integer, um, unit, value_and_u};
+use super::format::{integer, um, unit, value_and_u, with_minus_signs};
 use super::plot::bars::{self, Fill};
 use super::plot::lines::{ACROSS, Lines, Mark, Series, UP, span};
 use super::plot::scale::{Scale, coordinate, polyline};
@@ -135,14 +135,19 @@ fn estimate(effect: &EffectResult) -> String {
         } else {
             coefficient
         };
-        format!("{coefficient} {value} ± {u} {}", unit(&parameter.unit))
+        let separator = if coefficient.ends_with(|c: char| c.is_ascii_digit()) {
+            ":"
+        } else {
+            ""
+        };
+        format!("{coefficient}{separator} {value} ± {u} {}", unit(&parameter.unit))
             .trim()
             .to_string()
     });
     let numbers = effect
         .shape_parameters
         .iter()
-        .map(|number| unit(&shape_number(number)));
+        .map(|number| with_minus_signs(&unit(&shape_number(number))));
     values.chain(numbers).collect::<Vec<_>>().join(", ")
 }
 

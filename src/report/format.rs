@@ -34,16 +34,19 @@ pub fn units<'n>(names: impl Iterator<Item = &'n str>) -> Vec<&'n str> {
     distinct
 }
 
-/// Table cells with a minus sign in place of a hyphen before numbers.
-pub fn typeset(rows: Vec<Vec<String>>) -> Vec<Vec<String>> {
+/// Text with a minus sign in place of a hyphen before numbers.
+pub fn with_minus_signs(text: &str) -> String {
     let word = |word: &str| match word.strip_prefix('-') {
         Some(number) if number.starts_with(|c: char| c.is_ascii_digit()) => format!("\u{2212}{number}"),
         _ => word.to_string(),
     };
-    let cell = |cell: String| cell.split(' ').map(word).collect::<Vec<_>>().join(" ");
-    rows.into_iter()
-        .map(|row| row.into_iter().map(cell).collect())
-        .collect()
+    text.split(' ').map(word).collect::<Vec<_>>().join(" ")
+}
+
+/// Table cells with a minus sign in place of a hyphen before numbers.
+pub fn typeset(rows: Vec<Vec<String>>) -> Vec<Vec<String>> {
+    let row = |row: Vec<String>| row.iter().map(|cell| with_minus_signs(cell)).collect();
+    rows.into_iter().map(row).collect()
 }
 
 /// A value and its standard uncertainty, rounded to the same decimal place.

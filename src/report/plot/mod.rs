@@ -60,7 +60,7 @@ impl Plot {
     pub fn figure(&self) -> Markup {
         let [width, height] = self.size;
         html! {
-            figure style=(format!("--width:{width}")) {
+            figure class=[(width >= WIDTH).then_some("wide")] style=(format!("--width:{width}")) {
                 figcaption { b { (self.title) } " " (self.caption) }
                 svg xmlns="http://www.w3.org/2000/svg" class="plot" viewBox=(format!("0 0 {width} {height}"))
                     role="img" aria-label=(self.title) data-interaction=[(!self.interaction.is_empty()).then_some(&self.interaction)] {
