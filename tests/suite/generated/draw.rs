@@ -7,7 +7,7 @@ use rand_distr::{Distribution, StandardNormal};
 use rand_pcg::Pcg64;
 
 use super::bar;
-use crate::plant::chain::{Chain, OutOfPlace};
+use crate::plant::chain::{Chain, ChainErrors};
 
 /// Standard deviation of drawn errors, µm and arcsec.
 const ERRORS: f64 = 20.0;
@@ -20,7 +20,7 @@ pub struct Draw {
 }
 
 /// What the plant has out of place in a test.
-fn out_of_place(plan: &Session, test: &Test, values: &[(String, f64)]) -> OutOfPlace {
+fn out_of_place(plan: &Session, test: &Test, values: &[(String, f64)]) -> ChainErrors {
     let value = |id: String| {
         values
             .iter()
@@ -42,7 +42,7 @@ fn out_of_place(plan: &Session, test: &Test, values: &[(String, f64)]) -> OutOfP
         let [a, b, c] = angles;
         (letter, [x, y, z, a, b, c])
     });
-    OutOfPlace {
+    ChainErrors {
         location: location.collect(),
         workpiece_ball: ball("workpiece_ball", &test.setup),
         spindle_ball: ball("spindle_ball", &test.spindle_setup),

@@ -23,7 +23,7 @@ use abbe::model::session::{Session, Test};
 use self::draw::draw;
 use super::topologies::{FIGURE_1_1, TABLE_1_1};
 use super::{abbe, text};
-use crate::plant::chain::{Chain, OutOfPlace};
+use crate::plant::chain::{Chain, ChainErrors};
 
 /// Codes that no textbook lists: rotary axes on both sides of any order, linear axes on and behind rotary ones, parallel axes, one rotary axis.
 const MIXED: [&str; 5] = [
@@ -99,7 +99,7 @@ fn check_described_once(code: &str, plan: &Session) {
             for (axis, still) in still.iter_mut().enumerate() {
                 *still &= readings.positions[axis][row] == readings.positions[axis][0];
             }
-            let none = OutOfPlace::default();
+            let none = ChainErrors::default();
             let length = chain.reading_mm(&position, stated.workpiece_ball, stated.spindle_ball, &none);
             assert!(
                 (length - stated.bar).abs() < 1e-9,
