@@ -83,13 +83,16 @@ fn shapes_have_the_signs_of_their_table() {
         decay: Decay::Way(10.0),
     };
     near(of_x(spike).basis(&there), (-(100.0 - x_mm) / 10.0).exp());
-    let bump = |profile| Shape::Local {
+    let local_feature = |profile| Shape::Local {
         centre: x_mm - 5.0,
         width: 10.0,
         profile,
     };
-    near(of_x(bump(Profile::Gaussian)).basis(&there), (-0.125_f64).exp());
-    near(of_x(bump(Profile::RaisedCosine)).basis(&there), 0.5);
+    near(
+        of_x(local_feature(Profile::Gaussian)).basis(&there),
+        (-0.125_f64).exp(),
+    );
+    near(of_x(local_feature(Profile::RaisedCosine)).basis(&there), 0.5);
     let steps = Shape::Steps {
         at: vec![-50.0, 0.0, 90.0],
         heights: vec![1.0, -3.0, 7.0],

@@ -79,12 +79,12 @@ fn known_aliases_are_found_and_others_are_not() {
         oracle.smallest_significant_amplitude(&harmonic(Z, 1), 1.96),
         f64::INFINITY
     );
-    let wobble = harmonic(Z, 2).with_amplitude(2.0);
-    let class = oracle.alias_class(&wobble, 0.95, 2.0);
+    let axial_motion = harmonic(Z, 2).with_amplitude(2.0);
+    let class = oracle.alias_class(&axial_motion, 0.95, 2.0);
     for alias in &class {
         println!(
             "{:?}: share {:.4}, deficit {:.1} sigma",
-            alias.name, alias.share, alias.behind_sigma
+            alias.name, alias.share, alias.deficit_sigma
         );
     }
     let has = |component: &str, order| {
@@ -96,11 +96,19 @@ fn known_aliases_are_found_and_others_are_not() {
     assert!(class[0].share > 0.9999);
     // Two tilts together explain at least as much as one; a set with the truth explains everything.
     let tilts = [harmonic(A, 1), harmonic(B, 1)];
-    assert!(oracle.explained_share_of(&wobble, &tilts) >= oracle.explained_share(&wobble, &tilts[0]) - 1e-12);
-    assert!(oracle.explained_share_of(&wobble, &[harmonic(Z, 5), harmonic(Z, 2)]) > 0.9999);
-    assert!(oracle.explained_share_of(&wobble, &[harmonic(Z, 5), harmonic(Z, 4)]) < 0.1);
+    assert!(
+        oracle.explained_share_of(&axial_motion, &tilts)
+            >= oracle.explained_share(&axial_motion, &tilts[0]) - 1e-12
+    );
+    assert!(oracle.explained_share_of(&axial_motion, &[harmonic(Z, 5), harmonic(Z, 2)]) > 0.9999);
+    assert!(oracle.explained_share_of(&axial_motion, &[harmonic(Z, 5), harmonic(Z, 4)]) < 0.1);
     // A smaller amplitude has more aliases.
-    assert!(oracle.alias_class(&wobble.with_amplitude(0.1), 0.95, 2.0).len() > class.len());
+    assert!(
+        oracle
+            .alias_class(&axial_motion.with_amplitude(0.1), 0.95, 2.0)
+            .len()
+            > class.len()
+    );
 }
 
 #[test]

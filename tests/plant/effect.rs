@@ -194,7 +194,7 @@ impl Injected {
                 centre,
                 width,
                 profile,
-            } => bump(
+            } => local_feature(
                 distance(driver, shown(driver, instant), *centre) / width,
                 *profile,
             ),
@@ -318,7 +318,7 @@ fn distance(driver: &Driver, here: f64, centre: f64) -> f64 {
     }
 }
 
-fn bump(widths: f64, profile: Profile) -> f64 {
+fn local_feature(widths: f64, profile: Profile) -> f64 {
     match profile {
         Profile::Gaussian => (-0.5 * widths * widths).exp(),
         Profile::RaisedCosine if widths.abs() < 1.0 => 0.5 * (1.0 + (PI * widths).cos()),

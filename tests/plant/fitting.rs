@@ -105,7 +105,7 @@ impl Oracle {
             let gradient = columns.tr_mul(&whitened) - weights.component_mul(&values);
             values += &inverse * gradient;
         }
-        let left = self.residuals_um(rows, values.as_slice(), effects);
+        let residual = self.residuals_um(rows, values.as_slice(), effects);
         let names = self.plan.unknowns.iter().map(|unknown| unknown.id.clone());
         Fit {
             ids: names
@@ -117,7 +117,7 @@ impl Oracle {
                 .iter()
                 .map(|variance| variance.sqrt())
                 .collect(),
-            rms_um: (left.norm_squared() / rows.len() as f64).sqrt(),
+            rms_um: (residual.norm_squared() / rows.len() as f64).sqrt(),
         }
     }
 }

@@ -20,7 +20,7 @@ use std::collections::HashMap;
 pub(super) const WEAK_U: f64 = 1000.0;
 
 /// Smallest share of a column that remains after projection on the present model; a smaller one counts as not identifiable.
-const SEEN_SHARE: f64 = 1e-3;
+const MIN_REMAINING_SHARE: f64 = 1e-3;
 
 /// Changes of a reading below this are rounding errors of the difference, µm.
 const MIN_CHANGE_UM: f64 = 1e-7;
@@ -40,7 +40,7 @@ pub struct Oracle {
     /// µm of reading per µm or arcsec of each parameter.
     pub(super) base: DMatrix<f64>,
     /// Orthonormal basis of the column space of the parameters in the whitened readings, with the priors as additional rows.
-    absorbed: DMatrix<f64>,
+    parameter_space: DMatrix<f64>,
 }
 
 impl Oracle {
@@ -70,13 +70,13 @@ impl Oracle {
         for (k, unknown) in plan.unknowns.iter().enumerate() {
             whitened[(every_row.len() + k, k)] = 1.0 / unknown.prior_u_um.unwrap_or(WEAK_U);
         }
-        let absorbed = whitened.qr().q();
+        let parameter_space = whitened.qr().q();
         Oracle {
             plan,
             noise,
             sensitivities,
             base,
-            absorbed,
+            parameter_space,
         }
     }
 
@@ -104,19 +104,19 @@ impl Oracle {
         let whitened = whiten(&self.plan, self.noise, &rows_of(&self.plan), self.columns(effect));
         let lengths = whitened.column_iter().map(|column| column.norm()).collect();
         let rows = whitened.nrows();
-        let mut left = whitened.insert_rows(rows, self.plan.unknowns.len(), 0.0);
+        let mut projected = whitened.insert_rows(rows, self.plan.unknowns.len(), 0.0);
         for _ in 0..2 {
-            left -= &self.absorbed * self.absorbed.tr_mul(&left);
+            projected -= &self.parameter_space * self.parameter_space.tr_mul(&projected);
         }
-        (left, lengths)
+        (projected, lengths)
     }
 
     /// Orthonormal basis of the response to several effects that the parameters do not explain; no column if none is identifiable.
-    fn signature(&self, effects: &[Injected]) -> DMatrix<f64> {
+    fn response(&self, effects: &[Injected]) -> DMatrix<f64> {
         let mut basis: Vec<DVector<f64>> = Vec::new();
         for effect in effects {
-            let (left, lengths) = self.projected(effect);
-            for (column, length) in left.column_iter().zip(lengths) {
+            let (projected, lengths) = self.projected(effect);
+            for (column, length) in projected.column_iter().zip(lengths) {
                 let mut rest = column.into_owned();
                 for _ in 0..2 {
                     for other in &basis {
@@ -124,13 +124,13 @@ impl Oracle {
                     }
                 }
                 let norm = rest.norm();
-                if norm > SEEN_SHARE * length && norm > MIN_SIGNATURE {
+                if norm > MIN_REMAINING_SHARE * length && norm > MIN_SIGNATURE {
                     basis.push(rest / norm);
                 }
             }
         }
         if basis.is_empty() {
-            DMatrix::zeros(self.absorbed.nrows(), 0)
+            DMatrix::zeros(self.parameter_space.nrows(), 0)
         } else {
             DMatrix::from_columns(&basis)
         }
@@ -140,11 +140,11 @@ impl Oracle {
     /// standard deviations for one amplitude. With an unknown phase (cosine and sine) the critical value is that of χ² with two degrees
     /// of freedom at the same probability, and the amplitude that of the phase of this effect. Infinite if it is not identifiable.
     pub fn smallest_significant_amplitude(&self, effect: &Injected, z: f64) -> f64 {
-        let (left, lengths) = self.projected(effect);
+        let (projected, lengths) = self.projected(effect);
         let coordinates = DVector::from_vec(effect.coordinates());
         let length: f64 = lengths.iter().map(|length| length * length).sum::<f64>().sqrt();
-        let seen = (&left * &coordinates).norm();
-        if seen <= SEEN_SHARE * length || seen == 0.0 {
+        let response = (&projected * &coordinates).norm();
+        if response <= MIN_REMAINING_SHARE * length || response == 0.0 {
             return f64::INFINITY;
         }
         let level = if coordinates.len() == 1 {
@@ -152,7 +152,7 @@ impl Oracle {
         } else {
             -2.0 * two_sided_tail(z).ln()
         };
-        level.sqrt() / seen
+        level.sqrt() / response
     }
 
     /// The share of the projected response of this effect that lies in the readings. The rest lies in the priors: it shifts the
@@ -166,8 +166,8 @@ impl Oracle {
     /// either is not identifiable.
     pub fn largest_angle_cosine(&self, a: &Injected, b: &Injected) -> f64 {
         let (a, b) = (
-            self.signature(std::slice::from_ref(a)),
-            self.signature(std::slice::from_ref(b)),
+            self.response(std::slice::from_ref(a)),
+            self.response(std::slice::from_ref(b)),
         );
         if a.ncols() == 0 || b.ncols() == 0 {
             return 0.0;
@@ -194,25 +194,25 @@ impl Oracle {
 
     /// Unit vector of the projected response, or zero.
     fn direction(&self, effect: &Injected) -> DVector<f64> {
-        let (left, lengths) = self.projected(effect);
-        let signature = left * DVector::from_vec(effect.coordinates());
+        let (projected, lengths) = self.projected(effect);
+        let response = projected * DVector::from_vec(effect.coordinates());
         let length: f64 = lengths.iter().map(|length| length * length).sum::<f64>().sqrt();
-        let norm = signature.norm();
-        if norm > SEEN_SHARE * length {
-            signature / norm
+        let norm = response.norm();
+        if norm > MIN_REMAINING_SHARE * length {
+            response / norm
         } else {
-            signature * 0.0
+            response * 0.0
         }
     }
 
     fn share(&self, direction: &DVector<f64>, others: &[Injected]) -> f64 {
-        self.signature(others).tr_mul(direction).norm().min(1.0)
+        self.response(others).tr_mul(direction).norm().min(1.0)
     }
 
     /// The strength of an effect at its amplitude, in standard deviations: the square root of the χ² gain of the truth without noise.
     pub fn strength_sigma(&self, effect: &Injected) -> f64 {
-        let (left, _) = self.projected(effect);
-        (left * DVector::from_vec(effect.coordinates())).norm() * effect.amplitude.abs()
+        let (projected, _) = self.projected(effect);
+        (projected * DVector::from_vec(effect.coordinates())).norm() * effect.amplitude.abs()
     }
 
     /// The aliases of this effect: every entry of the catalogue that explains at least `cosine` of it, and every entry whose expected χ²
@@ -224,15 +224,15 @@ impl Oracle {
             .into_iter()
             .map(|other| {
                 let share = self.share(&direction, std::slice::from_ref(&other));
-                let behind_sigma = strength * (1.0 - share * share).max(0.0).sqrt();
+                let deficit_sigma = strength * (1.0 - share * share).max(0.0).sqrt();
                 Alias {
                     name: named(&other),
                     effect: other,
                     share,
-                    behind_sigma,
+                    deficit_sigma,
                 }
             })
-            .filter(|alias| alias.share >= cosine || alias.behind_sigma <= sigma)
+            .filter(|alias| alias.share >= cosine || alias.deficit_sigma <= sigma)
             .collect();
         class.sort_by(|a, b| b.share.total_cmp(&a.share));
         class
@@ -286,7 +286,7 @@ pub struct Alias {
     /// The share of the true effect that it explains, as a cosine.
     pub share: f64,
     /// Square root of the expected χ² deficit relative to the truth, in standard deviations.
-    pub behind_sigma: f64,
+    pub deficit_sigma: f64,
 }
 
 /// Effects with a larger smallest significant amplitude are unrealistic and are not simulated.

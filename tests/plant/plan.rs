@@ -57,12 +57,12 @@ impl Plan {
             })
             .collect();
         let mut add = |component: Component, letter: &str, name: &str, owners: &[String], u_um: f64| {
-            let mut seen: Vec<&String> = Vec::new();
+            let mut listed: Vec<&String> = Vec::new();
             for owner in owners {
-                if seen.contains(&owner) {
+                if listed.contains(&owner) {
                     continue;
                 }
-                seen.push(owner);
+                listed.push(owner);
                 unknowns.push(Unknown {
                     id: format!("{name}[{owner}]{letter}"),
                     component,
