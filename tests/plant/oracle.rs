@@ -31,7 +31,7 @@ const MIN_SIGNATURE: f64 = 1e-6;
 /// The oracle of one kind of session.
 #[derive(Clone, Debug)]
 pub struct Oracle {
-    /// The session's plan.
+    /// The plan of the session.
     pub plan: Plan,
     /// The noise, assumed known.
     pub noise: Noise,
@@ -99,7 +99,7 @@ impl Oracle {
         DMatrix::from_columns(&columns)
     }
 
-    /// Whitened columns after projection off the parameters, and their lengths before it.
+    /// Whitened columns after removal of their projection on the parameters, and their lengths before.
     fn projected(&self, effect: &Injected) -> (DMatrix<f64>, Vec<f64>) {
         let whitened = whiten(&self.plan, self.noise, &rows_of(&self.plan), self.columns(effect));
         let lengths = whitened.column_iter().map(|column| column.norm()).collect();

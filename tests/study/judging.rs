@@ -32,7 +32,8 @@ pub fn is(name: &EffectName, truth: &Injected) -> bool {
     }
 }
 
-/// The found effect that is the truth or has it among its aliases. A period that divides a turn, within the resolution of a turn, is that harmonic.
+/// The found effect that is the truth or has it among its aliases. A period that divides a turn, within the resolution of a turn, is that
+/// harmonic.
 pub fn found<'r>(outcome: &'r Outcome, truth: &Injected) -> Option<&'r EffectResult> {
     let oracle = oracle(outcome.kind, outcome.noise);
     let is_truth = |name: &EffectName| {

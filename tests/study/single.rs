@@ -15,7 +15,8 @@ fn study(factor: f64) -> Vec<Outcome> {
     })
 }
 
-/// An alias lies within 2 σ of the named effect with noise. One that is more than 4 σ behind without noise does so in one session of fourteen.
+/// An alias lies within 2 σ of the named effect with noise. One that is more than 4 σ behind without noise does so in one session of
+/// fourteen.
 const FAR_SIGMA: f64 = 4.0;
 
 #[derive(Default)]

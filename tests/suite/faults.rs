@@ -1,5 +1,5 @@
-//! Faults of the environment: full disks, outputs that cannot be written, pipes, links. The command succeeds, or a message states the reason and
-//! existing files are unchanged.
+//! Faults of the environment: full disks, outputs that cannot be written, pipes, links. The command succeeds, or a message states the
+//! reason and existing files are unchanged.
 #![cfg(unix)]
 
 use std::fs;

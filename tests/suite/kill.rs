@@ -1,7 +1,7 @@
 //! Killed at any time, `abbe` leaves the old file or the complete new one.
 //!
-//! `ABBE_KILLS` is the number of kills (24 by default). Half of them occur at a random time of the run, half within a few milliseconds after the
-//! first output file appears.
+//! `ABBE_KILLS` is the number of kills (24 by default). Half of them occur at a random time of the run, half within a few milliseconds
+//! after the first output file appears.
 #![cfg(unix)]
 
 use std::collections::BTreeMap;

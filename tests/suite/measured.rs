@@ -9,8 +9,8 @@ use crate::plant::{AxisName, Component, Draw, Driver, Freedom, Injected, Kind, R
 const FOLDER: &str = "hermle-c600u/measured";
 
 const ABOUT: &str = "\
-# A simulated measured session: the method of Jiang (2014), Chapter 5, with bars of 100 and 150 mm, two runs in both directions, noise of 0.3 um.
-# The machine has an effect that this file does not declare; `abbe trace` finds it.
+# A simulated measured session: the method of Jiang (2014), Chapter 5, with bars of 100 and 150 mm, two runs in both directions, noise of
+# 0.3 um. The machine has an effect that this file does not declare; `abbe trace` finds it.
 
 ";
 
