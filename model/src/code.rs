@@ -1,13 +1,13 @@
 //! Structural codes: the order of bodies from workpiece to tool, `b` the bed.
 //!
-//! `w C A b Y X Z t` (spaced, any axis names) and `[wCAbYXZt]` (compact, one letter an axis) say the same.
+//! `w C A b Y X Z t` (spaced, any axis names) and `[wCAbYXZt]` (compact, one letter per axis) are equivalent.
 
 use crate::error::ModelError;
 
-/// Most axes of a chain.
+/// Largest number of axes in a chain.
 const MAX_AXES: usize = 64;
 
-/// The axes of a structural code, as written.
+/// The axes of a structural code, in the order of the code.
 ///
 /// ```
 /// use abbe_model::code::StructuralCode;
@@ -27,10 +27,10 @@ pub struct StructuralCode {
 }
 
 impl StructuralCode {
-    /// Reads either form.
+    /// Parses either form.
     ///
     /// # Errors
-    /// Names what is missing: `w` at the start, `t` at the end, exactly one `b`, each axis once.
+    /// The message names what is missing: `w` at the start, `t` at the end, exactly one `b`, each axis once.
     pub fn parse(text: &str) -> Result<StructuralCode, ModelError> {
         let fault = |found: String| ModelError::StructuralCode {
             code: text.to_string(),

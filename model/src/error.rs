@@ -2,19 +2,19 @@
 
 use std::path::PathBuf;
 
-/// Where in the user's files something stands.
+/// A location in the user's files.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Place {
     /// The file as the user named it.
     pub file: PathBuf,
-    /// Line, from 1; 0 where the whole file is meant.
+    /// Line, from 1; 0 for the whole file.
     pub line: usize,
-    /// Bytes of the file that the message points at, where known.
+    /// The bytes of the file to which the message refers, if known.
     pub span: Option<std::ops::Range<usize>>,
 }
 
 impl Place {
-    /// A file as a whole.
+    /// The whole file.
     pub fn file(file: &std::path::Path) -> Place {
         Place {
             file: file.to_path_buf(),
@@ -22,7 +22,7 @@ impl Place {
         }
     }
 
-    /// A line of a file.
+    /// A line of the file.
     pub fn line(file: &std::path::Path, line: usize) -> Place {
         Place {
             line,
@@ -41,21 +41,21 @@ impl std::fmt::Display for Place {
     }
 }
 
-/// What can be wrong with a machine, a session or its readings.
+/// Errors of a machine, a session or its readings.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum ModelError {
-    /// A structural code that cannot be read.
+    /// An invalid structural code.
     #[error(
         "structural code `{code}`: {found}; a code goes from workpiece over bed to tool, as in `w C A b Y X Z t`"
     )]
     StructuralCode {
         /// The code as given.
         code: String,
-        /// What is wrong with it.
+        /// The fault.
         found: String,
     },
-    /// An axis whose kind its name does not tell.
+    /// An axis whose kind does not follow from its name.
     #[error(
         "axis `{axis}` is no ISO 841 letter; state its `kind` (\"rotary\" or \"linear\") and `direction`"
     )]
@@ -63,7 +63,7 @@ pub enum ModelError {
         /// The axis.
         axis: String,
     },
-    /// Input that cannot be used, with its place and the way out.
+    /// Unusable input, with its location and a remedy.
     #[error("{place}: {message}")]
     Input {
         /// File and line.
@@ -76,7 +76,7 @@ pub enum ModelError {
     /// A plan that the machine cannot carry out.
     #[error("{message}")]
     Plan {
-        /// Which test, and what keeps it from being carried out.
+        /// The test and the obstacle.
         message: String,
         /// What to do.
         help: String,
@@ -86,13 +86,13 @@ pub enum ModelError {
     Output {
         /// The file.
         file: PathBuf,
-        /// What the system said.
+        /// The message of the operating system.
         cause: String,
     },
 }
 
 impl ModelError {
-    /// Where the fault lies in the user's files, where it lies in one.
+    /// The location of the fault in the user's files, if it is in one.
     pub fn place(&self) -> Option<&Place> {
         match self {
             ModelError::Input { place, .. } => Some(place),
@@ -100,7 +100,7 @@ impl ModelError {
         }
     }
 
-    /// What to do about it, where more can be said than the message does.
+    /// The remedy, if it is not part of the message.
     pub fn help(&self) -> Option<&str> {
         match self {
             ModelError::Input { help, .. } => help.as_deref(),

@@ -1,4 +1,4 @@
-//! Lengths as a session writes them: numbers, or expressions over the session's constants.
+//! Lengths in a session: numbers, or expressions in the session's constants.
 
 use crate::scalar::Nominal;
 
@@ -23,13 +23,13 @@ pub enum Length {
     Root(Box<Length>),
 }
 
-/// Most characters of an expression.
+/// Largest length of an expression, characters.
 const MAX_CHARACTERS: usize = 400;
-/// Most nested parentheses, signs and roots.
+/// Largest nesting depth of parentheses, signs and roots.
 const MAX_DEPTH: usize = 40;
 
 impl Length {
-    /// The value over any nominal type, `constant` giving that of a named constant.
+    /// Evaluates the length over any nominal type; `constant` gives the value of a named constant.
     pub fn evaluate<N: Nominal>(&self, constant: &impl Fn(&str) -> N) -> N {
         match self {
             Length::Number(value) => N::constant(*value),
@@ -43,7 +43,7 @@ impl Length {
         }
     }
 
-    /// How many numbers and names stand in it.
+    /// Number of numbers and names in the expression.
     fn size(&self) -> usize {
         match self {
             Length::Number(_) | Length::Constant(_) => 1,
@@ -54,7 +54,7 @@ impl Length {
         }
     }
 
-    /// Reads numbers, names, `+ - * /`, `^2`, `sqrt( )` and parentheses.
+    /// Parses numbers, names, `+ - * /`, `^2`, `sqrt( )` and parentheses.
     ///
     /// ```
     /// use abbe_model::session::expression::Length;
@@ -67,7 +67,7 @@ impl Length {
     /// ```
     ///
     /// # Errors
-    /// Says what was found where, or which constant is not among the `known` ones.
+    /// The message tells what was found and where, or which constant is not among the `known` ones.
     pub fn parse(text: &str, known: &[&str]) -> Result<Length, String> {
         let characters: Vec<char> = text.chars().collect();
         if characters.len() > MAX_CHARACTERS {
@@ -98,7 +98,7 @@ struct Reader<'a> {
 }
 
 impl Reader<'_> {
-    /// The next character that is no space.
+    /// The next character that is not a space.
     fn peek(&mut self) -> Option<char> {
         while self.characters.get(self.place).is_some_and(|c| c.is_whitespace()) {
             self.place += 1;

@@ -1,4 +1,4 @@
-//! Whether an instrument reaches where the session says that it is: a bar between its balls, a stylus before its artefact, a ball in its nest.
+//! Plausibility of the set-up: whether the bar spans its balls, the stylus is in front of its artefact, and the ball is in its nest.
 
 use super::Test;
 use super::readings::Readings;
@@ -6,10 +6,11 @@ use crate::axis::AxisKind;
 use crate::chain::{BodyErrors, Machine};
 use crate::instrument::Station;
 
-/// A ball bar's sensor moves a millimetre or two, those of an R-test a few; beyond this something else than an error of the machine is wrong, mm.
+/// The sensor range is one to two millimetres for a ball bar and a few for an R-test. A larger deviation is not an error of the machine,
+/// mm.
 const MAX_MM: f64 = 5.0;
 
-/// Balls that lie nearer to each other than this lie in one place, mm.
+/// Balls that are closer to each other than this coincide, mm.
 const MIN_MM: f64 = 1e-6;
 
 /// The calibrated length of a ball bar; 0 for other instruments.
@@ -20,8 +21,9 @@ pub(crate) fn bar_mm(station: &Station<f64>) -> f64 {
     }
 }
 
-/// That the instrument nominally reaches: the distance between the balls is the bar's length, the stylus stands before its artefact, the ball lies in
-/// its nest. Where a single slip in the positions of an axis (its sign, its unit) would account for it, the help names that slip.
+/// Checks that the instrument nominally fits: the distance between the balls is the length of the bar, the stylus is in front of its
+/// artefact, the ball is in its nest. If a single mistake in the positions of an axis (its sign, its unit) explains the deviation, the
+/// help names it.
 pub(crate) fn check(machine: &Machine, test: &Test, readings: &Readings) -> Result<(), (String, String)> {
     let Err((message, help)) = reaches(machine, test, readings) else {
         return Ok(());
@@ -33,11 +35,11 @@ pub(crate) fn check(machine: &Machine, test: &Test, readings: &Readings) -> Resu
     Err((message, help))
 }
 
-/// What a slip does to the positions of an axis, and how it is called.
+/// The factor by which a mistake changes the positions of an axis, and its description.
 type Slip = (f64, &'static str);
 
 const SIGN: &str = "with the opposite sign (check its `direction` and its column)";
-/// Slips that are tried on linear axes. A sign error looks like a unit error: positions are off by a factor.
+/// Mistakes that are tried on linear axes. Sign and unit errors both multiply the positions by a factor.
 const LINEAR: [Slip; 7] = [
     (-1.0, SIGN),
     (1e3, "in m rather than mm"),
@@ -47,17 +49,17 @@ const LINEAR: [Slip; 7] = [
     (1.0 / 25.4, "in mm rather than inches"),
     (1.0 / 0.0254, "in mm rather than mil"),
 ];
-/// Slips that are tried on rotary axes.
+/// Mistakes that are tried on rotary axes.
 const ROTARY: [Slip; 3] = [
     (-1.0, SIGN),
     (180.0 / std::f64::consts::PI, "in radians rather than degrees"),
     (std::f64::consts::PI / 180.0, "in degrees rather than radians"),
 ];
 
-/// Most readings that slips are tried on.
+/// Largest number of readings on which mistakes are tried.
 const MAX_TRIED: usize = 500;
 
-/// The slips, of one axis or of all axes of a kind, after whose correction the instrument reaches.
+/// The mistakes, of one axis or of all axes of a kind, whose correction makes the instrument fit.
 fn slips(machine: &Machine, test: &Test, readings: &Readings) -> Vec<String> {
     let rows: Vec<usize> = (0..readings.rows())
         .step_by(readings.rows().div_ceil(MAX_TRIED).max(1))
@@ -90,7 +92,7 @@ fn slips(machine: &Machine, test: &Test, readings: &Readings) -> Vec<String> {
             }
         }
     }
-    // A scale that all but stops an axis lets a bar reach in many a set-up: only what fits as well as the best counts.
+    // A scale that nearly stops an axis makes many set-ups fit, so only corrections about as good as the best are kept.
     let best = found
         .iter()
         .map(|(misfit, _)| *misfit)
@@ -99,11 +101,11 @@ fn slips(machine: &Machine, test: &Test, readings: &Readings) -> Vec<String> {
     found.into_iter().map(|(_, said)| said).collect()
 }
 
-/// Slips whose misfits differ by less than this factor and this length, mm, fit alike.
+/// Corrections are equivalent if their misfits differ by less than this factor and this length, mm.
 const ALIKE: f64 = 2.0;
 const MISFIT_MM: f64 = 0.05;
 
-/// How far the instrument nominally is from reaching, mm: rms over the readings.
+/// Nominal misfit of the instrument, mm: rms over the readings.
 fn misfit(machine: &Machine, test: &Test, readings: &Readings) -> f64 {
     let none = vec![BodyErrors::<f64>::NONE; machine.axes.len()];
     let mut state = Vec::new();
@@ -134,7 +136,7 @@ fn reaches(machine: &Machine, test: &Test, readings: &Readings) -> Result<(), (S
     for row in 0..readings.rows() {
         readings.state(machine, row, &mut state);
         let length = bar.read::<f64>(machine, &state, &none, |_| None);
-        // A length has no direction there, so that no error moves it one way or the other.
+        // A length of zero has no direction, so that no error changes it to first order.
         if length < MIN_MM {
             return Err((
                 format!(
@@ -166,7 +168,7 @@ fn reaches(machine: &Machine, test: &Test, readings: &Readings) -> Result<(), (S
     ))
 }
 
-/// That the stylus stands before the artefact, and near it, wherever a reading is taken.
+/// Checks that the stylus is in front of the artefact and near it at every reading.
 fn check_touch(machine: &Machine, test: &Test, readings: &Readings) -> Result<(), (String, String)> {
     let none = vec![BodyErrors::<f64>::NONE; machine.axes.len()];
     let mut state = Vec::new();
@@ -192,7 +194,7 @@ fn check_touch(machine: &Machine, test: &Test, readings: &Readings) -> Result<()
     Ok(())
 }
 
-/// That the master ball nominally lies in the nest wherever a reading is taken.
+/// Checks that the master ball is nominally in the nest at every reading.
 fn check_nest(machine: &Machine, test: &Test, readings: &Readings) -> Result<(), (String, String)> {
     let none = vec![BodyErrors::<f64>::NONE; machine.axes.len()];
     let mut state = Vec::new();
@@ -216,7 +218,7 @@ fn check_nest(machine: &Machine, test: &Test, readings: &Readings) -> Result<(),
     Ok(())
 }
 
-/// That the bar read about its own length, the sensors of an R-test within their range.
+/// Checks that the readings are near the length of the bar, or within the range of an R-test's sensors.
 pub(crate) fn check_lengths(test: &Test, readings: &Readings) -> Result<(), (String, String)> {
     let bar = match &test.station {
         Station::BallBar(bar) => bar,

@@ -1,4 +1,4 @@
-//! What any file can get wrong, whatever it says: no file, no text, no TOML, unknown keys, numbers that are none.
+//! Tests of faults that any file can have: missing file, no text, no TOML, unknown keys, invalid numbers.
 
 use std::fs;
 use std::path::Path;

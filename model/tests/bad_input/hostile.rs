@@ -1,4 +1,4 @@
-//! Input that somebody made to do harm: names that lead elsewhere, nesting and growth without end, files beyond every limit.
+//! Tests of malicious input: names that lead elsewhere, unlimited nesting and growth, files beyond every limit.
 
 use std::fs;
 use std::path::Path;
@@ -9,7 +9,7 @@ use abbe_model::session::read::{self, ReadOptions};
 
 use super::{DATA, MACHINE, SESSION, holds, session, told, with_data, with_machine, with_session};
 
-/// One test for each input: its name, what is told of it, what that has to hold.
+/// One test per input: its name, the resulting message, and the text that it must contain.
 macro_rules! refused {
     ($($name:ident: $told:expr => [$($part:expr),+ $(,)?])+) => {
         $(#[test]
@@ -233,7 +233,7 @@ refused! {
     runs_beyond_count: with_session("data = \"C100.csv\"", "sweep = { axis = \"C\", from_deg = 0, to_deg = 360, step_deg = 1, runs = 1000000 }") => ["session.toml:10", "1000000 readings is the most"]
 }
 
-/// A data file that is not text of today.
+/// Reads a data file of arbitrary bytes.
 fn with_bytes(bytes: &[u8]) -> String {
     let folder = tempfile::tempdir().unwrap();
     let at = |name: &str| folder.path().join(name);
@@ -261,7 +261,7 @@ refused! {
     a_cell_too_many: with_data(&DATA.replace("100.0010", "100.0010,7")) => ["C100.csv:3", "5 cells", "4 columns"]
 }
 
-/// A file of that many bytes, all of them NUL, that takes no room.
+/// A sparse file of this number of NUL bytes, which occupies no disk space.
 fn sparse(name: &str, bytes: u64) -> String {
     let folder = tempfile::tempdir().unwrap();
     let at = |name: &str| folder.path().join(name);
@@ -342,7 +342,7 @@ refused! {
     an_element_without_its_end: with_xml("<a>\n<b>") => ["C.b5r:2", "it ends within <b>"]
 }
 
-/// A pipe is read once, as it comes.
+/// A pipe is read once, as a stream.
 #[cfg(unix)]
 #[test]
 fn a_pipe_is_read_as_it_comes() {

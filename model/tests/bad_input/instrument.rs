@@ -1,4 +1,4 @@
-//! Instruments as a test sets them up.
+//! Tests of instrument set-ups.
 
 use super::{DATA, MACHINE, SESSION, holds, session, told, with_data, with_session, without_tests};
 
@@ -42,7 +42,7 @@ fn a_bar_that_cannot_reach() {
             "degrees taken for radians",
         ],
     );
-    // A follows from both balls: turned by degrees read as radians the balls come apart.
+    // A depends on both balls: degrees misread as radians separate the balls.
     let both = SESSION.replace("spindle_ball_mm = [0, 0, 0]", "spindle_ball_mm = [0, 100, 100]");
     let data = radians
         .replace("a_deg", "a_rad")
@@ -114,7 +114,7 @@ at = { x_mm = 45, y_mm = 0, z_mm = 0, a_deg = 0 }
     assert!(told(named).contains("`length_mm`, which is not known"));
 }
 
-/// An R-test that cannot be: what is changed in a good one, and what is told.
+/// An invalid R-test: the change in a valid one, and the message.
 #[test]
 fn sensors_that_cannot_read() {
     const TEST: &str = r#"[[test]]

@@ -1,4 +1,4 @@
-//! What a user can get wrong in a session, one test each, by what is read: the message names the file, the line and the way out.
+//! Tests of user errors in a session, one test each. The message names the file, the line and what to do.
 
 mod document;
 mod foreign;
@@ -58,7 +58,7 @@ fn session(machine: &str, session: &str, data: Option<&str>) -> Result<Session, 
     read::session(&folder.path().join("session.toml"), &ReadOptions::default())
 }
 
-/// The session up to its tests.
+/// The session before its tests.
 fn without_tests() -> &'static str {
     &SESSION[..SESSION.find("[[test]]").unwrap()]
 }

@@ -1,4 +1,4 @@
-//! Sessions: the files they name, their tests, unknowns, effects and expressions.
+//! Tests of sessions: their files, tests, estimated errors, effects and expressions.
 
 use super::{DATA, MACHINE, SESSION, holds, session, told, with_session, without_tests};
 

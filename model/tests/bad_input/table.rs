@@ -1,4 +1,4 @@
-//! Tables of readings: columns, cells, lines.
+//! Tests of tables of readings: columns, cells, lines.
 
 use super::{DATA, MACHINE, SESSION, holds, session, told, with_data};
 

@@ -1,4 +1,4 @@
-//! A value of a TOML file, with its key and its place.
+//! A value of a TOML file, with its key and location.
 
 use std::ops::Range;
 
@@ -15,9 +15,9 @@ pub(crate) struct Value<'a> {
     pub source: &'a Source,
     /// The key it belongs to.
     pub key: String,
-    /// Where the key stands.
+    /// Location of the key.
     pub key_span: Range<usize>,
-    /// Where the value stands.
+    /// Location of the value.
     pub span: Range<usize>,
     pub(super) value: DeValue<'a>,
 }
@@ -28,7 +28,7 @@ impl<'a> Value<'a> {
         self.source.error(self.span.clone(), message, help)
     }
 
-    /// An error that says what the value is and what it should be.
+    /// An error with the found value and the expected one.
     pub fn unlike(&self, wanted: &str) -> ModelError {
         let found = match &self.value {
             DeValue::String(text) => format!("the text \"{text}\""),
@@ -41,7 +41,7 @@ impl<'a> Value<'a> {
         self.error(format!("`{}` is {found}; {wanted} is expected", self.key), None)
     }
 
-    /// A text.
+    /// The value as a text.
     pub fn text(&self) -> Result<String, ModelError> {
         match &self.value {
             DeValue::String(text) => match text.chars().find(|c| c.is_control() && *c != '\t') {
@@ -58,12 +58,12 @@ impl<'a> Value<'a> {
         }
     }
 
-    /// The text, where it is one.
+    /// The text, if the value is one.
     pub fn as_text(&self) -> Option<&str> {
         self.value.as_str()
     }
 
-    /// What is written there, as a text: a note may be a number or a date.
+    /// The value as a text of any type: a note may be a number or a date.
     pub fn note(&self) -> Result<String, ModelError> {
         match &self.value {
             DeValue::Integer(number) => Ok(number.as_str().to_string()),
@@ -90,13 +90,13 @@ impl<'a> Value<'a> {
         self.value.as_bool().ok_or_else(|| self.unlike("true or false"))
     }
 
-    /// A number within [`limits::LARGEST`], perhaps infinite, never NaN.
+    /// A number within [`limits::LARGEST`], possibly infinite, never NaN.
     pub fn number_or_inf(&self, wanted: &str) -> Result<f64, ModelError> {
         let number = match &self.value {
             DeValue::Integer(integer) => {
                 i64::from_str_radix(&integer.as_str().replace('_', ""), integer.radix())
                     .map(|integer| integer as f64)
-                    // What is too large for a whole number is a number all the same.
+                    // A value that is too large for an integer is still a number.
                     .or_else(|_| integer.as_str().replace('_', "").parse())
                     .ok()
             }
@@ -135,7 +135,7 @@ impl<'a> Value<'a> {
         }
     }
 
-    /// A whole number of at least `least` and at most `most`.
+    /// An integer of at least `least` and at most `most`.
     pub fn count(&self, least: usize, most: usize) -> Result<usize, ModelError> {
         let number = self.number()?;
         if number.fract() == 0.0 && number >= least as f64 && number <= most as f64 {
@@ -151,7 +151,7 @@ impl<'a> Value<'a> {
         }
     }
 
-    /// The items of a list, each under the list's key.
+    /// The items of a list, each with the key of the list.
     pub fn list(self, wanted: &str) -> Result<Vec<Value<'a>>, ModelError> {
         if !self.value.is_array() {
             return Err(self.unlike(wanted));
@@ -197,12 +197,12 @@ impl<'a> Value<'a> {
         Ok(vector)
     }
 
-    /// A table, called `name` in messages.
+    /// A table with `name` as its name in messages.
     pub fn table(self, name: String) -> Result<Table<'a>, ModelError> {
         if !self.value.is_table() {
             return Err(self.unlike("a table"));
         }
-        // A header `[name]` is what a message about the table should point at.
+        // Messages about the table point at its header `[name]`.
         let span = if self.key_span.start < self.span.start {
             self.key_span.clone()
         } else {

@@ -1,4 +1,4 @@
-//! `[[effect]]`: component × driver × shape.
+//! Reader of `[[effect]]`: component × driver × shape.
 
 use super::shape::{self, DriverUnit};
 use super::{Context, Declared, quantity};
@@ -90,7 +90,7 @@ fn component(context: &Context<'_>, table: &mut Table<'_>) -> Result<Component, 
     }
 }
 
-/// The driver; where it may be left out, an error motion follows its own axis and what drifts or warms up follows time.
+/// The driver. The default is the own axis for an error motion, and time for a drift or warm-up.
 fn driver(
     context: &Context<'_>,
     table: &mut Table<'_>,
@@ -139,7 +139,7 @@ fn driver(
     }
 }
 
-/// Whether a shape can follow this driver.
+/// Checks that a shape and a driver are compatible.
 fn suits(context: &Context<'_>, word: &Value<'_>, shape: &Shape, driver: &Driver) -> Result<(), ModelError> {
     if (*driver == Driver::None) != (*shape == Shape::Constant) {
         let message = format!("the shape \"{}\" cannot follow \"{driver}\"", shape.word());
@@ -169,7 +169,7 @@ fn suits(context: &Context<'_>, word: &Value<'_>, shape: &Shape, driver: &Driver
     }
 }
 
-/// The tests that an effect is confined to; a test that its data part by socket stands for all its parts.
+/// The tests in which an effect acts. A test that its data split by socket stands for all its parts.
 fn tests(table: &mut Table<'_>, declared: &[Declared]) -> Result<Vec<String>, ModelError> {
     let Some(value) = table.take("tests") else {
         return Ok(Vec::new());

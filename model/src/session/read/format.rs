@@ -1,10 +1,10 @@
-//! `[format]` and `[columns]`: how other people's files are written.
+//! Reader of `[format]` and `[columns]`: the layout of foreign files.
 
 use crate::error::ModelError;
 use crate::session::document::{Table, Value};
 use crate::session::table::{Format, Mapped, Theirs, encoding};
 
-/// `[format]`: separator, decimal, header, encoding, lines above the header; sheet of a spreadsheet; direction in a ball-bar file.
+/// Reads `[format]`: separator, decimal, header, encoding, lines above the header; sheet of a spreadsheet; direction in a ball-bar file.
 pub(super) fn format(mut table: Table<'_>) -> Result<Format, ModelError> {
     let mut format = Format::default();
     if let Some(value) = table.take("separator") {
@@ -21,7 +21,7 @@ pub(super) fn format(mut table: Table<'_>) -> Result<Format, ModelError> {
         format.sheet = Some(value.text()?);
     }
     if let Some(value) = table.take("anticlockwise") {
-        // Files number directions, or say whether one is meant.
+        // Files number directions, or name one of them.
         format.anticlockwise = Some(match value.truth() {
             Ok(truth) => truth.to_string(),
             Err(_) if value.as_text().is_none() => value.count(0, 1_000_000)?.to_string(),
@@ -65,7 +65,7 @@ fn one_of(value: &Value<'_>, known: &[u8]) -> Result<u8, ModelError> {
     }
 }
 
-/// `[columns]`: ours = theirs, by name or number.
+/// Reads `[columns]`: own name = foreign name or number.
 pub(super) fn columns(mut table: Table<'_>) -> Result<Vec<Mapped>, ModelError> {
     let mut columns = Vec::new();
     for entry in table.remaining_values()? {

@@ -1,4 +1,4 @@
-//! `machine.toml`, or the same tables inside a session.
+//! Reader of `machine.toml`, or of the same tables in a session.
 
 use std::path::Path;
 
@@ -193,7 +193,7 @@ fn travel(name: &str, kind: AxisKind, table: &mut Table<'_>) -> Result<Option<[f
     }
 }
 
-/// The vector at length 1, unless it has none.
+/// The vector scaled to length 1; `None` for a zero vector.
 fn unit(vector: [f64; 3]) -> Option<[f64; 3]> {
     let largest = vector.iter().fold(0.0_f64, |largest, v| largest.max(v.abs()));
     if largest == 0.0 || !largest.is_finite() {

@@ -1,4 +1,4 @@
-//! `sweep` and `path`: how the axes move in a planned test.
+//! Reader of `sweep` and `path`: the motion of the axes in a planned test.
 
 use super::{Context, quantity};
 use crate::axis::AxisKind;
@@ -7,12 +7,12 @@ use crate::instrument::Station;
 use crate::session::document::{Table, Value};
 use crate::session::motion::{FollowOffset, MAX_READINGS, Motion, programmed_over_path_feed};
 
-/// Feed of a linear axis or a circle where none is stated, mm/s: 1000 mm/min.
+/// Default feed of a linear axis or a circle, mm/s: 1000 mm/min.
 const DEFAULT_FEED_MM_S: f64 = 1000.0 / 60.0;
-/// Speed of a rotary axis where none is stated, rad/s: 120 °/min.
+/// Default speed of a rotary axis, rad/s: 120 °/min.
 const DEFAULT_TURN_RAD_S: f64 = 2.0 / 180.0 * std::f64::consts::PI;
 
-/// `sweep = { axis, from_…, to_…, step_…, feed_…, runs, both_directions }`.
+/// Reads `sweep = { axis, from_…, to_…, step_…, feed_…, runs, both_directions }`.
 pub(super) fn sweep(
     context: &Context<'_>,
     value: Value<'_>,
@@ -35,7 +35,7 @@ pub(super) fn sweep(
     })
 }
 
-/// `path = { kind = "circle" | "follow" | "list", … }`.
+/// Reads `path = { kind = "circle" | "follow" | "list", … }`.
 pub(super) fn path(
     context: &Context<'_>,
     value: Value<'_>,
@@ -143,7 +143,7 @@ fn follow(context: &Context<'_>, mut table: Table<'_>, station: &Station<f64>) -
             }
             FollowOffset::Touching
         }
-        // Nothing of a fixed length lies between the points.
+        // The points have no fixed distance.
         _ => FollowOffset::None,
     };
     let way = Abscissa::read(&mut table, kind, false)?;
@@ -175,7 +175,7 @@ fn moved_axis(context: &Context<'_>, table: &mut Table<'_>) -> Result<(usize, Ax
     Ok((axis, context.machine.axes[axis].kind))
 }
 
-/// From, to and step of a movement, in the unit inside.
+/// Start, end and step of a motion, in the internal unit.
 struct Abscissa {
     from: f64,
     to: f64,
@@ -183,7 +183,7 @@ struct Abscissa {
 }
 
 impl Abscissa {
-    /// Reads `from_…`, `to_…` and `step_…`; a full turn where the ends may be left out and are.
+    /// Reads `from_…`, `to_…` and `step_…`; the default of optional ends is a full revolution.
     fn read(table: &mut Table<'_>, kind: AxisKind, ends_needed: bool) -> Result<Abscissa, ModelError> {
         let from = end(table, kind, ["from_mm", "from_deg"])?;
         let to = end(table, kind, ["to_mm", "to_deg"])?;
@@ -233,7 +233,7 @@ impl Abscissa {
     }
 }
 
-/// A number that belongs to an axis, in mm or degrees as the axis is; the other unit is an error.
+/// A number of an axis in mm or degrees, as the kind of the axis requires; the other unit is an error.
 fn end<'a>(
     table: &mut Table<'a>,
     kind: AxisKind,
@@ -253,7 +253,8 @@ fn end<'a>(
     }
 }
 
-/// The speed of an axis: degrees or millimetres a minute; `feed_mm_min` of a rotary axis is the path speed of the ball that it carries.
+/// The speed of an axis, in degrees or millimetres per minute; `feed_mm_min` of a rotary axis is the path speed of the ball that it
+/// carries.
 fn speed(
     context: &Context<'_>,
     table: &mut Table<'_>,
@@ -275,7 +276,7 @@ fn speed(
     }
 }
 
-/// The speed of a rotary axis that linear axes follow, from the feed as programmed.
+/// The speed of a rotary axis that linear axes follow, from the programmed feed.
 fn programmed_speed(
     context: &Context<'_>,
     table: &mut Table<'_>,
@@ -297,7 +298,7 @@ fn programmed_speed(
     Ok(feed_mm_s / programmed_over_path_feed(radius) / radius)
 }
 
-/// How far from a rotary axis the ball lies that it carries, mm.
+/// Distance of the carried ball from a rotary axis, mm.
 fn radius_on_axis(
     context: &Context<'_>,
     axis: usize,
@@ -318,7 +319,7 @@ fn radius_on_axis(
     Ok(radius)
 }
 
-/// Distance of a point from an axis, all axes at zero.
+/// Distance of a point from an axis, all axes at zero, mm.
 fn radius_about(axis: &crate::axis::Axis, point: [f64; 3]) -> f64 {
     let from: [f64; 3] = std::array::from_fn(|i| point[i] - axis.origin_mm[i]);
     let along: f64 = (0..3).map(|i| from[i] * axis.direction[i]).sum();
@@ -326,7 +327,7 @@ fn radius_about(axis: &crate::axis::Axis, point: [f64; 3]) -> f64 {
     square.max(0.0).sqrt()
 }
 
-/// `runs` and `both_directions`: once, there and back, unless said otherwise.
+/// Reads `runs` and `both_directions`; the default is one run in both directions.
 fn repeats(table: &mut Table<'_>, steps: f64) -> Result<(usize, bool), ModelError> {
     let both_directions = match table.take("both_directions") {
         Some(value) => value.truth()?,

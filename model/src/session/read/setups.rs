@@ -1,4 +1,4 @@
-//! What tests share: things mounted once, and sockets at known distances.
+//! Set-ups shared by tests, and sockets at known distances.
 
 use super::quantity::MICROMETRE;
 use crate::error::ModelError;
@@ -6,7 +6,7 @@ use crate::instrument::{InstrumentKind, InstrumentUnknown, SharedBy, Station};
 use crate::session::document::Table;
 use crate::session::{Prior, SocketDistance, Test};
 
-/// Tests that share a mounted thing and describe it differently.
+/// Warnings about tests that share a mounted object and describe it differently.
 pub(super) fn unlike(tests: &[Test]) -> Vec<String> {
     let mut warnings = Vec::new();
     for (index, test) in tests.iter().enumerate() {
@@ -40,7 +40,7 @@ pub(super) fn unlike(tests: &[Test]) -> Vec<String> {
     warnings
 }
 
-/// What the unknowns of an instrument are shared by, of the things that a user mounts.
+/// The groups of an instrument's parameters that belong to objects that a user mounts.
 fn unlike_groups(unknowns: &[InstrumentUnknown]) -> Vec<SharedBy> {
     [SharedBy::Setup, SharedBy::SpindleSetup, SharedBy::BarSetup]
         .into_iter()
@@ -48,7 +48,7 @@ fn unlike_groups(unknowns: &[InstrumentUnknown]) -> Vec<SharedBy> {
         .collect()
 }
 
-/// Where the thing that a group shares nominally lies.
+/// Nominal position of the object that a group shares.
 fn nominal(station: &Station<f64>, group: SharedBy) -> [f64; 3] {
     match (station, group) {
         (Station::BallBar(bar), SharedBy::Setup) => bar.workpiece_ball,
@@ -85,7 +85,7 @@ pub(super) fn socket_distances(
         let mut names = Vec::new();
         for name in between.list("a list of two sockets")? {
             let socket = name.text()?;
-            // Sockets that a column names are known once the data are read.
+            // Sockets named by a column are known after the data are read.
             if read
                 && !tests
                     .iter()

@@ -1,4 +1,4 @@
-//! The instrument as a test sets it up: nominal geometry, and what is known of it.
+//! Reader of the instrument of a test: nominal geometry and priors.
 
 use super::Context;
 use super::quantity::MICROMETRE;
@@ -23,7 +23,7 @@ pub(super) struct SetUp {
     pub socket: Option<String>,
 }
 
-/// Keys of a test that not every instrument has.
+/// Keys of a test that only some instruments have.
 const OWN: [(InstrumentKind, &[&str]); 5] = [
     (
         InstrumentKind::BallBar,
@@ -68,7 +68,7 @@ const OWN: [(InstrumentKind, &[&str]); 5] = [
     ),
 ];
 
-/// Takes the instrument's keys out of a test.
+/// Reads the instrument's keys of a test.
 pub(super) fn set_up(context: &Context<'_>, table: &mut Table<'_>) -> Result<SetUp, ModelError> {
     let own = OWN.iter().find(|(kind, _)| *kind == context.instrument);
     let own = own.map_or(&[][..], |(_, keys)| keys);
@@ -122,7 +122,7 @@ fn ball_bar(context: &Context<'_>, table: &mut Table<'_>) -> Result<SetUp, Model
     })
 }
 
-/// The point on the table and the one in the spindle, as written and in mm, and what is known of them.
+/// The points on the table and in the spindle, as written and in mm, and their priors.
 struct Balls {
     workpiece: ([Length; 3], [f64; 3]),
     spindle: ([Length; 3], [f64; 3]),
@@ -181,7 +181,7 @@ fn r_test(context: &Context<'_>, table: &mut Table<'_>) -> Result<SetUp, ModelEr
     })
 }
 
-/// The directions along which three sensors count: ω, φ, θ, or the directions themselves; `None` where readings come in X, Y, Z.
+/// The measuring directions of three sensors: from ω, φ, θ, or stated; `None` if readings are in X, Y, Z.
 fn sensors(table: &mut Table<'_>) -> Result<Option<[[f64; 3]; 3]>, ModelError> {
     let (angles, directions) = (table.take("sensor_angles_deg"), table.take("sensor_directions"));
     match (angles, directions) {
@@ -225,7 +225,7 @@ fn sensors(table: &mut Table<'_>) -> Result<Option<[[f64; 3]; 3]>, ModelError> {
     }
 }
 
-/// Least triple product of three unit directions that still tell three coordinates: below it one of them is read with twenty times the noise.
+/// Least triple product of three measuring directions. Below it, one coordinate has twenty times the noise.
 const MIN_VOLUME: f64 = 0.05;
 
 fn tracker(context: &Context<'_>, table: &mut Table<'_>) -> Result<SetUp, ModelError> {
@@ -318,7 +318,7 @@ fn probe(context: &Context<'_>, table: &mut Table<'_>) -> Result<SetUp, ModelErr
     })
 }
 
-/// A direction as three numbers, brought to unit length.
+/// A direction of three numbers, normalised to unit length.
 fn unit_vector(value: Value<'_>) -> Result<[f64; 3], ModelError> {
     let (source, span, key) = (value.source, value.span.clone(), value.key.clone());
     let items = value.three("a direction as three numbers")?;
@@ -346,7 +346,7 @@ fn angle_priors(value: Option<Value<'_>>) -> Result<Vec<Prior>, ModelError> {
         .collect())
 }
 
-/// `…_u_um`: a number for all coordinates or a list with one for each. Absent or 0 is known, `inf` is free.
+/// `…_u_um`: a number for all coordinates or a list with one for each. Absent or 0 is known, `inf` is no prior.
 fn priors(value: Option<Value<'_>>, count: usize) -> Result<Vec<Prior>, ModelError> {
     let Some(value) = value else {
         return Ok(vec![Prior::Known; count]);

@@ -1,4 +1,4 @@
-//! `[[test]]`: one test, or one for each socket that its data name.
+//! Reader of `[[test]]`: one test, or one for each socket in its data.
 
 use std::path::{Path, PathBuf};
 
@@ -14,7 +14,7 @@ use crate::session::readings::Readings;
 use crate::session::table::{self, Request};
 use crate::session::{Test, reach, runs};
 
-/// The name of a test, unlike every other.
+/// The name of a test, which must be unique.
 pub(super) fn name(table: &mut Table<'_>, declared: &[Declared]) -> Result<String, ModelError> {
     let value = table.need("name", "a name that no other test has")?;
     let name = value.text()?;
@@ -48,7 +48,7 @@ pub(super) fn tests(
         None => Ok(default.to_string()),
     };
     let setup = group("setup", name)?;
-    // The ball at a robot's flange stays there from socket to socket; a ball in a spindle is mounted for each test.
+    // The ball at a robot's flange stays mounted from socket to socket; a ball in a spindle is mounted for each test.
     let spindle_setup = match context.instrument {
         InstrumentKind::Socket => group("spindle_setup", "tool")?,
         _ => group("spindle_setup", name)?,
@@ -129,7 +129,7 @@ pub(super) fn tests(
         bar_mm: reach::bar_mm(&test.station),
         sensors: matches!(&test.station, Station::RTest(rtest) if rtest.sensors.is_some()),
         format,
-        // An empty table names no column: the file has our names.
+        // An empty table maps no column: the file has the default names.
         columns: columns.as_deref().filter(|columns| !columns.is_empty()),
         at: &test.at,
         at_listed: &listed,
@@ -172,7 +172,7 @@ pub(super) fn tests(
     Ok(tests)
 }
 
-/// What measured readings say about the set-up that was declared.
+/// Checks of measured readings against the declared set-up.
 fn check_readings(
     context: &Context<'_>,
     test: &Test,
@@ -194,12 +194,12 @@ fn check_readings(
     Ok(())
 }
 
-/// Where the axes of a test stand, axis by axis.
+/// Positions at which a test holds its axes, by axis.
 struct HeldOutState {
     at: Vec<f64>,
     /// As written, for linear axes stated in mm.
     written: Vec<Option<Length>>,
-    /// Whether the test states it.
+    /// Whether the test states the position.
     listed: Vec<bool>,
 }
 
@@ -235,7 +235,7 @@ fn at(context: &Context<'_>, table: &mut Table<'_>) -> Result<HeldOutState, Mode
     Ok(standing)
 }
 
-/// The data file: where `--data` points, else beside the session file.
+/// The data file: in the data directory if one is given, else beside the session file.
 fn data_file(context: &Context<'_>, data: &Value<'_>) -> Result<PathBuf, ModelError> {
     let named = data.text()?;
     let beside = context.file.parent().unwrap_or(Path::new("")).join(&named);

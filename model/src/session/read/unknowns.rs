@@ -1,4 +1,4 @@
-//! `[unknowns]`: the errors to be identified.
+//! Reader of `[unknowns]`: the errors to be estimated.
 
 use super::quantity;
 use crate::axis::AxisKind;
@@ -9,7 +9,7 @@ use crate::instrument::InstrumentKind;
 use crate::pattern;
 use crate::session::document::{Table, Value};
 
-/// The errors to be identified: those stated, or what the instrument is there for.
+/// The errors to be estimated: those stated, or the defaults of the instrument.
 pub(super) fn unknowns(
     machine: &Machine,
     kind: InstrumentKind,
@@ -33,7 +33,7 @@ pub(super) fn unknowns(
         });
     };
     let mut unknowns: Vec<ErrorName> = Vec::new();
-    // What a pattern stands for may be among the others already: each error is estimated once.
+    // A pattern may include errors that are named already; each error is estimated once.
     let mut by_pattern: Vec<ErrorName> = Vec::new();
     for item in value.list("a list of error names")? {
         let text = item.text()?;
@@ -58,7 +58,7 @@ pub(super) fn unknowns(
     Ok(unknowns)
 }
 
-/// The errors that a pattern stands for.
+/// The errors that a pattern matches.
 fn matching(machine: &Machine, item: &Value<'_>, text: &str) -> Result<Vec<ErrorName>, ModelError> {
     let found = pattern::matching(machine, text);
     if found.is_empty() {
@@ -89,8 +89,8 @@ fn error_name(machine: &Machine, item: &Value<'_>) -> Result<ErrorName, ModelErr
     Ok(name)
 }
 
-/// All location errors of all axes, but for what moves no reading: the rotation of a linear axis about its own direction. A robot's joints have six
-/// each, more than its readings identify; the fit names the combinations.
+/// All location errors of all axes, except the rotation of a linear axis about its own direction, which affects no reading. The joints of
+/// a robot have six each, more than its readings identify; the fit names the confounded combinations.
 fn all_location_errors(machine: &Machine) -> Vec<ErrorName> {
     let mut errors = pattern::errors(machine);
     errors.retain(|name| {
@@ -104,8 +104,8 @@ fn all_location_errors(machine: &Machine) -> Vec<ErrorName> {
     errors
 }
 
-/// The position and orientation errors of every rotary axis, in alphabetical order of the axes: its location errors without the two
-/// that its own movement hides.
+/// The position and orientation errors of every rotary axis, in alphabetical order of the axes. The two location errors in the axis' own
+/// degrees of freedom are excluded, because its own motion is confounded with them.
 fn default_unknowns(machine: &Machine) -> Vec<ErrorName> {
     let mut rotary: Vec<_> = machine
         .axes

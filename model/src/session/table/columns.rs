@@ -1,4 +1,4 @@
-//! Which column holds what.
+//! Assignment of the columns of a file to their roles.
 
 use std::path::Path;
 
@@ -11,18 +11,18 @@ use crate::instrument::InstrumentKind;
 use crate::session::read::quantity::{self, Unit};
 use crate::session::spelling::meant;
 
-/// A line of `[columns]`: ours = theirs.
+/// A line of `[columns]`: own name = foreign name.
 #[derive(Clone, Debug)]
 pub(crate) struct Mapped {
-    /// Our name, which carries the unit.
+    /// Our name, which includes the unit.
     pub ours: String,
-    /// Their name or number.
+    /// The foreign name or number.
     pub theirs: Theirs,
-    /// Where it is written.
+    /// The location of the line.
     pub place: Place,
 }
 
-/// How a foreign column is called.
+/// The identification of a foreign column.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) enum Theirs {
     /// By the header.
@@ -31,7 +31,7 @@ pub(crate) enum Theirs {
     Number(usize),
 }
 
-/// What a column holds.
+/// The content of a column.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) enum Role {
     Time,
@@ -40,7 +40,7 @@ pub(super) enum Role {
     Axis(usize, Unit),
     Length(Unit),
     Deviation(Unit),
-    /// Against the probing direction: how far out a surface was met beyond the target.
+    /// Against the probing direction: the distance by which the surface lies beyond the target.
     Outward(Unit),
     Coordinate(usize, Unit),
     Socket,
@@ -50,14 +50,14 @@ pub(super) enum Role {
 #[derive(Clone, Debug)]
 pub(super) struct Column {
     pub role: Role,
-    /// Its place in a row, from 0.
+    /// Its index in a row, from 0.
     pub index: usize,
-    /// How messages call it.
+    /// Its name in messages.
     pub name: String,
 }
 
 impl Role {
-    /// Reads one of our names.
+    /// Parses one of our names.
     pub fn of(name: &str, request: &Request<'_>) -> Option<Role> {
         match name {
             "time_s" => return Some(Role::Time),
@@ -89,7 +89,7 @@ impl Role {
         }
     }
 
-    /// Whether two columns would tell the same.
+    /// Whether two columns contain the same quantity.
     fn same_as(self, other: Role) -> bool {
         match (self, other) {
             (Role::Axis(a, _), Role::Axis(b, _)) => a == b,
@@ -103,7 +103,7 @@ impl Role {
     }
 }
 
-/// What an R-test's columns are called before their unit: what the sensors count one by one, or the vector in the frame that carries them.
+/// The names of an R-test's columns before their unit: the values of the single sensors, or the vector in the frame that carries them.
 pub(crate) fn r_test_columns(sensors: bool) -> [&'static str; 3] {
     if sensors {
         ["du", "dv", "dw"]
@@ -112,7 +112,7 @@ pub(crate) fn r_test_columns(sensors: bool) -> [&'static str; 3] {
     }
 }
 
-/// What an R-test's columns need to be, where they are the other kind's.
+/// The required columns of an R-test, for data with columns of the other kind.
 pub(super) fn r_test_help(request: &Request<'_>) -> &'static str {
     if request.sensors {
         "the test says how the sensors stand: it needs what they count, `du_um`, `dv_um` and `dw_um`; without `sensor_angles_deg` and \
@@ -123,7 +123,7 @@ pub(super) fn r_test_help(request: &Request<'_>) -> &'static str {
     }
 }
 
-/// Every name that a column may have in this test.
+/// Every valid column name of this test.
 pub(super) fn known(request: &Request<'_>) -> Vec<String> {
     let mut known: Vec<String> = ["time_s", "run"].map(str::to_string).to_vec();
     for axis in &request.machine.axes {
@@ -152,7 +152,7 @@ pub(super) fn listed(names: &[String]) -> String {
     text
 }
 
-/// The columns to be read: of the first row, which is the header where the file has one.
+/// The columns to be read, from the first row, which is the header if the file has one.
 pub(super) fn columns(
     request: &Request<'_>,
     file: &Path,
@@ -306,7 +306,7 @@ fn mapped_columns(
     }
 }
 
-/// Whether what stands for a header is a row of readings: columns are called by number alone, and all of them hold numbers.
+/// Whether the first row is a row of readings instead of a header: columns are given by number only, and all of them contain numbers.
 fn are_readings(request: &Request<'_>, mapped: &[Mapped], columns: &[Column], header: &Row) -> bool {
     let mut of_numbers = columns
         .iter()
@@ -319,7 +319,7 @@ fn are_readings(request: &Request<'_>, mapped: &[Mapped], columns: &[Column], he
         && of_numbers.all(|column| number(&header.cells[column.index], &request.format).is_ok())
 }
 
-/// The place of a column by its number; a message and what to do where there is none.
+/// The index of a column from its number; otherwise a message and what to do.
 fn number_in(number: usize, file: &Path, width: usize) -> Result<usize, (String, String)> {
     if number > width {
         let message = format!("column {number} of {}, which has {width}", file.display());
@@ -328,7 +328,7 @@ fn number_in(number: usize, file: &Path, width: usize) -> Result<usize, (String,
     Ok(number - 1)
 }
 
-/// The place of a column by its name in the header; a message and what to do where there is none, or more than one.
+/// The index of a column from its name in the header. If there is none or more than one: a message and what to do.
 fn name_in(
     name: &str,
     request: &Request<'_>,

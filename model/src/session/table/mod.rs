@@ -1,7 +1,8 @@
-//! Tables of readings: CSV files of our own, other people's through `[format]` and `[columns]`, spreadsheets, and ball-bar files in XML.
+//! Reader of tables of readings: CSV files, foreign CSV files through `[format]` and `[columns]`, spreadsheets, and ball-bar files in
+//! XML.
 //!
-//! A header line, then a row a reading; `#` begins a comment line; empty lines, a byte order mark and CRLF do no harm. What is wrong
-//! is told with file, line and column.
+//! A header line, then one row per reading. A `#` starts a comment line. Empty lines, a byte order mark and CRLF are accepted. Errors
+//! have file, line and column.
 
 mod ballbar_xml;
 mod columns;
@@ -28,20 +29,20 @@ use crate::session::limits;
 use crate::session::readings::Readings;
 use crate::session::stamp::FileStamp;
 
-/// How a file writes its rows.
+/// The layout of the rows of a file.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct Format {
-    /// Between cells.
+    /// The separator between cells.
     pub separator: u8,
     /// `.` or `,`.
     pub decimal: u8,
     /// Whether the first row names the columns.
     pub header: bool,
-    /// The sheet of a spreadsheet; the first that is not empty where absent.
+    /// The sheet of a spreadsheet; by default the first that is not empty.
     pub sheet: Option<String>,
-    /// How a ball-bar file in XML calls the direction from the first axis of the plane towards the second.
+    /// The word in a ball-bar file in XML for the direction from the first axis of the plane towards the second.
     pub anticlockwise: Option<String>,
-    /// The encoding of the text, where it is stated.
+    /// The stated encoding of the text.
     pub encoding: Option<&'static Encoding>,
     /// Lines (of a spreadsheet: rows) above the header.
     pub skip_lines: usize,
@@ -61,41 +62,41 @@ impl Default for Format {
     }
 }
 
-/// What a test wants from its data file.
+/// What a test requires of its data file.
 pub(crate) struct Request<'a> {
-    /// The machine whose axes the columns name.
+    /// The machine that has the axes of the columns.
     pub machine: &'a Machine,
-    /// What read.
+    /// The instrument.
     pub instrument: InstrumentKind,
-    /// Whether an R-test's sensors are read one by one rather than as X, Y, Z.
+    /// Whether the sensors of an R-test are read singly instead of as X, Y, Z.
     pub sensors: bool,
-    /// What a deviation is counted from, mm.
+    /// The reference length of deviations, mm.
     pub bar_mm: f64,
-    /// How the rows are written.
+    /// The layout of the rows.
     pub format: Format,
-    /// Foreign names, where declared.
+    /// Foreign names, if declared.
     pub columns: Option<&'a [Mapped]>,
-    /// Where axes stand that the data do not list, mm or rad.
+    /// Positions of axes that the data do not contain, mm or rad.
     pub at: &'a [f64],
     /// Which of them the test states.
     pub at_listed: &'a [bool],
-    /// Axes that move in the test as planned.
+    /// Axes that move in the planned test.
     pub moved: &'a [usize],
-    /// The socket of all poses, where the test states one.
+    /// The socket of all poses, if the test states one.
     pub socket: Option<&'a str>,
 }
 
-/// Most sockets that a file names.
+/// Largest number of sockets in a file.
 const MAX_SOCKETS: usize = 1000;
 
-/// Readings of one data file: one for each socket that it names, else one.
+/// Readings of one data file: one set per socket in the file, else one.
 pub(crate) type BySocket = Vec<(Option<String>, Readings)>;
 
-/// Reads a data file. Beside the readings: what a user should know of the file.
+/// Reads a data file. Returns the readings, and warnings about the file.
 ///
 /// # Errors
-/// Anything that is not a finite number where one is expected, with file, line and column; missing or unknown columns; time that
-/// runs backwards; fewer than two readings.
+/// Any cell that is not a finite number where one is expected, with file, line and column; missing or unknown columns; decreasing time;
+/// fewer than two readings.
 pub(crate) fn read(file: &Path, request: &Request<'_>) -> Result<(BySocket, Vec<String>), ModelError> {
     let (stamp, mut rows) = if sheet::is_spreadsheet(file) {
         let (stamp, rows) = sheet::rows(file, &request.format)?;
@@ -137,7 +138,7 @@ pub(crate) fn read(file: &Path, request: &Request<'_>) -> Result<(BySocket, Vec<
     }
 }
 
-/// Rows of a text or of a sheet.
+/// Rows of a text or of a spreadsheet.
 enum Source {
     Text(Rows),
     Sheet(std::vec::IntoIter<rows::Row>),
@@ -168,7 +169,7 @@ fn wrong_width(file: &Path, row: &rows::Row, width: usize, format: &Format) -> M
     }
 }
 
-/// The columns as they fill.
+/// The columns while they are filled.
 struct Filled<'a> {
     request: &'a Request<'a>,
     columns: Vec<Column>,
@@ -176,7 +177,7 @@ struct Filled<'a> {
     /// The socket of each row, as an index into `sockets`.
     socket: Vec<usize>,
     sockets: Vec<String>,
-    /// A number for the cells of each row, all columns of the file included.
+    /// A hash of the cells of each row, over all columns of the file.
     cells: Vec<u64>,
 }
 
@@ -198,7 +199,7 @@ impl<'a> Filled<'a> {
         }
     }
 
-    /// Drops rows that are copies of earlier ones; says which.
+    /// Removes rows that are copies of earlier ones and returns a message that lists them.
     fn without_duplicates(&mut self) -> Option<String> {
         let kept = duplicates::kept(&self.readings, &self.cells)?;
         let said = duplicates::said(&self.readings, &kept);
@@ -271,7 +272,7 @@ impl<'a> Filled<'a> {
         Ok(())
     }
 
-    /// The readings, parted by socket where a column names it.
+    /// The readings, split by socket if a column names it.
     fn by_socket(self) -> BySocket {
         if self.sockets.is_empty() {
             return vec![(None, self.readings)];
@@ -290,7 +291,7 @@ impl<'a> Filled<'a> {
     }
 }
 
-/// The place of a socket among those that the file has named so far.
+/// The index of a socket among those found so far in the file.
 fn socket_index(sockets: &mut Vec<String>, name: &str, place: Place) -> Result<usize, ModelError> {
     if let Some(known) = sockets.iter().position(|socket| socket == name) {
         return Ok(known);
@@ -318,7 +319,7 @@ fn socket_index(sockets: &mut Vec<String>, name: &str, place: Place) -> Result<u
     Ok(sockets.len() - 1)
 }
 
-/// A finite number in a cell, or what is wrong with it and what to do.
+/// A finite number in a cell, or its fault and what to do.
 fn number(cell: &str, format: &Format) -> Result<f64, (String, &'static str)> {
     const NUMBER: &str = "put a number there or remove the row";
     if cell.is_empty() {

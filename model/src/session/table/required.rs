@@ -1,4 +1,4 @@
-//! The columns that an instrument cannot do without.
+//! Columns that an instrument requires.
 
 use std::path::Path;
 
@@ -7,7 +7,7 @@ use super::columns::{Column, Role, known, listed, r_test_columns, r_test_help};
 use crate::error::{ModelError, Place};
 use crate::instrument::InstrumentKind;
 
-/// An error where one of them is not there.
+/// Returns an error if one of them is missing.
 pub(super) fn required(
     request: &Request<'_>,
     file: &Path,

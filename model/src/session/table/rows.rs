@@ -1,4 +1,4 @@
-//! Rows of cells from a file, in memory one line at a time.
+//! Rows of cells from a file, read one line at a time.
 
 use std::fs::File;
 use std::io::{BufRead, BufReader, Read};
@@ -11,9 +11,9 @@ use super::{Format, encoding};
 use crate::error::{ModelError, Place};
 use crate::session::stamp::FileStamp;
 
-/// Most bytes of one line.
+/// Largest length of one line, bytes.
 const LONGEST_LINE: u64 = 1 << 20;
-/// How long a file may be.
+/// Limits of the size of a file.
 #[derive(Clone, Copy)]
 struct Limits {
     bytes: u64,
@@ -26,7 +26,7 @@ const LIMITS: Limits = Limits {
     rows: 10_000_001,
 };
 
-/// What to do with a file that is too long.
+/// The remedy for a file that is too long.
 const SPLIT: &str = "leave out readings (every tenth will do), or split the file over several tests";
 
 /// One row.
@@ -34,18 +34,18 @@ const SPLIT: &str = "leave out readings (every tenth will do), or split the file
 pub(super) struct Row {
     /// Its line, from 1.
     pub line: usize,
-    /// Its cells, without the spaces around them.
+    /// Its cells, without surrounding spaces.
     pub cells: Vec<String>,
-    /// The bytes of the file that the line takes, without byte-order mark and line end.
+    /// The bytes of the line in the file, without byte order mark and line end.
     bytes: Range<usize>,
-    /// The line as it stands.
+    /// The text of the line.
     text: String,
-    /// What it is encoded in, where it is not plain ASCII.
+    /// The encoding, if the line is not plain ASCII.
     pub encoding: Option<&'static Encoding>,
 }
 
 impl Row {
-    /// A row that stands in no text: of a sheet.
+    /// A row of a spreadsheet, which has no text.
     pub fn of_cells(line: usize, cells: Vec<String>) -> Row {
         Row {
             line,
@@ -56,12 +56,12 @@ impl Row {
         }
     }
 
-    /// The bytes of the file that a cell takes, where no quotes hide them.
+    /// The bytes of a cell in the file, if it is not quoted.
     pub fn span(&self, cell: usize) -> Option<Range<usize>> {
         let cell = self.cells.get(cell).filter(|cell| !cell.is_empty())?;
         let mut found = self.text.match_indices(cell.as_str());
         let (at, _) = found.next()?;
-        // The same text twice in the line leaves in doubt which one is meant; another encoding may have moved the cell.
+        // If the same text occurs twice in the line, the cell is ambiguous; another encoding may have moved it.
         if found.next().is_some() || self.text.len() != self.bytes.len() {
             return Some(self.bytes.clone());
         }
@@ -70,13 +70,13 @@ impl Row {
     }
 }
 
-/// The rows of a file: no comments, no empty lines.
+/// The rows of a file, without comments and empty lines.
 pub(super) struct Rows {
     file: PathBuf,
     separator: u8,
-    /// As stated or as the byte order mark says; `None`: UTF-8, or Latin-1 from the first line that is not.
+    /// As stated or by the byte order mark. `None` means UTF-8, or Latin-1 from the first line that is not UTF-8.
     encoding: Option<&'static Encoding>,
-    /// Lines of the file that are still to be passed over.
+    /// Number of lines of the file still to be skipped.
     skip: usize,
     reader: BufReader<File>,
     stamp: FileStamp,
@@ -137,7 +137,7 @@ impl Rows {
         })
     }
 
-    /// The file as it was when it was opened.
+    /// The state of the file when it was opened.
     pub fn stamp(&self) -> &FileStamp {
         &self.stamp
     }
@@ -179,7 +179,7 @@ impl Rows {
         }
     }
 
-    /// Reads the next line into the buffer, without byte order mark and line end; the bytes of the file that it takes.
+    /// Reads the next line into the buffer, without byte order mark and line end; returns its bytes in the file.
     fn next_line(&mut self) -> Result<Option<Range<usize>>, ModelError> {
         let mut start = self.byte;
         self.buffer.clear();
@@ -193,7 +193,7 @@ impl Rows {
         if self.line == 1 {
             let (found, mark) = encoding::of_start(&self.buffer, self.encoding);
             self.encoding = found;
-            // Only now is it known where the line ends.
+            // The position of the line end is known only after decoding.
             if self.is_wide() {
                 self.until_line_end()?;
                 read = self.buffer.len();
@@ -202,7 +202,7 @@ impl Rows {
             self.buffer.drain(..mark);
         }
         self.byte += read;
-        // A pipe does not say how much there is to come.
+        // The length of a pipe is unknown in advance.
         if self.byte as u64 > self.limits.bytes {
             let most = self.limits.bytes;
             return Err(self.fault(format!("more than {most} bytes, the most that are read"), SPLIT));
@@ -222,7 +222,7 @@ impl Rows {
         Ok(Some(start..start + self.buffer.len()))
     }
 
-    /// Reads on until the buffer ends with a line end, as the encoding writes it, or holds the longest line.
+    /// Reads until the buffer ends with a line end in the encoding of the file, or contains the longest line.
     fn until_line_end(&mut self) -> Result<(), ModelError> {
         while !self.ends_with(b'\n') && (self.buffer.len() as u64) < LONGEST_LINE {
             let room = LONGEST_LINE - self.buffer.len() as u64;
@@ -272,7 +272,7 @@ impl Rows {
                 "save the file with lines that end in LF or CRLF",
             ));
         }
-        // One line that is not UTF-8 tells of all that follow.
+        // One line that is not UTF-8 determines the encoding of all that follow.
         if found != UTF_8 {
             self.encoding = Some(found);
         }

@@ -1,10 +1,10 @@
-//! Ball-bar files in XML (`.b5r` and others), as far as anything is publicly known of them.
+//! Reader of ball-bar files in XML (`.b5r` and others), within the limits of public knowledge.
 //!
-//! There is no public description of the format. What programs that read such files rely on is: an element `READINGS` for each run with
-//! numbers in it, a `RUN_DIRECTION` beside it or about it (element or attribute), and an element `PLANE` with `TEST_PLANE="XY"`. Neither the
-//! unit of the readings nor the angles at which they were taken is known, so nothing is assumed: `[columns]` states the unit, as
-//! `deviation_um = "READINGS"`, and the test's `path` states the circle, over which the readings of a run lie evenly from one end to the
-//! other. Everything else in the file is named in a warning, not interpreted.
+//! There is no public description of the format. Programs that read such files rely on three facts: an element `READINGS` with numbers
+//! for each run, a `RUN_DIRECTION` beside or around it (element or attribute), and an element `PLANE` with `TEST_PLANE="XY"`. The unit of
+//! the readings and the angles at which they were taken are unknown, so nothing is assumed. `[columns]` states the unit, as `deviation_um
+//! = "READINGS"`. The test's `path` states the circle, over which the readings of a run are evenly distributed from one end to the other.
+//! A warning names everything else in the file; it is not interpreted.
 
 mod contents;
 mod direction;
@@ -20,7 +20,7 @@ use crate::session::motion::Motion;
 use crate::session::readings::Readings;
 use crate::session::{Test, plan};
 
-/// Whether a file is one of these, by its name.
+/// Whether a file is of this format, by its name.
 pub(crate) fn is_xml(file: &Path) -> bool {
     let extension = file
         .extension()
@@ -28,10 +28,10 @@ pub(crate) fn is_xml(file: &Path) -> bool {
     matches!(extension.as_deref(), Some("xml" | "b5r"))
 }
 
-/// Reads a file for a test. Beside the readings: what in the file was not read.
+/// Reads a file for a test. Returns the readings, and warnings about the elements that were not read.
 ///
 /// # Errors
-/// If it is no XML, holds no readings, or does not say what it takes to use them, with the line and what to do.
+/// If it is not XML, contains no readings, or lacks information for their use, with the line and what to do.
 pub(crate) fn read(
     file: &Path,
     request: &Request<'_>,
@@ -157,7 +157,7 @@ pub(crate) fn read(
     Ok((readings, warnings))
 }
 
-/// Which of our columns READINGS are, as `[columns]` states.
+/// The column of ours that READINGS contains, as `[columns]` states.
 fn value_role(file: &Path, request: &Request<'_>) -> Result<Role, ModelError> {
     let help = "state their unit: `[columns]` with `deviation_um = \"READINGS\"` (from `bar_mm`), or `length_mm = \"READINGS\"`";
     let mapped = request.columns.unwrap_or(&[]);
