@@ -48,10 +48,10 @@ impl Followed {
 
     pub(crate) fn meaning(&self) -> String {
         match self {
-            Followed::Direction(axis) => format!("direction in which axis {axis} last moved: −1, 0 or 1"),
+            Followed::Direction(axis) => format!("direction of the last movement of axis {axis}: −1, 0 or 1"),
             Followed::Rate(axis, _) => format!("rate of axis {axis}"),
             Followed::SinceReversal(axis, _) => {
-                format!("how far axis {axis} has moved since it last turned round")
+                format!("distance of axis {axis} since its last reversal")
             }
             Followed::Time => "time since the first reading of the session".to_string(),
             Followed::Temperature => "temperature above the mean of the session".to_string(),
@@ -202,7 +202,7 @@ fn unit_of_component(
             found
                 .map(|unknown| Some(unknown.unit))
                 .ok_or_else(|| CodegenError::NoSuchUnknown {
-                    unknown: format!("`{}` that the effect `{}` moves", effect.component, effect.id()),
+                    unknown: format!("`{}` of the effect `{}`", effect.component, effect.id()),
                 })
         }
         Component::TriggerDelay => Ok(None),
@@ -255,7 +255,9 @@ impl<N: Nominal> Movement<'_, N> {
                 let Component::Axis(ErrorName { axis, .. }) = &effect.component else {
                     return Err(CodegenError::EffectWithoutForm {
                         effect: effect.id(),
-                        why: "gravity exerts a moment about an axis, and it moves none".to_string(),
+                        why:
+                            "gravity needs an axis about which it exerts a moment, and the component has none"
+                                .to_string(),
                     });
                 };
                 sample.value = followed(Followed::Gravity(axis.clone()));

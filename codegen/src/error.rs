@@ -7,7 +7,7 @@ use crate::symbol::Unary;
 #[non_exhaustive]
 pub enum CodegenError {
     /// An exponential, a sign, a step or a rounding of an error; the chain cannot differentiate it.
-    #[error("{function:?} is taken of an error; only nominal quantities may go through it")]
+    #[error("the function {function:?} is applied to an error; only nominal quantities are allowed")]
     FunctionOfError {
         /// The function.
         function: Unary,
@@ -23,7 +23,7 @@ pub enum CodegenError {
         machine: String,
     },
     /// A parameter that the instrument does not have.
-    #[error("the instrument has no unknown {unknown}")]
+    #[error("the instrument has no parameter {unknown}")]
     NoSuchUnknown {
         /// The parameter.
         unknown: String,
@@ -36,7 +36,7 @@ pub enum CodegenError {
     },
     /// Derivatives that are not printed in mathematical notation.
     #[error(
-        "the derivatives of {what} are written as code only: as rust, c, python or matlab; at the machine without errors they are the coefficients of first order"
+        "the derivatives of {what} are written as code only: as rust, c, python or matlab; at zero errors they equal the first-order coefficients"
     )]
     GradientForReaders {
         /// The quantity that is differentiated.
@@ -44,7 +44,7 @@ pub enum CodegenError {
     },
     /// A curve, which has hundreds of terms, in mathematical notation.
     #[error(
-        "the curve `{effect}` is written as code only: as rust, c, python or matlab; name what to keep with --errors to leave it out"
+        "the curve `{effect}` is written as code only: as rust, c, python or matlab; to omit it, name the errors to keep"
     )]
     CurveForReaders {
         /// The effect.
@@ -53,25 +53,23 @@ pub enum CodegenError {
     /// A stated probing direction whose angle with the artefact's axis changes as the axes move.
     #[error(
         "the first order of a distance has no short form where the angle between the stated probing `direction` and the artefact's \
-         axis changes as the axes move; `--order exact` and `--order bilinear` have one"
+         axis changes as the axes move; use the exact or the bilinear order"
     )]
     ObliqueProbing,
     /// An expression that has no normal form.
-    #[error("{what} has no place in the polynomial normal form")]
+    #[error("{what} cannot be represented in the polynomial normal form")]
     NoPolynomial {
         /// The obstacle.
         what: String,
     },
     /// A truncation order that no printed form has.
-    #[error("order {order} in the errors is not offered; the orders are first, bilinear and exact")]
+    #[error("order {order} in the errors is not available; the orders are first, bilinear and exact")]
     OrderTooHigh {
         /// The requested order.
         order: u32,
     },
     /// An effect that has no closed form.
-    #[error(
-        "the effect `{effect}` cannot be written: {why}; name the errors to keep with --errors to leave it out"
-    )]
+    #[error("the effect `{effect}` cannot be written: {why}; to omit it, name the errors to keep")]
     EffectWithoutForm {
         /// The effect.
         effect: String,
@@ -80,8 +78,8 @@ pub enum CodegenError {
     },
     /// An effect with more coefficients than an equation can contain.
     #[error(
-        "the effect `{effect}` has {coefficients} coefficients, more than the {most} that an equation is written with; \
-         give its shape fewer intervals, steps or powers, or name what to keep with --errors to leave it out"
+        "the effect `{effect}` has {coefficients} coefficients, more than the limit of {most}; \
+         give its shape fewer intervals, steps or powers, or omit it by naming the errors to keep"
     )]
     EffectTooLong {
         /// The effect.
@@ -94,7 +92,7 @@ pub enum CodegenError {
     /// A program that the check against the chain over dual numbers does not confirm; it is not written.
     #[error(
         "the equation is not written: over {points} points it differs from the chain with dual numbers by {value:.1e} (value) \
-         and {gradient:.1e} (derivatives), relative, where 1e-12 is allowed"
+         and {gradient:.1e} (derivatives), relative; the limit is 1e-12"
     )]
     Unconfirmed {
         /// Number of points compared.

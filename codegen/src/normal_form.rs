@@ -214,7 +214,7 @@ impl<'a> Ring<'a> {
         let mut terms = angle.terms();
         if !terms.all(|(monomial, _)| monomial.degree(|atom| self.is_small(atom)) > 0) {
             return Err(CodegenError::NoPolynomial {
-                what: "a sine of an error and what is none".to_string(),
+                what: "the sine of a sum of an error and a nominal quantity".to_string(),
             });
         }
         if function == Unary::Sin {

@@ -108,9 +108,13 @@ pub(crate) fn of_subject<'a>(
             vectors.push(named(
                 "v",
                 sight.stylus,
-                "stylus from the artefact's axis, across it",
+                "position of the stylus perpendicular to the artefact's axis",
             ));
-            vectors.push(named("u", sight.step, "the step across the artefact's axis"));
+            vectors.push(named(
+                "u",
+                sight.step,
+                "the step perpendicular to the artefact's axis",
+            ));
             vectors
         }
         // The point that does not carry the sensors; the sensors' point is the origin of the difference.
@@ -269,7 +273,7 @@ pub(crate) fn adjoint_vectors(vectors: &[NamedVector], adjoints: &Adjoints) -> V
             let components = vector.components.map(|component| adjoints.of(component));
             let meaning = match vector.letter {
                 "b" => "unit vector of the bar".to_string(),
-                _ => format!("the same carried back: derivatives by the {}", vector.meaning),
+                _ => format!("the same transformed back: derivatives by the {}", vector.meaning),
             };
             NamedVector {
                 letter: "u",

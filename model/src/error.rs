@@ -4,7 +4,7 @@ use std::path::PathBuf;
 
 /// A location in the user's files.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
-pub struct Place {
+pub struct Location {
     /// The file as the user named it.
     pub file: PathBuf,
     /// Line, from 1; 0 for the whole file.
@@ -13,25 +13,25 @@ pub struct Place {
     pub span: Option<std::ops::Range<usize>>,
 }
 
-impl Place {
+impl Location {
     /// The whole file.
-    pub fn file(file: &std::path::Path) -> Place {
-        Place {
+    pub fn file(file: &std::path::Path) -> Location {
+        Location {
             file: file.to_path_buf(),
-            ..Place::default()
+            ..Location::default()
         }
     }
 
     /// A line of the file.
-    pub fn line(file: &std::path::Path, line: usize) -> Place {
-        Place {
+    pub fn line(file: &std::path::Path, line: usize) -> Location {
+        Location {
             line,
-            ..Place::file(file)
+            ..Location::file(file)
         }
     }
 }
 
-impl std::fmt::Display for Place {
+impl std::fmt::Display for Location {
     fn fmt(&self, formatter: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         write!(formatter, "{}", self.file.display())?;
         if self.line > 0 {
@@ -57,21 +57,32 @@ pub enum ModelError {
     },
     /// An axis whose kind does not follow from its name.
     #[error(
-        "axis `{axis}` is no ISO 841 letter; state its `kind` (\"rotary\" or \"linear\") and `direction`"
+        "axis `{axis}` is not an ISO 841 letter; state its `kind` (\"rotary\" or \"linear\") and `direction`"
     )]
     UnknownAxisKind {
         /// The axis.
         axis: String,
     },
     /// Unusable input, with its location and a remedy.
-    #[error("{place}: {message}")]
+    #[error("{location}: {message}")]
     Input {
         /// File and line.
-        place: Place,
+        location: Location,
         /// What was found and what was expected.
         message: String,
         /// What to do.
         help: Option<String>,
+    },
+    /// A file that does not exist in the searched folders, or lies outside the folders that a session may read. Other options for reading
+    /// (a data folder, files outside allowed) may remedy it.
+    #[error("{location}: {message}")]
+    FileAccess {
+        /// File and line that name it.
+        location: Location,
+        /// What was found and what was expected.
+        message: String,
+        /// What to do.
+        help: String,
     },
     /// A plan that the machine cannot carry out.
     #[error("{message}")]
@@ -93,9 +104,9 @@ pub enum ModelError {
 
 impl ModelError {
     /// The location of the fault in the user's files, if it is in one.
-    pub fn place(&self) -> Option<&Place> {
+    pub fn location(&self) -> Option<&Location> {
         match self {
-            ModelError::Input { place, .. } => Some(place),
+            ModelError::Input { location, .. } | ModelError::FileAccess { location, .. } => Some(location),
             _ => None,
         }
     }
@@ -104,7 +115,7 @@ impl ModelError {
     pub fn help(&self) -> Option<&str> {
         match self {
             ModelError::Input { help, .. } => help.as_deref(),
-            ModelError::Plan { help, .. } => Some(help),
+            ModelError::FileAccess { help, .. } | ModelError::Plan { help, .. } => Some(help),
             _ => None,
         }
     }

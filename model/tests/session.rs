@@ -377,7 +377,7 @@ fn runs_that_the_data_lack_are_said() {
         let warnings = unseparated();
         assert_eq!(warnings.len(), 1, "{movement}: {warnings:?}");
         assert!(
-            warnings[0].contains("run 1 goes there and back under one number"),
+            warnings[0].contains("run 1 goes forward and backward under one number"),
             "{warnings:?}"
         );
         for (runs, found) in [

@@ -91,7 +91,7 @@ fn an_unknown_key() {
         "nois_um",
         &[
             "session.toml:6",
-            "knows no key `nois_um`",
+            "has the unknown key `nois_um`",
             "did you mean `noise_um`?",
         ],
     );
@@ -205,7 +205,7 @@ fn a_bar_that_cannot_reach() {
             "session.toml:8",
             "a bar of 100.0000 mm cannot reach",
             "116.619 mm apart",
-            "degrees taken for radians",
+            "degrees read as radians",
         ],
     );
     // Degrees in a column of radians: the balls stay together at 0 only.
@@ -213,7 +213,7 @@ fn a_bar_that_cannot_reach() {
     let data = "a_rad,length_mm\n0,100.0\n30,100.0\n60,100.0\n";
     holds(
         &told(MACHINE, &session, Some(data)),
-        &["cannot reach", "degrees taken for radians"],
+        &["cannot reach", "degrees read as radians"],
     );
 }
 

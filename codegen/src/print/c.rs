@@ -48,7 +48,7 @@ pub(crate) fn print(equation: &Equation) -> String {
     let advice = match whole.program.operations().roots {
         0 => "",
         _ => {
-            " * Compile with -O3 -fno-math-errno, or the square root keeps the loop over readings from being vectorised.\n"
+            " * Compile with -O3 -fno-math-errno, otherwise the square root prevents vectorisation of the loop over readings.\n"
         }
     };
     let _ = writeln!(

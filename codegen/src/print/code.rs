@@ -278,7 +278,7 @@ impl<'e> Code<'e> {
             "Value"
         };
         lines.push(format!(
-            "{with}: {} operations a reading ({} + and −, {} ·, {} /, {} √{functions}).",
+            "{with}: {} operations per reading ({} + and −, {} ·, {} /, {} √{functions}).",
             operations.arithmetic(),
             operations.sums,
             operations.products,

@@ -34,7 +34,7 @@ pub(crate) fn sections(equation: &Equation) -> (Program, Vec<Section>) {
         for mut vector in vectors::adjoint_vectors(forth, &adjoints) {
             if vector.frame.is_empty() && !unit {
                 vector.meaning =
-                    "derivatives by the bar: its unit vector times what the sensor makes of it".to_string();
+                    "derivatives by the bar vector: its unit vector times the gain of the sensor".to_string();
             }
             // A pure translation leaves the adjoint vector and its name unchanged.
             let new =
@@ -85,7 +85,7 @@ pub(crate) fn sections(equation: &Equation) -> (Program, Vec<Section>) {
     let mut sections: Vec<Section> = vectors.by_ref().take(forth.len()).collect();
     if !followers.is_empty() {
         let follow = Section {
-            heading: "errors that effects make up".to_string(),
+            heading: "errors as functions of drivers".to_string(),
             rows: followers,
         };
         sections.insert(0, follow);

@@ -21,7 +21,7 @@ pub(crate) fn title(equation: &Equation) -> Vec<String> {
         Order::First => "first order in the errors",
     };
     let order = match &equation.form {
-        Form::Groups { complete: true, .. } => "up to products of two errors, which is all there is",
+        Form::Groups { complete: true, .. } => "up to products of two errors, which is complete",
         _ => order,
     };
     let rotation = match (equation.options.order, equation.machine.rotation) {
@@ -89,7 +89,7 @@ pub(crate) fn notes_spelt(
                     name(&sensitivity.parameter),
                     escape("is confounded with"),
                     name(of),
-                    escape(": a fixed multiple wherever the axes stand.")
+                    escape(": a constant multiple at all positions of the axes.")
                 ));
             }
         }

@@ -54,9 +54,9 @@ pub(crate) fn print(equation: &Equation) -> String {
                 "Positions of moving axes: sine and cosine of a rotary one."
             }
             "AXES" => {
-                "Positions of moving axes: sine and cosine of a rotary one; and what else effects follow."
+                "Positions of moving axes (sine and cosine of a rotary one), and other drivers of effects."
             }
-            _ => "Errors and instrument unknowns.",
+            _ => "Errors and instrument parameters.",
         };
         let _ = writeln!(file, "/// {what}\npub const {name}: usize = {};", places.len());
     }
@@ -275,7 +275,7 @@ fn elementary(file: &mut String, code: &Code<'_>) {
     if used.is_empty() {
         return;
     }
-    file.push_str("/// What `core` lacks. In a crate without `std` put the functions of `libm` here; nothing else needs it.\nmod elementary {\n");
+    file.push_str("/// Functions that `core` lacks. In a crate without `std` replace them by those of `libm`; nothing else needs `std`.\nmod elementary {\n");
     for (place, (name, body)) in used.iter().enumerate() {
         let gap = if place == 0 { "" } else { "\n" };
         let _ = write!(

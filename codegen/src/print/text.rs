@@ -145,9 +145,13 @@ pub(crate) fn print(equation: &Equation) -> String {
             );
             match &row.remark {
                 None => page.push('\n'),
-                Some(NoteKind::NotSeen) => page.push_str("   (not seen)\n"),
+                Some(NoteKind::NotSeen) => page.push_str("   (not observable)\n"),
                 Some(NoteKind::MultipleOf(other)) => {
-                    let _ = writeln!(page, "   (a fixed multiple of that of {})", other.text(symbols));
+                    let _ = writeln!(
+                        page,
+                        "   (a constant multiple of that of {})",
+                        other.text(symbols)
+                    );
                 }
             }
         }

@@ -201,7 +201,7 @@ fn write_row(equation: &Equation, program: &Program, row: &Row, symbols: Symbols
     let lines = dialect::lines(&terms_of(&row.right), &spelling, WIDTH, visible);
     let remark = match &row.remark {
         None => String::new(),
-        Some(NoteKind::NotSeen) => " quad #[(not seen)]".to_string(),
+        Some(NoteKind::NotSeen) => " quad #[(not observable)]".to_string(),
         Some(NoteKind::MultipleOf(other)) => {
             format!(" quad #[(multiple of ${}$)]", variable(other, symbols))
         }

@@ -294,7 +294,7 @@ fn an_equation_names_what_effects_make_up_and_what_they_follow() {
     let equation = Equation::of(&machine, &Bar, &[], &with(effects)).expect("an equation");
     let text = equation.print(Language::Text).expect("a text");
     for line in [
-        "errors that effects make up\n",
+        "errors as functions of drivers\n",
         "  e_zc  = k_1·cos(2·θ_c) + k_2·sin(2·θ_c)\n",
         "  δ_bar = k_3·(1 − exp(−t/900))\n",
         " − δ_bar\n",

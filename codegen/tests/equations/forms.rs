@@ -183,7 +183,9 @@ fn the_printed_rust_builds_without_std() {
         ..Options::default()
     };
     let printed = chapter5(&options).print(Language::Rust).expect("code");
-    let end = printed.find("/// What `core` lacks").expect("the last module");
+    let end = printed
+        .find("/// Functions that `core` lacks")
+        .expect("the last module");
     let stub = |name: &str| format!("pub fn {name}(x: f64) -> f64 {{ x }} ");
     let stubs: String = ["sqrt", "sin", "cos"].map(stub).concat();
     let text = format!(

@@ -170,7 +170,7 @@ impl Shape {
                 Ok(())
             } else {
                 Err(ShapeFault(format!(
-                    "{what} is {value}; it has to be a positive number"
+                    "{what} is {value}; it must be a positive number"
                 )))
             }
         };
@@ -179,7 +179,7 @@ impl Shape {
                 positive(*degree as f64, "the degree of a polynomial")?;
                 if *degree > 30 {
                     return Err(ShapeFault(format!(
-                        "a polynomial of degree {degree} cannot be fitted; 30 is the most"
+                        "a polynomial of degree {degree} cannot be fitted; the limit is 30"
                     )));
                 }
                 positive(*scale, "the scale of a polynomial")
@@ -196,7 +196,7 @@ impl Shape {
                 let least = if *closed { 4 } else { 1 };
                 if *intervals < least || *intervals > 500 {
                     return Err(ShapeFault(format!(
-                        "a curve of {intervals} intervals; it takes {least} to 500"
+                        "a curve has {intervals} intervals; {least} to 500 are allowed"
                     )));
                 }
                 Ok(())

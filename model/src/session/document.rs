@@ -12,7 +12,7 @@ use toml::de::DeTable;
 
 use super::spelling::known_names;
 use super::stamp::FileStamp;
-use crate::error::{ModelError, Place};
+use crate::error::{Location, ModelError};
 pub(crate) use value::Value;
 
 /// Largest size of a machine or session file, bytes.
@@ -38,19 +38,18 @@ impl Source {
     /// Reads a text file; `what` names its content in messages.
     pub fn read(file: &Path, what: &str) -> Result<Source, ModelError> {
         let fault = |message: String, help: &str| ModelError::Input {
-            place: Place::file(file),
+            location: Location::file(file),
             message,
             help: Some(help.to_string()),
         };
         if file.is_dir() {
             return Err(fault(
-                format!("this is a folder; {what} is a file"),
+                format!("this is a folder; {what} must be a file"),
                 "name the .toml file in it",
             ));
         }
         let unreadable = |cause: std::io::Error| {
-            let help = "check the name; a relative one starts from the file that mentions it, or from where \
-                        the command was called";
+            let help = "check the name; a relative name starts from the file that contains it, or from the working directory";
             fault(format!("{what} cannot be read: {cause}"), help)
         };
         let opened = File::open(file).map_err(unreadable)?;
@@ -63,7 +62,7 @@ impl Source {
             .map_err(unreadable)?;
         if bytes.len() as u64 > MAX_BYTES {
             return Err(fault(
-                format!("{what} has more than {MAX_BYTES} bytes, the most that is read"),
+                format!("{what} has more than {MAX_BYTES} bytes, which is the limit"),
                 "readings belong in CSV files named by `data`",
             ));
         }
@@ -71,7 +70,7 @@ impl Source {
         let text = String::from_utf8(bytes).map_err(|cause| {
             fault(
                 format!(
-                    "byte {} is not UTF-8, which TOML is written in",
+                    "byte {} is not UTF-8, the encoding of TOML",
                     cause.utf8_error().valid_up_to() + 1
                 ),
                 "save the file as UTF-8",
@@ -101,7 +100,7 @@ impl Source {
                 fault.span().unwrap_or(0..0),
                 format!("not valid TOML: {}", fault.message()),
                 fault.message().contains("recursion").then(|| {
-                    format!("tables, lists and the parts of a key go {MAX_DEPTH} levels deep at most")
+                    format!("tables, lists and the parts of a key may be nested {MAX_DEPTH} levels deep")
                 }),
             )
         })?;
@@ -109,9 +108,9 @@ impl Source {
     }
 
     /// The location of some bytes of the text.
-    pub fn place(&self, span: Range<usize>) -> Place {
+    pub fn location(&self, span: Range<usize>) -> Location {
         let until = span.start.min(self.text.len());
-        Place {
+        Location {
             file: self.file.clone(),
             line: 1 + self.text.as_bytes()[..until]
                 .iter()
@@ -124,7 +123,7 @@ impl Source {
     /// An error at a location of this file.
     pub fn error(&self, span: Range<usize>, message: impl Into<String>, help: Option<String>) -> ModelError {
         ModelError::Input {
-            place: self.place(span),
+            location: self.location(span),
             message: message.into(),
             help,
         }
@@ -187,7 +186,7 @@ impl<'a> Table<'a> {
     pub fn remaining_values(&mut self) -> Result<Vec<Value<'a>>, ModelError> {
         if self.entries.len() > MAX_ITEMS {
             let message = format!(
-                "{} has {} entries; {MAX_ITEMS} are the most",
+                "{} has {} entries; the limit is {MAX_ITEMS}",
                 self.called(),
                 self.entries.len()
             );
@@ -204,7 +203,7 @@ impl<'a> Table<'a> {
                 let mut known: Vec<&str> = self.asked.clone();
                 known.sort_unstable();
                 known.dedup();
-                let message = format!("{} knows no key `{}`", self.called(), entry.key);
+                let message = format!("{} has the unknown key `{}`", self.called(), entry.key);
                 Err(self.source.error(
                     entry.key_span.clone(),
                     message,

@@ -10,10 +10,11 @@ pub const MIN_UM: f64 = 1e-6;
 /// The fault of a number that is larger than [`LARGEST`].
 pub fn too_large(number: f64) -> Option<String> {
     (number.is_finite() && number.abs() > LARGEST)
-        .then(|| format!("{number:e}, which is too large; {LARGEST:e} is the most"))
+        .then(|| format!("{number:e}, which is too large; the limit is {LARGEST:e}"))
 }
 
 /// The fault of a standard deviation or step in µm that is neither zero nor at least [`MIN_UM`].
 pub fn too_small_um(number: f64) -> Option<String> {
-    (number > 0.0 && number < MIN_UM).then(|| format!("{number:e} µm; {MIN_UM:e} µm is the least besides 0"))
+    (number > 0.0 && number < MIN_UM)
+        .then(|| format!("{number:e} µm; the least value other than 0 is {MIN_UM:e} µm"))
 }

@@ -152,7 +152,7 @@ pub(crate) fn checked_plan(machine: &Machine, test: &Test) -> Result<Readings, (
             let Some(data) = &test.readings else {
                 return Err((
                     format!(
-                        "test \"{}\" has no movement to plan and no data to take its states from",
+                        "test \"{}\" has neither a motion nor data from which its states follow",
                         test.name
                     ),
                     "add `sweep = { … }` or `path = { … }`, or read its data".into(),

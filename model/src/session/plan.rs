@@ -77,7 +77,7 @@ pub(super) fn states(machine: &Machine, test: &Test, motion: &Motion) -> Result<
         } => {
             let Some(mut bar) = pair(&test.station) else {
                 return Err((
-                    format!("test \"{}\" follows no point of the table", test.name),
+                    format!("test \"{}\" has no point of the table to follow", test.name),
                     "a path of kind \"follow\" needs a ball bar, an R-test or a probe".into(),
                 ));
             };
@@ -97,11 +97,10 @@ pub(super) fn states(machine: &Machine, test: &Test, motion: &Motion) -> Result<
                 if missed > MISSED_MM {
                     return Err((
                         format!(
-                            "test \"{}\": the linear axes cannot keep the balls where the path wants them; they miss \
-                             by {missed:.3} mm",
+                            "test \"{}\": the linear axes cannot keep the balls on the path; the deviation is {missed:.3} mm",
                             test.name
                         ),
-                        "a path of kind \"follow\" takes linear axes that span the space".into(),
+                        "a path of kind \"follow\" needs linear axes that span the space".into(),
                     ));
                 }
                 Ok(state)
@@ -226,11 +225,8 @@ impl Circle {
         if dot.abs() > 1e-9 {
             let names = axes.map(|axis| machine.axes[axis].name.clone());
             return Err((
-                format!(
-                    "axes `{}` and `{}` do not stand at right angles",
-                    names[0], names[1]
-                ),
-                "a circle takes two linear axes at right angles".into(),
+                format!("axes `{}` and `{}` are not at right angles", names[0], names[1]),
+                "a circle needs two linear axes at right angles".into(),
             ));
         }
         let (state, _) = placed(machine, bar, at, &axes, centre);
@@ -355,10 +351,10 @@ fn offset_vector(
         _ if radius < 1e-6 => {
             return Err((
                 format!(
-                    "the ball lies on axis `{}`: it goes round no circle",
+                    "the ball lies on axis `{}` and does not move on a circle",
                     machine.axes[axis].name
                 ),
-                "a radial or tangential bar takes a ball away from the axis".into(),
+                "a radial or tangential bar needs a ball away from the axis".into(),
             ));
         }
         FollowOffset::Radial => radial.map(|x| x / radius),

@@ -30,7 +30,7 @@ pub(crate) fn check(machine: &Machine, test: &Test, readings: &Readings) -> Resu
     };
     let help = match slips(machine, test, readings) {
         found if found.is_empty() => help,
-        found => format!("it would reach if {}; {help}", found.join(", or if ")),
+        found => format!("it would fit if {}; {help}", found.join(", or if ")),
     };
     Err((message, help))
 }
@@ -86,7 +86,7 @@ fn slips(machine: &Machine, test: &Test, readings: &Readings) -> Vec<String> {
                     }
                 }
                 if reaches(machine, test, &corrected).is_ok() {
-                    let said = format!("the positions of {} were taken {words}", names.join(" and "));
+                    let said = format!("the positions of {} were read {words}", names.join(" and "));
                     found.push((misfit(machine, test, &corrected), said));
                 }
             }
@@ -140,7 +140,7 @@ fn reaches(machine: &Machine, test: &Test, readings: &Readings) -> Result<(), (S
         if length < MIN_MM {
             return Err((
                 format!(
-                    "test \"{}\", reading {}: the two balls nominally lie in one place, and the bar is {:e} mm long",
+                    "test \"{}\", reading {}: the two balls nominally coincide, but the bar is {:e} mm long",
                     test.name,
                     row + 1,
                     bar.bar
@@ -162,7 +162,7 @@ fn reaches(machine: &Machine, test: &Test, readings: &Readings) -> Result<(), (S
             bar.bar,
             off.len()
         ),
-        "degrees taken for radians (or radians for degrees) look like this; so do a ball position, an axis position \
+        "possible causes are degrees read as radians (or radians as degrees), and a ball position, an axis position \
          in `at` or an axis direction that is not as on the machine"
             .into(),
     ))
@@ -180,13 +180,13 @@ fn check_touch(machine: &Machine, test: &Test, readings: &Readings) -> Result<()
             continue;
         }
         let found = if distance.is_finite() {
-            format!("stands {distance:.3} mm before the artefact's nominal surface; {MAX_MM} mm is the most")
+            format!("is {distance:.3} mm from the artefact's nominal surface; the limit is {MAX_MM} mm")
         } else {
-            "looks past the artefact, or stands on its axis without a `direction`".into()
+            "misses the artefact, or is on its axis without a `direction`".into()
         };
         return Err((
             format!("test \"{}\", reading {}: the stylus {found}", test.name, row + 1),
-            "check `radius_mm` (the stylus' radius included), `artefact_mm`, `stylus_mm`, `direction` and the axis \
+            "check `radius_mm` (including the stylus radius), `artefact_mm`, `stylus_mm`, `direction` and the axis \
              positions in `at` and the data"
                 .into(),
         ));
@@ -205,12 +205,11 @@ fn check_nest(machine: &Machine, test: &Test, readings: &Readings) -> Result<(),
         if apart > MAX_MM {
             return Err((
                 format!(
-                    "test \"{}\", reading {}: the master ball nominally lies {apart:.3} mm from the centre of the sensors; {MAX_MM} mm is the most",
+                    "test \"{}\", reading {}: the master ball nominally lies {apart:.3} mm from the centre of the sensors; the limit is {MAX_MM} mm",
                     test.name,
                     row + 1
                 ),
-                "check `workpiece_ball_mm`, `spindle_ball_mm` and the axis positions in `at` and the data: the linear axes \
-                 have to follow the rotary one"
+                "check `workpiece_ball_mm`, `spindle_ball_mm` and the axis positions in `at` and the data: the linear axes must follow the rotary axis"
                     .into(),
             ));
         }
@@ -249,11 +248,11 @@ fn check_sensors(test: &Test, readings: &Readings) -> Result<(), (String, String
     }
     Err((
         format!(
-            "test \"{}\": the sensors read {read:.3} mm (median of {} values); {MAX_MM} mm is the most",
+            "test \"{}\": the sensors read {read:.3} mm (median of {} values); the limit is {MAX_MM} mm",
             test.name,
             sizes.len()
         ),
-        "are the columns in another unit than their name says, or counted from another zero than the ball in the middle \
+        "are the columns in another unit than their name says, or relative to another zero than the ball in the middle \
          of the nest?"
             .into(),
     ))

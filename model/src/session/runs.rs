@@ -49,10 +49,10 @@ pub(crate) fn unlike_stated(motion: Option<&Motion>, readings: &Readings) -> Opt
         let numbers = turning.join(", ");
         return Some(match turning.len() {
             1 => format!(
-                "run {numbers} goes there and back under one number: `run` numbers each traversal in one direction; {states}"
+                "run {numbers} goes forward and backward under one number: `run` numbers each traversal in one direction; {states}"
             ),
             _ => format!(
-                "runs {numbers} go there and back under one number each: `run` numbers each traversal in one direction; {states}"
+                "runs {numbers} go forward and backward under one number each: `run` numbers each traversal in one direction; {states}"
             ),
         });
     }
@@ -60,7 +60,7 @@ pub(crate) fn unlike_stated(motion: Option<&Motion>, readings: &Readings) -> Opt
     let only_forward = *both_directions || backward == 0;
     (!(enough && only_forward)).then(|| {
         format!(
-            "the data hold {} forward and {backward} backward where {states}",
+            "the data contain {} forward and {backward} backward, but {states}",
             counted(forward, "run")
         )
     })

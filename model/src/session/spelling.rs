@@ -5,7 +5,7 @@ use strsim::osa_distance;
 /// The most similar known name if one is similar, and all of them.
 pub(crate) fn known_names(found: &str, known: &[&str]) -> String {
     let all = if known.is_empty() {
-        "no key is known here".to_string()
+        "no key is allowed here".to_string()
     } else {
         format!("known: {}", known.join(", "))
     };
@@ -77,7 +77,7 @@ mod tests {
             "did you mean `sweep`? (known: sweep, path)"
         );
         assert_eq!(known_names("at", &["sweep", "path"]), "known: sweep, path");
-        assert_eq!(known_names("at", &[]), "no key is known here");
+        assert_eq!(known_names("at", &[]), "no key is allowed here");
         assert_eq!(meant("swep", &["sweep"]), "did you mean `sweep`? ");
         assert_eq!(meant("at", &["sweep"]), "");
     }

@@ -4,7 +4,7 @@ use std::fs::{File, Metadata};
 use std::path::{Path, PathBuf};
 use std::time::SystemTime;
 
-use crate::error::{ModelError, Place};
+use crate::error::{Location, ModelError};
 
 /// The state of a file when it was opened.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -36,9 +36,9 @@ impl FileStamp {
         match opened.metadata() {
             Ok(found) if FileStamp::of(&self.file, &found) == *self || !self.regular => Ok(()),
             _ => Err(ModelError::Input {
-                place: Place::file(&self.file),
+                location: Location::file(&self.file),
                 message: "the file changed while it was read".into(),
-                help: Some("wait until it is written, and try again".into()),
+                help: Some("wait until it is written and try again".into()),
             }),
         }
     }
@@ -46,10 +46,8 @@ impl FileStamp {
     /// A description of the change if the file has changed since it was read.
     pub fn changed(&self) -> Option<String> {
         match std::fs::metadata(&self.file) {
-            _ if !self.regular => {
-                Some("it is no file but a pipe or a device, which can be read only once".into())
-            }
-            Err(cause) => Some(format!("it is no longer there: {cause}")),
+            _ if !self.regular => Some("it is a pipe or a device, which can be read only once".into()),
+            Err(cause) => Some(format!("it no longer exists: {cause}")),
             Ok(found) if FileStamp::of(&self.file, &found) == *self => None,
             Ok(_) => Some("it has changed since it was read".into()),
         }

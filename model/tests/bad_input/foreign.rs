@@ -66,7 +66,10 @@ fn latin_1_and_utf_16_are_read_as_utf_8_is() {
     ));
     holds(&fault, &["no column `Länge`", "read as Latin-1", "encoding = "]);
     let fault = told(with_bytes(&format!("{COLUMNS}encoding = \"latin-one\""), &latin));
-    holds(&fault, &["session.toml", "which no encoding is called", "latin1"]);
+    holds(
+        &fault,
+        &["session.toml", "which is not a known encoding", "latin1"],
+    );
 }
 
 #[test]
@@ -141,8 +144,8 @@ fn a_column_is_one_column() {
         &fault,
         &[
             "session.toml",
-            "2 columns called `reading`: 2, 3",
-            "number of the one",
+            "2 columns with the name `reading`: 2, 3",
+            "number of one of them",
         ],
     );
     let read = with_bytes(&columns.replace("\"reading\"", "3"), twice.as_bytes()).unwrap();
@@ -204,7 +207,7 @@ fn copies_of_rows_are_named_and_are_no_repeats() {
             "C100.csv",
             "2 rows are copies",
             "line 3, 6",
-            "not taken as repeats",
+            "not treated as repeats",
         ],
     );
     // Without time: the whole file repeated after itself.
@@ -274,20 +277,20 @@ fn the_sign_of_an_axis_is_suggested_as_its_unit_is() {
     let fault = told(session(MACHINE, SESSION, Some(&with("c_deg", &|angle| -angle))));
     holds(
         &fault,
-        &["cannot reach", "positions of C were taken with the opposite sign"],
+        &["cannot reach", "positions of C were read with the opposite sign"],
     );
     let fault = told(session(MACHINE, SESSION, Some(&with("c_deg", &f64::to_radians))));
     holds(
         &fault,
         &[
             "cannot reach",
-            "positions of C were taken in radians rather than degrees",
+            "positions of C were read in radians rather than degrees",
         ],
     );
     let inches = with("c_deg", &|angle| angle).replace("x_mm,y_mm", "x_in,y_in");
     let fault = told(session(MACHINE, SESSION, Some(&inches)));
     holds(
         &fault,
-        &["positions of Y and X were taken in mm rather than inches"],
+        &["positions of Y and X were read in mm rather than inches"],
     );
 }

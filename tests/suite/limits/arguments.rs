@@ -72,8 +72,8 @@ fn steps_without_end() {
             &["--no-effects"],
             &[
                 "session.toml:16",
-                "1000000 readings is the most",
-                "take a larger step",
+                "the limit is 1000000 readings",
+                "use a larger step",
             ],
         );
     }

@@ -49,17 +49,17 @@ fn error_functions_beyond_all_numbers() {
         (
             "EXX",
             "polynomial = { um = [1e300] }",
-            "1e300, which is too large; 1e12 is the most",
+            "1e300, which is too large; the limit is 1e12",
         ),
         (
             "EXX",
             "table = { at_mm = [-1e308, 1e308], um = [0, 1] }",
-            "-1e308, which is too large; 1e12 is the most",
+            "-1e308, which is too large; the limit is 1e12",
         ),
         (
             "EXC",
             "harmonic = { order = 1e300, amplitude_um = 1 }",
-            "1e300, which is too large; 1e12 is the most",
+            "1e300, which is too large; the limit is 1e12",
         ),
         ("EXX", "polynomial = { um = [nan] }", "`NaN` is no finite number"),
         (
@@ -113,10 +113,7 @@ fn files_of_errors_that_are_none() {
         String::from_utf8(output.stderr).unwrap()
     };
     for (file, message) in [
-        (
-            large.as_path(),
-            "has more than 8388608 bytes, the most that is read",
-        ),
+        (large.as_path(), "has more than 8388608 bytes, which is the limit"),
         (latin.as_path(), "byte 11 is not UTF-8"),
         (folder.path(), "this is a folder"),
         (Path::new("/dev/zero"), "has more than 8388608 bytes"),

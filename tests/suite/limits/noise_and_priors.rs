@@ -22,21 +22,21 @@ fn a_noise_that_is_no_noise() {
     for (noise, message) in [
         (
             "noise_um = 1e-300",
-            "`noise_um` is 1e-300 µm; 1e-6 µm is the least besides 0",
+            "`noise_um` is 1e-300 µm; the least value other than 0 is 1e-6 µm",
         ),
         (
             "noise_um = 5e-324",
-            "`noise_um` is 5e-324 µm; 1e-6 µm is the least besides 0",
+            "`noise_um` is 5e-324 µm; the least value other than 0 is 1e-6 µm",
         ),
         (
             "noise_um = 1e300",
-            "`noise_um` is 1e300, which is too large; 1e12 is the most",
+            "`noise_um` is 1e300, which is too large; the limit is 1e12",
         ),
         ("noise_um = inf", "`noise_um` is infinite"),
         ("noise_um = -0.1", "`noise_um` is -0.1; it cannot be negative"),
         (
             "resolution_um = 1e-300",
-            "`resolution_um` is 1e-300 µm; 1e-6 µm is the least besides 0",
+            "`resolution_um` is 1e-300 µm; the least value other than 0 is 1e-6 µm",
         ),
     ] {
         session_refused(
@@ -151,11 +151,11 @@ fn priors_that_are_none() {
         ("bar_u_um = nan", "`bar_u_um` is NaN"),
         (
             "bar_u_um = 1e-300",
-            "`bar_u_um` is 1e-300 µm; 1e-6 µm is the least besides 0",
+            "`bar_u_um` is 1e-300 µm; the least value other than 0 is 1e-6 µm",
         ),
         (
             "bar_u_um = 1e300",
-            "`bar_u_um` is 1e300, which is too large; 1e12 is the most",
+            "`bar_u_um` is 1e300, which is too large; the limit is 1e12",
         ),
     ] {
         session_refused(

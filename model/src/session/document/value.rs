@@ -28,6 +28,15 @@ impl<'a> Value<'a> {
         self.source.error(self.span.clone(), message, help)
     }
 
+    /// An error about the file that the value names.
+    pub fn file_error(&self, message: String, help: &str) -> ModelError {
+        ModelError::FileAccess {
+            location: self.source.location(self.span.clone()),
+            message,
+            help: help.to_string(),
+        }
+    }
+
     /// An error with the found value and the expected one.
     pub fn unlike(&self, wanted: &str) -> ModelError {
         let found = match &self.value {
@@ -48,10 +57,10 @@ impl<'a> Value<'a> {
                 None => Ok(text.to_string()),
                 Some(control) => Err(self.error(
                     format!(
-                        "`{}` holds the control character U+{:04X}",
+                        "`{}` contains the control character U+{:04X}",
                         self.key, control as u32
                     ),
-                    Some("names are shown as they are: leave it out".into()),
+                    Some("remove it".into()),
                 )),
             },
             _ => Err(self.unlike("a text in quotes")),
@@ -131,7 +140,10 @@ impl<'a> Value<'a> {
         if number > 0.0 {
             Ok(number)
         } else {
-            Err(self.error(format!("`{}` is {number}; it has to be above 0", self.key), None))
+            Err(self.error(
+                format!("`{}` is {number}; it must be greater than 0", self.key),
+                None,
+            ))
         }
     }
 
@@ -161,7 +173,7 @@ impl<'a> Value<'a> {
             return Ok(Vec::new());
         };
         if items.len() > MAX_ITEMS {
-            let message = format!("`{key}` is a list of {}; {MAX_ITEMS} are the most", items.len());
+            let message = format!("`{key}` is a list of {}; the limit is {MAX_ITEMS}", items.len());
             return Err(source.error(span, message, None));
         }
         Ok(items

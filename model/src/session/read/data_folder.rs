@@ -39,11 +39,12 @@ pub(super) fn check(
         return Ok(());
     }
     let message = format!(
-        "`{} = \"{}\"` leads out of the session's folder, to {}",
+        "`{} = \"{}\"` is outside the session's folder: {}",
         named.key,
         named.as_text().unwrap_or(""),
         real.as_deref().unwrap_or(found).display()
     );
-    let help = "a session reads beside itself, below, and where `--data DIR` points; copy the file there, or say `--allow-outside` if you trust the session";
-    Err(named.error(message, Some(help.into())))
+    let help = "a session may read files in its own folder, below it, and in the data folder; copy the file there, or allow files outside \
+                if you trust the session";
+    Err(named.file_error(message, help))
 }

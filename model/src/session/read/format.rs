@@ -31,8 +31,8 @@ pub(super) fn format(mut table: Table<'_>) -> Result<Format, ModelError> {
     if let Some(value) = table.take("encoding") {
         let name = value.text()?;
         let Some(encoding) = encoding::of_name(&name) else {
-            let message = format!("`encoding` is \"{name}\", which no encoding is called");
-            let help = "common are \"utf-8\", \"latin1\", \"utf-16le\", \"utf-16be\"; others go by their name in the WHATWG Encoding Standard, as \"shift_jis\"";
+            let message = format!("`encoding` is \"{name}\", which is not a known encoding");
+            let help = "common are \"utf-8\", \"latin1\", \"utf-16le\", \"utf-16be\"; others have their name in the WHATWG Encoding Standard, such as \"shift_jis\"";
             return Err(value.error(message, Some(help.into())));
         };
         format.encoding = Some(encoding);
@@ -44,7 +44,7 @@ pub(super) fn format(mut table: Table<'_>) -> Result<Format, ModelError> {
         && let Some(value) = decimal
     {
         let message = "the decimal comma is also the separator (\",\" unless declared)";
-        let help = "declare what parts the columns, as `separator = \";\"`";
+        let help = "declare the separator of the columns, such as `separator = \";\"`";
         return Err(value.error(message, Some(help.into())));
     }
     table.finish()?;
@@ -76,7 +76,7 @@ pub(super) fn columns(mut table: Table<'_>) -> Result<Vec<Mapped>, ModelError> {
         columns.push(Mapped {
             ours: entry.key.clone(),
             theirs,
-            place: entry.source.place(entry.key_span.start..entry.span.end),
+            location: entry.source.location(entry.key_span.start..entry.span.end),
         });
     }
     Ok(columns)

@@ -23,7 +23,7 @@ use super::stamp::FileStamp;
 use super::table::{Format, Mapped};
 use super::{Session, Test};
 use crate::chain::Machine;
-use crate::error::{ModelError, Place};
+use crate::error::{Location, ModelError};
 use crate::instrument::InstrumentKind;
 use quantity::MICROMETRE;
 
@@ -73,7 +73,7 @@ impl Context<'_> {
         };
         let names: Vec<&str> = self.constants.iter().map(|(name, _)| name.as_str()).collect();
         let length = Length::parse(text, &names).map_err(|fault| {
-            let help = "a length is a number or an expression over [constants] with + - * / ^2 sqrt( )";
+            let help = "a length is a number or an expression in [constants] with + - * / ^2 sqrt( )";
             value.error(
                 format!("`{}` = \"{text}\": {fault}", value.key),
                 Some(help.into()),
@@ -84,12 +84,12 @@ impl Context<'_> {
             found.map_or(f64::NAN, |(_, value)| *value)
         });
         if let Some(fault) = limits::too_large(number) {
-            let message = format!("`{}` = \"{text}\" comes to {fault}", value.key);
+            let message = format!("`{}` = \"{text}\" evaluates to {fault}", value.key);
             return Err(value.error(message, None));
         }
         if !number.is_finite() {
             let message = format!(
-                "`{}` = \"{text}\" comes to {number} with these constants",
+                "`{}` = \"{text}\" evaluates to {number} with these constants",
                 value.key
             );
             return Err(value.error(
@@ -222,7 +222,7 @@ fn session_machine(path: &Path, options: &ReadOptions, root: &mut Table<'_>) -> 
     let found = path.parent().unwrap_or(Path::new("")).join(&named);
     if !found.exists() {
         let message = format!(
-            "the machine file `{named}` is not there; looked for {}",
+            "the machine file `{named}` does not exist; looked for {}",
             found.display()
         );
         return Err(file.error(message, Some("its name is relative to the session file".into())));
@@ -248,8 +248,8 @@ fn constants(root: &mut Table<'_>) -> Result<Vec<(String, f64)>, ModelError> {
             && letters.all(|c| c.is_alphanumeric() || c == '_')
             && name != "sqrt";
         if !valid {
-            let help = "a letter, then letters, digits and `_`; `sqrt` is taken";
-            let message = format!("a constant cannot be called `{name}`");
+            let help = "a name is a letter followed by letters, digits and `_`; `sqrt` is reserved";
+            let message = format!("a constant cannot have the name `{name}`");
             return Err(entry
                 .source
                 .error(entry.key_span.clone(), message, Some(help.into())));
@@ -270,8 +270,8 @@ fn about(root: &mut Table<'_>) -> Result<Vec<(String, String)>, ModelError> {
         .map(|note| {
             let control = note.key.chars().any(char::is_control);
             if control || note.key.trim().is_empty() {
-                let message = "a note of [about] has a name that cannot be shown";
-                let help = "as in `serial_number`, `operator`, `date`, `comment`";
+                let message = "a note of [about] has a name that cannot be displayed";
+                let help = "use names such as `serial_number`, `operator`, `date`, `comment`";
                 return Err(note
                     .source
                     .error(note.key_span.clone(), message, Some(help.into())));
@@ -355,7 +355,7 @@ fn tests(
     }
     if tests.is_empty() {
         return Err(ModelError::Input {
-            place: Place::file(context.file),
+            location: Location::file(context.file),
             message: "a session without tests".into(),
             help: Some("add at least one [[test]]".into()),
         });

@@ -55,11 +55,11 @@ pub(super) fn path(
 }
 
 fn circle(context: &Context<'_>, mut table: Table<'_>) -> Result<Motion, ModelError> {
-    let plane = table.need("plane", "the two linear axes, as \"XY\"")?;
+    let plane = table.need("plane", "the two linear axes, such as \"XY\"")?;
     let text = plane.text()?;
     let letters: Vec<String> = text.chars().map(String::from).collect();
     let [first, second] = &letters[..] else {
-        return Err(plane.unlike("two linear axes, as \"XY\","));
+        return Err(plane.unlike("two linear axes, such as \"XY\","));
     };
     let linear = |name: &str| -> Result<usize, ModelError> {
         let Some(index) = quantity::axis_index(context.machine, name) else {
@@ -81,7 +81,10 @@ fn circle(context: &Context<'_>, mut table: Table<'_>) -> Result<Motion, ModelEr
     let radius_value = table.need("radius_mm", "the radius of the circle")?;
     let (_, radius) = context.length(&radius_value)?;
     if radius <= 0.0 {
-        return Err(radius_value.error(format!("`radius_mm` is {radius}; it has to be above 0"), None));
+        return Err(radius_value.error(
+            format!("`radius_mm` is {radius}; it must be greater than 0"),
+            None,
+        ));
     }
     let centre = match table.take("centre_mm") {
         Some(value) => context.point(value)?.1,
@@ -111,7 +114,7 @@ fn circle(context: &Context<'_>, mut table: Table<'_>) -> Result<Motion, ModelEr
 fn follow(context: &Context<'_>, mut table: Table<'_>, station: &Station<f64>) -> Result<Motion, ModelError> {
     if station.table_point_mm().is_none() {
         return Err(table.error(
-            "a path of kind \"follow\" needs an instrument that holds a point of the table: a ball bar, an R-test or a probe",
+            "a path of kind \"follow\" needs an instrument with a point of the table: a ball bar, an R-test or a probe",
             None,
         ));
     }
@@ -119,7 +122,7 @@ fn follow(context: &Context<'_>, mut table: Table<'_>, station: &Station<f64>) -
     if kind != AxisKind::Rotary {
         let name = &context.machine.axes[axis].name;
         return Err(table.error(
-            format!("axis `{name}` is linear; a path of kind \"follow\" turns a rotary axis"),
+            format!("axis `{name}` is linear; a path of kind \"follow\" needs a rotary axis"),
             None,
         ));
     }
@@ -137,8 +140,8 @@ fn follow(context: &Context<'_>, mut table: Table<'_>, station: &Station<f64>) -
             if let Some(offset) = table.take("offset") {
                 return Err(offset.source.error(
                     offset.key_span.clone(),
-                    "`offset` is the direction of a bar; an R-test has none and reads all three directions at once",
-                    Some("leave it out; `abbe fit --views` parts radial, tangential and axial".into()),
+                    "`offset` is the direction of a bar; an R-test has no bar and measures all three directions at once",
+                    Some("remove it; the readings can be resolved into radial, tangential and axial components after a fit".into()),
                 ));
             }
             FollowOffset::Touching
@@ -209,21 +212,21 @@ impl Abscissa {
         };
         if step <= 0.0 {
             let message = format!(
-                "`{}` has to be above 0; the way back is `both_directions = true`",
+                "`{}` must be greater than 0; the return traversal is `both_directions = true`",
                 stepped.key
             );
             return Err(stepped.error(message, None));
         }
         if from == to {
-            return Err(table.error(format!("{} ends where it begins", table.called()), None));
+            return Err(table.error(format!("{} has equal start and end", table.called()), None));
         }
         let way = Abscissa { from, to, step };
         if way.steps() > MAX_READINGS as f64 {
-            let message = format!("{:.2e} steps; {MAX_READINGS} readings is the most", way.steps());
-            return Err(stepped.error(message, Some("take a larger step".into())));
+            let message = format!("{:.2e} steps; the limit is {MAX_READINGS} readings", way.steps());
+            return Err(stepped.error(message, Some("use a larger step".into())));
         }
         if way.steps() < 1.0 {
-            return Err(stepped.error(format!("`{}` is longer than the way", stepped.key), None));
+            return Err(stepped.error(format!("`{}` is larger than the whole motion", stepped.key), None));
         }
         Ok(way)
     }
@@ -244,7 +247,7 @@ fn end<'a>(
         AxisKind::Rotary => (table.take(deg), table.take(mm)),
     };
     if let Some(wrong) = wrong {
-        let message = format!("`{}` for what moves in {}", wrong.key, kind.unit());
+        let message = format!("`{}` for an axis in {}", wrong.key, kind.unit());
         return Err(wrong.source.error(wrong.key_span.clone(), message, None));
     }
     match right {
@@ -287,7 +290,7 @@ fn programmed_speed(
     let feed_mm_s = feed.positive()? / 60.0;
     for key in ["feed_mm_min", "feed_deg_min"] {
         if let Some(other) = table.take(key) {
-            let help = "the programmed feed already says how fast the ball goes: keep one of them";
+            let help = "the programmed feed determines the speed of the ball: keep one of them";
             return Err(other.error(
                 format!("both `programmed_feed_mm_min` and `{key}`"),
                 Some(help.into()),
@@ -313,8 +316,8 @@ fn radius_on_axis(
     };
     let radius = radius_about(&context.machine.axes[axis], carried);
     if radius < 1e-3 {
-        let message = format!("`{}` of a ball that lies on the axis it turns about", feed.key);
-        return Err(feed.error(message, Some("give `feed_deg_min`".into())));
+        let message = format!("`{}` of a ball that lies on its axis of rotation", feed.key);
+        return Err(feed.error(message, Some("use `feed_deg_min`".into())));
     }
     Ok(radius)
 }
@@ -338,7 +341,7 @@ fn repeats(table: &mut Table<'_>, steps: f64) -> Result<(usize, bool), ModelErro
             let runs = value.count(1, MAX_READINGS)?;
             if runs as f64 * (steps + 1.0) * 2.0 > MAX_READINGS as f64 {
                 return Err(value.error(
-                    format!("{runs} runs of {steps:.0} steps; {MAX_READINGS} readings is the most"),
+                    format!("{runs} runs of {steps:.0} steps; the limit is {MAX_READINGS} readings"),
                     None,
                 ));
             }

@@ -28,8 +28,7 @@ pub(super) fn unlike(tests: &[Test]) -> Vec<String> {
             };
             if own(first) != own(test) {
                 warnings.push(format!(
-                    "tests \"{}\" and \"{}\" share the set-up \"{}\" and describe it differently; it is mounted once and \
-                     lies in one place",
+                    "tests \"{}\" and \"{}\" share the set-up \"{}\" and describe it differently; an object that is mounted once has one position",
                     first.name,
                     test.name,
                     test.group(group)
@@ -80,7 +79,7 @@ pub(super) fn socket_distances(
     let mut distances = Vec::new();
     for item in value.list("tables [[socket_distance]]")? {
         let mut table = item.table("[[socket_distance]]".into())?;
-        let between = table.need("between", "the two sockets, as [\"0\", \"1\"]")?;
+        let between = table.need("between", "the two sockets, such as [\"0\", \"1\"]")?;
         let (source, span) = (between.source, between.span.clone());
         let mut names = Vec::new();
         for name in between.list("a list of two sockets")? {
@@ -99,10 +98,10 @@ pub(super) fn socket_distances(
             names.push(socket);
         }
         let Ok(between) = <[String; 2]>::try_from(names) else {
-            return Err(source.error(span, "`between` takes two sockets", None));
+            return Err(source.error(span, "`between` needs two sockets", None));
         };
         if between[0] == between[1] {
-            return Err(source.error(span, "`between` takes two different sockets", None));
+            return Err(source.error(span, "`between` needs two different sockets", None));
         }
         let distance_mm = table.need("mm", "the distance in mm")?.positive()?;
         let u_mm = match table.take("u_um") {

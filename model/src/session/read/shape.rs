@@ -133,11 +133,11 @@ fn suffixed<'a>(
         let Some(degrees) = unit.degrees(suffix) else {
             let id_stem = key.trim_end_matches(suffix);
             let message = format!("`{key}` for a driver in {}", unit.suffix());
-            let help = format!("it takes `{id_stem}{}`", unit.suffix());
+            let help = format!("use `{id_stem}{}`", unit.suffix());
             return Err(value.source.error(value.key_span.clone(), message, Some(help)));
         };
         if found.is_some() {
-            return Err(value.error(format!("`{key}` beside the same in another unit"), None));
+            return Err(value.error(format!("`{key}` is given twice, in two units"), None));
         }
         found = Some((value, degrees));
     }
@@ -245,7 +245,7 @@ pub(super) fn shape(
             })
         }
         other => {
-            let message = format!("\"{other}\" is no shape");
+            let message = format!("\"{other}\" is not a shape");
             Err(value.error(message, Some(known_names(other, &SHAPES))))
         }
     }

@@ -97,7 +97,7 @@ fn ball_bar(context: &Context<'_>, table: &mut Table<'_>) -> Result<SetUp, Model
     let bar = table.need("bar_mm", "the calibrated length of the bar")?;
     let (bar_as_written, bar_mm) = context.length(&bar)?;
     if bar_mm <= 0.0 {
-        return Err(bar.error(format!("`bar_mm` is {bar_mm}; a bar has a length above 0"), None));
+        return Err(bar.error(format!("`bar_mm` is {bar_mm}; it must be greater than 0"), None));
     }
     let Balls {
         workpiece: (workpiece, workpiece_mm),
@@ -132,11 +132,11 @@ struct Balls {
 fn balls(context: &Context<'_>, table: &mut Table<'_>) -> Result<Balls, ModelError> {
     let workpiece = table.need(
         "workpiece_ball_mm",
-        "the workpiece ball in the table frame, as [0, 100, 0]",
+        "the workpiece ball in the table frame, such as [0, 100, 0]",
     )?;
     let spindle = table.need(
         "spindle_ball_mm",
-        "the spindle ball in the tool frame, as [0, 0, 0]",
+        "the spindle ball in the tool frame, such as [0, 0, 0]",
     )?;
     let (workpiece, spindle) = (context.point(workpiece)?, context.point(spindle)?);
     let mut priors = priors(table.take("workpiece_ball_u_um"), 3)?;
@@ -188,7 +188,7 @@ fn sensors(table: &mut Table<'_>) -> Result<Option<[[f64; 3]; 3]>, ModelError> {
         (Some(_), Some(directions)) => Err(directions.source.error(
             directions.key_span.clone(),
             "both `sensor_angles_deg` and `sensor_directions`",
-            Some("keep one of them: either says along which directions the sensors count".into()),
+            Some("keep one of them: either states the measuring directions of the sensors".into()),
         )),
         (None, None) => Ok(None),
         (Some(angles), None) => {
@@ -217,7 +217,8 @@ fn sensors(table: &mut Table<'_>) -> Result<Option<[[f64; 3]; 3]>, ModelError> {
                 let message = format!(
                     "the three `sensor_directions` lie almost in a plane (their triple product is {volume:.3}; 1 at right angles)"
                 );
-                let help = "sensors that read three coordinates point three ways; check the directions";
+                let help =
+                    "three coordinates need three independent measuring directions; check the directions";
                 return Err(source.error(span, message, Some(help.into())));
             }
             Ok(Some(rows))
@@ -276,10 +277,10 @@ fn socket(context: &Context<'_>, table: &mut Table<'_>) -> Result<SetUp, ModelEr
 fn probe(context: &Context<'_>, table: &mut Table<'_>) -> Result<SetUp, ModelError> {
     let artefact = table.need("artefact_mm", "a point of the cylinder's axis in the table frame")?;
     let (artefact, artefact_mm) = context.point(artefact)?;
-    let radius = table.need("radius_mm", "the cylinder's radius, the stylus' included")?;
+    let radius = table.need("radius_mm", "the radius of the cylinder plus that of the stylus")?;
     let (radius_as_written, radius_mm) = context.length(&radius)?;
     if radius_mm <= 0.0 {
-        let message = format!("`radius_mm` is {radius_mm}; a cylinder has a radius above 0");
+        let message = format!("`radius_mm` is {radius_mm}; it must be greater than 0");
         return Err(radius.error(message, None));
     }
     let stylus = table.need("stylus_mm", "the stylus' centre in the tool frame")?;
@@ -328,7 +329,7 @@ fn unit_vector(value: Value<'_>) -> Result<[f64; 3], ModelError> {
     }
     let length = vector.iter().map(|x| x * x).sum::<f64>().sqrt();
     if length < 1e-9 {
-        return Err(source.error(span, format!("`{key}` has no length"), None));
+        return Err(source.error(span, format!("`{key}` is zero"), None));
     }
     Ok(vector.map(|x| x / length))
 }
@@ -365,11 +366,11 @@ fn prior(value: &Value<'_>) -> Result<Prior, ModelError> {
     let u = value.number_or_inf("a number or `inf`")?;
     if u < 0.0 {
         let message = format!("`{}` is {u}; an uncertainty cannot be negative", value.key);
-        let help = "0 says exactly known, `inf` says not known at all";
+        let help = "0 means exactly known, `inf` means unknown";
         return Err(value.error(message, Some(help.into())));
     }
     if let Some(fault) = limits::too_small_um(u) {
-        let help = "0 says exactly known";
+        let help = "0 means exactly known";
         return Err(value.error(format!("`{}` is {fault}", value.key), Some(help.into())));
     }
     Ok(if u == 0.0 {

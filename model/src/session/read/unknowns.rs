@@ -51,7 +51,7 @@ pub(super) fn unknowns(
             continue;
         }
         if unknowns.contains(&name) {
-            return Err(item.error(format!("`{name}` stands twice among the unknowns"), None));
+            return Err(item.error(format!("`{name}` occurs twice in `errors`"), None));
         }
         unknowns.push(name);
     }
@@ -64,7 +64,7 @@ fn matching(machine: &Machine, item: &Value<'_>, text: &str) -> Result<Vec<Error
     if found.is_empty() {
         let axes: Vec<&str> = machine.axes.iter().map(|axis| axis.name.as_str()).collect();
         let help = format!(
-            "`?` stands for one character, `*` for any number of them, as in \"E?0C\", the location errors of C, and \"E?0J*\"; the axes are {}",
+            "`?` matches one character and `*` any number of them: \"E?0C\" for the location errors of C, \"E?0J*\" for those of all joints; the axes are {}",
             axes.join(", ")
         );
         return Err(item.error(format!("\"{text}\" matches no error of the machine"), Some(help)));
@@ -77,7 +77,10 @@ fn error_name(machine: &Machine, item: &Value<'_>) -> Result<ErrorName, ModelErr
     let text = item.text()?;
     let Some(mut name) = ErrorName::parse(&text) else {
         let help = "ISO 230-1 names such as \"EY0A\" (location) and \"EYA\" (motion), or `e_y0a`, `θ_z0c`";
-        return Err(item.error(format!("\"{text}\" is no error's name"), Some(help.into())));
+        return Err(item.error(
+            format!("\"{text}\" is not the name of an error"),
+            Some(help.into()),
+        ));
     };
     match quantity::axis_index(machine, &name.axis) {
         Some(index) => name.axis.clone_from(&machine.axes[index].name),

@@ -62,7 +62,7 @@ pub(super) fn said(readings: &Readings, kept: &[usize]) -> String {
         ),
     };
     format!(
-        "{}: {count} {are} {copies_of} in every column (line {}); {they} left out, not taken as repeats",
+        "{}: {count} {are} {copies_of} in every column (line {}); {they} removed, not treated as repeats",
         readings.file.display(),
         lines.join(", ")
     )

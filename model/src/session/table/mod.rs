@@ -23,7 +23,7 @@ use columns::{Column, Role};
 use rows::Rows;
 
 use crate::chain::Machine;
-use crate::error::{ModelError, Place};
+use crate::error::{Location, ModelError};
 use crate::instrument::InstrumentKind;
 use crate::session::limits;
 use crate::session::readings::Readings;
@@ -106,7 +106,7 @@ pub(crate) fn read(file: &Path, request: &Request<'_>) -> Result<(BySocket, Vec<
         (rows.stamp().clone(), Source::Text(rows))
     };
     let empty = |what: &str| ModelError::Input {
-        place: Place::file(file),
+        location: Location::file(file),
         message: format!("an empty data file: {what}"),
         help: Some("check that the measurement was exported".into()),
     };
@@ -130,9 +130,9 @@ pub(crate) fn read(file: &Path, request: &Request<'_>) -> Result<(BySocket, Vec<
     match filled.readings.line.len() {
         0 => Err(empty("a header without readings")),
         1 => Err(ModelError::Input {
-            place: Place::line(file, filled.readings.line[0]),
-            message: "one reading; nothing can be fitted to a single reading".into(),
-            help: Some("a test needs at least two readings, and as many as its unknowns in all".into()),
+            location: Location::line(file, filled.readings.line[0]),
+            message: "one reading, which is not enough for a fit".into(),
+            help: Some("a test needs at least two readings, and as many as it has parameters".into()),
         }),
         _ => Ok((filled.by_socket(), warning.into_iter().collect())),
     }
@@ -163,8 +163,8 @@ fn wrong_width(file: &Path, row: &rows::Row, width: usize, format: &Format) -> M
         "complete the row or remove it"
     };
     ModelError::Input {
-        place: Place::line(file, row.line),
-        message: format!("a row of {} where the file has {width} columns", cells(found)),
+        location: Location::line(file, row.line),
+        message: format!("a row of {}, but the file has {width} columns", cells(found)),
         help: Some(help.into()),
     }
 }
@@ -219,14 +219,14 @@ impl<'a> Filled<'a> {
         for column in &self.columns {
             let cell = row.cells[column.index].as_str();
             if column.role == Role::Socket {
-                let place = Place::line(&readings.file, row.line);
-                self.socket.push(socket_index(&mut self.sockets, cell, place)?);
+                let location = Location::line(&readings.file, row.line);
+                self.socket.push(socket_index(&mut self.sockets, cell, location)?);
                 continue;
             }
             let fault = |message: String, help: &str| ModelError::Input {
-                place: Place {
+                location: Location {
                     span: row.span(column.index),
-                    ..Place::line(&readings.file, row.line)
+                    ..Location::line(&readings.file, row.line)
                 },
                 message: format!("column {} (`{}`): {message}", column.index + 1, column.name),
                 help: Some(help.to_string()),
@@ -238,8 +238,8 @@ impl<'a> Filled<'a> {
                         && value < before
                     {
                         return Err(fault(
-                            format!("time runs backwards: {value} s after {before} s on the row before"),
-                            "sort the rows by time, or leave the time column out of [columns] if it means nothing",
+                            format!("time decreases: {value} s after {before} s in the row before"),
+                            "sort the rows by time, or omit the time column from [columns] if it has no meaning",
                         ));
                     }
                     readings.time_s.push(value);
@@ -247,8 +247,8 @@ impl<'a> Filled<'a> {
                 Role::Run => {
                     if value.fract() != 0.0 || value.abs() > 1e9 {
                         return Err(fault(
-                            format!("`{cell}` numbers no run"),
-                            "runs are numbered by whole numbers, one for each traversal in one direction",
+                            format!("`{cell}` is not a run number"),
+                            "run numbers are integers, one for each traversal in one direction",
                         ));
                     }
                     readings.run.push(value as i64);
@@ -292,12 +292,12 @@ impl<'a> Filled<'a> {
 }
 
 /// The index of a socket among those found so far in the file.
-fn socket_index(sockets: &mut Vec<String>, name: &str, place: Place) -> Result<usize, ModelError> {
+fn socket_index(sockets: &mut Vec<String>, name: &str, location: Location) -> Result<usize, ModelError> {
     if let Some(known) = sockets.iter().position(|socket| socket == name) {
         return Ok(known);
     }
     let fault = |message: String, help: &str| ModelError::Input {
-        place,
+        location,
         message,
         help: Some(help.into()),
     };
@@ -305,15 +305,15 @@ fn socket_index(sockets: &mut Vec<String>, name: &str, place: Place) -> Result<u
         let message = format!("more than {MAX_SOCKETS} sockets in column `socket`");
         return Err(fault(
             message,
-            "a socket has many poses; is the column the socket's name?",
+            "a socket has many poses; does the column contain the socket's name?",
         ));
     }
     if let Some(control) = name.chars().find(|c| c.is_control()) {
         let message = format!(
-            "a socket's name holds the control character U+{:04X}",
+            "a socket's name contains the control character U+{:04X}",
             control as u32
         );
-        return Err(fault(message, "names are shown as they are: leave it out"));
+        return Err(fault(message, "remove it"));
     }
     sockets.push(name.to_string());
     Ok(sockets.len() - 1)
@@ -321,15 +321,15 @@ fn socket_index(sockets: &mut Vec<String>, name: &str, place: Place) -> Result<u
 
 /// A finite number in a cell, or its fault and what to do.
 fn number(cell: &str, format: &Format) -> Result<f64, (String, &'static str)> {
-    const NUMBER: &str = "put a number there or remove the row";
+    const NUMBER: &str = "enter a number or remove the row";
     if cell.is_empty() {
         return Err(("an empty cell where a number is expected".into(), NUMBER));
     }
     let parsed = if format.decimal == b',' {
         if cell.contains('.') {
             return Err((
-                format!("`{cell}` has a decimal point where `decimal = \",\"` is declared"),
-                "declare what the file uses",
+                format!("`{cell}` has a decimal point, but `decimal = \",\"` is declared"),
+                "declare the decimal sign of the file",
             ));
         }
         cell.replace(',', ".").parse::<f64>()
@@ -341,7 +341,7 @@ fn number(cell: &str, format: &Format) -> Result<f64, (String, &'static str)> {
         Ok(value) if value.is_nan() => Err((format!("`{cell}` is not a number (NaN)"), NUMBER)),
         Ok(_) => {
             let fault = format!(
-                "`{cell}` is infinite or too large; {:e} is the most",
+                "`{cell}` is infinite or too large; the limit is {:e}",
                 limits::LARGEST
             );
             Err((fault, NUMBER))

@@ -8,7 +8,7 @@ use std::path::{Path, PathBuf};
 use encoding_rs::{Encoding, UTF_8, UTF_16BE, UTF_16LE};
 
 use super::{Format, encoding};
-use crate::error::{ModelError, Place};
+use crate::error::{Location, ModelError};
 use crate::session::stamp::FileStamp;
 
 /// Largest length of one line, bytes.
@@ -27,7 +27,7 @@ const LIMITS: Limits = Limits {
 };
 
 /// The remedy for a file that is too long.
-const SPLIT: &str = "leave out readings (every tenth will do), or split the file over several tests";
+const SPLIT: &str = "thin out the readings (every tenth is enough), or split the file into several tests";
 
 /// One row.
 #[derive(Clone, Debug)]
@@ -95,7 +95,7 @@ impl Rows {
 
     fn within(file: &Path, format: &Format, limits: Limits) -> Result<Rows, ModelError> {
         let fault = |message: String, help: &str| ModelError::Input {
-            place: Place::file(file),
+            location: Location::file(file),
             message,
             help: Some(help.into()),
         };
@@ -115,7 +115,7 @@ impl Rows {
         if found.len() > limits.bytes {
             return Err(fault(
                 format!(
-                    "a data file of {} bytes; {} is the most that is read",
+                    "a data file of {} bytes; the limit is {}",
                     found.len(),
                     limits.bytes
                 ),
@@ -167,7 +167,7 @@ impl Rows {
             self.rows += 1;
             if self.rows > self.limits.rows {
                 let most = self.limits.rows;
-                return Err(self.fault(format!("a row beyond {most}, the most that are read"), SPLIT));
+                return Err(self.fault(format!("more than {most} rows, which is the limit"), SPLIT));
             }
             return Ok(Some(Row {
                 line: self.line,
@@ -205,12 +205,12 @@ impl Rows {
         // The length of a pipe is unknown in advance.
         if self.byte as u64 > self.limits.bytes {
             let most = self.limits.bytes;
-            return Err(self.fault(format!("more than {most} bytes, the most that are read"), SPLIT));
+            return Err(self.fault(format!("more than {most} bytes, which is the limit"), SPLIT));
         }
         if self.buffer.len() as u64 >= LONGEST_LINE && !self.ends_with(b'\n') {
             return Err(self.fault(
                 format!("a line of more than {LONGEST_LINE} bytes"),
-                "a data file has a line for each reading; is it one?",
+                "a data file has one line per reading; check that it is a data file",
             ));
         }
         for end in [b'\n', b'\r'] {
@@ -262,14 +262,14 @@ impl Rows {
     fn decoded(&mut self) -> Result<String, ModelError> {
         let (text, found) = encoding::decode(&self.buffer, self.encoding).map_err(|encoding| {
             let name = encoding::name_of(encoding);
-            let help = "declare what the file is written in, as `[format] encoding = \"latin1\"`";
+            let help = "declare the encoding of the file, such as `[format] encoding = \"latin1\"`";
             self.fault(format!("the line is not valid {name}"), help)
         })?;
         let text = text.into_owned();
         if text.contains('\r') {
             return Err(self.fault(
                 "a carriage return within a line".into(),
-                "save the file with lines that end in LF or CRLF",
+                "save the file with line ends LF or CRLF",
             ));
         }
         // One line that is not UTF-8 determines the encoding of all that follow.
@@ -282,8 +282,8 @@ impl Rows {
     fn quoted(&self, text: &str) -> Result<Vec<String>, ModelError> {
         if text.matches('"').count() % 2 == 1 {
             return Err(self.fault(
-                "a quote without its end".into(),
-                "a quoted cell begins and ends on its line",
+                "a quote is not closed".into(),
+                "a quoted cell must end on its line",
             ));
         }
         let mut record = csv::StringRecord::new();
@@ -296,15 +296,15 @@ impl Rows {
             Ok(true) => Ok(record.iter().map(str::to_string).collect()),
             Ok(false) => Ok(Vec::new()),
             Err(cause) => Err(self.fault(
-                format!("quotes that cannot be read: {cause}"),
-                "a quoted cell begins and ends on its line",
+                format!("invalid quotes: {cause}"),
+                "a quoted cell must end on its line",
             )),
         }
     }
 
     fn fault(&self, message: String, help: &str) -> ModelError {
         ModelError::Input {
-            place: Place::line(&self.file, self.line),
+            location: Location::line(&self.file, self.line),
             message,
             help: Some(help.to_string()),
         }

@@ -13,7 +13,7 @@ use zip::ZipArchive;
 
 use super::Format;
 use super::rows::Row;
-use crate::error::{ModelError, Place};
+use crate::error::{Location, ModelError};
 use crate::session::stamp::FileStamp;
 
 /// Whether a file is a spreadsheet, by its name.
@@ -39,7 +39,7 @@ const MAX_CELLS: usize = 20_000_000;
 /// The rows of a sheet, and the state of the file.
 pub(super) fn rows(file: &Path, format: &Format) -> Result<(FileStamp, Vec<Row>), ModelError> {
     let fault = |message: String, help: String| ModelError::Input {
-        place: Place::file(file),
+        location: Location::file(file),
         message,
         help: Some(help),
     };
@@ -51,20 +51,17 @@ pub(super) fn rows(file: &Path, format: &Format) -> Result<(FileStamp, Vec<Row>)
     };
     let found = std::fs::metadata(file).map_err(|cause| broken(cause.into()))?;
     if !found.is_file() {
-        return Err(broken(std::io::Error::other("it is no file").into()));
+        return Err(broken(std::io::Error::other("it is not a file").into()));
     }
     if found.len() > MAX_BYTES {
         return Err(fault(
-            format!(
-                "a spreadsheet of {} bytes; {MAX_BYTES} is the most that is read",
-                found.len()
-            ),
+            format!("a spreadsheet of {} bytes; the limit is {MAX_BYTES}", found.len()),
             "export it as CSV".into(),
         ));
     }
     if unpacks_beyond(file, MAX_UNPACKED) {
         return Err(fault(
-            format!("a spreadsheet that unpacks to more than {MAX_UNPACKED} bytes, the most that is read"),
+            format!("a spreadsheet that unpacks to more than {MAX_UNPACKED} bytes, which is the limit"),
             "export it as CSV".into(),
         ));
     }
@@ -90,15 +87,15 @@ pub(super) fn rows(file: &Path, format: &Format) -> Result<(FileStamp, Vec<Row>)
         }
     }
     if let Some(what) = stamp.changed() {
-        return Err(fault(what, "wait until it is written, and try again".into()));
+        return Err(fault(what, "wait until it is written and try again".into()));
     }
     match filled.len() {
         0 | 1 => Ok((stamp, filled.pop().map(|(_, rows)| rows).unwrap_or_default())),
         _ => {
             let names: Vec<&str> = filled.iter().map(|(name, _)| name.as_str()).collect();
             Err(fault(
-                format!("several sheets hold cells: {}", names.join(", ")),
-                format!("say which one: `[format] sheet = \"{}\"`", names[0]),
+                format!("several sheets contain cells: {}", names.join(", ")),
+                format!("select one: `[format] sheet = \"{}\"`", names[0]),
             ))
         }
     }
@@ -128,7 +125,7 @@ fn unpacks_beyond(file: &Path, most: u64) -> bool {
 /// Calls the library. It may panic on a contradictory file (a row number beyond 32 bits, in builds with overflow checks); the panic
 /// becomes an ordinary error.
 fn guarded<T>(read: impl FnOnce() -> Result<T, calamine::Error>) -> Result<T, calamine::Error> {
-    let contradicts = || std::io::Error::other("its contents contradict each other").into();
+    let contradicts = || std::io::Error::other("its content is contradictory").into();
     catch_unwind(AssertUnwindSafe(read)).unwrap_or_else(|_| Err(contradicts()))
 }
 
@@ -178,10 +175,10 @@ fn by_row(mut cells: Vec<Placed>, format: &Format) -> Result<Vec<Row>, (String, 
     let (Some(left), Some(right)) = (columns().min(), columns().max()) else {
         return Ok(Vec::new());
     };
-    let help = "clear what lies beside the table, or export it as CSV";
+    let help = "remove the cells beside the table, or export it as CSV";
     if right - left >= MAX_COLUMNS {
         let message = format!(
-            "cells from column {} to column {}; {MAX_COLUMNS} columns are the most",
+            "cells from column {} to column {}; the limit is {MAX_COLUMNS} columns",
             left + 1,
             u64::from(right) + 1
         );
@@ -197,7 +194,7 @@ fn by_row(mut cells: Vec<Placed>, format: &Format) -> Result<Vec<Row>, (String, 
             continue;
         }
         if (rows.len() + 1) * width > MAX_CELLS {
-            let message = format!("more than {MAX_CELLS} cells in the rectangle around all that are filled");
+            let message = format!("more than {MAX_CELLS} cells in the rectangle around all filled cells");
             return Err((message, help.into()));
         }
         let mut texts = vec![String::new(); width];

@@ -10,7 +10,7 @@ use quick_xml::Reader;
 use quick_xml::events::{BytesStart, Event};
 
 use super::super::encoding;
-use crate::error::{ModelError, Place};
+use crate::error::{Location, ModelError};
 use crate::session::stamp::FileStamp;
 
 /// Largest file size, bytes.
@@ -52,7 +52,7 @@ struct Open {
 /// The state of a file and its text.
 fn decoded(file: &Path, stated: Option<&'static Encoding>) -> Result<(FileStamp, String), ModelError> {
     let fault = |message: String| ModelError::Input {
-        place: Place::file(file),
+        location: Location::file(file),
         message,
         help: Some("check `data` and the file".into()),
     };
@@ -66,7 +66,7 @@ fn decoded(file: &Path, stated: Option<&'static Encoding>) -> Result<(FileStamp,
         .map_err(unreadable)?;
     if bytes.len() as u64 > MAX_BYTES {
         return Err(fault(format!(
-            "more than {MAX_BYTES} bytes, the most that are read of a ball-bar file in XML"
+            "more than {MAX_BYTES} bytes, the limit of a ball-bar file in XML"
         )));
     }
     stamp.check(&opened)?;
@@ -98,10 +98,10 @@ pub(super) fn parse(
             .count();
         counted = until;
         let broken = |cause: String| ModelError::Input {
-            place: Place::line(file, line),
+            location: Location::line(file, line),
             message: format!("not valid XML: {cause}"),
             help: Some(
-                "a ball-bar file in XML is expected; other files are read by another name, as .csv or .xlsx"
+                "a ball-bar file in XML is expected; other files need another name, such as .csv or .xlsx"
                     .into(),
             ),
         };
@@ -113,7 +113,7 @@ pub(super) fn parse(
                 return Err(broken(format!("it ends within <{unclosed}>")));
             }
             Ok(Event::Start(_)) if open.len() == MAX_DEPTH => {
-                return Err(broken(format!("elements nested deeper than {MAX_DEPTH}")));
+                return Err(broken(format!("elements are nested deeper than {MAX_DEPTH}")));
             }
             Ok(Event::Start(start)) => open.push(opened(&start, line, &mut contents, &broken)?),
             Ok(Event::Empty(start)) => {

@@ -11,8 +11,8 @@ const ANTICLOCKWISE: [&str; 6] = [
     "ANTI_CLOCKWISE",
     "COUNTER_CLOCKWISE",
 ];
-const KNOWN: &str = "words that speak for themselves are CW, CCW, CLOCKWISE, ANTICLOCKWISE, COUNTERCLOCKWISE; for others say \
-                     `[format] anticlockwise = \"…\"`, which word means from the first axis of the plane towards the second";
+const KNOWN: &str = "known words are CW, CCW, CLOCKWISE, ANTICLOCKWISE, COUNTERCLOCKWISE; for others use \
+                     `[format] anticlockwise = \"…\"`, the word for the direction from the first axis of the plane towards the second";
 
 /// For each run, whether it goes from the first axis of the plane towards the second. If that is unknown: a line, a message and what to
 /// do.
@@ -38,7 +38,7 @@ pub(super) fn of_runs(runs: &[Run], stated: Option<&str>) -> Result<Vec<bool>, (
                 Some(stated) if *stated == word => Ok(true),
                 Some(_) if other.get_or_insert_with(|| word.clone()) == &word => Ok(false),
                 Some(_) => fault(format!(
-                    "RUN_DIRECTION is `{direction}`: neither the word stated by `anticlockwise`, nor `{}`, which is the other one in this file",
+                    "RUN_DIRECTION is `{direction}`: neither the word stated by `anticlockwise`, nor `{}`, the other word in this file",
                     other.as_deref().unwrap_or("")
                 )),
                 None => fault(format!("RUN_DIRECTION is `{direction}`, which is not known")),

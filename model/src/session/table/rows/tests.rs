@@ -23,12 +23,12 @@ fn a_file_at_its_limits_is_read_and_one_beyond_them_is_refused() {
     assert_eq!(read("1,2\n3,4\n5,6\n", limits, still), Ok(3));
     let long = read("1,2\n3,4\n5,67\n", limits, still).unwrap_err();
     assert!(
-        long.ends_with("a data file of 13 bytes; 12 is the most that is read"),
+        long.ends_with("a data file of 13 bytes; the limit is 12"),
         "{long}"
     );
     let many = read("1\n2\n3\n4\n", limits, still).unwrap_err();
     assert!(
-        many.ends_with("data.csv:4: a row beyond 3, the most that are read"),
+        many.ends_with("data.csv:4: more than 3 rows, which is the limit"),
         "{many}"
     );
 }
