@@ -1,7 +1,7 @@
-//! Description length: several effects that follow one axis are attributed to one that says as much, or are given back where they explain nothing.
+//! Description length: merges effects that follow one axis into one effect, and withdraws effects that explain nothing.
 //!
-//! A group of effects is worth what it explains together, `−ln P(χ²)`, less what it takes to say it: each effect's cost, and `ln n` for having been chosen
-//! among the `n` entries of the library that the session can see.
+//! The value of a group of effects is its joint evidence `−ln P(χ²)` less its description length. The description length of an
+//! effect is its cost plus `ln n`, where `n` is the number of detectable effects in the library.
 
 use abbe_model::effect::{Driver, Shape};
 use rayon::prelude::*;
@@ -12,12 +12,12 @@ use super::score::Gain;
 use super::search::{Search, SearchBranch, SelectedEffect};
 use crate::error::IdentifyError;
 
-/// How finely the curves without a name are divided, one after another.
+/// Numbers of intervals of the nonparametric curves.
 const INTERVALS: [usize; 3] = [8, 16, 32];
 
 impl Search<'_> {
-    /// Puts several effects that follow one axis down to one, where that one explains as much with a shorter description. From three effects or places on, a free curve may
-    /// be that one.
+    /// Merges several effects that follow one axis into one effect, if it explains as much with a shorter description. For three
+    /// or more effects or positions, a nonparametric curve is a candidate too.
     pub fn merge(&mut self) -> Result<(), IdentifyError> {
         if self.stop.in_residual_variance {
             return Ok(());
@@ -46,7 +46,7 @@ impl Search<'_> {
         Ok(())
     }
 
-    /// The axes that effects follow which a search has added, each once.
+    /// The axes that the selected effects follow, each once.
     fn axes_followed(&self, track: usize) -> Vec<Driver> {
         let mut drivers: Vec<Driver> = Vec::new();
         for candidate in self.tracks[track].chosen() {
@@ -58,7 +58,7 @@ impl Search<'_> {
         drivers
     }
 
-    /// Puts a group of effects down to one, if one explains as much with a shorter description. Returns whether it did.
+    /// Merges a group of effects into one effect, if it explains as much with a shorter description. Returns whether it did.
     fn merge_group(&mut self, track: usize, group: &[usize]) -> Result<bool, IdentifyError> {
         let columns: usize = group.iter().map(|c| self.moments.count[*c]).sum();
         let curves = group.len() > 2 || columns > 2 && self.is_composed(group);
@@ -101,8 +101,8 @@ impl Search<'_> {
         group.iter().any(composed)
     }
 
-    /// Gives back effects that follow one axis where they are no explanation: where curves over that axis, another in every test and in no component's name,
-    /// say as much with a shorter description. One simple effect is asked only where structure remains beside it.
+    /// Withdraws effects that follow one axis if curves over that axis, one for each test and without a component, explain as
+    /// much with a shorter description. A single simple effect is compared only if significant structure remains.
     pub fn withdraw(&mut self, structured: bool) -> Result<(), IdentifyError> {
         for track in 0..self.tracks.len() {
             for driver in self.axes_followed(track) {
@@ -129,7 +129,8 @@ impl Search<'_> {
         self.note_held_out()
     }
 
-    /// What curves over an axis say, another in every test: `None` where no test carries one. They are one choice, that of the axis.
+    /// The value of curves over an axis, one for each test. `None` if no test permits such a curve. They count as one choice,
+    /// that of the axis.
     fn evidence_of_test_curves(
         &mut self,
         driver: &Driver,
@@ -145,7 +146,7 @@ impl Search<'_> {
         Ok(Some(self.evidence_of(&curves, rest, folds)? - self.choice()))
     }
 
-    /// Curves over an axis, one in each test: laid over the readings when they are first asked for.
+    /// Curves over an axis, one for each test. Their columns are computed at the first call.
     fn test_curve(&mut self, driver: &Driver, intervals: usize) -> Vec<usize> {
         let fresh = self.columns.curves_of_tests(driver, intervals);
         let effects: Vec<_> = fresh.iter().map(|(effect, _)| effect.clone()).collect();
@@ -164,7 +165,7 @@ impl Search<'_> {
         (first..self.candidates.len()).collect()
     }
 
-    /// What it costs to have chosen one entry of the library.
+    /// Description length of the choice of one effect in the library.
     fn choice(&self) -> f64 {
         (self.seen_entries().max(1) as f64).ln()
     }
@@ -176,7 +177,7 @@ impl Search<'_> {
             .sum()
     }
 
-    /// `−ln P` of what candidates gain together.
+    /// `−ln P` of the joint gain of candidates.
     pub(super) fn evidence_of(
         &self,
         group: &[usize],
@@ -187,7 +188,7 @@ impl Search<'_> {
         self.evidence_of_gain(self.lean_model_of(&all, folds)?.explained(), group, rest, folds)
     }
 
-    /// The same of some and one more, which need not have a place in the base.
+    /// `−ln P` of the joint gain of candidates and one more, which need not be in the base.
     pub(super) fn evidence_with(
         &self,
         some: &[usize],
@@ -217,14 +218,14 @@ impl Search<'_> {
         Ok(self.evidence(&gain, self.variance(&without)))
     }
 
-    /// Which of the chosen follow a driver, and which do not.
+    /// Divides the chosen candidates into those that follow a driver and the others.
     fn following(&self, driver: &Driver, chosen: &[usize]) -> (Vec<usize>, Vec<usize>) {
         chosen
             .iter()
             .partition(|candidate| self.candidates[**candidate].effect.driver == *driver)
     }
 
-    /// The one of a pool that says more than a group, if there is one.
+    /// The candidate of a pool with a larger value than a group, if there is one.
     fn shorter_description(
         &self,
         group: &[usize],

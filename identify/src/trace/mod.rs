@@ -1,12 +1,15 @@
 //! Find the unmodelled effect behind the residual of a fitted model.
 //!
-//! 1. Noise first: size and memory from repeats ([`crate::noise`]), outliers left out by name ([`crate::outliers`]).
-//! 2. The library of effects ([`library`]) is laid over the session (`columns`) and multiplied once with model, residual and null draws (`moments`).
-//! 3. The search (`search`) adds, removes and exchanges effects; its p-values come from the same search on readings without structure (`null`).
-//!    An effect is claimed where its p-value is below the level of significance and the held-out error falls by more than the standard error of the fall,
-//!    which follows from paired differences over runs, blocks or poses (`paired`).
-//! 4. Everything is refitted together (`judge`), and reported before and after (`report`) on readings that neither fit nor search saw.
-//! 5. For each effect, what would look the same ([`alias`]); for the rest, whether it has structure (`remainder`).
+//! 1. The noise standard deviation and autocorrelation follow from repeats ([`crate::noise`]). Outliers are excluded by name
+//!    ([`crate::outliers`]).
+//! 2. The basis columns of the library's effects ([`library`]) are computed for the session (`columns`). Their products with the
+//!    model, the residual and the null draws are computed once (`moments`).
+//! 3. The search (`search`) adds, removes and exchanges effects. Its p-values come from the same search on readings without
+//!    structure (`null`). An effect is claimed if its p-value is below the significance level and the held-out error decreases by
+//!    more than the standard error of the decrease. That standard error follows from paired differences over runs, blocks or
+//!    poses (`paired`).
+//! 4. All parameters are refitted together (`judge`). The result (`result`) states the held-out error before and after.
+//! 5. For each effect the trace lists its aliases ([`alias`]). It tests the residual for remaining structure (`remainder`).
 
 pub mod alias;
 mod chi_square_tail;
@@ -52,21 +55,21 @@ use rounds::{Account, search_on};
 use search::{Search, Stop};
 use start::Start;
 
-/// What a user can ask of a trace.
+/// Options of a trace.
 #[derive(Clone, Debug)]
 pub struct TraceOptions {
-    /// Seed of folds and null draws.
+    /// Seed of the folds and the null draws.
     pub seed: u64,
-    /// The most effects; `None` for default: until the held-out error stops improving.
+    /// Maximum number of effects. `None`: until the held-out error stops improving.
     pub max_effects: Option<usize>,
-    /// If not empty, only candidates whose identifier contains one of these.
+    /// If not empty, only candidates whose identifier contains one of these strings are searched.
     pub only: Vec<String>,
-    /// Candidates whose identifier contains one of these are left out.
+    /// Candidates whose identifier contains one of these strings are excluded.
     pub exclude: Vec<String>,
     /// Number of null draws.
     pub draws: usize,
-    /// Probability that a session without structure is claimed to have an effect, if the null were exact. What is estimated of the noise makes it larger: see
-    /// the rates in the documentation of the method.
+    /// Probability that the trace claims an effect on readings without structure, if the null distribution is exact. The noise
+    /// model is estimated, which increases this probability. The documentation of the method gives measured rates.
     pub significance: f64,
 }
 
@@ -83,61 +86,63 @@ impl Default for TraceOptions {
     }
 }
 
-/// How far a trace has come, for those who wait.
+/// Progress of a trace.
 #[derive(Clone, Debug)]
 pub enum Progress {
     /// The declared model is being fitted.
     Fitting,
-    /// The library is being multiplied with the readings: how many candidates.
+    /// The candidates are being screened: the number of candidates.
     Screening(usize),
-    /// An effect was taken: its number, its identifier, the held-out rms in µm.
+    /// An effect was added: the number of effects, its identifier, the held-out rms in µm.
     SelectedEffect(usize, String, f64),
-    /// The found effects are being refitted and judged.
+    /// The model with the found effects is being refitted, and its residual tested.
     Judging,
-    /// Nothing new: asked often, so that an end is heeded soon.
+    /// No new event. Reported often, so that the caller can stop the trace soon.
     Working,
 }
 
-/// Sessions along runs have few effects; more than this says that something else is meant.
+/// Maximum number of effects for readings along runs. A larger number indicates a different cause.
 const MAX_ALONG_RUNS: usize = 12;
-/// Poses of a robot have many.
+/// Maximum number of effects for independent poses.
 const MAX_OF_POSES: usize = 200;
 
-/// One addition of a search.
+/// One addition of the search.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Step {
-    /// The effect that was added, by its identifier; later rounds may have let it go or exchanged it.
+    /// Identifier of the added effect. A later round may have removed or exchanged it.
     pub id: String,
-    /// How many effects there were then.
+    /// Number of effects after this addition.
     pub effects: usize,
-    /// Held-out rms then, µm.
+    /// Held-out rms after this addition, µm.
     pub heldout_rms_um: f64,
 }
 
-/// Everything that a trace knows when it ends.
+/// The outcome of a trace: the models before and after, and the result.
 pub struct Trace<'a> {
     /// The declared model.
     pub before: Problem<'a>,
-    /// Its fit.
+    /// The fit of the declared model.
     pub before_fit: Fit,
     /// The model with the found effects.
     pub after: Problem<'a>,
-    /// Its fit.
+    /// The fit of the model with the found effects.
     pub after_fit: Fit,
     /// The found effects.
     pub effects: Vec<Effect>,
-    /// For each of them what the readings cannot tell from it, nearest first.
+    /// For each found effect its aliases, nearest first.
     pub alias_effects: Vec<Vec<Effect>>,
-    /// For each of them what stands highest in its place, the best first.
+    /// For each found effect the competing explanations, best first.
     pub competing_effects: Vec<Vec<alias::CompetingEffect>>,
-    /// How the search came to them.
+    /// The additions of the search, in order.
     pub steps: Vec<Step>,
-    /// As it is reported.
+    /// The result as it is reported.
     pub result: TraceResult,
 }
 
-/// Closes the loop on a session. `progress` is told how far it has come and says whether to go on; where it says no, the trace ends within a fraction of a
-/// second after the fit of the declared model, with the effects found until then, and is marked as interrupted.
+/// Finds the unmodelled effects behind the residual of a session.
+///
+/// `progress` receives the progress and returns whether to continue. If it returns `false`, the trace ends within a fraction of a
+/// second after the fit of the declared model. It then returns the effects found so far and marks the result as interrupted.
 ///
 /// # Errors
 /// If the session cannot be fitted.
@@ -158,7 +163,8 @@ pub fn trace<'a>(
             contradicted.tell(&mut found.result);
             return Ok(found);
         }
-        // The effects that were found without the set-up explain what seemed wrong with it.
+        // The effects found without the set-up priors explain the apparent contradiction. The search therefore runs with these
+        // priors.
         return with_noise_of_repeats(problem, fitted, options, progress);
     }
     let mut found = with_noise_of_repeats(problem, fitted, options, progress)?;
@@ -166,7 +172,7 @@ pub fn trace<'a>(
     Ok(found)
 }
 
-/// Searches with the noise that repeats show, and once more where the effects that are found change it.
+/// Searches with the noise model estimated from repeats. Searches once more if the found effects change that noise model.
 fn with_noise_of_repeats<'a>(
     mut problem: Problem<'a>,
     mut before_fit: Fit,
@@ -178,7 +184,7 @@ fn with_noise_of_repeats<'a>(
     }
     let residuals = before_fit.residuals.clone();
     let first = trace_with(problem, before_fit, &residuals, options, progress)?;
-    // What moved between runs was taken for noise as long as the model lacked it.
+    // Variation between runs counts as noise as long as the model lacks its cause.
     let mut problem = first.before.clone();
     if first.result.interrupted
         || first.effects.is_empty()
@@ -191,13 +197,13 @@ fn with_noise_of_repeats<'a>(
     if !again.result.interrupted {
         return Ok(again);
     }
-    // The first search is whole, if with a noise that is less well known.
+    // The first search is complete, although its noise model is less accurate.
     let mut first = first;
     first.result.mark_interrupted();
     Ok(first)
 }
 
-/// Closes the loop with a given noise; `pure` are the residuals whose repeats show it.
+/// Traces with a given noise model. The repeats in the residuals `pure` determine the null distribution.
 fn trace_with<'a>(
     problem: Problem<'a>,
     before_fit: Fit,
@@ -211,7 +217,7 @@ fn trace_with<'a>(
     }
 }
 
-/// The same, and [`IdentifyError::Interrupted`] if it was interrupted before the search began.
+/// Traces with a given noise model, and returns [`IdentifyError::Interrupted`] if it was interrupted before the search began.
 fn searched<'a>(
     problem: &Problem<'a>,
     before_fit: &Fit,
@@ -278,11 +284,11 @@ fn searched<'a>(
         found => Some(found?),
     };
     let interrupted = found.is_none();
-    // What the search came to is reported whole.
+    // The report of the selected effects is not interrupted.
     search.interrupt = None;
     let (ended, judged) = match found {
         Some((p_value, judged)) => (Some(p_value), judged),
-        // The effects found until then are fitted; what they leave is not looked at.
+        // The effects found so far are fitted. Their residual is not tested for structure.
         None => (
             None,
             RefittedModel::of(problem, before_fit, &search, options, None)?,
@@ -328,11 +334,11 @@ fn searched<'a>(
     })
 }
 
-/// Searches and judges; where structure remains that nothing simpler explains, searches on with free curves; gives back what explains nothing. Returns how
-/// the search ended ([`search_on`]) and what it came to.
+/// Searches and refits. If significant structure remains, the search continues with nonparametric curves. Effects that explain
+/// nothing are withdrawn. Returns the p-value at which the search ended ([`search_on`]) and the refitted model.
 ///
 /// # Errors
-/// [`IdentifyError::Interrupted`] if the user has seen enough.
+/// [`IdentifyError::Interrupted`] if the caller stopped the trace.
 fn found<'a>(
     search: &mut Search<'_>,
     account: &mut Account<'_>,
@@ -341,7 +347,7 @@ fn found<'a>(
     let mut ended = search_on(search, account)?;
     (account.progress)(Progress::Judging);
     let mut judged = judge(search)?;
-    // Among poses structure is looked for effect by effect, and never ends.
+    // For poses the residual always has structure, so the structure test cannot decide.
     let poses = search.stop.in_residual_variance;
     if (poses || judged.is_structured()) && search.taken().len() < search.stop.most {
         search.add_reserve_candidates();
@@ -361,17 +367,17 @@ fn found<'a>(
     Ok((ended, judged))
 }
 
-/// As many draws as are asked for, and as many as the significance needs: fewer could not show it.
+/// The number of null draws: the requested number, but at least as many as the significance level needs.
 fn draws_of(options: &TraceOptions) -> usize {
     let least = (1.0 / options.significance.max(1e-6)).ceil() as usize;
     options.draws.max(least - 1)
 }
 
-/// By how much estimates of a coefficient of the memory, and relatively of the size of the noise, scatter anyway.
+/// Sampling scatter of an estimated AR coefficient, and relative scatter of an estimated noise standard deviation.
 const SCATTER: f64 = 0.02;
 
-/// Takes size and autocorrelation of the noise from repeats, where there are enough. Returns whether that changed them by more than estimates of the noise
-/// scatter anyway.
+/// Sets the noise standard deviation and autocorrelation from repeats, if there are enough. Returns whether this changed them by
+/// more than their sampling scatter.
 fn give_noise_autocorrelation(problem: &mut Problem<'_>, residuals: &[Vec<f64>]) -> bool {
     if problem.folds.kind == FoldKind::Poses {
         return false;

@@ -1,23 +1,25 @@
-//! What of a candidate the readings see: the inverse of its projected product on the directions that are left beside a model.
+//! The observable subspace of a candidate: the directions that remain after projection on the model, and the inverse of the
+//! projected product on them.
 
 use faer::Mat;
 
 use crate::error::IdentifyError;
 
-/// Share of a candidate's own length that has to remain beside the model for it to count as seen.
+/// Least share of a candidate's squared column length that has to remain after projection for the candidate to count as
+/// observable.
 pub const MIN_VISIBLE: f64 = 1e-7;
 
-/// `gᵀ D⁻¹ g` on the directions that are seen.
+/// `gᵀ D⁻¹ g` on the observable directions.
 pub fn quadratic_gain(d: &Mat<f64>, own: &Mat<f64>, g: &[f64]) -> f64 {
     Visible::of(d, own).quadratic(g)
 }
 
-/// The inverse of a candidate's projected product on the directions that are seen.
+/// The inverse of a candidate's projected product on its observable directions.
 pub(super) struct Visible {
     vectors: Mat<f64>,
     values: Vec<f64>,
     scale: Vec<f64>,
-    /// Number of directions that are seen.
+    /// Number of observable directions.
     pub freedom: usize,
 }
 
@@ -70,7 +72,7 @@ impl Visible {
         }
     }
 
-    /// Of two columns, as sine and cosine have: by one rotation (Jacobi; Golub & Van Loan 8.5).
+    /// For two columns, as sine and cosine have: one Jacobi rotation (Golub & Van Loan, section 8.5).
     fn of_two(scaled: Mat<f64>, scale: Vec<f64>) -> Visible {
         let (a, b, c) = (scaled[(0, 0)], scaled[(1, 0)], scaled[(1, 1)]);
         let tangent = if b == 0.0 {
@@ -121,7 +123,7 @@ impl Visible {
     }
 }
 
-/// Inverse of a symmetric product, directions below rounding left out.
+/// Inverse of a symmetric product. Directions below rounding are excluded.
 ///
 /// # Errors
 /// If the product has entries that are not finite.

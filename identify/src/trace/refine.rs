@@ -1,7 +1,7 @@
-//! Shapes with a number in them (a period, a time constant, a place, a width): the library holds a grid, here the grid is left.
+//! Tunes shapes with numbers (a period, a time constant, a centre, a width) off the grid of the library.
 //!
-//! It is left before candidates are compared with each other: between grid points one component may do better than another that at its own best
-//! explains more. So every component that comes near the best is given its own best numbers first.
+//! Candidates are tuned before they are compared. On the grid, a wrong component may have a larger gain than the true one, which
+//! gains more at its own optimum. Every component near the best is therefore tuned first.
 
 use std::collections::HashMap;
 use std::ops::Range;
@@ -14,24 +14,25 @@ use super::library::Candidate;
 use super::score::{Gain, TrainedModel};
 use super::search::Search;
 
-/// Steps of a line search, each to 0.62 of the interval: to name a period, and to predict a fold.
+/// Iterations of a line search, each reducing the interval to 0.62: on all readings, and with one fold left out.
 const STEPS: usize = 12;
 const STEPS_TO_PREDICT: usize = 6;
-/// The share of the best evidence that a candidate has to have on the grid to be sharpened: a bump between two grid points loses a third.
+/// Share of the best evidence that a candidate needs on the grid to be tuned. A local feature between two grid points loses a
+/// third of its evidence.
 const NEAR: f64 = 0.5;
-/// The most candidates that are sharpened at a time: enough to name one of them, and where one fold is left out, to predict that.
+/// Maximum number of candidates that are tuned at a time: on all readings, and with one fold left out.
 const MAX: usize = 10;
 const MAX_TO_PREDICT: usize = 2;
-/// What a composed effect may lack of the best evidence and still be told as what it might be.
+/// Evidence by which a step table may fall short of the best and still be reported as an alternative.
 const BEHIND: f64 = 4.0;
 
-/// Whether a candidate has numbers or places that can be chosen better than the library's grid has them.
+/// Whether a candidate has shape numbers or positions that can be tuned off the library's grid.
 pub(super) fn can_be_tuned(candidate: &Candidate) -> bool {
     candidate.dictionary || brackets(candidate).is_some()
 }
 
-/// Candidates with the best numbers that they can have beside a model, of those that come near the best; with what has been composed. `gains` are those of
-/// all candidates beside the model.
+/// The candidates near the best, each with its best shape numbers beside a model, and the step tables near the best. `gains` are
+/// those of all candidates beside the model.
 pub fn refined(
     search: &Search<'_>,
     model: &TrainedModel<'_>,
@@ -88,7 +89,7 @@ pub fn refined(
     fresh
 }
 
-/// What has been composed and comes near the best evidence, with its places where they gain most.
+/// The step tables near the best evidence, with their positions tuned.
 fn moved(
     search: &Search<'_>,
     model: &TrainedModel<'_>,
@@ -118,7 +119,7 @@ fn moved(
         .collect()
 }
 
-/// Looks around an effect for the numbers of its shape that gain most; `None` where nothing is gained.
+/// Tunes the shape numbers of an effect for the largest gain. `None` if the gain does not increase.
 pub(super) fn refine(
     search: &Search<'_>,
     model: &TrainedModel<'_>,
@@ -133,7 +134,7 @@ pub(super) fn refine(
     } else {
         STEPS_TO_PREDICT
     };
-    // Numbers of one shape are looked for in turn.
+    // The numbers of one shape are tuned in turn.
     for _ in 0..brackets.len() {
         for (which, low, high) in &brackets {
             let value_at = |share: f64| low + (high - low) * share;
@@ -151,7 +152,7 @@ pub(super) fn refine(
     (best > before * (1.0 + 1e-6)).then_some(effect)
 }
 
-/// The highest value that a line search between 0 and 1 comes to, and what has it. By golden section (Kiefer, Proc. Am. Math. Soc. 4 (1953) 502).
+/// The maximum of a line search between 0 and 1, and its argument, by golden section (Kiefer, Proc. Am. Math. Soc. 4 (1953) 502).
 fn highest<T>(value_at: impl Fn(f64) -> (f64, T), steps: usize) -> (f64, T) {
     let golden = 0.5 * (5.0_f64.sqrt() - 1.0);
     let (mut a, mut b) = (0.0, 1.0);
@@ -173,7 +174,7 @@ fn highest<T>(value_at: impl Fn(f64) -> (f64, T), steps: usize) -> (f64, T) {
     if at_c.0 > at_d.0 { at_c } else { at_d }
 }
 
-/// Moves each step by parts of the grid to where all together gain most; what that is.
+/// Moves each step position by fractions of the grid for the largest joint gain. Returns the effect and its gain.
 fn moved_steps(search: &Search<'_>, model: &TrainedModel<'_>, candidate: &Candidate) -> (Effect, f64) {
     let original = &candidate.effect;
     let (Shape::Steps { at }, Some(mut present)) = (&original.shape, search.trial(model, original)) else {
@@ -209,7 +210,7 @@ fn moved_steps(search: &Search<'_>, model: &TrainedModel<'_>, candidate: &Candid
     (with(&places), best)
 }
 
-/// The numbers of a shape with the interval around each that the grid leaves open.
+/// The shape numbers that can be tuned, each with the interval between its neighbours on the grid.
 fn brackets(candidate: &Candidate) -> Option<Vec<(usize, f64, f64)>> {
     match &candidate.effect.shape {
         Shape::Periodic { period } => {

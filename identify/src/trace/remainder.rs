@@ -1,7 +1,8 @@
-//! What is left when the search has ended: whether it has structure, what it looks like, and where it lies.
+//! Tests the residual after the search for remaining structure, and describes and locates it.
 //!
-//! The detectors look at readings, not at components: a wave over an axis' position in one test or one run of it, or opposite in the two directions, a
-//! curve, a feature at a place, a drift over time. They are tested against draws from the same pure error as the search.
+//! The detectors act on readings, not on components: a wave over an axis position in one test or one run, a wave with opposite
+//! sign in the two directions, a curve, a local feature, a drift over time. Their null distribution comes from the same pure
+//! error as that of the search.
 
 use std::ops::Range;
 
@@ -19,19 +20,20 @@ use crate::problem::Problem;
 /// Structure in a residual.
 #[derive(Clone, Debug)]
 pub struct Structure {
-    /// Probability of as much in readings without structure.
+    /// Probability of at least as large a maximum in readings without structure.
     pub p_value: f64,
-    /// What the best detector takes off the sum of squares beyond what it would of noise: its `χ²` less its degrees of freedom.
+    /// Decrease of the sum of squares by the best detector in excess of its expectation for noise: its `χ²` less its degrees of
+    /// freedom.
     pub excess: f64,
-    /// In words: which test, over what, how large.
+    /// Description: the test, the driver, and the amplitude.
     pub words: String,
 }
 
-/// Significance below which a remainder counts as structured.
+/// Significance level of the structure test.
 const STRUCTURED: f64 = 0.01;
 
 impl Structure {
-    /// Whether there is any beyond noise.
+    /// Whether the structure is significant.
     pub fn is_significant(&self) -> bool {
         self.p_value <= STRUCTURED
     }
@@ -68,7 +70,7 @@ fn detectors(problem: &Problem<'_>, columns: &Columns<'_, '_>) -> Vec<Detector> 
     detectors
 }
 
-/// The detectors of one test, as they are made.
+/// Collects the detectors of one test.
 struct TestResidual<'t, 'p, 'a> {
     columns: &'t Columns<'p, 'a>,
     number: usize,
@@ -78,12 +80,12 @@ struct TestResidual<'t, 'p, 'a> {
 }
 
 impl TestResidual<'_, '_, '_> {
-    /// A shape over each coordinate of the readings.
+    /// Adds a shape over each coordinate of the readings.
     fn add(&mut self, driver: &Driver, shape: Shape, words: String) {
         self.add_confined(driver, shape, false, None, words);
     }
 
-    /// The same with a sign that turns with the direction of travel, or in some rows only.
+    /// Adds a shape that changes sign with the direction of travel, or that acts in some rows only.
     fn add_confined(
         &mut self,
         driver: &Driver,
@@ -164,7 +166,7 @@ impl TestResidual<'_, '_, '_> {
                 self.add_confined(driver, wave(half_cycles), true, None, words);
             }
         }
-        // What comes and goes with time is in no mean over runs.
+        // A structure that changes with time cancels in the mean over runs.
         let runs = self.readings.runs();
         let most = if runs.len() > 1 {
             MAX_HALF_CYCLES_OF_A_RUN
@@ -205,10 +207,10 @@ impl TestResidual<'_, '_, '_> {
     }
 }
 
-/// The most half cycles that are looked for in one run.
+/// Maximum number of half cycles that is tested in one run.
 const MAX_HALF_CYCLES_OF_A_RUN: usize = 40;
 
-/// The most half cycles that so many readings show: 2.4 readings a cycle, as for the candidates of the library.
+/// Maximum number of half cycles for a number of readings: 2.4 readings per cycle, as for the candidates of the library.
 fn most_half_cycles(readings: usize) -> usize {
     readings * 10 / 12
 }
@@ -222,7 +224,7 @@ fn curve(from: f64, to: f64, intervals: usize) -> Shape {
     }
 }
 
-/// Looks for structure in a residual, beside a model given by its orthonormal columns.
+/// Tests a residual for structure beside a model, which is given by its orthonormal columns.
 ///
 /// # Errors
 /// If products are not finite.

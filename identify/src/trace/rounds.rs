@@ -1,25 +1,25 @@
-//! Rounds of the search until no addition is significant or lowers the held-out error any more, and an account of them for those who wait.
+//! Runs rounds of the search until no addition is significant or lowers the held-out error, and records the additions.
 
 use super::search::{Round, Search};
 use super::{Progress, Step};
 use crate::error::IdentifyError;
 
-/// Up to this many effects exchanges are tried after each addition, beyond it after each eighth.
+/// Up to this number of effects, exchanges are tried after each addition. Beyond it they are tried after every eighth.
 const SWAP_EVERY_ROUND_UP_TO: usize = 14;
 const SWAP_EVERY: usize = 8;
 
-/// What is told of a search as it goes.
+/// The record of a search, and its progress.
 pub(super) struct Account<'t> {
     /// The additions so far.
     pub steps: Vec<Step>,
     /// Standard deviation of a reading, µm.
     pub noise_um: f64,
-    /// Whom it is told; they say whether they want more.
+    /// Receives the progress. Returns whether to continue.
     pub progress: &'t (dyn Fn(Progress) -> bool + Sync),
 }
 
 impl Account<'_> {
-    /// Notes additions that are claimed.
+    /// Records claimed additions.
     fn note(&mut self, search: &Search<'_>, added: impl Iterator<Item = usize>) {
         let held_out = search.held_out.last().copied().unwrap_or(0.0);
         let heldout_rms_um = (held_out / search.columns.rows().max(1) as f64).sqrt() * self.noise_um;
@@ -36,15 +36,15 @@ impl Account<'_> {
     }
 }
 
-/// How many additions in a row may fail to lower the held-out error before they are withdrawn: of two effects that undo part of each other the first alone
-/// explains little.
+/// Consecutive additions that may fail to lower the held-out error before they are withdrawn. Of two effects that partly cancel
+/// each other, the first alone explains little.
 const UNCLAIMED_IN_A_ROW: usize = 2;
 
-/// Rounds until no candidate is significant, or until additions do not lower the held-out error: the p-value of the best that was not added. What remains
-/// is what is claimed.
+/// Runs rounds until no candidate is significant, or until additions do not lower the held-out error. The claimed effects remain.
+/// Returns the p-value of the best candidate that was not added.
 ///
 /// # Errors
-/// [`IdentifyError::Interrupted`] if the user has seen enough; [`Search::roll_back`] then leads to what was claimed until then.
+/// [`IdentifyError::Interrupted`] if the caller stopped the trace. [`Search::roll_back`] then restores the claimed effects.
 pub(super) fn search_on(search: &mut Search<'_>, account: &mut Account<'_>) -> Result<f64, IdentifyError> {
     let p_value = rounds(search, account)?;
     search.withdraw_unclaimed();
@@ -52,16 +52,17 @@ pub(super) fn search_on(search: &mut Search<'_>, account: &mut Account<'_>) -> R
 }
 
 fn rounds(search: &mut Search<'_>, account: &mut Account<'_>) -> Result<f64, IdentifyError> {
-    // Additions since the last that was claimed.
+    // Additions since the last claim.
     let mut unclaimed = Vec::new();
-    // Effects that are attributed to one make room for others; that must end.
+    // A merge of effects permits further additions. The limit on rounds guarantees termination.
     for _ in 0..search.most_rounds() {
         let mut ended = None;
         match search.round()? {
             Round::Done { .. } if search.retune_all()? || search.merge_groups()? => unclaimed.push(None),
             Round::Done { p_value } => ended = Some(p_value),
             Round::Added { candidate } => {
-                // Every exchange costs a model an effect; among many effects the gain is small and a sweep now and then will do.
+                // Each exchange trains one model per effect. With many effects the gain is small, and an occasional sweep is
+                // enough.
                 let taken = search.taken().len();
                 if taken <= SWAP_EVERY_ROUND_UP_TO || taken.is_multiple_of(SWAP_EVERY) {
                     search.exchange()?;
@@ -77,7 +78,7 @@ fn rounds(search: &mut Search<'_>, account: &mut Account<'_>) -> Result<f64, Ide
             return Ok(p_value);
         }
         if unclaimed.len() >= UNCLAIMED_IN_A_ROW {
-            // No p-value tells how many more would be added.
+            // No p-value is available for further additions.
             return Ok(1.0);
         }
     }

@@ -1,4 +1,5 @@
-//! The library as a session sees it: every entry that can be laid over the readings, and whether they show it beside the declared unknowns.
+//! Screens the library for a session: which effects apply to its readings, and which are observable beside the declared
+//! parameters.
 
 use abbe_model::session::Session;
 use faer::Mat;
@@ -14,18 +15,18 @@ use crate::error::IdentifyError;
 use crate::fit::prepare;
 use crate::problem::Problem;
 
-/// An entry of the library.
+/// An effect of the library, screened for a session.
 #[derive(Clone, Debug)]
 pub struct Entry {
     /// Its identifier.
     pub id: String,
-    /// Index of its family.
+    /// Index of its family in the library.
     pub family: usize,
-    /// Whether the session's readings can see it beside the declared unknowns.
+    /// Whether the effect is observable beside the declared parameters.
     pub seen: bool,
 }
 
-/// The entries that a session has what they follow for, in the order of the library.
+/// The library's effects for which the session has driver data, in the order of the library.
 ///
 /// # Errors
 /// If the session cannot be fitted.
@@ -53,8 +54,10 @@ pub fn entries(session: &Session, options: &TraceOptions) -> Result<Vec<Entry>, 
         .collect())
 }
 
-/// The candidates that a user wants to be looked for, laid over the readings: those that the data have what they follow for, in the order of the library.
-/// An error if what is wanted is in no identifier: misspelt, it would look as if nothing were there to be found.
+/// The requested candidates for which the data have driver values, in the order of the library, with their basis columns.
+///
+/// # Errors
+/// If a requested string occurs in no identifier: a misspelt string would otherwise look like an absent effect.
 pub(super) fn laid(
     problem: &Problem<'_>,
     columns: &Columns<'_, '_>,
@@ -78,7 +81,7 @@ pub(super) fn laid(
         .collect())
 }
 
-/// What a user wanted to leave out and is in no identifier, a warning each.
+/// A warning for each exclusion that matches no candidate.
 pub(super) fn unused_exclusions(
     problem: &Problem<'_>,
     options: &TraceOptions,
@@ -89,7 +92,7 @@ pub(super) fn unused_exclusions(
         .collect())
 }
 
-/// Of some texts those that no candidate has in its identifier.
+/// The texts that occur in no candidate's identifier.
 fn matching_no_candidate<'t>(
     candidates: &[Candidate],
     texts: &'t [String],

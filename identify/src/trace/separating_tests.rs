@@ -11,14 +11,15 @@ use crate::plan::candidate_tests::CandidateTests;
 use crate::plan::separate::{Alternative, SeparatingTest, separating_tests};
 use crate::results::{AlternativeResult, EffectResult, SeparatingTestResult, SeparationResult};
 
-/// Aliases that are weighed against an effect, the nearest first: each takes columns of its own.
+/// Maximum number of aliases that are compared with an effect, the nearest first. Each alias adds columns.
 const MAX_COMPARED_TESTS: usize = 24;
 
-/// Fills in, for each found effect, the tests among the candidate tests that separate it from its aliases. Without a menu for the session's instrument nothing is filled
-/// in. Where `progress` says that no more is wanted, the trace is marked as interrupted, with the tests that were found until then.
+/// Adds to each found effect the candidate tests that separate it from its aliases. Adds nothing if there are no candidate tests
+/// for the session's instrument. If `progress` returns `false`, the trace is marked as interrupted and keeps the tests found so
+/// far.
 ///
 /// # Errors
-/// If an effect cannot be laid over the session.
+/// If the basis columns of an effect cannot be computed for the session.
 pub fn separate_aliases(
     trace: &mut Trace<'_>,
     menu: &CandidateTests,
@@ -73,7 +74,7 @@ fn tests_for(
     )
 }
 
-/// Puts tests into an effect's result.
+/// Writes tests into an effect's result.
 fn fill_in(
     effect: &mut EffectResult,
     aliases: &[Effect],

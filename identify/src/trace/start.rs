@@ -1,7 +1,7 @@
-//! Where a search starts: the fitted model in orthonormal columns, priors included.
+//! The start of a search: the fitted model in orthonormal columns, priors included.
 //!
-//! With `J` the model's rows, `V` the directions that are seen and `R` the triangle of `J V` with its prior rows, the columns are `J V R⁻¹`: normal
-//! equations over them lose nothing.
+//! `J` is the Jacobian, `V` the basis of the identifiable directions, and `R` the triangular factor of `J V` with its prior rows.
+//! The columns are `J V R⁻¹`. Normal equations over orthonormal columns lose no precision.
 
 use faer::Mat;
 
@@ -13,20 +13,20 @@ use crate::fit::{Fit, in_directions};
 use crate::problem::Problem;
 use crate::triangle::Triangle;
 
-/// The fitted model as the search takes it: orthonormal columns and the residual, whitened, in the order of the folds.
+/// The fitted model for the search: orthonormal columns and residual, whitened, in fold order.
 pub(super) struct Start {
     /// Rows × rank.
     pub model: Mat<f64>,
-    /// One a row.
+    /// One value per row.
     pub residual: Vec<f64>,
-    /// Orthonormal coordinates to unknowns in internal units: unknowns × rank.
+    /// Maps orthonormal coordinates to parameters in internal units: parameters × rank.
     pub to_unknowns: Mat<f64>,
     prior_rows: Mat<f64>,
     prior_residual: Vec<f64>,
 }
 
 impl Start {
-    /// From a fit, whose triangles hold its readings.
+    /// Computes the start from a fit, whose triangular factors contain the readings.
     pub fn of(problem: &Problem<'_>, columns: &Columns<'_, '_>, fit: &Fit) -> Result<Start, IdentifyError> {
         let unknowns = fit.beta.len();
         let basis = &fit.rank.seen;
@@ -53,7 +53,7 @@ impl Start {
         })
     }
 
-    /// The same model and residual, not whitened.
+    /// The same model and residual without whitening.
     pub fn plain(
         &self,
         columns: &Columns<'_, '_>,
@@ -74,7 +74,7 @@ impl Start {
         })
     }
 
-    /// What is known beforehand, as products with the columns.
+    /// The priors as products with the orthonormal columns.
     pub fn prior(&self) -> PriorMoments {
         let rank = self.to_unknowns.ncols();
         PriorMoments {
@@ -89,7 +89,7 @@ impl Start {
     }
 }
 
-/// The inverse of an upper triangle by back substitution.
+/// The inverse of an upper triangular matrix by back substitution.
 fn inverse_of_triangle(r: &Mat<f64>) -> Mat<f64> {
     let n = r.nrows();
     let mut inverse = Mat::zeros(n, n);

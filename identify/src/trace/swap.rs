@@ -1,9 +1,12 @@
-//! What a search that only adds would miss: an effect that took the place of another, and a pair that hid behind one.
+//! Exchanges that a purely additive search misses: a wrong effect in place of the true one, and one effect in place of a pair.
 //!
-//! Each effect is exchanged for what explains clearly better beside the others. When nothing more is to be added, effects with numbers or places of
-//! their own are fitted anew beside each of the next best: steps with many places, or a warm-up with its own time constant, can swallow most of a second
-//! effect, which shows only when both are there. Two effects are also looked for together in the place of two, or of one: where each undoes part of the
-//! other, neither shows much alone, and something that does a little of both is found in their place.
+//! Each effect is exchanged for a candidate that explains clearly more beside the others. When no addition is significant,
+//! effects with tunable shape numbers or positions are tuned anew beside each of the next best candidates. A step table or a
+//! warm-up with a free time constant can absorb most of a second effect. The second effect becomes significant only when both are
+//! in the model.
+//!
+//! Pairs of effects are also searched jointly as replacements of two effects or of one. If two effects partly cancel each other,
+//! neither is significant alone, and the search finds a single effect that approximates both.
 
 use std::collections::HashSet;
 
@@ -17,31 +20,31 @@ use super::score::TrainedModel;
 use super::search::{ALL, Search, SearchBranch, SelectedEffect};
 use crate::error::IdentifyError;
 
-/// The most effects whose places and periods are looked at again whenever one is added.
+/// Maximum number of effects whose positions and periods are tuned again after an addition.
 const MAX_REFINED: usize = 4;
-/// How many are tried beside an effect that is fitted anew: on all readings, and where one fold is left out.
+/// Candidates tried beside an effect that is tuned anew: on all readings, and with one fold left out.
 const MAX_TRIED: usize = 6;
 const MAX_TRIED_TO_PREDICT: usize = 2;
-/// How many are tried as the first of two that are looked for together: in the place of two, and in the place of one or to predict a fold.
+/// Candidates tried as the first of a pair: in place of two effects, and in place of one or with one fold left out.
 const MAX_FIRST_MEMBERS: usize = 32;
 const FEW_FIRST_MEMBERS: usize = 8;
-/// The most effects that are fitted anew beside others.
+/// Maximum number of selected effects for which effects are tuned anew beside others.
 const MAX_RESTARTS: usize = 3;
-/// Relative difference of scores below which two candidates do the same.
+/// Relative difference of scores below which two candidates count as equivalent.
 const SAME: f64 = 1e-6;
 
-/// Sets of effects against what a search has added.
+/// A comparison of sets of effects with the selected set.
 #[derive(Clone)]
 struct Contest {
-    /// The folds that the search sees.
+    /// The training folds of the search.
     folds: Vec<usize>,
-    /// What it has added.
+    /// The selected effects.
     chosen: Vec<usize>,
-    /// The score that readings without structure hardly reach.
+    /// The score that readings without structure exceed with the probability of the significance level.
     threshold: f64,
-    /// What a set has to say more than: what the best so far says, and for what was there what is confounded.
+    /// The value that a set has to exceed: the best value so far, at first that of the selected set plus the confounding margin.
     most: f64,
-    /// The best that does.
+    /// The best set that exceeds it.
     best: Option<Vec<usize>>,
 }
 
@@ -53,7 +56,7 @@ impl Contest {
 }
 
 impl Search<'_> {
-    /// Exchanges effects for candidates that explain clearly better what they stand for.
+    /// Exchanges effects for candidates that explain clearly more.
     pub fn exchange(&mut self) -> Result<(), IdentifyError> {
         for track in 0..self.tracks.len() {
             for k in 0..self.tracks[track].taken.len() {
@@ -63,8 +66,8 @@ impl Search<'_> {
         self.note_held_out()
     }
 
-    /// Exchanges one effect for what explains clearly better beside the others. A change has to be worth more than what is confounded, so that
-    /// exchanges end.
+    /// Exchanges one effect for a candidate that explains clearly more beside the others. The improvement has to exceed the
+    /// confounding margin, so that exchanges end.
     fn exchange_one(&mut self, track: usize, k: usize) -> Result<(), IdentifyError> {
         let SearchBranch { folds, .. } = self.tracks[track].clone();
         let mut others = self.tracks[track].chosen();
@@ -88,8 +91,9 @@ impl Search<'_> {
         Ok(())
     }
 
-    /// Fits effects with numbers or places of their own anew beside each of the next best, in addition to the others or in the place of one, and takes the
-    /// best of these sets if it says clearly more than the present one. Returns whether the search on all readings did.
+    /// Tunes effects with shape numbers or positions anew beside each of the next best candidates, in addition to the others or
+    /// in place of one. Selects the best of these sets if it has clearly more evidence than the present one. Returns whether the
+    /// search on all readings changed.
     pub fn retune_all(&mut self) -> Result<bool, IdentifyError> {
         if self.stop.in_residual_variance {
             return Ok(false);
@@ -128,7 +132,7 @@ impl Search<'_> {
                         continue;
                     }
                     self.materialise(&[restart]);
-                    // What is added has to hold its own against readings without structure.
+                    // The added effect has to be significant against readings without structure.
                     if self.is_significant_in(other, &set, &contest)? {
                         contest.accept_set(set, value);
                     }
@@ -138,13 +142,13 @@ impl Search<'_> {
         Ok(self.replace(track, contest.best))
     }
 
-    /// Looks for two effects together in the place of one or two, and takes the best two if they say clearly more. Returns whether the search on all
-    /// readings did.
+    /// Searches two effects jointly in place of one or two, and selects the best pair if it has clearly more evidence. Returns
+    /// whether the search on all readings changed.
     pub fn merge_groups(&mut self) -> Result<bool, IdentifyError> {
         if self.stop.in_residual_variance {
             return Ok(false);
         }
-        // Where all readings say no more in another pair, those of a fold have no reason to.
+        // If all readings do not prefer another pair, the folds are not searched.
         if !self.merge_group_once(ALL)? {
             return Ok(false);
         }
@@ -206,8 +210,8 @@ impl Search<'_> {
         Ok(self.replace(track, contest.best))
     }
 
-    /// Puts a set, if there is one, in the place of what a search has added; it is no more certain than the least certain of that. Returns whether there
-    /// was one.
+    /// Replaces the selected effects by a set, if there is one. The largest p-value of the replaced effects applies to all of the
+    /// set. Returns whether the effects were replaced.
     fn replace(&mut self, track: usize, set: Option<Vec<usize>>) -> bool {
         let Some(set) = set else { return false };
         let taken = &mut self.tracks[track].taken;
@@ -217,7 +221,7 @@ impl Search<'_> {
         true
     }
 
-    /// Opens a contest for the place of what a search has added; none where that is nothing, or too much to be fitted anew.
+    /// Starts a comparison with the selected set. `None` if the set is empty or too large to be tuned anew.
     fn contest(&self, track: usize) -> Result<Option<Contest>, IdentifyError> {
         let SearchBranch { folds, .. } = self.tracks[track].clone();
         let chosen = self.tracks[track].chosen();
@@ -234,15 +238,15 @@ impl Search<'_> {
         }))
     }
 
-    /// Whether one of a set scores beside the others what readings without structure do not give.
+    /// Whether one effect of a set scores at least the null threshold beside the others.
     fn is_significant_in(&self, one: usize, set: &[usize], contest: &Contest) -> Result<bool, IdentifyError> {
         let others: Vec<usize> = set.iter().copied().filter(|c| *c != one).collect();
         let model = self.lean_model_of(&others, &contest.folds)?;
         Ok(self.score(one, &model.gain(one), self.variance(&model)) >= contest.threshold)
     }
 
-    /// Effects without numbers or places of their own that explain anything beside some others, the best first; of those that do the very same to the
-    /// readings one.
+    /// Effects without tunable shape numbers or positions that have a positive score beside some others, best first. Of
+    /// equivalent effects one is kept.
     fn simple_firsts(
         &self,
         base: &[usize],
@@ -254,8 +258,8 @@ impl Search<'_> {
         Ok(ranked)
     }
 
-    /// What explains anything beside some effects, the best first, as far as it is asked for; of those that do the very same to the readings one.
-    /// `asked_for` is asked of the best before the others.
+    /// The candidates with a positive score beside some effects that `asked_for` accepts, best first. Of equivalent candidates
+    /// one is kept. `asked_for` is called in order of decreasing score.
     fn ranked(
         &self,
         base: &[usize],
@@ -286,7 +290,7 @@ impl Search<'_> {
         matches!(self.candidates[candidate].effect.shape, Shape::Steps { .. })
     }
 
-    /// The best beside some effects, each component, driver and shape once, and what does the very same to the readings once.
+    /// The best candidates beside some effects: one for each identifier, and one of equivalent candidates.
     fn next_best(&self, base: &[usize], but: usize, folds: &[usize]) -> Result<Vec<usize>, IdentifyError> {
         let mut seen: HashSet<String> = HashSet::from([self.candidates[but].effect.id()]);
         let mut ranked = self.ranked(base, folds, |candidate| {
@@ -301,7 +305,7 @@ impl Search<'_> {
         Ok(ranked)
     }
 
-    /// An effect with the numbers or places that are best beside others.
+    /// An effect with the shape numbers or positions that are best beside others.
     fn restart(
         &mut self,
         flexible: usize,
@@ -327,7 +331,7 @@ impl Search<'_> {
         Ok(fresh.and_then(|fresh| self.add_tuned(fresh, folds)))
     }
 
-    /// The best that the dictionary of an effect's name holds beside a model.
+    /// The best step table of an effect's dictionary beside a model.
     fn composed_anew(&self, model: &TrainedModel<'_>, id: &str) -> Option<Candidate> {
         let dictionary = self.candidates.iter().position(|candidate| {
             candidate.dictionary

@@ -1,6 +1,7 @@
-//! An effect on trial: what it would gain beside a model with other numbers or places than the library has.
+//! The gain of an effect whose shape numbers or positions differ from those of the library.
 //!
-//! Its products are made from the readings, not looked up; when one place of several moves, only that place's column is made anew.
+//! Its products are computed from the readings. If one of several positions changes, only the column of that position is computed
+//! anew.
 
 use std::ops::Range;
 
@@ -11,7 +12,7 @@ use super::moments::{Moments, transposed_product};
 use super::observable::quadratic_gain;
 use super::score::TrainedModel;
 
-/// The columns of an effect and their products over the folds that a model is trained on.
+/// The columns of an effect and their products over the training folds of a model.
 pub struct Trial {
     /// Rows × columns of the effect.
     rows: Mat<f64>,
@@ -29,7 +30,7 @@ struct Products {
 }
 
 impl Trial {
-    /// Lays an effect over the readings and multiplies it.
+    /// Computes the columns of an effect and their products.
     pub fn new(
         columns: &Columns<'_, '_>,
         moments: &Moments,
@@ -59,12 +60,12 @@ impl Trial {
         Trial { rows, products }
     }
 
-    /// What it gains beside the model that it was made for.
+    /// The gain of the effect beside the model that it was computed for.
     pub fn gain(&self, model: &TrainedModel<'_>) -> f64 {
         self.products.gain(model)
     }
 
-    /// What it gains with another column in a place; `stretches` are the rows that the model is trained on.
+    /// The gain with column `place` replaced by the column of `other`. `stretches` are the rows that the model is trained on.
     pub fn gain_with(
         &self,
         place: usize,
@@ -75,7 +76,7 @@ impl Trial {
         self.exchanged(place, other, stretches).gain(model)
     }
 
-    /// Puts another column into a place.
+    /// Replaces column `place` by the column of `other`.
     pub fn exchange(&mut self, place: usize, other: &Trial, stretches: &[Range<usize>]) {
         self.products = self.exchanged(place, other, stretches);
         self.rows.col_mut(place).copy_from(other.rows.col(0));

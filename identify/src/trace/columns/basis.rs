@@ -1,4 +1,4 @@
-//! An effect laid over the tests: what it moves, and the basis functions that it moves it by.
+//! The basis columns of an effect for the tests of a session: the component it moves, and its basis functions.
 
 use std::collections::HashMap;
 use std::ops::Range;
@@ -10,24 +10,24 @@ use abbe_model::instrument::InternalUnit;
 use super::Columns;
 use crate::drivers;
 
-/// An effect laid over the tests.
+/// The basis columns of an effect in each test.
 #[derive(Clone, Debug)]
 pub struct Layout {
     /// Number of columns.
     pub count: usize,
-    /// How many numbers of its shape are chosen to fit: each may gain what a column may.
+    /// Number of tuned shape numbers. Each counts as a degree of freedom of the gain.
     pub numbers: usize,
-    /// What it moves in each test: nothing in those in which it does not act.
+    /// The terms of each test. Empty for a test in which the effect does not act.
     pub(super) parts: Vec<Vec<Part>>,
 }
 
 impl Layout {
-    /// Whether anything moves in a test.
+    /// Whether the effect acts in a test.
     pub(super) fn acts_in(&self, test: usize) -> bool {
         !self.parts[test].is_empty()
     }
 
-    /// The greatest absolute value of its basis functions.
+    /// The largest absolute value of its basis functions.
     pub fn greatest(&self) -> f64 {
         let parts = self.parts.iter().flatten();
         let factors = |part: &Part| {
@@ -48,17 +48,17 @@ impl Layout {
     }
 }
 
-/// One thing that an effect moves in a test.
+/// One term of an effect in a test: a target, and the basis functions by which it moves.
 #[derive(Clone, Debug)]
 pub(super) struct Part {
     pub moves: Moves,
-    /// By how much of the basis functions in each row; 1 where there is none.
+    /// Factor of the basis functions in each row; 1 if absent.
     pub factor: Option<Arc<Vec<f64>>>,
-    /// Function by function, one value a row.
+    /// The basis functions, one value per row.
     pub basis: Arc<Vec<Vec<f64>>>,
 }
 
-/// What a part of a layout moves.
+/// The target of a term.
 #[derive(Clone, Copy, Debug)]
 pub(super) enum Moves {
     /// A component, through its sensitivity.
@@ -68,12 +68,12 @@ pub(super) enum Moves {
 }
 
 impl Columns<'_, '_> {
-    /// Lays an effect over the tests; `None` where the data lack what it follows.
+    /// Computes the basis columns of an effect. `None` if the data lack its driver.
     pub fn layout(&self, effect: &Effect) -> Option<Layout> {
         self.lay(effect, true)
     }
 
-    /// The same for an effect that is tried once: its basis functions are not kept.
+    /// Computes the basis columns of an effect that is evaluated once: its basis functions are not cached.
     pub fn layout_uncached(&self, effect: &Effect) -> Option<Layout> {
         self.lay(effect, false)
     }
@@ -116,7 +116,7 @@ impl Columns<'_, '_> {
         })
     }
 
-    /// What a driver does in a test, and the name that the stores have for it: the moment of gravity is another about each axis.
+    /// The samples of a driver in a test, and its key in the caches. The moment of gravity differs from axis to axis.
     fn followed(
         &self,
         test: usize,
@@ -135,8 +135,8 @@ impl Columns<'_, '_> {
         Some((name, samples))
     }
 
-    /// Lays a shape over one coordinate of the readings of one test, whatever component would cause it; `by_direction` turns its sign with the
-    /// direction of travel, `rows` confines it. `None` where the data lack what it follows.
+    /// Places a shape on one coordinate of the readings of one test, without a component. `by_direction` changes its sign with
+    /// the direction of travel. `rows` confines it. `None` if the data lack its driver.
     pub fn reading_layout(
         &self,
         effect: &Effect,
@@ -166,8 +166,8 @@ impl Columns<'_, '_> {
         })
     }
 
-    /// A free curve over an axis in each test in which it moves, in the readings themselves, whatever component would cause it; none where the readings are
-    /// too few for that many intervals.
+    /// A nonparametric curve over an axis in the readings of each test in which the axis moves, without a component. Tests with
+    /// too few readings for that many intervals have none.
     pub fn curves_of_tests(&self, driver: &Driver, intervals: usize) -> Vec<(Effect, Layout)> {
         let Driver::Axis(name) = driver else {
             return Vec::new();
@@ -204,8 +204,8 @@ impl Columns<'_, '_> {
         layouts
     }
 
-    /// The greatest coefficient that an effect may plausibly have, in internal units: 0.1 mm and 1 mrad on a machine tool, ten times as much on the
-    /// robots and long chains that trackers and sockets measure.
+    /// The largest plausible coefficient of an effect, in internal units: 0.1 mm and 1 mrad on a machine tool, ten times as much
+    /// on the robots and long chains that trackers and sockets measure.
     pub fn plausible(&self, effect: &Effect, layout: &Layout) -> f64 {
         let machine_tool = self.problem.session.instrument.is_two_sided();
         let scale = if machine_tool { 1.0 } else { 10.0 };
@@ -213,7 +213,7 @@ impl Columns<'_, '_> {
             Some(InternalUnit::Millimetre) => 0.1 * scale,
             Some(InternalUnit::Radian) => 1e-3 * scale,
             Some(InternalUnit::Ratio) => 0.1,
-            // The factor of a delay is the speed; a tenth of a second is long.
+            // The factor of a delay is the speed. A tenth of a second is a long delay.
             None => return 0.1,
         };
         let greatest = layout.greatest();
@@ -221,10 +221,10 @@ impl Columns<'_, '_> {
     }
 }
 
-/// Columns that are made together.
+/// Number of columns that are computed together.
 const CHUNK_COLUMNS: usize = 48;
 
-/// Consecutive layouts whose columns are made together: as many as fit into a chunk, and at least one.
+/// Groups consecutive effects whose columns are computed together: as many as fit into a chunk, and at least one.
 pub fn chunked(layouts: &[Layout]) -> Vec<Range<usize>> {
     let mut chunks = Vec::new();
     let (mut start, mut width) = (0, 0);
@@ -241,7 +241,7 @@ pub fn chunked(layouts: &[Layout]) -> Vec<Range<usize>> {
     chunks
 }
 
-/// What a store holds under a key, made and kept if it was not there.
+/// The cached value of a key. Computes and stores it if it is absent.
 fn cached<K: std::hash::Hash + Eq, V: Clone>(
     store: &Mutex<HashMap<K, V>>,
     key: K,
@@ -262,7 +262,7 @@ fn cached<K: std::hash::Hash + Eq, V: Clone>(
 mod tests {
     use super::*;
 
-    /// Chunks are full, and nothing is in two of them or in none: what is made together bounds the memory of a screening.
+    /// Chunks are full, and each effect is in exactly one. The chunk size bounds the memory of a screening.
     #[test]
     fn chunks_are_as_full_as_they_can_be() {
         let layouts = |counts: &[usize]| -> Vec<Layout> {
@@ -289,7 +289,7 @@ mod tests {
         assert_eq!(ends(&[2; 24]), [24]);
         assert_eq!(ends(&[2; 25]), [24, 25]);
         assert_eq!(ends(&[1, 47, 1, 46, 2]), [2, 4, 5]);
-        // A curve of many coefficients is one by itself.
+        // A curve with many coefficients is a chunk of its own.
         assert_eq!(ends(&[3, 200, 3, 3]), [1, 2, 4]);
     }
 }

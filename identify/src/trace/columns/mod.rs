@@ -1,6 +1,6 @@
-//! Columns of candidates: sensitivity × basis, whitened as the readings are.
+//! The columns of candidates: sensitivity × basis function, whitened as the readings are.
 //!
-//! The chain is evaluated once, for the sensitivities of every component; hundreds of candidates cost no further kinematics.
+//! The chain is evaluated once for the sensitivities of every component. Hundreds of candidates need no further kinematics.
 
 mod basis;
 mod plain;
@@ -19,29 +19,29 @@ use crate::problem::{Block, Problem};
 use basis::Moves;
 pub use basis::{Layout, chunked};
 
-/// Readings whose sensitivities are taken at once.
+/// Number of readings per evaluation of sensitivities.
 const ROWS_AT_ONCE: usize = 512;
 
-/// The whitened rows of a problem, by fold, and what is needed to lay any effect over them.
+/// The whitened rows of a problem in fold order, and the data to compute the columns of any effect.
 pub struct Columns<'p, 'a> {
     problem: &'p Problem<'a>,
-    /// By test.
+    /// The sensitivities of each test.
     sensitivities: Vec<Sensitivities>,
-    /// Place of each slot among the sensitivities, by test.
+    /// Index of each slot among the sensitivities, by test.
     place: Vec<HashMap<usize, usize>>,
     blocks: Vec<Block>,
     /// The scalar rows of each block that whitening keeps.
     kept: Vec<Vec<usize>>,
-    /// Where each whitened row goes, block after block, so that folds lie together.
+    /// Index of each whitened row, block after block, in fold order.
     target: Vec<usize>,
     /// The rows of each fold.
     pub fold_rows: Vec<Range<usize>>,
-    /// The tests whose readings each fold has.
+    /// The tests in each fold.
     fold_tests: Vec<BTreeSet<usize>>,
     rows: usize,
-    /// What each driver does, by test and name; none where the data have no such column.
+    /// The samples of each driver, by test and name. `None` if the data have no such column.
     samples: Mutex<HashMap<(usize, String), SharedSamples>>,
-    /// The basis functions of each shape over a driver, likewise.
+    /// The basis functions of each shape over a driver, by test and name.
     bases: Mutex<HashMap<(usize, String), SharedColumns>>,
 }
 
@@ -49,7 +49,7 @@ type SharedColumns = Arc<Vec<Vec<f64>>>;
 type SharedSamples = Option<Arc<Vec<DriverSample<f64>>>>;
 
 impl<'p, 'a> Columns<'p, 'a> {
-    /// At the unknowns' values of a fit.
+    /// Computes the sensitivities at the parameter values of a fit.
     pub fn new(problem: &'p Problem<'a>, beta: &[f64]) -> Columns<'p, 'a> {
         let sensitivities = sensitivities(problem, beta);
         let place = sensitivities
@@ -103,7 +103,7 @@ impl<'p, 'a> Columns<'p, 'a> {
         self.rows
     }
 
-    /// The rows of layouts in one block, in mm, not whitened.
+    /// The unwhitened columns of effects in one block, mm.
     fn block_rows(&self, layouts: &[&Layout], block: &Block) -> Mat<f64> {
         let coordinates = self.problem.coordinates();
         let total: usize = layouts.iter().map(|layout| layout.count).sum();
@@ -125,7 +125,7 @@ impl<'p, 'a> Columns<'p, 'a> {
                 for k in 0..layout.count {
                     let basis = &part.basis[k][block.rows.clone()];
                     let entries = raw.col_as_slice_mut(column + k);
-                    // One coordinate a reading and no factor is the common case, and the compiler makes vector instructions of it.
+                    // One coordinate per reading without a factor is the common case. The compiler vectorises it.
                     if let (1, Some(derivative), None) = (coordinates, derivative, factor) {
                         let terms = derivative.iter().zip(basis);
                         entries
@@ -153,7 +153,7 @@ impl<'p, 'a> Columns<'p, 'a> {
         raw
     }
 
-    /// The rows of each fold in which any of the layouts moves anything; none of a fold in which none does.
+    /// For each fold the rows in which any of the effects acts. Empty if none acts in the fold.
     pub fn moved_rows(&self, layouts: &[Layout]) -> Vec<Range<usize>> {
         let moved = |test: &usize| layouts.iter().any(|layout| layout.acts_in(*test));
         let folds = self.fold_rows.iter().zip(&self.fold_tests);
@@ -168,7 +168,7 @@ impl<'p, 'a> Columns<'p, 'a> {
             .collect()
     }
 
-    /// The stretches of rows of some folds in which any of the layouts moves anything.
+    /// The stretches of rows of some folds in which any of the effects acts.
     pub fn moved_stretches(
         &self,
         layouts: &[Layout],
@@ -189,7 +189,7 @@ impl<'p, 'a> Columns<'p, 'a> {
         stretches
     }
 
-    /// Fills columns, which are zero before, with the whitened rows of layouts, one after another.
+    /// Fills zero columns with the whitened columns of effects, one after another.
     pub fn fill(&self, layouts: &[&Layout], mut columns: MatMut<'_, f64>) {
         let total: usize = layouts.iter().map(|layout| layout.count).sum();
         let mut start = 0;
@@ -234,7 +234,7 @@ impl<'p, 'a> Columns<'p, 'a> {
         Ok(rows)
     }
 
-    /// Places columns that were whitened block by block in the order of the folds.
+    /// Sorts values that are whitened block by block into fold order.
     pub fn placed(&self, values: &[f64]) -> Vec<f64> {
         let mut placed = vec![0.0; self.rows];
         for (value, target) in values.iter().zip(&self.target) {
@@ -243,7 +243,7 @@ impl<'p, 'a> Columns<'p, 'a> {
         placed
     }
 
-    /// The test, row and coordinate of each whitened row, in the order of the folds.
+    /// The test, row and coordinate of each whitened row, in fold order.
     pub fn origin_of_rows(&self) -> Vec<(usize, usize, usize)> {
         let coordinates = self.problem.coordinates();
         let mut origins = vec![(0, 0, 0); self.rows];
@@ -259,7 +259,7 @@ impl<'p, 'a> Columns<'p, 'a> {
     }
 }
 
-/// The sensitivities of every test, in pieces that both short and long tests keep all cores busy with.
+/// The sensitivities of every test, computed in pieces that keep all cores busy with both short and long tests.
 fn sensitivities(problem: &Problem<'_>, beta: &[f64]) -> Vec<Sensitivities> {
     let values = problem.slot_values(beta);
     let pieces: Vec<(usize, Range<usize>)> = problem
@@ -268,7 +268,7 @@ fn sensitivities(problem: &Problem<'_>, beta: &[f64]) -> Vec<Sensitivities> {
         .enumerate()
         .flat_map(|(test, model)| {
             let rows = model.rows();
-            // A test without readings has a piece too: the sensitivities stand in the order of the tests.
+            // A test without readings has a piece too, because the sensitivities are in the order of the tests.
             (0..rows.div_ceil(ROWS_AT_ONCE).max(1))
                 .map(move |k| (test, k * ROWS_AT_ONCE..((k + 1) * ROWS_AT_ONCE).min(rows)))
         })
@@ -304,7 +304,7 @@ mod tests {
     use super::*;
     use crate::fit::prepare;
 
-    /// No file holds a test without readings, but a program may hand one over.
+    /// No file holds a test without readings, but a calling program may supply one.
     #[test]
     fn sensitivities_stand_beside_their_tests_where_one_has_no_readings() {
         let file =

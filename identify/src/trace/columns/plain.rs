@@ -1,4 +1,4 @@
-//! Rows as they are, not whitened, block after block: those whose readings count.
+//! Unwhitened rows of the readings that are not rejected as outliers, block after block.
 
 use faer::Mat;
 
@@ -9,7 +9,7 @@ use crate::problem::Block;
 use crate::trace::paired::Units;
 
 impl Columns<'_, '_> {
-    /// The rows of layouts that count, in mm, not whitened, block after block.
+    /// The rows of effects for the accepted readings, in mm, unwhitened, block after block.
     pub fn plain_rows(&self, layouts: &[&Layout]) -> Mat<f64> {
         let blocks = self.blocks.iter().map(|block| self.block_rows(layouts, block));
         self.plain(blocks.collect())
@@ -37,8 +37,8 @@ impl Columns<'_, '_> {
             .collect()
     }
 
-    /// The independent units that held-out errors are paired over: poses where folds are made of them, else folds (runs or blocks), each of which belongs to
-    /// one test. The rows are those of [`Columns::plain_rows`].
+    /// The independent units over which held-out errors are paired: the poses if folds consist of poses, otherwise the folds
+    /// (runs or blocks), each of which belongs to one test. The rows are those of [`Columns::plain_rows`].
     pub fn plain_units(&self) -> Units {
         let coordinates = self.problem.coordinates();
         let rows = self.blocks.iter().flat_map(|block| {
@@ -52,7 +52,7 @@ impl Columns<'_, '_> {
         Units::of(rows.map(|(test, row)| (test, (fold(test, row), 0)))).divided()
     }
 
-    /// The scalar rows of a block whose readings count.
+    /// The scalar rows of a block whose readings are accepted.
     fn counting(&self, block: &Block) -> Vec<usize> {
         let coordinates = self.problem.coordinates();
         let rejected = &self.problem.rejected[block.test];
@@ -61,7 +61,7 @@ impl Columns<'_, '_> {
             .collect()
     }
 
-    /// The rows of all blocks that count, one block below another.
+    /// The accepted rows of all blocks, one block below another.
     fn plain(&self, blocks: Vec<Mat<f64>>) -> Mat<f64> {
         let counting: Vec<Vec<usize>> = self.blocks.iter().map(|block| self.counting(block)).collect();
         let mut rows = Mat::zeros(

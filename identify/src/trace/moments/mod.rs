@@ -1,13 +1,13 @@
-//! Products of candidates with the model and the residual, fold by fold.
+//! Products of candidates with the model and the residual, for each fold.
 //!
-//! With these every question of the search is small algebra: the gain of any candidate over any model on any set of folds needs no second look
-//! at the readings. With `X` the model's columns, `y` the residual and `C` a candidate's columns over the folds of a training set,
-//!
+//! With these products, the search needs no further pass over the readings. The gain of any candidate beside any model on any set
+//! of folds is a small matrix expression. With `X` the model's columns, `y` the residual and `C` a candidate's columns over the
+//! training folds,
 //! ```text
 //! gain = gᵀ D⁻¹ g,   D = CᵀC − CᵀX (XᵀX)⁻¹ XᵀC,   g = Cᵀy − CᵀX (XᵀX)⁻¹ Xᵀy
 //! ```
 //!
-//! `X` begins with an orthonormal basis of what the fit has (priors included), so that the normal equations lose nothing.
+//! `X` begins with an orthonormal basis of the fitted model (priors included), so that the normal equations lose no precision.
 
 mod products;
 
@@ -22,7 +22,7 @@ use products::{Block, laid, with_side};
 /// Products over one fold.
 #[derive(Clone, Debug)]
 pub struct FoldMoments {
-    /// Base with base: the orthonormal model columns, then those of materialised candidates.
+    /// Base with base: the orthonormal model columns, then those of the added candidates.
     pub base: Mat<f64>,
     /// Base with the residual.
     pub base_y: Vec<f64>,
@@ -32,12 +32,12 @@ pub struct FoldMoments {
     pub cross: Mat<f64>,
     /// Residual with candidates.
     pub cross_y: Vec<f64>,
-    /// Candidate with itself, one after another, each count × count.
+    /// Each candidate with itself, count × count.
     pub own: Vec<Mat<f64>>,
 }
 
 impl FoldMoments {
-    /// Over several folds together.
+    /// The sum over several folds.
     fn sum(folds: &[FoldMoments]) -> FoldMoments {
         let Some((first, rest)) = folds.split_first() else {
             return FoldMoments {
@@ -65,7 +65,8 @@ impl FoldMoments {
         sum
     }
 
-    /// Adds base columns by their products with the whole base (base × added), with the candidates (added × candidate columns) and with the residual.
+    /// Adds base columns by their products with the whole base (base × added), with the candidates (added × candidate columns)
+    /// and with the residual.
     fn extend_base(&mut self, gram: &Mat<f64>, cross: &Mat<f64>, with_y: impl Iterator<Item = f64>) {
         let base = gram.nrows();
         let old = base - gram.ncols();
@@ -89,26 +90,27 @@ pub struct Moments {
     pub whole: FoldMoments,
     /// Null draws with candidates: draws × all candidate columns.
     pub null_cross: Mat<f64>,
-    /// Base with null draws (readings part): base × draws.
+    /// Base with null draws (rows of readings): base × draws.
     pub null_base: Mat<f64>,
     /// First column of each candidate.
     pub first: Vec<usize>,
     /// Number of columns of each candidate.
     pub count: Vec<usize>,
-    /// How many numbers of its shape are chosen to fit.
+    /// Number of tuned shape numbers of each candidate.
     pub numbers: Vec<usize>,
     blocks: Vec<Block>,
-    /// Base columns, rows × base, kept to extend.
+    /// Base columns, rows × base. They are kept because the base grows.
     base_columns: Mat<f64>,
     residual: Vec<f64>,
     null: Mat<f64>,
 }
 
-/// Rows and columns by which room is made.
+/// Increments of the reserved capacity.
 const BUFFER_ROWS: usize = 32;
 const BUFFER_COLUMNS: usize = 128;
 
-/// Enlarges a matrix, with room for more: candidates and effects come one after another, and what is large is not copied each time.
+/// Enlarges a matrix and reserves capacity. Candidates and effects are added one at a time, and large matrices are not copied
+/// each time.
 pub(super) fn grow(
     matrix: &mut Mat<f64>,
     rows: usize,
@@ -129,7 +131,8 @@ pub(super) fn transposed_product(a: MatRef<'_, f64>, b: MatRef<'_, f64>) -> Mat<
 }
 
 impl Moments {
-    /// From the orthonormal model columns (rows × rank), the residual and null draws (rows × draws). `go_on` is asked now and then; `None` where it says no.
+    /// From the orthonormal model columns (rows × rank), the residual and the null draws (rows × draws). Returns `None` if
+    /// `go_on` returns `false`.
     pub fn new(
         columns: &Columns<'_, '_>,
         layouts: &[Layout],
@@ -180,12 +183,12 @@ impl Moments {
         })
     }
 
-    /// Number of base columns so far.
+    /// Number of base columns.
     pub fn base(&self) -> usize {
         self.base_columns.ncols()
     }
 
-    /// Adds the columns of candidates to the base, each of unit length; returns their places there.
+    /// Adds the columns of candidates to the base, each at unit length. Returns their ranges in the base.
     pub fn materialise(
         &mut self,
         columns: &Columns<'_, '_>,
@@ -223,7 +226,7 @@ impl Moments {
         places
     }
 
-    /// Adds the last of the candidates to those that are scored: those that are not yet.
+    /// Computes the products of those effects in `layouts` that are not yet candidates.
     pub fn append(&mut self, columns: &Columns<'_, '_>, layouts: &[Layout]) {
         let rank = self.base();
         let side = beside(&self.base_columns, &self.residual);
@@ -263,7 +266,7 @@ impl Moments {
         });
     }
 
-    /// Extends the products over all folds to what each fold has now: so many base columns and candidate columns.
+    /// Extends the products over all folds to the present number of base columns and candidate columns.
     fn accumulate_totals(&mut self, base: usize, total: usize) {
         let (folds, whole) = (&self.folds, &mut self.whole);
         grow(&mut whole.base, base, base, |i, j| {
@@ -285,18 +288,18 @@ impl Moments {
         }
     }
 
-    /// The base columns, rows × base, in the order of the folds.
+    /// The base columns, rows × base, in fold order.
     pub fn base_columns(&self) -> MatRef<'_, f64> {
         self.base_columns.as_ref()
     }
 
-    /// The residual, in the same order: rows × 1.
+    /// The residual in fold order: rows × 1.
     pub fn residual(&self) -> MatRef<'_, f64> {
         MatRef::from_column_major_slice(&self.residual, self.residual.len(), 1)
     }
 }
 
-/// The columns of layouts, each of unit length.
+/// The columns of effects, each at unit length.
 fn unit_columns(columns: &Columns<'_, '_>, layouts: &[&Layout]) -> Mat<f64> {
     let width = layouts.iter().map(|layout| layout.count).sum();
     let mut fresh = Mat::zeros(columns.rows(), width);
@@ -312,7 +315,7 @@ fn unit_columns(columns: &Columns<'_, '_>, layouts: &[&Layout]) -> Mat<f64> {
     fresh
 }
 
-/// Model and residual side by side: one product with each chunk of candidates.
+/// Model and residual side by side, so that one product with each chunk of candidates is enough.
 fn beside(model: &Mat<f64>, residual: &[f64]) -> Mat<f64> {
     let rank = model.ncols();
     let mut side = Mat::zeros(residual.len(), rank + 1);

@@ -1,4 +1,4 @@
-//! Columns of candidates multiplied block by block, while a block is at hand: all of them at once need more room than there is.
+//! Multiplies the columns of candidates chunk by chunk. All columns together would not fit into memory.
 
 use std::ops::Range;
 
@@ -9,17 +9,17 @@ use rayon::prelude::*;
 use super::transposed_product;
 use crate::trace::columns::{Columns, Layout, chunked};
 
-/// The most entries of columns that are kept: 320 MB.
+/// Maximum number of stored column entries: 320 MB.
 const MAX_KEPT: usize = 40_000_000;
 
-/// Consecutive candidates with their columns, where these are kept.
+/// Consecutive candidates, with their columns if these are stored.
 pub(super) struct Block {
     candidates: Range<usize>,
     kept: Option<Mat<f64>>,
 }
 
-/// Lays candidates out block by block and multiplies each block while it is at hand; columns are kept as long as they find room beside those that are
-/// kept already. `go_on` is asked before each block; `None` where it says no.
+/// Computes the columns of candidates chunk by chunk and multiplies each chunk. Columns are stored as long as the memory limit
+/// permits it, including those stored already. `go_on` is called before each chunk. Returns `None` if it returns `false`.
 pub(super) fn laid(
     columns: &Columns<'_, '_>,
     layouts: &[Layout],
@@ -68,7 +68,7 @@ pub(super) fn laid(
     Some((blocks, products))
 }
 
-/// For each fold `sideᵀ · candidates` of everything that has been laid out; what is not kept is laid out once more.
+/// For each fold `sideᵀ · candidates` of all candidates. Columns that are not stored are computed again.
 pub(super) fn with_side(
     blocks: &[Block],
     columns: &Columns<'_, '_>,
@@ -108,7 +108,7 @@ pub(super) struct Products {
 }
 
 impl Products {
-    /// Of one block after another, with so many columns at the side and null draws.
+    /// Joins the products of consecutive chunks. `side` is the number of side columns, `draws` that of null draws.
     fn joined(parts: Vec<Products>, folds: usize, side: usize, draws: usize) -> Products {
         let null = joined(draws, parts.iter().map(|part| &part.null));
         let mut sides = Vec::with_capacity(parts.len());
@@ -127,13 +127,13 @@ impl Products {
     }
 }
 
-/// The products of one block beside those of another, fold by fold.
+/// Joins the products of chunks side by side, for each fold.
 fn joined_by_fold(parts: &[Vec<Mat<f64>>], folds: usize, rows: usize) -> Vec<Mat<f64>> {
     let of_fold = |fold: usize| joined(rows, parts.iter().filter_map(|part| part.get(fold)));
     (0..folds).into_par_iter().map(of_fold).collect()
 }
 
-/// Matrices of so many rows, one beside another.
+/// Joins matrices with the same number of rows side by side.
 fn joined<'p>(rows: usize, parts: impl Iterator<Item = &'p Mat<f64>> + Clone) -> Mat<f64> {
     let mut whole = Mat::zeros(rows, parts.clone().map(Mat::ncols).sum());
     let mut column = 0;
@@ -144,7 +144,7 @@ fn joined<'p>(rows: usize, parts: impl Iterator<Item = &'p Mat<f64>> + Clone) ->
     whole
 }
 
-/// For each fold `sideᵀ · candidates`: zero without a look where none of the candidates moves anything.
+/// For each fold `sideᵀ · candidates`. The product is zero without computation if none of the candidates acts in the fold.
 fn cross_by_fold(
     columns: &Columns<'_, '_>,
     layouts: &[Layout],
@@ -177,7 +177,7 @@ fn gram_by_fold(columns: &Columns<'_, '_>, layouts: &[Layout], all: MatRef<'_, f
         .collect()
 }
 
-/// Null draws with candidates, over all folds in which any of them moves anything.
+/// Null draws with candidates, over all folds in which any of them acts.
 fn null_product(
     columns: &Columns<'_, '_>,
     layouts: &[Layout],

@@ -1,5 +1,5 @@
-//! The held-out error: each fold, as it was read, under the model of the search that did not see it. Effects are claimed only where it falls by more than
-//! the standard error of the fall.
+//! The held-out error: each fold is predicted, unwhitened, by the model of the search that excludes it. Effects are claimed only
+//! if this error decreases by more than the standard error of the decrease.
 
 use faer::Mat;
 use rayon::prelude::*;
@@ -10,22 +10,22 @@ use crate::trace::moments::grow;
 use crate::trace::paired::{HeldOutDecrease, Units};
 use crate::trace::score::TrainedModel;
 
-/// Readings as they are, not whitened: what held-out errors are of. In units of the noise.
+/// The unwhitened base and residual, divided by the noise standard deviation. Held-out errors refer to these.
 pub struct Plain {
-    /// The base: rows × columns, extended as candidates are added.
+    /// The base: rows × columns. It grows as candidates are added.
     pub base: Mat<f64>,
     /// The residual.
     pub residual: Vec<f64>,
     /// The fold of each row.
     pub folds: Vec<usize>,
-    /// What held-out errors are paired over.
+    /// The independent units over which held-out errors are paired.
     pub units: Units,
     /// Standard deviation of a reading, mm.
     pub sigma_mm: f64,
 }
 
 impl Plain {
-    /// Adds base columns in mm, which the base has divided by these norms.
+    /// Adds base columns in mm. `norms` are the lengths by which the base divides them.
     pub(super) fn extend(&mut self, rows: &Mat<f64>, norms: &[f64]) {
         let old = self.base.ncols();
         let sigma_mm = self.sigma_mm;
@@ -40,10 +40,10 @@ impl Plain {
     }
 }
 
-/// What the searches have added and what that leaves on held-out readings.
+/// The selected effects of all searches and their held-out error.
 #[derive(Clone, Debug, Default)]
 pub struct HeldOutState {
-    /// The effects of every search.
+    /// The branches of the search.
     tracks: Vec<SearchBranch>,
     /// [`Search::held_out`].
     held_out: Vec<f64>,
@@ -57,17 +57,18 @@ impl HeldOutState {
     }
 }
 
-/// An effect that scores better than readings without structure, and that was not claimed.
+/// An effect that scores better than readings without structure but is not claimed.
 #[derive(Clone, Copy, Debug)]
 pub struct RejectedByHeldOut {
     /// The effect.
     pub taken: SelectedEffect,
-    /// What it did to the held-out error.
+    /// The decrease of the held-out error that it causes.
     pub fall: HeldOutDecrease,
 }
 
 impl Search<'_> {
-    /// Sums of squares of held-out residuals over the variance of the noise, by unit: each fold under the model of the search that did not see it.
+    /// Sums of squares of held-out residuals over the noise variance, by unit. The model of the search that excludes a fold
+    /// predicts it.
     fn held_out_by_unit(&self) -> Result<Vec<f64>, IdentifyError> {
         let models: Vec<TrainedModel<'_>> = self.tracks[ALL + 1..]
             .par_iter()
@@ -83,12 +84,12 @@ impl Search<'_> {
         Ok(self.plain.units.sums(squares))
     }
 
-    /// Sum of squares of held-out residuals over the variance of the noise.
+    /// Sum of squares of held-out residuals over the noise variance.
     pub(super) fn held_out_now(&self) -> Result<f64, IdentifyError> {
         Ok(self.held_out_by_unit()?.iter().sum())
     }
 
-    /// Writes down the held-out error with as many effects as there are now.
+    /// Records the held-out error for the present number of effects.
     pub(in crate::trace) fn note_held_out(&mut self) -> Result<(), IdentifyError> {
         self.units_now = self.held_out_by_unit()?;
         let held_out = self.units_now.iter().sum();
@@ -98,7 +99,7 @@ impl Search<'_> {
         Ok(())
     }
 
-    /// What the searches have added now.
+    /// The present state of the searches.
     pub(super) fn standing(&self) -> HeldOutState {
         HeldOutState {
             tracks: self.tracks.clone(),
@@ -107,8 +108,9 @@ impl Search<'_> {
         }
     }
 
-    /// Claims what the searches have added, if the held-out error says so: with more effects than are claimed it has to fall by more than the standard error of
-    /// the fall, with as many or fewer it must not rise by more than that. Returns whether all that was added is claimed.
+    /// Claims the selected effects if the held-out error permits it. With more effects than are claimed, it has to decrease by
+    /// more than the standard error. With as many or fewer, it must not increase by more than the standard error. Returns whether
+    /// all selected effects are claimed.
     pub(in crate::trace) fn claim(&mut self) -> bool {
         let fall = self.fall_since_claimed();
         let added = self.taken().len() > self.claimed.effects().len();
@@ -126,22 +128,23 @@ impl Search<'_> {
         claimed
     }
 
-    /// How far the held-out error has fallen since effects were claimed last.
+    /// The decrease of the held-out error since the last claim.
     pub(in crate::trace) fn fall_since_claimed(&self) -> HeldOutDecrease {
         self.plain.units.decrease(&self.claimed.units, &self.units_now)
     }
 
-    /// How far the held-out error is below that of the declared model.
+    /// The decrease of the held-out error since the declared model.
     pub(in crate::trace) fn fall_since_declared(&self) -> HeldOutDecrease {
         self.plain.units.decrease(&self.declared_units, &self.units_now)
     }
 
-    /// Whether nothing was added, or the held-out error is below that of the declared model by more than the standard error of the fall.
+    /// Whether nothing is selected, or the held-out error is below that of the declared model by more than the standard error of
+    /// the decrease.
     fn lowers_heldout_error(&self) -> bool {
         self.taken().is_empty() || self.fall_since_declared().is_significant()
     }
 
-    /// Withdraws what was added since effects were claimed last, and remembers it as not claimed.
+    /// Withdraws the effects added since the last claim, and records them as rejected.
     pub(in crate::trace) fn withdraw_unclaimed(&mut self) {
         let fall = self.fall_since_claimed();
         let claimed: Vec<usize> = self
@@ -162,7 +165,7 @@ impl Search<'_> {
         self.restore();
     }
 
-    /// Goes back to what is claimed, where an interruption has left a round half done. From then on nothing interrupts.
+    /// Restores the claimed effects after an interruption within a round. The search is not interrupted again.
     pub(in crate::trace) fn roll_back(&mut self) {
         self.restore();
         self.interrupt = None;
@@ -179,7 +182,8 @@ impl Search<'_> {
         self.units_now = units;
     }
 
-    /// Withdraws all effects where together they do not lower the held-out error of the declared model by more than the standard error of the fall.
+    /// Withdraws all effects if together they do not lower the held-out error of the declared model by more than the standard
+    /// error of the decrease.
     pub(in crate::trace) fn withdraw_all_unless_better(&mut self) -> Result<(), IdentifyError> {
         if !self.lowers_heldout_error() {
             self.claimed = HeldOutState::default();

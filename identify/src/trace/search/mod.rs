@@ -1,8 +1,10 @@
-//! The search: project out what the model has, score every candidate, add the best, refit all together, let what has lost its place go, exchange
-//! what something else explains better, until the best that is left is no better than the best on readings without structure.
+//! The search. Each round projects out the present model, scores every candidate, adds the best and refits. It removes effects
+//! that are no longer significant, and exchanges effects for better candidates. The search ends when the best remaining candidate
+//! is no better than the best on readings without structure.
 //!
-//! It runs on all readings, and beside that once for each fold on the readings outside that fold alone ([`SearchBranch`]): each chooses for itself, and uses
-//! numbers and places only that it has tuned itself. So the error on held-out readings is that of a search that never saw them.
+//! One branch searches on all readings. One further branch for each fold searches on the readings outside that fold
+//! ([`SearchBranch`]). Each branch selects for itself, and uses only shape numbers and positions that it has tuned itself. The
+//! held-out error therefore belongs to a search without access to the held-out readings.
 
 mod heldout;
 mod models;
@@ -21,105 +23,106 @@ use crate::error::IdentifyError;
 use heldout::HeldOutState;
 pub use heldout::{Plain, RejectedByHeldOut};
 
-/// When the search stops.
+/// The stopping rule of the search.
 #[derive(Clone, Copy, Debug)]
 pub struct Stop {
-    /// Probability that the search claims anything on readings without structure.
+    /// Probability that the search claims an effect on readings without structure.
     pub significance: f64,
-    /// The most effects.
+    /// Maximum number of effects.
     pub most: usize,
-    /// Whether residual variance, not noise, is what gains are measured in: for poses, whose structure never ends.
+    /// Whether gains are divided by the residual variance instead of the noise variance. This applies to poses, whose residual
+    /// always has structure.
     pub in_residual_variance: bool,
 }
 
-/// An effect that a search has added.
+/// An effect that a search has selected.
 #[derive(Clone, Copy, Debug)]
 pub struct SelectedEffect {
     /// Index of the candidate.
     pub candidate: usize,
-    /// Probability that the search finds as good on readings without structure.
+    /// Probability that the search finds at least as high a score on readings without structure.
     pub p_value: f64,
 }
 
-/// One of the searches: on all readings, or on all but one fold.
+/// One branch of the search: on all readings, or on all but one fold.
 #[derive(Clone, Debug)]
 pub struct SearchBranch {
-    /// The folds that it sees, ascending.
+    /// The training folds, ascending.
     pub folds: Vec<usize>,
-    /// What it has added.
+    /// The selected effects.
     pub taken: Vec<SelectedEffect>,
 }
 
 impl SearchBranch {
-    /// The candidates that it has added.
+    /// Indices of the selected candidates.
     pub fn chosen(&self) -> Vec<usize> {
         self.taken.iter().map(|taken| taken.candidate).collect()
     }
 }
 
-/// Place of the search on all readings among the tracks; that which leaves out fold `k` is at `k + 1`.
+/// Index of the branch on all readings. The branch that excludes fold `k` has index `k + 1`.
 pub(super) const ALL: usize = 0;
 
-/// Where the search stands.
+/// The state of the search.
 pub struct Search<'s> {
     /// The columns.
     pub columns: &'s Columns<'s, 's>,
-    /// What is looked for.
+    /// The candidates.
     pub candidates: Vec<Candidate>,
-    /// The candidates laid over the tests.
+    /// The basis columns of the candidates.
     layouts: Vec<Layout>,
     /// All products.
     pub moments: Moments,
-    /// What is known beforehand.
+    /// The priors.
     prior: PriorMoments,
     /// Number of base columns that the fitted model has.
     pub rank: usize,
-    /// The search on all readings, then that of each fold.
+    /// The branch on all readings, then one for each fold.
     pub tracks: Vec<SearchBranch>,
-    /// For each candidate the folds whose readings its numbers and places were tuned on; none for an entry of the library.
+    /// For each candidate the folds on which its shape numbers and positions were tuned. Empty for an effect of the library.
     tuned_on: Vec<Vec<usize>>,
-    /// Where the columns of every candidate that was ever added stand in the base.
+    /// For each candidate that was ever added, the range of its columns in the base.
     materialised: Vec<(usize, Range<usize>)>,
-    /// Sum of squares of held-out residuals over the variance of the noise, before and after each addition.
+    /// Sum of squares of held-out residuals over the noise variance, for each number of effects.
     pub held_out: Vec<f64>,
-    /// The best score on readings without structure that is exceeded with the probability of the stop, by round.
+    /// For each round, the best score that readings without structure exceed with the probability of the significance level.
     pub thresholds: Vec<f64>,
-    /// Whether candidates of last resort are tried.
+    /// Whether candidates of last resort are searched.
     pub last_resort: bool,
-    /// Candidates of last resort whose products are not made yet.
+    /// Candidates of last resort whose products are not computed yet.
     pub reserve: Vec<(Candidate, Layout)>,
-    /// What held-out errors are of.
+    /// The unwhitened base and residual for the held-out error.
     plain: Plain,
-    /// Sums of squares of held-out residuals over the variance of the noise, by unit: now, and under the declared model.
+    /// Sums of squares of held-out residuals over the noise variance, by unit: at present, and under the declared model.
     units_now: Vec<f64>,
     declared_units: Vec<f64>,
-    /// What is claimed: additions that lowered the held-out error by more than the standard error of the fall.
+    /// The claimed effects: additions that lowered the held-out error by more than the standard error of the decrease.
     claimed: HeldOutState,
-    /// What scored better than readings without structure and was not claimed, in the order in which it was added.
+    /// Effects that scored better than readings without structure but were not claimed, in order of addition.
     pub unclaimed: Vec<RejectedByHeldOut>,
-    /// Entries of the library that would not stand out however large they plausibly were.
+    /// For each effect of the library whether it is undetectable at its largest plausible size.
     unseen: Vec<bool>,
-    /// Asked before each model that is trained; `None` where the search is not to be interrupted.
+    /// Checked before each model is trained. `None` if the search must not be interrupted.
     pub interrupt: Option<Interrupt<'s>>,
     pub(super) stop: Stop,
 }
 
-/// What a round came to.
+/// The outcome of a round.
 pub enum Round {
     /// An effect was added.
     Added {
-        /// Its candidate.
+        /// Index of the candidate.
         candidate: usize,
     },
-    /// No remaining candidate is significant; the best that there was, and its p-value.
+    /// No remaining candidate is significant.
     Done {
-        /// The p-value of the best that was not taken.
+        /// The p-value of the best candidate that was not added.
         p_value: f64,
     },
 }
 
 impl<'s> Search<'s> {
-    /// Before the first round.
+    /// The state before the first round.
     ///
     /// # Errors
     /// If products are not finite.
@@ -171,22 +174,22 @@ impl<'s> Search<'s> {
         Ok(search)
     }
 
-    /// What the search on all readings has added.
+    /// The selected effects of the branch on all readings.
     pub fn taken(&self) -> &[SelectedEffect] {
         &self.tracks[ALL].taken
     }
 
-    /// Whether folds are all that there are.
+    /// Whether these folds are all folds.
     pub(super) fn identifies_all(&self, folds: &[usize]) -> bool {
         folds.len() == self.tracks[ALL].folds.len()
     }
 
-    /// Enough for every effect that may be added, and some that were attributed to one.
+    /// A limit on rounds: enough for the maximum number of effects and some merges.
     pub fn most_rounds(&self) -> usize {
         self.stop.most.saturating_add(self.stop.most / 2).max(1)
     }
 
-    /// The best beside a model of what has been chosen, of what each would gain there.
+    /// The best candidate beside a model with the chosen candidates, and its score.
     pub(super) fn best_of(
         &self,
         model: &TrainedModel<'_>,
@@ -207,7 +210,7 @@ impl<'s> Search<'s> {
         best.filter(|(_, score)| score.is_finite())
     }
 
-    /// The simplest of the candidates that the readings cannot tell from the best one.
+    /// The candidate with the shortest description among those that are confounded with the best one.
     pub(super) fn named_first(
         &self,
         model: &TrainedModel<'_>,
@@ -232,7 +235,7 @@ impl<'s> Search<'s> {
         first
     }
 
-    /// One round.
+    /// Runs one round.
     pub fn round(&mut self) -> Result<Round, IdentifyError> {
         let Some((p_value, threshold)) = self.best_against_null()? else {
             return Ok(Round::Done { p_value: 1.0 });
@@ -252,7 +255,7 @@ impl<'s> Search<'s> {
             }
         }
         let held_out = self.held_out_now()?;
-        // For poses p-values say little; there an effect has to be significant on the readings that were held out.
+        // P-values are unreliable for poses. There an addition also has to lower the held-out error.
         if self.stop.in_residual_variance
             && held_out >= self.held_out.last().copied().unwrap_or(f64::INFINITY)
         {
@@ -264,8 +267,8 @@ impl<'s> Search<'s> {
         Ok(Round::Added { candidate })
     }
 
-    /// The p-value of the best beside what has been taken, among the best of draws without structure, and the score that those exceed with the probability
-    /// of the stop.
+    /// The p-value of the best candidate with respect to the best scores of the null draws, and the score that these exceed with
+    /// the probability of the significance level.
     fn best_against_null(&self) -> Result<Option<(f64, f64)>, IdentifyError> {
         let chosen = self.tracks[ALL].chosen();
         let model = self.model_without(None)?;
@@ -292,8 +295,8 @@ impl<'s> Search<'s> {
         Ok(Some((p_value, threshold.copied().unwrap_or(0.0))))
     }
 
-    /// What a search would add, if it reaches a score: on all readings the simplest among those that are indistinguishable from the best; where a fold is left out, which has to
-    /// be predicted and not named, the best.
+    /// The candidate that a branch adds, if it reaches a score. On all readings it is the candidate with the shortest description
+    /// among those confounded with the best. With one fold left out, prediction matters and not the name, so it is the best.
     fn pick(&mut self, track: usize, least: f64) -> Result<Option<usize>, IdentifyError> {
         let SearchBranch { folds, .. } = self.tracks[track].clone();
         let chosen = self.tracks[track].chosen();
@@ -315,7 +318,7 @@ impl<'s> Search<'s> {
         self.tracks[track].taken.push(taken);
     }
 
-    /// Drops what the later effects have made superfluous.
+    /// Removes effects that later additions have made insignificant.
     fn remove_insignificant(&mut self, threshold: f64) -> Result<(), IdentifyError> {
         let folds = self.tracks[ALL].folds.clone();
         loop {

@@ -1,4 +1,5 @@
-//! The models that a search compares: what has been chosen, trained on the folds that it sees, and what a candidate is worth beside that.
+//! The models that a search compares: the chosen effects, trained on the folds of a branch, and the score of a candidate beside
+//! them.
 
 use std::ops::Range;
 
@@ -12,7 +13,7 @@ use crate::trace::score::{Gain, TrainedModel};
 use crate::trace::tuning::Trial;
 
 impl Search<'_> {
-    /// Where a candidate's columns stand in the base; nowhere before it was ever added.
+    /// The range of a candidate's columns in the base. Empty if the candidate was never added.
     pub fn places(&self, candidate: usize) -> Range<usize> {
         self.materialised
             .iter()
@@ -36,7 +37,7 @@ impl Search<'_> {
         TrainedModel::new(&self.moments, &self.prior, self.base_with(chosen), folds.to_vec())
     }
 
-    /// The same, to be asked for few candidates.
+    /// The model with some candidates, for the evaluation of few candidates.
     pub(in crate::trace) fn lean_model_of(
         &self,
         chosen: &[usize],
@@ -46,7 +47,7 @@ impl Search<'_> {
         TrainedModel::projection(&self.moments, &self.prior, self.base_with(chosen), folds.to_vec())
     }
 
-    /// The model with what has been taken, less one of it, on all readings.
+    /// The model with the selected effects, without the `k`-th if one is given, on all readings.
     pub fn model_without(&self, left_out: Option<usize>) -> Result<TrainedModel<'_>, IdentifyError> {
         let mut chosen = self.tracks[ALL].chosen();
         if let Some(k) = left_out {
@@ -55,7 +56,7 @@ impl Search<'_> {
         self.model_of(&chosen, &self.tracks[ALL].folds)
     }
 
-    /// Puts the columns of candidates into the base, where they are not there yet.
+    /// Adds the columns of candidates to the base, if they are not there yet.
     pub(in crate::trace) fn materialise(&mut self, candidates: &[usize]) {
         let fresh: Vec<usize> = candidates
             .iter()
@@ -88,7 +89,7 @@ impl Search<'_> {
             .collect()
     }
 
-    /// The variance that gains are measured in.
+    /// The variance by which gains are divided.
     pub fn variance(&self, model: &TrainedModel<'_>) -> f64 {
         if !self.stop.in_residual_variance {
             return 1.0;
@@ -107,7 +108,7 @@ impl Search<'_> {
         (sum / freedom).max(f64::MIN_POSITIVE)
     }
 
-    /// The variance of the null draws, in the same sense.
+    /// The variance by which the gains of the null draws are divided.
     pub(super) fn null_variance(&self) -> Result<f64, IdentifyError> {
         Ok(self.variance(&self.lean_model_of(&[], &self.tracks[ALL].folds)?))
     }
@@ -120,23 +121,23 @@ impl Search<'_> {
         -ln_chi_square_tail(gain.gain / variance, gain.freedom)
     }
 
-    /// The evidence for a candidate: `−ln P` of its gain, less the price of its places.
+    /// The evidence for a candidate: `−ln P` of its gain, less its selection penalty.
     pub fn evidence_for(&self, candidate: usize, gain: &Gain, variance: f64) -> f64 {
         self.evidence(gain, variance) - self.candidates[candidate].price
     }
 
-    /// The same, less the candidate's cost.
+    /// The evidence for a candidate, less its cost.
     pub fn score(&self, candidate: usize, gain: &Gain, variance: f64) -> f64 {
         self.evidence_for(candidate, gain, variance) - self.candidates[candidate].cost
     }
 
-    /// Any effect on trial beside a model; `None` where the data lack what it follows.
+    /// The products of any effect beside a model. `None` if the data lack its driver.
     pub(in crate::trace) fn trial(&self, model: &TrainedModel<'_>, effect: &Effect) -> Option<Trial> {
         let layout = self.columns.layout_uncached(effect)?;
         Some(Trial::new(self.columns, &self.moments, &layout, model))
     }
 
-    /// What any effect would gain beside a model, on the folds that it is trained on; `None` where the data lack what it follows.
+    /// The gain of any effect beside a model, on the training folds of the model. `None` if the data lack its driver.
     pub fn gain_beside(&self, model: &TrainedModel<'_>, effect: &Effect) -> Option<f64> {
         Some(self.trial(model, effect)?.gain(model))
     }

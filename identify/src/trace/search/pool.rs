@@ -1,4 +1,4 @@
-//! What a search may add: entries of the library that the readings would show, and what it has tuned itself.
+//! The candidates that a search may add: the library's detectable effects, and the effects that it has tuned itself.
 
 use rayon::prelude::*;
 
@@ -10,12 +10,12 @@ use crate::trace::library::Candidate;
 use crate::trace::refine;
 use crate::trace::score::Gain;
 
-/// By how many standard deviations an effect as large as is plausible has to change the readings, all together and beyond what the model absorbs, to be
-/// looked for.
+/// Least detectability of a searched effect. An effect of the largest plausible size has to change the readings by this many
+/// standard deviations in total, beyond what the model absorbs.
 const MIN_PLAUSIBLE_SIGMA: f64 = 3.0;
 
 impl Search<'_> {
-    /// For each candidate whether it would not stand out however large it plausibly was.
+    /// For each candidate whether it is undetectable at its largest plausible size.
     pub(super) fn not_detectable(&self) -> Result<Vec<bool>, IdentifyError> {
         let model = self.model_without(None)?;
         let candidates = 0..self.candidates.len();
@@ -32,7 +32,7 @@ impl Search<'_> {
         Ok(unseen)
     }
 
-    /// Whether a search that sees some folds may take a candidate up now.
+    /// Whether a branch with some training folds may add a candidate now.
     pub fn is_open(&self, candidate: usize, folds: &[usize]) -> bool {
         let unseen = self.unseen.get(candidate).is_some_and(|unseen| *unseen);
         let entry = &self.candidates[candidate];
@@ -42,13 +42,13 @@ impl Search<'_> {
             && self.is_own(candidate, folds)
     }
 
-    /// Whether a candidate is an entry of the library, or was tuned on the very folds that a search sees.
+    /// Whether a candidate is an effect of the library or was tuned on exactly these folds.
     pub(in crate::trace) fn is_own(&self, candidate: usize, folds: &[usize]) -> bool {
         let tuned_on = &self.tuned_on[candidate];
         tuned_on.is_empty() || tuned_on == folds
     }
 
-    /// What can be composed of the library's dictionaries beside a model.
+    /// The step tables from the library's dictionaries beside a model.
     pub(super) fn composed(&self, model: &TrainedModel<'_>) -> Vec<StepTable> {
         let variance = self.variance(model);
         (0..self.candidates.len())
@@ -60,8 +60,8 @@ impl Search<'_> {
             .collect()
     }
 
-    /// Adds what comes near the best, with the best numbers that it can have beside some candidates on some folds. Returns what each candidate that was there
-    /// before gains beside them.
+    /// Adds the candidates near the best, with their shape numbers tuned beside some candidates on some folds. Returns the gains
+    /// of the candidates that were present before.
     pub(in crate::trace) fn refine(
         &mut self,
         beside: &[usize],
@@ -82,14 +82,14 @@ impl Search<'_> {
         Ok(gains)
     }
 
-    /// Adds a candidate that was tuned on some folds; its number, if the data have what it follows.
+    /// Adds a candidate that was tuned on some folds. Returns its index, or `None` if the data lack its driver.
     pub(in crate::trace) fn add_tuned(&mut self, candidate: Candidate, folds: &[usize]) -> Option<usize> {
         let layout = self.columns.layout(&candidate.effect)?;
         self.append(vec![(candidate, layout)], folds);
         Some(self.candidates.len() - 1)
     }
 
-    /// Adds candidates that were tuned on some folds; on none, if they are entries of the library.
+    /// Adds candidates that were tuned on some folds, or effects of the library if `tuned_on` is empty.
     pub(in crate::trace) fn append(&mut self, fresh: Vec<(Candidate, Layout)>, tuned_on: &[usize]) {
         if fresh.is_empty() {
             return;
@@ -101,13 +101,14 @@ impl Search<'_> {
         self.moments.append(self.columns, &self.layouts);
     }
 
-    /// How many entries of the library would stand out if they were as large as is plausible. A dictionary is one of them: what is composed of it bears its
-    /// name, and its places have a price of their own. Curves of last resort, some dozens beside thousands, are not counted.
+    /// The number of the library's effects that are detectable at their largest plausible size. A dictionary counts once: its
+    /// step tables share its identifier, and their positions have a penalty of their own. Curves of last resort, some dozens
+    /// beside thousands, do not count.
     pub(in crate::trace) fn seen_entries(&self) -> usize {
         self.unseen.iter().filter(|unseen| !**unseen).count()
     }
 
-    /// Adds the candidates of last resort to those whose products are made.
+    /// Computes the products of the candidates of last resort, and adds them to the candidates.
     pub fn add_reserve_candidates(&mut self) {
         let reserve = std::mem::take(&mut self.reserve);
         self.append(reserve, &[]);
