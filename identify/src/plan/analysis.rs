@@ -1,4 +1,4 @@
-//! The analysis of a plan: everything that can be said before anybody measures.
+//! The analysis of a plan: predicted uncertainties, identifiability and efficiency before the measurement.
 
 use abbe_model::instrument::Station;
 use abbe_model::sensitivity::SlotValues;
@@ -14,18 +14,18 @@ use crate::problem::Problem;
 /// How a plan is analysed.
 #[derive(Clone, Debug)]
 pub struct PlanOptions {
-    /// Standard deviation of a reading, mm, in place of the session's.
+    /// Standard deviation of a reading, mm. It replaces that of the session.
     pub noise_mm: Option<f64>,
-    /// Pass over data where a test has a movement of its own.
+    /// Whether a test with a movement is analysed at its planned states even if it has data.
     pub planned_only: bool,
-    /// Whether undeclared effects of the library are looked at.
+    /// Whether the library's undeclared effects are screened.
     pub effects: bool,
-    /// Travel of the bar's sensor either way, mm, beyond which a test is warned of.
+    /// Travel of the bar's sensor in either direction, mm. A test that exceeds it causes a warning.
     pub reach_mm: f64,
 }
 
 impl Default for PlanOptions {
-    /// The session's noise, its data where there are any, effects, and the sensor's usual travel.
+    /// The session's noise, its data if present, effects included, and the usual sensor travel.
     fn default() -> Self {
         PlanOptions {
             noise_mm: None,
@@ -36,15 +36,15 @@ impl Default for PlanOptions {
     }
 }
 
-/// Travel of a ball bar's sensor either way.
+/// Travel of a ball bar's sensor in either direction.
 pub const BAR_TRAVEL_MM: f64 = 1.0;
-/// A variance that grows less than this without a test is not worth a word.
+/// Variance ratio below which the loss of a test is not reported.
 const REPORT_RATIO: f64 = 1.5;
 
-/// Analyses a plan, or the states of a measured session.
+/// Analyses a plan or the states of a measured session.
 ///
 /// # Errors
-/// If a test has neither data nor a movement, a movement leaves the travel, or the model cannot be evaluated.
+/// If a test has neither data nor a movement, if a movement leaves the travel, or if the model cannot be evaluated.
 pub fn analyse(session: &Session, options: &PlanOptions) -> Result<PlanAnalysis, IdentifyError> {
     let (complete, noise) = prepared(session, options)?;
     let problem = states::problem_by_test(&complete, noise)?;
@@ -65,7 +65,7 @@ pub fn analyse(session: &Session, options: &PlanOptions) -> Result<PlanAnalysis,
     Ok(analysis)
 }
 
-/// The complete session (see [`states::complete`]) and the noise that a plan is judged with.
+/// The complete session (see [`states::complete`]) and the noise model of the plan.
 ///
 /// # Errors
 /// If a test has neither data nor a movement, or a movement leaves the travel.
@@ -77,8 +77,8 @@ pub fn prepared(session: &Session, options: &PlanOptions) -> Result<(Session, No
     Ok((states::complete(session, options.planned_only)?, noise))
 }
 
-/// Analyses a problem whose folds are its tests (see [`states::problem_by_test`]), without effects; tests whose readings differ from the
-/// bar by more than `travel_mm` are warned of.
+/// Analyses a problem whose folds are its tests (see [`states::problem_by_test`]), without effects. A test causes a warning if
+/// the distance of its balls differs from the bar length by more than `travel_mm`.
 ///
 /// # Errors
 /// If the model cannot be evaluated.
@@ -147,7 +147,7 @@ pub fn analyse_problem(problem: &Problem<'_>, travel_mm: f64) -> Result<PlanAnal
     })
 }
 
-/// What is mounted for a test: the workpiece ball or tracker, or the socket.
+/// The mounted object of a test: the workpiece ball or tracker, or the socket.
 fn mounted(test: &abbe_model::session::Test) -> &str {
     test.socket.as_deref().unwrap_or(&test.setup)
 }
@@ -195,7 +195,7 @@ fn correlation(problem: &Problem<'_>, linear: &Linearisation, wanted: &[usize]) 
     }
 }
 
-/// Leaves out one test after another.
+/// Determines the uncertainties without each test in turn.
 fn without(
     problem: &Problem<'_>,
     linear: &Linearisation,

@@ -1,24 +1,24 @@
-//! Where a menu puts the carried ball, and where the axes that do not sweep stand.
+//! Positions of the carried ball in candidate tests, and positions of the rotary axes that do not sweep.
 
 use abbe_model::instrument::Station;
 use abbe_model::session::Session;
 
 use super::candidate_tests::CandidateTests;
 
-/// A ball nearer than this to one that is mounted already is that one, mm.
+/// Distance below which a ball position counts as one that is already mounted, mm.
 const SAME_PLACE_MM: f64 = 0.5;
 
-/// A place of the carried ball: where, and under which set-up.
+/// A position of the carried ball, with its set-up.
 pub(super) struct Place {
     /// Centre, mm.
     pub ball: [f64; 3],
-    /// The set-up that it has in the session; empty where it is mounted anew.
+    /// The set-up of this position in the session. Empty for a new mount.
     pub setup: String,
-    /// Whether it is mounted anew.
+    /// Whether the ball has to be mounted for it.
     pub new: bool,
 }
 
-/// Where the carried ball may be: as it is mounted in the session, or anew about each rotary axis of its side.
+/// The positions of the carried ball: as mounted in the session, or newly mounted about each rotary axis of its side.
 pub(super) fn places(
     session: &Session,
     menu: &CandidateTests,
@@ -80,7 +80,7 @@ pub(super) fn places(
     places
 }
 
-/// A unit vector square to an axis: R's Y where it can be, else Z.
+/// A unit vector perpendicular to an axis: the projection of R's Y, or of Z if the axis is close to Y.
 fn across(direction: [f64; 3]) -> [f64; 3] {
     let start = if direction[1].abs() < 0.5 {
         [0.0, 1.0, 0.0]
@@ -93,7 +93,7 @@ fn across(direction: [f64; 3]) -> [f64; 3] {
     rest.map(|x| x / length)
 }
 
-/// The positions of all axes with the other rotary ones where the menu has them stand.
+/// The positions of all axes, with the rotary axes other than the swept one at the candidate positions.
 pub(super) fn standings(
     session: &Session,
     menu: &CandidateTests,

@@ -1,4 +1,4 @@
-//! A menu made ready: the information of every entry, evaluated once.
+//! The information of every candidate test, evaluated once.
 
 use rayon::prelude::*;
 
@@ -11,26 +11,27 @@ use crate::parameters::{Parameter, Role};
 use crate::problem::Problem;
 use crate::triangle::Triangle;
 
-/// A menu made ready: the information of every entry on the shared unknowns.
+/// The information of every candidate test on the shared parameters.
 pub struct Prepared {
-    /// The shared unknowns.
+    /// The shared parameters.
     pub shared: Shared,
-    /// The plan's own information.
+    /// The information of the plan itself.
     pub base: Root,
-    /// The entries.
+    /// The candidate tests.
     pub entries: Vec<CandidateInformation>,
 }
 
-/// An entry with its information.
+/// A candidate test with its information.
 pub struct CandidateInformation {
-    /// The entry; its name says what is left mounted.
+    /// The test. Its name states which ball stays mounted.
     pub entry: Entry,
     /// Its information.
     pub root: Root,
 }
 
 impl Prepared {
-    /// The menu of a problem whose folds are its tests, at the unknowns' values `beta`. `asked` are the unknowns that the goal is about.
+    /// Evaluates the candidate tests for a problem whose folds are its tests, at the parameter values `beta`. `asked` are the
+    /// parameters of the goal.
     ///
     /// # Errors
     /// If the model cannot be evaluated.
@@ -59,19 +60,19 @@ impl Prepared {
         })
     }
 
-    /// The plan with some entries added.
+    /// The plan with some candidate tests added.
     pub fn with(&self, entries: &[usize]) -> Root {
         entries.iter().fold(self.base.clone(), |root, entry| {
             sum(root.as_ref(), self.entries[*entry].root.as_ref())
         })
     }
 
-    /// Some information with an entry added.
+    /// The information `root` with a candidate test added.
     pub fn added(&self, root: &Root, entry: usize) -> Root {
         sum(root.as_ref(), self.entries[entry].root.as_ref())
     }
 
-    /// A figure of some information with each entry added.
+    /// A figure of the information with each candidate test added.
     pub fn figures<T: Send>(&self, root: &Root, figure: &(impl Fn(&Root) -> T + Sync)) -> Vec<T> {
         (0..self.entries.len())
             .into_par_iter()
@@ -79,8 +80,8 @@ impl Prepared {
             .collect()
     }
 
-    /// The entry after which a figure (the smaller the better) stands best, and the figures of all. Of equal ones the first of the menu, which lists
-    /// mounted balls before those that are mounted anew.
+    /// The candidate test with the smallest figure, and the figures of all. Of equal tests the first counts. Mounted balls come
+    /// before newly mounted ones.
     pub fn best(&self, root: &Root, figure: &(impl Fn(&Root) -> f64 + Sync)) -> Option<(usize, Vec<f64>)> {
         let figures = self.figures(root, figure);
         let best = (0..figures.len()).min_by(|a, b| smallest_first(figures[*a], figures[*b]))?;
@@ -88,7 +89,8 @@ impl Prepared {
     }
 }
 
-/// Whether a new test can share an unknown: errors and effects, a mounted workpiece ball, the spindle ball of the last test, the sensor.
+/// Whether a new test can share a parameter: errors and effects, a mounted workpiece ball, the spindle ball of the last test, the
+/// sensor.
 fn may_be_shared(problem: &Problem<'_>, parameter: &Parameter) -> bool {
     if parameter.role != Role::Setup {
         return true;
@@ -102,8 +104,8 @@ fn may_be_shared(problem: &Problem<'_>, parameter: &Parameter) -> bool {
         || !parameter.id.contains('[')
 }
 
-/// The information of an entry, with a spindle ball mounted for it and, where the menu allows it, with the one that is left mounted. The
-/// readings are the same.
+/// The information of a candidate test with a newly mounted spindle ball and, if permitted, with the spindle ball that stays
+/// mounted. The readings are the same.
 fn ready(
     problem: &Problem<'_>,
     shared: &Shared,

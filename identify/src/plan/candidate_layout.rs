@@ -1,4 +1,4 @@
-//! The choices of a menu laid out as tests: where the ball is, which axis sweeps, where the others stand, which bar, on which side.
+//! Generates the candidate tests: ball position, swept axis, positions of the other axes, bar, and side.
 
 use abbe_model::axis::AxisKind;
 use abbe_model::instrument::Station;
@@ -11,22 +11,23 @@ use super::ball_positions::{Place, dot, norm, places, standings};
 use super::candidate_tests::CandidateTests;
 use super::sweep::{Sweep, sweep_of};
 
-/// Least radius about a swept axis that a test is made at, mm: nearer, the bar hardly moves.
+/// Least radius about the swept axis, mm. At smaller radii the bar hardly moves.
 const MIN_RADIUS_MM: f64 = 10.0;
-/// Shortest bar with which linear axes follow, mm: the shortest of the kits, less what calibration may take off. Nearer, the cups touch.
+/// Shortest bar with which linear axes follow, mm: the shortest nominal length less its calibration deviation. With a shorter bar
+/// the cups touch.
 const MIN_FOLLOWING_MM: f64 = 49.0;
 
-/// An entry before its states are planned.
+/// A candidate test without its states.
 pub(super) struct Draft {
-    /// The test, without its states.
+    /// The test without its states.
     pub test: Test,
-    /// In words.
+    /// Description of the test.
     pub name: String,
-    /// Whether a ball has to be mounted anew.
+    /// Whether a ball has to be mounted for it.
     pub new_setup: bool,
 }
 
-/// Everything that the menu's choices come to, before travel and reach are checked.
+/// All combinations of the permitted choices, before travel and reach are checked.
 pub(super) fn drafts(session: &Session, menu: &CandidateTests, last: &Test) -> Vec<Draft> {
     let machine = &session.machine;
     let rotary: Vec<usize> = (0..machine.axes.len())
@@ -76,8 +77,8 @@ pub(super) fn drafts(session: &Session, menu: &CandidateTests, last: &Test) -> V
     drafts
 }
 
-/// The bar for tests in which linear axes follow, where its length changes nothing but how far the balls are apart: the shortest that keeps
-/// them 100 mm apart, else the longest that keeps their cups apart.
+/// The bar for tests in which linear axes follow. Its length only sets the distance of the balls. It is the shortest bar of at
+/// least 99 mm, otherwise the longest bar that keeps the cups apart.
 fn following_bar(menu: &CandidateTests) -> Option<f64> {
     let bars = || {
         menu.bars_mm
@@ -96,7 +97,7 @@ struct Base<'b> {
     last: &'b Test,
     axis: usize,
     sweep: Sweep,
-    /// Times the speed of the sweep.
+    /// Multiple of the sweep's speed.
     feed: f64,
     on_table: bool,
     place: &'b Place,
@@ -104,7 +105,7 @@ struct Base<'b> {
 }
 
 impl Base<'_> {
-    /// The bar of the kit as the session has calibrated it, if it has.
+    /// The calibrated length of the bar in the session, or its nominal length.
     fn length(&self, nominal: f64) -> f64 {
         let bars = self.session.tests.iter().filter_map(|test| match &test.station {
             Station::BallBar(bar) => Some(bar.bar),
@@ -208,7 +209,7 @@ impl Base<'_> {
         }
     }
 
-    /// What is known of the set-up: as in the session's tests; of the bar, as of the same bar there.
+    /// The set-up priors: those of the session's last test, and for the bar those of the same bar.
     fn priors(&self, nominal: f64) -> Vec<Prior> {
         let mut priors = self.last.priors.clone();
         let same_bar = self.session.tests.iter().find(|test| match &test.station {
@@ -221,7 +222,8 @@ impl Base<'_> {
         priors
     }
 
-    /// The other ball on the swept axis: at the foot of the circle where the bar is as long as the radius, else beside it.
+    /// Places the other ball on the swept axis: in the plane of the circle if the bar is as long as the radius, otherwise beside
+    /// that plane.
     fn on_axis(&self, menu: &CandidateTests, nominal: f64) -> Vec<Draft> {
         let machine = &self.session.machine;
         let station = self.station(nominal);
@@ -245,7 +247,7 @@ impl Base<'_> {
         beside
             .into_iter()
             .filter_map(|beside| {
-                // From the carried ball to the other one.
+                // The vector from the carried ball to the other one.
                 let across: [f64; 3] = std::array::from_fn(|i| beside * along[i] - radial[i]);
                 let wanted = if self.on_table { across } else { across.map(|x| -x) };
                 if outward.is_some_and(|outward| dot(wanted, outward) < -MIN_RADIUS_MM) {
@@ -276,7 +278,7 @@ impl Base<'_> {
             .collect()
     }
 
-    /// Where the table's axis stands on end and carries the ball itself, the way out of the table: no other ball lies below it.
+    /// The outward direction of a vertical table axis that carries the ball itself. No other ball can be below the table.
     fn outward(&self) -> Option<[f64; 3]> {
         let machine = &self.session.machine;
         let table = machine
@@ -290,7 +292,7 @@ impl Base<'_> {
         })
     }
 
-    /// The linear axes keep the bar radial, tangential or axial.
+    /// Tests in which the linear axes keep the bar radial, tangential or axial.
     fn following(&self, menu: &CandidateTests, nominal: f64) -> Vec<Draft> {
         let offsets = [
             (FollowOffset::Radial, "radial"),

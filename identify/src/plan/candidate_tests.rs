@@ -1,8 +1,9 @@
-//! The menu of ball-bar tests from which a next one is proposed: what may be varied, and which of it the machine can do.
+//! The candidate ball-bar tests for the next measurement: the permitted variations, and those that the machine can perform.
 //!
-//! An entry sweeps one rotary axis while the other ball stands on that axis (at the foot of the circle or beside it, as the bar's length
-//! demands), or lets the linear axes keep the bar radial, tangential or axial. A part of the range, or one direction, never sees more than
-//! the whole: they are tried where gain is judged by the minute. What an axis' travel forbids, or a bar cannot reach, is not among the candidate tests.
+//! A candidate test sweeps one rotary axis. The other ball is on that axis, in the plane of the circle or beside it, as the bar
+//! length requires. Alternatively the linear axes keep the bar radial, tangential or axial. A part of the range, or one
+//! direction, never gives more information than the whole. Such tests are candidates only if the gain per minute decides. Tests
+//! beyond the travel of an axis or the reach of the bar are not candidates.
 
 use abbe_model::axis::AxisKind;
 use abbe_model::effect::{Component, Driver, Effect, Shape};
@@ -16,39 +17,40 @@ use crate::error::IdentifyError;
 use crate::parameters::Role;
 use crate::problem::Problem;
 
-/// What may be varied. Lengths in mm, times in min.
+/// The permitted variations. Lengths in mm, times in min.
 #[derive(Clone, Debug)]
 pub struct CandidateTests {
     /// Bars of the kit, nominal lengths.
     pub bars_mm: Vec<f64>,
-    /// Distances of the ball from the axis that it is mounted about.
+    /// Distances of the ball from the axis about which it is mounted.
     pub radii_mm: Vec<f64>,
-    /// Heights of the ball along that axis, both ways except below the table.
+    /// Heights of the ball along that axis, in both directions except below the table.
     pub heights_mm: Vec<f64>,
-    /// Where the other rotary axis stands.
+    /// Positions of the other rotary axis.
     pub standing_deg: Vec<f64>,
-    /// Feeds, as multiples of that of the session's tests; more than one where something depends on it (see [`CandidateTests::for_effects`]).
+    /// Feeds as multiples of that of the session's tests. Several if an effect depends on the feed (see
+    /// [`CandidateTests::for_effects`]).
     pub feeds: Vec<f64>,
-    /// Shares of the swept range, about its middle.
+    /// Shares of the sweep range, about its middle.
     pub ranges: Vec<f64>,
-    /// Whether each run comes back: `true` both ways, `false` one way.
+    /// Directions of travel: `true` for both, `false` for one.
     pub both_directions: Vec<bool>,
-    /// Whether linear axes may follow.
+    /// Whether linear axes may follow the swept axis.
     pub follow: bool,
-    /// Whether a test may leave the spindle ball mounted from the last test before it.
+    /// Whether a test may use the spindle ball of the last test without a new mount.
     pub keep_spindle_ball: bool,
-    /// Travel of a bar's sensor either way.
+    /// Travel of a bar's sensor in either direction.
     pub reach_mm: f64,
-    /// Mounting a ball anew.
+    /// Time to mount a ball.
     pub setup_min: f64,
-    /// Preparing a test: bar, position, feed-in.
+    /// Time to prepare a test: bar, position, feed-in.
     pub test_min: f64,
-    /// Evaluate every n-th position only, its information counted n times.
+    /// Only every n-th position is evaluated, and its information counts n times.
     pub thin: usize,
 }
 
 impl Default for CandidateTests {
-    /// A kit of 50, 100, 150 and 300 mm; a set-up takes five minutes, preparing a test one.
+    /// A kit of 50, 100, 150 and 300 mm. A new mount takes five minutes, the preparation of a test one minute.
     fn default() -> Self {
         CandidateTests {
             bars_mm: vec![50.0, 100.0, 150.0, 300.0],
@@ -69,7 +71,7 @@ impl Default for CandidateTests {
 }
 
 impl CandidateTests {
-    /// The same menu with a second feed, if one of the effects depends on speed or time.
+    /// The same variations with a second feed, if one of the effects depends on speed or time.
     pub fn for_effects<'e>(mut self, effects: impl IntoIterator<Item = &'e Effect>) -> CandidateTests {
         let depends = |effect: &Effect| {
             effect.shape == Shape::Lag
@@ -82,7 +84,7 @@ impl CandidateTests {
         self
     }
 
-    /// A short menu, every fourth position: to name a test beside a result, not to choose the last per cent.
+    /// Fewer variations and every fourth position: enough to name a test beside a result, not to optimise it.
     pub fn short() -> CandidateTests {
         CandidateTests {
             radii_mm: vec![50.0, 100.0, 150.0],
@@ -98,20 +100,21 @@ impl CandidateTests {
 /// The second feed, as a multiple of the first.
 const SECOND_FEED: f64 = 3.0;
 
-/// A test that can be made.
+/// A candidate test.
 #[derive(Clone, Debug)]
 pub struct Entry {
-    /// In words: `C150 with the workpiece ball at radius 50 mm`.
+    /// Description, for example `C150 with the workpiece ball at radius 50 mm`.
     pub name: String,
     /// The test with its planned states.
     pub test: Test,
-    /// Whether a ball has to be mounted anew.
+    /// Whether a ball has to be mounted for it.
     pub new_setup: bool,
-    /// What it takes, min.
+    /// Duration, min.
     pub minutes: f64,
 }
 
-/// Whether tests can be proposed for a problem: it has errors to identify, the instrument is a ball bar, and a rotary axis can be swept.
+/// Whether candidate tests exist for a problem: it has errors to identify, the instrument is a ball bar, and a rotary axis can be
+/// swept.
 pub fn has_candidates(problem: &Problem<'_>) -> bool {
     let session = problem.session;
     let has_errors = problem
@@ -129,7 +132,7 @@ pub fn has_candidates(problem: &Problem<'_>) -> bool {
             .any(|axis| axis.kind == AxisKind::Rotary)
 }
 
-/// The entries that a session's machine can do. The session is complete (see [`states::complete`]).
+/// The candidate tests that a session's machine can perform. The session is complete (see [`states::complete`]).
 ///
 /// # Errors
 /// If the instrument is no ball bar, or no rotary axis can be swept.
@@ -157,7 +160,7 @@ pub fn entries(session: &Session, menu: &CandidateTests) -> Result<Vec<Entry>, I
     Ok(entries)
 }
 
-/// Plans an entry's states; `None` where the travel forbids them or the bar does not reach.
+/// Plans the states of a candidate test. `None` if the travel forbids them or the bar does not reach.
 fn finished(session: &Session, menu: &CandidateTests, draft: Draft) -> Option<Entry> {
     let Draft {
         mut test,

@@ -1,4 +1,4 @@
-//! What a next test is for, as a figure of the information.
+//! The goal of a next test, and its figure of merit.
 
 use faer::Mat;
 
@@ -7,22 +7,23 @@ use super::linear::is_wanted;
 use crate::parameters::{Parameter, Role};
 use crate::problem::Problem;
 
-/// What a next test is for.
+/// The goal of a next test.
 #[derive(Clone, Debug)]
 pub enum Goal {
-    /// The least worst standard uncertainty of the errors, 1 µm weighing as much as 1″.
+    /// The smallest maximum standard uncertainty of the errors. 1 µm has the same weight as 1″.
     WorstUncertainty,
-    /// The greatest distance in standard deviations between an effect of these coefficients (internal units; none: of one outside unit, at
-    /// the worst phase) and the best that everything else, the other effect included, can make of it.
+    /// The largest separation, in standard deviations, of an effect from the best approximation by all other parameters, the
+    /// other effect included. `coefficients` are in internal units. If they are empty, the effect has one display unit at the
+    /// worst phase.
     Separation {
-        /// The effect that is there.
+        /// The effect that is present.
         effect: String,
         /// Its coefficients.
         coefficients: Vec<f64>,
     },
 }
 
-/// The unknowns that a goal is about.
+/// The parameters of a goal.
 pub fn asked(problem: &Problem<'_>, goal: &Goal) -> Vec<usize> {
     let list = &problem.parameters.list;
     let is_asked = |parameter: &Parameter| match (goal, parameter.role) {
@@ -35,7 +36,7 @@ pub fn asked(problem: &Problem<'_>, goal: &Goal) -> Vec<usize> {
     (0..list.len()).filter(|j| is_asked(&list[*j])).collect()
 }
 
-/// The figure of a goal, the smaller the better.
+/// The figure of a goal. Smaller is better.
 pub fn figure(shared: &Shared, root: &Root, goal: &Goal) -> f64 {
     match goal {
         Goal::WorstUncertainty => shared.uncertainties(root).into_iter().fold(0.0, f64::max),
@@ -43,8 +44,8 @@ pub fn figure(shared: &Shared, root: &Root, goal: &Goal) -> f64 {
     }
 }
 
-/// How many standard deviations what is asked about, with these coefficients, stands from the best that all others can make of it; without
-/// coefficients that of one outside unit at the worst phase.
+/// The distance, in standard deviations, of the asked parameters at these coefficients from the best approximation by all others.
+/// Without coefficients it is that of one display unit at the worst phase.
 pub fn separation(shared: &Shared, root: &Root, coefficients: &[f64]) -> f64 {
     let block = shared.criterion_block(root);
     let first = shared.ids.len() - shared.asked;
@@ -72,7 +73,7 @@ pub fn separation(shared: &Shared, root: &Root, coefficients: &[f64]) -> f64 {
     }
 }
 
-/// A figure as it is reported: the larger the better for separations.
+/// A figure as it is reported. For separations, larger is better.
 pub fn reported(figure: f64, goal: &Goal) -> f64 {
     match goal {
         Goal::WorstUncertainty => figure,

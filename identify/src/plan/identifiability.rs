@@ -1,4 +1,5 @@
-//! Blind spots by name: what no reading sees, what only the set-up's priors hold, and what is nearly collinear.
+//! Identifiability: null-space combinations, errors determined by set-up priors only, and near collinearity, each described in
+//! words.
 
 use faer::Mat;
 
@@ -11,21 +12,21 @@ use crate::problem::Problem;
 use crate::rank::{Rank, combinations};
 use crate::results::Unobservable;
 
-/// Coefficients below this, relative to the largest, are rounding.
+/// Coefficients below this value, relative to the largest, are rounding errors.
 const NEGLIGIBLE: f64 = 1e-5;
-/// Condition index from which a dependency is named: moderate from 10, strong from 30 (Belsley, Kuh & Welsch, Regression Diagnostics,
-/// 1980, ch. 3).
+/// Condition index from which a near dependency is reported: moderate from 10, strong from 30 (Belsley, Kuh & Welsch, Regression
+/// Diagnostics, 1980, ch. 3).
 const NAMED_FROM: f64 = 10.0;
-/// Share of the largest part in the null space that an error needs to lead a combination with set-up quantities.
+/// Least share of the largest entry of the null space for an error to be the pivot of a combination with set-up quantities.
 const MIN_ERROR: f64 = 1.37e-3;
-/// Things that a combination names in words.
+/// Maximum number of quantities that a description names.
 const MAX_NAMED: usize = 5;
-/// The verb of a combination that no reading sees.
+/// The verb of a combination that leaves every reading unchanged.
 const CONFOUNDED: &str = "is confounded with";
-/// Share of the largest coefficient below which an unknown is left out of a near dependency.
+/// Share of the largest coefficient below which a parameter is omitted from a near dependency.
 const MIN_PART: f64 = 0.1;
 
-/// A thing and the group that it belongs to, in words: `spindle_ball.z[A150]` is `z of the spindle ball` in `A150`.
+/// The name of a quantity and its group: `spindle_ball.z[A150]` is `z of the spindle ball` in `A150`.
 fn called<'i>(list: &[Parameter], id: &'i str) -> (String, Option<&'i str>) {
     let setup = list
         .iter()
@@ -46,8 +47,8 @@ fn called<'i>(list: &[Parameter], id: &'i str) -> (String, Option<&'i str>) {
     )
 }
 
-/// A combination in words: what is confounded with what, and in which proportion, with units where they differ. One thing in several tests is
-/// named once, and of a long combination only the first.
+/// Describes a combination: the confounded quantities and their proportion, with units if they differ. A quantity that occurs in
+/// several tests is named once. A long combination is shortened.
 fn describe(list: &[Parameter], combination: &[(String, f64)], verb: &str) -> String {
     let unit_of = |id: &str| {
         list.iter()
@@ -72,7 +73,7 @@ fn describe(list: &[Parameter], combination: &[(String, f64)], verb: &str) -> St
             None => things.push((thing, group.into_iter().collect(), value)),
         }
     }
-    // One more than is named is named too: it takes no more room than to say so.
+    // A single further quantity is named, because the count would take as much space.
     let unnamed = match things.len() {
         count if count > MAX_NAMED + 1 => count - MAX_NAMED,
         _ => 0,
@@ -93,14 +94,14 @@ fn describe(list: &[Parameter], combination: &[(String, f64)], verb: &str) -> St
     }
 }
 
-/// Two decimals, or two digits of a small number.
+/// Two decimals, or two significant digits of a small number.
 fn short(value: f64) -> String {
     let places = (1.0 - value.abs().max(1e-9).log10().floor()).clamp(1.0, 9.0) as usize;
     let text = format!("{value:.*}", places.max(if value.abs() < 10.0 { 2 } else { 1 }));
     text.trim_end_matches('0').trim_end_matches('.').replace('-', "−")
 }
 
-/// Combinations that no reading sees, priors included.
+/// Null-space combinations: they leave every reading unchanged, and no prior determines them.
 pub fn unidentifiable(problem: &Problem<'_>, rank: &Rank) -> Vec<Unobservable> {
     let list = &problem.parameters.list;
     rank.unseen
@@ -124,7 +125,7 @@ pub fn unidentifiable(problem: &Problem<'_>, rank: &Rank) -> Vec<Unobservable> {
         .collect()
 }
 
-/// A row over scaled unknowns in outside units: its pivot first, with 1, then the others in the order of the unknowns.
+/// A row over scaled parameters in display units: the pivot first, with 1, then the others in the order of the parameters.
 fn outside(problem: &Problem<'_>, row: &[f64], pivot: usize) -> Vec<(String, f64)> {
     let list = &problem.parameters.list;
     let largest = row.iter().fold(0.0_f64, |most, value| most.max(value.abs()));
@@ -146,8 +147,9 @@ fn outside(problem: &Problem<'_>, row: &[f64], pivot: usize) -> Vec<(String, f64
         .collect()
 }
 
-/// Errors that the readings alone cannot tell from set-up quantities, one sparse combination each: the null space of the readings
-/// without priors, reduced with errors as pivots, so that each combination holds one error and set-up quantities.
+/// The errors that the readings alone confound with set-up quantities, one sparse combination each. They follow from the null
+/// space of the readings without priors. It is reduced with errors as pivots, so that each combination contains one error and
+/// set-up quantities.
 ///
 /// # Errors
 /// If the decomposition fails.
@@ -165,13 +167,13 @@ pub fn held_by_setup(
     let (rows, pivots) = combinations(alone.null_space.as_ref(), scaled.as_ref(), &order, MIN_ERROR);
     let (mut of_errors, of_setups): (Vec<usize>, Vec<usize>) =
         (0..rows.len()).partition(|row| is_wanted(&list[pivots[*row]]));
-    // Listed as the errors are declared.
+    // In the order of declaration.
     of_errors.sort_by_key(|row| pivots[*row]);
     let setups: Vec<Vec<f64>> = of_setups.iter().map(|row| rows[*row].clone()).collect();
     let mut held = Vec::new();
     for row in of_errors {
         let error = pivots[row];
-        // What is not seen even with the priors is blind, and named there.
+        // A combination that is not identifiable even with the priors is reported as such elsewhere.
         let sparse = sparser(rows[row].clone(), &setups);
         let setup_only =
             (0..list.len()).all(|j| j == error || !is_wanted(&list[j]) || sparse[j].abs() < NEGLIGIBLE);
@@ -200,7 +202,7 @@ fn subtract(row: &mut [f64], factor: f64, other: &[f64]) {
     }
 }
 
-/// A row less multiples of others such that fewer entries remain, as long as that succeeds.
+/// A row less multiples of others, as long as this reduces the number of nonzero entries.
 fn sparser(mut row: Vec<f64>, others: &[Vec<f64>]) -> Vec<f64> {
     let support = |row: &[f64]| row.iter().filter(|value| value.abs() > NEGLIGIBLE).count();
     loop {
@@ -223,7 +225,7 @@ fn sparser(mut row: Vec<f64>, others: &[Vec<f64>]) -> Vec<f64> {
     }
 }
 
-/// Combinations of errors that are seen, but badly: small singular values of the information on the errors with columns of unit length.
+/// Near dependencies of identifiable errors: small singular values of the information on the errors, with columns of unit length.
 ///
 /// # Errors
 /// If the decomposition fails.
@@ -252,7 +254,8 @@ pub fn nearly_collinear(
     let unit = Mat::from_fn(n, n, |i, j| r[(i, j)] / norm[j]);
     let svd = unit.svd().map_err(|_| IdentifyError::Decomposition)?;
     let singular: Vec<f64> = svd.S().column_vector().iter().copied().collect();
-    // Equal singular values share a space of which the decomposition returns any basis: the reduced one is the same everywhere.
+    // Equal singular values share a subspace, and the decomposition returns an arbitrary basis of it. The reduced basis is
+    // unique.
     let mut directions: Vec<(f64, Vec<f64>)> = Vec::new();
     let mut first = 0;
     while first < n {
@@ -271,7 +274,7 @@ pub fn nearly_collinear(
         if condition_index < NAMED_FROM {
             continue;
         }
-        // A move along the direction, in outside units.
+        // The direction in display units.
         let parts: Vec<(usize, f64)> = direction.into_iter().enumerate().collect();
         let largest = parts.iter().fold(0.0_f64, |most, (_, v)| most.max(v.abs()));
         let chosen: Vec<(usize, f64)> = parts
@@ -305,7 +308,7 @@ pub fn nearly_collinear(
     Ok(found)
 }
 
-/// The reduced row echelon form of independent rows, pivots in the order of the columns.
+/// The reduced row echelon form of independent rows, with pivots in column order.
 fn reduced(mut rows: Vec<Vec<f64>>) -> Vec<Vec<f64>> {
     let width = rows.first().map_or(0, Vec::len);
     let mut done = 0;

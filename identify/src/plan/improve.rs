@@ -1,7 +1,8 @@
-//! The next test: from a menu, greedily and by exchange, by what it does to the information. Nothing is refitted.
+//! Selects the next tests from the candidate tests by their information, greedily and by exchange. Nothing is refitted.
 //!
-//! Greedy: the entry after which the goal stands best, again and again. Exchange: each proposed test is taken away in turn and the best entry for
-//! its place looked for, until no place changes (Fedorov's algorithm: Atkinson, Donev & Tobias, Optimum Experimental Designs, 2007, ch. 12).
+//! Greedy: the candidate test with the best figure is added, repeatedly. Exchange: each proposed test is removed in turn and
+//! replaced by the best candidate test, until no test changes (Fedorov's algorithm: Atkinson, Donev & Tobias, Optimum
+//! Experimental Designs, 2007, ch. 12).
 
 use schemars::JsonSchema;
 use serde::Serialize;
@@ -14,53 +15,55 @@ use super::ranking::smallest_first;
 use crate::error::IdentifyError;
 use crate::problem::Problem;
 
-/// How proposals are sought.
+/// Options of the selection of next tests.
 #[derive(Clone, Debug)]
 pub struct ImproveOptions {
-    /// What for.
+    /// The goal.
     pub goal: Goal,
-    /// How many tests are proposed.
+    /// Number of proposed tests.
     pub tests: usize,
-    /// Whether the gain is judged a minute.
+    /// Whether the gain per minute decides.
     pub by_minute: bool,
 }
 
-/// What is proposed.
+/// The proposed tests.
 #[derive(Clone, Debug, Serialize, JsonSchema)]
 pub struct Improvement {
-    /// What the figures are: `worst standard uncertainty, um or arcsec`, or `separation, standard deviations`.
+    /// Name of the figure: `worst standard uncertainty, um or arcsec`, or `separation, standard deviations`.
     pub figure: String,
-    /// Number of entries looked at.
+    /// Number of candidate tests.
     pub menu_entries: usize,
     /// The figure before; infinite (`null` in JSON) where an error is not identifiable.
     #[schemars(with = "Option<f64>")]
     pub before: f64,
-    /// The errors and their standard uncertainties before, outside units; infinite (`null` in JSON) where an error is not identifiable.
+    /// The errors and their standard uncertainties before, display units; infinite (`null` in JSON) where an error is not
+    /// identifiable.
     #[schemars(with = "Vec<(String, Option<f64>)>")]
     pub uncertainties_before: Vec<(String, f64)>,
     /// The tests, in the order in which they are added.
     pub steps: Vec<Step>,
-    /// What the exchange changed, in words.
+    /// The exchanges, each as a sentence.
     pub exchanged: Vec<String>,
-    /// The best by themselves, in the order in which they were judged: by the figure, or by its gain a minute. Of tests that read alike, one.
+    /// The best single tests, in order of the figure or of its gain per minute. Of tests with identical readings one is listed.
     pub alternatives: Vec<Alternative>,
 }
 
 /// A proposed test.
 #[derive(Clone, Debug, Serialize, JsonSchema)]
 pub struct Step {
-    /// In words.
+    /// Description of the test.
     pub test: String,
-    /// The figure with it.
+    /// The figure with this test and those before it.
     #[schemars(with = "Option<f64>")]
     pub after: f64,
-    /// What it takes, min.
+    /// Duration, min.
     pub minutes: f64,
-    /// Whether a ball is mounted anew.
+    /// Whether a ball has to be mounted.
     pub new_setup: bool,
-    /// Blind spots that it opens.
+    /// Errors that it makes identifiable.
     pub opens: Vec<String>,
-    /// The errors and their standard uncertainties with it, outside units; infinite (`null` in JSON) where an error is not identifiable.
+    /// The errors and their standard uncertainties with it, display units; infinite (`null` in JSON) where an error is not
+    /// identifiable.
     #[schemars(with = "Vec<(String, Option<f64>)>")]
     pub uncertainties: Vec<(String, f64)>,
     /// Centre of the workpiece ball in the table frame, mm.
@@ -71,30 +74,30 @@ pub struct Step {
     pub bar_mm: f64,
 }
 
-/// An entry that comes close.
+/// One of the best candidate tests.
 #[derive(Clone, Debug, Serialize, JsonSchema)]
 pub struct Alternative {
-    /// In words.
+    /// Description of the test.
     pub test: String,
     /// The figure with it.
     pub after: f64,
-    /// What it takes, min.
+    /// Duration, min.
     pub minutes: f64,
 }
 
-/// An uncertainty of this share of the physical size is that of a blind spot.
+/// Share of the physical size above which the uncertainty of an error means that the error is not identifiable.
 const UNIDENTIFIABLE_SHARE: f64 = 0.1;
-/// Gain below which an exchange is not made.
+/// Relative gain below which a test is neither added nor exchanged.
 const MIN_GAIN: f64 = 1e-6;
-/// Alternatives that are listed.
+/// Maximum number of listed alternatives.
 const ALTERNATIVES: usize = 5;
-/// Rounds of exchange at most.
+/// Maximum number of exchange rounds.
 const ROUNDS: usize = 10;
 
 /// Proposes tests for a problem whose folds are its tests.
 ///
 /// # Errors
-/// If there is nothing to propose or the model cannot be evaluated.
+/// If there is no candidate test or the model cannot be evaluated.
 pub fn improve(
     problem: &Problem<'_>,
     menu: &CandidateTests,
@@ -140,7 +143,7 @@ pub fn improve(
     } else {
         exchange(&prepared, &mut chosen, &figure)
     };
-    // An uncertainty that is that of the physical size is none.
+    // An uncertainty near the physical size counts as infinite.
     let outside = |root: &Root| match options.goal {
         Goal::WorstUncertainty => named_uncertainties(shared, root)
             .into_iter()
@@ -168,9 +171,9 @@ fn is_no_gain(before: f64, after: f64) -> bool {
     before - after <= MIN_GAIN * before.abs()
 }
 
-/// By how much an entry lowers the logarithm of the figure a minute.
+/// The decrease of the logarithm of the figure per minute.
 fn gain_a_minute(prepared: &Prepared, now: f64, figures: &[f64], entry: usize) -> f64 {
-    // A separation is negative here: the ratio is turned round.
+    // A separation is negative here, so the ratio is inverted.
     let ratio = if now > 0.0 {
         now / figures[entry]
     } else {
@@ -179,13 +182,13 @@ fn gain_a_minute(prepared: &Prepared, now: f64, figures: &[f64], entry: usize) -
     ratio.max(1e-12).ln() / prepared.entries[entry].entry.minutes.max(1e-3)
 }
 
-/// The entry that gains most a minute.
+/// The candidate test with the largest gain per minute.
 fn best_a_minute(prepared: &Prepared, now: f64, figures: &[f64]) -> Option<usize> {
     let gain = |entry: usize| gain_a_minute(prepared, now, figures, entry);
     (0..figures.len()).min_by(|a, b| smallest_first(-gain(*a), -gain(*b)))
 }
 
-/// The entries with the least scores, each name once.
+/// The candidate tests with the smallest scores, each name once.
 fn listed(
     prepared: &Prepared,
     figures: &[f64],
@@ -201,7 +204,7 @@ fn listed(
     };
     let mut listed: Vec<Alternative> = Vec::new();
     for alternative in order.into_iter().map(of) {
-        // Entries that are mirror images of one another read alike and are as good.
+        // Mirror-image tests have equal names and figures.
         if listed.len() < ALTERNATIVES && !listed.iter().any(|other| other.test == alternative.test) {
             listed.push(alternative);
         }
@@ -209,7 +212,7 @@ fn listed(
     listed
 }
 
-/// Takes each proposed test away in turn and puts the best entry in its place.
+/// Removes each proposed test in turn and replaces it by the best candidate test.
 fn exchange(
     prepared: &Prepared,
     chosen: &mut [usize],
@@ -278,14 +281,15 @@ fn step(prepared: &Prepared, chosen: &[usize], outside: &impl Fn(&Root) -> f64) 
     }
 }
 
-/// Whether an uncertainty, the `j`-th of what is asked about, is that of a parameter which no reading tells and which is held at its physical size instead.
+/// Whether the `j`-th asked parameter is not identifiable. Its uncertainty is then that of the regularisation at its physical
+/// size.
 fn is_unidentifiable(shared: &Shared, u: &[f64], j: usize) -> bool {
     let place = shared.ids.len() - shared.asked + j;
     u[j] > UNIDENTIFIABLE_SHARE * shared.size[place] * shared.display_per_internal[place]
 }
 
-/// What is asked about, with its uncertainties: infinite where the figure would be that of the physical size at which [`Shared`] holds what is not
-/// identifiable.
+/// The asked parameters with their uncertainties. They are infinite for parameters that [`Shared`] regularises because they are
+/// not identifiable.
 fn named_uncertainties(shared: &Shared, root: &Root) -> Vec<(String, f64)> {
     let first = shared.ids.len() - shared.asked;
     let u = shared.uncertainties(root);

@@ -1,4 +1,4 @@
-//! How far a sweep can shrink, about its middle, before an uncertainty doubles.
+//! The smallest range of a sweep, about its middle, at which no uncertainty doubles.
 
 use faer::Mat;
 use schemars::JsonSchema;
@@ -10,7 +10,7 @@ use crate::fit;
 use crate::problem::Problem;
 use crate::rank::Rank;
 
-/// What a sweep could spare.
+/// The range by which a sweep can be reduced.
 #[derive(Clone, Debug, Serialize, JsonSchema)]
 pub struct Shrinkage {
     /// The test.
@@ -21,7 +21,7 @@ pub struct Shrinkage {
     pub range: [f64; 2],
     /// Unit of the ranges.
     pub unit: String,
-    /// The least range at which no uncertainty has doubled; absent where the test can be left out altogether.
+    /// The smallest range at which no uncertainty doubles. Absent if the test can be omitted.
     pub least: Option<[f64; 2]>,
     /// The error whose uncertainty doubles first.
     pub first_to_double: Option<String>,
@@ -30,10 +30,10 @@ pub struct Shrinkage {
 /// The position of an axis at each whitened row, and the rows.
 type PlacedRows = (Vec<f64>, Mat<f64>);
 
-/// Bisections of the range: to a thousandth.
+/// Number of bisections of the range, for a resolution of one thousandth.
 const BISECTIONS: usize = 10;
 
-/// Of every test in which one axis does most of the moving.
+/// The smallest range of every test in which a single axis moves.
 ///
 /// # Errors
 /// If the model cannot be evaluated.
@@ -58,7 +58,7 @@ pub fn shrinkages(problem: &Problem<'_>) -> Result<Vec<Shrinkage>, IdentifyError
                 .map(|(_, triangle)| triangle),
         );
         let rows = whitened(problem, test, axis)?;
-        // The worst ratio of uncertainties at a share of the range, and whose it is.
+        // The largest ratio of uncertainties at a share of the range, and its parameter.
         let worst = |share: f64| -> Result<(f64, usize), IdentifyError> {
             let (middle, half) = (0.5 * (low + high), 0.5 * share * (high - low) + 1e-9);
             let mut whole = rest.clone();
@@ -117,7 +117,7 @@ pub fn shrinkages(problem: &Problem<'_>) -> Result<Vec<Shrinkage>, IdentifyError
     Ok(found)
 }
 
-/// The axis that alone moves in a test, and how far.
+/// The axis that moves alone in a test, and its limits.
 fn swept(problem: &Problem<'_>, test: usize) -> Option<(usize, f64, f64)> {
     let readings = problem.tests[test].readings.as_ref()?;
     let mut moving = readings

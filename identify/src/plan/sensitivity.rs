@@ -1,4 +1,5 @@
-//! What the readings do when one unknown moves: largest, root mean square, along each test; and the leverage of every reading.
+//! The sensitivity of the readings to each parameter (largest, root mean square, along each test), and the leverage of the
+//! readings.
 
 use faer::Mat;
 use rayon::prelude::*;
@@ -7,16 +8,17 @@ use super::results::{Curve, Sensitivity};
 use crate::error::IdentifyError;
 use crate::problem::{Block, Problem};
 
-/// Points of a curve at most.
+/// Maximum number of points of a curve.
 const CURVE_POINTS: usize = 60;
 
-/// Sensitivities of every unknown, internal units (mm of reading a mm or rad), and the leverages of readings.
+/// Sensitivities to every parameter, internal units (mm of reading per mm or rad), and the leverages of the readings.
 pub struct Sensitivities {
-    /// By unknown: the largest with its sign, the test where, and the root mean square.
+    /// By parameter: the largest with its sign, its test, and the root mean square.
     pub summary: Vec<(f64, usize, f64)>,
-    /// By unknown and test: along the first run.
+    /// By parameter and test: along the first run.
     pub curves: Vec<Vec<Vec<f64>>>,
-    /// Mean over greatest leverage: `xᵀ Cov x` of a whitened row `x` is by how much the fit follows that reading.
+    /// Mean over greatest leverage. The leverage `xᵀ Cov x` of a whitened row `x` is the response of the fitted value to that
+    /// reading.
     pub g_efficiency: f64,
 }
 
@@ -139,7 +141,7 @@ fn of_block(
     }
 }
 
-/// The summary of an unknown in outside units: µm of reading per unit of it.
+/// The summary of a parameter in display units: µm of reading per display unit.
 pub fn reported(problem: &Problem<'_>, found: &Sensitivities, unknown: usize) -> Sensitivity {
     let (largest, test, rms) = found.summary[unknown];
     let scale = outside(problem, unknown);
@@ -150,7 +152,7 @@ pub fn reported(problem: &Problem<'_>, found: &Sensitivities, unknown: usize) ->
     }
 }
 
-/// The curves of an unknown in outside units; tests that do not change with it are left out.
+/// The curves of a parameter in display units, without tests that do not depend on it.
 pub fn curves(problem: &Problem<'_>, found: &Sensitivities, unknown: usize) -> Vec<Curve> {
     let scale = outside(problem, unknown);
     found.curves[unknown]
@@ -164,10 +166,10 @@ pub fn curves(problem: &Problem<'_>, found: &Sensitivities, unknown: usize) -> V
         .collect()
 }
 
-/// Sensitivities below this are rounding, mm a mm or rad.
+/// Sensitivities below this value are rounding errors, mm per mm or rad.
 const NOTHING: f64 = 1e-9;
 
-/// From mm of reading an internal unit to µm per unit outside.
+/// Converts mm of reading per internal unit into µm per display unit.
 fn outside(problem: &Problem<'_>, unknown: usize) -> f64 {
     1e3 / problem.parameters.list[unknown].unit.display_per_internal
 }
