@@ -1,4 +1,4 @@
-//! How long a plan takes: a large one analysed, and a menu of a thousand tests judged.
+//! Measures the duration of a plan: the analysis of a large plan, and the selection from a thousand candidate tests.
 //!
 //! `cargo bench -p abbe-identify --bench plan`
 
@@ -19,7 +19,7 @@ fn sessions() -> std::path::PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("../sessions/hermle-c600u")
 }
 
-/// Ten tests of a thousand readings, sixty-two unknowns.
+/// Ten tests of a thousand readings, 62 parameters.
 fn large_plan() -> Session {
     let folder = tempfile::tempdir().expect("a temporary folder");
     let machine = sessions().join("machine.toml");

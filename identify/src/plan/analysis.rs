@@ -53,10 +53,10 @@ pub fn analyse(session: &Session, options: &PlanOptions) -> Result<PlanAnalysis,
         let found = if problem.noise.source == NoiseSource::Stated {
             "is assumed"
         } else {
-            "is what its data show"
+            "is estimated from its data"
         };
         let sigma_um = problem.noise.sigma_mm * 1e3;
-        let warning = format!("the session states no `noise_um`; {sigma_um:.2} µm {found}");
+        let warning = format!("the session states no `noise_um`: {sigma_um:.2} µm {found}");
         analysis.warnings.push(warning);
     }
     if options.effects {
@@ -117,7 +117,7 @@ pub fn analyse_problem(problem: &Problem<'_>, travel_mm: f64) -> Result<PlanAnal
     for test in &tests {
         if let Some(reach_mm) = test.reach_mm.filter(|reach_mm| *reach_mm > travel_mm) {
             warnings.push(format!(
-                "{}: the balls come {reach_mm:.2} mm nearer or farther than the bar is long; its sensor travels {travel_mm} mm either way",
+                "{}: the distance of the balls differs from the bar length by up to {reach_mm:.2} mm; the sensor travels ±{travel_mm} mm",
                 test.name
             ));
         }
@@ -231,13 +231,16 @@ fn without(
             let name = &problem.tests[test].name;
             let mut words = Vec::new();
             if !all.is_empty() {
-                words.push(format!("{name} contributes all of {}", all.join(", ")));
+                words.push(format!("only {name} makes {} identifiable", all.join(", ")));
             }
             if !much.is_empty() {
-                words.push(format!("without {name} the variance grows: {}", much.join(", ")));
+                words.push(format!(
+                    "without {name} the variance increases: {}",
+                    much.join(", ")
+                ));
             }
             if words.is_empty() {
-                words.push(format!("without {name} no variance grows by half"));
+                words.push(format!("without {name} no variance increases by 50 %"));
             }
             Ok(WithoutTest {
                 test: name.clone(),

@@ -140,7 +140,7 @@ fn ready(
         entry.test.spindle_setup = last.spindle_setup.clone();
         entry
             .name
-            .push_str(&format!(", spindle ball left as in {}", last.name));
+            .push_str(&format!(", spindle ball left mounted as in {}", last.name));
         ready.push(CandidateInformation { entry, root });
     }
     let root = shared.root_of_test(&alone, r.as_ref(), str::to_string);

@@ -164,9 +164,9 @@ impl Base<'_> {
         if self.sweep.is_part || !self.sweep.both_directions {
             let [from, to] = [self.sweep.from, self.sweep.to].map(f64::to_degrees);
             let ways = if self.sweep.both_directions {
-                "both ways"
+                "in both directions"
             } else {
-                "one way"
+                "in one direction"
             };
             name.push_str(&format!(", swept {from:.0} … {to:.0}° {ways}").replace('-', "−"));
         }

@@ -143,7 +143,8 @@ pub fn entries(session: &Session, menu: &CandidateTests) -> Result<Vec<Entry>, I
         .filter(|test| matches!(test.station, Station::BallBar(_)))
     else {
         return Err(IdentifyError::Request(
-            "a next test can be proposed for ball bars only; this session has another instrument".to_string(),
+            "candidate tests are available for ball bars only; this session uses another instrument"
+                .to_string(),
         ));
     };
     let drafts = drafts(session, menu, last);
@@ -153,7 +154,7 @@ pub fn entries(session: &Session, menu: &CandidateTests) -> Result<Vec<Entry>, I
         .collect();
     if entries.is_empty() {
         return Err(IdentifyError::Request(
-            "no candidate test can be made on this machine: no bar reaches, or the travel is too short"
+            "no candidate test is feasible on this machine: no bar reaches, or the travel is too short"
                 .to_string(),
         ));
     }

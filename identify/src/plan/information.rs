@@ -69,7 +69,7 @@ impl Shared {
             .iter()
             .map(|id| place.get(id.as_str()).copied())
             .collect::<Option<Vec<usize>>>()
-            .ok_or_else(|| IdentifyError::Request("an unknown is not one of this plan".to_string()))?;
+            .ok_or_else(|| IdentifyError::Request("a parameter does not belong to this plan".to_string()))?;
         let root = marginal(linear.whole.parts().0.as_ref(), &columns, &linear.size)?;
         Ok(self.held(&root))
     }

@@ -74,7 +74,7 @@ impl<'a> Contradicted<'a> {
         let mut warnings = plausibility::warnings(&self.plausibility);
         if !self.parameters.is_empty() {
             warnings.push(format!(
-                "the search takes nothing as known of {}: no effect is claimed that only stands for a wrong statement of the set-up",
+                "the search uses no prior of {}, so that it claims no effect that only represents a wrong set-up value",
                 self.parameters.join(", ")
             ));
         }

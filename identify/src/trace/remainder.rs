@@ -138,7 +138,11 @@ impl TestResidual<'_, '_, '_> {
                     width,
                     recurs: None,
                 };
-                self.add(&driver, shape, format!("a feature at {name} = {place} in {test}"));
+                self.add(
+                    &driver,
+                    shape,
+                    format!("a local feature at {name} = {place} in {test}"),
+                );
             }
         }
         self.add(
@@ -177,7 +181,7 @@ impl TestResidual<'_, '_, '_> {
             let shows = |run: &&Range<usize>| half_cycles <= most_half_cycles(run.len());
             for (k, run) in runs.iter().enumerate().filter(|(_, run)| shows(run)) {
                 let words = format!(
-                    "a wave over {name}, {half_cycles} half cycles over its way, in run {} of {test}",
+                    "a wave over {name}, {half_cycles} half cycles over its travel, in run {} of {test}",
                     k + 1
                 );
                 self.add_confined(driver, wave(half_cycles), false, Some(run), words);
@@ -241,7 +245,7 @@ pub fn structure(
         return Ok(Structure {
             p_value: 1.0,
             excess: 0.0,
-            words: "nothing to look at".to_string(),
+            words: "no detector applies to these readings".to_string(),
         });
     }
     let layouts: Vec<Layout> = detectors.iter().map(|detector| detector.layout.clone()).collect();

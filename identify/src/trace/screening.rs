@@ -88,7 +88,9 @@ pub(super) fn unused_exclusions(
 ) -> Result<Vec<String>, IdentifyError> {
     let candidates = library::candidates(problem)?;
     Ok(matching_no_candidate(&candidates, &options.exclude)
-        .map(|text| format!("nothing was left out by `{text}`: no effect that the library has for this session is called so"))
+        .map(|text| {
+            format!("`{text}` excludes nothing: no candidate of this session has it in its identifier")
+        })
         .collect())
 }
 
