@@ -7,7 +7,7 @@ use std::hint::black_box;
 use std::path::Path;
 use std::time::Duration;
 
-use abbe_identify::plan::candidate_tests::CandidateTests;
+use abbe_identify::plan::candidate_tests::TestVariations;
 use abbe_identify::plan::criterion::Goal;
 use abbe_identify::plan::improve::{ImproveOptions, improve};
 use abbe_identify::plan::{PlanOptions, analyse, prepared, states};
@@ -91,10 +91,12 @@ fn plans(criterion: &mut Criterion) {
         tests: 1,
         by_minute: false,
     };
-    let menu = CandidateTests::default();
-    let entries = improve(&problem, &menu, &next).expect("a proposal").menu_entries;
+    let variations = TestVariations::default();
+    let entries = improve(&problem, &variations, &next)
+        .expect("a proposal")
+        .menu_entries;
     group.bench_function(format!("improve/{entries} entries"), |bench| {
-        bench.iter(|| improve(black_box(&problem), &menu, &next).expect("a proposal"));
+        bench.iter(|| improve(black_box(&problem), &variations, &next).expect("a proposal"));
     });
     group.finish();
 }

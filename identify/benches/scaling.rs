@@ -7,7 +7,7 @@ use std::hint::black_box;
 use std::time::Instant;
 
 use abbe_identify::fit::prepare;
-use abbe_identify::trace::screening::entries;
+use abbe_identify::trace::screening::screened_effects;
 use abbe_identify::trace::{TraceOptions, trace};
 
 mod sessions;
@@ -92,7 +92,7 @@ fn main() {
     );
 
     let session = sessions::chapter_5();
-    let ids: Vec<String> = entries(&session, &TraceOptions::default())
+    let ids: Vec<String> = screened_effects(&session, &TraceOptions::default())
         .expect("the library")
         .into_iter()
         .map(|entry| entry.id)
@@ -108,7 +108,7 @@ fn main() {
             only,
             ..TraceOptions::default()
         };
-        let candidates = entries(&session, &options).expect("the library").len();
+        let candidates = screened_effects(&session, &options).expect("the library").len();
         let (seconds, memory) = measured(1, || {
             black_box(trace(&session, &options, &|_| true).expect("a trace"));
         });

@@ -4,7 +4,7 @@ use abbe_model::instrument::Station;
 use abbe_model::sensitivity::SlotValues;
 use abbe_model::session::Session;
 
-use super::linear::{Linearisation, is_wanted};
+use super::linear::{Linearisation, is_of_interest};
 use super::results::{Correlation, ErrorAnalysis, PlanAnalysis, TestSummary, WithoutTest};
 use super::{budget, effects, identifiability, indices, sensitivity, states};
 use crate::error::IdentifyError;
@@ -39,7 +39,7 @@ impl Default for PlanOptions {
 /// Travel of a ball bar's sensor in either direction.
 pub const BAR_TRAVEL_MM: f64 = 1.0;
 /// Variance ratio below which the loss of a test is not reported.
-const REPORT_RATIO: f64 = 1.5;
+const MIN_REPORTED_RATIO: f64 = 1.5;
 
 /// Analyses a plan or the states of a measured session.
 ///
@@ -86,10 +86,10 @@ pub fn analyse_problem(problem: &Problem<'_>, travel_mm: f64) -> Result<PlanAnal
     let list = &problem.parameters.list;
     let nominal = vec![0.0; list.len()];
     let linear = Linearisation::of(problem, &nominal)?;
-    let wanted: Vec<usize> = (0..list.len()).filter(|j| is_wanted(&list[*j])).collect();
+    let of_interest: Vec<usize> = (0..list.len()).filter(|j| is_of_interest(&list[*j])).collect();
     let found = sensitivity::sensitivities(problem, &nominal, &linear.covariance)?;
-    let conditional_u = budget::conditional_u(&linear, &wanted)?;
-    let errors = wanted
+    let conditional_u = budget::conditional_u(&linear, &of_interest)?;
+    let errors = of_interest
         .iter()
         .zip(conditional_u)
         .map(|(&j, conditional_u)| {
@@ -133,15 +133,15 @@ pub fn analyse_problem(problem: &Problem<'_>, travel_mm: f64) -> Result<PlanAnal
         errors,
         blind: identifiability::unidentifiable(problem, &linear.rank),
         held_by_setup: identifiability::held_by_setup(problem, &linear)?,
-        nearly_collinear: identifiability::nearly_collinear(problem, &linear, &wanted)?,
-        correlation: correlation(problem, &linear, &wanted),
+        nearly_collinear: identifiability::nearly_collinear(problem, &linear, &of_interest)?,
+        correlation: correlation(problem, &linear, &of_interest),
         indices: indices::indices(
             &linear,
-            &wanted,
+            &of_interest,
             problem.readings() * problem.coordinates(),
             found.g_efficiency,
         )?,
-        without: without(problem, &linear, &wanted)?,
+        without: without(problem, &linear, &of_interest)?,
         effects: None,
         warnings,
     })
@@ -178,18 +178,20 @@ fn summary(problem: &Problem<'_>, number: usize) -> TestSummary {
     }
 }
 
-fn correlation(problem: &Problem<'_>, linear: &Linearisation, wanted: &[usize]) -> Correlation {
-    let both_seen = |i: usize, j: usize| linear.rank.is_identifiable(i) && linear.rank.is_identifiable(j);
+fn correlation(problem: &Problem<'_>, linear: &Linearisation, of_interest: &[usize]) -> Correlation {
+    let both_identifiable =
+        |i: usize, j: usize| linear.rank.is_identifiable(i) && linear.rank.is_identifiable(j);
     Correlation {
-        ids: wanted
+        ids: of_interest
             .iter()
             .map(|j| problem.parameters.list[*j].id.clone())
             .collect(),
-        matrix: wanted
+        matrix: of_interest
             .iter()
             .map(|&i| {
-                let entry = |j: usize| both_seen(i, j).then(|| budget::correlation(&linear.covariance, i, j));
-                wanted.iter().map(|&j| entry(j)).collect()
+                let entry =
+                    |j: usize| both_identifiable(i, j).then(|| budget::correlation(&linear.covariance, i, j));
+                of_interest.iter().map(|&j| entry(j)).collect()
             })
             .collect(),
     }
@@ -199,7 +201,7 @@ fn correlation(problem: &Problem<'_>, linear: &Linearisation, wanted: &[usize]) 
 fn without(
     problem: &Problem<'_>,
     linear: &Linearisation,
-    wanted: &[usize],
+    of_interest: &[usize],
 ) -> Result<Vec<WithoutTest>, IdentifyError> {
     let list = &problem.parameters.list;
     if problem.tests.len() < 2 {
@@ -208,7 +210,7 @@ fn without(
     (0..problem.tests.len())
         .map(|test| {
             let (rank, covariance) = linear.without(&[test])?;
-            let variance_inflation: Vec<(String, Option<f64>)> = wanted
+            let variance_inflation: Vec<(String, Option<f64>)> = of_interest
                 .iter()
                 .filter(|j| linear.rank.is_identifiable(**j))
                 .map(|&j| {
@@ -224,7 +226,7 @@ fn without(
             let much: Vec<String> = variance_inflation
                 .iter()
                 .filter_map(|(id, f)| {
-                    f.filter(|f| *f >= REPORT_RATIO)
+                    f.filter(|f| *f >= MIN_REPORTED_RATIO)
                         .map(|f| format!("{id} {f:.1} times"))
                 })
                 .collect();

@@ -3,13 +3,13 @@
 use abbe_model::instrument::Station;
 use abbe_model::session::Session;
 
-use super::candidate_tests::CandidateTests;
+use super::candidate_tests::TestVariations;
 
 /// Distance below which a ball position counts as one that is already mounted, mm.
-const SAME_PLACE_MM: f64 = 0.5;
+const SAME_POSITION_MM: f64 = 0.5;
 
 /// A position of the carried ball, with its set-up.
-pub(super) struct Place {
+pub(super) struct BallPosition {
     /// Centre, mm.
     pub ball: [f64; 3],
     /// The set-up of this position in the session. Empty for a new mount.
@@ -19,14 +19,14 @@ pub(super) struct Place {
 }
 
 /// The positions of the carried ball: as mounted in the session, or newly mounted about each rotary axis of its side.
-pub(super) fn places(
+pub(super) fn ball_positions(
     session: &Session,
-    menu: &CandidateTests,
+    variations: &TestVariations,
     rotary: &[usize],
     on_table: bool,
-) -> Vec<Place> {
+) -> Vec<BallPosition> {
     let machine = &session.machine;
-    let mut places: Vec<Place> = Vec::new();
+    let mut positions: Vec<BallPosition> = Vec::new();
     for test in &session.tests {
         let Station::BallBar(bar) = &test.station else {
             continue;
@@ -36,8 +36,8 @@ pub(super) fn places(
         } else {
             (bar.spindle_ball, test.spindle_setup.clone())
         };
-        if on_table && !places.iter().any(|place| place.setup == setup) {
-            places.push(Place {
+        if on_table && !positions.iter().any(|position| position.setup == setup) {
+            positions.push(BallPosition {
                 ball,
                 setup,
                 new: false,
@@ -51,8 +51,8 @@ pub(super) fn places(
         let axis = &machine.axes[about];
         let across = across(axis.direction);
         let carries_table = on_table && about == 0;
-        for &radius in &menu.radii_mm {
-            for &height in &menu.heights_mm {
+        for &radius in &variations.radii_mm {
+            for &height in &variations.heights_mm {
                 let both = if carries_table || height == 0.0 {
                     &[1.0][..]
                 } else {
@@ -63,11 +63,11 @@ pub(super) fn places(
                     let ball: [f64; 3] = std::array::from_fn(|i| {
                         axis.origin_mm[i] + up * sign * height * axis.direction[i] + radius * across[i]
                     });
-                    let taken = places
+                    let present = positions
                         .iter()
-                        .any(|place| distance(place.ball, ball) < SAME_PLACE_MM);
-                    if !taken {
-                        places.push(Place {
+                        .any(|position| distance(position.ball, ball) < SAME_POSITION_MM);
+                    if !present {
+                        positions.push(BallPosition {
                             ball,
                             setup: String::new(),
                             new: true,
@@ -77,7 +77,7 @@ pub(super) fn places(
             }
         }
     }
-    places
+    positions
 }
 
 /// A unit vector perpendicular to an axis: the projection of R's Y, or of Z if the axis is close to Y.
@@ -94,9 +94,9 @@ fn across(direction: [f64; 3]) -> [f64; 3] {
 }
 
 /// The positions of all axes, with the rotary axes other than the swept one at the candidate positions.
-pub(super) fn standings(
+pub(super) fn axis_positions(
     session: &Session,
-    menu: &CandidateTests,
+    variations: &TestVariations,
     rotary: &[usize],
     swept: usize,
 ) -> Vec<Vec<f64>> {
@@ -105,7 +105,7 @@ pub(super) fn standings(
     for &other in rotary.iter().filter(|axis| **axis != swept) {
         let mut more = Vec::new();
         for at in &all {
-            for degrees in &menu.standing_deg {
+            for degrees in &variations.standing_deg {
                 let position = degrees.to_radians();
                 let [low, high] = machine.axes[other]
                     .travel

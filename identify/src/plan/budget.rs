@@ -14,7 +14,7 @@
 
 use faer::Mat;
 
-use super::linear::{Linearisation, is_wanted, marginal, prior_u};
+use super::linear::{Linearisation, is_of_interest, marginal, prior_u};
 use super::ranking::largest_first;
 use super::results::{Contribution, CorrelatedWith};
 use crate::error::IdentifyError;
@@ -74,7 +74,7 @@ pub fn shared_with(problem: &Problem<'_>, linear: &Linearisation, error: usize) 
         .iter()
         .enumerate()
         .filter(|(other, parameter)| {
-            *other != error && is_wanted(parameter) && linear.rank.is_identifiable(*other)
+            *other != error && is_of_interest(parameter) && linear.rank.is_identifiable(*other)
         })
         .map(|(other, parameter)| CorrelatedWith {
             id: parameter.id.clone(),
@@ -100,9 +100,9 @@ pub fn correlation(covariance: &Mat<f64>, i: usize, j: usize) -> f64 {
 ///
 /// # Errors
 /// If the decomposition fails.
-pub fn conditional_u(linear: &Linearisation, wanted: &[usize]) -> Result<Vec<f64>, IdentifyError> {
-    let r = marginal(linear.whole.parts().0.as_ref(), wanted, &linear.size)?;
-    Ok((0..wanted.len())
+pub fn conditional_u(linear: &Linearisation, of_interest: &[usize]) -> Result<Vec<f64>, IdentifyError> {
+    let r = marginal(linear.whole.parts().0.as_ref(), of_interest, &linear.size)?;
+    Ok((0..of_interest.len())
         .map(|j| 1.0 / (0..=j).map(|i| r[(i, j)].powi(2)).sum::<f64>().sqrt())
         .collect())
 }

@@ -2,8 +2,8 @@
 
 use rayon::prelude::*;
 
-use super::candidate_tests::{CandidateTests, Entry};
-use super::information::{Root, Shared, sum};
+use super::candidate_tests::{CandidateTest, TestVariations};
+use super::information::{Root, SharedParameters, sum};
 use super::linear::{Linearisation, merged};
 use super::ranking::smallest_first;
 use crate::error::IdentifyError;
@@ -12,25 +12,25 @@ use crate::problem::Problem;
 use crate::triangle::Triangle;
 
 /// The information of every candidate test on the shared parameters.
-pub struct Prepared {
+pub struct PreparedCandidates {
     /// The shared parameters.
-    pub shared: Shared,
+    pub shared: SharedParameters,
     /// The information of the plan itself.
     pub base: Root,
     /// The candidate tests.
-    pub entries: Vec<CandidateInformation>,
+    pub candidates: Vec<CandidateInformation>,
 }
 
 /// A candidate test with its information.
 pub struct CandidateInformation {
     /// The test. Its name states which ball stays mounted.
-    pub entry: Entry,
+    pub test: CandidateTest,
     /// Its information.
     pub root: Root,
 }
 
-impl Prepared {
-    /// Evaluates the candidate tests for a problem whose folds are its tests, at the parameter values `beta`. `asked` are the
+impl PreparedCandidates {
+    /// Evaluates the candidate tests for a problem whose folds are its tests, at the parameter values `beta`. `targets` are the
     /// parameters of the goal.
     ///
     /// # Errors
@@ -38,45 +38,45 @@ impl Prepared {
     pub fn new(
         problem: &Problem<'_>,
         beta: &[f64],
-        entries: Vec<Entry>,
-        menu: &CandidateTests,
-        asked: &[usize],
-    ) -> Result<Prepared, IdentifyError> {
+        tests: Vec<CandidateTest>,
+        variations: &TestVariations,
+        targets: &[usize],
+    ) -> Result<PreparedCandidates, IdentifyError> {
         let list = &problem.parameters.list;
         let kept: Vec<usize> = (0..list.len())
-            .filter(|j| !asked.contains(j) && may_be_shared(problem, &list[*j]))
+            .filter(|j| !targets.contains(j) && may_be_shared(problem, &list[*j]))
             .collect();
-        let shared = Shared::of(problem, &kept, asked);
+        let shared = SharedParameters::of(problem, &kept, targets);
         let linear = Linearisation::of(problem, beta)?;
         let base = shared.root_of(problem, &linear)?;
-        let ready: Vec<Vec<CandidateInformation>> = entries
+        let ready: Vec<Vec<CandidateInformation>> = tests
             .into_par_iter()
-            .map(|entry| ready(problem, &shared, entry, menu))
+            .map(|candidate| ready(problem, &shared, candidate, variations))
             .collect::<Result<_, IdentifyError>>()?;
-        Ok(Prepared {
+        Ok(PreparedCandidates {
             shared,
             base,
-            entries: ready.into_iter().flatten().collect(),
+            candidates: ready.into_iter().flatten().collect(),
         })
     }
 
     /// The plan with some candidate tests added.
-    pub fn with(&self, entries: &[usize]) -> Root {
-        entries.iter().fold(self.base.clone(), |root, entry| {
-            sum(root.as_ref(), self.entries[*entry].root.as_ref())
+    pub fn with(&self, candidates: &[usize]) -> Root {
+        candidates.iter().fold(self.base.clone(), |root, candidate| {
+            sum(root.as_ref(), self.candidates[*candidate].root.as_ref())
         })
     }
 
     /// The information `root` with a candidate test added.
-    pub fn added(&self, root: &Root, entry: usize) -> Root {
-        sum(root.as_ref(), self.entries[entry].root.as_ref())
+    pub fn added(&self, root: &Root, candidate: usize) -> Root {
+        sum(root.as_ref(), self.candidates[candidate].root.as_ref())
     }
 
     /// A figure of the information with each candidate test added.
     pub fn figures<T: Send>(&self, root: &Root, figure: &(impl Fn(&Root) -> T + Sync)) -> Vec<T> {
-        (0..self.entries.len())
+        (0..self.candidates.len())
             .into_par_iter()
-            .map(|entry| figure(&self.added(root, entry)))
+            .map(|candidate| figure(&self.added(root, candidate)))
             .collect()
     }
 
@@ -108,16 +108,16 @@ fn may_be_shared(problem: &Problem<'_>, parameter: &Parameter) -> bool {
 /// mounted. The readings are the same.
 fn ready(
     problem: &Problem<'_>,
-    shared: &Shared,
-    entry: Entry,
-    menu: &CandidateTests,
+    shared: &SharedParameters,
+    candidate: CandidateTest,
+    variations: &TestVariations,
 ) -> Result<Vec<CandidateInformation>, IdentifyError> {
     let mut session = problem.session.clone();
-    session.tests = vec![entry.test.clone()];
+    session.tests = vec![candidate.test.clone()];
     session.effects = Vec::new();
     session.socket_distances = Vec::new();
     let mut noise = problem.noise.clone();
-    noise.sigma_mm /= (menu.thin.max(1) as f64).sqrt();
+    noise.sigma_mm /= (variations.thin.max(1) as f64).sqrt();
     let mut alone = Problem::new(&session, noise, 0)?;
     alone.origin = problem.origin;
     for effect in &problem.parameters.effects {
@@ -128,22 +128,32 @@ fn ready(
     let r = triangle.parts().0;
     let mut ready = Vec::new();
     let last = problem.tests.last().filter(|last| {
-        menu.keep_spindle_ball && last.station.tool_point_mm() == entry.test.station.tool_point_mm()
+        variations.keep_spindle_ball && last.station.tool_point_mm() == candidate.test.station.tool_point_mm()
     });
     if let Some(last) = last {
-        let [own, left] = [&entry.test.spindle_setup, &last.spindle_setup].map(|setup| format!("[{setup}]"));
+        let [own, left] =
+            [&candidate.test.spindle_setup, &last.spindle_setup].map(|setup| format!("[{setup}]"));
         let root = shared.root_of_test(&alone, r.as_ref(), |id| match id.strip_suffix(&own) {
             Some(id_stem) if id.starts_with("spindle_ball.") => format!("{id_stem}{left}"),
             _ => id.to_string(),
         });
-        let mut entry = entry.clone();
-        entry.test.spindle_setup = last.spindle_setup.clone();
-        entry
+        let mut candidate = candidate.clone();
+        candidate.test.spindle_setup = last.spindle_setup.clone();
+        candidate
             .name
             .push_str(&format!(", spindle ball left mounted as in {}", last.name));
-        ready.push(CandidateInformation { entry, root });
+        ready.push(CandidateInformation {
+            test: candidate,
+            root,
+        });
     }
     let root = shared.root_of_test(&alone, r.as_ref(), str::to_string);
-    ready.insert(0, CandidateInformation { entry, root });
+    ready.insert(
+        0,
+        CandidateInformation {
+            test: candidate,
+            root,
+        },
+    );
     Ok(ready)
 }

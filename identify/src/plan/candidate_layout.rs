@@ -7,8 +7,8 @@ use abbe_model::session::expression::Length;
 use abbe_model::session::motion::{FollowOffset, Motion};
 use abbe_model::session::{Prior, Session, Test, placing};
 
-use super::ball_positions::{Place, dot, norm, places, standings};
-use super::candidate_tests::CandidateTests;
+use super::ball_positions::{BallPosition, axis_positions, ball_positions, dot, norm};
+use super::candidate_tests::TestVariations;
 use super::sweep::{Sweep, sweep_of};
 
 /// Least radius about the swept axis, mm. At smaller radii the bar hardly moves.
@@ -28,7 +28,7 @@ pub(super) struct Draft {
 }
 
 /// All combinations of the permitted choices, before travel and reach are checked.
-pub(super) fn drafts(session: &Session, menu: &CandidateTests, last: &Test) -> Vec<Draft> {
+pub(super) fn drafts(session: &Session, variations: &TestVariations, last: &Test) -> Vec<Draft> {
     let machine = &session.machine;
     let rotary: Vec<usize> = (0..machine.axes.len())
         .filter(|axis| machine.axes[*axis].kind == AxisKind::Rotary)
@@ -36,39 +36,46 @@ pub(super) fn drafts(session: &Session, menu: &CandidateTests, last: &Test) -> V
     let mut drafts = Vec::new();
     for &axis in &rotary {
         let whole = sweep_of(session, axis);
-        let sweeps: Vec<Sweep> = menu
+        let sweeps: Vec<Sweep> = variations
             .ranges
             .iter()
-            .flat_map(|share| menu.both_directions.iter().map(|both| whole.part(*share, *both)))
+            .flat_map(|share| {
+                variations
+                    .both_directions
+                    .iter()
+                    .map(|both| whole.part(*share, *both))
+            })
             .collect();
         let on_table = axis < machine.workpiece_side;
-        for place in places(session, menu, &rotary, on_table) {
-            for at in standings(session, menu, &rotary, axis) {
+        for ball in ball_positions(session, variations, &rotary, on_table) {
+            for at in axis_positions(session, variations, &rotary, axis) {
                 for (sweep, &feed) in sweeps
                     .iter()
-                    .flat_map(|sweep| menu.feeds.iter().map(|feed| (*sweep, feed)))
+                    .flat_map(|sweep| variations.feeds.iter().map(|feed| (*sweep, feed)))
                 {
-                    let place = &place;
+                    let ball = &ball;
                     let mut at = at.clone();
                     at[axis] = sweep.from;
-                    let base = Base {
+                    let choice = Choice {
                         session,
                         last,
                         axis,
                         sweep,
                         feed,
                         on_table,
-                        place,
+                        ball,
                         at: &at,
                     };
                     drafts.extend(
-                        menu.bars_mm
+                        variations
+                            .bars_mm
                             .iter()
-                            .flat_map(|nominal| base.on_axis(menu, *nominal)),
+                            .flat_map(|nominal| choice.on_axis(variations, *nominal)),
                     );
                     let upright = at.iter().enumerate().all(|(k, q)| k == axis || *q == 0.0);
-                    if let Some(nominal) = following_bar(menu).filter(|_| menu.follow && upright) {
-                        drafts.extend(base.following(menu, nominal));
+                    if let Some(nominal) = following_bar(variations).filter(|_| variations.follow && upright)
+                    {
+                        drafts.extend(choice.following(variations, nominal));
                     }
                 }
             }
@@ -79,9 +86,10 @@ pub(super) fn drafts(session: &Session, menu: &CandidateTests, last: &Test) -> V
 
 /// The bar for tests in which linear axes follow. Its length only sets the distance of the balls. It is the shortest bar of at
 /// least 99 mm, otherwise the longest bar that keeps the cups apart.
-fn following_bar(menu: &CandidateTests) -> Option<f64> {
+fn following_bar(variations: &TestVariations) -> Option<f64> {
     let bars = || {
-        menu.bars_mm
+        variations
+            .bars_mm
             .iter()
             .copied()
             .filter(|bar| *bar >= MIN_FOLLOWING_MM)
@@ -92,7 +100,7 @@ fn following_bar(menu: &CandidateTests) -> Option<f64> {
         .or_else(|| bars().max_by(f64::total_cmp))
 }
 
-struct Base<'b> {
+struct Choice<'b> {
     session: &'b Session,
     last: &'b Test,
     axis: usize,
@@ -100,11 +108,11 @@ struct Base<'b> {
     /// Multiple of the sweep's speed.
     feed: f64,
     on_table: bool,
-    place: &'b Place,
+    ball: &'b BallPosition,
     at: &'b [f64],
 }
 
-impl Base<'_> {
+impl Choice<'_> {
     /// The calibrated length of the bar in the session, or its nominal length.
     fn length(&self, nominal: f64) -> f64 {
         let bars = self.session.tests.iter().filter_map(|test| match &test.station {
@@ -127,9 +135,9 @@ impl Base<'_> {
         };
         bar.bar = self.length(nominal);
         if self.on_table {
-            bar.workpiece_ball = self.place.ball;
+            bar.workpiece_ball = self.ball.ball;
         } else {
-            bar.spindle_ball = self.place.ball;
+            bar.spindle_ball = self.ball.ball;
         }
         bar
     }
@@ -173,8 +181,8 @@ impl Base<'_> {
         if self.feed != 1.0 {
             name.push_str(&format!(", at {} times the feed", self.feed));
         }
-        if !self.place.new {
-            name.push_str(&format!(" ({ball} as in {})", self.place.setup));
+        if !self.ball.new {
+            name.push_str(&format!(" ({ball} as in {})", self.ball.setup));
         }
         let geometry = Station::BallBar(BallBar {
             workpiece_ball: station.workpiece_ball.map(Length::Number),
@@ -182,8 +190,8 @@ impl Base<'_> {
             bar: Length::Number(station.bar),
         });
         let unique = "proposed".to_string();
-        let setup = match (self.on_table, self.place.new) {
-            (true, false) => self.place.setup.clone(),
+        let setup = match (self.on_table, self.ball.new) {
+            (true, false) => self.ball.setup.clone(),
             (true, true) => unique.clone(),
             (false, _) => self.last.setup.clone(),
         };
@@ -205,7 +213,7 @@ impl Base<'_> {
         Draft {
             test,
             name,
-            new_setup: self.place.new,
+            new_setup: self.ball.new,
         }
     }
 
@@ -224,7 +232,7 @@ impl Base<'_> {
 
     /// Places the other ball on the swept axis: in the plane of the circle if the bar is as long as the radius, otherwise beside
     /// that plane.
-    fn on_axis(&self, menu: &CandidateTests, nominal: f64) -> Vec<Draft> {
+    fn on_axis(&self, variations: &TestVariations, nominal: f64) -> Vec<Draft> {
         let machine = &self.session.machine;
         let station = self.station(nominal);
         let (origin, along) = placing::axis_line(machine, self.at, self.axis);
@@ -234,10 +242,10 @@ impl Base<'_> {
         let height = dot(from, along);
         let radial: [f64; 3] = std::array::from_fn(|i| from[i] - height * along[i]);
         let radius = norm(radial);
-        if radius < MIN_RADIUS_MM || station.bar < radius - menu.reach_mm {
+        if radius < MIN_RADIUS_MM || station.bar < radius - variations.reach_mm {
             return Vec::new();
         }
-        let beside = if (station.bar - radius).abs() <= menu.reach_mm {
+        let beside = if (station.bar - radius).abs() <= variations.reach_mm {
             vec![0.0]
         } else {
             let beside = (station.bar.powi(2) - radius.powi(2)).sqrt();
@@ -258,7 +266,7 @@ impl Base<'_> {
                     axis: self.axis,
                     from: self.sweep.from,
                     to: self.sweep.to,
-                    step: self.sweep.step * menu.thin.max(1) as f64,
+                    step: self.sweep.step * variations.thin.max(1) as f64,
                     speed: self.sweep.speed * self.feed,
                     runs: self.sweep.runs,
                     both_directions: self.sweep.both_directions,
@@ -293,7 +301,7 @@ impl Base<'_> {
     }
 
     /// Tests in which the linear axes keep the bar radial, tangential or axial.
-    fn following(&self, menu: &CandidateTests, nominal: f64) -> Vec<Draft> {
+    fn following(&self, variations: &TestVariations, nominal: f64) -> Vec<Draft> {
         let offsets = [
             (FollowOffset::Radial, "radial"),
             (FollowOffset::Tangential, "tangential"),
@@ -306,7 +314,7 @@ impl Base<'_> {
                     axis: self.axis,
                     from: self.sweep.from,
                     to: self.sweep.to,
-                    step: self.sweep.step * menu.thin.max(1) as f64,
+                    step: self.sweep.step * variations.thin.max(1) as f64,
                     speed: self.sweep.speed * self.feed,
                     runs: self.sweep.runs,
                     both_directions: self.sweep.both_directions,

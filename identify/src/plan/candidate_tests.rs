@@ -19,7 +19,7 @@ use crate::problem::Problem;
 
 /// The permitted variations. Lengths in mm, times in min.
 #[derive(Clone, Debug)]
-pub struct CandidateTests {
+pub struct TestVariations {
     /// Bars of the kit, nominal lengths.
     pub bars_mm: Vec<f64>,
     /// Distances of the ball from the axis about which it is mounted.
@@ -29,7 +29,7 @@ pub struct CandidateTests {
     /// Positions of the other rotary axis.
     pub standing_deg: Vec<f64>,
     /// Feeds as multiples of that of the session's tests. Several if an effect depends on the feed (see
-    /// [`CandidateTests::for_effects`]).
+    /// [`TestVariations::for_effects`]).
     pub feeds: Vec<f64>,
     /// Shares of the sweep range, about its middle.
     pub ranges: Vec<f64>,
@@ -49,10 +49,10 @@ pub struct CandidateTests {
     pub thin: usize,
 }
 
-impl Default for CandidateTests {
+impl Default for TestVariations {
     /// A kit of 50, 100, 150 and 300 mm. A new mount takes five minutes, the preparation of a test one minute.
     fn default() -> Self {
-        CandidateTests {
+        TestVariations {
             bars_mm: vec![50.0, 100.0, 150.0, 300.0],
             radii_mm: vec![50.0, 75.0, 100.0, 150.0],
             heights_mm: vec![0.0, 50.0, 100.0, 200.0],
@@ -70,9 +70,9 @@ impl Default for CandidateTests {
     }
 }
 
-impl CandidateTests {
+impl TestVariations {
     /// The same variations with a second feed, if one of the effects depends on speed or time.
-    pub fn for_effects<'e>(mut self, effects: impl IntoIterator<Item = &'e Effect>) -> CandidateTests {
+    pub fn for_effects<'e>(mut self, effects: impl IntoIterator<Item = &'e Effect>) -> TestVariations {
         let depends = |effect: &Effect| {
             effect.shape == Shape::Lag
                 || effect.driver == Driver::Time
@@ -85,14 +85,14 @@ impl CandidateTests {
     }
 
     /// Fewer variations and every fourth position: enough to name a test beside a result, not to optimise it.
-    pub fn short() -> CandidateTests {
-        CandidateTests {
+    pub fn short() -> TestVariations {
+        TestVariations {
             radii_mm: vec![50.0, 100.0, 150.0],
             heights_mm: vec![0.0, 100.0],
             standing_deg: vec![0.0],
             keep_spindle_ball: false,
             thin: 4,
-            ..CandidateTests::default()
+            ..TestVariations::default()
         }
     }
 }
@@ -102,7 +102,7 @@ const SECOND_FEED: f64 = 3.0;
 
 /// A candidate test.
 #[derive(Clone, Debug)]
-pub struct Entry {
+pub struct CandidateTest {
     /// Description, for example `C150 with the workpiece ball at radius 50 mm`.
     pub name: String,
     /// The test with its planned states.
@@ -136,7 +136,10 @@ pub fn has_candidates(problem: &Problem<'_>) -> bool {
 ///
 /// # Errors
 /// If the instrument is no ball bar, or no rotary axis can be swept.
-pub fn entries(session: &Session, menu: &CandidateTests) -> Result<Vec<Entry>, IdentifyError> {
+pub fn candidate_tests(
+    session: &Session,
+    variations: &TestVariations,
+) -> Result<Vec<CandidateTest>, IdentifyError> {
     let Some(last) = session
         .tests
         .last()
@@ -147,22 +150,22 @@ pub fn entries(session: &Session, menu: &CandidateTests) -> Result<Vec<Entry>, I
                 .to_string(),
         ));
     };
-    let drafts = drafts(session, menu, last);
-    let entries: Vec<Entry> = drafts
+    let drafts = drafts(session, variations, last);
+    let tests: Vec<CandidateTest> = drafts
         .into_par_iter()
-        .filter_map(|draft| finished(session, menu, draft))
+        .filter_map(|draft| finished(session, variations, draft))
         .collect();
-    if entries.is_empty() {
+    if tests.is_empty() {
         return Err(IdentifyError::Request(
             "no candidate test is feasible on this machine: no bar reaches, or the travel is too short"
                 .to_string(),
         ));
     }
-    Ok(entries)
+    Ok(tests)
 }
 
 /// Plans the states of a candidate test. `None` if the travel forbids them or the bar does not reach.
-fn finished(session: &Session, menu: &CandidateTests, draft: Draft) -> Option<Entry> {
+fn finished(session: &Session, variations: &TestVariations, draft: Draft) -> Option<CandidateTest> {
     let Draft {
         mut test,
         name,
@@ -176,7 +179,7 @@ fn finished(session: &Session, menu: &CandidateTests, draft: Draft) -> Option<En
     if readings
         .observed
         .iter()
-        .any(|reading| (reading - length).abs() > menu.reach_mm)
+        .any(|reading| (reading - length).abs() > variations.reach_mm)
     {
         return None;
     }
@@ -189,7 +192,7 @@ fn finished(session: &Session, menu: &CandidateTests, draft: Draft) -> Option<En
     readings
         .time_s
         .iter_mut()
-        .for_each(|time| *time += start + menu.test_min * 60.0);
+        .for_each(|time| *time += start + variations.test_min * 60.0);
     if session.tests.iter().any(|test| {
         test.readings
             .as_ref()
@@ -199,8 +202,8 @@ fn finished(session: &Session, menu: &CandidateTests, draft: Draft) -> Option<En
         readings.temperature_c = vec![mean; readings.rows()];
     }
     test.readings = Some(readings);
-    let minutes = menu.test_min + moving_s / 60.0 + if new_setup { menu.setup_min } else { 0.0 };
-    Some(Entry {
+    let minutes = variations.test_min + moving_s / 60.0 + if new_setup { variations.setup_min } else { 0.0 };
+    Some(CandidateTest {
         name,
         test,
         new_setup,

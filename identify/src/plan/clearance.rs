@@ -93,7 +93,7 @@ mod tests {
     }
 
     #[test]
-    fn a_flat_device_on_the_table_takes_a_long_shaft() {
+    fn a_flat_device_on_the_table_requires_a_long_shaft() {
         assert_eq!(machine_a(true).faults().len(), 1);
         assert!(
             Clearance {

@@ -2,8 +2,8 @@
 
 use faer::Mat;
 
-use super::information::{Root, Shared};
-use super::linear::is_wanted;
+use super::information::{Root, SharedParameters};
+use super::linear::is_of_interest;
 use crate::parameters::{Parameter, Role};
 use crate::problem::Problem;
 
@@ -24,35 +24,35 @@ pub enum Goal {
 }
 
 /// The parameters of a goal.
-pub fn asked(problem: &Problem<'_>, goal: &Goal) -> Vec<usize> {
+pub fn targets(problem: &Problem<'_>, goal: &Goal) -> Vec<usize> {
     let list = &problem.parameters.list;
-    let is_asked = |parameter: &Parameter| match (goal, parameter.role) {
-        (Goal::WorstUncertainty, _) => is_wanted(parameter),
+    let is_target = |parameter: &Parameter| match (goal, parameter.role) {
+        (Goal::WorstUncertainty, _) => is_of_interest(parameter),
         (Goal::Separation { effect, .. }, Role::Coefficient { effect: index, .. }) => {
             problem.parameters.effects[index].id() == *effect
         }
         _ => false,
     };
-    (0..list.len()).filter(|j| is_asked(&list[*j])).collect()
+    (0..list.len()).filter(|j| is_target(&list[*j])).collect()
 }
 
 /// The figure of a goal. Smaller is better.
-pub fn figure(shared: &Shared, root: &Root, goal: &Goal) -> f64 {
+pub fn figure(shared: &SharedParameters, root: &Root, goal: &Goal) -> f64 {
     match goal {
         Goal::WorstUncertainty => shared.uncertainties(root).into_iter().fold(0.0, f64::max),
         Goal::Separation { coefficients, .. } => -separation(shared, root, coefficients),
     }
 }
 
-/// The distance, in standard deviations, of the asked parameters at these coefficients from the best approximation by all others.
+/// The distance, in standard deviations, of the target parameters at these coefficients from the best approximation by all others.
 /// Without coefficients it is that of one display unit at the worst phase.
-pub fn separation(shared: &Shared, root: &Root, coefficients: &[f64]) -> f64 {
+pub fn separation(shared: &SharedParameters, root: &Root, coefficients: &[f64]) -> f64 {
     let block = shared.criterion_block(root);
-    let first = shared.ids.len() - shared.asked;
-    if coefficients.len() == shared.asked {
-        return (0..shared.asked)
+    let first = shared.ids.len() - shared.targets;
+    if coefficients.len() == shared.targets {
+        return (0..shared.targets)
             .map(|i| {
-                (i..shared.asked)
+                (i..shared.targets)
                     .map(|j| block[(i, j)] * coefficients[j])
                     .sum::<f64>()
                     .powi(2)
@@ -61,7 +61,7 @@ pub fn separation(shared: &Shared, root: &Root, coefficients: &[f64]) -> f64 {
             .sqrt();
     }
     let one = 1.0 / shared.display_per_internal[first];
-    let square = Mat::from_fn(shared.asked, shared.asked, |i, j| block[(i, j)] * one);
+    let square = Mat::from_fn(shared.targets, shared.targets, |i, j| block[(i, j)] * one);
     match square.svd() {
         Ok(svd) => svd
             .S()

@@ -11,10 +11,10 @@ pub const SIGNIFICANCE: f64 = 0.01;
 /// Probability of detecting an effect that is present.
 pub const POWER: f64 = 0.95;
 
-/// The significance of one of `looks` tests if `SIGNIFICANCE` is that of all together (Šidák, J. Am. Stat. Assoc. 62 (1967) 626).
+/// The significance of one of `tests` tests if `SIGNIFICANCE` is that of all together (Šidák, J. Am. Stat. Assoc. 62 (1967) 626).
 /// Similar candidates count as one test each, so that the true significance is smaller.
-pub fn corrected(looks: usize) -> f64 {
-    -f64::exp_m1(f64::ln_1p(-SIGNIFICANCE) / looks.max(1) as f64)
+pub fn corrected(tests: usize) -> f64 {
+    -f64::exp_m1(f64::ln_1p(-SIGNIFICANCE) / tests.max(1) as f64)
 }
 
 /// The noncentrality at which a test of `freedom` coefficients at `significance` has the power [`POWER`].
@@ -92,7 +92,7 @@ mod tests {
     }
 
     #[test]
-    fn more_coefficients_and_more_looks_take_more() {
+    fn more_coefficients_and_more_tests_need_a_larger_noncentrality() {
         assert!(noncentrality(2, 0.01) > noncentrality(1, 0.01));
         assert!(noncentrality(1, corrected(1000)) > noncentrality(1, 0.01));
         assert!((corrected(1) - SIGNIFICANCE).abs() < 1e-15);

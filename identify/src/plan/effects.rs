@@ -17,14 +17,14 @@ use nalgebra::DMatrix;
 use rayon::prelude::*;
 
 use super::detectability::{POWER, SIGNIFICANCE, corrected, noncentrality};
-use super::linear::{Linearisation, is_wanted};
+use super::linear::{Linearisation, is_of_interest};
 use super::ranking::{largest_first, smallest_first};
 use super::results::{Bias, EffectDetectability, EffectsAnalysis};
 use crate::drivers;
 use crate::error::IdentifyError;
 use crate::parameters::physical_size;
 use crate::problem::Problem;
-use crate::trace::columns::{Columns, Layout, chunked};
+use crate::trace::columns::{Columns, EffectColumns, chunked};
 use crate::trace::library::{self, Candidate};
 use crate::unit::Unit;
 
@@ -43,7 +43,7 @@ const EVERY_SHORT_PERIOD: usize = 8;
 /// parameters, so that its worst direction is always confounded.
 const MAX_COEFFICIENTS: usize = 2;
 /// Maximum number of biases listed for an effect.
-const BIASES: usize = 4;
+const MAX_BIASES: usize = 4;
 /// Biases below this value, in display units per display unit, are not listed.
 const MIN_BIAS: f64 = 1e-3;
 
@@ -60,13 +60,13 @@ pub fn effects(problem: &Problem<'_>) -> Result<EffectsAnalysis, IdentifyError> 
     let all = library::candidates(problem)?;
     let searched = all.len();
     let mut periods: HashMap<String, usize> = HashMap::new();
-    let (candidates, layouts): (Vec<Candidate>, Vec<Layout>) = all
+    let (candidates, column_sets): (Vec<Candidate>, Vec<EffectColumns>) = all
         .into_iter()
         .filter(|candidate| is_screened(&candidate.effect, &mut periods))
         .filter_map(|candidate| {
             columns
-                .layout(&candidate.effect)
-                .map(|layout| (candidate, layout))
+                .effect_columns(&candidate.effect)
+                .map(|column_set| (candidate, column_set))
         })
         .unzip();
     let significance_corrected = corrected(searched);
@@ -78,12 +78,12 @@ pub fn effects(problem: &Problem<'_>) -> Result<EffectsAnalysis, IdentifyError> 
             ]
         })
         .collect();
-    let chunks = chunked(&layouts);
+    let chunks = chunked(&column_sets);
     let judged: Vec<Vec<EffectDetectability>> = chunks
         .into_par_iter()
         .map(|chunk| {
-            let chosen: Vec<&Layout> = layouts[chunk.clone()].iter().collect();
-            let width: usize = chosen.iter().map(|layout| layout.count).sum();
+            let chosen: Vec<&EffectColumns> = column_sets[chunk.clone()].iter().collect();
+            let width: usize = chosen.iter().map(|column_set| column_set.count).sum();
             let mut block = Mat::zeros(columns.rows(), width);
             columns.fill(&chosen, block.as_mut());
             let cross = model.as_ref().subcols(0, nominal.len()).transpose() * &block;
@@ -91,16 +91,16 @@ pub fn effects(problem: &Problem<'_>) -> Result<EffectsAnalysis, IdentifyError> 
             let mut start = 0;
             chunk
                 .map(|index| {
-                    let count = layouts[index].count;
+                    let count = column_sets[index].count;
                     let range = start..start + count;
                     start = range.end;
                     let name = &families[candidates[index].family].name;
-                    let products = Products {
+                    let products = EffectProjection {
                         own: block.subcols(range.start, count),
                         cross: cross.subcols(range.start, count),
                         moved: moved.subcols(range.start, count),
                     };
-                    let greatest = layouts[index].greatest();
+                    let greatest = column_sets[index].greatest();
                     judge(
                         problem,
                         &candidates[index],
@@ -140,7 +140,7 @@ fn is_screened(effect: &Effect, periods: &mut HashMap<String, usize>) -> bool {
     }
 }
 
-struct Products<'m> {
+struct EffectProjection<'m> {
     own: MatRef<'m, f64>,
     cross: MatRef<'m, f64>,
     moved: MatRef<'m, f64>,
@@ -153,7 +153,7 @@ fn judge(
     problem: &Problem<'_>,
     candidate: &Candidate,
     family: &str,
-    products: &Products<'_>,
+    products: &EffectProjection<'_>,
     greatest: f64,
     threshold: &[f64; 2],
 ) -> EffectDetectability {
@@ -228,7 +228,7 @@ fn biases(problem: &Problem<'_>, moved: MatRef<'_, f64>, unit: &Unit) -> Vec<Bia
         .list
         .iter()
         .enumerate()
-        .filter(|(_, parameter)| is_wanted(parameter))
+        .filter(|(_, parameter)| is_of_interest(parameter))
         .map(|(j, parameter)| {
             let worst = match moved.ncols() {
                 1 => moved[(j, 0)],
@@ -243,7 +243,7 @@ fn biases(problem: &Problem<'_>, moved: MatRef<'_, f64>, unit: &Unit) -> Vec<Bia
         .filter(|bias| bias.per_unit.abs() >= MIN_BIAS)
         .collect();
     biases.sort_by(|a, b| largest_first((a.per_unit, &a.id), (b.per_unit, &b.id)));
-    biases.truncate(BIASES);
+    biases.truncate(MAX_BIASES);
     biases
 }
 

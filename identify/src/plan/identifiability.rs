@@ -3,7 +3,7 @@
 
 use faer::Mat;
 
-use super::linear::{Linearisation, is_wanted, marginal};
+use super::linear::{Linearisation, is_of_interest, marginal};
 use super::ranking::smallest_first;
 use super::results::{HeldBySetup, NearDependency};
 use crate::error::IdentifyError;
@@ -16,7 +16,7 @@ use crate::results::Unobservable;
 const NEGLIGIBLE: f64 = 1e-5;
 /// Condition index from which a near dependency is reported: moderate from 10, strong from 30 (Belsley, Kuh & Welsch, Regression
 /// Diagnostics, 1980, ch. 3).
-const NAMED_FROM: f64 = 10.0;
+const MIN_CONDITION_INDEX: f64 = 10.0;
 /// Least share of the largest entry of the null space for an error to be the pivot of a combination with set-up quantities.
 const MIN_ERROR: f64 = 1.37e-3;
 /// Maximum number of quantities that a description names.
@@ -27,22 +27,22 @@ const CONFOUNDED: &str = "is confounded with";
 const MIN_PART: f64 = 0.1;
 
 /// The name of a quantity and its group: `spindle_ball.z[A150]` is `z of the spindle ball` in `A150`.
-fn called<'i>(list: &[Parameter], id: &'i str) -> (String, Option<&'i str>) {
+fn name_of<'i>(list: &[Parameter], id: &'i str) -> (String, Option<&'i str>) {
     let setup = list
         .iter()
         .any(|parameter| parameter.id == id && parameter.role == Role::Setup);
     if !setup {
         return (id.to_string(), None);
     }
-    let (thing, group) = id.split_once('[').unwrap_or((id, ""));
-    let (thing, coordinate) = thing.split_once('.').unwrap_or((thing, ""));
+    let (quantity, group) = id.split_once('[').unwrap_or((id, ""));
+    let (quantity, coordinate) = quantity.split_once('.').unwrap_or((quantity, ""));
     let of = if coordinate.is_empty() {
         String::new()
     } else {
         format!("{coordinate} of ")
     };
     (
-        format!("{of}the {}", thing.replace('_', " ")),
+        format!("{of}the {}", quantity.replace('_', " ")),
         group.strip_suffix(']'),
     )
 }
@@ -57,34 +57,36 @@ fn describe(list: &[Parameter], combination: &[(String, f64)], verb: &str) -> St
     };
     let first_unit = combination.first().map_or("", |(id, _)| unit_of(id));
     let mixed = combination.iter().any(|(id, _)| unit_of(id) != first_unit);
-    let mut things: Vec<(String, Vec<&str>, String)> = Vec::new();
+    let mut quantities: Vec<(String, Vec<&str>, String)> = Vec::new();
     for (id, value) in combination {
-        let (thing, group) = called(list, id);
+        let (quantity, group) = name_of(list, id);
         let value = if mixed {
-            format!("{} {}", short(*value), unit_of(id))
+            format!("{} {}", format_short(*value), unit_of(id))
         } else {
-            short(*value)
+            format_short(*value)
         };
-        match things
+        match quantities
             .iter_mut()
-            .find(|(other, groups, v)| *other == thing && *v == value && !groups.is_empty())
+            .find(|(other, groups, v)| *other == quantity && *v == value && !groups.is_empty())
         {
             Some((_, groups, _)) => groups.extend(group),
-            None => things.push((thing, group.into_iter().collect(), value)),
+            None => quantities.push((quantity, group.into_iter().collect(), value)),
         }
     }
     // A single further quantity is named, because the count would take as much space.
-    let unnamed = match things.len() {
+    let unnamed = match quantities.len() {
         count if count > MAX_NAMED + 1 => count - MAX_NAMED,
         _ => 0,
     };
-    things.truncate(things.len() - unnamed);
-    let mut words = things.iter().map(|(thing, groups, _)| match groups.as_slice() {
-        [] => thing.clone(),
-        [one] => format!("{thing} in {one}"),
-        [first @ .., last] => format!("{thing} in {} and {last}", first.join(", ")),
-    });
-    let proportion: Vec<&str> = things.iter().map(|(_, _, value)| value.as_str()).collect();
+    quantities.truncate(quantities.len() - unnamed);
+    let mut words = quantities
+        .iter()
+        .map(|(quantity, groups, _)| match groups.as_slice() {
+            [] => quantity.clone(),
+            [one] => format!("{quantity} in {one}"),
+            [first @ .., last] => format!("{quantity} in {} and {last}", first.join(", ")),
+        });
+    let proportion: Vec<&str> = quantities.iter().map(|(_, _, value)| value.as_str()).collect();
     let first = words.next().unwrap_or_default();
     let others: Vec<String> = words.collect();
     let (others, proportion) = (others.join(", "), proportion.join(" : "));
@@ -95,7 +97,7 @@ fn describe(list: &[Parameter], combination: &[(String, f64)], verb: &str) -> St
 }
 
 /// Two decimals, or two significant digits of a small number.
-fn short(value: f64) -> String {
+fn format_short(value: f64) -> String {
     let places = (1.0 - value.abs().max(1e-9).log10().floor()).clamp(1.0, 9.0) as usize;
     let text = format!("{value:.*}", places.max(if value.abs() < 10.0 { 2 } else { 1 }));
     text.trim_end_matches('0').trim_end_matches('.').replace('-', "−")
@@ -108,12 +110,12 @@ pub fn unidentifiable(problem: &Problem<'_>, rank: &Rank) -> Vec<Unobservable> {
         .iter()
         .zip(&rank.pivots)
         .map(|(row, pivot)| {
-            let combination = outside(problem, row, *pivot);
+            let combination = in_display_units(problem, row, *pivot);
             let why = match combination.as_slice() {
                 [(id, _)] => {
-                    let (thing, group) = called(list, id);
+                    let (quantity, group) = name_of(list, id);
                     let place = group.map_or(String::new(), |group| format!(" in {group}"));
-                    format!("no reading of these tests changes with {thing}{place}")
+                    format!("no reading of these tests changes with {quantity}{place}")
                 }
                 _ => describe(list, &combination, CONFOUNDED),
             };
@@ -126,7 +128,7 @@ pub fn unidentifiable(problem: &Problem<'_>, rank: &Rank) -> Vec<Unobservable> {
 }
 
 /// A row over scaled parameters in display units: the pivot first, with 1, then the others in the order of the parameters.
-fn outside(problem: &Problem<'_>, row: &[f64], pivot: usize) -> Vec<(String, f64)> {
+fn in_display_units(problem: &Problem<'_>, row: &[f64], pivot: usize) -> Vec<(String, f64)> {
     let list = &problem.parameters.list;
     let largest = row.iter().fold(0.0_f64, |most, value| most.max(value.abs()));
     let others = (0..row.len()).filter(|j| *j != pivot && row[*j].abs() > NEGLIGIBLE * largest);
@@ -161,12 +163,12 @@ pub fn held_by_setup(
     let r = linear.readings.parts().0;
     let alone = Rank::decide(r.as_ref(), &linear.size, &linear.preference)?;
     let (errors, setups): (Vec<usize>, Vec<usize>) =
-        (linear.preference.iter()).partition(|j| is_wanted(&list[**j]));
+        (linear.preference.iter()).partition(|j| is_of_interest(&list[**j]));
     let order = [errors, setups].concat();
     let scaled = Mat::from_fn(r.nrows(), r.ncols(), |i, j| r[(i, j)] * linear.size[j]);
     let (rows, pivots) = combinations(alone.null_space.as_ref(), scaled.as_ref(), &order, MIN_ERROR);
     let (mut of_errors, of_setups): (Vec<usize>, Vec<usize>) =
-        (0..rows.len()).partition(|row| is_wanted(&list[pivots[*row]]));
+        (0..rows.len()).partition(|row| is_of_interest(&list[pivots[*row]]));
     // In the order of declaration.
     of_errors.sort_by_key(|row| pivots[*row]);
     let setups: Vec<Vec<f64>> = of_setups.iter().map(|row| rows[*row].clone()).collect();
@@ -176,11 +178,11 @@ pub fn held_by_setup(
         // A combination that is not identifiable even with the priors is reported as such elsewhere.
         let sparse = sparser(rows[row].clone(), &setups);
         let setup_only =
-            (0..list.len()).all(|j| j == error || !is_wanted(&list[j]) || sparse[j].abs() < NEGLIGIBLE);
+            (0..list.len()).all(|j| j == error || !is_of_interest(&list[j]) || sparse[j].abs() < NEGLIGIBLE);
         if !linear.rank.is_identifiable(error) || !setup_only {
             continue;
         }
-        let combination = outside(problem, &sparse, error);
+        let combination = in_display_units(problem, &sparse, error);
         if combination.len() < 2 {
             continue;
         }
@@ -210,16 +212,16 @@ fn sparser(mut row: Vec<f64>, others: &[Vec<f64>]) -> Vec<f64> {
         let mut best: Option<(usize, Vec<f64>)> = None;
         for other in others {
             for column in (0..row.len()).filter(|c| row[*c].abs() > NEGLIGIBLE && other[*c].abs() > 1e-3) {
-                let mut trial = row.clone();
-                subtract(&mut trial, row[column] / other[column], other);
-                let count = support(&trial);
+                let mut reduced_row = row.clone();
+                subtract(&mut reduced_row, row[column] / other[column], other);
+                let count = support(&reduced_row);
                 if count < best.as_ref().map_or(before, |(count, _)| *count) {
-                    best = Some((count, trial));
+                    best = Some((count, reduced_row));
                 }
             }
         }
         match best {
-            Some((_, trial)) => row = trial,
+            Some((_, reduced_row)) => row = reduced_row,
             None => return row,
         }
     }
@@ -232,16 +234,16 @@ fn sparser(mut row: Vec<f64>, others: &[Vec<f64>]) -> Vec<f64> {
 pub fn nearly_collinear(
     problem: &Problem<'_>,
     linear: &Linearisation,
-    wanted: &[usize],
+    of_interest: &[usize],
 ) -> Result<Vec<NearDependency>, IdentifyError> {
     let list = &problem.parameters.list;
-    let seen: Vec<usize> = wanted
+    let identifiable: Vec<usize> = of_interest
         .iter()
         .copied()
         .filter(|j| linear.rank.is_identifiable(*j))
         .collect();
-    let r = marginal(linear.whole.parts().0.as_ref(), &seen, &linear.size)?;
-    let n = seen.len();
+    let r = marginal(linear.whole.parts().0.as_ref(), &identifiable, &linear.size)?;
+    let n = identifiable.len();
     let norm: Vec<f64> = (0..n)
         .map(|j| {
             (0..n)
@@ -271,7 +273,7 @@ pub fn nearly_collinear(
     }
     let mut found = Vec::new();
     for (condition_index, direction) in directions {
-        if condition_index < NAMED_FROM {
+        if condition_index < MIN_CONDITION_INDEX {
             continue;
         }
         // The direction in display units.
@@ -285,7 +287,7 @@ pub fn nearly_collinear(
             continue;
         }
         let raw = chosen.iter().map(|(j, v)| {
-            let parameter = &list[seen[*j]];
+            let parameter = &list[identifiable[*j]];
             (
                 parameter.id.clone(),
                 v / norm[*j] * parameter.unit.display_per_internal,
@@ -337,7 +339,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn any_basis_of_a_space_reduces_to_one() {
+    fn all_bases_of_a_subspace_reduce_to_the_same_rows() {
         let plane = [[1.0, 0.0, 2.0, -1.0], [0.0, 1.0, 0.5, 3.0]];
         for turn in 0..16 {
             let (sin, cos) = (0.3 + f64::from(turn)).sin_cos();

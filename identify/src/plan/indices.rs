@@ -19,17 +19,17 @@ use crate::error::IdentifyError;
 /// If the decomposition fails.
 pub fn indices(
     linear: &Linearisation,
-    wanted: &[usize],
+    of_interest: &[usize],
     readings: usize,
     g_efficiency: f64,
 ) -> Result<Indices, IdentifyError> {
-    let errors = wanted.len();
-    let seen: Vec<usize> = wanted
+    let errors = of_interest.len();
+    let identifiable: Vec<usize> = of_interest
         .iter()
         .copied()
         .filter(|j| linear.rank.is_identifiable(*j))
         .collect();
-    let m = seen.len();
+    let m = identifiable.len();
     if m == 0 {
         return Ok(Indices {
             errors,
@@ -37,8 +37,8 @@ pub fn indices(
             ..Indices::default()
         });
     }
-    let r = marginal(linear.whole.parts().0.as_ref(), &seen, &linear.size)?;
-    let size: Vec<f64> = seen.iter().map(|j| linear.size[*j]).collect();
+    let r = marginal(linear.whole.parts().0.as_ref(), &identifiable, &linear.size)?;
+    let size: Vec<f64> = identifiable.iter().map(|j| linear.size[*j]).collect();
     Ok(Indices {
         errors,
         g_efficiency,
@@ -84,13 +84,13 @@ fn singular_values(matrix: MatRef<'_, f64>) -> Result<Vec<f64>, IdentifyError> {
 mod tests {
     use super::*;
 
-    fn near(found: f64, wanted: f64) {
-        assert!((found - wanted).abs() < 1e-12, "{found} instead of {wanted}");
+    fn near(found: f64, expected: f64) {
+        assert!((found - expected).abs() < 1e-12, "{found} instead of {expected}");
     }
 
     /// Singular values 8 and 2 over 16 readings.
     #[test]
-    fn observability_indices_of_two_errors_that_do_not_disturb_one_another() {
+    fn observability_indices_of_two_uncorrelated_errors() {
         let r = Mat::from_fn(2, 2, |i, j| if i == j { [4.0, 0.2][i] } else { 0.0 });
         let found = of_triangle(r.as_ref(), &[2.0, 10.0], 16).unwrap();
         near(found.o1, 1.0);

@@ -13,42 +13,42 @@ use crate::error::IdentifyError;
 use crate::problem::Problem;
 use crate::triangle::upper;
 
-/// The parameters that tests share, in column order. The asked parameters are last.
+/// The parameters that tests share, in column order. The target parameters are last.
 #[derive(Clone, Debug)]
-pub struct Shared {
+pub struct SharedParameters {
     /// Their identifiers.
     pub ids: Vec<String>,
     /// Physical sizes, internal units.
     pub size: Vec<f64>,
     /// Display units per internal unit.
     pub display_per_internal: Vec<f64>,
-    /// Number of asked parameters: the last columns.
-    pub asked: usize,
+    /// Number of target parameters: the last columns.
+    pub targets: usize,
 }
 
 /// A square root of information: `RᵀR`, upper triangular.
 pub type Root = Mat<f64>;
 
-impl Shared {
-    /// Parameters of a problem by index: the `kept` ones first, the `asked` ones last.
-    pub fn of(problem: &Problem<'_>, kept: &[usize], asked: &[usize]) -> Shared {
+impl SharedParameters {
+    /// Parameters of a problem by index: the `kept` ones first, the `targets` ones last.
+    pub fn of(problem: &Problem<'_>, kept: &[usize], targets: &[usize]) -> SharedParameters {
         let list = &problem.parameters.list;
-        let order: Vec<usize> = kept.iter().chain(asked).copied().collect();
-        Shared {
+        let order: Vec<usize> = kept.iter().chain(targets).copied().collect();
+        SharedParameters {
             ids: order.iter().map(|j| list[*j].id.clone()).collect(),
             size: order.iter().map(|j| list[*j].size).collect(),
             display_per_internal: order.iter().map(|j| list[*j].unit.display_per_internal).collect(),
-            asked: asked.len(),
+            targets: targets.len(),
         }
     }
 
-    /// The parameters in some columns, which include all asked parameters.
-    pub fn part(&self, columns: &[usize]) -> Shared {
-        Shared {
+    /// The parameters in some columns, which include all target parameters.
+    pub fn part(&self, columns: &[usize]) -> SharedParameters {
+        SharedParameters {
             ids: columns.iter().map(|j| self.ids[*j].clone()).collect(),
             size: columns.iter().map(|j| self.size[*j]).collect(),
             display_per_internal: columns.iter().map(|j| self.display_per_internal[*j]).collect(),
-            asked: self.asked,
+            targets: self.targets,
         }
     }
 
@@ -118,20 +118,20 @@ impl Shared {
         Mat::from_fn(k, k, |i, j| if i <= j { upper[(m + i, m + j)] } else { 0.0 })
     }
 
-    /// The root of the information on the asked parameters, with the others eliminated.
+    /// The root of the information on the target parameters, with the others eliminated.
     pub fn criterion_block<'r>(&self, root: &'r Root) -> MatRef<'r, f64> {
-        let first = self.ids.len() - self.asked;
-        root.as_ref().submatrix(first, first, self.asked, self.asked)
+        let first = self.ids.len() - self.targets;
+        root.as_ref().submatrix(first, first, self.targets, self.targets)
     }
 
-    /// Standard uncertainties of the asked parameters, display units.
+    /// Standard uncertainties of the target parameters, display units.
     pub fn uncertainties(&self, root: &Root) -> Vec<f64> {
         let block = self.criterion_block(root);
         let inverse = inverted(block);
-        let first = self.ids.len() - self.asked;
-        (0..self.asked)
+        let first = self.ids.len() - self.targets;
+        (0..self.targets)
             .map(|i| {
-                let row = (i..self.asked)
+                let row = (i..self.targets)
                     .map(|j| inverse[(i, j)].powi(2))
                     .sum::<f64>()
                     .sqrt();

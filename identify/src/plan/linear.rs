@@ -67,10 +67,10 @@ impl Linearisation {
     }
 
     /// Standard uncertainty of a parameter, internal unit. `None` if the parameter is not identifiable.
-    pub fn u(&self, unknown: usize) -> Option<f64> {
+    pub fn u(&self, parameter: usize) -> Option<f64> {
         self.rank
-            .is_identifiable(unknown)
-            .then(|| self.covariance[(unknown, unknown)].max(0.0).sqrt())
+            .is_identifiable(parameter)
+            .then(|| self.covariance[(parameter, parameter)].max(0.0).sqrt())
     }
 
     /// The same plan without some of its tests.
@@ -99,7 +99,7 @@ pub fn merged<'t>(mut whole: Triangle, others: impl Iterator<Item = &'t Triangle
 
 /// Whether a parameter is a target of the plan: an error of the machine or a coefficient of a declared effect, not a set-up
 /// quantity.
-pub fn is_wanted(parameter: &Parameter) -> bool {
+pub fn is_of_interest(parameter: &Parameter) -> bool {
     parameter.role != Role::Setup
 }
 
@@ -129,11 +129,11 @@ pub fn marginal(r: MatRef<'_, f64>, kept: &[usize], size: &[f64]) -> Result<Mat<
         let singular: Vec<f64> = svd.S().column_vector().iter().copied().collect();
         let rounding = singular.first().copied().unwrap_or(0.0) * 1e-13 * size.len() as f64;
         // The column space of the dropped parameters is projected out of every column.
-        let told = singular
+        let informed = singular
             .iter()
             .filter(|s| **s >= MIN_IDENTIFIABLE && **s > rounding)
             .count();
-        let directions = svd.U().subcols(0, told);
+        let directions = svd.U().subcols(0, informed);
         let along = directions.transpose() * &rows;
         rows -= directions * along;
     }
@@ -154,7 +154,7 @@ mod tests {
     /// A reading with 0.1 µm noise depends on the sum of an error and a ball position with a prior of 300 µm. The prior then
     /// determines the error. A second ball position, with neither prior nor readings, removes no information.
     #[test]
-    fn what_is_dropped_is_known_by_its_prior_and_no_better() {
+    fn dropped_parameters_are_limited_by_their_priors() {
         let r = Mat::from_fn(3, 3, |i, j| {
             [[1e4, 1e4, 0.0], [0.0, 1.0 / 0.3, 0.0], [0.0; 3]][i][j]
         });

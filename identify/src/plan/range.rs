@@ -4,7 +4,7 @@ use faer::Mat;
 use schemars::JsonSchema;
 use serde::Serialize;
 
-use super::linear::{Linearisation, is_wanted, merged};
+use super::linear::{Linearisation, is_of_interest, merged};
 use crate::error::IdentifyError;
 use crate::fit;
 use crate::problem::Problem;
@@ -40,8 +40,8 @@ const BISECTIONS: usize = 10;
 pub fn shrinkages(problem: &Problem<'_>) -> Result<Vec<Shrinkage>, IdentifyError> {
     let nominal = vec![0.0; problem.parameters.list.len()];
     let linear = Linearisation::of(problem, &nominal)?;
-    let wanted: Vec<usize> = (0..problem.parameters.list.len())
-        .filter(|j| is_wanted(&problem.parameters.list[*j]) && linear.rank.is_identifiable(*j))
+    let of_interest: Vec<usize> = (0..problem.parameters.list.len())
+        .filter(|j| is_of_interest(&problem.parameters.list[*j]) && linear.rank.is_identifiable(*j))
         .collect();
     let mut found = Vec::new();
     for test in 0..problem.tests.len() {
@@ -70,7 +70,7 @@ pub fn shrinkages(problem: &Problem<'_>) -> Result<Vec<Shrinkage>, IdentifyError
             }
             let rank = Rank::decide(whole.parts().0.as_ref(), &linear.size, &linear.preference)?;
             let covariance = fit::covariance(&whole, &rank.seen)?;
-            let ratios = wanted.iter().map(|&j| {
+            let ratios = of_interest.iter().map(|&j| {
                 let ratio = (covariance[(j, j)] / linear.covariance[(j, j)]).sqrt();
                 (
                     if rank.is_identifiable(j) {
@@ -84,7 +84,7 @@ pub fn shrinkages(problem: &Problem<'_>) -> Result<Vec<Shrinkage>, IdentifyError
             Ok(ratios.fold((0.0, 0), |most, next| if next.0 > most.0 { next } else { most }))
         };
         let kind = problem.session.machine.axes[axis].kind;
-        let (outside, unit) = match kind {
+        let (display_per_internal, unit) = match kind {
             abbe_model::axis::AxisKind::Rotary => (1.0_f64.to_degrees(), "deg"),
             abbe_model::axis::AxisKind::Linear => (1.0, "mm"),
         };
@@ -92,25 +92,28 @@ pub fn shrinkages(problem: &Problem<'_>) -> Result<Vec<Shrinkage>, IdentifyError
         let mut shrinkage = Shrinkage {
             test: problem.tests[test].name.clone(),
             axis: problem.session.machine.axes[axis].name.clone(),
-            range: [low * outside, high * outside],
+            range: [low * display_per_internal, high * display_per_internal],
             unit: unit.to_string(),
             least: None,
             first_to_double: None,
         };
         if none.0 >= 2.0 {
-            let (mut enough, mut too_little, mut who) = (1.0, 0.0, none.1);
+            let (mut enough, mut too_little, mut parameter) = (1.0, 0.0, none.1);
             for _ in 0..BISECTIONS {
                 let share = 0.5 * (enough + too_little);
                 let (ratio, j) = worst(share)?;
                 if ratio < 2.0 {
                     enough = share;
                 } else {
-                    (too_little, who) = (share, j);
+                    (too_little, parameter) = (share, j);
                 }
             }
             let (middle, half) = (0.5 * (low + high), 0.5 * enough * (high - low));
-            shrinkage.least = Some([(middle - half) * outside, (middle + half) * outside]);
-            shrinkage.first_to_double = Some(problem.parameters.list[who].id.clone());
+            shrinkage.least = Some([
+                (middle - half) * display_per_internal,
+                (middle + half) * display_per_internal,
+            ]);
+            shrinkage.first_to_double = Some(problem.parameters.list[parameter].id.clone());
         }
         found.push(shrinkage);
     }

@@ -36,7 +36,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn figures_that_rounding_parts_are_put_in_order_by_name() {
+    fn figures_that_differ_by_rounding_are_sorted_by_name() {
         let names = ["EX0C", "EA0C", "EY0C", "EB0C"];
         // The same magnitude as four processors may compute it, with either sign.
         let figures = [0.3, -(0.1 + 0.2), 0.3 - 1e-16, 0.300_000_000_01];
@@ -55,7 +55,7 @@ mod tests {
     }
 
     #[test]
-    fn the_first_eight_digits_count() {
+    fn eight_significant_digits_decide() {
         for value in [1.234_567_89e-300, 9.999_999_94, 12_345_678.4, 7.0e300] {
             let off = (rounded(value) / value - 1.0).abs();
             assert!(off < 5e-8, "{value}: {off}");

@@ -42,21 +42,21 @@ pub fn sensitivities(
     covariance: &Mat<f64>,
 ) -> Result<Sensitivities, IdentifyError> {
     let values = problem.slot_values(beta);
-    let unknowns = beta.len();
+    let parameters = beta.len();
     let parts: Vec<BlockSensitivity> = problem
         .blocks()
         .par_iter()
         .map(|block| {
             let rows = problem.rows(&values, block)?;
-            Ok(of_block(problem, block, &rows, unknowns, covariance))
+            Ok(of_block(problem, block, &rows, parameters, covariance))
         })
         .collect::<Result<_, IdentifyError>>()?;
     let tests = problem.tests.len();
-    let mut summary = vec![(0.0_f64, 0_usize, 0.0_f64); unknowns];
-    let mut curves = vec![vec![Vec::new(); tests]; unknowns];
+    let mut summary = vec![(0.0_f64, 0_usize, 0.0_f64); parameters];
+    let mut curves = vec![vec![Vec::new(); tests]; parameters];
     let (mut sum, mut most, mut rows) = (0.0, 0.0_f64, 0);
     for part in parts {
-        for j in 0..unknowns {
+        for j in 0..parameters {
             if part.largest[j].abs() > summary[j].0.abs() {
                 (summary[j].0, summary[j].1) = (part.largest[j], part.test);
             }
@@ -86,7 +86,7 @@ fn of_block(
     problem: &Problem<'_>,
     block: &Block,
     rows: &Mat<f64>,
-    unknowns: usize,
+    parameters: usize,
     covariance: &Mat<f64>,
 ) -> BlockSensitivity {
     let coordinates = problem.coordinates();
@@ -103,10 +103,10 @@ fn of_block(
             first_run.contains(&row) && (row - first_run.start).is_multiple_of(every)
         })
         .collect();
-    let mut largest = vec![0.0_f64; unknowns];
-    let mut squares = vec![0.0; unknowns];
-    let mut curve = vec![Vec::with_capacity(picked.len()); unknowns];
-    for j in 0..unknowns {
+    let mut largest = vec![0.0_f64; parameters];
+    let mut squares = vec![0.0; parameters];
+    let mut curve = vec![Vec::with_capacity(picked.len()); parameters];
+    for j in 0..parameters {
         for i in 0..rows.nrows() {
             let value = rows[(i, j)];
             if value.abs() > largest[j].abs() {
@@ -126,9 +126,13 @@ fn of_block(
         }
     }
     let (white, _) = problem.whiten(rows, block);
-    let spread = white.as_ref().subcols(0, unknowns) * covariance;
+    let spread = white.as_ref().subcols(0, parameters) * covariance;
     let leverages = (0..white.nrows())
-        .map(|i| (0..unknowns).map(|j| spread[(i, j)] * white[(i, j)]).sum::<f64>())
+        .map(|i| {
+            (0..parameters)
+                .map(|j| spread[(i, j)] * white[(i, j)])
+                .sum::<f64>()
+        })
         .collect::<Vec<f64>>();
     BlockSensitivity {
         test: block.test,
@@ -142,9 +146,9 @@ fn of_block(
 }
 
 /// The summary of a parameter in display units: µm of reading per display unit.
-pub fn reported(problem: &Problem<'_>, found: &Sensitivities, unknown: usize) -> Sensitivity {
-    let (largest, test, rms) = found.summary[unknown];
-    let scale = outside(problem, unknown);
+pub fn reported(problem: &Problem<'_>, found: &Sensitivities, parameter: usize) -> Sensitivity {
+    let (largest, test, rms) = found.summary[parameter];
+    let scale = display_scale(problem, parameter);
     Sensitivity {
         largest: largest * scale,
         largest_in: problem.tests[test].name.clone(),
@@ -153,12 +157,12 @@ pub fn reported(problem: &Problem<'_>, found: &Sensitivities, unknown: usize) ->
 }
 
 /// The curves of a parameter in display units, without tests that do not depend on it.
-pub fn curves(problem: &Problem<'_>, found: &Sensitivities, unknown: usize) -> Vec<Curve> {
-    let scale = outside(problem, unknown);
-    found.curves[unknown]
+pub fn curves(problem: &Problem<'_>, found: &Sensitivities, parameter: usize) -> Vec<Curve> {
+    let scale = display_scale(problem, parameter);
+    found.curves[parameter]
         .iter()
         .enumerate()
-        .filter(|(_, values)| values.iter().any(|value| value.abs() > NOTHING))
+        .filter(|(_, values)| values.iter().any(|value| value.abs() > MIN_SENSITIVITY))
         .map(|(test, values)| Curve {
             test: problem.tests[test].name.clone(),
             values: values.iter().map(|value| value * scale).collect(),
@@ -167,9 +171,9 @@ pub fn curves(problem: &Problem<'_>, found: &Sensitivities, unknown: usize) -> V
 }
 
 /// Sensitivities below this value are rounding errors, mm per mm or rad.
-const NOTHING: f64 = 1e-9;
+const MIN_SENSITIVITY: f64 = 1e-9;
 
 /// Converts mm of reading per internal unit into µm per display unit.
-fn outside(problem: &Problem<'_>, unknown: usize) -> f64 {
-    1e3 / problem.parameters.list[unknown].unit.display_per_internal
+fn display_scale(problem: &Problem<'_>, parameter: usize) -> f64 {
+    1e3 / problem.parameters.list[parameter].unit.display_per_internal
 }

@@ -10,10 +10,10 @@ use faer::Mat;
 use schemars::JsonSchema;
 use serde::Serialize;
 
-use super::candidate_information::Prepared;
-use super::candidate_tests::CandidateTests;
+use super::candidate_information::PreparedCandidates;
+use super::candidate_tests::TestVariations;
 use super::criterion;
-use super::information::{Root, Shared};
+use super::information::{Root, SharedParameters};
 use super::ranking::{rounded, smallest_first};
 use super::states;
 use crate::error::IdentifyError;
@@ -51,7 +51,7 @@ pub struct SeparatingTest {
     /// Duration, min.
     pub minutes: f64,
     /// The alternatives that no previous test separates, in their order.
-    pub alternatives: Vec<Alternative>,
+    pub alternatives: Vec<AlternativeSeparation>,
 }
 
 impl SeparatingTest {
@@ -63,7 +63,7 @@ impl SeparatingTest {
 
 /// The separation of an effect from one alternative by a test.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Alternative {
+pub struct AlternativeSeparation {
     /// Index among the given alternatives.
     pub number: usize,
     /// Separation by the present readings and the previous tests, standard deviations.
@@ -72,7 +72,7 @@ pub struct Alternative {
     pub after: f64,
 }
 
-impl Alternative {
+impl AlternativeSeparation {
     /// Whether the test separates the two.
     pub fn is_separated(&self) -> bool {
         self.after >= SEPARATED_SIGMA
@@ -90,29 +90,29 @@ pub fn separation(
     found: &Effect,
     coefficients: &[f64],
     alias: &Effect,
-    menu: &CandidateTests,
+    variations: &TestVariations,
 ) -> Result<Option<SeparationAnalysis>, IdentifyError> {
-    let contest = Contest::new(
+    let comparison = SeparationComparison::new(
         problem,
         beta,
         found,
         coefficients,
         std::slice::from_ref(alias),
-        menu,
+        variations,
     )?;
-    let base = &contest.prepared.base;
-    let before = contest.sigma(base, 0);
-    let sigmas = contest.with_each(base, &[0]);
-    let Some(best) = contest.best(&sigmas, f64::MIN_POSITIVE) else {
+    let base = &comparison.prepared.base;
+    let before = comparison.sigma(base, 0);
+    let sigmas = comparison.with_each(base, &[0]);
+    let Some(best) = comparison.best(&sigmas, f64::MIN_POSITIVE) else {
         return Ok(None);
     };
-    let entry = &contest.prepared.entries[best].entry;
+    let candidate = &comparison.prepared.candidates[best].test;
     let after = sigmas[best][0];
     Ok((after > before * (1.0 + MIN_GAIN)).then(|| SeparationAnalysis {
-        test: entry.name.clone(),
+        test: candidate.name.clone(),
         before,
         after,
-        minutes: entry.minutes,
+        minutes: candidate.minutes,
     }))
 }
 
@@ -128,34 +128,34 @@ pub fn separating_tests(
     found: &Effect,
     coefficients: &[f64],
     alternatives: &[Effect],
-    menu: &CandidateTests,
+    variations: &TestVariations,
 ) -> Result<Vec<SeparatingTest>, IdentifyError> {
     if alternatives.is_empty() {
         return Ok(Vec::new());
     }
-    let contest = Contest::new(problem, beta, found, coefficients, alternatives, menu)?;
+    let comparison = SeparationComparison::new(problem, beta, found, coefficients, alternatives, variations)?;
     let mut left: Vec<usize> = (0..alternatives.len()).collect();
-    let mut root = contest.prepared.base.clone();
+    let mut root = comparison.prepared.base.clone();
     let mut tests: Vec<SeparatingTest> = Vec::new();
     while !left.is_empty() && tests.len() < MAX_TESTS {
-        let before: Vec<f64> = left.iter().map(|one| contest.sigma(&root, *one)).collect();
-        let sigmas = contest.with_each(&root, &left);
-        let Some(best) = contest.best(&sigmas, SEPARATED_SIGMA) else {
+        let before: Vec<f64> = left.iter().map(|one| comparison.sigma(&root, *one)).collect();
+        let sigmas = comparison.with_each(&root, &left);
+        let Some(best) = comparison.best(&sigmas, SEPARATED_SIGMA) else {
             break;
         };
-        let entry = &contest.prepared.entries[best].entry;
-        let of = |((number, before), after): ((&usize, &f64), &f64)| Alternative {
+        let candidate = &comparison.prepared.candidates[best].test;
+        let of = |((number, before), after): ((&usize, &f64), &f64)| AlternativeSeparation {
             number: *number,
             before: *before,
             after: *after,
         };
         let test = SeparatingTest {
-            test: entry.name.clone(),
-            minutes: entry.minutes,
+            test: candidate.name.clone(),
+            minutes: candidate.minutes,
             alternatives: left.iter().zip(&before).zip(&sigmas[best]).map(of).collect(),
         };
         // Alternatives that the readings separate already need no test.
-        let gained = |one: &Alternative| one.is_separated() && one.before < SEPARATED_SIGMA;
+        let gained = |one: &AlternativeSeparation| one.is_separated() && one.before < SEPARATED_SIGMA;
         if !test.alternatives.iter().any(gained) {
             break;
         }
@@ -163,29 +163,29 @@ pub fn separating_tests(
             .filter(|one| !one.is_separated())
             .map(|one| one.number)
             .collect();
-        root = contest.prepared.added(&root, best);
+        root = comparison.prepared.added(&root, best);
         tests.push(test);
     }
     Ok(tests)
 }
 
 /// The separation of a found effect from each of its alternatives by every candidate test.
-struct Contest {
-    prepared: Prepared,
+struct SeparationComparison {
+    prepared: PreparedCandidates,
     coefficients: Vec<f64>,
     /// For each alternative, the columns that remain when it alone is in the model, and their parameters.
-    pairs: Vec<(Vec<usize>, Shared)>,
+    pairs: Vec<(Vec<usize>, SharedParameters)>,
 }
 
-impl Contest {
+impl SeparationComparison {
     fn new(
         problem: &Problem<'_>,
         beta: &[f64],
         found: &Effect,
         coefficients: &[f64],
         alternatives: &[Effect],
-        menu: &CandidateTests,
-    ) -> Result<Contest, IdentifyError> {
+        variations: &TestVariations,
+    ) -> Result<SeparationComparison, IdentifyError> {
         let mut all = problem.clone();
         states::fold_by_test(&mut all);
         let mut values = beta.to_vec();
@@ -202,14 +202,14 @@ impl Contest {
             _ => None,
         };
         let found_at = place(found);
-        let asked: Vec<usize> = (0..all.parameters.list.len())
+        let targets: Vec<usize> = (0..all.parameters.list.len())
             .filter(|j| effect_of(*j).is_some() && effect_of(*j) == found_at)
             .collect();
-        let menu = &menu
+        let variations = &variations
             .clone()
             .for_effects(std::iter::once(found).chain(alternatives));
-        let entries = super::candidate_tests::entries(all.session, menu)?;
-        let prepared = Prepared::new(&all, &values, entries, menu, &asked)?;
+        let tests = super::candidate_tests::candidate_tests(all.session, variations)?;
+        let prepared = PreparedCandidates::new(&all, &values, tests, variations, &targets)?;
         // An alternative that is part of the model always remains in it.
         let is_added = |effect: usize| effect >= known && Some(effect) != found_at;
         let added: Vec<Option<usize>> = (prepared.shared.ids.iter())
@@ -232,7 +232,7 @@ impl Contest {
                 (columns, shared)
             })
             .collect();
-        Ok(Contest {
+        Ok(SeparationComparison {
             prepared,
             coefficients: coefficients.to_vec(),
             pairs,
@@ -256,21 +256,21 @@ impl Contest {
     /// The candidate test that separates the largest number of alternatives by at least `least` standard deviations. Of several,
     /// the shortest test whose least separation is close to the largest. Names decide ties.
     fn best(&self, sigmas: &[Vec<f64>], least: f64) -> Option<usize> {
-        let count = |entry: usize| sigmas[entry].iter().filter(|sigma| **sigma >= least).count();
-        let worst = |entry: usize| {
-            let separated = sigmas[entry].iter().filter(|sigma| **sigma >= least);
+        let count = |candidate: usize| sigmas[candidate].iter().filter(|sigma| **sigma >= least).count();
+        let worst = |candidate: usize| {
+            let separated = sigmas[candidate].iter().filter(|sigma| **sigma >= least);
             rounded(separated.copied().fold(f64::INFINITY, f64::min))
         };
         let most = (0..sigmas.len()).map(count).max().filter(|most| *most > 0)?;
-        let with_most = || (0..sigmas.len()).filter(|entry| count(*entry) == most);
+        let with_most = || (0..sigmas.len()).filter(|candidate| count(*candidate) == most);
         let best = with_most().map(worst).fold(0.0, f64::max);
-        let entry = |entry: usize| &self.prepared.entries[entry].entry;
+        let candidate = |candidate: usize| &self.prepared.candidates[candidate].test;
         with_most()
             .filter(|one| worst(*one) >= EQUIVALENT_SHARE * best)
             .min_by(|a, b| {
-                smallest_first(entry(*a).minutes, entry(*b).minutes)
+                smallest_first(candidate(*a).minutes, candidate(*b).minutes)
                     .then(worst(*b).total_cmp(&worst(*a)))
-                    .then_with(|| entry(*a).name.cmp(&entry(*b).name))
+                    .then_with(|| candidate(*a).name.cmp(&candidate(*b).name))
             })
     }
 }

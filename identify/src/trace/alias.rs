@@ -55,8 +55,8 @@ fn to_six_decimals(value: f64) -> f64 {
 fn simplest_first(search: &Search<'_>, a: usize, b: usize) -> Ordering {
     let [first, second] = [a, b].map(|candidate| &search.candidates[candidate]);
     first
-        .length()
-        .total_cmp(&second.length())
+        .description_length()
+        .total_cmp(&second.description_length())
         .then_with(|| first.effect.id().cmp(&second.effect.id()))
         .then(a.cmp(&b))
 }
@@ -69,21 +69,21 @@ fn competing_effects(
     variance: f64,
     aliases: &[Alias],
 ) -> Vec<CompetingEffect> {
-    let taken = search.taken()[k].candidate;
-    let named = search.candidates[taken].effect.id();
+    let selected = search.selected()[k].candidate;
+    let named = search.candidates[selected].effect.id();
     let alike: HashSet<String> = aliases
         .iter()
         .map(|alias| search.candidates[alias.candidate].effect.id())
         .collect();
-    let others: Vec<usize> = search.taken().iter().map(|t| t.candidate).collect();
+    let others: Vec<usize> = search.selected().iter().map(|t| t.candidate).collect();
     let mut standing: Vec<(f64, usize)> = gains
         .iter()
         .enumerate()
         .filter(|(candidate, gain)| {
             gain.freedom > 0
-                && (*candidate == taken || !others.contains(candidate))
+                && (*candidate == selected || !others.contains(candidate))
                 && !search.candidates[*candidate].last_resort
-                && search.is_open(*candidate, &search.tracks[ALL].folds)
+                && search.may_be_added(*candidate, &search.branches[ALL].folds)
         })
         .map(|(candidate, gain)| {
             let evidence = search.evidence_for(candidate, gain, variance);
@@ -117,25 +117,25 @@ pub(super) fn aliases(
     model: &TrainedModel<'_>,
     variance: f64,
 ) -> (Vec<Alias>, Vec<CompetingEffect>) {
-    let taken = &search.taken()[k];
-    let of_named = model.gain(taken.candidate);
-    let least = search.evidence_for(taken.candidate, &of_named, variance) - INDISTINGUISHABLE;
+    let selected = &search.selected()[k];
+    let of_named = model.gain(selected.candidate);
+    let least = search.evidence_for(selected.candidate, &of_named, variance) - INDISTINGUISHABLE;
     let least_unpriced = search.evidence(&of_named, variance) - INDISTINGUISHABLE;
     let least_gain = of_named.gain / variance - 2.0 * INDISTINGUISHABLE;
     let columns = |candidate: usize| search.moments.count[candidate];
     // A harmonic has two columns because its phase is estimated. It still counts as an alias of an effect with one column.
     let no_more_said = |candidate: usize| {
-        columns(candidate) <= columns(taken.candidate)
+        columns(candidate) <= columns(selected.candidate)
             || matches!(search.candidates[candidate].effect.shape, Shape::Harmonic { .. })
     };
-    let (_, coefficients) = model.joined(taken.candidate);
+    let (_, coefficients) = model.with_candidate(selected.candidate);
     // Base columns are the candidate's columns at unit length. The signature is their linear combination.
-    let norms = search.norms(taken.candidate);
+    let norms = search.norms(selected.candidate);
     let signature: Vec<(usize, f64)> = search
-        .places(taken.candidate)
+        .places(selected.candidate)
         .zip(coefficients.iter().zip(&norms).map(|(c, norm)| c * norm))
         .collect();
-    let others: Vec<usize> = search.taken().iter().map(|t| t.candidate).collect();
+    let others: Vec<usize> = search.selected().iter().map(|t| t.candidate).collect();
     let gains = model.gains();
     let mut aliases: Vec<Alias> = gains
         .iter()
@@ -143,7 +143,7 @@ pub(super) fn aliases(
         .filter(|(candidate, gain)| {
             !others.contains(candidate)
                 && !search.candidates[*candidate].last_resort
-                && search.is_open(*candidate, &model.folds)
+                && search.may_be_added(*candidate, &model.folds)
                 && gain.freedom > 0
                 && (search.evidence_for(*candidate, gain, variance) >= least
                     || search.evidence(gain, variance) >= least_unpriced
@@ -154,7 +154,7 @@ pub(super) fn aliases(
             (cosine >= MIN_COSINE).then(|| Alias {
                 candidate,
                 cosine,
-                model_coefficients: model.joined(candidate).0,
+                model_coefficients: model.with_candidate(candidate).0,
             })
         })
         .collect();
@@ -165,7 +165,7 @@ pub(super) fn aliases(
     });
     // The nearest candidate represents all candidates with its identifier. Candidates with the found effect's own identifier are
     // excluded.
-    let named = search.candidates[taken.candidate].effect.id();
+    let named = search.candidates[selected.candidate].effect.id();
     let mut seen = HashSet::from([named]);
     aliases.retain(|alias| seen.insert(search.candidates[alias.candidate].effect.id()));
     let competing_effects = competing_effects(search, k, &gains, variance, &aliases);

@@ -50,7 +50,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn the_quick_bound_is_a_bound() {
+    fn the_fast_bound_is_an_upper_bound() {
         for k in 1..6 {
             for x in [1e-6, 0.01, 0.5, 1.0, 3.0, 20.0, 200.0, 4000.0] {
                 let evidence = -ln_chi_square_tail(x, k);

@@ -12,11 +12,11 @@ use statrs::function::gamma::ln_gamma;
 
 use super::chi_square_tail::ln_chi_square_tail;
 use super::library::Candidate;
-use super::observable::MIN_VISIBLE;
+use super::observable::MIN_OBSERVABLE;
 use super::score::TrainedModel;
 
 /// Maximum number of positions of one effect. An effect with more positions is a curve.
-const MAX_PLACES: usize = 6;
+const MAX_POSITIONS: usize = 6;
 /// Maximum number of exchange sweeps after a selection.
 const MAX_SWEEPS: usize = 4;
 
@@ -38,7 +38,7 @@ impl StepTable {
 
 /// The best step table of a dictionary beside a model, with at least two positions. A single step is an effect of the library
 /// itself.
-pub fn composed(
+pub fn best_step_table(
     model: &TrainedModel<'_>,
     number: usize,
     dictionary: &Candidate,
@@ -55,31 +55,31 @@ pub fn composed(
     };
     let mut chosen: Vec<usize> = Vec::new();
     let mut best: Option<StepTable> = None;
-    while chosen.len() < MAX_PLACES {
-        let Some((place, _)) = subset.best_addition(&chosen) else {
+    while chosen.len() < MAX_POSITIONS {
+        let Some((position, _)) = subset.best_addition(&chosen) else {
             break;
         };
-        chosen.push(place);
+        chosen.push(position);
         let gain = subset.splice(&mut chosen);
         let n = chosen.len();
         if n < 2 {
             continue;
         }
-        let price = ln_choices(at.len(), n);
-        let evidence = -ln_chi_square_tail(gain / variance, n) - price;
+        let selection_penalty = ln_choices(at.len(), n);
+        let evidence = -ln_chi_square_tail(gain / variance, n) - selection_penalty;
         if best
             .as_ref()
             .is_none_or(|best| evidence - dictionary.cost > best.score())
         {
-            let mut places: Vec<f64> = chosen.iter().map(|k| at[*k]).collect();
-            places.sort_by(f64::total_cmp);
+            let mut positions: Vec<f64> = chosen.iter().map(|k| at[*k]).collect();
+            positions.sort_by(f64::total_cmp);
             let effect = Effect {
-                shape: Shape::Steps { at: places },
+                shape: Shape::Steps { at: positions },
                 ..dictionary.effect.clone()
             };
             let candidate = Candidate {
                 effect,
-                price,
+                selection_penalty,
                 dictionary: false,
                 ..dictionary.clone()
             };
@@ -127,7 +127,7 @@ impl Subset<'_> {
                 |column: usize| -> f64 { (0..n).map(|i| self.d[(chosen[i], j)] * solved[(i, column)]).sum() };
             let left = self.d[(j, j)] - with(j);
             // A position that is nearly a linear combination of the others adds rounding errors and no evidence.
-            if left <= MIN_VISIBLE.sqrt() * self.own[(j, j)] {
+            if left <= MIN_OBSERVABLE.sqrt() * self.own[(j, j)] {
                 continue;
             }
             let along = self.g[j] - with(m);
@@ -148,9 +148,9 @@ impl Subset<'_> {
                 let out = chosen.remove(0);
                 let rest = self.gain(chosen);
                 match self.best_addition(chosen) {
-                    Some((place, more)) if rest + more > gain * (1.0 + 1e-9) => {
+                    Some((position, more)) if rest + more > gain * (1.0 + 1e-9) => {
                         gain = rest + more;
-                        chosen.push(place);
+                        chosen.push(position);
                         changed = true;
                     }
                     _ => chosen.push(out),
@@ -180,10 +180,10 @@ mod tests {
     use super::*;
 
     #[test]
-    fn the_subset_that_gains_most_is_found() {
+    fn the_subset_with_the_largest_gain_is_found() {
         // Steps over forty readings. The second and fourth of five are real. The reference is the best pair by exhaustive search.
-        let places = [5, 12, 20, 28, 35];
-        let column = |k: usize, i: usize| f64::from(u8::from(i >= places[k]));
+        let positions = [5, 12, 20, 28, 35];
+        let column = |k: usize, i: usize| f64::from(u8::from(i >= positions[k]));
         let y = |i: usize| 1.5 * column(1, i) - column(3, i) + 0.1 * ((i * i) % 7) as f64;
         let d = Mat::from_fn(5, 5, |k, l| (0..40).map(|i| column(k, i) * column(l, i)).sum());
         let g: Vec<f64> = (0..5)

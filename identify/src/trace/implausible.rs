@@ -3,7 +3,7 @@
 
 use abbe_model::effect::Effect;
 
-use super::Trace;
+use super::TraceOutcome;
 use super::result::unsearched;
 use crate::error::IdentifyError;
 use crate::fit::{self, Fit};
@@ -32,7 +32,7 @@ impl<'a> Contradicted<'a> {
             freed: None,
         };
         let mut freed = problem.clone();
-        if !contradicted.stops()
+        if !contradicted.forbids_search()
             && let Some((parameters, found)) = with_set_ups_freed(&mut freed, fit)?
         {
             contradicted.parameters = parameters;
@@ -65,12 +65,12 @@ impl<'a> Contradicted<'a> {
     }
 
     /// Whether the readings belong to another session, so that a search has no purpose.
-    pub fn stops(&self) -> bool {
+    pub fn forbids_search(&self) -> bool {
         is_another_session(&self.plausibility)
     }
 
     /// Adds the contradictions to a result, before its other warnings.
-    pub fn tell(&self, result: &mut TraceResult) {
+    pub fn add_warnings(&self, result: &mut TraceResult) {
         let mut warnings = plausibility::warnings(&self.plausibility);
         if !self.parameters.is_empty() {
             warnings.push(format!(
@@ -84,7 +84,7 @@ impl<'a> Contradicted<'a> {
     }
 
     /// The trace that ends before its search.
-    pub fn stopped(&self, problem: Problem<'a>, fit: Fit) -> Trace<'a> {
+    pub fn outcome_without_search(&self, problem: Problem<'a>, fit: Fit) -> TraceOutcome<'a> {
         let mut result = TraceResult {
             verdict: "unexplained".to_string(),
             remainder: Remainder {
@@ -97,7 +97,7 @@ impl<'a> Contradicted<'a> {
             residual_before: "the readings contradict the session".to_string(),
             ..unsearched(&problem, &fit)
         };
-        self.tell(&mut result);
-        Trace::of_declared(problem, fit, result)
+        self.add_warnings(&mut result);
+        TraceOutcome::of_declared(problem, fit, result)
     }
 }

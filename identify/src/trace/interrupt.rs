@@ -1,7 +1,7 @@
 //! Interrupts a trace: the caller can stop it at any time and gets the effects found so far.
 
 use super::result::unsearched;
-use super::{Progress, Trace};
+use super::{Progress, TraceOutcome};
 use crate::error::IdentifyError;
 use crate::fit::Fit;
 use crate::problem::Problem;
@@ -49,17 +49,17 @@ impl TraceResult {
     }
 }
 
-impl<'a> Trace<'a> {
+impl<'a> TraceOutcome<'a> {
     /// A trace that was interrupted before its search began. It contains the declared model only.
-    pub(super) fn unsearched(problem: Problem<'a>, fit: Fit) -> Trace<'a> {
+    pub(super) fn unsearched(problem: Problem<'a>, fit: Fit) -> TraceOutcome<'a> {
         let mut result = unsearched(&problem, &fit);
         result.mark_interrupted();
-        Trace::of_declared(problem, fit, result)
+        TraceOutcome::of_declared(problem, fit, result)
     }
 
     /// A trace that contains the declared model only, with its result.
-    pub(super) fn of_declared(problem: Problem<'a>, fit: Fit, result: TraceResult) -> Trace<'a> {
-        Trace {
+    pub(super) fn of_declared(problem: Problem<'a>, fit: Fit, result: TraceResult) -> TraceOutcome<'a> {
+        TraceOutcome {
             after: problem.clone(),
             after_fit: fit.clone(),
             before: problem,

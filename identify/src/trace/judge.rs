@@ -6,7 +6,7 @@ use super::columns::Columns;
 use super::remainder::{self, Structure};
 use super::search::Search;
 use super::start::Start;
-use super::{SCATTER, TraceOptions, draws_of, null};
+use super::{SCATTER, TraceOptions, null, null_draw_count};
 use crate::error::IdentifyError;
 use crate::fit::{Fit, fit, prepare_with};
 use crate::noise::NoiseSource;
@@ -30,7 +30,7 @@ impl<'a> RefittedModel<'a> {
         options: &TraceOptions,
         structure_before: Option<&Structure>,
     ) -> Result<RefittedModel<'a>, IdentifyError> {
-        let effects: Vec<Effect> = taken_effects(search).cloned().collect();
+        let effects: Vec<Effect> = selected_effects(search).cloned().collect();
         if effects.is_empty() {
             return Ok(RefittedModel {
                 after: problem.clone(),
@@ -60,7 +60,7 @@ impl<'a> RefittedModel<'a> {
     /// Whether this model has the effects that the search selects now, in the same order. Exchanges keep the number of effects,
     /// so the number alone does not decide.
     pub fn is_of(&self, search: &Search<'_>) -> bool {
-        self.effects.iter().eq(taken_effects(search))
+        self.effects.iter().eq(selected_effects(search))
     }
 
     /// Whether the residual was tested and has significant structure.
@@ -70,9 +70,9 @@ impl<'a> RefittedModel<'a> {
 }
 
 /// The effects that a search has selected, in its order.
-fn taken_effects<'s>(search: &'s Search<'_>) -> impl Iterator<Item = &'s Effect> {
-    let taken = search.taken().iter();
-    taken.map(|taken| &search.candidates[taken.candidate].effect)
+fn selected_effects<'s>(search: &'s Search<'_>) -> impl Iterator<Item = &'s Effect> {
+    let selected = search.selected().iter();
+    selected.map(|selected| &search.candidates[selected.candidate].effect)
 }
 
 /// Whether the search used a noise model from repeats along runs that differs from that of a fit: autocorrelated, or with another
@@ -91,7 +91,7 @@ fn remaining_structure(
 ) -> Result<Structure, IdentifyError> {
     let columns = Columns::new(problem, &fit.beta);
     let start = Start::of(problem, &columns, fit)?;
-    let (count, seed) = (draws_of(options), options.seed.wrapping_add(1));
+    let (count, seed) = (null_draw_count(options), options.seed.wrapping_add(1));
     let draws = null::draws(
         problem,
         &columns,

@@ -45,14 +45,14 @@ use crate::heldout::FoldKind;
 use crate::noise::{NoiseSource, PureError};
 use crate::problem::Problem;
 use crate::results::TraceResult;
-use columns::{Columns, Layout};
+use columns::{Columns, EffectColumns};
 use implausible::Contradicted;
 use interrupt::Interrupt;
 use judge::RefittedModel;
 use library::Candidate;
 use moments::Moments;
-use rounds::{Account, search_on};
-use search::{Search, Stop};
+use rounds::{SearchRecord, search_on};
+use search::{Search, StoppingRule};
 use start::Start;
 
 /// Options of a trace.
@@ -108,7 +108,7 @@ const MAX_OF_POSES: usize = 200;
 
 /// One addition of the search.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Step {
+pub struct SearchStep {
     /// Identifier of the added effect. A later round may have removed or exchanged it.
     pub id: String,
     /// Number of effects after this addition.
@@ -118,7 +118,7 @@ pub struct Step {
 }
 
 /// The outcome of a trace: the models before and after, and the result.
-pub struct Trace<'a> {
+pub struct TraceOutcome<'a> {
     /// The declared model.
     pub before: Problem<'a>,
     /// The fit of the declared model.
@@ -134,7 +134,7 @@ pub struct Trace<'a> {
     /// For each found effect the competing explanations, best first.
     pub competing_effects: Vec<Vec<alias::CompetingEffect>>,
     /// The additions of the search, in order.
-    pub steps: Vec<Step>,
+    pub steps: Vec<SearchStep>,
     /// The result as it is reported.
     pub result: TraceResult,
 }
@@ -150,17 +150,17 @@ pub fn trace<'a>(
     session: &'a Session,
     options: &TraceOptions,
     progress: &(dyn Fn(Progress) -> bool + Sync),
-) -> Result<Trace<'a>, IdentifyError> {
+) -> Result<TraceOutcome<'a>, IdentifyError> {
     progress(Progress::Fitting);
     let (problem, fitted) = prepare(session, options.seed)?;
     let contradicted = Contradicted::of(&problem, &fitted)?;
-    if contradicted.stops() {
-        return Ok(contradicted.stopped(problem, fitted));
+    if contradicted.forbids_search() {
+        return Ok(contradicted.outcome_without_search(problem, fitted));
     }
     if let Some((problem_freed, fit_freed)) = &contradicted.freed {
         let mut found = with_noise_of_repeats(problem_freed.clone(), fit_freed.clone(), options, progress)?;
         if found.result.interrupted || contradicted.contradicted_by(&problem, &fitted, &found.effects)? {
-            contradicted.tell(&mut found.result);
+            contradicted.add_warnings(&mut found.result);
             return Ok(found);
         }
         // The effects found without the set-up priors explain the apparent contradiction. The search therefore runs with these
@@ -168,7 +168,7 @@ pub fn trace<'a>(
         return with_noise_of_repeats(problem, fitted, options, progress);
     }
     let mut found = with_noise_of_repeats(problem, fitted, options, progress)?;
-    contradicted.tell(&mut found.result);
+    contradicted.add_warnings(&mut found.result);
     Ok(found)
 }
 
@@ -178,8 +178,8 @@ fn with_noise_of_repeats<'a>(
     mut before_fit: Fit,
     options: &TraceOptions,
     progress: &(dyn Fn(Progress) -> bool + Sync),
-) -> Result<Trace<'a>, IdentifyError> {
-    if give_noise_autocorrelation(&mut problem, &before_fit.residuals) {
+) -> Result<TraceOutcome<'a>, IdentifyError> {
+    if estimate_noise_model(&mut problem, &before_fit.residuals) {
         before_fit = fit(&problem, Some(&before_fit.beta))?;
     }
     let residuals = before_fit.residuals.clone();
@@ -188,7 +188,7 @@ fn with_noise_of_repeats<'a>(
     let mut problem = first.before.clone();
     if first.result.interrupted
         || first.effects.is_empty()
-        || !give_noise_autocorrelation(&mut problem, &first.after_fit.residuals)
+        || !estimate_noise_model(&mut problem, &first.after_fit.residuals)
     {
         return Ok(first);
     }
@@ -210,9 +210,9 @@ fn trace_with<'a>(
     pure: &[Vec<f64>],
     options: &TraceOptions,
     progress: &(dyn Fn(Progress) -> bool + Sync),
-) -> Result<Trace<'a>, IdentifyError> {
+) -> Result<TraceOutcome<'a>, IdentifyError> {
     match searched(&problem, &before_fit, pure, options, progress) {
-        Err(IdentifyError::Interrupted) => Ok(Trace::unsearched(problem, before_fit)),
+        Err(IdentifyError::Interrupted) => Ok(TraceOutcome::unsearched(problem, before_fit)),
         searched => searched,
     }
 }
@@ -224,7 +224,7 @@ fn searched<'a>(
     pure: &[Vec<f64>],
     options: &TraceOptions,
     progress: &(dyn Fn(Progress) -> bool + Sync),
-) -> Result<Trace<'a>, IdentifyError> {
+) -> Result<TraceOutcome<'a>, IdentifyError> {
     let interrupt = Interrupt(progress);
     interrupt.check()?;
     let poses = problem.folds.kind == FoldKind::Poses;
@@ -232,7 +232,7 @@ fn searched<'a>(
     let start = Start::of(problem, &columns, before_fit)?;
     interrupt.check()?;
     let null = |block: usize| {
-        let (count, seed) = (draws_of(options), options.seed);
+        let (count, seed) = (null_draw_count(options), options.seed);
         null::draws(problem, &columns, pure, &start.residual, count, block, seed)
     };
     let structure_before = || {
@@ -245,30 +245,39 @@ fn searched<'a>(
     let structure_before = structure_before.transpose()?;
     interrupt.check()?;
 
-    let laid = screening::laid(problem, &columns, options)?;
-    let looked_for = laid.len();
-    progress(Progress::Screening(looked_for));
-    let (reserve, laid): (Vec<_>, Vec<_>) =
-        laid.into_iter().partition(|(candidate, _)| candidate.last_resort);
-    let (candidates, layouts): (Vec<Candidate>, Vec<Layout>) = laid.into_iter().unzip();
+    let searched = screening::searched_candidates(problem, &columns, options)?;
+    let candidate_count = searched.len();
+    progress(Progress::Screening(candidate_count));
+    let (reserve, searched): (Vec<_>, Vec<_>) = searched
+        .into_iter()
+        .partition(|(candidate, _)| candidate.last_resort);
+    let (candidates, column_sets): (Vec<Candidate>, Vec<EffectColumns>) = searched.into_iter().unzip();
     let (model, prior) = (start.model.clone(), start.prior());
     let go_on = || interrupt.check().is_ok();
-    let moments = Moments::new(&columns, &layouts, model, &start.residual, draws, &go_on)
+    let moments = Moments::new(&columns, &column_sets, model, &start.residual, draws, &go_on)
         .ok_or(IdentifyError::Interrupted)?;
-    let most = if poses { MAX_OF_POSES } else { MAX_ALONG_RUNS };
-    let stop = Stop {
+    let max_effects = if poses { MAX_OF_POSES } else { MAX_ALONG_RUNS };
+    let stop = StoppingRule {
         significance: options.significance,
-        most: options.max_effects.unwrap_or(most),
+        max_effects: options.max_effects.unwrap_or(max_effects),
         in_residual_variance: poses,
     };
-    let plain = start.plain(&columns, &before_fit.beta, problem.noise.sigma_mm)?;
-    let mut search = Search::new(&columns, candidates, layouts, moments, prior, plain, stop)?;
+    let unwhitened = start.unwhitened(&columns, &before_fit.beta, problem.noise.sigma_mm)?;
+    let mut search = Search::new(
+        &columns,
+        candidates,
+        column_sets,
+        moments,
+        prior,
+        unwhitened,
+        stop,
+    )?;
     search.reserve = reserve;
     search.interrupt = Some(interrupt);
     let gains = search.model_without(None)?.gains();
     let seen = gains.iter().filter(|gain| gain.freedom > 0).count();
 
-    let mut account = Account {
+    let mut record = SearchRecord {
         steps: Vec::new(),
         noise_um: problem.noise.sigma_mm * 1e3,
         progress,
@@ -276,7 +285,7 @@ fn searched<'a>(
     let structure_before = structure_before.as_ref();
     let judge =
         |search: &Search<'_>| RefittedModel::of(problem, before_fit, search, options, structure_before);
-    let found = match found(&mut search, &mut account, judge) {
+    let found = match found(&mut search, &mut record, judge) {
         Err(IdentifyError::Interrupted) => {
             search.roll_back();
             None
@@ -310,9 +319,9 @@ fn searched<'a>(
         structure_before,
         structure_after: structure_after.as_ref(),
         last_p_value: ended.unwrap_or(1.0),
-        stopped_early: ended.is_none() || search.taken().len() >= stop.most,
+        stopped_early: ended.is_none() || search.selected().len() >= stop.max_effects,
         interrupted,
-        candidates: looked_for,
+        candidates: candidate_count,
         candidates_seen: seen,
     })?;
     reported
@@ -321,7 +330,7 @@ fn searched<'a>(
         .extend(screening::unused_exclusions(problem, options)?);
     drop(search);
     drop(columns);
-    Ok(Trace {
+    Ok(TraceOutcome {
         before: problem.clone(),
         before_fit: before_fit.clone(),
         after,
@@ -329,7 +338,7 @@ fn searched<'a>(
         effects,
         alias_effects: reported.alias_effects,
         competing_effects: reported.competing_effects,
-        steps: account.steps,
+        steps: record.steps,
         result: reported.result,
     })
 }
@@ -341,18 +350,18 @@ fn searched<'a>(
 /// [`IdentifyError::Interrupted`] if the caller stopped the trace.
 fn found<'a>(
     search: &mut Search<'_>,
-    account: &mut Account<'_>,
+    record: &mut SearchRecord<'_>,
     judge: impl Fn(&Search<'_>) -> Result<RefittedModel<'a>, IdentifyError>,
 ) -> Result<(f64, RefittedModel<'a>), IdentifyError> {
-    let mut ended = search_on(search, account)?;
-    (account.progress)(Progress::Judging);
+    let mut ended = search_on(search, record)?;
+    (record.progress)(Progress::Judging);
     let mut judged = judge(search)?;
     // For poses the residual always has structure, so the structure test cannot decide.
     let poses = search.stop.in_residual_variance;
-    if (poses || judged.is_structured()) && search.taken().len() < search.stop.most {
+    if (poses || judged.is_structured()) && search.selected().len() < search.stop.max_effects {
         search.add_reserve_candidates();
         search.last_resort = true;
-        ended = search_on(search, account)?;
+        ended = search_on(search, record)?;
         if !judged.is_of(search) {
             judged = judge(search)?;
         }
@@ -368,7 +377,7 @@ fn found<'a>(
 }
 
 /// The number of null draws: the requested number, but at least as many as the significance level needs.
-fn draws_of(options: &TraceOptions) -> usize {
+fn null_draw_count(options: &TraceOptions) -> usize {
     let least = (1.0 / options.significance.max(1e-6)).ceil() as usize;
     options.draws.max(least - 1)
 }
@@ -378,7 +387,7 @@ const SCATTER: f64 = 0.02;
 
 /// Sets the noise standard deviation and autocorrelation from repeats, if there are enough. Returns whether this changed them by
 /// more than their sampling scatter.
-fn give_noise_autocorrelation(problem: &mut Problem<'_>, residuals: &[Vec<f64>]) -> bool {
+fn estimate_noise_model(problem: &mut Problem<'_>, residuals: &[Vec<f64>]) -> bool {
     if problem.folds.kind == FoldKind::Poses {
         return false;
     }
@@ -395,13 +404,13 @@ fn give_noise_autocorrelation(problem: &mut Problem<'_>, residuals: &[Vec<f64>])
         noise.source = NoiseSource::Repeats;
     }
     let present = &problem.noise;
-    let same_memory = noise.memory.len() == present.memory.len()
+    let same_coefficients = noise.memory.len() == present.memory.len()
         && noise
             .memory
             .iter()
             .zip(&present.memory)
             .all(|(a, b)| (a - b).abs() < SCATTER);
-    if same_memory && (noise.sigma_mm / present.sigma_mm - 1.0).abs() < SCATTER {
+    if same_coefficients && (noise.sigma_mm / present.sigma_mm - 1.0).abs() < SCATTER {
         return false;
     }
     problem.noise = noise;

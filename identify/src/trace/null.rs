@@ -24,7 +24,7 @@ pub const BLOCK: usize = 20;
 /// autocorrelation.
 pub const SINGLE: usize = 1;
 /// Largest sum of the AR coefficients of a draw.
-const SLOWEST: f64 = 0.98;
+const MAX_AR_SUM: f64 = 0.98;
 /// Least number of deviations to draw from. With fewer, Gaussian noise is drawn.
 const MIN_POOL: usize = 200;
 /// Readings on either side of the running median that removes structure from a residual without repeats.
@@ -42,12 +42,12 @@ pub fn draws(
 ) -> Mat<f64> {
     let mut generator = Pcg64::seed_from_u64(seed ^ 0x6e75_6c6c);
     if problem.folds.kind == FoldKind::Poses {
-        return turned(columns, whitened, count, &mut generator);
+        return sign_flipped(columns, whitened, count, &mut generator);
     }
     let pool = pool(problem, residuals);
     let mut draws = Mat::zeros(columns.rows(), count);
     for draw in 0..count {
-        let mut values = drawn(&pool, columns.rows(), block, &mut generator);
+        let mut values = block_draws(&pool, columns.rows(), block, &mut generator);
         with_noise_spectrum(&mut values, &problem.noise, &mut generator);
         for (i, value) in columns.placed(&values).into_iter().enumerate() {
             draws[(i, draw)] = value;
@@ -57,7 +57,12 @@ pub fn draws(
 }
 
 /// The residual with a random sign for each pose.
-fn turned(columns: &Columns<'_, '_>, whitened: &[f64], count: usize, generator: &mut Pcg64) -> Mat<f64> {
+fn sign_flipped(
+    columns: &Columns<'_, '_>,
+    whitened: &[f64],
+    count: usize,
+    generator: &mut Pcg64,
+) -> Mat<f64> {
     let origins = columns.origin_of_rows();
     let mut draws = Mat::zeros(columns.rows(), count);
     for draw in 0..count {
@@ -75,7 +80,7 @@ fn sign(generator: &mut Pcg64) -> f64 {
 }
 
 /// Draws `rows` deviations from the pool in blocks with random signs. Draws Gaussian noise if the pool is too small.
-fn drawn(pool: &[Vec<f64>], rows: usize, block: usize, generator: &mut Pcg64) -> Vec<f64> {
+fn block_draws(pool: &[Vec<f64>], rows: usize, block: usize, generator: &mut Pcg64) -> Vec<f64> {
     let total: usize = pool.iter().map(Vec::len).sum();
     if total < MIN_POOL {
         return (0..rows).map(|_| generator.sample(StandardNormal)).collect();
@@ -111,7 +116,7 @@ fn with_noise_spectrum(values: &mut [f64], noise: &Noise, generator: &mut Pcg64)
     let standard: f64 = generator.sample(StandardNormal);
     let sum: f64 = noise.memory.iter().sum();
     let mut own = noise.memory.clone();
-    own[0] += (noise.ar_sum_u * standard).min(SLOWEST - sum);
+    own[0] += (noise.ar_sum_u * standard).min(MAX_AR_SUM - sum);
     let drawn = values.to_vec();
     for t in 0..values.len() {
         let mut value = drawn[t];
@@ -203,7 +208,7 @@ mod tests {
     /// Three coordinates rise at their own rates. Nothing of the rise remains away from the ends. The spike remains up to the
     /// difference of its neighbours.
     #[test]
-    fn what_is_smooth_goes_coordinate_by_coordinate() {
+    fn smooth_structure_is_removed_from_each_coordinate() {
         const ROWS: usize = 60;
         let (spiked, coordinate) = (30, 1);
         let residual: Vec<f64> = (0..3 * ROWS)

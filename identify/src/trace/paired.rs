@@ -139,7 +139,7 @@ mod tests {
 
     /// Over many simulated sets of units, the scatter of the decrease equals its standard error.
     #[test]
-    fn the_fall_scatters_by_its_standard_error() {
+    fn the_decrease_scatters_by_its_standard_error() {
         let mut random = rand_pcg::Pcg64Mcg::seed_from_u64(5);
         let units = Units::of((0..16).map(|unit| (unit / 4, unit)));
         let (mut squares, mut variances) = (0.0, 0.0);

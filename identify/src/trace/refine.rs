@@ -16,15 +16,15 @@ use super::search::Search;
 
 /// Iterations of a line search, each reducing the interval to 0.62: on all readings, and with one fold left out.
 const STEPS: usize = 12;
-const STEPS_TO_PREDICT: usize = 6;
+const STEPS_WITHOUT_A_FOLD: usize = 6;
 /// Share of the best evidence that a candidate needs on the grid to be tuned. A local feature between two grid points loses a
 /// third of its evidence.
-const NEAR: f64 = 0.5;
+const MIN_EVIDENCE_SHARE: f64 = 0.5;
 /// Maximum number of candidates that are tuned at a time: on all readings, and with one fold left out.
-const MAX: usize = 10;
-const MAX_TO_PREDICT: usize = 2;
+const MAX_TUNED: usize = 10;
+const MAX_WITHOUT_A_FOLD: usize = 2;
 /// Evidence by which a step table may fall short of the best and still be reported as an alternative.
-const BEHIND: f64 = 4.0;
+const MAX_EVIDENCE_DEFICIT: f64 = 4.0;
 
 /// Whether a candidate has shape numbers or positions that can be tuned off the library's grid.
 pub(super) fn can_be_tuned(candidate: &Candidate) -> bool {
@@ -40,15 +40,15 @@ pub fn refined(
     composed: &[StepTable],
 ) -> Vec<Candidate> {
     let variance = search.variance(model);
-    let most = if search.identifies_all(&model.folds) {
-        MAX
+    let most = if search.has_all_folds(&model.folds) {
+        MAX_TUNED
     } else {
-        MAX_TO_PREDICT
+        MAX_WITHOUT_A_FOLD
     };
     let mut nearest: HashMap<String, (usize, f64)> = HashMap::new();
     let mut best = 0.0_f64;
     for (candidate, gain) in gains.iter().enumerate() {
-        if gain.freedom == 0 || !search.is_open(candidate, &model.folds) {
+        if gain.freedom == 0 || !search.may_be_added(candidate, &model.folds) {
             continue;
         }
         let evidence = search.evidence(gain, variance);
@@ -57,14 +57,14 @@ pub fn refined(
         if brackets(&search.candidates[candidate]).is_none() {
             continue;
         }
-        let place = nearest.entry(effect.id()).or_insert((candidate, evidence));
-        if evidence > place.1 {
-            *place = (candidate, evidence);
+        let best_of_id = nearest.entry(effect.id()).or_insert((candidate, evidence));
+        if evidence > best_of_id.1 {
+            *best_of_id = (candidate, evidence);
         }
     }
     let mut near: Vec<(usize, f64)> = nearest
         .into_values()
-        .filter(|(_, evidence)| *evidence >= NEAR * best)
+        .filter(|(_, evidence)| *evidence >= MIN_EVIDENCE_SHARE * best)
         .collect();
     near.sort_by(|a, b| b.1.total_cmp(&a.1).then(a.0.cmp(&b.0)));
     near.truncate(most);
@@ -82,7 +82,7 @@ pub fn refined(
     fresh.extend(moved(search, model, composed, best, most));
     fresh.retain(|candidate| {
         let is_same = |present: usize| {
-            search.candidates[present].effect == candidate.effect && search.is_own(present, &model.folds)
+            search.candidates[present].effect == candidate.effect && search.may_be_used(present, &model.folds)
         };
         !(0..search.candidates.len()).any(is_same)
     });
@@ -98,7 +98,10 @@ fn moved(
     most: usize,
 ) -> Vec<Candidate> {
     let variance = search.variance(model);
-    let mut nearest: Vec<&StepTable> = composed.iter().filter(|c| c.evidence >= NEAR * best).collect();
+    let mut nearest: Vec<&StepTable> = composed
+        .iter()
+        .filter(|c| c.evidence >= MIN_EVIDENCE_SHARE * best)
+        .collect();
     nearest.sort_by(|a, b| b.evidence.total_cmp(&a.evidence));
     nearest.truncate(most);
     nearest
@@ -110,7 +113,8 @@ fn moved(
                 freedom: effect.shape.coefficients() + effect.shape.numbers(),
             };
             let evidence = search.evidence(&gain, variance);
-            let near = evidence >= best - BEHIND || evidence - composed.candidate.cost >= NEAR * best;
+            let near = evidence >= best - MAX_EVIDENCE_DEFICIT
+                || evidence - composed.candidate.cost >= MIN_EVIDENCE_SHARE * best;
             near.then(|| Candidate {
                 effect,
                 ..composed.candidate.clone()
@@ -129,23 +133,23 @@ pub(super) fn refine(
     let mut effect = original.effect.clone();
     let brackets = brackets(original)?;
     let mut best = before;
-    let steps = if search.identifies_all(&model.folds) {
+    let steps = if search.has_all_folds(&model.folds) {
         STEPS
     } else {
-        STEPS_TO_PREDICT
+        STEPS_WITHOUT_A_FOLD
     };
     // The numbers of one shape are tuned in turn.
     for _ in 0..brackets.len() {
         for (which, low, high) in &brackets {
             let value_at = |share: f64| low + (high - low) * share;
             let gain_at = |share: f64| {
-                let trial = with_number(&effect, *which, value_at(share));
-                (search.gain_beside(model, &trial).unwrap_or(0.0), trial)
+                let tuned = with_number(&effect, *which, value_at(share));
+                (search.gain_beside(model, &tuned).unwrap_or(0.0), tuned)
             };
-            let (gain, trial) = highest(gain_at, steps);
+            let (gain, tuned) = highest(gain_at, steps);
             if gain > best {
                 best = gain;
-                effect = trial;
+                effect = tuned;
             }
         }
     }
@@ -177,37 +181,40 @@ fn highest<T>(value_at: impl Fn(f64) -> (f64, T), steps: usize) -> (f64, T) {
 /// Moves each step position by fractions of the grid for the largest joint gain. Returns the effect and its gain.
 fn moved_steps(search: &Search<'_>, model: &TrainedModel<'_>, candidate: &Candidate) -> (Effect, f64) {
     let original = &candidate.effect;
-    let (Shape::Steps { at }, Some(mut present)) = (&original.shape, search.trial(model, original)) else {
+    let (Shape::Steps { at }, Some(mut present)) = (&original.shape, search.tuned_effect(model, original))
+    else {
         return (original.clone(), 0.0);
     };
     let mut best = present.gain(model);
-    let mut places = at.clone();
-    let with = |places: &[f64]| Effect {
-        shape: Shape::Steps { at: places.to_vec() },
+    let mut positions = at.clone();
+    let with = |positions: &[f64]| Effect {
+        shape: Shape::Steps {
+            at: positions.to_vec(),
+        },
         ..original.clone()
     };
     let trained: Vec<Range<usize>> = (model.folds.iter())
         .map(|fold| search.columns.fold_rows[*fold].clone())
         .collect();
     for _ in 0..2 {
-        for k in 0..places.len() {
-            let middle = places[k];
+        for k in 0..positions.len() {
+            let middle = positions[k];
             for part in -3..=3 {
-                let place = middle + candidate.grid * f64::from(part) / 4.0;
-                let Some(moved) = search.trial(model, &with(&[place])) else {
+                let position = middle + candidate.grid * f64::from(part) / 4.0;
+                let Some(moved) = search.tuned_effect(model, &with(&[position])) else {
                     continue;
                 };
                 let gain = present.gain_with(k, &moved, &trained, model);
                 if gain > best * (1.0 + 1e-9) {
                     best = gain;
-                    places[k] = place;
+                    positions[k] = position;
                     present.exchange(k, &moved, &trained);
                 }
             }
         }
     }
-    places.sort_by(f64::total_cmp);
-    (with(&places), best)
+    positions.sort_by(f64::total_cmp);
+    (with(&positions), best)
 }
 
 /// The shape numbers that can be tuned, each with the interval between its neighbours on the grid.

@@ -11,7 +11,7 @@ use abbe_model::effect::{Component, Driver, Effect, Shape};
 use abbe_model::session::readings::Readings;
 
 use super::chi_square_tail::ln_chi_square_tail;
-use super::columns::{Columns, Layout};
+use super::columns::{Columns, EffectColumns};
 use super::moments::Moments;
 use super::score::{PriorMoments, TrainedModel};
 use crate::error::IdentifyError;
@@ -41,7 +41,7 @@ impl Structure {
 
 /// One detector.
 struct Detector {
-    layout: Layout,
+    column_set: EffectColumns,
     words: String,
 }
 
@@ -101,16 +101,16 @@ impl TestResidual<'_, '_, '_> {
             tests: vec![self.name.to_string()],
         };
         for coordinate in 0..self.readings.coordinates {
-            let layout = self
-                .columns
-                .reading_layout(&effect, self.number, coordinate, by_direction, rows);
+            let column_set =
+                self.columns
+                    .reading_columns(&effect, self.number, coordinate, by_direction, rows);
             let words = if self.readings.coordinates == 3 {
                 format!("{words} in {}", ["x", "y", "z"][coordinate])
             } else {
                 words.clone()
             };
             self.detectors
-                .extend(layout.map(|layout| Detector { layout, words }));
+                .extend(column_set.map(|column_set| Detector { column_set, words }));
         }
     }
 
@@ -248,10 +248,13 @@ pub fn structure(
             words: "no detector applies to these readings".to_string(),
         });
     }
-    let layouts: Vec<Layout> = detectors.iter().map(|detector| detector.layout.clone()).collect();
+    let column_sets: Vec<EffectColumns> = detectors
+        .iter()
+        .map(|detector| detector.column_set.clone())
+        .collect();
     let rank = model.ncols();
-    let moments =
-        Moments::new(columns, &layouts, model, residual, null, &|| true).ok_or(IdentifyError::Interrupted)?;
+    let moments = Moments::new(columns, &column_sets, model, residual, null, &|| true)
+        .ok_or(IdentifyError::Interrupted)?;
     let folds = (0..columns.fold_rows.len()).collect();
     let trained = TrainedModel::new(&moments, prior, (0..rank).collect(), folds)?;
     let mut best = (0, f64::NEG_INFINITY, 0.0);
@@ -264,7 +267,7 @@ pub fn structure(
             best = (index, score, gain.gain - gain.freedom as f64);
         }
     }
-    let null_best = trained.null_best(&vec![0.0; layouts.len()], 1.0);
+    let null_best = trained.null_best(&vec![0.0; column_sets.len()], 1.0);
     let above = null_best.iter().filter(|score| **score >= best.1).count();
     let p_value = (above + 1) as f64 / (null_best.len() + 1) as f64;
     let size_um =

@@ -9,7 +9,7 @@ use std::ops::Range;
 
 use super::chi_square_tail::{ln_chi_square_tail, most_evidence};
 use super::moments::{FoldMoments, Moments};
-use super::observable::{Visible, pseudo_inverse};
+use super::observable::{ObservableSubspace, pseudo_inverse};
 use crate::error::IdentifyError;
 use faer::{Mat, MatRef};
 use rayon::prelude::*;
@@ -237,18 +237,18 @@ impl<'m> TrainedModel<'m> {
 
     /// The degrees of freedom of a candidate's gain: its observable directions and its tuned shape numbers. Without the latter,
     /// tunable candidates would be preferred.
-    fn freedom(&self, candidate: usize, seen: usize) -> usize {
-        if seen == 0 {
+    fn freedom(&self, candidate: usize, observable: usize) -> usize {
+        if observable == 0 {
             0
         } else {
-            seen + self.moments.numbers[candidate]
+            observable + self.moments.numbers[candidate]
         }
     }
 
     /// The gain of a candidate.
     pub fn gain(&self, candidate: usize) -> Gain {
         let (d, g, own) = self.projected(candidate);
-        let inverse = Visible::of(&d, &own);
+        let inverse = ObservableSubspace::of(&d, &own);
         Gain {
             gain: inverse.quadratic(&g),
             freedom: self.freedom(candidate, inverse.freedom),
@@ -257,11 +257,11 @@ impl<'m> TrainedModel<'m> {
 
     /// The gains of all candidates.
     pub fn gains(&self) -> Vec<Gain> {
-        self.more_gains(Vec::new())
+        self.remaining_gains(Vec::new())
     }
 
     /// The gains of all candidates, where those of the first candidates beside the same model are known.
-    pub fn more_gains(&self, mut known: Vec<Gain>) -> Vec<Gain> {
+    pub fn remaining_gains(&self, mut known: Vec<Gain>) -> Vec<Gain> {
         known.par_extend(
             (known.len()..self.moments.count.len())
                 .into_par_iter()
@@ -285,7 +285,7 @@ impl<'m> TrainedModel<'m> {
                 for &candidate in chunk.iter().filter(|candidate| costs[**candidate].is_finite()) {
                     let beside = self.beside(candidate);
                     let (d, _, own) = self.projected_with(candidate, &beside);
-                    let inverse = Visible::of(&d, &own);
+                    let inverse = ObservableSubspace::of(&d, &own);
                     let freedom = self.freedom(candidate, inverse.freedom);
                     if freedom == 0 {
                         continue;
@@ -341,7 +341,7 @@ impl<'m> TrainedModel<'m> {
         for k in 0..count {
             g[k] -= dot(beside.solved(k), &gram_with);
         }
-        let inverse = Visible::of(&d, &own);
+        let inverse = ObservableSubspace::of(&d, &own);
         let projected = length - self.model_share(&gram_with);
         if projected <= 0.0 {
             0.0
@@ -361,9 +361,9 @@ impl<'m> TrainedModel<'m> {
     }
 
     /// Coefficients of the model's base columns and of a candidate's columns if the candidate is added.
-    pub fn joined(&self, candidate: usize) -> (Vec<f64>, Vec<f64>) {
+    pub fn with_candidate(&self, candidate: usize) -> (Vec<f64>, Vec<f64>) {
         let (d, g, own) = self.projected(candidate);
-        let of_candidate = Visible::of(&d, &own).solve(&g);
+        let of_candidate = ObservableSubspace::of(&d, &own).solve(&g);
         let beside = self.beside(candidate);
         let of_model = (0..self.base.len())
             .map(|i| {

@@ -6,7 +6,7 @@ use faer::Mat;
 use rayon::prelude::*;
 
 use super::TraceOptions;
-use super::columns::{Columns, Layout};
+use super::columns::{Columns, EffectColumns};
 use super::library::{self, Candidate};
 use super::moments::Moments;
 use super::score::TrainedModel;
@@ -17,39 +17,49 @@ use crate::problem::Problem;
 
 /// An effect of the library, screened for a session.
 #[derive(Clone, Debug)]
-pub struct Entry {
+pub struct ScreenedEffect {
     /// Its identifier.
     pub id: String,
     /// Index of its family in the library.
     pub family: usize,
     /// Whether the effect is observable beside the declared parameters.
-    pub seen: bool,
+    pub observable: bool,
 }
 
 /// The library's effects for which the session has driver data, in the order of the library.
 ///
 /// # Errors
 /// If the session cannot be fitted.
-pub fn entries(session: &Session, options: &TraceOptions) -> Result<Vec<Entry>, IdentifyError> {
+pub fn screened_effects(
+    session: &Session,
+    options: &TraceOptions,
+) -> Result<Vec<ScreenedEffect>, IdentifyError> {
     let (problem, fit) = prepare(session, options.seed)?;
     let columns = Columns::new(&problem, &fit.beta);
     let start = Start::of(&problem, &columns, &fit)?;
     let prior = start.prior();
-    let laid = laid(&problem, &columns, options)?;
-    let (candidates, layouts): (Vec<Candidate>, Vec<Layout>) = laid.into_iter().unzip();
+    let searched = searched_candidates(&problem, &columns, options)?;
+    let (candidates, column_sets): (Vec<Candidate>, Vec<EffectColumns>) = searched.into_iter().unzip();
     let none = Mat::zeros(columns.rows(), 0);
-    let moments = Moments::new(&columns, &layouts, start.model, &start.residual, none, &|| true)
-        .ok_or(IdentifyError::Interrupted)?;
+    let moments = Moments::new(
+        &columns,
+        &column_sets,
+        start.model,
+        &start.residual,
+        none,
+        &|| true,
+    )
+    .ok_or(IdentifyError::Interrupted)?;
     let rank = moments.base();
     let folds = (0..columns.fold_rows.len()).collect();
     let trained = TrainedModel::new(&moments, &prior, (0..rank).collect(), folds)?;
     Ok(candidates
         .into_iter()
         .zip(trained.gains())
-        .map(|(candidate, gain)| Entry {
+        .map(|(candidate, gain)| ScreenedEffect {
             id: candidate.effect.id(),
             family: candidate.family,
-            seen: gain.freedom > 0,
+            observable: gain.freedom > 0,
         })
         .collect())
 }
@@ -58,25 +68,25 @@ pub fn entries(session: &Session, options: &TraceOptions) -> Result<Vec<Entry>, 
 ///
 /// # Errors
 /// If a requested string occurs in no identifier: a misspelt string would otherwise look like an absent effect.
-pub(super) fn laid(
+pub(super) fn searched_candidates(
     problem: &Problem<'_>,
     columns: &Columns<'_, '_>,
     options: &TraceOptions,
-) -> Result<Vec<(Candidate, Layout)>, IdentifyError> {
+) -> Result<Vec<(Candidate, EffectColumns)>, IdentifyError> {
     let mut candidates = library::candidates(problem)?;
     if let Some(text) = matching_no_candidate(&candidates, &options.only).next() {
         return Err(IdentifyError::NotInTheLibrary { text: text.clone() });
     }
     let all = candidates.len();
-    candidates.retain(|candidate| wanted(options, &candidate.effect.id()));
+    candidates.retain(|candidate| is_requested(options, &candidate.effect.id()));
     if candidates.is_empty() && all > 0 {
         return Err(IdentifyError::EverythingLeftOut);
     }
     Ok(candidates
         .into_par_iter()
         .filter_map(|candidate| {
-            let layout = columns.layout(&candidate.effect)?;
-            Some((candidate, layout))
+            let column_set = columns.effect_columns(&candidate.effect)?;
+            Some((candidate, column_set))
         })
         .collect())
 }
@@ -105,7 +115,7 @@ fn matching_no_candidate<'t>(
         .filter(move |text| !ids.iter().any(|id| id.contains(text.as_str())))
 }
 
-fn wanted(options: &TraceOptions, id: &str) -> bool {
+fn is_requested(options: &TraceOptions, id: &str) -> bool {
     let matches = |patterns: &[String]| patterns.iter().any(|pattern| id.contains(pattern.as_str()));
     (options.only.is_empty() || matches(&options.only)) && !matches(&options.exclude)
 }

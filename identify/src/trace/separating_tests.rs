@@ -4,11 +4,11 @@ use abbe_model::effect::Effect;
 
 use super::interrupt::Interrupt;
 use super::result::effect_name;
-use super::{Progress, Trace};
+use super::{Progress, TraceOutcome};
 use crate::error::IdentifyError;
 use crate::parameters::Role;
-use crate::plan::candidate_tests::CandidateTests;
-use crate::plan::separate::{Alternative, SeparatingTest, separating_tests};
+use crate::plan::candidate_tests::TestVariations;
+use crate::plan::separate::{AlternativeSeparation, SeparatingTest, separating_tests};
 use crate::results::{AlternativeResult, EffectResult, SeparatingTestResult, SeparationResult};
 
 /// Maximum number of aliases that are compared with an effect, the nearest first. Each alias adds columns.
@@ -21,8 +21,8 @@ const MAX_COMPARED_TESTS: usize = 24;
 /// # Errors
 /// If the basis columns of an effect cannot be computed for the session.
 pub fn separate_aliases(
-    trace: &mut Trace<'_>,
-    menu: &CandidateTests,
+    trace: &mut TraceOutcome<'_>,
+    variations: &TestVariations,
     progress: &(dyn Fn(Progress) -> bool + Sync),
 ) -> Result<(), IdentifyError> {
     if trace.result.interrupted {
@@ -30,7 +30,7 @@ pub fn separate_aliases(
     }
     let interrupt = Interrupt(progress);
     for k in 0..trace.effects.len() {
-        match interrupt.check().and_then(|()| tests_for(trace, k, menu)) {
+        match interrupt.check().and_then(|()| tests_for(trace, k, variations)) {
             Ok(tests) => fill_in(
                 &mut trace.result.effects[k],
                 &trace.alias_effects[k],
@@ -50,9 +50,9 @@ pub fn separate_aliases(
 
 /// The tests that separate the `k`-th found effect from its aliases.
 fn tests_for(
-    trace: &Trace<'_>,
+    trace: &TraceOutcome<'_>,
     k: usize,
-    menu: &CandidateTests,
+    variations: &TestVariations,
 ) -> Result<Vec<SeparatingTest>, IdentifyError> {
     let number = trace.before.parameters.effects.len() + k;
     let is_own = |role: &Role| matches!(role, Role::Coefficient { effect, .. } if *effect == number);
@@ -70,7 +70,7 @@ fn tests_for(
         &trace.effects[k],
         &coefficients,
         weighed,
-        menu,
+        variations,
     )
 }
 
@@ -81,7 +81,7 @@ fn fill_in(
     session: &abbe_model::session::Session,
     tests: Vec<SeparatingTest>,
 ) {
-    let name = |one: &Alternative| effect_name(&session.machine, &aliases[one.number]);
+    let name = |one: &AlternativeSeparation| effect_name(&session.machine, &aliases[one.number]);
     if let Some(first) = tests.first() {
         effect.separated_by = Some(first.test.clone());
         let nearest = first.alternatives.iter().find(|one| one.is_separated());
@@ -92,7 +92,7 @@ fn fill_in(
             minutes: first.minutes,
         });
     }
-    let alternative = |one: &Alternative| AlternativeResult {
+    let alternative = |one: &AlternativeSeparation| AlternativeResult {
         name: name(one),
         before_sigma: one.before,
         after_sigma: one.after,

@@ -3,7 +3,7 @@
 //! The chain is evaluated once for the sensitivities of every component. Hundreds of candidates need no further kinematics.
 
 mod basis;
-mod plain;
+mod unwhitened;
 
 use std::collections::{BTreeSet, HashMap};
 use std::ops::Range;
@@ -16,8 +16,8 @@ use rayon::prelude::*;
 
 use crate::error::IdentifyError;
 use crate::problem::{Block, Problem};
-use basis::Moves;
-pub use basis::{Layout, chunked};
+use basis::TermTarget;
+pub use basis::{EffectColumns, chunked};
 
 /// Number of readings per evaluation of sensitivities.
 const ROWS_AT_ONCE: usize = 512;
@@ -104,26 +104,26 @@ impl<'p, 'a> Columns<'p, 'a> {
     }
 
     /// The unwhitened columns of effects in one block, mm.
-    fn block_rows(&self, layouts: &[&Layout], block: &Block) -> Mat<f64> {
+    fn block_rows(&self, column_sets: &[&EffectColumns], block: &Block) -> Mat<f64> {
         let coordinates = self.problem.coordinates();
-        let total: usize = layouts.iter().map(|layout| layout.count).sum();
+        let total: usize = column_sets.iter().map(|column_set| column_set.count).sum();
         let scalars = block.rows.len() * coordinates;
         let first = block.rows.start;
         let mut raw = Mat::<f64>::zeros(scalars, total);
         let sensitivities = &self.sensitivities[block.test];
         let mut column = 0;
-        for layout in layouts {
-            for part in &layout.parts[block.test] {
-                let derivative = match part.moves {
-                    Moves::Slot(slot) => {
+        for column_set in column_sets {
+            for term in &column_set.terms[block.test] {
+                let derivative = match term.target {
+                    TermTarget::Slot(slot) => {
                         let whole = &sensitivities.derivatives[self.place[block.test][&slot]];
                         Some(&whole[first * coordinates..first * coordinates + scalars])
                     }
-                    Moves::Reading(_) => None,
+                    TermTarget::Reading(_) => None,
                 };
-                let factor = part.factor.as_ref().map(|factor| &factor[block.rows.clone()]);
-                for k in 0..layout.count {
-                    let basis = &part.basis[k][block.rows.clone()];
+                let factor = term.factor.as_ref().map(|factor| &factor[block.rows.clone()]);
+                for k in 0..column_set.count {
+                    let basis = &term.basis[k][block.rows.clone()];
                     let entries = raw.col_as_slice_mut(column + k);
                     // One coordinate per reading without a factor is the common case. The compiler vectorises it.
                     if let (1, Some(derivative), None) = (coordinates, derivative, factor) {
@@ -137,8 +137,8 @@ impl<'p, 'a> Columns<'p, 'a> {
                     for (row, basis) in basis.iter().enumerate() {
                         let value = factor.map_or(*basis, |factor| basis * factor[row]);
                         let scalars = row * coordinates..(row + 1) * coordinates;
-                        match (derivative, part.moves) {
-                            (None, Moves::Reading(moved)) => entries[scalars.start + moved] += value,
+                        match (derivative, term.target) {
+                            (None, TermTarget::Reading(moved)) => entries[scalars.start + moved] += value,
                             (derivative, _) => {
                                 let derivative = derivative.map_or(&[][..], |whole| &whole[scalars.clone()]);
                                 let terms = entries[scalars].iter_mut().zip(derivative);
@@ -148,14 +148,14 @@ impl<'p, 'a> Columns<'p, 'a> {
                     }
                 }
             }
-            column += layout.count;
+            column += column_set.count;
         }
         raw
     }
 
     /// For each fold the rows in which any of the effects acts. Empty if none acts in the fold.
-    pub fn moved_rows(&self, layouts: &[Layout]) -> Vec<Range<usize>> {
-        let moved = |test: &usize| layouts.iter().any(|layout| layout.acts_in(*test));
+    pub fn moved_rows(&self, column_sets: &[EffectColumns]) -> Vec<Range<usize>> {
+        let moved = |test: &usize| column_sets.iter().any(|column_set| column_set.acts_in(*test));
         let folds = self.fold_rows.iter().zip(&self.fold_tests);
         folds
             .map(|(rows, tests)| {
@@ -171,10 +171,10 @@ impl<'p, 'a> Columns<'p, 'a> {
     /// The stretches of rows of some folds in which any of the effects acts.
     pub fn moved_stretches(
         &self,
-        layouts: &[Layout],
+        column_sets: &[EffectColumns],
         folds: impl IntoIterator<Item = usize>,
     ) -> Vec<Range<usize>> {
-        let moved = self.moved_rows(layouts);
+        let moved = self.moved_rows(column_sets);
         let mut stretches: Vec<Range<usize>> = Vec::new();
         for rows in folds
             .into_iter()
@@ -190,16 +190,20 @@ impl<'p, 'a> Columns<'p, 'a> {
     }
 
     /// Fills zero columns with the whitened columns of effects, one after another.
-    pub fn fill(&self, layouts: &[&Layout], mut columns: MatMut<'_, f64>) {
-        let total: usize = layouts.iter().map(|layout| layout.count).sum();
+    pub fn fill(&self, column_sets: &[&EffectColumns], mut columns: MatMut<'_, f64>) {
+        let total: usize = column_sets.iter().map(|column_set| column_set.count).sum();
         let mut start = 0;
         for (block, kept) in self.blocks.iter().zip(&self.kept) {
             let target = &self.target[start..start + kept.len()];
             start += kept.len();
-            if target.is_empty() || !layouts.iter().any(|layout| layout.acts_in(block.test)) {
+            if target.is_empty()
+                || !column_sets
+                    .iter()
+                    .any(|column_set| column_set.acts_in(block.test))
+            {
                 continue;
             }
-            let white = self.problem.whitened(self.block_rows(layouts, block), kept);
+            let white = self.problem.whitened(self.block_rows(column_sets, block), kept);
             let together = target.windows(2).all(|pair| pair[1] == pair[0] + 1);
             for (mut column, white) in columns.as_mut().col_iter_mut().zip(white.col_iter()).take(total) {
                 if together {
@@ -306,7 +310,7 @@ mod tests {
 
     /// No file holds a test without readings, but a calling program may supply one.
     #[test]
-    fn sensitivities_stand_beside_their_tests_where_one_has_no_readings() {
+    fn sensitivities_match_their_tests_if_one_has_no_readings() {
         let file =
             Path::new(env!("CARGO_MANIFEST_DIR")).join("../sessions/hermle-c600u/measured/session.toml");
         let mut session = read::session(&file, &ReadOptions::default()).unwrap();

@@ -99,7 +99,7 @@ pub struct Candidate {
     /// Cost in the score in addition to its degrees of freedom, in natural-logarithm units.
     pub cost: f64,
     /// Selection penalty: the reduction of the evidence for the selection of several positions. 0 for an effect of the library.
-    pub price: f64,
+    pub selection_penalty: f64,
     /// Whether it is searched only if no simpler candidate is significant and structure remains.
     pub last_resort: bool,
     /// Whether it is a dictionary of positions for `compose` and not an effect itself.
@@ -115,7 +115,7 @@ impl Candidate {
             effect,
             family: usize::MAX,
             cost: 0.0,
-            price: 0.0,
+            selection_penalty: 0.0,
             last_resort: false,
             dictionary: true,
             grid: 0.0,
@@ -123,8 +123,8 @@ impl Candidate {
     }
 
     /// Description length. The simplest candidate has the shortest description.
-    pub fn length(&self) -> f64 {
-        self.cost + self.price
+    pub fn description_length(&self) -> f64 {
+        self.cost + self.selection_penalty
     }
 }
 
@@ -165,7 +165,7 @@ pub fn candidates(problem: &Problem<'_>) -> Result<Vec<Candidate>, IdentifyError
                         effect,
                         family: number,
                         cost,
-                        price: 0.0,
+                        selection_penalty: 0.0,
                         last_resort,
                         dictionary,
                         grid,

@@ -47,8 +47,12 @@ pub(super) fn shapes(
         step: axis.map_or(0.0, |axis| sampling.step[axis]),
         poses: sampling.is_poses(),
     };
-    let only_if = |seen: bool, shape: Shape| {
-        if seen { vec![plain(shape)] } else { Vec::new() }
+    let only_if = |observable: bool, shape: Shape| {
+        if observable {
+            vec![plain(shape)]
+        } else {
+            Vec::new()
+        }
     };
     match family.shape {
         ShapeChoice::Constant => vec![plain(Shape::Constant)],
@@ -62,8 +66,8 @@ pub(super) fn shapes(
         ShapeChoice::Power => powers(&family.degrees, driver.default_scale(&problem.session.machine)),
         ShapeChoice::Periodic => over.periods(),
         ShapeChoice::Backlash => {
-            let seen = axis.is_some_and(|axis| sampling.both_directions[axis]);
-            only_if(seen && !over.poses, Shape::Backlash)
+            let observable = axis.is_some_and(|axis| sampling.both_directions[axis]);
+            only_if(observable && !over.poses, Shape::Backlash)
         }
         ShapeChoice::Lag => only_if(sampling.has_time && !over.poses, Shape::Lag),
         ShapeChoice::ReversalSpike => over.spikes(),
@@ -146,10 +150,10 @@ impl FamilyScope<'_> {
 
     fn spikes(&self) -> Vec<Member> {
         // A run that starts where the previous run ended starts with a reversal.
-        let seen = self.axis.is_some_and(|axis| {
+        let observable = self.axis.is_some_and(|axis| {
             self.sampling.reverses_inside_runs[axis] || self.sampling.both_directions[axis]
         });
-        if !seen || self.poses {
+        if !observable || self.poses {
             return Vec::new();
         }
         let spike = |share: f64| Shape::ReversalSpike {
@@ -166,11 +170,11 @@ impl FamilyScope<'_> {
             return Vec::new();
         };
         let low = self.sampling.low[axis];
-        let place = |k: usize| low + self.span * k as f64 / STEP_POSITIONS as f64;
-        let places: Vec<f64> = (1..STEP_POSITIONS).map(place).collect();
-        let singles = places.iter().map(|place| vec![*place]);
+        let position = |k: usize| low + self.span * k as f64 / STEP_POSITIONS as f64;
+        let positions: Vec<f64> = (1..STEP_POSITIONS).map(position).collect();
+        let singles = positions.iter().map(|position| vec![*position]);
         singles
-            .chain([places.clone()])
+            .chain([positions.clone()])
             .map(|at| plain(Shape::Steps { at }))
             .collect()
     }

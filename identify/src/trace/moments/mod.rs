@@ -16,8 +16,8 @@ use std::ops::Range;
 use faer::linalg::matmul::matmul;
 use faer::{Accum, Mat, MatRef, Par};
 
-use super::columns::{Columns, Layout};
-use products::{Block, laid, with_side};
+use super::columns::{Columns, EffectColumns};
+use products::{CandidateChunk, multiply, with_side};
 
 /// Products over one fold.
 #[derive(Clone, Debug)]
@@ -98,7 +98,7 @@ pub struct Moments {
     pub count: Vec<usize>,
     /// Number of tuned shape numbers of each candidate.
     pub numbers: Vec<usize>,
-    blocks: Vec<Block>,
+    chunks: Vec<CandidateChunk>,
     /// Base columns, rows × base. They are kept because the base grows.
     base_columns: Mat<f64>,
     residual: Vec<f64>,
@@ -135,23 +135,23 @@ impl Moments {
     /// `go_on` returns `false`.
     pub fn new(
         columns: &Columns<'_, '_>,
-        layouts: &[Layout],
+        column_sets: &[EffectColumns],
         model: Mat<f64>,
         residual: &[f64],
         null: Mat<f64>,
         go_on: &(dyn Fn() -> bool + Sync),
     ) -> Option<Moments> {
-        let mut first = Vec::with_capacity(layouts.len());
+        let mut first = Vec::with_capacity(column_sets.len());
         let mut total = 0;
-        for layout in layouts {
+        for column_set in column_sets {
             first.push(total);
-            total += layout.count;
+            total += column_set.count;
         }
-        let count: Vec<usize> = layouts.iter().map(|layout| layout.count).collect();
+        let count: Vec<usize> = column_sets.iter().map(|column_set| column_set.count).collect();
         let rank = model.ncols();
         let side = beside(&model, residual);
-        let all = 0..layouts.len();
-        let (blocks, products) = laid(columns, layouts, all, &[], (&side, &null), go_on)?;
+        let all = 0..column_sets.len();
+        let (chunks, products) = multiply(columns, column_sets, all, &[], (&side, &null), go_on)?;
         let folds = (columns.fold_rows.iter().zip(products.side).zip(products.own))
             .map(|((range, product), own)| {
                 let part = side.as_ref().subrows(range.start, range.len());
@@ -175,8 +175,8 @@ impl Moments {
             null_base,
             first,
             count,
-            numbers: layouts.iter().map(|layout| layout.numbers).collect(),
-            blocks,
+            numbers: column_sets.iter().map(|column_set| column_set.numbers).collect(),
+            chunks,
             base_columns: model,
             residual: residual.to_vec(),
             null,
@@ -189,27 +189,30 @@ impl Moments {
     }
 
     /// Adds the columns of candidates to the base, each at unit length. Returns their ranges in the base.
-    pub fn materialise(
+    pub fn add_to_base(
         &mut self,
         columns: &Columns<'_, '_>,
-        layouts: &[Layout],
+        column_sets: &[EffectColumns],
         candidates: &[usize],
     ) -> Vec<Range<usize>> {
-        let chosen: Vec<&Layout> = candidates.iter().map(|candidate| &layouts[*candidate]).collect();
-        let added: usize = chosen.iter().map(|layout| layout.count).sum();
+        let chosen: Vec<&EffectColumns> = candidates
+            .iter()
+            .map(|candidate| &column_sets[*candidate])
+            .collect();
+        let added: usize = chosen.iter().map(|column_set| column_set.count).sum();
         let (rows, old) = (columns.rows(), self.base());
         let mut places = Vec::new();
         let mut next = old;
-        for layout in &chosen {
-            places.push(next..next + layout.count);
-            next += layout.count;
+        for column_set in &chosen {
+            places.push(next..next + column_set.count);
+            next += column_set.count;
         }
         if added == 0 {
             return places;
         }
         let fresh = unit_columns(columns, &chosen);
         grow(&mut self.base_columns, rows, next, |i, j| fresh[(i, j - old)]);
-        let products = with_side(&self.blocks, columns, layouts, fresh.as_ref());
+        let products = with_side(&self.chunks, columns, column_sets, fresh.as_ref());
         let null_fresh = transposed_product(fresh.as_ref(), self.null.as_ref());
         let draws = self.null.ncols();
         grow(&mut self.null_base, next, draws, |i, d| null_fresh[(i - old, d)]);
@@ -226,17 +229,17 @@ impl Moments {
         places
     }
 
-    /// Computes the products of those effects in `layouts` that are not yet candidates.
-    pub fn append(&mut self, columns: &Columns<'_, '_>, layouts: &[Layout]) {
+    /// Computes the products of those effects in `column_sets` that are not yet candidates.
+    pub fn append(&mut self, columns: &Columns<'_, '_>, column_sets: &[EffectColumns]) {
         let rank = self.base();
         let side = beside(&self.base_columns, &self.residual);
-        let candidates = self.count.len()..layouts.len();
+        let candidates = self.count.len()..column_sets.len();
         let beside = (&side, &self.null);
-        let Some((fresh, products)) = laid(
+        let Some((fresh, products)) = multiply(
             columns,
-            layouts,
+            column_sets,
             candidates.clone(),
-            &self.blocks,
+            &self.chunks,
             beside,
             &|| true,
         ) else {
@@ -245,13 +248,13 @@ impl Moments {
         let draws = self.null.ncols();
         let total = self.null_cross.ncols();
         let mut added = 0;
-        for layout in &layouts[candidates] {
+        for column_set in &column_sets[candidates] {
             self.first.push(total + added);
-            self.count.push(layout.count);
-            self.numbers.push(layout.numbers);
-            added += layout.count;
+            self.count.push(column_set.count);
+            self.numbers.push(column_set.numbers);
+            added += column_set.count;
         }
-        self.blocks.extend(fresh);
+        self.chunks.extend(fresh);
         let of_null = products.null;
         for ((moments, product), own) in self.folds.iter_mut().zip(products.side).zip(products.own) {
             grow(&mut moments.cross, rank, total + added, |i, j| {
@@ -300,10 +303,10 @@ impl Moments {
 }
 
 /// The columns of effects, each at unit length.
-fn unit_columns(columns: &Columns<'_, '_>, layouts: &[&Layout]) -> Mat<f64> {
-    let width = layouts.iter().map(|layout| layout.count).sum();
+fn unit_columns(columns: &Columns<'_, '_>, column_sets: &[&EffectColumns]) -> Mat<f64> {
+    let width = column_sets.iter().map(|column_set| column_set.count).sum();
     let mut fresh = Mat::zeros(columns.rows(), width);
-    columns.fill(layouts, fresh.as_mut());
+    columns.fill(column_sets, fresh.as_mut());
     for j in 0..width {
         let norm = fresh.col(j).norm_l2();
         if norm > 0.0 {

@@ -11,7 +11,7 @@ use crate::trace::paired::{HeldOutDecrease, Units};
 use crate::trace::score::TrainedModel;
 
 /// The unwhitened base and residual, divided by the noise standard deviation. Held-out errors refer to these.
-pub struct Plain {
+pub struct UnwhitenedModel {
     /// The base: rows × columns. It grows as candidates are added.
     pub base: Mat<f64>,
     /// The residual.
@@ -24,7 +24,7 @@ pub struct Plain {
     pub sigma_mm: f64,
 }
 
-impl Plain {
+impl UnwhitenedModel {
     /// Adds base columns in mm. `norms` are the lengths by which the base divides them.
     pub(super) fn extend(&mut self, rows: &Mat<f64>, norms: &[f64]) {
         let old = self.base.ncols();
@@ -44,7 +44,7 @@ impl Plain {
 #[derive(Clone, Debug, Default)]
 pub struct HeldOutState {
     /// The branches of the search.
-    tracks: Vec<SearchBranch>,
+    branches: Vec<SearchBranch>,
     /// [`Search::held_out`].
     held_out: Vec<f64>,
     /// Sums of squares of held-out residuals over the variance of the noise, by unit.
@@ -53,7 +53,7 @@ pub struct HeldOutState {
 
 impl HeldOutState {
     fn effects(&self) -> &[SelectedEffect] {
-        self.tracks.first().map_or(&[], |all| &all.taken)
+        self.branches.first().map_or(&[], |all| &all.selected)
     }
 }
 
@@ -61,27 +61,29 @@ impl HeldOutState {
 #[derive(Clone, Copy, Debug)]
 pub struct RejectedByHeldOut {
     /// The effect.
-    pub taken: SelectedEffect,
+    pub selected: SelectedEffect,
     /// The decrease of the held-out error that it causes.
-    pub fall: HeldOutDecrease,
+    pub decrease: HeldOutDecrease,
 }
 
 impl Search<'_> {
     /// Sums of squares of held-out residuals over the noise variance, by unit. The model of the search that excludes a fold
     /// predicts it.
     fn held_out_by_unit(&self) -> Result<Vec<f64>, IdentifyError> {
-        let models: Vec<TrainedModel<'_>> = self.tracks[ALL + 1..]
+        let models: Vec<TrainedModel<'_>> = self.branches[ALL + 1..]
             .par_iter()
-            .map(|track| self.lean_model_of(&track.chosen(), &track.folds))
+            .map(|branch| self.projection_of(&branch.chosen(), &branch.folds))
             .collect::<Result<_, _>>()?;
         let predicted = |model: &TrainedModel<'_>, row: usize| -> f64 {
             let along = model.base.iter().zip(&model.coefficients);
-            along.map(|(column, c)| self.plain.base[(row, *column)] * c).sum()
+            along
+                .map(|(column, c)| self.unwhitened.base[(row, *column)] * c)
+                .sum()
         };
-        let squares = self.plain.folds.iter().enumerate();
-        let squares =
-            squares.map(|(row, fold)| (self.plain.residual[row] - predicted(&models[*fold], row)).powi(2));
-        Ok(self.plain.units.sums(squares))
+        let squares = self.unwhitened.folds.iter().enumerate();
+        let squares = squares
+            .map(|(row, fold)| (self.unwhitened.residual[row] - predicted(&models[*fold], row)).powi(2));
+        Ok(self.unwhitened.units.sums(squares))
     }
 
     /// Sum of squares of held-out residuals over the noise variance.
@@ -93,16 +95,16 @@ impl Search<'_> {
     pub(in crate::trace) fn note_held_out(&mut self) -> Result<(), IdentifyError> {
         self.units_now = self.held_out_by_unit()?;
         let held_out = self.units_now.iter().sum();
-        let taken = self.taken().len();
-        self.held_out.truncate(taken);
-        self.held_out.resize(taken + 1, held_out);
+        let selected = self.selected().len();
+        self.held_out.truncate(selected);
+        self.held_out.resize(selected + 1, held_out);
         Ok(())
     }
 
     /// The present state of the searches.
-    pub(super) fn standing(&self) -> HeldOutState {
+    pub(super) fn state(&self) -> HeldOutState {
         HeldOutState {
-            tracks: self.tracks.clone(),
+            branches: self.branches.clone(),
             held_out: self.held_out.clone(),
             units: self.units_now.clone(),
         }
@@ -112,54 +114,58 @@ impl Search<'_> {
     /// more than the standard error. With as many or fewer, it must not increase by more than the standard error. Returns whether
     /// all selected effects are claimed.
     pub(in crate::trace) fn claim(&mut self) -> bool {
-        let fall = self.fall_since_claimed();
-        let added = self.taken().len() > self.claimed.effects().len();
+        let decrease = self.decrease_since_claimed();
+        let added = self.selected().len() > self.claimed.effects().len();
         let claimed = if added {
-            fall.is_significant()
+            decrease.is_significant()
         } else {
-            !fall.is_increase() && self.lowers_heldout_error()
+            !decrease.is_increase() && self.lowers_heldout_error()
         };
         if claimed {
-            self.claimed = self.standing();
-            let claimed: Vec<usize> = self.tracks[ALL].chosen();
+            self.claimed = self.state();
+            let claimed: Vec<usize> = self.branches[ALL].chosen();
             self.unclaimed
-                .retain(|unclaimed| !claimed.contains(&unclaimed.taken.candidate));
+                .retain(|unclaimed| !claimed.contains(&unclaimed.selected.candidate));
         }
         claimed
     }
 
     /// The decrease of the held-out error since the last claim.
-    pub(in crate::trace) fn fall_since_claimed(&self) -> HeldOutDecrease {
-        self.plain.units.decrease(&self.claimed.units, &self.units_now)
+    pub(in crate::trace) fn decrease_since_claimed(&self) -> HeldOutDecrease {
+        self.unwhitened
+            .units
+            .decrease(&self.claimed.units, &self.units_now)
     }
 
     /// The decrease of the held-out error since the declared model.
-    pub(in crate::trace) fn fall_since_declared(&self) -> HeldOutDecrease {
-        self.plain.units.decrease(&self.declared_units, &self.units_now)
+    pub(in crate::trace) fn decrease_since_declared(&self) -> HeldOutDecrease {
+        self.unwhitened
+            .units
+            .decrease(&self.declared_units, &self.units_now)
     }
 
     /// Whether nothing is selected, or the held-out error is below that of the declared model by more than the standard error of
     /// the decrease.
     fn lowers_heldout_error(&self) -> bool {
-        self.taken().is_empty() || self.fall_since_declared().is_significant()
+        self.selected().is_empty() || self.decrease_since_declared().is_significant()
     }
 
     /// Withdraws the effects added since the last claim, and records them as rejected.
     pub(in crate::trace) fn withdraw_unclaimed(&mut self) {
-        let fall = self.fall_since_claimed();
+        let decrease = self.decrease_since_claimed();
         let claimed: Vec<usize> = self
             .claimed
             .effects()
             .iter()
-            .map(|taken| taken.candidate)
+            .map(|selected| selected.candidate)
             .collect();
-        for taken in self.tracks[ALL].taken.clone() {
+        for selected in self.branches[ALL].selected.clone() {
             let known = self
                 .unclaimed
                 .iter()
-                .any(|u| u.taken.candidate == taken.candidate);
-            if !claimed.contains(&taken.candidate) && !known {
-                self.unclaimed.push(RejectedByHeldOut { taken, fall });
+                .any(|u| u.selected.candidate == selected.candidate);
+            if !claimed.contains(&selected.candidate) && !known {
+                self.unclaimed.push(RejectedByHeldOut { selected, decrease });
             }
         }
         self.restore();
@@ -173,11 +179,11 @@ impl Search<'_> {
 
     fn restore(&mut self) {
         let HeldOutState {
-            tracks,
+            branches,
             held_out,
             units,
         } = self.claimed.clone();
-        self.tracks = tracks;
+        self.branches = branches;
         self.held_out = held_out;
         self.units_now = units;
     }
@@ -187,16 +193,16 @@ impl Search<'_> {
     pub(in crate::trace) fn withdraw_all_unless_better(&mut self) -> Result<(), IdentifyError> {
         if !self.lowers_heldout_error() {
             self.claimed = HeldOutState::default();
-            self.claimed.tracks = self.tracks.clone();
+            self.claimed.branches = self.branches.clone();
             self.claimed
-                .tracks
+                .branches
                 .iter_mut()
-                .for_each(|track| track.taken.clear());
+                .for_each(|branch| branch.selected.clear());
             self.claimed.held_out = self.held_out[..1].to_vec();
             self.claimed.units = self.declared_units.clone();
             self.withdraw_unclaimed();
         }
-        self.claimed = self.standing();
+        self.claimed = self.state();
         Ok(())
     }
 }

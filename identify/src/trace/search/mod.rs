@@ -13,7 +13,7 @@ mod pool;
 use std::ops::Range;
 
 use super::alias::INDISTINGUISHABLE;
-use super::columns::{Columns, Layout};
+use super::columns::{Columns, EffectColumns};
 use super::compose::StepTable;
 use super::interrupt::Interrupt;
 use super::library::Candidate;
@@ -21,15 +21,15 @@ use super::moments::Moments;
 use super::score::{Gain, PriorMoments, TrainedModel};
 use crate::error::IdentifyError;
 use heldout::HeldOutState;
-pub use heldout::{Plain, RejectedByHeldOut};
+pub use heldout::{RejectedByHeldOut, UnwhitenedModel};
 
 /// The stopping rule of the search.
 #[derive(Clone, Copy, Debug)]
-pub struct Stop {
+pub struct StoppingRule {
     /// Probability that the search claims an effect on readings without structure.
     pub significance: f64,
     /// Maximum number of effects.
-    pub most: usize,
+    pub max_effects: usize,
     /// Whether gains are divided by the residual variance instead of the noise variance. This applies to poses, whose residual
     /// always has structure.
     pub in_residual_variance: bool,
@@ -50,13 +50,13 @@ pub struct SearchBranch {
     /// The training folds, ascending.
     pub folds: Vec<usize>,
     /// The selected effects.
-    pub taken: Vec<SelectedEffect>,
+    pub selected: Vec<SelectedEffect>,
 }
 
 impl SearchBranch {
     /// Indices of the selected candidates.
     pub fn chosen(&self) -> Vec<usize> {
-        self.taken.iter().map(|taken| taken.candidate).collect()
+        self.selected.iter().map(|selected| selected.candidate).collect()
     }
 }
 
@@ -70,7 +70,7 @@ pub struct Search<'s> {
     /// The candidates.
     pub candidates: Vec<Candidate>,
     /// The basis columns of the candidates.
-    layouts: Vec<Layout>,
+    column_sets: Vec<EffectColumns>,
     /// All products.
     pub moments: Moments,
     /// The priors.
@@ -78,11 +78,11 @@ pub struct Search<'s> {
     /// Number of base columns that the fitted model has.
     pub rank: usize,
     /// The branch on all readings, then one for each fold.
-    pub tracks: Vec<SearchBranch>,
+    pub branches: Vec<SearchBranch>,
     /// For each candidate the folds on which its shape numbers and positions were tuned. Empty for an effect of the library.
     tuned_on: Vec<Vec<usize>>,
     /// For each candidate that was ever added, the range of its columns in the base.
-    materialised: Vec<(usize, Range<usize>)>,
+    added_to_base: Vec<(usize, Range<usize>)>,
     /// Sum of squares of held-out residuals over the noise variance, for each number of effects.
     pub held_out: Vec<f64>,
     /// For each round, the best score that readings without structure exceed with the probability of the significance level.
@@ -90,9 +90,9 @@ pub struct Search<'s> {
     /// Whether candidates of last resort are searched.
     pub last_resort: bool,
     /// Candidates of last resort whose products are not computed yet.
-    pub reserve: Vec<(Candidate, Layout)>,
+    pub reserve: Vec<(Candidate, EffectColumns)>,
     /// The unwhitened base and residual for the held-out error.
-    plain: Plain,
+    unwhitened: UnwhitenedModel,
     /// Sums of squares of held-out residuals over the noise variance, by unit: at present, and under the declared model.
     units_now: Vec<f64>,
     declared_units: Vec<f64>,
@@ -101,10 +101,10 @@ pub struct Search<'s> {
     /// Effects that scored better than readings without structure but were not claimed, in order of addition.
     pub unclaimed: Vec<RejectedByHeldOut>,
     /// For each effect of the library whether it is undetectable at its largest plausible size.
-    unseen: Vec<bool>,
+    undetectable: Vec<bool>,
     /// Checked before each model is trained. `None` if the search must not be interrupted.
     pub interrupt: Option<Interrupt<'s>>,
-    pub(super) stop: Stop,
+    pub(super) stop: StoppingRule,
 }
 
 /// The outcome of a round.
@@ -129,64 +129,67 @@ impl<'s> Search<'s> {
     pub fn new(
         columns: &'s Columns<'s, 's>,
         candidates: Vec<Candidate>,
-        layouts: Vec<Layout>,
+        column_sets: Vec<EffectColumns>,
         moments: Moments,
         prior: PriorMoments,
-        plain: Plain,
-        stop: Stop,
+        unwhitened: UnwhitenedModel,
+        stop: StoppingRule,
     ) -> Result<Search<'s>, IdentifyError> {
         let rank = moments.base();
         let folds = 0..columns.fold_rows.len();
         let without = |left_out: Option<usize>| SearchBranch {
             folds: folds.clone().filter(|fold| Some(*fold) != left_out).collect(),
-            taken: Vec::new(),
+            selected: Vec::new(),
         };
         let mut search = Search {
             columns,
             tuned_on: vec![Vec::new(); candidates.len()],
             candidates,
-            layouts,
+            column_sets,
             moments,
             prior,
             rank,
-            tracks: std::iter::once(None)
+            branches: std::iter::once(None)
                 .chain(folds.clone().map(Some))
                 .map(without)
                 .collect(),
-            materialised: Vec::new(),
+            added_to_base: Vec::new(),
             held_out: Vec::new(),
             thresholds: Vec::new(),
             last_resort: false,
             reserve: Vec::new(),
-            plain,
+            unwhitened,
             units_now: Vec::new(),
             declared_units: Vec::new(),
             claimed: HeldOutState::default(),
             unclaimed: Vec::new(),
-            unseen: Vec::new(),
+            undetectable: Vec::new(),
             interrupt: None,
             stop,
         };
-        search.unseen = search.not_detectable()?;
+        search.undetectable = search.undetectable_candidates()?;
         search.note_held_out()?;
         search.declared_units = search.units_now.clone();
-        search.claimed = search.standing();
+        search.claimed = search.state();
         Ok(search)
     }
 
     /// The selected effects of the branch on all readings.
-    pub fn taken(&self) -> &[SelectedEffect] {
-        &self.tracks[ALL].taken
+    pub fn selected(&self) -> &[SelectedEffect] {
+        &self.branches[ALL].selected
     }
 
     /// Whether these folds are all folds.
-    pub(super) fn identifies_all(&self, folds: &[usize]) -> bool {
-        folds.len() == self.tracks[ALL].folds.len()
+    pub(super) fn has_all_folds(&self, folds: &[usize]) -> bool {
+        folds.len() == self.branches[ALL].folds.len()
     }
 
     /// A limit on rounds: enough for the maximum number of effects and some merges.
-    pub fn most_rounds(&self) -> usize {
-        self.stop.most.saturating_add(self.stop.most / 2).max(1)
+    pub fn max_rounds(&self) -> usize {
+        self.stop
+            .max_effects
+            .saturating_add(self.stop.max_effects / 2)
+            .max(1)
     }
 
     /// The best candidate beside a model with the chosen candidates, and its score.
@@ -199,7 +202,7 @@ impl<'s> Search<'s> {
         let variance = self.variance(model);
         let mut best: Option<(usize, f64)> = None;
         for (candidate, gain) in gains.iter().enumerate() {
-            if chosen.contains(&candidate) || !self.is_open(candidate, &model.folds) {
+            if chosen.contains(&candidate) || !self.may_be_added(candidate, &model.folds) {
                 continue;
             }
             let score = self.score(candidate, gain, variance);
@@ -211,7 +214,7 @@ impl<'s> Search<'s> {
     }
 
     /// The candidate with the shortest description among those that are confounded with the best one.
-    pub(super) fn named_first(
+    pub(super) fn simplest_confounded(
         &self,
         model: &TrainedModel<'_>,
         gains: &[Gain],
@@ -222,12 +225,12 @@ impl<'s> Search<'s> {
         let least = self.evidence_for(best, &gains[best], variance) - INDISTINGUISHABLE;
         let mut first = best;
         for (candidate, gain) in gains.iter().enumerate() {
-            let passed_over = chosen.contains(&candidate) || !self.is_open(candidate, &model.folds);
+            let passed_over = chosen.contains(&candidate) || !self.may_be_added(candidate, &model.folds);
             if passed_over || gain.freedom == 0 || self.evidence_for(candidate, gain, variance) < least {
                 continue;
             }
-            let length = self.candidates[candidate].length();
-            let present = self.candidates[first].length();
+            let length = self.candidates[candidate].description_length();
+            let present = self.candidates[first].description_length();
             if length < present || (length == present && gain.gain > gains[first].gain * (1.0 + 1e-9)) {
                 first = candidate;
             }
@@ -241,17 +244,17 @@ impl<'s> Search<'s> {
             return Ok(Round::Done { p_value: 1.0 });
         };
         self.thresholds.push(threshold);
-        if p_value > self.stop.significance || self.taken().len() >= self.stop.most {
+        if p_value > self.stop.significance || self.selected().len() >= self.stop.max_effects {
             return Ok(Round::Done { p_value });
         }
-        let Some(candidate) = self.pick(ALL, f64::NEG_INFINITY)? else {
+        let Some(candidate) = self.select(ALL, f64::NEG_INFINITY)? else {
             return Ok(Round::Done { p_value });
         };
-        let before = self.tracks.clone();
+        let before = self.branches.clone();
         self.add(ALL, SelectedEffect { candidate, p_value });
-        for track in 1..self.tracks.len() {
-            if let Some(candidate) = self.pick(track, threshold)? {
-                self.add(track, SelectedEffect { candidate, p_value });
+        for branch in 1..self.branches.len() {
+            if let Some(candidate) = self.select(branch, threshold)? {
+                self.add(branch, SelectedEffect { candidate, p_value });
             }
         }
         let held_out = self.held_out_now()?;
@@ -259,7 +262,7 @@ impl<'s> Search<'s> {
         if self.stop.in_residual_variance
             && held_out >= self.held_out.last().copied().unwrap_or(f64::INFINITY)
         {
-            self.tracks = before;
+            self.branches = before;
             return Ok(Round::Done { p_value });
         }
         self.remove_insignificant(threshold)?;
@@ -270,17 +273,17 @@ impl<'s> Search<'s> {
     /// The p-value of the best candidate with respect to the best scores of the null draws, and the score that these exceed with
     /// the probability of the significance level.
     fn best_against_null(&self) -> Result<Option<(f64, f64)>, IdentifyError> {
-        let chosen = self.tracks[ALL].chosen();
+        let chosen = self.branches[ALL].chosen();
         let model = self.model_without(None)?;
         let Some((_, score)) = self.best_of(&model, &model.gains(), &chosen) else {
             return Ok(None);
         };
-        let composed = self.composed(&model);
+        let composed = self.step_tables(&model);
         let score = composed.iter().map(StepTable::score).fold(score, f64::max);
         let costs: Vec<f64> = (0..self.candidates.len())
             .map(|c| {
-                if self.is_open(c, &model.folds) {
-                    self.candidates[c].length()
+                if self.may_be_added(c, &model.folds) {
+                    self.candidates[c].description_length()
                 } else {
                     f64::INFINITY
                 }
@@ -297,43 +300,43 @@ impl<'s> Search<'s> {
 
     /// The candidate that a branch adds, if it reaches a score. On all readings it is the candidate with the shortest description
     /// among those confounded with the best. With one fold left out, prediction matters and not the name, so it is the best.
-    fn pick(&mut self, track: usize, least: f64) -> Result<Option<usize>, IdentifyError> {
-        let SearchBranch { folds, .. } = self.tracks[track].clone();
-        let chosen = self.tracks[track].chosen();
+    fn select(&mut self, branch: usize, least: f64) -> Result<Option<usize>, IdentifyError> {
+        let SearchBranch { folds, .. } = self.branches[branch].clone();
+        let chosen = self.branches[branch].chosen();
         let known = self.refine(&chosen, &folds)?;
         let model = self.model_of(&chosen, &folds)?;
-        let gains = model.more_gains(known);
+        let gains = model.remaining_gains(known);
         let Some((best, score)) = self.best_of(&model, &gains, &chosen) else {
             return Ok(None);
         };
-        let first = || match track {
-            ALL => self.named_first(&model, &gains, best, &chosen),
+        let first = || match branch {
+            ALL => self.simplest_confounded(&model, &gains, best, &chosen),
             _ => best,
         };
         Ok((score >= least).then(first))
     }
 
-    fn add(&mut self, track: usize, taken: SelectedEffect) {
-        self.materialise(&[taken.candidate]);
-        self.tracks[track].taken.push(taken);
+    fn add(&mut self, branch: usize, selected: SelectedEffect) {
+        self.add_to_base(&[selected.candidate]);
+        self.branches[branch].selected.push(selected);
     }
 
     /// Removes effects that later additions have made insignificant.
     fn remove_insignificant(&mut self, threshold: f64) -> Result<(), IdentifyError> {
-        let folds = self.tracks[ALL].folds.clone();
+        let folds = self.branches[ALL].folds.clone();
         loop {
-            let chosen = self.tracks[ALL].chosen();
+            let chosen = self.branches[ALL].chosen();
             let scored = (0..chosen.len().saturating_sub(1)).map(|k| {
                 let mut others = chosen.clone();
                 let candidate = others.remove(k);
-                let model = self.lean_model_of(&others, &folds)?;
+                let model = self.projection_of(&others, &folds)?;
                 let score = self.score(candidate, &model.gain(candidate), self.variance(&model));
                 Ok((k, score))
             });
             let scored: Vec<(usize, f64)> = scored.collect::<Result<_, IdentifyError>>()?;
             match scored.into_iter().min_by(|a, b| a.1.total_cmp(&b.1)) {
                 Some((k, score)) if score < threshold => {
-                    self.tracks[ALL].taken.remove(k);
+                    self.branches[ALL].selected.remove(k);
                 }
                 _ => return Ok(()),
             }

@@ -8,14 +8,14 @@ use abbe_model::effect::Effect;
 use super::{ALL, Search};
 use crate::error::IdentifyError;
 use crate::trace::chi_square_tail::ln_chi_square_tail;
-use crate::trace::columns::Layout;
+use crate::trace::columns::EffectColumns;
 use crate::trace::score::{Gain, TrainedModel};
-use crate::trace::tuning::Trial;
+use crate::trace::tuning::TunedEffect;
 
 impl Search<'_> {
     /// The range of a candidate's columns in the base. Empty if the candidate was never added.
     pub fn places(&self, candidate: usize) -> Range<usize> {
-        self.materialised
+        self.added_to_base
             .iter()
             .find(|(c, _)| *c == candidate)
             .map_or(0..0, |(_, places)| places.clone())
@@ -38,7 +38,7 @@ impl Search<'_> {
     }
 
     /// The model with some candidates, for the evaluation of few candidates.
-    pub(in crate::trace) fn lean_model_of(
+    pub(in crate::trace) fn projection_of(
         &self,
         chosen: &[usize],
         folds: &[usize],
@@ -49,29 +49,29 @@ impl Search<'_> {
 
     /// The model with the selected effects, without the `k`-th if one is given, on all readings.
     pub fn model_without(&self, left_out: Option<usize>) -> Result<TrainedModel<'_>, IdentifyError> {
-        let mut chosen = self.tracks[ALL].chosen();
+        let mut chosen = self.branches[ALL].chosen();
         if let Some(k) = left_out {
             chosen.remove(k);
         }
-        self.model_of(&chosen, &self.tracks[ALL].folds)
+        self.model_of(&chosen, &self.branches[ALL].folds)
     }
 
     /// Adds the columns of candidates to the base, if they are not there yet.
-    pub(in crate::trace) fn materialise(&mut self, candidates: &[usize]) {
+    pub(in crate::trace) fn add_to_base(&mut self, candidates: &[usize]) {
         let fresh: Vec<usize> = candidates
             .iter()
             .copied()
-            .filter(|c| !self.materialised.iter().any(|(present, _)| present == c))
+            .filter(|c| !self.added_to_base.iter().any(|(present, _)| present == c))
             .collect();
         if fresh.is_empty() {
             return;
         }
-        let places = self.moments.materialise(self.columns, &self.layouts, &fresh);
-        let chosen: Vec<&Layout> = fresh.iter().map(|c| &self.layouts[*c]).collect();
-        let rows = self.columns.plain_rows(&chosen);
+        let places = self.moments.add_to_base(self.columns, &self.column_sets, &fresh);
+        let chosen: Vec<&EffectColumns> = fresh.iter().map(|c| &self.column_sets[*c]).collect();
+        let rows = self.columns.unwhitened_rows(&chosen);
         let norms: Vec<f64> = fresh.iter().flat_map(|c| self.norms(*c)).collect();
-        self.plain.extend(&rows, &norms);
-        self.materialised.extend(fresh.into_iter().zip(places));
+        self.unwhitened.extend(&rows, &norms);
+        self.added_to_base.extend(fresh.into_iter().zip(places));
     }
 
     /// The lengths of a candidate's columns over all readings.
@@ -110,7 +110,7 @@ impl Search<'_> {
 
     /// The variance by which the gains of the null draws are divided.
     pub(super) fn null_variance(&self) -> Result<f64, IdentifyError> {
-        Ok(self.variance(&self.lean_model_of(&[], &self.tracks[ALL].folds)?))
+        Ok(self.variance(&self.projection_of(&[], &self.branches[ALL].folds)?))
     }
 
     /// `−ln P` of a gain.
@@ -123,7 +123,7 @@ impl Search<'_> {
 
     /// The evidence for a candidate: `−ln P` of its gain, less its selection penalty.
     pub fn evidence_for(&self, candidate: usize, gain: &Gain, variance: f64) -> f64 {
-        self.evidence(gain, variance) - self.candidates[candidate].price
+        self.evidence(gain, variance) - self.candidates[candidate].selection_penalty
     }
 
     /// The evidence for a candidate, less its cost.
@@ -132,13 +132,17 @@ impl Search<'_> {
     }
 
     /// The products of any effect beside a model. `None` if the data lack its driver.
-    pub(in crate::trace) fn trial(&self, model: &TrainedModel<'_>, effect: &Effect) -> Option<Trial> {
-        let layout = self.columns.layout_uncached(effect)?;
-        Some(Trial::new(self.columns, &self.moments, &layout, model))
+    pub(in crate::trace) fn tuned_effect(
+        &self,
+        model: &TrainedModel<'_>,
+        effect: &Effect,
+    ) -> Option<TunedEffect> {
+        let column_set = self.columns.effect_columns_uncached(effect)?;
+        Some(TunedEffect::new(self.columns, &self.moments, &column_set, model))
     }
 
     /// The gain of any effect beside a model, on the training folds of the model. `None` if the data lack its driver.
     pub fn gain_beside(&self, model: &TrainedModel<'_>, effect: &Effect) -> Option<f64> {
-        Some(self.trial(model, effect)?.gain(model))
+        Some(self.tuned_effect(model, effect)?.gain(model))
     }
 }
