@@ -131,10 +131,10 @@ fn ready(
         variations.keep_spindle_ball && last.station.tool_point_mm() == candidate.test.station.tool_point_mm()
     });
     if let Some(last) = last {
-        let [own, left] =
+        let [own, mounted_setup] =
             [&candidate.test.spindle_setup, &last.spindle_setup].map(|setup| format!("[{setup}]"));
         let root = shared.root_of_test(&alone, r.as_ref(), |id| match id.strip_suffix(&own) {
-            Some(id_stem) if id.starts_with("spindle_ball.") => format!("{id_stem}{left}"),
+            Some(id_stem) if id.starts_with("spindle_ball.") => format!("{id_stem}{mounted_setup}"),
             _ => id.to_string(),
         });
         let mut candidate = candidate.clone();

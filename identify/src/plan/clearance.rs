@@ -4,12 +4,12 @@
 //! `H` and `W` are the height and width of the device, `L` the shaft from jig to ball, `T` the jig, `Ds` and `Dt` the diameters
 //! of spindle and table:
 //!
-//! | device on | when | needed |
+//! | device on | condition | requirement |
 //! |---|---|---|
 //! | table | `Ds/2 ≥ H` | `L + T > Dt/2` |
 //! | table | `Ds/2 < H` | `L > W/2` |
 //! | spindle | `Ds/2 ≥ L` | `H ≥ Dt/2` and `L > W/2` |
-//! | spindle | `Ds/2 < L` | nothing: the paper prints `H ≤ Dt/2 should be satisfied`, which is what is then allowed, not needed |
+//! | spindle | `Ds/2 < L` | nothing: Yamaji et al. print `H ≤ Dt/2 should be satisfied`, which is permitted and not required |
 
 /// The relevant dimensions, mm.
 #[derive(Clone, Copy, Debug, PartialEq)]

@@ -3,8 +3,8 @@
 //! With `X` the whitened columns of the parameters, `Cov` their covariance and `C` the columns of an effect,
 //!
 //! ```text
-//! S = CᵀC − CᵀX·Cov·XᵀC      information on the effect beside the unknowns: what is left of it in the residual
-//! B = Cov·XᵀC                what an undeclared effect adds to the unknowns, per unit of each coefficient
+//! S = CᵀC − CᵀX·Cov·XᵀC      information on the effect with the parameters eliminated
+//! B = Cov·XᵀC                bias of the parameters by the undeclared effect, per unit of each coefficient
 //! ```
 //!
 //! An effect with several coefficients (cosine and sine) is judged at its worst phase.

@@ -59,7 +59,7 @@ impl SharedParameters {
     /// If a parameter does not belong to the problem.
     pub fn root_of(&self, problem: &Problem<'_>, linear: &Linearisation) -> Result<Root, IdentifyError> {
         let list = &problem.parameters.list;
-        let place: HashMap<&str, usize> = list
+        let index: HashMap<&str, usize> = list
             .iter()
             .enumerate()
             .map(|(j, parameter)| (parameter.id.as_str(), j))
@@ -67,18 +67,18 @@ impl SharedParameters {
         let columns = self
             .ids
             .iter()
-            .map(|id| place.get(id.as_str()).copied())
+            .map(|id| index.get(id.as_str()).copied())
             .collect::<Option<Vec<usize>>>()
             .ok_or_else(|| IdentifyError::Request("a parameter does not belong to this plan".to_string()))?;
         let root = marginal(linear.whole.parts().0.as_ref(), &columns, &linear.size)?;
-        Ok(self.held(&root))
+        Ok(self.regularised(&root))
     }
 
     /// Adds a prior of the physical size to every parameter.
-    fn held(&self, root: &Root) -> Root {
+    fn regularised(&self, root: &Root) -> Root {
         let k = self.ids.len();
-        let held = Mat::from_fn(k, k, |i, j| if i == j { 1.0 / self.size[i] } else { 0.0 });
-        sum(root.as_ref(), held.as_ref())
+        let priors = Mat::from_fn(k, k, |i, j| if i == j { 1.0 / self.size[i] } else { 0.0 });
+        sum(root.as_ref(), priors.as_ref())
     }
 
     /// The root of the readings of a problem with one test, from their triangular factor `r`. Parameters that are not shared are
@@ -94,11 +94,11 @@ impl SharedParameters {
             let name = as_shared(id);
             self.ids.iter().position(|shared| *shared == name)
         };
-        let place: Vec<Option<usize>> = list.iter().map(|parameter| column_of(&parameter.id)).collect();
-        let own: Vec<usize> = (0..list.len()).filter(|j| place[*j].is_none()).collect();
+        let index: Vec<Option<usize>> = list.iter().map(|parameter| column_of(&parameter.id)).collect();
+        let own: Vec<usize> = (0..list.len()).filter(|j| index[*j].is_none()).collect();
         let (m, k) = (own.len(), self.ids.len());
         let mut stacked = Mat::zeros((list.len() + m).max(m + k), m + k);
-        for (j, column) in place.iter().enumerate() {
+        for (j, column) in index.iter().enumerate() {
             let target = match column {
                 Some(column) => m + column,
                 None => own.iter().position(|own| *own == j).unwrap_or(0),
@@ -107,12 +107,12 @@ impl SharedParameters {
                 stacked[(i, target)] = r[(i, j)];
             }
         }
-        for (place, j) in own.iter().enumerate() {
+        for (index, j) in own.iter().enumerate() {
             let u = match list[*j].prior {
                 Prior::Gaussian(u) => u,
                 _ => list[*j].size,
             };
-            stacked[(list.len() + place, place)] = 1.0 / u;
+            stacked[(list.len() + index, index)] = 1.0 / u;
         }
         let upper = upper(stacked);
         Mat::from_fn(k, k, |i, j| if i <= j { upper[(m + i, m + j)] } else { 0.0 })

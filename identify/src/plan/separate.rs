@@ -134,12 +134,15 @@ pub fn separating_tests(
         return Ok(Vec::new());
     }
     let comparison = SeparationComparison::new(problem, beta, found, coefficients, alternatives, variations)?;
-    let mut left: Vec<usize> = (0..alternatives.len()).collect();
+    let mut remaining: Vec<usize> = (0..alternatives.len()).collect();
     let mut root = comparison.prepared.base.clone();
     let mut tests: Vec<SeparatingTest> = Vec::new();
-    while !left.is_empty() && tests.len() < MAX_TESTS {
-        let before: Vec<f64> = left.iter().map(|one| comparison.sigma(&root, *one)).collect();
-        let sigmas = comparison.with_each(&root, &left);
+    while !remaining.is_empty() && tests.len() < MAX_TESTS {
+        let before: Vec<f64> = remaining
+            .iter()
+            .map(|one| comparison.sigma(&root, *one))
+            .collect();
+        let sigmas = comparison.with_each(&root, &remaining);
         let Some(best) = comparison.best(&sigmas, SEPARATED_SIGMA) else {
             break;
         };
@@ -152,14 +155,14 @@ pub fn separating_tests(
         let test = SeparatingTest {
             test: candidate.name.clone(),
             minutes: candidate.minutes,
-            alternatives: left.iter().zip(&before).zip(&sigmas[best]).map(of).collect(),
+            alternatives: remaining.iter().zip(&before).zip(&sigmas[best]).map(of).collect(),
         };
         // Alternatives that the readings separate already need no test.
         let gained = |one: &AlternativeSeparation| one.is_separated() && one.before < SEPARATED_SIGMA;
         if !test.alternatives.iter().any(gained) {
             break;
         }
-        left = (test.alternatives.iter())
+        remaining = (test.alternatives.iter())
             .filter(|one| !one.is_separated())
             .map(|one| one.number)
             .collect();

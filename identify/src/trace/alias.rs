@@ -71,12 +71,12 @@ fn competing_effects(
 ) -> Vec<CompetingEffect> {
     let selected = search.selected()[k].candidate;
     let named = search.candidates[selected].effect.id();
-    let alike: HashSet<String> = aliases
+    let alias_ids: HashSet<String> = aliases
         .iter()
         .map(|alias| search.candidates[alias.candidate].effect.id())
         .collect();
     let others: Vec<usize> = search.selected().iter().map(|t| t.candidate).collect();
-    let mut standing: Vec<(f64, usize)> = gains
+    let mut ranked: Vec<(f64, usize)> = gains
         .iter()
         .enumerate()
         .filter(|(candidate, gain)| {
@@ -90,9 +90,9 @@ fn competing_effects(
             (to_six_decimals(evidence), candidate)
         })
         .collect();
-    standing.sort_by(|a, b| b.0.total_cmp(&a.0).then_with(|| simplest_first(search, a.1, b.1)));
+    ranked.sort_by(|a, b| b.0.total_cmp(&a.0).then_with(|| simplest_first(search, a.1, b.1)));
     let mut competing_effects: Vec<CompetingEffect> = Vec::new();
-    for (evidence, candidate) in standing {
+    for (evidence, candidate) in ranked {
         let id = search.candidates[candidate].effect.id();
         if competing_effects.iter().any(|rival| rival.id == id) {
             continue;
@@ -102,7 +102,7 @@ fn competing_effects(
         }
         competing_effects.push(CompetingEffect {
             named: id == named,
-            alias: alike.contains(&id),
+            alias: alias_ids.contains(&id),
             id,
             evidence,
         });
@@ -166,8 +166,8 @@ pub(super) fn aliases(
     // The nearest candidate represents all candidates with its identifier. Candidates with the found effect's own identifier are
     // excluded.
     let named = search.candidates[selected.candidate].effect.id();
-    let mut seen = HashSet::from([named]);
-    aliases.retain(|alias| seen.insert(search.candidates[alias.candidate].effect.id()));
+    let mut ids = HashSet::from([named]);
+    aliases.retain(|alias| ids.insert(search.candidates[alias.candidate].effect.id()));
     let competing_effects = competing_effects(search, k, &gains, variance, &aliases);
     (aliases, competing_effects)
 }

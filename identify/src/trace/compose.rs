@@ -125,13 +125,13 @@ impl Subset<'_> {
         for j in (0..m).filter(|j| !chosen.contains(j)) {
             let with =
                 |column: usize| -> f64 { (0..n).map(|i| self.d[(chosen[i], j)] * solved[(i, column)]).sum() };
-            let left = self.d[(j, j)] - with(j);
+            let projected = self.d[(j, j)] - with(j);
             // A position that is nearly a linear combination of the others adds rounding errors and no evidence.
-            if left <= MIN_OBSERVABLE.sqrt() * self.own[(j, j)] {
+            if projected <= MIN_OBSERVABLE.sqrt() * self.own[(j, j)] {
                 continue;
             }
             let along = self.g[j] - with(m);
-            let gain = along * along / left;
+            let gain = along * along / projected;
             if best.is_none_or(|(_, most)| gain > most) {
                 best = Some((j, gain));
             }

@@ -211,14 +211,14 @@ fn trace_with<'a>(
     options: &TraceOptions,
     progress: &(dyn Fn(Progress) -> bool + Sync),
 ) -> Result<TraceOutcome<'a>, IdentifyError> {
-    match searched(&problem, &before_fit, pure, options, progress) {
+    match trace_or_interrupted(&problem, &before_fit, pure, options, progress) {
         Err(IdentifyError::Interrupted) => Ok(TraceOutcome::unsearched(problem, before_fit)),
-        searched => searched,
+        traced => traced,
     }
 }
 
 /// Traces with a given noise model, and returns [`IdentifyError::Interrupted`] if it was interrupted before the search began.
-fn searched<'a>(
+fn trace_or_interrupted<'a>(
     problem: &Problem<'a>,
     before_fit: &Fit,
     pure: &[Vec<f64>],
@@ -275,7 +275,7 @@ fn searched<'a>(
     search.reserve = reserve;
     search.interrupt = Some(interrupt);
     let gains = search.model_without(None)?.gains();
-    let seen = gains.iter().filter(|gain| gain.freedom > 0).count();
+    let observable = gains.iter().filter(|gain| gain.freedom > 0).count();
 
     let mut record = SearchRecord {
         steps: Vec::new(),
@@ -285,7 +285,7 @@ fn searched<'a>(
     let structure_before = structure_before.as_ref();
     let judge =
         |search: &Search<'_>| RefittedModel::of(problem, before_fit, search, options, structure_before);
-    let found = match found(&mut search, &mut record, judge) {
+    let found = match search_and_refit(&mut search, &mut record, judge) {
         Err(IdentifyError::Interrupted) => {
             search.roll_back();
             None
@@ -322,7 +322,7 @@ fn searched<'a>(
         stopped_early: ended.is_none() || search.selected().len() >= stop.max_effects,
         interrupted,
         candidates: candidate_count,
-        candidates_seen: seen,
+        candidates_seen: observable,
     })?;
     reported
         .result
@@ -348,7 +348,7 @@ fn searched<'a>(
 ///
 /// # Errors
 /// [`IdentifyError::Interrupted`] if the caller stopped the trace.
-fn found<'a>(
+fn search_and_refit<'a>(
     search: &mut Search<'_>,
     record: &mut SearchRecord<'_>,
     judge: impl Fn(&Search<'_>) -> Result<RefittedModel<'a>, IdentifyError>,

@@ -88,19 +88,19 @@ fn block_draws(pool: &[Vec<f64>], rows: usize, block: usize, generator: &mut Pcg
     let mut values = Vec::with_capacity(rows + block);
     while values.len() < rows {
         // A stretch is chosen with probability proportional to its length, and a start within it uniformly.
-        let mut place = generator.random_range(0..total);
+        let mut start = generator.random_range(0..total);
         let stretch = pool.iter().find(|stretch| {
-            if place < stretch.len() {
+            if start < stretch.len() {
                 true
             } else {
-                place -= stretch.len();
+                start -= stretch.len();
                 false
             }
         });
         let Some(stretch) = stretch else { continue };
         let sign = sign(generator);
-        let end = (place + block).min(stretch.len());
-        values.extend(stretch[place..end].iter().map(|value| sign * value));
+        let end = (start + block).min(stretch.len());
+        values.extend(stretch[start..end].iter().map(|value| sign * value));
     }
     values.truncate(rows);
     values

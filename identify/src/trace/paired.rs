@@ -45,11 +45,11 @@ impl Units {
         let wanted = (MIN_FREEDOM + strata).div_ceil(self.stratum.len());
         let mut rows = vec![0; self.stratum.len()];
         self.of_row.iter().for_each(|unit| rows[*unit] += 1);
-        let mut seen = vec![0; self.stratum.len()];
+        let mut counted = vec![0; self.stratum.len()];
         let parts = self.of_row.iter().map(|unit| {
             let blocks = wanted.min(rows[*unit] / MIN_BLOCK).max(1);
-            let block = seen[*unit] * blocks / rows[*unit];
-            seen[*unit] += 1;
+            let block = counted[*unit] * blocks / rows[*unit];
+            counted[*unit] += 1;
             (self.stratum[*unit], (*unit, block))
         });
         Units::of(parts)
@@ -157,7 +157,7 @@ mod tests {
             squares += (decrease.by - 24.0).powi(2);
             variances += decrease.standard_error.powi(2);
         }
-        // 4 · (1 + 4 + 9 + 16). The sampling error of a variance of so many sets is 2 %.
+        // 4 · (1 + 4 + 9 + 16). The relative standard error of the variance from this number of sets is 2 %.
         for variance in [squares, variances] {
             assert!((variance / SETS as f64 / 120.0 - 1.0).abs() < 0.08, "{variance}");
         }

@@ -26,7 +26,7 @@ pub struct Structure {
     /// freedom.
     pub excess: f64,
     /// Description: the test, the driver, and the amplitude.
-    pub words: String,
+    pub description: String,
 }
 
 /// Significance level of the structure test.
@@ -42,7 +42,7 @@ impl Structure {
 /// One detector.
 struct Detector {
     column_set: EffectColumns,
-    words: String,
+    description: String,
 }
 
 fn detectors(problem: &Problem<'_>, columns: &Columns<'_, '_>) -> Vec<Detector> {
@@ -81,8 +81,8 @@ struct TestResidual<'t, 'p, 'a> {
 
 impl TestResidual<'_, '_, '_> {
     /// Adds a shape over each coordinate of the readings.
-    fn add(&mut self, driver: &Driver, shape: Shape, words: String) {
-        self.add_confined(driver, shape, false, None, words);
+    fn add(&mut self, driver: &Driver, shape: Shape, description: String) {
+        self.add_confined(driver, shape, false, None, description);
     }
 
     /// Adds a shape that changes sign with the direction of travel, or that acts in some rows only.
@@ -92,7 +92,7 @@ impl TestResidual<'_, '_, '_> {
         shape: Shape,
         by_direction: bool,
         rows: Option<&Range<usize>>,
-        words: String,
+        description: String,
     ) {
         let effect = Effect {
             component: Component::TriggerDelay,
@@ -104,13 +104,15 @@ impl TestResidual<'_, '_, '_> {
             let column_set =
                 self.columns
                     .reading_columns(&effect, self.number, coordinate, by_direction, rows);
-            let words = if self.readings.coordinates == 3 {
-                format!("{words} in {}", ["x", "y", "z"][coordinate])
+            let description = if self.readings.coordinates == 3 {
+                format!("{description} in {}", ["x", "y", "z"][coordinate])
             } else {
-                words.clone()
+                description.clone()
             };
-            self.detectors
-                .extend(column_set.map(|column_set| Detector { column_set, words }));
+            self.detectors.extend(column_set.map(|column_set| Detector {
+                column_set,
+                description,
+            }));
         }
     }
 
@@ -163,11 +165,11 @@ impl TestResidual<'_, '_, '_> {
                 AxisKind::Rotary => format!("{:.1}°", period.to_degrees()),
                 AxisKind::Linear => format!("{period:.2} mm"),
             };
-            let words = format!("a wave over {name} with a period of {length} in {test}");
-            self.add(driver, wave(half_cycles), words.clone());
+            let description = format!("a wave over {name} with a period of {length} in {test}");
+            self.add(driver, wave(half_cycles), description.clone());
             if half_cycles <= 16 {
-                let words = format!("{words}, opposite in the two directions");
-                self.add_confined(driver, wave(half_cycles), true, None, words);
+                let description = format!("{description}, opposite in the two directions");
+                self.add_confined(driver, wave(half_cycles), true, None, description);
             }
         }
         // A structure that changes with time cancels in the mean over runs.
@@ -180,11 +182,11 @@ impl TestResidual<'_, '_, '_> {
         for half_cycles in 2..=most {
             let shows = |run: &&Range<usize>| half_cycles <= most_half_cycles(run.len());
             for (k, run) in runs.iter().enumerate().filter(|(_, run)| shows(run)) {
-                let words = format!(
+                let description = format!(
                     "a wave over {name}, {half_cycles} half cycles over its travel, in run {} of {test}",
                     k + 1
                 );
-                self.add_confined(driver, wave(half_cycles), false, Some(run), words);
+                self.add_confined(driver, wave(half_cycles), false, Some(run), description);
             }
         }
     }
@@ -245,7 +247,7 @@ pub fn structure(
         return Ok(Structure {
             p_value: 1.0,
             excess: 0.0,
-            words: "no detector applies to these readings".to_string(),
+            description: "no detector applies to these readings".to_string(),
         });
     }
     let column_sets: Vec<EffectColumns> = detectors
@@ -272,10 +274,13 @@ pub fn structure(
     let p_value = (above + 1) as f64 / (null_best.len() + 1) as f64;
     let size_um =
         (2.0 * best.2.max(0.0) / columns.rows().max(1) as f64).sqrt() * problem.noise.sigma_mm * 1e3;
-    let words = format!("{} ({size_um:.2} µm over all readings)", detectors[best.0].words);
+    let description = format!(
+        "{} ({size_um:.2} µm over all readings)",
+        detectors[best.0].description
+    );
     Ok(Structure {
         p_value,
         excess: best.2.max(0.0),
-        words,
+        description,
     })
 }

@@ -260,7 +260,7 @@ impl<'m> TrainedModel<'m> {
         self.remaining_gains(Vec::new())
     }
 
-    /// The gains of all candidates, where those of the first candidates beside the same model are known.
+    /// The gains of all candidates. `known` are those of the first candidates beside the same model.
     pub fn remaining_gains(&self, mut known: Vec<Gain>) -> Vec<Gain> {
         known.par_extend(
             (known.len()..self.moments.count.len())

@@ -300,9 +300,9 @@ impl Search<'_> {
 
     /// The best candidates beside some effects: one for each identifier, and one of equivalent candidates.
     fn next_best(&self, base: &[usize], but: usize, folds: &[usize]) -> Result<Vec<usize>, IdentifyError> {
-        let mut seen: HashSet<String> = HashSet::from([self.candidates[but].effect.id()]);
+        let mut ids: HashSet<String> = HashSet::from([self.candidates[but].effect.id()]);
         let mut ranked = self.ranked(base, folds, |candidate| {
-            seen.insert(self.candidates[candidate].effect.id())
+            ids.insert(self.candidates[candidate].effect.id())
         })?;
         let most = if self.has_all_folds(folds) {
             MAX_TRIED

@@ -1,7 +1,6 @@
 //! The gain of an effect whose shape numbers or positions differ from those of the library.
 //!
-//! Its products are computed from the readings. If one of several positions changes, only the column of that position is computed
-//! anew.
+//! Its products are computed from the readings. If one of several positions changes, only its column is computed again.
 
 use std::ops::Range;
 

@@ -52,10 +52,10 @@ pub struct Changes {
 pub fn changes(mut session: Session, effects: &[Effect]) -> Changes {
     session.unknowns.clear();
     session.effects = effects.to_vec();
-    let unknowns = session.instrument.unknowns();
+    let components = session.instrument.unknowns();
     for test in &mut session.tests {
-        for (prior, unknown) in test.priors.iter_mut().zip(unknowns) {
-            *prior = if MOUNTED.contains(&unknown.thing) {
+        for (prior, component) in test.priors.iter_mut().zip(components) {
+            *prior = if MOUNTED.contains(&component.thing) {
                 Prior::Free
             } else {
                 Prior::Known
@@ -156,7 +156,7 @@ impl Changes {
             .collect();
         let setup = basis(&self.setup.select_rows(&rows).select_columns(&open), 1e-5);
         let changes: Vec<DMatrix<f64>> = self.effects.iter().map(|e| e.select_rows(&rows)).collect();
-        let taken: Vec<Share> = changes.iter().map(|change| share(change, &setup)).collect();
+        let by_setup: Vec<Share> = changes.iter().map(|change| share(change, &setup)).collect();
         let left: Vec<DMatrix<f64>> = changes
             .iter()
             .map(|change| change - &setup * (setup.transpose() * change))
@@ -170,7 +170,7 @@ impl Changes {
             .iter()
             .map(|own| bases.iter().map(|other| share(own, other)).collect())
             .collect();
-        (taken, between)
+        (by_setup, between)
     }
 
     /// Amplitudes by order of a test whose runs are full turns in equal steps: `[same, opposite]` in the two directions, µm per

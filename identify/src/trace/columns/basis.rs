@@ -70,15 +70,15 @@ pub(super) enum TermTarget {
 impl Columns<'_, '_> {
     /// Computes the basis columns of an effect. `None` if the data lack its driver.
     pub fn effect_columns(&self, effect: &Effect) -> Option<EffectColumns> {
-        self.lay(effect, true)
+        self.compute(effect, true)
     }
 
     /// Computes the basis columns of an effect that is evaluated once: its basis functions are not cached.
     pub fn effect_columns_uncached(&self, effect: &Effect) -> Option<EffectColumns> {
-        self.lay(effect, false)
+        self.compute(effect, false)
     }
 
-    fn lay(&self, effect: &Effect, keep: bool) -> Option<EffectColumns> {
+    fn compute(&self, effect: &Effect, keep: bool) -> Option<EffectColumns> {
         let session = self.problem.session;
         let mut terms = Vec::new();
         for (number, test) in self.problem.tests.iter().enumerate() {
@@ -86,7 +86,7 @@ impl Columns<'_, '_> {
             if effect.acts_in(&test.name) {
                 let readings = test.readings.as_ref()?;
                 let axis = drivers::component_axis(session, &effect.component);
-                let (follows, samples) = self.followed(number, &effect.driver, axis)?;
+                let (follows, samples) = self.driver_samples(number, &effect.driver, axis)?;
                 let make = || Arc::new(drivers::basis_columns(&effect.shape, &samples));
                 let basis = if keep {
                     cached(
@@ -98,7 +98,7 @@ impl Columns<'_, '_> {
                     make()
                 };
                 for (slot, factor) in drivers::component_slots(session, test, readings, &effect.component) {
-                    if self.place[number].contains_key(&slot) {
+                    if self.slot_index[number].contains_key(&slot) {
                         of_test.push(EffectTerm {
                             target: TermTarget::Slot(slot),
                             factor: factor.map(Arc::new),
@@ -117,7 +117,7 @@ impl Columns<'_, '_> {
     }
 
     /// The samples of a driver in a test, and its key in the caches. The moment of gravity differs from axis to axis.
-    fn followed(
+    fn driver_samples(
         &self,
         test: usize,
         driver: &Driver,
@@ -145,7 +145,7 @@ impl Columns<'_, '_> {
         by_direction: bool,
         rows: Option<&Range<usize>>,
     ) -> Option<EffectColumns> {
-        let (_, samples) = self.followed(test, &effect.driver, None)?;
+        let (_, samples) = self.driver_samples(test, &effect.driver, None)?;
         let basis = Arc::new(drivers::basis_columns(&effect.shape, &samples));
         let factor = (by_direction || rows.is_some()).then(|| {
             let turned = |sample: &DriverSample<f64>| if by_direction { sample.direction } else { 1.0 };

@@ -28,7 +28,7 @@ pub struct Columns<'p, 'a> {
     /// The sensitivities of each test.
     sensitivities: Vec<Sensitivities>,
     /// Index of each slot among the sensitivities, by test.
-    place: Vec<HashMap<usize, usize>>,
+    slot_index: Vec<HashMap<usize, usize>>,
     blocks: Vec<Block>,
     /// The scalar rows of each block that whitening keeps.
     kept: Vec<Vec<usize>>,
@@ -52,13 +52,13 @@ impl<'p, 'a> Columns<'p, 'a> {
     /// Computes the sensitivities at the parameter values of a fit.
     pub fn new(problem: &'p Problem<'a>, beta: &[f64]) -> Columns<'p, 'a> {
         let sensitivities = sensitivities(problem, beta);
-        let place = sensitivities
+        let slot_index = sensitivities
             .iter()
             .map(|s| {
                 s.slots
                     .iter()
                     .enumerate()
-                    .map(|(place, slot)| (*slot, place))
+                    .map(|(index, slot)| (*slot, index))
                     .collect()
             })
             .collect();
@@ -86,7 +86,7 @@ impl<'p, 'a> Columns<'p, 'a> {
         Columns {
             problem,
             sensitivities,
-            place,
+            slot_index,
             blocks,
             kept,
             rows: target.len(),
@@ -116,7 +116,7 @@ impl<'p, 'a> Columns<'p, 'a> {
             for term in &column_set.terms[block.test] {
                 let derivative = match term.target {
                     TermTarget::Slot(slot) => {
-                        let whole = &sensitivities.derivatives[self.place[block.test][&slot]];
+                        let whole = &sensitivities.derivatives[self.slot_index[block.test][&slot]];
                         Some(&whole[first * coordinates..first * coordinates + scalars])
                     }
                     TermTarget::Reading(_) => None,
@@ -217,7 +217,7 @@ impl<'p, 'a> Columns<'p, 'a> {
         }
     }
 
-    /// Puts whitened rows of `[J | r]` at given values in the same order: rows × (unknowns + 1).
+    /// The whitened rows of `[J | r]` at given parameter values, in fold order: rows × (parameters + 1).
     ///
     /// # Errors
     /// If the model cannot be evaluated.

@@ -18,7 +18,7 @@ impl Columns<'_, '_> {
         self.unwhitened(blocks.collect())
     }
 
-    /// `[J | r]` at given values, likewise.
+    /// The unwhitened rows of `[J | r]` at given parameter values, block after block.
     ///
     /// # Errors
     /// If the model cannot be evaluated.

@@ -112,7 +112,7 @@ pub(super) fn report(findings: &TraceFindings<'_, '_>) -> Result<ReportedEffect,
         effects,
         remainder,
         residual_before: match findings.structure_before {
-            Some(structure) if structure.is_significant() => structure.words.clone(),
+            Some(structure) if structure.is_significant() => structure.description.clone(),
             // Detectors look at one test at a time; the search adds up what all tests show of one effect.
             Some(_) if !search.selected().is_empty() => {
                 "structure that no single test shows beyond noise; the search over all tests finds it"
@@ -311,7 +311,7 @@ fn verdict(findings: &TraceFindings<'_, '_>, effects: &[EffectResult]) -> (Strin
     let remainder = Remainder {
         structured,
         p_value: after.p_value,
-        place: structured.then(|| after.words.clone()),
+        place: structured.then(|| after.description.clone()),
     };
     let before = findings
         .structure_before

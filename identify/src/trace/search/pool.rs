@@ -38,10 +38,10 @@ impl Search<'_> {
             .undetectable
             .get(candidate)
             .is_some_and(|undetectable| *undetectable);
-        let entry = &self.candidates[candidate];
+        let effect = &self.candidates[candidate];
         !undetectable
-            && !entry.dictionary
-            && (!entry.last_resort || self.last_resort)
+            && !effect.dictionary
+            && (!effect.last_resort || self.last_resort)
             && self.may_be_used(candidate, folds)
     }
 
