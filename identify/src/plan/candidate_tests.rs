@@ -84,7 +84,7 @@ impl TestVariations {
         self
     }
 
-    /// Fewer variations and every fourth position: enough to name a test beside a result, not to optimise it.
+    /// Fewer variations and every fourth position: enough to name a test with a result, not to optimise it.
     pub fn short() -> TestVariations {
         TestVariations {
             radii_mm: vec![50.0, 100.0, 150.0],

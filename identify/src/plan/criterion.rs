@@ -23,7 +23,7 @@ pub enum Goal {
     },
 }
 
-/// The parameters of a goal.
+/// Indices of the target parameters of a goal.
 pub fn targets(problem: &Problem<'_>, goal: &Goal) -> Vec<usize> {
     let list = &problem.parameters.list;
     let is_target = |parameter: &Parameter| match (goal, parameter.role) {
@@ -36,7 +36,7 @@ pub fn targets(problem: &Problem<'_>, goal: &Goal) -> Vec<usize> {
     (0..list.len()).filter(|j| is_target(&list[*j])).collect()
 }
 
-/// The figure of a goal. Smaller is better.
+/// The figure of merit of a goal. Smaller values are better.
 pub fn figure(shared: &SharedParameters, root: &Root, goal: &Goal) -> f64 {
     match goal {
         Goal::WorstUncertainty => shared.uncertainties(root).into_iter().fold(0.0, f64::max),
@@ -73,7 +73,7 @@ pub fn separation(shared: &SharedParameters, root: &Root, coefficients: &[f64]) 
     }
 }
 
-/// A figure as it is reported. For separations, larger is better.
+/// A figure as it is reported. Larger separations are better.
 pub fn reported(figure: f64, goal: &Goal) -> f64 {
     match goal {
         Goal::WorstUncertainty => figure,

@@ -1,6 +1,6 @@
 //! Aliases of a found effect: other effects that explain the residual equally well.
 //!
-//! Two candidates are aliases if the readings do not separate them. The alias replaces the found effect beside the same model.
+//! Two candidates are aliases if the readings do not separate them. The alias replaces the found effect in the same model.
 //! Its log-likelihood is then at most 2 lower, with or without the penalty for selected shape numbers and positions. It also
 //! reproduces at least half of the found effect's signature in the readings. The search reports the candidate with the shortest
 //! description. The others are listed, nearest first.
@@ -110,7 +110,8 @@ fn competing_effects(
     competing_effects
 }
 
-/// The aliases of the `k`-th selected effect, nearest first, and its competing explanations, beside the model without it.
+/// The aliases of the `k`-th selected effect, nearest first, and its competing explanations. `model` is the model without that
+/// effect.
 pub(super) fn aliases(
     search: &Search<'_>,
     k: usize,

@@ -36,8 +36,8 @@ impl StepTable {
     }
 }
 
-/// The best step table of a dictionary beside a model, with at least two positions. A single step is an effect of the library
-/// itself.
+/// The best step table of a dictionary for addition to a model, with at least two positions. A single step is an effect of the
+/// library itself.
 pub fn best_step_table(
     model: &TrainedModel<'_>,
     number: usize,
@@ -103,7 +103,7 @@ struct Subset<'d> {
 }
 
 impl Subset<'_> {
-    /// The position with the largest gain beside those chosen, and its gain.
+    /// The position with the largest gain in addition to those chosen, and its gain.
     fn best_addition(&self, chosen: &[usize]) -> Option<(usize, f64)> {
         let n = chosen.len();
         let m = self.g.len();

@@ -133,8 +133,8 @@ impl Search<'_> {
         self.note_held_out()
     }
 
-    /// The value of curves over an axis, one for each test. `None` if no test permits such a curve. They count as one choice,
-    /// that of the axis.
+    /// The joint evidence of curves over an axis, one for each test, less their description length. `None` if no test permits
+    /// such a curve. They count as one choice, that of the axis.
     fn evidence_of_test_curves(
         &mut self,
         driver: &Driver,

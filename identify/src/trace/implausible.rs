@@ -1,5 +1,5 @@
 //! A trace of a session whose readings contradict it. The trace states the contradiction first. It does not search if the
-//! readings belong to another session. It claims no effect that only represents a wrong set-up value.
+//! readings belong to another session. It accepts no effect that only represents a wrong set-up value.
 
 use abbe_model::effect::Effect;
 
@@ -74,7 +74,7 @@ impl<'a> Contradicted<'a> {
         let mut warnings = plausibility::warnings(&self.plausibility);
         if !self.parameters.is_empty() {
             warnings.push(format!(
-                "the search uses no prior of {}, so that it claims no effect that only represents a wrong set-up value",
+                "the search uses no prior of {}, so that it accepts no effect that only represents a wrong set-up value",
                 self.parameters.join(", ")
             ));
         }

@@ -3,10 +3,11 @@
 use abbe_model::effect::Effect;
 
 use super::columns::Columns;
+use super::noise_model::SCATTER;
 use super::remainder::{self, Structure};
 use super::search::Search;
 use super::start::Start;
-use super::{SCATTER, TraceOptions, null, null_draw_count};
+use super::{TraceOptions, null, null_draw_count};
 use crate::error::IdentifyError;
 use crate::fit::{Fit, fit, prepare_with};
 use crate::noise::NoiseSource;

@@ -5,7 +5,7 @@
 //! 2. The basis columns of the library's effects ([`library`]) are computed for the session (`columns`). Their products with the
 //!    model, the residual and the null draws are computed once (`moments`).
 //! 3. The search (`search`) adds, removes and exchanges effects. Its p-values come from the same search on readings without
-//!    structure (`null`). An effect is claimed if its p-value is below the significance level and the held-out error decreases by
+//!    structure (`null`). An effect is accepted if its p-value is below the significance level and the held-out error decreases by
 //!    more than the standard error of the decrease. That standard error follows from paired differences over runs, blocks or
 //!    poses (`paired`).
 //! 4. All parameters are refitted together (`judge`). The result (`result`) states the held-out error before and after.
@@ -21,6 +21,7 @@ mod interrupt;
 mod judge;
 pub mod library;
 mod moments;
+mod noise_model;
 mod null;
 mod observable;
 mod paired;
@@ -42,7 +43,6 @@ use abbe_model::session::Session;
 use crate::error::IdentifyError;
 use crate::fit::{Fit, fit, prepare};
 use crate::heldout::FoldKind;
-use crate::noise::{NoiseSource, PureError};
 use crate::problem::Problem;
 use crate::results::TraceResult;
 use columns::{Columns, EffectColumns};
@@ -51,6 +51,7 @@ use interrupt::Interrupt;
 use judge::RefittedModel;
 use library::Candidate;
 use moments::Moments;
+use noise_model::estimate_noise_model;
 use rounds::{SearchRecord, search_on};
 use search::{Search, StoppingRule};
 use start::Start;
@@ -68,7 +69,7 @@ pub struct TraceOptions {
     pub exclude: Vec<String>,
     /// Number of null draws.
     pub draws: usize,
-    /// Probability that the trace claims an effect on readings without structure, if the null distribution is exact. The noise
+    /// Probability that the trace accepts an effect on readings without structure, if the null distribution is exact. The noise
     /// model is estimated, which increases this probability. The documentation of the method gives measured rates.
     pub significance: f64,
 }
@@ -380,39 +381,4 @@ fn search_and_refit<'a>(
 fn null_draw_count(options: &TraceOptions) -> usize {
     let least = (1.0 / options.significance.max(1e-6)).ceil() as usize;
     options.draws.max(least - 1)
-}
-
-/// Sampling scatter of an estimated AR coefficient, and relative scatter of an estimated noise standard deviation.
-const SCATTER: f64 = 0.02;
-
-/// Sets the noise standard deviation and autocorrelation from repeats, if there are enough. Returns whether this changed them by
-/// more than their sampling scatter.
-fn estimate_noise_model(problem: &mut Problem<'_>, residuals: &[Vec<f64>]) -> bool {
-    if problem.folds.kind == FoldKind::Poses {
-        return false;
-    }
-    let kept = |test: usize, row: usize| !problem.rejected[test][row];
-    let pure = PureError::of(&problem.tests, residuals, kept).without_waves(&problem.tests, kept);
-    let Some(memory) = pure.memory(&problem.tests, kept) else {
-        return false;
-    };
-    let mut noise = problem.noise.clone();
-    noise.memory = memory.coefficients;
-    noise.ar_sum_u = memory.sum_u;
-    if let Some(sigma) = pure.sigma_mm() {
-        noise.sigma_mm = sigma * memory.inflation;
-        noise.source = NoiseSource::Repeats;
-    }
-    let present = &problem.noise;
-    let same_coefficients = noise.memory.len() == present.memory.len()
-        && noise
-            .memory
-            .iter()
-            .zip(&present.memory)
-            .all(|(a, b)| (a - b).abs() < SCATTER);
-    if same_coefficients && (noise.sigma_mm / present.sigma_mm - 1.0).abs() < SCATTER {
-        return false;
-    }
-    problem.noise = noise;
-    true
 }

@@ -18,7 +18,7 @@ use crate::noise::{Noise, PureError};
 use crate::outliers::median;
 use crate::problem::Problem;
 
-/// Readings per block for the search. A block keeps intermittent structure, so that the search does not claim it as an effect.
+/// Readings per block for the search. A block keeps intermittent structure, so that the search does not accept it as an effect.
 pub const BLOCK: usize = 20;
 /// Readings per block for the test of the remaining structure. Single readings leave only noise with the estimated
 /// autocorrelation.

@@ -31,8 +31,8 @@ pub(super) fn can_be_tuned(candidate: &Candidate) -> bool {
     candidate.dictionary || brackets(candidate).is_some()
 }
 
-/// The candidates near the best, each with its best shape numbers beside a model, and the step tables near the best. `gains` are
-/// those of all candidates beside the model.
+/// The candidates near the best, each with its best shape numbers for addition to a model, and the step tables near the best.
+/// `gains` are those of all candidates added to the model.
 pub fn refined(
     search: &Search<'_>,
     model: &TrainedModel<'_>,

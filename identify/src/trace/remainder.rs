@@ -230,7 +230,7 @@ fn curve(from: f64, to: f64, intervals: usize) -> Shape {
     }
 }
 
-/// Tests a residual for structure beside a model, which is given by its orthonormal columns.
+/// Tests a residual for structure that a model, given by its orthonormal columns, does not explain.
 ///
 /// # Errors
 /// If products are not finite.

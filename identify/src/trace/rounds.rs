@@ -19,7 +19,7 @@ pub(super) struct SearchRecord<'t> {
 }
 
 impl SearchRecord<'_> {
-    /// Records claimed additions.
+    /// Records accepted additions.
     fn note(&mut self, search: &Search<'_>, added: impl Iterator<Item = usize>) {
         let held_out = search.held_out.last().copied().unwrap_or(0.0);
         let heldout_rms_um = (held_out / search.columns.rows().max(1) as f64).sqrt() * self.noise_um;
@@ -38,30 +38,30 @@ impl SearchRecord<'_> {
 
 /// Consecutive additions that may fail to lower the held-out error before they are withdrawn. Of two effects that partly cancel
 /// each other, the first alone explains little.
-const UNCLAIMED_IN_A_ROW: usize = 2;
+const MAX_REJECTED_IN_A_ROW: usize = 2;
 
-/// Runs rounds until no candidate is significant, or until additions do not lower the held-out error. The claimed effects remain.
+/// Runs rounds until no candidate is significant, or until additions do not lower the held-out error. The accepted effects remain.
 /// Returns the p-value of the best candidate that was not added.
 ///
 /// # Errors
-/// [`IdentifyError::Interrupted`] if the caller stopped the trace. [`Search::roll_back`] then restores the claimed effects.
+/// [`IdentifyError::Interrupted`] if the caller stopped the trace. [`Search::roll_back`] then restores the accepted effects.
 pub(super) fn search_on(
     search: &mut Search<'_>,
     record: &mut SearchRecord<'_>,
 ) -> Result<f64, IdentifyError> {
     let p_value = rounds(search, record)?;
-    search.withdraw_unclaimed();
+    search.withdraw_rejected();
     Ok(p_value)
 }
 
 fn rounds(search: &mut Search<'_>, record: &mut SearchRecord<'_>) -> Result<f64, IdentifyError> {
-    // Additions since the last claim.
-    let mut unclaimed = Vec::new();
+    // Additions since the last acceptance.
+    let mut pending = Vec::new();
     // A merge of effects permits further additions. The limit on rounds guarantees termination.
     for _ in 0..search.max_rounds() {
         let mut ended = None;
         match search.round()? {
-            Round::Done { .. } if search.retune_all()? || search.exchange_pairs()? => unclaimed.push(None),
+            Round::Done { .. } if search.retune_all()? || search.exchange_pairs()? => pending.push(None),
             Round::Done { p_value } => ended = Some(p_value),
             Round::Added { candidate } => {
                 // Each exchange trains one model per effect. With many effects the gain is small, and an occasional sweep is
@@ -71,16 +71,16 @@ fn rounds(search: &mut Search<'_>, record: &mut SearchRecord<'_>) -> Result<f64,
                     search.exchange()?;
                 }
                 search.merge()?;
-                unclaimed.push(Some(candidate));
+                pending.push(Some(candidate));
             }
         }
-        if search.claim() {
-            record.note(search, unclaimed.drain(..).flatten());
+        if search.accept() {
+            record.note(search, pending.drain(..).flatten());
         }
         if let Some(p_value) = ended {
             return Ok(p_value);
         }
-        if unclaimed.len() >= UNCLAIMED_IN_A_ROW {
+        if pending.len() >= MAX_REJECTED_IN_A_ROW {
             // No p-value is available for further additions.
             return Ok(1.0);
         }

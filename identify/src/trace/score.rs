@@ -260,7 +260,7 @@ impl<'m> TrainedModel<'m> {
         self.remaining_gains(Vec::new())
     }
 
-    /// The gains of all candidates. `known` are those of the first candidates beside the same model.
+    /// The gains of all candidates. `known` are those of the first candidates with the same model.
     pub fn remaining_gains(&self, mut known: Vec<Gain>) -> Vec<Gain> {
         known.par_extend(
             (known.len()..self.moments.count.len())
@@ -316,7 +316,7 @@ impl<'m> TrainedModel<'m> {
         best
     }
 
-    /// The share of a signature that a candidate can reproduce beside the model: `cos²` of the angle between the two. The
+    /// The share of a signature that a candidate can reproduce in addition to the model: `cos²` of the angle between the two. The
     /// signature is given by coefficients of base columns that are not in this model.
     pub fn explained_by_signature(&self, candidate: usize, signature: &[(usize, f64)]) -> f64 {
         let (d, _, own) = self.projected(candidate);

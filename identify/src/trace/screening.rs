@@ -1,4 +1,4 @@
-//! Screens the library for a session: which effects apply to its readings, and which are observable beside the declared
+//! Screens the library for a session: which effects apply to its readings, and which are observable in addition to the declared
 //! parameters.
 
 use abbe_model::session::Session;
@@ -22,7 +22,7 @@ pub struct ScreenedEffect {
     pub id: String,
     /// Index of its family in the library.
     pub family: usize,
-    /// Whether the effect is observable beside the declared parameters.
+    /// Whether the effect is observable in addition to the declared parameters.
     pub observable: bool,
 }
 

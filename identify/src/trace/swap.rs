@@ -1,9 +1,9 @@
 //! Exchanges that a purely additive search misses: a wrong effect in place of the true one, and one effect in place of a pair.
 //!
-//! Each effect is exchanged for a candidate that explains clearly more beside the others. When no addition is significant,
-//! effects with tunable shape numbers or positions are tuned anew beside each of the next best candidates. A step table or a
-//! warm-up with a free time constant can absorb most of a second effect. The second effect becomes significant only when both are
-//! in the model.
+//! Each effect is exchanged for a candidate that explains clearly more together with the others. When no addition is significant,
+//! effects with tunable shape numbers or positions are tuned again together with each of the next best candidates. A step table
+//! or a warm-up with a free time constant can absorb most of a second effect. The second effect becomes significant only when
+//! both are in the model.
 //!
 //! Pairs of effects are also searched jointly as replacements of two effects or of one. If two effects partly cancel each other,
 //! neither is significant alone, and the search finds a single effect that approximates both.
@@ -22,13 +22,13 @@ use crate::error::IdentifyError;
 
 /// Maximum number of effects whose positions and periods are tuned again after an addition.
 const MAX_REFINED: usize = 4;
-/// Candidates tried beside an effect that is tuned anew: on all readings, and with one fold left out.
+/// Candidates tried together with an effect that is tuned again: on all readings, and with one fold left out.
 const MAX_TRIED: usize = 6;
 const MAX_TRIED_WITHOUT_A_FOLD: usize = 2;
 /// Candidates tried as the first of a pair: in place of two effects, and in place of one or with one fold left out.
 const MAX_FIRST_MEMBERS: usize = 32;
 const FEW_FIRST_MEMBERS: usize = 8;
-/// Maximum number of selected effects for which effects are tuned anew beside others.
+/// Maximum number of selected effects for which effects are tuned again.
 const MAX_RETUNED: usize = 3;
 /// Relative difference of scores below which two candidates count as equivalent.
 const EQUIVALENT: f64 = 1e-6;
@@ -66,7 +66,7 @@ impl Search<'_> {
         self.note_held_out()
     }
 
-    /// Exchanges one effect for a candidate that explains clearly more beside the others. The improvement has to exceed the
+    /// Exchanges one effect for a candidate that explains clearly more together with the others. The improvement has to exceed the
     /// confounding margin, so that exchanges end.
     fn exchange_one(&mut self, branch: usize, k: usize) -> Result<(), IdentifyError> {
         let SearchBranch { folds, .. } = self.branches[branch].clone();
@@ -91,9 +91,9 @@ impl Search<'_> {
         Ok(())
     }
 
-    /// Tunes effects with shape numbers or positions anew beside each of the next best candidates, in addition to the others or
-    /// in place of one. Selects the best of these sets if it has clearly more evidence than the present one. Returns whether the
-    /// search on all readings changed.
+    /// Tunes effects with shape numbers or positions again together with each of the next best candidates, in addition to the
+    /// others or in place of one. Selects the best of these sets if it has clearly more evidence than the present one. Returns
+    /// whether the search on all readings changed.
     pub fn retune_all(&mut self) -> Result<bool, IdentifyError> {
         if self.stop.in_residual_variance {
             return Ok(false);
@@ -224,7 +224,7 @@ impl Search<'_> {
         true
     }
 
-    /// Starts a comparison with the selected set. `None` if the set is empty or too large to be tuned anew.
+    /// Starts a comparison with the selected set. `None` if the set is empty or too large to be tuned again.
     fn comparison(&self, branch: usize) -> Result<Option<SetComparison>, IdentifyError> {
         let SearchBranch { folds, .. } = self.branches[branch].clone();
         let chosen = self.branches[branch].chosen();
@@ -241,7 +241,7 @@ impl Search<'_> {
         }))
     }
 
-    /// Whether one effect of a set scores at least the null threshold beside the others.
+    /// Whether one effect of a set scores at least the null threshold in addition to the others.
     fn is_significant_in(
         &self,
         one: usize,
@@ -253,7 +253,7 @@ impl Search<'_> {
         Ok(self.score(one, &model.gain(one), self.variance(&model)) >= comparison.threshold)
     }
 
-    /// Effects without tunable shape numbers or positions that have a positive score beside some others, best first. Of
+    /// Effects without tunable shape numbers or positions that have a positive score in addition to some others, best first. Of
     /// equivalent effects one is kept.
     fn untunable_candidates(
         &self,
@@ -266,8 +266,8 @@ impl Search<'_> {
         Ok(ranked)
     }
 
-    /// The candidates with a positive score beside some effects that `accepts` accepts, best first. Of equivalent candidates
-    /// one is kept. `accepts` is called in order of decreasing score.
+    /// The candidates with a positive score in addition to some effects, restricted to those that `accepts` accepts, best first.
+    /// Of equivalent candidates one is kept. `accepts` is called in order of decreasing score.
     fn ranked(
         &self,
         base: &[usize],
@@ -298,7 +298,7 @@ impl Search<'_> {
         matches!(self.candidates[candidate].effect.shape, Shape::Steps { .. })
     }
 
-    /// The best candidates beside some effects: one for each identifier, and one of equivalent candidates.
+    /// The best candidates in addition to some effects: one for each identifier, and one of equivalent candidates.
     fn next_best(&self, base: &[usize], but: usize, folds: &[usize]) -> Result<Vec<usize>, IdentifyError> {
         let mut ids: HashSet<String> = HashSet::from([self.candidates[but].effect.id()]);
         let mut ranked = self.ranked(base, folds, |candidate| {
@@ -313,7 +313,7 @@ impl Search<'_> {
         Ok(ranked)
     }
 
-    /// An effect with the shape numbers or positions that are best beside others.
+    /// An effect with the shape numbers or positions that are best together with others.
     fn retuned(
         &mut self,
         tunable: usize,
@@ -339,7 +339,7 @@ impl Search<'_> {
         Ok(fresh.and_then(|fresh| self.add_tuned(fresh, folds)))
     }
 
-    /// The best step table of an effect's dictionary beside a model.
+    /// The best step table of an effect's dictionary for addition to a model.
     fn best_step_table(&self, model: &TrainedModel<'_>, id: &str) -> Option<Candidate> {
         let dictionary = self.candidates.iter().position(|candidate| {
             candidate.dictionary

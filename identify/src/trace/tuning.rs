@@ -60,7 +60,7 @@ impl TunedEffect {
         TunedEffect { rows, products }
     }
 
-    /// The gain of the effect beside the model that it was computed for.
+    /// The gain of the effect with the model for which its products were computed.
     pub fn gain(&self, model: &TrainedModel<'_>) -> f64 {
         self.products.gain(model)
     }

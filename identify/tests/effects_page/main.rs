@@ -361,8 +361,8 @@ fn circles_follow_their_closed_forms() {
         for (run, direction) in [(0, 1.0), (1, -1.0)] {
             let change = changes.of(own, |at| at.test == test && at.run == run);
             let turn = change.nrows() - 1;
-            // The first and last reading of a run have no difference of their own, and an axis has no direction where it
-            // reverses.
+            // The first and last reading of a run take direction and speed from their neighbours, and an axis has no
+            // direction where it reverses.
             for k in (1..turn).filter(|k| 2 * k % turn != 0) {
                 let along = if direction > 0.0 { k } else { turn - k };
                 let angle = std::f64::consts::TAU * along as f64 / turn as f64;

@@ -1,6 +1,6 @@
 //! Products of candidates with the model and the residual, for each fold.
 //!
-//! With these products, the search needs no further pass over the readings. The gain of any candidate beside any model on any set
+//! With these products, the search needs no further pass over the readings. The gain of any candidate added to any model on any set
 //! of folds is a small matrix expression. With `X` the model's columns, `y` the residual and `C` a candidate's columns over the
 //! training folds,
 //! ```text

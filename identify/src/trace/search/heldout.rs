@@ -1,4 +1,4 @@
-//! The held-out error: each fold is predicted, unwhitened, by the model of the search that excludes it. Effects are claimed only
+//! The held-out error: each fold is predicted, unwhitened, by the model of the search that excludes it. Effects are accepted only
 //! if this error decreases by more than the standard error of the decrease.
 
 use faer::Mat;
@@ -57,7 +57,7 @@ impl HeldOutState {
     }
 }
 
-/// An effect that scores better than readings without structure but is not claimed.
+/// An effect that scores better than readings without structure but is not accepted.
 #[derive(Clone, Copy, Debug)]
 pub struct RejectedByHeldOut {
     /// The effect.
@@ -110,31 +110,31 @@ impl Search<'_> {
         }
     }
 
-    /// Claims the selected effects if the held-out error permits it. With more effects than are claimed, it has to decrease by
+    /// Accepts the selected effects if the held-out error permits it. With more effects than are accepted, it has to decrease by
     /// more than the standard error. With as many or fewer, it must not increase by more than the standard error. Returns whether
-    /// all selected effects are claimed.
-    pub(in crate::trace) fn claim(&mut self) -> bool {
-        let decrease = self.decrease_since_claimed();
-        let added = self.selected().len() > self.claimed.effects().len();
-        let claimed = if added {
+    /// all selected effects are accepted.
+    pub(in crate::trace) fn accept(&mut self) -> bool {
+        let decrease = self.decrease_since_accepted();
+        let added = self.selected().len() > self.accepted.effects().len();
+        let accepted = if added {
             decrease.is_significant()
         } else {
             !decrease.is_increase() && self.lowers_heldout_error()
         };
-        if claimed {
-            self.claimed = self.state();
-            let claimed: Vec<usize> = self.branches[ALL].chosen();
-            self.unclaimed
-                .retain(|unclaimed| !claimed.contains(&unclaimed.selected.candidate));
+        if accepted {
+            self.accepted = self.state();
+            let accepted: Vec<usize> = self.branches[ALL].chosen();
+            self.rejected
+                .retain(|rejected| !accepted.contains(&rejected.selected.candidate));
         }
-        claimed
+        accepted
     }
 
-    /// The decrease of the held-out error since the last claim.
-    pub(in crate::trace) fn decrease_since_claimed(&self) -> HeldOutDecrease {
+    /// The decrease of the held-out error since the last acceptance.
+    pub(in crate::trace) fn decrease_since_accepted(&self) -> HeldOutDecrease {
         self.unwhitened
             .units
-            .decrease(&self.claimed.units, &self.units_now)
+            .decrease(&self.accepted.units, &self.units_now)
     }
 
     /// The decrease of the held-out error since the declared model.
@@ -150,28 +150,28 @@ impl Search<'_> {
         self.selected().is_empty() || self.decrease_since_declared().is_significant()
     }
 
-    /// Withdraws the effects added since the last claim, and records them as rejected.
-    pub(in crate::trace) fn withdraw_unclaimed(&mut self) {
-        let decrease = self.decrease_since_claimed();
-        let claimed: Vec<usize> = self
-            .claimed
+    /// Withdraws the effects added since the last acceptance, and records them as rejected.
+    pub(in crate::trace) fn withdraw_rejected(&mut self) {
+        let decrease = self.decrease_since_accepted();
+        let accepted: Vec<usize> = self
+            .accepted
             .effects()
             .iter()
             .map(|selected| selected.candidate)
             .collect();
         for selected in self.branches[ALL].selected.clone() {
             let known = self
-                .unclaimed
+                .rejected
                 .iter()
                 .any(|u| u.selected.candidate == selected.candidate);
-            if !claimed.contains(&selected.candidate) && !known {
-                self.unclaimed.push(RejectedByHeldOut { selected, decrease });
+            if !accepted.contains(&selected.candidate) && !known {
+                self.rejected.push(RejectedByHeldOut { selected, decrease });
             }
         }
         self.restore();
     }
 
-    /// Restores the claimed effects after an interruption within a round. The search is not interrupted again.
+    /// Restores the accepted effects after an interruption within a round. The search is not interrupted again.
     pub(in crate::trace) fn roll_back(&mut self) {
         self.restore();
         self.interrupt = None;
@@ -182,7 +182,7 @@ impl Search<'_> {
             branches,
             held_out,
             units,
-        } = self.claimed.clone();
+        } = self.accepted.clone();
         self.branches = branches;
         self.held_out = held_out;
         self.units_now = units;
@@ -192,17 +192,17 @@ impl Search<'_> {
     /// error of the decrease.
     pub(in crate::trace) fn withdraw_all_unless_better(&mut self) -> Result<(), IdentifyError> {
         if !self.lowers_heldout_error() {
-            self.claimed = HeldOutState::default();
-            self.claimed.branches = self.branches.clone();
-            self.claimed
+            self.accepted = HeldOutState::default();
+            self.accepted.branches = self.branches.clone();
+            self.accepted
                 .branches
                 .iter_mut()
                 .for_each(|branch| branch.selected.clear());
-            self.claimed.held_out = self.held_out[..1].to_vec();
-            self.claimed.units = self.declared_units.clone();
-            self.withdraw_unclaimed();
+            self.accepted.held_out = self.held_out[..1].to_vec();
+            self.accepted.units = self.declared_units.clone();
+            self.withdraw_rejected();
         }
-        self.claimed = self.state();
+        self.accepted = self.state();
         Ok(())
     }
 }

@@ -26,7 +26,7 @@ pub use heldout::{RejectedByHeldOut, UnwhitenedModel};
 /// The stopping rule of the search.
 #[derive(Clone, Copy, Debug)]
 pub struct StoppingRule {
-    /// Probability that the search claims an effect on readings without structure.
+    /// Probability that the search accepts an effect on readings without structure.
     pub significance: f64,
     /// Maximum number of effects.
     pub max_effects: usize,
@@ -96,10 +96,10 @@ pub struct Search<'s> {
     /// Sums of squares of held-out residuals over the noise variance, by unit: at present, and under the declared model.
     units_now: Vec<f64>,
     declared_units: Vec<f64>,
-    /// The claimed effects: additions that lowered the held-out error by more than the standard error of the decrease.
-    claimed: HeldOutState,
-    /// Effects that scored better than readings without structure but were not claimed, in order of addition.
-    pub unclaimed: Vec<RejectedByHeldOut>,
+    /// The accepted effects: additions that lowered the held-out error by more than the standard error of the decrease.
+    accepted: HeldOutState,
+    /// Effects that scored better than readings without structure but were not accepted, in order of addition.
+    pub rejected: Vec<RejectedByHeldOut>,
     /// For each effect of the library whether it is undetectable at its largest plausible size.
     undetectable: Vec<bool>,
     /// Checked before each model is trained. `None` if the search must not be interrupted.
@@ -161,8 +161,8 @@ impl<'s> Search<'s> {
             unwhitened,
             units_now: Vec::new(),
             declared_units: Vec::new(),
-            claimed: HeldOutState::default(),
-            unclaimed: Vec::new(),
+            accepted: HeldOutState::default(),
+            rejected: Vec::new(),
             undetectable: Vec::new(),
             interrupt: None,
             stop,
@@ -170,7 +170,7 @@ impl<'s> Search<'s> {
         search.undetectable = search.undetectable_candidates()?;
         search.note_held_out()?;
         search.declared_units = search.units_now.clone();
-        search.claimed = search.state();
+        search.accepted = search.state();
         Ok(search)
     }
 
@@ -192,7 +192,7 @@ impl<'s> Search<'s> {
             .max(1)
     }
 
-    /// The best candidate beside a model with the chosen candidates, and its score.
+    /// The best candidate for addition to a model with the chosen candidates, and its score.
     pub(super) fn best_of(
         &self,
         model: &TrainedModel<'_>,

@@ -1,5 +1,5 @@
-//! The models that a search compares: the chosen effects, trained on the folds of a branch, and the score of a candidate beside
-//! them.
+//! The models that a search compares: the chosen effects, trained on the folds of a branch, and the score of a candidate in
+//! addition to them.
 
 use std::ops::Range;
 
@@ -131,7 +131,7 @@ impl Search<'_> {
         self.evidence_for(candidate, gain, variance) - self.candidates[candidate].cost
     }
 
-    /// The products of any effect beside a model. `None` if the data lack its driver.
+    /// The products of any effect with a model. `None` if the data lack its driver.
     pub(in crate::trace) fn tuned_effect(
         &self,
         model: &TrainedModel<'_>,
@@ -141,7 +141,7 @@ impl Search<'_> {
         Some(TunedEffect::new(self.columns, &self.moments, &column_set, model))
     }
 
-    /// The gain of any effect beside a model, on the training folds of the model. `None` if the data lack its driver.
+    /// The gain of any effect added to a model, on the training folds of the model. `None` if the data lack its driver.
     pub fn gain_beside(&self, model: &TrainedModel<'_>, effect: &Effect) -> Option<f64> {
         Some(self.tuned_effect(model, effect)?.gain(model))
     }

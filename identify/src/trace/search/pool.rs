@@ -51,7 +51,7 @@ impl Search<'_> {
         tuned_on.is_empty() || tuned_on == folds
     }
 
-    /// The step tables from the library's dictionaries beside a model.
+    /// The step tables from the library's dictionaries for addition to a model.
     pub(super) fn step_tables(&self, model: &TrainedModel<'_>) -> Vec<StepTable> {
         let variance = self.variance(model);
         (0..self.candidates.len())
@@ -63,8 +63,8 @@ impl Search<'_> {
             .collect()
     }
 
-    /// Adds the candidates near the best, with their shape numbers tuned beside some candidates on some folds. Returns the gains
-    /// of the candidates that were present before.
+    /// Adds the candidates near the best, with their shape numbers tuned in addition to some candidates on some folds. Returns
+    /// the gains of the candidates that were present before.
     pub(in crate::trace) fn refine(
         &mut self,
         beside: &[usize],
@@ -106,7 +106,7 @@ impl Search<'_> {
 
     /// The number of the library's effects that are detectable at their largest plausible size. A dictionary counts once: its
     /// step tables share its identifier, and their positions have a penalty of their own. Curves of last resort, some dozens
-    /// beside thousands, do not count.
+    /// compared with thousands, do not count.
     pub(in crate::trace) fn detectable_effects(&self) -> usize {
         self.undetectable
             .iter()
