@@ -217,11 +217,11 @@ fn is_free_setup(problem: &Problem<'_>, effect: &Effect) -> bool {
     else {
         return false;
     };
-    let unknowns = problem.session.instrument.unknowns();
-    let place = unknowns
+    let setup_parameters = problem.session.instrument.unknowns();
+    let index = setup_parameters
         .iter()
         .position(|u| u.thing == thing && u.coordinate == coordinate);
-    place.is_some_and(|place| test.priors[place] == abbe_model::session::Prior::Free)
+    index.is_some_and(|index| test.priors[index] == abbe_model::session::Prior::Free)
 }
 
 fn components(problem: &Problem<'_>, sampling: &Sampling, choice: Components) -> Vec<Component> {
@@ -240,10 +240,10 @@ fn components(problem: &Problem<'_>, sampling: &Sampling, choice: Components) ->
             .instrument
             .unknowns()
             .iter()
-            .filter(|unknown| names.contains(&unknown.thing))
-            .map(|unknown| Component::Instrument {
-                thing: unknown.thing.to_string(),
-                coordinate: unknown.coordinate.to_string(),
+            .filter(|parameter| names.contains(&parameter.thing))
+            .map(|parameter| Component::Instrument {
+                thing: parameter.thing.to_string(),
+                coordinate: parameter.coordinate.to_string(),
             })
             .collect()
     };

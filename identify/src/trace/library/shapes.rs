@@ -246,8 +246,8 @@ fn mounts(problem: &Problem<'_>, component: &Component) -> Vec<Vec<String>> {
         .instrument
         .unknowns()
         .iter()
-        .find(|unknown| unknown.thing == thing)
-        .map_or(SharedBy::Session, |unknown| unknown.shared_by);
+        .find(|parameter| parameter.thing == thing)
+        .map_or(SharedBy::Session, |parameter| parameter.shared_by);
     let mut groups: Vec<(String, Vec<String>)> = Vec::new();
     for test in &problem.tests {
         let name = test.group(shared_by).to_string();
