@@ -35,7 +35,7 @@ fn the_screen_and_the_json_say_the_same() {
         assert!(error["u"].as_f64().unwrap() > 0.0);
         assert!(screen.contains(error["id"].as_str().unwrap()));
     }
-    assert!(screen.contains("A150 contributes all of EB0A, EC0A"));
+    assert!(screen.contains("only A150 makes EB0A, EC0A identifiable"));
     assert!(
         screen.contains("EC0A is confounded with y of the spindle ball in A150: 1 arcsec : −0.54 um"),
         "{screen}"

@@ -1,6 +1,6 @@
 //! The next test: better than the published methods, and what tells two effects apart.
 
-use abbe::identify::plan::candidate_tests::{CandidateTests, entries};
+use abbe::identify::plan::candidate_tests::{TestVariations, candidate_tests};
 use abbe::identify::plan::criterion::Goal;
 use abbe::identify::plan::improve::{ImproveOptions, improve};
 use abbe::identify::plan::{PlanOptions, analyse, separation, states};
@@ -52,10 +52,10 @@ fn one_test_more_than_chapter_5_beats_the_best_published_method_by_a_third() {
     };
     for follow in [true, false] {
         // Like the published methods, every test has a spindle ball of its own; no linear axis follows where its errors would enter.
-        let menu = CandidateTests {
+        let menu = TestVariations {
             keep_spindle_ball: false,
             follow,
-            ..CandidateTests::default()
+            ..TestVariations::default()
         };
         let found = improve(&problem, &menu, &options).unwrap();
         let after = found.steps[0].after;
@@ -66,7 +66,7 @@ fn one_test_more_than_chapter_5_beats_the_best_published_method_by_a_third() {
         assert!(after < 0.7 * best, "{after} against {best}");
 
         // The information agrees with the plan analysed anew, the test among the others.
-        let entry = entries(&complete, &menu)
+        let entry = candidate_tests(&complete, &menu)
             .unwrap()
             .into_iter()
             .find(|entry| entry.name == found.steps[0].test);
@@ -97,9 +97,9 @@ fn a_blind_spot_is_opened() {
     };
     let found = improve(
         &problem,
-        &CandidateTests {
+        &TestVariations {
             thin: 4,
-            ..CandidateTests::default()
+            ..TestVariations::default()
         },
         &options,
     )
@@ -122,7 +122,7 @@ fn wobble_and_axial_motion_are_told_apart_at_a_second_radius() {
         tests: Vec::new(),
     };
     let beta = vec![0.0; problem.parameters.list.len()];
-    let menu = CandidateTests::short();
+    let menu = TestVariations::short();
     // 1.5 µm of EZC order 2 against EAC order 1, which at one radius is the same.
     let found = separation(
         &problem,
@@ -183,11 +183,11 @@ fn curves_reach_the_largest_sensitivity() {
 fn what_is_proposed_stays_within_the_reach_of_the_bar() {
     let complete = states::complete(&with_setups_of_1_um(5), true).unwrap();
     let within = |reach_mm: f64| {
-        let menu = CandidateTests {
+        let menu = TestVariations {
             reach_mm,
-            ..CandidateTests::short()
+            ..TestVariations::short()
         };
-        let found = entries(&complete, &menu).unwrap();
+        let found = candidate_tests(&complete, &menu).unwrap();
         for entry in &found {
             let Station::BallBar(bar) = &entry.test.station else {
                 panic!("{}", entry.name)
@@ -212,14 +212,14 @@ fn what_is_proposed_stays_within_the_reach_of_the_bar() {
 fn by_the_minute_a_short_test_is_taken() {
     let complete = states::complete(&with_setups_of_1_um(5), true).unwrap();
     let problem = states::problem_by_test(&complete, noise_um(0.3)).unwrap();
-    let menu = CandidateTests {
+    let menu = TestVariations {
         bars_mm: vec![100.0, 150.0],
         radii_mm: vec![100.0],
         heights_mm: vec![0.0],
         standing_deg: vec![0.0],
         ranges: vec![1.0, 0.5],
         both_directions: vec![true, false],
-        ..CandidateTests::default()
+        ..TestVariations::default()
     };
     let proposed = |by_minute| {
         let options = ImproveOptions {
@@ -231,9 +231,17 @@ fn by_the_minute_a_short_test_is_taken() {
     };
     let [best, quick] = [proposed(false), proposed(true)];
     // A part never sees more than the whole, …
-    assert!(!best.steps[0].test.contains("one way"), "{}", best.steps[0].test);
+    assert!(
+        !best.steps[0].test.contains("in one direction"),
+        "{}",
+        best.steps[0].test
+    );
     // … and where set-ups decide, it sees nearly as much in less time.
-    assert!(quick.steps[0].test.contains("one way"), "{}", quick.steps[0].test);
+    assert!(
+        quick.steps[0].test.contains("in one direction"),
+        "{}",
+        quick.steps[0].test
+    );
     let gain = |found: &abbe::identify::plan::improve::Improvement| {
         (found.before / found.steps[0].after).ln() / found.steps[0].minutes
     };

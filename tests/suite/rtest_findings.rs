@@ -3,7 +3,7 @@
 
 use std::f64::consts::FRAC_PI_2;
 
-use abbe::identify::trace::{Trace, TraceOptions, trace};
+use abbe::identify::trace::{TraceOptions, TraceOutcome, trace};
 use abbe::model::session::read::{self, ReadOptions};
 
 use crate::plant::machine::Stated;
@@ -127,7 +127,7 @@ fn pitch_compensation() -> Vec<Injected> {
 }
 
 /// Reads a session of the plant and traces it, whatever may have been meant by it.
-fn traced<T>(session: &Session, told: impl FnOnce(&Trace<'_>) -> T) -> T {
+fn traced<T>(session: &Session, told: impl FnOnce(&TraceOutcome<'_>) -> T) -> T {
     let folder = tempfile::tempdir().unwrap();
     session.write(folder.path()).unwrap();
     let session = read::session(&folder.path().join("session.toml"), &ReadOptions::default()).unwrap();
@@ -144,7 +144,7 @@ fn traced<T>(session: &Session, told: impl FnOnce(&Trace<'_>) -> T) -> T {
 }
 
 /// The staircase that trace has found for a component: where and how high, µm.
-fn staircase(outcome: &Trace<'_>, component: &str) -> Option<Vec<(f64, f64)>> {
+fn staircase(outcome: &TraceOutcome<'_>, component: &str) -> Option<Vec<(f64, f64)>> {
     let number = outcome
         .effects
         .iter()

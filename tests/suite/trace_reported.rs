@@ -2,7 +2,7 @@
 
 use abbe::identify::fit::fit;
 use abbe::identify::noise::Noise;
-use abbe::identify::plan::candidate_tests::{CandidateTests, entries};
+use abbe::identify::plan::candidate_tests::{TestVariations, candidate_tests};
 use abbe::identify::problem::Problem;
 use abbe::identify::quantity::Given;
 use abbe::identify::results::EffectName;
@@ -201,9 +201,9 @@ fn each_explanation_is_told_with_how_well_a_further_test_separates_it() {
     let file = ready("hermle-c600u/measured/session.toml");
     let session = read::session(&file, &ReadOptions::default()).unwrap();
     let mut trace = trace(&session, &TraceOptions::default(), &|_| true).unwrap();
-    let menu = CandidateTests {
+    let menu = TestVariations {
         thin: 1,
-        ..CandidateTests::short()
+        ..TestVariations::short()
     };
     separate_aliases(&mut trace, &menu, &|_| true).unwrap();
     let effect = &trace.result.effects[0];
@@ -242,7 +242,7 @@ fn each_explanation_is_told_with_how_well_a_further_test_separates_it() {
     let coefficients = &trace.after_fit.beta[trace.after_fit.beta.len() - 2..];
     let alternatives = &trace.alias_effects[0];
     let menu = menu.for_effects(std::iter::once(found).chain(alternatives));
-    let proposed = entries(&session, &menu).unwrap();
+    let proposed = candidate_tests(&session, &menu).unwrap();
     let proposed = proposed.iter().find(|entry| entry.name == tests[0].test).unwrap();
     let mut longer = session.clone();
     longer.tests.push(proposed.test.clone());
@@ -267,7 +267,7 @@ fn an_effect_without_an_alternative_is_unique() {
         ..TraceOptions::default()
     };
     let mut trace = trace(&session, &options, &|_| true).unwrap();
-    separate_aliases(&mut trace, &CandidateTests::short(), &|_| true).unwrap();
+    separate_aliases(&mut trace, &TestVariations::short(), &|_| true).unwrap();
     let effect = &trace.result.effects[0];
     assert!(effect.unique && effect.indistinguishable == 1 && effect.aliases.is_empty());
     assert_eq!(effect.explanations, effect.name.meaning);

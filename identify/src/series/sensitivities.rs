@@ -7,7 +7,7 @@ use abbe_model::sensitivity::TestModel;
 use super::abscissa::Abscissa;
 use crate::error::IdentifyError;
 use crate::parameters::Parameter;
-use crate::plan::linear::is_wanted;
+use crate::plan::linear::is_of_interest;
 use crate::problem::{Block, Problem};
 
 /// Points along a run at most.
@@ -69,7 +69,7 @@ pub fn sensitivities(problem: &Problem<'_>, beta: &[f64]) -> Result<Vec<TestSens
         let names = names(&test.station);
         for coordinate in 0..coordinates {
             let columns = (0..list.len())
-                .filter(|j| is_wanted(&list[*j]))
+                .filter(|j| is_of_interest(&list[*j]))
                 .filter_map(|j| {
                     let scale = 1e3 / list[j].unit.display_per_internal;
                     let value = |i: &usize| rows[(i * coordinates + coordinate, j)] * scale;
@@ -107,7 +107,7 @@ pub fn over_poses(problem: &Problem<'_>, beta: &[f64]) -> Result<Vec<Sensitivity
     let wanted = list
         .iter()
         .zip(squares)
-        .filter(|(parameter, _)| is_wanted(parameter));
+        .filter(|(parameter, _)| is_of_interest(parameter));
     Ok(wanted
         .map(|(parameter, square)| {
             let rms_um = (square / readings).sqrt() * 1e3 / parameter.unit.display_per_internal;
