@@ -1,7 +1,8 @@
-//! Effects in words for whoever works on the machine: `C table: axial motion twice per turn`.
+//! Plain descriptions of effects for work at the machine: `C table: axial motion twice per turn`.
 //!
-//! The words follow from component × driver × shape, so that every effect of the library has them, and no two have the same. Parts are named by their place
-//! in the chain: a rotary axis on the workpiece side is a table, on the tool side a head, a linear axis a slide, an axis of a robot a joint.
+//! A description follows from component × driver × shape, so every effect of the library has its own. Machine parts are named by their
+//! position in the chain. A rotary axis on the workpiece side is a table, on the tool side a head. A linear axis is a slide, an axis of a
+//! robot a joint.
 
 use std::fmt;
 
@@ -10,7 +11,7 @@ use abbe_model::chain::Machine;
 use abbe_model::component::{ErrorKind, ErrorName, Freedom};
 use abbe_model::effect::{Component, Driver, Effect, Shape};
 
-/// What an effect means: the part of the machine or instrument, and what it does.
+/// The description of an effect: the part of the machine or instrument, and its error.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Meaning {
     /// `C table`, `X slide`, `joint J2`, `workpiece ball`.
@@ -25,7 +26,7 @@ impl fmt::Display for Meaning {
     }
 }
 
-/// What an effect means on a machine.
+/// The description of an effect on a machine.
 pub fn meaning(machine: &Machine, effect: &Effect) -> Meaning {
     let words = Words { machine, effect };
     let tests = match effect.tests.as_slice() {
@@ -39,7 +40,7 @@ pub fn meaning(machine: &Machine, effect: &Effect) -> Meaning {
     }
 }
 
-/// Several explanations in one phrase, each part of the machine once, in the order in which the parts first occur.
+/// Joins several explanations into one phrase. Each part of the machine occurs once, in the order of first occurrence.
 pub fn explanations(meanings: &[Meaning]) -> String {
     let mut parts: Vec<(&str, Vec<&str>)> = Vec::new();
     for Meaning { part, what } in meanings {
@@ -53,7 +54,7 @@ pub fn explanations(meanings: &[Meaning]) -> String {
     parts.join("; or ")
 }
 
-/// The name of an axis as a part of its machine.
+/// The name of an axis as a machine part.
 fn part_of_axis(machine: &Machine, axis: usize) -> String {
     let Axis { name, kind, .. } = &machine.axes[axis];
     let has = |kind: AxisKind| machine.axes.iter().any(|axis| axis.kind == kind);
@@ -67,7 +68,7 @@ fn part_of_axis(machine: &Machine, axis: usize) -> String {
     }
 }
 
-/// X, Y or Z: the direction of a translation, or the one that a rotation turns about.
+/// X, Y or Z: the direction of a translation, or the axis of a rotation.
 fn direction(freedom: Freedom) -> char {
     Freedom::ALL[freedom.index() % 3].letter()
 }
@@ -96,7 +97,7 @@ impl Words<'_> {
         self.axis_of_driver().is_some() && self.axis_of_driver() == self.axis_of_component()
     }
 
-    /// What moves.
+    /// The part that moves.
     fn part(&self) -> String {
         match &self.effect.component {
             Component::Axis(name) => match self.axis_of_component() {
@@ -112,7 +113,7 @@ impl Words<'_> {
         }
     }
 
-    /// In which way it moves.
+    /// The motion of the part.
     fn motion(&self) -> String {
         match &self.effect.component {
             Component::Axis(name) => self.axis_motion(name),
@@ -158,7 +159,7 @@ impl Words<'_> {
         }
     }
 
-    /// What it follows, as the object of a sentence: `its angle`, `the position of the X slide`, `time`.
+    /// The driver as the object of a sentence: `its angle`, `the position of the X slide`, `time`.
     fn followed(&self) -> String {
         let quantity = |axis: usize| match self.machine.axes[axis].kind {
             AxisKind::Rotary => "angle",
@@ -179,7 +180,7 @@ impl Words<'_> {
         }
     }
 
-    /// ` of the X slide` where it follows another axis.
+    /// ` of the X slide` if the effect follows another axis.
     fn of_another(&self) -> String {
         match self.axis_of_driver() {
             Some(axis) if !self.follows_its_own_axis() => {
@@ -189,7 +190,7 @@ impl Words<'_> {
         }
     }
 
-    /// A position, period or width of what it follows, with its unit.
+    /// A position, period or width of the driver, with its unit.
     fn place(&self, value: f64) -> String {
         let rotary = self
             .axis_of_driver()
@@ -203,7 +204,7 @@ impl Words<'_> {
         }
     }
 
-    /// In which way it moves, and how that follows its driver.
+    /// The motion and its dependence on the driver.
     fn what(&self) -> String {
         let motion = self.motion();
         match &self.effect.shape {
@@ -222,14 +223,14 @@ impl Words<'_> {
             }
             Shape::Curve { intervals, .. } => {
                 format!(
-                    "{motion}, a free curve over {} in {intervals} intervals",
+                    "{motion}, a nonparametric curve over {} in {intervals} intervals",
                     self.followed()
                 )
             }
             Shape::Backlash => self.backlash(motion),
             Shape::Lag => self.lag(motion),
             Shape::ReversalSpike { width } => format!(
-                "{motion}, a spike after reversal{} that dies away over {}",
+                "{motion}, a spike after reversal{} that decays over {}",
                 self.of_another(),
                 self.place(*width)
             ),
@@ -269,7 +270,7 @@ impl Words<'_> {
         }
     }
 
-    /// Whether the component is the error of the axis in the very freedom that it moves in.
+    /// Whether the component is the positioning error of its axis.
     fn is_positioning(&self) -> bool {
         let Component::Axis(name) = &self.effect.component else {
             return false;
@@ -318,7 +319,7 @@ impl Words<'_> {
     }
 }
 
-/// Steps that are listed one by one.
+/// Maximum number of steps in a list.
 const MAX_PLACES: usize = 6;
 
 /// `once`, `twice`, `17 times`.

@@ -1,8 +1,8 @@
-//! Identify: the unknowns of a session from its readings.
+//! Estimation of the parameters of a session from its readings.
 //!
-//! The rank is decided on the linearisation at the nominal machine; Gauss–Newton then moves in the seen directions only, so that what cannot
-//! be seen stays at its nominal value and is reported as a combination, never as a number. Uncertainties follow from the law of propagation,
-//! `Cov = N (Nᵀ JᵀV⁻¹J N)⁻¹ Nᵀ` with `N` the seen directions (JCGM 100, 5.2; JCGM 102, 6.2).
+//! The rank is decided on the linearisation at the nominal machine. Gauss–Newton then iterates in the identifiable directions only. A
+//! non-identifiable combination keeps its nominal value and is reported as a combination, never as a number. The law of propagation gives
+//! the uncertainties, `Cov = N (Nᵀ JᵀV⁻¹J N)⁻¹ Nᵀ`. The columns of `N` span the identifiable directions (JCGM 100, 5.2; JCGM 102, 6.2).
 
 use std::cell::RefCell;
 use std::collections::BTreeMap;
@@ -25,43 +25,43 @@ use crate::rank::Rank;
 use crate::results::{FitResult, ParameterResult, Rejected, Unobservable};
 use crate::triangle::Triangle;
 
-/// What a fit found, internal units.
+/// The result of a fit, in internal units.
 #[derive(Clone, Debug)]
 pub struct Fit {
-    /// Every unknown; those in unseen combinations hold the part that is seen.
+    /// Estimates of all parameters. A parameter in a null-space combination holds its identifiable part only.
     pub beta: Vec<f64>,
-    /// What is seen and what is not.
+    /// Identifiable and null directions.
     pub rank: Rank,
-    /// Covariance of the unknowns (seen part), from the noise alone.
+    /// Covariance of the parameters (identifiable part), from the noise alone.
     pub covariance: Mat<f64>,
-    /// The triangles of the folds at the solution.
+    /// The triangular factors of the folds at the solution.
     pub triangles: Vec<Triangle>,
     /// Residuals by test, mm.
     pub residuals: Vec<Vec<f64>>,
-    /// On readings that were left out.
+    /// Held-out residuals.
     pub held_out: HeldOut,
-    /// The Birge ratio `√(χ²/ν)`: residual over noise; below 1 where readings scatter less than the noise says.
+    /// The Birge ratio `√(χ²/ν)`. It is below 1 if the readings scatter less than the assumed noise.
     pub birge_ratio: f64,
-    /// By how much uncertainties are enlarged: the Birge ratio where it is significantly above 1, else 1.
+    /// Factor on the standard uncertainties: the Birge ratio if it is significantly above 1, else 1.
     pub u_enlargement: f64,
 }
 
-/// Guess of the noise from which iterations start where nothing is known: 1 µm.
+/// Start value of the noise standard deviation if neither session nor repeats give one: 1 µm.
 const FIRST_GUESS_MM: f64 = 1e-3;
-/// Least noise that is estimated: readings that repeat exactly, as computed ones do, are still rounded.
+/// Least estimate of the noise standard deviation. Computed readings repeat exactly, but are still rounded.
 const MIN_NOISE_MM: f64 = MIN_UM * 1e-3;
-/// How many times noise and outliers are found anew at most.
+/// Maximum number of rounds that re-estimate noise and outliers.
 const ROUNDS: usize = 6;
-/// Relative change of the noise from which on it is found.
+/// Relative change of the noise standard deviation at which the rounds stop.
 const SETTLED: f64 = 1e-4;
-/// Probability below which χ² is taken to say that the residual holds more than noise.
+/// Significance level of the χ² test of the residual against the noise.
 const BIRGE_SIGNIFICANCE: f64 = 1e-3;
 
-/// A session as a problem in the directions that are seen.
+/// The least-squares problem of a session, restricted to the identifiable directions.
 struct IdentifiableDirections<'p, 'a> {
     problem: &'p Problem<'a>,
     basis: &'p Mat<f64>,
-    /// The last linearisation: the unknowns, and the triangles of the folds there.
+    /// The last linearisation: the parameters, and the triangular factors of the folds at these values.
     last: RefCell<(Vec<f64>, Vec<Triangle>)>,
 }
 
@@ -93,14 +93,14 @@ impl LeastSquares for IdentifiableDirections<'_, '_> {
     }
 }
 
-/// The triangle of all readings and of what is known beforehand.
+/// The triangular factor of all readings and priors.
 pub(crate) fn whole(problem: &Problem<'_>, beta: &[f64], triangles: &[Triangle]) -> Triangle {
     let mut whole = problem.prior_triangle(beta);
     triangles.iter().for_each(|triangle| whole.merge(triangle));
     whole
 }
 
-/// The triangle of `[J·N | r]` from that of `[J | r]`.
+/// The triangular factor of `[J·N | r]` from that of `[J | r]`.
 pub fn in_directions(triangle: &Triangle, basis: &Mat<f64>) -> Triangle {
     let (r, c, rest) = triangle.parts();
     let (n, rank) = (basis.nrows(), basis.ncols());
@@ -116,15 +116,16 @@ pub fn in_directions(triangle: &Triangle, basis: &Mat<f64>) -> Triangle {
     result
 }
 
-/// A session as a problem, with the noise that the session states, that its repeats show, or that the residual of its fit gives, and with its outliers excluded.
+/// Prepares and fits a session. The noise is the stated one, that of repeats, or that of the residual. Outliers are excluded.
 ///
 /// # Errors
-/// See [`Problem::new`]; also if the iterations do not end.
+/// See [`Problem::new`]; also if the iterations do not converge.
 pub fn prepare(session: &Session, seed: u64) -> Result<(Problem<'_>, Fit), IdentifyError> {
     prepare_with(session, &[], seed)
 }
 
-/// The same of a session that declares some more effects: noise, outliers and rank are those of the fit of that session, figure for figure.
+/// As [`prepare`], for the session with further declared effects. Noise, outliers and rank are exactly those of a session that declares
+/// them.
 ///
 /// # Errors
 /// See [`prepare`].
@@ -150,7 +151,7 @@ pub fn prepare_with<'a>(
         );
     }
     let mut fit = plausibility::checked(&problem, fit(&problem, None))?;
-    // Noise and outliers follow from residuals, residuals from a fit; a few rounds settle both. What is returned is always a fit with the noise returned.
+    // Noise and outliers depend on the residuals, and the residuals on the fit. The returned fit always uses the returned noise.
     for _ in 0..ROUNDS {
         let rejected = crate::outliers::reject(&problem, &fit);
         let unchanged = rejected == problem.rejected;
@@ -169,8 +170,9 @@ pub fn prepare_with<'a>(
     Ok((problem, fit))
 }
 
-/// What the nominal machine leaves as residual, mm, once the set-ups are fitted to it (linearised): noise for a first decision on what is seen. The
-/// machine's errors stay out of it: among sockets, shrinking the machine to nothing would explain every reading.
+/// Root mean square of the residual of the nominal machine, mm, after a linearised fit of the set-up quantities. It serves as the noise in
+/// the first decision on the rank. Machine errors are excluded: in a socket session, shrinking the machine to a point would explain every
+/// reading.
 fn nominal_residual_mm(problem: &Problem<'_>) -> Result<f64, IdentifyError> {
     let list = &problem.parameters.list;
     let nominal = vec![0.0; list.len()];
@@ -204,10 +206,10 @@ fn estimated_noise(problem: &Problem<'_>, fit: &Fit, floor: f64) -> Noise {
     Noise::white(sigma.max(floor).max(MIN_NOISE_MM), NoiseSource::Residual)
 }
 
-/// Fits a problem, from the nominal machine or from an earlier fit's unknowns.
+/// Fits a problem, starting from the nominal machine or from given parameters.
 ///
 /// # Errors
-/// If there is nothing to fit, the model cannot be evaluated, or the iterations do not end.
+/// If there are no parameters, the model cannot be evaluated, or the iterations do not converge.
 pub fn fit(problem: &Problem<'_>, start: Option<&[f64]>) -> Result<Fit, IdentifyError> {
     let unknowns = problem.parameters.list.len();
     let size: Vec<f64> = problem
@@ -240,13 +242,13 @@ pub fn fit(problem: &Problem<'_>, start: Option<&[f64]>) -> Result<Fit, Identify
     }
     let (last, triangles) = seen.last.into_inner();
     let beta = end.unwrap_or_else(|| last.clone());
-    // The iterations end within a step of the last linearisation that is too small for the model to bend.
+    // After the last linearisation the parameters move by a step at which nonlinearity is negligible.
     let step: Vec<f64> = beta.iter().zip(&last).map(|(end, last)| end - last).collect();
     let triangles = triangles.iter().map(|triangle| triangle.after(&step)).collect();
     finish(problem, beta, triangles, rank)
 }
 
-/// Everything that follows from the solution.
+/// Computes covariance, residuals, cross-validation and χ² at the solution.
 fn finish(
     problem: &Problem<'_>,
     beta: Vec<f64>,
@@ -259,7 +261,7 @@ fn finish(
     let held_out = held_out(problem, &beta, &triangles, &whole, &rank.seen)?;
     let zero = vec![0.0; beta.len()];
     let chi_square: f64 = whole.sum_of_squares_after(&zero);
-    // What is known beforehand counts as observed: it has its rows in χ².
+    // Each prior counts as an observation in χ².
     let free = (problem.readings() * problem.coordinates() + problem.prior_rows())
         .saturating_sub(rank.seen.ncols())
         .max(1) as f64;
@@ -275,7 +277,7 @@ fn finish(
     })
 }
 
-/// By how much uncertainties are enlarged: the Birge ratio `√(χ²/ν)` where it is significantly above 1, else 1.
+/// Factor on the standard uncertainties: the Birge ratio `√(χ²/ν)` if it is significantly above 1, else 1.
 pub(crate) fn u_enlargement(chi_square: f64, free: f64) -> f64 {
     let significance = ChiSquared::new(free).map(|law| law.sf(chi_square)).unwrap_or(1.0);
     if significance < BIRGE_SIGNIFICANCE {
@@ -285,12 +287,12 @@ pub(crate) fn u_enlargement(chi_square: f64, free: f64) -> f64 {
     }
 }
 
-/// What a user should know where uncertainties are enlarged.
+/// The warning about enlarged uncertainties, if they are enlarged.
 pub(crate) fn enlargement_warning(enlargement: f64) -> Option<String> {
     (enlargement > 1.0).then(|| {
         format!(
             "the residual exceeds the noise (χ² is {:.2} times its degrees of freedom); uncertainties are enlarged by {enlargement:.2}; \
-             `abbe trace` looks for the cause",
+             trace the residual to find the unmodelled effect",
             enlargement.powi(2)
         )
     })
@@ -318,7 +320,7 @@ pub(crate) fn covariance(triangle: &Triangle, basis: &Mat<f64>) -> Result<Mat<f6
     Ok(&scaled * scaled.transpose())
 }
 
-/// The fit as it is reported.
+/// The fit in its reported form.
 pub fn report(problem: &Problem<'_>, fit: &Fit) -> FitResult {
     let three = problem.coordinates() == 3;
     let rms = rms_mm(problem, &fit.residuals);
@@ -354,16 +356,16 @@ pub fn report(problem: &Problem<'_>, fit: &Fit) -> FitResult {
     }
 }
 
-/// A quantity that a fit reports.
+/// A reported quantity.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Quantity {
-    /// An unknown, by its place.
+    /// A parameter, by index.
     Unknown(usize),
-    /// Amplitude and phase of a harmonic, by the place of its cosine.
+    /// Amplitude and phase of a harmonic, by the index of its cosine coefficient.
     Harmonic(usize),
 }
 
-/// What is reported, in its order: the unknowns that are seen.
+/// The reported quantities in their order: those of the identifiable parameters.
 pub(crate) fn quantities(problem: &Problem<'_>, rank: &Rank) -> Vec<Quantity> {
     let list = &problem.parameters.list;
     let mut quantities = Vec::new();
@@ -390,8 +392,8 @@ pub(crate) fn quantities(problem: &Problem<'_>, rank: &Rank) -> Vec<Quantity> {
     quantities
 }
 
-/// Passes on the values of quantities at other unknowns than those of a fit, in outside units, amplitude before phase. A phase is counted from that of the
-/// fit, so that none lies a turn away.
+/// Passes the reported quantities at the parameters `beta` to a function, in display units, amplitude before phase. Each phase lies within
+/// half a turn of the fit's phase.
 pub(crate) fn values_at(
     problem: &Problem<'_>,
     fit: &Fit,
@@ -413,7 +415,7 @@ pub(crate) fn values_at(
     }
 }
 
-/// The unknowns that are seen, in outside units; harmonics as amplitude and phase of `amplitude · cos(order · angle + phase)`.
+/// The identifiable parameters, in display units. A harmonic has amplitude and phase of `amplitude · cos(order · angle + phase)`.
 pub fn parameters(problem: &Problem<'_>, fit: &Fit) -> Vec<ParameterResult> {
     let list = &problem.parameters.list;
     let u_inside = |j: usize| fit.covariance[(j, j)].max(0.0).sqrt() * fit.u_enlargement;
@@ -468,12 +470,12 @@ fn amplitude_and_phase(problem: &Problem<'_>, fit: &Fit, j: usize) -> [Parameter
     ]
 }
 
-/// Of a phase no more can be said than the standard deviation of a uniform one, °.
+/// Standard uncertainty of an undetermined phase, °: the standard deviation of a uniform distribution over one turn.
 pub(crate) fn any_phase_deg() -> f64 {
     180.0 / 3.0_f64.sqrt()
 }
 
-/// The unseen combinations, in outside units and in words.
+/// The null-space combinations, in display units and in words.
 pub fn unobservable(problem: &Problem<'_>, rank: &Rank) -> Vec<Unobservable> {
     let list = &problem.parameters.list;
     rank.unseen
@@ -491,7 +493,7 @@ pub fn unobservable(problem: &Problem<'_>, rank: &Rank) -> Vec<Unobservable> {
                 .map(|(j, value)| (list[*j].id.clone(), value / leading))
                 .collect();
             let why = match outside.as_slice() {
-                [(j, _)] => format!("no reading of these tests changes with {}", list[*j].id),
+                [(j, _)] => format!("no reading changes with {}", list[*j].id),
                 [(first, _), rest @ ..] => {
                     let others: Vec<&str> = rest.iter().map(|(j, _)| list[*j].id.as_str()).collect();
                     format!(
@@ -507,7 +509,7 @@ pub fn unobservable(problem: &Problem<'_>, rank: &Rank) -> Vec<Unobservable> {
         .collect()
 }
 
-/// The readings that are left out, by name.
+/// The excluded outliers, by test, file and line.
 pub fn rejected(problem: &Problem<'_>, fit: &Fit) -> Vec<Rejected> {
     let coordinates = problem.coordinates();
     let mut list = Vec::new();
@@ -570,7 +572,7 @@ mod tests {
             other[j..j + 2].copy_from_slice(&coefficients(3.0, other_deg));
             let mut values = Vec::new();
             values_at(&problem, &fit, &quantities, &other, |value| values.push(value));
-            // Every wave before this one says two numbers; there is none.
+            // No harmonic with two reported values precedes this one.
             assert!((values[place] - 3.0).abs() < 1e-12, "{}", values[place]);
             assert!(
                 (values[place + 1] - other_deg).abs() < 1e-9,

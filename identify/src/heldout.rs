@@ -1,9 +1,10 @@
-//! The error on readings that the fit did not see.
+//! Cross-validation: the residual of readings that the fit did not use.
 //!
-//! One run at a time is left out, or contiguous blocks where there are no runs, or seeded folds where rows are independent poses. Nothing of the left-out
-//! fold enters: with `W` such that `WᵀAW = I` for the normal matrix `A` of all readings, `T = J·W` of the fold's rows `[J | r]` and `y` what is left to
-//! do in these directions, the step to the fit of the others is `W(I − TᵀT)⁻¹(y − Tᵀr)`, which takes a matrix no larger than the fold has rows
-//! (Woodbury). Where the others hardly see a direction any more, their triangles are merged and solved anew.
+//! A fold is one run, or a contiguous block where there are no runs, or a seeded set of independent poses. The fit of the other folds does
+//! not use the held-out fold. Let `A` be the normal matrix of all readings and `W` such that `WᵀAW = I`. Let `T = J·W` for the fold's rows
+//! `[J | r]`, and `y` the remaining step in these directions. The step to the fit of the other folds is `W(I − TᵀT)⁻¹(y − Tᵀr)`, with a
+//! matrix no larger than the number of the fold's rows (Woodbury). If the other folds barely determine a direction, their triangular
+//! factors are merged and solved again.
 
 mod folds;
 
@@ -15,16 +16,16 @@ use crate::problem::Problem;
 use crate::triangle::Triangle;
 pub use folds::{FoldKind, Folds, mislabelled_runs};
 
-/// The error on left-out readings.
+/// Held-out residuals.
 #[derive(Clone, Debug)]
 pub struct HeldOut {
-    /// The residual of every scalar reading under the fit that did not see it, mm, by test.
+    /// The residual of every scalar reading under the fit without its fold, mm, by test.
     pub residuals: Vec<Vec<f64>>,
-    /// Root mean square over scalar readings that count, mm.
+    /// Root mean square over the scalar readings that are not excluded, mm.
     pub rms_mm: f64,
 }
 
-/// Root mean square over the scalar readings that count, mm.
+/// Root mean square over the scalar readings that are not excluded, mm.
 pub fn rms_mm(problem: &Problem<'_>, residuals: &[Vec<f64>]) -> f64 {
     let coordinates = problem.coordinates();
     let (mut sum, mut count) = (0.0, 0_usize);
@@ -39,8 +40,8 @@ pub fn rms_mm(problem: &Problem<'_>, residuals: &[Vec<f64>]) -> f64 {
     (sum / count.max(1) as f64).sqrt()
 }
 
-/// Leaves out one fold after another. `beta` is the fit of all readings, `triangles` those of the folds there, `whole` that of all readings and priors,
-/// `basis` spans the seen directions (unknowns × rank).
+/// Holds out each fold in turn. `beta` is the fit of all readings, `triangles` are the factors of the folds there, `whole` is the factor
+/// of all readings and priors, `basis` spans the identifiable directions (parameters × rank).
 ///
 /// # Errors
 /// If the model cannot be evaluated.
@@ -82,7 +83,7 @@ pub fn held_out(
         }
         Ok(residual)
     });
-    // Blocks come in the order of the rows.
+    // Blocks are in the order of the rows.
     for (block, residual) in blocks
         .iter()
         .zip(predicted.collect::<Result<Vec<_>, IdentifyError>>()?)
@@ -95,14 +96,14 @@ pub fn held_out(
     })
 }
 
-/// What the others have to see of a direction, as a share of what all readings see of it, for the fit of all to lead to theirs.
+/// Least share of the information on a direction that the other folds must hold for the update formula.
 const MIN_SHARE: f64 = 1e-6;
 
-/// The seen directions, in which the normal matrix of all readings is the identity.
+/// The identifiable directions, scaled so that the normal matrix of all readings is the identity.
 struct Directions {
-    /// `W`: unknowns × rank.
+    /// `W`: parameters × rank.
     spread: Mat<f64>,
-    /// `y`: the step that all readings still ask for.
+    /// `y`: the remaining step of the fit of all readings.
     left: Mat<f64>,
 }
 
@@ -122,7 +123,7 @@ impl Directions {
         let singular = svd.S().column_vector();
         let mut spread = basis * svd.V();
         for (k, mut column) in spread.col_iter_mut().enumerate() {
-            // A direction of nothing is none: what leaves it out solves anew.
+            // A direction without information becomes infinite here; the folds are then solved again.
             column *= faer::Scale(1.0 / singular[k]);
         }
         let right = Mat::from_fn(c.len(), 1, |i, _| c[i]);
@@ -132,7 +133,7 @@ impl Directions {
         })
     }
 
-    /// The step to the fit of all readings but a fold's; `None` where they hardly see a direction any more.
+    /// The step to the fit without a fold; `None` if the other folds barely determine a direction.
     fn step_without(&self, fold: &Triangle) -> Result<Option<Vec<f64>>, IdentifyError> {
         if !self.spread.is_all_finite() {
             return Ok(None);
@@ -167,8 +168,8 @@ impl Directions {
     }
 }
 
-/// From the fit of all readings to that of the readings in `rest`: the least solution in absolute terms, so that what the remaining readings do
-/// not see goes to its nominal value and not to what the left-out ones said.
+/// The step from the fit of all readings to that of the readings in `rest`. It is the minimum-norm solution: a direction that the
+/// remaining readings do not determine returns to its nominal value.
 fn step_without(rest: &Triangle, beta: &[f64], basis: &Mat<f64>) -> Result<Vec<f64>, IdentifyError> {
     let (r, c, _) = rest.parts();
     let (n, rank) = (basis.nrows(), basis.ncols());
@@ -201,7 +202,7 @@ mod tests {
     use super::*;
     use rand::{RngExt, SeedableRng};
 
-    /// Rows of `[J | r]`, drawn.
+    /// Simulated rows of `[J | r]`.
     fn drawn(rows: usize, unknowns: usize, random: &mut rand_pcg::Pcg64Mcg) -> Triangle {
         let mut triangle = Triangle::new(unknowns);
         let block = Mat::from_fn(rows, unknowns + 1, |_, _| random.random_range(-1.0..1.0));
@@ -213,7 +214,7 @@ mod tests {
     fn a_fold_is_left_out_as_if_the_others_were_solved_anew() {
         let mut random = rand_pcg::Pcg64Mcg::seed_from_u64(1);
         let unknowns = 6;
-        // Two combinations of the unknowns are not among the directions that are fitted.
+        // Two combinations of the parameters are outside the fitted directions.
         let basis = Mat::from_fn(
             unknowns,
             4,
@@ -230,7 +231,7 @@ mod tests {
         let end = Directions::of(&merged(&folds, usize::MAX), &basis).unwrap();
         let step: Vec<f64> = (&end.spread * &end.left).col(0).iter().copied().collect();
         let moved: Vec<Triangle> = folds.iter().map(|fold| fold.after(&step)).collect();
-        // From the end of the fit, where nothing is left to do, and from before it, where much is.
+        // At the solution, where the remaining step is zero, and before it.
         for (folds, beta) in [(moved, step), (folds, vec![0.0; unknowns])] {
             let all = Directions::of(&merged(&folds, usize::MAX), &basis).unwrap();
             for (number, fold) in folds.iter().enumerate() {

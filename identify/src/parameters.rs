@@ -1,4 +1,4 @@
-//! The unknowns of a session, and which components of which readings each of them moves.
+//! The parameters of a session, and the components of the readings that each parameter affects.
 
 use std::collections::BTreeSet;
 use std::sync::Arc;
@@ -12,14 +12,14 @@ use crate::drivers::{self, Origin};
 use crate::error::IdentifyError;
 use crate::unit::Unit;
 
-/// Where an unknown comes from.
+/// The kind of a parameter.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Role {
-    /// A location error or a constant of an axis: a PIGE.
+    /// A location error or a constant error of an axis (PIGE).
     Error,
     /// A set-up quantity of the instrument.
     Setup,
-    /// A coefficient of an effect: which effect, which coefficient.
+    /// A coefficient of an effect.
     Coefficient {
         /// Index among the effects.
         effect: usize,
@@ -28,22 +28,22 @@ pub enum Role {
     },
 }
 
-/// One unknown.
+/// One parameter.
 #[derive(Clone, Debug)]
 pub struct Parameter {
-    /// As it stands in results: `EY0A`, `bar[A100]`, `EZC~C:h2.cos`.
+    /// Identifier in results: `EY0A`, `bar[A100]`, `EZC~C:h2.cos`.
     pub id: String,
-    /// Unit outside.
+    /// Display unit.
     pub unit: Unit,
-    /// Physical size, internal units: 1 mm, 0.01 rad, or what moves the component by that much.
+    /// Physical size, internal units: 1 mm, 0.01 rad, or the value that changes the component by that much.
     pub size: f64,
-    /// What is known before.
+    /// The prior.
     pub prior: Prior,
-    /// Where it comes from.
+    /// The kind.
     pub role: Role,
 }
 
-/// A parameter moves a slot of a test, by a constant or by a basis function row by row.
+/// The contribution of a parameter to a slot of a test: a constant, or a basis function row by row.
 #[derive(Clone, Debug)]
 pub struct Part {
     /// Index of the parameter.
@@ -54,19 +54,19 @@ pub struct Part {
     pub basis: Option<Arc<Vec<f64>>>,
 }
 
-/// What moves the readings of one test: a test of many has few of the session's unknowns.
+/// The parameters that affect the readings of one test. A test of a large session depends on few of the session's parameters.
 #[derive(Clone, Debug, Default)]
 pub struct InstrumentParameter {
-    /// The slots that some unknown moves.
+    /// The slots that depend on a parameter.
     pub slots: Vec<usize>,
-    /// The unknowns.
+    /// The parameters, by index in the session.
     pub unknowns: Vec<usize>,
-    /// For each slot, the unknowns that move it, by their places among these, and their basis functions.
+    /// For each slot, the parameters that it depends on (index within `parameters`) and their basis functions.
     pub movers: Vec<Vec<(usize, Option<Arc<Vec<f64>>>)>>,
 }
 
 impl InstrumentParameter {
-    /// From what moves what in the test.
+    /// Collects the parameters and slots of a test from their contributions.
     pub fn of(parts: &[Part]) -> InstrumentParameter {
         let sorted = |numbers: &mut dyn Iterator<Item = usize>| {
             let numbers: BTreeSet<usize> = numbers.collect();
@@ -88,16 +88,16 @@ impl InstrumentParameter {
     }
 }
 
-/// The unknowns of a session.
+/// The parameters of a session.
 #[derive(Clone, Debug, Default)]
 pub struct Parameters {
-    /// The unknowns, errors first, then set-up quantities, then coefficients of effects.
+    /// Errors first, then set-up quantities, then coefficients of effects.
     pub list: Vec<Parameter>,
-    /// For each test with readings, what moves what.
+    /// For each test with readings, the contributions of parameters to slots.
     pub parts: Vec<Vec<Part>>,
-    /// The effects whose coefficients are among the unknowns.
+    /// The effects whose coefficients are parameters.
     pub effects: Vec<Effect>,
-    /// Their identifiers: [`Effect::id`], numbered from the second of those that differ only in the numbers of their shapes.
+    /// Their identifiers: [`Effect::id`]. Effects that differ only in the numbers of their shapes are numbered from the second on.
     pub effect_ids: Vec<String>,
 }
 
@@ -111,7 +111,7 @@ pub fn physical_size(unit: InternalUnit) -> f64 {
 }
 
 impl Parameters {
-    /// The errors and set-up quantities that a session declares. `tests` are the tests with readings, `models` theirs.
+    /// The declared errors and set-up quantities of a session. `tests` are the tests with readings, `models` their models.
     ///
     /// # Errors
     /// If an error belongs to no axis of the machine or is declared twice.
@@ -170,7 +170,7 @@ impl Parameters {
                 let id = format!("{}{dot}{}{bracket}", unknown.thing, unknown.coordinate);
                 let index = match parameters.list.iter().position(|p| p.id == id) {
                     Some(index) => {
-                        // Tests that share a thing state it once; the tightest statement holds.
+                        // Tests that share a component state its prior once. The smallest standard uncertainty holds.
                         let shared = &mut parameters.list[index].prior;
                         *shared = tighter(*shared, prior);
                         index
@@ -205,7 +205,7 @@ impl Parameters {
     /// Adds the coefficients of an effect.
     ///
     /// # Errors
-    /// If the data lack the driver's column, the instrument lacks the component, or the effect is there already.
+    /// If the data lack the driver's column, the instrument lacks the component, or the effect is already declared.
     pub fn add_effect(
         &mut self,
         session: &Session,
@@ -306,7 +306,7 @@ impl Parameters {
         Ok(())
     }
 
-    /// The components of every test at the unknowns' values (internal units).
+    /// The components of every test at the parameters `beta` (internal units).
     pub fn slot_values(&self, models: &[TestModel<'_>], beta: &[f64]) -> Vec<SlotValues> {
         self.parts
             .iter()

@@ -1,8 +1,8 @@
-//! A session with readings as a least-squares problem over blocks of rows.
+//! The least-squares problem of a session with readings, over blocks of rows.
 //!
-//! A block is a stretch of consecutive readings of one run. Its rows of `[J | r]` are made from one sweep of the chain times the basis
-//! functions, whitened along the run, and absorbed into the triangle of the test and fold that they belong to, which is as wide as that test has
-//! unknowns.
+//! A block is a sequence of consecutive readings of one run. One sweep of the chain times the basis functions gives its rows of `[J | r]`.
+//! The rows are whitened along the run and absorbed into the triangular factor of their test and fold. That factor has one column for each
+//! parameter of the test.
 
 use std::collections::BTreeMap;
 use std::collections::btree_map::Entry;
@@ -23,26 +23,26 @@ use crate::noise::Noise;
 use crate::parameters::{InstrumentParameter, Parameters};
 use crate::triangle::{BLOCK_ROWS, Triangle};
 
-/// A session with readings, its unknowns, and how its readings are weighted.
+/// A session with readings, its parameters, and the weights of its readings.
 #[derive(Clone)]
 pub struct Problem<'a> {
     /// The session.
     pub session: &'a Session,
     /// The tests that have readings.
     pub tests: Vec<&'a Test>,
-    /// Those tests, ready to be evaluated.
+    /// The models of these tests.
     pub models: Vec<TestModel<'a>>,
-    /// The unknowns.
+    /// The parameters.
     pub parameters: Parameters,
-    /// When the session began.
+    /// Reference time and temperature of the session.
     pub origin: Origin,
     /// The noise of a reading.
     pub noise: Noise,
-    /// Readings that are left out, by test and row.
+    /// Excluded outliers, by test and row.
     pub rejected: Vec<Vec<bool>>,
-    /// Which readings are left out together when the model is judged.
+    /// The folds of cross-validation.
     pub folds: Folds,
-    /// What moves the readings of each test.
+    /// For each test, the parameters that affect its readings.
     own: Vec<InstrumentParameter>,
 }
 
@@ -55,16 +55,16 @@ pub struct Block {
     pub rows: Range<usize>,
 }
 
-/// Triangles over the tests' own unknowns, by test and fold.
+/// Triangular factors over the parameters of each test, by test and fold.
 type Narrow = BTreeMap<(usize, usize), Triangle>;
 
-/// Mean number of readings below which runs are not evaluated one by one.
+/// Mean number of readings below which runs are evaluated together.
 const SHORT_RUN: usize = 8;
-/// How many blocks one thread takes at a time.
+/// Number of blocks that one parallel task evaluates.
 const BLOCKS_PER_SEGMENT: usize = 16;
 
 impl<'a> Problem<'a> {
-    /// From a session, with its declared unknowns and effects.
+    /// The problem of a session with its declared parameters and effects.
     ///
     /// # Errors
     /// If there are no readings, or an effect cannot be evaluated.
@@ -108,7 +108,7 @@ impl<'a> Problem<'a> {
         Ok(problem)
     }
 
-    /// Adds an effect's coefficients to the unknowns.
+    /// Adds the coefficients of an effect to the parameters.
     ///
     /// # Errors
     /// See [`Parameters::add_effect`].
@@ -128,7 +128,7 @@ impl<'a> Problem<'a> {
             .collect();
     }
 
-    /// Number of readings that count.
+    /// Number of readings that are not excluded.
     pub fn readings(&self) -> usize {
         self.rejected
             .iter()
@@ -137,23 +137,23 @@ impl<'a> Problem<'a> {
             .count()
     }
 
-    /// Number of scalar coordinates a reading.
+    /// Number of scalar coordinates per reading.
     pub fn coordinates(&self) -> usize {
         self.session.instrument.coordinates()
     }
 
-    /// The stretches of rows that are evaluated together, in order.
+    /// The blocks of rows, in order.
     pub fn blocks(&self) -> Vec<Block> {
         let mut blocks = Vec::new();
         for (test, plan) in self.tests.iter().enumerate() {
             let Some(readings) = &plan.readings else { continue };
             let mut runs = readings.runs();
-            // Many short runs take long one by one; only a whitening filter has to keep them apart.
+            // One by one, many short runs are slow. Only a whitening filter has to separate them.
             if self.noise.memory.is_empty() && readings.rows() < SHORT_RUN * runs.len() {
                 runs = std::iter::once(0..readings.rows()).collect();
             }
             for run in runs {
-                // A whitening filter must not be cut; without one, blocks are what the triangle absorbs at once.
+                // A block must not cut a whitening filter. Without a filter, a block has the number of rows that a factor absorbs at once.
                 let most = if self.noise.memory.is_empty() {
                     (BLOCK_ROWS / self.coordinates()).max(1)
                 } else {
@@ -173,12 +173,12 @@ impl<'a> Problem<'a> {
         blocks
     }
 
-    /// The components of every test at the unknowns' values (internal units).
+    /// The components of every test at the parameters `beta` (internal units).
     pub fn slot_values(&self, beta: &[f64]) -> Vec<SlotValues> {
         self.parameters.slot_values(&self.models, beta)
     }
 
-    /// Rows of `[J | r]` of a block in mm, not whitened, rejected rows included: (rows × coordinates) × (unknowns + 1).
+    /// Rows of `[J | r]` of a block in mm, not whitened, outliers included: (rows × coordinates) × (parameters + 1).
     ///
     /// # Errors
     /// If the model yields a number that is not finite.
@@ -193,12 +193,13 @@ impl<'a> Problem<'a> {
         Ok(rows)
     }
 
-    /// The unknowns that move the readings of a test.
+    /// The parameters that affect the readings of a test.
     pub fn own_unknowns(&self, test: usize) -> &[usize] {
         &self.own[test].unknowns
     }
 
-    /// The columns of [`Problem::rows`] that are not zero throughout: those of [`Problem::own_unknowns`], and the residual. `values` are the test's.
+    /// The nonzero columns of [`Problem::rows`]: those of [`Problem::own_parameters`], and the residual. `values` belong to the block's
+    /// test.
     ///
     /// # Errors
     /// If the model yields a number that is not finite.
@@ -240,7 +241,7 @@ impl<'a> Problem<'a> {
                         .for_each(|(entry, term)| *entry += term);
                 };
                 match basis {
-                    // The plain case is worth a loop that the compiler can turn into vector instructions.
+                    // A separate loop for the simple case, so that the compiler can vectorise it.
                     None if coordinates == 1 => {
                         let entries = column[start..].iter_mut();
                         entries.zip(values).for_each(|(entry, d)| *entry += d);
@@ -263,7 +264,8 @@ impl<'a> Problem<'a> {
         }
     }
 
-    /// The scalar rows of a block that whitening keeps: those that neither are nor remember a rejected reading.
+    /// The scalar rows of a block that remain after whitening. A row is dropped if its reading, or one within the filter's order before
+    /// it, is an outlier.
     pub fn kept_rows(&self, block: &Block) -> Vec<usize> {
         let coordinates = self.coordinates();
         let rejected = &self.rejected[block.test];
@@ -279,22 +281,22 @@ impl<'a> Problem<'a> {
             .collect()
     }
 
-    /// Divides rows by the noise: `(x_t − Σ a_k x_{t−k})/σ_innovation` along a run, and drops rejected ones. Returns the rows that remain, with
-    /// the fold of each.
+    /// Whitens rows along a run, `(x_t − Σ a_k x_{t−k})/σ_innovation`, and drops outliers. Returns the remaining rows and the fold of
+    /// each.
     pub fn whiten(&self, rows: &Mat<f64>, block: &Block) -> (Mat<f64>, Vec<usize>) {
         let kept = self.kept_rows(block);
         let folds = self.folds_of(&kept, block).collect();
         (self.whitened(rows.clone(), &kept), folds)
     }
 
-    /// The fold of each of some scalar rows of a block.
+    /// The fold of each of the given scalar rows of a block.
     pub fn folds_of(&self, rows: &[usize], block: &Block) -> impl Iterator<Item = usize> {
         let fold_of = &self.folds.of_row[block.test][block.rows.clone()];
         let coordinates = self.coordinates();
         rows.iter().map(move |i| fold_of[i / coordinates])
     }
 
-    /// The rows of [`Problem::whiten`], where it is known which are kept.
+    /// The rows of [`Problem::whiten`] for known remaining rows.
     pub fn whitened(&self, mut rows: Mat<f64>, kept: &[usize]) -> Mat<f64> {
         let coordinates = self.coordinates();
         let memory = &self.noise.memory;
@@ -319,13 +321,13 @@ impl<'a> Problem<'a> {
         white
     }
 
-    /// The triangle of each fold at the unknowns' values, in internal units of the unknowns.
+    /// The triangular factor of each fold at the parameters `beta`, in internal units of the parameters.
     ///
     /// # Errors
     /// If the model yields a number that is not finite.
     pub fn triangles(&self, beta: &[f64]) -> Result<Vec<Triangle>, IdentifyError> {
         let values = self.slot_values(beta);
-        // Stretches of fixed length, so that the sums do not depend on the number of threads.
+        // Segments have a fixed length, so that the sums do not depend on the number of threads.
         let stretches: Vec<Narrow> = (self.blocks().par_chunks(BLOCKS_PER_SEGMENT))
             .map(|blocks| self.narrow_triangles(&values, blocks))
             .collect::<Result<_, IdentifyError>>()?;
@@ -346,7 +348,7 @@ impl<'a> Problem<'a> {
         Ok(triangles)
     }
 
-    /// The triangles of some blocks over their tests' own unknowns, by test and fold.
+    /// The triangular factors of some blocks over the parameters of their tests, by test and fold.
     fn narrow_triangles(&self, values: &[SlotValues], blocks: &[Block]) -> Result<Narrow, IdentifyError> {
         let mut narrow = Narrow::new();
         for block in blocks {
@@ -375,7 +377,7 @@ impl<'a> Problem<'a> {
         Ok(narrow)
     }
 
-    /// How many statements are known beforehand: the rows of [`Problem::prior_triangle`].
+    /// Number of prior observations: the rows of [`Problem::prior_triangle`].
     pub fn prior_rows(&self) -> usize {
         let gaussian = |prior: &Prior| matches!(prior, Prior::Gaussian(_));
         let list = &self.parameters.list;
@@ -387,13 +389,13 @@ impl<'a> Problem<'a> {
         list.iter().filter(|parameter| gaussian(&parameter.prior)).count() + told.count()
     }
 
-    /// What is known beforehand, as rows: Gaussian priors and distances between sockets.
+    /// The triangular factor of the priors: Gaussian priors and distances between sockets.
     pub fn prior_triangle(&self, beta: &[f64]) -> Triangle {
         self.prior_triangle_about(beta, |_| 0.0, |_| 0.0)
     }
 
-    /// The same with other expectations: `centre` of each unknown with a Gaussian prior, and by how much each distance between sockets is
-    /// `longer`, mm.
+    /// As [`Problem::prior_triangle`], with other prior means: `centre` for each parameter with a Gaussian prior, and an offset in mm
+    /// `longer` for each distance between sockets.
     pub fn prior_triangle_about(
         &self,
         beta: &[f64],
@@ -441,7 +443,7 @@ impl<'a> Problem<'a> {
         triangle
     }
 
-    /// The unknowns of a socket and where it stands nominally.
+    /// The parameters of a socket and its nominal position.
     fn socket(&self, name: &str) -> Option<([usize; 3], [f64; 3])> {
         let test = self
             .tests
@@ -462,7 +464,7 @@ impl<'a> Problem<'a> {
         Some((unknowns, station.socket))
     }
 
-    /// Residuals observed − model of every test, mm, rejected readings included.
+    /// Residuals observed − model of every test, mm, outliers included.
     pub fn residuals(&self, beta: &[f64]) -> Vec<Vec<f64>> {
         let values = self.slot_values(beta);
         (self.models.par_iter().zip(&self.tests).zip(&values))

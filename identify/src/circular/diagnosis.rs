@@ -1,15 +1,15 @@
-//! The classical diagnosis: which faults of two linear axes make up the deviation of a circle.
+//! Diagnosis of a circular test of two linear axes: the contribution of each classical fault to the radial deviation.
 //!
-//! Figures have the signs of the error motions `E` of ISO 230-1, along R: `backlash` of X has the sign of the effect `EXX~X:backlash`, whichever way X counts.
-//! What only a difference or a sum of both axes shows (scale mismatch, servo mismatch, third-order positioning) is counted along the travel of the axes: positive
-//! where an axis travels too far, or lags.
+//! Values have the signs of the error motions `E` of ISO 230-1, along R. For example, the backlash of X has the sign of the effect
+//! `EXX~X:backlash`, whatever the counting direction of X. Faults that follow from a difference or a sum over both axes (scale mismatch,
+//! servo mismatch, third-order positioning) refer to the axes' positive directions. They are positive if an axis travels too far or lags.
 //!
-//! The terms of [`super::terms`] are fitted together by least squares with radius and centre, which the set-up absorbs. Reversal spikes
-//! and cyclic errors have a width and a pitch that are searched for; they are taken in only where chance would not give as good a one in
-//! a thousand circles. A share is the range of a fault's own `δL` over the sum of all ranges.
+//! One least-squares fit estimates all terms of [`super::terms`], the radius and the centre. Radius and centre absorb the set-up. The
+//! width of reversal spikes and the pitch of cyclic errors are searched. These faults are added only if chance gives as large a gain in
+//! fewer than one of a thousand circles. The share of a fault is the range of its own `δL` over the sum of all ranges.
 //!
-//! Uncertainties follow from the noise, or from the residual where that is more; where neighbouring readings err alike with the
-//! correlation r, they are enlarged by √((1 + r)/(1 − r)).
+//! The uncertainties follow from the noise, or from the residual if that is larger. If neighbouring residuals have the correlation r, the
+//! uncertainties are enlarged by √((1 + r)/(1 − r)).
 
 use abbe_model::chain::Machine;
 
@@ -21,14 +21,14 @@ use super::search::{cyclic, is_separable, is_third_order, spikes, third_order};
 use super::terms::Rows;
 use crate::results::ParameterResult;
 
-/// A single reading beyond this many standard deviations is wild.
+/// Limit for a single outlier, in robust standard deviations.
 const OUTLIER_SIGMA: f64 = 6.0;
-/// An arc shorter than this is not taken apart.
+/// Least arc for a diagnosis.
 const SHORTEST_ARC_DEG: f64 = 180.0;
 /// Arc of a full circle.
 const FULL_CIRCLE_DEG: f64 = 360.0;
 
-/// A circle taken apart.
+/// The decomposition of one circle.
 struct Model {
     names: [String; 2],
     rows: Rows,
@@ -37,7 +37,7 @@ struct Model {
 }
 
 impl Model {
-    /// Of a path; or why it has none, in words where it is a circle of linear axes.
+    /// Decomposes a path. The error holds the reason in words if the path is a circle of linear axes.
     fn of(machine: &Machine, path: &Path) -> Result<Model, Option<String>> {
         let Moves::Linear {
             axes,
@@ -63,11 +63,11 @@ impl Model {
         let mut faults = standard(path, &rows, &names, radius_mm);
         let Some(mut regression) = solve(&rows, &faults) else {
             return Err(Some(
-                "no diagnosis: the readings cannot tell the faults apart".into(),
+                "no diagnosis: the faults are not separable with these readings".into(),
             ));
         };
-        // Errors of third order are in the model while spikes and cyclic errors are searched for, and stay where they stand out beside those. Over part of a
-        // circle they are nearly collinear with scale and straightness.
+        // Third-order errors are in the model during the search for spikes and cyclic errors, and remain if they are significant. On a
+        // partial circle they are nearly collinear with scale mismatch and straightness.
         if arc_deg > FULL_CIRCLE_DEG * 0.99 {
             let found = third_order(&rows, &names);
             add_faults(&rows, &mut faults, &mut regression, found);
@@ -95,13 +95,13 @@ impl Model {
     }
 }
 
-/// The outliers of a circle: single ones that stand out of the residual of the diagnosis; `None` where there is no diagnosis.
+/// The outliers of a circle: single readings with a large residual of the diagnosis; `None` if there is no diagnosis.
 pub(super) fn reject_outliers(machine: &Machine, path: &Path) -> Option<Vec<bool>> {
     let model = Model::of(machine, path).ok()?;
     let residual = &model.regression.residual;
     let mut sizes: Vec<f64> = residual.iter().map(|r| r.abs()).collect();
     sizes.sort_by(f64::total_cmp);
-    // Of a normal distribution the median size is 0.6745 σ.
+    // The median of |x| for a normal distribution is 0.6745 σ.
     let limit = OUTLIER_SIGMA * sizes[sizes.len() / 2] / 0.6745;
     let mut reject_outliers = path.left_out.clone();
     for (i, value) in residual.iter().enumerate() {
@@ -117,7 +117,7 @@ pub(super) fn reject_outliers(machine: &Machine, path: &Path) -> Option<Vec<bool
     Some(reject_outliers)
 }
 
-/// Adds the diagnosis to a result, and what the test cannot tell.
+/// Adds the diagnosis and its limitations to a result.
 pub(super) fn add(machine: &Machine, path: &Path, noise_mm: f64, result: &mut CircularTest) {
     match Model::of(machine, path) {
         Ok(model) => {
@@ -126,7 +126,7 @@ pub(super) fn add(machine: &Machine, path: &Path, noise_mm: f64, result: &mut Ci
             limits(path, &model.regression, sigma, &model.names, result);
             if model.faults.iter().any(is_third_order) {
                 result.not_told.push(format!(
-                    "a third-order error of {} is confounded with one of {}: the figure is that of both together",
+                    "the third-order errors of {} and {} are confounded: the value is that of their combination",
                     model.names[0], model.names[1]
                 ));
             }
@@ -135,7 +135,7 @@ pub(super) fn add(machine: &Machine, path: &Path, noise_mm: f64, result: &mut Ci
     }
 }
 
-/// Takes further faults into the model, where the readings can tell them from the others.
+/// Adds those of the given faults that are separable from the others.
 fn add_faults(rows: &Rows, faults: &mut Vec<Fault>, regression: &mut Regression, found: Vec<Fault>) {
     if found.is_empty() {
         return;
@@ -158,7 +158,7 @@ fn solve(rows: &Rows, faults: &[Fault]) -> Option<Regression> {
     Regression::solve(&columns(rows, faults), &rows.y)
 }
 
-/// The faults that every circle is asked for.
+/// The faults that every diagnosis contains.
 fn standard(path: &Path, rows: &Rows, names: &[String; 2], radius_mm: f64) -> Vec<Fault> {
     let plane = names.concat();
     let ppm = 1e6 / radius_mm;
@@ -218,7 +218,7 @@ fn standard(path: &Path, rows: &Rows, names: &[String; 2], radius_mm: f64) -> Ve
     faults
 }
 
-/// Variance of the residual, and the correlation of neighbours in it.
+/// Variance of the residual, and the correlation of neighbouring residuals.
 pub(super) fn variance_and_correlation(rows: &Rows, regression: &Regression) -> (f64, f64) {
     let residual = &regression.residual;
     let sum = regression.sum_of_squares();
@@ -235,7 +235,7 @@ pub(super) fn variance_and_correlation(rows: &Rows, regression: &Regression) -> 
     (sum / freedom as f64, correlation)
 }
 
-/// The standard deviation that uncertainties follow from, mm.
+/// The standard deviation for the uncertainties, mm.
 fn scatter(rows: &Rows, regression: &Regression, noise_mm: f64) -> f64 {
     let (variance, r) = variance_and_correlation(rows, regression);
     (variance.max(noise_mm * noise_mm) * (1.0 + r) / (1.0 - r)).sqrt()
@@ -306,16 +306,16 @@ fn report(rows: &Rows, faults: &[Fault], regression: &Regression, sigma: f64, re
     result.diagnosis_rms_um = Some((regression.sum_of_squares() / rows.count() as f64).sqrt() * 1e3);
 }
 
-/// What these readings confound.
+/// States the limitations: confounded faults and missing data.
 fn limits(path: &Path, regression: &Regression, sigma: f64, names: &[String; 2], result: &mut CircularTest) {
     let (radius_um, u) = (regression.beta[0] * 1e3, regression.u(&[(0, 1e3)], sigma));
     result.not_told.push(format!(
-        "the mean radius is off by {radius_um:.2} µm (u {u:.2}): the bar's length, the mean scale of {} and {}, and what both axes lag \
-         (that grows with the square of the feed) do the same",
+        "the mean radius deviates by {radius_um:.2} µm (u {u:.2}): it combines the bar length, the mean scale of {} and {}, and the mean lag of both axes \
+         (proportional to the square of the feed)",
         names[0], names[1]
     ));
     if !path.both_directions() {
-        let why = "one direction only: servo mismatch is in the squareness, lateral play in radius and scale, and neither is separable";
+        let why = "one direction only: servo mismatch is confounded with squareness, and lateral play with radius and scale";
         result.not_told.push(why.into());
     } else if path.feed_mm_s.is_none() {
         let why = "no time in the data: servo mismatch is given as a lag in µm at this feed, not in ms";

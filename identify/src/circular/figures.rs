@@ -1,12 +1,12 @@
-//! The figures of ISO 230-4: circular deviation G, bidirectional circular deviation G(b), radial deviation F, mean bidirectional radial
-//! deviation D, circular hysteresis H (of the edition of 1996).
+//! Characteristics of ISO 230-4: circular deviation G, bidirectional circular deviation G(b), radial deviation F, mean bidirectional
+//! radial deviation D, and circular hysteresis H (edition of 1996).
 //!
 //! ```text
 //! p(θ) = L(θ)·(cos θ, sin θ)     c, ρ: least-squares circle through p     G = max ‖p − c‖ − min ‖p − c‖     F(θ) = ‖p − c‖ − L_nominal
 //! ```
 //!
-//! The standard's minimum-zone circles may be replaced by the least-squares circle (its clause 3); that is what is done here, so that
-//! G is never smaller than the standard's.
+//! The standard permits the least-squares circle in place of the minimum-zone circles (clause 3). This module uses the least-squares
+//! circle, so G is never smaller than with minimum-zone circles.
 
 use std::f64::consts::{PI, TAU};
 
@@ -17,10 +17,10 @@ use super::path::{Moves, Path};
 use super::results::{CircularTest, DirectionFigures};
 use crate::circle;
 
-/// A path as points: angle, deviation of the length from nominal, nominal length.
+/// A path in polar form: angle, deviation of the length from nominal, nominal length.
 struct Trace(Vec<[f64; 3]>);
 
-/// The figures of a path.
+/// The characteristics of a path.
 pub(super) fn figures(machine: &Machine, test: &Test, path: &Path) -> CircularTest {
     let name = |axis: usize| machine.axes[axis].name.clone();
     let (axes, radius_mm) = match path.moves {
@@ -32,7 +32,7 @@ pub(super) fn figures(machine: &Machine, test: &Test, path: &Path) -> CircularTe
     let arc = path.arc();
     if arc < TAU * 0.99 {
         not_told.push(format!(
-            "an arc of {:.0}°: the figures are of that arc, ISO 230-4 asks for a full circle",
+            "an arc of {:.0}°: the characteristics refer to this arc; ISO 230-4 requires a full circle",
             arc.to_degrees()
         ));
     }
@@ -78,12 +78,12 @@ pub(super) fn figures(machine: &Machine, test: &Test, path: &Path) -> CircularTe
         }
         _ => result
             .not_told
-            .push("one direction only: G(b), D and hysteresis need the other one too".into()),
+            .push("one direction only: G(b), D and hysteresis require both directions".into()),
     }
     result
 }
 
-/// The mean path of the runs in one direction, on the angles of the first of them; and how many they are.
+/// The mean path of the runs in one direction, at the angles of the first run, and the number of these runs.
 fn mean(path: &Path, direction: f64) -> Option<(Trace, usize)> {
     let runs: Vec<Trace> = path
         .runs
@@ -111,7 +111,7 @@ fn mean(path: &Path, direction: f64) -> Option<(Trace, usize)> {
 }
 
 impl Trace {
-    /// The deviation at an angle or at one that differs by whole turns, between the neighbouring readings.
+    /// The deviation at an angle (modulo whole turns), interpolated between the neighbouring readings.
     fn at(&self, angle: f64) -> Option<f64> {
         const SAME: f64 = 1e-6;
         let points = &self.0;
@@ -131,7 +131,7 @@ impl Trace {
     }
 }
 
-/// A path about the centre of its least-squares circle.
+/// Radial deviations about the centre of the least-squares circle.
 struct SpokeAngles {
     /// Distance from the centre less the nominal length, mm.
     deviations_mm: Vec<f64>,
@@ -139,7 +139,7 @@ struct SpokeAngles {
     radius_mm: f64,
 }
 
-/// Takes out the centre. What a rotary axis turns need not read a radius; there it is the first harmonic of the reading.
+/// Removes the centre. If a rotary axis turns, the reading need not be a radius; the centre is then the first harmonic of the reading.
 fn about(path: &Path, trace: &Trace) -> SpokeAngles {
     let mean = |values: &mut dyn Iterator<Item = f64>| values.sum::<f64>() / trace.0.len() as f64;
     let nominal = mean(&mut trace.0.iter().map(|p| p[2]));
@@ -152,7 +152,7 @@ fn about(path: &Path, trace: &Trace) -> SpokeAngles {
             [length * p[0].cos(), length * p[0].sin()]
         })
         .collect();
-    // The centre of a short arc is confounded with its radius.
+    // On a short arc the centre is confounded with the radius.
     let found = (path.arc() >= PI * 0.99)
         .then(|| circle::through(&points))
         .flatten();

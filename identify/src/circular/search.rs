@@ -1,7 +1,7 @@
-//! Faults with a number that has to be searched for: the width of a reversal spike, the pitch of a cyclic error.
+//! Faults with a nonlinear parameter: the width of a reversal spike, the pitch of a cyclic error.
 //!
-//! One is taken for found where `P(χ² ≥ gain / s²)` times the number of looks is below one in a thousand, `s²` the variance of the residual, enlarged
-//! for the correlation of neighbours.
+//! A fault is significant if `P(χ² ≥ gain / s²)` times the number of candidates is below one in a thousand. `s²` is the variance of the
+//! residual, enlarged for the correlation of neighbours.
 
 use statrs::distribution::{ChiSquared, ContinuousCDF};
 
@@ -12,23 +12,24 @@ use super::regression::{Orthonormal, Regression};
 use super::terms::Rows;
 use crate::results::ParameterResult;
 
-/// Probability with which chance may yield a spike or a cyclic error.
+/// Significance level of a spike or cyclic error.
 const CHANCE: f64 = 1e-3;
-/// Below this, 2 nm, no bar reads and the terms are no longer right: they are of first order, and 20 µm across a radius of 100 mm are 2 nm along it.
+/// Least amplitude, 2 nm. Smaller values are below the resolution of a ball bar, and the terms are of first order only: 20 µm across a
+/// radius of 100 mm change it by 2 nm.
 const MIN_MM: f64 = 2e-6;
-/// Widths of reversal spikes that are tried, degrees of the path.
+/// Candidate widths of reversal spikes, degrees of the path.
 const SPIKE_WIDTHS_DEG: [f64; 6] = [0.5, 1.0, 2.0, 3.0, 5.0, 8.0];
 
-/// How the faults of third order are called.
+/// Names of the third-order faults.
 const THIRD_ORDER: [&str; 2] = ["third-order positioning", "third-order straightness"];
 
-/// Whether a fault is one of third order.
+/// Whether a fault is a third-order fault.
 pub(super) fn is_third_order(fault: &Fault) -> bool {
     THIRD_ORDER.contains(&fault.fault)
 }
 
-/// Errors that grow with the third power of the position: with radius, centre and scale they leave `cos 4θ` and `sin 4θ`, which a cyclic error of few
-/// periods would stand in for.
+/// Errors that grow with the third power of the position. Beside radius, centre and scale they contribute `cos 4θ` and `sin 4θ`, with
+/// which a cyclic error of few periods is confounded.
 pub(super) fn third_order(rows: &Rows, names: &[String; 2]) -> Vec<Fault> {
     let figures = ["sum", "difference"];
     let columns = rows.third_order().into_iter().zip(THIRD_ORDER).zip(figures);
@@ -39,7 +40,7 @@ pub(super) fn third_order(rows: &Rows, names: &[String; 2]) -> Vec<Fault> {
         .collect()
 }
 
-/// Whether a fault of one column stands out of the noise beside all the others.
+/// Whether a fault of one column is significant beside all the others.
 pub(super) fn is_separable(rows: &Rows, faults: &[Fault], fault: &Fault, regression: &Regression) -> bool {
     let before = faults.iter().take_while(|other| !std::ptr::eq(*other, fault));
     let place = rows.setup().len() + before.map(|other| other.columns.len()).sum::<usize>();
@@ -53,19 +54,19 @@ pub(super) fn is_separable(rows: &Rows, faults: &[Fault], fault: &Fault, regress
         )
 }
 
-/// The variance in which a gain is counted: that of the residual, enlarged for the correlation of neighbours.
+/// The variance of the gain test: that of the residual, enlarged for the correlation of neighbours.
 fn unit_of_gain(rows: &Rows, regression: &Regression) -> f64 {
     let (variance, r) = variance_and_correlation(rows, regression);
     variance.max(MIN_MM * MIN_MM) * (1.0 + r) / (1.0 - r)
 }
 
-/// Whether chance would seldom give so large a gain, by this many columns, in this many looks.
+/// Whether a gain of this many columns is significant after this many candidates.
 fn is_significant(gain: f64, unit: f64, columns: usize, looks: usize) -> bool {
     let chance = ChiSquared::new(columns as f64).map_or(1.0, |chi| chi.sf(gain / unit));
     unit > 0.0 && chance * looks as f64 <= CHANCE
 }
 
-/// Reversal spikes of each axis, at the width that explains most.
+/// The reversal spikes of each axis, at the width with the largest gain.
 pub(super) fn spikes(
     path: &Path,
     rows: &Rows,
@@ -103,7 +104,7 @@ pub(super) fn spikes(
     found
 }
 
-/// The cyclic error of each axis, at the pitch that explains most.
+/// The cyclic error of each axis, at the pitch with the largest gain.
 pub(super) fn cyclic(
     rows: &Rows,
     names: &[String; 2],
@@ -123,7 +124,7 @@ pub(super) fn cyclic(
             .map(|i| (q[i] - q[i - 1]).abs())
             .fold(0.0, f64::max);
         let travel = most - least;
-        // From four periods over the travel to two and a half readings a period.
+        // From four periods over the travel to 2.5 readings per period.
         let (slowest, fastest) = (4.0, travel / (2.5 * spacing.max(1e-3)));
         let tried = (((fastest - slowest) * 4.0).max(0.0) as usize).min(1000);
         let best = (0..tried)
@@ -139,7 +140,7 @@ pub(super) fn cyclic(
         if unit <= 0.0 || (-0.5 * gain / unit).exp() * (2 * tried) as f64 > CHANCE {
             continue;
         }
-        // Once found, each direction of travel has its own amplitude.
+        // A significant cyclic error has a separate amplitude for each direction of travel.
         let both = rows.cyclic(axis, pitch);
         let (mut columns, mut amplitudes) = (Vec::new(), Vec::new());
         for (direction, name) in [(1.0, "forward"), (-1.0, "backward")] {
@@ -164,7 +165,7 @@ pub(super) fn cyclic(
     found
 }
 
-/// A number that was searched for on a grid, and has no uncertainty of its own.
+/// A parameter from a grid search, without an uncertainty of its own.
 fn searched(id: &str, value: f64, unit: &str) -> ParameterResult {
     ParameterResult {
         id: id.to_string(),

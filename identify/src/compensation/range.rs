@@ -1,4 +1,4 @@
-//! The positions over which an error motion was seen while its axis moved: beyond them a curve would be extrapolated.
+//! The range of positions over which an error motion was observed while its axis moved.
 
 use std::ops::Range;
 
@@ -8,27 +8,27 @@ use abbe_model::sensitivity::SlotValues;
 
 use crate::problem::Problem;
 
-/// A reading that sees an error with less than this share of the best one's sensitivity does not see it.
+/// A reading observes an error if its sensitivity is at least this share of the largest one.
 const MOVED_SHARE: f64 = 0.01;
-/// Stretches that lie further apart than this many of their steps are two.
+/// Ranges that are more than this number of steps apart are separate.
 const GAP_STEPS: f64 = 1.5;
 
-/// A stretch that an axis moved over, and the longest step in it.
+/// A range of motion of an axis, and its longest step.
 #[derive(Clone, Debug, PartialEq)]
 struct Stretch {
     range: Range<f64>,
     step: f64,
 }
 
-/// Where the axis of an error moved, in runs that see the error.
+/// The ranges of motion of an error's axis, in runs that observe the error.
 pub(super) struct Covered {
-    /// The longest stretch, mm or rad.
+    /// The longest range, mm or rad.
     pub range: Range<f64>,
-    /// Others that lie apart from it.
+    /// Other, unconnected ranges.
     pub apart: Vec<Range<f64>>,
 }
 
-/// Where an axis moved while readings saw its error; `None` where it stood.
+/// The ranges in which an axis moved while readings observed its error; `None` if it stood still.
 pub(super) fn covered(problem: &Problem<'_>, error: &ErrorName, axis: usize) -> Option<Covered> {
     let machine = &problem.session.machine;
     let slot = machine.error_slot(error)?;
@@ -51,7 +51,7 @@ pub(super) fn covered(problem: &Problem<'_>, error: &ErrorName, axis: usize) -> 
     if best <= 0.0 {
         return None;
     }
-    // Positions in a file are rounded; a change below this is no movement.
+    // Positions in a file are rounded; a smaller change is no movement.
     let still = match machine.axes[axis].kind {
         AxisKind::Linear => 1e-6,
         AxisKind::Rotary => 1e-9,
@@ -67,7 +67,7 @@ pub(super) fn covered(problem: &Problem<'_>, error: &ErrorName, axis: usize) -> 
             let mut moved: Option<Stretch> = None;
             for pair in seen.windows(2) {
                 let (a, b) = (positions[pair[0]], positions[pair[1]]);
-                // Where readings between do not see the error, the axis still moved through.
+                // The axis moves through readings in between that do not observe the error.
                 if (b - a).abs() <= still {
                     continue;
                 }
@@ -93,7 +93,7 @@ pub(super) fn covered(problem: &Problem<'_>, error: &ErrorName, axis: usize) -> 
     })
 }
 
-/// Stretches that touch as one.
+/// Merges ranges that touch.
 fn merged(mut stretches: Vec<Stretch>) -> Vec<Stretch> {
     stretches.sort_by(|a, b| a.range.start.total_cmp(&b.range.start));
     let mut merged: Vec<Stretch> = Vec::new();

@@ -1,4 +1,4 @@
-//! A geometric method and the full fit on the same readings: value, uncertainty, and bias on readings simulated with known errors.
+//! Comparison of a geometric method with the full fit on the same readings: value, uncertainty, and bias.
 
 use abbe_model::session::Session;
 use schemars::JsonSchema;
@@ -10,51 +10,51 @@ use crate::fit::{self, Fit};
 use crate::parameters::Role;
 use crate::problem::Problem;
 
-/// The centre of one test.
+/// The circle centre of one test.
 #[derive(Clone, Debug, PartialEq, Serialize, JsonSchema)]
 pub struct CentreResult {
     /// The test.
     pub test: String,
     /// The axis that turns.
     pub axis: String,
-    /// The two directions across it, `X`, `Y` or `Z`.
+    /// The two directions across the axis, `X`, `Y` or `Z`.
     pub across: [String; 2],
-    /// Of the circle's centre from where the axis nominally is, µm.
+    /// Offset of the circle's centre from the nominal axis, µm.
     pub offset_um: [f64; 2],
     /// Standard uncertainties, µm.
     pub u_um: [f64; 2],
     /// Radius of the circle, mm.
     pub radius_mm: f64,
-    /// Of the circle's plane along the axis, mm from the axis' origin.
+    /// Position of the circle's plane along the axis, mm from the axis' origin.
     pub plane_mm: f64,
-    /// Height of the cone, mm; 0 where both balls lie in the plane.
+    /// Height of the cone, mm; 0 if both balls lie in the plane.
     pub height_mm: f64,
-    /// What each declared error adds to the offsets, µm a µm or µm an arcsec.
+    /// Contribution of each declared error to the offsets, µm per µm or µm per arcsec.
     pub shares: Vec<(String, [f64; 2])>,
 }
 
-/// One error by both ways, in its own unit.
+/// One error by the method and by the full fit, in its display unit.
 #[derive(Clone, Debug, PartialEq, Serialize, JsonSchema)]
 pub struct ComparisonRow {
     /// The error.
     pub id: String,
-    /// Unit of all figures.
+    /// Unit of all values.
     pub unit: String,
-    /// By the method; `None` where it does not tell the error.
+    /// Estimate of the method; `None` if the method does not identify the error.
     pub value: Option<f64>,
-    /// Its standard uncertainty from noise and set-ups, enlarged as that of the full fit.
+    /// Its standard uncertainty from noise and set-ups, with the factor of the full fit.
     pub u: Option<f64>,
-    /// By the method on noise-free readings simulated with the full fit's errors, less those errors.
+    /// Bias of the method: its estimate from noise-free readings simulated with the full fit's errors, minus those errors.
     pub bias: Option<f64>,
-    /// By the full fit; `None` where it does not see the error.
+    /// Estimate of the full fit; `None` if the error is not identifiable.
     pub full_value: Option<f64>,
     /// Its standard uncertainty.
     pub full_u: Option<f64>,
-    /// As `bias`, for the full fit.
+    /// Bias of the full fit.
     pub full_bias: Option<f64>,
 }
 
-/// A method beside the full fit.
+/// Comparison of a method with the full fit.
 #[derive(Clone, Debug, PartialEq, Serialize, JsonSchema)]
 pub struct Comparison {
     /// `circle`, `cone`, `two-plane`.
@@ -63,19 +63,19 @@ pub struct Comparison {
     pub readings: usize,
     /// Standard uncertainty of a reading, µm.
     pub noise_um: f64,
-    /// Where that comes from.
+    /// Source of the noise standard deviation.
     pub noise_source: String,
     /// Residual of the full fit, µm.
     pub rms_um: f64,
-    /// Residual of the method's errors on the readings that it took, set-ups nominal, µm.
+    /// Residual of the readings of the method with its estimates, set-ups nominal, µm.
     pub method_rms_um: f64,
-    /// Residual of the nominal machine on the same readings, µm: before compensation.
+    /// Residual of the same readings with the nominal machine, µm: before compensation.
     pub nominal_rms_um: f64,
     /// The centres.
     pub centres: Vec<CentreResult>,
     /// The errors.
     pub errors: Vec<ComparisonRow>,
-    /// What a user should know.
+    /// Warnings for the user.
     pub warnings: Vec<String>,
 }
 
@@ -90,7 +90,7 @@ pub fn compare(session: &Session, method: Method, seed: u64) -> Result<Compariso
     let estimate = estimator.estimate(&problem, &observed)?;
     let list = &problem.parameters.list;
 
-    // Known errors: the full fit's, set-ups and effects left out.
+    // The known errors are those of the full fit, without set-up quantities and effects.
     let mut known = vec![0.0; list.len()];
     for (p, parameter) in list.iter().enumerate() {
         if parameter.role == Role::Error && full.rank.is_identifiable(p) {
@@ -142,7 +142,7 @@ pub fn compare(session: &Session, method: Method, seed: u64) -> Result<Compariso
     warnings.extend(fit::enlargement_warning(full.u_enlargement));
     if !problem.parameters.effects.is_empty() {
         warnings.push(format!(
-            "the {} method knows nothing of the declared effects: what they move is in its errors",
+            "the {} method does not model the declared effects: their contributions bias its estimates",
             method.word()
         ));
     }
@@ -169,14 +169,14 @@ fn observed<'p>(problem: &'p Problem<'_>) -> Vec<&'p [f64]> {
     problem.tests.iter().map(of).collect()
 }
 
-/// Noise-free readings for values of the unknowns, test by test, mm.
+/// Noise-free readings at given parameters, test by test, mm.
 fn readings(problem: &Problem<'_>, beta: &[f64]) -> Vec<Vec<f64>> {
     let values = problem.slot_values(beta);
     let models = problem.models.iter().zip(&values);
     models.map(|(model, values)| model.readings_mm(values)).collect()
 }
 
-/// The full fit on other readings of the same tests: its unknowns.
+/// The parameters of the full fit to other readings of the same tests.
 fn refitted(problem: &Problem<'_>, readings: &[Vec<f64>], full: &Fit) -> Result<Vec<f64>, IdentifyError> {
     let mut session = problem.session.clone();
     let mut left = readings.iter();

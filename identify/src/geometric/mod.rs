@@ -1,15 +1,16 @@
-//! The geometric methods of the thesis beside the full fit: errors of rotary axes from the centres of circles (Chapters 4 to 6).
+//! Geometric methods beside the full fit: errors of rotary axes from the centres of circles.
 //!
-//! Each test gives the place where an axis passes the standing ball. To first order that place is a linear combination of position and orientation
-//! errors,
+//! The methods are those of Jiang (2014), Chapters 4 to 6: X. Jiang, *Characterising Geometric Errors in Rotary Axes of 5-axis Machine
+//! Tools*, PhD thesis, University of Birmingham. Each test gives the position of an axis relative to the fixed ball. To first order this
+//! position is a linear combination of position and orientation errors,
 //!
 //! ```text
 //! centre = Σ S·error,    S = ∂centre/∂L · ∂L/∂error
 //! ```
 //!
-//! with the derivative of the length from the chain and that of the centre from the circle's own equations. `S` holds what the thesis
-//! derives by hand: the levers of the cone and of the two planes, the share that axis A's errors have in the centres of axis C, and
-//! the conversion from local to reference position errors. No sign is typed in.
+//! The chain gives the derivative of the length, and the equations of the circle give that of the centre. `S` thus contains what the
+//! reference derives by hand: the levers of the cone and of the two planes, the contributions of axis A's errors to the centres of axis C,
+//! and the conversion from local to reference position errors. All signs follow from the chain.
 
 mod centre;
 mod compare;
@@ -26,19 +27,19 @@ use crate::problem::{Block, Problem};
 use abbe_model::session::Prior;
 use abbe_model::words::counted;
 
-/// Which tests a method takes, and what it makes of them.
+/// The geometric method, which determines the tests that it uses.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Method {
-    /// Position errors from one plane for each axis, as if there were no orientation errors (Section 4.2).
+    /// Position errors from one plane per axis, with orientation errors assumed zero (Section 4.2).
     Circle,
-    /// Position errors from the plane, orientation errors from the cone of the bar with its extension (Sections 4.2.1, 5.2).
+    /// Position errors from the plane, orientation errors from the cone of the extension bar (Sections 4.2.1, 5.2).
     Cone,
     /// Position and orientation errors from two planes along each axis (Section 6.1.2).
     TwoPlane,
 }
 
 impl Method {
-    /// As it stands on the command line and in results.
+    /// The name in requests and results.
     pub fn word(self) -> &'static str {
         match self {
             Method::Circle => "circle",
@@ -48,47 +49,47 @@ impl Method {
     }
 }
 
-/// Height of a cone, and distance of two planes, below which they are none, mm.
+/// Least height of a cone and least distance of two planes, mm.
 const MIN_LEVER_MM: f64 = 1.0;
 
-/// A method made ready: its tests, its errors, and how the errors follow from the centres.
+/// A method prepared for a session: its tests, its errors, and the linear map from centres to errors.
 #[derive(Clone, Debug)]
 pub struct Estimator {
     /// The method.
     pub method: Method,
-    /// The tests it takes, by place among the problem's.
+    /// The tests, by index among the problem's tests.
     pub tests: Vec<usize>,
-    /// How each sees its axis.
+    /// The geometry of each test.
     pub layouts: Vec<Layout>,
-    /// The errors that it tells, by place among the problem's parameters.
+    /// The errors that the method identifies, by index among the problem's parameters.
     pub errors: Vec<usize>,
-    /// `S`: two rows a test, a column for each of the problem's parameters, mm or rad.
+    /// `S`: two rows per test, one column per parameter of the problem, mm or rad.
     pub shares: Mat<f64>,
     /// Errors from centres: errors × rows.
     pub inverse: Mat<f64>,
 }
 
-/// What a method found.
+/// The estimates of a method.
 #[derive(Clone, Debug)]
 pub struct Estimate {
     /// The centre of each test.
     pub centres: Vec<Centre>,
     /// Each error, mm or rad.
     pub values: Vec<f64>,
-    /// Covariance of the centres from noise and from what is known of the set-ups, mm².
+    /// Covariance of the centres from noise and set-up priors, mm².
     pub centre_covariance: Mat<f64>,
     /// Covariance of the errors.
     pub covariance: Mat<f64>,
 }
 
 impl Estimator {
-    /// For a session.
+    /// Prepares a method for a session.
     ///
     /// # Errors
-    /// If the session has no tests for the method, or they leave errors undetermined.
+    /// If the session lacks tests for the method, or the errors are not identifiable from them.
     pub fn new(problem: &Problem<'_>, method: Method) -> Result<Estimator, IdentifyError> {
         let machine = &problem.session.machine;
-        let no = |message: String| IdentifyError::Request(format!("--method {}: {message}", method.word()));
+        let no = |message: String| IdentifyError::Request(format!("method {}: {message}", method.word()));
         let mut circles = Vec::new();
         let mut refused = Vec::new();
         for (test, model) in problem.models.iter().enumerate() {
@@ -118,7 +119,7 @@ impl Estimator {
         let errors = errors(problem, method, &layouts);
         let shares = shares(problem, &tests, &layouts)?;
         let of_errors = Mat::from_fn(shares.nrows(), errors.len(), |i, k| {
-            // An angle moves a centre by its lever: radians times 100 mm compare with mm.
+            // An angle moves a centre by its lever. The physical sizes make radians times 100 mm comparable with mm.
             shares[(i, errors[k])] * problem.parameters.list[errors[k]].size
         });
         let svd = of_errors.svd().map_err(|_| IdentifyError::Decomposition)?;
@@ -130,7 +131,7 @@ impl Estimator {
                 .map(|k| problem.parameters.list[errors[k]].id.as_str())
                 .collect();
             return Err(no(format!(
-                "the centres of {} do not tell {} apart",
+                "the centres of {} do not separate the errors {}",
                 counted(tests.len(), "test"),
                 hidden.join(", ")
             )));
@@ -151,10 +152,10 @@ impl Estimator {
         })
     }
 
-    /// From readings, test by test as the problem has them, mm.
+    /// Estimates the errors from readings, test by test in the order of the problem, mm.
     ///
     /// # Errors
-    /// If the readings of a test lie on no circle.
+    /// If the readings of a test do not lie on a circle.
     pub fn estimate(&self, problem: &Problem<'_>, observed: &[&[f64]]) -> Result<Estimate, IdentifyError> {
         let mut centres = Vec::new();
         for (test, layout) in self.tests.iter().zip(&self.layouts) {
@@ -201,7 +202,7 @@ impl Estimator {
     }
 }
 
-/// The tests of a method.
+/// The tests that a method uses.
 fn chosen(method: Method, circles: Vec<(usize, Layout)>) -> Vec<(usize, Layout)> {
     let plane = |layout: &Layout| layout.height_mm.abs() < MIN_LEVER_MM;
     let of = |axis: usize| circles.iter().filter(move |(_, layout)| layout.axis == axis);
@@ -227,7 +228,7 @@ fn chosen(method: Method, circles: Vec<(usize, Layout)>) -> Vec<(usize, Layout)>
     circles.iter().filter(taken).cloned().collect()
 }
 
-/// The declared errors of the axes that turn which the method tells.
+/// The declared errors of the turning axes that the method identifies.
 fn errors(problem: &Problem<'_>, method: Method, layouts: &[Layout]) -> Vec<usize> {
     let machine = &problem.session.machine;
     let of_method = |id: &str| {

@@ -1,7 +1,8 @@
-//! What comes and goes from run to run: waves along a run that no memory explains.
+//! Waves along runs that vary from run to run and that no autocorrelation explains.
 //!
-//! A wave whose size swells and fades is no line in a spectrum but a hump, some cycles wide, and an autoregression of two or three terms can imitate one.
-//! Deviations are therefore whitened with one term, whose spectrum only falls, and a hump is looked for in bands.
+//! A wave of varying amplitude has no line in the spectrum but a hump of some cycles' width. An autoregression of order two or three can
+//! imitate such a hump. The deviations are therefore whitened with order one, whose spectrum is monotonic, and the search for humps is by
+//! bands.
 
 use std::ops::Range;
 
@@ -12,17 +13,17 @@ use super::trends::MIN_RUN;
 use super::{Autocorrelation, PureError};
 use crate::outliers::median;
 
-/// Half cycles along a run where the bands may begin that are looked at in deviations, and how many half cycles wide they are.
+/// Half cycles along a run at which the candidate bands begin, and the widths of the bands in half cycles.
 const FIRST: std::ops::RangeInclusive<usize> = 2..=40;
 const WIDTHS: [usize; 3] = [1, 4, 8];
-/// Half cycles up to which the level is taken that a band has to stand out from.
+/// Half cycles up to which the median level is computed.
 const HIGHEST: usize = 100;
-/// The most bands that are taken out of a test.
+/// Maximum number of bands to remove from a test.
 const MAX_BANDS: usize = 4;
-/// Probability that anything is taken out of a test's noise.
+/// Significance level of a band, over all candidate bands.
 const BAND_SIGNIFICANCE: f64 = 1e-4;
 
-/// Rows of a test that were read in one go.
+/// Consecutive rows of one run of a test.
 #[derive(Clone)]
 struct Run {
     test: usize,
@@ -30,8 +31,9 @@ struct Run {
 }
 
 impl PureError {
-    /// The same less waves along runs that no memory explains: what comes and goes from run to run is structure, and would be taken for noise. A band is taken
-    /// out of all tests, or of one, where the periodogram of their whitened deviations, summed over runs, stands out from the median of all ordinates.
+    /// Removes waves along runs that no autocorrelation explains: they vary from run to run, so they are structure that would count as
+    /// noise. A band is removed from all tests or from one. The criterion is the periodogram of the whitened deviations, summed over runs,
+    /// against the median of all ordinates.
     pub fn without_waves(mut self, tests: &[&Test], kept: impl Fn(usize, usize) -> bool) -> PureError {
         let Some(mut memory) = self.autocorrelation_up_to(1, tests, &kept) else {
             return self;
@@ -54,10 +56,10 @@ impl PureError {
                     .map(|(deviations, freedom)| freedom / deviations.iter().flatten().count().max(1) as f64)
                     .collect();
                 for run in &runs {
-                    // Half cycles overlap: every second one of a band holds all of it.
+                    // Half cycles overlap: every second one of a band represents the whole band.
                     for half_cycles in band.clone().step_by(2) {
                         if take_out(&mut self.deviations[run.test][run.rows.clone()], half_cycles) {
-                            // Of deviations that repeats hold more than once, their share of two degrees of freedom.
+                            // Repeats hold a deviation more than once, so a wave uses only its share of two degrees of freedom.
                             self.of_tests[run.test] -= 2.0 * independent[run.test];
                         }
                     }
@@ -75,7 +77,7 @@ impl PureError {
         self
     }
 
-    /// The band, in half cycles, that stands out most in runs, if any does.
+    /// The most significant band of runs, in half cycles, if any is significant.
     fn band(&self, runs: &[Run], memory: &Autocorrelation) -> Option<Range<usize>> {
         let shortest = runs.iter().map(|run| run.rows.len()).min()?;
         let whitened: Vec<Vec<f64>> = runs
@@ -103,10 +105,10 @@ impl PureError {
         let sums: Vec<f64> = (first..HIGHEST.min(shortest))
             .map(|half_cycles| whitened.iter().map(|run| ordinate(run, half_cycles)).sum())
             .collect();
-        // Repeats hold the same deviation more than once: so many of these runs are independent.
+        // Repeats hold the same deviation more than once: this is the number of independent runs.
         let seen = self.deviations.iter().flatten().flatten().count().max(1);
         let independent = runs.len() as f64 * self.freedom as f64 / seen as f64;
-        // Wilson and Hilferty's median of a gamma distribution.
+        // Median of a gamma distribution (Wilson and Hilferty).
         let median_of_gamma = independent * (1.0 - 1.0 / (9.0 * independent)).powi(3);
         let level = median(&mut sums.clone()) / median_of_gamma;
         if level <= 0.0 {
@@ -117,7 +119,7 @@ impl PureError {
             .into_iter()
             .flat_map(|width| sums.windows(width).take(FIRST.count()).enumerate())
             .map(|(begin, band)| {
-                // Of ordinates half a cycle apart every second one is independent.
+                // Of ordinates half a cycle apart, every second one is independent.
                 let cycles = (0.5 * band.len() as f64).max(1.0);
                 let mean = band.iter().sum::<f64>() / (band.len() as f64 * level);
                 let by_chance = gamma_ur(independent * cycles, mean * cycles);
@@ -129,8 +131,8 @@ impl PureError {
     }
 }
 
-/// Takes a wave of so many half cycles out of the deviations of a run, by least squares; what is left is rescaled for what the wave took of the noise.
-/// Returns whether there was anything to take it from.
+/// Removes a wave of so many half cycles from the deviations of a run, by least squares. Rescales the rest for the variance that the wave
+/// removes. Returns whether the run has enough deviations.
 fn take_out(run: &mut [Option<f64>], half_cycles: usize) -> bool {
     let step = std::f64::consts::PI * half_cycles as f64 / run.len() as f64;
     let (mut cc, mut cs, mut ss, mut cy, mut sy) = (0.0, 0.0, 0.0, 0.0, 0.0);
@@ -167,7 +169,7 @@ fn take_out(run: &mut [Option<f64>], half_cycles: usize) -> bool {
 mod tests {
     use super::*;
 
-    /// Waves of whole cycles are orthogonal along a run: one goes, the other stays and is rescaled by `√(n/(n − 2))`.
+    /// Waves of whole cycles are orthogonal along a run: one is removed, the other remains, rescaled by `√(n/(n − 2))`.
     #[test]
     fn a_wave_is_taken_out_and_no_other() {
         const N: usize = 48;
@@ -180,7 +182,7 @@ mod tests {
         for (t, left) in run.iter().enumerate() {
             assert!((left.unwrap() - rescale * wave(10.0, t)).abs() < 1e-12);
         }
-        // Gaps stay gaps, and half a cycle may be taken out beside them.
+        // Gaps remain gaps, and half a cycle can be removed beside them.
         let mut run: Vec<Option<f64>> = (0..N).map(|t| (t % 5 != 0).then(|| wave(5.0, t))).collect();
         take_out(&mut run, 5);
         for (t, left) in run.iter().enumerate() {

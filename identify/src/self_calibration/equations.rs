@@ -12,21 +12,21 @@ use abbe_model::session::{Prior, Session, Test};
 
 use crate::error::IdentifyError;
 
-/// Angles nearer than this are one, rad: positions in files are rounded to 0.1 µm or so.
+/// Angles nearer than this are equal, rad: positions in files are rounded to about 0.1 µm.
 const SAME_ANGLE: f64 = 1e-4;
-/// Sine of the angle up to which a probing direction counts as radial.
+/// Sine of the angle up to which a probing direction is radial.
 const RADIAL: f64 = 1e-6;
 
-/// The four functions, in the order of their columns.
+/// The four unknown functions, in the order of their columns.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Function {
-    /// Displacement of the table along the first direction across its axis, over the axis' position: `E_XC,total`.
+    /// Displacement of the table along the first direction across its axis, as a function of the axis' position: `E_XC,total`.
     First,
     /// The same along the second direction: `E_YC,total`.
     Second,
-    /// Positioning error of the linear axes away from the rotary axis, over the angle of the place: `E_radial`.
+    /// Positioning error of the linear axes away from the rotary axis, as a function of the machine angle: `E_radial`.
     Linear,
-    /// What the artefact's surface stands out by, over the angle on the artefact: `W_radial`.
+    /// Form deviation of the artefact's surface, as a function of the angle on the artefact: `W_radial`.
     Artefact,
 }
 
@@ -40,31 +40,32 @@ impl Function {
     ];
 }
 
-/// Equations `Σ a·f(angle) = Δr`, one a reading.
+/// Equations `Σ a·f(angle) = Δr`, one per reading.
 #[derive(Clone, Debug)]
 pub struct Equations {
     /// Index of the rotary axis in the machine.
     pub axis: usize,
     /// The two directions of R across the axis: 0, 1, 2 for X, Y, Z; a positive turn carries the first towards the second.
     pub across: [usize; 2],
-    /// 1 where the axis turns from the first direction towards the second for an increasing command, else −1.
+    /// 1 if the axis turns from the first direction towards the second for an increasing command, else −1.
     pub sense: f64,
-    /// The angles at which each function is met, rad in (−π, π], ascending.
+    /// The angles of each function, rad in (−π, π], ascending.
     pub angles: [Vec<f64>; 4],
-    /// One row a reading, one column an angle of a function.
+    /// One row per reading, one column per angle of a function.
     pub rows: Vec<Vec<f64>>,
-    /// By how much further out than nominal the surface was met, mm: `Δr`.
+    /// Outward deviation of the measured surface from nominal, mm: `Δr`.
     pub outward_mm: Vec<f64>,
-    /// What the readings are referred to.
+    /// The reference of the readings.
     pub reference: Reference,
 }
 
-/// What the radius of an uncalibrated artefact is taken from.
+/// The source of an uncalibrated artefact's radius.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Reference {
-    /// An unknown of its own, from all readings.
+    /// A parameter, estimated from all readings.
     Estimated,
-    /// The first reading at which every angle is 0, as in the paper: it is taken off all readings, and its own noise is not propagated.
+    /// The first reading at which every angle is 0, as in Zimmermann & Ibaraki (2020). It is subtracted from all readings, and its own
+    /// noise is not propagated.
     FirstReading,
 }
 
@@ -79,7 +80,7 @@ impl Equations {
         self.angles.iter().map(Vec::len).sum()
     }
 
-    /// The column of a function at an angle, if some reading meets it there.
+    /// The column of a function at an angle, if a reading determines it there.
     pub fn column(&self, function: Function, angle: f64) -> Option<usize> {
         let place = self.angles[function as usize]
             .iter()
@@ -100,7 +101,7 @@ impl Equations {
         (Function::Artefact, f64::NAN)
     }
 
-    /// What a function is called: `EXC`, `EYC` with the axis' own letters, `E_radial`, `W_radial`.
+    /// The name of a function: `EXC`, `EYC` with the axis' own letters, `E_radial`, `W_radial`.
     pub fn name(&self, function: Function, axis: &str) -> String {
         let letter = |k: usize| ["X", "Y", "Z"][self.across[k]];
         match function {
@@ -111,7 +112,7 @@ impl Equations {
         }
     }
 
-    /// From the readings of a session: the coefficients are the chain's own derivatives.
+    /// The equations of a session. The coefficients are the derivatives of the chain.
     ///
     /// # Errors
     /// If the session is none of this kind: another instrument, no or several rotary axes that turn under the artefact, another rotary
@@ -134,7 +135,7 @@ impl Equations {
         };
         if let Some(other) = tests.iter().find(|test| test.setup != first.setup) {
             return Err(no(format!(
-                "tests \"{}\" and \"{}\" have different set-ups; all tests touch one artefact in one clamping: give them the same `setup`",
+                "tests \"{}\" and \"{}\" have different set-ups; all tests must probe one artefact in one clamping: give them the same `setup`",
                 first.name, other.name
             )));
         }
@@ -176,8 +177,8 @@ impl Equations {
             let at_zero = |touch: &&Touch| touch.angles.iter().all(|angle| apart(*angle, 0.0) < SAME_ANGLE);
             let Some(first) = touches.iter().find(at_zero).map(|touch| touch.outward_mm) else {
                 return Err(no(
-                    "no reading at 0° of axis, machine and artefact, to which the others could be referred; \
-                     `radius_u_um = inf` makes the radius an unknown instead"
+                    "no reading at 0° of axis, machine and artefact as reference; \
+                     `radius_u_um = inf` makes the radius a parameter instead"
                         .into(),
                 ));
             };
@@ -198,7 +199,7 @@ impl Equations {
         Ok(equations)
     }
 
-    /// What each reading of a test touches.
+    /// The probed points of a test, one per reading.
     fn touches(&self, session: &Session, test: &Test) -> Result<Vec<Touch>, String> {
         let (Station::Probe(probe), Some(readings)) = (&test.station, &test.readings) else {
             return Ok(Vec::new());
@@ -214,8 +215,8 @@ impl Equations {
         let places: Vec<Place> = (0..model.rows())
             .map(|row| self.place(machine, probe, &model, row))
             .collect();
-        // Eq. (2): a table that stands at 0 throughout has no displacement but that to which all are referred. Eq. (3): nor has a spot at 0 of the
-        // artefact, touched throughout, any form.
+        // Eq. (2): a table that stays at 0 has no displacement beyond the reference. Eq. (3): nor has a spot at 0 of the artefact, probed
+        // throughout, a form deviation.
         let varies = |angle: fn(&Place) -> f64| {
             let stays = places.iter().all(|place| apart(angle(place), 0.0) < SAME_ANGLE);
             f64::from(u8::from(!stays))
@@ -228,13 +229,13 @@ impl Equations {
                 let place = &places[row];
                 if place.beside > RADIAL {
                     return Err(format!(
-                        "test \"{}\", reading {}: the probe does not move straight towards axis `{}`; the method takes radial touches",
+                        "test \"{}\", reading {}: the probe does not move straight towards axis `{}`; the method requires radial probing",
                         test.name,
                         row + 1,
                         machine.axes[self.axis].name
                     ));
                 }
-                // The measured radius grows as the distance shrinks.
+                // The measured radius increases as the distance decreases.
                 let by = |slot: usize| -sensitivities.derivatives[slot][row];
                 Ok(Touch {
                     angles: [place.position, place.position, place.angle, place.on_artefact],
@@ -245,7 +246,7 @@ impl Equations {
             .collect()
     }
 
-    /// Where a reading touches.
+    /// The angles of a probed point.
     fn place(
         &self,
         machine: &abbe_model::chain::Machine,
@@ -269,7 +270,7 @@ impl Equations {
             position: wrapped(state[self.axis].value),
             angle: wrapped(angle),
             on_artefact: wrapped(angle_of(on_table)),
-            // Inwards, the direction is minus the unit vector at the angle.
+            // For inward probing the direction is minus the unit vector at the angle.
             beside: (first + angle.cos()).hypot(second + angle.sin()),
         }
     }
@@ -350,7 +351,7 @@ fn wrapped(angle: f64) -> f64 {
     }
 }
 
-/// By how much two angles differ, whole turns aside.
+/// The distance of two angles, modulo whole turns.
 fn apart(a: f64, b: f64) -> f64 {
     let turned = (a - b).rem_euclid(TAU);
     turned.min(TAU - turned)

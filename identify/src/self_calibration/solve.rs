@@ -1,4 +1,4 @@
-//! The functions' values from the equations: linear least squares in what the boundary conditions leave free.
+//! Linear least-squares solution for the functions' values under the boundary conditions.
 
 use faer::Mat;
 
@@ -8,10 +8,10 @@ use crate::error::IdentifyError;
 use crate::rank::Rank;
 use crate::triangle::Triangle;
 
-/// Values of the functions, mm, and how they follow from the readings.
+/// Values of the functions, mm, and their linear dependence on the readings.
 #[derive(Clone, Debug)]
 pub struct Solution {
-    /// Every column of the equations, then the radius where it is estimated.
+    /// Every column of the equations, then the radius if it is estimated.
     pub values_mm: Vec<f64>,
     /// Their covariance, mm².
     pub covariance: Mat<f64>,
@@ -19,15 +19,15 @@ pub struct Solution {
     pub estimator: Mat<f64>,
     /// Standard uncertainty of each input, mm.
     pub u_inputs_mm: Vec<f64>,
-    /// What is seen of the free values.
+    /// Identifiable directions of the free values.
     pub rank: Rank,
-    /// Whether each of the values is seen.
+    /// Whether each of the values is identifiable.
     pub seen: Vec<bool>,
-    /// Number of free values, the radius included where it is one.
+    /// Number of free values, with the radius if it is estimated.
     pub unknowns: usize,
-    /// Square root of the mean square residual over the readings, mm.
+    /// Root mean square of the residual, mm.
     pub rms_mm: f64,
-    /// Readings that say something, less what is seen.
+    /// Degrees of freedom: readings with information, minus the rank.
     pub freedom: usize,
 }
 
@@ -64,7 +64,7 @@ pub fn solve(equations: &Equations, reduction: &Reduction, sigma_mm: f64) -> Res
     });
     let mut triangle = Triangle::new(unknowns);
     triangle.absorb(white.as_ref());
-    // The unknowns stand in the order of their functions and angles.
+    // The parameters are in the order of their functions and angles.
     let preference: Vec<usize> = (0..unknowns).collect();
     let rank = Rank::decide(triangle.parts().0.as_ref(), &vec![1.0; unknowns], &preference)?;
     let of_free = crate::fit::covariance(&triangle, &rank.seen)?;
@@ -113,7 +113,7 @@ pub fn solve(equations: &Equations, reduction: &Reduction, sigma_mm: f64) -> Res
     })
 }
 
-/// Rank of the equations before any condition is agreed upon.
+/// Rank of the equations without the boundary conditions.
 ///
 /// # Errors
 /// If an equation holds a number that is not finite.
@@ -123,6 +123,6 @@ pub fn rank_before(equations: &Equations) -> Result<usize, IdentifyError> {
     let svd = matrix.svd().map_err(|_| IdentifyError::Decomposition)?;
     let singular: Vec<f64> = svd.S().column_vector().iter().copied().collect();
     let largest = singular.first().copied().unwrap_or(0.0);
-    // Coefficients are sines and cosines: what is dependent comes out at rounding, what is not at a hundredth or more.
+    // Coefficients are sines and cosines: singular values of dependent columns are at rounding level, others at a hundredth or more.
     Ok(singular.iter().filter(|s| **s > 1e-9 * largest).count())
 }

@@ -1,4 +1,4 @@
-//! What a test goes along: the angle about which its trace is drawn, or the axis that moves most.
+//! The abscissa of a test: the angle of a circular path, or the axis that moves most.
 
 use std::ops::Range;
 
@@ -8,15 +8,15 @@ use abbe_model::session::readings::Readings;
 
 use crate::circle;
 
-/// Positions nearer than this are one: mm or rad.
+/// Tolerance of equal positions: mm or rad.
 const STANDS: f64 = 1e-6;
-/// More stretches than one in this many readings: no traversals, but poses.
+/// Readings per segment below which the test consists of poses, not of traversals.
 const MIN_STRETCH: usize = 10;
 
-/// What a test goes along.
+/// The abscissa of a test.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Abscissa {
-    /// `C`, or `XY` for the angle about the middle of a circle.
+    /// `C`, or `XY` for the angle about the centre of a circle.
     pub name: String,
     /// Whether it is an angle.
     pub is_angle: bool,
@@ -24,7 +24,7 @@ pub struct Abscissa {
     pub axis: Option<usize>,
     /// Row by row: degrees, or mm.
     pub values: Vec<f64>,
-    /// All axes that move: their places among the machine's.
+    /// All axes that move, by index in the machine.
     pub moving: Vec<usize>,
 }
 
@@ -35,7 +35,7 @@ pub struct Stretch {
     pub run: i64,
     /// Its rows.
     pub rows: Range<usize>,
-    /// Whether the way's values grow; `None` for poses.
+    /// Whether the abscissa increases; `None` for poses.
     pub forward: Option<bool>,
 }
 
@@ -46,8 +46,8 @@ fn range(values: &[f64]) -> f64 {
 }
 
 impl Abscissa {
-    /// Of a test's readings: the rotary axis that turns most; else the angle about the circle of two linear axes; else the linear axis that
-    /// moves most; else the number of the reading.
+    /// The abscissa of a test's readings: the rotary axis with the largest travel; else the angle about the circle of two linear axes;
+    /// else the linear axis with the largest travel; else the number of the reading.
     pub fn of(machine: &Machine, readings: &Readings) -> Abscissa {
         let moving: Vec<usize> = (0..machine.axes.len())
             .filter(|axis| range(&readings.positions[*axis]) > STANDS)
@@ -100,7 +100,8 @@ impl Abscissa {
         }
     }
 
-    /// The stretches of one direction of each run; for `poses`, and where the direction changes at every other reading, whole runs without one.
+    /// The segments of one direction of each run. For `poses`, and if the direction changes at every other reading, whole runs without a
+    /// direction.
     pub fn stretches(&self, readings: &Readings, poses: bool) -> Vec<Stretch> {
         let runs = readings.runs();
         let number = |row: usize| readings.run.get(row).copied().unwrap_or(1);
@@ -148,7 +149,7 @@ impl Abscissa {
     }
 }
 
-/// The unwrapped angle (degrees) about the circle that two axes go along; `None` where they go along none.
+/// The unwrapped angle (degrees) about the circle of two axes; `None` if they describe none.
 fn about_a_circle(first: &[f64], second: &[f64]) -> Option<Vec<f64>> {
     let points: Vec<[f64; 2]> = first.iter().zip(second).map(|(x, y)| [*x, *y]).collect();
     let circle = circle::through(&points)?;
