@@ -58,7 +58,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_circle_is_found_from_part_of_it() {
+    fn an_arc_determines_the_circle() {
         let points: Vec<[f64; 2]> = (0..5)
             .map(|k| (0.3 * f64::from(k)).sin_cos())
             .map(|(sin, cos)| [3.0 + 2.0 * cos, -1.0 + 2.0 * sin])

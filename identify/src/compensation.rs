@@ -29,7 +29,7 @@ pub struct ErrorCurve {
     pub range: Range<f64>,
     terms: Vec<(Effect, Vec<f64>)>,
     /// The indices of the terms' coefficients among the fit's parameters, term by term.
-    places: Vec<usize>,
+    coefficients: Vec<usize>,
     /// Covariance of the coefficients, row by row, with the fit's factor on uncertainties; internal units.
     covariance: Vec<Vec<f64>>,
 }
@@ -42,7 +42,7 @@ impl ErrorCurve {
             direction,
             ..DriverSample::default()
         };
-        let mut basis = Vec::with_capacity(self.places.len());
+        let mut basis = Vec::with_capacity(self.coefficients.len());
         for (effect, _) in &self.terms {
             effect.shape.basis(&sample, &mut basis);
         }
@@ -153,7 +153,7 @@ pub fn of_fit(problem: &Problem<'_>, fit: &Fit) -> Compensation {
             result.left_out.push(format!("{id}: {why}"));
             continue;
         }
-        let (Some(axis), Some(places)) = (
+        let (Some(axis), Some(coefficients)) = (
             machine.axis_index(&error.axis),
             found.into_iter().collect::<Option<Vec<usize>>>(),
         ) else {
@@ -162,42 +162,45 @@ pub fn of_fit(problem: &Problem<'_>, fit: &Fit) -> Compensation {
                 .push(format!("{id}: not all of its coefficients are identifiable"));
             continue;
         };
-        let term = (effect.clone(), places.iter().map(|j| fit.beta[*j]).collect());
+        let term = (
+            effect.clone(),
+            coefficients.iter().map(|j| fit.beta[*j]).collect(),
+        );
         if let Some(curve) = result.curves.iter_mut().find(|curve| curve.error == *error) {
             curve.terms.push(term);
-            curve.places.extend(places);
+            curve.coefficients.extend(coefficients);
             continue;
         }
-        let Some(covered) = range::covered(problem, error, axis) else {
+        let Some(observed) = range::observed_range(problem, error, axis) else {
             let why = "its axis stands still wherever readings observe it, and the positions between are not measured";
             result.left_out.push(format!("{id}: {why}"));
             continue;
         };
         let kind = machine.axes[axis].kind;
-        for apart in &covered.apart {
+        for unconnected in &observed.unconnected {
             result.left_out.push(format!(
                 "{error} from {:.3} to {:.3} {}: not connected to the longest range of motion of the axis",
-                kind.outside(apart.start),
-                kind.outside(apart.end),
+                kind.outside(unconnected.start),
+                kind.outside(unconnected.end),
                 kind.unit()
             ));
         }
         result.curves.push(ErrorCurve {
             error: error.clone(),
             axis,
-            range: covered.range,
+            range: observed.range,
             terms: vec![term],
-            places,
+            coefficients,
             covariance: Vec::new(),
         });
     }
     let enlarged = fit.u_enlargement.powi(2);
     for curve in &mut result.curves {
         let row = |j: &usize| -> Vec<f64> {
-            let columns = curve.places.iter();
+            let columns = curve.coefficients.iter();
             columns.map(|k| fit.covariance[(*j, *k)] * enlarged).collect()
         };
-        curve.covariance = curve.places.iter().map(row).collect();
+        curve.covariance = curve.coefficients.iter().map(row).collect();
     }
     result
 }

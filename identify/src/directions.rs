@@ -6,8 +6,8 @@
 //! ```
 //!
 //! `a` is the direction of the turning axis, as carried by the axes beneath it. `r` is the direction from the axis to the ball. For a C
-//! axis with the ball at +X at C = 0, radial and tangential are Eqs. (10) and (11) of Yamaji, Hamabata & Ihara (2014): radial `X cos C + Y
-//! sin C`, tangential `−X sin C + Y cos C`.
+//! axis with the ball at +X at C = 0, radial and tangential are Eqs. (10) and (11) of Yamaji, Hamabata & Ihara (2014): radial
+//! `X cos C + Y sin C`, tangential `−X sin C + Y cos C`.
 
 use abbe_model::axis::AxisKind;
 use abbe_model::chain::{AxisPosition, BodyErrors, Machine};
@@ -67,11 +67,11 @@ pub fn views(problem: &Problem<'_>, fit: &Fit) -> Result<Vec<Vec<DirectionCompon
             .map(|row| {
                 readings.state(machine, row, &mut state);
                 let frames = Frames::at(machine, rtest, &state, turning);
-                let seen = |read: &[f64]| frames.view(rtest, &orientation, read);
-                let three = 3 * row..3 * row + 3;
+                let components = |read: &[f64]| frames.view(rtest, &orientation, read);
+                let scalars = 3 * row..3 * row + 3;
                 DirectionComponents {
-                    reading: seen(&readings.observed[three.clone()]),
-                    residual: seen(&fit.residuals[number][three]),
+                    reading: components(&readings.observed[scalars.clone()]),
+                    residual: components(&fit.residuals[number][scalars]),
                 }
             })
             .collect();

@@ -163,7 +163,7 @@ pub fn component_unit(session: &Session, component: &Component) -> Option<Intern
 
 /// The unit in which coefficient `k` of an effect is reported.
 pub fn coefficient_unit(session: &Session, effect: &Effect, k: usize) -> Unit {
-    let Some(inside) = component_unit(session, &effect.component) else {
+    let Some(internal_unit) = component_unit(session, &effect.component) else {
         return Unit {
             name: "ms".to_string(),
             display_per_internal: 1e3,
@@ -174,7 +174,7 @@ pub fn coefficient_unit(session: &Session, effect: &Effect, k: usize) -> Unit {
         Driver::Axis(name) => machine.axis_index(name).map(|axis| machine.axes[axis].kind),
         _ => None,
     };
-    Unit::of_coefficient(inside, &effect.driver, driver_axis, &effect.shape, k)
+    Unit::of_coefficient(internal_unit, &effect.driver, driver_axis, &effect.shape, k)
 }
 
 /// The axis of a component.

@@ -28,15 +28,15 @@ impl fmt::Display for Meaning {
 
 /// The description of an effect on a machine.
 pub fn meaning(machine: &Machine, effect: &Effect) -> Meaning {
-    let words = Words { machine, effect };
+    let terms = EffectTerms { machine, effect };
     let tests = match effect.tests.as_slice() {
         [] => String::new(),
         [test] => format!(", in test {test}"),
         tests => format!(", in tests {}", tests.join(", ")),
     };
     Meaning {
-        part: words.part(),
-        what: format!("{}{tests}", words.what()),
+        part: terms.part(),
+        what: format!("{}{tests}", terms.what()),
     }
 }
 
@@ -73,12 +73,12 @@ fn direction(freedom: Freedom) -> char {
     Freedom::ALL[freedom.index() % 3].letter()
 }
 
-struct Words<'w> {
+struct EffectTerms<'w> {
     machine: &'w Machine,
     effect: &'w Effect,
 }
 
-impl Words<'_> {
+impl EffectTerms<'_> {
     fn axis_of_component(&self) -> Option<usize> {
         match &self.effect.component {
             Component::Axis(name) => self.machine.axis_index(&name.axis),
@@ -160,7 +160,7 @@ impl Words<'_> {
     }
 
     /// The driver as the object of a sentence: `its angle`, `the position of the X slide`, `time`.
-    fn followed(&self) -> String {
+    fn driver_phrase(&self) -> String {
         let quantity = |axis: usize| match self.machine.axes[axis].kind {
             AxisKind::Rotary => "angle",
             AxisKind::Linear => "position",
@@ -181,7 +181,7 @@ impl Words<'_> {
     }
 
     /// ` of the X slide` if the effect follows another axis.
-    fn of_another(&self) -> String {
+    fn of_another_axis(&self) -> String {
         match self.axis_of_driver() {
             Some(axis) if !self.follows_its_own_axis() => {
                 format!(" of the {}", part_of_axis(self.machine, axis))
@@ -191,16 +191,16 @@ impl Words<'_> {
     }
 
     /// A position, period or width of the driver, with its unit.
-    fn place(&self, value: f64) -> String {
+    fn at_value(&self, value: f64) -> String {
         let rotary = self
             .axis_of_driver()
             .is_some_and(|axis| self.machine.axes[axis].kind == AxisKind::Rotary);
         match self.effect.driver {
-            Driver::Time => format!("{} s", digits(value)),
-            Driver::Temperature => format!("{} °C", digits(value)),
-            Driver::Gravity => format!("{} m", digits(value)),
-            _ if rotary => format!("{}°", digits(value.to_degrees())),
-            _ => format!("{} mm", digits(value)),
+            Driver::Time => format!("{} s", four_digits(value)),
+            Driver::Temperature => format!("{} °C", four_digits(value)),
+            Driver::Gravity => format!("{} m", four_digits(value)),
+            _ if rotary => format!("{}°", four_digits(value.to_degrees())),
+            _ => format!("{} mm", four_digits(value)),
         }
     }
 
@@ -211,37 +211,42 @@ impl Words<'_> {
             Shape::Constant => format!("{motion}, constant"),
             Shape::Power { degree, .. } => format!("{motion}{}", self.power(*degree)),
             Shape::Polynomial { degree, .. } => {
-                format!("{motion}, a polynomial of degree {degree} in {}", self.followed())
+                format!(
+                    "{motion}, a polynomial of degree {degree} in {}",
+                    self.driver_phrase()
+                )
             }
-            Shape::Harmonic { order } => format!("{motion} {} per turn{}", times(*order), self.of_another()),
+            Shape::Harmonic { order } => {
+                format!("{motion} {} per turn{}", times(*order), self.of_another_axis())
+            }
             Shape::Periodic { period } => {
                 format!(
                     "{motion}, repeating every {}{}",
-                    self.place(*period),
-                    self.of_another()
+                    self.at_value(*period),
+                    self.of_another_axis()
                 )
             }
             Shape::Curve { intervals, .. } => {
                 format!(
                     "{motion}, a nonparametric curve over {} in {intervals} intervals",
-                    self.followed()
+                    self.driver_phrase()
                 )
             }
             Shape::Backlash => self.backlash(motion),
             Shape::Lag => self.lag(motion),
             Shape::ReversalSpike { width } => format!(
                 "{motion}, a spike after reversal{} that decays over {}",
-                self.of_another(),
-                self.place(*width)
+                self.of_another_axis(),
+                self.at_value(*width)
             ),
-            Shape::Drift => format!("{motion}, drifting with {}", self.followed()),
+            Shape::Drift => format!("{motion}, drifting with {}", self.driver_phrase()),
             Shape::Warmup { tau_s } => {
                 format!(
                     "{motion}, warming up with a time constant of {} s",
-                    digits(*tau_s)
+                    four_digits(*tau_s)
                 )
             }
-            Shape::Steps { at } => format!("{motion}, {}{}", self.steps(at), self.of_another()),
+            Shape::Steps { at } => format!("{motion}, {}{}", self.steps(at), self.of_another_axis()),
             Shape::Local {
                 centre,
                 width,
@@ -250,23 +255,23 @@ impl Words<'_> {
                 let each_turn = if recurs.is_some() { " of each turn" } else { "" };
                 format!(
                     "{motion}, a local feature at {}{each_turn}{}, {} to either side",
-                    self.place(*centre),
-                    self.of_another(),
-                    self.place(*width)
+                    self.at_value(*centre),
+                    self.of_another_axis(),
+                    self.at_value(*width)
                 )
             }
         }
     }
 
     fn power(&self, degree: usize) -> String {
-        let followed = self.followed();
+        let driver_phrase = self.driver_phrase();
         match (degree, &self.effect.driver) {
             (1, Driver::Temperature) => ", following the temperature".to_string(),
             (1, Driver::Gravity) => " under gravity (compliance)".to_string(),
-            (1, _) => format!(" in proportion to {followed}"),
-            (2, _) => format!(" with the square of {followed}"),
-            (3, _) => format!(" with the cube of {followed}"),
-            (degree, _) => format!(" with {followed} to the power of {degree}"),
+            (1, _) => format!(" in proportion to {driver_phrase}"),
+            (2, _) => format!(" with the square of {driver_phrase}"),
+            (3, _) => format!(" with the cube of {driver_phrase}"),
+            (degree, _) => format!(" with {driver_phrase} to the power of {degree}"),
         }
     }
 
@@ -287,7 +292,7 @@ impl Words<'_> {
         } else {
             format!(
                 "{motion} that changes at reversal{} (backlash)",
-                self.of_another()
+                self.of_another_axis()
             )
         }
     }
@@ -296,31 +301,31 @@ impl Words<'_> {
         if self.is_positioning() {
             "lag behind the command in proportion to the speed".to_string()
         } else {
-            format!("{motion} in proportion to the speed{}", self.of_another())
+            format!("{motion} in proportion to the speed{}", self.of_another_axis())
         }
     }
 
     fn steps(&self, at: &[f64]) -> String {
         match at {
-            [one] => format!("a step at {}", self.place(*one)),
-            [first, .., last] if at.len() > MAX_PLACES => {
+            [one] => format!("a step at {}", self.at_value(*one)),
+            [first, .., last] if at.len() > MAX_LISTED_STEPS => {
                 format!(
                     "{} steps from {} to {}",
                     at.len(),
-                    self.place(*first),
-                    self.place(*last)
+                    self.at_value(*first),
+                    self.at_value(*last)
                 )
             }
             several => {
-                let places: Vec<String> = several.iter().map(|place| self.place(*place)).collect();
-                format!("steps at {}", places.join(", "))
+                let steps_listed: Vec<String> = several.iter().map(|place| self.at_value(*place)).collect();
+                format!("steps at {}", steps_listed.join(", "))
             }
         }
     }
 }
 
 /// Maximum number of steps in a list.
-const MAX_PLACES: usize = 6;
+const MAX_LISTED_STEPS: usize = 6;
 
 /// `once`, `twice`, `17 times`.
 fn times(order: f64) -> String {
@@ -334,7 +339,7 @@ fn times(order: f64) -> String {
 }
 
 /// Four significant digits, at most four decimals.
-fn digits(value: f64) -> String {
+fn four_digits(value: f64) -> String {
     let magnitude = value.abs().max(1e-3).log10().floor() as i32;
     let text = format!("{value:.*}", (3 - magnitude).clamp(0, 4) as usize);
     match text.strip_prefix('-') {

@@ -47,13 +47,13 @@ pub struct Fit {
 }
 
 /// Start value of the noise standard deviation if neither session nor repeats give one: 1 µm.
-const FIRST_GUESS_MM: f64 = 1e-3;
+const START_NOISE_MM: f64 = 1e-3;
 /// Least estimate of the noise standard deviation. Computed readings repeat exactly, but are still rounded.
 const MIN_NOISE_MM: f64 = MIN_UM * 1e-3;
 /// Maximum number of rounds that re-estimate noise and outliers.
-const ROUNDS: usize = 6;
+const MAX_ROUNDS: usize = 6;
 /// Relative change of the noise standard deviation at which the rounds stop.
-const SETTLED: f64 = 1e-4;
+const NOISE_TOLERANCE: f64 = 1e-4;
 /// Significance level of the χ² test of the residual against the noise.
 const BIRGE_SIGNIFICANCE: f64 = 1e-3;
 
@@ -74,7 +74,7 @@ impl IdentifiableDirections<'_, '_> {
 }
 
 impl LeastSquares for IdentifiableDirections<'_, '_> {
-    fn unknowns(&self) -> usize {
+    fn parameters(&self) -> usize {
         self.basis.ncols()
     }
 
@@ -138,7 +138,7 @@ pub fn prepare_with<'a>(
     let floor = session.resolution_mm.unwrap_or(0.0) / 12.0_f64.sqrt();
     let first = match stated {
         Some(sigma) => Noise::white(sigma, NoiseSource::Stated),
-        None => Noise::white(FIRST_GUESS_MM.max(floor), NoiseSource::Residual),
+        None => Noise::white(START_NOISE_MM.max(floor), NoiseSource::Residual),
     };
     let mut problem = Problem::new(session, first, seed)?;
     for effect in effects {
@@ -152,7 +152,7 @@ pub fn prepare_with<'a>(
     }
     let mut fit = plausibility::checked(&problem, fit(&problem, None))?;
     // Noise and outliers depend on the residuals, and the residuals on the fit. The returned fit always uses the returned noise.
-    for _ in 0..ROUNDS {
+    for _ in 0..MAX_ROUNDS {
         let rejected = crate::outliers::reject(&problem, &fit);
         let unchanged = rejected == problem.rejected;
         problem.rejected = rejected;
@@ -160,7 +160,7 @@ pub fn prepare_with<'a>(
             Some(_) => problem.noise.clone(),
             None => estimated_noise(&problem, &fit, floor),
         };
-        let settled = (noise.sigma_mm / problem.noise.sigma_mm - 1.0).abs() < SETTLED;
+        let settled = (noise.sigma_mm / problem.noise.sigma_mm - 1.0).abs() < NOISE_TOLERANCE;
         if settled && unchanged {
             break;
         }
@@ -186,10 +186,10 @@ fn nominal_residual_mm(problem: &Problem<'_>) -> Result<f64, IdentifyError> {
         Some(setup) => r[(i, *setup)],
         None => c[i],
     });
-    let mut of_setups = Triangle::new(setups.len());
-    of_setups.absorb(rows.as_ref());
+    let mut setup_factor = Triangle::new(setups.len());
+    setup_factor.absorb(rows.as_ref());
     let count = (problem.readings() * problem.coordinates()) as f64;
-    let sum_of_squares = of_setups.parts().2 + rest;
+    let sum_of_squares = setup_factor.parts().2 + rest;
     Ok((sum_of_squares / count.max(1.0)).sqrt() * problem.noise.sigma_mm)
 }
 
@@ -211,14 +211,14 @@ fn estimated_noise(problem: &Problem<'_>, fit: &Fit, floor: f64) -> Noise {
 /// # Errors
 /// If there are no parameters, the model cannot be evaluated, or the iterations do not converge.
 pub fn fit(problem: &Problem<'_>, start: Option<&[f64]>) -> Result<Fit, IdentifyError> {
-    let unknowns = problem.parameters.list.len();
+    let parameter_count = problem.parameters.list.len();
     let size: Vec<f64> = problem
         .parameters
         .list
         .iter()
         .map(|parameter| parameter.size)
         .collect();
-    let nominal = vec![0.0; unknowns];
+    let nominal = vec![0.0; parameter_count];
     let triangles = problem.triangles(&nominal)?;
     let preference = pivot_preference(&problem.parameters.list);
     let rank = Rank::decide(
@@ -226,7 +226,7 @@ pub fn fit(problem: &Problem<'_>, start: Option<&[f64]>) -> Result<Fit, Identify
         &size,
         &preference,
     )?;
-    let seen = IdentifiableDirections {
+    let restricted = IdentifiableDirections {
         problem,
         basis: &rank.seen,
         last: RefCell::new((nominal, triangles)),
@@ -238,9 +238,9 @@ pub fn fit(problem: &Problem<'_>, start: Option<&[f64]>) -> Result<Fit, Identify
             || vec![0.0; rank.seen.ncols()],
             |beta| rank.coordinates(beta, &size),
         );
-        end = Some(seen.beta(&minimise(&seen, &from, &scale)?.x));
+        end = Some(restricted.beta(&minimise(&restricted, &from, &scale)?.x));
     }
-    let (last, triangles) = seen.last.into_inner();
+    let (last, triangles) = restricted.last.into_inner();
     let beta = end.unwrap_or_else(|| last.clone());
     // After the last linearisation the parameters move by a step at which nonlinearity is negligible.
     let step: Vec<f64> = beta.iter().zip(&last).map(|(end, last)| end - last).collect();
@@ -360,7 +360,7 @@ pub fn report(problem: &Problem<'_>, fit: &Fit) -> FitResult {
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Quantity {
     /// A parameter, by index.
-    Unknown(usize),
+    Parameter(usize),
     /// Amplitude and phase of a harmonic, by the index of its cosine coefficient.
     Harmonic(usize),
 }
@@ -385,7 +385,7 @@ pub(crate) fn quantities(problem: &Problem<'_>, rank: &Rank) -> Vec<Quantity> {
             }
         }
         if rank.is_identifiable(j) {
-            quantities.push(Quantity::Unknown(j));
+            quantities.push(Quantity::Parameter(j));
         }
         j += 1;
     }
@@ -399,17 +399,17 @@ pub(crate) fn values_at(
     fit: &Fit,
     quantities: &[Quantity],
     beta: &[f64],
-    mut put: impl FnMut(f64),
+    mut accept: impl FnMut(f64),
 ) {
     let list = &problem.parameters.list;
     for quantity in quantities {
         match *quantity {
-            Quantity::Unknown(j) => put(beta[j] * list[j].unit.display_per_internal),
+            Quantity::Parameter(j) => accept(beta[j] * list[j].unit.display_per_internal),
             Quantity::Harmonic(j) => {
-                put(beta[j].hypot(beta[j + 1]) * list[j].unit.display_per_internal);
+                accept(beta[j].hypot(beta[j + 1]) * list[j].unit.display_per_internal);
                 let (a, b) = (fit.beta[j], fit.beta[j + 1]);
                 let off = (b * beta[j] - a * beta[j + 1]).atan2(a * beta[j] + b * beta[j + 1]);
-                put(((-b).atan2(a) + off).to_degrees());
+                accept(((-b).atan2(a) + off).to_degrees());
             }
         }
     }
@@ -418,15 +418,15 @@ pub(crate) fn values_at(
 /// The identifiable parameters, in display units. A harmonic has amplitude and phase of `amplitude · cos(order · angle + phase)`.
 pub fn parameters(problem: &Problem<'_>, fit: &Fit) -> Vec<ParameterResult> {
     let list = &problem.parameters.list;
-    let u_inside = |j: usize| fit.covariance[(j, j)].max(0.0).sqrt() * fit.u_enlargement;
+    let u_internal = |j: usize| fit.covariance[(j, j)].max(0.0).sqrt() * fit.u_enlargement;
     let mut results = Vec::new();
     for quantity in quantities(problem, &fit.rank) {
         match quantity {
             Quantity::Harmonic(j) => results.extend(amplitude_and_phase(problem, fit, j)),
-            Quantity::Unknown(j) => results.push(ParameterResult {
+            Quantity::Parameter(j) => results.push(ParameterResult {
                 id: list[j].id.clone(),
                 value: fit.beta[j] * list[j].unit.display_per_internal,
-                u: u_inside(j) * list[j].unit.display_per_internal,
+                u: u_internal(j) * list[j].unit.display_per_internal,
                 unit: list[j].unit.name.clone(),
             }),
         }
@@ -450,9 +450,9 @@ fn amplitude_and_phase(problem: &Problem<'_>, fit: &Fit, j: usize) -> [Parameter
     let u_phase = if amplitude > 0.0 {
         (across.max(0.0).sqrt() / amplitude)
             .to_degrees()
-            .min(any_phase_deg())
+            .min(u_of_undetermined_phase_deg())
     } else {
-        any_phase_deg()
+        u_of_undetermined_phase_deg()
     };
     [
         ParameterResult {
@@ -471,7 +471,7 @@ fn amplitude_and_phase(problem: &Problem<'_>, fit: &Fit, j: usize) -> [Parameter
 }
 
 /// Standard uncertainty of an undetermined phase, °: the standard deviation of a uniform distribution over one turn.
-pub(crate) fn any_phase_deg() -> f64 {
+pub(crate) fn u_of_undetermined_phase_deg() -> f64 {
     180.0 / 3.0_f64.sqrt()
 }
 
@@ -483,17 +483,17 @@ pub fn unobservable(problem: &Problem<'_>, rank: &Rank) -> Vec<Unobservable> {
         .zip(&rank.pivots)
         .map(|(row, pivot)| {
             let others = (0..row.len()).filter(|j| j != pivot && row[*j] != 0.0);
-            let outside: Vec<(usize, f64)> = std::iter::once(*pivot)
+            let displayed: Vec<(usize, f64)> = std::iter::once(*pivot)
                 .chain(others)
                 .map(|j| (j, row[j] * list[j].size * list[j].unit.display_per_internal))
                 .collect();
-            let leading = outside.first().map_or(1.0, |(_, value)| *value);
-            let combination: BTreeMap<String, f64> = outside
+            let leading = displayed.first().map_or(1.0, |(_, value)| *value);
+            let combination: BTreeMap<String, f64> = displayed
                 .iter()
                 .map(|(j, value)| (list[*j].id.clone(), value / leading))
                 .collect();
-            let why = match outside.as_slice() {
-                [(j, _)] => format!("no reading changes with {}", list[*j].id),
+            let why = match displayed.as_slice() {
+                [(j, _)] => format!("no reading of these tests changes with {}", list[*j].id),
                 [(first, _), rest @ ..] => {
                     let others: Vec<&str> = rest.iter().map(|(j, _)| list[*j].id.as_str()).collect();
                     format!(
@@ -539,7 +539,7 @@ mod tests {
 
     /// `A cos(nC + φ)` has the coefficients `A cos φ` and `−A sin φ`.
     #[test]
-    fn a_wave_elsewhere_has_the_amplitude_and_the_phase_that_its_coefficients_say() {
+    fn amplitude_and_phase_of_a_harmonic_follow_from_its_coefficients() {
         let file =
             Path::new(env!("CARGO_MANIFEST_DIR")).join("../sessions/hermle-c600u/measured/session.toml");
         let session = read::session(&file, &ReadOptions::default()).unwrap();
@@ -559,7 +559,7 @@ mod tests {
             .enumerate()
             .find_map(|(place, quantity)| match quantity {
                 Quantity::Harmonic(j) => Some((place, *j)),
-                Quantity::Unknown(_) => None,
+                Quantity::Parameter(_) => None,
             })
             .unwrap();
         let coefficients = |amplitude_um: f64, phase_deg: f64| {

@@ -72,13 +72,13 @@ pub fn held_out(
     let mut residuals: Vec<Vec<f64>> = vec![Vec::new(); problem.models.len()];
     let blocks = problem.blocks();
     let predicted = blocks.par_iter().map(|block| {
-        let own = problem.own_unknowns(block.test);
+        let of_test = problem.own_parameters(block.test);
         let rows = problem.own_rows(&values[block.test], block)?;
-        let mut residual = rows.col(own.len()).to_owned();
+        let mut residual = rows.col(of_test.len()).to_owned();
         let fold_of = &problem.folds.of_row[block.test][block.rows.clone()];
-        for (unknown, column) in own.iter().zip(rows.col_iter()) {
+        for (parameter, column) in of_test.iter().zip(rows.col_iter()) {
             for (i, residual) in residual.iter_mut().enumerate() {
-                *residual -= column[i] * steps[fold_of[i / coordinates]][*unknown];
+                *residual -= column[i] * steps[fold_of[i / coordinates]][*parameter];
             }
         }
         Ok(residual)
@@ -102,9 +102,9 @@ const MIN_SHARE: f64 = 1e-6;
 /// The identifiable directions, scaled so that the normal matrix of all readings is the identity.
 struct Directions {
     /// `W`: parameters × rank.
-    spread: Mat<f64>,
+    scaled_basis: Mat<f64>,
     /// `y`: the remaining step of the fit of all readings.
-    left: Mat<f64>,
+    step: Mat<f64>,
 }
 
 impl Directions {
@@ -113,39 +113,39 @@ impl Directions {
         let rank = basis.ncols();
         if rank == 0 {
             return Ok(Directions {
-                spread: Mat::zeros(basis.nrows(), 0),
-                left: Mat::zeros(0, 1),
+                scaled_basis: Mat::zeros(basis.nrows(), 0),
+                step: Mat::zeros(0, 1),
             });
         }
         let svd = (&r * basis)
             .thin_svd()
             .map_err(|_| IdentifyError::Decomposition)?;
         let singular = svd.S().column_vector();
-        let mut spread = basis * svd.V();
-        for (k, mut column) in spread.col_iter_mut().enumerate() {
+        let mut scaled_basis = basis * svd.V();
+        for (k, mut column) in scaled_basis.col_iter_mut().enumerate() {
             // A direction without information becomes infinite here; the folds are then solved again.
             column *= faer::Scale(1.0 / singular[k]);
         }
         let right = Mat::from_fn(c.len(), 1, |i, _| c[i]);
         Ok(Directions {
-            left: svd.U().transpose() * right,
-            spread,
+            step: svd.U().transpose() * right,
+            scaled_basis,
         })
     }
 
     /// The step to the fit without a fold; `None` if the other folds barely determine a direction.
     fn step_without(&self, fold: &Triangle) -> Result<Option<Vec<f64>>, IdentifyError> {
-        if !self.spread.is_all_finite() {
+        if !self.scaled_basis.is_all_finite() {
             return Ok(None);
         }
         let rows = fold.rows();
-        let unknowns = fold.columns();
-        if rows.nrows() == 0 || self.spread.ncols() == 0 {
-            let step = &self.spread * &self.left;
+        let parameters = fold.columns();
+        if rows.nrows() == 0 || self.scaled_basis.ncols() == 0 {
+            let step = &self.scaled_basis * &self.step;
             return Ok(Some(step.col(0).iter().copied().collect()));
         }
-        let t = rows.subcols(0, unknowns) * &self.spread;
-        let asked = &self.left - t.transpose() * rows.subcols(unknowns, 1);
+        let t = rows.subcols(0, parameters) * &self.scaled_basis;
+        let residual_step = &self.step - t.transpose() * rows.subcols(parameters, 1);
         let leverage = &t * t.transpose();
         let eigen = leverage
             .self_adjoint_eigen(faer::Side::Lower)
@@ -159,11 +159,11 @@ impl Directions {
         if shares.iter().any(|share| *share < MIN_SHARE) {
             return Ok(None);
         }
-        let mut along = eigen.U().transpose() * (&t * &asked);
+        let mut along = eigen.U().transpose() * (&t * &residual_step);
         for (k, share) in shares.iter().enumerate() {
             along[(k, 0)] /= share;
         }
-        let step = &self.spread * (asked + t.transpose() * (eigen.U() * along));
+        let step = &self.scaled_basis * (residual_step + t.transpose() * (eigen.U() * along));
         Ok(Some(step.col(0).iter().copied().collect()))
     }
 }
@@ -203,53 +203,53 @@ mod tests {
     use rand::{RngExt, SeedableRng};
 
     /// Simulated rows of `[J | r]`.
-    fn drawn(rows: usize, unknowns: usize, random: &mut rand_pcg::Pcg64Mcg) -> Triangle {
-        let mut triangle = Triangle::new(unknowns);
-        let block = Mat::from_fn(rows, unknowns + 1, |_, _| random.random_range(-1.0..1.0));
+    fn simulated(rows: usize, parameters: usize, random: &mut rand_pcg::Pcg64Mcg) -> Triangle {
+        let mut triangle = Triangle::new(parameters);
+        let block = Mat::from_fn(rows, parameters + 1, |_, _| random.random_range(-1.0..1.0));
         triangle.absorb(block.as_ref());
         triangle
     }
 
     #[test]
-    fn a_fold_is_left_out_as_if_the_others_were_solved_anew() {
+    fn the_update_without_a_fold_equals_a_new_solution() {
         let mut random = rand_pcg::Pcg64Mcg::seed_from_u64(1);
-        let unknowns = 6;
+        let parameters = 6;
         // Two combinations of the parameters are outside the fitted directions.
         let basis = Mat::from_fn(
-            unknowns,
+            parameters,
             4,
             |i, k| if i == k { 1.0 } else { 0.1 * (i * k) as f64 },
         );
         let basis = basis.qr().compute_thin_Q();
-        let folds: Vec<Triangle> = (0..5).map(|_| drawn(9, unknowns, &mut random)).collect();
+        let folds: Vec<Triangle> = (0..5).map(|_| simulated(9, parameters, &mut random)).collect();
         let merged = |folds: &[Triangle], but: usize| {
-            let mut whole = Triangle::new(unknowns);
+            let mut whole = Triangle::new(parameters);
             let others = folds.iter().enumerate().filter(|(fold, _)| *fold != but);
             others.for_each(|(_, fold)| whole.merge(fold));
             whole
         };
         let end = Directions::of(&merged(&folds, usize::MAX), &basis).unwrap();
-        let step: Vec<f64> = (&end.spread * &end.left).col(0).iter().copied().collect();
+        let step: Vec<f64> = (&end.scaled_basis * &end.step).col(0).iter().copied().collect();
         let moved: Vec<Triangle> = folds.iter().map(|fold| fold.after(&step)).collect();
         // At the solution, where the remaining step is zero, and before it.
-        for (folds, beta) in [(moved, step), (folds, vec![0.0; unknowns])] {
+        for (folds, beta) in [(moved, step), (folds, vec![0.0; parameters])] {
             let all = Directions::of(&merged(&folds, usize::MAX), &basis).unwrap();
             for (number, fold) in folds.iter().enumerate() {
-                let short = all.step_without(fold).unwrap().unwrap();
-                let anew = step_without(&merged(&folds, number), &beta, &basis).unwrap();
-                for (short, anew) in short.iter().zip(&anew) {
-                    assert!((short - anew).abs() < 1e-12, "{short} {anew}");
+                let updated = all.step_without(fold).unwrap().unwrap();
+                let solved = step_without(&merged(&folds, number), &beta, &basis).unwrap();
+                for (updated, solved) in updated.iter().zip(&solved) {
+                    assert!((updated - solved).abs() < 1e-12, "{updated} {solved}");
                 }
             }
         }
     }
 
     #[test]
-    fn what_one_fold_alone_sees_is_not_left_to_the_short_way() {
+    fn a_direction_identifiable_from_one_fold_only_is_solved_again() {
         let mut random = rand_pcg::Pcg64Mcg::seed_from_u64(2);
-        let unknowns = 3;
-        let mut others = Triangle::new(unknowns);
-        let block = Mat::from_fn(9, unknowns + 1, |_, j| {
+        let parameters = 3;
+        let mut others = Triangle::new(parameters);
+        let block = Mat::from_fn(9, parameters + 1, |_, j| {
             if j == 2 {
                 0.0
             } else {
@@ -257,11 +257,11 @@ mod tests {
             }
         });
         others.absorb(block.as_ref());
-        let alone = drawn(9, unknowns, &mut random);
+        let single_fold = simulated(9, parameters, &mut random);
         let mut whole = others.clone();
-        whole.merge(&alone);
-        let all = Directions::of(&whole, &Mat::identity(unknowns, unknowns)).unwrap();
-        assert!(all.step_without(&alone).unwrap().is_none());
+        whole.merge(&single_fold);
+        let all = Directions::of(&whole, &Mat::identity(parameters, parameters)).unwrap();
+        assert!(all.step_without(&single_fold).unwrap().is_none());
         assert!(all.step_without(&others).unwrap().is_some());
     }
 }

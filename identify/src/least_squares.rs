@@ -12,7 +12,7 @@ use crate::triangle::Triangle;
 /// A problem `min ‖r(x)‖²`.
 pub trait LeastSquares {
     /// Number of parameters.
-    fn unknowns(&self) -> usize;
+    fn parameters(&self) -> usize;
     /// The triangular factor of `[J | r]` at `x`, with `r = observed − model` and `J = ∂model/∂x`, both divided by the standard deviation.
     ///
     /// # Errors
@@ -33,7 +33,7 @@ pub enum Scaling {
 
 /// The solution of a least-squares problem.
 #[derive(Clone, Debug)]
-pub struct Solution {
+pub struct LeastSquaresSolution {
     /// The parameters.
     pub x: Vec<f64>,
     /// The triangular factor at the solution.
@@ -47,7 +47,7 @@ pub struct Solution {
 const MAX_ITERATIONS: usize = 200;
 const SMALLEST_RELATIVE_STEP: f64 = 1e-12;
 /// Relative step below which the nonlinearity of the model is negligible: its square is below rounding.
-const STRAIGHT_RELATIVE_STEP: f64 = 1e-7;
+const LINEAR_RELATIVE_STEP: f64 = 1e-7;
 
 /// Minimises the sum of squares from a start value.
 ///
@@ -57,12 +57,12 @@ pub fn minimise(
     problem: &impl LeastSquares,
     start: &[f64],
     scaling: &Scaling,
-) -> Result<Solution, IdentifyError> {
-    let n = problem.unknowns();
-    let nothing = vec![0.0; n];
+) -> Result<LeastSquaresSolution, IdentifyError> {
+    let n = problem.parameters();
+    let zero_step = vec![0.0; n];
     let mut x = start.to_vec();
     let mut triangle = problem.linearise(&x)?;
-    let mut current = triangle.sum_of_squares_after(&nothing);
+    let mut current = triangle.sum_of_squares_after(&zero_step);
     let mut scale = match scaling {
         Scaling::Physical(sizes) => sizes.clone(),
         Scaling::Columns => vec![f64::INFINITY; n],
@@ -105,7 +105,7 @@ pub fn minimise(
         // A step is accepted if the sum of squares falls. Near the minimum the decrease is below rounding and the size of the step
         // decides.
         let mut accepted = false;
-        let mut smallest = false;
+        let mut converged = false;
         let mut next = None;
         for attempt in 0..60 {
             let step = step_with(damping);
@@ -126,12 +126,12 @@ pub fn minimise(
                 })
                 .fold(0.0, f64::max);
             // Successive steps shrink by about the same factor. This product estimates the next step.
-            let left = relative * (relative / step_before);
-            if damping == 0.0 && relative < STRAIGHT_RELATIVE_STEP && left < SMALLEST_RELATIVE_STEP {
+            let next_relative = relative * (relative / step_before);
+            if damping == 0.0 && relative < LINEAR_RELATIVE_STEP && next_relative < SMALLEST_RELATIVE_STEP {
                 let triangle = triangle.after(&step);
-                return Ok(Solution {
+                return Ok(LeastSquaresSolution {
                     x: trial,
-                    sum_of_squares: triangle.sum_of_squares_after(&nothing),
+                    sum_of_squares: triangle.sum_of_squares_after(&zero_step),
                     triangle,
                     iterations: iteration,
                 });
@@ -140,7 +140,7 @@ pub fn minimise(
             let sum = if attempt == 0 {
                 next = problem.linearise(&trial).ok();
                 next.as_ref()
-                    .map_or(f64::NAN, |next| next.sum_of_squares_after(&nothing))
+                    .map_or(f64::NAN, |next| next.sum_of_squares_after(&zero_step))
             } else {
                 next = None;
                 problem.sum_of_squares(&trial)
@@ -148,7 +148,7 @@ pub fn minimise(
             let close = relative < SMALLEST_RELATIVE_STEP * 100.0;
             if sum.is_finite() && (sum < current || (close && sum <= current * (1.0 + 1e-9))) {
                 x = trial;
-                smallest =
+                converged =
                     relative < SMALLEST_RELATIVE_STEP || current - sum <= 1e-15 * current && relative < 1e-7;
                 current = sum;
                 damping *= 0.1;
@@ -162,7 +162,7 @@ pub fn minimise(
             next = None;
             if relative < 1e-9 && damping == 0.0 {
                 // The full step is below rounding: this is the minimum.
-                smallest = true;
+                converged = true;
                 accepted = true;
                 break;
             }
@@ -179,8 +179,8 @@ pub fn minimise(
             Some(next) => next,
             None => problem.linearise(&x)?,
         };
-        if smallest {
-            return Ok(Solution {
+        if converged {
+            return Ok(LeastSquaresSolution {
                 x,
                 triangle,
                 sum_of_squares: current,

@@ -82,7 +82,7 @@ const REACH: f64 = 8.0;
 
 /// The histogram of one output.
 #[derive(Clone)]
-struct Count {
+struct Histogram {
     centre: f64,
     from: f64,
     per_width: f64,
@@ -92,9 +92,9 @@ struct Count {
     outside: [u64; 3],
 }
 
-impl Count {
-    fn over(centre: f64, reach: f64) -> Count {
-        Count {
+impl Histogram {
+    fn over(centre: f64, reach: f64) -> Histogram {
+        Histogram {
             centre,
             from: centre - reach,
             per_width: BINS as f64 / (2.0 * reach),
@@ -106,7 +106,7 @@ impl Count {
     }
 
     #[inline]
-    fn take(&mut self, value: f64) {
+    fn add(&mut self, value: f64) {
         if !value.is_finite() {
             self.outside[2] += 1;
             return;
@@ -124,7 +124,7 @@ impl Count {
         }
     }
 
-    fn merge(&mut self, other: &Count) {
+    fn merge(&mut self, other: &Histogram) {
         self.sum += other.sum;
         self.square += other.square;
         for (mine, theirs) in self.counts.iter_mut().zip(&other.counts) {
@@ -166,10 +166,10 @@ impl Count {
         let tail = (1.0 - coverage) / 2.0;
         let symmetric = [quantile(tail), quantile(1.0 - tail)];
         // The density is equal at both ends of the shortest interval. The search varies the probability of the lower tail.
-        const SLIDES: usize = 400;
+        const TAIL_STEPS: usize = 400;
         let mut shortest = symmetric;
-        for slide in 0..=SLIDES {
-            let share = 2.0 * tail * slide as f64 / SLIDES as f64;
+        for slide in 0..=TAIL_STEPS {
+            let share = 2.0 * tail * slide as f64 / TAIL_STEPS as f64;
             let interval = [quantile(share), quantile(share + coverage)];
             if interval[1] - interval[0] < shortest[1] - shortest[0] {
                 shortest = interval;
@@ -208,7 +208,7 @@ fn draw(function: &impl Function, draws: &Draws<'_>, stream: u128, runs: u64, mu
 pub fn propagate<F: Function>(function: &F, draws: &Draws<'_>) -> Vec<Distribution> {
     let empty = pilot(function, draws);
     let blocks = draws.runs.div_ceil(F::BLOCK);
-    let lanes: Vec<Vec<Count>> = (0..LANES.min(blocks))
+    let lanes: Vec<Vec<Histogram>> = (0..LANES.min(blocks))
         .into_par_iter()
         .map(|lane| {
             let mut counts = empty.clone();
@@ -216,7 +216,7 @@ pub fn propagate<F: Function>(function: &F, draws: &Draws<'_>) -> Vec<Distributi
                 let runs = F::BLOCK.min(draws.runs - block * F::BLOCK);
                 draw(function, draws, u128::from(block), runs, |outputs| {
                     for (count, value) in counts.iter_mut().zip(outputs) {
-                        count.take(*value);
+                        count.add(*value);
                     }
                 });
             }
@@ -236,7 +236,7 @@ pub fn propagate<F: Function>(function: &F, draws: &Draws<'_>) -> Vec<Distributi
 }
 
 /// Empty histograms with ranges from the pilot runs.
-fn pilot<F: Function>(function: &F, draws: &Draws<'_>) -> Vec<Count> {
+fn pilot<F: Function>(function: &F, draws: &Draws<'_>) -> Vec<Histogram> {
     let blocks: Vec<Vec<f64>> = (0..F::PILOT.div_ceil(F::BLOCK))
         .into_par_iter()
         .map(|block| {
@@ -270,12 +270,12 @@ fn pilot<F: Function>(function: &F, draws: &Draws<'_>) -> Vec<Count> {
                     .copied()
             };
             let (Some(low), Some(middle), Some(high)) = (at(0.1587), at(0.5), at(0.8413)) else {
-                return Count::over(0.0, 1.0);
+                return Histogram::over(0.0, 1.0);
             };
             // Quantiles, not moments: a few extreme runs should count as outside instead of widening the bins.
             let reach = REACH * (high - low) / 2.0;
             let least = (middle.abs() * 1e-12).max(f64::MIN_POSITIVE * 1e20);
-            Count::over(middle, reach.max(least))
+            Histogram::over(middle, reach.max(least))
         })
         .collect()
 }
@@ -285,16 +285,16 @@ mod tests {
     use super::*;
 
     /// A triangular distribution over 0 to 1 with mode `m`. Of the probability `1 − p` outside the shortest interval, the share `m` lies
-    /// below it. The shortest interval is thus `m √(1 − p)` to `1 − (1 − m) √(1 − p)`. The symmetric one is `√(m (1 − p) / 2)` to `1 −
-    /// √((1 − m) (1 − p) / 2)`.
+    /// below it. The shortest interval is thus `m √(1 − p)` to `1 − (1 − m) √(1 − p)`. The symmetric one is `√(m (1 − p) / 2)` to
+    /// `1 − √((1 − m) (1 − p) / 2)`.
     #[test]
-    fn a_triangle_has_the_intervals_of_its_closed_form() {
+    fn a_triangular_distribution_has_its_closed_form_intervals() {
         const DRAWS: usize = 200_000;
         let (m, p) = (0.25_f64, 0.95_f64);
-        let mut count = Count::over(0.5, 0.6);
+        let mut count = Histogram::over(0.5, 0.6);
         for k in 0..DRAWS {
             let share = (k as f64 + 0.5) / DRAWS as f64;
-            count.take(if share < m {
+            count.add(if share < m {
                 (share * m).sqrt()
             } else {
                 1.0 - ((1.0 - share) * (1.0 - m)).sqrt()
@@ -323,12 +323,12 @@ mod tests {
     }
 
     #[test]
-    fn what_lies_outside_is_counted_and_what_is_no_number_is_left_out() {
-        let mut count = Count::over(0.0, 1.0);
+    fn values_outside_the_range_are_counted_and_nan_is_excluded() {
+        let mut count = Histogram::over(0.0, 1.0);
         for value in [-3.0, -2.0, 0.5, 2.0, f64::NAN, f64::INFINITY] {
-            count.take(value);
+            count.add(value);
         }
-        let mut both = Count::over(0.0, 1.0);
+        let mut both = Histogram::over(0.0, 1.0);
         both.merge(&count);
         both.merge(&count);
         let found = both.distribution(0.95);

@@ -113,7 +113,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn the_median_of_five_is_the_third_of_them_in_order() {
+    fn the_median_of_five_is_the_third_in_order() {
         // All orders of five numbers, ties included.
         for code in 0..5_usize.pow(5) {
             let values: [f64; 5] = std::array::from_fn(|place| (code / 5_usize.pow(place as u32) % 5) as f64);

@@ -20,7 +20,7 @@ use crate::drivers::Origin;
 use crate::error::IdentifyError;
 use crate::heldout::Folds;
 use crate::noise::Noise;
-use crate::parameters::{InstrumentParameter, Parameters};
+use crate::parameters::{Parameters, TestParameters};
 use crate::triangle::{BLOCK_ROWS, Triangle};
 
 /// A session with readings, its parameters, and the weights of its readings.
@@ -43,7 +43,7 @@ pub struct Problem<'a> {
     /// The folds of cross-validation.
     pub folds: Folds,
     /// For each test, the parameters that affect its readings.
-    own: Vec<InstrumentParameter>,
+    test_parameters: Vec<TestParameters>,
 }
 
 /// Consecutive rows of one run of one test.
@@ -56,7 +56,7 @@ pub struct Block {
 }
 
 /// Triangular factors over the parameters of each test, by test and fold.
-type Narrow = BTreeMap<(usize, usize), Triangle>;
+type FactorsByTestAndFold = BTreeMap<(usize, usize), Triangle>;
 
 /// Mean number of readings below which runs are evaluated together.
 const SHORT_RUN: usize = 8;
@@ -99,9 +99,9 @@ impl<'a> Problem<'a> {
             noise,
             rejected,
             folds,
-            own: Vec::new(),
+            test_parameters: Vec::new(),
         };
-        problem.update_own();
+        problem.update_test_parameters();
         for effect in &session.effects {
             problem.add_effect(effect)?;
         }
@@ -115,16 +115,16 @@ impl<'a> Problem<'a> {
     pub fn add_effect(&mut self, effect: &Effect) -> Result<(), IdentifyError> {
         self.parameters
             .add_effect(self.session, &self.tests, &self.models, &self.origin, effect)?;
-        self.update_own();
+        self.update_test_parameters();
         Ok(())
     }
 
-    fn update_own(&mut self) {
-        self.own = self
+    fn update_test_parameters(&mut self) {
+        self.test_parameters = self
             .parameters
-            .parts
+            .contributions
             .iter()
-            .map(|parts| InstrumentParameter::of(parts))
+            .map(|contributions| TestParameters::of(contributions))
             .collect();
     }
 
@@ -183,19 +183,19 @@ impl<'a> Problem<'a> {
     /// # Errors
     /// If the model yields a number that is not finite.
     pub fn rows(&self, values: &[SlotValues], block: &Block) -> Result<Mat<f64>, IdentifyError> {
-        let own = &self.own[block.test].unknowns;
-        let narrow = self.own_rows(&values[block.test], block)?;
-        let mut rows = Mat::zeros(narrow.nrows(), self.parameters.list.len() + 1);
-        let places = own.iter().copied().chain([self.parameters.list.len()]);
-        for (place, column) in places.zip(narrow.col_iter()) {
-            rows.col_mut(place).copy_from(column);
+        let own = &self.test_parameters[block.test].parameters;
+        let own_rows = self.own_rows(&values[block.test], block)?;
+        let mut rows = Mat::zeros(own_rows.nrows(), self.parameters.list.len() + 1);
+        let indices = own.iter().copied().chain([self.parameters.list.len()]);
+        for (index, column) in indices.zip(own_rows.col_iter()) {
+            rows.col_mut(index).copy_from(column);
         }
         Ok(rows)
     }
 
     /// The parameters that affect the readings of a test.
-    pub fn own_unknowns(&self, test: usize) -> &[usize] {
-        &self.own[test].unknowns
+    pub fn own_parameters(&self, test: usize) -> &[usize] {
+        &self.test_parameters[test].parameters
     }
 
     /// The nonzero columns of [`Problem::rows`]: those of [`Problem::own_parameters`], and the residual. `values` belong to the block's
@@ -205,9 +205,9 @@ impl<'a> Problem<'a> {
     /// If the model yields a number that is not finite.
     pub fn own_rows(&self, values: &SlotValues, block: &Block) -> Result<Mat<f64>, IdentifyError> {
         let coordinates = self.coordinates();
-        let own = &self.own[block.test];
+        let own = &self.test_parameters[block.test];
         let scalars = block.rows.start * coordinates..block.rows.end * coordinates;
-        let mut rows = Mat::zeros(scalars.len(), own.unknowns.len() + 1);
+        let mut rows = Mat::zeros(scalars.len(), own.parameters.len() + 1);
         let Some(readings) = &self.tests[block.test].readings else {
             return Ok(rows);
         };
@@ -219,7 +219,7 @@ impl<'a> Problem<'a> {
         self.models[block.test].sweep(values, &own.slots, block.rows.clone(), |output, start, values| {
             let Some(by) = output.checked_sub(coordinates) else {
                 let first = start * coordinates + output;
-                let residuals = columns[own.unknowns.len()][first..]
+                let residuals = columns[own.parameters.len()][first..]
                     .iter_mut()
                     .step_by(coordinates);
                 let observed = observed[first..].iter().step_by(coordinates);
@@ -231,8 +231,8 @@ impl<'a> Problem<'a> {
                 }
                 return;
             };
-            for (unknown, basis) in &own.movers[by % own.slots.len()] {
-                let column = &mut columns[*unknown];
+            for (parameter, basis) in &own.contributions[by % own.slots.len()] {
+                let column = &mut columns[*parameter];
                 let mut add = |terms: &mut dyn Iterator<Item = f64>| {
                     let entries = column[start * coordinates + by / own.slots.len()..].iter_mut();
                     entries
@@ -328,29 +328,33 @@ impl<'a> Problem<'a> {
     pub fn triangles(&self, beta: &[f64]) -> Result<Vec<Triangle>, IdentifyError> {
         let values = self.slot_values(beta);
         // Segments have a fixed length, so that the sums do not depend on the number of threads.
-        let stretches: Vec<Narrow> = (self.blocks().par_chunks(BLOCKS_PER_SEGMENT))
-            .map(|blocks| self.narrow_triangles(&values, blocks))
+        let segments: Vec<FactorsByTestAndFold> = (self.blocks().par_chunks(BLOCKS_PER_SEGMENT))
+            .map(|blocks| self.factors_of_blocks(&values, blocks))
             .collect::<Result<_, IdentifyError>>()?;
-        let mut narrow = Narrow::new();
-        for ((test, fold), triangle) in stretches.into_iter().flatten() {
-            match narrow.entry((test, fold)) {
-                Entry::Vacant(place) => {
-                    place.insert(triangle);
+        let mut factors = FactorsByTestAndFold::new();
+        for ((test, fold), triangle) in segments.into_iter().flatten() {
+            match factors.entry((test, fold)) {
+                Entry::Vacant(entry) => {
+                    entry.insert(triangle);
                 }
                 Entry::Occupied(mut sum) => sum.get_mut().merge(&triangle),
             }
         }
-        let unknowns = self.parameters.list.len();
-        let mut triangles = vec![Triangle::new(unknowns); self.folds.count];
-        for ((test, fold), triangle) in narrow {
-            triangles[fold].merge(&triangle.among(&self.own[test].unknowns, unknowns));
+        let count = self.parameters.list.len();
+        let mut triangles = vec![Triangle::new(count); self.folds.count];
+        for ((test, fold), triangle) in factors {
+            triangles[fold].merge(&triangle.over_columns(&self.test_parameters[test].parameters, count));
         }
         Ok(triangles)
     }
 
     /// The triangular factors of some blocks over the parameters of their tests, by test and fold.
-    fn narrow_triangles(&self, values: &[SlotValues], blocks: &[Block]) -> Result<Narrow, IdentifyError> {
-        let mut narrow = Narrow::new();
+    fn factors_of_blocks(
+        &self,
+        values: &[SlotValues],
+        blocks: &[Block],
+    ) -> Result<FactorsByTestAndFold, IdentifyError> {
+        let mut factors = FactorsByTestAndFold::new();
         for block in blocks {
             let rows = self.own_rows(&values[block.test], block)?;
             let kept = self.kept_rows(block);
@@ -361,9 +365,9 @@ impl<'a> Problem<'a> {
             present.sort_unstable();
             present.dedup();
             for fold in &present {
-                let triangle = narrow
+                let triangle = factors
                     .entry((block.test, *fold))
-                    .or_insert_with(|| Triangle::new(self.own[block.test].unknowns.len()));
+                    .or_insert_with(|| Triangle::new(self.test_parameters[block.test].parameters.len()));
                 if present.len() == 1 {
                     triangle.absorb(white.as_ref());
                 } else {
@@ -374,7 +378,7 @@ impl<'a> Problem<'a> {
                 }
             }
         }
-        Ok(narrow)
+        Ok(factors)
     }
 
     /// Number of prior observations: the rows of [`Problem::prior_triangle`].
@@ -382,11 +386,11 @@ impl<'a> Problem<'a> {
         let gaussian = |prior: &Prior| matches!(prior, Prior::Gaussian(_));
         let list = &self.parameters.list;
         let distances = self.session.socket_distances.iter();
-        let told = distances.filter(|distance| {
+        let stated = distances.filter(|distance| {
             let mut ends = distance.between.iter();
             ends.all(|name| self.socket(name).is_some())
         });
-        list.iter().filter(|parameter| gaussian(&parameter.prior)).count() + told.count()
+        list.iter().filter(|parameter| gaussian(&parameter.prior)).count() + stated.count()
     }
 
     /// The triangular factor of the priors: Gaussian priors and distances between sockets.
@@ -402,13 +406,13 @@ impl<'a> Problem<'a> {
         centre: impl Fn(usize) -> f64,
         longer: impl Fn(usize) -> f64,
     ) -> Triangle {
-        let unknowns = self.parameters.list.len();
+        let count = self.parameters.list.len();
         let mut rows: Vec<Vec<f64>> = Vec::new();
         for (j, parameter) in self.parameters.list.iter().enumerate() {
             if let Prior::Gaussian(u) = parameter.prior {
-                let mut row = vec![0.0; unknowns + 1];
+                let mut row = vec![0.0; count + 1];
                 row[j] = 1.0 / u;
-                row[unknowns] = (centre(j) - beta[j]) / u;
+                row[count] = (centre(j) - beta[j]) / u;
                 rows.push(row);
             }
         }
@@ -418,28 +422,28 @@ impl<'a> Problem<'a> {
             let [Some((a, nominal_a)), Some((b, nominal_b))] = ends[..] else {
                 continue;
             };
-            let place = |k: usize, unknown: usize, nominal: f64| {
+            let coordinate = |k: usize, parameter: usize, nominal: f64| {
                 let mut seed = nalgebra::SVector::<f64, 6>::zeros();
                 seed[k] = 1.0;
-                num_dual::DualSVec64::<6>::new(nominal + beta[unknown], num_dual::Derivative::some(seed))
+                num_dual::DualSVec64::<6>::new(nominal + beta[parameter], num_dual::Derivative::some(seed))
             };
             let square = (0..3)
-                .map(|i| (place(i, a[i], nominal_a[i]) - place(i + 3, b[i], nominal_b[i])).powi(2))
+                .map(|i| (coordinate(i, a[i], nominal_a[i]) - coordinate(i + 3, b[i], nominal_b[i])).powi(2))
                 .fold(num_dual::DualSVec64::<6>::from(0.0), |sum, term| sum + term);
             let length = square.sqrt();
             let gradient = length
                 .eps
                 .unwrap_generic(nalgebra::Const::<6>, nalgebra::Const::<1>);
-            let mut row = vec![0.0; unknowns + 1];
+            let mut row = vec![0.0; count + 1];
             for i in 0..3 {
                 row[a[i]] += gradient[i] / distance.u_mm;
                 row[b[i]] += gradient[i + 3] / distance.u_mm;
             }
-            row[unknowns] = (distance.distance_mm + longer(number) - length.re) / distance.u_mm;
+            row[count] = (distance.distance_mm + longer(number) - length.re) / distance.u_mm;
             rows.push(row);
         }
-        let mut triangle = Triangle::new(unknowns);
-        triangle.absorb(Mat::from_fn(rows.len(), unknowns + 1, |i, j| rows[i][j]).as_ref());
+        let mut triangle = Triangle::new(count);
+        triangle.absorb(Mat::from_fn(rows.len(), count + 1, |i, j| rows[i][j]).as_ref());
         triangle
     }
 
@@ -452,16 +456,16 @@ impl<'a> Problem<'a> {
         let Station::Socket(station) = self.models[test].station() else {
             return None;
         };
-        let mut unknowns = [0; 3];
-        for (unknown, coordinate) in unknowns.iter_mut().zip(["x", "y", "z"]) {
+        let mut indices = [0; 3];
+        for (index, coordinate) in indices.iter_mut().zip(["x", "y", "z"]) {
             let id = format!("socket.{coordinate}[{name}]");
-            *unknown = self
+            *index = self
                 .parameters
                 .list
                 .iter()
                 .position(|parameter| parameter.id == id)?;
         }
-        Some((unknowns, station.socket))
+        Some((indices, station.socket))
     }
 
     /// Residuals observed − model of every test, mm, outliers included.
@@ -492,7 +496,7 @@ impl<'a> Problem<'a> {
             white.col(0).iter().map(|value| value * value).sum::<f64>()
         });
         let readings: f64 = squares.collect::<Vec<f64>>().iter().sum();
-        let nothing = vec![0.0; beta.len()];
-        readings + self.prior_triangle(beta).sum_of_squares_after(&nothing)
+        let zero_step = vec![0.0; beta.len()];
+        readings + self.prior_triangle(beta).sum_of_squares_after(&zero_step)
     }
 }

@@ -23,7 +23,7 @@ use crate::results::{DrawnParameter, FitMonteCarlo, FitResult, Verdict};
 use crate::triangle::{BLOCK_ROWS, Triangle};
 
 /// Number of steps with the curvature of the original fit. After these the simulated session is fitted with its own curvature.
-const FEW_STEPS: usize = 8;
+const MAX_SHARED_STEPS: usize = 8;
 /// Expected decrease of the sum of squares below which the iteration ends: a hundredth of a standard uncertainty.
 const MIN_DECREASE: f64 = 1e-4;
 
@@ -98,12 +98,12 @@ impl<'p, 'a> Refit<'p, 'a> {
 
     /// The identifiable coordinates with the best fit to the inputs.
     fn fitted(&self, deviations: &[f64]) -> Result<Vec<f64>, IdentifyError> {
-        let drawn = Drawn {
+        let drawn = SimulatedFit {
             refit: self,
             deviations,
         };
         let mut z = self.end.clone();
-        for _ in 0..FEW_STEPS {
+        for _ in 0..MAX_SHARED_STEPS {
             let Ok(descent) = drawn.descent(&z) else { break };
             let step: Vec<f64> = (0..z.len())
                 .map(|i| (0..z.len()).map(|k| self.inverse[(i, k)] * descent[k]).sum())
@@ -134,7 +134,7 @@ impl Function for Refit<'_, '_> {
 
     fn outputs(&self) -> usize {
         let of = |quantity: &Quantity| match quantity {
-            Quantity::Unknown(_) => 1,
+            Quantity::Parameter(_) => 1,
             Quantity::Harmonic(_) => 2,
         };
         self.quantities.iter().map(of).sum()
@@ -156,12 +156,12 @@ impl Function for Refit<'_, '_> {
 }
 
 /// One simulated session as a least-squares problem in the identifiable directions.
-struct Drawn<'r, 'p, 'a> {
+struct SimulatedFit<'r, 'p, 'a> {
     refit: &'r Refit<'p, 'a>,
     deviations: &'r [f64],
 }
 
-impl Drawn<'_, '_, '_> {
+impl SimulatedFit<'_, '_, '_> {
     fn prior_triangle(&self, beta: &[f64]) -> Triangle {
         let refit = self.refit;
         let centre = |j: usize| refit.priors[j].map_or(0.0, |place| self.deviations[place]);
@@ -181,7 +181,7 @@ impl Drawn<'_, '_, '_> {
             for i in 0..rows.nrows() {
                 rows[(i, last)] += self.deviations[start + i];
             }
-            take(problem.own_unknowns(block.test), problem.whiten(&rows, block).0);
+            take(problem.own_parameters(block.test), problem.whiten(&rows, block).0);
         }
         Ok(())
     }
@@ -189,8 +189,8 @@ impl Drawn<'_, '_, '_> {
     /// `Nᵀ Jᵀ V⁻¹ r`: the negative gradient of half the sum of squares.
     fn descent(&self, z: &[f64]) -> Result<Vec<f64>, IdentifyError> {
         let beta = self.refit.beta(z);
-        let unknowns = beta.len();
-        let mut whole = vec![0.0; unknowns];
+        let count = beta.len();
+        let mut whole = vec![0.0; count];
         let mut add = |own: &[usize], rows: &Mat<f64>| {
             let residual = rows.col(own.len());
             for (j, column) in own.iter().zip(rows.col_iter()) {
@@ -198,21 +198,19 @@ impl Drawn<'_, '_, '_> {
             }
         };
         let (r, c, _) = self.prior_triangle(&beta).parts();
-        let all: Vec<usize> = (0..unknowns).collect();
-        let known = Mat::from_fn(unknowns, unknowns + 1, |i, j| {
-            if j == unknowns { c[i] } else { r[(i, j)] }
-        });
+        let all: Vec<usize> = (0..count).collect();
+        let known = Mat::from_fn(count, count + 1, |i, j| if j == count { c[i] } else { r[(i, j)] });
         add(&all, &known);
         self.rows(&beta, |own, rows| add(own, &rows))?;
         let seen = &self.refit.fit.rank.seen;
         Ok((0..seen.ncols())
-            .map(|k| (0..unknowns).map(|j| seen[(j, k)] * whole[j]).sum())
+            .map(|k| (0..count).map(|j| seen[(j, k)] * whole[j]).sum())
             .collect())
     }
 }
 
-impl LeastSquares for Drawn<'_, '_, '_> {
-    fn unknowns(&self) -> usize {
+impl LeastSquares for SimulatedFit<'_, '_, '_> {
+    fn parameters(&self) -> usize {
         self.refit.end.len()
     }
 
@@ -225,7 +223,7 @@ impl LeastSquares for Drawn<'_, '_, '_> {
                 let count = BLOCK_ROWS.min(rows.nrows() - start);
                 narrow.absorb(rows.subrows(start, count));
             }
-            whole.merge(&narrow.among(own, beta.len()));
+            whole.merge(&narrow.over_columns(own, beta.len()));
         })?;
         Ok(in_directions(&whole, &self.refit.fit.rank.seen))
     }
@@ -253,8 +251,8 @@ impl LeastSquares for Drawn<'_, '_, '_> {
                 sum += (0..white.nrows()).map(|i| white[(i, 0)].powi(2)).sum::<f64>();
             }
         }
-        let nothing = vec![0.0; beta.len()];
-        sum + self.prior_triangle(&beta).sum_of_squares_after(&nothing)
+        let zero_step = vec![0.0; beta.len()];
+        sum + self.prior_triangle(&beta).sum_of_squares_after(&zero_step)
     }
 }
 
@@ -379,7 +377,7 @@ fn compared(
 ///
 /// assert_eq!(tolerance(0.00035), 0.00005);
 /// assert_eq!(tolerance(2.0), 0.5);
-/// 9.7 with one significant digit is 1·10¹.
+/// // 9.7 with one significant digit is 1·10¹.
 /// assert_eq!(tolerance(9.7), 5.0);
 /// ```
 pub fn tolerance(u: f64) -> f64 {
@@ -412,7 +410,7 @@ mod tests {
     /// Three computations for one simulated session agree: the sum of squares of its rows, that of its residuals, and its gradient against
     /// differences.
     #[test]
-    fn a_draw_has_one_sum_of_squares_and_its_slope() {
+    fn sum_of_squares_and_gradient_of_a_simulated_session_agree() {
         let file =
             Path::new(env!("CARGO_MANIFEST_DIR")).join("../sessions/hermle-c600u/measured/session.toml");
         let session = read::session(&file, &ReadOptions::default()).unwrap();
@@ -421,16 +419,19 @@ mod tests {
         // Deviations of one standard uncertainty with alternating signs.
         let signs = [1.0, -1.0, 1.0, 1.0, -1.0].iter().cycle();
         let deviations: Vec<f64> = refit.u.iter().zip(signs).map(|(u, sign)| u * sign).collect();
-        let drawn = Drawn {
+        let drawn = SimulatedFit {
             refit: &refit,
             deviations: &deviations,
         };
         let z = drawn.refit.end.clone();
-        let nothing = vec![0.0; z.len()];
-        let whole = drawn.linearise(&z).unwrap().sum_of_squares_after(&nothing);
-        let alone = drawn.sum_of_squares(&z);
-        assert!(alone > 0.5 * problem.readings() as f64, "{alone}");
-        assert!((alone / whole - 1.0).abs() < 1e-9, "{alone} and {whole}");
+        let zero_step = vec![0.0; z.len()];
+        let whole = drawn.linearise(&z).unwrap().sum_of_squares_after(&zero_step);
+        let of_residuals = drawn.sum_of_squares(&z);
+        assert!(of_residuals > 0.5 * problem.readings() as f64, "{of_residuals}");
+        assert!(
+            (of_residuals / whole - 1.0).abs() < 1e-9,
+            "{of_residuals} and {whole}"
+        );
         let descent = drawn.descent(&z).unwrap();
         for k in 0..z.len() {
             let by = 1e-2 * refit.inverse[(k, k)].sqrt();

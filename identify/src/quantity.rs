@@ -28,7 +28,7 @@ pub struct Given {
 }
 
 /// Maximum length of a number with its unit, in bytes. It bounds the time to separate number and unit.
-const LONGEST: usize = 100;
+const MAX_BYTES: usize = 100;
 
 /// Units of one quantity, each with its size in the first unit.
 const LENGTHS: [(&str, f64); 5] = [("um", 1.0), ("µm", 1.0), ("μm", 1.0), ("nm", 1e-3), ("mm", 1e3)];
@@ -63,9 +63,9 @@ impl Given {
     /// If the text does not start with a finite number of moderate size, or has no unit.
     pub fn of(id: &str, quantity: &str) -> Result<Given, IdentifyError> {
         let quantity = quantity.trim();
-        if quantity.len() > LONGEST {
+        if quantity.len() > MAX_BYTES {
             return Err(IdentifyError::Request(format!(
-                "`{id}`: the number with its unit has {} bytes; the maximum is {LONGEST}; write it as in `EY0A=35.3um`",
+                "`{id}`: the number with its unit has {} bytes; the maximum is {MAX_BYTES}; write it as in `EY0A=35.3um`",
                 quantity.len()
             )));
         }

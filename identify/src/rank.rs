@@ -90,8 +90,8 @@ impl Rank {
     }
 
     /// Whether a parameter takes part in no null-space combination.
-    pub fn is_identifiable(&self, unknown: usize) -> bool {
-        self.unseen.iter().all(|row| row[unknown] == 0.0)
+    pub fn is_identifiable(&self, parameter: usize) -> bool {
+        self.unseen.iter().all(|row| row[parameter] == 0.0)
     }
 }
 
@@ -131,7 +131,7 @@ fn prune(row: &mut [f64], pivot: usize, scaled: MatRef<'_, f64>, preference: &[u
         .iter()
         .rev()
         .copied()
-        .filter(|j| *j != pivot && row[*j] != 0.0 && row[*j].abs() < PRUNED * largest)
+        .filter(|j| *j != pivot && row[*j] != 0.0 && row[*j].abs() < MAX_PRUNED_SHARE * largest)
         .collect();
     order.sort_by_key(|j| magnitude(row[*j]));
     for j in order {
@@ -149,10 +149,10 @@ pub fn magnitude(value: f64) -> i64 {
 }
 
 /// Coefficients below this share of the largest coefficient of the combination may be pruned.
-const PRUNED: f64 = 0.02;
+const MAX_PRUNED_SHARE: f64 = 0.02;
 
 /// Coefficients below this share of the largest coefficient of the combination are rounding errors.
-const NEGLIGIBLE: f64 = 1e-5;
+const ROUNDING_SHARE: f64 = 1e-5;
 
 /// A parameter is a pivot if its part in the remaining null space is at least this share of the largest such part. The share is large
 /// enough for a stable elimination. It is no ratio of round lengths, so that parts of a geometry in round numbers are not equal to it and
@@ -168,12 +168,12 @@ pub const MIN_PIVOT: f64 = 0.0937;
 pub fn echelon(space: MatRef<'_, f64>, preference: &[usize], least: f64) -> (Vec<Vec<f64>>, Vec<usize>) {
     let (n, dimension) = (space.nrows(), space.ncols());
     // The remaining projection of each parameter, one row each.
-    let mut left: Vec<Vec<f64>> = (0..n)
+    let mut remaining: Vec<Vec<f64>> = (0..n)
         .map(|j| (0..dimension).map(|k| space[(j, k)]).collect())
         .collect();
     let mut pivots: Vec<usize> = Vec::new();
     while pivots.len() < dimension {
-        let length = |j: usize| left[j].iter().map(|v| v * v).sum::<f64>().sqrt();
+        let length = |j: usize| remaining[j].iter().map(|v| v * v).sum::<f64>().sqrt();
         let free = |j: &usize| !pivots.contains(j);
         let largest = (0..n).filter(free).map(length).fold(0.0, f64::max);
         let next = preference
@@ -181,12 +181,12 @@ pub fn echelon(space: MatRef<'_, f64>, preference: &[usize], least: f64) -> (Vec
             .copied()
             .filter(free)
             .find(|j| length(*j) >= least * largest);
-        let Some(pivot) = next.filter(|_| largest > NEGLIGIBLE) else {
+        let Some(pivot) = next.filter(|_| largest > ROUNDING_SHARE) else {
             break;
         };
         let along = length(pivot);
-        let unit: Vec<f64> = left[pivot].iter().map(|v| v / along).collect();
-        for row in &mut left {
+        let unit: Vec<f64> = remaining[pivot].iter().map(|v| v / along).collect();
+        for row in &mut remaining {
             let share: f64 = row.iter().zip(&unit).map(|(v, u)| v * u).sum();
             row.iter_mut().zip(&unit).for_each(|(v, u)| *v -= share * u);
         }
@@ -210,7 +210,7 @@ pub fn echelon(space: MatRef<'_, f64>, preference: &[usize], least: f64) -> (Vec
             (0..n)
                 .map(|j| match pivots.iter().position(|pivot| *pivot == j) {
                     Some(place) => f64::from(u8::from(place == i)),
-                    None if form[(j, i)].abs() < NEGLIGIBLE * largest => 0.0,
+                    None if form[(j, i)].abs() < ROUNDING_SHARE * largest => 0.0,
                     None => form[(j, i)],
                 })
                 .collect()
@@ -240,7 +240,7 @@ mod tests {
     /// Five parameters with the null space `x0 − x1`, `x1 + 2 x2 − x3`, `x4`. The combinations are those of the equations, for every basis
     /// of the space and for rounding errors of 10⁻¹⁰.
     #[test]
-    fn a_null_space_has_one_form_whatever_its_basis() {
+    fn the_canonical_null_space_is_independent_of_the_basis() {
         let raw = [
             [1.0, -1.0, 0.0, 0.0, 0.0],
             [0.0, 1.0, 2.0, -1.0, 0.0],
@@ -296,14 +296,14 @@ mod tests {
     /// Readings of nine parameters with rank 5. The null space is the same, name by name, for every order of declaration and with rounding
     /// errors of 10⁻¹¹ in every entry.
     #[test]
-    fn a_null_space_does_not_depend_on_the_order_of_declarations() {
+    fn the_null_space_is_independent_of_the_order_of_declarations() {
         const N: usize = 9;
-        let seen = |i: usize, j: usize| [1.0, -1.0, 2.0, 0.0, 0.5][(3 * i + 2 * j + i * j) % 5] * 1e4;
+        let entry = |i: usize, j: usize| [1.0, -1.0, 2.0, 0.0, 0.5][(3 * i + 2 * j + i * j) % 5] * 1e4;
         let order = |turn: usize| (0..N).map(move |j| (4 * j + turn) % N).collect::<Vec<usize>>();
-        let told = |turn: usize| {
+        let decide = |turn: usize| {
             let order = order(turn);
             let r = Mat::from_fn(N, N, |i, j| {
-                let exact = if i < 5 { seen(i, order[j]) } else { 0.0 };
+                let exact = if i < 5 { entry(i, order[j]) } else { 0.0 };
                 exact * (1.0 + 1e-15 * ((5 * i + 3 * j + turn) % 7) as f64)
             });
             // Preferred by name: parameter 0 first.
@@ -323,10 +323,10 @@ mod tests {
             let pivots: Vec<usize> = rank.pivots.iter().map(|pivot| order[*pivot]).collect();
             (rows, pivots)
         };
-        let (rows, pivots) = told(0);
+        let (rows, pivots) = decide(0);
         assert!(pivots.is_sorted() && !pivots.is_empty(), "{pivots:?}");
         for turn in 1..N {
-            let (others, of_others) = told(turn);
+            let (others, of_others) = decide(turn);
             assert_eq!(of_others, pivots);
             for (row, other) in rows.iter().zip(&others) {
                 for (a, b) in row.iter().zip(other) {

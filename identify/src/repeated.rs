@@ -29,7 +29,7 @@ const SIGNIFICANCE: f64 = 0.01;
 pub struct Session {
     /// Its file.
     pub name: String,
-    /// What it was made with, in words: sessions that differ in it are not repeats.
+    /// Machine, instrument and tests in words. Sessions with different plans are not repeats.
     plan: String,
     /// Errors and coefficients of effects.
     parameters: Vec<ParameterResult>,
@@ -258,29 +258,29 @@ fn over_sessions(parameter: &ParameterResult, values: &[(f64, f64)], significanc
 /// its probability.
 fn deviating_from_others(values: &[(f64, f64)], significance: f64) -> Vec<(usize, f64, f64, f64)> {
     let normal = Normal::standard();
-    let mut rest: Vec<usize> = (0..values.len()).collect();
+    let mut remaining: Vec<usize> = (0..values.len()).collect();
     let mut found = Vec::new();
-    while rest.len() > 2 {
-        let others = rest.len() as f64 - 1.0;
-        let sum: f64 = rest.iter().map(|k| values[*k].0).sum();
-        let square: f64 = rest.iter().map(|k| values[*k].1.powi(2)).sum();
+    while remaining.len() > 2 {
+        let others = remaining.len() as f64 - 1.0;
+        let sum: f64 = remaining.iter().map(|k| values[*k].0).sum();
+        let square: f64 = remaining.iter().map(|k| values[*k].1.powi(2)).sum();
         let off = |k: &usize| {
             let (x, u) = values[*k];
             let by = x - (sum - x) / others;
             (*k, by, (u * u + (square - u * u) / others.powi(2)).sqrt())
         };
-        let clearest = rest
+        let most_significant = remaining
             .iter()
             .map(off)
             .max_by(|a, b| (a.1 / a.2).abs().total_cmp(&(b.1 / b.2).abs()));
-        let Some((k, by, u)) = clearest else { break };
+        let Some((k, by, u)) = most_significant else { break };
         let p_value = 2.0 * normal.sf((by / u).abs());
         // Zero uncertainties give no probability.
         if p_value.is_nan() || p_value >= significance {
             break;
         }
         found.push((k, by, u, p_value));
-        rest.retain(|other| *other != k);
+        remaining.retain(|other| *other != k);
     }
     found
 }

@@ -83,9 +83,9 @@ pub fn simulate(session: &Session, simulation: &Simulation) -> Result<Simulated,
     }
     let planned = motion::planned_session(session)?;
     let mut given = Vec::with_capacity(simulation.given.len());
-    let mut open = opened(session, planned);
+    let mut open = with_free_setups(session, planned);
     for value in &simulation.given {
-        let id = own_name(&open, &value.id)?;
+        let id = result_id(&open, &value.id)?;
         if given.iter().any(|(known, _): &(String, &Given)| *known == id) {
             return Err(IdentifyError::Request(format!("`{}` is given twice", value.id)));
         }
@@ -126,7 +126,7 @@ pub fn simulate(session: &Session, simulation: &Simulation) -> Result<Simulated,
             }
         }
     }
-    place(&parameters, &given, &mut beta)?;
+    assign(&parameters, &given, &mut beta)?;
 
     let warnings = warnings(&parameters, &beta);
     let noise_mm = simulation.noise_mm.or(session.noise_mm).unwrap_or(0.0);
@@ -186,7 +186,7 @@ fn rounded(value: f64, step: f64) -> f64 {
 }
 
 /// The session with its planned states as readings and every set-up quantity free, so that each has an identifier and a slot.
-fn opened(session: &Session, planned: Vec<Readings>) -> Session {
+fn with_free_setups(session: &Session, planned: Vec<Readings>) -> Session {
     let mut open = session.clone();
     for (test, states) in open.tests.iter_mut().zip(planned) {
         test.readings = Some(states);
@@ -200,7 +200,7 @@ fn opened(session: &Session, planned: Vec<Readings>) -> Session {
 }
 
 /// The identifier in results: errors of axes by ISO 230-1.
-fn own_name(session: &Session, id: &str) -> Result<String, IdentifyError> {
+fn result_id(session: &Session, id: &str) -> Result<String, IdentifyError> {
     let Some(mut name) = ErrorName::parse(id) else {
         return Ok(id.to_string());
     };
@@ -227,9 +227,13 @@ fn own_name(session: &Session, id: &str) -> Result<String, IdentifyError> {
 
 /// Writes the given values to the parameters. Amplitude and phase of a harmonic become cosine and sine,
 /// `A·cos(nq + φ) = A cos φ · cos nq − A sin φ · sin nq`.
-fn place(parameters: &Parameters, given: &[(String, &Given)], beta: &mut [f64]) -> Result<(), IdentifyError> {
+fn assign(
+    parameters: &Parameters,
+    given: &[(String, &Given)],
+    beta: &mut [f64],
+) -> Result<(), IdentifyError> {
     let find = |id: &str| parameters.list.iter().position(|parameter| parameter.id == id);
-    let mut taken = vec![false; given.len()];
+    let mut used = vec![false; given.len()];
     for effect in &parameters.effects {
         if !matches!(effect.shape, Shape::Harmonic { .. } | Shape::Periodic { .. }) {
             continue;
@@ -257,11 +261,11 @@ fn place(parameters: &Parameters, given: &[(String, &Given)], beta: &mut [f64]) 
         let Some(cosine) = find(&format!("{id}.cos")) else {
             continue;
         };
-        taken[amplitude] = true;
+        used[amplitude] = true;
         let size = given[amplitude].1.inside(&parameters.list[cosine].unit)?;
         let angle = match phase {
             Some(phase) => {
-                taken[phase] = true;
+                used[phase] = true;
                 given[phase].1.in_unit("rad")?
             }
             None => 0.0,
@@ -269,12 +273,12 @@ fn place(parameters: &Parameters, given: &[(String, &Given)], beta: &mut [f64]) 
         beta[cosine] = size * angle.cos();
         beta[cosine + 1] = -size * angle.sin();
     }
-    for ((id, value), taken) in given.iter().zip(taken) {
-        if taken {
+    for ((id, value), used) in given.iter().zip(used) {
+        if used {
             continue;
         }
         let Some(index) = find(id) else {
-            return Err(unknown(parameters, &value.id));
+            return Err(unknown_identifier(parameters, &value.id));
         };
         beta[index] = value.inside(&parameters.list[index].unit)?;
     }
@@ -282,7 +286,7 @@ fn place(parameters: &Parameters, given: &[(String, &Given)], beta: &mut [f64]) 
 }
 
 /// The error for an identifier that the session lacks, with those that it has.
-fn unknown(parameters: &Parameters, id: &str) -> IdentifyError {
+fn unknown_identifier(parameters: &Parameters, id: &str) -> IdentifyError {
     let of = |coefficients: bool| {
         let chosen = parameters.list.iter().filter(|parameter| match parameter.role {
             Role::Coefficient { .. } => coefficients,
@@ -310,10 +314,10 @@ fn warnings(parameters: &Parameters, beta: &[f64]) -> Vec<String> {
     let mut warnings = Vec::new();
     for (index, (parameter, value)) in parameters.list.iter().zip(beta).enumerate() {
         let moves = parameters
-            .parts
+            .contributions
             .iter()
             .flatten()
-            .any(|part| part.parameter == index);
+            .any(|contribution| contribution.parameter == index);
         if *value != 0.0 && !moves {
             warnings.push(format!("`{}` affects no reading of these tests", parameter.id));
         }
@@ -338,7 +342,7 @@ mod tests {
 
     /// Readings are written to files: a rounded reading has no more decimals than its step.
     #[test]
-    fn a_step_leaves_its_own_decimals() {
+    fn rounding_keeps_the_decimals_of_the_step() {
         assert_eq!(rounded(100.012_349, 1e-4), 100.0123);
         assert_eq!(rounded(-0.000_05, 1e-4), -0.0001);
         // 1/1e-5 is not a whole number in `f64`, and 3 · 1e-5 is not 3e-5.

@@ -1,8 +1,8 @@
 //! The triangular factor of a least-squares problem, built from a stream of rows.
 //!
 //! Householder QR reduces the augmented matrix `[J | r]` block by block (tall-skinny QR: Demmel, Grigori, Hoemmen, Langou, SIAM J. Sci.
-//! Comput. 34 (2012) A206). Memory does not grow with the number of readings. The factors of different readings merge into one. With `[J |
-//! r] = Q·[R c; 0 ρ]` the sum of squares after a step `δ` is `‖c − Rδ‖² + ρ²`.
+//! Comput. 34 (2012) A206). Memory does not grow with the number of readings. The factors of different readings merge into one. With
+//! `[J | r] = Q·[R c; 0 ρ]` the sum of squares after a step `δ` is `‖c − Rδ‖² + ρ²`.
 
 use faer::dyn_stack::{MemBuffer, MemStack};
 use faer::linalg::qr::no_pivoting::factor;
@@ -63,10 +63,10 @@ impl Triangle {
 
     /// The same rows over more parameters. `places` gives the index of each of these parameters among all; the rows do not depend on the
     /// others.
-    pub fn among(&self, places: &[usize], columns: usize) -> Triangle {
+    pub fn over_columns(&self, indices: &[usize], columns: usize) -> Triangle {
         let mut wide = Mat::zeros(self.factor.nrows(), columns + 1);
-        for (place, column) in places.iter().chain([&columns]).zip(self.factor.col_iter()) {
-            wide.col_mut(*place).copy_from(column);
+        for (index, column) in indices.iter().chain([&columns]).zip(self.factor.col_iter()) {
+            wide.col_mut(*index).copy_from(column);
         }
         let mut triangle = Triangle::new(columns);
         triangle.absorb(wide.as_ref());
@@ -126,9 +126,10 @@ impl Triangle {
 /// long in this range.
 pub(crate) fn upper(mut matrix: Mat<f64>) -> Mat<f64> {
     let (rows, columns) = (matrix.nrows(), matrix.ncols());
-    let together = if columns < 40 { 1 } else { 16 };
-    let mut reflections = Mat::zeros(together, columns);
-    let scratch = factor::qr_in_place_scratch::<f64>(rows, columns, together, Par::Seq, Default::default());
+    let block_columns = if columns < 40 { 1 } else { 16 };
+    let mut reflections = Mat::zeros(block_columns, columns);
+    let scratch =
+        factor::qr_in_place_scratch::<f64>(rows, columns, block_columns, Par::Seq, Default::default());
     factor::qr_in_place(
         matrix.as_mut(),
         reflections.as_mut(),

@@ -18,8 +18,8 @@ pub const ARCSEC: f64 = 180.0 * 3600.0 / std::f64::consts::PI;
 
 impl Unit {
     /// The unit of a component.
-    pub fn of(inside: InternalUnit) -> Unit {
-        let (name, display_per_internal) = match inside {
+    pub fn of(internal_unit: InternalUnit) -> Unit {
+        let (name, display_per_internal) = match internal_unit {
             InternalUnit::Millimetre => ("um", 1e3),
             InternalUnit::Radian => ("arcsec", ARCSEC),
             InternalUnit::Ratio => ("um/m", 1e6),

@@ -14,32 +14,32 @@
 use abbe_model::chain::Machine;
 
 use super::fault::Fault;
-use super::path::{Moves, Path};
+use super::path::{MovingAxes, Path};
 use super::regression::Regression;
 use super::results::{CircularTest, Diagnosis};
 use super::search::{cyclic, is_separable, is_third_order, spikes, third_order};
-use super::terms::Rows;
+use super::terms::PathRows;
 use crate::results::ParameterResult;
 
 /// Limit for a single outlier, in robust standard deviations.
 const OUTLIER_SIGMA: f64 = 6.0;
 /// Least arc for a diagnosis.
-const SHORTEST_ARC_DEG: f64 = 180.0;
+const MIN_ARC_DEG: f64 = 180.0;
 /// Arc of a full circle.
 const FULL_CIRCLE_DEG: f64 = 360.0;
 
 /// The decomposition of one circle.
-struct Model {
+struct Decomposition {
     names: [String; 2],
-    rows: Rows,
+    rows: PathRows,
     faults: Vec<Fault>,
     regression: Regression,
 }
 
-impl Model {
+impl Decomposition {
     /// Decomposes a path. The error holds the reason in words if the path is a circle of linear axes.
-    fn of(machine: &Machine, path: &Path) -> Result<Model, Option<String>> {
-        let Moves::Linear {
+    fn of(machine: &Machine, path: &Path) -> Result<Decomposition, Option<String>> {
+        let MovingAxes::Linear {
             axes,
             radius_mm,
             radial,
@@ -53,13 +53,13 @@ impl Model {
                 "no diagnosis: the bar does not lie in the plane of the circle".into(),
             ));
         }
-        if arc_deg < SHORTEST_ARC_DEG * 0.99 {
+        if arc_deg < MIN_ARC_DEG * 0.99 {
             return Err(Some(format!(
                 "no diagnosis: an arc of {arc_deg:.0}° is too short for it"
             )));
         }
         let names = axes.map(|axis| machine.axes[axis].name.clone());
-        let rows = Rows::of(path);
+        let rows = PathRows::of(path);
         let mut faults = standard(path, &rows, &names, radius_mm);
         let Some(mut regression) = solve(&rows, &faults) else {
             return Err(Some(
@@ -86,7 +86,7 @@ impl Model {
                 regression = without;
             }
         }
-        Ok(Model {
+        Ok(Decomposition {
             names,
             rows,
             faults,
@@ -97,13 +97,13 @@ impl Model {
 
 /// The outliers of a circle: single readings with a large residual of the diagnosis; `None` if there is no diagnosis.
 pub(super) fn reject_outliers(machine: &Machine, path: &Path) -> Option<Vec<bool>> {
-    let model = Model::of(machine, path).ok()?;
+    let model = Decomposition::of(machine, path).ok()?;
     let residual = &model.regression.residual;
     let mut sizes: Vec<f64> = residual.iter().map(|r| r.abs()).collect();
     sizes.sort_by(f64::total_cmp);
     // The median of |x| for a normal distribution is 0.6745 σ.
     let limit = OUTLIER_SIGMA * sizes[sizes.len() / 2] / 0.6745;
-    let mut reject_outliers = path.left_out.clone();
+    let mut outliers = path.left_out.clone();
     for (i, value) in residual.iter().enumerate() {
         let neighbours = [i.checked_sub(1), Some(i + 1)];
         let alone = neighbours
@@ -111,15 +111,15 @@ pub(super) fn reject_outliers(machine: &Machine, path: &Path) -> Option<Vec<bool
             .filter_map(|j| residual.get(j?))
             .all(|other| other.abs() < 0.5 * value.abs());
         if value.abs() > limit && alone {
-            reject_outliers[model.rows.row[i]] = true;
+            outliers[model.rows.row[i]] = true;
         }
     }
-    Some(reject_outliers)
+    Some(outliers)
 }
 
 /// Adds the diagnosis and its limitations to a result.
 pub(super) fn add(machine: &Machine, path: &Path, noise_mm: f64, result: &mut CircularTest) {
-    match Model::of(machine, path) {
+    match Decomposition::of(machine, path) {
         Ok(model) => {
             let sigma = scatter(&model.rows, &model.regression, noise_mm);
             report(&model.rows, &model.faults, &model.regression, sigma, result);
@@ -136,7 +136,7 @@ pub(super) fn add(machine: &Machine, path: &Path, noise_mm: f64, result: &mut Ci
 }
 
 /// Adds those of the given faults that are separable from the others.
-fn add_faults(rows: &Rows, faults: &mut Vec<Fault>, regression: &mut Regression, found: Vec<Fault>) {
+fn add_faults(rows: &PathRows, faults: &mut Vec<Fault>, regression: &mut Regression, found: Vec<Fault>) {
     if found.is_empty() {
         return;
     }
@@ -148,18 +148,18 @@ fn add_faults(rows: &Rows, faults: &mut Vec<Fault>, regression: &mut Regression,
     }
 }
 
-pub(super) fn columns(rows: &Rows, faults: &[Fault]) -> Vec<Vec<f64>> {
+pub(super) fn columns(rows: &PathRows, faults: &[Fault]) -> Vec<Vec<f64>> {
     let mut columns = rows.setup();
     columns.extend(faults.iter().flat_map(|fault| fault.columns.iter().cloned()));
     columns
 }
 
-fn solve(rows: &Rows, faults: &[Fault]) -> Option<Regression> {
+fn solve(rows: &PathRows, faults: &[Fault]) -> Option<Regression> {
     Regression::solve(&columns(rows, faults), &rows.y)
 }
 
 /// The faults that every diagnosis contains.
-fn standard(path: &Path, rows: &Rows, names: &[String; 2], radius_mm: f64) -> Vec<Fault> {
+fn standard(path: &Path, rows: &PathRows, names: &[String; 2], radius_mm: f64) -> Vec<Fault> {
     let plane = names.concat();
     let ppm = 1e6 / radius_mm;
     let mut faults = vec![
@@ -219,7 +219,7 @@ fn standard(path: &Path, rows: &Rows, names: &[String; 2], radius_mm: f64) -> Ve
 }
 
 /// Variance of the residual, and the correlation of neighbouring residuals.
-pub(super) fn variance_and_correlation(rows: &Rows, regression: &Regression) -> (f64, f64) {
+pub(super) fn variance_and_correlation(rows: &PathRows, regression: &Regression) -> (f64, f64) {
     let residual = &regression.residual;
     let sum = regression.sum_of_squares();
     let neighbours: f64 = (1..residual.len())
@@ -236,12 +236,12 @@ pub(super) fn variance_and_correlation(rows: &Rows, regression: &Regression) -> 
 }
 
 /// The standard deviation for the uncertainties, mm.
-fn scatter(rows: &Rows, regression: &Regression, noise_mm: f64) -> f64 {
+fn scatter(rows: &PathRows, regression: &Regression, noise_mm: f64) -> f64 {
     let (variance, r) = variance_and_correlation(rows, regression);
     (variance.max(noise_mm * noise_mm) * (1.0 + r) / (1.0 - r)).sqrt()
 }
 
-fn report(rows: &Rows, faults: &[Fault], regression: &Regression, sigma: f64, result: &mut CircularTest) {
+fn report(rows: &PathRows, faults: &[Fault], regression: &Regression, sigma: f64, result: &mut CircularTest) {
     let mut first = rows.setup().len();
     for fault in faults {
         let mut values: Vec<ParameterResult> = fault

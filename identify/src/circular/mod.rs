@@ -43,7 +43,7 @@ const OTHER_FEED: f64 = 1.2;
 
 /// Adds a limitation to every diagnosis: what tests at other feeds separate.
 fn compare_feeds(results: &mut [CircularTest]) {
-    let told: Vec<Option<String>> = results
+    let limitations: Vec<Option<String>> = results
         .iter()
         .map(|result| {
             if result.diagnosis.is_empty() {
@@ -64,7 +64,7 @@ fn compare_feeds(results: &mut [CircularTest]) {
             })
         })
         .collect();
-    for (result, told) in results.iter_mut().zip(told) {
-        result.not_told.extend(told);
+    for (result, limitations) in results.iter_mut().zip(limitations) {
+        result.not_told.extend(limitations);
     }
 }

@@ -21,7 +21,7 @@ const OFF_PLANE: f64 = 0.02;
 
 /// The axes that move.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) enum Moves {
+pub(super) enum MovingAxes {
     /// Two linear axes, by index, on a circle of this radius, mm.
     Linear {
         axes: [usize; 2],
@@ -44,13 +44,13 @@ pub(super) struct Signs {
 }
 
 impl Signs {
-    fn of(machine: &Machine, moves: &Moves) -> Signs {
+    fn of(machine: &Machine, moves: &MovingAxes) -> Signs {
         match moves {
-            Moves::Linear { axes, .. } => Signs {
+            MovingAxes::Linear { axes, .. } => Signs {
                 direction: axes.map(|axis| machine.axes[axis].principal().map_or(1.0, |(_, sign)| sign)),
                 side: axes.map(|axis| if axis < machine.workpiece_side { -1.0 } else { 1.0 }),
             },
-            Moves::Rotary(_) => Signs {
+            MovingAxes::Rotary(_) => Signs {
                 direction: [1.0; 2],
                 side: [1.0; 2],
             },
@@ -72,7 +72,7 @@ impl Signs {
 
 /// The readings of one run in one direction.
 #[derive(Clone, Debug)]
-pub(super) struct Run {
+pub(super) struct DirectionRun {
     /// Its rows.
     pub rows: Range<usize>,
     /// +1 if the angle increases.
@@ -82,8 +82,8 @@ pub(super) struct Run {
 /// A test's path.
 #[derive(Clone, Debug)]
 pub(super) struct Path {
-    pub moves: Moves,
-    pub runs: Vec<Run>,
+    pub moves: MovingAxes,
+    pub runs: Vec<DirectionRun>,
     /// Angle of each row, rad, unwrapped within a run.
     pub angle: Vec<f64>,
     /// Observed less nominal length, mm.
@@ -112,27 +112,27 @@ impl Path {
         let nominal_mm = model.readings_mm(&SlotValues::zero(model.slots()));
         let moves = moves(machine, &readings.positions, &nominal_mm)?;
         let mut angle = match moves {
-            Moves::Rotary(axis) => readings.positions[axis].clone(),
-            Moves::Linear { axes, .. } => around(&readings.positions, axes)?,
+            MovingAxes::Rotary(axis) => readings.positions[axis].clone(),
+            MovingAxes::Linear { axes, .. } => around(&readings.positions, axes)?,
         };
         let mut runs = Vec::new();
         for rows in readings.runs() {
             for row in rows.start + 1..rows.end {
-                if let Moves::Linear { .. } = moves {
+                if let MovingAxes::Linear { .. } = moves {
                     angle[row] -= ((angle[row] - angle[row - 1]) / TAU).round() * TAU;
                 }
             }
             if rows.len() >= MIN_READINGS {
                 let direction = (angle[rows.end - 1] - angle[rows.start]).signum();
-                runs.push(Run { rows, direction });
+                runs.push(DirectionRun { rows, direction });
             }
         }
         if runs.is_empty() {
             return None;
         }
         let samples = match moves {
-            Moves::Linear { axes, .. } => axes.map(|axis| readings.axis_samples(axis, AxisKind::Linear)),
-            Moves::Rotary(_) => [Vec::new(), Vec::new()],
+            MovingAxes::Linear { axes, .. } => axes.map(|axis| readings.axis_samples(axis, AxisKind::Linear)),
+            MovingAxes::Rotary(_) => [Vec::new(), Vec::new()],
         };
         let signs = Signs::of(machine, &moves);
         let feed_mm_s = feed(&samples, !readings.time_s.is_empty());
@@ -161,7 +161,7 @@ impl Path {
 
     /// Arc of the longest run, rad, at most one full turn.
     pub fn arc(&self) -> f64 {
-        let of = |run: &Run| {
+        let of = |run: &DirectionRun| {
             let angles = &self.angle[run.rows.clone()];
             let (least, most) = angles
                 .iter()
@@ -175,7 +175,7 @@ impl Path {
 }
 
 /// The moving axes of a test, if they make a circle.
-fn moves(machine: &Machine, positions: &[Vec<f64>], nominal_mm: &[f64]) -> Option<Moves> {
+fn moves(machine: &Machine, positions: &[Vec<f64>], nominal_mm: &[f64]) -> Option<MovingAxes> {
     let range = |column: &[f64]| {
         let least = column.iter().copied().fold(f64::INFINITY, f64::min);
         column.iter().copied().fold(f64::NEG_INFINITY, f64::max) - least
@@ -187,7 +187,7 @@ fn moves(machine: &Machine, positions: &[Vec<f64>], nominal_mm: &[f64]) -> Optio
     };
     let (linear, rotary) = (moving(AxisKind::Linear, 1e-3), moving(AxisKind::Rotary, 1e-4));
     match (&linear[..], &rotary[..]) {
-        (_, [axis]) => Some(Moves::Rotary(*axis)),
+        (_, [axis]) => Some(MovingAxes::Rotary(*axis)),
         (&[first, second], []) => {
             let points: Vec<[f64; 2]> = points(positions, [first, second]);
             let circle = circle::through(&points)?;
@@ -195,7 +195,7 @@ fn moves(machine: &Machine, positions: &[Vec<f64>], nominal_mm: &[f64]) -> Optio
                 .iter()
                 .map(|p| ((p[0] - circle.centre[0]).hypot(p[1] - circle.centre[1]) - circle.radius).abs())
                 .fold(0.0, f64::max);
-            (off < OFF_CIRCLE * circle.radius).then(|| Moves::Linear {
+            (off < OFF_CIRCLE * circle.radius).then(|| MovingAxes::Linear {
                 axes: ordered(machine, [first, second]),
                 radius_mm: circle.radius,
                 radial: nominal_mm

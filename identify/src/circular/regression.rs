@@ -87,21 +87,21 @@ impl Orthonormal {
 
     fn push(&mut self, column: Vec<f64>) -> bool {
         let before = dot(&column, &column).sqrt();
-        let mut rest = column;
+        let mut remainder = column;
         // Two passes suffice (Giraud, Langou & Rozložník 2005).
         for _ in 0..2 {
             for q in &self.0 {
-                let along = dot(q, &rest);
-                rest.iter_mut().zip(q).for_each(|(r, q)| *r -= along * q);
+                let along = dot(q, &remainder);
+                remainder.iter_mut().zip(q).for_each(|(r, q)| *r -= along * q);
             }
         }
-        let norm = dot(&rest, &rest).sqrt();
-        let seen = norm > 1e-6 * before.max(f64::MIN_POSITIVE);
-        if seen {
-            rest.iter_mut().for_each(|r| *r /= norm);
-            self.0.push(rest);
+        let norm = dot(&remainder, &remainder).sqrt();
+        let independent = norm > 1e-6 * before.max(f64::MIN_POSITIVE);
+        if independent {
+            remainder.iter_mut().for_each(|r| *r /= norm);
+            self.0.push(remainder);
         }
-        seen
+        independent
     }
 
     /// The decrease of the sum of squares of a residual, orthogonal to these columns, by further columns.

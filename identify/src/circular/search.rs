@@ -9,11 +9,11 @@ use super::diagnosis::{columns, variance_and_correlation};
 use super::fault::Fault;
 use super::path::Path;
 use super::regression::{Orthonormal, Regression};
-use super::terms::Rows;
+use super::terms::PathRows;
 use crate::results::ParameterResult;
 
 /// Significance level of a spike or cyclic error.
-const CHANCE: f64 = 1e-3;
+const SIGNIFICANCE: f64 = 1e-3;
 /// Least amplitude, 2 nm. Smaller values are below the resolution of a ball bar, and the terms are of first order only: 20 µm across a
 /// radius of 100 mm change it by 2 nm.
 const MIN_MM: f64 = 2e-6;
@@ -30,7 +30,7 @@ pub(super) fn is_third_order(fault: &Fault) -> bool {
 
 /// Errors that grow with the third power of the position. Beside radius, centre and scale they contribute `cos 4θ` and `sin 4θ`, with
 /// which a cyclic error of few periods is confounded.
-pub(super) fn third_order(rows: &Rows, names: &[String; 2]) -> Vec<Fault> {
+pub(super) fn third_order(rows: &PathRows, names: &[String; 2]) -> Vec<Fault> {
     let figures = ["sum", "difference"];
     let columns = rows.third_order().into_iter().zip(THIRD_ORDER).zip(figures);
     columns
@@ -41,41 +41,46 @@ pub(super) fn third_order(rows: &Rows, names: &[String; 2]) -> Vec<Fault> {
 }
 
 /// Whether a fault of one column is significant beside all the others.
-pub(super) fn is_separable(rows: &Rows, faults: &[Fault], fault: &Fault, regression: &Regression) -> bool {
+pub(super) fn is_separable(
+    rows: &PathRows,
+    faults: &[Fault],
+    fault: &Fault,
+    regression: &Regression,
+) -> bool {
     let before = faults.iter().take_while(|other| !std::ptr::eq(*other, fault));
     let place = rows.setup().len() + before.map(|other| other.columns.len()).sum::<usize>();
     let u = regression.u(&[(place, 1.0)], 1.0);
     u > 0.0
         && is_significant(
             (regression.beta[place] / u).powi(2),
-            unit_of_gain(rows, regression),
+            gain_variance(rows, regression),
             1,
             2,
         )
 }
 
 /// The variance of the gain test: that of the residual, enlarged for the correlation of neighbours.
-fn unit_of_gain(rows: &Rows, regression: &Regression) -> f64 {
+fn gain_variance(rows: &PathRows, regression: &Regression) -> f64 {
     let (variance, r) = variance_and_correlation(rows, regression);
     variance.max(MIN_MM * MIN_MM) * (1.0 + r) / (1.0 - r)
 }
 
 /// Whether a gain of this many columns is significant after this many candidates.
-fn is_significant(gain: f64, unit: f64, columns: usize, looks: usize) -> bool {
-    let chance = ChiSquared::new(columns as f64).map_or(1.0, |chi| chi.sf(gain / unit));
-    unit > 0.0 && chance * looks as f64 <= CHANCE
+fn is_significant(gain: f64, variance: f64, columns: usize, candidates: usize) -> bool {
+    let chance = ChiSquared::new(columns as f64).map_or(1.0, |chi| chi.sf(gain / variance));
+    variance > 0.0 && chance * candidates as f64 <= SIGNIFICANCE
 }
 
 /// The reversal spikes of each axis, at the width with the largest gain.
 pub(super) fn spikes(
     path: &Path,
-    rows: &Rows,
+    rows: &PathRows,
     names: &[String; 2],
     faults: &[Fault],
     regression: &Regression,
 ) -> Vec<Fault> {
     let mut basis = Orthonormal::of(&columns(rows, faults));
-    let unit = unit_of_gain(rows, regression);
+    let variance = gain_variance(rows, regression);
     let step = path.arc() / (rows.count() as f64 / path.runs.len() as f64);
     let mut found = Vec::new();
     for axis in 0..2 {
@@ -91,7 +96,7 @@ pub(super) fn spikes(
             })
             .max_by(|a, b| a.0.total_cmp(&b.0));
         let Some((gain, width)) = best else { continue };
-        if !is_significant(gain, unit, 2, 2 * tried.len()) {
+        if !is_significant(gain, variance, 2, 2 * tried.len()) {
             continue;
         }
         let name = &names[axis];
@@ -106,13 +111,13 @@ pub(super) fn spikes(
 
 /// The cyclic error of each axis, at the pitch with the largest gain.
 pub(super) fn cyclic(
-    rows: &Rows,
+    rows: &PathRows,
     names: &[String; 2],
     faults: &[Fault],
     regression: &Regression,
 ) -> Vec<Fault> {
     let mut basis = Orthonormal::of(&columns(rows, faults));
-    let unit = unit_of_gain(rows, regression);
+    let variance = gain_variance(rows, regression);
     let mut found = Vec::new();
     for axis in 0..2 {
         let q = &rows.q[axis];
@@ -137,7 +142,7 @@ pub(super) fn cyclic(
             })
             .max_by(|a, b| a.0.total_cmp(&b.0));
         let Some((gain, pitch)) = best else { continue };
-        if unit <= 0.0 || (-0.5 * gain / unit).exp() * (2 * tried) as f64 > CHANCE {
+        if variance <= 0.0 || (-0.5 * gain / variance).exp() * (2 * tried) as f64 > SIGNIFICANCE {
             continue;
         }
         // A significant cyclic error has a separate amplitude for each direction of travel.

@@ -21,7 +21,7 @@ use std::f64::consts::TAU;
 use super::path::Path;
 
 /// The rows of a path that are not outliers, in the quantities of the terms.
-pub(super) struct Rows {
+pub(super) struct PathRows {
     /// cos θ and sin θ.
     pub u: [Vec<f64>; 2],
     /// Direction of the path.
@@ -41,10 +41,10 @@ pub(super) struct Rows {
     pub row: Vec<usize>,
 }
 
-impl Rows {
+impl PathRows {
     /// Collects the rows of a path that are not outliers.
-    pub fn of(path: &Path) -> Rows {
-        let mut rows = Rows {
+    pub fn of(path: &Path) -> PathRows {
+        let mut rows = PathRows {
             u: Default::default(),
             s: Vec::new(),
             d: Default::default(),

@@ -24,13 +24,13 @@ use num_dual::{Derivative, DualNum, DualSVec64};
 use crate::circle;
 
 /// Tolerance of other axes' nominal motion and of directions, mm or rad.
-const STILL: f64 = 1e-6;
+const MOTION_TOLERANCE: f64 = 1e-6;
 /// Number of readings per differentiation.
 const PACK: usize = 8;
 
 /// The geometry of a circular test about one rotary axis.
 #[derive(Clone, Debug)]
-pub struct Layout {
+pub struct CircleGeometry {
     /// The axis that turns, by index.
     pub axis: usize,
     /// The two directions of R across the axis: 0, 1, 2 for X, Y, Z.
@@ -56,9 +56,9 @@ pub struct Centre {
     pub by_reading: [Vec<f64>; 2],
 }
 
-impl Layout {
+impl CircleGeometry {
     /// From the nominal machine. The error states why the path is no circle.
-    pub fn of(machine: &Machine, model: &TestModel<'_>) -> Result<Layout, String> {
+    pub fn of(machine: &Machine, model: &TestModel<'_>) -> Result<CircleGeometry, String> {
         let Station::BallBar(bar) = model.station() else {
             return Err("it is not a ball-bar test".into());
         };
@@ -66,7 +66,7 @@ impl Layout {
         let on_table = axis < machine.workpiece_side;
         let balls = |row| balls(machine, model, bar, row, on_table);
         let (origin, along) = line(machine, model, axis);
-        let Some(principal) = (0..3).find(|k| (along[*k].abs() - 1.0).abs() < STILL) else {
+        let Some(principal) = (0..3).find(|k| (along[*k].abs() - 1.0).abs() < MOTION_TOLERANCE) else {
             return Err(format!(
                 "axis `{}` does not lie along X, Y or Z while it turns",
                 machine.axes[axis].name
@@ -77,8 +77,8 @@ impl Layout {
         let mut angle = Vec::with_capacity(model.rows());
         let (mut height_mm, mut plane_mm) = (0.0, 0.0);
         for row in 0..model.rows() {
-            let (moving, stands) = balls(row);
-            let from: [f64; 3] = std::array::from_fn(|k| moving[k] - stands[k]);
+            let (moving, fixed) = balls(row);
+            let from: [f64; 3] = std::array::from_fn(|k| moving[k] - fixed[k]);
             if row == 0 {
                 height_mm = from[principal];
                 plane_mm = moving[principal] - origin[principal];
@@ -90,7 +90,7 @@ impl Layout {
             }
             angle.push([v / radius, u / radius]);
         }
-        Ok(Layout {
+        Ok(CircleGeometry {
             axis,
             nominal_mm: across.map(|k| origin[k] - standing[k]),
             across,
@@ -152,7 +152,7 @@ impl Layout {
 fn turning(machine: &Machine, model: &TestModel<'_>) -> Result<usize, String> {
     let moves = |axis: &usize| {
         let first = model.state(0)[*axis].value;
-        (1..model.rows()).any(|row| (model.state(row)[*axis].value - first).abs() > STILL)
+        (1..model.rows()).any(|row| (model.state(row)[*axis].value - first).abs() > MOTION_TOLERANCE)
     };
     let moving: Vec<usize> = (0..machine.axes.len()).filter(moves).collect();
     match moving[..] {

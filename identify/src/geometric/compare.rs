@@ -107,18 +107,19 @@ pub fn compare(session: &Session, method: Method, seed: u64) -> Result<Compariso
         if parameter.role != Role::Error {
             continue;
         }
-        let outside = parameter.unit.display_per_internal;
-        let place = estimator.errors.iter().position(|error| *error == p);
-        let seen = full.rank.is_identifiable(p).then_some(());
+        let display = parameter.unit.display_per_internal;
+        let index = estimator.errors.iter().position(|error| *error == p);
+        let identifiable = full.rank.is_identifiable(p).then_some(());
         errors.push(ComparisonRow {
             id: parameter.id.clone(),
             unit: parameter.unit.name.clone(),
-            value: place.map(|k| estimate.values[k] * outside),
-            u: place.map(|k| estimate.covariance[(k, k)].max(0.0).sqrt() * full.u_enlargement * outside),
-            bias: place.map(|k| (again.values[k] - known[p]) * outside),
-            full_value: seen.map(|()| full.beta[p] * outside),
-            full_u: seen.map(|()| full.covariance[(p, p)].max(0.0).sqrt() * full.u_enlargement * outside),
-            full_bias: seen.map(|()| (full_again[p] - known[p]) * outside),
+            value: index.map(|k| estimate.values[k] * display),
+            u: index.map(|k| estimate.covariance[(k, k)].max(0.0).sqrt() * full.u_enlargement * display),
+            bias: index.map(|k| (again.values[k] - known[p]) * display),
+            full_value: identifiable.map(|()| full.beta[p] * display),
+            full_u: identifiable
+                .map(|()| full.covariance[(p, p)].max(0.0).sqrt() * full.u_enlargement * display),
+            full_bias: identifiable.map(|()| (full_again[p] - known[p]) * display),
         });
     }
     let mut by_method = vec![0.0; list.len()];
@@ -179,11 +180,11 @@ fn readings(problem: &Problem<'_>, beta: &[f64]) -> Vec<Vec<f64>> {
 /// The parameters of the full fit to other readings of the same tests.
 fn refitted(problem: &Problem<'_>, readings: &[Vec<f64>], full: &Fit) -> Result<Vec<f64>, IdentifyError> {
     let mut session = problem.session.clone();
-    let mut left = readings.iter();
+    let mut remaining = readings.iter();
     for test in &mut session.tests {
         if let (Some(known), Some(drawn)) = (
             &mut test.readings,
-            test_has(problem, &test.name).then(|| left.next()).flatten(),
+            test_has(problem, &test.name).then(|| remaining.next()).flatten(),
         ) {
             known.observed.clone_from(drawn);
         }
@@ -209,28 +210,28 @@ fn centres(
     let tests = estimator
         .tests
         .iter()
-        .zip(&estimator.layouts)
+        .zip(&estimator.geometries)
         .zip(&estimate.centres);
     tests
         .enumerate()
-        .map(|(place, ((test, layout), centre))| {
+        .map(|(test_index, ((test, geometry), centre))| {
             let u = |which: usize| {
-                let row = 2 * place + which;
+                let row = 2 * test_index + which;
                 estimate.centre_covariance[(row, row)].max(0.0).sqrt() * u_enlargement * 1e3
             };
             let share = |p: usize| {
                 let scale = 1e3 / list[p].unit.display_per_internal;
-                [0, 1].map(|which| estimator.shares[(2 * place + which, p)] * scale)
+                [0, 1].map(|which| estimator.sensitivities[(2 * test_index + which, p)] * scale)
             };
             CentreResult {
                 test: problem.tests[*test].name.clone(),
-                axis: problem.session.machine.axes[layout.axis].name.clone(),
-                across: layout.across.map(letter),
+                axis: problem.session.machine.axes[geometry.axis].name.clone(),
+                across: geometry.across.map(letter),
                 offset_um: centre.offset_mm.map(|mm| mm * 1e3),
                 u_um: [u(0), u(1)],
                 radius_mm: centre.radius_mm,
-                plane_mm: layout.plane_mm,
-                height_mm: layout.height_mm,
+                plane_mm: geometry.plane_mm,
+                height_mm: geometry.height_mm,
                 shares: declared
                     .iter()
                     .map(|p| (list[*p].id.clone(), share(*p)))

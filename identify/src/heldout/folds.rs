@@ -184,7 +184,7 @@ mod tests {
     }
 
     #[test]
-    fn runs_are_folds_until_there_are_very_many() {
+    fn each_run_is_a_fold_up_to_a_maximum_number() {
         let as_measured = folds(&numbered(|_, run| run));
         assert_eq!((as_measured.kind, as_measured.count), (FoldKind::Runs, 16));
         assert_eq!(folds(&numbered(|_, _| 1)).kind, FoldKind::Blocks);
@@ -213,7 +213,7 @@ mod tests {
     }
 
     #[test]
-    fn a_run_column_that_numbers_no_traversals_is_named() {
+    fn a_run_column_that_does_not_number_traversals_gives_a_warning() {
         let warnings = |session: &Session| mislabelled_runs(&session.tests.iter().collect::<Vec<_>>()).len();
         assert_eq!(warnings(&numbered(|_, run| run)), 0);
         assert_eq!(warnings(&numbered(|_, _| 1)), 0);

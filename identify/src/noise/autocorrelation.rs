@@ -15,11 +15,15 @@ impl PureError {
     /// its slow part. The autocovariances are therefore corrected. The correction ends when noise with the estimated coefficients, after
     /// the same treatment, has the observed autocovariances (indirect inference: Gouriéroux, Monfort & Renault, J. Appl. Econometrics 8
     /// (1993) S85).
-    pub fn memory(&self, tests: &[&Test], kept: impl Fn(usize, usize) -> bool) -> Option<Autocorrelation> {
-        self.autocorrelation_up_to(MAX, tests, kept)
+    pub fn autocorrelation(
+        &self,
+        tests: &[&Test],
+        kept: impl Fn(usize, usize) -> bool,
+    ) -> Option<Autocorrelation> {
+        self.autocorrelation_up_to(MAX_ORDER, tests, kept)
     }
 
-    /// As [`PureError::memory`], with a maximum order.
+    /// As [`PureError::autocorrelation`], with a maximum order.
     pub(super) fn autocorrelation_up_to(
         &self,
         order: usize,
@@ -27,9 +31,9 @@ impl PureError {
         kept: impl Fn(usize, usize) -> bool,
     ) -> Option<Autocorrelation> {
         // Deviations before their rescaling for the trends: the variance that trends remove depends on the autocorrelation.
-        let mut covariance = [0.0; MAX + 1];
+        let mut covariance = [0.0; MAX_ORDER + 1];
         let mut enlarged = 0.0;
-        let mut pairs = [0_usize; MAX + 1];
+        let mut pairs = [0_usize; MAX_ORDER + 1];
         let mut lengths: BTreeMap<usize, usize> = BTreeMap::new();
         for (number, test) in tests.iter().enumerate() {
             let readings = test.readings.as_ref()?;
@@ -37,14 +41,14 @@ impl PureError {
                 return None;
             }
             for run in readings.runs() {
-                for lag in 0..=MAX {
+                for lag in 0..=MAX_ORDER {
                     for row in run.start + lag..run.end {
                         let both = self.deviations[number][row].zip(self.deviations[number][row - lag]);
                         if let Some((now, before)) = both
                             && kept(number, row)
                             && kept(number, row - lag)
                         {
-                            covariance[lag] += now * before / self.for_trends[number].powi(2);
+                            covariance[lag] += now * before / self.rescaling_of_tests[number].powi(2);
                             pairs[lag] += 1;
                             if lag == 0 {
                                 enlarged += now * before;
@@ -55,21 +59,24 @@ impl PureError {
                 *lengths.entry(run.len()).or_default() += run.len();
             }
         }
-        if pairs[MAX] < 100 || covariance[0] <= 0.0 {
+        if pairs[MAX_ORDER] < 100 || covariance[0] <= 0.0 {
             return None;
         }
-        let seen: [f64; MAX + 1] = std::array::from_fn(|lag| covariance[lag] / pairs[lag] as f64);
+        let observed: [f64; MAX_ORDER + 1] = std::array::from_fn(|lag| covariance[lag] / pairs[lag] as f64);
         // Two repeats hold the same deviation twice, so half of the pairs are independent.
         let insignificant = 3.0 / (0.5 * pairs[0] as f64).sqrt();
-        let (coefficients, variance) = without_trends_taken(&seen, order, insignificant, &lengths);
+        let (coefficients, variance) = without_detrending(&observed, order, insignificant, &lengths);
         // Bartlett's standard error of the lag-1 correlation, propagated through the correction.
-        let neighbours = seen[1] / seen[0];
-        let u = SCATTER * ((1.0 - neighbours * neighbours).max(0.0) / self.freedom.max(1) as f64).sqrt();
-        let mut slower = seen;
-        slower[1..].iter_mut().for_each(|value| *value += u * seen[0]);
-        let (of_slower, _) = without_trends_taken(&slower, order, insignificant, &lengths);
+        let neighbours = observed[1] / observed[0];
+        let u =
+            SCATTER_RATIO * ((1.0 - neighbours * neighbours).max(0.0) / self.freedom.max(1) as f64).sqrt();
+        let mut shifted = observed;
+        shifted[1..]
+            .iter_mut()
+            .for_each(|value| *value += u * observed[0]);
+        let (of_shifted, _) = without_detrending(&shifted, order, insignificant, &lengths);
         let total = |coefficients: &[f64]| coefficients.iter().sum::<f64>();
-        let sum_u = (total(&of_slower) - total(&coefficients)).abs();
+        let sum_u = (total(&of_shifted) - total(&coefficients)).abs();
         Some(Autocorrelation {
             sum_u: if coefficients.is_empty() { 0.0 } else { sum_u },
             coefficients,
@@ -79,18 +86,18 @@ impl PureError {
 }
 
 /// Coefficients and variance of the noise whose detrended deviations have these autocovariances.
-fn without_trends_taken(
-    seen: &[f64; MAX + 1],
+fn without_detrending(
+    observed: &[f64; MAX_ORDER + 1],
     order: usize,
     insignificant: f64,
     lengths: &BTreeMap<usize, usize>,
 ) -> (Vec<f64>, f64) {
-    let mut coefficients = autoregression(seen, order, insignificant);
-    let mut variance = seen[0];
+    let mut coefficients = autoregression(observed, order, insignificant);
+    let mut variance = observed[0];
     for _ in 0..CORRECTIONS {
-        let (process, shown) = with_trends_out(&coefficients, lengths);
-        variance = seen[0] / shown[0];
-        let corrected = std::array::from_fn(|lag| seen[lag] + variance * (process[lag] - shown[lag]));
+        let (process, shown) = detrended(&coefficients, lengths);
+        variance = observed[0] / shown[0];
+        let corrected = std::array::from_fn(|lag| observed[lag] + variance * (process[lag] - shown[lag]));
         let next = autoregression(&corrected, order, insignificant);
         if next == coefficients {
             break;
@@ -101,13 +108,13 @@ fn without_trends_taken(
 }
 
 /// Maximum autoregressive order.
-const MAX: usize = 3;
+const MAX_ORDER: usize = 3;
 const CORRECTIONS: usize = 8;
 /// Ratio of the actual scatter of the lag-1 correlation to Bartlett's formula. The excess is due to removed trends and selected orders.
 /// Over 64 simulated sessions with a coefficient of 0.8 the scatter was 0.034.
-const SCATTER: f64 = 1.6;
+const SCATTER_RATIO: f64 = 1.6;
 /// Run length beyond which detrending removes a negligible part of the noise.
-const LONG: usize = 600;
+const LONG_RUN: usize = 600;
 
 /// Autocorrelation of the noise along runs.
 #[derive(Clone, Debug, PartialEq)]
@@ -121,24 +128,24 @@ pub struct Autocorrelation {
 }
 
 /// Coefficients from autocovariances (Durbin–Levinson). The last coefficient of each order is its partial autocorrelation.
-fn autoregression(covariance: &[f64; MAX + 1], most: usize, insignificant: f64) -> Vec<f64> {
+fn autoregression(covariance: &[f64; MAX_ORDER + 1], most: usize, insignificant: f64) -> Vec<f64> {
     let correlation = covariance.map(|value| value / covariance[0]);
     let mut coefficients: Vec<f64> = Vec::new();
     let mut accepted = Vec::new();
-    let mut left = 1.0;
+    let mut unexplained = 1.0;
     for order in 1..=most {
         let predicted: f64 = coefficients
             .iter()
             .enumerate()
             .map(|(k, a)| a * correlation[order - 1 - k])
             .sum();
-        let partial = ((correlation[order] - predicted) / left).clamp(-0.99, 0.99);
+        let partial = ((correlation[order] - predicted) / unexplained).clamp(-0.99, 0.99);
         let previous = coefficients.clone();
         for k in 0..previous.len() {
             coefficients[k] = previous[k] - partial * previous[previous.len() - 1 - k];
         }
         coefficients.push(partial);
-        left *= 1.0 - partial * partial;
+        unexplained *= 1.0 - partial * partial;
         if partial.abs() > insignificant {
             accepted = coefficients.clone();
         }
@@ -148,17 +155,17 @@ fn autoregression(covariance: &[f64; MAX + 1], most: usize, insignificant: f64) 
 
 /// Autocorrelations of a process, and their expectation after detrending of runs with these lengths. `lengths` gives the number of
 /// readings in runs of each length.
-fn with_trends_out(
+fn detrended(
     coefficients: &[f64],
     lengths: &BTreeMap<usize, usize>,
-) -> ([f64; MAX + 1], [f64; MAX + 1]) {
+) -> ([f64; MAX_ORDER + 1], [f64; MAX_ORDER + 1]) {
     let longest = lengths
         .keys()
         .copied()
-        .filter(|n| *n <= LONG)
+        .filter(|n| *n <= LONG_RUN)
         .max()
         .unwrap_or(0)
-        .max(MAX + 1);
+        .max(MAX_ORDER + 1);
     // Impulse response, long enough for every autocorrelation short of a drift.
     let mut response = vec![0.0; longest + 2000];
     response[0] = 1.0;
@@ -182,13 +189,13 @@ fn with_trends_out(
         })
         .collect();
     let process = std::array::from_fn(|lag| correlation[lag]);
-    let mut shown = [0.0; MAX + 1];
+    let mut shown = [0.0; MAX_ORDER + 1];
     let mut total = 0.0;
     for (&n, &readings) in lengths {
         let weight = readings as f64;
         total += weight;
-        if !(MAX + 1..=LONG).contains(&n) {
-            (0..=MAX).for_each(|lag| shown[lag] += weight * process[lag]);
+        if !(MAX_ORDER + 1..=LONG_RUN).contains(&n) {
+            (0..=MAX_ORDER).for_each(|lag| shown[lag] += weight * process[lag]);
             continue;
         }
         // d = e − Q Qᵀe with orthonormal terms Q, so Cov d = Γ − Q(QᵀΓ) − (ΓQ)Qᵀ + Q(QᵀΓQ)Qᵀ.
@@ -202,7 +209,7 @@ fn with_trends_out(
             .collect();
         let qgq: [[f64; TERMS]; TERMS] =
             std::array::from_fn(|i| std::array::from_fn(|j| (0..n).map(|t| q[t][i] * gq[t][j]).sum()));
-        for lag in 0..=MAX {
+        for lag in 0..=MAX_ORDER {
             let sum: f64 = (lag..n)
                 .map(|t| {
                     let s = t - lag;
@@ -236,11 +243,11 @@ mod tests {
     }
 
     #[test]
-    fn coefficients_come_back_from_their_autocovariances_and_no_more_of_them() {
+    fn autoregression_returns_the_coefficients_and_the_order() {
         for a in [[0.8, 0.0], [1.1, -0.4], [-0.5, 0.3]] {
-            let correlation = correlations(a, MAX + 1);
+            let correlation = correlations(a, MAX_ORDER + 1);
             let covariance = std::array::from_fn(|lag| 2.5 * correlation[lag]);
-            let found = autoregression(&covariance, MAX, 1e-6);
+            let found = autoregression(&covariance, MAX_ORDER, 1e-6);
             let wanted = if a[1] == 0.0 { &a[..1] } else { &a[..] };
             assert_eq!(found.len(), wanted.len());
             assert!(
@@ -248,31 +255,31 @@ mod tests {
                 "{found:?}"
             );
             assert_eq!(autoregression(&covariance, 1, 1e-6).len(), 1);
-            assert!(autoregression(&covariance, MAX, 1.0).is_empty());
+            assert!(autoregression(&covariance, MAX_ORDER, 1.0).is_empty());
         }
     }
 
     /// Compares with `Cov d = P Γ P`, `P = 1 − Q Qᵀ`, as explicit products. A run of negligible trend shows the autocorrelations of the
     /// process itself.
     #[test]
-    fn what_trends_leave_is_the_projected_covariance() {
+    fn detrended_autocovariances_equal_the_projected_covariance() {
         let a = [1.1, -0.4];
         let correlation = correlations(a, 60);
-        let mut wanted = [0.0; MAX + 1];
-        let lengths = BTreeMap::from([(30, 90), (47, 47), (LONG + 1, 601)]);
+        let mut wanted = [0.0; MAX_ORDER + 1];
+        let lengths = BTreeMap::from([(30, 90), (47, 47), (LONG_RUN + 1, 601)]);
         for (n, readings) in [(30_usize, 90.0), (47, 47.0)] {
             let q = trend_terms(&(0..n).map(|t| t as f64).collect::<Vec<_>>());
             let q = faer::Mat::from_fn(n, TERMS, |t, i| q[t][i]);
             let p = faer::Mat::<f64>::identity(n, n) - &q * q.transpose();
             let gamma = faer::Mat::from_fn(n, n, |t, s| correlation[t.abs_diff(s)]);
-            let left = &p * gamma * &p;
+            let projected = &p * gamma * &p;
             for (lag, wanted) in wanted.iter_mut().enumerate() {
-                let mean = (lag..n).map(|t| left[(t, t - lag)]).sum::<f64>() / (n - lag) as f64;
+                let mean = (lag..n).map(|t| projected[(t, t - lag)]).sum::<f64>() / (n - lag) as f64;
                 *wanted += readings * mean;
             }
         }
-        let (process, shown) = with_trends_out(&a, &lengths);
-        for lag in 0..=MAX {
+        let (process, shown) = detrended(&a, &lengths);
+        for lag in 0..=MAX_ORDER {
             assert!((process[lag] - correlation[lag]).abs() < 1e-12);
             let wanted = (wanted[lag] + 601.0 * correlation[lag]) / 738.0;
             assert!(
@@ -285,12 +292,12 @@ mod tests {
 
     /// The inverse problem: coefficients and standard deviation follow from the autocovariances of detrended runs.
     #[test]
-    fn memory_and_size_are_found_behind_the_trends_that_were_taken() {
+    fn coefficients_and_variance_are_recovered_from_detrended_runs() {
         for (a, sigma) in [(vec![0.8], 1.5), (vec![0.6, 0.25], 0.7)] {
             let lengths = BTreeMap::from([(100, 100)]);
-            let (_, shown) = with_trends_out(&a, &lengths);
-            let seen = shown.map(|value| value * sigma * sigma);
-            let (found, variance) = without_trends_taken(&seen, MAX, 0.05, &lengths);
+            let (_, shown) = detrended(&a, &lengths);
+            let observed = shown.map(|value| value * sigma * sigma);
+            let (found, variance) = without_detrending(&observed, MAX_ORDER, 0.05, &lengths);
             assert_eq!(found.len(), a.len(), "{found:?}");
             for (found, wanted) in found.iter().zip(&a) {
                 assert!((found - wanted).abs() < 0.02, "{found} instead of {wanted}");

@@ -38,9 +38,9 @@ pub struct Noise {
 /// Source of a noise standard deviation.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum NoiseSource {
-    /// The session states it.
+    /// Stated in the session.
     Stated,
-    /// Repeated readings.
+    /// Repeated readings (pure error).
     Repeats,
     /// The residual of the model: noise and unmodelled effects.
     Residual,
@@ -93,9 +93,9 @@ pub struct PureError {
     /// Degrees of freedom after means and trends, rounded down.
     pub freedom: usize,
     /// Degrees of freedom of each test.
-    of_tests: Vec<f64>,
+    freedom_of_tests: Vec<f64>,
     /// For each test, the factor on its deviations for the removed trends.
-    for_trends: Vec<f64>,
+    rescaling_of_tests: Vec<f64>,
 }
 
 impl PureError {
@@ -113,8 +113,8 @@ impl PureError {
         let mut pure = PureError {
             deviations: Vec::new(),
             freedom: 0,
-            of_tests: Vec::new(),
-            for_trends: Vec::new(),
+            freedom_of_tests: Vec::new(),
+            rescaling_of_tests: Vec::new(),
         };
         for (number, (readings, residual)) in tests.iter().zip(residuals).enumerate() {
             let (mut deviation, mut freedom, mut enlarged) = (vec![None; residual.len()], 0.0, 1.0);
@@ -122,8 +122,8 @@ impl PureError {
                 (freedom, enlarged) = deviations(readings, residual, |row| kept(number, row), &mut deviation);
             }
             pure.deviations.push(deviation);
-            pure.of_tests.push(freedom);
-            pure.for_trends.push(enlarged);
+            pure.freedom_of_tests.push(freedom);
+            pure.rescaling_of_tests.push(enlarged);
         }
         pure.count();
         pure
@@ -131,13 +131,13 @@ impl PureError {
 
     fn count(&mut self) {
         // The small term keeps rounding of a trace from costing a degree of freedom.
-        self.freedom = (self.of_tests.iter().sum::<f64>() + 1e-6).floor() as usize;
+        self.freedom = (self.freedom_of_tests.iter().sum::<f64>() + 1e-6).floor() as usize;
     }
 
     /// The standard deviation, mm, if there are at least ten degrees of freedom.
     pub fn sigma_mm(&self) -> Option<f64> {
         let (mut sum, mut freedom) = (0.0, 0.0);
-        for (deviations, of_test) in self.deviations.iter().zip(&self.of_tests) {
+        for (deviations, of_test) in self.deviations.iter().zip(&self.freedom_of_tests) {
             let values = deviations.iter().flatten();
             let (squares, count) = values.fold((0.0, 0_usize), |(sum, count), value| {
                 (sum + value * value, count + 1)
@@ -161,8 +161,8 @@ fn deviations(
 ) -> (f64, f64) {
     let coordinates = readings.coordinates;
     let trends = Trends::of(readings, &kept);
-    let level = trends.taken_out(residual, coordinates);
-    let keys = Keys::of(readings);
+    let level = trends.removed_from(residual, coordinates);
+    let keys = RepeatKeys::of(readings);
     let mut order: Vec<usize> = (0..readings.rows()).filter(|row| kept(*row)).collect();
     order.sort_by(|a, b| keys.of_row(*a).cmp(keys.of_row(*b)));
     // Over one coordinate: the trace, the expected sum of squares of deviations rescaled for the means alone, and their number.
@@ -185,7 +185,7 @@ fn deviations(
             }
         }
     }
-    if expected < MIN_LEFT * count as f64 {
+    if expected < MIN_VARIANCE_SHARE * count as f64 {
         deviation.fill(None);
         return (0.0, 1.0);
     }
@@ -198,16 +198,16 @@ fn deviations(
 }
 
 /// Least share of the variance that the trends must leave.
-const MIN_LEFT: f64 = 0.05;
+const MIN_VARIANCE_SHARE: f64 = 0.05;
 
 /// The position of a reading as integers that are equal for repeats: axis positions and directions of travel.
-struct Keys {
+struct RepeatKeys {
     columns: usize,
     keys: Vec<i64>,
 }
 
-impl Keys {
-    fn of(readings: &Readings) -> Keys {
+impl RepeatKeys {
+    fn of(readings: &Readings) -> RepeatKeys {
         let directions = directions(readings);
         let columns = readings.positions.len() + 1;
         let mut keys = Vec::with_capacity(readings.rows() * columns);
@@ -217,7 +217,7 @@ impl Keys {
             keys.extend(positions.map(|column| (column[row] * 1e4).round() as i64));
             keys.push(if readings.run.is_empty() { 0 } else { *direction });
         }
-        Keys { columns, keys }
+        RepeatKeys { columns, keys }
     }
 
     fn of_row(&self, row: usize) -> &[i64] {
@@ -226,7 +226,7 @@ impl Keys {
 }
 
 /// Ratio beyond which stated noise and noise of repeats disagree.
-const DISAGREEMENT: f64 = 2.0;
+const DISAGREEMENT_RATIO: f64 = 2.0;
 /// Significance level of this disagreement.
 const DISAGREEMENT_P: f64 = 0.001;
 
@@ -243,7 +243,7 @@ pub fn stated_against_repeats(problem: &Problem<'_>, residuals: &[Vec<f64>]) -> 
     let freedom = pure.freedom as f64;
     let below = ChiSquared::new(freedom).ok()?.cdf(freedom * ratio * ratio);
     let by_chance = below.min(1.0 - below) > DISAGREEMENT_P / 2.0;
-    (!by_chance && !(1.0 / DISAGREEMENT..=DISAGREEMENT).contains(&ratio)).then(|| {
+    (!by_chance && !(1.0 / DISAGREEMENT_RATIO..=DISAGREEMENT_RATIO).contains(&ratio)).then(|| {
         format!(
             "the session states a noise of {} µm, and the repeatability is {:.3} µm ({} degrees of freedom): the uncertainties of a fit follow from \
              the stated noise; correct `noise_um`, or omit it",
@@ -275,7 +275,7 @@ mod tests {
 
     /// With the impulse response ψ of `x_t = Σ a_k x_{t−k} + e_t`, the variance of x is that of e times `Σ ψ²`.
     #[test]
-    fn what_a_reading_adds_is_what_the_impulse_response_says() {
+    fn innovation_follows_from_the_impulse_response() {
         for memory in [vec![], vec![0.8], vec![1.1, -0.4], vec![0.5, 0.2, -0.3]] {
             let mut response = vec![1.0];
             for t in 1..2000 {
@@ -318,7 +318,7 @@ mod tests {
     /// one. The scatter of σ² is that of χ² with the remaining degrees of freedom, `(R − 1)(n − K)` for a test of R runs of n readings
     /// which lose K terms each.
     #[test]
-    fn the_noise_of_repeats_is_that_of_the_readings_in_short_runs_and_long_ones() {
+    fn pure_error_is_unbiased_for_short_and_long_runs() {
         const SIGMA: f64 = 0.5e-3;
         const TESTS: usize = 4;
         let sessions = sessions();
@@ -332,13 +332,13 @@ mod tests {
                 for _ in 0..sessions {
                     let residuals: Vec<Vec<f64>> = (0..TESTS)
                         .map(|_| {
-                            let apart: Vec<f64> =
+                            let offsets: Vec<f64> =
                                 (0..runs).map(|_| generator.sample(StandardNormal)).collect();
                             (0..runs * places)
                                 .map(|row| {
                                     let noise: f64 = generator.sample(StandardNormal);
                                     let structure = (1.0 + (row % places) as f64).ln();
-                                    SIGMA * (noise + 3.0 * structure + 5.0 * apart[row / places])
+                                    SIGMA * (noise + 3.0 * structure + 5.0 * offsets[row / places])
                                 })
                                 .collect()
                         })

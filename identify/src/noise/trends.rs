@@ -93,7 +93,7 @@ impl Trends {
     }
 
     /// Residuals without the trend of each run and coordinate.
-    pub fn taken_out(&self, residual: &[f64], coordinates: usize) -> Vec<f64> {
+    pub fn removed_from(&self, residual: &[f64], coordinates: usize) -> Vec<f64> {
         let mut level = residual.to_vec();
         for rows in &self.rows {
             for coordinate in 0..coordinates {
@@ -112,8 +112,8 @@ impl Trends {
         level
     }
 
-    /// Contribution of a group of repeats to the trace of `M·P`: `Σ_t P_tt − (1/R)·Σ_ts P_ts` over its R rows. `P_ts = δ_ts − Σ_i q_ti
-    /// q_si` for rows of one run, and `δ_ts` for others.
+    /// Contribution of a group of repeats to the trace of `M·P`: `Σ_t P_tt − (1/R)·Σ_ts P_ts` over its R rows. `P_ts` is
+    /// `δ_ts − Σ_i q_ti q_si` for rows of one run, and `δ_ts` for others.
     pub fn freedom_of(&self, group: &[usize]) -> f64 {
         let repeats = group.len() as f64;
         let mut own = 0.0;
@@ -127,8 +127,8 @@ impl Trends {
                 None => sums.push((self.run[*row], *terms)),
             }
         }
-        let together: f64 = sums.iter().flat_map(|(_, sum)| sum).map(|q| q * q).sum();
-        (repeats - own) - (repeats - together) / repeats
+        let of_trends: f64 = sums.iter().flat_map(|(_, sum)| sum).map(|q| q * q).sum();
+        (repeats - own) - (repeats - of_trends) / repeats
     }
 }
 
@@ -137,10 +137,10 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_trend_is_a_parabola_and_one_cycle_and_nothing_else() {
+    fn a_trend_is_a_parabola_and_one_cycle() {
         let times: Vec<f64> = (0..60).map(|t| f64::from(t) * 1.5 + 7.0).collect();
         let q = trend_terms(&times);
-        let left = |of: &dyn Fn(f64) -> f64| -> f64 {
+        let remaining_share = |of: &dyn Fn(f64) -> f64| -> f64 {
             let values: Vec<f64> = times.iter().map(|t| of(*t)).collect();
             let along: [f64; TERMS] =
                 std::array::from_fn(|i| values.iter().zip(&q).map(|(value, q)| value * q[i]).sum());
@@ -148,17 +148,17 @@ mod tests {
                 .iter()
                 .zip(&q)
                 .map(|(value, q)| value - along.iter().zip(q).map(|(a, q)| a * q).sum::<f64>());
-            let (left, whole) = (
+            let (remaining, total) = (
                 rest.map(|r| r * r).sum::<f64>(),
                 values.iter().map(|v| v * v).sum::<f64>(),
             );
-            (left / whole).sqrt()
+            (remaining / total).sqrt()
         };
         // One cycle from the first reading to the last.
         let angle = |t: f64| std::f64::consts::TAU * (t - 7.0) / 88.5;
-        assert!(left(&|t| 3.0 - 0.2 * t + 0.01 * t * t) < 1e-12);
-        assert!(left(&|t| (angle(t) + 0.7).cos()) < 1e-12);
-        assert!(left(&|t| (4.0 * angle(t) + 0.7).cos()) > 0.9);
+        assert!(remaining_share(&|t| 3.0 - 0.2 * t + 0.01 * t * t) < 1e-12);
+        assert!(remaining_share(&|t| (angle(t) + 0.7).cos()) < 1e-12);
+        assert!(remaining_share(&|t| (4.0 * angle(t) + 0.7).cos()) > 0.9);
         // A run of few readings loses no cycle. Shorter runs also lose no parabola, no slope, or nothing.
         for (readings, terms) in [(23, 3), (15, 3), (14, 2), (10, 2), (9, 1), (4, 1), (3, 0), (1, 0)] {
             let few = trend_terms(&times[..readings]);

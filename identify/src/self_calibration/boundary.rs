@@ -14,7 +14,7 @@ use crate::error::IdentifyError;
 /// A condition `Σ a·f(angle) = 0`.
 #[derive(Clone, Debug)]
 pub struct Condition {
-    /// As it is reported.
+    /// The condition in results.
     pub words: String,
     /// Column and coefficient.
     pub terms: Vec<(usize, f64)>,
@@ -69,9 +69,9 @@ fn at(equations: &Equations, angle: f64) -> Vec<(usize, f64)> {
     let angles = &equations.angles[Function::Linear as usize];
     let ahead = |k: &usize| (angles[*k] - angle).rem_euclid(TAU);
     let behind = |k: &usize| (angle - angles[*k]).rem_euclid(TAU);
-    let nearest = |way: &dyn Fn(&usize) -> f64| {
+    let nearest = |distance: &dyn Fn(&usize) -> f64| {
         (0..angles.len())
-            .min_by(|a, b| way(a).total_cmp(&way(b)))
+            .min_by(|a, b| distance(a).total_cmp(&distance(b)))
             .unwrap_or(0)
     };
     let (next, last) = (nearest(&ahead), nearest(&behind));

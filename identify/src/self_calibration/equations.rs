@@ -13,9 +13,9 @@ use abbe_model::session::{Prior, Session, Test};
 use crate::error::IdentifyError;
 
 /// Angles nearer than this are equal, rad: positions in files are rounded to about 0.1 µm.
-const SAME_ANGLE: f64 = 1e-4;
+const ANGLE_TOLERANCE: f64 = 1e-4;
 /// Sine of the angle up to which a probing direction is radial.
-const RADIAL: f64 = 1e-6;
+const DIRECTION_TOLERANCE: f64 = 1e-6;
 
 /// The four unknown functions, in the order of their columns.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -45,7 +45,7 @@ impl Function {
 pub struct Equations {
     /// Index of the rotary axis in the machine.
     pub axis: usize,
-    /// The two directions of R across the axis: 0, 1, 2 for X, Y, Z; a positive turn carries the first towards the second.
+    /// The two directions of R across the axis: 0, 1, 2 for X, Y, Z. A positive rotation turns the first towards the second.
     pub across: [usize; 2],
     /// 1 if the axis turns from the first direction towards the second for an increasing command, else −1.
     pub sense: f64,
@@ -82,21 +82,21 @@ impl Equations {
 
     /// The column of a function at an angle, if a reading determines it there.
     pub fn column(&self, function: Function, angle: f64) -> Option<usize> {
-        let place = self.angles[function as usize]
+        let index = self.angles[function as usize]
             .iter()
-            .position(|known| apart(*known, angle) < SAME_ANGLE)?;
-        Some(self.offset(function) + place)
+            .position(|known| angular_distance(*known, angle) < ANGLE_TOLERANCE)?;
+        Some(self.offset(function) + index)
     }
 
     /// Function and angle of a column.
     pub fn node(&self, column: usize) -> (Function, f64) {
-        let mut place = column;
+        let mut index = column;
         for function in Function::ALL {
             let angles = &self.angles[function as usize];
-            if let Some(angle) = angles.get(place) {
+            if let Some(angle) = angles.get(index) {
                 return (function, *angle);
             }
-            place -= angles.len();
+            index -= angles.len();
         }
         (Function::Artefact, f64::NAN)
     }
@@ -115,12 +115,12 @@ impl Equations {
     /// The equations of a session. The coefficients are the derivatives of the chain.
     ///
     /// # Errors
-    /// If the session is none of this kind: another instrument, no or several rotary axes that turn under the artefact, another rotary
-    /// axis off its zero, artefacts that are not one and the same, a probing direction that is not radial, no readings.
+    /// If the session does not fit the method: another instrument, no or several rotary axes that turn under the artefact, another
+    /// rotary axis that is not at zero, several artefacts or set-ups, a probing direction that is not radial, no readings.
     pub fn of(session: &Session) -> Result<Equations, IdentifyError> {
-        let no = |message: String| IdentifyError::Request(format!("self-calibration: {message}"));
+        let refuse = |message: String| IdentifyError::Request(format!("self-calibration: {message}"));
         if session.instrument != InstrumentKind::Probe {
-            return Err(no(format!(
+            return Err(refuse(format!(
                 "the session's instrument is a {}; the method takes a probe",
                 session.instrument.word()
             )));
@@ -134,14 +134,14 @@ impl Equations {
             return Err(IdentifyError::NoReadings);
         };
         if let Some(other) = tests.iter().find(|test| test.setup != first.setup) {
-            return Err(no(format!(
+            return Err(refuse(format!(
                 "tests \"{}\" and \"{}\" have different set-ups; all tests must probe one artefact in one clamping: give them the same `setup`",
                 first.name, other.name
             )));
         }
-        let axis = turning_axis(session, &tests).map_err(no)?;
+        let axis = turning_axis(session, &tests).map_err(refuse)?;
         let Some((coordinate, sense)) = session.machine.axes[axis].principal() else {
-            return Err(no(format!(
+            return Err(refuse(format!(
                 "axis `{}` does not lie along X, Y or Z",
                 session.machine.axes[axis].name
             )));
@@ -161,11 +161,14 @@ impl Equations {
         };
         let mut touches = Vec::new();
         for test in &tests {
-            touches.extend(equations.touches(session, test).map_err(no)?);
+            touches.extend(equations.touches(session, test).map_err(refuse)?);
         }
         for touch in &touches {
             for (known, angle) in equations.angles.iter_mut().zip(touch.angles) {
-                if known.iter().all(|known| apart(*known, angle) >= SAME_ANGLE) {
+                if known
+                    .iter()
+                    .all(|known| angular_distance(*known, angle) >= ANGLE_TOLERANCE)
+                {
                     known.push(angle);
                 }
             }
@@ -174,9 +177,14 @@ impl Equations {
             known.sort_by(f64::total_cmp);
         }
         if equations.reference == Reference::FirstReading {
-            let at_zero = |touch: &&Touch| touch.angles.iter().all(|angle| apart(*angle, 0.0) < SAME_ANGLE);
+            let at_zero = |touch: &&TouchEquation| {
+                touch
+                    .angles
+                    .iter()
+                    .all(|angle| angular_distance(*angle, 0.0) < ANGLE_TOLERANCE)
+            };
             let Some(first) = touches.iter().find(at_zero).map(|touch| touch.outward_mm) else {
-                return Err(no(
+                return Err(refuse(
                     "no reading at 0° of axis, machine and artefact as reference; \
                      `radius_u_um = inf` makes the radius a parameter instead"
                         .into(),
@@ -200,7 +208,7 @@ impl Equations {
     }
 
     /// The probed points of a test, one per reading.
-    fn touches(&self, session: &Session, test: &Test) -> Result<Vec<Touch>, String> {
+    fn touches(&self, session: &Session, test: &Test) -> Result<Vec<TouchEquation>, String> {
         let (Station::Probe(probe), Some(readings)) = (&test.station, &test.readings) else {
             return Ok(Vec::new());
         };
@@ -212,22 +220,27 @@ impl Equations {
             motions + self.across[1],
             machine.error_slots() + FORM,
         ];
-        let places: Vec<Place> = (0..model.rows())
-            .map(|row| self.place(machine, probe, &model, row))
+        let touched: Vec<TouchAngles> = (0..model.rows())
+            .map(|row| self.touch_angles(machine, probe, &model, row))
             .collect();
         // Eq. (2): a table that stays at 0 has no displacement beyond the reference. Eq. (3): nor has a spot at 0 of the artefact, probed
         // throughout, a form deviation.
-        let varies = |angle: fn(&Place) -> f64| {
-            let stays = places.iter().all(|place| apart(angle(place), 0.0) < SAME_ANGLE);
+        let varies = |angle: fn(&TouchAngles) -> f64| {
+            let stays = touched
+                .iter()
+                .all(|angles| angular_distance(angle(angles), 0.0) < ANGLE_TOLERANCE);
             f64::from(u8::from(!stays))
         };
-        let (turns, wanders) = (varies(|place| place.position), varies(|place| place.on_artefact));
+        let (axis_varies, spot_varies) = (
+            varies(|angles| angles.position),
+            varies(|angles| angles.on_artefact),
+        );
         let nominal = SlotValues::zero(model.slots());
         let sensitivities = model.sensitivities(&nominal, &slots, 0..model.rows());
         (0..model.rows())
             .map(|row| {
-                let place = &places[row];
-                if place.beside > RADIAL {
+                let angles = &touched[row];
+                if angles.direction_error > DIRECTION_TOLERANCE {
                     return Err(format!(
                         "test \"{}\", reading {}: the probe does not move straight towards axis `{}`; the method requires radial probing",
                         test.name,
@@ -237,9 +250,9 @@ impl Equations {
                 }
                 // The measured radius increases as the distance decreases.
                 let by = |slot: usize| -sensitivities.derivatives[slot][row];
-                Ok(Touch {
-                    angles: [place.position, place.position, place.angle, place.on_artefact],
-                    coefficients: [turns * by(0), turns * by(1), -1.0, wanders * by(2)],
+                Ok(TouchEquation {
+                    angles: [angles.position, angles.position, angles.angle, angles.on_artefact],
+                    coefficients: [axis_varies * by(0), axis_varies * by(1), -1.0, spot_varies * by(2)],
                     outward_mm: sensitivities.readings_mm[row] - readings.observed[row],
                 })
             })
@@ -247,13 +260,13 @@ impl Equations {
     }
 
     /// The angles of a probed point.
-    fn place(
+    fn touch_angles(
         &self,
         machine: &abbe_model::chain::Machine,
         probe: &Probe<f64>,
         model: &TestModel<'_>,
         row: usize,
-    ) -> Place {
+    ) -> TouchAngles {
         let state = &model.state(row);
         let none = vec![BodyErrors::<f64>::NONE; machine.axes.len()];
         let origin = machine.axes[self.axis].origin_mm;
@@ -266,28 +279,29 @@ impl Equations {
         let angle = angle_of(stylus);
         let direction = probe.direction_at::<f64>(machine, state).0;
         let [first, second] = self.across.map(|k| direction[k]);
-        Place {
+        TouchAngles {
             position: wrapped(state[self.axis].value),
             angle: wrapped(angle),
             on_artefact: wrapped(angle_of(on_table)),
             // For inward probing the direction is minus the unit vector at the angle.
-            beside: (first + angle.cos()).hypot(second + angle.sin()),
+            direction_error: (first + angle.cos()).hypot(second + angle.sin()),
         }
     }
 }
 
-/// One reading.
-struct Touch {
+/// The equation of one reading.
+struct TouchEquation {
     angles: [f64; 4],
     coefficients: [f64; 4],
     outward_mm: f64,
 }
 
-struct Place {
+/// The angles of a probed point, rad, and the sine of the angle between probing direction and radius.
+struct TouchAngles {
     position: f64,
     angle: f64,
     on_artefact: f64,
-    beside: f64,
+    direction_error: f64,
 }
 
 /// The rotary axis that turns under the artefact.
@@ -299,7 +313,9 @@ fn turning_axis(session: &Session, tests: &[&Test]) -> Result<usize, String> {
             .filter_map(|test| test.readings.as_ref())
             .any(|readings| {
                 let positions = &readings.positions[axis];
-                positions.iter().any(|q| (q - positions[0]).abs() > SAME_ANGLE)
+                positions
+                    .iter()
+                    .any(|q| (q - positions[0]).abs() > ANGLE_TOLERANCE)
             })
     };
     let rotary = |axis: &usize| machine.axes[*axis].kind == AxisKind::Rotary;
@@ -313,13 +329,13 @@ fn turning_axis(session: &Session, tests: &[&Test]) -> Result<usize, String> {
             .map(|axis| machine.axes[*axis].name.as_str())
             .collect();
         return Err(match names.len() {
-            0 => "no rotary axis turns in these tests".into(),
+            0 => "no rotary axis axis_varies in these tests".into(),
             _ => format!("axes {} turn; the method is for one", names.join(" and ")),
         });
     };
     if axis >= machine.workpiece_side {
         return Err(format!(
-            "axis `{}` turns the tool; the method is for an axis that turns the table",
+            "axis `{}` axis_varies the tool; the method is for an axis that axis_varies the table",
             machine.axes[axis].name
         ));
     }
@@ -330,7 +346,7 @@ fn turning_axis(session: &Session, tests: &[&Test]) -> Result<usize, String> {
         let readings = tests.iter().filter_map(|test| test.readings.as_ref());
         if readings
             .flat_map(|readings| &readings.positions[other])
-            .any(|q| q.abs() > SAME_ANGLE)
+            .any(|q| q.abs() > ANGLE_TOLERANCE)
         {
             return Err(format!(
                 "axis `{}` does not stand at zero; the directions across axis `{}` are then not those of R",
@@ -344,7 +360,7 @@ fn turning_axis(session: &Session, tests: &[&Test]) -> Result<usize, String> {
 /// An angle in (−π, π].
 fn wrapped(angle: f64) -> f64 {
     let turned = angle.rem_euclid(TAU);
-    if turned > PI + SAME_ANGLE / 2.0 {
+    if turned > PI + ANGLE_TOLERANCE / 2.0 {
         turned - TAU
     } else {
         turned
@@ -352,7 +368,7 @@ fn wrapped(angle: f64) -> f64 {
 }
 
 /// The distance of two angles, modulo whole turns.
-fn apart(a: f64, b: f64) -> f64 {
+fn angular_distance(a: f64, b: f64) -> f64 {
     let turned = (a - b).rem_euclid(TAU);
     turned.min(TAU - turned)
 }

@@ -6,8 +6,8 @@
 //! ```
 //!
 //! φ is the angle of the probed point in the machine while the table is at C. The coefficients are the derivatives of the chain, so all
-//! signs follow from the machine file. In test 3 the probed point turns with the table. For a table that turns clockwise `e(φ) = (cos C,
-//! −sin C)`; Eq. (3) of the reference prints `+sin C`.
+//! signs follow from the machine file. In test 3 the probed point turns with the table. For a table that turns clockwise
+//! `e(φ) = (cos C, −sin C)`; Eq. (3) of the reference prints `+sin C`.
 
 mod boundary;
 mod equations;
@@ -23,7 +23,7 @@ pub use equations::{Equations, Function, Reference};
 pub use results::{
     DistributionResult, FunctionPoint, FunctionResult, Histogram, MonteCarloResult, SelfCalibration,
 };
-pub use solve::{Solution, rank_before, solve};
+pub use solve::{CalibrationSolution, rank_before, solve};
 
 use crate::error::IdentifyError;
 use crate::monte_carlo;
@@ -39,7 +39,7 @@ pub struct Calibration {
     /// Rank of the equations without the boundary conditions.
     pub rank_before: usize,
     /// The solution.
-    pub solution: Solution,
+    pub solution: CalibrationSolution,
     /// Standard uncertainty of a reading, mm.
     pub sigma_mm: f64,
     /// Factor on the uncertainties of the solution: `√(χ²/ν)` if the readings scatter significantly more than stated, else 1.
@@ -51,7 +51,7 @@ pub struct Calibration {
 }
 
 /// Noise standard deviation for the decision on the rank if the session states none, mm.
-const FIRST_GUESS_MM: f64 = 1e-3;
+const START_NOISE_MM: f64 = 1e-3;
 
 /// Solves the equations of a session. The noise is the session's `noise_um`, or the residual of the solution.
 ///
@@ -67,12 +67,12 @@ pub fn calibrate(session: &Session) -> Result<Calibration, IdentifyError> {
         reference: Reference::Estimated,
         ..equations.clone()
     };
-    let left = solve(&free_radius, &reduction, stated.unwrap_or(FIRST_GUESS_MM))?;
-    let square = left.rms_mm.powi(2) * equations.rows.len() as f64;
-    let freedom = left.freedom as f64;
+    let unreferenced = solve(&free_radius, &reduction, stated.unwrap_or(START_NOISE_MM))?;
+    let square = unreferenced.rms_mm.powi(2) * equations.rows.len() as f64;
+    let freedom = unreferenced.freedom as f64;
     let (sigma_mm, u_enlargement) = match stated {
         Some(sigma) => (sigma, crate::fit::u_enlargement(square / sigma.powi(2), freedom)),
-        None if left.freedom == 0 => {
+        None if unreferenced.freedom == 0 => {
             return Err(IdentifyError::Request(
                 "self-calibration: the session states no `noise_um`, and there are no more readings than parameters to estimate it from; \
                  state it, or repeat the cycle"
@@ -108,7 +108,7 @@ impl Calibration {
     /// estimated.
     pub fn has_position(&self) -> bool {
         let count = 2 * self.equations.angles[0].len();
-        self.solution.seen[..count].iter().all(|seen| *seen)
+        self.solution.identifiable[..count].iter().all(|seen| *seen)
     }
 
     /// Sine and cosine of each position of the axis.

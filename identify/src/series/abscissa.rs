@@ -9,9 +9,9 @@ use abbe_model::session::readings::Readings;
 use crate::circle;
 
 /// Tolerance of equal positions: mm or rad.
-const STANDS: f64 = 1e-6;
+const POSITION_TOLERANCE: f64 = 1e-6;
 /// Readings per segment below which the test consists of poses, not of traversals.
-const MIN_STRETCH: usize = 10;
+const MIN_READINGS_PER_SEGMENT: usize = 10;
 
 /// The abscissa of a test.
 #[derive(Clone, Debug, PartialEq)]
@@ -30,7 +30,7 @@ pub struct Abscissa {
 
 /// Consecutive readings of one run in one direction.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Stretch {
+pub struct PathSegment {
     /// The number of the run in the file, or 1.
     pub run: i64,
     /// Its rows.
@@ -50,7 +50,7 @@ impl Abscissa {
     /// else the linear axis with the largest travel; else the number of the reading.
     pub fn of(machine: &Machine, readings: &Readings) -> Abscissa {
         let moving: Vec<usize> = (0..machine.axes.len())
-            .filter(|axis| range(&readings.positions[*axis]) > STANDS)
+            .filter(|axis| range(&readings.positions[*axis]) > POSITION_TOLERANCE)
             .collect();
         let most = |kind: AxisKind| {
             moving
@@ -102,45 +102,45 @@ impl Abscissa {
 
     /// The segments of one direction of each run. For `poses`, and if the direction changes at every other reading, whole runs without a
     /// direction.
-    pub fn stretches(&self, readings: &Readings, poses: bool) -> Vec<Stretch> {
+    pub fn stretches(&self, readings: &Readings, poses: bool) -> Vec<PathSegment> {
         let runs = readings.runs();
         let number = |row: usize| readings.run.get(row).copied().unwrap_or(1);
-        let whole = |rows: &Range<usize>| Stretch {
+        let whole_run = |rows: &Range<usize>| PathSegment {
             run: number(rows.start),
             rows: rows.clone(),
             forward: None,
         };
         if poses {
-            return runs.iter().map(whole).collect();
+            return runs.iter().map(whole_run).collect();
         }
         let mut stretches = Vec::new();
         for run in &runs {
-            let mut parts: Vec<Stretch> = Vec::new();
+            let mut parts: Vec<PathSegment> = Vec::new();
             for row in run.start + 1..run.end {
                 let step = self.values[row] - self.values[row - 1];
-                if step.abs() <= STANDS {
+                if step.abs() <= POSITION_TOLERANCE {
                     continue;
                 }
                 let forward = Some(step > 0.0);
                 match parts.last_mut() {
                     Some(last) if last.forward != forward => {
                         last.rows.end = row;
-                        parts.push(Stretch {
+                        parts.push(PathSegment {
                             run: number(run.start),
                             rows: row..run.end,
                             forward,
                         });
                     }
                     Some(_) => {}
-                    None => parts.push(Stretch {
+                    None => parts.push(PathSegment {
                         run: number(run.start),
                         rows: run.clone(),
                         forward,
                     }),
                 }
             }
-            if parts.is_empty() || parts.len() > 1 + run.len() / MIN_STRETCH {
-                stretches.push(whole(run));
+            if parts.is_empty() || parts.len() > 1 + run.len() / MIN_READINGS_PER_SEGMENT {
+                stretches.push(whole_run(run));
             } else {
                 stretches.extend(parts);
             }
@@ -180,7 +180,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_circle_of_two_axes_is_an_angle_that_goes_on() {
+    fn a_circle_of_two_axes_gives_an_unwrapped_angle() {
         let wanted: Vec<f64> = (0..=72).map(|k| 10.0 * f64::from(k)).collect();
         let at = |k: &f64| k.to_radians();
         let x: Vec<f64> = wanted.iter().map(|k| 5.0 + 100.0 * at(k).cos()).collect();
@@ -193,7 +193,7 @@ mod tests {
     }
 
     #[test]
-    fn a_run_there_and_back_has_two_stretches() {
+    fn a_forward_and_backward_run_has_two_segments() {
         let machine = Machine::from_code("wCbt").unwrap();
         let there = (0..=20).chain((0..20).rev()).map(f64::from);
         let positions: Vec<f64> = there.map(f64::to_radians).collect();

@@ -20,7 +20,7 @@ use crate::fit::Fit;
 use crate::heldout::{FoldKind, rms_mm};
 use crate::parameters::Role;
 use crate::problem::Problem;
-use abscissa::{Abscissa, Stretch};
+use abscissa::{Abscissa, PathSegment};
 
 /// The source of a share.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -40,7 +40,7 @@ pub enum Cause {
 pub struct Share {
     /// `EY0A`, `EZC~C:h2`, `set-up`, `confounded`.
     pub id: String,
-    /// What it belongs to.
+    /// The source.
     pub cause: Cause,
     /// The indices of its parameters.
     pub unknowns: Vec<usize>,
@@ -54,7 +54,7 @@ pub struct TestSeries {
     /// Its abscissa.
     pub way: Abscissa,
     /// Segments of one run in one direction.
-    pub stretches: Vec<Stretch>,
+    pub stretches: Vec<PathSegment>,
     /// Observed minus nominal. For instruments with three coordinates without the set-up's share, which includes the frame of reference.
     pub deviation_um: Vec<f64>,
     /// Residual of the model before.

@@ -15,7 +15,7 @@ use crate::problem::{Block, Problem};
 /// Maximum number of points along a run.
 const MAX_POINTS: usize = 181;
 /// Sensitivity below which an error does not affect a test, µm per unit. Smaller values are second-order contributions of other errors.
-const NOTHING: f64 = 1e-3;
+const MIN_SENSITIVITY_UM: f64 = 1e-3;
 
 /// The sensitivities of one test.
 #[derive(Clone, Debug)]
@@ -77,7 +77,7 @@ pub fn sensitivities(problem: &Problem<'_>, beta: &[f64]) -> Result<Vec<TestSens
                     let scale = 1e3 / list[j].unit.display_per_internal;
                     let value = |i: &usize| rows[(i * coordinates + coordinate, j)] * scale;
                     let values: Vec<f64> = picked.iter().map(value).collect();
-                    let moves = values.iter().any(|value| value.abs() > NOTHING);
+                    let moves = values.iter().any(|value| value.abs() > MIN_SENSITIVITY_UM);
                     moves.then(|| sensitivity(&list[j], values))
                 })
                 .collect();
@@ -116,7 +116,7 @@ pub fn over_poses(problem: &Problem<'_>, beta: &[f64]) -> Result<Vec<Sensitivity
             let rms_um = (square / readings).sqrt() * 1e3 / parameter.unit.display_per_internal;
             sensitivity(parameter, vec![rms_um])
         })
-        .filter(|found| found.values[0] > NOTHING)
+        .filter(|found| found.values[0] > MIN_SENSITIVITY_UM)
         .collect())
 }
 

@@ -117,7 +117,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_wave_over_whole_turns_has_its_amplitude_at_its_order_alone() {
+    fn a_wave_over_whole_turns_has_one_nonzero_order() {
         let angle: Vec<f64> = (0..720).map(f64::from).collect();
         let values: Vec<f64> = angle
             .iter()
@@ -130,7 +130,7 @@ mod tests {
     }
 
     #[test]
-    fn over_a_short_arc_no_order_claims_more_than_there_is() {
+    fn amplitudes_over_a_short_arc_do_not_exceed_the_residual() {
         let angle: Vec<f64> = (0..50).map(|k| 0.5 * f64::from(k)).collect();
         let values: Vec<f64> = angle.iter().map(|a| (0.7 * a).sin()).collect();
         let most = 2.0_f64.sqrt() * (values.iter().map(|v| v * v).sum::<f64>() / 50.0).sqrt();

@@ -378,7 +378,7 @@ fn give_noise_autocorrelation(problem: &mut Problem<'_>, residuals: &[Vec<f64>])
     }
     let kept = |test: usize, row: usize| !problem.rejected[test][row];
     let pure = PureError::of(&problem.tests, residuals, kept).without_waves(&problem.tests, kept);
-    let Some(memory) = pure.memory(&problem.tests, kept) else {
+    let Some(memory) = pure.autocorrelation(&problem.tests, kept) else {
         return false;
     };
     let mut noise = problem.noise.clone();

@@ -89,12 +89,12 @@ struct File {
     #[serde(default)]
     constant: BTreeMap<String, String>,
     #[serde(default)]
-    function: Vec<Entry>,
+    function: Vec<FunctionEntry>,
 }
 
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
-struct Entry {
+struct FunctionEntry {
     error: String,
     over: Option<String>,
     table: Option<TableEntry>,
@@ -168,7 +168,7 @@ fn parse(text: &str, machine: &Machine) -> Result<Vec<ErrorFunction>, String> {
     let file: File = toml::from_str(text).map_err(|cause| cause.to_string())?;
     let mut functions = Vec::new();
     for (id, quantity) in &file.constant {
-        let (slot, over, angle) = placed(machine, id)?;
+        let (slot, over, angle) = error_slot_of(machine, id)?;
         let unit = Unit::of(if angle {
             abbe_model::instrument::InternalUnit::Radian
         } else {
@@ -182,14 +182,14 @@ fn parse(text: &str, machine: &Machine) -> Result<Vec<ErrorFunction>, String> {
         });
     }
     for (number, entry) in file.function.iter().enumerate() {
-        let called = format!("[[function]] {} (`{}`)", number + 1, entry.error);
-        functions.push(function(machine, entry).map_err(|message| format!("{called}: {message}"))?);
+        let label = format!("[[function]] {} (`{}`)", number + 1, entry.error);
+        functions.push(function(machine, entry).map_err(|message| format!("{label}: {message}"))?);
     }
     Ok(functions)
 }
 
-fn function(machine: &Machine, entry: &Entry) -> Result<ErrorFunction, String> {
-    let (slot, own, angle) = placed(machine, &entry.error)?;
+fn function(machine: &Machine, entry: &FunctionEntry) -> Result<ErrorFunction, String> {
+    let (slot, own, angle) = error_slot_of(machine, &entry.error)?;
     let over = match &entry.over {
         None => own,
         Some(name) => machine.axis_index(name).ok_or_else(|| no_axis(machine, name))?,
@@ -198,7 +198,7 @@ fn function(machine: &Machine, entry: &Entry) -> Result<ErrorFunction, String> {
     let form = match (&entry.table, &entry.polynomial, &entry.harmonic) {
         (Some(table), None, None) => {
             let at = position(kind, table.at_mm.clone(), table.at_deg.clone(), "at")?
-                .ok_or_else(|| format!("a table needs positions: `at_{}`", unit_word(kind)))?;
+                .ok_or_else(|| format!("a table needs positions: `at_{}`", unit_suffix(kind)))?;
             let values = values(angle, table.um.clone(), table.arcsec.clone())?;
             if at.len() != values.len() || at.len() < 2 {
                 return Err(format!(
@@ -235,7 +235,7 @@ fn function(machine: &Machine, entry: &Entry) -> Result<ErrorFunction, String> {
                 single(harmonic.period_deg),
                 "period",
             )?;
-            moderate(harmonic.order.as_slice())?;
+            check_finite(harmonic.order.as_slice())?;
             let period = match (period, harmonic.order, kind) {
                 (Some(period), None, _) => period[0],
                 (None, Some(order), AxisKind::Rotary) => std::f64::consts::TAU / order,
@@ -253,7 +253,7 @@ fn function(machine: &Machine, entry: &Entry) -> Result<ErrorFunction, String> {
                 single(harmonic.amplitude_um),
                 single(harmonic.amplitude_arcsec),
             )?;
-            moderate(&[harmonic.phase_deg])?;
+            check_finite(&[harmonic.phase_deg])?;
             Form::Harmonic {
                 period,
                 amplitude: amplitude[0],
@@ -266,7 +266,7 @@ fn function(machine: &Machine, entry: &Entry) -> Result<ErrorFunction, String> {
 }
 
 /// Slot and axis of an error, and whether it is an angle.
-fn placed(machine: &Machine, id: &str) -> Result<(usize, usize, bool), String> {
+fn error_slot_of(machine: &Machine, id: &str) -> Result<(usize, usize, bool), String> {
     let Some(name) = ErrorName::parse(id) else {
         return Err(format!(
             "`{id}` is not the name of an error; use ISO 230-1 names such as EXX, EB0A"
@@ -293,7 +293,7 @@ fn no_axis(machine: &Machine, name: &str) -> String {
     )
 }
 
-fn unit_word(kind: AxisKind) -> &'static str {
+fn unit_suffix(kind: AxisKind) -> &'static str {
     match kind {
         AxisKind::Linear => "mm",
         AxisKind::Rotary => "deg",
@@ -316,10 +316,10 @@ fn position(
     if wrong.is_some() {
         return Err(format!(
             "`{id_stem}_{}` is expected for this axis",
-            unit_word(kind)
+            unit_suffix(kind)
         ));
     }
-    moderate(right.as_deref().unwrap_or_default())?;
+    check_finite(right.as_deref().unwrap_or_default())?;
     Ok(right)
 }
 
@@ -333,7 +333,7 @@ fn values(angle: bool, um: Option<Vec<f64>>, arcsec: Option<Vec<f64>>) -> Result
         (Some(values), None) if !values.is_empty() => values,
         _ => return Err(format!("the values of this error must be in `{word}`")),
     };
-    moderate(&values)?;
+    check_finite(&values)?;
     Ok(values
         .into_iter()
         .map(|value| value / display_per_internal)
@@ -341,7 +341,7 @@ fn values(angle: bool, um: Option<Vec<f64>>, arcsec: Option<Vec<f64>>) -> Result
 }
 
 /// Checks that numbers are finite and within the limits of all files.
-fn moderate(values: &[f64]) -> Result<(), String> {
+fn check_finite(values: &[f64]) -> Result<(), String> {
     for value in values {
         if !value.is_finite() {
             return Err(format!("`{value}` is not a finite number"));

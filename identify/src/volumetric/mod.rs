@@ -28,7 +28,7 @@ pub const MAX_POINTS: usize = 1_000_000;
 /// Maximum number of iterations of a compensation.
 const MAX_STEPS: usize = 20;
 /// Residual at which the iteration ends, mm.
-const SETTLED_MM: f64 = 1e-10;
+const CONVERGENCE_MM: f64 = 1e-10;
 
 /// A machine with errors.
 #[derive(Clone, Debug)]
@@ -43,7 +43,7 @@ pub struct MachineWithErrors<'a> {
 
 /// The volumetric error at one point, mm.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Place {
+pub struct VolumetricPoint {
     /// Positions of the axes, mm or rad.
     pub positions: Vec<f64>,
     /// Nominal position of the tool point in the table frame.
@@ -89,9 +89,9 @@ impl MachineWithErrors<'_> {
     }
 
     /// The error vector at given axis positions.
-    pub fn place(&self, positions: &[f64]) -> Place {
+    pub fn error_at(&self, positions: &[f64]) -> VolumetricPoint {
         let nominal = self.point(positions, false, None);
-        Place {
+        VolumetricPoint {
             positions: positions.to_vec(),
             nominal_mm: nominal.into(),
             error_mm: (self.point(positions, true, None) - nominal).into(),
@@ -105,7 +105,7 @@ impl MachineWithErrors<'_> {
     }
 
     /// Axis positions in display units, mm or degrees.
-    fn stands(&self, positions: &[f64]) -> String {
+    fn position_text(&self, positions: &[f64]) -> String {
         let axes = self.machine.axes.iter().zip(positions);
         let each: Vec<String> = axes
             .map(|(axis, q)| format!("{} {:.3}", axis.name, axis.kind.outside(*q)))
@@ -146,7 +146,7 @@ impl MachineWithErrors<'_> {
         let mut commands = positions.to_vec();
         for _ in 0..MAX_STEPS {
             let residual = self.point(&commands, true, None) - wanted;
-            if residual.norm() <= SETTLED_MM {
+            if residual.norm() <= CONVERGENCE_MM {
                 return Ok(Compensated {
                     positions: commands,
                     error_mm: residual.into(),
@@ -210,10 +210,10 @@ pub struct Summary {
 /// # Errors
 /// If the grid has too many points, an error exceeds the limits, or a compensation fails.
 pub fn map(
-    erring: &MachineWithErrors<'_>,
+    machine_with_errors: &MachineWithErrors<'_>,
     grid: &[Vec<f64>],
     compensate: bool,
-) -> Result<(Vec<Place>, Summary), IdentifyError> {
+) -> Result<(Vec<VolumetricPoint>, Summary), IdentifyError> {
     let total = grid
         .iter()
         .try_fold(1_usize, |total, axis| total.checked_mul(axis.len()));
@@ -222,7 +222,7 @@ pub fn map(
             "a map needs 1 to {MAX_POINTS} points"
         )));
     };
-    let places: Vec<(Place, Vec<f64>)> = (0..total)
+    let points: Vec<(VolumetricPoint, Vec<f64>)> = (0..total)
         .into_par_iter()
         .map(|number| {
             let mut rest = number;
@@ -231,28 +231,28 @@ pub fn map(
                 positions[axis] = values[rest % values.len()];
                 rest /= values.len();
             }
-            let mut place = erring.place(&positions);
-            if !place.error_mm.iter().all(|error| error.abs() <= LARGEST) {
+            let mut point = machine_with_errors.error_at(&positions);
+            if !point.error_mm.iter().all(|error| error.abs() <= LARGEST) {
                 return Err(IdentifyError::Request(format!(
                     "the errors displace the tool by {:e} mm at {}; polynomials grow fast beyond their scale",
-                    norm(place.error_mm),
-                    erring.stands(&positions)
+                    norm(point.error_mm),
+                    machine_with_errors.position_text(&positions)
                 )));
             }
             if compensate {
-                place.compensated = Some(erring.compensate(&positions)?);
+                point.compensated = Some(machine_with_errors.compensate(&positions)?);
             }
             let by_axis = (0..grid.len())
-                .map(|axis| norm(erring.of_axis(&positions, axis)))
+                .map(|axis| norm(machine_with_errors.of_axis(&positions, axis)))
                 .collect();
-            Ok((place, by_axis))
+            Ok((point, by_axis))
         })
         // With several failures, the first one in grid order is reported, independent of threads.
         .collect::<Vec<Result<_, IdentifyError>>>()
         .into_iter()
         .collect::<Result<_, _>>()?;
-    let machine = erring.machine;
-    let largest = places
+    let machine = machine_with_errors.machine;
+    let largest = points
         .iter()
         .max_by(|(a, _), (b, _)| norm(a.error_mm).total_cmp(&norm(b.error_mm)));
     let outside = |axis: usize, q: f64| match machine.axes[axis].kind {
@@ -260,31 +260,31 @@ pub fn map(
         AxisKind::Rotary => q.to_degrees(),
     };
     let residual = compensate.then(|| {
-        let left = places.iter().filter_map(|(place, _)| place.compensated.as_ref());
-        Size::of(left.map(|compensated| norm(compensated.error_mm)))
+        let compensated_points = points.iter().filter_map(|(point, _)| point.compensated.as_ref());
+        Size::of(compensated_points.map(|compensated| norm(compensated.error_mm)))
     });
     let summary = Summary {
         places: total,
-        error: Size::of(places.iter().map(|(place, _)| norm(place.error_mm))),
-        largest_at: largest.map_or(Vec::new(), |(place, _)| {
-            let named = machine.axes.iter().zip(&place.positions).enumerate();
+        error: Size::of(points.iter().map(|(point, _)| norm(point.error_mm))),
+        largest_at: largest.map_or(Vec::new(), |(point, _)| {
+            let named = machine.axes.iter().zip(&point.positions).enumerate();
             named
                 .map(|(k, (axis, q))| (axis.name.clone(), outside(k, *q)))
                 .collect()
         }),
-        coordinates: std::array::from_fn(|k| Size::of(places.iter().map(|(place, _)| place.error_mm[k]))),
+        coordinates: std::array::from_fn(|k| Size::of(points.iter().map(|(point, _)| point.error_mm[k]))),
         by_axis: machine
             .axes
             .iter()
             .enumerate()
             .map(|(k, axis)| {
-                let size = Size::of(places.iter().map(|(_, by_axis)| by_axis[k]));
+                let size = Size::of(points.iter().map(|(_, by_axis)| by_axis[k]));
                 (axis.name.clone(), size)
             })
             .collect(),
         residual,
     };
-    Ok((places.into_iter().map(|(place, _)| place).collect(), summary))
+    Ok((points.into_iter().map(|(point, _)| point).collect(), summary))
 }
 
 fn norm(vector: [f64; 3]) -> f64 {

@@ -257,7 +257,7 @@ fn cover(parameters: &mut [ParameterResult], problem: &Problem<'_>, fit: &Fit, m
     for (parameter, moved) in parameters.iter_mut().zip(moved) {
         parameter.u = parameter.u.hypot(moved);
         if parameter.id.ends_with(".phase") {
-            parameter.u = parameter.u.min(fit::any_phase_deg());
+            parameter.u = parameter.u.min(fit::u_of_undetermined_phase_deg());
         }
     }
 }
