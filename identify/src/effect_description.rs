@@ -40,6 +40,19 @@ pub fn meaning(machine: &Machine, effect: &Effect) -> Meaning {
     }
 }
 
+/// The description of a component on a machine, without a driver: `C table: axial motion`.
+pub(crate) fn component_meaning(machine: &Machine, component: &Component) -> Meaning {
+    let effect = constant(component.clone());
+    let terms = EffectTerms {
+        machine,
+        effect: &effect,
+    };
+    Meaning {
+        part: terms.part(),
+        what: terms.motion(),
+    }
+}
+
 /// Joins several explanations into one phrase. Each part of the machine occurs once, in the order of first occurrence.
 pub fn explanations(meanings: &[Meaning]) -> String {
     let mut parts: Vec<(&str, Vec<&str>)> = Vec::new();
@@ -52,6 +65,16 @@ pub fn explanations(meanings: &[Meaning]) -> String {
     let of_part = |(part, what): &(&str, Vec<&str>)| format!("{part}: {}", what.join(", or "));
     let parts: Vec<String> = parts.iter().map(of_part).collect();
     parts.join("; or ")
+}
+
+/// A constant effect on a component.
+fn constant(component: Component) -> Effect {
+    Effect {
+        component,
+        driver: Driver::None,
+        shape: Shape::Constant,
+        tests: Vec::new(),
+    }
 }
 
 /// The name of an axis as a machine part.

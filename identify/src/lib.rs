@@ -7,7 +7,8 @@
 //! - [`monte_carlo`], [`propagation`]: propagation of distributions by Monte Carlo; [`repeated`]: Type A against Type B uncertainty;
 //! - [`compensation`]: identified error motions as functions of the axis position;
 //! - [`circular`]: ball-bar characteristics of ISO 230-4 and the diagnosis of circular tests;
-//! - [`trace`]: search for the unmodelled effect behind the residual; [`effect_description`]: plain descriptions of effects;
+//! - [`trace`]: search for the unmodelled effect behind the residual; [`effect_description`], [`parameter_description`]: effects and parameters
+//!   in words;
 //! - [`plan`]: identifiability and expected uncertainty of a plan, before any measurement;
 //! - [`directions`]: readings and residuals of an R-test by direction;
 //! - [`simulate`]: simulated readings; [`patterns`]: the pattern of each single error in a test; [`quantity`]: values with units;
@@ -43,6 +44,7 @@
 pub mod circle;
 pub mod circular;
 pub mod compensation;
+mod covariance;
 pub mod directions;
 pub mod drivers;
 pub mod effect_description;
@@ -54,6 +56,7 @@ pub mod least_squares;
 pub mod monte_carlo;
 pub mod noise;
 pub mod outliers;
+pub mod parameter_description;
 pub mod parameters;
 pub mod patterns;
 pub mod plan;

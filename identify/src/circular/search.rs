@@ -172,10 +172,5 @@ pub(super) fn cyclic(
 
 /// A parameter from a grid search, without an uncertainty of its own.
 fn searched(id: &str, value: f64, unit: &str) -> ParameterResult {
-    ParameterResult {
-        id: id.to_string(),
-        value,
-        u: 0.0,
-        unit: unit.to_string(),
-    }
+    ParameterResult::new(id, value, 0.0, unit)
 }
