@@ -43,6 +43,9 @@ impl From<IdentifyError> for Failure {
     fn from(error: IdentifyError) -> Self {
         match error {
             IdentifyError::Model(error) => Failure::Model(error),
+            error @ IdentifyError::NotInTheLibrary { .. } => {
+                Failure::Other(format!("{error}; `abbe trace --list` lists all candidates"))
+            }
             other => Failure::Identify(other),
         }
     }

@@ -203,7 +203,7 @@ fn print(result: &TraceResult) {
         "{}, {}; {} of {} can be seen",
         counted(result.readings, "reading"),
         noise(result),
-        result.candidates_seen,
+        result.candidates_detectable,
         counted(result.candidates, "candidate")
     );
     say!("The declared model leaves: {}", result.residual_before);
@@ -231,7 +231,7 @@ fn print(result: &TraceResult) {
     for (number, effect) in result.effects.iter().enumerate() {
         say!("\n{}. {}  ({})", number + 1, name(&effect.name), effect.family);
         say!("   {}", effect.name.meaning);
-        for number in &effect.numbers {
+        for number in &effect.shape_parameters {
             say!("   {}", table::shape_number(number));
         }
         for p in &effect.parameters {
@@ -243,7 +243,10 @@ fn print(result: &TraceResult) {
             table::micrometres(effect.rms_gain_um),
             effect.p_value
         );
-        say!("   {}", uniqueness::standing(effect, result.candidates_seen));
+        say!(
+            "   {}",
+            uniqueness::standing(effect, result.candidates_detectable)
+        );
         for alias in &effect.aliases {
             say!("     or {}  ({})", alias.meaning, name(alias));
         }
@@ -256,8 +259,8 @@ fn print(result: &TraceResult) {
             "\nNot claimed: {} (p ≤ {:.3}); the held-out rms falls by {:.4} µm, with a standard error of {:.4} µm",
             name(&rejected.name),
             rejected.p_value,
-            rejected.heldout_fall_um,
-            rejected.u_heldout_fall_um
+            rejected.heldout_decrease_um,
+            rejected.u_heldout_decrease_um
         );
     }
     if result.remainder.structured {
@@ -271,10 +274,10 @@ fn print(result: &TraceResult) {
         say!("");
         fit::print_parameters(&result.after.parameters);
     }
-    if !result.moved.is_empty() {
+    if !result.changed_parameters.is_empty() {
         say!("\nMoved by more than their uncertainty when the effects were added (the bias before):");
-        for moved in &result.moved {
-            let (by, u) = table::value_and_u(moved.by, moved.u);
+        for moved in &result.changed_parameters {
+            let (by, u) = table::value_and_u(moved.change, moved.u);
             say!("  {}  by {by} {} (u {u})", moved.id, moved.unit);
         }
     }

@@ -327,7 +327,7 @@ fn an_effect_that_the_library_does_not_have() {
         holds(
             &told,
             &[
-                &format!("has `{misspelt}` in its identifier"),
+                &format!("contains `{misspelt}` in its identifier"),
                 "abbe trace --list",
             ],
         );
@@ -337,7 +337,7 @@ fn an_effect_that_the_library_does_not_have() {
         assert_eq!(output.status.code(), Some(1), "{words:?}");
         holds(
             &String::from_utf8(output.stderr).unwrap(),
-            &["nothing is left to look for", "--exclude"],
+            &["no candidate effects remain"],
         );
     }
     let output = asked(&["--only", "gain", "--exclude", "gravitation"]);

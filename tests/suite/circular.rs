@@ -321,7 +321,7 @@ fn what_one_direction_cannot_tell_is_said() {
     is(&test, "squareness", "XY", "angle", 20.0, 0.01);
     let told = test["not_told"].to_string();
     assert!(
-        told.contains("servo mismatch is in the squareness") && told.contains("hysteresis need"),
+        told.contains("servo mismatch is confounded with squareness") && told.contains("hysteresis require"),
         "{told}"
     );
     assert!(test.get("hysteresis_um").is_none() && test.get("feed_mm_min").is_none());
@@ -452,7 +452,7 @@ fn a_short_arc_is_said_to_be_one() {
     assert!(test.get("diagnosis").is_none(), "{test}");
     let told = test["not_told"].to_string();
     assert!(
-        told.contains("ISO 230-4 asks for a full circle") && told.contains("an arc of 120° is too short"),
+        told.contains("ISO 230-4 requires a full circle") && told.contains("an arc of 120° is too short"),
         "{told}"
     );
     // 40 µm/m of X alone, from the set-up's centre: 40·cos²θ·R, between 30° and 90°.

@@ -385,7 +385,7 @@ fn an_axis_that_merely_stands_has_no_table() {
     assert_eq!(run.status.code(), Some(1), "{said}");
     assert!(
         said.contains("nothing to compensate")
-            && said.contains("EXX~X:p1: its axis stands wherever readings see it"),
+            && said.contains("EXX~X:p1: its axis stands still wherever readings observe it"),
         "{said}"
     );
     assert!(!out.exists());

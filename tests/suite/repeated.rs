@@ -209,7 +209,7 @@ fn the_command_compares_files() {
     };
     refused(1, &["--repeat", text(&files[0])], "is named twice");
     let other = ready("hermle-c600u/measured/session.toml");
-    refused(1, &["--repeat", text(&other)], "is no repeat of");
+    refused(1, &["--repeat", text(&other)], "is not a repeat of");
     refused(
         2,
         &["--repeat", text(&files[1]), "--method", "cone"],

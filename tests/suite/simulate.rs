@@ -187,7 +187,7 @@ fn errors_come_from_a_file_and_the_command_line_has_the_last_word() {
     assert!(row("bar[C 150]").unwrap().contains("0.4000"), "{told}");
     assert!(row("EB0C").unwrap().contains("-2.0000"), "{told}");
     for (bad, message) in [
-        ("EY0C = 10", "`EY0C` is no text"),
+        ("EY0C = 10", "`EY0C` is not text"),
         ("EY0C = \"10\"", "has no unit"),
         ("EY0C = ", "errors.toml: "),
     ] {
@@ -208,11 +208,11 @@ fn what_cannot_be_simulated_is_said_and_nothing_is_written() {
             "has no axis `Q`; its axes are C, A, Y, X, Z",
         ),
         (&["--error", "EY0A=1"], "`EY0A=1` has no unit"),
-        (&["--error", "EY0A=onemm"], "is no number with a unit"),
-        (&["--error", "EY0A"], "gives no value"),
+        (&["--error", "EY0A=onemm"], "is not a number with a unit"),
+        (&["--error", "EY0A"], "has no value"),
         (
             &["--error", "EY0A=1arcsec"],
-            "`EY0A` is given in `arcsec`; it is measured in `um`",
+            "`EY0A` has the unit `arcsec`; a unit such as `um` is expected",
         ),
         (&["--error", "e_y0a=1um", "--error", "EY0A=2um"], "is given twice"),
         (&["--error", "bra=1um"], "the session has no `bra`"),

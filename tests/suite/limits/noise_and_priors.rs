@@ -90,7 +90,7 @@ fn a_noise_that_is_not_that_of_the_repeats() {
         let is_it = |warning: &&serde_json::Value| {
             let warning = warning.as_str().unwrap();
             warning.starts_with("the session states a noise of")
-                && warning.contains("repeated readings scatter by 0.")
+                && warning.contains("the repeatability is 0.")
         };
         assert_eq!(warnings.iter().any(|w| is_it(&w)), told, "{noise}: {warnings:?}");
         assert_eq!(

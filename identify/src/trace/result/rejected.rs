@@ -14,12 +14,12 @@ pub(super) fn candidates(
     held_out: &HeldOut<'_>,
 ) -> Vec<RejectedCandidate> {
     let rejected = search.rejected.iter().map(|rejected| {
-        let (heldout_fall_um, u_heldout_fall_um) = held_out.decrease_um(rejected.decrease);
+        let (heldout_decrease_um, u_heldout_decrease_um) = held_out.decrease_um(rejected.decrease);
         RejectedCandidate {
             name: effect_name(machine, &search.candidates[rejected.selected.candidate].effect),
             p_value: rejected.selected.p_value,
-            heldout_fall_um,
-            u_heldout_fall_um,
+            heldout_decrease_um,
+            u_heldout_decrease_um,
         }
     });
     rejected.collect()
