@@ -345,7 +345,7 @@ pub fn report(problem: &Problem<'_>, fit: &Fit) -> FitResult {
     FitResult {
         noise_um: problem.noise.sigma_mm * 1e3,
         noise_source: problem.noise.source.word().to_string(),
-        noise_ar_coefficients: problem.noise.memory.clone(),
+        noise_ar_coefficients: problem.noise.ar_coefficients.clone(),
         readings: problem.readings(),
         rms_um: rms * 1e3,
         heldout_rms_um: held * 1e3,

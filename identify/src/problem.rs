@@ -149,12 +149,12 @@ impl<'a> Problem<'a> {
             let Some(readings) = &plan.readings else { continue };
             let mut runs = readings.runs();
             // One by one, many short runs are slow. Only a whitening filter has to separate them.
-            if self.noise.memory.is_empty() && readings.rows() < SHORT_RUN * runs.len() {
+            if self.noise.ar_coefficients.is_empty() && readings.rows() < SHORT_RUN * runs.len() {
                 runs = std::iter::once(0..readings.rows()).collect();
             }
             for run in runs {
                 // A block must not cut a whitening filter. Without a filter, a block has the number of rows that a factor absorbs at once.
-                let most = if self.noise.memory.is_empty() {
+                let most = if self.noise.ar_coefficients.is_empty() {
                     (BLOCK_ROWS / self.coordinates()).max(1)
                 } else {
                     run.len().max(1)
@@ -275,7 +275,7 @@ impl<'a> Problem<'a> {
         (0..block.rows.len() * coordinates)
             .filter(|i| {
                 let row = block.rows.start + i / coordinates;
-                let reach = self.noise.memory.len().min(i / coordinates);
+                let reach = self.noise.ar_coefficients.len().min(i / coordinates);
                 (row - reach..=row).all(|row| !rejected[row])
             })
             .collect()
@@ -299,7 +299,7 @@ impl<'a> Problem<'a> {
     /// The rows of [`Problem::whiten`] for known remaining rows.
     pub fn whitened(&self, mut rows: Mat<f64>, kept: &[usize]) -> Mat<f64> {
         let coordinates = self.coordinates();
-        let memory = &self.noise.memory;
+        let memory = &self.noise.ar_coefficients;
         let innovation = 1.0 / self.noise.innovation_mm();
         let marginal = 1.0 / self.noise.sigma_mm;
         if memory.is_empty() && kept.len() == rows.nrows() {

@@ -1,4 +1,4 @@
-//! The next test: better than the published methods, and what tells two effects apart.
+//! The next test: improvement over the published methods, and separation of two effects.
 
 use abbe::identify::plan::candidate_tests::{TestVariations, candidate_tests};
 use abbe::identify::plan::criterion::Goal;
@@ -38,7 +38,7 @@ fn worst(session: &Session) -> f64 {
 }
 
 #[test]
-fn one_test_more_than_chapter_5_beats_the_best_published_method_by_a_third() {
+fn one_test_more_than_chapter_5_reduces_the_uncertainty_by_a_third() {
     let best = [4, 5, 6]
         .map(|chapter| worst(&with_setups_of_1_um(chapter)))
         .into_iter()
@@ -51,7 +51,7 @@ fn one_test_more_than_chapter_5_beats_the_best_published_method_by_a_third() {
         by_minute: false,
     };
     for follow in [true, false] {
-        // Like the published methods, every test has a spindle ball of its own; no linear axis follows where its errors would enter.
+        // As in the published methods, every test has its own spindle ball. No linear axis follows, so its errors have no influence.
         let menu = TestVariations {
             keep_spindle_ball: false,
             follow,
@@ -65,7 +65,7 @@ fn one_test_more_than_chapter_5_beats_the_best_published_method_by_a_third() {
         );
         assert!(after < 0.7 * best, "{after} against {best}");
 
-        // The information agrees with the plan analysed anew, the test among the others.
+        // The updated information agrees with a new analysis of the plan that includes the test.
         let entry = candidate_tests(&complete, &menu)
             .unwrap()
             .into_iter()
@@ -81,7 +81,7 @@ fn one_test_more_than_chapter_5_beats_the_best_published_method_by_a_third() {
 }
 
 #[test]
-fn a_blind_spot_is_opened() {
+fn a_proposed_test_makes_a_combination_identifiable() {
     let known = "sweep = { axis = \"C\", from_deg = 0, to_deg = 360, step_deg = 2, runs = 1, both_directions = true }";
     let text = format!(
         "{}[instrument]\nkind = \"ballbar\"\nnoise_um = 0.3\n[[test]]\nname = \"C100\"\nbar_mm = 100\nworkpiece_ball_mm = [0, 100, 50]\n\
@@ -111,7 +111,7 @@ fn a_blind_spot_is_opened() {
 }
 
 #[test]
-fn wobble_and_axial_motion_are_told_apart_at_a_second_radius() {
+fn a_second_radius_separates_tilt_and_axial_motion() {
     let session = ready("hermle-c600u/chapter5.toml");
     let complete = states::complete(&session, true).unwrap();
     let problem = states::problem_by_test(&complete, noise_um(0.3)).unwrap();
@@ -123,7 +123,7 @@ fn wobble_and_axial_motion_are_told_apart_at_a_second_radius() {
     };
     let beta = vec![0.0; problem.parameters.list.len()];
     let menu = TestVariations::short();
-    // 1.5 µm of EZC order 2 against EAC order 1, which at one radius is the same.
+    // 1.5 µm of EZC order 2 against EAC order 1; the two are confounded at one radius.
     let found = separation(
         &problem,
         &beta,
@@ -143,8 +143,8 @@ fn wobble_and_axial_motion_are_told_apart_at_a_second_radius() {
     );
 }
 
-/// A curve is the sensitivity along a test; the largest that any test has is told beside it. A unit of a length moves a reading by its like at most, a
-/// second of arc by 5 nm a millimetre of lever.
+/// A curve is the sensitivity along a test; the result also states the largest of all tests. A length changes a reading by at most its own size, an
+/// angle of 1″ by 5 nm per millimetre of lever.
 #[test]
 fn curves_reach_the_largest_sensitivity() {
     let options = PlanOptions {
@@ -161,7 +161,7 @@ fn curves_reach_the_largest_sensitivity() {
             .filter(|curve| curve.test == error.sensitivity.largest_in)
             .flat_map(|curve| &curve.values)
             .fold(0.0_f64, |most, value| most.max(value.abs()));
-        // A curve is thinned.
+        // A curve holds a subset of the readings.
         assert!(
             reached <= largest * (1.0 + 1e-9) && reached > 0.99 * largest,
             "{}: {reached} {largest}",
@@ -178,9 +178,9 @@ fn curves_reach_the_largest_sensitivity() {
     assert!(lengths >= 3 && angles >= 3, "{lengths} {angles}");
 }
 
-/// No test is proposed of which a bar's sensor would leave its travel; with more travel there are more tests.
+/// No proposed test exceeds the travel of the bar sensor; with more travel there are more candidate tests.
 #[test]
-fn what_is_proposed_stays_within_the_reach_of_the_bar() {
+fn proposed_tests_stay_within_the_travel_of_the_bar() {
     let complete = states::complete(&with_setups_of_1_um(5), true).unwrap();
     let within = |reach_mm: f64| {
         let menu = TestVariations {
@@ -198,7 +198,7 @@ fn what_is_proposed_stays_within_the_reach_of_the_bar() {
                 .map(|reading| (reading - bar.bar).abs())
                 .fold(0.0, f64::max);
             assert!(most <= reach_mm, "{}: {most}", entry.name);
-            // Only axes that do not stand at zero are told.
+            // The description names only axes that are not at zero.
             assert!(!entry.name.contains(" at 0°"), "{}", entry.name);
         }
         found.len()
@@ -209,7 +209,7 @@ fn what_is_proposed_stays_within_the_reach_of_the_bar() {
 }
 
 #[test]
-fn by_the_minute_a_short_test_is_taken() {
+fn gain_per_minute_selects_a_short_test() {
     let complete = states::complete(&with_setups_of_1_um(5), true).unwrap();
     let problem = states::problem_by_test(&complete, noise_um(0.3)).unwrap();
     let menu = TestVariations {
@@ -230,13 +230,13 @@ fn by_the_minute_a_short_test_is_taken() {
         improve(&problem, &menu, &options).unwrap()
     };
     let [best, quick] = [proposed(false), proposed(true)];
-    // A part never sees more than the whole, …
+    // A part never has more information than the whole, …
     assert!(
         !best.steps[0].test.contains("in one direction"),
         "{}",
         best.steps[0].test
     );
-    // … and where set-ups decide, it sees nearly as much in less time.
+    // … and if set-ups dominate, it has nearly as much in less time.
     assert!(
         quick.steps[0].test.contains("in one direction"),
         "{}",

@@ -27,7 +27,7 @@ pub struct Noise {
     /// Standard deviation, mm.
     pub sigma_mm: f64,
     /// Autoregressive coefficients along a run; empty for white noise.
-    pub memory: Vec<f64>,
+    pub ar_coefficients: Vec<f64>,
     /// Standard uncertainty of the sum of these coefficients. The sum determines how slow the noise is, and thus the uncertainty of its
     /// slow part.
     pub ar_sum_u: f64,
@@ -62,7 +62,7 @@ impl Noise {
     pub fn white(sigma_mm: f64, source: NoiseSource) -> Noise {
         Noise {
             sigma_mm,
-            memory: Vec::new(),
+            ar_coefficients: Vec::new(),
             ar_sum_u: 0.0,
             source,
         }
@@ -72,7 +72,7 @@ impl Noise {
     pub fn innovation_mm(&self) -> f64 {
         // The innovation variance is γ0 Π(1 − κ²) with the reflection coefficients κ, from the Durbin–Levinson recursion run backwards.
         let mut variance_ratio = 1.0;
-        let mut coefficients = self.memory.clone();
+        let mut coefficients = self.ar_coefficients.clone();
         while let Some(reflection) = coefficients.last().copied() {
             let bound = 1.0 - reflection * reflection;
             variance_ratio *= bound;
@@ -284,7 +284,7 @@ mod tests {
             }
             let power: f64 = response.iter().map(|r| r * r).sum();
             let noise = Noise {
-                memory,
+                ar_coefficients: memory,
                 ..Noise::white(2.0, NoiseSource::Stated)
             };
             let innovation = noise.innovation_mm();

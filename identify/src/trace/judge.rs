@@ -81,7 +81,7 @@ fn selected_effects<'s>(search: &'s Search<'_>) -> impl Iterator<Item = &'s Effe
 fn noise_is_from_residual(search: &Problem<'_>, fit: &Problem<'_>) -> bool {
     let (of_search, of_fit) = (&search.noise, &fit.noise);
     let of_one_size = (of_search.sigma_mm / of_fit.sigma_mm - 1.0).abs() < SCATTER;
-    of_search.source == NoiseSource::Repeats && !(of_search.memory.is_empty() && of_one_size)
+    of_search.source == NoiseSource::Repeats && !(of_search.ar_coefficients.is_empty() && of_one_size)
 }
 
 /// The remaining structure in the residual of a fit.

@@ -15,22 +15,22 @@ pub(super) fn estimate_noise_model(problem: &mut Problem<'_>, residuals: &[Vec<f
     }
     let kept = |test: usize, row: usize| !problem.rejected[test][row];
     let pure = PureError::of(&problem.tests, residuals, kept).without_waves(&problem.tests, kept);
-    let Some(memory) = pure.memory(&problem.tests, kept) else {
+    let Some(estimated) = pure.autocorrelation(&problem.tests, kept) else {
         return false;
     };
     let mut noise = problem.noise.clone();
-    noise.memory = memory.coefficients;
-    noise.ar_sum_u = memory.sum_u;
+    noise.ar_coefficients = estimated.coefficients;
+    noise.ar_sum_u = estimated.sum_u;
     if let Some(sigma) = pure.sigma_mm() {
-        noise.sigma_mm = sigma * memory.inflation;
+        noise.sigma_mm = sigma * estimated.inflation;
         noise.source = NoiseSource::Repeats;
     }
     let present = &problem.noise;
-    let same_coefficients = noise.memory.len() == present.memory.len()
+    let same_coefficients = noise.ar_coefficients.len() == present.ar_coefficients.len()
         && noise
-            .memory
+            .ar_coefficients
             .iter()
-            .zip(&present.memory)
+            .zip(&present.ar_coefficients)
             .all(|(a, b)| (a - b).abs() < SCATTER);
     if same_coefficients && (noise.sigma_mm / present.sigma_mm - 1.0).abs() < SCATTER {
         return false;

@@ -110,17 +110,17 @@ fn block_draws(pool: &[Vec<f64>], rows: usize, block: usize, generator: &mut Pcg
 /// over-whitens. The AR coefficients of each draw differ from the estimate by its uncertainty. With `A` the estimated polynomial
 /// and `A*` that of the draw, `A* w = A ε`.
 fn with_noise_spectrum(values: &mut [f64], noise: &Noise, generator: &mut Pcg64) {
-    if noise.memory.is_empty() || noise.ar_sum_u <= 0.0 {
+    if noise.ar_coefficients.is_empty() || noise.ar_sum_u <= 0.0 {
         return;
     }
     let standard: f64 = generator.sample(StandardNormal);
-    let sum: f64 = noise.memory.iter().sum();
-    let mut own = noise.memory.clone();
+    let sum: f64 = noise.ar_coefficients.iter().sum();
+    let mut own = noise.ar_coefficients.clone();
     own[0] += (noise.ar_sum_u * standard).min(MAX_AR_SUM - sum);
     let drawn = values.to_vec();
     for t in 0..values.len() {
         let mut value = drawn[t];
-        for (lag, (found, own)) in noise.memory.iter().zip(&own).enumerate() {
+        for (lag, (found, own)) in noise.ar_coefficients.iter().zip(&own).enumerate() {
             if let Some(before) = t.checked_sub(lag + 1) {
                 value += own * values[before] - found * drawn[before];
             }
@@ -143,13 +143,13 @@ fn pool(problem: &Problem<'_>, residuals: &[Vec<f64>]) -> Vec<Vec<f64>> {
         } else {
             without_smooth(&residuals[block.test][scalars], coordinates)
         };
-        let memory = problem.noise.memory.len() * coordinates;
+        let memory = problem.noise.ar_coefficients.len() * coordinates;
         let mut stretch = Vec::new();
         for i in memory..deviations.len() {
             let row = block.rows.start + i / coordinates;
             let past: Option<f64> = problem
                 .noise
-                .memory
+                .ar_coefficients
                 .iter()
                 .enumerate()
                 .map(|(lag, a)| deviations[i - (lag + 1) * coordinates].map(|value| a * value))

@@ -1,4 +1,4 @@
-//! Lengths, angles and readings, as small and as large as a double can be.
+//! Lengths, angles and readings at the limits of double precision.
 
 use super::{Case, displaced, fitted, folder, found, refused, session_refused, works};
 
@@ -40,9 +40,9 @@ fn a_million_turns() {
     });
 }
 
-/// At 10¹² degrees a double knows where it is to 10⁻⁴ degrees; beyond, an angle means nothing.
+/// At 10¹² degrees a double resolves 10⁻⁴ degrees; larger angles are meaningless.
 #[test]
-fn more_turns_than_a_number_can_count() {
+fn more_turns_than_double_precision_resolves() {
     let case = Case::default();
     let data = case.data().replacen("180.0", "1e13", 1);
     refused(
@@ -58,7 +58,7 @@ fn more_turns_than_a_number_can_count() {
 }
 
 #[test]
-fn an_angle_of_the_smallest_number() {
+fn a_denormal_angle() {
     let case = Case::default();
     let result = fitted(&case.session(), &case.data().replace("1,0.0,", "1,5e-324,"));
     displaced(&result, 1e-3);
@@ -115,7 +115,7 @@ fn huge_numbers_in_a_session() {
 }
 
 #[test]
-fn readings_of_the_smallest_number() {
+fn denormal_readings() {
     let data = "run,c_deg,length_mm\n1,0,5e-324\n1,90,5e-324\n1,180,5e-324\n";
     refused(
         folder(&Case::default().session(), data).path(),
