@@ -176,8 +176,8 @@ pub fn of_fit(problem: &Problem<'_>, fit: &Fit) -> Compensation {
         for apart in &covered.apart {
             result.left_out.push(format!(
                 "{error} from {:.3} to {:.3} {}: apart from the longest stretch that the axis moved over",
-                kind.outside(apart.start),
-                kind.outside(apart.end),
+                kind.to_display(apart.start),
+                kind.to_display(apart.end),
                 kind.unit()
             ));
         }
