@@ -87,7 +87,7 @@ fn print(found: &Patterns) {
                 format!("{} {}", pattern.size, pattern.unit),
                 number(pattern.largest_um),
                 number(pattern.mean_um),
-                number(pattern.rms_um),
+                number(pattern.standard_deviation_um),
             ]
         })
         .collect();
@@ -98,7 +98,7 @@ fn print(found: &Patterns) {
             "size",
             "largest, µm",
             "mean, µm",
-            "rms about it, µm",
+            "std. dev., µm",
         ],
         &rows,
     );
