@@ -171,7 +171,7 @@ fn print(result: &FitResult) {
     say!(
         "{} of {} parameters identifiable (rank)",
         result.rank,
-        result.unknowns
+        result.parameter_count
     );
     say!("");
     match &result.monte_carlo {
@@ -179,9 +179,9 @@ fn print(result: &FitResult) {
         None => print_parameters(&result.parameters),
     }
     print_unobservable(&result.unobservable);
-    if !result.rejected.is_empty() {
+    if !result.outliers.is_empty() {
         say!("\nExcluded as outliers:");
-        for reading in &result.rejected {
+        for reading in &result.outliers {
             say!(
                 "  {} {}:{}  residual {}",
                 reading.test,
@@ -225,10 +225,13 @@ fn print_drawn(drawn: &FitMonteCarlo) {
             let (_, u) = table::value_and_u(parameter.value, parameter.u);
             let (quoted, of) = match parameter.verdict {
                 Verdict::Agree => (parameter.gum_interval, "GUM"),
-                Verdict::Differ => (parameter.symmetric, "Monte Carlo"),
-                Verdict::Undecided => (parameter.symmetric, "Monte Carlo (too few runs to compare)"),
+                Verdict::Differ => (parameter.symmetric_interval, "Monte Carlo"),
+                Verdict::Undecided => (
+                    parameter.symmetric_interval,
+                    "Monte Carlo (too few runs to compare)",
+                ),
             };
-            let [low, high] = quoted.map(|end| table::value_and_u(end, parameter.u).0);
+            let [low, high] = [quoted.low, quoted.high].map(|end| table::value_and_u(end, parameter.u).0);
             vec![
                 parameter.id.clone(),
                 value,
@@ -240,7 +243,7 @@ fn print_drawn(drawn: &FitMonteCarlo) {
             ]
         })
         .collect();
-    let interval = format!("{} %", drawn.coverage * 100.0);
+    let interval = format!("{} %", drawn.coverage_probability * 100.0);
     table::print(
         &[
             "parameter",

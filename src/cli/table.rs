@@ -1,6 +1,6 @@
 //! Tables for people: aligned, with only the digits that mean something.
 
-use abbe::identify::results::ShapeNumber;
+use abbe::identify::results::ShapeParameter;
 
 /// Prints rows under a header; the first column to the left, the others to the right.
 pub fn print(header: &[&str], rows: &[Vec<String>]) {
@@ -57,7 +57,7 @@ pub fn micrometres(value_um: f64) -> String {
 }
 
 /// A number or the places of an effect's shape, to four digits: `period 13.78 mm`, `at -84.72, -40.72 mm`.
-pub fn shape_number(number: &ShapeNumber) -> String {
+pub fn shape_number(number: &ShapeParameter) -> String {
     let to_four_digits = |value: &f64| {
         let magnitude = value.abs().max(1e-3).log10().floor() as i32;
         format!("{value:.*}", (3 - magnitude).clamp(0, 4) as usize)

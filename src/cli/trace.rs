@@ -3,7 +3,7 @@
 use std::sync::Mutex;
 use std::time::Duration;
 
-use abbe::identify::plan::candidate_tests::CandidateTests;
+use abbe::identify::plan::candidate_tests::TestVariations;
 use abbe::identify::results::{EffectName, ModelResult, TraceResult};
 use abbe::identify::trace::separating_tests::separate_aliases;
 use abbe::identify::trace::{Progress, TraceOptions, library};
@@ -103,7 +103,7 @@ pub fn run(arguments: &TraceArguments) -> Result<(), Failure> {
     };
     let mut trace = abbe::identify::trace::trace(&session, &options, &report)?;
     bar.set_message("weighing further tests");
-    separate_aliases(&mut trace, &CandidateTests::short(), &report)?;
+    separate_aliases(&mut trace, &TestVariations::short(), &report)?;
     interrupts.end_at_once();
     bar.finish_and_clear();
     if tables {
@@ -115,7 +115,7 @@ pub fn run(arguments: &TraceArguments) -> Result<(), Failure> {
     }
     if let Some(path) = &arguments.write {
         let data = arguments.session.data.as_deref();
-        let text = rewrite::moved(&session.text, &session.file, output::folder_of(path), data)?;
+        let text = rewrite::relocated(&session.text, &session.file, output::folder_of(path), data)?;
         let mut next = write::with_effects(&text, &trace.effects, &session.machine);
         if trace.result.interrupted {
             let interruption = trace.result.interruption();
@@ -164,16 +164,16 @@ fn progress_bar(quiet: bool) -> ProgressBar {
 
 fn list(session: &abbe::model::session::Session, options: &TraceOptions) -> Result<(), Failure> {
     let families = library::families()?;
-    let entries = abbe::identify::trace::screening::entries(session, options)?;
+    let entries = abbe::identify::trace::screening::screened_effects(session, options)?;
     for (number, family) in families.iter().enumerate() {
         let of_family: Vec<_> = entries.iter().filter(|entry| entry.family == number).collect();
-        let seen = of_family.iter().filter(|entry| entry.seen).count();
+        let seen = of_family.iter().filter(|entry| entry.observable).count();
         let candidates = counted(of_family.len(), "candidate");
         say!("{}: {candidates}, {seen} seen", family.name);
         for entry in of_family {
             say!(
                 "  {} {}",
-                if entry.seen { "seen    " } else { "not seen" },
+                if entry.observable { "seen    " } else { "not seen" },
                 entry.id
             );
         }
@@ -203,7 +203,7 @@ fn print(result: &TraceResult) {
         "{}, {}; {} of {} can be seen",
         counted(result.readings, "reading"),
         noise(result),
-        result.candidates_seen,
+        result.candidates_detectable,
         counted(result.candidates, "candidate")
     );
     say!("The declared model leaves: {}", result.residual_before);
@@ -231,7 +231,7 @@ fn print(result: &TraceResult) {
     for (number, effect) in result.effects.iter().enumerate() {
         say!("\n{}. {}  ({})", number + 1, name(&effect.name), effect.family);
         say!("   {}", effect.name.meaning);
-        for number in &effect.numbers {
+        for number in &effect.shape_parameters {
             say!("   {}", table::shape_number(number));
         }
         for p in &effect.parameters {
@@ -243,7 +243,10 @@ fn print(result: &TraceResult) {
             table::micrometres(effect.rms_gain_um),
             effect.p_value
         );
-        say!("   {}", uniqueness::standing(effect, result.candidates_seen));
+        say!(
+            "   {}",
+            uniqueness::standing(effect, result.candidates_detectable)
+        );
         for alias in &effect.aliases {
             say!("     or {}  ({})", alias.meaning, name(alias));
         }
@@ -256,8 +259,8 @@ fn print(result: &TraceResult) {
             "\nNot claimed: {} (p ≤ {:.3}); the held-out rms falls by {:.4} µm, with a standard error of {:.4} µm",
             name(&rejected.name),
             rejected.p_value,
-            rejected.heldout_fall_um,
-            rejected.u_heldout_fall_um
+            rejected.heldout_decrease_um,
+            rejected.u_heldout_decrease_um
         );
     }
     if result.remainder.structured {
@@ -271,10 +274,10 @@ fn print(result: &TraceResult) {
         say!("");
         fit::print_parameters(&result.after.parameters);
     }
-    if !result.moved.is_empty() {
+    if !result.changed_parameters.is_empty() {
         say!("\nMoved by more than their uncertainty when the effects were added (the bias before):");
-        for moved in &result.moved {
-            let (by, u) = table::value_and_u(moved.by, moved.u);
+        for moved in &result.changed_parameters {
+            let (by, u) = table::value_and_u(moved.change, moved.u);
             say!("  {}  by {by} {} (u {u})", moved.id, moved.unit);
         }
     }

@@ -9,7 +9,7 @@ const MAX_LISTED: usize = 4;
 
 /// What stands below the verdict; `None` without an effect.
 pub fn headline(result: &TraceResult) -> Option<String> {
-    let screened = result.candidates_seen;
+    let screened = result.candidates_detectable;
     match result.effects.as_slice() {
         [] => None,
         [one] => Some(format!("{}: {}", standing(one, screened), in_short(one))),
@@ -27,7 +27,7 @@ pub fn headline(result: &TraceResult) -> Option<String> {
         many => {
             let alike: Vec<usize> = many
                 .iter()
-                .map(|effect| effect.indistinguishable)
+                .map(|effect| effect.explanation_count)
                 .filter(|count| *count > 1)
                 .collect();
             let unique = many.len() - alike.len();
@@ -46,7 +46,7 @@ pub fn standing(effect: &EffectResult, screened: usize) -> String {
     if effect.unique {
         format!("unique among {screened} candidates screened")
     } else {
-        format!("1 of {} indistinguishable explanations", effect.indistinguishable)
+        format!("1 of {} indistinguishable explanations", effect.explanation_count)
     }
 }
 
@@ -67,7 +67,7 @@ fn in_short(effect: &EffectResult) -> String {
             }
         }
     }
-    match effect.indistinguishable.saturating_sub(MAX_NAMED) {
+    match effect.explanation_count.saturating_sub(MAX_NAMED) {
         0 => {}
         1 => named.push("1 other".to_string()),
         more => named.push(format!("{more} others")),
@@ -79,16 +79,20 @@ fn in_short(effect: &EffectResult) -> String {
 pub fn tests(effect: &EffectResult, name: impl Fn(&EffectName) -> String) -> Vec<String> {
     let sentence = |(k, test): (usize, &SeparatingTestResult)| {
         let first = if k == 0 { "" } else { "after that, " };
-        let all = if test.separates == test.of { "all " } else { "" };
-        let of_them = match (k, test.of) {
-            (0, 1) => "the other".to_string(),
-            (0, of) if test.separates == of => format!("{of} others"),
-            (0, of) => format!("{} of {of} others", test.separates),
-            (_, 1) => "the one that is left".to_string(),
-            (_, of) if test.separates == of => format!("{of} that are left"),
-            (_, of) => format!("{} of {of} that are left", test.separates),
+        let all = if test.separated_count == test.alternative_count {
+            "all "
+        } else {
+            ""
         };
-        let all = if test.of == 1 { "" } else { all };
+        let of_them = match (k, test.alternative_count) {
+            (0, 1) => "the other".to_string(),
+            (0, of) if test.separated_count == of => format!("{of} others"),
+            (0, of) => format!("{} of {of} others", test.separated_count),
+            (_, 1) => "the one that is left".to_string(),
+            (_, of) if test.separated_count == of => format!("{of} that are left"),
+            (_, of) => format!("{} of {of} that are left", test.separated_count),
+        };
+        let all = if test.alternative_count == 1 { "" } else { all };
         let separated = || test.alternatives.iter().filter(|one| one.separated);
         let after = separated()
             .map(|one| one.after_sigma)
@@ -96,7 +100,7 @@ pub fn tests(effect: &EffectResult, name: impl Fn(&EffectName) -> String) -> Vec
         let before = separated().map(|one| one.before_sigma).fold(0.0, f64::max);
         format!(
             "{first}{} separates it from {all}{of_them}, in {:.0} min: by {after:.1} standard deviations or more, {before:.1} or less without it",
-            test.test, test.minutes
+            test.test, test.duration_min
         )
     };
     let mut sentences: Vec<String> = effect.separating_tests.iter().enumerate().map(sentence).collect();

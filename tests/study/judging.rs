@@ -12,10 +12,7 @@ pub fn name_in_plant(name: &EffectName) -> Named {
         component: name.component.clone(),
         driver: name.driver.clone(),
         shape: name.shape.clone(),
-        order: name
-            .order
-            .filter(|order| order.fract() == 0.0)
-            .map(|order| order as u32),
+        order: name.order.map(|order| order as u32),
     }
 }
 
@@ -157,7 +154,7 @@ pub fn summary(outcome: &Outcome, mark: &str) -> String {
         .rejected_candidates
         .iter()
         .map(|rejected| {
-            let (fall, u) = (rejected.heldout_fall_um, rejected.u_heldout_fall_um);
+            let (fall, u) = (rejected.heldout_decrease_um, rejected.u_heldout_decrease_um);
             let name = short(&rejected.name);
             format!(
                 "\n        REJECTED {name} (p {:.3}, held out falls by {fall:.5} ± {u:.5})",
@@ -173,7 +170,7 @@ pub fn summary(outcome: &Outcome, mark: &str) -> String {
         result.verdict,
         result.noise_um,
         result.noise_ar_coefficients,
-        result.rejected.len(),
+        result.outliers.len(),
         result.before.heldout_rms_um,
         result.after.heldout_rms_um,
         result.remainder.p_value,

@@ -100,7 +100,7 @@ fn an_unknown_key() {
         "nois_um",
         &[
             "session.toml:6",
-            "knows no key `nois_um`",
+            "has the unknown key `nois_um`",
             "did you mean `noise_um`?",
         ],
     );
@@ -214,7 +214,7 @@ fn a_bar_that_cannot_reach() {
             "session.toml:8",
             "a bar of 100.0000 mm cannot reach",
             "116.619 mm apart",
-            "degrees taken for radians",
+            "degrees read as radians",
         ],
     );
     // Degrees in a column of radians: the balls keep their distance at 0 only.
@@ -222,7 +222,7 @@ fn a_bar_that_cannot_reach() {
     let data = "a_rad,length_mm\n0,100.0\n30,100.0\n60,100.0\n";
     holds(
         &message_of(MACHINE, &session, Some(data)),
-        &["cannot reach", "degrees taken for radians"],
+        &["cannot reach", "degrees read as radians"],
     );
 }
 
@@ -336,7 +336,7 @@ fn an_effect_that_the_library_does_not_have() {
         holds(
             &stderr,
             &[
-                &format!("has `{misspelt}` in its identifier"),
+                &format!("contains `{misspelt}` in its identifier"),
                 "abbe trace --list",
             ],
         );
@@ -346,13 +346,13 @@ fn an_effect_that_the_library_does_not_have() {
         assert_eq!(output.status.code(), Some(1), "{words:?}");
         holds(
             &String::from_utf8(output.stderr).unwrap(),
-            &["nothing is left to look for", "--exclude"],
+            &["no candidate effects remain"],
         );
     }
     let output = asked(&["--only", "gain", "--exclude", "gravitation"]);
     assert!(output.status.success());
     let printed = String::from_utf8(output.stdout).unwrap() + &String::from_utf8(output.stderr).unwrap();
-    holds(&printed, &["nothing was left out by `gravitation`"]);
+    holds(&printed, &["`gravitation` excludes nothing"]);
 }
 
 #[test]

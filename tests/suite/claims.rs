@@ -45,7 +45,7 @@ fn assert_consistent(result: &TraceResult, what: &str) {
     }
     for rejected in &result.rejected_candidates {
         assert!(
-            rejected.heldout_fall_um <= rejected.u_heldout_fall_um,
+            rejected.heldout_decrease_um <= rejected.u_heldout_decrease_um,
             "{what}: {rejected:?}"
         );
     }
@@ -105,7 +105,7 @@ fn mislabelled_runs_cause_neither_false_claims_nor_missed_effects() {
         1.0,
     );
     let is_axial_motion =
-        |name: &EffectName| name.component == "EZC" && name.shape == "harmonic" && name.order == Some(3.0);
+        |name: &EffectName| name.component == "EZC" && name.shape == "harmonic" && name.order == Some(3);
     for effects in [vec![], vec![axial_motion]] {
         let recipe = Recipe {
             effects,

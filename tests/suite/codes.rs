@@ -40,16 +40,16 @@ fn invalid_codes_are_refused_with_the_reason() {
         ("w", "does not end with the tool"),
         ("w C A Y X Z t", "it holds 0 beds"),
         ("w C b A b Y t", "it holds 2 beds"),
-        ("w C C b Y t", "`C` stands in it twice"),
-        ("[wBAXYbZABBt]", "stands in it twice"),
-        ("w C w b Y t", "`w` is no axis name"),
-        ("w 1 b Y t", "`1` is no axis name"),
-        ("w C-1 b Y t", "`C-1` is no axis name"),
+        ("w C C b Y t", "`C` occurs twice"),
+        ("[wBAXYbZABBt]", "occurs twice"),
+        ("w C w b Y t", "`w` is not an axis name"),
+        ("w 1 b Y t", "`1` is not an axis name"),
+        ("w C-1 b Y t", "`C-1` is not an axis name"),
     ] {
         let stderr = StructuralCode::parse(code).unwrap_err().to_string();
         assert!(stderr.contains(message), "{code}: {stderr}");
         assert!(stderr.contains("as in `w C A b Y X Z t`"), "{stderr}");
     }
     let stderr = Machine::from_code("w b J1 t").unwrap_err().to_string();
-    assert!(stderr.contains("axis `J1` is no ISO 841 letter"), "{stderr}");
+    assert!(stderr.contains("axis `J1` is not an ISO 841 letter"), "{stderr}");
 }

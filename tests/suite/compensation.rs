@@ -388,7 +388,7 @@ fn a_stationary_axis_has_no_table() {
     assert_eq!(run.status.code(), Some(1), "{printed}");
     assert!(
         printed.contains("nothing to compensate")
-            && printed.contains("EXX~X:p1: its axis stands wherever readings see it"),
+            && printed.contains("EXX~X:p1: its axis stands still wherever readings observe it"),
         "{printed}"
     );
     assert!(!out.exists());

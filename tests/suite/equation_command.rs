@@ -144,7 +144,7 @@ fn the_error_vector_in_every_language() {
         // By hand at the machine without errors: Δ = Rz(−C)·Rx(−A)·(displacement of the tool − displacement of the table).
         "∂Δ.x/∂e_x0c = −c_c\n",
         "∂Δ.y/∂e_x0c = s_c\n",
-        "∂Δ.x/∂e_xx  = c_c   (a fixed multiple of that of e_x0c)",
+        "∂Δ.x/∂e_xx  = c_c   (a constant multiple of that of e_x0c)",
         "∂Δ.z/∂e_zc  = −1\n",
         "e_xx is confounded with e_x0c",
     ] {
@@ -170,8 +170,8 @@ fn the_first_order_is_a_sum_and_a_table() {
         "L    ≈ L_0 + S/L_0",
         "∂L/∂e_y0a = (R·c_a − (H − Z_CA)·s_a)/L_0\n",
         "∂L/∂e_z0a = (R·s_a + (H − Z_CA)·c_a)/L_0\n",
-        "∂L/∂θ_y0a = 0   (not seen)",
-        "∂L/∂e_x0c = 0   (not seen)",
+        "∂L/∂θ_y0a = 0   (not observable)",
+        "∂L/∂e_x0c = 0   (not observable)",
         "Not contained: ",
         "Largest deviation from the exact chain over A −20° to 70°: ",
         " µm at errors of ±10 µm and ±0.01°, ",
@@ -292,7 +292,7 @@ fn the_reading_of_a_probe_in_every_language() {
         "L_0² = y² + x²",
         "d    ≈ L_0 − R + S/L_0 − δ_radius",
         "∂d/∂e_x0c    = −x/L_0",
-        "∂d/∂e_xx     = x/L_0   (a fixed multiple of that of e_x0c)",
+        "∂d/∂e_xx     = x/L_0   (a constant multiple of that of e_x0c)",
     ] {
         assert!(first.contains(line), "{first}");
     }

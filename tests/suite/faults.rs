@@ -128,7 +128,7 @@ fn a_session_that_reads_outside_its_folder_needs_permission() {
             &output,
             &[
                 "session.toml:",
-                "leads out of the session's folder",
+                "is outside the session's folder",
                 "--allow-outside",
             ],
         );
@@ -385,7 +385,7 @@ fn cells_at_opposite_corners_of_a_sheet() {
     );
     refused(
         &place.fit(&[]),
-        &["far.xlsx: cells from column 1 to column 16384; 1000 columns are the most"],
+        &["far.xlsx: cells from column 1 to column 16384; the limit is 1000 columns"],
     );
 }
 

@@ -104,7 +104,7 @@ fn a_spreadsheet_gives_the_same_fit() {
     });
     let message = message_of(&several);
     assert!(
-        message.contains("several sheets hold cells: XY-F1000, XY-F3000") && message.contains("sheet = "),
+        message.contains("several sheets contain cells: XY-F1000, XY-F3000") && message.contains("sheet = "),
         "{message}"
     );
     let none = rewritten(folder, "none.toml", |session| {
@@ -265,7 +265,7 @@ fn ball_bar_xml_gives_the_same_fit() {
         &good.replace("<READINGS>", "<READINGS>dropout "),
         "READINGS: `dropout` is not a number",
     );
-    says(&good.replace("READINGS", "VALUES"), "no element READINGS in it");
+    says(&good.replace("READINGS", "VALUES"), "it has no element READINGS");
     says(
         &good[..good.find("<READINGS>").unwrap() + 40],
         "it ends within <READINGS>",
@@ -285,7 +285,7 @@ fn ball_bar_xml_gives_the_same_fit() {
         path(session).replace("columns = { deviation_um = \"READINGS\" }", "")
     }));
     assert!(
-        message.contains("in which unit its READINGS are") && message.contains("deviation_um = "),
+        message.contains("does not state the unit of its READINGS") && message.contains("deviation_um = "),
         "{message}"
     );
 }
@@ -347,7 +347,7 @@ fn the_direction_of_a_run_is_read_from_words_numbers_and_booleans() {
         assert!(!warnings.contains("forward"), "{warnings}");
         let warnings = fit(&session(more, false))["warnings"].to_string();
         assert!(
-            warnings.contains("backward where the session states runs = 1, both_directions = false"),
+            warnings.contains("backward, but the session states runs = 1, both_directions = false"),
             "{warnings}"
         );
     }
@@ -358,7 +358,7 @@ fn the_direction_of_a_run_is_read_from_words_numbers_and_booleans() {
     std::fs::write(folder.join(format!("{test}.b5r")), three).unwrap();
     let stderr = message_of(&session("format = { anticlockwise = \"0\" }", true));
     assert!(
-        stderr.contains("RUN_DIRECTION is `") && stderr.contains("the other one in this file"),
+        stderr.contains("RUN_DIRECTION is `") && stderr.contains("the other word in this file"),
         "{stderr}"
     );
 }

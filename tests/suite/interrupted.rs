@@ -9,7 +9,7 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 use std::time::{Duration, Instant};
 
 use abbe::identify::results::TraceResult;
-use abbe::identify::trace::{Progress, Trace, TraceOptions, trace};
+use abbe::identify::trace::{Progress, TraceOptions, TraceOutcome, trace};
 use abbe::model::session::Session;
 use abbe::model::session::read::{self, ReadOptions};
 
@@ -154,7 +154,7 @@ fn an_interrupted_fit_ends_by_the_signal() {
 }
 
 /// Runs a trace that is interrupted at the `until`-th query. Returns the number of queries.
-fn traced(session: &Session, until: usize) -> (Trace<'_>, usize) {
+fn traced(session: &Session, until: usize) -> (TraceOutcome<'_>, usize) {
     let asked = AtomicUsize::new(0);
     let progress = |progress: Progress| match progress {
         Progress::Working => asked.fetch_add(1, Ordering::Relaxed) < until,
@@ -168,7 +168,7 @@ fn traced(session: &Session, until: usize) -> (Trace<'_>, usize) {
     (found, asked.into_inner())
 }
 
-fn ids(trace: &Trace<'_>) -> Vec<String> {
+fn ids(trace: &TraceOutcome<'_>) -> Vec<String> {
     trace.effects.iter().map(|effect| effect.id()).collect()
 }
 

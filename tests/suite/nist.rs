@@ -63,7 +63,7 @@ struct Regression<'a, const N: usize, F> {
 }
 
 impl<const N: usize, F: Fn(&[Dual<N>; N], f64) -> Dual<N>> LeastSquares for Regression<'_, N, F> {
-    fn unknowns(&self) -> usize {
+    fn parameters(&self) -> usize {
         N
     }
 

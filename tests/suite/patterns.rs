@@ -123,10 +123,10 @@ fn invalid_patterns_are_refused_with_the_reason() {
         assert!(stderr.contains(part), "{stderr}");
         assert!(!file.exists());
     };
-    refused(&["--error", "EY0A"], "gives no value");
+    refused(&["--error", "EY0A"], "has no value");
     refused(&["--error", "EY0A=10"], "has no unit");
     refused(&["--error", "EY0B=10um"], "has no axis `B`");
-    refused(&["--error", "EY0A=10arcsec"], "it is measured in `um`");
+    refused(&["--error", "EY0A=10arcsec"], "a unit such as `um` is expected");
     let alone = abbe(&["plan", text(&session), "--error", "EY0A=10um"]);
     assert_eq!(alone.status.code(), Some(2));
 }

@@ -1,6 +1,6 @@
 //! The next test: improvement over the published methods, and separation of two effects.
 
-use abbe::identify::plan::candidate_tests::{CandidateTests, entries};
+use abbe::identify::plan::candidate_tests::{TestVariations, candidate_tests};
 use abbe::identify::plan::criterion::Goal;
 use abbe::identify::plan::improve::{ImproveOptions, improve};
 use abbe::identify::plan::{PlanOptions, analyse, separation, states};
@@ -52,10 +52,10 @@ fn one_test_more_than_chapter_5_reduces_the_uncertainty_by_a_third() {
     };
     for follow in [true, false] {
         // As in the published methods, every test has its own spindle ball. No linear axis follows, so its errors have no influence.
-        let menu = CandidateTests {
+        let menu = TestVariations {
             keep_spindle_ball: false,
             follow,
-            ..CandidateTests::default()
+            ..TestVariations::default()
         };
         let found = improve(&problem, &menu, &options).unwrap();
         let after = found.steps[0].after;
@@ -66,7 +66,7 @@ fn one_test_more_than_chapter_5_reduces_the_uncertainty_by_a_third() {
         assert!(after < 0.7 * best, "{after} against {best}");
 
         // The updated information agrees with a new analysis of the plan that includes the test.
-        let entry = entries(&complete, &menu)
+        let entry = candidate_tests(&complete, &menu)
             .unwrap()
             .into_iter()
             .find(|entry| entry.name == found.steps[0].test);
@@ -97,15 +97,19 @@ fn a_proposed_test_makes_a_combination_identifiable() {
     };
     let found = improve(
         &problem,
-        &CandidateTests {
+        &TestVariations {
             thin: 4,
-            ..CandidateTests::default()
+            ..TestVariations::default()
         },
         &options,
     )
     .unwrap();
     assert!(found.before > 1e3, "{}", found.before);
-    let opened: Vec<&String> = found.steps.iter().flat_map(|step| &step.opens).collect();
+    let opened: Vec<&String> = found
+        .steps
+        .iter()
+        .flat_map(|step| &step.makes_identifiable)
+        .collect();
     assert!(opened.len() >= 4, "{opened:?}");
     assert!(found.steps.last().unwrap().after < 10.0);
 }
@@ -122,7 +126,7 @@ fn a_second_radius_separates_tilt_and_axial_motion() {
         tests: Vec::new(),
     };
     let beta = vec![0.0; problem.parameters.list.len()];
-    let menu = CandidateTests::short();
+    let menu = TestVariations::short();
     // 1.5 µm of EZC order 2 against EAC order 1; the two are confounded at one radius.
     let found = separation(
         &problem,
@@ -135,8 +139,11 @@ fn a_second_radius_separates_tilt_and_axial_motion() {
     .unwrap()
     .expect("a candidate test");
     println!("{found:?}");
-    assert!(found.before < 3.0, "{found:?}");
-    assert!(found.after > 20.0 * found.before.max(1.0), "{found:?}");
+    assert!(found.before_sigma < 3.0, "{found:?}");
+    assert!(
+        found.after_sigma > 20.0 * found.before_sigma.max(1.0),
+        "{found:?}"
+    );
     assert!(
         found.test.starts_with('C') && found.test.contains("radius"),
         "{found:?}"
@@ -158,7 +165,7 @@ fn curves_reach_the_largest_sensitivity() {
         let reached = error
             .curves
             .iter()
-            .filter(|curve| curve.test == error.sensitivity.largest_in)
+            .filter(|curve| curve.test == error.sensitivity.largest_in_test)
             .flat_map(|curve| &curve.values)
             .fold(0.0_f64, |most, value| most.max(value.abs()));
         // A curve holds a subset of the readings.
@@ -183,11 +190,11 @@ fn curves_reach_the_largest_sensitivity() {
 fn proposed_tests_stay_within_the_travel_of_the_bar() {
     let complete = states::complete(&with_setups_of_1_um(5), true).unwrap();
     let within = |reach_mm: f64| {
-        let menu = CandidateTests {
+        let menu = TestVariations {
             reach_mm,
-            ..CandidateTests::short()
+            ..TestVariations::short()
         };
-        let found = entries(&complete, &menu).unwrap();
+        let found = candidate_tests(&complete, &menu).unwrap();
         for entry in &found {
             let Station::BallBar(bar) = &entry.test.station else {
                 panic!("{}", entry.name)
@@ -212,14 +219,14 @@ fn proposed_tests_stay_within_the_travel_of_the_bar() {
 fn gain_per_minute_selects_a_short_test() {
     let complete = states::complete(&with_setups_of_1_um(5), true).unwrap();
     let problem = states::problem_by_test(&complete, noise_um(0.3)).unwrap();
-    let menu = CandidateTests {
+    let menu = TestVariations {
         bars_mm: vec![100.0, 150.0],
         radii_mm: vec![100.0],
         heights_mm: vec![0.0],
         standing_deg: vec![0.0],
         ranges: vec![1.0, 0.5],
         both_directions: vec![true, false],
-        ..CandidateTests::default()
+        ..TestVariations::default()
     };
     let proposed = |by_minute| {
         let options = ImproveOptions {
@@ -231,11 +238,19 @@ fn gain_per_minute_selects_a_short_test() {
     };
     let [best, quick] = [proposed(false), proposed(true)];
     // A part never has more information than the whole, …
-    assert!(!best.steps[0].test.contains("one way"), "{}", best.steps[0].test);
+    assert!(
+        !best.steps[0].test.contains("in one direction"),
+        "{}",
+        best.steps[0].test
+    );
     // … and if set-ups dominate, it has nearly as much in less time.
-    assert!(quick.steps[0].test.contains("one way"), "{}", quick.steps[0].test);
+    assert!(
+        quick.steps[0].test.contains("in one direction"),
+        "{}",
+        quick.steps[0].test
+    );
     let gain = |found: &abbe::identify::plan::improve::Improvement| {
-        (found.before / found.steps[0].after).ln() / found.steps[0].minutes
+        (found.before / found.steps[0].after).ln() / found.steps[0].duration_min
     };
     assert!(gain(&quick) > gain(&best));
 }

@@ -3,7 +3,7 @@
 
 use std::f64::consts::FRAC_PI_2;
 
-use abbe::identify::trace::{Trace, TraceOptions, trace};
+use abbe::identify::trace::{TraceOptions, TraceOutcome, trace};
 use abbe::model::session::read::{self, ReadOptions};
 
 use crate::plant::machine::Stated;
@@ -127,7 +127,7 @@ fn pitch_compensation() -> Vec<Injected> {
 }
 
 /// Writes a session of the plant, reads it and traces it.
-fn traced<T>(session: &Session, examine: impl FnOnce(&Trace<'_>) -> T) -> T {
+fn traced<T>(session: &Session, examine: impl FnOnce(&TraceOutcome<'_>) -> T) -> T {
     let folder = tempfile::tempdir().unwrap();
     session.write(folder.path()).unwrap();
     let session = read::session(&folder.path().join("session.toml"), &ReadOptions::default()).unwrap();
@@ -144,13 +144,16 @@ fn traced<T>(session: &Session, examine: impl FnOnce(&Trace<'_>) -> T) -> T {
 }
 
 /// The staircase that trace finds for a component: positions and heights, µm.
-fn staircase(outcome: &Trace<'_>, component: &str) -> Option<Vec<(f64, f64)>> {
+fn staircase(outcome: &TraceOutcome<'_>, component: &str) -> Option<Vec<(f64, f64)>> {
     let number = outcome
         .effects
         .iter()
         .position(|effect| effect.component.to_string() == component)?;
     let effect = &outcome.result.effects[number];
-    let at = effect.numbers.iter().find(|number| number.name == "at")?;
+    let at = effect
+        .shape_parameters
+        .iter()
+        .find(|number| number.name == "at")?;
     assert_eq!(at.unit, "mm");
     let heights = effect.parameters.iter().map(|height| height.value);
     Some(at.values.iter().copied().zip(heights).collect())

@@ -116,8 +116,8 @@ fn table_5_is_reproduced_in_every_cell() {
         assert_eq!(calibration.equations.columns(), 32);
         assert_eq!(calibration.rank_before, 30);
         assert_eq!(calibration.conditions.len(), 6);
-        assert_eq!(calibration.solution.unknowns, unknowns);
-        assert!(calibration.solution.seen.iter().all(|seen| *seen));
+        assert_eq!(calibration.solution.parameters, unknowns);
+        assert!(calibration.solution.identifiable.iter().all(|seen| *seen));
         let (cells, worst) = off(&expanded_um(&calibration, &calibration.solution.covariance));
         assert_eq!(cells, 0, "{reference:?}: worst {worst}");
         assert!(worst < worst_cell, "{reference:?}: {worst}");
@@ -324,7 +324,10 @@ fn any_number_of_angles_and_any_second_direction() {
         let calibration = calibrate(&session).unwrap();
         assert_eq!(calibration.equations.columns(), 4 * count);
         assert_eq!(calibration.rank_before, 4 * count - 2, "N = {count}");
-        assert!(calibration.solution.seen.iter().all(|seen| *seen), "N = {count}");
+        assert!(
+            calibration.solution.identifiable.iter().all(|seen| *seen),
+            "N = {count}"
+        );
         let report = calibration.report(&session, None);
         for (parameter, expected) in report.parameters.iter().zip([4.0, -3.0]) {
             assert!(

@@ -188,7 +188,7 @@ fn errors_come_from_a_file_and_the_command_line_overrides_it() {
     assert!(row("bar[C 150]").unwrap().contains("0.4000"), "{printed}");
     assert!(row("EB0C").unwrap().contains("-2.0000"), "{printed}");
     for (bad, message) in [
-        ("EY0C = 10", "`EY0C` is no text"),
+        ("EY0C = 10", "`EY0C` is not text"),
         ("EY0C = \"10\"", "has no unit"),
         ("EY0C = ", "errors.toml: "),
     ] {
@@ -212,11 +212,11 @@ fn invalid_simulations_are_refused_and_nothing_is_written() {
             "has no axis `Q`; its axes are C, A, Y, X, Z",
         ),
         (&["--error", "EY0A=1"], "`EY0A=1` has no unit"),
-        (&["--error", "EY0A=onemm"], "is no number with a unit"),
-        (&["--error", "EY0A"], "gives no value"),
+        (&["--error", "EY0A=onemm"], "is not a number with a unit"),
+        (&["--error", "EY0A"], "has no value"),
         (
             &["--error", "EY0A=1arcsec"],
-            "`EY0A` is given in `arcsec`; it is measured in `um`",
+            "`EY0A` has the unit `arcsec`; a unit such as `um` is expected",
         ),
         (&["--error", "e_y0a=1um", "--error", "EY0A=2um"], "is given twice"),
         (&["--error", "bra=1um"], "the session has no `bra`"),

@@ -86,7 +86,7 @@ fn the_33_errors_of_the_bundled_machine_agree_with_matrices() {
             &positions,
             tool,
         );
-        let place = erring.place(&positions);
+        let place = erring.error_at(&positions);
         let expected = actual - nominal;
         assert!(
             (Vector3::from(place.error_mm) - expected).norm() < 1e-10,
@@ -234,11 +234,14 @@ fn the_command_writes_map_and_summary_and_names_what_is_wrong() {
     let file = folder.path().join("errors.toml");
     for (written, expected) in [
         ("[constant]\nEX0W = \"1 um\"\n", "no axis `W`"),
-        ("[constant]\nEX0X = \"1 um\"\n", "a linear axis has squarenesses"),
+        (
+            "[constant]\nEX0X = \"1 um\"\n",
+            "a linear axis has squareness errors",
+        ),
         ("[constant]\nEX0C = \"1 arcsec\"\n", "arcsec"),
         (
             "[[function]]\nerror = \"EXX\"\n",
-            "[[function]] 1 (`EXX`): it is one of",
+            "[[function]] 1 (`EXX`): give exactly one of",
         ),
         (
             "[[function]]\nerror = \"EXX\"\ntable = { at_deg = [0, 1], um = [0, 1] }\n",

@@ -44,7 +44,7 @@ fn arguments_at_their_limits() {
         (
             "simulate",
             &["--error", "EX0C=1e300um"],
-            "1e300 is too large; 1e12 is the most",
+            "1e300 is too large; the maximum is 1e12",
         ),
     ] {
         let mut arguments = more.to_vec();
@@ -72,8 +72,8 @@ fn steps_without_end() {
             &["--no-effects"],
             &[
                 "session.toml:16",
-                "1000000 readings is the most",
-                "take a larger step",
+                "the limit is 1000000 readings",
+                "use a larger step",
             ],
         );
     }

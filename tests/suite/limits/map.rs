@@ -49,23 +49,27 @@ fn error_functions_beyond_the_largest_value() {
         (
             "EXX",
             "polynomial = { um = [1e300] }",
-            "1e300, which is too large; 1e12 is the most",
+            "1e300, which is too large; the limit is 1e12",
         ),
         (
             "EXX",
             "table = { at_mm = [-1e308, 1e308], um = [0, 1] }",
-            "-1e308, which is too large; 1e12 is the most",
+            "-1e308, which is too large; the limit is 1e12",
         ),
         (
             "EXC",
             "harmonic = { order = 1e300, amplitude_um = 1 }",
-            "1e300, which is too large; 1e12 is the most",
+            "1e300, which is too large; the limit is 1e12",
         ),
-        ("EXX", "polynomial = { um = [nan] }", "`NaN` is no finite number"),
+        (
+            "EXX",
+            "polynomial = { um = [nan] }",
+            "`NaN` is not a finite number",
+        ),
         (
             "EXX",
             "polynomial = { scale_mm = 1e-300, um = [0, 1, 1] }",
-            "the errors move the tool by inf mm at C -180.000, A -115.000, Y -250.000, X -300.000, Z -250.000",
+            "the errors displace the tool by inf mm at C -180.000, A -115.000, Y -250.000, X -300.000, Z -250.000",
         ),
     ] {
         fs::write(&file, format!("[[function]]\nerror = \"{error}\"\n{form}\n")).unwrap();
@@ -89,7 +93,7 @@ fn arguments_of_a_map() {
         (["--axis", "A=inf"], "--axis A=inf: 1e12 is the most"),
         (["--axis", "A=nan"], "write where the axis stands"),
         (["--tool-mm", "1e300,0,0"], "three numbers of 1e12 at most"),
-        (["--places", "100"], "at least one and at most 1000000 places"),
+        (["--places", "100"], "a map needs 1 to 1000000 points"),
     ] {
         let stderr = message_of(&folder, &ready, &more);
         assert!(stderr.contains(message), "{stderr}");
@@ -113,10 +117,7 @@ fn invalid_files_of_errors() {
         String::from_utf8(output.stderr).unwrap()
     };
     for (file, message) in [
-        (
-            large.as_path(),
-            "has more than 8388608 bytes, the most that is read",
-        ),
+        (large.as_path(), "has more than 8388608 bytes, which is the limit"),
         (latin.as_path(), "byte 11 is not UTF-8"),
         (folder.path(), "this is a folder"),
         (Path::new("/dev/zero"), "has more than 8388608 bytes"),
@@ -130,7 +131,7 @@ fn invalid_files_of_errors() {
     }
     let stderr = refused(&long);
     assert!(
-        stderr.contains("`EX0C`: a number with its unit of 300000 bytes; 100 is the most"),
+        stderr.contains("`EX0C`: the number with its unit has 300000 bytes; the maximum is 100"),
         "{stderr}"
     );
 }

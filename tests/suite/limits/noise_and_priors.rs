@@ -22,21 +22,21 @@ fn an_invalid_noise() {
     for (noise, message) in [
         (
             "noise_um = 1e-300",
-            "`noise_um` is 1e-300 µm; 1e-6 µm is the least besides 0",
+            "`noise_um` is 1e-300 µm; the least value other than 0 is 1e-6 µm",
         ),
         (
             "noise_um = 5e-324",
-            "`noise_um` is 5e-324 µm; 1e-6 µm is the least besides 0",
+            "`noise_um` is 5e-324 µm; the least value other than 0 is 1e-6 µm",
         ),
         (
             "noise_um = 1e300",
-            "`noise_um` is 1e300, which is too large; 1e12 is the most",
+            "`noise_um` is 1e300, which is too large; the limit is 1e12",
         ),
         ("noise_um = inf", "`noise_um` is infinite"),
         ("noise_um = -0.1", "`noise_um` is -0.1; it cannot be negative"),
         (
             "resolution_um = 1e-300",
-            "`resolution_um` is 1e-300 µm; 1e-6 µm is the least besides 0",
+            "`resolution_um` is 1e-300 µm; the least value other than 0 is 1e-6 µm",
         ),
     ] {
         session_refused(
@@ -90,7 +90,7 @@ fn a_stated_noise_that_differs_from_that_of_repeats() {
         let is_it = |warning: &&serde_json::Value| {
             let warning = warning.as_str().unwrap();
             warning.starts_with("the session states a noise of")
-                && warning.contains("repeated readings scatter by 0.")
+                && warning.contains("the repeatability is 0.")
         };
         assert_eq!(
             warnings.iter().any(|w| is_it(&w)),
@@ -155,11 +155,11 @@ fn invalid_priors() {
         ("bar_u_um = nan", "`bar_u_um` is NaN"),
         (
             "bar_u_um = 1e-300",
-            "`bar_u_um` is 1e-300 µm; 1e-6 µm is the least besides 0",
+            "`bar_u_um` is 1e-300 µm; the least value other than 0 is 1e-6 µm",
         ),
         (
             "bar_u_um = 1e300",
-            "`bar_u_um` is 1e300, which is too large; 1e12 is the most",
+            "`bar_u_um` is 1e300, which is too large; the limit is 1e12",
         ),
     ] {
         session_refused(

@@ -25,7 +25,7 @@ fn a_bar_of_no_length() {
         &[
             "session.toml:11",
             "reading 1",
-            "the two balls nominally lie in one place",
+            "the two balls nominally coincide",
             "5e-324 mm",
         ],
     );
@@ -52,7 +52,7 @@ fn more_turns_than_double_precision_resolves() {
         &[
             "C.csv:20",
             "`c_deg`",
-            "`1e13` is infinite or too large; 1e12 is the most",
+            "`1e13` is infinite or too large; the limit is 1e12",
         ],
     );
 }
@@ -72,7 +72,7 @@ fn infinite_and_huge_readings() {
         let parts = [
             "C.csv:20",
             "`c_deg`",
-            "is infinite or too large; 1e12 is the most",
+            "is infinite or too large; the limit is 1e12",
         ];
         refused(folder(&case.session(), &data).path(), "fit", &[], &parts);
     }
@@ -85,22 +85,22 @@ fn huge_numbers_in_a_session() {
         (
             "bar_mm = 100.0",
             "bar_mm = 1e300",
-            "`bar_mm` is 1e300, which is too large; 1e12 is the most",
+            "`bar_mm` is 1e300, which is too large; the limit is 1e12",
         ),
         (
             "[0, 100.0, 0]",
             "[0, 1e300, 0]",
-            "is 1e300, which is too large; 1e12 is the most",
+            "is 1e300, which is too large; the limit is 1e12",
         ),
         (
             "[0, 100.0, 0]",
             "[0, \"1e200 * 1e10\", 0]",
-            "which is too large; 1e12 is the most",
+            "which is too large; the limit is 1e12",
         ),
         (
             "data = \"C.csv\"",
             "data = \"C.csv\"\nat = { x_mm = 1e300 }",
-            "`x_mm` is 1e300, which is too large; 1e12 is the most",
+            "`x_mm` is 1e300, which is too large; the limit is 1e12",
         ),
     ] {
         assert!(case.session().contains(from));
