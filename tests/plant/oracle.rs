@@ -7,7 +7,7 @@ use super::component::{AxisName, Cartesian, Component, Freedom, unit_size};
 use super::effect::{Injected, Shape};
 use super::families;
 use super::machine::Displacement;
-use super::naming::{Named, named};
+use super::naming::{EffectLabel, named};
 use super::noise::Noise;
 use super::plan::Plan;
 use super::recipe::Recipe;
@@ -280,7 +280,7 @@ const PAIR_SHARE: f64 = 0.5;
 #[derive(Clone, Debug, PartialEq)]
 pub struct Alias {
     /// Its name in results.
-    pub name: Named,
+    pub name: EffectLabel,
     /// The effect of the plant, at unit amplitude.
     pub effect: Injected,
     /// The share of the true effect that it explains, as a cosine.

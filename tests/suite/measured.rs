@@ -4,7 +4,7 @@
 
 use abbe::model::session::read::{self, ReadOptions};
 
-use crate::plant::{AxisName, Component, Draw, Driver, Freedom, Injected, Kind, Recipe, Shape};
+use crate::plant::{AxisName, Component, Driver, Freedom, Injected, Kind, Recipe, Shape, SimulatedSession};
 
 const FOLDER: &str = "hermle-c600u/measured";
 
@@ -29,7 +29,7 @@ fn axial_motion() -> Injected {
 }
 
 /// The session with its true values.
-fn draw() -> Draw {
+fn draw() -> SimulatedSession {
     let mut draw = Recipe::new(Kind::Rotary, 5)
         .with(axial_motion())
         .readings(2400)
