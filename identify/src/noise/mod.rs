@@ -161,7 +161,7 @@ fn deviations(
 ) -> (f64, f64) {
     let coordinates = readings.coordinates;
     let trends = Trends::of(readings, &kept);
-    let level = trends.removed_from(residual, coordinates);
+    let level = trends.detrend(residual, coordinates);
     let keys = RepeatKeys::of(readings);
     let mut order: Vec<usize> = (0..readings.rows()).filter(|row| kept(*row)).collect();
     order.sort_by(|a, b| keys.of_row(*a).cmp(keys.of_row(*b)));
