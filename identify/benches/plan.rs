@@ -66,7 +66,7 @@ fn plans(criterion: &mut Criterion) {
     };
     let found = analyse(&large, &options).expect("an analysis");
     assert_eq!(
-        (found.tests.len(), found.readings, found.unknowns),
+        (found.tests.len(), found.readings, found.parameter_count),
         (10, 10_000, 62)
     );
     let mut group = criterion.benchmark_group("plan");
@@ -94,7 +94,7 @@ fn plans(criterion: &mut Criterion) {
     let variations = TestVariations::default();
     let entries = improve(&problem, &variations, &next)
         .expect("a proposal")
-        .menu_entries;
+        .candidate_tests;
     group.bench_function(format!("improve/{entries} entries"), |bench| {
         bench.iter(|| improve(black_box(&problem), &variations, &next).expect("a proposal"));
     });

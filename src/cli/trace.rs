@@ -115,7 +115,7 @@ pub fn run(arguments: &TraceArguments) -> Result<(), Failure> {
     }
     if let Some(path) = &arguments.write {
         let data = arguments.session.data.as_deref();
-        let text = rewrite::moved(&session.text, &session.file, output::folder_of(path), data)?;
+        let text = rewrite::relocated(&session.text, &session.file, output::folder_of(path), data)?;
         let mut next = write::with_effects(&text, &trace.effects, &session.machine);
         if trace.result.interrupted {
             let interruption = trace.result.interruption();

@@ -134,7 +134,7 @@ fn a_cubic_is_not_called_cyclic() {
             // cos⁴θ is ⅜ + ½cos 2θ + ⅛cos 4θ: the second term is that of a linear error, 4 µm over 100 mm by one axis.
             let sign = if axis == 0 { 1.0 } else { -1.0 };
             is(&test, "scale mismatch", "XY", "ratio", sign * 40.0, 0.5);
-            let undetermined = test["not_told"].to_string();
+            let undetermined = test["not_identifiable"].to_string();
             assert!(
                 undetermined.contains("third-order error of X is confounded with one of Y"),
                 "{undetermined}"
@@ -319,7 +319,7 @@ fn quantities_that_one_direction_does_not_determine_are_listed() {
     });
     assert!(fault(&test, "servo mismatch", "XY").is_none() && fault(&test, "lateral play", "X").is_none());
     is(&test, "squareness", "XY", "angle", 20.0, 0.01);
-    let undetermined = test["not_told"].to_string();
+    let undetermined = test["not_identifiable"].to_string();
     assert!(
         undetermined.contains("servo mismatch is confounded with squareness")
             && undetermined.contains("hysteresis require"),
@@ -328,7 +328,7 @@ fn quantities_that_one_direction_does_not_determine_are_listed() {
     assert!(test.get("hysteresis_um").is_none() && test.get("feed_mm_min").is_none());
     // Without time a lag is stated as a length.
     let test = circle(folder.path(), &[1.0, -1.0], false, |_| [0.0, 0.0]);
-    let undetermined = test["not_told"].to_string();
+    let undetermined = test["not_identifiable"].to_string();
     assert!(
         undetermined.contains("not in ms") && undetermined.contains("one feed"),
         "{undetermined}"
@@ -380,7 +380,9 @@ fn the_faults_of_the_plant_are_found_within_their_uncertainty() {
             }
             assert!(um(&test, "diagnosis_rms_um") < 0.35, "{test}");
             assert!(
-                test["not_told"].to_string().contains("at the feed of XY-F"),
+                test["not_identifiable"]
+                    .to_string()
+                    .contains("at the feed of XY-F"),
                 "{test}"
             );
         }
@@ -454,7 +456,7 @@ fn a_short_arc_is_reported_as_an_arc() {
     let test = figures(&folder.path().join("session.toml"))[0].clone();
     assert!((um(&test, "arc_deg") - 120.0).abs() < 0.6, "{test}");
     assert!(test.get("diagnosis").is_none(), "{test}");
-    let undetermined = test["not_told"].to_string();
+    let undetermined = test["not_identifiable"].to_string();
     assert!(
         undetermined.contains("ISO 230-4 requires a full circle")
             && undetermined.contains("an arc of 120° is too short"),

@@ -105,7 +105,7 @@ fn mislabelled_runs_cause_neither_false_claims_nor_missed_effects() {
         1.0,
     );
     let is_axial_motion =
-        |name: &EffectName| name.component == "EZC" && name.shape == "harmonic" && name.order == Some(3.0);
+        |name: &EffectName| name.component == "EZC" && name.shape == "harmonic" && name.order == Some(3);
     for effects in [vec![], vec![axial_motion]] {
         let recipe = Recipe {
             effects,

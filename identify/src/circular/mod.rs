@@ -67,6 +67,6 @@ fn compare_feeds(results: &mut [CircularTest]) {
         })
         .collect();
     for (result, limitations) in results.iter_mut().zip(limitations) {
-        result.not_told.extend(limitations);
+        result.not_identifiable.extend(limitations);
     }
 }

@@ -29,22 +29,20 @@ pub struct ImproveOptions {
 /// The proposed tests.
 #[derive(Clone, Debug, Serialize, JsonSchema)]
 pub struct Improvement {
-    /// Name of the figure: `worst standard uncertainty, um or arcsec`, or `separation, standard deviations`.
-    pub figure: String,
-    /// Number of candidate tests.
-    pub menu_entries: usize,
-    /// The figure before; infinite (`null` in JSON) where an error is not identifiable.
+    /// The criterion and of unit of its values: `worst standard uncertainty, um or arcsec`, or `separation, standard deviations`.
+    pub criterion: String,
+    /// Number of candidate tests that were evaluated.
+    pub candidate_tests: usize,
+    /// Value of the criterion before; infinite (`null` in JSON) where an error is not identifiable.
     #[schemars(with = "Option<f64>")]
     pub before: f64,
-    /// The errors and their standard uncertainties before, display units; infinite (`null` in JSON) where an error is not
-    /// identifiable.
-    #[schemars(with = "Vec<(String, Option<f64>)>")]
-    pub uncertainties_before: Vec<(String, f64)>,
-    /// The tests, in the order in which they are added.
+    /// The errors and their standard uncertainties before.
+    pub uncertainties_before: Vec<NamedUncertainty>,
+    /// The proposed tests, in the order in which they are added.
     pub steps: Vec<ProposedTest>,
-    /// The exchanges, each as a sentence.
+    /// The exchanges of proposed tests, a sentence.
     pub exchanged: Vec<String>,
-    /// The best single tests, in order of the figure or of its gain per minute. Of tests with identical readings one is listed.
+    /// The best candidate tests by tests, in order of the criterion, or of its gain per minute. Of tests with equal readings, one is listed.
     pub alternatives: Vec<AlternativeTest>,
 }
 
@@ -53,19 +51,17 @@ pub struct Improvement {
 pub struct ProposedTest {
     /// Description of the test.
     pub test: String,
-    /// The figure with this test and those before it.
+    /// Value of the criterion with this test and those before it; infinite (`null` in JSON) where an error is not identifiable.
     #[schemars(with = "Option<f64>")]
     pub after: f64,
-    /// Duration, min.
-    pub minutes: f64,
-    /// Whether a ball has to be mounted.
+    /// Duration of the test, min.
+    pub duration_min: f64,
+    /// Whether the test needs a new set-up.
     pub new_setup: bool,
     /// Errors that it makes identifiable.
-    pub opens: Vec<String>,
-    /// The errors and their standard uncertainties with it, display units; infinite (`null` in JSON) where an error is not
-    /// identifiable.
-    #[schemars(with = "Vec<(String, Option<f64>)>")]
-    pub uncertainties: Vec<(String, f64)>,
+    pub makes_identifiable: Vec<String>,
+    /// The errors and their standard uncertainties with it.
+    pub uncertainties: Vec<NamedUncertainty>,
     /// Centre of the workpiece ball in the table frame, mm.
     pub workpiece_ball_mm: [f64; 3],
     /// Centre of the spindle ball in the tool frame, mm.
@@ -74,15 +70,28 @@ pub struct ProposedTest {
     pub bar_mm: f64,
 }
 
-/// One of the best candidate tests.
+/// An error and its standard uncertainty.
+#[derive(Clone, Debug, Serialize, JsonSchema)]
+pub struct NamedUncertainty {
+    /// The error.
+    pub id: String,
+    /// Its standard uncertainty, in `unit`; infinite (`null` in JSON) where it is not identifiable.
+    #[schemars(with = "Option<f64>")]
+    pub u: f64,
+    /// `um`, `arcsec`, …
+    pub unit: String,
+}
+
+/// A candidate test the best candidate tests.
 #[derive(Clone, Debug, Serialize, JsonSchema)]
 pub struct AlternativeTest {
     /// Description of the test.
     pub test: String,
-    /// The figure with it.
+    /// Value of the criterion with it; infinite (`null` in JSON) where an error is not identifiable.
+    #[schemars(with = "Option<f64>")]
     pub after: f64,
-    /// Duration, min.
-    pub minutes: f64,
+    /// Duration of the test, min.
+    pub duration_min: f64,
 }
 
 /// Share of the physical size above which the uncertainty of an error means that the error is not identifiable.
@@ -150,17 +159,27 @@ pub fn improve(
             .fold(0.0, |worst: f64, (_, u)| worst.max(u)),
         Goal::Separation { .. } => reported(figure(root), &options.goal),
     };
+    let with_units = |named: Vec<(String, f64)>| -> Vec<NamedUncertainty> {
+        let unit = |id: &str| list.iter().find(|parameter| parameter.id == id);
+        (named.into_iter())
+            .map(|(id, u)| NamedUncertainty {
+                unit: unit(&id).map_or(String::new(), |parameter| parameter.unit.name.clone()),
+                id,
+                u,
+            })
+            .collect()
+    };
     let steps = (0..chosen.len())
-        .map(|k| step(&prepared, &chosen[..=k], &outside))
+        .map(|k| step(&prepared, &chosen[..=k], &outside, &with_units))
         .collect();
     Ok(Improvement {
-        figure: match options.goal {
+        criterion: match options.goal {
             Goal::WorstUncertainty => "worst standard uncertainty, um or arcsec".to_string(),
             Goal::Separation { .. } => "separation, standard deviations".to_string(),
         },
-        menu_entries: prepared.candidates.len(),
+        candidate_tests: prepared.candidates.len(),
         before: outside(&prepared.base),
-        uncertainties_before: named_uncertainties(shared, &prepared.base),
+        uncertainties_before: with_units(named_uncertainties(shared, &prepared.base)),
         steps,
         exchanged,
         alternatives,
@@ -200,7 +219,7 @@ fn listed(
     let of = |candidate: usize| AlternativeTest {
         test: prepared.candidates[candidate].test.name.clone(),
         after: reported(figures[candidate], goal),
-        minutes: prepared.candidates[candidate].test.minutes,
+        duration_min: prepared.candidates[candidate].test.minutes,
     };
     let mut listed: Vec<AlternativeTest> = Vec::new();
     for alternative in order.into_iter().map(of) {
@@ -252,7 +271,12 @@ fn exchange(
     words
 }
 
-fn step(prepared: &PreparedCandidates, chosen: &[usize], outside: &impl Fn(&Root) -> f64) -> ProposedTest {
+fn step(
+    prepared: &PreparedCandidates,
+    chosen: &[usize],
+    outside: &impl Fn(&Root) -> f64,
+    with_units: &impl Fn(Vec<(String, f64)>) -> Vec<NamedUncertainty>,
+) -> ProposedTest {
     let shared = &prepared.shared;
     let candidate = &prepared.candidates[chosen[chosen.len() - 1]].test;
     let root = prepared.with(chosen);
@@ -260,7 +284,7 @@ fn step(prepared: &PreparedCandidates, chosen: &[usize], outside: &impl Fn(&Root
     let first = shared.ids.len() - shared.targets;
     let unidentifiable = |u: &[f64], j: usize| is_unidentifiable(shared, u, j);
     let (u_before, u_after) = (shared.uncertainties(&before), shared.uncertainties(&root));
-    let opens = (0..shared.targets)
+    let makes_identifiable = (0..shared.targets)
         .filter(|j| unidentifiable(&u_before, *j) && !unidentifiable(&u_after, *j))
         .map(|j| shared.ids[first + j].clone())
         .collect();
@@ -271,10 +295,10 @@ fn step(prepared: &PreparedCandidates, chosen: &[usize], outside: &impl Fn(&Root
     ProposedTest {
         test: candidate.name.clone(),
         after: outside(&root),
-        minutes: candidate.minutes,
+        duration_min: candidate.minutes,
         new_setup: candidate.new_setup,
-        opens,
-        uncertainties: named_uncertainties(shared, &root),
+        makes_identifiable,
+        uncertainties: with_units(named_uncertainties(shared, &root)),
         workpiece_ball_mm,
         spindle_ball_mm,
         bar_mm,

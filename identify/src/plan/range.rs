@@ -9,20 +9,21 @@ use crate::error::IdentifyError;
 use crate::fit;
 use crate::problem::Problem;
 use crate::rank::Rank;
+use crate::results::Interval;
 
-/// The range by which a sweep can be reduced.
+/// How far a sweep can shrink.
 #[derive(Clone, Debug, Serialize, JsonSchema)]
 pub struct Shrinkage {
     /// The test.
     pub test: String,
     /// The axis that sweeps.
     pub axis: String,
-    /// Range as planned, deg or mm.
-    pub range: [f64; 2],
-    /// Unit of the ranges.
+    /// Range as planned, in `unit`.
+    pub range: Interval,
+    /// Unit of the ranges: `deg`, `mm`.
     pub unit: String,
-    /// The smallest range at which no uncertainty doubles. Absent if the test can be omitted.
-    pub least: Option<[f64; 2]>,
+    /// The smallest range at which no uncertainty has doubled, in `unit`; `null` if the test can be left out.
+    pub minimum_range: Option<Interval>,
     /// The error whose uncertainty doubles first.
     pub first_to_double: Option<String>,
 }
@@ -92,9 +93,9 @@ pub fn shrinkages(problem: &Problem<'_>) -> Result<Vec<Shrinkage>, IdentifyError
         let mut shrinkage = Shrinkage {
             test: problem.tests[test].name.clone(),
             axis: problem.session.machine.axes[axis].name.clone(),
-            range: [low * display_per_internal, high * display_per_internal],
+            range: [low * display_per_internal, high * display_per_internal].into(),
             unit: unit.to_string(),
-            least: None,
+            minimum_range: None,
             first_to_double: None,
         };
         if none.0 >= 2.0 {
@@ -109,10 +110,13 @@ pub fn shrinkages(problem: &Problem<'_>) -> Result<Vec<Shrinkage>, IdentifyError
                 }
             }
             let (middle, half) = (0.5 * (low + high), 0.5 * enough * (high - low));
-            shrinkage.least = Some([
-                (middle - half) * display_per_internal,
-                (middle + half) * display_per_internal,
-            ]);
+            shrinkage.minimum_range = Some(
+                [
+                    (middle - half) * display_per_internal,
+                    (middle + half) * display_per_internal,
+                ]
+                .into(),
+            );
             shrinkage.first_to_double = Some(problem.parameters.list[parameter].id.clone());
         }
         found.push(shrinkage);

@@ -151,8 +151,9 @@ pub fn reported(problem: &Problem<'_>, found: &Sensitivities, parameter: usize) 
     let scale = display_scale(problem, parameter);
     Sensitivity {
         largest: largest * scale,
-        largest_in: problem.tests[test].name.clone(),
+        largest_in_test: problem.tests[test].name.clone(),
         rms: rms * scale,
+        unit: format!("um/{}", problem.parameters.list[parameter].unit.name),
     }
 }
 

@@ -36,11 +36,11 @@ pub struct SeparationAnalysis {
     /// Description, for example `C150 with the workpiece ball at radius 50 mm`.
     pub test: String,
     /// Separation by the present readings, standard deviations.
-    pub before: f64,
-    /// Separation with the test added.
-    pub after: f64,
-    /// Duration, min.
-    pub minutes: f64,
+    pub before_sigma: f64,
+    /// Separation with the test added, standard deviations.
+    pub after_sigma: f64,
+    /// Duration of the test, min.
+    pub duration_min: f64,
 }
 
 /// A test that separates an effect from some of its alternatives.
@@ -110,9 +110,9 @@ pub fn separation(
     let after = sigmas[best][0];
     Ok((after > before * (1.0 + MIN_GAIN)).then(|| SeparationAnalysis {
         test: candidate.name.clone(),
-        before,
-        after,
-        minutes: candidate.minutes,
+        before_sigma: before,
+        after_sigma: after,
+        duration_min: candidate.minutes,
     }))
 }
 

@@ -9,6 +9,7 @@
 //! the linear axes, without errors. The errors change by a few parts in 10⁵ of the travel, so each step gains about four digits.
 
 pub mod functions;
+mod results;
 
 use abbe_model::axis::AxisKind;
 use abbe_model::chain::{AxisPosition, BodyErrors, ERRORS_PER_AXIS, Machine};
@@ -16,10 +17,9 @@ use abbe_model::frames::Point;
 use abbe_model::session::limits::LARGEST;
 use nalgebra::{DMatrix, DVector, Vector3};
 use rayon::prelude::*;
-use schemars::JsonSchema;
-use serde::Serialize;
 
 pub use functions::{ErrorFunction, Form};
+pub use results::{AxisShare, Coordinates, MapPosition, Size, Summary};
 
 use crate::error::IdentifyError;
 
@@ -108,7 +108,7 @@ impl MachineWithErrors<'_> {
     fn position_text(&self, positions: &[f64]) -> String {
         let axes = self.machine.axes.iter().zip(positions);
         let each: Vec<String> = axes
-            .map(|(axis, q)| format!("{} {:.3}", axis.name, axis.kind.outside(*q)))
+            .map(|(axis, q)| format!("{} {:.3}", axis.name, axis.kind.to_display(*q)))
             .collect();
         each.join(", ")
     }
@@ -161,48 +161,6 @@ impl MachineWithErrors<'_> {
             "compensation: no convergence within {MAX_STEPS} iterations; the errors are too large"
         )))
     }
-}
-
-/// Maximum and root mean square of a length over a map, µm.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, JsonSchema)]
-pub struct Size {
-    /// Maximum.
-    pub largest_um: f64,
-    /// Root mean square.
-    pub rms_um: f64,
-}
-
-impl Size {
-    fn of(lengths_mm: impl Iterator<Item = f64>) -> Size {
-        let (mut largest, mut sum, mut count) = (0.0_f64, 0.0, 0);
-        for length in lengths_mm {
-            largest = largest.max(length.abs());
-            sum += length * length;
-            count += 1;
-        }
-        Size {
-            largest_um: largest * 1e3,
-            rms_um: (sum / f64::from(count.max(1))).sqrt() * 1e3,
-        }
-    }
-}
-
-/// The statistics of a map.
-#[derive(Clone, Debug, PartialEq, Serialize, JsonSchema)]
-pub struct Summary {
-    /// Number of points.
-    pub places: usize,
-    /// Magnitude of the error vector.
-    pub error: Size,
-    /// Positions of the axes where the error is largest, mm or degrees, by axis.
-    pub largest_at: Vec<(String, f64)>,
-    /// Its coordinates X, Y, Z in the table frame.
-    pub coordinates: [Size; 3],
-    /// Magnitude of the error vector due to each axis alone.
-    pub by_axis: Vec<(String, Size)>,
-    /// Residual error after compensation, if requested.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub residual: Option<Size>,
 }
 
 /// The volumetric error at every point of a grid, in the order of the axes, the last one fastest.
@@ -263,23 +221,35 @@ pub fn map(
         let compensated_points = points.iter().filter_map(|(point, _)| point.compensated.as_ref());
         Size::of(compensated_points.map(|compensated| norm(compensated.error_mm)))
     });
+    let coordinate = |k: usize| Size::of(points.iter().map(|(point, _)| point.error_mm[k]));
     let summary = Summary {
-        places: total,
+        points: total,
         error: Size::of(points.iter().map(|(point, _)| norm(point.error_mm))),
         largest_at: largest.map_or(Vec::new(), |(point, _)| {
             let named = machine.axes.iter().zip(&point.positions).enumerate();
             named
-                .map(|(k, (axis, q))| (axis.name.clone(), outside(k, *q)))
+                .map(|(k, (axis, q))| MapPosition {
+                    axis: axis.name.clone(),
+                    position: outside(k, *q),
+                    unit: match axis.kind {
+                        AxisKind::Linear => "mm".to_string(),
+                        AxisKind::Rotary => "deg".to_string(),
+                    },
+                })
                 .collect()
         }),
-        coordinates: std::array::from_fn(|k| Size::of(points.iter().map(|(point, _)| point.error_mm[k]))),
+        coordinates: Coordinates {
+            x: coordinate(0),
+            y: coordinate(1),
+            z: coordinate(2),
+        },
         by_axis: machine
             .axes
             .iter()
             .enumerate()
-            .map(|(k, axis)| {
-                let size = Size::of(points.iter().map(|(_, by_axis)| by_axis[k]));
-                (axis.name.clone(), size)
+            .map(|(k, axis)| AxisShare {
+                axis: axis.name.clone(),
+                size: Size::of(points.iter().map(|(_, by_axis)| by_axis[k])),
             })
             .collect(),
         residual,
