@@ -142,7 +142,7 @@ fn by(session: &Session, method: Method) -> [f64; 8] {
 fn centre(session: &Session, test: &str) -> [f64; 2] {
     let problem = problem(session);
     let place = problem.tests.iter().position(|known| known.name == test).unwrap();
-    let layout =
+    let geometry =
         abbe::identify::geometric::CircleGeometry::of(&session.machine, &problem.models[place]).unwrap();
     let observed = &problem.tests[place].readings.as_ref().unwrap().observed;
     let left_out = vec![false; observed.len()];

@@ -41,7 +41,7 @@ fn rank(height: f64, spindles: &[(&str, [f64; 3])]) -> (usize, Vec<String>) {
         .enumerate()
         .filter(|(j, _)| !linear.rank.is_identifiable(*j))
         .map(|(_, id)| id.clone());
-    (linear.rank.seen.ncols(), not_identifiable.collect())
+    (linear.rank.identifiable_basis.ncols(), not_identifiable.collect())
 }
 
 #[test]
@@ -86,7 +86,7 @@ fn individually_identifiable(orders: std::ops::RangeInclusive<usize>) -> (usize,
         .filter(|(j, _)| linear.rank.is_identifiable(*j))
         .map(|(_, id)| id.clone())
         .collect();
-    (linear.rank.seen.ncols(), ids.len(), identifiable)
+    (linear.rank.identifiable_basis.ncols(), ids.len(), identifiable)
 }
 
 #[test]

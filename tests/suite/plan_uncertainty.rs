@@ -108,7 +108,7 @@ fn squares(code: &str, first_seed: usize, complete_fit: bool) -> Vec<(String, f6
         let found = if complete_fit {
             fit(&problem, None).unwrap().beta
         } else {
-            linear_step(&problem, &linear.rank.seen)
+            linear_step(&problem, &linear.rank.identifiable_basis)
         };
         let truth = |id: &str| {
             let named = drawn.truth.iter().find(|(name, _, _)| name == id);
@@ -180,7 +180,7 @@ fn with_axes_in_head_and_table_two_pairs_are_confounded() {
         let (ids, linear) = linearised(&plan(code));
         let pairs: Vec<Vec<&str>> = linear
             .rank
-            .unseen
+            .null_combinations
             .iter()
             .map(|row| {
                 (0..ids.len())

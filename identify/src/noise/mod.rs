@@ -161,7 +161,7 @@ fn deviations(
 ) -> (f64, f64) {
     let coordinates = readings.coordinates;
     let trends = Trends::of(readings, &kept);
-    let level = trends.removed_from(residual, coordinates);
+    let level = trends.detrend(residual, coordinates);
     let keys = RepeatKeys::of(readings);
     let mut order: Vec<usize> = (0..readings.rows()).filter(|row| kept(*row)).collect();
     order.sort_by(|a, b| keys.of_row(*a).cmp(keys.of_row(*b)));
@@ -276,15 +276,15 @@ mod tests {
     /// With the impulse response ψ of `x_t = Σ a_k x_{t−k} + e_t`, the variance of x is that of e times `Σ ψ²`.
     #[test]
     fn innovation_follows_from_the_impulse_response() {
-        for memory in [vec![], vec![0.8], vec![1.1, -0.4], vec![0.5, 0.2, -0.3]] {
+        for ar_coefficients in [vec![], vec![0.8], vec![1.1, -0.4], vec![0.5, 0.2, -0.3]] {
             let mut response = vec![1.0];
             for t in 1..2000 {
-                let terms = memory.iter().enumerate().filter(|(k, _)| *k < t);
+                let terms = ar_coefficients.iter().enumerate().filter(|(k, _)| *k < t);
                 response.push(terms.map(|(k, a)| a * response[t - 1 - k]).sum::<f64>());
             }
             let power: f64 = response.iter().map(|r| r * r).sum();
             let noise = Noise {
-                ar_coefficients: memory,
+                ar_coefficients: ar_coefficients,
                 ..Noise::white(2.0, NoiseSource::Stated)
             };
             let innovation = noise.innovation_mm();
