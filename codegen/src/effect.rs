@@ -96,7 +96,7 @@ pub struct Coefficient {
     /// The effect.
     pub effect: Arc<Effect>,
     /// Index among the coefficients of the effect.
-    pub place: usize,
+    pub index: usize,
     /// The unit of the component; `None` for a delay.
     pub component: Option<InternalUnit>,
     /// Whether component and driver are both lengths or both angles.
@@ -134,11 +134,11 @@ impl Coefficient {
                 _ => false,
             };
             let shared = Arc::new(effect.clone());
-            for place in 0..count {
+            for index in 0..count {
                 coefficients.push(Coefficient {
                     number: coefficients.len() + 1,
                     effect: Arc::clone(&shared),
-                    place,
+                    index,
                     component,
                     same_kind,
                 });
@@ -150,7 +150,7 @@ impl Coefficient {
     /// The identifier as in the results of a fit: `EZC~C:h2.cos`.
     pub fn id(&self) -> String {
         let names = self.effect.shape.coefficient_names();
-        match names.get(self.place).map(String::as_str) {
+        match names.get(self.index).map(String::as_str) {
             None | Some("") => self.effect.id(),
             Some(name) => format!("{}.{name}", self.effect.id()),
         }
@@ -316,8 +316,8 @@ impl<N: Nominal> AxisStates<'_, N> {
             Component::Instrument { thing, coordinate } => {
                 let own =
                     |unknown: &InstrumentUnknown| unknown.thing == thing && unknown.coordinate == coordinate;
-                let place = unknowns.iter().position(own);
-                let slot = place.map(|place| (self.machine.error_slots() + place, None));
+                let position = unknowns.iter().position(own);
+                let slot = position.map(|position| (self.machine.error_slots() + position, None));
                 slot.into_iter().collect()
             }
             Component::TriggerDelay => {

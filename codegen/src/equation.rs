@@ -185,7 +185,7 @@ impl Equation {
                 source,
                 &parameters,
                 &|variable| arena.variable(variable),
-                &|place| arena.variable(parameters[place].clone()),
+                &|index| arena.variable(parameters[index].clone()),
             )?;
             let kind = match run.subject {
                 Subject::Station(Station::BallBar(_)) => Kind::Length,
@@ -199,7 +199,7 @@ impl Equation {
             });
             let on_the_way = vectors.clone();
             let inputs = inputs(&arena, &machine, &parameters);
-            let symbol = |place: usize| arena.variable(parameters[place].clone());
+            let symbol = |index: usize| arena.variable(parameters[index].clone());
             let driven_errors = run.driven_errors(&symbol).into_iter();
             let driven_errors = driven_errors
                 .map(|(variable, value)| (variable, value.operand()))
@@ -382,9 +382,9 @@ impl Equation {
 /// The basis functions of curves; expanded interval by interval they have hundreds of terms.
 fn curves(run: &Run<'_, Symbol<'_>>, parameters: &[Variable]) -> Vec<Operand> {
     let of_curve = |parameter: &Variable| matches!(parameter, Variable::Coefficient(c) if matches!(c.effect.shape, Shape::Curve { .. }));
-    let places = (0..parameters.len()).filter(|place| of_curve(&parameters[*place]));
+    let places = (0..parameters.len()).filter(|index| of_curve(&parameters[*index]));
     places
-        .flat_map(|place| run.bases(place))
+        .flat_map(|index| run.bases(index))
         .map(Symbol::operand)
         .collect()
 }
@@ -399,17 +399,17 @@ fn parameters(
 ) -> Result<Vec<Variable>, CodegenError> {
     let known = source.subject(&|name: &str| length(arena, name)).unknowns();
     let mut parameters: Vec<Variable> = errors.iter().cloned().map(Variable::Error).collect();
-    for place in &options.unknowns {
-        let unknown = known.get(*place).ok_or_else(|| CodegenError::NoSuchUnknown {
-            unknown: format!("number {place}"),
+    for index in &options.unknowns {
+        let unknown = known.get(*index).ok_or_else(|| CodegenError::NoSuchUnknown {
+            unknown: format!("number {index}"),
         })?;
         parameters.push(Variable::Unknown(*unknown));
     }
     let coefficients = Coefficient::of_effects(&options.effects, machine, known)?;
     parameters.extend(coefficients.into_iter().map(Variable::Coefficient));
     // Naming them here fixes their order wherever terms are sorted.
-    for (place, parameter) in parameters.iter().enumerate() {
-        if parameters[..place].contains(parameter) {
+    for (index, parameter) in parameters.iter().enumerate() {
+        if parameters[..index].contains(parameter) {
             return Err(CodegenError::Twice {
                 name: parameter.name(),
             });

@@ -70,7 +70,7 @@ pub fn evaluate<S: Scalar>(
     };
     for id in arena.reachable(outputs) {
         let value = match arena.node(id) {
-            Node::Variable(place) => variable(&arena.variable_at(place)),
+            Node::Variable(index) => variable(&arena.variable_at(index)),
             Node::Unary(op, a) => normal_form_of(&values, a)
                 .unary(op)
                 .ok_or(CodegenError::FunctionOfError { function: op })?,

@@ -96,7 +96,7 @@ pub(crate) fn sections(equation: &Equation) -> (Program, Vec<Section>) {
     let mut read = Section {
         heading: quantity_heading(equation).to_string(),
         rows: outputs
-            .map(|(place, tree)| row(LeftSide::Output(place), tree.clone()))
+            .map(|(index, tree)| row(LeftSide::Output(index), tree.clone()))
             .collect(),
     };
     if equation.kind == Kind::Distance {
@@ -126,11 +126,11 @@ pub(crate) fn sections(equation: &Equation) -> (Program, Vec<Section>) {
             .iter()
             .position(|step| step.label == Label::Scalar("d"));
         read.rows = match named {
-            Some(place) => vec![
+            Some(index) => vec![
                 row(LeftSide::Named(Label::Scalar("d")), norm),
                 row(
                     LeftSide::Output(0),
-                    with_bar_unknowns(equation, &program, Tree::Step(place)),
+                    with_bar_unknowns(equation, &program, Tree::Step(index)),
                 ),
             ],
             None => vec![row(

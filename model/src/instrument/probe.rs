@@ -138,8 +138,8 @@ impl<N: Nominal> Probe<N> {
         }
         let axis = Point::nominal(self.axis);
         let mut radius = S::nominal(self.radius);
-        for place in [RADIUS, FORM] {
-            if let Some(larger) = unknown(place) {
+        for index in [RADIUS, FORM] {
+            if let Some(larger) = unknown(index) {
                 radius = radius + larger;
             }
         }

@@ -147,7 +147,7 @@ impl<N: Nominal> RTest<N> {
         unknown: impl Fn(usize) -> Option<S>,
     ) -> Point<S> {
         let mut vector = self.difference(machine, state, errors, &unknown);
-        let carried = (SENSOR..SENSOR + 3).any(|place| unknown(place).is_some());
+        let carried = (SENSOR..SENSOR + 3).any(|index| unknown(index).is_some());
         if carried {
             let angles = std::array::from_fn(|i| unknown(SENSOR + i).unwrap_or_else(|| S::constant(0.0)));
             vector = Orientation::new(angles, machine.rotation).to_sensors(vector);
@@ -166,7 +166,7 @@ mod tests {
 
     /// Each sensor angle transforms the reading by the transpose of its own matrix above, and by nothing else.
     #[test]
-    fn sensors_that_stand_askew_turn_the_reading() {
+    fn sensor_orientation_errors_rotate_the_reading() {
         let machine = Machine {
             name: "none".into(),
             axes: Vec::new(),
@@ -187,7 +187,7 @@ mod tests {
             ..vectors.clone()
         };
         let (sin, cos) = 0.4_f64.sin_cos();
-        for (place, turned) in [
+        for (index, turned) in [
             [x, cos * y - sin * z, sin * y + cos * z],
             [cos * x + sin * z, y, -sin * x + cos * z],
             [cos * x - sin * y, sin * x + cos * y, z],
@@ -195,10 +195,10 @@ mod tests {
         .into_iter()
         .enumerate()
         {
-            let askew = |unknown: usize| (unknown == SENSOR + place).then_some(0.4);
+            let askew = |unknown: usize| (unknown == SENSOR + index).then_some(0.4);
             let near = |found: [f64; 3], expected: [f64; 3]| {
                 let far = (0..3).any(|i| (found[i] - expected[i]).abs() > 1e-15);
-                assert!(!far, "angle {place}: {found:?}, not {expected:?}");
+                assert!(!far, "angle {index}: {found:?}, not {expected:?}");
             };
             near(vectors.read(&machine, &[], &[], askew).0, turned);
             let counted = directions.map(|direction| (0..3).map(|i| direction[i] * turned[i]).sum());

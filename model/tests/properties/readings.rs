@@ -132,7 +132,7 @@ proptest! {
     }
 
     #[test]
-    fn what_is_not_effective_moves_nothing(test in tests()) {
+    fn ineffective_slots_do_not_change_readings(test in tests()) {
         let model = test.model();
         let effective = model.effective_slots();
         let slots: Vec<usize> = (0..model.slots()).filter(|slot| !effective.contains(slot)).collect();
@@ -156,7 +156,7 @@ proptest! {
     }
 
     #[test]
-    fn what_varies_row_by_row_is_a_constant_in_each(test in tests(), slot in any::<prop::sample::Index>()) {
+    fn varying_slots_equal_constant_slots_row_by_row(test in tests(), slot in any::<prop::sample::Index>()) {
         let model = test.model();
         let slot = slot.index(model.slots());
         let mut varying = test.values.clone();

@@ -86,7 +86,7 @@ mod tests {
     }
 
     #[test]
-    fn words_that_speak_for_themselves_do_so_whatever_is_stated() {
+    fn known_words_keep_their_meaning_whatever_is_stated() {
         for stated in [
             None,
             Some("0"),
