@@ -9,7 +9,7 @@ use abbe_model::axis::AxisKind;
 use abbe_model::chain::{AxisPosition, Machine};
 use abbe_model::component::ErrorName;
 use abbe_model::effect::{Component, Driver, DriverSample, Effect, Shape};
-use abbe_model::instrument::{InstrumentUnknown, InternalUnit};
+use abbe_model::instrument::{InstrumentParameter, InternalUnit};
 use abbe_model::scalar::Nominal;
 
 use crate::error::CodegenError;
@@ -111,7 +111,7 @@ impl Coefficient {
     pub(crate) fn of_effects(
         effects: &[Effect],
         machine: &Machine,
-        unknowns: &[InstrumentUnknown],
+        unknowns: &[InstrumentParameter],
     ) -> Result<Vec<Coefficient>, CodegenError> {
         let mut coefficients = Vec::new();
         for (earlier, effect) in effects.iter().enumerate() {
@@ -189,7 +189,7 @@ const MAX_COEFFICIENTS: usize = 40;
 fn unit_of_component(
     effect: &Effect,
     machine: &Machine,
-    unknowns: &[InstrumentUnknown],
+    unknowns: &[InstrumentParameter],
 ) -> Result<Option<InternalUnit>, CodegenError> {
     match &effect.component {
         Component::Axis(name) => match machine.axis_index(&name.axis) {
@@ -199,12 +199,12 @@ fn unit_of_component(
         },
         Component::Instrument { thing, coordinate } => {
             let own =
-                |unknown: &&InstrumentUnknown| unknown.thing == thing && unknown.coordinate == coordinate;
+                |unknown: &&InstrumentParameter| unknown.thing == thing && unknown.coordinate == coordinate;
             let found = unknowns.iter().find(own);
             found
                 .map(|unknown| Some(unknown.unit))
-                .ok_or_else(|| CodegenError::NoSuchUnknown {
-                    unknown: format!("`{}` of the effect `{}`", effect.component, effect.id()),
+                .ok_or_else(|| CodegenError::NoSuchParameter {
+                    parameter: format!("`{}` of the effect `{}`", effect.component, effect.id()),
                 })
         }
         Component::TriggerDelay => Ok(None),
@@ -305,7 +305,7 @@ impl<N: Nominal> AxisStates<'_, N> {
     pub(crate) fn slots(
         &self,
         effect: &Effect,
-        unknowns: &[InstrumentUnknown],
+        unknowns: &[InstrumentParameter],
         nominal: &impl Fn(Variable) -> N,
     ) -> Vec<(usize, Option<N>)> {
         match &effect.component {
@@ -314,8 +314,9 @@ impl<N: Nominal> AxisStates<'_, N> {
                 slot.map(|slot| (slot, None)).into_iter().collect()
             }
             Component::Instrument { thing, coordinate } => {
-                let own =
-                    |unknown: &InstrumentUnknown| unknown.thing == thing && unknown.coordinate == coordinate;
+                let own = |unknown: &InstrumentParameter| {
+                    unknown.thing == thing && unknown.coordinate == coordinate
+                };
                 let position = unknowns.iter().position(own);
                 let slot = position.map(|position| (self.machine.error_slots() + position, None));
                 slot.into_iter().collect()

@@ -148,7 +148,7 @@ pub struct Equation {
     /// The stated length of the bar, for a ball bar.
     pub stated_length: Option<Operand>,
     /// The length error of the bar and the gain error of its sensor, if included.
-    pub(crate) bar_unknowns: [Option<Operand>; 2],
+    pub(crate) bar_parameters: [Option<Operand>; 2],
     /// The quantities between the vectors of a probe and its reading, for a probe.
     pub touch: Option<ProbeTerms>,
     /// Basis functions that are kept as they are and never expanded.
@@ -179,7 +179,7 @@ impl Equation {
         machine.rotation = options.rotation.unwrap_or(machine.rotation);
         let arena = Arena::new();
         let parameters = parameters(&arena, &machine, source, errors, options)?;
-        let (kind, exact, vectors, outputs, form, stated_length, driven_errors, bar_unknowns, touch, whole) = {
+        let (kind, exact, vectors, outputs, form, stated_length, driven_errors, bar_parameters, touch, whole) = {
             let run = Run::<Symbol<'_>>::new(
                 &machine,
                 source,
@@ -204,7 +204,7 @@ impl Equation {
             let driven_errors = driven_errors
                 .map(|(variable, value)| (variable, value.operand()))
                 .collect();
-            let bar_unknowns = run.bar_unknowns().map(|unknown| unknown.map(Symbol::operand));
+            let bar_parameters = run.bar_parameters().map(|unknown| unknown.map(Symbol::operand));
             let whole = curves(&run, &parameters);
             let written = FormContext {
                 arena: &arena,
@@ -239,7 +239,7 @@ impl Equation {
                 form,
                 stated,
                 driven_errors,
-                bar_unknowns,
+                bar_parameters,
                 touch,
                 whole,
             )
@@ -256,7 +256,7 @@ impl Equation {
             vectors,
             driven_errors,
             stated_length,
-            bar_unknowns,
+            bar_parameters,
             touch,
             whole,
             absent: Vec::new(),
@@ -400,10 +400,10 @@ fn parameters(
     let known = source.subject(&|name: &str| length(arena, name)).unknowns();
     let mut parameters: Vec<Variable> = errors.iter().cloned().map(Variable::Error).collect();
     for index in &options.unknowns {
-        let unknown = known.get(*index).ok_or_else(|| CodegenError::NoSuchUnknown {
-            unknown: format!("number {index}"),
+        let unknown = known.get(*index).ok_or_else(|| CodegenError::NoSuchParameter {
+            parameter: format!("number {index}"),
         })?;
-        parameters.push(Variable::Unknown(*unknown));
+        parameters.push(Variable::Instrument(*unknown));
     }
     let coefficients = Coefficient::of_effects(&options.effects, machine, known)?;
     parameters.extend(coefficients.into_iter().map(Variable::Coefficient));

@@ -95,7 +95,7 @@ pub(crate) fn first<'a>(
     let read_over = read_over(run, vectors);
     let form = match (read_over.as_slice(), &run.subject) {
         ([bar], Subject::Station(Station::BallBar(station))) => {
-            let unknowns = run.bar_unknowns().map(|unknown| unknown.map(Symbol::operand));
+            let unknowns = run.bar_parameters().map(|unknown| unknown.map(Symbol::operand));
             FirstOrder::of_length(
                 &mut ring,
                 bar.components,

@@ -66,10 +66,10 @@ impl<'m, S: Scalar> Run<'m, S> {
                     })?;
                     slots[slot].push((index, None));
                 }
-                Variable::Unknown(unknown) => {
+                Variable::Instrument(unknown) => {
                     let slot = unknowns.iter().position(|known| known == unknown);
-                    let slot = slot.ok_or_else(|| CodegenError::NoSuchUnknown {
-                        unknown: parameter.meaning(),
+                    let slot = slot.ok_or_else(|| CodegenError::NoSuchParameter {
+                        parameter: parameter.meaning(),
                     })?;
                     slots[machine.error_slots() + slot].push((index, None));
                 }
@@ -131,7 +131,7 @@ impl<'m, S: Scalar> Run<'m, S> {
             if let (true, Some(value)) = (effects_alone, in_slot(shares, small)) {
                 let variable = match slot.checked_sub(first) {
                     None => Variable::Error(self.machine.error_name(slot)),
-                    Some(index) => Variable::Unknown(self.subject.unknowns()[index]),
+                    Some(index) => Variable::Instrument(self.subject.unknowns()[index]),
                 };
                 driven_errors.push((variable, value));
             }
@@ -146,7 +146,7 @@ impl<'m, S: Scalar> Run<'m, S> {
     }
 
     /// The length error of the bar and the gain error of its sensor, if a bar is read and they are included.
-    pub(crate) fn bar_unknowns(&self) -> [Option<S>; 2] {
+    pub(crate) fn bar_parameters(&self) -> [Option<S>; 2] {
         match self.subject {
             Subject::Station(Station::BallBar(_)) => {
                 [ballbar::BAR, ballbar::GAIN].map(|slot| self.unknown(slot))
@@ -180,7 +180,7 @@ impl<'m, S: Scalar> Run<'m, S> {
         let Subject::Station(Station::BallBar(bar)) = &self.subject else {
             return distance;
         };
-        let [error, gain] = self.bar_unknowns();
+        let [error, gain] = self.bar_parameters();
         let length = match error {
             Some(error) => distance - error,
             None => distance,

@@ -143,7 +143,7 @@ impl Equation {
                     stated.unwrap_or_else(|| whole_range(&variable))
                 }
                 Variable::Driver(_) => whole_range(&variable),
-                Variable::Error(_) | Variable::Unknown(_) | Variable::Coefficient(_) => [0.0; 2],
+                Variable::Error(_) | Variable::Instrument(_) | Variable::Coefficient(_) => [0.0; 2],
             };
             (variable, ends)
         };

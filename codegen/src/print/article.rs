@@ -168,7 +168,7 @@ fn groups(equation: &Equation, trees: &[Tree], complete: bool) -> (Program, Vec<
         .into_iter()
         .zip(trees)
         .map(|(label, tree)| row(LeftSide::Named(label), tree.clone()));
-    let length = with_bar_unknowns(equation, &program, norm_of_steps(0));
+    let length = with_bar_parameters(equation, &program, norm_of_steps(0));
     let sections = vec![
         Section {
             heading: bar.meaning.clone(),
@@ -186,9 +186,9 @@ fn groups(equation: &Equation, trees: &[Tree], complete: bool) -> (Program, Vec<
 }
 
 /// `d − δ_bar + δ_gain·(d − bar)`, with the parameters that are included.
-pub(crate) fn with_bar_unknowns(equation: &Equation, program: &Program, distance: Tree) -> Tree {
+pub(crate) fn with_bar_parameters(equation: &Equation, program: &Program, distance: Tree) -> Tree {
     let tree = |operand: Operand| named_or_expanded(equation, program, operand);
-    let [bar, gain] = equation.bar_unknowns;
+    let [bar, gain] = equation.bar_parameters;
     let mut terms = vec![(false, distance.clone())];
     if let Some(bar) = bar {
         terms.push((true, tree(bar)));

@@ -6,7 +6,7 @@
 
 use crate::equation::{Equation, Kind};
 use crate::print::article::{
-    EquationLine, LeftSide, Section, norm_of_steps, quantity_heading, row, with_bar_unknowns,
+    EquationLine, LeftSide, Section, norm_of_steps, quantity_heading, row, with_bar_parameters,
 };
 use crate::program::{Label, Naming, Program, Step, Tree};
 use crate::symbol::{Binary, Operand, Symbol};
@@ -130,12 +130,12 @@ pub(crate) fn sections(equation: &Equation) -> (Program, Vec<Section>) {
                 row(LeftSide::Named(Label::Scalar("d")), norm),
                 row(
                     LeftSide::Output(0),
-                    with_bar_unknowns(equation, &program, Tree::Step(index)),
+                    with_bar_parameters(equation, &program, Tree::Step(index)),
                 ),
             ],
             None => vec![row(
                 LeftSide::Output(0),
-                with_bar_unknowns(equation, &program, norm),
+                with_bar_parameters(equation, &program, norm),
             )],
         };
     }

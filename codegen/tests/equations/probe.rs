@@ -178,7 +178,7 @@ fn geometry(touch: Touch, parameters: &[Variable], point: &State) -> f64 {
     let unknown = |thing: &str, coordinate: &str| {
         let pairs = parameters.iter().zip(&point.small);
         let found = pairs.filter_map(|(parameter, value)| match parameter {
-            Variable::Unknown(u) if u.thing == thing && u.coordinate == coordinate => Some(*value),
+            Variable::Instrument(u) if u.thing == thing && u.coordinate == coordinate => Some(*value),
             _ => None,
         });
         found.sum::<f64>()

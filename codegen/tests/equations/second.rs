@@ -66,7 +66,8 @@ fn draw(equation: &Equation, random: &mut impl rand::Rng) -> State {
                     .positions
                     .push((axis.clone(), random.random_range(-size..size)));
             }
-            Variable::Error(_) | Variable::Unknown(_) | Variable::Driver(_) | Variable::Coefficient(_) => {}
+            Variable::Error(_) | Variable::Instrument(_) | Variable::Driver(_) | Variable::Coefficient(_) => {
+            }
         }
     }
     point.small = equation

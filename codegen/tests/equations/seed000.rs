@@ -224,7 +224,7 @@ fn eq_3_21_with_the_printed_d_and_with_the_right_one() {
         let nominal = evaluate::<Symbol<'_>>(arena, &[chain.operand()], |variable| {
             let zero = arena.symbol(Operand::constant(0.0));
             abbe_codegen::VariableValue::Nominal(match variable {
-                Variable::Error(_) | Variable::Unknown(_) => zero,
+                Variable::Error(_) | Variable::Instrument(_) => zero,
                 Variable::Position { axis, .. } if axis == "C" => zero,
                 Variable::Length(name) if name == "H" => length(arena, "Z_CA"),
                 other => arena.variable(other.clone()),

@@ -12,25 +12,25 @@
 //! of linear axis motion error of machine tools using an R-test device (HPC 2014), Section 4: sensor outputs become machine coordinates
 //! by `R = R_φ·R_θ·R_ω` (Eqs. 1–3). The matrices above Eq. 1 are printed in a different order from the expanded equations and the text.
 
-use super::{InstrumentUnknown, SharedBy, displaced};
+use super::{InstrumentParameter, SharedBy, displaced};
 use crate::chain::{AxisPosition, BodyErrors, Machine};
 use crate::frames::{Coordinate, Point, Rotation, SinCos, turn_about};
 use crate::scalar::{Nominal, Scalar};
 
 /// Both points, then ω₁, φ₁ and θ₁ of the nest.
-pub const UNKNOWNS: [InstrumentUnknown; 9] = [
-    InstrumentUnknown::length("workpiece_ball", "x", SharedBy::Setup),
-    InstrumentUnknown::length("workpiece_ball", "y", SharedBy::Setup),
-    InstrumentUnknown::length("workpiece_ball", "z", SharedBy::Setup),
-    InstrumentUnknown::length("spindle_ball", "x", SharedBy::SpindleSetup),
-    InstrumentUnknown::length("spindle_ball", "y", SharedBy::SpindleSetup),
-    InstrumentUnknown::length("spindle_ball", "z", SharedBy::SpindleSetup),
-    InstrumentUnknown::angle("sensor", "omega", SharedBy::Sensors),
-    InstrumentUnknown::angle("sensor", "phi", SharedBy::Sensors),
-    InstrumentUnknown::angle("sensor", "theta", SharedBy::Sensors),
+pub const PARAMETERS: [InstrumentParameter; 9] = [
+    InstrumentParameter::length("workpiece_ball", "x", SharedBy::Setup),
+    InstrumentParameter::length("workpiece_ball", "y", SharedBy::Setup),
+    InstrumentParameter::length("workpiece_ball", "z", SharedBy::Setup),
+    InstrumentParameter::length("spindle_ball", "x", SharedBy::SpindleSetup),
+    InstrumentParameter::length("spindle_ball", "y", SharedBy::SpindleSetup),
+    InstrumentParameter::length("spindle_ball", "z", SharedBy::SpindleSetup),
+    InstrumentParameter::angle("sensor", "omega", SharedBy::Sensors),
+    InstrumentParameter::angle("sensor", "phi", SharedBy::Sensors),
+    InstrumentParameter::angle("sensor", "theta", SharedBy::Sensors),
 ];
 
-/// Index of ω₁ in [`UNKNOWNS`].
+/// Index of ω₁ in [`PARAMETERS`].
 pub const SENSOR: usize = 6;
 
 /// The body that carries the sensors.

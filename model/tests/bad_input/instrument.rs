@@ -85,7 +85,7 @@ at = { x_mm = 45, y_mm = 0, z_mm = 0, a_deg = 0 }
         (
             "stylus_mm = [0, 0, 0]",
             "stylus_mm = [0, 0, 0]\ndirection = [0, 1, 0]\nartefact_axis = [0, 1, 0]",
-            "looks past",
+            "misses the artefact",
         ),
         (
             "stylus_mm = [0, 0, 0]",
@@ -174,7 +174,12 @@ at = { y_mm = 0, z_mm = 50, a_deg = 0 }
         (
             angles,
             "sensor_directions = [[1, 0, 0], [0, 1, 0], [1, 1, 0.01]]",
-            &["session.toml:14", "almost in a plane", "0.007", "three ways"],
+            &[
+                "session.toml:14",
+                "almost in a plane",
+                "0.007",
+                "three independent measuring directions",
+            ],
         ),
         (
             angles,
