@@ -143,7 +143,7 @@ pub struct Equation {
     pub form: Form,
     /// The intermediate vectors.
     pub vectors: Vec<NamedVector>,
-    /// The errors and instrument parameters that are determined by effects alone, as functions of their drivers.
+    /// The driven errors: errors and instrument parameters that are determined by effects alone, as functions of their drivers.
     pub driven_errors: Vec<(Variable, Operand)>,
     /// The stated length of the bar, for a ball bar.
     pub stated_length: Option<Operand>,
@@ -363,7 +363,7 @@ impl Equation {
         Program::of(&self.arena, self.inputs(), &outputs, &labels, Naming::Shared)
     }
 
-    /// The names of errors that effects determine.
+    /// The names of the driven errors, which effects determine.
     pub(crate) fn driven_labels(&self) -> impl Iterator<Item = (NodeId, Label)> {
         let label = |(variable, value): &(Variable, Operand)| match value {
             Operand::Node(id) => Some((*id, Label::Quantity(variable.clone()))),

@@ -56,7 +56,7 @@ impl<S: Scalar> VariableValue<S> {
 /// Evaluates `outputs`; every node is computed once.
 ///
 /// # Errors
-/// If the expression takes an exponential, a sign, a step or a rounding of an error; the chain never does.
+/// If the expression takes an exponential, a sign, a step or a rounding of an error. The chain contains no such expression.
 pub fn evaluate<S: Scalar>(
     arena: &Arena,
     outputs: &[Operand],

@@ -200,7 +200,7 @@ pub(crate) fn with_bar_parameters(equation: &Equation, program: &Program, distan
     sum(terms)
 }
 
-/// An operand by the name that effects give it, or as its own expression.
+/// An operand under the name of a driven error, or as its own expression.
 pub(crate) fn named_or_expanded(equation: &Equation, program: &Program, operand: Operand) -> Tree {
     let follower = equation.driven_errors.iter().find(|(_, value)| *value == operand);
     let named = follower.and_then(|(variable, _)| {

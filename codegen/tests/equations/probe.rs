@@ -231,7 +231,7 @@ fn geometry(touch: Touch, parameters: &[Variable], point: &State) -> f64 {
         let p = transformed(to_artefact, start + direction * t);
         (p - axis * p.dot(&axis)).norm() - radius
     };
-    // The distance from the axis is convex along the line: ternary search for its minimum, then bisection for the crossing before it.
+    // The distance from the axis is convex along the line. Ternary search finds its minimum, bisection the crossing before it.
     let (mut low, mut high) = (-2000.0, 2000.0);
     for _ in 0..200 {
         let third = (high - low) / 3.0;
@@ -410,7 +410,7 @@ pub fn printed(
             let point = point(touch, &equation.parameters, [5.0, 0.05], random);
             let arguments = point.arguments(&equation.machine, &program.inputs, &equation.parameters);
             let found = program.run(&arguments.concat());
-            // Near the edge of the artefact rounding errors are unbounded.
+            // Near the edge of the artefact rounding errors grow without bound.
             if found.iter().all(|value| value.is_finite() && value.abs() < 300.0) {
                 cases.push(Case {
                     arguments,

@@ -67,7 +67,7 @@ pub struct RTest<N> {
 /// use abbe_model::frames::{Point, Rotation};
 /// use abbe_model::instrument::rtest::Orientation;
 ///
-/// // Eq. (4) of the paper: what sensor u counts is cos(−35.264°) of X and sin(−35.264°) of Z.
+/// // Eq. (4) of the paper: sensor u measures cos(−35.264°)·X + sin(−35.264°)·Z.
 /// let angles: [f64; 3] = [135.0_f64, -35.264, 0.0].map(f64::to_radians);
 /// let machine = Orientation::new(angles, Rotation::Exact).to_machine(Point([1.0, 0.0, 0.0])).0;
 /// assert!((machine[0] - 0.81650).abs() < 1e-5 && machine[1] == 0.0 && (machine[2] + 0.57735).abs() < 1e-5);

@@ -146,7 +146,7 @@ proptest! {
         let slot = slot.index(model.slots());
         let mut with = test.values.clone();
         with.varying.push((slot, vec![0.0; model.rows()]));
-        // An exact zero is omitted from the chain; if included, it multiplies and adds zeros.
+        // An exact zero is omitted from the chain. If it is included, it only adds zeros and multiplies by zero.
         let mut without = test.values.clone();
         without.constant[slot] = 0.0;
         with.constant[slot] = 0.0;
