@@ -259,7 +259,7 @@ fn ball_bar_xml_gives_the_same_fit() {
     );
     says(
         &good.replace("TEST_PLANE=\"XY\"", "TEST_PLANE=\"YZ\""),
-        "TEST_PLANE is `YZ`, the test's `path` is in XY",
+        "TEST_PLANE is `YZ`, but the test's `path` is in XY",
     );
     says(
         &good.replace("<READINGS>", "<READINGS>dropout "),
