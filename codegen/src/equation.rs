@@ -1,4 +1,4 @@
-//! An equation: what the chain yields for symbols, with everything that a printer or a reader needs beside it.
+//! Closed-form equation of a reading: the symbolic result of the chain, with everything that the printers need.
 
 use abbe_model::axis::AxisKind;
 use abbe_model::chain::Machine;
@@ -24,82 +24,82 @@ use crate::touch::{self, Touch};
 use crate::variable::{Symbols, Variable};
 use crate::vectors::{self, NamedVector};
 
-/// How far an equation goes in the errors.
+/// Truncation order of an equation in the errors.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Order {
-    /// As the chain has it.
+    /// No truncation.
     #[default]
     Exact,
-    /// Coordinates up to products of two errors (squares too, where the rotations are exact); a length is still their norm.
+    /// Coordinates up to products of two errors (and squares, for exact rotations); a length is the norm of these coordinates.
     Bilinear,
     /// The value without errors and a coefficient for each error.
     First,
 }
 
-/// What form an equation takes.
+/// The form of an equation.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Options {
-    /// How far it goes in the errors.
+    /// Truncation order in the errors.
     pub order: Order,
-    /// How error angles rotate; `None` for the machine's own way.
+    /// Rotation convention of the error angles; `None` for that of the machine.
     pub rotation: Option<Rotation>,
-    /// Which names errors go by.
+    /// Naming convention of the errors.
     pub symbols: Symbols,
-    /// Whether it comes with derivatives by every error.
+    /// Whether the derivatives by every error are included.
     pub gradient: bool,
-    /// The instrument's own unknowns that are carried, by their places in its list.
+    /// Parameters of the instrument that are included, by index in its list.
     pub unknowns: Vec<usize>,
-    /// Effects that are carried, with all their coefficients.
+    /// Effects that are included, with all their coefficients.
     pub effects: Vec<Effect>,
 }
 
-/// What an equation is of.
+/// The quantity that an equation describes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Kind {
     /// The length of a ball bar.
     Length,
     /// The distance from a probe to the surface of its artefact.
     Distance,
-    /// Three coordinates that an instrument reads.
+    /// Three coordinates measured by an instrument.
     Coordinates,
     /// The error vector of the tool in the table frame.
     Volumetric,
 }
 
-/// What an equation says, in the order that was asked for.
+/// The content of an equation, by the requested order.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Form {
-    /// The named vectors, and the outputs over them.
+    /// The named vectors, and the outputs in terms of them.
     Exact,
-    /// The coordinate groups, collected by error: the bar vector of a length, the coordinates themselves otherwise.
+    /// The coordinate groups, grouped by error: the bar vector for a length, otherwise the coordinates themselves.
     Groups {
-        /// In normal form.
+        /// The normal forms.
         polynomials: Vec<Polynomial>,
-        /// As they are written.
+        /// The expressions as printed.
         layout: Vec<Tree>,
-        /// Whether nothing was left out: the chain itself has no more terms. Decided for up to twelve parameters, beyond which the
-        /// whole normal form is not built and the answer is no.
+        /// Whether the truncation omitted nothing because the chain has no further terms. This is decided for up to twelve parameters.
+        /// For more, the full normal form is not built and the value is false.
         complete: bool,
     },
-    /// The value without errors and a coefficient for each error, with the layout of each.
+    /// The value without errors and a coefficient for each error, with the printed expression of each.
     First(FirstOrder, FirstOrderLayout),
 }
 
-/// The first-order form as it is written.
+/// The first-order form as printed.
 #[derive(Clone, Debug, PartialEq)]
 pub struct FirstOrderLayout {
-    /// The coordinates without errors; of a length its square.
+    /// The coordinates without errors; for a length, its square.
     pub nominal: Vec<Tree>,
-    /// Sign of `L₀` and what is added to it, where that is read without errors.
+    /// Sign of `L₀` and the offset added to it, if the reading without errors is not `L₀` itself.
     pub beside_length: Option<(f64, Tree)>,
     /// The coefficients, parameter by parameter, coordinate by coordinate.
     pub coefficients: Vec<Vec<Tree>>,
-    /// For a fixed multiple of an earlier column: numerator and denominator of the factor.
+    /// For a constant multiple of an earlier column: numerator and denominator of the factor.
     pub factors: Vec<Option<(Tree, Tree)>>,
 }
 
 impl FirstOrderLayout {
-    /// With `length` in the place of the root that it is.
+    /// Replaces the root by the name `length`.
     pub(crate) fn with_named_length(&self, length: &Tree) -> FirstOrderLayout {
         let root = Tree::Unary(Unary::Sqrt, Box::new(self.nominal[0].clone()));
         let named = |trees: &Vec<Tree>| trees.iter().map(|tree| tree.replaced(&root, length)).collect();
@@ -109,7 +109,7 @@ impl FirstOrderLayout {
         }
     }
 
-    /// What is read without errors, from the length `L₀`.
+    /// The reading without errors, from the length `L₀`.
     pub(crate) fn without_errors(&self, length: Tree) -> Tree {
         match &self.beside_length {
             None => length,
@@ -122,53 +122,53 @@ impl FirstOrderLayout {
     }
 }
 
-/// The closed form of one reading of one machine, confirmed against the chain with dual numbers.
+/// The closed form of one reading of one machine, checked against the chain over dual numbers.
 #[derive(Debug)]
 pub struct Equation {
-    /// The machine, with the rotation form that the equation has.
+    /// The machine, with the rotation convention of the equation.
     pub machine: Machine,
-    /// What form it takes.
+    /// The form of the equation.
     pub options: Options,
-    /// What it is of.
+    /// The quantity that it describes.
     pub kind: Kind,
-    /// Where its expressions live.
+    /// The arena that owns its expressions.
     pub arena: Arena,
-    /// The errors, instrument unknowns and coefficients of effects that it is written in.
+    /// The errors, instrument parameters and effect coefficients that it contains.
     pub parameters: Vec<Variable>,
-    /// The coordinates of the reading as the chain has them.
+    /// The coordinates of the reading without truncation.
     pub exact: Vec<Operand>,
-    /// The coordinates of the reading in the form that was asked for.
+    /// The coordinates of the reading in the requested form.
     pub outputs: Vec<Operand>,
-    /// The form.
+    /// The requested form.
     pub form: Form,
-    /// The vectors on the way there.
+    /// The intermediate vectors.
     pub vectors: Vec<NamedVector>,
-    /// The errors and instrument unknowns that effects alone make up, as they follow their drivers.
+    /// The errors and instrument parameters that are determined by effects alone, as functions of their drivers.
     pub followers: Vec<(Variable, Operand)>,
-    /// The stated length of the bar, where a bar is read.
+    /// The stated length of the bar, for a ball bar.
     pub stated_length: Option<Operand>,
-    /// The error of the bar and of its sensor's gain, where they are carried.
+    /// The length error of the bar and the gain error of its sensor, if included.
     pub(crate) bar_unknowns: [Option<Operand>; 2],
-    /// What lies between the vectors of a probe and its reading, where one is read.
+    /// The quantities between the vectors of a probe and its reading, for a probe.
     pub touch: Option<Touch>,
-    /// Basis functions that are written as they are, never multiplied out.
+    /// Basis functions that are kept as they are and never expanded.
     pub(crate) whole: Vec<Operand>,
-    /// Errors and unknowns that the form does not contain.
+    /// Errors and instrument parameters that the form does not contain.
     pub absent: Vec<Variable>,
-    /// How well it agrees with the chain.
+    /// Agreement with the chain.
     pub check: Check,
-    /// Between which values the lengths and the positions of moving axes lie, mm or rad: the session's range.
+    /// Ranges of the lengths and of the positions of moving axes in the session, mm or rad.
     pub range: Vec<(Variable, [f64; 2])>,
-    /// How far a truncated or small-angle form strays from the exact chain over that range.
+    /// Deviations of a truncated or small-angle form from the exact chain over that range.
     pub deviations: Vec<Deviation>,
 }
 
 impl Equation {
-    /// The equation of a reading in the named errors; other errors are exact zeros.
+    /// Derives the equation of a reading in the named errors; other errors are exactly zero.
     ///
     /// # Errors
-    /// If the machine lacks the axis of an error or the instrument an unknown, if the form has no closed polynomial, or if the
-    /// check against the dual numbers fails.
+    /// If the machine lacks the axis of an error, if the instrument lacks a parameter, if the form has no closed polynomial, or if the
+    /// check against dual numbers fails.
     pub fn of(
         machine: &Machine,
         source: &impl Source,
@@ -273,7 +273,7 @@ impl Equation {
     }
 
     /// The parameters that the outputs do not contain. A derivative that is not zero at some point proves that its parameter is
-    /// contained; where none was met, the normal form decides.
+    /// contained; otherwise the normal form decides.
     fn absent_parameters(&self) -> Result<Vec<Variable>, CodegenError> {
         let rounding = 1e-9;
         let derivatives = self.parameters.iter().zip(&self.check.largest_derivatives);
@@ -304,7 +304,7 @@ impl Equation {
         Ok(absent)
     }
 
-    /// The error vector of the tool in the table frame, over the whole workspace.
+    /// Derives the error vector of the tool in the table frame, over the whole workspace.
     ///
     /// # Errors
     /// If the machine lacks the axis of an error.
@@ -316,9 +316,9 @@ impl Equation {
         Equation::of(machine, &ToolPoint, errors, options)
     }
 
-    /// The arguments of its programs in their order: lengths, positions of moving axes from workpiece to tool (a rotary axis by sine and
-    /// cosine, and by its angle where an effect follows that), what else effects follow, then errors, instrument unknowns and coefficients
-    /// as they were asked for.
+    /// The arguments of its programs in order. First come the lengths and the positions of moving axes from workpiece to tool. A rotary
+    /// axis is given by sine and cosine, and by its angle if an effect depends on that. Then come the other drivers of effects, then
+    /// errors, instrument parameters and coefficients in the requested order.
     pub fn inputs(&self) -> Vec<Input> {
         inputs(&self.arena, &self.machine, &self.parameters)
     }
@@ -330,8 +330,8 @@ impl Equation {
         self.outputs.iter().map(gradient).collect()
     }
 
-    /// The second derivatives of each output by each pair of parameters: output, row, column. For curvature terms of an error budget,
-    /// and for solvers that take Newton steps; printed code carries the first derivatives only.
+    /// The second derivatives of each output by each pair of parameters: output, row, column. They serve curvature terms of an error
+    /// budget and solvers with Newton steps. Printed code contains first derivatives only.
     pub fn second_derivatives(&self) -> Vec<Vec<Vec<Operand>>> {
         let parameters = self.parameter_operands();
         let second = |output: &Operand| self.arena.second_derivatives(*output, &parameters);
@@ -363,7 +363,7 @@ impl Equation {
         Program::of(&self.arena, self.inputs(), &outputs, &labels, Naming::Shared)
     }
 
-    /// The names of errors that effects make up.
+    /// The names of errors that effects determine.
     pub(crate) fn follower_labels(&self) -> impl Iterator<Item = (NodeId, Label)> {
         let label = |(variable, value): &(Variable, Operand)| match value {
             Operand::Node(id) => Some((*id, Label::Quantity(variable.clone()))),
@@ -379,7 +379,7 @@ impl Equation {
     }
 }
 
-/// The basis functions of curves: piece by piece they are hundreds of terms.
+/// The basis functions of curves; expanded interval by interval they have hundreds of terms.
 fn curves(run: &Run<'_, Symbol<'_>>, parameters: &[Variable]) -> Vec<Operand> {
     let of_curve = |parameter: &Variable| matches!(parameter, Variable::Coefficient(c) if matches!(c.effect.shape, Shape::Curve { .. }));
     let places = (0..parameters.len()).filter(|place| of_curve(&parameters[*place]));
@@ -389,7 +389,7 @@ fn curves(run: &Run<'_, Symbol<'_>>, parameters: &[Variable]) -> Vec<Operand> {
         .collect()
 }
 
-/// The errors, unknowns and effects that were asked for.
+/// The requested errors, instrument parameters and effect coefficients.
 fn parameters(
     arena: &Arena,
     machine: &Machine,
@@ -407,7 +407,7 @@ fn parameters(
     }
     let coefficients = Coefficient::of_effects(&options.effects, machine, known)?;
     parameters.extend(coefficients.into_iter().map(Variable::Coefficient));
-    // Named here, they keep the order in which they were asked for wherever terms are sorted.
+    // Naming them here fixes their order wherever terms are sorted.
     for (place, parameter) in parameters.iter().enumerate() {
         if parameters[..place].contains(parameter) {
             return Err(CodegenError::Twice {

@@ -1,4 +1,4 @@
-//! Expressions at numbers: `f64`, dual numbers, a counting scalar, or symbols again.
+//! Evaluation of expressions over numbers: `f64`, dual numbers, a counting scalar, or other symbols.
 
 use abbe_model::scalar::{Nominal, Scalar};
 
@@ -6,7 +6,7 @@ use crate::error::CodegenError;
 use crate::symbol::{Arena, Binary, Node, Operand, Unary};
 use crate::variable::Variable;
 
-/// The value of a variable: nominal, or an error that derivatives are taken by.
+/// The value of a variable: nominal, or an error by which derivatives are taken.
 #[derive(Clone, Copy, Debug)]
 pub enum Value<S: Scalar> {
     /// Never differentiated.
@@ -16,7 +16,7 @@ pub enum Value<S: Scalar> {
 }
 
 impl<S: Scalar> Value<S> {
-    /// As an error, whatever it is.
+    /// The value as a scalar, nominal or not.
     pub fn scalar(self) -> S {
         match self {
             Value::Nominal(value) => S::nominal(value),
@@ -53,10 +53,10 @@ impl<S: Scalar> Value<S> {
     }
 }
 
-/// The values of `outputs`, every node computed once.
+/// Evaluates `outputs`; every node is computed once.
 ///
 /// # Errors
-/// If an exponential, a sign, a step or a whole number is taken of an error; the chain does none of it.
+/// If the expression takes an exponential, a sign, a step or a rounding of an error; the chain never does.
 pub fn evaluate<S: Scalar>(
     arena: &Arena,
     outputs: &[Operand],
@@ -84,10 +84,10 @@ pub fn evaluate<S: Scalar>(
         .collect())
 }
 
-/// The values of `outputs` at plain numbers.
+/// Evaluates `outputs` over plain numbers.
 ///
 /// # Errors
-/// None that plain numbers can cause.
+/// None for plain numbers.
 pub fn evaluate_f64(
     arena: &Arena,
     outputs: &[Operand],

@@ -1,4 +1,4 @@
-//! The truncated forms: built from the normal form, laid out for a reader, and put back into the arena for a compiler.
+//! Truncated forms: built from the normal form, arranged for printing, and put back into the arena for code.
 
 use abbe_model::instrument::Station;
 use abbe_model::scalar::Nominal;
@@ -18,17 +18,17 @@ use crate::vectors::NamedVector;
 
 type Formed = (Vec<Operand>, Form);
 
-/// What a form is written in.
+/// The context in which a form is written.
 pub(crate) struct Written<'a, 'w> {
     pub(crate) arena: &'a Arena,
     /// The inputs of its programs.
     pub(crate) inputs: &'w [Input],
     pub(crate) parameters: &'w [Variable],
-    /// Expressions that stand as they are.
+    /// Expressions that are kept as they are.
     pub(crate) whole: &'w [Operand],
 }
 
-/// Coordinates up to second order in the errors, a length still their norm.
+/// Bilinear form: coordinates up to second order in the errors; a length is their norm.
 pub(crate) fn bilinear<'a>(
     run: &Run<'_, Symbol<'a>>,
     exact: &[Operand],
@@ -77,7 +77,7 @@ pub(crate) fn bilinear<'a>(
     Ok((outputs, form))
 }
 
-/// The value without errors and a coefficient for each error.
+/// First-order form: the value without errors and a coefficient for each error.
 pub(crate) fn first<'a>(
     run: &Run<'_, Symbol<'a>>,
     exact: &[Operand],
@@ -174,7 +174,7 @@ pub(crate) fn first<'a>(
     Ok((outputs, Form::First(form, laid_out)))
 }
 
-/// The vectors that the reading is a function of, where it is none of three coordinates: the bar; the stylus and the step of a probe.
+/// The vectors of which a scalar reading is a function: the bar, or the stylus and the step of a probe.
 fn read_over(run: &Run<'_, Symbol<'_>>, vectors: &[NamedVector]) -> Vec<NamedVector> {
     let last = match run.subject {
         Subject::Station(Station::BallBar(_)) => 1,
@@ -184,7 +184,7 @@ fn read_over(run: &Run<'_, Symbol<'_>>, vectors: &[NamedVector]) -> Vec<NamedVec
     vectors[vectors.len() - last..].to_vec()
 }
 
-/// The operands that a program's inputs are.
+/// The operands of the program's inputs.
 fn operands(arena: &Arena, inputs: &[Input]) -> Vec<Operand> {
     let operand = |input: &Input| {
         let symbol = match input {

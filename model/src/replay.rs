@@ -1,10 +1,11 @@
-//! A recorded calculation, replayed over columns of readings.
+//! Evaluation of a recorded calculation over columns of readings.
 //!
-//! What the chain computes is recorded once as an [expression](crate::expression). What is the same for all readings is computed once a replay; of
-//! the rest every step is done for a block of readings before the next one: a loop of fixed length over plain arrays, which the compiler turns into vector
-//! instructions, and beside which looking the step up costs little. The block's intermediate results stay in the processor's first cache.
+//! The chain is recorded once as an [expression](crate::expression). Quantities that are equal for all readings are computed once per
+//! evaluation. Every other operation is done for a block of readings before the next operation. This is a loop of fixed length over plain
+//! arrays, which the compiler vectorises and which makes the cost of decoding the operation small. The intermediate results of a block
+//! stay in the first-level cache.
 //!
-//! Products that only one sum or difference uses are absorbed by it: `a·b + c·d` is one step.
+//! A product that is used only by one sum or difference is fused with it: `a·b + c·d` is one operation.
 
 use std::collections::{HashMap, HashSet};
 
@@ -12,18 +13,18 @@ use pulp::NullaryFnOnce;
 
 use crate::expression::{Arena, Binary, Node, NodeId, Operand, Unary, operands};
 
-/// Readings in a block.
+/// Number of readings in a block.
 const READINGS: usize = 128;
 
-/// A quantity of a block: a number a reading. Aligned so that no vector lies across two lines of the cache.
+/// A quantity of a block: one number per reading. The alignment keeps vectors within cache lines.
 #[derive(Clone)]
 #[repr(align(64))]
 struct Block([f64; READINGS]);
 
-/// Where a quantity of a block lies.
+/// Index of a block in the register file.
 type Register = usize;
 
-/// A step over a block: an operation on up to four quantities; those that it does not need repeat the first.
+/// An operation over a block with up to four operands; unused operands repeat the first.
 #[derive(Clone, Copy, Debug)]
 struct Step<Q> {
     operation: Operation,
@@ -34,13 +35,13 @@ struct Step<Q> {
 enum Operation {
     Unary(Unary),
     Binary(Binary),
-    /// Of `a·b` and `c`.
+    /// `a·b` and `c`.
     ProductAnd(Joined),
-    /// Of `a·b` and `c·d`.
+    /// `a·b` and `c·d`.
     Products(Joined),
 }
 
-/// How two terms are joined.
+/// Combination of two terms.
 #[derive(Clone, Copy, Debug)]
 enum Joined {
     Sum,
@@ -49,7 +50,7 @@ enum Joined {
     Reverse,
 }
 
-/// A quantity that is the same for all readings.
+/// A quantity that is equal for all readings.
 #[derive(Clone, Debug)]
 enum Uniform<V> {
     Given(V),
@@ -58,25 +59,26 @@ enum Uniform<V> {
     Binary(Binary, usize, usize),
 }
 
-/// A recorded calculation of some outputs.
+/// A recorded calculation of several outputs.
 #[derive(Clone, Debug)]
 pub struct Replay<V> {
     uniform: Vec<Uniform<V>>,
-    /// The uniform quantities that steps or outputs use; they take the first registers.
+    /// The uniform quantities that operations or outputs use; they have the first registers.
     spread: Vec<usize>,
-    /// What is given reading by reading, in the registers that follow.
+    /// The variables given for each reading, in the registers that follow.
     columns: Vec<V>,
-    /// What is computed, and into which register.
+    /// The operations, each with its result register.
     steps: Vec<(Step<Register>, Register)>,
     registers: usize,
-    /// The outputs that no step computes: uniform or given. By number, with where each stands.
+    /// The outputs that no operation computes, because they are uniform or given: output index and register.
     standing: Vec<(usize, Register)>,
-    /// The others in the order of their steps: the step, and the output's number. They are handed over at once, so that their registers are free again.
+    /// The computed outputs in the order of their operations: operation index and output index. Each is delivered immediately, so that
+    /// its register can be reused.
     computed: Vec<(usize, usize)>,
 }
 
 impl<V: Clone + PartialEq> Replay<V> {
-    /// Of `outputs` of an arena; `varies` tells whether a variable differs from reading to reading.
+    /// Prepares the evaluation of `outputs` of an arena; `varies` tells whether a variable differs between readings.
     pub fn new(arena: &Arena<V>, outputs: &[Operand], varies: impl Fn(&V) -> bool) -> Self {
         let nodes = arena.reachable(outputs);
         let mut recorder = Recorder {
@@ -106,8 +108,8 @@ impl<V: Clone + PartialEq> Replay<V> {
         recorder.replay(&nodes, outputs)
     }
 
-    /// Replays the calculation for a number of readings: `given` are the uniform variables, `column` those that vary, a value a reading. Block by
-    /// block `put` takes for each output by its number the values of the readings from the one named on.
+    /// Evaluates the calculation for a number of readings. `given` returns the uniform variables, `column` the varying ones, one value
+    /// per reading. For each block and output, `put` receives the index of the output, the first reading of the block and the values.
     pub fn run<'c>(
         &self,
         rows: usize,
@@ -126,7 +128,7 @@ impl<V: Clone + PartialEq> Replay<V> {
             uniform.push(value);
         }
         let spread = self.spread.iter().map(|place| uniform[*place]);
-        // One more than the registers: a step is computed there, then trades places with what it replaces.
+        // One more than the registers: an operation writes there and then swaps with the register that it replaces.
         let mut store = vec![Block([0.0; READINGS]); self.registers + 1];
         store
             .iter_mut()
@@ -144,7 +146,7 @@ impl<V: Clone + PartialEq> Replay<V> {
     }
 }
 
-/// A replay over all blocks, compiled for each kind of vector instructions that the processor may have.
+/// An evaluation over all blocks, compiled for each vector instruction set that the processor may have.
 struct Blocks<'r, 'f, V, P> {
     replay: &'r Replay<V>,
     rows: usize,
@@ -163,7 +165,7 @@ impl<V, P: FnMut(usize, usize, &[f64])> NullaryFnOnce for Blocks<'_, '_, V, P> {
         for start in (0..self.rows).step_by(READINGS) {
             let end = (start + READINGS).min(self.rows);
             for (place, column) in self.columns.iter().enumerate() {
-                // What lies beyond the last reading is computed too and goes nowhere.
+                // Values beyond the last reading are computed too and discarded.
                 self.file[first + place].0[..end - start].copy_from_slice(&column[start..end]);
             }
             for (output, register) in &self.replay.standing {
@@ -211,12 +213,12 @@ fn each(made: &mut Block, value: impl Fn(usize) -> f64) {
     }
 }
 
-/// What is known of the nodes while a replay is laid out.
+/// State of the nodes while an evaluation is prepared.
 struct Recorder<'a, V> {
     arena: &'a Arena<V>,
     uniform: Vec<Uniform<V>>,
     uniform_of: HashMap<Operand, usize>,
-    /// For each use of an operand, whether a sum or difference makes it, which could absorb a product.
+    /// For each use of an operand, whether a sum or difference uses it and could fuse with a product.
     uses: HashMap<Operand, Vec<bool>>,
     varying: HashSet<NodeId>,
 }
@@ -226,7 +228,7 @@ impl<V: Clone + PartialEq> Recorder<'_, V> {
         matches!(operand, Operand::Node(id) if self.varying.contains(&id))
     }
 
-    /// The place of a uniform operand among the uniform quantities.
+    /// The index of a uniform operand among the uniform quantities.
     fn uniform(&mut self, operand: Operand) -> usize {
         if let Some(place) = self.uniform_of.get(&operand) {
             return *place;
@@ -244,7 +246,7 @@ impl<V: Clone + PartialEq> Recorder<'_, V> {
         self.uniform.len() - 1
     }
 
-    /// The factors of a product that one sum or difference uses and nothing else.
+    /// The factors of a product that is used only by one sum or difference.
     fn product(&self, operand: Operand) -> Option<[Operand; 2]> {
         match self.arena.node_of(operand)? {
             Node::Binary(Binary::Mul, a, b) if self.varies(operand) && self.uses[&operand] == [true] => {
@@ -254,7 +256,7 @@ impl<V: Clone + PartialEq> Recorder<'_, V> {
         }
     }
 
-    /// The step that computes a node; `None` for a variable, and for a product that another step absorbs.
+    /// The operation of a node; `None` for a variable, and for a product that is fused with another operation.
     fn step(&self, id: NodeId) -> Option<Step<Operand>> {
         if self.product(Operand::Node(id)).is_some() {
             return None;
@@ -307,7 +309,7 @@ impl<V: Clone + PartialEq> Recorder<'_, V> {
         for operand in column_nodes {
             register_of.insert(operand, register_of.len());
         }
-        // The others are taken again once nothing reads them any more.
+        // The other registers are reused after their last use.
         let kept = register_of.len();
         let mut registers = kept;
         let mut last_read: HashMap<Operand, usize> = HashMap::new();

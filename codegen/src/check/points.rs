@@ -1,4 +1,4 @@
-//! Points to compare at: numbers that look random and are the same every time.
+//! Deterministic pseudo-random points at which programs are compared.
 
 use abbe_model::axis::AxisKind;
 use abbe_model::effect::{Driver, Effect, Shape};
@@ -9,7 +9,7 @@ use crate::program::{Input, Program};
 use crate::subject::Source;
 use crate::variable::Variable;
 
-/// Numbers that look random and are the same every time (SplitMix64).
+/// Deterministic pseudo-random numbers (SplitMix64).
 pub(crate) struct Draws(u64);
 
 impl Draws {
@@ -31,10 +31,10 @@ impl Draws {
     }
 }
 
-/// A length that nobody states, mm.
+/// Value of a length that the source does not state, mm.
 const UNSTATED_MM: f64 = 100.0;
 
-/// Values of lengths and positions, and of the parameters.
+/// Values of the lengths, the positions and the parameters.
 pub(crate) struct Point {
     pub(crate) nominal: Vec<(Variable, f64)>,
     pub(crate) small: Vec<f64>,
@@ -61,7 +61,7 @@ impl Point {
 }
 
 impl Equation {
-    /// Between which values of a driver the shapes that follow it have something to show, where that is less than everywhere.
+    /// Intervals of a driver in which effects with a local shape are not zero.
     fn places_of_effects(&self, driver: &Variable) -> Vec<[f64; 2]> {
         let follows = |effect: &Effect| match (driver, &effect.driver) {
             (Variable::Position { axis, .. }, Driver::Axis(name)) => axis == name,
@@ -93,7 +93,7 @@ impl Equation {
             .collect()
     }
 
-    /// The variables that no derivative is taken by, anywhere: lengths near what the source states, positions over every one there is.
+    /// Draws the nominal variables over their whole range: lengths near their stated values, positions over all possible values.
     pub(crate) fn draw_anywhere(&self, source: &impl Source, draws: &mut Draws) -> Vec<(Variable, f64)> {
         let draw = |variable: Variable| {
             let value = match &variable {
@@ -110,7 +110,7 @@ impl Equation {
                 }
                 moving => {
                     let places = self.places_of_effects(moving);
-                    // Half of the points lie where the shapes of effects have something to show.
+                    // Half of the points lie where local effects are not zero.
                     let anywhere = places.is_empty() || draws.bits() & 1 == 0;
                     let [low, high] = if anywhere {
                         whole_range(moving)
@@ -126,8 +126,8 @@ impl Equation {
         nominal.map(draw).collect()
     }
 
-    /// The same over the session's range: lengths as stated, positions of axes between the ends of their movement (as the source or else
-    /// the machine states it), mm or rad.
+    /// Ranges of the nominal variables in the session: lengths as stated; axis positions between the ends of their motion, as stated by
+    /// the source or else by the machine; mm or rad.
     pub(crate) fn range(&self, source: &impl Source) -> Vec<(Variable, [f64; 2])> {
         let range = |variable: Variable| {
             let ends = match &variable {
@@ -148,7 +148,7 @@ impl Equation {
     }
 }
 
-/// Of a position or another driver whose range nobody states, in its unit.
+/// Range of a position or another driver whose range is not stated, in its unit.
 fn whole_range(moving: &Variable) -> [f64; 2] {
     if let Variable::Driver(followed) = moving {
         match followed {

@@ -1,4 +1,4 @@
-//! What a form's value and derivatives must be: the chain over dual numbers.
+//! Reference value and derivatives of a form, from the chain over dual numbers.
 
 use abbe_model::instrument::Station;
 use num_dual::{Derivative, Dual64, DualNum, DualSVec64, HyperDual64};
@@ -10,15 +10,15 @@ use crate::run::Run;
 use crate::subject::{Source, Subject};
 use crate::variable::Variable;
 
-/// Parameters seeded at once.
+/// Number of parameters seeded per dual-number evaluation.
 const PACK: usize = 8;
 type Pack = DualSVec64<PACK>;
 
-/// Outputs, and each output's derivatives by every parameter.
+/// The outputs, and the derivatives of each output by every parameter.
 pub(crate) type ValueAndGradient = (Vec<f64>, Vec<Vec<f64>>);
 
 impl Equation {
-    /// The reading, and the coordinate groups that it is made of.
+    /// The reading, and the coordinate groups from which it is computed.
     fn run<S>(
         &self,
         source: &impl Source,
@@ -47,7 +47,7 @@ impl Equation {
         Ok((run.read(), groups))
     }
 
-    /// What the outputs of a program must be.
+    /// The reference outputs of a program.
     pub(crate) fn expected(
         &self,
         source: &impl Source,
@@ -68,7 +68,7 @@ impl Equation {
         }
     }
 
-    /// The reading and its derivatives at the given parameters.
+    /// The reading and its derivatives at the given parameter values.
     fn by_duals(
         &self,
         source: &impl Source,
@@ -99,7 +99,7 @@ impl Equation {
         Ok((values, gradient))
     }
 
-    /// The Taylor series of the coordinate groups to second order, by hyper-dual numbers, and its derivatives.
+    /// The second-order Taylor series of the coordinate groups and its derivatives, from hyper-dual numbers.
     fn expected_bilinear(
         &self,
         source: &impl Source,
@@ -149,7 +149,8 @@ impl Equation {
         Ok((values, gradient))
     }
 
-    /// The reading from its coordinate groups: themselves, the length with the bar's own unknowns, or the distance of a probe.
+    /// Computes the reading from its coordinate groups: the groups themselves, the length with the parameters of the bar, or the distance
+    /// of a probe.
     fn reading_of_groups(
         &self,
         source: &impl Source,

@@ -1,4 +1,4 @@
-//! The bilinear form of a probe's reading for a reader: the groups of stylus and step, and the distance over them.
+//! Bilinear form of a probe's reading for readers: the groups of stylus and step, and the distance in terms of them.
 
 use crate::collect::sum;
 use crate::equation::Equation;
@@ -10,10 +10,10 @@ use crate::symbol::{Binary, Unary};
 use crate::touch::{self, Touch};
 use crate::vectors::NamedVector;
 
-/// Where the coordinates of the step in R stand among the names: behind two vectors, `a`, `b`, `c` and `l_n`.
+/// Index of the first coordinate of the step in R among the names: after two vectors, `a`, `b`, `c` and `l_n`.
 const STEP: usize = 10;
 
-/// The groups of stylus and step, and the distance over them.
+/// The groups of stylus and step, and the distance in terms of them.
 pub(crate) fn groups(
     equation: &Equation,
     touch: &Touch,
@@ -91,7 +91,7 @@ pub(crate) fn groups(
     (program, sections)
 }
 
-/// `−l_n·(b + √(b² − a·c))/a`, with `a`, `b`, `c` and `l_n` in this order from the step `start`.
+/// `−l_n·(b + √(b² − a·c))/a`, where the steps from `start` are `a`, `b`, `c` and `l_n` in this order.
 fn distance_of_steps(start: usize, with_length: bool) -> Tree {
     let [a, b, c, length] = [0, 1, 2, 3].map(|place| Tree::Step(start + place));
     let product_of = |x: &Tree, y: &Tree| binary(Binary::Mul, x.clone(), y.clone());

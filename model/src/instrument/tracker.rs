@@ -1,7 +1,7 @@
-//! The laser tracker: a target's three coordinates in the tracker's own frame, wherever that stands.
+//! The laser tracker: three coordinates of a target in the tracker's own frame.
 //!
-//! `m = B · E · P`, with `P` the target in R through the chain, `E` a small motion (the pose's unknowns) and `B` a fixed rigid
-//! motion, so that the unknown angles stay small however the tracker is turned.
+//! `m = B · E · P`: `P` is the target in R through the chain, `E` a small motion (the pose parameters) and `B` a fixed rigid motion. `B`
+//! keeps the estimated angles small for any orientation of the tracker.
 
 use super::{InstrumentUnknown, SharedBy, displaced, moved};
 use crate::chain::{AxisPosition, BodyErrors, Machine};

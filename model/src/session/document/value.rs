@@ -1,4 +1,4 @@
-//! A value of a TOML file, with its key and its place.
+//! A value of a TOML file, with its key and location.
 
 use std::ops::Range;
 
@@ -15,9 +15,9 @@ pub(crate) struct Value<'a> {
     pub source: &'a Source,
     /// The key it belongs to.
     pub key: String,
-    /// Where the key stands.
+    /// Location of the key.
     pub key_span: Range<usize>,
-    /// Where the value stands.
+    /// Location of the value.
     pub span: Range<usize>,
     pub(super) value: DeValue<'a>,
 }
@@ -28,7 +28,16 @@ impl<'a> Value<'a> {
         self.source.error(self.span.clone(), message, help)
     }
 
-    /// An error that says what the value is and what it should be.
+    /// An error about the file that the value names.
+    pub fn file_error(&self, message: String, help: &str) -> ModelError {
+        ModelError::FileAccess {
+            location: self.source.location(self.span.clone()),
+            message,
+            help: help.to_string(),
+        }
+    }
+
+    /// An error with the found value and the expected one.
     pub fn unlike(&self, wanted: &str) -> ModelError {
         let found = match &self.value {
             DeValue::String(text) => format!("the text \"{text}\""),
@@ -41,29 +50,29 @@ impl<'a> Value<'a> {
         self.error(format!("`{}` is {found}; {wanted} is expected", self.key), None)
     }
 
-    /// A text.
+    /// The value as a text.
     pub fn text(&self) -> Result<String, ModelError> {
         match &self.value {
             DeValue::String(text) => match text.chars().find(|c| c.is_control() && *c != '\t') {
                 None => Ok(text.to_string()),
                 Some(control) => Err(self.error(
                     format!(
-                        "`{}` holds the control character U+{:04X}",
+                        "`{}` contains the control character U+{:04X}",
                         self.key, control as u32
                     ),
-                    Some("names are shown as they are: leave it out".into()),
+                    Some("remove it".into()),
                 )),
             },
             _ => Err(self.unlike("a text in quotes")),
         }
     }
 
-    /// The text, where it is one.
+    /// The text, if the value is one.
     pub fn as_text(&self) -> Option<&str> {
         self.value.as_str()
     }
 
-    /// What is written there, as a text: a note may be a number or a date.
+    /// The value as a text of any type: a note may be a number or a date.
     pub fn note(&self) -> Result<String, ModelError> {
         match &self.value {
             DeValue::Integer(number) => Ok(number.as_str().to_string()),
@@ -90,13 +99,13 @@ impl<'a> Value<'a> {
         self.value.as_bool().ok_or_else(|| self.unlike("true or false"))
     }
 
-    /// A number within [`limits::LARGEST`], perhaps infinite, never NaN.
+    /// A number within [`limits::LARGEST`], possibly infinite, never NaN.
     pub fn number_or_inf(&self, wanted: &str) -> Result<f64, ModelError> {
         let number = match &self.value {
             DeValue::Integer(integer) => {
                 i64::from_str_radix(&integer.as_str().replace('_', ""), integer.radix())
                     .map(|integer| integer as f64)
-                    // What is too large for a whole number is a number all the same.
+                    // A value that is too large for an integer is still a number.
                     .or_else(|_| integer.as_str().replace('_', "").parse())
                     .ok()
             }
@@ -131,11 +140,14 @@ impl<'a> Value<'a> {
         if number > 0.0 {
             Ok(number)
         } else {
-            Err(self.error(format!("`{}` is {number}; it has to be above 0", self.key), None))
+            Err(self.error(
+                format!("`{}` is {number}; it must be greater than 0", self.key),
+                None,
+            ))
         }
     }
 
-    /// A whole number of at least `least` and at most `most`.
+    /// An integer of at least `least` and at most `most`.
     pub fn count(&self, least: usize, most: usize) -> Result<usize, ModelError> {
         let number = self.number()?;
         if number.fract() == 0.0 && number >= least as f64 && number <= most as f64 {
@@ -151,7 +163,7 @@ impl<'a> Value<'a> {
         }
     }
 
-    /// The items of a list, each under the list's key.
+    /// The items of a list, each with the key of the list.
     pub fn list(self, wanted: &str) -> Result<Vec<Value<'a>>, ModelError> {
         if !self.value.is_array() {
             return Err(self.unlike(wanted));
@@ -161,7 +173,7 @@ impl<'a> Value<'a> {
             return Ok(Vec::new());
         };
         if items.len() > MAX_ITEMS {
-            let message = format!("`{key}` is a list of {}; {MAX_ITEMS} are the most", items.len());
+            let message = format!("`{key}` is a list of {}; the limit is {MAX_ITEMS}", items.len());
             return Err(source.error(span, message, None));
         }
         Ok(items
@@ -197,12 +209,12 @@ impl<'a> Value<'a> {
         Ok(vector)
     }
 
-    /// A table, called `name` in messages.
+    /// A table with `name` as its name in messages.
     pub fn table(self, name: String) -> Result<Table<'a>, ModelError> {
         if !self.value.is_table() {
             return Err(self.unlike("a table"));
         }
-        // A header `[name]` is what a message about the table should point at.
+        // Messages about the table point at its header `[name]`.
         let span = if self.key_span.start < self.span.start {
             self.key_span.clone()
         } else {

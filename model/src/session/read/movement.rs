@@ -1,4 +1,4 @@
-//! `sweep` and `path`: how the axes move in a planned test.
+//! Reader of `sweep` and `path`: the motion of the axes in a planned test.
 
 use super::{Context, quantity};
 use crate::axis::AxisKind;
@@ -7,12 +7,12 @@ use crate::instrument::Station;
 use crate::session::document::{Table, Value};
 use crate::session::motion::{FollowOffset, MAX_READINGS, Motion, programmed_over_path_feed};
 
-/// Feed of a linear axis or a circle where none is stated, mm/s: 1000 mm/min.
+/// Default feed of a linear axis or a circle, mm/s: 1000 mm/min.
 const DEFAULT_FEED_MM_S: f64 = 1000.0 / 60.0;
-/// Speed of a rotary axis where none is stated, rad/s: 120 °/min.
+/// Default speed of a rotary axis, rad/s: 120 °/min.
 const DEFAULT_TURN_RAD_S: f64 = 2.0 / 180.0 * std::f64::consts::PI;
 
-/// `sweep = { axis, from_…, to_…, step_…, feed_…, runs, both_directions }`.
+/// Reads `sweep = { axis, from_…, to_…, step_…, feed_…, runs, both_directions }`.
 pub(super) fn sweep(
     context: &Context<'_>,
     value: Value<'_>,
@@ -35,7 +35,7 @@ pub(super) fn sweep(
     })
 }
 
-/// `path = { kind = "circle" | "follow" | "list", … }`.
+/// Reads `path = { kind = "circle" | "follow" | "list", … }`.
 pub(super) fn path(
     context: &Context<'_>,
     value: Value<'_>,
@@ -55,11 +55,11 @@ pub(super) fn path(
 }
 
 fn circle(context: &Context<'_>, mut table: Table<'_>) -> Result<Motion, ModelError> {
-    let plane = table.need("plane", "the two linear axes, as \"XY\"")?;
+    let plane = table.need("plane", "the two linear axes, such as \"XY\"")?;
     let text = plane.text()?;
     let letters: Vec<String> = text.chars().map(String::from).collect();
     let [first, second] = &letters[..] else {
-        return Err(plane.unlike("two linear axes, as \"XY\","));
+        return Err(plane.unlike("two linear axes, such as \"XY\","));
     };
     let linear = |name: &str| -> Result<usize, ModelError> {
         let Some(index) = quantity::axis_index(context.machine, name) else {
@@ -81,7 +81,10 @@ fn circle(context: &Context<'_>, mut table: Table<'_>) -> Result<Motion, ModelEr
     let radius_value = table.need("radius_mm", "the radius of the circle")?;
     let (_, radius) = context.length(&radius_value)?;
     if radius <= 0.0 {
-        return Err(radius_value.error(format!("`radius_mm` is {radius}; it has to be above 0"), None));
+        return Err(radius_value.error(
+            format!("`radius_mm` is {radius}; it must be greater than 0"),
+            None,
+        ));
     }
     let centre = match table.take("centre_mm") {
         Some(value) => context.point(value)?.1,
@@ -111,7 +114,7 @@ fn circle(context: &Context<'_>, mut table: Table<'_>) -> Result<Motion, ModelEr
 fn follow(context: &Context<'_>, mut table: Table<'_>, station: &Station<f64>) -> Result<Motion, ModelError> {
     if station.table_point_mm().is_none() {
         return Err(table.error(
-            "a path of kind \"follow\" needs an instrument that holds a point of the table: a ball bar, an R-test or a probe",
+            "a path of kind \"follow\" needs an instrument with a point of the table: a ball bar, an R-test or a probe",
             None,
         ));
     }
@@ -119,7 +122,7 @@ fn follow(context: &Context<'_>, mut table: Table<'_>, station: &Station<f64>) -
     if kind != AxisKind::Rotary {
         let name = &context.machine.axes[axis].name;
         return Err(table.error(
-            format!("axis `{name}` is linear; a path of kind \"follow\" turns a rotary axis"),
+            format!("axis `{name}` is linear; a path of kind \"follow\" needs a rotary axis"),
             None,
         ));
     }
@@ -137,13 +140,13 @@ fn follow(context: &Context<'_>, mut table: Table<'_>, station: &Station<f64>) -
             if let Some(offset) = table.take("offset") {
                 return Err(offset.source.error(
                     offset.key_span.clone(),
-                    "`offset` is the direction of a bar; an R-test has none and reads all three directions at once",
-                    Some("leave it out; `abbe fit --views` parts radial, tangential and axial".into()),
+                    "`offset` is the direction of a bar; an R-test has no bar and measures all three directions at once",
+                    Some("remove it; the readings can be resolved into radial, tangential and axial components after a fit".into()),
                 ));
             }
             FollowOffset::Touching
         }
-        // Nothing of a fixed length lies between the points.
+        // The points have no fixed distance.
         _ => FollowOffset::None,
     };
     let way = Abscissa::read(&mut table, kind, false)?;
@@ -175,7 +178,7 @@ fn moved_axis(context: &Context<'_>, table: &mut Table<'_>) -> Result<(usize, Ax
     Ok((axis, context.machine.axes[axis].kind))
 }
 
-/// From, to and step of a movement, in the unit inside.
+/// Start, end and step of a motion, in the internal unit.
 struct Abscissa {
     from: f64,
     to: f64,
@@ -183,7 +186,7 @@ struct Abscissa {
 }
 
 impl Abscissa {
-    /// Reads `from_…`, `to_…` and `step_…`; a full turn where the ends may be left out and are.
+    /// Reads `from_…`, `to_…` and `step_…`; the default of optional ends is a full revolution.
     fn read(table: &mut Table<'_>, kind: AxisKind, ends_needed: bool) -> Result<Abscissa, ModelError> {
         let from = end(table, kind, ["from_mm", "from_deg"])?;
         let to = end(table, kind, ["to_mm", "to_deg"])?;
@@ -209,21 +212,21 @@ impl Abscissa {
         };
         if step <= 0.0 {
             let message = format!(
-                "`{}` has to be above 0; the way back is `both_directions = true`",
+                "`{}` must be greater than 0; the return traversal is `both_directions = true`",
                 stepped.key
             );
             return Err(stepped.error(message, None));
         }
         if from == to {
-            return Err(table.error(format!("{} ends where it begins", table.called()), None));
+            return Err(table.error(format!("{} has equal start and end", table.called()), None));
         }
         let way = Abscissa { from, to, step };
         if way.steps() > MAX_READINGS as f64 {
-            let message = format!("{:.2e} steps; {MAX_READINGS} readings is the most", way.steps());
-            return Err(stepped.error(message, Some("take a larger step".into())));
+            let message = format!("{:.2e} steps; the limit is {MAX_READINGS} readings", way.steps());
+            return Err(stepped.error(message, Some("use a larger step".into())));
         }
         if way.steps() < 1.0 {
-            return Err(stepped.error(format!("`{}` is longer than the way", stepped.key), None));
+            return Err(stepped.error(format!("`{}` is larger than the whole motion", stepped.key), None));
         }
         Ok(way)
     }
@@ -233,7 +236,7 @@ impl Abscissa {
     }
 }
 
-/// A number that belongs to an axis, in mm or degrees as the axis is; the other unit is an error.
+/// A number of an axis in mm or degrees, as the kind of the axis requires; the other unit is an error.
 fn end<'a>(
     table: &mut Table<'a>,
     kind: AxisKind,
@@ -244,7 +247,7 @@ fn end<'a>(
         AxisKind::Rotary => (table.take(deg), table.take(mm)),
     };
     if let Some(wrong) = wrong {
-        let message = format!("`{}` for what moves in {}", wrong.key, kind.unit());
+        let message = format!("`{}` for an axis in {}", wrong.key, kind.unit());
         return Err(wrong.source.error(wrong.key_span.clone(), message, None));
     }
     match right {
@@ -253,7 +256,8 @@ fn end<'a>(
     }
 }
 
-/// The speed of an axis: degrees or millimetres a minute; `feed_mm_min` of a rotary axis is the path speed of the ball that it carries.
+/// The speed of an axis, in degrees or millimetres per minute; `feed_mm_min` of a rotary axis is the path speed of the ball that it
+/// carries.
 fn speed(
     context: &Context<'_>,
     table: &mut Table<'_>,
@@ -275,7 +279,7 @@ fn speed(
     }
 }
 
-/// The speed of a rotary axis that linear axes follow, from the feed as programmed.
+/// The speed of a rotary axis that linear axes follow, from the programmed feed.
 fn programmed_speed(
     context: &Context<'_>,
     table: &mut Table<'_>,
@@ -286,7 +290,7 @@ fn programmed_speed(
     let feed_mm_s = feed.positive()? / 60.0;
     for key in ["feed_mm_min", "feed_deg_min"] {
         if let Some(other) = table.take(key) {
-            let help = "the programmed feed already says how fast the ball goes: keep one of them";
+            let help = "the programmed feed determines the speed of the ball: keep one of them";
             return Err(other.error(
                 format!("both `programmed_feed_mm_min` and `{key}`"),
                 Some(help.into()),
@@ -297,7 +301,7 @@ fn programmed_speed(
     Ok(feed_mm_s / programmed_over_path_feed(radius) / radius)
 }
 
-/// How far from a rotary axis the ball lies that it carries, mm.
+/// Distance of the carried ball from a rotary axis, mm.
 fn radius_on_axis(
     context: &Context<'_>,
     axis: usize,
@@ -312,13 +316,13 @@ fn radius_on_axis(
     };
     let radius = radius_about(&context.machine.axes[axis], carried);
     if radius < 1e-3 {
-        let message = format!("`{}` of a ball that lies on the axis it turns about", feed.key);
-        return Err(feed.error(message, Some("give `feed_deg_min`".into())));
+        let message = format!("`{}` of a ball that lies on its axis of rotation", feed.key);
+        return Err(feed.error(message, Some("use `feed_deg_min`".into())));
     }
     Ok(radius)
 }
 
-/// Distance of a point from an axis, all axes at zero.
+/// Distance of a point from an axis, all axes at zero, mm.
 fn radius_about(axis: &crate::axis::Axis, point: [f64; 3]) -> f64 {
     let from: [f64; 3] = std::array::from_fn(|i| point[i] - axis.origin_mm[i]);
     let along: f64 = (0..3).map(|i| from[i] * axis.direction[i]).sum();
@@ -326,7 +330,7 @@ fn radius_about(axis: &crate::axis::Axis, point: [f64; 3]) -> f64 {
     square.max(0.0).sqrt()
 }
 
-/// `runs` and `both_directions`: once, there and back, unless said otherwise.
+/// Reads `runs` and `both_directions`; the default is one run in both directions.
 fn repeats(table: &mut Table<'_>, steps: f64) -> Result<(usize, bool), ModelError> {
     let both_directions = match table.take("both_directions") {
         Some(value) => value.truth()?,
@@ -337,7 +341,7 @@ fn repeats(table: &mut Table<'_>, steps: f64) -> Result<(usize, bool), ModelErro
             let runs = value.count(1, MAX_READINGS)?;
             if runs as f64 * (steps + 1.0) * 2.0 > MAX_READINGS as f64 {
                 return Err(value.error(
-                    format!("{runs} runs of {steps:.0} steps; {MAX_READINGS} readings is the most"),
+                    format!("{runs} runs of {steps:.0} steps; the limit is {MAX_READINGS} readings"),
                     None,
                 ));
             }
