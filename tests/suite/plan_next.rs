@@ -1,8 +1,9 @@
 //! The next test: improvement over the published methods, and separation of two effects.
 
-use abbe::identify::plan::candidate_tests::{TestVariations, candidate_tests};
+use abbe::identify::plan::candidate_tests::candidate_tests;
 use abbe::identify::plan::criterion::Goal;
 use abbe::identify::plan::improve::{ImproveOptions, improve};
+use abbe::identify::plan::test_variations::TestVariations;
 use abbe::identify::plan::{PlanOptions, analyse, separation, states};
 use abbe::model::effect::{Component, Driver, Effect, Shape};
 use abbe::model::instrument::Station;

@@ -8,10 +8,10 @@ use schemars::JsonSchema;
 use serde::Serialize;
 
 use super::candidate_information::PreparedCandidates;
-use super::candidate_tests::TestVariations;
 use super::criterion::{Goal, figure, reported, targets};
 use super::information::{Root, SharedParameters};
 use super::ranking::smallest_first;
+use super::test_variations::TestVariations;
 use crate::error::IdentifyError;
 use crate::problem::Problem;
 
