@@ -76,7 +76,7 @@ pub enum Form {
         /// The normal forms.
         polynomials: Vec<Polynomial>,
         /// The expressions as printed.
-        layout: Vec<Tree>,
+        printed: Vec<Tree>,
         /// Whether the truncation omitted nothing because the chain has no further terms. This is decided for up to twelve parameters.
         /// For more, the full normal form is not built and the value is false.
         complete: bool,
@@ -284,7 +284,7 @@ impl Equation {
             |parameter: &Variable| below.iter().any(|id| self.arena.variable_at(*id) == *parameter);
         let (doubtful, mut absent): (Vec<Variable>, Vec<Variable>) = unseen.into_iter().partition(in_graph);
         if !doubtful.is_empty() {
-            let wanted = match (self.kind, self.vectors.as_slice()) {
+            let requested = match (self.kind, self.vectors.as_slice()) {
                 (Kind::Length, [.., bar]) => bar.components.to_vec(),
                 (Kind::Distance, [.., stylus, step]) => {
                     let radius = self.touch.iter().map(|touch| touch.radius);
@@ -295,7 +295,7 @@ impl Equation {
             };
             let mut ring = Ring::exact(&self.arena);
             ring.keep(&self.whole);
-            let forms = wanted
+            let forms = requested
                 .iter()
                 .map(|w| ring.normal_form(*w))
                 .collect::<Result<Vec<_>, _>>()?;

@@ -103,18 +103,18 @@ impl<'a> Ring<'a> {
     /// If it is not a polynomial: a quotient of expressions, a root of errors, or a function of errors other than the sine or cosine of
     /// one.
     pub fn normal_form(&mut self, operand: Operand) -> Result<Polynomial, CodegenError> {
-        let mut wanted = BTreeSet::new();
+        let mut requested = BTreeSet::new();
         let mut pending = vec![operand];
         while let Some(next) = pending.pop() {
             if let Operand::Node(id) = next
                 && !self.known.contains_key(&id)
-                && wanted.insert(id)
+                && requested.insert(id)
                 && !self.is_function(id)
             {
                 pending.extend(operands(self.arena.node(id)));
             }
         }
-        for id in wanted {
+        for id in requested {
             let form = self.of_node(id)?;
             self.known.insert(id, form);
         }

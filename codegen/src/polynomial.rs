@@ -155,10 +155,10 @@ impl Polynomial {
         self.0.is_empty()
     }
 
-    /// Whether some term contains an atom for which `wanted` holds.
-    pub fn contains(&self, wanted: impl Fn(Atom) -> bool) -> bool {
+    /// Whether some term contains an atom for which `condition` holds.
+    pub fn contains(&self, condition: impl Fn(Atom) -> bool) -> bool {
         let mut atoms = self.0.keys().flat_map(|monomial| monomial.0.iter());
-        atoms.any(|(atom, _)| wanted(*atom))
+        atoms.any(|(atom, _)| condition(*atom))
     }
 
     /// Groups the terms by their atoms for which `by` holds: each such monomial with its coefficient.

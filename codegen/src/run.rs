@@ -38,9 +38,9 @@ impl<'m, S: Scalar> Run<'m, S> {
         let mut held = Vec::with_capacity(machine.axes.len());
         let mut state = Vec::with_capacity(machine.axes.len());
         for axis in &machine.axes {
-            let stands = source.held(&axis.name, &length);
-            held.push(stands.is_some());
-            let position = stands.unwrap_or_else(|| {
+            let held_position = source.held(&axis.name, &length);
+            held.push(held_position.is_some());
+            let position = held_position.unwrap_or_else(|| {
                 nominal(Variable::Position {
                     axis: axis.name.clone(),
                     kind: axis.kind,

@@ -60,12 +60,12 @@ impl Source for SessionTest<'_> {
             return None;
         }
         let written = self.test.at_written.get(index).and_then(Option::as_ref);
-        let stands = if least.is_finite() {
+        let held_position = if least.is_finite() {
             least
         } else {
             self.test.at[index]
         };
-        Some(written.map_or_else(|| N::constant(stands), |written| written.evaluate(length)))
+        Some(written.map_or_else(|| N::constant(held_position), |written| written.evaluate(length)))
     }
 
     fn length_mm(&self, name: &str) -> Option<f64> {

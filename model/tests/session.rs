@@ -356,10 +356,10 @@ fn missing_runs_are_reported() {
             read::session(&path, &ReadOptions::default()).unwrap().warnings
         };
         let forward_only = movement.replace("both_directions = true", "both_directions = false");
-        let said = |runs: &[bool]| warnings_of(movement, runs, true);
+        let reported = |runs: &[bool]| warnings_of(movement, runs, true);
         let one_way = |runs: &[bool]| warnings_of(&forward_only, runs, true);
         let unseparated = || warnings_of(movement, &[true, false], false);
-        assert!(said(&[true, false, true, false]).is_empty(), "{movement}");
+        assert!(reported(&[true, false, true, false]).is_empty(), "{movement}");
         // One direction is stated, but the other one was run as well, or instead.
         for (runs, found) in [
             (&[true, true, false][..], "2 runs forward and 1 backward"),
@@ -385,7 +385,7 @@ fn missing_runs_are_reported() {
             (&[true, true, true, true][..], "4 runs forward and 0 backward"),
             (&[false][..], "0 runs forward and 1 backward"),
         ] {
-            let warnings = said(runs);
+            let warnings = reported(runs);
             assert_eq!(warnings.len(), 1, "{warnings:?}");
             assert!(warnings[0].starts_with("test \"T\": "), "{warnings:?}");
             assert!(warnings[0].contains(found), "{warnings:?}");

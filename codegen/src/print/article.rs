@@ -63,10 +63,12 @@ impl Article {
     pub(crate) fn new(equation: &Equation) -> Self {
         let (program, sections) = match &equation.form {
             Form::Exact => exact::sections(equation),
-            Form::Groups { layout, complete, .. } => groups(equation, layout, *complete),
-            Form::First(first, layout) => first_order(equation, first, layout),
+            Form::Groups {
+                printed, complete, ..
+            } => groups(equation, printed, *complete),
+            Form::First(first, printed) => first_order(equation, first, printed),
         };
-        let told = |index: usize, input: &Input| match input {
+        let is_listed = |index: usize, input: &Input| match input {
             // Omit a length or position that the form does not contain.
             Input::Plain(variable) if variable.is_small() => true,
             Input::Plain(_) => uses(&sections, index),
@@ -75,7 +77,7 @@ impl Article {
         };
         let inputs = program.inputs.iter().enumerate();
         let symbols = inputs
-            .filter(|(index, input)| told(*index, input))
+            .filter(|(index, input)| is_listed(*index, input))
             .map(|(_, input)| match input {
                 Input::Plain(variable) => {
                     (input.clone(), notes::meaning(equation, variable), variable.unit())
@@ -222,35 +224,35 @@ const S: Label = Label::Scalar("S");
 fn first_order(
     equation: &Equation,
     first: &FirstOrder,
-    layout: &PrintedFirstOrder,
+    printed: &PrintedFirstOrder,
 ) -> (Program, Vec<Section>) {
     let is_length = matches!(equation.kind, Kind::Length | Kind::Distance);
     let program = naming(equation, if is_length { vec![L_0, S] } else { Vec::new() });
     let (l_0, s) = (Tree::Step(0), Tree::Step(1));
-    let named = (equation.kind == Kind::Distance).then(|| layout.with_named_length(&l_0));
-    let layout = named.as_ref().unwrap_or(layout);
+    let named = (equation.kind == Kind::Distance).then(|| printed.with_named_length(&l_0));
+    let printed = named.as_ref().unwrap_or(printed);
     let mut sum_rows = Vec::new();
     if is_length {
-        sum_rows.push(row(LeftSide::Square(L_0), layout.nominal[0].clone()));
+        sum_rows.push(row(LeftSide::Square(L_0), printed.nominal[0].clone()));
         sum_rows.push(row(
             LeftSide::Named(S),
-            sum(terms(equation, first, layout, 0, true)),
+            sum(terms(equation, first, printed, 0, true)),
         ));
         let slope = binary(Binary::Div, s, l_0.clone());
-        let mut all = terms_of(&layout.without_errors(l_0.clone()));
+        let mut all = terms_of(&printed.without_errors(l_0.clone()));
         all.push((false, slope));
-        all.extend(terms(equation, first, layout, 0, false));
+        all.extend(terms(equation, first, printed, 0, false));
         sum_rows.push(EquationLine {
             approximate: true,
             ..row(LeftSide::Output(0), sum(all))
         });
     } else {
-        for (index, nominal) in layout.nominal.iter().enumerate() {
+        for (index, nominal) in printed.nominal.iter().enumerate() {
             let mut all = Vec::new();
             if *nominal != Tree::Number(0.0) {
                 all.push((false, nominal.clone()));
             }
-            all.extend(terms(equation, first, layout, index, false));
+            all.extend(terms(equation, first, printed, index, false));
             sum_rows.push(EquationLine {
                 approximate: true,
                 ..row(LeftSide::Output(index), sum(all))
@@ -258,7 +260,7 @@ fn first_order(
         }
     }
     let mut table = Vec::new();
-    for (sensitivity, coefficients) in first.sensitivities.iter().zip(&layout.coefficients) {
+    for (sensitivity, coefficients) in first.sensitivities.iter().zip(&printed.coefficients) {
         let remark = match &sensitivity.column {
             Column::Distinct => None,
             Column::Zero => Some(NoteKind::NotObservable),
@@ -324,35 +326,39 @@ fn order_words(order: Order) -> &'static str {
 fn terms(
     equation: &Equation,
     first: &FirstOrder,
-    layout: &PrintedFirstOrder,
+    printed: &PrintedFirstOrder,
     coordinate: usize,
     over_length: bool,
 ) -> Vec<(bool, Tree)> {
     let inputs = equation.inputs();
     let input = |parameter: &Variable| {
-        let wanted = Input::Plain(parameter.clone());
-        inputs.iter().position(|input| *input == wanted).map(Tree::Input)
+        let requested = Input::Plain(parameter.clone());
+        inputs
+            .iter()
+            .position(|input| *input == requested)
+            .map(Tree::Input)
     };
     let mut terms = Vec::new();
     for (index, sensitivity) in first.sensitivities.iter().enumerate() {
-        let coefficient = &layout.coefficients[index][coordinate];
+        let coefficient = &printed.coefficients[index][coordinate];
         // A multiple stays a separate term if only one of the two columns is divided by L₀, or if its factor is a fraction, which is not
         // shorter.
-        let stands = match &sensitivity.column {
+        let is_separate = match &sensitivity.column {
             Column::Distinct => true,
             Column::Zero => false,
             Column::Multiple { of, .. } => {
                 let mut bases = first.sensitivities.iter();
-                is_fraction(&layout.factors[index])
+                is_fraction(&printed.factors[index])
                     || bases.any(|base| base.parameter == *of && base.over_length != sensitivity.over_length)
             }
         };
-        let shown = stands && sensitivity.over_length == over_length && *coefficient != Tree::Number(0.0);
+        let shown =
+            is_separate && sensitivity.over_length == over_length && *coefficient != Tree::Number(0.0);
         let (true, Some(own)) = (shown, input(&sensitivity.parameter)) else {
             continue;
         };
         let mut errors = vec![(false, own)];
-        for (other, factor) in first.sensitivities.iter().zip(&layout.factors) {
+        for (other, factor) in first.sensitivities.iter().zip(&printed.factors) {
             let Column::Multiple { of, .. } = &other.column else {
                 continue;
             };

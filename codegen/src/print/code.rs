@@ -147,11 +147,11 @@ impl<'e> Code<'e> {
     pub(crate) fn new(equation: &'e Equation, gradient: bool) -> Self {
         let program = equation.program(gradient);
         let mut taken: HashSet<String> = RESERVED_WORDS.iter().map(|word| (*word).to_string()).collect();
-        let mut name = |wanted: String| {
-            let mut free = wanted.clone();
+        let mut name = |requested: String| {
+            let mut free = requested.clone();
             let mut number = 2;
             while !taken.insert(free.clone()) {
-                free = format!("{wanted}_{number}");
+                free = format!("{requested}_{number}");
                 number += 1;
             }
             free
@@ -177,7 +177,8 @@ impl<'e> Code<'e> {
             .iter()
             .map(|step| name(step_name(&step.label, symbols)))
             .collect();
-        let count = |wanted: &dyn Fn(&Input) -> bool| program.inputs.iter().filter(|i| wanted(i)).count();
+        let count =
+            |requested: &dyn Fn(&Input) -> bool| program.inputs.iter().filter(|i| requested(i)).count();
         let lengths = count(&|input| matches!(input, Input::Plain(Variable::Length(_))));
         let small = count(&|input| matches!(input, Input::Plain(variable) if variable.is_small()));
         let all = program.inputs.len();

@@ -275,11 +275,11 @@ fn every_form_is_confirmed_with_every_shape() {
                 match equation.print(language) {
                     Ok(text) => assert!(!(text.contains("NaN") || curved && for_readers), "{text}"),
                     Err(refused) => {
-                        let told = refused.to_string();
-                        assert!(curved && for_readers, "{told}");
+                        let message = refused.to_string();
+                        assert!(curved && for_readers, "{message}");
                         assert!(
-                            told.contains("`EYC~C:curve`") && told.contains("rust, c, python"),
-                            "{told}"
+                            message.contains("`EYC~C:curve`") && message.contains("rust, c, python"),
+                            "{message}"
                         );
                     }
                 }
@@ -341,15 +341,18 @@ fn effects_without_a_closed_form_are_refused_by_name() {
         intervals: 200,
         closed: true,
     };
-    let told = refused(effect("EZC", "C", long));
+    let message = refused(effect("EZC", "C", long));
     assert!(
-        told.contains("EZC~C:curve") && told.contains("200") && told.contains("fewer intervals"),
-        "{told}"
+        message.contains("EZC~C:curve") && message.contains("200") && message.contains("fewer intervals"),
+        "{message}"
     );
-    let told = refused(effect("EZA", "A", Shape::Backlash));
-    assert!(told.contains("EZA~A:backlash") && told.contains("`A`"), "{told}");
-    let told = refused(effect("tracker.x", "time", Shape::Drift));
-    assert!(told.contains("tracker.x~time:drift"), "{told}");
+    let message = refused(effect("EZA", "A", Shape::Backlash));
+    assert!(
+        message.contains("EZA~A:backlash") && message.contains("`A`"),
+        "{message}"
+    );
+    let message = refused(effect("tracker.x", "time", Shape::Drift));
+    assert!(message.contains("tracker.x~time:drift"), "{message}");
     let twice = effect("EZC", "C", Shape::Backlash);
     let equation = Equation::of(&machine, &Bar, &[], &with(vec![twice.clone(), twice]));
     assert!(matches!(equation, Err(CodegenError::Twice { .. })));

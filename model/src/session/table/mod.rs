@@ -202,12 +202,12 @@ impl<'a> ReadingColumns<'a> {
     /// Removes rows that are copies of earlier ones and returns a message that lists them.
     fn without_duplicates(&mut self) -> Option<String> {
         let kept = duplicates::kept(&self.readings, &self.cells)?;
-        let said = duplicates::message(&self.readings, &kept);
+        let message = duplicates::message(&self.readings, &kept);
         self.readings = self.readings.of_rows(&kept);
         if !self.socket.is_empty() {
             self.socket = kept.iter().map(|row| self.socket[*row]).collect();
         }
-        Some(said)
+        Some(message)
     }
 
     fn push(&mut self, row: &rows::Row) -> Result<(), ModelError> {
