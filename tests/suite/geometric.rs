@@ -146,7 +146,7 @@ fn centre(session: &Session, test: &str) -> [f64; 2] {
         abbe::identify::geometric::CircleGeometry::of(&session.machine, &problem.models[place]).unwrap();
     let observed = &problem.tests[place].readings.as_ref().unwrap().observed;
     let left_out = vec![false; observed.len()];
-    layout
+    geometry
         .centre(observed, &left_out)
         .unwrap()
         .offset_mm
