@@ -95,7 +95,7 @@ pub(crate) fn first<'a>(
     let read_over = read_over(run, vectors);
     let form = match (read_over.as_slice(), &run.subject) {
         ([bar], Subject::Station(Station::BallBar(station))) => {
-            let unknowns = run.bar_unknowns().map(|unknown| unknown.map(Symbol::operand));
+            let unknowns = run.bar_parameters().map(|unknown| unknown.map(Symbol::operand));
             FirstOrder::of_length(
                 &mut ring,
                 bar.components,
@@ -145,7 +145,7 @@ pub(crate) fn first<'a>(
     };
     vectors.clear();
     let operands = operands(arena, inputs);
-    let place = |parameter: &Variable| {
+    let index = |parameter: &Variable| {
         let wanted = Input::Plain(parameter.clone());
         inputs.iter().position(|input| *input == wanted)
     };
@@ -154,8 +154,8 @@ pub(crate) fn first<'a>(
         for (sensitivity, coefficients) in form.sensitivities.iter().zip(&laid_out.coefficients) {
             let coefficient = &coefficients[coordinate];
             let seen = *coefficient != Tree::Number(0.0) && sensitivity.over_length == over_length;
-            if let (true, Some(place)) = (seen, place(&sensitivity.parameter)) {
-                terms.push((false, product(vec![coefficient.clone(), Tree::Input(place)])));
+            if let (true, Some(index)) = (seen, index(&sensitivity.parameter)) {
+                terms.push((false, product(vec![coefficient.clone(), Tree::Input(index)])));
             }
         }
         sum(terms)

@@ -58,8 +58,8 @@ impl Monomial {
     pub fn divided_by(&self, other: &Monomial) -> Option<Monomial> {
         let mut quotient = self.clone();
         for (atom, power) in &other.0 {
-            let place = quotient.0.iter().position(|(own, n)| own == atom && n >= power)?;
-            quotient.0[place].1 -= power;
+            let index = quotient.0.iter().position(|(own, n)| own == atom && n >= power)?;
+            quotient.0[index].1 -= power;
         }
         quotient.0.retain(|(_, power)| *power > 0);
         Some(quotient)

@@ -72,7 +72,7 @@ fn the_three_methods_are_plans_in_which_the_bar_fits() {
 }
 
 #[test]
-fn runs_go_there_and_back_and_time_runs_on() {
+fn runs_alternate_direction_and_time_increases() {
     let session = plan("hermle-c600u/chapter5.toml");
     let readings = motion::planned(&session.machine, &session.tests[0]).unwrap();
     assert_eq!(readings.rows(), 4 * 361);
@@ -91,7 +91,7 @@ fn runs_go_there_and_back_and_time_runs_on() {
 }
 
 #[test]
-fn a_circle_goes_round_the_workpiece_ball_wherever_it_stands() {
+fn a_circle_is_centred_on_the_workpiece_ball_anywhere() {
     let test = "bar_mm = 100\nworkpiece_ball_mm = [10, 20, 30]\n\
                 path = { kind = \"circle\", plane = \"XY\", radius_mm = 100, step_deg = 0.5, feed_mm_min = 1000 }";
     let session = one_test(test).unwrap();
@@ -133,7 +133,7 @@ fn a_plan_beyond_the_travel_is_refused() {
 }
 
 #[test]
-fn effects_written_read_back_the_same() {
+fn written_effects_read_back_equal() {
     let effect = |component: &str, driver: &str, shape: Shape| Effect {
         component: Component::parse(component).unwrap(),
         driver: Driver::parse(driver),
@@ -323,7 +323,7 @@ fn sockets_named_by_a_column_become_tests() {
 }
 
 #[test]
-fn runs_that_the_data_lack_are_said() {
+fn missing_runs_are_reported() {
     let sweep = "sweep = { axis = \"C\", from_deg = 0, to_deg = 270, step_deg = 90, runs = 2, both_directions = true }";
     let circle = "path = { kind = \"circle\", plane = \"XY\", radius_mm = 100, step_deg = 90, runs = 2, both_directions = true }";
     for (movement, columns) in [(sweep, "c_deg"), (circle, "x_mm,y_mm")] {

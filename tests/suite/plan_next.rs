@@ -150,8 +150,8 @@ fn a_second_radius_separates_tilt_and_axial_motion() {
     );
 }
 
-/// A curve is the sensitivity along a test; the result also states the largest of all tests. A length changes a reading by at most its own size, an
-/// angle of 1″ by 5 nm per millimetre of lever.
+/// A curve is the sensitivity along a test; the result also states the largest of all tests. A length changes a reading by at most its
+/// own size, an angle of 1″ by 5 nm per millimetre of lever.
 #[test]
 fn curves_reach_the_largest_sensitivity() {
     let options = PlanOptions {

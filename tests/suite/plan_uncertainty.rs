@@ -156,7 +156,8 @@ fn check(code: &str, sums: &[(String, f64)]) {
             "{code} {id}: χ² {sum:.0} over {FITS}"
         );
     }
-    // With one axis in the head and one in the table only the relative location of the two lines is identifiable: two pairs of errors are confounded.
+    // With one axis in the head and one in the table only the relative location of the two lines is identifiable: two pairs of errors are
+    // confounded.
     let divided = code.starts_with("[wC") && !code.starts_with("[wCA") && !code.starts_with("[wCB");
     assert_eq!(errors, if divided { 4 } else { 8 }, "{code}");
 }

@@ -211,9 +211,9 @@ impl<'e> Code<'e> {
     }
 
     /// Whether the program uses an input.
-    pub(crate) fn uses(&self, place: usize) -> bool {
+    pub(crate) fn uses(&self, index: usize) -> bool {
         let steps = self.program.steps.iter().map(|step| &step.value);
-        steps.chain(&self.program.outputs).any(|tree| tree.holds(place))
+        steps.chain(&self.program.outputs).any(|tree| tree.holds(index))
     }
 
     /// The steps as text; `assign` writes an assignment in the language.
@@ -239,8 +239,8 @@ impl<'e> Code<'e> {
         lines.push(String::new());
         lines.push("Arguments in order:".to_string());
         for (group, places) in GROUPS.iter().zip(&self.groups) {
-            for (number, place) in places.clone().enumerate() {
-                let input = &self.program.inputs[place];
+            for (number, index) in places.clone().enumerate() {
+                let input = &self.program.inputs[index];
                 let (unit, meaning) = match input {
                     Input::Plain(variable) => (variable.unit(), notes::meaning(equation, variable)),
                     Input::Sine(variable) => ("1", format!("sine of the {}", variable.meaning())),
@@ -249,7 +249,7 @@ impl<'e> Code<'e> {
                 let argument = at(group, number);
                 lines.push(format!(
                     "  {argument:<12} {:<12} {unit:<4} {meaning}",
-                    self.inputs[place]
+                    self.inputs[index]
                 ));
             }
         }

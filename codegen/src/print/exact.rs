@@ -6,7 +6,7 @@
 
 use crate::equation::{Equation, Kind};
 use crate::print::article::{
-    EquationLine, LeftSide, Section, norm_of_steps, quantity_heading, row, with_bar_unknowns,
+    EquationLine, LeftSide, Section, norm_of_steps, quantity_heading, row, with_bar_parameters,
 };
 use crate::program::{Label, Naming, Program, Step, Tree};
 use crate::symbol::{Binary, Operand, Symbol};
@@ -96,7 +96,7 @@ pub(crate) fn sections(equation: &Equation) -> (Program, Vec<Section>) {
     let mut read = Section {
         heading: quantity_heading(equation).to_string(),
         rows: outputs
-            .map(|(place, tree)| row(LeftSide::Output(place), tree.clone()))
+            .map(|(index, tree)| row(LeftSide::Output(index), tree.clone()))
             .collect(),
     };
     if equation.kind == Kind::Distance {
@@ -126,16 +126,16 @@ pub(crate) fn sections(equation: &Equation) -> (Program, Vec<Section>) {
             .iter()
             .position(|step| step.label == Label::Scalar("d"));
         read.rows = match named {
-            Some(place) => vec![
+            Some(index) => vec![
                 row(LeftSide::Named(Label::Scalar("d")), norm),
                 row(
                     LeftSide::Output(0),
-                    with_bar_unknowns(equation, &program, Tree::Step(place)),
+                    with_bar_parameters(equation, &program, Tree::Step(index)),
                 ),
             ],
             None => vec![row(
                 LeftSide::Output(0),
-                with_bar_unknowns(equation, &program, norm),
+                with_bar_parameters(equation, &program, norm),
             )],
         };
     }

@@ -8,7 +8,7 @@ use abbe_model::session::read::{self, ReadOptions};
 use super::{DATA, MACHINE, SESSION, holds, session, told, with_data, with_machine, with_session};
 
 #[test]
-fn files_that_are_none() {
+fn missing_and_invalid_files() {
     let folder = tempfile::tempdir().unwrap();
     let read = |path: &Path| told(read::session(path, &ReadOptions::default()));
     holds(&read(folder.path()), &["this is a folder"]);
@@ -22,7 +22,7 @@ fn files_that_are_none() {
 }
 
 #[test]
-fn text_that_is_no_toml() {
+fn invalid_toml() {
     holds(
         &with_session("kind = ", "kind "),
         &["session.toml:5", "not valid TOML"],
@@ -69,7 +69,7 @@ fn unknown_keys() {
 }
 
 #[test]
-fn numbers_that_are_none() {
+fn invalid_numbers() {
     holds(
         &with_data(&DATA.replace("100.0010", "NaN")),
         &["C100.csv:3", "column 4", "NaN"],

@@ -73,7 +73,7 @@ fn latin_1_and_utf_16_are_read_as_utf_8_is() {
 }
 
 #[test]
-fn lines_above_the_header_are_passed_over() {
+fn lines_above_the_header_are_skipped() {
     let above = format!("Gerät \"7\nSerie;1;2;3;4\n\n{DATA}");
     let read = with_bytes("[format]\nskip_lines = 3\n", above.as_bytes()).unwrap();
     let readings = read.tests[0].readings.as_ref().unwrap();
@@ -136,7 +136,7 @@ fn a_file_without_a_header_keeps_its_first_reading() {
 }
 
 #[test]
-fn a_column_is_one_column() {
+fn a_foreign_column_maps_to_one_column() {
     let twice = "angle,reading,reading\n0,99.9,100.0\n90,99.9,100.0\n";
     let columns = "[columns]\nc_deg = \"angle\"\nlength_mm = \"reading\"\n";
     let fault = told(with_bytes(columns, twice.as_bytes()));
@@ -169,7 +169,7 @@ fn a_column_is_one_column() {
 }
 
 #[test]
-fn an_empty_table_of_columns_is_none() {
+fn an_empty_table_of_columns_is_ignored() {
     assert_eq!(
         observed(&with_bytes("[columns]\n", DATA.as_bytes()).unwrap()).len(),
         4
@@ -187,7 +187,7 @@ fn an_empty_table_of_columns_is_none() {
 }
 
 #[test]
-fn copies_of_rows_are_named_and_are_no_repeats() {
+fn duplicate_rows_are_reported_and_are_not_repeats() {
     let copied = |data: &str| {
         let read = session(MACHINE, SESSION, Some(data)).unwrap();
         (read.tests[0].readings.as_ref().unwrap().rows(), read.warnings)
@@ -260,7 +260,7 @@ fn notes_of_the_measurement_are_kept_in_order() {
 }
 
 #[test]
-fn the_sign_of_an_axis_is_suggested_as_its_unit_is() {
+fn sign_and_unit_mistakes_of_an_axis_are_suggested() {
     // X moves the ball away from the axis of C; with the opposite sign the bar fits.
     let with = |column: &str, value: &dyn Fn(f64) -> f64| {
         let mut data = format!("run,{column},x_mm,y_mm,length_mm\n");

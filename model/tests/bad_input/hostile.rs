@@ -82,7 +82,7 @@ refused! {
     data_above: data_at("../C100.csv") => ["session.toml:10", "`data = \"../C100.csv\"`", OUTSIDE, "allow files outside"]
     data_above_by_a_detour: data_at("sub/../../C100.csv") => ["session.toml:10", OUTSIDE]
     data_in_another_branch: data_at("../other/C100.csv") => ["session.toml:10", OUTSIDE, "other"]
-    data_that_are_not_there_above: data_at("../nowhere.csv") => ["session.toml:10", "`../nowhere.csv` does not exist"]
+    missing_data_in_the_parent_folder: data_at("../nowhere.csv") => ["session.toml:10", "`../nowhere.csv` does not exist"]
     data_that_are_a_folder: data_at("sub") => ["sub:0", "it is a folder"]
     data_without_a_name: data_at("") => ["it is a folder"]
     data_with_a_nul: data_at("a\\u0000b") => ["session.toml:10", "control character U+0000"]
@@ -161,7 +161,7 @@ fn above_the_data_directory_is_outside_too() {
 }
 
 #[test]
-fn what_lies_inside_is_read_by_whatever_name() {
+fn files_inside_are_read_under_any_name() {
     let sandbox = Sandbox::new();
     let inside = sandbox.absolute("inner/sub/C100.csv").replace('\\', "/");
     for name in [
@@ -211,9 +211,9 @@ refused! {
     roots_beyond_all_depth: ball(&nested("sqrt(", ")", 60)) => ["session.toml:12", "nested deeper than 40"]
     signs_beyond_all_depth: ball(&nested("-", "", 60)) => ["session.toml:12", "nested deeper than 40"]
     squares_that_double_each_time: ball(&nested("(", ")^2", 38)) => ["session.toml:12", "too many nested squares"]
-    a_power_that_is_none: ball("2^3") => ["`^` with a power other than 2"]
+    a_power_other_than_two: ball("2^3") => ["`^` with a power other than 2"]
     a_division_by_zero: ball("1/0") => ["session.toml:12", "evaluates to inf"]
-    a_root_of_less_than_nothing: ball("sqrt(0-1)") => ["session.toml:12", "evaluates to NaN"]
+    a_root_of_a_negative_number: ball("sqrt(0-1)") => ["session.toml:12", "evaluates to NaN"]
     an_expression_that_breaks_off: ball("1+") => ["the expression ends where a number or a constant is expected"]
     an_expression_that_goes_on: ball("1 1") => ["`1` where the expression should end"]
     a_call_of_another_function: ball("exec(1)") => ["no constant `exec`"]
@@ -258,8 +258,8 @@ refused! {
     a_cell_that_is_not_utf8: with_bytes(&DATA.replace("100.0010", "100.0~").bytes().map(|b| if b == b'~' { 0xe4 } else { b }).collect::<Vec<_>>()) => ["C100.csv:3", "column 4", "is not a number"]
     a_cell_with_a_nul: with_data(&DATA.replace("100.0010", "100\0")) => ["C100.csv:3", "column 4", "is not a number"]
     a_cell_with_a_formula: with_data(&DATA.replace("100.0010", "=1+1")) => ["C100.csv:3", "`=1+1` is not a number"]
-    a_quote_without_its_end: with_data(&DATA.replace("100.0010", "\"100.0010")) => ["C100.csv:3", "a quote is not closed"]
-    a_run_that_is_no_whole_number: with_data(&DATA.replace("1,1,90", "1,1.5,90")) => ["C100.csv:3", "`1.5` is not a run number"]
+    an_unclosed_quote: with_data(&DATA.replace("100.0010", "\"100.0010")) => ["C100.csv:3", "a quote is not closed"]
+    a_run_number_that_is_not_an_integer: with_data(&DATA.replace("1,1,90", "1,1.5,90")) => ["C100.csv:3", "`1.5` is not a run number"]
     a_column_twice: with_data(&DATA.replace("time_s", "run")) => ["C100.csv:1", "`run`"]
     a_cell_too_many: with_data(&DATA.replace("100.0010", "100.0010,7")) => ["C100.csv:3", "5 cells", "4 columns"]
 }
@@ -348,7 +348,7 @@ refused! {
 /// A pipe is read once, as a stream.
 #[cfg(unix)]
 #[test]
-fn a_pipe_is_read_as_it_comes() {
+fn a_pipe_is_read_as_a_stream() {
     let sandbox = Sandbox::new();
     let pipe = sandbox.at("inner/pipe.csv");
     let made = std::process::Command::new("mkfifo").arg(&pipe).status().unwrap();
@@ -365,7 +365,7 @@ fn a_pipe_is_read_as_it_comes() {
 }
 
 #[test]
-fn what_was_read_is_known_to_be_the_same_or_changed() {
+fn changed_files_are_detected() {
     let sandbox = Sandbox::new();
     let session = sandbox.data("C100.csv").unwrap();
     let names: Vec<_> = session

@@ -3,7 +3,7 @@
 use super::{DATA, MACHINE, SESSION, holds, session, told, with_data, with_session, without_tests};
 
 #[test]
-fn instruments_that_there_are_not() {
+fn unknown_instruments() {
     holds(
         &with_session("\"ballbar\"", "\"bar\""),
         &[
@@ -30,7 +30,7 @@ fn uncertainties_below_zero() {
 }
 
 #[test]
-fn a_bar_that_cannot_reach() {
+fn a_bar_that_does_not_fit() {
     let radians = DATA.replace("c_deg", "a_deg");
     let offset = SESSION.replace("[0, 100, 0]", "[0, 100, 60]");
     holds(
@@ -61,7 +61,7 @@ fn a_bar_that_cannot_reach() {
 }
 
 #[test]
-fn probes_that_cannot_touch() {
+fn probes_that_miss_the_artefact() {
     const TEST: &str = r#"[[test]]
 name = "1a"
 data = "C100.csv"
@@ -85,7 +85,7 @@ at = { x_mm = 45, y_mm = 0, z_mm = 0, a_deg = 0 }
         (
             "stylus_mm = [0, 0, 0]",
             "stylus_mm = [0, 0, 0]\ndirection = [0, 1, 0]\nartefact_axis = [0, 1, 0]",
-            "looks past",
+            "misses the artefact",
         ),
         (
             "stylus_mm = [0, 0, 0]",
@@ -108,7 +108,7 @@ at = { x_mm = 45, y_mm = 0, z_mm = 0, a_deg = 0 }
 
 /// An invalid R-test: the change in a valid one, and the message.
 #[test]
-fn sensors_that_cannot_read() {
+fn invalid_sensors() {
     const TEST: &str = r#"[[test]]
 name = "BK2"
 data = "C100.csv"
@@ -174,7 +174,12 @@ at = { y_mm = 0, z_mm = 50, a_deg = 0 }
         (
             angles,
             "sensor_directions = [[1, 0, 0], [0, 1, 0], [1, 1, 0.01]]",
-            &["session.toml:14", "almost in a plane", "0.007", "three ways"],
+            &[
+                "session.toml:14",
+                "almost in a plane",
+                "0.007",
+                "three independent measuring directions",
+            ],
         ),
         (
             angles,

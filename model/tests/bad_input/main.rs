@@ -98,7 +98,7 @@ fn with_machine(from: &str, to: &str) -> String {
 }
 
 #[test]
-fn the_good_one_reads() {
+fn the_valid_session_reads() {
     let read = session(MACHINE, SESSION, Some(DATA)).unwrap();
     assert_eq!(read.tests[0].readings.as_ref().unwrap().rows(), 4);
 }

@@ -24,7 +24,7 @@ fn missing_data_file() {
 }
 
 #[test]
-fn test_names_twice_and_tests_absent() {
+fn duplicate_test_names_and_missing_tests() {
     let twice = SESSION.to_string() + &SESSION[without_tests().len()..];
     holds(
         &told(session(MACHINE, &twice, Some(DATA))),
@@ -37,7 +37,7 @@ fn test_names_twice_and_tests_absent() {
 }
 
 #[test]
-fn tests_that_do_not_say_how_they_move() {
+fn tests_without_a_motion() {
     holds(
         &with_session("data = \"C100.csv\"\n", ""),
         &["session.toml:8", "neither data nor a motion"],
@@ -51,7 +51,7 @@ fn tests_that_do_not_say_how_they_move() {
 }
 
 #[test]
-fn unknowns_that_the_machine_cannot_have() {
+fn errors_of_missing_axes() {
     let unknown = |name: &str| {
         with_session(
             "[[test]]",
@@ -63,7 +63,7 @@ fn unknowns_that_the_machine_cannot_have() {
 }
 
 #[test]
-fn effects_that_the_machine_cannot_have() {
+fn effects_on_missing_components() {
     let effect = |text: &str| {
         told(session(
             MACHINE,

@@ -34,7 +34,7 @@ fn missing_columns() {
 }
 
 #[test]
-fn columns_of_other_peoples_files() {
+fn foreign_columns() {
     let with = |columns: &str| SESSION.replace("[[test]]", &format!("{columns}\n[[test]]"));
     let foreign = "t,angle,reading,remark\n0,0,100.0,a\n1,1,100.1,b\n";
     let good = with("[columns]\ntime_s = \"t\"\nc_deg = \"angle\"\nlength_mm = 3\n");
@@ -125,7 +125,7 @@ fn a_decimal_comma_undeclared() {
 }
 
 #[test]
-fn time_running_backwards() {
+fn decreasing_time() {
     holds(
         &with_data(&DATA.replace("\n2,1", "\n0.5,1")),
         &[

@@ -154,7 +154,7 @@ fn derivatives_agree_with_central_differences_on_every_topology() {
 }
 
 /// The largest difference between the recorded chain and the chain over dual numbers, relative to the largest value or derivative. Errors
-/// are 10 mm and 0.1 rad, some of them vary between rows, and the rows exceed one block.
+/// are 10 mm and 0.1 rad; some of them vary between rows. The test has more rows than one block.
 fn worst_beside_duals(machine: &Machine, station: Station<f64>, random: &mut impl Rng) -> f64 {
     let rows = 131;
     let mut readings = states(machine, rows, random);
@@ -213,7 +213,7 @@ fn the_recorded_chain_is_the_chain_over_dual_numbers_at_large_errors() {
             for station in every_station(table, tool) {
                 let kind = station.kind();
                 let worst = worst_beside_duals(&machine, station, &mut random);
-                // Under 10 mm and 0.1 rad the normal of a cylinder can change strongly: the cause is cancellation, not another formula.
+                // Errors of 10 mm and 0.1 rad can turn the normal of a cylinder far. The larger tolerance allows for cancellation.
                 let most = if kind == InstrumentKind::Probe {
                     1e-9
                 } else {

@@ -69,7 +69,8 @@ fn bar(test: &Test) -> &BallBar<f64> {
     }
 }
 
-/// Asserts that tests with one set-up state one position and one uncertainty of its ball, and that the nominal length of the plant is the stated one.
+/// Asserts that tests with one set-up state one position and one uncertainty of its ball, and that the nominal length of the plant is the
+/// stated one.
 fn check_described_once(code: &str, plan: &Session) {
     assert!(plan.warnings.is_empty(), "{code}: {:?}", plan.warnings);
     for (index, test) in plan.tests.iter().enumerate() {

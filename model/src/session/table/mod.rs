@@ -255,8 +255,8 @@ impl<'a> ReadingColumns<'a> {
                 }
                 Role::Temperature => readings.temperature_c.push(value),
                 Role::Axis(axis, unit) => {
-                    if let Some(place) = readings.positions[axis].last_mut() {
-                        *place = unit.to_internal(value);
+                    if let Some(last) = readings.positions[axis].last_mut() {
+                        *last = unit.to_internal(value);
                     }
                 }
                 Role::Length(unit) => observed[0] = unit.to_internal(value),
