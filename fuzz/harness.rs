@@ -9,7 +9,7 @@ use std::path::Path;
 
 use abbe_model::ModelError;
 use abbe_model::session::read::{self, ReadOptions};
-use abbe_model::session::{Session, motion, rewrite, write};
+use abbe_model::session::{Session, planned, rewrite, write};
 
 const MACHINE: &str = "chain = \"w C A b Y X Z t\"\n[axis.C]\n[axis.A]\n[axis.X]\n[axis.Y]\n[axis.Z]\n";
 
@@ -124,7 +124,7 @@ pub fn session(input: &[u8]) {
         let steps = session.tests.iter().filter(|test| test.motion.is_some()).count();
         if short && steps == 1 {
             // A plan that the machine cannot execute gives an error.
-            if let Err(fault) = motion::planned_session(&session) {
+            if let Err(fault) = planned::planned_session(&session) {
                 check_message(&fault);
             }
         }

@@ -2,7 +2,8 @@
 
 use abbe_model::error::ModelError;
 use abbe_model::scalar::Nominal;
-use abbe_model::session::motion::{self, Motion};
+use abbe_model::session::motion::Motion;
+use abbe_model::session::planned;
 use abbe_model::session::{Session, Test};
 
 use crate::subject::{Source, Subject};
@@ -36,7 +37,7 @@ impl<'s> SessionTest<'s> {
                 held.collect()
             }
             (None, Some(_)) => {
-                let planned = motion::planned(&session.machine, test)?;
+                let planned = planned::planned(&session.machine, test)?;
                 planned.positions.iter().map(range).collect()
             }
         };

@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 
 use abbe_model::chain::BodyErrors;
 use abbe_model::effect::{Component, Driver, Effect, Shape};
-use abbe_model::session::motion;
+use abbe_model::session::planned;
 use abbe_model::session::read::{self, ReadOptions};
 use abbe_model::session::readings::Readings;
 use abbe_model::session::{Session, Test, write};
@@ -57,7 +57,7 @@ fn the_three_methods_are_plans_in_which_the_bar_fits() {
         for (test, readings) in session
             .tests
             .iter()
-            .zip(motion::planned_session(&session).unwrap())
+            .zip(planned::planned_session(&session).unwrap())
         {
             for length in nominal(&session, test, &readings) {
                 let bar = if test.name.ends_with("150") {
@@ -74,7 +74,7 @@ fn the_three_methods_are_plans_in_which_the_bar_fits() {
 #[test]
 fn runs_alternate_direction_and_time_increases() {
     let session = plan("hermle-c600u/chapter5.toml");
-    let readings = motion::planned(&session.machine, &session.tests[0]).unwrap();
+    let readings = planned::planned(&session.machine, &session.tests[0]).unwrap();
     assert_eq!(readings.rows(), 4 * 361);
     assert_eq!(readings.runs().len(), 4);
     assert_eq!(readings.run.last(), Some(&4));
@@ -86,7 +86,7 @@ fn runs_alternate_direction_and_time_increases() {
     // 500 mm/min at 100 mm: 5 rad/min.
     let turn = 90.0_f64.to_radians();
     assert!((readings.time_s[360] - turn / 5.0 * 60.0).abs() < 1e-9);
-    let all = motion::planned_session(&session).unwrap();
+    let all = planned::planned_session(&session).unwrap();
     assert!(all[1].time_s[0] > *all[0].time_s.last().unwrap());
 }
 
@@ -95,7 +95,7 @@ fn a_circle_is_centred_on_the_workpiece_ball_anywhere() {
     let test = "bar_mm = 100\nworkpiece_ball_mm = [10, 20, 30]\n\
                 path = { kind = \"circle\", plane = \"XY\", radius_mm = 100, step_deg = 0.5, feed_mm_min = 1000 }";
     let session = one_test(test).unwrap();
-    let readings = motion::planned(&session.machine, &session.tests[0]).unwrap();
+    let readings = planned::planned(&session.machine, &session.tests[0]).unwrap();
     assert_eq!(readings.rows(), 2 * 721);
     for length in nominal(&session, &session.tests[0], &readings) {
         assert!((length - 100.0).abs() < 1e-10, "{length}");
@@ -113,7 +113,7 @@ fn linear_axes_follow_a_rotary_one_at_the_length_of_the_bar() {
                  offset = \"{offset}\", from_deg = 0, to_deg = 90, step_deg = 1 }}"
             );
             let session = one_test(&test).unwrap();
-            let readings = motion::planned(&session.machine, &session.tests[0]).unwrap();
+            let readings = planned::planned(&session.machine, &session.tests[0]).unwrap();
             for length in nominal(&session, &session.tests[0], &readings) {
                 assert!((length - 100.0).abs() < 1e-9, "{axis} {offset}: {length}");
             }
@@ -255,7 +255,7 @@ fn a_plan_becomes_a_measured_session() {
     let original = fs::read_to_string(ready("hermle-c600u/chapter5.toml")).unwrap();
     let folder = tempfile::tempdir().unwrap();
     let mut data = Vec::new();
-    let plans = motion::planned_session(&session).unwrap();
+    let plans = planned::planned_session(&session).unwrap();
     let mut measured = Vec::new();
     for (test, mut readings) in session.tests.iter().zip(plans) {
         readings.observed = nominal(&session, test, &readings);

@@ -6,7 +6,8 @@ use abbe::identify::geometric::{Estimator, Method, compare};
 use abbe::identify::noise::{Noise, NoiseSource};
 use abbe::identify::problem::Problem;
 use abbe::model::instrument::Station;
-use abbe::model::session::motion::{self, Motion};
+use abbe::model::session::motion::Motion;
+use abbe::model::session::planned;
 use abbe::model::session::read::{self, ReadOptions};
 use abbe::model::session::{Prior, Session};
 use nalgebra::{Point3, Rotation3, Translation3, Vector3};
@@ -81,7 +82,7 @@ fn measured(plan: &Session, errors: &Errors, moved: [f64; 3], noise: Option<(f64
     let [a, c, x, y, z] = ["A", "C", "X", "Y", "Z"].map(place);
     let mut random = Pcg64::seed_from_u64(noise.map_or(0, |(_, seed)| seed));
     for test in &mut session.tests {
-        let mut readings = motion::planned(&machine, test).unwrap();
+        let mut readings = planned::planned(&machine, test).unwrap();
         let Station::BallBar(bar) = &test.station else {
             unreachable!()
         };

@@ -197,7 +197,7 @@ fn touched(session: &mut Session, case: &Touched) {
     let machine = session.machine.clone();
     let [c, x, y] = ["C", "X", "Y"].map(|name| machine.axis_index(name).unwrap());
     for test in &mut session.tests {
-        let mut readings = abbe::model::session::motion::planned(&machine, test).unwrap();
+        let mut readings = abbe::model::session::planned::planned(&machine, test).unwrap();
         for row in 0..readings.rows() {
             let (commanded_x, commanded_y) = (readings.positions[x][row], readings.positions[y][row]);
             // The table rotates clockwise by C.

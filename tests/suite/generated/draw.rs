@@ -1,6 +1,6 @@
 //! Draws errors and set-ups and simulates the readings with the plant.
 
-use abbe::model::session::motion::planned_session;
+use abbe::model::session::planned::planned_session;
 use abbe::model::session::{Prior, Session, Test};
 use rand::SeedableRng;
 use rand_distr::{Distribution, StandardNormal};

@@ -16,7 +16,7 @@ use abbe::identify::quantity::Given;
 use abbe::identify::simulate::{Simulation, simulate};
 use abbe::model::instrument::Station;
 use abbe::model::instrument::ballbar::BallBar;
-use abbe::model::session::motion::planned_session;
+use abbe::model::session::planned::planned_session;
 use abbe::model::session::read::{self, ReadOptions};
 use abbe::model::session::{Session, Test};
 

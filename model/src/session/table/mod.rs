@@ -116,6 +116,13 @@ pub(crate) fn read(file: &Path, request: &Request<'_>) -> Result<(BySocket, Vec<
     let width = first.cells.len();
     let header = request.format.header.then_some(&first);
     let columns = columns::columns(request, file, &first, header)?;
+    required::required(
+        request,
+        file,
+        first.line,
+        &columns,
+        header.map(|row| row.cells.as_slice()),
+    )?;
     let mut filled = ReadingColumns::new(request, stamp, columns);
     if header.is_none() {
         filled.push(&first)?;
