@@ -1,6 +1,6 @@
-//! Words around numbers.
+//! Counts with correct number agreement, for messages.
 
-/// A count with its thing, which agrees with it in number.
+/// A count with its noun, singular or plural.
 ///
 /// ```
 /// use abbe_model::words::counted;
@@ -22,7 +22,7 @@ pub fn counted(count: impl TryInto<u64> + std::fmt::Display + Copy, thing: &str)
         None => (thing, ""),
     };
     let plural = match noun.strip_suffix('y') {
-        Some(id_stem) if !id_stem.ends_with(['a', 'e', 'o']) => format!("{id_stem}ies"),
+        Some(stem) if !stem.ends_with(['a', 'e', 'o']) => format!("{stem}ies"),
         _ => format!("{noun}s"),
     };
     format!("{count} {plural}{rest}")

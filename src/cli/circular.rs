@@ -59,7 +59,7 @@ pub fn print(tests: &[CircularTest]) {
                 say!("  residual: {} rms", table::micrometres(rms));
             }
         }
-        for line in &test.not_told {
+        for line in &test.not_identifiable {
             say!("  not told: {line}");
         }
     }

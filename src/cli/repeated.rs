@@ -119,14 +119,14 @@ fn print(result: &Repeated) {
         .deviating
         .iter()
         .map(|off| {
-            let (by, u) = table::value_and_u(off.by, off.u);
+            let (by, u) = table::value_and_u(off.deviation, off.u);
             vec![
                 off.session.clone(),
                 off.id.clone(),
                 by,
                 u,
                 off.unit.clone(),
-                format!("{:.1}", (off.by / off.u).abs()),
+                format!("{:.1}", (off.deviation / off.u).abs()),
             ]
         })
         .collect();

@@ -88,8 +88,8 @@ fn print(result: &SelfCalibration) {
     );
     say!(
         "{} of four functions, rank {} before boundary conditions",
-        counted(result.values, "value"),
-        result.rank_before
+        counted(result.value_count, "value"),
+        result.rank_without_conditions
     );
     say!(
         "{} under {}, rank {}",

@@ -3,7 +3,7 @@
 use std::sync::Mutex;
 use std::time::Duration;
 
-use abbe::identify::plan::candidate_tests::CandidateTests;
+use abbe::identify::plan::test_variations::TestVariations;
 use abbe::identify::results::{EffectName, ModelResult, TraceResult};
 use abbe::identify::trace::separating_tests::separate_aliases;
 use abbe::identify::trace::{Progress, TraceOptions, library};
@@ -103,7 +103,7 @@ pub fn run(arguments: &TraceArguments) -> Result<(), Failure> {
     };
     let mut trace = abbe::identify::trace::trace(&session, &options, &report)?;
     bar.set_message("weighing further tests");
-    separate_aliases(&mut trace, &CandidateTests::short(), &report)?;
+    separate_aliases(&mut trace, &TestVariations::short(), &report)?;
     interrupts.end_at_once();
     bar.finish_and_clear();
     if tables {
@@ -115,7 +115,7 @@ pub fn run(arguments: &TraceArguments) -> Result<(), Failure> {
     }
     if let Some(path) = &arguments.write {
         let data = arguments.session.data.as_deref();
-        let text = rewrite::moved(&session.text, &session.file, output::folder_of(path), data)?;
+        let text = rewrite::relocated(&session.text, &session.file, output::folder_of(path), data)?;
         let mut next = write::with_effects(&text, &trace.effects, &session.machine);
         if trace.result.interrupted {
             let interruption = trace.result.interruption();
@@ -164,16 +164,16 @@ fn progress_bar(quiet: bool) -> ProgressBar {
 
 fn list(session: &abbe::model::session::Session, options: &TraceOptions) -> Result<(), Failure> {
     let families = library::families()?;
-    let entries = abbe::identify::trace::screening::entries(session, options)?;
+    let entries = abbe::identify::trace::screening::screened_effects(session, options)?;
     for (number, family) in families.iter().enumerate() {
         let of_family: Vec<_> = entries.iter().filter(|entry| entry.family == number).collect();
-        let seen = of_family.iter().filter(|entry| entry.seen).count();
+        let seen = of_family.iter().filter(|entry| entry.observable).count();
         let candidates = counted(of_family.len(), "candidate");
         say!("{}: {candidates}, {seen} seen", family.name);
         for entry in of_family {
             say!(
                 "  {} {}",
-                if entry.seen { "seen    " } else { "not seen" },
+                if entry.observable { "seen    " } else { "not seen" },
                 entry.id
             );
         }

@@ -1,7 +1,7 @@
 //! Effects that a trace has found, each beside its competing explanations.
 
 use abbe::identify::results::{EffectName, EffectResult, SeparatingTestResult, TraceResult};
-use abbe::identify::trace::Trace;
+use abbe::identify::trace::TraceOutcome;
 use abbe::identify::trace::alias::CompetingEffect;
 use abbe::model::words::counted;
 use maud::{Markup, html};
@@ -24,7 +24,7 @@ const MAX_RANKED: usize = 12;
 const MAX_NAMED: usize = 8;
 
 /// Found effects, rejected candidates, remaining structure and convergence of the search.
-pub fn section(document: &mut Document, trace: &Trace<'_>) -> Markup {
+pub fn section(document: &mut Document, trace: &TraceOutcome<'_>) -> Markup {
     let result = &trace.result;
     let blocks: Vec<Markup> = result
         .effects
@@ -264,7 +264,7 @@ fn curve(effect: &EffectResult) -> Plot {
 }
 
 /// Held-out error after each addition of the search.
-fn convergence(trace: &Trace<'_>) -> Plot {
+fn convergence(trace: &TraceOutcome<'_>) -> Plot {
     let before = trace.result.before.heldout_rms_um;
     let mut points = vec![(0.0, before)];
     points.extend(

@@ -1,6 +1,6 @@
 //! Report of `abbe plan --improve`, `--separate` and `--range`.
 
-use abbe::identify::plan::improve::{Improvement, Step};
+use abbe::identify::plan::improve::{Improvement, ProposedTest};
 use abbe::identify::plan::range::Shrinkage;
 use abbe::identify::problem::Problem;
 use abbe::model::words::counted;
@@ -50,17 +50,17 @@ fn verdict(found: &Improvement) -> String {
     match found.steps.as_slice() {
         [] => format!(
             "None of {} reduces the {}, {}.",
-            counted(found.menu_entries, "candidate test"),
-            name_of(&found.figure),
+            counted(found.candidate_tests, "candidate test"),
+            name_of(&found.criterion),
             digits(found.before)
         ),
         [.., last] => format!(
             "{} the {} from {} to {}.",
             match found.steps.len() {
-                1 => format!("1 of {} candidate tests reduces", found.menu_entries),
-                many => format!("{many} of {} candidate tests reduce", found.menu_entries),
+                1 => format!("1 of {} candidate tests reduces", found.candidate_tests),
+                many => format!("{many} of {} candidate tests reduce", found.candidate_tests),
             },
-            name_of(&found.figure),
+            name_of(&found.criterion),
             digits(found.before),
             digits(last.after)
         ),
@@ -85,9 +85,9 @@ fn proposed(document: &mut Document, found: &Improvement) -> Markup {
         "Plan with each proposed test".to_string(),
         format!(
             "{}. The tests are added one after another.",
-            capitalised(&unit(&found.figure))
+            capitalised(&unit(&found.criterion))
         ),
-        &unit(&found.figure),
+        &unit(&found.criterion),
         &bar_rows,
         &[],
     )]);
@@ -99,7 +99,7 @@ fn proposed(document: &mut Document, found: &Improvement) -> Markup {
             vec![
                 other.test.clone(),
                 digits(other.after),
-                format!("{:.1}", other.minutes),
+                format!("{:.1}", other.duration_min),
             ]
         })
         .collect();
@@ -122,20 +122,20 @@ fn proposed(document: &mut Document, found: &Improvement) -> Markup {
     }
 }
 
-fn row((number, step): (usize, &Step)) -> Vec<String> {
+fn row((number, step): (usize, &ProposedTest)) -> Vec<String> {
     let point = |mm: [f64; 3]| mm.map(|x| format!("{x:.1}").replace('-', "\u{2212}")).join(", ");
     vec![
         (number + 1).to_string(),
         digits(step.after),
         format!(
             "{:.1}{}",
-            step.minutes,
+            step.duration_min,
             if step.new_setup { " with set-up" } else { "" }
         ),
         point(step.workpiece_ball_mm),
         point(step.spindle_ball_mm),
         step.bar_mm.to_string(),
-        step.opens.join(", "),
+        step.makes_identifiable.join(", "),
         step.test.clone(),
     ]
 }
@@ -147,9 +147,12 @@ fn uncertainties(found: &Improvement) -> Markup {
         .uncertainties_before
         .iter()
         .enumerate()
-        .map(|(k, (id, before))| {
-            let with = found.steps.iter().map(|step| digits(step.uncertainties[k].1));
-            [id.clone(), digits(*before)].into_iter().chain(with).collect()
+        .map(|(k, before)| {
+            let with = found.steps.iter().map(|step| digits(step.uncertainties[k].u));
+            [before.id.clone(), digits(before.u)]
+                .into_iter()
+                .chain(with)
+                .collect()
         })
         .collect();
     let header: Vec<&str> = header.iter().map(String::as_str).collect();

@@ -86,7 +86,7 @@ fn figures(problem: &Problem<'_>, analysis: &PlanAnalysis) -> Vec<KeyFigure> {
             format!("{identifiable} of {}", analysis.errors.len()),
             "",
         ),
-        summary::rank(analysis.rank, analysis.unknowns),
+        summary::rank(analysis.rank, analysis.parameter_count),
     ];
     figures.extend(worst(analysis).into_iter().map(|error| {
         let u = error.u.unwrap_or_default();
@@ -126,7 +126,7 @@ fn worst(analysis: &PlanAnalysis) -> Vec<&ErrorAnalysis> {
 /// The largest contribution to the variance of an error.
 fn contribution(error: &ErrorAnalysis) -> String {
     error.budget.first().map_or(String::new(), |part| {
-        format!("{:.0} % of the variance from {}", 100.0 * part.share, part.from)
+        format!("{:.0} % of the variance from {}", 100.0 * part.share, part.source)
     })
 }
 
@@ -153,7 +153,7 @@ fn uncertainties(errors: &[ErrorAnalysis]) -> Vec<Plot> {
                 .filter(|error| error.unit == name)
                 .filter_map(|error| Some((error, error.u?)))
                 .flat_map(|(error, u)| {
-                    let known = error.u_others_known.unwrap_or(u);
+                    let known = error.conditional_u.unwrap_or(u);
                     [
                         (error.id.clone(), u, Fill::Named),
                         (format!("{}, conditional", error.id), known, Fill::Alias),
@@ -180,18 +180,18 @@ fn row(error: &ErrorAnalysis) -> Vec<String> {
         .budget
         .iter()
         .take(3)
-        .map(|part| format!("{} {:.0} %", part.from, 100.0 * part.share))
+        .map(|part| format!("{} {:.0} %", part.source, 100.0 * part.share))
         .collect();
     vec![
         error.id.clone(),
         figure(error.u),
         unit(&error.unit),
-        figure(error.u_others_known),
+        figure(error.conditional_u),
         format!(
             "{:.3} µm/{} in {}",
             error.sensitivity.largest,
             unit(&error.unit),
-            error.sensitivity.largest_in
+            error.sensitivity.largest_in_test
         )
         .replace('-', "\u{2212}"),
         budget.join(", "),
@@ -209,7 +209,7 @@ fn confounding(document: &mut Document, analysis: &PlanAnalysis) -> Markup {
         effects
             .effects
             .iter()
-            .filter(|effect| effect.verdict == "hidden" && !effect.biases.is_empty())
+            .filter(|effect| effect.verdict.starts_with("confounded") && !effect.biases.is_empty())
             .take(MAX_ROWS)
             .map(|effect| {
                 let biases = effect.biases.iter().take(2);
@@ -218,7 +218,7 @@ fn confounding(document: &mut Document, analysis: &PlanAnalysis) -> Markup {
                     .collect();
                 vec![
                     effect.id.clone(),
-                    format!("{:.2} %", 100.0 * effect.surviving_share),
+                    format!("{:.2} %", 100.0 * effect.residual_share),
                     biases.join(", "),
                 ]
             })
@@ -226,10 +226,10 @@ fn confounding(document: &mut Document, analysis: &PlanAnalysis) -> Markup {
     });
     html! {
         (shown)
-        (readings::confounded(&analysis.blind))
-        @if !analysis.held_by_setup.is_empty() {
+        (readings::confounded(&analysis.unidentifiable))
+        @if !analysis.determined_by_prior.is_empty() {
             h3 { "Errors determined by the set-up priors only" }
-            (list(analysis.held_by_setup.iter().map(|error| capitalised(&error.why))))
+            (list(analysis.determined_by_prior.iter().map(|error| capitalised(&error.why))))
         }
         @if !analysis.nearly_collinear.is_empty() {
             h3 { "Poorly separable errors" }
@@ -247,9 +247,9 @@ fn confounding(document: &mut Document, analysis: &PlanAnalysis) -> Markup {
 
 fn next(analysis: &PlanAnalysis, has_candidates: bool) -> Markup {
     html! {
-        @if !analysis.without.is_empty() {
+        @if !analysis.leave_one_out.is_empty() {
             h3 { "Contribution of each test" }
-            (list(analysis.without.iter().map(|without| capitalised(&without.why))))
+            (list(analysis.leave_one_out.iter().map(|without| capitalised(&without.why))))
         }
         @if has_candidates {
             p {

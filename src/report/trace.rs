@@ -5,7 +5,7 @@ use abbe::identify::plan::candidate_tests;
 use abbe::identify::problem::Problem;
 use abbe::identify::results::{ChangedParameter, ModelResult, TraceResult};
 use abbe::identify::series::{spectrum, views};
-use abbe::identify::trace::Trace;
+use abbe::identify::trace::TraceOutcome;
 use abbe::model::words::counted;
 use maud::{Markup, html};
 
@@ -59,7 +59,7 @@ fn verdict(result: &TraceResult) -> String {
 ///
 /// # Errors
 /// If the model cannot be evaluated.
-pub fn document(trace: &Trace<'_>) -> Result<Document, IdentifyError> {
+pub fn document(trace: &TraceOutcome<'_>) -> Result<Document, IdentifyError> {
     let result = &trace.result;
     let problem = &trace.after;
     let series = views(problem, &trace.after_fit, Some(&trace.before_fit.residuals))?;
@@ -130,7 +130,7 @@ fn quality<'r>(result: &'r TraceResult, model: &ModelResult) -> Quality<'r> {
 }
 
 /// Key figures of the summary.
-fn figures(trace: &Trace<'_>) -> Vec<KeyFigure> {
+fn figures(trace: &TraceOutcome<'_>) -> Vec<KeyFigure> {
     let result = &trace.result;
     let [before, after] = [&result.before, &result.after].map(|model| quality(result, model));
     let mut figures = vec![

@@ -1,5 +1,5 @@
-//! Faults around the program: full disks, outputs that cannot be written, pipes, files that lead elsewhere. The work is done, or a message
-//! says why not; what was there before still is.
+//! Faults of the environment: full disks, outputs that cannot be written, pipes, links. The command succeeds, or a message states the
+//! reason and existing files are unchanged.
 #![cfg(unix)]
 
 use std::fs;
@@ -36,11 +36,11 @@ workpiece_ball_u_um = [2, 2, 0]
 "#;
 
 /// A folder with that session and its readings.
-pub struct Place(pub tempfile::TempDir);
+pub struct TestFolder(pub tempfile::TempDir);
 
-impl Place {
-    pub fn new() -> Place {
-        let place = Place(tempfile::tempdir().unwrap());
+impl TestFolder {
+    pub fn new() -> TestFolder {
+        let place = TestFolder(tempfile::tempdir().unwrap());
         let mut table = String::from("run,x_mm,y_mm,length_mm\n");
         for k in 0..90 {
             let (sin, cos) = (f64::from(k) * 4.0).to_radians().sin_cos();
@@ -65,7 +65,7 @@ impl Place {
         abbe(&[&["fit", text(&session)], arguments].concat())
     }
 
-    /// A shell's line in the folder, `abbe` being the program.
+    /// Runs a shell line in the folder, with `abbe` as the program.
     pub fn shell(&self, line: &str) -> Output {
         let path = std::env::var("PATH").unwrap_or_default();
         let folder = Path::new(PROGRAM).parent().unwrap();
@@ -88,13 +88,13 @@ impl Place {
     }
 }
 
-/// The message of a command that could not do its work.
+/// Asserts exit status 1 and these parts of the message.
 #[track_caller]
 fn refused(output: &Output, parts: &[&str]) {
-    let told = String::from_utf8_lossy(&output.stderr);
-    assert_eq!(output.status.code(), Some(1), "{told}");
+    let stderr = String::from_utf8_lossy(&output.stderr);
+    assert_eq!(output.status.code(), Some(1), "{stderr}");
     for part in parts {
-        assert!(told.contains(part), "`{part}` is not in\n{told}");
+        assert!(stderr.contains(part), "`{part}` is not in\n{stderr}");
     }
 }
 
@@ -108,8 +108,8 @@ fn done(output: &Output) {
 }
 
 #[test]
-fn a_session_that_reads_outside_has_to_be_allowed_to() {
-    let place = Place::new();
+fn a_session_that_reads_outside_its_folder_needs_permission() {
+    let place = TestFolder::new();
     fs::create_dir(place.at("inner")).unwrap();
     place.put(
         "inner/session.toml",
@@ -128,26 +128,26 @@ fn a_session_that_reads_outside_has_to_be_allowed_to() {
             &output,
             &[
                 "session.toml:",
-                "leads out of the session's folder",
+                "is outside the session's folder",
                 "--allow-outside",
             ],
         );
         done(&place.shell(&format!("abbe {command} --allow-outside")));
     }
-    // The folder that the command line names is the user's own word.
+    // A folder on the command line is permitted.
     done(&place.shell("abbe fit inner/session.toml --data inner/.."));
 }
 
 #[test]
 fn a_full_standard_output() {
-    let place = Place::new();
+    let place = TestFolder::new();
     let output = place.shell("abbe fit session.toml > /dev/full");
     refused(&output, &["standard output: cannot be written", "No space left"]);
 }
 
 #[test]
-fn a_reader_that_has_seen_enough() {
-    let place = Place::new();
+fn a_closed_pipe_ends_without_a_message() {
+    let place = TestFolder::new();
     let output = place.shell("abbe fit session.toml | head -n 1");
     assert!(
         output.stderr.is_empty(),
@@ -158,7 +158,7 @@ fn a_reader_that_has_seen_enough() {
 
 #[test]
 fn a_full_device_for_a_file() {
-    let place = Place::new();
+    let place = TestFolder::new();
     refused(
         &place.fit(&["--json", "/dev/full"]),
         &["/dev/full: cannot be written", "No space left"],
@@ -168,15 +168,15 @@ fn a_full_device_for_a_file() {
 }
 
 #[test]
-fn a_full_disk_leaves_what_was_there() {
-    // Files of at most one block can be written: what a full disk says, said without a disk to fill.
+fn a_full_disk_leaves_existing_files_unchanged() {
+    // The limit on the file size is one block: the same error as on a full disk.
     for (option, file) in [
         ("--report", "out.html"),
         ("--json", "out.json"),
         ("--csv", "out.csv"),
         ("--plots", "plots"),
     ] {
-        let place = Place::new();
+        let place = TestFolder::new();
         if option != "--plots" {
             place.put(file, "old");
         }
@@ -194,7 +194,7 @@ fn a_full_disk_leaves_what_was_there() {
 
 #[test]
 fn standard_output_as_a_file() {
-    let place = Place::new();
+    let place = TestFolder::new();
     let piped = place.shell("abbe fit session.toml --json /dev/stdout | cat");
     let printed = String::from_utf8(piped.stdout).unwrap();
     assert!(
@@ -207,7 +207,7 @@ fn standard_output_as_a_file() {
 
 #[test]
 fn a_write_protected_file() {
-    let place = Place::new();
+    let place = TestFolder::new();
     place.put("out.json", "old");
     fs::set_permissions(place.at("out.json"), fs::Permissions::from_mode(0o444)).unwrap();
     let output = place.fit(&["--json", text(&place.at("out.json"))]);
@@ -221,7 +221,7 @@ fn a_write_protected_file() {
 
 #[test]
 fn an_output_that_would_replace_an_input() {
-    let place = Place::new();
+    let place = TestFolder::new();
     place.put("errors.toml", "EC0Y = \"5 arcsec\"\n");
     place.put("machine.toml", "chain = \"w b X t\"\n[axis.X]\n");
     place.put(
@@ -234,7 +234,7 @@ fn an_output_that_would_replace_an_input() {
         .replace("NAME", "circle")
         .replace("\"circle.csv\"", "\"../circle.csv\"");
     place.put("plans/session.toml", &outside);
-    let held = |place: &Place| {
+    let held = |place: &TestFolder| {
         let files = place.names().into_iter().filter(|name| name != "plans");
         files
             .map(|name| (fs::read_to_string(place.at(&name)).unwrap(), name))
@@ -285,8 +285,8 @@ fn an_output_that_would_replace_an_input() {
 }
 
 #[test]
-fn a_folder_that_is_not_there() {
-    let place = Place::new();
+fn a_missing_folder() {
+    let place = TestFolder::new();
     let output = place.fit(&["--csv", text(&place.at("nowhere/out.csv"))]);
     refused(
         &output,
@@ -297,7 +297,7 @@ fn a_folder_that_is_not_there() {
 
 #[test]
 fn a_file_for_a_folder() {
-    let place = Place::new();
+    let place = TestFolder::new();
     place.put("file", "");
     refused(
         &place.fit(&["--json", text(&place.at("file/out.json"))]),
@@ -311,7 +311,7 @@ fn a_file_for_a_folder() {
 
 #[test]
 fn a_folder_for_a_file() {
-    let place = Place::new();
+    let place = TestFolder::new();
     refused(
         &place.fit(&["--json", text(place.0.path())]),
         &["this is a folder; name a file in it"],
@@ -320,8 +320,8 @@ fn a_folder_for_a_file() {
 
 #[test]
 #[cfg(target_os = "linux")]
-fn a_folder_in_which_nobody_may_write() {
-    let place = Place::new();
+fn a_write_protected_folder() {
+    let place = TestFolder::new();
     refused(
         &place.fit(&["--json", "/proc/out.json"]),
         &["/proc/out.json: cannot be written"],
@@ -330,7 +330,7 @@ fn a_folder_in_which_nobody_may_write() {
 
 #[test]
 fn a_link_stays_a_link_and_permissions_stay() {
-    let place = Place::new();
+    let place = TestFolder::new();
     place.put("real.json", "old");
     fs::set_permissions(place.at("real.json"), fs::Permissions::from_mode(0o600)).unwrap();
     symlink("real.json", place.at("link.json")).unwrap();
@@ -349,11 +349,11 @@ fn a_link_stays_a_link_and_permissions_stay() {
 
 #[test]
 fn a_pipe_for_a_session() {
-    let place = Place::new();
+    let place = TestFolder::new();
     let fitted = place.shell("cat session.toml | abbe fit /dev/stdin --data .");
     done(&fitted);
     assert_eq!(fitted.stdout, place.fit(&[]).stdout);
-    // What comes through a pipe is written from what was read, and has no checksum afterwards.
+    // Input from a pipe is used as read, and has no checksum afterwards.
     done(&place.shell("cat session.toml | abbe simulate /dev/stdin --data . --out new"));
     assert!(
         fs::read_to_string(place.at("new/session.toml"))
@@ -373,7 +373,7 @@ fn a_pipe_for_a_session() {
 
 #[test]
 fn cells_at_opposite_corners_of_a_sheet() {
-    let place = Place::new();
+    let place = TestFolder::new();
     let mut book = Workbook::new();
     let sheet = book.add_worksheet();
     sheet.write_string(0, 0, "x_mm").unwrap();
@@ -385,14 +385,14 @@ fn cells_at_opposite_corners_of_a_sheet() {
     );
     refused(
         &place.fit(&[]),
-        &["far.xlsx: cells from column 1 to column 16384; 1000 columns are the most"],
+        &["far.xlsx: cells from column 1 to column 16384; the limit is 1000 columns"],
     );
 }
 
 #[test]
 fn names_that_are_formulas_are_text_in_a_spreadsheet() {
     for name in ["=cmd|' /C calc'!A0", "+1+1", "-2+3", "@SUM(1,2)", " =1"] {
-        let place = Place::new();
+        let place = TestFolder::new();
         place.put("session.toml", &SESSION.replace("NAME", name));
         let table = place.at("patterns.csv");
         done(&abbe(&[
@@ -409,14 +409,14 @@ fn names_that_are_formulas_are_text_in_a_spreadsheet() {
             "{name}: {:?}",
             rows[0]
         );
-        // Numbers stay numbers, those below zero too.
+        // Numbers stay numbers, including negative ones.
         assert!(rows.iter().any(|row| row[row.len() - 1].starts_with('-')));
     }
 }
 
 #[test]
-fn what_steers_a_terminal_is_not_shown_to_one() {
-    let place = Place::new();
+fn control_characters_are_not_shown() {
+    let place = TestFolder::new();
     let table = fs::read_to_string(place.at("circle.csv")).unwrap();
     place.put(
         "circle.csv",
@@ -430,7 +430,7 @@ fn what_steers_a_terminal_is_not_shown_to_one() {
 #[test]
 fn names_of_files_that_are_not_utf8() {
     use std::os::unix::ffi::OsStrExt;
-    let place = Place::new();
+    let place = TestFolder::new();
     let odd = place
         .0
         .path()

@@ -1,14 +1,14 @@
-//! Messages on standard error: one form, colour on a terminal alone, and counts that agree in number.
+//! Messages on standard error: one form, colour on a terminal only, and counts that agree in number.
 
 use std::fs;
 use std::path::Path;
 use std::process::{Command, Output};
 
-use super::faults::Place;
+use super::faults::TestFolder;
 
 const PROGRAM: &str = env!("CARGO_BIN_EXE_abbe");
 
-fn run(place: &Place, arguments: &[&str], environment: &[(&str, &str)]) -> Output {
+fn run(place: &TestFolder, arguments: &[&str], environment: &[(&str, &str)]) -> Output {
     Command::new(PROGRAM)
         .args(arguments)
         .current_dir(place.0.path())
@@ -21,9 +21,9 @@ fn run(place: &Place, arguments: &[&str], environment: &[(&str, &str)]) -> Outpu
         .unwrap()
 }
 
-/// Sessions that are refused at a line, refused as a whole, and warned of.
-fn place() -> Place {
-    let place = Place::new();
+/// Sessions that are refused at a line, refused as a whole, or accepted with a warning.
+fn test_folder() -> TestFolder {
+    let place = TestFolder::new();
     let session = fs::read_to_string(place.at("session.toml")).unwrap();
     place.put("key.toml", &session.replace("noise_um", "noise_umm"));
     place.put("loud.toml", &session.replace("noise_um = 0.3", "noise_um = 0.03"));
@@ -54,32 +54,32 @@ fn plain(text: &str) -> String {
 
 #[test]
 fn messages_have_one_form() {
-    let place = place();
+    let place = test_folder();
     for (arguments, starts) in MESSAGES {
         let output = run(&place, arguments, &[]);
-        let said = String::from_utf8(output.stderr).unwrap();
-        assert!(said.starts_with(starts[0]), "{arguments:?}: {said}");
+        let stderr = String::from_utf8(output.stderr).unwrap();
+        assert!(stderr.starts_with(starts[0]), "{arguments:?}: {stderr}");
         for start in *starts {
             assert!(
-                said.lines().any(|line| line.starts_with(start)),
-                "{start}: {said}"
+                stderr.lines().any(|line| line.starts_with(start)),
+                "{start}: {stderr}"
             );
         }
         for other in ["Error:", "Help:", "Warning:"] {
-            assert!(!said.contains(other), "{arguments:?}: {said}");
+            assert!(!stderr.contains(other), "{arguments:?}: {stderr}");
         }
     }
-    // The line that is meant is shown.
-    let said = String::from_utf8(run(&place, &["fit", "key.toml"], &[]).stderr).unwrap();
+    // The message shows the line.
+    let stderr = String::from_utf8(run(&place, &["fit", "key.toml"], &[]).stderr).unwrap();
     assert!(
-        said.contains("key.toml:8") && said.contains("noise_umm = 0.3"),
-        "{said}"
+        stderr.contains("key.toml:8") && stderr.contains("noise_umm = 0.3"),
+        "{stderr}"
     );
 }
 
 #[test]
 fn colour_is_for_terminals_and_no_color_is_respected() {
-    let place = place();
+    let place = test_folder();
     for (arguments, starts) in MESSAGES {
         let piped = String::from_utf8(run(&place, arguments, &[]).stderr).unwrap();
         assert!(!piped.contains('\u{1b}'), "{arguments:?}: {piped}");
@@ -103,7 +103,7 @@ fn a_terminal_has_colour() {
         println!("a_terminal_has_colour: skipped, there is no /usr/bin/script");
         return;
     }
-    let place = place();
+    let place = test_folder();
     let on_terminal = |environment: &[(&str, &str)]| {
         let output = Command::new("/usr/bin/script")
             .args(["-qec", &format!("{PROGRAM} fit key.toml"), "/dev/null"])
@@ -115,22 +115,25 @@ fn a_terminal_has_colour() {
             .unwrap();
         String::from_utf8(output.stdout).unwrap()
     };
-    let said = on_terminal(&[]);
+    let stderr = on_terminal(&[]);
     assert!(
-        said.starts_with('\u{1b}') && plain(&said).starts_with("error: "),
-        "{said}"
+        stderr.starts_with('\u{1b}') && plain(&stderr).starts_with("error: "),
+        "{stderr}"
     );
-    let said = on_terminal(&[("NO_COLOR", "1")]);
-    assert!(said.starts_with("error: ") && !said.contains('\u{1b}'), "{said}");
+    let stderr = on_terminal(&[("NO_COLOR", "1")]);
+    assert!(
+        stderr.starts_with("error: ") && !stderr.contains('\u{1b}'),
+        "{stderr}"
+    );
 }
 
 #[test]
 fn one_test_and_two_tests() {
-    let place = Place::new();
+    let place = TestFolder::new();
     let simulate = |out: &str, session: &str| {
         let output = run(&place, &["simulate", session, "--out", out], &[]);
-        let said = String::from_utf8_lossy(&output.stderr).into_owned();
-        assert!(output.status.success(), "{said}");
+        let stderr = String::from_utf8_lossy(&output.stderr).into_owned();
+        assert!(output.status.success(), "{stderr}");
         String::from_utf8(output.stdout).unwrap()
     };
     let one = fs::read_to_string(place.at("session.toml")).unwrap();

@@ -1,4 +1,4 @@
-//! C99, for one reading and for columns of readings in one block that vectorises.
+//! Printer for C99: one function for one reading, and one for columns of readings with a loop that vectorises.
 
 use std::fmt::Write;
 
@@ -13,11 +13,11 @@ impl Dialect for C<'_, '_> {
     fn number(&self, value: f64) -> String {
         format!("{value:?}")
     }
-    fn input(&self, place: usize) -> String {
-        self.0.inputs[place].clone()
+    fn input(&self, index: usize) -> String {
+        self.0.inputs[index].clone()
     }
-    fn step(&self, place: usize) -> String {
-        self.0.steps[place].clone()
+    fn step(&self, index: usize) -> String {
+        self.0.steps[index].clone()
     }
     fn product(&self, a: &str, b: &str) -> String {
         format!("{a} * {b}")
@@ -37,7 +37,7 @@ impl Dialect for C<'_, '_> {
     }
 }
 
-/// The file.
+/// Prints the file.
 pub(crate) fn print(equation: &Equation) -> String {
     let value = Code::new(equation, false);
     let whole = Code::new(equation, equation.options.gradient);
@@ -48,7 +48,7 @@ pub(crate) fn print(equation: &Equation) -> String {
     let advice = match whole.program.operations().roots {
         0 => "",
         _ => {
-            " * Compile with -O3 -fno-math-errno, or the square root keeps the loop over readings from being vectorised.\n"
+            " * Compile with -O3 -fno-math-errno, otherwise the square root prevents vectorisation of the loop over readings.\n"
         }
     };
     let _ = writeln!(
@@ -88,11 +88,11 @@ fn kernel(file: &mut String, code: &Code<'_>, gradient: bool) {
     }
     let results = code.results(&dialect);
     let (values, derivatives) = results.split_at(code.outputs());
-    for (place, value) in values.iter().enumerate() {
-        let _ = writeln!(file, "    value[{place}] = {value};");
+    for (index, value) in values.iter().enumerate() {
+        let _ = writeln!(file, "    value[{index}] = {value};");
     }
-    for (place, slope) in derivatives.iter().enumerate() {
-        let _ = writeln!(file, "    gradient[{place}] = {slope};");
+    for (index, slope) in derivatives.iter().enumerate() {
+        let _ = writeln!(file, "    gradient[{index}] = {slope};");
     }
     file.push_str("}\n\n");
 
@@ -105,35 +105,35 @@ fn kernel(file: &mut String, code: &Code<'_>, gradient: bool) {
         "void {name}_columns(size_t n, const double *restrict lengths, const double *restrict axes, const double *restrict errors, double *restrict value{slopes})"
     );
     let _ = writeln!(file, "/* {what} of n readings. */\n{many};\n\n{many}\n{{");
-    // Each column is a pointer of its own, so that the compiler sees that no two of them overlap.
-    for (number, place) in code.groups[1].clone().enumerate() {
-        if code.uses(place) {
+    // Each column is a pointer of its own, so that the compiler knows that no two overlap.
+    for (number, index) in code.groups[1].clone().enumerate() {
+        if code.uses(index) {
             let _ = writeln!(
                 file,
                 "    const double *restrict column_{} = axes + {number} * n;",
-                code.inputs[place]
+                code.inputs[index]
             );
         }
     }
-    for place in 0..code.outputs() {
-        let _ = writeln!(file, "    double *restrict value_{place} = value + {place} * n;");
+    for index in 0..code.outputs() {
+        let _ = writeln!(file, "    double *restrict value_{index} = value + {index} * n;");
     }
-    for place in 0..derivatives.len() {
+    for index in 0..derivatives.len() {
         let _ = writeln!(
             file,
-            "    double *restrict gradient_{place} = gradient + {place} * n;"
+            "    double *restrict gradient_{index} = gradient + {index} * n;"
         );
     }
-    if !code.groups[1].clone().any(|place| code.uses(place)) {
+    if !code.groups[1].clone().any(|index| code.uses(index)) {
         file.push_str("    (void)axes;\n");
     }
     declare(file, code, "    ", &[0, 2]);
-    // So many columns are more than gcc tests for overlap; the pragma tells it that there is none.
+    // gcc tests only a limited number of columns for overlap; the pragma asserts that there is none.
     file.push_str("#if defined(__GNUC__) && !defined(__clang__)\n#pragma GCC ivdep\n#endif\n");
     file.push_str("    for (size_t i = 0; i < n; ++i) {\n");
-    for place in code.groups[1].clone() {
-        if code.uses(place) {
-            let input = &code.inputs[place];
+    for index in code.groups[1].clone() {
+        if code.uses(index) {
+            let input = &code.inputs[index];
             let _ = writeln!(file, "        const double {input} = column_{input}[i];");
         }
     }
@@ -142,23 +142,23 @@ fn kernel(file: &mut String, code: &Code<'_>, gradient: bool) {
     }) {
         let _ = writeln!(file, "{line}");
     }
-    for (place, value) in values.iter().enumerate() {
-        let _ = writeln!(file, "        value_{place}[i] = {value};");
+    for (index, value) in values.iter().enumerate() {
+        let _ = writeln!(file, "        value_{index}[i] = {value};");
     }
-    for (place, slope) in derivatives.iter().enumerate() {
-        let _ = writeln!(file, "        gradient_{place}[i] = {slope};");
+    for (index, slope) in derivatives.iter().enumerate() {
+        let _ = writeln!(file, "        gradient_{index}[i] = {slope};");
     }
     file.push_str("    }\n}\n\n");
 }
 
-/// The used arguments of the given groups by name; a group without any is marked as unused.
+/// Declares the used arguments of the given groups by name; marks a group without any as unused.
 fn declare(file: &mut String, code: &Code<'_>, indent: &str, groups: &[usize]) {
     for group in groups {
         let mut used = false;
-        for (number, place) in code.groups[*group].clone().enumerate() {
-            if code.uses(place) {
+        for (number, index) in code.groups[*group].clone().enumerate() {
+            if code.uses(index) {
                 used = true;
-                let name = &code.inputs[place];
+                let name = &code.inputs[index];
                 let _ = writeln!(
                     file,
                     "{indent}const double {name} = {}[{number}];",

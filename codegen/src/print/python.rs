@@ -1,4 +1,4 @@
-//! Python with NumPy: one function for one reading and for arrays of readings.
+//! Printer for Python with NumPy: one function for one reading and for arrays of readings.
 
 use std::fmt::Write;
 
@@ -13,11 +13,11 @@ impl Dialect for Python<'_, '_> {
     fn number(&self, value: f64) -> String {
         format!("{value:?}")
     }
-    fn input(&self, place: usize) -> String {
-        self.0.inputs[place].clone()
+    fn input(&self, index: usize) -> String {
+        self.0.inputs[index].clone()
     }
-    fn step(&self, place: usize) -> String {
-        self.0.steps[place].clone()
+    fn step(&self, index: usize) -> String {
+        self.0.steps[index].clone()
     }
     fn product(&self, a: &str, b: &str) -> String {
         format!("{a} * {b}")
@@ -37,7 +37,7 @@ impl Dialect for Python<'_, '_> {
     }
 }
 
-/// The file.
+/// Prints the file.
 pub(crate) fn print(equation: &Equation) -> String {
     let value = Code::new(equation, false);
     let whole = Code::new(equation, equation.options.gradient);
@@ -77,9 +77,9 @@ fn function(file: &mut String, code: &Code<'_>, gradient: bool) {
         code.function()
     );
     for (group, places) in GROUPS.iter().zip(&code.groups) {
-        for (number, place) in places.clone().enumerate() {
-            if code.uses(place) {
-                let _ = writeln!(file, "    {} = {group}[{number}]", code.inputs[place]);
+        for (number, index) in places.clone().enumerate() {
+            if code.uses(index) {
+                let _ = writeln!(file, "    {} = {group}[{number}]", code.inputs[index]);
             }
         }
     }
@@ -87,7 +87,7 @@ fn function(file: &mut String, code: &Code<'_>, gradient: bool) {
         let _ = writeln!(file, "{line}");
     }
     let results = code.results(&dialect);
-    // Constants take the shape of the readings.
+    // Constants get the shape of the readings.
     let _ = writeln!(
         file,
         "    shape = np.broadcast_shapes(*(np.shape(argument) for group in (lengths, axes, errors) for argument in group))"

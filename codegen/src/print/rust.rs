@@ -1,4 +1,4 @@
-//! Rust without dependencies, for one reading and for columns of readings. Nothing but the elementary functions needs `std`.
+//! Printer for Rust without dependencies, for one reading and for columns of readings. Only the elementary functions need `std`.
 
 use std::fmt::Write;
 
@@ -13,11 +13,11 @@ impl Dialect for Rust<'_, '_> {
     fn number(&self, value: f64) -> String {
         format!("{value:?}")
     }
-    fn input(&self, place: usize) -> String {
-        self.0.inputs[place].clone()
+    fn input(&self, index: usize) -> String {
+        self.0.inputs[index].clone()
     }
-    fn step(&self, place: usize) -> String {
-        self.0.steps[place].clone()
+    fn step(&self, index: usize) -> String {
+        self.0.steps[index].clone()
     }
     fn product(&self, a: &str, b: &str) -> String {
         format!("{a} * {b}")
@@ -38,7 +38,7 @@ impl Dialect for Rust<'_, '_> {
     }
 }
 
-/// The file.
+/// Prints the file.
 pub(crate) fn print(equation: &Equation) -> String {
     let value = Code::new(equation, false);
     let whole = Code::new(equation, equation.options.gradient);
@@ -54,9 +54,9 @@ pub(crate) fn print(equation: &Equation) -> String {
                 "Positions of moving axes: sine and cosine of a rotary one."
             }
             "AXES" => {
-                "Positions of moving axes: sine and cosine of a rotary one; and what else effects follow."
+                "Positions of moving axes (sine and cosine of a rotary one), and other drivers of effects."
             }
-            _ => "Errors and instrument unknowns.",
+            _ => "Errors and instrument parameters.",
         };
         let _ = writeln!(file, "/// {what}\npub const {name}: usize = {};", places.len());
     }
@@ -112,9 +112,9 @@ fn single(file: &mut String, code: &Code<'_>, gradient: bool) {
     for (group, places) in crate::print::code::GROUPS.iter().zip(&code.groups) {
         let names: Vec<String> = places
             .clone()
-            .map(|place| {
-                if code.uses(place) {
-                    code.inputs[place].clone()
+            .map(|index| {
+                if code.uses(index) {
+                    code.inputs[index].clone()
                 } else {
                     "_".to_string()
                 }
@@ -124,7 +124,7 @@ fn single(file: &mut String, code: &Code<'_>, gradient: bool) {
     }
     let mut lines = code.lines(&dialect, |name, value| format!("    let {name} = {value};"));
     let results = code.results(&dialect);
-    // A last step that is all that is returned needs no name.
+    // If the last step is the only result, it needs no name.
     if let (false, [only], Some(last)) = (gradient, results.as_slice(), lines.last())
         && let Some(value) = last.strip_prefix(&format!("    let {only} = "))
     {
@@ -156,8 +156,8 @@ fn single(file: &mut String, code: &Code<'_>, gradient: bool) {
     file.push_str("}\n\n");
 }
 
-/// Readings four at a time: the arrays of a block cannot overlap, so that the loop over its lanes is vectorised, and they are small
-/// enough to stay in registers.
+/// Evaluates four readings at a time. The arrays of a block cannot overlap, so that the loop over its lanes is vectorised, and they are
+/// small enough to stay in registers.
 fn columns(file: &mut String, code: &Code<'_>, gradient: bool) {
     let name = function(code, gradient);
     let (outputs, errors) = (code.outputs(), code.errors());
@@ -192,8 +192,8 @@ fn columns(file: &mut String, code: &Code<'_>, gradient: bool) {
          for (block, column) in x.iter_mut().zip(axes) {{\n            block.copy_from_slice(&column[at..at + LANES]);\n        }}\n        \
          for lane in 0..LANES {{\n"
     );
-    let row = |place: &dyn Fn(usize) -> String, count: usize| {
-        let inputs: Vec<String> = (0..count).map(place).collect();
+    let row = |index: &dyn Fn(usize) -> String, count: usize| {
+        let inputs: Vec<String> = (0..count).map(index).collect();
         inputs.join(", ")
     };
     let axes = code.groups[1].len();
@@ -253,7 +253,7 @@ fn columns(file: &mut String, code: &Code<'_>, gradient: bool) {
     file.push_str("    }\n}\n\n");
 }
 
-/// The functions that `core` lacks, as far as the code calls them.
+/// The functions that `core` lacks, if the code calls them.
 fn elementary(file: &mut String, code: &Code<'_>) {
     let dialect = Rust(code);
     let mut text = code.lines(&dialect, |_, value| value.to_string()).concat();
@@ -275,9 +275,9 @@ fn elementary(file: &mut String, code: &Code<'_>) {
     if used.is_empty() {
         return;
     }
-    file.push_str("/// What `core` lacks. In a crate without `std` put the functions of `libm` here; nothing else needs it.\nmod elementary {\n");
-    for (place, (name, body)) in used.iter().enumerate() {
-        let gap = if place == 0 { "" } else { "\n" };
+    file.push_str("/// Functions that `core` lacks. In a crate without `std` replace them by those of `libm`; nothing else needs `std`.\nmod elementary {\n");
+    for (index, (name, body)) in used.iter().enumerate() {
+        let gap = if index == 0 { "" } else { "\n" };
         let _ = write!(
             file,
             "{gap}    #[inline(always)]\n    pub fn {name}(x: f64) -> f64 {{\n        {body}\n    }}\n"

@@ -1,4 +1,4 @@
-//! Plain text, UTF-8.
+//! Printer for plain text, UTF-8.
 
 use std::f64::consts::{PI, TAU};
 use std::fmt::Write;
@@ -11,10 +11,10 @@ use crate::program::{Input, Label, Program};
 use crate::symbol::Unary;
 use crate::variable::{Symbols, Variable};
 
-/// Signs on a line.
+/// Characters per line.
 const WIDTH: usize = 100;
 
-/// Spells expressions for a reader of plain text.
+/// Notation of expressions in plain text.
 struct Text<'a> {
     program: &'a Program,
     symbols: Symbols,
@@ -28,11 +28,11 @@ impl Dialect for Text<'_> {
             value => format!("{}", dialect::for_readers(value)),
         }
     }
-    fn input(&self, place: usize) -> String {
-        input(&self.program.inputs[place], self.symbols)
+    fn input(&self, index: usize) -> String {
+        input(&self.program.inputs[index], self.symbols)
     }
-    fn step(&self, place: usize) -> String {
-        label(&self.program.steps[place].label, self.symbols)
+    fn step(&self, index: usize) -> String {
+        label(&self.program.steps[index].label, self.symbols)
     }
     fn product(&self, a: &str, b: &str) -> String {
         format!("{a}·{b}")
@@ -64,7 +64,7 @@ impl Dialect for Text<'_> {
     }
 }
 
-/// `s_a` for the sine of θ_a, and so on.
+/// The symbol of an input, such as `s_a` for the sine of θ_a.
 fn input(input: &Input, symbols: Symbols) -> String {
     let turn = |letter: &str, variable: &Variable| match variable {
         Variable::Position { axis, .. } => format!("{letter}_{}", axis.to_lowercase()),
@@ -78,7 +78,7 @@ fn input(input: &Input, symbols: Symbols) -> String {
     }
 }
 
-/// `p_A.x` for a coordinate of the point p in the frame of A.
+/// The symbol of a step, such as `p_A.x` for a coordinate of the point p in the frame of A.
 fn label(label: &Label, symbols: Symbols) -> String {
     match label {
         Label::Vector {
@@ -101,16 +101,16 @@ fn label(label: &Label, symbols: Symbols) -> String {
     }
 }
 
-fn output(kind: Kind, place: usize) -> String {
+fn output(kind: Kind, index: usize) -> String {
     match kind {
         Kind::Length => "L".to_string(),
         Kind::Distance => "d".to_string(),
-        Kind::Coordinates => format!("m.{}", ["x", "y", "z"][place]),
-        Kind::Volumetric => format!("Δ.{}", ["x", "y", "z"][place]),
+        Kind::Coordinates => format!("m.{}", ["x", "y", "z"][index]),
+        Kind::Volumetric => format!("Δ.{}", ["x", "y", "z"][index]),
     }
 }
 
-/// The whole equation.
+/// Prints the equation.
 pub(crate) fn print(equation: &Equation) -> String {
     let article = Article::new(equation);
     let symbols = equation.options.symbols;
@@ -124,9 +124,9 @@ pub(crate) fn print(equation: &Equation) -> String {
         let left = |left: &LeftSide| match left {
             LeftSide::Named(name) => label(name, symbols),
             LeftSide::Square(name) => format!("{}²", label(name, symbols)),
-            LeftSide::Output(place) => output(equation.kind, *place),
-            LeftSide::Slope(place, parameter) => {
-                format!("∂{}/∂{}", output(equation.kind, *place), parameter.text(symbols))
+            LeftSide::Output(index) => output(equation.kind, *index),
+            LeftSide::Slope(index, parameter) => {
+                format!("∂{}/∂{}", output(equation.kind, *index), parameter.text(symbols))
             }
         };
         let lefts: Vec<String> = section.rows.iter().map(|row| left(&row.left)).collect();
@@ -145,9 +145,13 @@ pub(crate) fn print(equation: &Equation) -> String {
             );
             match &row.remark {
                 None => page.push('\n'),
-                Some(NoteKind::NotSeen) => page.push_str("   (not seen)\n"),
+                Some(NoteKind::NotObservable) => page.push_str("   (not observable)\n"),
                 Some(NoteKind::MultipleOf(other)) => {
-                    let _ = writeln!(page, "   (a fixed multiple of that of {})", other.text(symbols));
+                    let _ = writeln!(
+                        page,
+                        "   (a constant multiple of that of {})",
+                        other.text(symbols)
+                    );
                 }
             }
         }

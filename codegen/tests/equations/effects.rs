@@ -1,16 +1,18 @@
-//! Declared effects in equations: every shape against its closed form by hand, forms, refusals.
+//! Tests of declared effects in equations: every shape against its closed form by hand, printed forms, refusals.
 
 use std::f64::consts::{PI, TAU};
 
 use abbe_codegen::evaluate::evaluate_f64;
-use abbe_codegen::{CodegenError, Equation, Followed, Language, Options, Order, Source, Subject, Variable};
+use abbe_codegen::{
+    CodegenError, DriverQuantity, Equation, Language, Options, Order, Source, Subject, Variable,
+};
 use abbe_model::chain::Machine;
 use abbe_model::component::ErrorName;
 use abbe_model::effect::{Component, Driver, Effect, Shape};
 use abbe_model::instrument::{Station, ballbar::BallBar, socket::Socket};
 use abbe_model::scalar::Nominal;
 
-/// A ball in the tool frame's origin, in a socket there: what is read is where the ball is.
+/// A ball at the tool frame's origin in a socket at R's origin: the reading is the position of the ball.
 #[derive(Clone, Copy)]
 struct Ball;
 
@@ -40,7 +42,7 @@ fn with(effects: Vec<Effect>) -> Options {
     }
 }
 
-/// What a driver does at a point: position, direction, rate, way since the turn.
+/// State of a driver at a point: position, direction, rate, distance since the reversal.
 #[derive(Clone, Copy)]
 struct At {
     q: f64,
@@ -49,17 +51,19 @@ struct At {
     way: f64,
 }
 
-/// What the linear axis X of a machine that has nothing else reads in Y where its error EYX follows a driver: the derivatives are the basis
-/// functions, and the reading their sum.
+/// Basis functions of an effect on EYX of a machine with the single axis X. The derivatives of the reading in Y are the basis functions,
+/// and the reading is their sum.
 fn bases(driver: &str, shape: Shape, at: At) -> Vec<f64> {
     let machine = Machine::from_code("w b X t").expect("a code");
     let options = with(vec![effect("EYX", driver, shape)]);
     let equation = Equation::of(&machine, &Ball, &[], &options).expect("an equation");
     let variable = |variable: &Variable| match variable {
-        Variable::Position { .. } | Variable::Driver(Followed::Time | Followed::Temperature) => at.q,
-        Variable::Driver(Followed::Direction(_)) => at.direction,
-        Variable::Driver(Followed::Rate(..)) => at.rate,
-        Variable::Driver(Followed::SinceReversal(..)) => at.way,
+        Variable::Position { .. } | Variable::Driver(DriverQuantity::Time | DriverQuantity::Temperature) => {
+            at.q
+        }
+        Variable::Driver(DriverQuantity::Direction(_)) => at.direction,
+        Variable::Driver(DriverQuantity::Rate(..)) => at.rate,
+        Variable::Driver(DriverQuantity::SinceReversal(..)) => at.way,
         Variable::Coefficient(coefficient) => coefficient.number as f64,
         other => panic!("{other:?} has no place here"),
     };
@@ -148,7 +152,8 @@ fn shapes_with_edges_by_hand_on_both_sides() {
     near(&bases("X", bump(Some(100.0)), here(180.0)), &[0.0]);
 }
 
-/// The cardinal cubic B-spline by its truncated powers (de Boor, ch. IX), which the shape does not use: N(s) = Σ (−1)^k (4 over k) (s − k)₊³ / 6.
+/// The cardinal cubic B-spline by its truncated powers (de Boor, ch. IX), independent of the implementation: N(s) = Σ (−1)^k (4 over k)
+/// (s − k)₊³ / 6.
 fn cardinal(s: f64) -> f64 {
     let terms = [1.0, -4.0, 6.0, -4.0, 1.0].into_iter().enumerate();
     let sum: f64 = terms.map(|(k, c)| c * (s - k as f64).max(0.0).powi(3)).sum();
@@ -163,9 +168,9 @@ fn curves_by_truncated_powers() {
         intervals: 5,
         closed: false,
     };
-    // Beyond its ends a curve stands where it ended.
-    for (q, place) in [(10.0, 0.0), (22.5, 1.25), (37.0, 2.7), (59.9, 4.99), (-20.0, 0.0)] {
-        let expected: Vec<f64> = (0..8).map(|j| cardinal(place - j as f64 + 3.0)).collect();
+    // Beyond its ends a curve is constant.
+    for (q, position) in [(10.0, 0.0), (22.5, 1.25), (37.0, 2.7), (59.9, 4.99), (-20.0, 0.0)] {
+        let expected: Vec<f64> = (0..8).map(|j| cardinal(position - j as f64 + 3.0)).collect();
         near(&bases("X", open(), here(q)), &expected);
     }
     for at in [60.0, 80.0] {
@@ -181,16 +186,16 @@ fn curves_by_truncated_powers() {
         closed: true,
     };
     for q in [0.0_f64, 13.0, 59.0, 73.0, -47.0] {
-        let place = (q / 10.0).rem_euclid(6.0);
+        let position = (q / 10.0).rem_euclid(6.0);
         let turns = |j: i32| (-1..=1).map(move |turn| f64::from(j + 6 * turn));
         let expected: Vec<f64> = (0..6)
-            .map(|j| turns(j).map(|j| cardinal(place - j + 3.0)).sum())
+            .map(|j| turns(j).map(|j| cardinal(position - j + 3.0)).sum())
             .collect();
         near(&bases("X", closed(), here(q)), &expected);
     }
 }
 
-/// One of each shape on a machine with a rotary axis, an instrument unknown and a delay among the components.
+/// One effect of each shape on a machine with a rotary axis; the components include an instrument parameter and a delay.
 pub fn every_shape() -> Vec<Effect> {
     let polynomial = |degree, scale| Shape::Polynomial { degree, scale };
     let local = Shape::Local {
@@ -225,7 +230,7 @@ pub fn every_shape() -> Vec<Effect> {
     ]
 }
 
-/// A curve, which is for compilers.
+/// A curve, which is printed as code only.
 pub fn curve() -> Effect {
     let shape = Shape::Curve {
         from: 0.0,
@@ -236,7 +241,7 @@ pub fn curve() -> Effect {
     effect("EYC", "C", shape)
 }
 
-/// A bar between balls at stated places.
+/// A bar between balls at stated positions.
 #[derive(Clone, Copy)]
 pub struct Bar;
 
@@ -270,11 +275,11 @@ fn every_form_is_confirmed_with_every_shape() {
                 match equation.print(language) {
                     Ok(text) => assert!(!(text.contains("NaN") || curved && for_readers), "{text}"),
                     Err(refused) => {
-                        let told = refused.to_string();
-                        assert!(curved && for_readers, "{told}");
+                        let message = refused.to_string();
+                        assert!(curved && for_readers, "{message}");
                         assert!(
-                            told.contains("`EYC~C:curve`") && told.contains("rust, c, python"),
-                            "{told}"
+                            message.contains("`EYC~C:curve`") && message.contains("rust, c, python"),
+                            "{message}"
                         );
                     }
                 }
@@ -284,7 +289,7 @@ fn every_form_is_confirmed_with_every_shape() {
 }
 
 #[test]
-fn an_equation_names_what_effects_make_up_and_what_they_follow() {
+fn an_equation_names_driven_errors_and_their_drivers() {
     let machine = Machine::from_code("w C b X t").expect("a code");
     let effects = vec![
         effect("EZC", "C", Shape::Harmonic { order: 2.0 }),
@@ -293,7 +298,7 @@ fn an_equation_names_what_effects_make_up_and_what_they_follow() {
     let equation = Equation::of(&machine, &Bar, &[], &with(effects)).expect("an equation");
     let text = equation.print(Language::Text).expect("a text");
     for line in [
-        "errors that effects make up\n",
+        "errors as functions of drivers\n",
         "  e_zc  = k_1·cos(2·θ_c) + k_2·sin(2·θ_c)\n",
         "  δ_bar = k_3·(1 − exp(−t/900))\n",
         " − δ_bar\n",
@@ -309,9 +314,9 @@ fn an_equation_names_what_effects_make_up_and_what_they_follow() {
     );
 }
 
-/// A harmonic of the first order in X and Y of C is where the ball's own eccentricity shows: one column, twice.
+/// A first-order harmonic in X and Y of C is confounded with the eccentricity of the ball: the same column twice.
 #[test]
-fn an_effect_that_is_a_location_error_is_marked() {
+fn an_effect_confounded_with_a_location_error_is_marked() {
     let machine = Machine::from_code("w C b X t").expect("a code");
     let options = Options {
         order: Order::First,
@@ -324,7 +329,7 @@ fn an_effect_that_is_a_location_error_is_marked() {
 }
 
 #[test]
-fn what_cannot_be_written_is_refused_by_name() {
+fn effects_without_a_closed_form_are_refused_by_name() {
     let machine = Machine::from_code("w C b X t").expect("a code");
     let refused = |effect: Effect| {
         let equation = Equation::of(&machine, &Bar, &[], &with(vec![effect]));
@@ -336,15 +341,18 @@ fn what_cannot_be_written_is_refused_by_name() {
         intervals: 200,
         closed: true,
     };
-    let told = refused(effect("EZC", "C", long));
+    let message = refused(effect("EZC", "C", long));
     assert!(
-        told.contains("EZC~C:curve") && told.contains("200") && told.contains("fewer intervals"),
-        "{told}"
+        message.contains("EZC~C:curve") && message.contains("200") && message.contains("fewer intervals"),
+        "{message}"
     );
-    let told = refused(effect("EZA", "A", Shape::Backlash));
-    assert!(told.contains("EZA~A:backlash") && told.contains("`A`"), "{told}");
-    let told = refused(effect("tracker.x", "time", Shape::Drift));
-    assert!(told.contains("tracker.x~time:drift"), "{told}");
+    let message = refused(effect("EZA", "A", Shape::Backlash));
+    assert!(
+        message.contains("EZA~A:backlash") && message.contains("`A`"),
+        "{message}"
+    );
+    let message = refused(effect("tracker.x", "time", Shape::Drift));
+    assert!(message.contains("tracker.x~time:drift"), "{message}");
     let twice = effect("EZC", "C", Shape::Backlash);
     let equation = Equation::of(&machine, &Bar, &[], &with(vec![twice.clone(), twice]));
     assert!(matches!(equation, Err(CodegenError::Twice { .. })));

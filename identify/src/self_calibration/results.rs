@@ -97,15 +97,15 @@ pub struct SelfCalibration {
     pub noise_source: String,
     /// Root mean square of the residual of the solution, µm.
     pub rms_um: f64,
-    /// Values that the functions have in all.
-    pub values: usize,
-    /// How many of them, or combinations, the readings tell before any condition.
-    pub rank_before: usize,
+    /// Number of values of all functions.
+    pub value_count: usize,
+    /// Numerical rank without boundary conditions.
+    pub rank_without_conditions: usize,
     /// The boundary conditions.
     pub conditions: Vec<String>,
-    /// Values that remain unknown under the conditions, with the radius where it is estimated.
+    /// Number of parameters under the conditions, the radius included where it is estimated.
     pub parameter_count: usize,
-    /// How many of those, or combinations, the readings tell.
+    /// Numerical rank under the conditions.
     pub rank: usize,
     /// The functions.
     pub functions: Vec<FunctionResult>,
@@ -186,23 +186,25 @@ impl Calibration {
             .word()
             .into(),
             rms_um: self.solution.rms_mm * 1e3,
-            values: columns,
-            rank_before: self.rank_before,
+            value_count: columns,
+            rank_without_conditions: self.rank_before,
             conditions: self
                 .conditions
                 .iter()
                 .map(|condition| condition.words.clone())
                 .collect(),
-            parameter_count: self.solution.unknowns,
-            rank: self.solution.rank.seen.ncols(),
+            parameter_count: self.solution.parameters,
+            rank: self.solution.rank.identifiable_basis.ncols(),
             functions: Function::ALL
                 .map(|function| self.function(function, &axis))
                 .to_vec(),
-            radius: (self.solution.values_mm.len() > columns && self.solution.seen[columns]).then(|| {
-                let value = self.solution.values_mm[columns] * 1e3;
-                ParameterResult::new("radius", value, self.u_mm(columns) * 1e3, "um")
-                    .with_meaning("artefact: deviation of the radius from the stated one")
-            }),
+            radius: (self.solution.values_mm.len() > columns && self.solution.identifiable[columns]).then(
+                || {
+                    let value = self.solution.values_mm[columns] * 1e3;
+                    ParameterResult::new("radius", value, self.u_mm(columns) * 1e3, "um")
+                        .with_meaning("artefact: deviation of the radius from the stated one")
+                },
+            ),
             parameters: parameters(0),
             parameters_by_turn: parameters(1),
             circle_radius_um: position.as_ref().map(|position| position.radius_mm * 1e3),
@@ -234,11 +236,11 @@ impl Calibration {
         let offset = self.equations.offset(function);
         let angles = &self.equations.angles[function as usize];
         let points = angles.iter().enumerate().map(|(k, angle)| {
-            let seen = self.solution.seen[offset + k];
+            let identifiable = self.solution.identifiable[offset + k];
             FunctionPoint {
                 at_deg: degrees(*angle),
-                value_um: seen.then(|| self.solution.values_mm[offset + k] * 1e3),
-                u_um: seen.then(|| self.u_mm(offset + k) * 1e3),
+                value_um: identifiable.then(|| self.solution.values_mm[offset + k] * 1e3),
+                u_um: identifiable.then(|| self.u_mm(offset + k) * 1e3),
             }
         });
         FunctionResult {
@@ -321,7 +323,7 @@ impl Calibration {
         };
         self.solution
             .rank
-            .unseen
+            .null_combinations
             .iter()
             .map(|row| {
                 let terms = row.iter().enumerate().filter(|(_, value)| **value != 0.0);
@@ -341,7 +343,7 @@ impl Calibration {
         let mut quantities = Vec::new();
         for (k, distribution) in distributions.iter().enumerate() {
             let id = match k.checked_sub(values) {
-                None if !self.solution.seen[k] || self.u_mm(k) <= 1e-9 * self.sigma_mm => continue,
+                None if !self.solution.identifiable[k] || self.u_mm(k) <= 1e-9 * self.sigma_mm => continue,
                 None => self.id(k, axis),
                 Some(_) if !with_position => continue,
                 Some(place @ 0..2) => self.location(place, axis),

@@ -1,38 +1,39 @@
-//! The R-test: three displacement sensors in a nest about a master ball read where the ball lies, as the vector `P_s − P_w`.
+//! The R-test: three displacement sensors in a nest around a master ball measure its position, as the vector `P_s − P_w`.
 //!
-//! With the nest on the table (E-setting) the vector is given in the table frame, with the nest in the spindle (Es-setting) in the tool frame:
+//! The vector is in the table frame if the nest is on the table (E-setting), and in the tool frame if the nest is in the spindle
+//! (Es-setting):
 //!
 //! ```text
 //! E:   m = T_w⁻¹·P_s − w          Es:   m = s − T_s⁻¹·P_w          r = D · Rᵀ(ω₁, φ₁, θ₁) · m
 //! ```
 //!
-//! `w` and `s` are the points of table and tool that nominally coincide, ω₁, φ₁, θ₁ the orientation error of the nest, and the rows of `D` the
-//! directions along which the sensors count (without them the reading has been turned into X, Y, Z already). Yamaji, Hamabata & Ihara, Evaluation of
-//! linear axis motion error of machine tools using an R-test device (HPC 2014), Section 4: sensor outputs become machine coordinates by
-//! `R = R_φ·R_θ·R_ω` (Eqs. 1–3; the matrices above Eq. 1 are printed in another order than the expanded equations and the text have).
+//! `w` and `s` are the points of table and tool that nominally coincide. ω₁, φ₁, θ₁ are the orientation errors of the nest. The rows of
+//! `D` are the measuring directions of the sensors; without `D` the reading is already in X, Y, Z. Yamaji, Hamabata & Ihara, Evaluation
+//! of linear axis motion error of machine tools using an R-test device (HPC 2014), Section 4: sensor outputs become machine coordinates
+//! by `R = R_φ·R_θ·R_ω` (Eqs. 1–3). The matrices above Eq. 1 are printed in a different order from the expanded equations and the text.
 
-use super::{InstrumentUnknown, SharedBy, displaced};
+use super::{InstrumentParameter, SharedBy, displaced};
 use crate::chain::{AxisPosition, BodyErrors, Machine};
 use crate::frames::{Coordinate, Point, Rotation, SinCos, turn_about};
 use crate::scalar::{Nominal, Scalar};
 
 /// Both points, then ω₁, φ₁ and θ₁ of the nest.
-pub const UNKNOWNS: [InstrumentUnknown; 9] = [
-    InstrumentUnknown::length("workpiece_ball", "x", SharedBy::Setup),
-    InstrumentUnknown::length("workpiece_ball", "y", SharedBy::Setup),
-    InstrumentUnknown::length("workpiece_ball", "z", SharedBy::Setup),
-    InstrumentUnknown::length("spindle_ball", "x", SharedBy::SpindleSetup),
-    InstrumentUnknown::length("spindle_ball", "y", SharedBy::SpindleSetup),
-    InstrumentUnknown::length("spindle_ball", "z", SharedBy::SpindleSetup),
-    InstrumentUnknown::angle("sensor", "omega", SharedBy::Sensors),
-    InstrumentUnknown::angle("sensor", "phi", SharedBy::Sensors),
-    InstrumentUnknown::angle("sensor", "theta", SharedBy::Sensors),
+pub const PARAMETERS: [InstrumentParameter; 9] = [
+    InstrumentParameter::length("workpiece_ball", "x", SharedBy::Setup),
+    InstrumentParameter::length("workpiece_ball", "y", SharedBy::Setup),
+    InstrumentParameter::length("workpiece_ball", "z", SharedBy::Setup),
+    InstrumentParameter::length("spindle_ball", "x", SharedBy::SpindleSetup),
+    InstrumentParameter::length("spindle_ball", "y", SharedBy::SpindleSetup),
+    InstrumentParameter::length("spindle_ball", "z", SharedBy::SpindleSetup),
+    InstrumentParameter::angle("sensor", "omega", SharedBy::Sensors),
+    InstrumentParameter::angle("sensor", "phi", SharedBy::Sensors),
+    InstrumentParameter::angle("sensor", "theta", SharedBy::Sensors),
 ];
 
-/// Place of ω₁ among [`UNKNOWNS`].
+/// Index of ω₁ in [`PARAMETERS`].
 pub const SENSOR: usize = 6;
 
-/// What carries the sensors.
+/// The body that carries the sensors.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Setting {
     /// E: the sensors on the table, the master ball in the spindle.
@@ -44,17 +45,17 @@ pub enum Setting {
 /// An R-test as set up for one test, lengths in mm.
 #[derive(Clone, Debug, PartialEq)]
 pub struct RTest<N> {
-    /// What carries the sensors.
+    /// The body that carries the sensors.
     pub setting: Setting,
     /// The point on the table, in the table frame: the centre of the nest in E, of the master ball in Es.
     pub workpiece_ball: [N; 3],
     /// The point in the spindle, in the tool frame: the centre of the master ball in E, of the nest in Es.
     pub spindle_ball: [N; 3],
-    /// The direction along which each sensor counts, in the carrying frame, row by row; `None` where readings are given in that frame.
+    /// The measuring direction of each sensor in the carrying frame, row by row; `None` if readings are in that frame.
     pub sensors: Option<[[N; 3]; 3]>,
 }
 
-/// Three turns between sensors and machine: `R = R_φ·R_θ·R_ω` with
+/// Three rotations between sensors and machine: `R = R_φ·R_θ·R_ω` with
 ///
 /// ```text
 ///       ⎛ 1    0     0   ⎞        ⎛ cos φ  0  −sin φ ⎞        ⎛  cos θ  sin θ  0 ⎞
@@ -66,7 +67,7 @@ pub struct RTest<N> {
 /// use abbe_model::frames::{Point, Rotation};
 /// use abbe_model::instrument::rtest::Orientation;
 ///
-/// // Eq. (4) of the paper: what sensor u counts is cos(−35.264°) of X and sin(−35.264°) of Z.
+/// // Eq. (4) of the paper: sensor u measures cos(−35.264°)·X + sin(−35.264°)·Z.
 /// let angles: [f64; 3] = [135.0_f64, -35.264, 0.0].map(f64::to_radians);
 /// let machine = Orientation::new(angles, Rotation::Exact).to_machine(Point([1.0, 0.0, 0.0])).0;
 /// assert!((machine[0] - 0.81650).abs() < 1e-5 && machine[1] == 0.0 && (machine[2] + 0.57735).abs() < 1e-5);
@@ -79,8 +80,8 @@ pub struct Orientation<S> {
 }
 
 impl<S: Scalar> Orientation<S> {
-    /// From ω, φ, θ in radians. The small-angle form has the angle for its sine and 1 for its cosine: Eqs. (7) to (9), which keep the products of
-    /// two angles and leave out their squares.
+    /// From ω, φ, θ in radians. The small-angle form replaces the sine by the angle and the cosine by 1, as in Eqs. (7) to (9), which
+    /// keep products of two angles and omit their squares.
     pub fn new(angles: [S; 3], rotation: Rotation) -> Self {
         let [omega, phi, theta] = angles.map(|angle| match rotation {
             Rotation::Exact => {
@@ -95,7 +96,7 @@ impl<S: Scalar> Orientation<S> {
         Orientation { omega, phi, theta }
     }
 
-    /// `R · v`: from the sensors' coordinates to those of the frame that carries them.
+    /// `R · v`: from sensor coordinates to the frame that carries the sensors.
     pub fn to_machine(&self, sensors: Point<S>) -> Point<S> {
         let [omega, phi, theta] = [self.omega, self.phi, self.theta].map(|turn| SinCos {
             sin: -turn.sin,
@@ -106,7 +107,7 @@ impl<S: Scalar> Orientation<S> {
         turn_about(Coordinate::Y, phi, about_w)
     }
 
-    /// `Rᵀ · v`: from the carrying frame to the sensors.
+    /// `Rᵀ · v`: from the carrying frame to sensor coordinates.
     pub fn to_sensors(&self, machine: Point<S>) -> Point<S> {
         let about_v = turn_about(Coordinate::Y, self.phi, machine);
         let about_w = turn_about(Coordinate::Z, self.theta, about_v);
@@ -137,7 +138,7 @@ impl<N: Nominal> RTest<N> {
         }
     }
 
-    /// The reading: what the three sensors count, or the vector in the carrying frame, mm.
+    /// The reading: the three sensor values, or the vector in the carrying frame, mm.
     pub fn read<S: Scalar<Nominal = N>>(
         &self,
         machine: &Machine,
@@ -146,7 +147,7 @@ impl<N: Nominal> RTest<N> {
         unknown: impl Fn(usize) -> Option<S>,
     ) -> Point<S> {
         let mut vector = self.difference(machine, state, errors, &unknown);
-        let carried = (SENSOR..SENSOR + 3).any(|place| unknown(place).is_some());
+        let carried = (SENSOR..SENSOR + 3).any(|index| unknown(index).is_some());
         if carried {
             let angles = std::array::from_fn(|i| unknown(SENSOR + i).unwrap_or_else(|| S::constant(0.0)));
             vector = Orientation::new(angles, machine.rotation).to_sensors(vector);
@@ -163,9 +164,9 @@ impl<N: Nominal> RTest<N> {
 mod tests {
     use super::*;
 
-    /// Each angle of the sensors turns the reading by its own matrix above, transposed, and by nothing else.
+    /// Each sensor angle transforms the reading by the transpose of its own matrix above, and by nothing else.
     #[test]
-    fn sensors_that_stand_askew_turn_the_reading() {
+    fn sensor_orientation_errors_rotate_the_reading() {
         let machine = Machine {
             name: "none".into(),
             axes: Vec::new(),
@@ -186,7 +187,7 @@ mod tests {
             ..vectors.clone()
         };
         let (sin, cos) = 0.4_f64.sin_cos();
-        for (place, turned) in [
+        for (index, turned) in [
             [x, cos * y - sin * z, sin * y + cos * z],
             [cos * x + sin * z, y, -sin * x + cos * z],
             [cos * x - sin * y, sin * x + cos * y, z],
@@ -194,10 +195,10 @@ mod tests {
         .into_iter()
         .enumerate()
         {
-            let askew = |unknown: usize| (unknown == SENSOR + place).then_some(0.4);
+            let askew = |unknown: usize| (unknown == SENSOR + index).then_some(0.4);
             let near = |found: [f64; 3], expected: [f64; 3]| {
                 let far = (0..3).any(|i| (found[i] - expected[i]).abs() > 1e-15);
-                assert!(!far, "angle {place}: {found:?}, not {expected:?}");
+                assert!(!far, "angle {index}: {found:?}, not {expected:?}");
             };
             near(vectors.read(&machine, &[], &[], askew).0, turned);
             let counted = directions.map(|direction| (0..3).map(|i| direction[i] * turned[i]).sum());

@@ -1,23 +1,23 @@
-//! A ball in fixed sockets: the tool's ball sits in one of a few places, so every pose of one socket is the same point.
+//! A ball in fixed sockets: the tool's ball is at the same point in every pose of one socket.
 //!
-//! The reading is the closure `P_s − s`, the ball in R less the socket in R; what is observed is zero.
+//! The reading is the closure `P_s − s`, the ball in R less the socket in R; the observed value is zero.
 
-use super::{InstrumentUnknown, SharedBy, displaced};
+use super::{InstrumentParameter, SharedBy, displaced};
 use crate::chain::{AxisPosition, BodyErrors, Machine};
 use crate::frames::Point;
 use crate::scalar::Scalar;
 
 /// The socket in R, then the ball in the tool frame.
-pub const UNKNOWNS: [InstrumentUnknown; 6] = [
-    InstrumentUnknown::length("socket", "x", SharedBy::Socket),
-    InstrumentUnknown::length("socket", "y", SharedBy::Socket),
-    InstrumentUnknown::length("socket", "z", SharedBy::Socket),
-    InstrumentUnknown::length("ball", "x", SharedBy::SpindleSetup),
-    InstrumentUnknown::length("ball", "y", SharedBy::SpindleSetup),
-    InstrumentUnknown::length("ball", "z", SharedBy::SpindleSetup),
+pub const PARAMETERS: [InstrumentParameter; 6] = [
+    InstrumentParameter::length("socket", "x", SharedBy::Socket),
+    InstrumentParameter::length("socket", "y", SharedBy::Socket),
+    InstrumentParameter::length("socket", "z", SharedBy::Socket),
+    InstrumentParameter::length("ball", "x", SharedBy::SpindleSetup),
+    InstrumentParameter::length("ball", "y", SharedBy::SpindleSetup),
+    InstrumentParameter::length("ball", "z", SharedBy::SpindleSetup),
 ];
 
-/// A ball and the socket it sits in, mm.
+/// A ball and its socket, mm.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Socket<N> {
     /// Centre of the ball in the tool frame.

@@ -1,4 +1,4 @@
-//! What a user can get wrong in a session, one test each, by what is read: the message names the file, the line and the way out.
+//! Tests of user errors in a session, one test each. The message names the file, the line and what to do.
 
 mod document;
 mod foreign;
@@ -58,43 +58,47 @@ fn session(machine: &str, session: &str, data: Option<&str>) -> Result<Session, 
     read::session(&folder.path().join("session.toml"), &ReadOptions::default())
 }
 
-/// The session up to its tests.
+/// The session before its tests.
 fn without_tests() -> &'static str {
     &SESSION[..SESSION.find("[[test]]").unwrap()]
 }
 
 /// The error as `file:line: message | help`, the file without its folder.
-fn told(result: Result<Session, ModelError>) -> String {
+fn error_text(result: Result<Session, ModelError>) -> String {
     let fault = result.expect_err("this input is bad");
-    let place = fault.place().expect("a place in a file").clone();
-    let name = place.file.file_name().unwrap().to_string_lossy().into_owned();
-    let message = fault.to_string().replace(&place.to_string(), &name);
-    format!("{name}:{} {message} | {}", place.line, fault.help().unwrap_or(""))
+    let location = fault.location().expect("a location in a file").clone();
+    let name = location.file.file_name().unwrap().to_string_lossy().into_owned();
+    let message = fault.to_string().replace(&location.to_string(), &name);
+    format!(
+        "{name}:{} {message} | {}",
+        location.line,
+        fault.help().unwrap_or("")
+    )
 }
 
 #[track_caller]
-fn holds(told: &str, parts: &[&str]) {
+fn assert_contains(error_text: &str, parts: &[&str]) {
     for part in parts {
-        assert!(told.contains(part), "`{part}` is not in\n{told}");
+        assert!(error_text.contains(part), "`{part}` is not in\n{error_text}");
     }
 }
 
 fn with_session(from: &str, to: &str) -> String {
     assert!(SESSION.contains(from), "{from}");
-    told(session(MACHINE, &SESSION.replacen(from, to, 1), Some(DATA)))
+    error_text(session(MACHINE, &SESSION.replacen(from, to, 1), Some(DATA)))
 }
 
 fn with_data(data: &str) -> String {
-    told(session(MACHINE, SESSION, Some(data)))
+    error_text(session(MACHINE, SESSION, Some(data)))
 }
 
 fn with_machine(from: &str, to: &str) -> String {
     assert!(MACHINE.contains(from), "{from}");
-    told(session(&MACHINE.replacen(from, to, 1), SESSION, Some(DATA)))
+    error_text(session(&MACHINE.replacen(from, to, 1), SESSION, Some(DATA)))
 }
 
 #[test]
-fn the_good_one_reads() {
+fn the_valid_session_reads() {
     let read = session(MACHINE, SESSION, Some(DATA)).unwrap();
     assert_eq!(read.tests[0].readings.as_ref().unwrap().rows(), 4);
 }

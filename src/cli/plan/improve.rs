@@ -1,11 +1,12 @@
 //! `abbe plan --improve`, `--separate`, `--range`.
 
 use abbe::identify::IdentifyError;
-use abbe::identify::plan::candidate_tests::CandidateTests;
 use abbe::identify::plan::criterion::Goal;
 use abbe::identify::plan::improve::{ImproveOptions, Improvement, improve};
 use abbe::identify::plan::range::Shrinkage;
+use abbe::identify::plan::test_variations::TestVariations;
 use abbe::identify::problem::Problem;
+use abbe::identify::results::Interval;
 use abbe::identify::trace::library;
 use abbe::model::words::counted;
 use clap::{Args, ValueEnum};
@@ -93,10 +94,10 @@ impl ImproveArguments {
         self.setup_min.is_some() || self.test_min.is_some()
     }
 
-    fn menu(&self) -> Result<CandidateTests, Failure> {
-        let mut menu = CandidateTests {
+    fn menu(&self) -> Result<TestVariations, Failure> {
+        let mut menu = TestVariations {
             reach_mm: self.reach_mm()?,
-            ..CandidateTests::default()
+            ..TestVariations::default()
         };
         let checked = |flag: &str, list: &[f64], least: f64| match list
             .iter()
@@ -238,8 +239,8 @@ fn add(problem: &mut Problem<'_>, id: &str) -> Result<(), IdentifyError> {
 pub fn print(found: &Improvement) {
     say!(
         "{} candidate tests; {} now: {}",
-        counted(found.menu_entries, "entry"),
-        found.figure,
+        counted(found.candidate_tests, "entry"),
+        found.criterion,
         three_digits(found.before)
     );
     if found.steps.is_empty() {
@@ -250,9 +251,9 @@ pub fn print(found: &Improvement) {
         say!("\n{}. {}", number + 1, step.test);
         say!(
             "   {} → {}, {:.1} min{}",
-            found.figure,
+            found.criterion,
             three_digits(step.after),
-            step.minutes,
+            step.duration_min,
             if step.new_setup { " with the set-up" } else { "" }
         );
         say!(
@@ -261,8 +262,8 @@ pub fn print(found: &Improvement) {
             point(step.spindle_ball_mm),
             step.bar_mm
         );
-        if !step.opens.is_empty() {
-            say!("   makes identifiable {}", step.opens.join(", "));
+        if !step.makes_identifiable.is_empty() {
+            say!("   makes identifiable {}", step.makes_identifiable.join(", "));
         }
     }
     say!("");
@@ -272,13 +273,13 @@ pub fn print(found: &Improvement) {
         .uncertainties_before
         .iter()
         .enumerate()
-        .map(|(k, (id, before))| {
-            let mut row = vec![id.clone(), three_digits(*before)];
+        .map(|(k, before)| {
+            let mut row = vec![before.id.clone(), three_digits(before.u)];
             row.extend(
                 found
                     .steps
                     .iter()
-                    .map(|step| three_digits(step.uncertainties[k].1)),
+                    .map(|step| three_digits(step.uncertainties[k].u)),
             );
             row
         })
@@ -293,7 +294,7 @@ pub fn print(found: &Improvement) {
             "  {}  {} ({:.1} min)",
             three_digits(other.after),
             other.test,
-            other.minutes
+            other.duration_min
         );
     }
 }
@@ -309,12 +310,12 @@ pub const RANGES: [&str; 5] = ["test", "axis", "planned", "least", "doubles firs
 /// How far each sweep can shrink, a row a sweep.
 pub fn range_rows(ranges: &[Shrinkage]) -> Vec<Vec<String>> {
     let row = |range: &Shrinkage| {
-        let span = |[low, high]: [f64; 2]| format!("{low:.0} … {high:.0} {}", range.unit);
+        let span = |Interval { low, high }: Interval| format!("{low:.0} … {high:.0} {}", range.unit);
         vec![
             range.test.clone(),
             range.axis.clone(),
             span(range.range),
-            range.least.map_or("can be left out".into(), span),
+            range.minimum_range.map_or("can be left out".into(), span),
             range.first_to_double.clone().unwrap_or("—".into()),
         ]
     };

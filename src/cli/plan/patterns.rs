@@ -87,7 +87,7 @@ fn print(found: &Patterns) {
                 format!("{} {}", pattern.size, pattern.unit),
                 number(pattern.largest_um),
                 number(pattern.mean_um),
-                number(pattern.rms_um),
+                number(pattern.standard_deviation_um),
             ]
         })
         .collect();
@@ -98,7 +98,7 @@ fn print(found: &Patterns) {
             "size",
             "largest, µm",
             "mean, µm",
-            "rms about it, µm",
+            "std. dev., µm",
         ],
         &rows,
     );
@@ -136,7 +136,7 @@ fn csv(found: &Patterns, session: &Session) -> Result<Vec<u8>, Failure> {
             // Without the digits that are rounding.
             let shown = |position: f64| (position * 1e9).round() / 1e9 + 0.0;
             let at = axes.iter().zip(&states.positions);
-            cells.extend(at.map(|(axis, column)| shown(axis.kind.outside(column[row])).to_string()));
+            cells.extend(at.map(|(axis, column)| shown(axis.kind.to_display(column[row])).to_string()));
             cells.extend(deviations.iter().map(|deviation| format!("{deviation:.6}")));
             rows.push(cells);
         }

@@ -41,13 +41,13 @@ fn header(analysis: &PlanAnalysis) {
         "{} in {}, {}{moving}, noise {}",
         counted(analysis.readings, "reading"),
         counted(analysis.tests.len(), "test"),
-        counted(analysis.setups, "set-up"),
+        counted(analysis.setup_count, "set-up"),
         table::micrometres(analysis.noise_um)
     );
     say!(
         "{} of {} parameters identifiable (rank)",
         analysis.rank,
-        analysis.unknowns
+        analysis.parameter_count
     );
 }
 
@@ -64,7 +64,10 @@ fn errors(errors: &[ErrorAnalysis]) {
         .iter()
         .map(|error| {
             let part = |noise: bool| {
-                let parts = error.budget.iter().filter(|part| (part.from == "noise") == noise);
+                let parts = error
+                    .budget
+                    .iter()
+                    .filter(|part| (part.source == "noise") == noise);
                 error
                     .u
                     .map(|_| parts.map(|part| part.u.powi(2)).sum::<f64>().sqrt())
@@ -75,13 +78,13 @@ fn errors(errors: &[ErrorAnalysis]) {
                 error.unit.clone(),
                 optional(part(true)),
                 optional(part(false)),
-                optional(error.u_others_known),
+                optional(error.conditional_u),
                 three_digits(error.sensitivity.largest),
                 three_digits(error.sensitivity.rms),
                 if error.sensitivity.largest == 0.0 {
                     "—".into()
                 } else {
-                    error.sensitivity.largest_in.clone()
+                    error.sensitivity.largest_in_test.clone()
                 },
             ]
         })
@@ -112,10 +115,10 @@ fn budget(errors: &[ErrorAnalysis]) {
             .budget
             .iter()
             .take(CONTRIBUTIONS)
-            .map(|part| format!("{} {:.0} %", part.from, part.share * 100.0))
+            .map(|part| format!("{} {:.0} %", part.source, part.share * 100.0))
             .collect();
         let shared: Vec<String> = error
-            .shared_with
+            .correlated_with
             .iter()
             .take(2)
             .map(|other| format!("{} {:+.2}", other.id, other.correlation))
@@ -182,11 +185,15 @@ fn print_unidentifiable(analysis: &PlanAnalysis) {
     };
     list(
         "Blind spots:",
-        analysis.blind.iter().map(|item| &item.why).collect(),
+        analysis.unidentifiable.iter().map(|item| &item.why).collect(),
     );
     list(
         "Held by what is known of the set-up, not by readings:",
-        analysis.held_by_setup.iter().map(|item| &item.why).collect(),
+        analysis
+            .determined_by_prior
+            .iter()
+            .map(|item| &item.why)
+            .collect(),
     );
     list(
         "Nearly blind:",
@@ -225,8 +232,8 @@ fn indices(analysis: &PlanAnalysis) {
     let indices = &analysis.indices;
     say!(
         "\nInformation on {} of {}, set-ups unknown within what is known of them:",
-        indices.seen,
-        counted(indices.errors, "error")
+        indices.identifiable_count,
+        counted(indices.error_count, "error")
     );
     say!(
         "  condition number {}; O1 {}  O2 {}  O3 {}  O4 {}  O5 {}",
@@ -247,11 +254,14 @@ fn indices(analysis: &PlanAnalysis) {
 }
 
 fn tests(analysis: &PlanAnalysis) {
-    if analysis.without.is_empty() {
+    if analysis.leave_one_out.is_empty() {
         return;
     }
     say!("\nWhat each test contributes:");
-    analysis.without.iter().for_each(|item| say!("  {}", item.why));
+    analysis
+        .leave_one_out
+        .iter()
+        .for_each(|item| say!("  {}", item.why));
 }
 
 fn effects(found: &EffectsAnalysis) {
@@ -262,28 +272,28 @@ fn effects(found: &EffectsAnalysis) {
             .filter(|effect| verdict(&effect.verdict))
             .collect()
     };
-    let hidden = by_verdict(|verdict| verdict.starts_with("hidden"));
-    let seen = by_verdict(|verdict| verdict == "seen");
-    let none = by_verdict(|verdict| verdict == "none").len();
+    let confounded = by_verdict(|verdict| verdict.starts_with("confounded"));
+    let seen = by_verdict(|verdict| verdict == "detectable");
+    let none = by_verdict(|verdict| verdict == "no signal").len();
     say!(
         "\nUndeclared effects: of {} looked at, {} would be seen, {} would hide and {none} move no reading of these tests.",
         found.effects.len(),
         seen.len(),
-        hidden.len()
+        confounded.len()
     );
     say!(
         "\nSeen: smallest amplitude found with {:.0} % power at {:.0} % significance, of one look and of a search of the whole library of {}\n\
          (Šidák, which is on the safe side); share of the signal that remains in the residual; what it adds to the errors until it is found;\n\
          how many alike, of the same component and driver, are not listed. A power has its amplitude at 100 mm, or at 180°:",
         found.power * 100.0,
-        found.significance * 100.0,
-        found.effects_searched
+        found.significance_level * 100.0,
+        found.effects_screened
     );
     effect_table(&seen);
     say!(
         "\nHidden: under 1 % of the signal fraction_left the fit. A clean residual does not exclude these, and they bias:"
     );
-    effect_table(&hidden);
+    effect_table(&confounded);
     say!("\nWhat may hide in each error, the strongest first:");
     let by_error = confounded_by_error(found);
     let width = by_error.keys().map(|id| id.chars().count()).max().unwrap_or(0);
@@ -337,10 +347,10 @@ fn effect_table(effects: &[&EffectDetectability]) {
                 .collect();
             vec![
                 effect.id.clone(),
-                optional(effect.detectable),
-                optional(effect.detectable_searched),
+                optional(effect.detectable_amplitude),
+                optional(effect.detectable_amplitude_screened),
                 effect.unit.clone(),
-                fraction_left(effect.surviving_share),
+                fraction_left(effect.residual_share),
                 if biases.is_empty() {
                     "none".into()
                 } else {
