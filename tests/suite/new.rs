@@ -51,7 +51,7 @@ fn every_template_is_copied_and_reads() {
         // What is there is not overwritten unasked.
         let again = abbe(&["new", text(&made), "--template", name]);
         assert_eq!(again.status.code(), Some(1));
-        assert!(String::from_utf8_lossy(&again.stderr).contains("there and not empty"));
+        assert!(String::from_utf8_lossy(&again.stderr).contains("exists and is not empty"));
         assert!(
             abbe(&["new", text(&made), "--template", name, "--force"])
                 .status
@@ -166,10 +166,10 @@ fn any_structural_code_is_laid_out_and_plans_at_once() {
 }
 
 #[test]
-fn the_menu_comes_without_arguments() {
-    let menu = abbe(&["new"]);
-    assert!(menu.status.success());
-    assert_eq!(menu.stdout, abbe(&["new", "--list"]).stdout);
+fn the_templates_are_listed_without_arguments() {
+    let listed = abbe(&["new"]);
+    assert!(listed.status.success());
+    assert_eq!(listed.stdout, abbe(&["new", "--list"]).stdout);
     let told = abbe(&["new", "somewhere"]);
     assert_eq!(told.status.code(), Some(2));
     assert!(String::from_utf8_lossy(&told.stderr).contains("--from-code"));

@@ -200,6 +200,7 @@ fn the_command_quotes_one_of_the_two() {
         text(&session),
         "--monte-carlo",
         "10000",
+        "--all",
         "--json",
         text(&json),
     ]);
@@ -227,7 +228,7 @@ fn the_command_quotes_one_of_the_two() {
         assert_eq!(output.status.code(), Some(status), "{said}");
         assert!(said.contains(part), "{said}");
     };
-    refused(1, &["--monte-carlo", "100"], "10000 runs are the fewest");
+    refused(1, &["--monte-carlo", "100"], "at least 10000 runs are needed");
     refused(
         1,
         &["--monte-carlo", "10000", "--coverage", "1"],

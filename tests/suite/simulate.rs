@@ -224,7 +224,7 @@ fn what_cannot_be_simulated_is_said_and_nothing_is_written() {
             &["--effect", "EZC~C:h2.phase=1deg"],
             "without `EZC~C:h2.amplitude`",
         ),
-        (&["--noise-um", "-1"], "not negative"),
+        (&["--noise-um", "-1"], "a standard deviation in µm is expected"),
     ] {
         let told = refused(&plan, &out, more);
         assert!(told.contains(message), "{told}");
@@ -234,14 +234,14 @@ fn what_cannot_be_simulated_is_said_and_nothing_is_written() {
     fs::write(out.join("notes.txt"), "mine").unwrap();
     let told = refused(&plan, &out, &[]);
     assert!(
-        told.contains("there and not empty") && told.contains("--force"),
+        told.contains("exists and is not empty") && told.contains("--force"),
         "{told}"
     );
     assert_eq!(fs::read_dir(&out).unwrap().count(), 1);
     fs::remove_dir_all(&out).unwrap();
     let before = fs::read(&plan).unwrap();
     let told = refused(&plan, folder.path(), &["--force"]);
-    assert!(told.contains("the plan itself lies there"), "{told}");
+    assert!(told.contains("this folder contains the plan itself"), "{told}");
     assert_eq!(fs::read(&plan).unwrap(), before);
     let told = refused(&ready("kuka-iiwa14/session.toml"), &out, &["--data", "nowhere"]);
     assert!(told.contains("nowhere"), "{told}");
