@@ -39,6 +39,19 @@ pub fn meaning(machine: &Machine, effect: &Effect) -> Meaning {
     }
 }
 
+/// What a component is on a machine, whatever it follows: `C table: axial motion`.
+pub(crate) fn component_meaning(machine: &Machine, component: &Component) -> Meaning {
+    let effect = constant(component.clone());
+    let words = Words {
+        machine,
+        effect: &effect,
+    };
+    Meaning {
+        part: words.part(),
+        what: words.motion(),
+    }
+}
+
 /// Several explanations in one phrase, each part of the machine once, in the order in which the parts first occur.
 pub fn explanations(meanings: &[Meaning]) -> String {
     let mut parts: Vec<(&str, Vec<&str>)> = Vec::new();
@@ -51,6 +64,16 @@ pub fn explanations(meanings: &[Meaning]) -> String {
     let of_part = |(part, what): &(&str, Vec<&str>)| format!("{part}: {}", what.join(", or "));
     let parts: Vec<String> = parts.iter().map(of_part).collect();
     parts.join("; or ")
+}
+
+/// A component that follows nothing, as an effect.
+fn constant(component: Component) -> Effect {
+    Effect {
+        component,
+        driver: Driver::None,
+        shape: Shape::Constant,
+        tests: Vec::new(),
+    }
 }
 
 /// The name of an axis as a part of its machine.

@@ -13,16 +13,18 @@ use abbe_model::session::limits::MIN_UM;
 use faer::Mat;
 use statrs::distribution::{ChiSquared, ContinuousCDF};
 
+use crate::covariance;
 use crate::error::IdentifyError;
 use crate::heldout::{HeldOut, held_out, mislabelled_runs, rms_mm};
 use crate::least_squares::{LeastSquares, Scaling, minimise};
 use crate::noise::{self, Noise, NoiseSource, PureError};
+use crate::parameter_description::parameter_meaning;
 use crate::parameters::Role;
 use crate::plausibility;
 use crate::preference::pivot_preference;
 use crate::problem::Problem;
 use crate::rank::Rank;
-use crate::results::{FitResult, ParameterResult, Rejected, Unobservable};
+use crate::results::{FitResult, Outlier, ParameterResult, Unobservable, phases_follow_amplitudes};
 use crate::triangle::Triangle;
 
 /// What a fit found, internal units.
@@ -40,6 +42,10 @@ pub struct Fit {
     pub residuals: Vec<Vec<f64>>,
     /// On readings that were left out.
     pub held_out: HeldOut,
+    /// χ², priors counted as observations.
+    pub chi_square: f64,
+    /// Its degrees of freedom, at least 1.
+    pub degrees_of_freedom: usize,
     /// The Birge ratio `√(χ²/ν)`: residual over noise; below 1 where readings scatter less than the noise says.
     pub birge_ratio: f64,
     /// By how much uncertainties are enlarged: the Birge ratio where it is significantly above 1, else 1.
@@ -254,15 +260,16 @@ fn finish(
     rank: Rank,
 ) -> Result<Fit, IdentifyError> {
     let whole = whole(problem, &beta, &triangles);
-    let covariance = covariance(&whole, &rank.seen)?;
+    let covariance = self::covariance(&whole, &rank.seen)?;
     let residuals = problem.residuals(&beta);
     let held_out = held_out(problem, &beta, &triangles, &whole, &rank.seen)?;
     let zero = vec![0.0; beta.len()];
     let chi_square: f64 = whole.sum_of_squares_after(&zero);
     // What is known beforehand counts as observed: it has its rows in χ².
-    let free = (problem.readings() * problem.coordinates() + problem.prior_rows())
+    let degrees_of_freedom = (problem.readings() * problem.coordinates() + problem.prior_rows())
         .saturating_sub(rank.seen.ncols())
-        .max(1) as f64;
+        .max(1);
+    let free = degrees_of_freedom as f64;
     Ok(Fit {
         beta,
         rank,
@@ -270,6 +277,8 @@ fn finish(
         triangles,
         residuals,
         held_out,
+        chi_square,
+        degrees_of_freedom,
         birge_ratio: (chi_square / free).sqrt(),
         u_enlargement: u_enlargement(chi_square, free),
     })
@@ -330,9 +339,11 @@ pub fn report(problem: &Problem<'_>, fit: &Fit) -> FitResult {
     warnings.extend(noise::stated_against_repeats(problem, &fit.residuals));
     warnings.extend(mislabelled_runs(&problem.tests));
     warnings.extend(enlargement_warning(fit.u_enlargement));
+    let parameters = parameters(problem, fit);
     FitResult {
         noise_um: problem.noise.sigma_mm * 1e3,
         noise_source: problem.noise.source.word().to_string(),
+        noise_ar_coefficients: problem.noise.memory.clone(),
         readings: problem.readings(),
         rms_um: rms * 1e3,
         heldout_rms_um: held * 1e3,
@@ -340,12 +351,17 @@ pub fn report(problem: &Problem<'_>, fit: &Fit) -> FitResult {
         heldout_rms_3d_um: in_3d(held),
         heldout_by: problem.folds.kind.words().to_string(),
         rank: fit.rank.seen.ncols(),
-        unknowns: fit.beta.len(),
+        parameter_count: fit.beta.len(),
+        chi_square: fit.chi_square,
+        degrees_of_freedom: fit.degrees_of_freedom,
         birge_ratio: fit.birge_ratio,
         u_enlargement: fit.u_enlargement,
-        parameters: parameters(problem, fit),
+        identifiable: ids(&parameters),
+        covariance: covariance::of_parameters(problem, fit, &parameters),
+        parameters,
         unobservable: unobservable(problem, &fit.rank),
-        rejected: rejected(problem, fit),
+        null_space: covariance::null_space(problem, &fit.rank),
+        outliers: outliers(problem, fit),
         circular: crate::circular::of_session(problem.session, problem.noise.sigma_mm, &problem.rejected),
         plausibility,
         warnings,
@@ -421,12 +437,15 @@ pub fn parameters(problem: &Problem<'_>, fit: &Fit) -> Vec<ParameterResult> {
     for quantity in quantities(problem, &fit.rank) {
         match quantity {
             Quantity::Harmonic(j) => results.extend(amplitude_and_phase(problem, fit, j)),
-            Quantity::Unknown(j) => results.push(ParameterResult {
-                id: list[j].id.clone(),
-                value: fit.beta[j] * list[j].unit.display_per_internal,
-                u: u_inside(j) * list[j].unit.display_per_internal,
-                unit: list[j].unit.name.clone(),
-            }),
+            Quantity::Unknown(j) => {
+                let unit = &list[j].unit;
+                let value = fit.beta[j] * unit.display_per_internal;
+                let u = u_inside(j) * unit.display_per_internal;
+                results.push(
+                    ParameterResult::new(&list[j].id, value, u, &unit.name)
+                        .with_meaning(parameter_meaning(problem, j, None)),
+                );
+            }
         }
     }
     results
@@ -452,20 +471,26 @@ fn amplitude_and_phase(problem: &Problem<'_>, fit: &Fit, j: usize) -> [Parameter
     } else {
         any_phase_deg()
     };
-    [
-        ParameterResult {
-            id: format!("{id}.amplitude"),
-            value: amplitude * unit.display_per_internal,
-            u: along.max(0.0).sqrt() * unit.display_per_internal,
-            unit: unit.name.clone(),
-        },
-        ParameterResult {
-            id: format!("{id}.phase"),
-            value: (-b).atan2(a).to_degrees(),
-            u: u_phase,
-            unit: "deg".to_string(),
-        },
-    ]
+    let outside = unit.display_per_internal;
+    let u_amplitude = along.max(0.0).sqrt() * outside;
+    let result = |name: &str, value: f64, u: f64, unit: &str| {
+        ParameterResult::new(format!("{id}.{name}"), value, u, unit).with_meaning(parameter_meaning(
+            problem,
+            j,
+            Some(name),
+        ))
+    };
+    let mut pair = [
+        result("amplitude", amplitude * outside, u_amplitude, &unit.name),
+        result("phase", (-b).atan2(a).to_degrees(), u_phase, "deg"),
+    ];
+    phases_follow_amplitudes(&mut pair);
+    pair
+}
+
+/// The identifiers of parameters.
+pub(crate) fn ids(parameters: &[ParameterResult]) -> Vec<String> {
+    parameters.iter().map(|parameter| parameter.id.clone()).collect()
 }
 
 /// Of a phase no more can be said than the standard deviation of a uniform one, °.
@@ -507,15 +532,15 @@ pub fn unobservable(problem: &Problem<'_>, rank: &Rank) -> Vec<Unobservable> {
         .collect()
 }
 
-/// The readings that are left out, by name.
-pub fn rejected(problem: &Problem<'_>, fit: &Fit) -> Vec<Rejected> {
+/// The readings that are excluded as outliers.
+pub fn outliers(problem: &Problem<'_>, fit: &Fit) -> Vec<Outlier> {
     let coordinates = problem.coordinates();
     let mut list = Vec::new();
     for (number, test) in problem.tests.iter().enumerate() {
         let Some(readings) = &test.readings else { continue };
         for row in (0..readings.rows()).filter(|row| problem.rejected[number][*row]) {
             let residual = &fit.residuals[number][row * coordinates..(row + 1) * coordinates];
-            list.push(Rejected {
+            list.push(Outlier {
                 test: test.name.clone(),
                 file: readings.file.display().to_string(),
                 line: readings.line.get(row).copied().unwrap_or(0),

@@ -7,7 +7,7 @@
 //! - [`monte_carlo`], [`propagation`]: distributions by drawing; [`repeated`]: Type A beside Type B;
 //! - [`compensation`]: identified error motions as curves over their axis;
 //! - [`circular`]: ball-bar figures of ISO 230-4 and the classical diagnosis;
-//! - [`trace`]: close the loop; [`effect_description`]: what an effect means at the machine;
+//! - [`trace`]: close the loop; [`effect_description`], [`parameter_description`]: effects and parameters in words;
 //! - [`plan`]: what tests can see before anybody measures;
 //! - [`directions`]: readings and residuals of an R-test by direction;
 //! - [`simulate`]: readings from a model; [`patterns`]: what each error alone does to a test; [`quantity`]: values with their units as people write them;
@@ -42,6 +42,7 @@
 pub mod circle;
 pub mod circular;
 pub mod compensation;
+mod covariance;
 pub mod directions;
 pub mod drivers;
 pub mod effect_description;
@@ -53,6 +54,7 @@ pub mod least_squares;
 pub mod monte_carlo;
 pub mod noise;
 pub mod outliers;
+pub mod parameter_description;
 pub mod parameters;
 pub mod patterns;
 pub mod plan;

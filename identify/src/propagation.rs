@@ -14,12 +14,13 @@ use statrs::distribution::{Continuous, ContinuousCDF, Normal};
 use abbe_model::session::Prior;
 use abbe_model::words::counted;
 
+use crate::covariance;
 use crate::error::IdentifyError;
 use crate::fit::{Fit, Quantity, covariance, in_directions, quantities, values_at};
 use crate::least_squares::{LeastSquares, Scaling, minimise};
 use crate::monte_carlo::{self, Distribution, Draws, Function, MonteCarlo};
 use crate::problem::{Block, Problem};
-use crate::results::{DrawnParameter, FitMonteCarlo, FitResult, Verdict};
+use crate::results::{DrawnParameter, FitMonteCarlo, FitResult, Verdict, phases_follow_amplitudes};
 use crate::triangle::{BLOCK_ROWS, Triangle};
 
 /// Steps with the fit's own curvature before a draw is fitted with its own.
@@ -310,9 +311,11 @@ pub fn add_monte_carlo(
         .collect();
     for (parameter, drawn) in result.parameters.iter_mut().zip(&parameters) {
         if drawn.verdict != Verdict::Agree {
-            parameter.u = drawn.u;
+            parameter.set_u(drawn.u);
         }
     }
+    phases_follow_amplitudes(&mut result.parameters);
+    result.covariance = covariance::of_parameters(problem, fit, &result.parameters);
     if unconverged > 0 {
         result.warnings.push(format!(
             "{unconverged} of {} could not be fitted and are in no figure",
@@ -322,8 +325,8 @@ pub fn add_monte_carlo(
     result.monte_carlo = Some(FitMonteCarlo {
         runs: draws.runs,
         seed: draws.seed,
-        coverage: draws.coverage,
-        unconverged,
+        coverage_probability: draws.coverage,
+        unconverged_runs: unconverged,
         parameters,
     });
     Ok(())
@@ -342,15 +345,15 @@ fn compared(
     let tail = (1.0 - draws.coverage) / 2.0;
     let factor = -normal.inverse_cdf(tail);
     let gum_interval = [value - factor * gum_u, value + factor * gum_u];
-    let end_differences = [0, 1].map(|end| (drawn.symmetric[end] - gum_interval[end]).abs());
+    let endpoint_differences = [0, 1].map(|end| (drawn.symmetric[end] - gum_interval[end]).abs());
     let tolerance = tolerance(gum_u);
     // A quantile's standard deviation, √(q(1 − q)/M) over the density there, taken as Gaussian.
     let share = (tail * (1.0 - tail) / draws.runs as f64).sqrt();
-    let end_u = drawn.u * share / normal.pdf(factor);
-    let worst = end_differences[0].max(end_differences[1]);
-    let verdict = if worst - 2.0 * end_u > tolerance {
+    let endpoint_u = drawn.u * share / normal.pdf(factor);
+    let worst = endpoint_differences[0].max(endpoint_differences[1]);
+    let verdict = if worst - 2.0 * endpoint_u > tolerance {
         Verdict::Differ
-    } else if worst <= tolerance && 2.0 * end_u <= tolerance {
+    } else if worst <= tolerance && 2.0 * endpoint_u <= tolerance {
         Verdict::Agree
     } else {
         Verdict::Undecided
@@ -360,14 +363,14 @@ fn compared(
         unit: unit.to_string(),
         value,
         gum_u,
-        gum_interval,
+        gum_interval: gum_interval.into(),
         mean: drawn.mean,
         u: drawn.u,
-        symmetric: drawn.symmetric,
-        shortest: drawn.shortest,
-        end_differences,
+        symmetric_interval: drawn.symmetric.into(),
+        shortest_interval: drawn.shortest.into(),
+        endpoint_differences: endpoint_differences.into(),
         tolerance,
-        end_u,
+        endpoint_u,
         verdict,
     }
 }

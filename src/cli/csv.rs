@@ -133,7 +133,7 @@ pub fn write_trace(path: &Path, result: &TraceResult) -> Result<(), Failure> {
     }
     for (index, effect) in result.effects.iter().enumerate() {
         let section = format!("effect {}", index + 1);
-        for number in &effect.numbers {
+        for number in &effect.shape_parameters {
             for value in &number.values {
                 rows.figure(&section, &number.name, "", *value, &number.unit);
             }

@@ -1,5 +1,6 @@
 //! `abbe fit --method self-calibration`: rotary axis, linear axes and artefact separately.
 
+use abbe::identify::results::Interval;
 use abbe::identify::self_calibration::{self, FunctionResult, MonteCarlo, SelfCalibration};
 use abbe::model::session::Session;
 use abbe::model::words::counted;
@@ -126,14 +127,14 @@ fn print(result: &SelfCalibration) {
             "\nMonte Carlo, {}, seed {}; coverage intervals of {} %, µm:",
             counted(drawn.runs, "run"),
             drawn.seed,
-            drawn.coverage * 100.0
+            drawn.coverage_probability * 100.0
         );
         let rows: Vec<Vec<String>> = drawn
             .quantities
             .iter()
             .map(|quantity| {
                 let (mean, u) = table::value_and_u(quantity.mean_um, quantity.u_um);
-                let interval = |[low, high]: [f64; 2]| {
+                let interval = |Interval { low, high }: Interval| {
                     let (low, _) = table::value_and_u(low, quantity.u_um);
                     let (high, _) = table::value_and_u(high, quantity.u_um);
                     format!("{low} … {high}")
@@ -142,8 +143,8 @@ fn print(result: &SelfCalibration) {
                     quantity.id.clone(),
                     mean,
                     u,
-                    interval(quantity.shortest_um),
-                    interval(quantity.symmetric_um),
+                    interval(quantity.shortest_interval_um),
+                    interval(quantity.symmetric_interval_um),
                 ]
             })
             .collect();

@@ -48,7 +48,7 @@ pub fn document(problem: &Problem<'_>, fit: &Fit, result: &FitResult) -> Result<
         verdict: format!(
             "{} of {} unknowns or combinations of them are identified from {}; they leave {} ({} held out). {excess}",
             result.rank,
-            result.unknowns,
+            result.parameter_count,
             counted(result.readings, "reading"),
             um(result.rms_um),
             um(result.heldout_rms_um),
@@ -64,7 +64,7 @@ pub fn document(problem: &Problem<'_>, fit: &Fit, result: &FitResult) -> Result<
         rms_3d_um: result.rms_3d_um,
         heldout_rms_3d_um: result.heldout_rms_3d_um,
         noise_um: result.noise_um,
-        parameters: Vec::new(),
+        ..ModelResult::default()
     };
     let section = readings::before_and_after(
         &mut document,
@@ -122,7 +122,7 @@ pub fn document(problem: &Problem<'_>, fit: &Fit, result: &FitResult) -> Result<
                     (result.unobservable.len()) (if result.unobservable.len() == 1 { " combination." } else { " combinations." })
                 }
             }
-            (readings::warnings(&result.rejected, &result.warnings))
+            (readings::warnings(&result.outliers, &result.warnings))
         },
     );
     document.section("What each error does to each test", patterns);
@@ -141,6 +141,6 @@ fn nominal_result(drawn: &Drawn<'_>) -> ModelResult {
         rms_3d_um,
         heldout_rms_3d_um: rms_3d_um,
         noise_um: drawn.problem.noise.sigma_mm * 1e3,
-        parameters: Vec::new(),
+        ..ModelResult::default()
     }
 }

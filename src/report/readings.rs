@@ -2,7 +2,7 @@
 
 use abbe::identify::fit::Fit;
 use abbe::identify::problem::Problem;
-use abbe::identify::results::{ModelResult, ParameterResult, Rejected, Unobservable};
+use abbe::identify::results::{ModelResult, Outlier, ParameterResult, Unobservable};
 use abbe::identify::series::spectrum::Spectrum;
 use abbe::identify::series::{Cause, SessionSeries, correlation};
 use maud::{Markup, html};
@@ -305,7 +305,7 @@ pub fn unobservable(items: &[Unobservable]) -> Markup {
 }
 
 /// What was left out, and what a user should know.
-pub fn warnings(rejected: &[Rejected], warnings: &[String]) -> Markup {
+pub fn warnings(rejected: &[Outlier], warnings: &[String]) -> Markup {
     let rows: Vec<Vec<String>> = rejected
         .iter()
         .map(|r| {

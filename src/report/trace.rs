@@ -29,7 +29,7 @@ pub fn method(result: &TraceResult) -> Markup {
     html! {
         p {
             "The residual of the declared model is searched for " (result.candidates) " effects of the library, of which \
-             these readings can see " (result.candidates_seen)
+             these readings can see " (result.candidates_detectable)
             ". An effect is added if readings without structure seldom let the whole search find as good; everything is then refitted together. "
             (sentence_of_noise(result.noise_um, &result.noise_source)) "; held out: leaving out " (result.heldout_by) ", search included."
         }
@@ -111,15 +111,15 @@ pub fn document(trace: &Trace<'_>) -> Result<Document, IdentifyError> {
         &result.after.parameters,
         Some(&result.before.parameters),
     );
-    let moved = result.moved.iter().map(|moved| {
-        let (by, u) = value_and_u(moved.by, moved.u);
+    let moved = result.changed_parameters.iter().map(|moved| {
+        let (by, u) = value_and_u(moved.change, moved.u);
         format!("{} moved by {by} {} (u {u})", moved.id, unit(&moved.unit))
     });
     document.section(
         "Parameters",
         html! {
             (section)
-            @if !result.moved.is_empty() { h3 { "Moved by more than their uncertainty when the effects were added" } (list(moved)) }
+            @if !result.changed_parameters.is_empty() { h3 { "Moved by more than their uncertainty when the effects were added" } (list(moved)) }
         },
     );
     let section = readings::residuals(&mut document, &drawn, &spectra);
@@ -163,7 +163,10 @@ fn effects(document: &mut Document, trace: &Trace<'_>) -> Markup {
 
 /// A found effect as a row of a table.
 fn row((number, effect): (usize, &EffectResult)) -> Vec<String> {
-    let numbers = effect.numbers.iter().map(|number| unit(&shape_number(number)));
+    let numbers = effect
+        .shape_parameters
+        .iter()
+        .map(|number| unit(&shape_number(number)));
     let values: Vec<String> = effect
         .parameters
         .iter()
@@ -192,7 +195,7 @@ fn row((number, effect): (usize, &EffectResult)) -> Vec<String> {
         if effect.unique {
             "unique".to_string()
         } else {
-            format!("1 of {}", effect.indistinguishable)
+            format!("1 of {}", effect.explanation_count)
         },
         effect.family.clone(),
     ]
@@ -203,7 +206,7 @@ fn alternatives(number: usize, effect: &EffectResult, result: &TraceResult) -> M
     let named = |effect: &EffectName| format!("{} ({})", effect.meaning, name(effect));
     let all = std::iter::once(&effect.name).chain(&effect.aliases).map(named);
     html! {
-        h3 { (number + 1) ". " (uniqueness::standing(effect, result.candidates_seen)) }
+        h3 { (number + 1) ". " (uniqueness::standing(effect, result.candidates_detectable)) }
         (list(all))
         @for sentence in uniqueness::tests(effect, name) { p { (capital(&sentence)) "." } }
     }
@@ -395,6 +398,6 @@ fn next(result: &TraceResult, offered: bool) -> Markup {
                 }
             }
         } @else { (list(tests)) }
-        (readings::warnings(&result.rejected, &result.warnings))
+        (readings::warnings(&result.outliers, &result.warnings))
     }
 }

@@ -156,7 +156,7 @@ pub fn tell(outcome: &Outcome, mark: &str) -> String {
         .rejected_candidates
         .iter()
         .map(|rejected| {
-            let (fall, u) = (rejected.heldout_fall_um, rejected.u_heldout_fall_um);
+            let (fall, u) = (rejected.heldout_decrease_um, rejected.u_heldout_decrease_um);
             let name = short(&rejected.name);
             format!(
                 "\n        REJECTED {name} (p {:.3}, held out falls by {fall:.5} ± {u:.5})",
@@ -172,7 +172,7 @@ pub fn tell(outcome: &Outcome, mark: &str) -> String {
         result.verdict,
         result.noise_um,
         result.noise_ar_coefficients,
-        result.rejected.len(),
+        result.outliers.len(),
         result.before.heldout_rms_um,
         result.after.heldout_rms_um,
         result.remainder.p_value,

@@ -45,7 +45,7 @@ fn assert_consistent(result: &TraceResult, what: &str) {
     }
     for rejected in &result.rejected_candidates {
         assert!(
-            rejected.heldout_fall_um <= rejected.u_heldout_fall_um,
+            rejected.heldout_decrease_um <= rejected.u_heldout_decrease_um,
             "{what}: {rejected:?}"
         );
     }

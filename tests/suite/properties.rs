@@ -137,7 +137,7 @@ fn test(number: usize, station: Station<f64>, readings: Readings, axes: usize) -
 fn fitted(session: &Session) -> FitResult {
     let (problem, fit) = prepare(session, 1).unwrap();
     let result = report(&problem, &fit);
-    assert!(result.rejected.is_empty());
+    assert!(result.outliers.is_empty());
     result
 }
 

@@ -36,7 +36,7 @@ fn ur10_with_pose_and_target_only() {
     let held_out = result.heldout_rms_3d_um.unwrap() * 1e-3;
     println!("UR10, pose and target: {held_out:.4} mm held out");
     assert!((0.83..0.85).contains(&held_out), "{held_out}");
-    assert_eq!((result.unknowns, result.rank), (9, 9));
+    assert_eq!((result.parameter_count, result.rank), (9, 9));
 }
 
 #[test]
@@ -49,10 +49,10 @@ fn ur10_with_every_location_error() {
     let held_out = result.heldout_rms_3d_um.unwrap() * 1e-3;
     println!(
         "UR10, all location errors: {held_out:.4} mm held out, rank {} of {}",
-        result.rank, result.unknowns
+        result.rank, result.parameter_count
     );
     assert!(held_out <= 0.44, "{held_out}");
-    assert_eq!((result.rank, result.unknowns), (25, 45));
+    assert_eq!((result.rank, result.parameter_count), (25, 45));
     assert_eq!(result.unobservable.len(), 20);
     // What is not seen is named and comes with no value.
     for unseen in &result.unobservable {
@@ -75,9 +75,9 @@ fn kuka_closes_and_names_the_two_badly_seated_poses() {
     };
     let result = fitted(&session);
     let held_out = result.heldout_rms_3d_um.unwrap() * 1e-3;
-    println!("KUKA: {held_out:.4} mm held out; left out: {:?}", result.rejected);
+    println!("KUKA: {held_out:.4} mm held out; left out: {:?}", result.outliers);
     assert!(held_out <= 0.25, "{held_out}");
-    assert_eq!(result.rejected.len(), 2, "{:?}", result.rejected);
+    assert_eq!(result.outliers.len(), 2, "{:?}", result.outliers);
 }
 
 #[test]

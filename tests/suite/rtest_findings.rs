@@ -150,7 +150,10 @@ fn staircase(outcome: &Trace<'_>, component: &str) -> Option<Vec<(f64, f64)>> {
         .iter()
         .position(|effect| effect.component.to_string() == component)?;
     let effect = &outcome.result.effects[number];
-    let at = effect.numbers.iter().find(|number| number.name == "at")?;
+    let at = effect
+        .shape_parameters
+        .iter()
+        .find(|number| number.name == "at")?;
     assert_eq!(at.unit, "mm");
     let heights = effect.parameters.iter().map(|height| height.value);
     Some(at.values.iter().copied().zip(heights).collect())

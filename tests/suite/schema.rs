@@ -328,7 +328,7 @@ fn results_hold_and_have_the_fields_of_the_design() {
             "residual_before",
             "moved",
             "candidates",
-            "candidates_seen",
+            "candidates_detectable",
             "unobservable",
             "rejected",
             "warnings",

@@ -62,7 +62,7 @@ fn what_is_no_effect_does_not_lower_the_error_held_out() {
     assert!(!result.rejected_candidates.is_empty());
     for rejected in &result.rejected_candidates {
         assert!(
-            rejected.heldout_fall_um <= rejected.u_heldout_fall_um,
+            rejected.heldout_decrease_um <= rejected.u_heldout_decrease_um,
             "{rejected:?}"
         );
     }

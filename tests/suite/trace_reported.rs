@@ -207,7 +207,7 @@ fn each_explanation_is_told_with_how_well_a_further_test_separates_it() {
     };
     separate_aliases(&mut trace, &menu, &|_| true).unwrap();
     let effect = &trace.result.effects[0];
-    assert!(!effect.unique && effect.indistinguishable == effect.aliases.len() + 1);
+    assert!(!effect.unique && effect.explanation_count == effect.aliases.len() + 1);
     assert!(effect.aliases.len() > 4, "{:?}", effect.aliases);
     assert_eq!(effect.name.meaning, "C table: axial motion twice per turn");
     for alias in &effect.aliases {
@@ -269,7 +269,7 @@ fn an_effect_without_an_alternative_is_unique() {
     let mut trace = trace(&session, &options, &|_| true).unwrap();
     separate_aliases(&mut trace, &CandidateTests::short(), &|_| true).unwrap();
     let effect = &trace.result.effects[0];
-    assert!(effect.unique && effect.indistinguishable == 1 && effect.aliases.is_empty());
+    assert!(effect.unique && effect.explanation_count == 1 && effect.aliases.is_empty());
     assert_eq!(effect.explanations, effect.name.meaning);
     assert!(effect.separating_tests.is_empty() && effect.separated_by.is_none());
 }

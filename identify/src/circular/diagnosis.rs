@@ -253,12 +253,8 @@ fn report(rows: &Rows, faults: &[Fault], regression: &Regression, sigma: f64, re
                     .iter()
                     .map(|(j, w)| (first + j, w * figure.per_mm))
                     .collect();
-                ParameterResult {
-                    id: figure.name.clone(),
-                    value: weights.iter().map(|(j, w)| regression.beta[*j] * w).sum(),
-                    u: regression.u(&weights, sigma),
-                    unit: figure.unit.to_string(),
-                }
+                let value = weights.iter().map(|(j, w)| regression.beta[*j] * w).sum();
+                ParameterResult::new(&figure.name, value, regression.u(&weights, sigma), figure.unit)
             })
             .collect();
         for (name, column) in &fault.amplitudes {
@@ -266,12 +262,8 @@ fn report(rows: &Rows, faults: &[Fault], regression: &Regression, sigma: f64, re
             let (a, b) = (regression.beta[j], regression.beta[k]);
             let amplitude = a.hypot(b);
             let along = [(j, a / amplitude * 1e3), (k, b / amplitude * 1e3)];
-            values.push(ParameterResult {
-                id: name.clone(),
-                value: amplitude * 1e3,
-                u: regression.u(&along, sigma),
-                unit: "um".into(),
-            });
+            let u = regression.u(&along, sigma);
+            values.push(ParameterResult::new(name, amplitude * 1e3, u, "um"));
         }
         values.extend(fault.searched.iter().cloned());
         let own = (0..rows.count()).map(|i| {
@@ -283,6 +275,9 @@ fn report(rows: &Rows, faults: &[Fault], regression: &Regression, sigma: f64, re
         let (least, most) = own.fold((f64::INFINITY, f64::NEG_INFINITY), |(a, b), x| {
             (a.min(x), b.max(x))
         });
+        for value in &mut values {
+            value.meaning = format!("{} of {}: {}", fault.fault, fault.axes, value.id);
+        }
         result.diagnosis.push(Diagnosis {
             fault: fault.fault.to_string(),
             axes: fault.axes.clone(),

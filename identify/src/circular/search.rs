@@ -166,10 +166,5 @@ pub(super) fn cyclic(
 
 /// A number that was searched for on a grid, and has no uncertainty of its own.
 fn searched(id: &str, value: f64, unit: &str) -> ParameterResult {
-    ParameterResult {
-        id: id.to_string(),
-        value,
-        u: 0.0,
-        unit: unit.to_string(),
-    }
+    ParameterResult::new(id, value, 0.0, unit)
 }

@@ -9,7 +9,8 @@ use super::position::{self, Position};
 use super::{Calibration, Function, MonteCarlo, Reference};
 use crate::monte_carlo::Distribution;
 use crate::noise::NoiseSource;
-use crate::results::{ParameterResult, Unobservable};
+use crate::parameter_description::error_meaning;
+use crate::results::{Interval, ParameterResult, Unobservable};
 
 /// Bins of a histogram in a report.
 const REPORTED_BINS: usize = 100;
@@ -61,9 +62,9 @@ pub struct DistributionResult {
     /// Standard deviation over the runs.
     pub u_um: f64,
     /// The shortest coverage interval.
-    pub shortest_um: [f64; 2],
+    pub shortest_interval_um: Interval,
     /// The probabilistically symmetric one.
-    pub symmetric_um: [f64; 2],
+    pub symmetric_interval_um: Interval,
     /// The runs by value.
     pub histogram: Histogram,
 }
@@ -76,7 +77,7 @@ pub struct MonteCarloResult {
     /// Seed.
     pub seed: u64,
     /// Coverage probability of the intervals.
-    pub coverage: f64,
+    pub coverage_probability: f64,
     /// Every quantity.
     pub quantities: Vec<DistributionResult>,
 }
@@ -103,7 +104,7 @@ pub struct SelfCalibration {
     /// The boundary conditions.
     pub conditions: Vec<String>,
     /// Values that remain unknown under the conditions, with the radius where it is estimated.
-    pub unknowns: usize,
+    pub parameter_count: usize,
     /// How many of those, or combinations, the readings tell.
     pub rank: usize,
     /// The functions.
@@ -163,11 +164,11 @@ impl Calibration {
         let parameters = |which: usize| {
             position.as_ref().map_or(Vec::new(), |position| {
                 (0..2)
-                    .map(|k| ParameterResult {
-                        id: self.location(k, &axis),
-                        value: position.centres_mm[which][k] * 1e3,
-                        u: position.u_mm[which][k] * 1e3,
-                        unit: "um".into(),
+                    .map(|k| {
+                        let id = self.location(k, &axis);
+                        let meaning = error_meaning(&session.machine, &id);
+                        let (value, u) = (position.centres_mm[which][k], position.u_mm[which][k]);
+                        ParameterResult::new(id, value * 1e3, u * 1e3, "um").with_meaning(meaning)
                     })
                     .collect()
             })
@@ -192,18 +193,15 @@ impl Calibration {
                 .iter()
                 .map(|condition| condition.words.clone())
                 .collect(),
-            unknowns: self.solution.unknowns,
+            parameter_count: self.solution.unknowns,
             rank: self.solution.rank.seen.ncols(),
             functions: Function::ALL
                 .map(|function| self.function(function, &axis))
                 .to_vec(),
             radius: (self.solution.values_mm.len() > columns && self.solution.seen[columns]).then(|| {
-                ParameterResult {
-                    id: "radius".into(),
-                    value: self.solution.values_mm[columns] * 1e3,
-                    u: self.u_mm(columns) * 1e3,
-                    unit: "um".into(),
-                }
+                let value = self.solution.values_mm[columns] * 1e3;
+                ParameterResult::new("radius", value, self.u_mm(columns) * 1e3, "um")
+                    .with_meaning("artefact: deviation of the radius from the stated one")
             }),
             parameters: parameters(0),
             parameters_by_turn: parameters(1),
@@ -354,7 +352,7 @@ impl Calibration {
         MonteCarloResult {
             runs: draws.runs,
             seed: draws.seed,
-            coverage: draws.coverage,
+            coverage_probability: draws.coverage,
             quantities,
         }
     }
@@ -370,13 +368,13 @@ struct AxisPositionEstimate {
 
 fn reported(id: String, distribution: &Distribution) -> DistributionResult {
     let merged = distribution.counts.len() / REPORTED_BINS;
-    let um = |interval: [f64; 2]| interval.map(|end| end * 1e3);
+    let um = |interval: [f64; 2]| Interval::from(interval.map(|end| end * 1e3));
     DistributionResult {
         id,
         mean_um: distribution.mean * 1e3,
         u_um: distribution.u * 1e3,
-        shortest_um: um(distribution.shortest),
-        symmetric_um: um(distribution.symmetric),
+        shortest_interval_um: um(distribution.shortest),
+        symmetric_interval_um: um(distribution.symmetric),
         histogram: Histogram {
             from_um: distribution.from * 1e3,
             to_um: distribution.to * 1e3,

@@ -88,7 +88,7 @@ fn fill_in(
             from: name(one),
             before_sigma: one.before,
             after_sigma: one.after,
-            minutes: first.minutes,
+            duration_min: first.minutes,
         });
     }
     let alternative = |one: &Alternative| AlternativeResult {
@@ -99,9 +99,9 @@ fn fill_in(
     };
     let result = |test: &SeparatingTest| SeparatingTestResult {
         test: test.test.clone(),
-        minutes: test.minutes,
-        separates: test.separates(),
-        of: test.alternatives.len(),
+        duration_min: test.minutes,
+        separated_count: test.separates(),
+        alternative_count: test.alternatives.len(),
         alternatives: test.alternatives.iter().map(alternative).collect(),
     };
     effect.separating_tests = tests.iter().map(result).collect();

@@ -59,6 +59,10 @@ fn sensitivity(errors: &[ErrorAnalysis]) {
     );
 }
 
+fn optional(value: Option<f64>) -> String {
+    value.map_or("–".to_string(), three_digits)
+}
+
 fn budget(errors: &[ErrorAnalysis]) {
     say!("\nLargest contributions to the variance of each error, and its largest correlations:");
     let width = errors

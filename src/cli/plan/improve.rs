@@ -262,7 +262,7 @@ fn add(problem: &mut Problem<'_>, id: &str) -> Result<(), IdentifyError> {
 pub fn print(found: &Improvement) {
     say!(
         "{}; {} of the plan: {}",
-        counted(found.candidate_tests, "candidate test"),
+        counted(found.menu_entries, "candidate test"),
         found.figure,
         three_digits(found.before)
     );
@@ -289,8 +289,8 @@ pub fn print(found: &Improvement) {
             point(step.spindle_ball_mm),
             step.bar_mm
         );
-        if !step.makes_identifiable.is_empty() {
-            say!("   makes identifiable: {}", step.makes_identifiable.join(", "));
+        if !step.opens.is_empty() {
+            say!("   makes identifiable: {}", step.opens.join(", "));
         }
     }
     say!("");

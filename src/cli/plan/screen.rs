@@ -31,7 +31,7 @@ fn header(analysis: &PlanAnalysis) {
         "{identifiable} of {} identifiable; numerical rank {} of {} with set-up parameters",
         counted(analysis.errors.len(), "error"),
         analysis.rank,
-        analysis.parameter_count
+        analysis.unknowns
     );
     let moving = analysis
         .moving_min
@@ -67,7 +67,7 @@ fn errors(errors: &[ErrorAnalysis]) {
                 table::unit(&error.unit),
                 optional(part(true)),
                 optional(part(false)),
-                optional(error.conditional_u),
+                optional(error.u_others_known),
                 largest.map_or(String::new(), |part| {
                     format!("{} {:.0} %", part.from, part.share * 100.0)
                 }),
@@ -94,7 +94,7 @@ fn unidentifiable(analysis: &PlanAnalysis, all: bool) {
             screen::list(&lines, "  ", all);
         }
     };
-    let null_space = analysis.unidentifiable.iter();
+    let null_space = analysis.blind.iter();
     list(
         "Confounded: null-space directions, which leave every reading unchanged:",
         null_space.map(|item| table::with_symbols(&item.why)).collect(),
@@ -132,7 +132,7 @@ fn effects(found: &EffectsAnalysis) {
 fn next(analysis: &PlanAnalysis, file: &Path, improvable: bool, all: bool) -> Vec<Step> {
     let mut steps: Vec<Step> = Vec::new();
     if improvable {
-        let purpose = if analysis.unidentifiable.is_empty() {
+        let purpose = if analysis.blind.is_empty() {
             "propose the test that most lowers the largest uncertainty"
         } else {
             "propose the test that makes the errors identifiable"

@@ -9,7 +9,7 @@ use crate::effect_description::{explanations, meaning};
 use crate::fit::Fit;
 use crate::parameters::Role;
 use crate::problem::Problem;
-use crate::results::{CurvePoint, EffectName, EffectResult, ParameterResult, ShapeNumber};
+use crate::results::{CurvePoint, EffectName, EffectResult, ParameterResult, ShapeParameter};
 use crate::trace::library::Family;
 
 /// An effect's name as it stands in results.
@@ -18,7 +18,7 @@ pub fn effect_name(machine: &Machine, effect: &Effect) -> EffectName {
         component: effect.component.to_string(),
         driver: effect.driver.to_string(),
         shape: effect.shape.word().to_string(),
-        order: effect.shape.order(),
+        order: effect.shape.order().map(|order| order.round() as usize),
         tests: effect.tests.clone(),
         meaning: meaning(machine, effect).to_string(),
     }
@@ -59,7 +59,7 @@ pub(super) fn result(
             .get(candidate.family)
             .map(|family| family.name.clone())
             .unwrap_or_default(),
-        numbers: numbers_of(after, &candidate.effect),
+        shape_parameters: shape_parameters_of(after, &candidate.effect),
         parameters: parameters_of(after, found.parameters, number),
         curve: curve_of(after, findings.after_fit, number, found.moves),
         curve_at_unit,
@@ -68,7 +68,7 @@ pub(super) fn result(
         rms_gain_um: found.rms_gain_um,
         heldout_rms_um: held_out.um(found.number + 1),
         unique: found.alias_effects.is_empty(),
-        indistinguishable: meanings.len(),
+        explanation_count: meanings.len(),
         explanations: explanations(&meanings),
         aliases: (found.alias_effects.iter())
             .map(|effect| effect_name(machine, effect))
@@ -177,7 +177,7 @@ fn driver_unit(problem: &Problem<'_>, effect: &Effect) -> (&'static str, f64) {
 }
 
 /// The numbers and places of an effect's shape.
-fn numbers_of(problem: &Problem<'_>, effect: &Effect) -> Vec<ShapeNumber> {
+fn shape_parameters_of(problem: &Problem<'_>, effect: &Effect) -> Vec<ShapeParameter> {
     let (unit, display_per_internal) = driver_unit(problem, effect);
     let numbers = match &effect.shape {
         Shape::Periodic { period } => vec![("period", vec![*period])],
@@ -187,7 +187,7 @@ fn numbers_of(problem: &Problem<'_>, effect: &Effect) -> Vec<ShapeNumber> {
         Shape::Steps { at } => vec![("at", at.clone())],
         _ => Vec::new(),
     };
-    let number = |(name, values): (&str, Vec<f64>)| ShapeNumber {
+    let number = |(name, values): (&str, Vec<f64>)| ShapeParameter {
         name: name.to_string(),
         values: values
             .into_iter()

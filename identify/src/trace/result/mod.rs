@@ -11,13 +11,17 @@ use super::library;
 use super::remainder::Structure;
 use super::search::Search;
 use super::start::Start;
+use crate::covariance;
 use crate::error::IdentifyError;
 use crate::fit::{self, Fit};
 use crate::heldout::{mislabelled_runs, rms_mm};
 use crate::noise;
 use crate::plausibility::Plausibility;
 use crate::problem::Problem;
-use crate::results::{ChangedParameter, EffectResult, ModelResult, ParameterResult, Remainder, TraceResult};
+use crate::results::{
+    ChangedParameter, EffectResult, ModelResult, ParameterResult, Remainder, TraceResult,
+    phases_follow_amplitudes,
+};
 pub(super) use effect::effect_name;
 pub(super) use unsearched::unsearched;
 
@@ -81,6 +85,7 @@ pub(super) fn report(findings: &TraceFindings<'_, '_>) -> Result<ReportedEffect,
         gains.push(model.gain(taken.candidate).gain);
     }
     cover(&mut after_result.parameters, after, after_fit, &moves);
+    after_result.covariance = covariance::of_parameters(after, after_fit, &after_result.parameters);
     let families = library::families()?;
     let effects: Vec<EffectResult> = (0..moves.len())
         .map(|k| {
@@ -98,10 +103,12 @@ pub(super) fn report(findings: &TraceFindings<'_, '_>) -> Result<ReportedEffect,
     let mut warnings = before.session.warnings.clone();
     warnings.extend(noise::stated_against_repeats(before, &before_fit.residuals));
     warnings.extend(mislabelled_runs(&before.tests));
-    let moved = moved(&before_result.parameters, &after_result.parameters);
+    let changed_parameters = changed_parameters(&before_result.parameters, &after_result.parameters);
+    let unique = effects.iter().all(|effect| effect.unique);
     let mut result = TraceResult {
         verdict,
         interrupted: false,
+        unique,
         noise_um: after.noise.sigma_mm * 1e3,
         noise_source: after.noise.source.word().to_string(),
         noise_ar_coefficients: after.noise.memory.clone(),
@@ -122,11 +129,12 @@ pub(super) fn report(findings: &TraceFindings<'_, '_>) -> Result<ReportedEffect,
             None => "independent poses: structure is looked for effect by effect".to_string(),
         },
         rejected_candidates: rejected::candidates(&before.session.machine, search, &held_out),
-        moved,
+        changed_parameters,
         candidates: findings.candidates,
-        candidates_seen: findings.candidates_seen,
+        candidates_detectable: findings.candidates_seen,
         unobservable: fit::unobservable(after, &after_fit.rank),
-        rejected: fit::rejected(after, after_fit),
+        null_space: covariance::null_space(after, &after_fit.rank),
+        outliers: fit::outliers(after, after_fit),
         plausibility: Plausibility::default(),
         warnings,
         about: before.session.about.iter().cloned().collect(),
@@ -207,13 +215,20 @@ pub(super) fn model_result(problem: &Problem<'_>, fit: &Fit, held_out_mm: f64) -
     let rms = rms_mm(problem, &fit.residuals) * 1e3;
     let held = held_out_mm * 1e3;
     let in_3d = |rms: f64| three.then(|| rms * 3.0_f64.sqrt());
+    let parameters = fit::parameters(problem, fit);
     ModelResult {
         rms_um: rms,
         heldout_rms_um: held,
         rms_3d_um: in_3d(rms),
         heldout_rms_3d_um: in_3d(held),
         noise_um: problem.noise.sigma_mm * 1e3,
-        parameters: fit::parameters(problem, fit),
+        rank: fit.rank.seen.ncols(),
+        parameter_count: fit.beta.len(),
+        chi_square: fit.chi_square,
+        degrees_of_freedom: fit.degrees_of_freedom,
+        identifiable: fit::ids(&parameters),
+        covariance: covariance::of_parameters(problem, fit, &parameters),
+        parameters,
     }
 }
 
@@ -255,11 +270,13 @@ fn cover(parameters: &mut [ParameterResult], problem: &Problem<'_>, fit: &Fit, m
     };
     let moved = alias_shifts(moves, &values(&fit.beta), values, &fit.beta);
     for (parameter, moved) in parameters.iter_mut().zip(moved) {
-        parameter.u = parameter.u.hypot(moved);
+        let mut u = parameter.u.hypot(moved);
         if parameter.id.ends_with(".phase") {
-            parameter.u = parameter.u.min(fit::any_phase_deg());
+            u = u.min(fit::any_phase_deg());
         }
+        parameter.set_u(u);
     }
+    phases_follow_amplitudes(parameters);
 }
 
 /// How far the unknowns move if an alias stands in the place of the `k`-th effect, internal units: `in_place` and `named` are the coefficients of the model
@@ -341,15 +358,15 @@ fn word(found: bool, structured: bool, share: f64) -> &'static str {
     }
 }
 
-/// Parameters that moved by more than their uncertainty.
-fn moved(before: &[ParameterResult], after: &[ParameterResult]) -> Vec<ChangedParameter> {
+/// Parameters that changed by more than their standard uncertainty.
+fn changed_parameters(before: &[ParameterResult], after: &[ParameterResult]) -> Vec<ChangedParameter> {
     before
         .iter()
         .filter_map(|b| {
             let a = after.iter().find(|a| a.id == b.id)?;
             ((a.value - b.value).abs() > a.u).then(|| ChangedParameter {
                 id: a.id.clone(),
-                by: a.value - b.value,
+                change: a.value - b.value,
                 u: a.u,
                 unit: a.unit.clone(),
             })
@@ -375,23 +392,18 @@ mod tests {
     }
 
     #[test]
-    fn what_moved_by_more_than_its_uncertainty_is_told() {
-        let parameter = |id: &str, value: f64, u: f64| ParameterResult {
-            id: id.into(),
-            value,
-            u,
-            unit: "um".into(),
-        };
+    fn parameters_that_change_by_more_than_their_uncertainty_are_listed() {
+        let parameter = |id: &str, value: f64, u: f64| ParameterResult::new(id, value, u, "um");
         let before = [
             parameter("EX0C", 3.0, 0.1),
             parameter("EY0C", 3.0, 0.1),
             parameter("EZ0A", 1.0, 0.1),
         ];
         let after = [parameter("EX0C", 1.0, 1.5), parameter("EY0C", 1.0, 2.5)];
-        let moved = moved(&before, &after);
-        assert_eq!(moved.len(), 1);
+        let changed = changed_parameters(&before, &after);
+        assert_eq!(changed.len(), 1);
         assert_eq!(
-            (moved[0].id.as_str(), moved[0].by, moved[0].u),
+            (changed[0].id.as_str(), changed[0].change, changed[0].u),
             ("EX0C", -2.0, 1.5)
         );
     }

@@ -14,12 +14,12 @@ pub(super) fn candidates(
     held_out: &HeldOut<'_>,
 ) -> Vec<RejectedCandidate> {
     let rejected = search.unclaimed.iter().map(|unclaimed| {
-        let (heldout_fall_um, u_heldout_fall_um) = held_out.decrease_um(unclaimed.fall);
+        let (heldout_decrease_um, u_heldout_decrease_um) = held_out.decrease_um(unclaimed.fall);
         RejectedCandidate {
             name: effect_name(machine, &search.candidates[unclaimed.taken.candidate].effect),
             p_value: unclaimed.taken.p_value,
-            heldout_fall_um,
-            u_heldout_fall_um,
+            heldout_decrease_um,
+            u_heldout_decrease_um,
         }
     });
     rejected.collect()

@@ -1,6 +1,7 @@
 //! What is reported of a trace without a search: the declared model.
 
 use super::{model_result, not_examined};
+use crate::covariance;
 use crate::fit::{self, Fit};
 use crate::noise;
 use crate::plausibility::Plausibility;
@@ -16,6 +17,7 @@ pub(in crate::trace) fn unsearched(problem: &Problem<'_>, fit: &Fit) -> TraceRes
     TraceResult {
         verdict: String::new(),
         interrupted: false,
+        unique: true,
         noise_um: problem.noise.sigma_mm * 1e3,
         noise_source: problem.noise.source.word().to_string(),
         noise_ar_coefficients: problem.noise.memory.clone(),
@@ -27,11 +29,12 @@ pub(in crate::trace) fn unsearched(problem: &Problem<'_>, fit: &Fit) -> TraceRes
         rejected_candidates: Vec::new(),
         residual_before: remainder.place.clone().unwrap_or_default(),
         remainder,
-        moved: Vec::new(),
+        changed_parameters: Vec::new(),
         candidates: 0,
-        candidates_seen: 0,
+        candidates_detectable: 0,
         unobservable: fit::unobservable(problem, &fit.rank),
-        rejected: fit::rejected(problem, fit),
+        null_space: covariance::null_space(problem, &fit.rank),
+        outliers: fit::outliers(problem, fit),
         about: problem.session.about.iter().cloned().collect(),
         plausibility: Plausibility::default(),
         warnings,

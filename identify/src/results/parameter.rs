@@ -1,0 +1,125 @@
+//! Parameters with their uncertainties, covariance and null space, as JSON has them.
+
+use std::collections::BTreeMap;
+
+use schemars::JsonSchema;
+use serde::Serialize;
+
+/// Coverage factor of the expanded uncertainty `U = k u` (JCGM 100, 6.2).
+pub const COVERAGE_FACTOR: f64 = 2.0;
+
+/// A value with its standard uncertainty.
+#[derive(Clone, Debug, PartialEq, Serialize, JsonSchema)]
+pub struct ParameterResult {
+    /// Identifier: `EY0A`, `bar[A100]`, `EZC~C:h2.amplitude`.
+    pub id: String,
+    /// Estimate, in `unit`.
+    pub value: f64,
+    /// Standard uncertainty, in `unit`. 0 where it is not quantified.
+    pub u: f64,
+    /// Expanded uncertainty `U = 2 u`, in `unit`.
+    pub expanded_u: f64,
+    /// Unit of `value`, `u` and `expanded_u`: `um`, `arcsec`, `deg`, …
+    pub unit: String,
+    /// Whether `|value|` exceeds `expanded_u`. For a phase: whether its amplitude does. `false` where `u` is not quantified.
+    pub significant: bool,
+    /// What the parameter is, in words: `C table: inclination of the axis about Y (squareness to X)`.
+    pub meaning: String,
+}
+
+impl ParameterResult {
+    /// A parameter with the expanded uncertainty and the significance that follow from `value` and `u`.
+    pub fn new(id: impl Into<String>, value: f64, u: f64, unit: impl Into<String>) -> ParameterResult {
+        let mut parameter = ParameterResult {
+            id: id.into(),
+            value,
+            u,
+            expanded_u: 0.0,
+            unit: unit.into(),
+            significant: false,
+            meaning: String::new(),
+        };
+        parameter.set_u(u);
+        parameter
+    }
+
+    /// The same with its meaning in words.
+    pub fn with_meaning(self, meaning: impl Into<String>) -> ParameterResult {
+        ParameterResult {
+            meaning: meaning.into(),
+            ..self
+        }
+    }
+
+    /// Replaces the standard uncertainty, and what follows from it.
+    pub fn set_u(&mut self, u: f64) {
+        self.u = u;
+        self.expanded_u = COVERAGE_FACTOR * u;
+        self.significant = u > 0.0 && self.value.abs() > self.expanded_u;
+    }
+}
+
+/// Gives each phase the significance of the amplitude in front of it.
+pub(crate) fn phases_follow_amplitudes(parameters: &mut [ParameterResult]) {
+    for k in 1..parameters.len() {
+        if parameters[k].id.ends_with(".phase") && parameters[k - 1].id.ends_with(".amplitude") {
+            parameters[k].significant = parameters[k - 1].significant;
+        }
+    }
+}
+
+/// A combination of parameters that leaves every reading unchanged.
+#[derive(Clone, Debug, PartialEq, Serialize, JsonSchema)]
+pub struct Unobservable {
+    /// Coefficient of each parameter, in the parameter's display unit. A change of all parameters in this proportion changes no reading.
+    pub combination: BTreeMap<String, f64>,
+    /// Explanation in words.
+    pub why: String,
+}
+
+/// The null space of the readings in reduced row echelon form.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, JsonSchema)]
+pub struct NullSpace {
+    /// The parameters that take part in a null-space direction.
+    pub ids: Vec<String>,
+    /// Display unit of each of them.
+    pub units: Vec<String>,
+    /// One row per null-space direction, one column per parameter of `ids`, in the units of `units`. The coefficient of the leading parameter is 1.
+    pub vectors: Vec<Vec<f64>>,
+}
+
+/// Covariance matrix of the parameters.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, JsonSchema)]
+pub struct Covariance {
+    /// The parameters, in the order of rows and columns: that of `parameters`.
+    pub ids: Vec<String>,
+    /// Unit of each parameter. Entry (i, j) has the unit `units[i] · units[j]`.
+    pub units: Vec<String>,
+    /// The matrix, row by row. Its diagonal holds the squares of the `u` in `parameters`.
+    pub matrix: Vec<Vec<f64>>,
+}
+
+/// An interval of values.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, JsonSchema)]
+pub struct Interval {
+    /// Lower end.
+    pub low: f64,
+    /// Upper end.
+    pub high: f64,
+}
+
+impl Interval {
+    /// Both ends after a function.
+    pub fn map(self, function: impl Fn(f64) -> f64) -> Interval {
+        Interval {
+            low: function(self.low),
+            high: function(self.high),
+        }
+    }
+}
+
+impl From<[f64; 2]> for Interval {
+    fn from([low, high]: [f64; 2]) -> Interval {
+        Interval { low, high }
+    }
+}

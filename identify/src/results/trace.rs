@@ -1,0 +1,265 @@
+//! What `trace` reports, as JSON has it.
+
+use std::collections::BTreeMap;
+
+use schemars::JsonSchema;
+use serde::Serialize;
+
+use super::Outlier;
+use super::parameter::{Covariance, NullSpace, ParameterResult, Unobservable};
+use crate::plausibility::Plausibility;
+
+/// Residual and parameters of a model.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, JsonSchema)]
+pub struct ModelResult {
+    /// Rms of the residual over scalar readings, µm.
+    pub rms_um: f64,
+    /// Rms of the residual over scalar readings that neither fit nor search used, µm.
+    pub heldout_rms_um: f64,
+    /// Rms length of the residual vector, µm, for instruments with three coordinates.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub rms_3d_um: Option<f64>,
+    /// Rms length of the residual vector over held-out readings, µm, for instruments with three coordinates.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub heldout_rms_3d_um: Option<f64>,
+    /// Standard deviation of one scalar reading from which the uncertainties follow, µm. Where the source is `residual`, that of this model.
+    pub noise_um: f64,
+    /// Numerical rank: number of independent combinations of the parameters that are identifiable.
+    pub rank: usize,
+    /// Number of parameters, set-up parameters included.
+    pub parameter_count: usize,
+    /// χ² of the fit, priors counted as observations.
+    pub chi_square: f64,
+    /// Degrees of freedom of χ²: scalar readings plus priors less rank.
+    pub degrees_of_freedom: usize,
+    /// The identifiable parameters.
+    pub parameters: Vec<ParameterResult>,
+    /// Identifiers of all identifiable parameters, set-up parameters included.
+    pub identifiable: Vec<String>,
+    /// Covariance of `parameters`.
+    pub covariance: Covariance,
+}
+
+/// An effect by its keys of session files.
+#[derive(Clone, Debug, PartialEq, Serialize, JsonSchema)]
+pub struct EffectName {
+    /// What moves.
+    pub component: String,
+    /// The quantity that the effect follows.
+    pub driver: String,
+    /// Shape of the dependence.
+    pub shape: String,
+    /// Order of a harmonic (periods per turn), degree of a polynomial.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub order: Option<usize>,
+    /// The tests to which the effect is confined; absent for all tests.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub tests: Vec<String>,
+    /// What the effect is, in words: `C table: axial motion twice per turn`.
+    pub meaning: String,
+}
+
+/// A point of a nonparametric curve. The curve excludes what location errors can absorb.
+#[derive(Clone, Debug, PartialEq, Serialize, JsonSchema)]
+pub struct CurvePoint {
+    /// Value of the driver, in `curve_at_unit`.
+    pub at: f64,
+    /// Value of the component there, in `curve_unit`.
+    pub value: f64,
+    /// Standard uncertainty of `value`, in `curve_unit`.
+    pub u: f64,
+}
+
+/// A number in an effect's shape that is chosen on a grid. It has no uncertainty.
+#[derive(Clone, Debug, PartialEq, Serialize, JsonSchema)]
+pub struct ShapeParameter {
+    /// `period`, `time constant`, `width`, `centre`, or `at` for the positions of steps.
+    pub name: String,
+    /// One value, or one for each position.
+    pub values: Vec<f64>,
+    /// Unit of the driver: mm, deg, s, K, m.
+    pub unit: String,
+}
+
+/// An effect that the search has found.
+#[derive(Clone, Debug, PartialEq, Serialize, JsonSchema)]
+pub struct EffectResult {
+    /// Component, driver, shape, order.
+    #[serde(flatten)]
+    pub name: EffectName,
+    /// Family of the effect in the library, in words.
+    pub family: String,
+    /// The numbers of its shape.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub shape_parameters: Vec<ShapeParameter>,
+    /// Its identifiable coefficients. A nonparametric curve may have none.
+    pub parameters: Vec<ParameterResult>,
+    /// The points of a nonparametric curve.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub curve: Vec<CurvePoint>,
+    /// Unit of the driver of a curve.
+    #[serde(skip_serializing_if = "String::is_empty")]
+    pub curve_at_unit: String,
+    /// Unit of the values of a curve.
+    #[serde(skip_serializing_if = "String::is_empty")]
+    pub curve_unit: String,
+    /// Probability that the whole search finds as much in readings without structure.
+    pub p_value: f64,
+    /// Rms of what the effect explains in addition to the rest of the model, µm.
+    pub rms_gain_um: f64,
+    /// Held-out rms with this effect and those found before it, µm.
+    pub heldout_rms_um: f64,
+    /// Whether the effect is unique: no other effect of the library explains the readings equally well in its place.
+    pub unique: bool,
+    /// Number of explanations that the readings do not separate, this effect included; 1 where it is unique.
+    pub explanation_count: usize,
+    /// All of these explanations in words, by part of the machine: `C table: axial motion twice per turn, or tilt about X once per turn`.
+    pub explanations: String,
+    /// The competing explanations, nearest first.
+    pub aliases: Vec<EffectName>,
+    /// The first of `separating_tests`.
+    pub separated_by: Option<String>,
+    /// Separation of the effect from the nearest alias that this test separates.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub separation: Option<SeparationResult>,
+    /// Further tests that separate the effect from its aliases. The first separates most aliases, each further test most of the remaining ones.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub separating_tests: Vec<SeparatingTestResult>,
+}
+
+/// Separation of a found effect from one of its aliases by a further test.
+#[derive(Clone, Debug, PartialEq, Serialize, JsonSchema)]
+pub struct SeparationResult {
+    /// The alias.
+    pub from: EffectName,
+    /// Separation by the present readings, standard deviations.
+    pub before_sigma: f64,
+    /// Separation with the test added, standard deviations.
+    pub after_sigma: f64,
+    /// Duration of the test, min.
+    pub duration_min: f64,
+}
+
+/// A further test, and the aliases that it separates from a found effect.
+#[derive(Clone, Debug, PartialEq, Serialize, JsonSchema)]
+pub struct SeparatingTestResult {
+    /// The test in words: `C150 with the workpiece ball at radius 50 mm`.
+    pub test: String,
+    /// Duration of the test, min.
+    pub duration_min: f64,
+    /// Number of `alternatives` that the test separates.
+    pub separated_count: usize,
+    /// Number of `alternatives`.
+    pub alternative_count: usize,
+    /// The aliases that no test before this one separates, nearest first.
+    pub alternatives: Vec<AlternativeResult>,
+}
+
+/// Separation of a found effect from one alternative by a test.
+#[derive(Clone, Debug, PartialEq, Serialize, JsonSchema)]
+pub struct AlternativeResult {
+    /// Component, driver, shape, order.
+    #[serde(flatten)]
+    pub name: EffectName,
+    /// Separation by the present readings and the tests before this one, standard deviations.
+    pub before_sigma: f64,
+    /// Separation with this test added, standard deviations.
+    pub after_sigma: f64,
+    /// Whether the separation is at least 3 standard deviations.
+    pub separated: bool,
+}
+
+/// A candidate that scores better than the null distribution of the search and is rejected by cross-validation.
+#[derive(Clone, Debug, PartialEq, Serialize, JsonSchema)]
+pub struct RejectedCandidate {
+    /// Component, driver, shape, order.
+    #[serde(flatten)]
+    pub name: EffectName,
+    /// Probability that the whole search finds as much in readings without structure.
+    pub p_value: f64,
+    /// Decrease of the held-out rms, µm; negative where it increases.
+    pub heldout_decrease_um: f64,
+    /// Standard error of this decrease, µm, from paired differences over runs, blocks or poses.
+    pub u_heldout_decrease_um: f64,
+}
+
+/// The residual of the model with the found effects.
+#[derive(Clone, Debug, PartialEq, Serialize, JsonSchema)]
+pub struct Remainder {
+    /// Whether it has structure beyond noise.
+    pub structured: bool,
+    /// Probability of as much structure in readings without structure.
+    pub p_value: f64,
+    /// Where the structure is, and what it looks like; `null` without structure.
+    #[serde(rename = "where")]
+    pub place: Option<String>,
+}
+
+/// A parameter that changed by more than its standard uncertainty between `before` and `after`.
+#[derive(Clone, Debug, PartialEq, Serialize, JsonSchema)]
+pub struct ChangedParameter {
+    /// The parameter.
+    pub id: String,
+    /// Estimate after less estimate before, in `unit`: the bias by the unmodelled effects.
+    pub change: f64,
+    /// Standard uncertainty after, in `unit`.
+    pub u: f64,
+    /// Unit of `change` and `u`.
+    pub unit: String,
+}
+
+/// What a trace reports.
+#[derive(Clone, Debug, PartialEq, Serialize, JsonSchema)]
+pub struct TraceResult {
+    /// `clean`, `explained`, `partly-explained`, `unexplained`; `incomplete` for an interrupted trace.
+    pub verdict: String,
+    /// Whether the trace was interrupted. Effects may then be missing.
+    pub interrupted: bool,
+    /// Whether every found effect is unique; `true` where there is none.
+    pub unique: bool,
+    /// Standard deviation of one scalar reading with the found effects, µm: that of `after`.
+    pub noise_um: f64,
+    /// Source of `noise_um`: `stated` by the session, `repeats` (repeated readings), or `residual` where there is neither. The residual of the
+    /// model with its effects also holds what that model lacks.
+    pub noise_source: String,
+    /// Autoregressive coefficients of the noise along a run; empty for white noise.
+    pub noise_ar_coefficients: Vec<f64>,
+    /// Number of readings without outliers.
+    pub readings: usize,
+    /// What each fold of the cross-validation holds out.
+    pub heldout_by: String,
+    /// The declared model.
+    pub before: ModelResult,
+    /// The model with the found effects.
+    pub after: ModelResult,
+    /// The effects, in the order in which they were found.
+    pub effects: Vec<EffectResult>,
+    /// The residual of the model with the found effects.
+    pub remainder: Remainder,
+    /// Structure of the residual of the declared model, in words.
+    pub residual_before: String,
+    /// Candidates that score better than the null distribution of the search and that are rejected, because the held-out error does not decrease by more
+    /// than the standard error of the decrease.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub rejected_candidates: Vec<RejectedCandidate>,
+    /// Parameters that changed by more than their standard uncertainty.
+    pub changed_parameters: Vec<ChangedParameter>,
+    /// Number of candidates that were screened.
+    pub candidates: usize,
+    /// Number of candidates that these readings can detect.
+    pub candidates_detectable: usize,
+    /// The null-space directions of the model with the found effects, in words.
+    pub unobservable: Vec<Unobservable>,
+    /// The null space of the model with the found effects, as a matrix.
+    pub null_space: NullSpace,
+    /// Readings excluded as outliers.
+    pub outliers: Vec<Outlier>,
+    /// Statements of the session that the readings contradict, and what may be wrong.
+    #[serde(flatten)]
+    pub plausibility: Plausibility,
+    /// Warnings in words.
+    pub warnings: Vec<String>,
+    /// Notes of the session file's `[about]`: `serial_number`, `operator`, `date`, `comment` and others.
+    #[serde(skip_serializing_if = "BTreeMap::is_empty")]
+    pub about: BTreeMap<String, String>,
+}
