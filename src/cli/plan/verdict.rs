@@ -38,7 +38,10 @@ pub fn verdict(analysis: &PlanAnalysis) -> Vec<String> {
         .filter_map(|error| Some((error, error.u?)))
         .max_by(|(a, u), (b, other)| u.total_cmp(other).then_with(|| b.id.cmp(&a.id)));
     match worst {
-        Some((error, u)) => sentences.extend([uncertainty(error, u), limit(error)]),
+        Some((error, u)) => {
+            sentences.push(uncertainty(error, u));
+            sentences.push(limit(error).join(" "));
+        }
         None if analysis.errors.is_empty() => sentences.push("the plan asks for no error.".to_string()),
         None => {}
     }
@@ -55,19 +58,16 @@ fn uncertainty(error: &ErrorAnalysis, u: f64) -> String {
     )
 }
 
-/// The largest contributions to its variance.
-fn limit(error: &ErrorAnalysis) -> String {
-    let noise = error
-        .budget
-        .iter()
-        .filter(|part| part.from == "noise")
-        .map(|part| part.share)
-        .sum::<f64>();
+/// What limits the error: the noise or the largest set-up contributions to its variance; and whether more readings help.
+fn limit(error: &ErrorAnalysis) -> [String; 2] {
+    let noise = error.budget.iter().filter(|part| part.from == "noise");
+    let noise: f64 = noise.map(|part| part.share).sum();
     if noise >= 0.5 {
-        return format!(
-            "The noise limits it ({} of its variance): more readings or less noise reduce it.",
-            percent(noise)
-        );
+        let share = percent(noise);
+        return [
+            format!("The noise limits it: it contributes {share} of the variance."),
+            "More readings or less noise reduce it.".to_string(),
+        ];
     }
     let setup = error
         .budget
@@ -76,20 +76,21 @@ fn limit(error: &ErrorAnalysis) -> String {
         .enumerate();
     let named = setup.take_while(|(k, part)| *k == 0 || (*k < MAX_NAMED && part.share >= MIN_NAMED_SHARE));
     let named: Vec<String> = named
-        .map(|(_, part): (usize, &Contribution)| {
-            format!("{} ({} of its variance)", part.from, percent(part.share))
-        })
+        .map(|(_, part): (usize, &Contribution)| format!("{} {}", part.from, percent(part.share)))
         .collect();
     let readings = if noise < MIN_NAMED_SHARE {
         "More readings do not reduce it."
     } else {
         "More readings reduce only the part of the noise."
     };
-    format!(
-        "The set-up limits it, first {}; the noise contributes {}. {readings}",
-        named.join(", then "),
-        percent(noise)
-    )
+    [
+        format!(
+            "The set-up limits it: {}, noise {} of the variance.",
+            named.join(", "),
+            percent(noise)
+        ),
+        readings.to_string(),
+    ]
 }
 
 fn percent(share: f64) -> String {
