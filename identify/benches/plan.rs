@@ -66,7 +66,7 @@ fn plans(criterion: &mut Criterion) {
     };
     let found = analyse(&large, &options).expect("an analysis");
     assert_eq!(
-        (found.tests.len(), found.readings, found.unknowns),
+        (found.tests.len(), found.readings, found.parameter_count),
         (10, 10_000, 62)
     );
     let mut group = criterion.benchmark_group("plan");
@@ -92,7 +92,9 @@ fn plans(criterion: &mut Criterion) {
         by_minute: false,
     };
     let menu = CandidateTests::default();
-    let entries = improve(&problem, &menu, &next).expect("a proposal").menu_entries;
+    let entries = improve(&problem, &menu, &next)
+        .expect("a proposal")
+        .candidate_tests;
     group.bench_function(format!("improve/{entries} entries"), |bench| {
         bench.iter(|| improve(black_box(&problem), &menu, &next).expect("a proposal"));
     });

@@ -4,6 +4,7 @@
 
 use abbe_model::session::Session;
 use abbe_model::session::readings::Readings;
+use schemars::JsonSchema;
 use serde::Serialize;
 
 use crate::error::IdentifyError;
@@ -15,23 +16,23 @@ const POSITION: (f64, &str) = (10.0, "um");
 /// Size of an orientation error.
 const ORIENTATION: (f64, &str) = (0.01, "deg");
 
-/// What one error does to one test.
-#[derive(Clone, Debug, PartialEq, Serialize)]
+/// Change of the readings of one test by one error.
+#[derive(Clone, Debug, PartialEq, Serialize, JsonSchema)]
 pub struct Pattern {
     /// The test.
     pub test: String,
-    /// The error, by the name that it was given by.
+    /// The error, by its name on input.
     pub error: String,
     /// Its size, in `unit`.
     pub size: f64,
     /// `um`, `deg`, …
     pub unit: String,
-    /// The largest deviation along the path, µm.
+    /// Largest absolute deviation along the path, µm.
     pub largest_um: f64,
-    /// Their mean, µm: what a circle's radius absorbs.
+    /// Mean deviation, µm: the part that the radius of a circle absorbs.
     pub mean_um: f64,
-    /// Their rms about the mean, µm.
-    pub rms_um: f64,
+    /// Standard deviation about the mean, µm.
+    pub standard_deviation_um: f64,
     /// Reading by reading, a reading's coordinates together, µm.
     #[serde(skip)]
     pub deviations_um: Vec<f64>,
@@ -103,7 +104,7 @@ pub fn patterns(session: &Session, errors: &[Given]) -> Result<Patterns, Identif
                 unit: error.unit.clone(),
                 largest_um: deviations_um.iter().fold(0.0, |most, d| d.abs().max(most)),
                 mean_um,
-                rms_um: (square / count).sqrt(),
+                standard_deviation_um: (square / count).sqrt(),
                 deviations_um,
             });
         }

@@ -12,6 +12,7 @@
 
 use std::collections::BTreeSet;
 
+use schemars::JsonSchema;
 use serde::Serialize;
 use statrs::distribution::{ChiSquared, ContinuousCDF, Normal};
 
@@ -57,21 +58,21 @@ impl Session {
     }
 }
 
-/// What repeated sessions say together.
-#[derive(Clone, Debug, PartialEq, Serialize)]
+/// Comparison of the fits of repeated sessions.
+#[derive(Clone, Debug, PartialEq, Serialize, JsonSchema)]
 pub struct Repeated {
-    /// The sessions' files.
+    /// The session files, in the order of `values`.
     pub sessions: Vec<String>,
-    /// Parameter by parameter.
+    /// The parameters.
     pub parameters: Vec<RepeatedParameter>,
-    /// Sessions that are off the others by more than the fits' uncertainties explain, the clearest first.
+    /// Sessions that deviate from the others by more than the uncertainties of the fits explain, the most significant first.
     pub deviating: Vec<DeviatingSession>,
 }
 
 /// One parameter over the sessions, in `unit`.
-#[derive(Clone, Debug, PartialEq, Serialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, JsonSchema)]
 pub struct RepeatedParameter {
-    /// `EY0A`, `EZC~C:h2.amplitude`.
+    /// Identifier: `EY0A`, `EZC~C:h2.amplitude`.
     pub id: String,
     /// `um`, `arcsec`, …
     pub unit: String,
@@ -85,18 +86,18 @@ pub struct RepeatedParameter {
     pub u_type_b: f64,
     /// `s` over `u_type_b`; `null` where the latter is zero.
     pub ratio: Option<f64>,
-    /// `(n − 1)·ratio²`.
+    /// χ² of the scatter, `(n − 1)·ratio²`.
     pub chi_square: Option<f64>,
-    /// Two-sided probability of such a ratio if the sessions scatter as their fits say.
+    /// Two-sided p-value of `chi_square`.
     pub p_value: Option<f64>,
-    /// What follows, at a probability of 1 % over all parameters.
+    /// Verdict at a significance level of 1 % over all parameters.
     pub scatter: Scatter,
-    /// Session by session.
+    /// Estimate of each session, in `unit`.
     pub values: Vec<f64>,
 }
 
 /// Scatter of the sessions against what their fits say.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 pub enum Scatter {
     /// Nothing speaks against it.
@@ -107,20 +108,20 @@ pub enum Scatter {
     Less,
 }
 
-/// A session that is off the mean of the others.
-#[derive(Clone, Debug, PartialEq, Serialize)]
+/// A parameter of a session that deviates from the mean of the other sessions.
+#[derive(Clone, Debug, PartialEq, Serialize, JsonSchema)]
 pub struct DeviatingSession {
     /// The session's file.
     pub session: String,
     /// The parameter.
     pub id: String,
-    /// Its value there less the mean over the others.
-    pub by: f64,
-    /// Standard uncertainty of this difference, by the fits.
+    /// Value of the session less the mean over the other sessions, in `unit`.
+    pub deviation: f64,
+    /// Standard uncertainty of this deviation by the fits, in `unit`.
     pub u: f64,
-    /// Unit of both.
+    /// Unit of `deviation` and `u`.
     pub unit: String,
-    /// Two-sided probability.
+    /// Two-sided p-value of the deviation.
     pub p_value: f64,
 }
 
@@ -162,7 +163,7 @@ pub fn compare(sessions: &[Session]) -> Result<Repeated, IdentifyError> {
                 result.deviating.push(DeviatingSession {
                     session: sessions[k].name.clone(),
                     id: parameter.id.clone(),
-                    by,
+                    deviation: by,
                     u,
                     unit: parameter.unit.clone(),
                     p_value,
@@ -170,7 +171,7 @@ pub fn compare(sessions: &[Session]) -> Result<Repeated, IdentifyError> {
             }
         }
     }
-    let sigma = |deviating: &DeviatingSession| (deviating.by / deviating.u).abs();
+    let sigma = |deviating: &DeviatingSession| (deviating.deviation / deviating.u).abs();
     result.deviating.sort_by(|a, b| sigma(b).total_cmp(&sigma(a)));
     Ok(result)
 }

@@ -99,7 +99,7 @@ fn print_in_full(test: &CircularTest) {
             say!("  residual of the diagnosis: {} rms", table::micrometres(rms));
         }
     }
-    for line in &test.not_told {
+    for line in &test.not_identifiable {
         say!("  limitation: {line}");
     }
 }

@@ -29,9 +29,9 @@ pub const HELP: &str = "Examples:
   abbe fit sessions/self-calibration/measured/session.toml --method self-calibration \\
       --monte-carlo 100000
 
-The first screen answers in this order: goodness of fit and rank; estimates with standard uncertainty u, expanded
-uncertainty U = 2u and significance; what is confounded; what to do next. It folds set-up parameters, ball-bar figures,
-null-space directions and outliers. --all lists them.";
+The first screen answers in this order: goodness of fit and rank; estimates with standard uncertainty u, expanded uncertainty \
+U = 2u and significance; what is confounded; what to do next. It folds set-up parameters, ball-bar figures, null-space \
+directions and outliers. --all lists them.";
 
 /// The method of identification.
 #[derive(Clone, Copy, PartialEq, Eq, ValueEnum)]
@@ -149,7 +149,7 @@ pub fn run(arguments: &FitArguments) -> Result<(), Failure> {
         abbe::identify::propagation::add_monte_carlo(&problem, &fit, draws, &mut result)?;
     }
     if tables {
-        screen::print(&problem, &fit, &result, &arguments.session.session, arguments.all);
+        screen::print(&problem, &fit, &result, &arguments.session, arguments.all);
     }
     print_warnings(&result.warnings);
     if let Some(path) = &arguments.common.json {

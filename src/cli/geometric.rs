@@ -44,17 +44,17 @@ fn print(result: &Comparison) {
         .centres
         .iter()
         .flat_map(|centre| {
-            (0..2).map(move |which| {
-                let (offset, u) = table::value_and_u(centre.offset_um[which], centre.u_um[which]);
-                let shares: Vec<String> = centre
-                    .shares
+            centre.offsets.iter().map(move |found| {
+                let (offset, u) = table::value_and_u(found.offset_um, found.u_um);
+                let shares: Vec<String> = found
+                    .sensitivities
                     .iter()
-                    .filter(|(_, share)| share[which].abs() > 1e-6)
-                    .map(|(id, share)| format!("{:+.3} {id}", share[which]))
+                    .filter(|share| share.value.abs() > 1e-6)
+                    .map(|share| format!("{:+.3} {}", share.value, share.id))
                     .collect();
                 vec![
                     centre.test.clone(),
-                    format!("{} of {}", centre.across[which], centre.axis),
+                    format!("{} of {}", found.direction, centre.axis),
                     offset,
                     u,
                     shares.join(" "),

@@ -206,13 +206,13 @@ fn csv(machine: &Machine, places: &[Place]) -> Result<Vec<u8>, Failure> {
 fn print(summary: &Summary, functions: usize, path: &str) {
     say!(
         "{path}: {}, {}",
-        counted(summary.places, "place"),
+        counted(summary.points, "place"),
         counted(functions, "error function")
     );
     let at: Vec<String> = summary
         .largest_at
         .iter()
-        .map(|(name, q)| format!("{name} {q:.1}"))
+        .map(|at| format!("{} {:.1}", at.axis, at.position))
         .collect();
     say!("largest at {}\n", at.join(", "));
     let row = |name: String, size: &volumetric::Size| {
@@ -223,11 +223,16 @@ fn print(summary: &Summary, functions: usize, path: &str) {
         ]
     };
     let mut rows = vec![row("error vector".into(), &summary.error)];
-    for (name, size) in ["X", "Y", "Z"].iter().zip(&summary.coordinates) {
+    let coordinates = &summary.coordinates;
+    for (name, size) in [
+        ("X", &coordinates.x),
+        ("Y", &coordinates.y),
+        ("Z", &coordinates.z),
+    ] {
         rows.push(row(format!("its {name}"), size));
     }
-    for (axis, size) in &summary.by_axis {
-        rows.push(row(format!("from axis {axis} alone"), size));
+    for share in &summary.by_axis {
+        rows.push(row(format!("from axis {} alone", share.axis), &share.size));
     }
     if let Some(residual) = &summary.residual {
         rows.push(vec![

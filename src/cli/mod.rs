@@ -61,7 +61,7 @@ const EXAMPLES: &str = "Example, from a template to a found effect:
   abbe trace my/run1/session.toml --only EZC --only EAC
   abbe equation my/chapter5.toml --test C150 --order first
 
-`abbe new` lists the templates. `abbe new mine --from-code \"[wCAbYXZt]\"` creates any other machine. `abbe COMMAND --help` has
+`abbe new` lists the templates. `abbe new mine --from-code \"[wCAbYXZt]\"` creates any other machine. `abbe COMMAND --help` has \
 examples of each command.
 
 Output:

@@ -120,14 +120,14 @@ fn print(result: &Repeated) {
         .deviating
         .iter()
         .map(|deviation| {
-            let (difference, u) = table::value_and_u(deviation.by, deviation.u);
+            let (difference, u) = table::value_and_u(deviation.deviation, deviation.u);
             vec![
                 deviation.session.clone(),
                 deviation.id.clone(),
                 difference,
                 u,
                 table::unit(&deviation.unit),
-                format!("{:.1}", (deviation.by / deviation.u).abs()),
+                format!("{:.1}", (deviation.deviation / deviation.u).abs()),
             ]
         })
         .collect();

@@ -9,7 +9,7 @@ use abbe::identify::problem::Problem;
 use abbe::identify::results::{Outlier, ParameterResult, Unobservable};
 use abbe::model::words::counted;
 
-use super::table;
+use super::{SessionArguments, table};
 
 /// Entries of a long list that the first screen shows.
 pub const MAX_LISTED: usize = 3;
@@ -146,7 +146,7 @@ impl<'r> Estimates<'r> {
                     value,
                     u,
                     table::unit(&p.unit),
-                    pull.map_or("–".to_string(), |(_, pull)| format!("{:.1}", pull.pull)),
+                    pull.map_or("–".to_string(), |(_, pull)| pull_text(pull.pull)),
                     p.meaning.clone(),
                 ]
             })
@@ -163,6 +163,11 @@ impl<'r> Estimates<'r> {
         let largest = |a: &&(&str, Pull), b: &&(&str, Pull)| a.1.pull.abs().total_cmp(&b.1.pull.abs());
         self.pulls.iter().max_by(largest)
     }
+}
+
+/// A pull with one decimal. A pull that rounds to zero has no sign.
+fn pull_text(pull: f64) -> String {
+    format!("{:.1}", (pull * 10.0).round() / 10.0 + 0.0)
 }
 
 /// A table of parameters with u, U, significance and meaning.
@@ -254,13 +259,24 @@ pub fn print_next(steps: &[Step]) {
 }
 
 /// A command line of `abbe` on a session.
-pub fn command(verb: &str, session: &Path, options: &str) -> String {
-    let path = session.display().to_string();
-    let path = if path.contains(char::is_whitespace) {
-        format!("\"{path}\"")
-    } else {
-        path
+pub fn command(verb: &str, session: &SessionArguments, options: &str) -> String {
+    let quoted = |path: &Path| {
+        let path = path.display().to_string();
+        if path.contains(char::is_whitespace) {
+            format!("\"{path}\"")
+        } else {
+            path
+        }
     };
-    let space = if options.is_empty() { "" } else { " " };
-    format!("abbe {verb} {path}{space}{options}")
+    let mut words = vec!["abbe".to_string(), verb.to_string(), quoted(&session.session)];
+    if let Some(data) = &session.data {
+        words.push(format!("--data {}", quoted(data)));
+    }
+    if session.allow_outside {
+        words.push("--allow-outside".to_string());
+    }
+    if !options.is_empty() {
+        words.push(options.to_string());
+    }
+    words.join(" ")
 }

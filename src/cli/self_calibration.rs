@@ -92,8 +92,8 @@ fn print(result: &SelfCalibration) {
     );
     say!(
         "{} of four functions, numerical rank {} without boundary conditions",
-        counted(result.values, "value"),
-        result.rank_before
+        counted(result.value_count, "value"),
+        result.rank_without_conditions
     );
     say!(
         "{} under {}, numerical rank {}",

@@ -30,8 +30,8 @@ pub const HELP: &str = "Examples:
   abbe trace sessions/hermle-c600u/measured/session.toml --only EZC --exclude ~time --max-effects 2
   abbe trace sessions/hermle-c600u/measured/session.toml --list
 
-The first screen answers in this order: verdict and uniqueness; residual before and after, also on held-out readings;
-the effects with their aliases; the estimates with standard uncertainty; what to measure next. It folds aliases beyond
+The first screen answers in this order: verdict and uniqueness; residual before and after, also on held-out readings; \
+the effects with their aliases; the estimates with standard uncertainty; what to measure next. It folds aliases beyond \
 three and set-up parameters. --all lists them.
 
 An effect is component~driver:shape. EZC~C:h2 is an axial motion (EZC) over the angle of C, harmonic of order 2.";
@@ -135,7 +135,7 @@ pub fn run(arguments: &TraceArguments) -> Result<(), Failure> {
     interrupts.end_at_once();
     bar.finish_and_clear();
     if tables {
-        screen::print(&trace, &arguments.session.session, arguments.all);
+        screen::print(&trace, &arguments.session, arguments.all);
     }
     fit::print_warnings(&trace.result.warnings);
     if let Some(path) = &arguments.common.json {

@@ -29,7 +29,7 @@ pub fn section(tests: &[CircularTest]) -> Markup {
                 (table(&FAULTS, &typeset(test.diagnosis.iter().flat_map(fault_rows).collect())))
                 @if let Some(rms) = test.diagnosis_rms_um { p { "The faults leave " (um(rms)) " rms." } }
             }
-            @if !test.not_told.is_empty() { (list(test.not_told.iter().cloned())) }
+            @if !test.not_identifiable.is_empty() { (list(test.not_identifiable.iter().cloned())) }
         }
     }
 }

@@ -98,11 +98,11 @@ fn centres(result: &Comparison) -> Markup {
         .centres
         .iter()
         .flat_map(|centre| {
-            (0..2).map(move |which| {
-                let (offset, u) = value_and_u(centre.offset_um[which], centre.u_um[which]);
+            centre.offsets.iter().map(move |found| {
+                let (offset, u) = value_and_u(found.offset_um, found.u_um);
                 vec![
                     centre.test.clone(),
-                    format!("{} of {}", centre.across[which], centre.axis),
+                    format!("{} of {}", found.direction, centre.axis),
                     offset,
                     u,
                     format!("{:.4}", centre.radius_mm),

@@ -52,17 +52,17 @@ fn verdict(found: &Improvement) -> String {
     match found.steps.as_slice() {
         [] => format!(
             "None of {} candidate tests improves the {}, {}.",
-            counted(found.menu_entries, "test"),
-            found.figure,
+            counted(found.candidate_tests, "test"),
+            found.criterion,
             digits(found.before)
         ),
         [.., last] => format!(
             "{} the {} from {} to {}.",
             match found.steps.len() {
-                1 => format!("One test of {} candidate tests takes", found.menu_entries),
-                many => format!("{many} tests of {} candidate tests take", found.menu_entries),
+                1 => format!("One test of {} candidate tests takes", found.candidate_tests),
+                many => format!("{many} tests of {} candidate tests take", found.candidate_tests),
             },
-            found.figure,
+            found.criterion,
             digits(found.before),
             digits(last.after)
         ),
@@ -80,8 +80,11 @@ fn proposed(document: &mut Document, found: &Improvement) -> Markup {
     let shown = document.show([bars(
         "next-test".to_string(),
         "The plan with each proposed test".to_string(),
-        format!("{}; tests are added one after another.", sentence(&found.figure)),
-        &found.figure,
+        format!(
+            "{}; tests are added one after another.",
+            sentence(&found.criterion)
+        ),
+        &found.criterion,
         &bar_rows,
         &[],
     )]);
@@ -93,7 +96,7 @@ fn proposed(document: &mut Document, found: &Improvement) -> Markup {
             vec![
                 other.test.clone(),
                 digits(other.after),
-                format!("{:.1}", other.minutes),
+                format!("{:.1}", other.duration_min),
             ]
         })
         .collect();
@@ -123,13 +126,13 @@ fn row((number, step): (usize, &Step)) -> Vec<String> {
         digits(step.after),
         format!(
             "{:.1}{}",
-            step.minutes,
+            step.duration_min,
             if step.new_setup { " with the set-up" } else { "" }
         ),
         point(step.workpiece_ball_mm),
         point(step.spindle_ball_mm),
         step.bar_mm.to_string(),
-        step.opens.join(", "),
+        step.makes_identifiable.join(", "),
         step.test.clone(),
     ]
 }
@@ -141,9 +144,12 @@ fn uncertainties(found: &Improvement) -> Markup {
         .uncertainties_before
         .iter()
         .enumerate()
-        .map(|(k, (id, before))| {
-            let with = found.steps.iter().map(|step| digits(step.uncertainties[k].1));
-            [id.clone(), digits(*before)].into_iter().chain(with).collect()
+        .map(|(k, before)| {
+            let with = found.steps.iter().map(|step| digits(step.uncertainties[k].u));
+            [before.id.clone(), digits(before.u)]
+                .into_iter()
+                .chain(with)
+                .collect()
         })
         .collect();
     let header: Vec<&str> = header.iter().map(String::as_str).collect();

@@ -81,7 +81,7 @@ fn uncertainties(errors: &[ErrorAnalysis]) -> Vec<Plot> {
                 .filter(|error| error.unit == name)
                 .filter_map(|error| Some((error, error.u?)))
                 .flat_map(|(error, u)| {
-                    let known = error.u_others_known.unwrap_or(u);
+                    let known = error.conditional_u.unwrap_or(u);
                     [
                         (error.id.clone(), u, Fill::Named),
                         (format!("{}, others known", error.id), known, Fill::Alias),
@@ -110,18 +110,18 @@ fn row(error: &ErrorAnalysis) -> Vec<String> {
         .budget
         .iter()
         .take(3)
-        .map(|part| format!("{} {:.0} %", part.from, 100.0 * part.share))
+        .map(|part| format!("{} {:.0} %", part.source, 100.0 * part.share))
         .collect();
     vec![
         error.id.clone(),
         figure(error.u),
         unit(&error.unit),
-        figure(error.u_others_known),
+        figure(error.conditional_u),
         format!(
             "{:.3} µm/{} in {}",
             error.sensitivity.largest,
             unit(&error.unit),
-            error.sensitivity.largest_in
+            error.sensitivity.largest_in_test
         )
         .replace('-', "\u{2212}"),
         budget.join(", "),
@@ -139,7 +139,7 @@ fn other_explanations(document: &mut Document, analysis: &PlanAnalysis) -> Marku
         effects
             .effects
             .iter()
-            .filter(|effect| effect.verdict == "hidden" && !effect.biases.is_empty())
+            .filter(|effect| effect.verdict == "confounded" && !effect.biases.is_empty())
             .take(MAX_ROWS)
             .map(|effect| {
                 let biases = effect.biases.iter().take(2);
@@ -148,7 +148,7 @@ fn other_explanations(document: &mut Document, analysis: &PlanAnalysis) -> Marku
                     .collect();
                 vec![
                     effect.id.clone(),
-                    format!("{:.2} %", 100.0 * effect.surviving_share),
+                    format!("{:.2} %", 100.0 * effect.residual_share),
                     biases.join(", "),
                 ]
             })
@@ -156,10 +156,10 @@ fn other_explanations(document: &mut Document, analysis: &PlanAnalysis) -> Marku
     });
     html! {
         (shown)
-        (readings::unobservable(&analysis.blind))
-        @if !analysis.held_by_setup.is_empty() {
+        (readings::unobservable(&analysis.unidentifiable))
+        @if !analysis.determined_by_prior.is_empty() {
             h3 { "Held by what is known of the set-up, not by readings" }
-            (list(analysis.held_by_setup.iter().map(|held| held.why.clone())))
+            (list(analysis.determined_by_prior.iter().map(|held| held.why.clone())))
         }
         @if !analysis.nearly_collinear.is_empty() {
             h3 { "Told apart, but badly" }
@@ -174,9 +174,9 @@ fn other_explanations(document: &mut Document, analysis: &PlanAnalysis) -> Marku
 
 fn next(analysis: &PlanAnalysis, offered: bool) -> Markup {
     html! {
-        @if !analysis.without.is_empty() {
+        @if !analysis.leave_one_out.is_empty() {
             h3 { "What each test contributes" }
-            (list(analysis.without.iter().map(|without| without.why.clone())))
+            (list(analysis.leave_one_out.iter().map(|without| without.why.clone())))
         }
         @if offered {
             p {

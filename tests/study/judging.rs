@@ -12,10 +12,7 @@ pub fn in_plants_words(name: &EffectName) -> Named {
         component: name.component.clone(),
         driver: name.driver.clone(),
         shape: name.shape.clone(),
-        order: name
-            .order
-            .filter(|order| order.fract() == 0.0)
-            .map(|order| order as u32),
+        order: name.order.map(|order| order as u32),
     }
 }
 

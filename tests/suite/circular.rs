@@ -134,7 +134,7 @@ fn a_cubic_is_not_called_cyclic() {
             // cos⁴θ is ⅜ + ½cos 2θ + ⅛cos 4θ: the rest stands where a linear error does, 4 µm over 100 mm by one axis.
             let sign = if axis == 0 { 1.0 } else { -1.0 };
             is(&test, "scale mismatch", "XY", "ratio", sign * 40.0, 0.5);
-            let told = test["not_told"].to_string();
+            let told = test["not_identifiable"].to_string();
             assert!(
                 told.contains("third-order error of X is confounded with one of Y"),
                 "{told}"
@@ -319,7 +319,7 @@ fn what_one_direction_cannot_tell_is_said() {
     });
     assert!(fault(&test, "servo mismatch", "XY").is_none() && fault(&test, "lateral play", "X").is_none());
     is(&test, "squareness", "XY", "angle", 20.0, 0.01);
-    let told = test["not_told"].to_string();
+    let told = test["not_identifiable"].to_string();
     assert!(
         told.contains("servo mismatch is in the squareness") && told.contains("hysteresis need"),
         "{told}"
@@ -327,7 +327,7 @@ fn what_one_direction_cannot_tell_is_said() {
     assert!(test.get("hysteresis_um").is_none() && test.get("feed_mm_min").is_none());
     // Without time a lag is a length.
     let test = circle(folder.path(), &[1.0, -1.0], false, |_| [0.0, 0.0]);
-    let told = test["not_told"].to_string();
+    let told = test["not_identifiable"].to_string();
     assert!(told.contains("not in ms") && told.contains("one feed"), "{told}");
     figure(&test, "servo mismatch", "XY", "lag");
 }
@@ -376,7 +376,9 @@ fn the_plant_s_faults_are_found_within_their_uncertainty() {
             }
             assert!(um(&test, "diagnosis_rms_um") < 0.35, "{test}");
             assert!(
-                test["not_told"].to_string().contains("at the feed of XY-F"),
+                test["not_identifiable"]
+                    .to_string()
+                    .contains("at the feed of XY-F"),
                 "{test}"
             );
         }
@@ -450,7 +452,7 @@ fn a_short_arc_is_said_to_be_one() {
     let test = figures(&folder.path().join("session.toml"))[0].clone();
     assert!((um(&test, "arc_deg") - 120.0).abs() < 0.6, "{test}");
     assert!(test.get("diagnosis").is_none(), "{test}");
-    let told = test["not_told"].to_string();
+    let told = test["not_identifiable"].to_string();
     assert!(
         told.contains("ISO 230-4 asks for a full circle") && told.contains("an arc of 120° is too short"),
         "{told}"

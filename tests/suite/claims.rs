@@ -106,7 +106,7 @@ fn mislabelled_runs_yield_no_false_claim_and_hide_no_effect() {
         1.0,
     );
     let is_wobble =
-        |name: &EffectName| name.component == "EZC" && name.shape == "harmonic" && name.order == Some(3.0);
+        |name: &EffectName| name.component == "EZC" && name.shape == "harmonic" && name.order == Some(3);
     for effects in [vec![], vec![wobble]] {
         let recipe = Recipe {
             effects,

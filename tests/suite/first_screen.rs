@@ -146,18 +146,18 @@ fn a_plan_ends_in_its_worst_error_and_what_limits_it() {
             "{worst:#}"
         );
         let parts = worst["budget"].as_array().unwrap();
-        let noise = parts.iter().find(|part| part["from"] == "noise").unwrap()["share"]
+        let noise = parts.iter().find(|part| part["source"] == "noise").unwrap()["share"]
             .as_f64()
             .unwrap();
         if noise >= 0.5 {
             assert!(verdict.contains("The noise limits it"), "{noise}");
         } else {
-            let setup = parts.iter().filter(|part| part["from"] != "noise");
+            let setup = parts.iter().filter(|part| part["source"] != "noise");
             let share = |part: &&Value| part["share"].as_f64().unwrap();
             let largest = setup.max_by(|a, b| share(a).total_cmp(&share(b))).unwrap();
             let named = format!(
                 "The set-up limits it, first {} (",
-                largest["from"].as_str().unwrap()
+                largest["source"].as_str().unwrap()
             );
             assert!(verdict.contains(&named), "{named}");
         }

@@ -28,7 +28,7 @@ fn the_screen_and_the_json_say_the_same() {
     let session = chapter_5();
     let plan = json(&[&session]);
     assert_eq!(plan["errors"].as_array().unwrap().len(), 8);
-    assert_eq!(plan["rank"], plan["unknowns"]);
+    assert_eq!(plan["rank"], plan["parameter_count"]);
     let screen = abbe(&["plan", &session, "--all"]);
     let screen = String::from_utf8(screen.stdout).unwrap();
     for error in plan["errors"].as_array().unwrap() {
@@ -62,20 +62,23 @@ fn the_effects_say_what_a_clean_residual_does_not_exclude() {
             .map(|effect| effect["verdict"].clone())
     };
     // One height and one radius: the wobble of C at order 1 is the axial motion at order 2.
-    assert_eq!(verdict("EZC~C:h3").unwrap(), "seen");
-    assert_eq!(verdict("EZC~C:h1").unwrap(), "hidden");
+    assert_eq!(verdict("EZC~C:h3").unwrap(), "detectable");
+    assert_eq!(verdict("EZC~C:h1").unwrap(), "confounded");
     // The spindle ball lies on the C axis: the C tests do not see it turn, the A tests see it at C = 0 as a constant.
-    assert_eq!(verdict("ECC~C:h2").unwrap(), "hidden");
+    assert_eq!(verdict("ECC~C:h2").unwrap(), "confounded");
     let bound = |id: &str| {
-        effects.iter().find(|effect| effect["id"] == id).unwrap()["detectable"]
+        effects.iter().find(|effect| effect["id"] == id).unwrap()["detectable_amplitude"]
             .as_f64()
             .unwrap()
     };
     assert!(bound("EZC~C:h3") < 0.1, "{}", bound("EZC~C:h3"));
-    for effect in effects.iter().filter(|effect| effect["detectable"].is_f64()) {
-        let searched = effect["detectable_searched"].as_f64();
+    for effect in effects
+        .iter()
+        .filter(|effect| effect["detectable_amplitude"].is_f64())
+    {
+        let searched = effect["detectable_amplitude_screened"].as_f64();
         assert!(
-            searched.is_none_or(|searched| searched > effect["detectable"].as_f64().unwrap()),
+            searched.is_none_or(|searched| searched > effect["detectable_amplitude"].as_f64().unwrap()),
             "{effect}"
         );
     }
@@ -129,8 +132,9 @@ fn sweeps_can_shrink_until_an_uncertainty_doubles() {
     let ranges = plan["ranges"].as_array().unwrap();
     assert_eq!(ranges.len(), 4);
     for range in ranges {
-        let planned = range["range"][1].as_f64().unwrap() - range["range"][0].as_f64().unwrap();
-        let least = range["least"][1].as_f64().unwrap() - range["least"][0].as_f64().unwrap();
+        let planned = range["range"]["high"].as_f64().unwrap() - range["range"]["low"].as_f64().unwrap();
+        let least = range["minimum_range"]["high"].as_f64().unwrap()
+            - range["minimum_range"]["low"].as_f64().unwrap();
         assert!(least > 0.0 && least < planned, "{range}");
     }
 }

@@ -85,7 +85,7 @@ const REPEATED: [(&str, [f64; 3]); 8] = [
 fn each_method_sees_all_eight_within_what_is_known_of_its_set_up() {
     for chapter in [4, 5, 6] {
         let plan = analysis(chapter, 1.0, false);
-        assert!(plan.blind.is_empty());
+        assert!(plan.unidentifiable.is_empty());
         for (id, repeated) in REPEATED {
             let error = plan.errors.iter().find(|error| error.id == id).unwrap();
             let total: f64 = error.budget.iter().map(|part| part.share).sum();
@@ -93,7 +93,7 @@ fn each_method_sees_all_eight_within_what_is_known_of_its_set_up() {
                 (total - 1.0).abs() < 2e-3,
                 "{chapter} {id}: shares come to {total}"
             );
-            let noise = error.budget.iter().find(|part| part.from == "noise").unwrap().u;
+            let noise = error.budget.iter().find(|part| part.source == "noise").unwrap().u;
             // White noise of 0.3 µm would repeat better than the thesis did, and a new set-up would repeat worse.
             assert!(noise < repeated[chapter - 4], "{chapter} {id}: {noise}");
             assert!(
@@ -156,8 +156,8 @@ fn an_offset_of_the_spindle_ball_between_two_tests_makes_both_differences_and_le
             .iter()
             .find(|found| found.id == effect)
             .unwrap();
-        assert_eq!(found.verdict, "hidden", "{effect}");
-        assert!(found.detectable.is_none());
+        assert_eq!(found.verdict, "confounded", "{effect}");
+        assert!(found.detectable_amplitude.is_none());
     }
     println!(
         "4.3 µm: EB0A {:+.2}″, EB0C {:+.2}″",
@@ -202,7 +202,7 @@ fn the_table_in_the_docs_is_what_is_computed() {
             let row = docs.lines().find(|line| line.starts_with(&start)).unwrap();
             let cells: Vec<&str> = row.split('|').map(str::trim).collect();
             let printed = |k: usize| cells[3 + 4 * column + k].parse::<f64>().unwrap();
-            let noise = error.budget.iter().find(|part| part.from == "noise").unwrap().u;
+            let noise = error.budget.iter().find(|part| part.source == "noise").unwrap().u;
             for (k, value) in [noise, error.u.unwrap(), u(&one, &error.id)]
                 .into_iter()
                 .enumerate()

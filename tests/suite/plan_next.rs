@@ -105,7 +105,11 @@ fn a_blind_spot_is_opened() {
     )
     .unwrap();
     assert!(found.before > 1e3, "{}", found.before);
-    let opened: Vec<&String> = found.steps.iter().flat_map(|step| &step.opens).collect();
+    let opened: Vec<&String> = found
+        .steps
+        .iter()
+        .flat_map(|step| &step.makes_identifiable)
+        .collect();
     assert!(opened.len() >= 4, "{opened:?}");
     assert!(found.steps.last().unwrap().after < 10.0);
 }
@@ -135,8 +139,11 @@ fn wobble_and_axial_motion_are_told_apart_at_a_second_radius() {
     .unwrap()
     .expect("a candidate test");
     println!("{found:?}");
-    assert!(found.before < 3.0, "{found:?}");
-    assert!(found.after > 20.0 * found.before.max(1.0), "{found:?}");
+    assert!(found.before_sigma < 3.0, "{found:?}");
+    assert!(
+        found.after_sigma > 20.0 * found.before_sigma.max(1.0),
+        "{found:?}"
+    );
     assert!(
         found.test.starts_with('C') && found.test.contains("radius"),
         "{found:?}"
@@ -158,7 +165,7 @@ fn curves_reach_the_largest_sensitivity() {
         let reached = error
             .curves
             .iter()
-            .filter(|curve| curve.test == error.sensitivity.largest_in)
+            .filter(|curve| curve.test == error.sensitivity.largest_in_test)
             .flat_map(|curve| &curve.values)
             .fold(0.0_f64, |most, value| most.max(value.abs()));
         // A curve is thinned.
@@ -235,7 +242,7 @@ fn by_the_minute_a_short_test_is_taken() {
     // … and where set-ups decide, it sees nearly as much in less time.
     assert!(quick.steps[0].test.contains("one way"), "{}", quick.steps[0].test);
     let gain = |found: &abbe::identify::plan::improve::Improvement| {
-        (found.before / found.steps[0].after).ln() / found.steps[0].minutes
+        (found.before / found.steps[0].after).ln() / found.steps[0].duration_min
     };
     assert!(gain(&quick) > gain(&best));
 }

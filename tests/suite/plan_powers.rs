@@ -60,7 +60,7 @@ fn closed_form(positions: impl Iterator<Item = f64>, signal: impl Fn(f64) -> [f6
 
 fn check(judged: &[EffectDetectability], id: &str, expected: f64) {
     let found = judged.iter().find(|effect| effect.id == id).unwrap();
-    let detectable = found.detectable.unwrap();
+    let detectable = found.detectable_amplitude.unwrap();
     println!(
         "{id}: {detectable:.4} {}, closed form {expected:.4} um",
         found.unit

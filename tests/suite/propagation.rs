@@ -80,7 +80,7 @@ fn linear() -> Session {
 fn they_agree_where_the_model_is_linear() {
     let session = linear();
     let found = drawn(&session, 20_000, 3);
-    assert_eq!(found.unconverged, 0);
+    assert_eq!(found.unconverged_runs, 0);
     assert!(found.parameters.len() > 8);
     for parameter in &found.parameters {
         // A standard deviation of 20,000 has a relative one of 0.005.
@@ -148,16 +148,16 @@ fn they_differ_where_a_set_up_counts_by_its_square() {
     assert!((bar.gum_u - 0.3 / 12.0_f64.sqrt()).abs() < 1e-3, "{}", bar.gum_u);
     // z is Gaussian: |z| is below 2.2414 u with 97.5 %, below 0.0313 u with 2.5 %.
     assert!(
-        (bar.symmetric[1] - bar.value - longer_um(2.2414)).abs() < 0.8,
+        (bar.symmetric_interval.high - bar.value - longer_um(2.2414)).abs() < 0.8,
         "{bar:?}"
     );
     assert!(
-        (bar.symmetric[0] - bar.value - longer_um(0.0313)).abs() < 0.2,
+        (bar.symmetric_interval.low - bar.value - longer_um(0.0313)).abs() < 0.2,
         "{bar:?}"
     );
     // The shortest interval starts at the edge: |z| is below 1.96 u with 95 %.
     assert!(
-        (bar.shortest[1] - bar.value - longer_um(1.96)).abs() < 1.0,
+        (bar.shortest_interval.high - bar.value - longer_um(1.96)).abs() < 1.0,
         "{bar:?}"
     );
     let mean = U_MM.powi(2) / (2.0 * R) * 1e3;

@@ -125,7 +125,7 @@ fn a_session_with_a_bias_is_named() {
             (off[0].session.as_str(), off[0].id.as_str()),
             (group[biased as usize].name.as_str(), "EZ0A")
         );
-        assert!((off[0].by - 10.0).abs() < 4.0 * off[0].u, "{off:?}");
+        assert!((off[0].deviation - 10.0).abs() < 4.0 * off[0].u, "{off:?}");
         let parameter = result.parameters.iter().find(|p| p.id == "EZ0A").unwrap();
         assert_eq!(parameter.scatter, Scatter::More);
     }

@@ -20,7 +20,7 @@ fn sample(test: &str, name: &str) -> Option<Session> {
     Some(read::session(&folder.join("session.toml"), &ReadOptions::default()).unwrap())
 }
 
-fn is(effect: &EffectName, component: &str, shape: &str, order: Option<f64>) -> bool {
+fn is(effect: &EffectName, component: &str, shape: &str, order: Option<usize>) -> bool {
     effect.component == component && effect.shape == shape && effect.order == order
 }
 
@@ -84,14 +84,14 @@ fn an_axial_wobble_is_found_or_stands_among_what_looks_the_same() {
         effect,
         "EZC",
         "harmonic",
-        Some(3.0)
+        Some(3)
     )));
     // One ball radius cannot tell it from a tilt of one order less (EFFECTS, METHOD).
     assert!(named_or_alias(&result, &|effect| is(
         effect,
         "EAC",
         "harmonic",
-        Some(2.0)
+        Some(2)
     )));
     assert!(result.after.heldout_rms_um < 0.32 && result.before.heldout_rms_um > 0.6);
 }
@@ -129,7 +129,7 @@ fn another_radius_is_proposed_to_tell_an_axial_wobble_from_a_tilt() {
     let separation = &effect["separation"];
     // Both tilts look the same: the first of them by name is told.
     assert_eq!(separation["from"]["component"], "EAC");
-    assert_eq!(separation["from"]["order"], 2.0);
+    assert_eq!(separation["from"]["order"], 2);
     // The session's ball sits at 100 mm.
     let test = effect["separated_by"].as_str().unwrap();
     let radius = test
@@ -171,7 +171,7 @@ fn a_wave_is_named_beside_a_compliance_that_looks_the_same() {
         effect,
         "EZC",
         "harmonic",
-        Some(2.0)
+        Some(2)
     )));
 }
 
@@ -256,7 +256,7 @@ fn ur10_shows_the_seventeenth_harmonic_of_its_second_joint_first() {
         ("EBJ2", "harmonic"),
         "{first:?}"
     );
-    assert!((first.order.unwrap() - 17.0).abs() <= 1.0, "{first:?}");
+    assert!(first.order.unwrap().abs_diff(17) <= 1, "{first:?}");
     let held_out = result.after.heldout_rms_3d_um.unwrap() * 1e-3;
     println!(
         "UR10 with {} effects: {held_out:.4} mm held out",

@@ -103,7 +103,7 @@ fn the_uncertainty_of_a_declared_wave_covers_what_looks_like_the_found_effect() 
         .result;
     assert_eq!(result.effects.len(), 1);
     let is_truth = |name: &&abbe::identify::results::EffectName| {
-        name.component == "EAC" && name.shape == "harmonic" && name.order == Some(3.0)
+        name.component == "EAC" && name.shape == "harmonic" && name.order == Some(3)
     };
     let effect = &result.effects[0];
     assert!(
@@ -138,18 +138,18 @@ fn the_uncertainty_of_a_found_wave_covers_what_looks_like_another_found_effect()
         ..TraceOptions::default()
     };
     let result = trace(&session, &options, &|_| true).unwrap().result;
-    let named: Vec<(&str, Option<f64>)> = result
+    let named: Vec<(&str, Option<usize>)> = result
         .effects
         .iter()
         .map(|effect| (effect.name.component.as_str(), effect.name.order))
         .collect();
-    assert_eq!(named, [("EZC", Some(2.0)), ("EZC", Some(4.0))]);
+    assert_eq!(named, [("EZC", Some(2)), ("EZC", Some(4))]);
     let fourth = &result.effects[1];
     assert!(
         fourth
             .aliases
             .iter()
-            .any(|name| name.component == "EAC" && name.order == Some(3.0))
+            .any(|name| name.component == "EAC" && name.order == Some(3))
     );
     for parameters in [&result.after.parameters, &result.effects[0].parameters] {
         let found = |id: &str| {
@@ -224,16 +224,19 @@ fn each_explanation_is_told_with_how_well_a_further_test_separates_it() {
     let named: Vec<&EffectName> = tests[0].alternatives.iter().map(|one| &one.name).collect();
     assert_eq!(named, effect.aliases.iter().collect::<Vec<_>>());
     for pair in tests.windows(2) {
-        assert_eq!(pair[1].of, pair[0].of - pair[0].separates);
+        assert_eq!(
+            pair[1].alternative_count,
+            pair[0].alternative_count - pair[0].separated_count
+        );
     }
     for test in tests {
-        assert_eq!(test.of, test.alternatives.len());
+        assert_eq!(test.alternative_count, test.alternatives.len());
         let separated = test
             .alternatives
             .iter()
             .filter(|one| one.after_sigma >= 3.0)
             .count();
-        assert!(separated == test.separates && separated > 0, "{test:?}");
+        assert!(separated == test.separated_count && separated > 0, "{test:?}");
     }
     assert_eq!(effect.separated_by.as_ref(), Some(&tests[0].test));
 

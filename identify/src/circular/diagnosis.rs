@@ -125,13 +125,13 @@ pub(super) fn add(machine: &Machine, path: &Path, noise_mm: f64, result: &mut Ci
             report(&model.rows, &model.faults, &model.regression, sigma, result);
             limits(path, &model.regression, sigma, &model.names, result);
             if model.faults.iter().any(is_third_order) {
-                result.not_told.push(format!(
+                result.not_identifiable.push(format!(
                     "a third-order error of {} is confounded with one of {}: the figure is that of both together",
                     model.names[0], model.names[1]
                 ));
             }
         }
-        Err(why) => result.not_told.extend(why),
+        Err(why) => result.not_identifiable.extend(why),
     }
 }
 
@@ -304,19 +304,19 @@ fn report(rows: &Rows, faults: &[Fault], regression: &Regression, sigma: f64, re
 /// What these readings confound.
 fn limits(path: &Path, regression: &Regression, sigma: f64, names: &[String; 2], result: &mut CircularTest) {
     let (radius_um, u) = (regression.beta[0] * 1e3, regression.u(&[(0, 1e3)], sigma));
-    result.not_told.push(format!(
+    result.not_identifiable.push(format!(
         "the mean radius is off by {radius_um:.2} µm (u {u:.2}): the bar's length, the mean scale of {} and {}, and what both axes lag \
          (that grows with the square of the feed) do the same",
         names[0], names[1]
     ));
     if !path.both_directions() {
         let why = "one direction only: servo mismatch is in the squareness, lateral play in radius and scale, and neither is separable";
-        result.not_told.push(why.into());
+        result.not_identifiable.push(why.into());
     } else if path.feed_mm_s.is_none() {
         let why = "no time in the data: servo mismatch is given as a lag in µm at this feed, not in ms";
-        result.not_told.push(why.into());
+        result.not_identifiable.push(why.into());
     }
-    result.not_told.push(
+    result.not_identifiable.push(
         "straightness is confounded with a positioning error of the other axis that grows with the square"
             .into(),
     );

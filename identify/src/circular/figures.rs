@@ -28,10 +28,10 @@ pub(super) fn figures(machine: &Machine, test: &Test, path: &Path) -> CircularTe
         Moves::Rotary(axis) => (name(axis), None),
     };
     let traces = [1.0, -1.0].map(|direction| mean(path, direction));
-    let mut not_told = Vec::new();
+    let mut not_identifiable = Vec::new();
     let arc = path.arc();
     if arc < TAU * 0.99 {
-        not_told.push(format!(
+        not_identifiable.push(format!(
             "an arc of {:.0}°: the figures are of that arc, ISO 230-4 asks for a full circle",
             arc.to_degrees()
         ));
@@ -64,7 +64,7 @@ pub(super) fn figures(machine: &Machine, test: &Test, path: &Path) -> CircularTe
         hysteresis_um: None,
         diagnosis: Vec::new(),
         diagnosis_rms_um: None,
-        not_told,
+        not_identifiable,
     };
     match &traces {
         [Some((there, _)), Some((back, _))] => {
@@ -77,7 +77,7 @@ pub(super) fn figures(machine: &Machine, test: &Test, path: &Path) -> CircularTe
             result.hysteresis_um = differences.reduce(f64::max).map(|most| most * 1e3);
         }
         _ => result
-            .not_told
+            .not_identifiable
             .push("one direction only: G(b), D and hysteresis need the other one too".into()),
     }
     result

@@ -65,6 +65,6 @@ fn compare_feeds(results: &mut [CircularTest]) {
         })
         .collect();
     for (result, told) in results.iter_mut().zip(told) {
-        result.not_told.extend(told);
+        result.not_identifiable.extend(told);
     }
 }

@@ -37,9 +37,9 @@ pub struct CircularTest {
     /// The residual of the diagnosis, rms, µm.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub diagnosis_rms_um: Option<f64>,
-    /// What this test cannot tell, in words.
+    /// What this test does not identify, in words.
     #[serde(skip_serializing_if = "Vec::is_empty")]
-    pub not_told: Vec<String>,
+    pub not_identifiable: Vec<String>,
 }
 
 /// Figures of the runs in one direction, of their mean path.

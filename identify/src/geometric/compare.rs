@@ -17,20 +17,38 @@ pub struct CentreResult {
     pub test: String,
     /// The axis that turns.
     pub axis: String,
-    /// The two directions across it, `X`, `Y` or `Z`.
-    pub across: [String; 2],
-    /// Of the circle's centre from where the axis nominally is, µm.
-    pub offset_um: [f64; 2],
-    /// Standard uncertainties, µm.
-    pub u_um: [f64; 2],
+    /// Offset of the circle's centre from the nominal axis in the two directions across it.
+    pub offsets: Vec<CentreOffset>,
     /// Radius of the circle, mm.
     pub radius_mm: f64,
     /// Of the circle's plane along the axis, mm from the axis' origin.
     pub plane_mm: f64,
     /// Height of the cone, mm; 0 where both balls lie in the plane.
     pub height_mm: f64,
-    /// What each declared error adds to the offsets, µm a µm or µm an arcsec.
-    pub shares: Vec<(String, [f64; 2])>,
+}
+
+/// Offset of a circle's centre in one direction.
+#[derive(Clone, Debug, PartialEq, Serialize, JsonSchema)]
+pub struct CentreOffset {
+    /// `X`, `Y` or `Z`.
+    pub direction: String,
+    /// The offset, µm.
+    pub offset_um: f64,
+    /// Its standard uncertainty, µm.
+    pub u_um: f64,
+    /// Sensitivity of the offset to each declared error.
+    pub sensitivities: Vec<OffsetSensitivity>,
+}
+
+/// Sensitivity of an offset to an error.
+#[derive(Clone, Debug, PartialEq, Serialize, JsonSchema)]
+pub struct OffsetSensitivity {
+    /// The error.
+    pub id: String,
+    /// Change of the offset per unit of the error, in `unit`.
+    pub value: f64,
+    /// `um/um`, `um/arcsec`.
+    pub unit: String,
 }
 
 /// One error by both ways, in its own unit.
@@ -218,23 +236,24 @@ fn centres(
                 let row = 2 * place + which;
                 estimate.centre_covariance[(row, row)].max(0.0).sqrt() * u_enlargement * 1e3
             };
-            let share = |p: usize| {
-                let scale = 1e3 / list[p].unit.display_per_internal;
-                [0, 1].map(|which| estimator.shares[(2 * place + which, p)] * scale)
+            let sensitivity = |which: usize, p: usize| OffsetSensitivity {
+                id: list[p].id.clone(),
+                value: estimator.shares[(2 * place + which, p)] * 1e3 / list[p].unit.display_per_internal,
+                unit: format!("um/{}", list[p].unit.name),
+            };
+            let offset = |which: usize| CentreOffset {
+                direction: letter(layout.across[which]),
+                offset_um: centre.offset_mm[which] * 1e3,
+                u_um: u(which),
+                sensitivities: declared.iter().map(|p| sensitivity(which, *p)).collect(),
             };
             CentreResult {
                 test: problem.tests[*test].name.clone(),
                 axis: problem.session.machine.axes[layout.axis].name.clone(),
-                across: layout.across.map(letter),
-                offset_um: centre.offset_mm.map(|mm| mm * 1e3),
-                u_um: [u(0), u(1)],
+                offsets: (0..2).map(offset).collect(),
                 radius_mm: centre.radius_mm,
                 plane_mm: layout.plane_mm,
                 height_mm: layout.height_mm,
-                shares: declared
-                    .iter()
-                    .map(|p| (list[*p].id.clone(), share(*p)))
-                    .collect(),
             }
         })
         .collect()

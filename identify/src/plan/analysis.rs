@@ -5,10 +5,11 @@ use abbe_model::sensitivity::SlotValues;
 use abbe_model::session::Session;
 
 use super::linear::{Linearisation, is_wanted};
-use super::results::{Correlation, ErrorAnalysis, PlanAnalysis, TestSummary, WithoutTest};
+use super::results::{Correlation, ErrorAnalysis, LeaveOneOut, PlanAnalysis, TestSummary, VarianceInflation};
 use super::{budget, effects, identifiability, indices, sensitivity, states};
 use crate::error::IdentifyError;
 use crate::noise::{Noise, NoiseSource};
+use crate::parameter_description::parameter_meaning;
 use crate::problem::Problem;
 
 /// How a plan is analysed.
@@ -97,12 +98,13 @@ pub fn analyse_problem(problem: &Problem<'_>, travel_mm: f64) -> Result<PlanAnal
             let u = linear.u(j);
             ErrorAnalysis {
                 id: list[j].id.clone(),
+                meaning: parameter_meaning(problem, j, None),
                 unit: unit.name.clone(),
                 u: u.map(|u| u * unit.display_per_internal),
                 sensitivity: sensitivity::reported(problem, &found, j),
                 budget: u.map_or(Vec::new(), |_| budget::budget(problem, &linear, j)),
-                u_others_known: u.map(|u| conditional_u.min(u) * unit.display_per_internal),
-                shared_with: u.map_or(Vec::new(), |_| budget::shared_with(problem, &linear, j)),
+                conditional_u: u.map(|u| conditional_u.min(u) * unit.display_per_internal),
+                correlated_with: u.map_or(Vec::new(), |_| budget::correlated_with(problem, &linear, j)),
                 curves: sensitivity::curves(problem, &found, j),
             }
         })
@@ -126,13 +128,13 @@ pub fn analyse_problem(problem: &Problem<'_>, travel_mm: f64) -> Result<PlanAnal
         noise_um: problem.noise.sigma_mm * 1e3,
         readings: problem.readings(),
         rank: linear.rank.seen.ncols(),
-        unknowns: list.len(),
-        setups: setups.len(),
+        parameter_count: list.len(),
+        setup_count: setups.len(),
         moving_min: tests.iter().map(|test| test.moving_min).sum(),
         tests,
         errors,
-        blind: identifiability::unidentifiable(problem, &linear.rank),
-        held_by_setup: identifiability::held_by_setup(problem, &linear)?,
+        unidentifiable: identifiability::unidentifiable(problem, &linear.rank),
+        determined_by_prior: identifiability::determined_by_prior(problem, &linear)?,
         nearly_collinear: identifiability::nearly_collinear(problem, &linear, &wanted)?,
         correlation: correlation(problem, &linear, &wanted),
         indices: indices::indices(
@@ -141,7 +143,7 @@ pub fn analyse_problem(problem: &Problem<'_>, travel_mm: f64) -> Result<PlanAnal
             problem.readings() * problem.coordinates(),
             found.g_efficiency,
         )?,
-        without: without(problem, &linear, &wanted)?,
+        leave_one_out: leave_one_out(problem, &linear, &wanted)?,
         effects: None,
         warnings,
     })
@@ -196,11 +198,11 @@ fn correlation(problem: &Problem<'_>, linear: &Linearisation, wanted: &[usize]) 
 }
 
 /// Leaves out one test after another.
-fn without(
+fn leave_one_out(
     problem: &Problem<'_>,
     linear: &Linearisation,
     wanted: &[usize],
-) -> Result<Vec<WithoutTest>, IdentifyError> {
+) -> Result<Vec<LeaveOneOut>, IdentifyError> {
     let list = &problem.parameters.list;
     if problem.tests.len() < 2 {
         return Ok(Vec::new());
@@ -208,24 +210,28 @@ fn without(
     (0..problem.tests.len())
         .map(|test| {
             let (rank, covariance) = linear.without(&[test])?;
-            let variance_inflation: Vec<(String, Option<f64>)> = wanted
+            let variance_inflation: Vec<VarianceInflation> = wanted
                 .iter()
                 .filter(|j| linear.rank.is_identifiable(**j))
                 .map(|&j| {
                     let grown = covariance[(j, j)] / linear.covariance[(j, j)];
-                    (list[j].id.clone(), rank.is_identifiable(j).then_some(grown))
+                    VarianceInflation {
+                        id: list[j].id.clone(),
+                        factor: rank.is_identifiable(j).then_some(grown),
+                    }
                 })
                 .collect();
             let all: Vec<&str> = variance_inflation
                 .iter()
-                .filter(|(_, f)| f.is_none())
-                .map(|(id, _)| id.as_str())
+                .filter(|inflation| inflation.factor.is_none())
+                .map(|inflation| inflation.id.as_str())
                 .collect();
             let much: Vec<String> = variance_inflation
                 .iter()
-                .filter_map(|(id, f)| {
-                    f.filter(|f| *f >= REPORT_RATIO)
-                        .map(|f| format!("{id} {f:.1} times"))
+                .filter_map(|VarianceInflation { id, factor }| {
+                    factor
+                        .filter(|factor| *factor >= REPORT_RATIO)
+                        .map(|factor| format!("{id} {factor:.1} times"))
                 })
                 .collect();
             let name = &problem.tests[test].name;
@@ -239,7 +245,7 @@ fn without(
             if words.is_empty() {
                 words.push(format!("without {name} no variance grows by half"));
             }
-            Ok(WithoutTest {
+            Ok(LeaveOneOut {
                 test: name.clone(),
                 variance_inflation,
                 why: words.join("; "),

@@ -35,19 +35,19 @@ pub fn budget(problem: &Problem<'_>, linear: &Linearisation, error: usize) -> Ve
         let Some(u) = prior_u(parameter) else { continue };
         let part = (covariance[(error, s)] / u).powi(2);
         parts.push(Contribution {
-            from: parameter.id.clone(),
+            source: parameter.id.clone(),
             u: part.sqrt() * scale,
             share: part / variance,
         });
     }
     let noise = noise_variance(linear, error);
     parts.push(Contribution {
-        from: "noise".to_string(),
+        source: "noise".to_string(),
         u: noise.sqrt() * scale,
         share: noise / variance,
     });
-    parts.retain(|part| part.share >= MIN_SHARE || part.from == "noise");
-    parts.sort_by(|a, b| largest_first((a.share, &a.from), (b.share, &b.from)));
+    parts.retain(|part| part.share >= MIN_SHARE || part.source == "noise");
+    parts.sort_by(|a, b| largest_first((a.share, &a.source), (b.share, &b.source)));
     parts
 }
 
@@ -66,7 +66,7 @@ fn noise_variance(linear: &Linearisation, error: usize) -> f64 {
 }
 
 /// The other errors that share an error's variance, the most correlated first.
-pub fn shared_with(problem: &Problem<'_>, linear: &Linearisation, error: usize) -> Vec<CorrelatedWith> {
+pub fn correlated_with(problem: &Problem<'_>, linear: &Linearisation, error: usize) -> Vec<CorrelatedWith> {
     let mut shared: Vec<CorrelatedWith> = problem
         .parameters
         .list

@@ -113,10 +113,10 @@ pub fn effects(problem: &Problem<'_>) -> Result<EffectsAnalysis, IdentifyError> 
         })
         .collect();
     Ok(EffectsAnalysis {
-        significance: SIGNIFICANCE,
+        significance_level: SIGNIFICANCE,
         power: POWER,
-        effects_searched: searched,
-        significance_corrected,
+        effects_screened: searched,
+        significance_level_corrected: significance_corrected,
         effects: grouped(judged.into_iter().flatten(), &candidates),
     })
 }
@@ -192,23 +192,23 @@ fn judge(
     };
     let detectable = amplitude(threshold[0]);
     let largest_own = own.clone().symmetric_eigen().eigenvalues.max();
-    let hidden = surviving_share < CONFOUNDED_BELOW || detectable.is_none();
+    let confounded = surviving_share < CONFOUNDED_BELOW || detectable.is_none();
     let verdict = if largest_own * size * size < 1.0 {
-        "none"
-    } else if !hidden {
-        "seen"
+        "no signal"
+    } else if !confounded {
+        "detectable"
     } else if strongest > CONFOUNDED_BELOW * largest_own {
-        "hidden at one phase"
+        "confounded at one phase"
     } else {
-        "hidden"
+        "confounded"
     };
     EffectDetectability {
         id: effect.id(),
         family: family.to_string(),
         unit: unit.name.clone(),
-        detectable,
-        detectable_searched: amplitude(threshold[1]),
-        surviving_share,
+        detectable_amplitude: detectable,
+        detectable_amplitude_screened: amplitude(threshold[1]),
+        residual_share: surviving_share,
         verdict: verdict.to_string(),
         biases: biases(problem, products.moved, &unit),
     }
@@ -263,9 +263,11 @@ fn grouped(
         match groups.get_mut(&key) {
             Some(present) => {
                 // Where equally much of several is needed, or none would do, the one of which least survives, and not the one that rounding or order picks.
-                let needed = |entry: &EffectDetectability| entry.detectable_searched.unwrap_or(f64::INFINITY);
+                let needed = |entry: &EffectDetectability| {
+                    entry.detectable_amplitude_screened.unwrap_or(f64::INFINITY)
+                };
                 let harder = smallest_first(needed(present), needed(&entry))
-                    .then_with(|| smallest_first(entry.surviving_share, present.surviving_share));
+                    .then_with(|| smallest_first(entry.residual_share, present.residual_share));
                 if harder.is_lt() {
                     *present = EffectDetectability { id: key, ..entry };
                 }
@@ -285,7 +287,7 @@ pub fn confounded_by_error(analysis: &EffectsAnalysis) -> BTreeMap<String, Vec<(
     for effect in analysis
         .effects
         .iter()
-        .filter(|effect| effect.verdict.starts_with("hidden"))
+        .filter(|effect| effect.verdict.starts_with("confounded"))
     {
         for bias in &effect.biases {
             let entry = (effect.id.clone(), bias.per_unit, bias.unit.clone());

@@ -4,7 +4,7 @@ use faer::Mat;
 
 use super::linear::{Linearisation, is_wanted, marginal};
 use super::ranking::smallest_first;
-use super::results::{HeldBySetup, NearDependency};
+use super::results::{DeterminedByPrior, NearDependency};
 use crate::error::IdentifyError;
 use crate::parameters::{Parameter, Role};
 use crate::problem::Problem;
@@ -151,10 +151,10 @@ fn outside(problem: &Problem<'_>, row: &[f64], pivot: usize) -> Vec<(String, f64
 ///
 /// # Errors
 /// If the decomposition fails.
-pub fn held_by_setup(
+pub fn determined_by_prior(
     problem: &Problem<'_>,
     linear: &Linearisation,
-) -> Result<Vec<HeldBySetup>, IdentifyError> {
+) -> Result<Vec<DeterminedByPrior>, IdentifyError> {
     let list = &problem.parameters.list;
     let r = linear.readings.parts().0;
     let alone = Rank::decide(r.as_ref(), &linear.size, &linear.preference)?;
@@ -183,7 +183,7 @@ pub fn held_by_setup(
             continue;
         }
         let why = describe(list, &combination, CONFOUNDED);
-        held.push(HeldBySetup {
+        held.push(DeterminedByPrior {
             error: list[error].id.clone(),
             combination,
             why,

@@ -28,21 +28,20 @@ pub struct ImproveOptions {
 /// What is proposed.
 #[derive(Clone, Debug, Serialize, JsonSchema)]
 pub struct Improvement {
-    /// What the figures are: `worst standard uncertainty, um or arcsec`, or `separation, standard deviations`.
-    pub figure: String,
-    /// Number of entries looked at.
-    pub menu_entries: usize,
-    /// The figure before; infinite (`null` in JSON) where an error is not identifiable.
+    /// The criterion and the unit of its values: `worst standard uncertainty, um or arcsec`, or `separation, standard deviations`.
+    pub criterion: String,
+    /// Number of candidate tests that were evaluated.
+    pub candidate_tests: usize,
+    /// Value of the criterion before; infinite (`null` in JSON) where an error is not identifiable.
     #[schemars(with = "Option<f64>")]
     pub before: f64,
-    /// The errors and their standard uncertainties before, outside units; infinite (`null` in JSON) where an error is not identifiable.
-    #[schemars(with = "Vec<(String, Option<f64>)>")]
-    pub uncertainties_before: Vec<(String, f64)>,
-    /// The tests, in the order in which they are added.
+    /// The errors and their standard uncertainties before.
+    pub uncertainties_before: Vec<NamedUncertainty>,
+    /// The proposed tests, in the order in which they are added.
     pub steps: Vec<Step>,
-    /// What the exchange changed, in words.
+    /// The exchanges of proposed tests, in words.
     pub exchanged: Vec<String>,
-    /// The best by themselves, in the order in which they were judged: by the figure, or by its gain a minute. Of tests that read alike, one.
+    /// The best candidate tests by themselves, in the order of the criterion, or of its gain per minute. Of tests with equal readings, one.
     pub alternatives: Vec<Alternative>,
 }
 
@@ -51,18 +50,17 @@ pub struct Improvement {
 pub struct Step {
     /// In words.
     pub test: String,
-    /// The figure with it.
+    /// Value of the criterion with it; infinite (`null` in JSON) where an error is not identifiable.
     #[schemars(with = "Option<f64>")]
     pub after: f64,
-    /// What it takes, min.
-    pub minutes: f64,
-    /// Whether a ball is mounted anew.
+    /// Duration of the test, min.
+    pub duration_min: f64,
+    /// Whether the test needs a new set-up.
     pub new_setup: bool,
-    /// Blind spots that it opens.
-    pub opens: Vec<String>,
-    /// The errors and their standard uncertainties with it, outside units; infinite (`null` in JSON) where an error is not identifiable.
-    #[schemars(with = "Vec<(String, Option<f64>)>")]
-    pub uncertainties: Vec<(String, f64)>,
+    /// Errors that it makes identifiable.
+    pub makes_identifiable: Vec<String>,
+    /// The errors and their standard uncertainties with it.
+    pub uncertainties: Vec<NamedUncertainty>,
     /// Centre of the workpiece ball in the table frame, mm.
     pub workpiece_ball_mm: [f64; 3],
     /// Centre of the spindle ball in the tool frame, mm.
@@ -71,15 +69,28 @@ pub struct Step {
     pub bar_mm: f64,
 }
 
-/// An entry that comes close.
+/// An error and its standard uncertainty.
+#[derive(Clone, Debug, Serialize, JsonSchema)]
+pub struct NamedUncertainty {
+    /// The error.
+    pub id: String,
+    /// Its standard uncertainty, in `unit`; infinite (`null` in JSON) where it is not identifiable.
+    #[schemars(with = "Option<f64>")]
+    pub u: f64,
+    /// `um`, `arcsec`, …
+    pub unit: String,
+}
+
+/// A candidate test that comes close.
 #[derive(Clone, Debug, Serialize, JsonSchema)]
 pub struct Alternative {
     /// In words.
     pub test: String,
-    /// The figure with it.
+    /// Value of the criterion with it; infinite (`null` in JSON) where an error is not identifiable.
+    #[schemars(with = "Option<f64>")]
     pub after: f64,
-    /// What it takes, min.
-    pub minutes: f64,
+    /// Duration of the test, min.
+    pub duration_min: f64,
 }
 
 /// An uncertainty of this share of the physical size is that of a blind spot.
@@ -147,17 +158,27 @@ pub fn improve(
             .fold(0.0, |worst: f64, (_, u)| worst.max(u)),
         Goal::Separation { .. } => reported(figure(root), &options.goal),
     };
+    let with_units = |named: Vec<(String, f64)>| -> Vec<NamedUncertainty> {
+        let unit = |id: &str| list.iter().find(|parameter| parameter.id == id);
+        (named.into_iter())
+            .map(|(id, u)| NamedUncertainty {
+                unit: unit(&id).map_or(String::new(), |parameter| parameter.unit.name.clone()),
+                id,
+                u,
+            })
+            .collect()
+    };
     let steps = (0..chosen.len())
-        .map(|k| step(&prepared, &chosen[..=k], &outside))
+        .map(|k| step(&prepared, &chosen[..=k], &outside, &with_units))
         .collect();
     Ok(Improvement {
-        figure: match options.goal {
+        criterion: match options.goal {
             Goal::WorstUncertainty => "worst standard uncertainty, um or arcsec".to_string(),
             Goal::Separation { .. } => "separation, standard deviations".to_string(),
         },
-        menu_entries: prepared.entries.len(),
+        candidate_tests: prepared.entries.len(),
         before: outside(&prepared.base),
-        uncertainties_before: named_uncertainties(shared, &prepared.base),
+        uncertainties_before: with_units(named_uncertainties(shared, &prepared.base)),
         steps,
         exchanged,
         alternatives,
@@ -197,7 +218,7 @@ fn listed(
     let of = |entry: usize| Alternative {
         test: prepared.entries[entry].entry.name.clone(),
         after: reported(figures[entry], goal),
-        minutes: prepared.entries[entry].entry.minutes,
+        duration_min: prepared.entries[entry].entry.minutes,
     };
     let mut listed: Vec<Alternative> = Vec::new();
     for alternative in order.into_iter().map(of) {
@@ -249,7 +270,12 @@ fn exchange(
     words
 }
 
-fn step(prepared: &Prepared, chosen: &[usize], outside: &impl Fn(&Root) -> f64) -> Step {
+fn step(
+    prepared: &Prepared,
+    chosen: &[usize],
+    outside: &impl Fn(&Root) -> f64,
+    with_units: &impl Fn(Vec<(String, f64)>) -> Vec<NamedUncertainty>,
+) -> Step {
     let shared = &prepared.shared;
     let entry = &prepared.entries[chosen[chosen.len() - 1]].entry;
     let root = prepared.with(chosen);
@@ -257,7 +283,7 @@ fn step(prepared: &Prepared, chosen: &[usize], outside: &impl Fn(&Root) -> f64) 
     let first = shared.ids.len() - shared.asked;
     let unidentifiable = |u: &[f64], j: usize| is_unidentifiable(shared, u, j);
     let (u_before, u_after) = (shared.uncertainties(&before), shared.uncertainties(&root));
-    let opens = (0..shared.asked)
+    let makes_identifiable = (0..shared.asked)
         .filter(|j| unidentifiable(&u_before, *j) && !unidentifiable(&u_after, *j))
         .map(|j| shared.ids[first + j].clone())
         .collect();
@@ -268,10 +294,10 @@ fn step(prepared: &Prepared, chosen: &[usize], outside: &impl Fn(&Root) -> f64) 
     Step {
         test: entry.name.clone(),
         after: outside(&root),
-        minutes: entry.minutes,
+        duration_min: entry.minutes,
         new_setup: entry.new_setup,
-        opens,
-        uncertainties: named_uncertainties(shared, &root),
+        makes_identifiable,
+        uncertainties: with_units(named_uncertainties(shared, &root)),
         workpiece_ball_mm,
         spindle_ball_mm,
         bar_mm,

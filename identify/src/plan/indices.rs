@@ -32,7 +32,7 @@ pub fn indices(
     let m = seen.len();
     if m == 0 {
         return Ok(Indices {
-            errors,
+            error_count: errors,
             condition_number: f64::INFINITY,
             ..Indices::default()
         });
@@ -40,7 +40,7 @@ pub fn indices(
     let r = marginal(linear.whole.parts().0.as_ref(), &seen, &linear.size)?;
     let size: Vec<f64> = seen.iter().map(|j| linear.size[*j]).collect();
     Ok(Indices {
-        errors,
+        error_count: errors,
         g_efficiency,
         ..of_triangle(r.as_ref(), &size, readings)?
     })
@@ -60,7 +60,7 @@ fn of_triangle(r: MatRef<'_, f64>, size: &[f64], readings: usize) -> Result<Indi
     let lambda: Vec<f64> = singular_values(unit.as_ref())?.iter().map(|s| s * s).collect();
     let count = m as f64;
     Ok(Indices {
-        seen: m,
+        identifiable_count: m,
         condition_number: first / last,
         o1: mean_log.exp() / (readings.max(1) as f64).sqrt(),
         o2: last / first,

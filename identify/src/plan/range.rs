@@ -9,20 +9,21 @@ use crate::error::IdentifyError;
 use crate::fit;
 use crate::problem::Problem;
 use crate::rank::Rank;
+use crate::results::Interval;
 
-/// What a sweep could spare.
+/// How far a sweep can shrink.
 #[derive(Clone, Debug, Serialize, JsonSchema)]
 pub struct Shrinkage {
     /// The test.
     pub test: String,
     /// The axis that sweeps.
     pub axis: String,
-    /// Range as planned, deg or mm.
-    pub range: [f64; 2],
-    /// Unit of the ranges.
+    /// Range as planned, in `unit`.
+    pub range: Interval,
+    /// Unit of the ranges: `deg`, `mm`.
     pub unit: String,
-    /// The least range at which no uncertainty has doubled; absent where the test can be left out altogether.
-    pub least: Option<[f64; 2]>,
+    /// The least range at which no uncertainty has doubled, in `unit`; `null` where the test can be left out.
+    pub minimum_range: Option<Interval>,
     /// The error whose uncertainty doubles first.
     pub first_to_double: Option<String>,
 }
@@ -92,9 +93,9 @@ pub fn shrinkages(problem: &Problem<'_>) -> Result<Vec<Shrinkage>, IdentifyError
         let mut shrinkage = Shrinkage {
             test: problem.tests[test].name.clone(),
             axis: problem.session.machine.axes[axis].name.clone(),
-            range: [low * outside, high * outside],
+            range: [low * outside, high * outside].into(),
             unit: unit.to_string(),
-            least: None,
+            minimum_range: None,
             first_to_double: None,
         };
         if none.0 >= 2.0 {
@@ -109,7 +110,7 @@ pub fn shrinkages(problem: &Problem<'_>) -> Result<Vec<Shrinkage>, IdentifyError
                 }
             }
             let (middle, half) = (0.5 * (low + high), 0.5 * enough * (high - low));
-            shrinkage.least = Some([(middle - half) * outside, (middle + half) * outside]);
+            shrinkage.minimum_range = Some([(middle - half) * outside, (middle + half) * outside].into());
             shrinkage.first_to_double = Some(problem.parameters.list[who].id.clone());
         }
         found.push(shrinkage);

@@ -1,45 +1,45 @@
-//! What a plan's analysis says, as it stands in JSON. Units stand in the names, or beside the value.
+//! What a plan's analysis reports, as JSON has it. Units stand in the names, or beside the value.
 
 use schemars::JsonSchema;
 use serde::Serialize;
 
-use crate::results::Unobservable;
+use crate::results::{Combination, Unobservable};
 
-/// What `abbe plan` reports.
+/// What a plan's analysis reports.
 #[derive(Clone, Debug, Serialize, JsonSchema)]
 pub struct PlanAnalysis {
     /// Standard deviation of one scalar reading, µm.
     pub noise_um: f64,
     /// Number of readings.
     pub readings: usize,
-    /// Independent combinations that are seen.
+    /// Numerical rank: number of independent combinations of the parameters that are identifiable.
     pub rank: usize,
-    /// Number of unknowns, set-up quantities included.
-    pub unknowns: usize,
+    /// Number of parameters, set-up parameters included.
+    pub parameter_count: usize,
     /// Number of times a workpiece ball (tracker, socket) is mounted.
-    pub setups: usize,
-    /// Time that the axes move, min; absent where the states tell no time.
+    pub setup_count: usize,
+    /// Time for which the axes move, min; `null` where the states have no time.
     pub moving_min: Option<f64>,
     /// The tests.
     pub tests: Vec<TestSummary>,
-    /// The errors that the plan is made for.
+    /// The errors that the plan identifies.
     pub errors: Vec<ErrorAnalysis>,
-    /// Combinations that no reading sees.
-    pub blind: Vec<Unobservable>,
-    /// Errors that readings alone cannot tell from set-up quantities.
-    pub held_by_setup: Vec<HeldBySetup>,
-    /// Errors that are nearly collinear.
+    /// Null-space directions: combinations of parameters that leave every reading unchanged.
+    pub unidentifiable: Vec<Unobservable>,
+    /// Errors that are confounded with set-up parameters and determined by the set-up priors only.
+    pub determined_by_prior: Vec<DeterminedByPrior>,
+    /// Combinations of errors whose columns are nearly collinear.
     pub nearly_collinear: Vec<NearDependency>,
     /// Correlation of the errors.
     pub correlation: Correlation,
-    /// Scalar figures of merit.
+    /// Observability indices and efficiencies.
     pub indices: Indices,
-    /// What every test contributes.
-    pub without: Vec<WithoutTest>,
-    /// What undeclared effects would do; absent where it was not asked for.
+    /// The plan without each test.
+    pub leave_one_out: Vec<LeaveOneOut>,
+    /// Detectability of undeclared effects and the biases by them; absent where it was not requested.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub effects: Option<EffectsAnalysis>,
-    /// What a user should know.
+    /// Warnings in words.
     pub warnings: Vec<String>,
 }
 
@@ -50,64 +50,68 @@ pub struct TestSummary {
     pub name: String,
     /// Number of readings.
     pub readings: usize,
-    /// How long the axes move, min.
+    /// Time for which the axes move, min.
     pub moving_min: Option<f64>,
-    /// Farthest that the nominal distance of the balls is from the bar's length, mm; absent for other instruments.
+    /// Largest difference of the nominal distance of the balls and the bar's length, mm; absent for other instruments.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub reach_mm: Option<f64>,
-    /// Which mounted workpiece ball it uses.
+    /// The mounted workpiece ball that it uses.
     pub setup: String,
 }
 
-/// An error and what the plan says of it.
+/// An error, and how well the plan identifies it.
 #[derive(Clone, Debug, Serialize, JsonSchema)]
 pub struct ErrorAnalysis {
-    /// `EY0A`, `EZC~C:h2.cos`.
+    /// Identifier: `EY0A`, `EZC~C:h2.cos`.
     pub id: String,
-    /// Unit of its uncertainties: `um`, `arcsec`, …
+    /// What the error is, in words.
+    pub meaning: String,
+    /// Unit of the uncertainties: `um`, `arcsec`, …
     pub unit: String,
-    /// Predicted standard uncertainty; absent where the error takes part in an unseen combination.
+    /// Predicted standard uncertainty, in `unit`; `null` where the error takes part in a null-space direction.
     pub u: Option<f64>,
-    /// µm of reading a `unit` of the error, all other unknowns standing still.
+    /// Sensitivity of the readings to the error, all other parameters constant.
     pub sensitivity: Sensitivity,
-    /// Where the uncertainty comes from, the largest first; the squares of the parts add up to the square of `u`.
+    /// Uncertainty budget, the largest contribution first. The squares of the contributions add up to the square of `u`.
     pub budget: Vec<Contribution>,
-    /// What `u` would be if all other errors were known.
-    pub u_others_known: Option<f64>,
-    /// Other errors, and the share of the variance that would go if each were known: the squared correlation.
-    pub shared_with: Vec<CorrelatedWith>,
+    /// Conditional standard uncertainty, in `unit`: `u` if all other errors were known.
+    pub conditional_u: Option<f64>,
+    /// The errors with which the error is correlated.
+    pub correlated_with: Vec<CorrelatedWith>,
     /// Sensitivity along the first run of each test.
     pub curves: Vec<Curve>,
 }
 
-/// µm of reading per unit of an error.
+/// Change of a reading per unit of an error.
 #[derive(Clone, Debug, Serialize, JsonSchema)]
 pub struct Sensitivity {
-    /// The largest over all readings, its sign kept.
+    /// The largest over all readings, with its sign, in `unit`.
     pub largest: f64,
-    /// The test where it is largest.
-    pub largest_in: String,
-    /// Root mean square over all readings.
+    /// The test in which it is largest.
+    pub largest_in_test: String,
+    /// Root mean square over all readings, in `unit`.
     pub rms: f64,
+    /// Unit: `um/um`, `um/arcsec`, …
+    pub unit: String,
 }
 
-/// A part of a standard uncertainty.
+/// A contribution to a standard uncertainty.
 #[derive(Clone, Debug, Serialize, JsonSchema)]
 pub struct Contribution {
-    /// `noise`, or a set-up quantity: `spindle_ball.z[A150]`.
-    pub from: String,
-    /// Its part, in the unit of the error.
+    /// `noise`, or a set-up parameter: `spindle_ball.z[A150]`.
+    pub source: String,
+    /// The contribution, in the unit of the error.
     pub u: f64,
     /// Its share of the variance, 0 to 1.
     pub share: f64,
 }
 
-/// Another error that shares the variance of an error.
+/// An error that is correlated with an error.
 #[derive(Clone, Debug, Serialize, JsonSchema)]
 pub struct CorrelatedWith {
     /// The other error.
     pub id: String,
-    /// The correlation, −1 to 1; its square is the share of the variance that would go if the other error were known.
+    /// Correlation coefficient, −1 to 1. Its square is the share of the variance that vanishes if the other error is known.
     pub correlation: f64,
 }
 
@@ -116,92 +120,106 @@ pub struct CorrelatedWith {
 pub struct Curve {
     /// The test.
     pub test: String,
-    /// Length of reading (for three coordinates: length of the vector) per unit of the error, evenly thinned.
+    /// Change of the reading (for three coordinates: length of the vector) per unit of the error, in the unit of the sensitivity, evenly thinned.
     pub values: Vec<f64>,
 }
 
-/// An error that readings alone cannot tell from set-up quantities.
+/// An error that is confounded with set-up parameters and determined by their priors only.
 #[derive(Clone, Debug, Serialize, JsonSchema)]
-pub struct HeldBySetup {
+pub struct DeterminedByPrior {
     /// The error.
     pub error: String,
-    /// Moving these together changes no reading: the error, then what it hides behind, in outside units.
+    /// A change of the error and the set-up parameters in this proportion changes no reading. Display units; the error first.
+    #[serde(serialize_with = "Combination::serialize_pairs")]
+    #[schemars(with = "Combination")]
     pub combination: Vec<(String, f64)>,
-    /// In words.
+    /// Explanation in words.
     pub why: String,
 }
 
-/// Unknowns that are nearly one combination.
+/// A combination of parameters whose columns are nearly collinear.
 #[derive(Clone, Debug, Serialize, JsonSchema)]
 pub struct NearDependency {
-    /// Condition index: the largest over this singular value of the Jacobian with columns of unit length.
+    /// Condition index: the largest singular value over this one, of the Jacobian with columns of unit length.
     pub condition_index: f64,
-    /// How much of each, in outside units.
+    /// Coefficient of each parameter, in its display unit.
+    #[serde(serialize_with = "Combination::serialize_pairs")]
+    #[schemars(with = "Combination")]
     pub combination: Vec<(String, f64)>,
-    /// In words.
+    /// Explanation in words.
     pub why: String,
 }
 
-/// Correlations of the errors.
+/// Correlation matrix of the errors.
 #[derive(Clone, Debug, Serialize, JsonSchema)]
 pub struct Correlation {
-    /// The errors.
+    /// The errors, in the order of rows and columns.
     pub ids: Vec<String>,
-    /// Row by row; `null` where one of the two is not seen.
+    /// Row by row; `null` where one of the two errors is not identifiable.
     pub matrix: Vec<Vec<Option<f64>>>,
 }
 
-/// Figures of merit of the information on the errors, set-up quantities being unknown within their priors.
+/// Observability indices and efficiencies of the information on the errors, with the set-up parameters estimated within their priors.
 #[derive(Clone, Debug, Default, Serialize, JsonSchema)]
 pub struct Indices {
-    /// Errors that are seen by themselves.
-    pub seen: usize,
-    /// Errors in all. Where fewer are seen, the figures are of those that are.
-    pub errors: usize,
+    /// Number of identifiable errors. The figures are of these.
+    pub identifiable_count: usize,
+    /// Number of errors.
+    pub error_count: usize,
     /// Largest over smallest singular value of the scaled Jacobian.
     pub condition_number: f64,
-    /// `(σ1 ⋯ σm)^(1/m) / √n` (Borm & Menq, Int. J. Robotics Res. 10 (1991) 51).
+    /// Observability index O1, the volume of the information: `(σ1 ⋯ σm)^(1/m) / √n` (Borm & Menq, Int. J. Robotics Res. 10 (1991) 51).
     pub o1: f64,
-    /// `σm / σ1` (Driels & Pathre, J. Robotic Syst. 7 (1990) 197).
+    /// Observability index O2, the inverse condition number: `σm / σ1` (Driels & Pathre, J. Robotic Syst. 7 (1990) 197).
     pub o2: f64,
-    /// `σm` (Nahvi, Hollerbach & Hayward, Proc. IEEE ICRA (1994) 407).
+    /// Observability index O3, the least sensitive direction: `σm` (Nahvi, Hollerbach & Hayward, Proc. IEEE ICRA (1994) 407).
     pub o3: f64,
-    /// `σm² / σ1`, the noise amplification index (Nahvi & Hollerbach, Proc. IEEE ICRA (1996) 647).
+    /// Observability index O4, the noise amplification: `σm² / σ1` (Nahvi & Hollerbach, Proc. IEEE ICRA (1996) 647).
     pub o4: f64,
-    /// `1 / (1/σ1 + ⋯ + 1/σm)` (Sun & Hollerbach, Proc. IEEE ICRA (2008) 831).
+    /// Observability index O5, the harmonic mean of sensitivities: `1 / (1/σ1 + ⋯ + 1/σm)` (Sun & Hollerbach, Proc. IEEE ICRA (2008) 831).
     pub o5: f64,
-    /// D-efficiency: 1 for errors that do not disturb one another.
+    /// D-efficiency: 1 for uncorrelated errors.
     pub d_efficiency: f64,
-    /// A-efficiency.
+    /// A-efficiency: 1 for uncorrelated errors.
     pub a_efficiency: f64,
-    /// E-efficiency.
+    /// E-efficiency: 1 for uncorrelated errors.
     pub e_efficiency: f64,
     /// G-efficiency: mean over greatest leverage of a reading.
     pub g_efficiency: f64,
 }
 
-/// What becomes of the uncertainties without a test.
+/// The uncertainties without one test.
 #[derive(Clone, Debug, Serialize, JsonSchema)]
-pub struct WithoutTest {
+pub struct LeaveOneOut {
     /// The test that is left out.
     pub test: String,
-    /// Each error and by how much its variance grows; absent where it is no longer seen.
-    pub variance_inflation: Vec<(String, Option<f64>)>,
-    /// In words.
+    /// Each identifiable error, and its variance inflation.
+    pub variance_inflation: Vec<VarianceInflation>,
+    /// Explanation in words.
     pub why: String,
 }
 
-/// What undeclared effects would do.
+/// Variance inflation of an error.
+#[derive(Clone, Debug, Serialize, JsonSchema)]
+pub struct VarianceInflation {
+    /// The error.
+    pub id: String,
+    /// Variance without the test over variance with it; `null` where the error is no longer identifiable.
+    pub factor: Option<f64>,
+}
+
+/// Detectability of undeclared effects, and the biases by them.
 #[derive(Clone, Debug, Serialize, JsonSchema)]
 pub struct EffectsAnalysis {
-    /// Significance of one look.
-    pub significance: f64,
+    /// Significance level of a test of a single effect.
+    pub significance_level: f64,
     /// Power at which an effect counts as detectable.
     pub power: f64,
-    /// Number of effects looked at.
-    pub effects_searched: usize,
-    /// Significance of one look when all effects are looked at and one false alarm in all has the probability `significance` (Šidák).
-    pub significance_corrected: f64,
+    /// Number of effects that are screened.
+    pub effects_screened: usize,
+    /// Significance level of a test of a single effect when all effects are screened and the probability of any false alarm is `significance_level`
+    /// (Šidák).
+    pub significance_level_corrected: f64,
     /// The effects.
     pub effects: Vec<EffectDetectability>,
 }
@@ -209,31 +227,33 @@ pub struct EffectsAnalysis {
 /// One undeclared effect.
 #[derive(Clone, Debug, Serialize, JsonSchema)]
 pub struct EffectDetectability {
-    /// `EZC~C:h2`.
+    /// Identifier: `EZC~C:h2`.
     pub id: String,
-    /// In words: the family of the library.
+    /// Family of the effect in the library, in words.
     pub family: String,
     /// Unit of its amplitude.
     pub unit: String,
-    /// Smallest amplitude that one look finds, of a power at 100 mm or 180°; absent where no amplitude of physical size on the travel would be found.
-    pub detectable: Option<f64>,
-    /// The same when all effects are looked at.
-    pub detectable_searched: Option<f64>,
-    /// Share of its signal (sum of squares) that remains after the fit of the parameters, 0 to 1.
-    pub surviving_share: f64,
-    /// `seen`, `hidden` (under a hundredth survives), `none` (these tests do not change with it).
+    /// Smallest amplitude that a test of this effect alone detects, in `unit`; of a power at 100 mm or 180°. `null` where no amplitude of physical size
+    /// is detectable.
+    pub detectable_amplitude: Option<f64>,
+    /// Smallest amplitude that is detected when all effects are screened, in `unit`.
+    pub detectable_amplitude_screened: Option<f64>,
+    /// Share of its signal (sum of squares) that remains in the residual after the fit of the parameters, 0 to 1.
+    pub residual_share: f64,
+    /// `detectable`; `confounded` with the parameters (less than a hundredth remains); `confounded at one phase`; `no signal` (these tests do not change
+    /// with it).
     pub verdict: String,
-    /// The errors it biases, the strongest first, in their unit per unit of the effect.
+    /// The errors that it biases, the most biased first.
     pub biases: Vec<Bias>,
 }
 
-/// By how much an effect biases an error.
+/// Bias of an error by an effect.
 #[derive(Clone, Debug, Serialize, JsonSchema)]
 pub struct Bias {
     /// The error.
     pub id: String,
-    /// Units of the error per unit of the effect; of cosine and sine at the worst phase, without a sign.
+    /// Bias per unit of the effect, in `unit`; of cosine and sine at the worst phase, without a sign.
     pub per_unit: f64,
-    /// The unit: `um/um`, `arcsec/um`, …
+    /// Unit: `um/um`, `arcsec/um`, …
     pub unit: String,
 }

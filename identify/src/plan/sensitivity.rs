@@ -145,8 +145,9 @@ pub fn reported(problem: &Problem<'_>, found: &Sensitivities, unknown: usize) ->
     let scale = outside(problem, unknown);
     Sensitivity {
         largest: largest * scale,
-        largest_in: problem.tests[test].name.clone(),
+        largest_in_test: problem.tests[test].name.clone(),
         rms: rms * scale,
+        unit: format!("um/{}", problem.parameters.list[unknown].unit.name),
     }
 }
 

@@ -34,12 +34,12 @@ const MAX_TESTS: usize = 3;
 pub struct SeparationAnalysis {
     /// In words: `C150 with the workpiece ball at radius 50 mm`.
     pub test: String,
-    /// Separation by the readings that there are, standard deviations.
-    pub before: f64,
-    /// Separation with the test added.
-    pub after: f64,
-    /// What it takes, min.
-    pub minutes: f64,
+    /// Separation by the present readings, standard deviations.
+    pub before_sigma: f64,
+    /// Separation with the test added, standard deviations.
+    pub after_sigma: f64,
+    /// Duration of the test, min.
+    pub duration_min: f64,
 }
 
 /// A test that separates an effect from some of its alternatives.
@@ -109,9 +109,9 @@ pub fn separation(
     let after = sigmas[best][0];
     Ok((after > before * (1.0 + MIN_GAIN)).then(|| SeparationAnalysis {
         test: entry.name.clone(),
-        before,
-        after,
-        minutes: entry.minutes,
+        before_sigma: before,
+        after_sigma: after,
+        duration_min: entry.minutes,
     }))
 }
 

@@ -49,7 +49,8 @@ pub struct Conflict {
     /// For a set-up parameter: the pull, that is the estimate over its standard deviation if the session is right.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub pull: Option<f64>,
-    /// In words.
+    /// Description in words.
+    #[serde(rename = "description")]
     pub words: String,
 }
 
@@ -88,6 +89,7 @@ pub struct Suggestion {
     pub subject: String,
     /// Residual over scalar readings with the change, µm.
     pub rms_um: f64,
-    /// In words.
+    /// Description in words.
+    #[serde(rename = "description")]
     pub words: String,
 }

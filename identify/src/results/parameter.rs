@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 
 use schemars::JsonSchema;
-use serde::Serialize;
+use serde::{Serialize, Serializer};
 
 /// Coverage factor of the expanded uncertainty `U = k u` (JCGM 100, 6.2).
 pub const COVERAGE_FACTOR: f64 = 2.0;
@@ -75,6 +75,22 @@ pub struct Unobservable {
     pub combination: BTreeMap<String, f64>,
     /// Explanation in words.
     pub why: String,
+}
+
+/// Coefficient of each parameter, in the parameter's display unit.
+#[derive(Clone, Debug, PartialEq, Serialize, JsonSchema)]
+#[serde(transparent)]
+#[schemars(inline)]
+pub struct Combination(BTreeMap<String, f64>);
+
+impl Combination {
+    /// Serialises pairs of identifier and coefficient as an object, in their order.
+    ///
+    /// # Errors
+    /// Those of the serialiser.
+    pub fn serialize_pairs<S: Serializer>(pairs: &[(String, f64)], serializer: S) -> Result<S::Ok, S::Error> {
+        serializer.collect_map(pairs.iter().map(|(id, coefficient)| (id, coefficient)))
+    }
 }
 
 /// The null space of the readings in reduced row echelon form.

@@ -97,15 +97,15 @@ pub struct SelfCalibration {
     pub noise_source: String,
     /// Root mean square of the residual of the solution, µm.
     pub rms_um: f64,
-    /// Values that the functions have in all.
-    pub values: usize,
-    /// How many of them, or combinations, the readings tell before any condition.
-    pub rank_before: usize,
+    /// Number of values of all functions.
+    pub value_count: usize,
+    /// Numerical rank without boundary conditions.
+    pub rank_without_conditions: usize,
     /// The boundary conditions.
     pub conditions: Vec<String>,
-    /// Values that remain unknown under the conditions, with the radius where it is estimated.
+    /// Number of parameters under the conditions, the radius included where it is estimated.
     pub parameter_count: usize,
-    /// How many of those, or combinations, the readings tell.
+    /// Numerical rank under the conditions.
     pub rank: usize,
     /// The functions.
     pub functions: Vec<FunctionResult>,
@@ -186,8 +186,8 @@ impl Calibration {
             .word()
             .into(),
             rms_um: self.solution.rms_mm * 1e3,
-            values: columns,
-            rank_before: self.rank_before,
+            value_count: columns,
+            rank_without_conditions: self.rank_before,
             conditions: self
                 .conditions
                 .iter()

@@ -9,6 +9,7 @@
 //! over the table. The errors, which change by a few parts in 10⁵ of the way, are left out of `J`, so that every step gains four digits or so.
 
 pub mod functions;
+mod results;
 
 use abbe_model::axis::AxisKind;
 use abbe_model::chain::{AxisPosition, BodyErrors, ERRORS_PER_AXIS, Machine};
@@ -16,10 +17,9 @@ use abbe_model::frames::Point;
 use abbe_model::session::limits::LARGEST;
 use nalgebra::{DMatrix, DVector, Vector3};
 use rayon::prelude::*;
-use schemars::JsonSchema;
-use serde::Serialize;
 
 pub use functions::{ErrorFunction, Form};
+pub use results::{AxisShare, Coordinates, MapPosition, Size, Summary};
 
 use crate::error::IdentifyError;
 
@@ -163,48 +163,6 @@ impl MachineWithErrors<'_> {
     }
 }
 
-/// Largest and root mean square of a length over a map, µm.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, JsonSchema)]
-pub struct Size {
-    /// The largest.
-    pub largest_um: f64,
-    /// Root mean square.
-    pub rms_um: f64,
-}
-
-impl Size {
-    fn of(lengths_mm: impl Iterator<Item = f64>) -> Size {
-        let (mut largest, mut sum, mut count) = (0.0_f64, 0.0, 0);
-        for length in lengths_mm {
-            largest = largest.max(length.abs());
-            sum += length * length;
-            count += 1;
-        }
-        Size {
-            largest_um: largest * 1e3,
-            rms_um: (sum / f64::from(count.max(1))).sqrt() * 1e3,
-        }
-    }
-}
-
-/// A map in figures.
-#[derive(Clone, Debug, PartialEq, Serialize, JsonSchema)]
-pub struct Summary {
-    /// Number of places.
-    pub places: usize,
-    /// Of the error vector.
-    pub error: Size,
-    /// Positions of the axes where the error is largest, mm or degrees, by axis.
-    pub largest_at: Vec<(String, f64)>,
-    /// Of its coordinates X, Y, Z in the table frame.
-    pub coordinates: [Size; 3],
-    /// Of the error vector from each axis' errors alone.
-    pub by_axis: Vec<(String, Size)>,
-    /// Of what compensation leaves, where asked for.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub residual: Option<Size>,
-}
-
 /// A map: every place of a grid, in the order of the axes, the last one fastest.
 ///
 /// # Errors
@@ -263,23 +221,35 @@ pub fn map(
         let left = places.iter().filter_map(|(place, _)| place.compensated.as_ref());
         Size::of(left.map(|compensated| norm(compensated.error_mm)))
     });
+    let coordinate = |k: usize| Size::of(places.iter().map(|(place, _)| place.error_mm[k]));
     let summary = Summary {
-        places: total,
+        points: total,
         error: Size::of(places.iter().map(|(place, _)| norm(place.error_mm))),
         largest_at: largest.map_or(Vec::new(), |(place, _)| {
             let named = machine.axes.iter().zip(&place.positions).enumerate();
             named
-                .map(|(k, (axis, q))| (axis.name.clone(), outside(k, *q)))
+                .map(|(k, (axis, q))| MapPosition {
+                    axis: axis.name.clone(),
+                    position: outside(k, *q),
+                    unit: match axis.kind {
+                        AxisKind::Linear => "mm".to_string(),
+                        AxisKind::Rotary => "deg".to_string(),
+                    },
+                })
                 .collect()
         }),
-        coordinates: std::array::from_fn(|k| Size::of(places.iter().map(|(place, _)| place.error_mm[k]))),
+        coordinates: Coordinates {
+            x: coordinate(0),
+            y: coordinate(1),
+            z: coordinate(2),
+        },
         by_axis: machine
             .axes
             .iter()
             .enumerate()
-            .map(|(k, axis)| {
-                let size = Size::of(places.iter().map(|(_, by_axis)| by_axis[k]));
-                (axis.name.clone(), size)
+            .map(|(k, axis)| AxisShare {
+                axis: axis.name.clone(),
+                size: Size::of(places.iter().map(|(_, by_axis)| by_axis[k])),
             })
             .collect(),
         residual,

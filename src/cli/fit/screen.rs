@@ -1,7 +1,5 @@
 //! The first screen of `abbe fit`: whether the result is good, what was found, what is missing or confounded, what to do next.
 
-use std::path::Path;
-
 use abbe::identify::fit::Fit;
 use abbe::identify::plan::candidate_tests;
 use abbe::identify::problem::Problem;
@@ -9,13 +7,13 @@ use abbe::identify::results::{FitMonteCarlo, FitResult, Verdict};
 use abbe::model::words::counted;
 
 use crate::cli::screen::{self, Estimates, Step, command};
-use crate::cli::{circular, plausibility, table};
+use crate::cli::{SessionArguments, circular, plausibility, table};
 
 /// χ²/ν below which the noise is said to be overstated.
 const MIN_RATIO: f64 = 0.5;
 
-/// Prints the result of a fit of the session in `file`. With `all`, no list is folded.
-pub fn print(problem: &Problem<'_>, fit: &Fit, result: &FitResult, file: &Path, all: bool) {
+/// Prints the result of a fit of a session. With `all`, no list is folded.
+pub fn print(problem: &Problem<'_>, fit: &Fit, result: &FitResult, session: &SessionArguments, all: bool) {
     plausibility::print(&result.plausibility);
     quality(result);
     let estimates = Estimates::new(problem, fit, &result.parameters, |_| false);
@@ -25,7 +23,7 @@ pub fn print(problem: &Problem<'_>, fit: &Fit, result: &FitResult, file: &Path, 
     }
     circular::print(&result.circular, all);
     screen::print_missing(&result.unobservable, &result.outliers, all);
-    screen::print_next(&next(problem, result, file));
+    screen::print_next(&next(problem, result, session));
 }
 
 /// Goodness of fit, held-out error and rank.
@@ -126,14 +124,14 @@ fn print_drawn(drawn: &FitMonteCarlo, estimates: &Estimates<'_>, all: bool) {
 }
 
 /// What to do next.
-fn next(problem: &Problem<'_>, result: &FitResult, file: &Path) -> Vec<Step> {
+fn next(problem: &Problem<'_>, result: &FitResult, session: &SessionArguments) -> Vec<Step> {
     let mut steps: Vec<Step> = Vec::new();
     if !result.plausibility.conflicts.is_empty() {
         steps.push(("correct the session".into(), "the readings contradict it".into()));
     }
     if result.u_enlargement > 1.0 || result.noise_source == "residual" {
         let purpose = "find the unmodelled effect behind the residual";
-        steps.push((command("trace", file, ""), purpose.into()));
+        steps.push((command("trace", session, ""), purpose.into()));
     }
     if result.noise_source == "residual" {
         let step = "state `noise_um` or repeat a run";
@@ -145,9 +143,9 @@ fn next(problem: &Problem<'_>, result: &FitResult, file: &Path) -> Vec<Step> {
         } else {
             "propose the test that makes the confounded parameters identifiable"
         };
-        steps.push((command("plan", file, "--improve"), purpose.into()));
+        steps.push((command("plan", session, "--improve"), purpose.into()));
     }
     let purpose = "write residuals, plots and sliders as a page";
-    steps.push((command("fit", file, "--report fit.html"), purpose.into()));
+    steps.push((command("fit", session, "--report fit.html"), purpose.into()));
     steps
 }

@@ -41,7 +41,7 @@ fn sensitivity(errors: &[ErrorAnalysis]) {
             let test = if error.sensitivity.largest == 0.0 {
                 "–".to_string()
             } else {
-                error.sensitivity.largest_in.clone()
+                error.sensitivity.largest_in_test.clone()
             };
             vec![
                 error.id.clone(),
@@ -75,10 +75,10 @@ fn budget(errors: &[ErrorAnalysis]) {
             .budget
             .iter()
             .take(MAX_CONTRIBUTIONS)
-            .map(|part| format!("{} {:.0} %", part.from, part.share * 100.0))
+            .map(|part| format!("{} {:.0} %", part.source, part.share * 100.0))
             .collect();
         let shared: Vec<String> = error
-            .shared_with
+            .correlated_with
             .iter()
             .take(2)
             .map(|other| format!("{} {:+.2}", other.id, other.correlation))
@@ -167,8 +167,8 @@ fn indices(analysis: &PlanAnalysis) {
     let indices = &analysis.indices;
     say!(
         "\nObservability indices of {} of {}, set-up parameters within their priors:",
-        indices.seen,
-        counted(indices.errors, "error")
+        indices.identifiable_count,
+        counted(indices.error_count, "error")
     );
     say!(
         "  condition number {}; O1 {}  O2 {}  O3 {}  O4 {}  O5 {}",
@@ -189,11 +189,14 @@ fn indices(analysis: &PlanAnalysis) {
 }
 
 fn tests(analysis: &PlanAnalysis) {
-    if analysis.without.is_empty() {
+    if analysis.leave_one_out.is_empty() {
         return;
     }
     say!("\nContribution of each test:");
-    analysis.without.iter().for_each(|item| say!("  {}", item.why));
+    analysis
+        .leave_one_out
+        .iter()
+        .for_each(|item| say!("  {}", item.why));
 }
 
 fn effects(found: &EffectsAnalysis) {
@@ -204,9 +207,9 @@ fn effects(found: &EffectsAnalysis) {
             .filter(|effect| verdict(&effect.verdict))
             .collect()
     };
-    let confounded = by_verdict(|verdict| verdict.starts_with("hidden"));
-    let detectable = by_verdict(|verdict| verdict == "seen");
-    let none = by_verdict(|verdict| verdict == "none").len();
+    let confounded = by_verdict(|verdict| verdict.starts_with("confounded"));
+    let detectable = by_verdict(|verdict| verdict == "detectable");
+    let none = by_verdict(|verdict| verdict == "no signal").len();
     say!(
         "\nUndeclared effects: of {} screened, {} are detectable, {} are confounded and {none} change no reading of these tests.",
         found.effects.len(),
@@ -218,8 +221,8 @@ fn effects(found: &EffectsAnalysis) {
          the library of {} effects (Šidák, conservative); share of the signal that remains in the residual; bias of the errors while it is\n\
          undeclared; number of further effects of the same component and driver. A power has its amplitude at 100 mm, or at 180°:",
         found.power * 100.0,
-        found.significance * 100.0,
-        found.effects_searched
+        found.significance_level * 100.0,
+        found.effects_screened
     );
     effect_table(&detectable);
     say!(
@@ -286,10 +289,10 @@ fn effect_table(effects: &[&EffectDetectability]) {
                 .collect();
             vec![
                 effect.id.clone(),
-                optional(effect.detectable),
-                optional(effect.detectable_searched),
+                optional(effect.detectable_amplitude),
+                optional(effect.detectable_amplitude_screened),
                 table::unit(&effect.unit),
-                per_cent(effect.surviving_share),
+                per_cent(effect.residual_share),
                 if biases.is_empty() {
                     "none".into()
                 } else {

@@ -6,6 +6,7 @@ use abbe::identify::plan::criterion::Goal;
 use abbe::identify::plan::improve::{ImproveOptions, Improvement, improve};
 use abbe::identify::plan::range::Shrinkage;
 use abbe::identify::problem::Problem;
+use abbe::identify::results::Interval;
 use abbe::identify::trace::library;
 use abbe::model::words::counted;
 use clap::{Args, ValueEnum};
@@ -262,8 +263,8 @@ fn add(problem: &mut Problem<'_>, id: &str) -> Result<(), IdentifyError> {
 pub fn print(found: &Improvement) {
     say!(
         "{}; {} of the plan: {}",
-        counted(found.menu_entries, "candidate test"),
-        found.figure,
+        counted(found.candidate_tests, "candidate test"),
+        found.criterion,
         three_digits(found.before)
     );
     if found.steps.is_empty() {
@@ -274,9 +275,9 @@ pub fn print(found: &Improvement) {
         say!("\n{}. {}", number + 1, step.test);
         say!(
             "   {} → {}, {:.1} min{}",
-            found.figure,
+            found.criterion,
             three_digits(step.after),
-            step.minutes,
+            step.duration_min,
             if step.new_setup {
                 " including the set-up"
             } else {
@@ -289,8 +290,8 @@ pub fn print(found: &Improvement) {
             point(step.spindle_ball_mm),
             step.bar_mm
         );
-        if !step.opens.is_empty() {
-            say!("   makes identifiable: {}", step.opens.join(", "));
+        if !step.makes_identifiable.is_empty() {
+            say!("   makes identifiable: {}", step.makes_identifiable.join(", "));
         }
     }
     say!("");
@@ -300,13 +301,13 @@ pub fn print(found: &Improvement) {
         .uncertainties_before
         .iter()
         .enumerate()
-        .map(|(k, (id, before))| {
-            let mut row = vec![id.clone(), three_digits(*before)];
+        .map(|(k, before)| {
+            let mut row = vec![before.id.clone(), three_digits(before.u)];
             row.extend(
                 found
                     .steps
                     .iter()
-                    .map(|step| three_digits(step.uncertainties[k].1)),
+                    .map(|step| three_digits(step.uncertainties[k].u)),
             );
             row
         })
@@ -321,7 +322,7 @@ pub fn print(found: &Improvement) {
             "  {}  {} ({:.1} min)",
             three_digits(other.after),
             other.test,
-            other.minutes
+            other.duration_min
         );
     }
 }
@@ -337,12 +338,12 @@ pub const RANGES: [&str; 5] = ["test", "axis", "planned", "smallest", "doubles f
 /// The smallest range of each sweep, one row per sweep.
 pub fn range_rows(ranges: &[Shrinkage]) -> Vec<Vec<String>> {
     let row = |range: &Shrinkage| {
-        let span = |[low, high]: [f64; 2]| format!("{low:.0} … {high:.0} {}", range.unit);
+        let span = |Interval { low, high }: Interval| format!("{low:.0} to {high:.0} {}", range.unit);
         vec![
             range.test.clone(),
             range.axis.clone(),
             span(range.range),
-            range.least.map_or("can be omitted".into(), span),
+            range.minimum_range.map_or("can be omitted".into(), span),
             range.first_to_double.clone().unwrap_or("–".into()),
         ]
     };

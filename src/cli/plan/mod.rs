@@ -79,8 +79,8 @@ pub const HELP: &str = "Examples:
       --error EY0A=10um --error EB0A=0.01deg
   abbe plan sessions/hermle-c600u/chapter5.toml --range
 
-The first screen answers in this order: identifiable errors and rank; predicted standard uncertainty u and expanded
-uncertainty U = 2u; what is confounded; what to do next; the verdict, which names the worst determined error and what
+The first screen answers in this order: identifiable errors and rank; predicted standard uncertainty u and expanded \
+uncertainty U = 2u; what is confounded; what to do next; the verdict, which names the worst determined error and what \
 limits it. --all adds sensitivities, budgets, correlations, observability indices and undeclared effects.";
 
 /// Runs `abbe plan`.
@@ -126,7 +126,7 @@ pub fn run(arguments: &PlanArguments) -> Result<(), Failure> {
         let (complete, noise) = plan::prepared(&session, &options)?;
         let problem = plan::states::problem_by_test(&complete, noise)?;
         let improvable = plan::candidate_tests::has_candidates(&problem);
-        screen::print(&analysis, &arguments.session.session, improvable, arguments.all);
+        screen::print(&analysis, &arguments.session, improvable, arguments.all);
     }
     print_warnings(&analysis.warnings);
     if let Some(path) = &arguments.common.json {

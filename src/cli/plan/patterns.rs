@@ -91,7 +91,7 @@ fn print(found: &Patterns) {
                 format!("{} {}", pattern.size, table::unit(&pattern.unit)),
                 number(pattern.largest_um),
                 number(pattern.mean_um),
-                number(pattern.rms_um),
+                number(pattern.standard_deviation_um),
             ]
         })
         .collect();

@@ -1,7 +1,5 @@
 //! The first screen of `abbe plan`: identifiability, predicted uncertainties, what is confounded, what to do next, the verdict.
 
-use std::path::Path;
-
 use abbe::identify::plan::results::{EffectsAnalysis, ErrorAnalysis, PlanAnalysis};
 use abbe::model::words::counted;
 
@@ -9,10 +7,10 @@ use super::details;
 use super::digits::three_digits;
 use super::verdict::verdict;
 use crate::cli::screen::{self, Step, command};
-use crate::cli::table;
+use crate::cli::{SessionArguments, table};
 
-/// Prints the analysis of the plan in `file`. With `all`, no list is folded and the tables of [`details`] are printed.
-pub fn print(analysis: &PlanAnalysis, file: &Path, improvable: bool, all: bool) {
+/// Prints the analysis of a plan. With `all`, no list is folded and the tables of [`details`] are printed.
+pub fn print(analysis: &PlanAnalysis, session: &SessionArguments, improvable: bool, all: bool) {
     header(analysis);
     errors(&analysis.errors);
     unidentifiable(analysis, all);
@@ -21,7 +19,7 @@ pub fn print(analysis: &PlanAnalysis, file: &Path, improvable: bool, all: bool) 
     } else if let Some(found) = &analysis.effects {
         effects(found);
     }
-    screen::print_next(&next(analysis, file, improvable, all));
+    screen::print_next(&next(analysis, session, improvable, all));
     say!("\nVerdict: {}", verdict(analysis).join("\n  "));
 }
 
@@ -31,7 +29,7 @@ fn header(analysis: &PlanAnalysis) {
         "{identifiable} of {} identifiable; numerical rank {} of {} with set-up parameters",
         counted(analysis.errors.len(), "error"),
         analysis.rank,
-        analysis.unknowns
+        analysis.parameter_count
     );
     let moving = analysis
         .moving_min
@@ -40,7 +38,7 @@ fn header(analysis: &PlanAnalysis) {
         "{} in {}, {}{moving}, noise {}",
         counted(analysis.readings, "reading"),
         counted(analysis.tests.len(), "test"),
-        counted(analysis.setups, "set-up"),
+        counted(analysis.setup_count, "set-up"),
         table::micrometres(analysis.noise_um)
     );
 }
@@ -55,7 +53,10 @@ fn errors(errors: &[ErrorAnalysis]) {
         .iter()
         .map(|error| {
             let part = |noise: bool| {
-                let parts = error.budget.iter().filter(|part| (part.from == "noise") == noise);
+                let parts = error
+                    .budget
+                    .iter()
+                    .filter(|part| (part.source == "noise") == noise);
                 let part = parts.map(|part| part.u.powi(2)).sum::<f64>().sqrt();
                 error.u.map(|_| part)
             };
@@ -67,9 +68,9 @@ fn errors(errors: &[ErrorAnalysis]) {
                 table::unit(&error.unit),
                 optional(part(true)),
                 optional(part(false)),
-                optional(error.u_others_known),
+                optional(error.conditional_u),
                 largest.map_or(String::new(), |part| {
-                    format!("{} {:.0} %", part.from, part.share * 100.0)
+                    format!("{} {:.0} %", part.source, part.share * 100.0)
                 }),
             ]
         })
@@ -94,12 +95,12 @@ fn unidentifiable(analysis: &PlanAnalysis, all: bool) {
             screen::list(&lines, "  ", all);
         }
     };
-    let null_space = analysis.blind.iter();
+    let null_space = analysis.unidentifiable.iter();
     list(
         "Confounded: null-space directions, which leave every reading unchanged:",
         null_space.map(|item| table::with_symbols(&item.why)).collect(),
     );
-    let by_setup = analysis.held_by_setup.iter();
+    let by_setup = analysis.determined_by_prior.iter();
     list(
         "Determined by the set-up priors only, because the readings alone do not separate them:",
         by_setup.map(|item| table::with_symbols(&item.why)).collect(),
@@ -123,28 +124,28 @@ fn effects(found: &EffectsAnalysis) {
     say!(
         "\nUndeclared effects: of {} screened, {} are detectable and {} are confounded with the errors; --all lists them",
         found.effects.len(),
-        count(|verdict| verdict == "seen"),
-        count(|verdict| verdict.starts_with("hidden"))
+        count(|verdict| verdict == "detectable"),
+        count(|verdict| verdict.starts_with("confounded"))
     );
 }
 
 /// What to do next.
-fn next(analysis: &PlanAnalysis, file: &Path, improvable: bool, all: bool) -> Vec<Step> {
+fn next(analysis: &PlanAnalysis, session: &SessionArguments, improvable: bool, all: bool) -> Vec<Step> {
     let mut steps: Vec<Step> = Vec::new();
     if improvable {
-        let purpose = if analysis.blind.is_empty() {
+        let purpose = if analysis.unidentifiable.is_empty() {
             "propose the test that most lowers the largest uncertainty"
         } else {
             "propose the test that makes the errors identifiable"
         };
-        steps.push((command("plan", file, "--improve"), purpose.into()));
+        steps.push((command("plan", session, "--improve"), purpose.into()));
     }
     if !all {
         let purpose = "list sensitivities, budgets, correlations, indices, tests, effects";
-        steps.push((command("plan", file, "--all"), purpose.into()));
+        steps.push((command("plan", session, "--all"), purpose.into()));
     }
     steps.push((
-        command("simulate", file, "--out run1"),
+        command("simulate", session, "--out run1"),
         "simulate readings of these tests".into(),
     ));
     steps

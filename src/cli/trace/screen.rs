@@ -1,17 +1,15 @@
 //! The first screen of `abbe trace`: verdict and uniqueness, the residual before and after, the effects with their aliases, the next measurement.
 
-use std::path::Path;
-
 use abbe::identify::results::{EffectResult, ModelResult, TraceResult};
 use abbe::identify::trace::Trace;
 use abbe::model::words::counted;
 
 use super::name;
 use crate::cli::screen::{self, Estimates, Step, command};
-use crate::cli::{fit, plausibility, table, uniqueness};
+use crate::cli::{SessionArguments, fit, plausibility, table, uniqueness};
 
-/// Prints the result of a trace of the session in `file`. With `all`, no list is folded.
-pub fn print(trace: &Trace<'_>, file: &Path, all: bool) {
+/// Prints the result of a trace of a session. With `all`, no list is folded.
+pub fn print(trace: &Trace<'_>, session: &SessionArguments, all: bool) {
     let result = &trace.result;
     verdict(result);
     plausibility::print(&result.plausibility);
@@ -34,7 +32,7 @@ pub fn print(trace: &Trace<'_>, file: &Path, all: bool) {
     changes(result, all);
     screen::print_missing(&result.unobservable, &result.outliers, all);
     measure_next(result);
-    screen::print_next(&next(result, file));
+    screen::print_next(&next(result, session));
 }
 
 /// The verdict and the number of effects, then the uniqueness of the effects, then readings, noise and candidates.
@@ -207,18 +205,18 @@ fn measure_next(result: &TraceResult) {
 }
 
 /// What to do next.
-fn next(result: &TraceResult, file: &Path) -> Vec<Step> {
+fn next(result: &TraceResult, session: &SessionArguments) -> Vec<Step> {
     let mut steps: Vec<Step> = Vec::new();
     if !result.plausibility.conflicts.is_empty() {
         steps.push(("correct the session".into(), "the readings contradict it".into()));
     }
     if result.interrupted {
-        steps.push((command("trace", file, ""), "search to the end".into()));
+        steps.push((command("trace", session, ""), "search to the end".into()));
     } else if !result.effects.is_empty() {
         let purpose = "declare the effects in a session, which `abbe fit next.toml` fits";
-        steps.push((command("trace", file, "--write next.toml"), purpose.into()));
+        steps.push((command("trace", session, "--write next.toml"), purpose.into()));
     }
     let purpose = "write residuals, plots and alternatives as a page";
-    steps.push((command("trace", file, "--report trace.html"), purpose.into()));
+    steps.push((command("trace", session, "--report trace.html"), purpose.into()));
     steps
 }

@@ -140,9 +140,13 @@ fn two_tests_of_one_set_up_place_a_ball_at_one_point() {
         let analysis = analyse(&plan, &options).unwrap();
         assert!(analysis.warnings.is_empty(), "{code}: {:?}", analysis.warnings);
         assert!(
-            analysis.blind.is_empty(),
+            analysis.unidentifiable.is_empty(),
             "{code}: {:?}",
-            analysis.blind.iter().map(|item| &item.why).collect::<Vec<_>>()
+            analysis
+                .unidentifiable
+                .iter()
+                .map(|item| &item.why)
+                .collect::<Vec<_>>()
         );
     }
 }

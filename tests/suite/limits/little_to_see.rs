@@ -10,7 +10,10 @@ fn exactly_collinear_columns() {
         ..Case::default()
     };
     let result = fitted(&case.session(), &case.data());
-    assert_eq!((&result["rank"], &result["unknowns"]), (&2.into(), &5.into()));
+    assert_eq!(
+        (&result["rank"], &result["parameter_count"]),
+        (&2.into(), &5.into())
+    );
     assert_eq!(result["parameters"].as_array().unwrap().len(), 0);
     let whys: Vec<&str> = result["unobservable"]
         .as_array()
@@ -43,7 +46,7 @@ fn more_unknowns_than_readings() {
     };
     let result = fitted(&case.session(), &case.data());
     assert_eq!(
-        (&result["readings"], &result["rank"], &result["unknowns"]),
+        (&result["readings"], &result["rank"], &result["parameter_count"]),
         (&2.into(), &2.into(), &7.into())
     );
     assert!(result["rms_um"].as_f64().unwrap() < 1e-3);
