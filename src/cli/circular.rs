@@ -53,8 +53,11 @@ pub fn print(tests: &[CircularTest], all: bool) {
     }
     say!("\nBall-bar figures (ISO 230-4); --all lists directions, diagnosis and limitations:");
     let header = ["test", "path of", "G(b), µm", "D, µm", "H, µm", "largest fault"];
-    let rows: Vec<Vec<String>> = tests.iter().take(MAX_TESTS).map(test_row).collect();
-    table::print_aligned(&header, &rows, &[0, 1, 5]);
+    let with_faults = tests.iter().any(|test| !test.diagnosis.is_empty());
+    let columns = header.len() - usize::from(!with_faults);
+    let mut rows: Vec<Vec<String>> = tests.iter().take(MAX_TESTS).map(test_row).collect();
+    rows.iter_mut().for_each(|row| row.truncate(columns));
+    table::print_aligned(&header[..columns], &rows, &[0, 1, 5]);
     if tests.len() > MAX_TESTS {
         say!("  … {} more", tests.len() - MAX_TESTS);
     }

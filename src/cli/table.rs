@@ -38,7 +38,7 @@ pub fn print_aligned(header: &[&str], rows: &[Vec<String>], left: &[usize]) {
     }
 }
 
-/// The symbol of a unit of a result: `µm` for `um`, `″` for `arcsec`, `°` for `deg`.
+/// The symbol for the unit in a result: `µm` for `um`, `″` for `arcsec`, `°` for `deg`.
 pub fn unit(name: &str) -> String {
     name.replace("arcsec", "″")
         .replace("um", "µm")

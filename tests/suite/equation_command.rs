@@ -239,7 +239,7 @@ fn a_measured_session_has_equations_too() {
     let told = String::from_utf8(output.stderr).unwrap();
     assert!(output.status.success(), "{told}");
     assert!(
-        told.contains("A100.csv") && told.contains("does without readings"),
+        told.contains("A100.csv") && told.contains("made without readings"),
         "{told}"
     );
     let found = String::from_utf8(output.stdout).unwrap();
@@ -341,7 +341,7 @@ fn what_cannot_be_is_said() {
         &["equation", text(&plan), "--test", "A200"],
         &["no test `A200`", "A100, A150, C100, C150"],
     );
-    told(&["--errors", "EQ0C"], &["`EQ0C` is no error", "EX0C"]);
+    told(&["--errors", "EQ0C"], &["`EQ0C` is no parameter of an equation", "EX0C"]);
     told(
         &["--errors", "EX0B"],
         &["`EX0B` is an error of axis `B`", "does not have"],

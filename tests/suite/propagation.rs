@@ -237,6 +237,6 @@ fn the_command_quotes_one_of_the_two() {
     refused(
         2,
         &["--monte-carlo", "10000", "--method", "circle"],
-        "--monte-carlo goes with the full fit",
+        "`--monte-carlo` works with the full fit",
     );
 }

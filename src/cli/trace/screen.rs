@@ -29,6 +29,9 @@ pub fn print(trace: &Trace<'_>, session: &SessionArguments, all: bool) {
         with_its_effect,
     )
     .print(all);
+    if result.effects.iter().any(|effect| !effect.unique) {
+        say!("  u covers the change of the parameter if an alias takes the place of an effect");
+    }
     changes(result, all);
     screen::print_missing(&result.unobservable, &result.outliers, all);
     measure_next(result);
