@@ -2,10 +2,10 @@
 
     python benches/table.py                      the release profile
     python benches/table.py --profile checked    another profile
-    python benches/table.py --native             beside it a build for the processor at hand, in target/native
-    python benches/table.py --read               no run: what criterion found last
+    python benches/table.py --native             also a build for the present processor, in target/native
+    python benches/table.py --read               no run: the last results of criterion
 
-Every figure is the median that criterion gives; a ratio is of two medians of one run. `identify/benches/peers.py` compares with other people's tools.
+Every figure is the median of criterion. A ratio divides two medians of one run. `identify/benches/peers.py` compares with other tools.
 """
 
 import argparse
@@ -20,18 +20,18 @@ BENCHES = [("abbe-model", "chain"), ("abbe-identify", "fit"), ("abbe-codegen", "
 CACHE, STREAM = "value and eight derivatives, in cache", "value and eight derivatives, streaming"
 ALL = "value and all components of a five-axis machine/37 components"
 MONTE_CARLO = "Monte Carlo"
-# What, criterion's name, how many of it a figure is divided by, unit; yardstick in words, its name, and how many of it make one of ours; README too.
+# Benchmark, its name in criterion, divisor of the time, unit; reference, its name in criterion, divisor of its time; whether the README shows the line.
 LINES = [
-    ("value and eight derivatives, columns in cache", f"{CACHE}/generic chain", 1e3, "ns a reading", "kernel by hand", f"{CACHE}/by hand", 1e3, True),
-    ("the same", f"{CACHE}/generic chain", 1e3, "ns a reading", "num-dual, one reading at a time", f"{CACHE}/generic chain over num-dual, one at a time", 1e3, False),
-    ("the same, a million readings", f"{STREAM}/generic chain", 1e6, "ns a reading", "kernel by hand", f"{STREAM}/by hand", 1e6, False),
-    ("value and all 37 components of a five-axis machine", ALL, 1e3, "ns a reading", None, None, None, True),
-    ("fit of 1,000 readings, 36 unknowns", "fit/1000", 1, "s", None, None, None, False),
+    ("value and eight derivatives, columns in cache", f"{CACHE}/generic chain", 1e3, "ns per reading", "hand-written kernel", f"{CACHE}/by hand", 1e3, True),
+    ("the same", f"{CACHE}/generic chain", 1e3, "ns per reading", "num-dual, one reading at a time", f"{CACHE}/generic chain over num-dual, one at a time", 1e3, False),
+    ("the same, a million readings", f"{STREAM}/generic chain", 1e6, "ns per reading", "hand-written kernel", f"{STREAM}/by hand", 1e6, False),
+    ("value and all 37 components of a five-axis machine", ALL, 1e3, "ns per reading", None, None, None, True),
+    ("fit of 1,000 readings, 36 parameters", "fit/1000", 1, "s", None, None, None, False),
     ("fit of 10,000 readings", "fit/10000", 1, "s", None, None, None, False),
     ("fit of 100,000 readings", "fit/100000", 1, "s", None, None, None, False),
-    ("fit of 1,000,000 readings, 36 unknowns", "fit/1000000", 1, "s", None, None, None, True),
-    ("trace of 3,616 readings, whole library, 199 null draws, nothing to find", "trace/chapter 5, nothing to find", 1, "s", None, None, None, True),
-    ("a thousand draws of the fit of 3,616 readings", f"{MONTE_CARLO}/a thousand draws of the fit of chapter 5", 1, "s", "a thousand fits", f"{MONTE_CARLO}/one fit of chapter 5", 1e-3, True),
+    ("fit of 1,000,000 readings, 36 parameters", "fit/1000000", 1, "s", None, None, None, True),
+    ("trace of 3,616 readings, whole library, 199 null residuals, no effect present", "trace/chapter 5, nothing to find", 1, "s", None, None, None, True),
+    ("1,000 Monte Carlo draws of the fit of 3,616 readings", f"{MONTE_CARLO}/a thousand draws of the fit of chapter 5", 1, "s", "1,000 fits", f"{MONTE_CARLO}/one fit of chapter 5", 1e-3, True),
     ("equation of the error vector with eight derivatives, as C", "equation/error vector with eight derivatives, as C", 1, "s", None, None, None, True),
 ]
 
@@ -40,7 +40,7 @@ def run(profile, target, flags):
     environment = dict(os.environ, CARGO_TARGET_DIR=str(target))
     if flags:
         environment["RUSTFLAGS"] = flags
-    # One command: the features of what they rest on are then the same for all, and it is built once.
+    # One command: the dependencies then have the same features for all packages and are built once.
     command = ["cargo", "bench", "--profile", profile]
     for package, bench in BENCHES:
         command += ["-p", package, "--bench", bench]
@@ -48,33 +48,33 @@ def run(profile, target, flags):
 
 
 def median(target, name):
-    """Seconds, or None where criterion has not run."""
+    """Median in seconds; None without a result of criterion."""
     file = target / "criterion" / name / "new" / "estimates.json"
     return json.loads(file.read_text())["median"]["point_estimate"] * 1e-9 if file.exists() else None
 
 
-def figure(seconds, of, unit):
-    value = seconds / of * (1e9 if unit.startswith("ns") else 1)
+def figure(seconds, divisor, unit):
+    value = seconds / divisor * (1e9 if unit.startswith("ns") else 1)
     return f"{value:.3g}"
 
 
 def table(target, native, short):
-    head = ["what", "Abbe", "yardstick in the same run", "Abbe's time over the yardstick's"] + ([] if native is None else ["built for this processor"])
+    head = ["benchmark", "Abbe", "reference in the same run", "time of Abbe over time of the reference"] + ([] if native is None else ["built for this processor"])
     rows = [head, ["---"] * len(head)]
-    for what, name, of, unit, yardstick, other, of_other, in_readme in LINES:
+    for benchmark, name, divisor, unit, reference, other, other_divisor, in_readme in LINES:
         ours = median(target, name)
         if ours is None or short and not in_readme:
             continue
-        row = [what, f"{figure(ours, of, unit)} {unit}", "", ""]
+        row = [benchmark, f"{figure(ours, divisor, unit)} {unit}", "", ""]
         theirs = median(target, other) if other else None
         if theirs is not None:
-            row[2] = f"{yardstick}: {figure(theirs, of_other, unit)}"
-            row[3] = f"{(ours / of) / (theirs / of_other):.2g}"
+            row[2] = f"{reference}: {figure(theirs, other_divisor, unit)}"
+            row[3] = f"{(ours / divisor) / (theirs / other_divisor):.2g}"
         if native is not None:
             there = median(native, name)
             theirs_there = median(native, other) if other else None
-            beside = "" if theirs_there is None else f"; yardstick {figure(theirs_there, of_other, unit)}"
-            row.append("" if there is None else f"{figure(there, of, unit)}, {ours / there:.2f} times as fast{beside}")
+            beside = "" if theirs_there is None else f"; reference {figure(theirs_there, other_divisor, unit)}"
+            row.append("" if there is None else f"{figure(there, divisor, unit)}, {ours / there:.2f} times as fast{beside}")
         rows.append(row)
     return "\n".join("| " + " | ".join(row) + " |" for row in rows)
 
@@ -90,8 +90,8 @@ def fill(file, text):
 def main():
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--profile", default="release", help="cargo's build profile")
-    parser.add_argument("--native", action="store_true", help="beside it a build with -C target-cpu=native")
-    parser.add_argument("--read", action="store_true", help="run nothing, take what criterion found last")
+    parser.add_argument("--native", action="store_true", help="also benchmark a build with -C target-cpu=native")
+    parser.add_argument("--read", action="store_true", help="run nothing, use the last results of criterion")
     arguments = parser.parse_args()
     target, native = ROOT / "target", ROOT / "target" / "native" if arguments.native else None
     if not arguments.read:

@@ -49,10 +49,10 @@ fn put(folder: &Path, name: &str, contents: &[u8]) {
 /// A message says where, and bytes that it points at are characters of the file: the command shows them.
 fn told(fault: &ModelError) {
     assert!(!fault.to_string().is_empty());
-    let Some(place) = fault.place() else { return };
-    let Some(span) = &place.span else { return };
+    let Some(location) = fault.location() else { return };
+    let Some(span) = &location.span else { return };
     assert!(span.start <= span.end, "{fault}: {span:?}");
-    if let Ok(text) = fs::read_to_string(&place.file)
+    if let Ok(text) = fs::read_to_string(&location.file)
         && span.end <= text.len()
     {
         assert!(

@@ -1,4 +1,4 @@
-//! The integration tests of the workspace, in one binary. The independent machine that they measure is in `plant`.
+//! The integration tests of the workspace, in one binary. `plant` is the independent simulator whose sessions they read.
 
 mod plant;
 mod study;

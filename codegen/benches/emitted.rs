@@ -19,7 +19,7 @@
 //!   errors[6]    theta_x0c    rad  orientation of C about X (EA0C)
 //!   errors[7]    theta_y0c    rad  orientation of C about Y (EB0C)
 //! Value: the length read, mm. Gradient: by errors[0], errors[1] and so on, mm/mm and mm/rad.
-//! Value and gradient: 66 operations a reading (28 + and −, 36 ·, 1 /, 1 √).
+//! Value and gradient: 66 operations per reading (28 + and −, 36 ·, 1 /, 1 √).
 //! Checked against the chain with dual numbers at 40 points, errors to ±10 mm and ±0.1 rad: largest relative difference 0e0 (value), 7e-16 (gradient).
 //! Largest deviation from the exact chain over C −180° to 180°, A −20° to 70°: 0.0054 µm at errors of ±10 µm and ±0.01°, 0.54 µm at errors of ±100 µm and ±0.1°.
 
@@ -27,7 +27,7 @@
 pub const LENGTHS: usize = 4;
 /// Positions of moving axes: sine and cosine of a rotary one.
 pub const AXES: usize = 4;
-/// Errors and instrument unknowns.
+/// Errors and instrument parameters.
 pub const ERRORS: usize = 8;
 
 /// Value of one reading.
@@ -173,7 +173,7 @@ pub fn bar_length_gradient_columns(lengths: &[f64; LENGTHS], axes: &[&[f64]; AXE
     }
 }
 
-/// What `core` lacks. In a crate without `std` put the functions of `libm` here; nothing else needs it.
+/// Functions that `core` lacks. In a crate without `std` replace them by those of `libm`; nothing else needs `std`.
 mod elementary {
     #[inline(always)]
     pub fn sqrt(x: f64) -> f64 {

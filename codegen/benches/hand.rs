@@ -1,5 +1,5 @@
-//! The length of the bar in the A and C tests of chapter 5 and its eight derivatives, written by hand: what the printed code is
-//! measured against.
+//! Length of the bar and its eight derivatives for the A and C tests of chapter 5, written by hand: the reference for the speed of
+//! printed code.
 
 /// One reading. `[sin_c, cos_c, sin_a, cos_a]`; errors e_y0a, e_z0a, θ_y0a, θ_z0a, e_x0c, e_y0c, θ_x0c, θ_y0c.
 #[inline(always)]
@@ -33,7 +33,7 @@ pub fn reading([d, r, h, z_ca]: &[f64; 4], [sc, cc, sa, ca]: &[f64; 4], e: &[f64
     (length, gradient)
 }
 
-/// Columns of readings.
+/// Evaluates columns of readings.
 #[inline(never)]
 pub fn columns(
     lengths: &[f64; 4],
@@ -47,7 +47,7 @@ pub fn columns(
     );
 }
 
-/// Every column an argument of its own, which tells the compiler that no two overlap.
+/// Takes every column as an argument of its own, so that the compiler knows that no two overlap.
 #[inline(never)]
 fn columns_of(
     lengths: &[f64; 4],

@@ -1,6 +1,6 @@
-//! The printed Rust against a kernel written by hand: value and eight derivatives of the chapter 5 test, one reading at a time and in
-//! columns of 1,000 (they stay in the cache); and how long an equation takes to make and print. `emitted.rs` is what the printer writes; a test
-//! compares it with the printer.
+//! Benchmark of printed Rust code against a kernel written by hand. The function is the chapter 5 test: value and eight derivatives, one
+//! reading at a time and in columns of 1,000, which fit in the cache. A second benchmark measures the time to derive and print an
+//! equation. `emitted.rs` is the printer's output; a test compares the two.
 #![allow(missing_docs)]
 
 use std::hint::black_box;
@@ -97,7 +97,7 @@ fn kernels(criterion: &mut Criterion) {
     group.finish();
 }
 
-/// The error vector of a five-axis machine with eight location errors: derived with derivatives and printed as C.
+/// Derives the error vector of a five-axis machine with eight location errors, with derivatives, and prints it as C.
 fn equations(criterion: &mut Criterion) {
     let file = Path::new(env!("CARGO_MANIFEST_DIR")).join("../sessions/hermle-c600u/machine.toml");
     let machine = machine(&file).expect("the ready machine");

@@ -1,4 +1,4 @@
-//! Polynomials as a person would write them: collected by error, then by the turns of the axes, lengths in parentheses.
+//! Arranges polynomials for printing: grouped by error, then by sines and cosines of the axes, with lengths in parentheses.
 
 use std::collections::HashMap;
 
@@ -11,17 +11,17 @@ use crate::polynomial::{Atom, Monomial, Polynomial};
 use crate::program::{Input, Naming, Program, Tree};
 use crate::symbol::{Arena, Binary, Operand, Symbol, Unary};
 
-/// A term with its sign: true for minus.
+/// A term with its sign; true means minus.
 type Term = (bool, Tree);
 
-/// Lays polynomials of a ring out over the inputs of a program.
-pub(crate) struct Layout<'r, 'a> {
+/// Writes polynomials of a ring as expressions in the inputs of a program.
+pub(crate) struct Collector<'r, 'a> {
     pub(crate) ring: &'r Ring<'a>,
     pub(crate) inputs: &'r [Input],
 }
 
-impl Layout<'_, '_> {
-    /// The polynomial: what holds no error first, then error by error, then their products.
+impl Collector<'_, '_> {
+    /// Arranges a polynomial: the terms without errors first, then error by error, then products of errors.
     pub(crate) fn group(&self, polynomial: &Polynomial) -> Tree {
         sum(self.group_terms(polynomial))
     }
@@ -50,7 +50,7 @@ impl Layout<'_, '_> {
         terms
     }
 
-    /// A polynomial in lengths and turns: turn by turn.
+    /// Terms of a polynomial in lengths, sines and cosines, grouped by sine and cosine.
     fn coefficient_terms(&self, polynomial: &Polynomial) -> Vec<Term> {
         let turns = polynomial.collect(is_sin_cos);
         let mut terms = Vec::new();
@@ -66,7 +66,7 @@ impl Layout<'_, '_> {
         positive_first(terms)
     }
 
-    /// Lengths as terms: several that share a factor are one, with the factor before the parentheses.
+    /// Lengths as terms. Terms with a common factor become one term, with the factor in front of the parentheses.
     fn length_terms(&self, polynomial: &Polynomial) -> Vec<Term> {
         if polynomial.len() > 1 && !common(polynomial).powers().is_empty() {
             let (minus, factors) = self.length_factors(polynomial);
@@ -75,7 +75,8 @@ impl Layout<'_, '_> {
         positive_first(polynomial.terms().map(|term| self.length_term(term)).collect())
     }
 
-    /// Lengths as factors of a product: `R`, or `D` and `(H − Z_CA)`, the first term positive and the sign outside. None for 1.
+    /// Lengths as factors of a product: `R`, or `D` and `(H − Z_CA)`. The first term of a sum is positive and the sign is returned
+    /// separately. Empty for 1.
     fn length_factors(&self, polynomial: &Polynomial) -> (bool, Vec<Tree>) {
         let shared = common(polynomial);
         let rest = polynomial
@@ -84,7 +85,7 @@ impl Layout<'_, '_> {
         let terms: Vec<Term> = rest.map(|(m, c)| self.length_term((&m, c))).collect();
         let (minus, inner) = as_factor(terms);
         let mut factors = Vec::new();
-        // A number stands before the letters.
+        // The number comes first.
         if let Some(number @ Tree::Number(_)) = &inner {
             factors.push(number.clone());
         }
@@ -146,7 +147,7 @@ impl Layout<'_, '_> {
     }
 }
 
-/// What coefficients are collected by before their lengths.
+/// Whether coefficients are grouped by this atom before their lengths.
 fn is_sin_cos(atom: Atom) -> bool {
     matches!(atom, Atom::Sin(_) | Atom::Cos(_) | Atom::Function(_))
 }
@@ -159,13 +160,13 @@ fn negative(tree: Tree) -> Tree {
     Tree::Unary(Unary::Neg, Box::new(tree))
 }
 
-/// `a·b·c`; 1 where there is nothing.
+/// `a·b·c`; 1 for no factors.
 pub(crate) fn product(factors: Vec<Tree>) -> Tree {
     let product = factors.into_iter().reduce(|a, b| binary(Binary::Mul, a, b));
     product.unwrap_or(Tree::Number(1.0))
 }
 
-/// `a + b − c`; 0 where there is nothing.
+/// `a + b − c`; 0 for no terms.
 pub(crate) fn sum(terms: Vec<Term>) -> Tree {
     let mut terms = terms.into_iter();
     let Some((minus, first)) = terms.next() else {
@@ -177,14 +178,14 @@ pub(crate) fn sum(terms: Vec<Term>) -> Tree {
     })
 }
 
-/// What all terms have as a factor.
+/// The largest common factor of all terms.
 fn common(polynomial: &Polynomial) -> Monomial {
     let mut monomials = polynomial.terms().map(|(monomial, _)| monomial.clone());
     let first = monomials.next().unwrap_or_default();
     monomials.fold(first, |shared, monomial| shared.shared_with(&monomial))
 }
 
-/// A sum that can start without a minus does.
+/// Moves a positive term to the front if there is one.
 fn positive_first(mut terms: Vec<Term>) -> Vec<Term> {
     if let Some(first) = terms.iter().position(|(minus, _)| !minus) {
         let first = terms.remove(first);
@@ -193,7 +194,7 @@ fn positive_first(mut terms: Vec<Term>) -> Vec<Term> {
     terms
 }
 
-/// A sum as a factor: its sign where all or the first of its terms carry one, and the factor unless it is 1.
+/// A sum as a factor: its sign if all terms or the first one are negative, and the factor unless it is 1.
 fn as_factor(terms: Vec<Term>) -> (bool, Option<Tree>) {
     let minus = terms.first().is_some_and(|(minus, _)| *minus);
     let terms: Vec<Term> = terms.into_iter().map(|(m, tree)| (m != minus, tree)).collect();
@@ -204,7 +205,7 @@ fn as_factor(terms: Vec<Term>) -> (bool, Option<Tree>) {
 }
 
 impl Tree {
-    /// The expression in an arena; `inputs` are the operands of a program's inputs.
+    /// Builds the expression in an arena; `inputs` are the operands of the program's inputs.
     pub(crate) fn symbol<'a>(&self, arena: &'a Arena, inputs: &[Operand]) -> Symbol<'a> {
         match self {
             Tree::Number(value) => arena.symbol(Operand::constant(*value)),

@@ -1,7 +1,7 @@
 //! Declared effects in an equation: `component × driver × shape` as `component = Σ k_i · b_i(driver)`.
 //!
-//! The coefficients `k_i` are parameters like any error. What is followed stays a symbol: the position of an axis, or else a quantity named
-//! here. The basis functions `b_i` are those of the fit, taken at symbols.
+//! The coefficients `k_i` are parameters like errors. The driver stays a symbol: the position of an axis, or one of the quantities named
+//! here. The basis functions `b_i` are those of the fit, evaluated over symbols.
 
 use std::sync::Arc;
 
@@ -15,73 +15,75 @@ use abbe_model::scalar::Nominal;
 use crate::error::CodegenError;
 use crate::variable::Variable;
 
-/// What an effect follows, where that is not the position of an axis.
+/// The driver of an effect, if it is not the position of an axis.
 #[derive(Clone, Debug, PartialEq)]
-pub enum Followed {
-    /// The direction in which an axis last moved: −1, 0 or 1.
+pub enum DriverQuantity {
+    /// Direction of the last movement of an axis: −1, 0 or 1.
     Direction(String),
     /// The rate of an axis, mm/s or rad/s.
     Rate(String, AxisKind),
-    /// How far an axis has moved since it last turned round, mm or rad.
+    /// Distance that an axis has travelled since its last reversal, mm or rad.
     SinceReversal(String, AxisKind),
     /// Time since the session's first reading, s.
     Time,
     /// Temperature above the session's mean, °C.
     Temperature,
-    /// The moment that a unit weight at the instrument's point exerts about an axis, m.
+    /// Moment about an axis of a unit weight at the instrument's point, m.
     Gravity(String),
 }
 
-impl Followed {
+impl DriverQuantity {
     pub(crate) fn unit(&self) -> &'static str {
         match self {
-            Followed::Direction(_) => "1",
-            Followed::Rate(_, AxisKind::Linear) => "mm/s",
-            Followed::Rate(_, AxisKind::Rotary) => "rad/s",
-            Followed::SinceReversal(_, AxisKind::Linear) => "mm",
-            Followed::SinceReversal(_, AxisKind::Rotary) => "rad",
-            Followed::Time => "s",
-            Followed::Temperature => "°C",
-            Followed::Gravity(_) => "m",
+            DriverQuantity::Direction(_) => "1",
+            DriverQuantity::Rate(_, AxisKind::Linear) => "mm/s",
+            DriverQuantity::Rate(_, AxisKind::Rotary) => "rad/s",
+            DriverQuantity::SinceReversal(_, AxisKind::Linear) => "mm",
+            DriverQuantity::SinceReversal(_, AxisKind::Rotary) => "rad",
+            DriverQuantity::Time => "s",
+            DriverQuantity::Temperature => "°C",
+            DriverQuantity::Gravity(_) => "m",
         }
     }
 
     pub(crate) fn meaning(&self) -> String {
         match self {
-            Followed::Direction(axis) => format!("direction in which axis {axis} last moved: −1, 0 or 1"),
-            Followed::Rate(axis, _) => format!("rate of axis {axis}"),
-            Followed::SinceReversal(axis, _) => {
-                format!("how far axis {axis} has moved since it last turned round")
+            DriverQuantity::Direction(axis) => {
+                format!("direction of the last movement of axis {axis}: −1, 0 or 1")
             }
-            Followed::Time => "time since the first reading of the session".to_string(),
-            Followed::Temperature => "temperature above the mean of the session".to_string(),
-            Followed::Gravity(axis) => {
+            DriverQuantity::Rate(axis, _) => format!("rate of axis {axis}"),
+            DriverQuantity::SinceReversal(axis, _) => {
+                format!("distance of axis {axis} since its last reversal")
+            }
+            DriverQuantity::Time => "time since the first reading of the session".to_string(),
+            DriverQuantity::Temperature => "temperature above the mean of the session".to_string(),
+            DriverQuantity::Gravity(axis) => {
                 format!("moment of a unit weight about axis {axis}")
             }
         }
     }
 
-    /// In plain text; typeset print takes the letter and the subscript from it.
+    /// The name in plain text; typeset output takes the letter and the subscript from it.
     pub(crate) fn text(&self) -> String {
         let of = |letter: &str, axis: &str| format!("{letter}_{}", axis.to_lowercase());
         match self {
-            Followed::Direction(axis) => of("σ", axis),
-            Followed::Rate(axis, _) => of("v", axis),
-            Followed::SinceReversal(axis, _) => of("w", axis),
-            Followed::Time => "t".to_string(),
-            Followed::Temperature => "T".to_string(),
-            Followed::Gravity(axis) => of("g", axis),
+            DriverQuantity::Direction(axis) => of("σ", axis),
+            DriverQuantity::Rate(axis, _) => of("v", axis),
+            DriverQuantity::SinceReversal(axis, _) => of("w", axis),
+            DriverQuantity::Time => "t".to_string(),
+            DriverQuantity::Temperature => "T".to_string(),
+            DriverQuantity::Gravity(axis) => of("g", axis),
         }
     }
 
     pub(crate) fn identifier(&self) -> String {
         match self {
-            Followed::Direction(axis) => format!("direction_{axis}"),
-            Followed::Rate(axis, _) => format!("rate_{axis}"),
-            Followed::SinceReversal(axis, _) => format!("since_reversal_{axis}"),
-            Followed::Time => "time_s".to_string(),
-            Followed::Temperature => "temperature_c".to_string(),
-            Followed::Gravity(axis) => format!("gravity_{axis}"),
+            DriverQuantity::Direction(axis) => format!("direction_{axis}"),
+            DriverQuantity::Rate(axis, _) => format!("rate_{axis}"),
+            DriverQuantity::SinceReversal(axis, _) => format!("since_reversal_{axis}"),
+            DriverQuantity::Time => "time_s".to_string(),
+            DriverQuantity::Temperature => "temperature_c".to_string(),
+            DriverQuantity::Gravity(axis) => format!("gravity_{axis}"),
         }
     }
 }
@@ -93,19 +95,19 @@ pub struct Coefficient {
     pub number: usize,
     /// The effect.
     pub effect: Arc<Effect>,
-    /// Its place among the coefficients of the effect.
+    /// Index among the coefficients of the effect.
     pub place: usize,
-    /// The unit of what moves; none of a delay.
+    /// The unit of the component; `None` for a delay.
     pub component: Option<InternalUnit>,
     /// Whether component and driver are both lengths or both angles.
     pub same_kind: bool,
 }
 
 impl Coefficient {
-    /// The coefficients of effects, numbered through.
+    /// The coefficients of all effects, numbered consecutively.
     ///
     /// # Errors
-    /// If an effect is named twice, moves what the machine or the instrument does not have, or follows what has no value.
+    /// If an effect is named twice, if the machine or the instrument lacks its component, or if its driver has no value.
     pub(crate) fn of_effects(
         effects: &[Effect],
         machine: &Machine,
@@ -145,7 +147,7 @@ impl Coefficient {
         Ok(coefficients)
     }
 
-    /// `EZC~C:h2.cos`: as in the results of a fit.
+    /// The identifier as in the results of a fit: `EZC~C:h2.cos`.
     pub fn id(&self) -> String {
         let names = self.effect.shape.coefficient_names();
         match names.get(self.place).map(String::as_str) {
@@ -181,7 +183,7 @@ impl Coefficient {
     }
 }
 
-/// Coefficients of one effect that can still be read, and that a compiler takes in one function.
+/// Largest number of coefficients of one effect. More would be unreadable and too much for a compiler in one function.
 const MAX_COEFFICIENTS: usize = 40;
 
 fn unit_of_component(
@@ -202,7 +204,7 @@ fn unit_of_component(
             found
                 .map(|unknown| Some(unknown.unit))
                 .ok_or_else(|| CodegenError::NoSuchUnknown {
-                    unknown: format!("`{}` that the effect `{}` moves", effect.component, effect.id()),
+                    unknown: format!("`{}` of the effect `{}`", effect.component, effect.id()),
                 })
         }
         Component::TriggerDelay => Ok(None),
@@ -217,22 +219,22 @@ fn no_axis(machine: &Machine, effect: &Effect, axis: &str) -> CodegenError {
     }
 }
 
-/// Whether the axis turns.
+/// The kind of the axis.
 fn kind_of(machine: &Machine, effect: &Effect, axis: &str) -> Result<bool, CodegenError> {
     let index = machine.axis_index(axis);
     let index = index.ok_or_else(|| no_axis(machine, effect, axis))?;
     Ok(machine.axes[index].kind == AxisKind::Rotary)
 }
 
-/// Where the axes stand, and which of them the test holds: those have no direction and no rate.
-pub(crate) struct Movement<'m, N> {
+/// Positions of the axes, and which axes the test holds fixed; those have no direction and no rate.
+pub(crate) struct AxisStates<'m, N> {
     pub(crate) machine: &'m Machine,
     pub(crate) state: &'m [AxisPosition<N>],
     pub(crate) held: &'m [bool],
 }
 
-impl<N: Nominal> Movement<'_, N> {
-    /// What the driver of an effect tells about a reading. Only what the shape asks for is named.
+impl<N: Nominal> AxisStates<'_, N> {
+    /// The state of an effect's driver at a reading. Only the quantities that the shape uses are named.
     pub(crate) fn sample(
         &self,
         effect: &Effect,
@@ -246,26 +248,28 @@ impl<N: Nominal> Movement<'_, N> {
             since_reversal: zero,
             since_reversal_s: zero,
         };
-        let followed = |followed: Followed| nominal(Variable::Driver(followed));
+        let followed = |followed: DriverQuantity| nominal(Variable::Driver(followed));
         match &effect.driver {
             Driver::None => {}
-            Driver::Time => sample.value = followed(Followed::Time),
-            Driver::Temperature => sample.value = followed(Followed::Temperature),
+            Driver::Time => sample.value = followed(DriverQuantity::Time),
+            Driver::Temperature => sample.value = followed(DriverQuantity::Temperature),
             Driver::Gravity => {
                 let Component::Axis(ErrorName { axis, .. }) = &effect.component else {
                     return Err(CodegenError::EffectWithoutForm {
                         effect: effect.id(),
-                        why: "gravity exerts a moment about an axis, and it moves none".to_string(),
+                        why:
+                            "gravity needs an axis about which it exerts a moment, and the component has none"
+                                .to_string(),
                     });
                 };
-                sample.value = followed(Followed::Gravity(axis.clone()));
+                sample.value = followed(DriverQuantity::Gravity(axis.clone()));
             }
             Driver::Axis(name) => {
                 let index = self.machine.axis_index(name);
                 let index = index.ok_or_else(|| no_axis(self.machine, effect, name))?;
                 let direction = || match self.held[index] {
                     true => zero,
-                    false => followed(Followed::Direction(name.clone())),
+                    false => followed(DriverQuantity::Direction(name.clone())),
                 };
                 match effect.shape {
                     Shape::Backlash => sample.direction = direction(),
@@ -274,7 +278,8 @@ impl<N: Nominal> Movement<'_, N> {
                         sample.direction = direction();
                         if !self.held[index] {
                             let kind = self.machine.axes[index].kind;
-                            sample.since_reversal = followed(Followed::SinceReversal(name.clone(), kind));
+                            sample.since_reversal =
+                                followed(DriverQuantity::SinceReversal(name.clone(), kind));
                         }
                     }
                     _ => sample.value = self.state[index].value,
@@ -290,10 +295,13 @@ impl<N: Nominal> Movement<'_, N> {
             return N::constant(0.0);
         }
         let axis = &self.machine.axes[index];
-        nominal(Variable::Driver(Followed::Rate(axis.name.clone(), axis.kind)))
+        nominal(Variable::Driver(DriverQuantity::Rate(
+            axis.name.clone(),
+            axis.kind,
+        )))
     }
 
-    /// The slots that an effect moves, the machine's errors first, and what multiplies its basis there.
+    /// The slots that an effect changes (machine errors first), with the factor of its basis function in each slot.
     pub(crate) fn slots(
         &self,
         effect: &Effect,

@@ -1,4 +1,4 @@
-//! An equation: what the chain yields for symbols, with everything that a printer or a reader needs beside it.
+//! Closed-form equation of a reading: the symbolic result of the chain, with everything that the printers need.
 
 use abbe_model::axis::AxisKind;
 use abbe_model::chain::Machine;
@@ -12,7 +12,7 @@ use crate::collect::sum;
 use crate::effect::Coefficient;
 use crate::error::CodegenError;
 use crate::first_order::FirstOrder;
-use crate::forms::{self, Written};
+use crate::forms::{self, FormContext};
 use crate::normal_form::Ring;
 use crate::polynomial::Polynomial;
 use crate::print::terms_of;
@@ -20,98 +20,98 @@ use crate::program::{Input, Label, Naming, Program, Tree};
 use crate::run::Run;
 use crate::subject::{Source, Subject, ToolPoint};
 use crate::symbol::{Arena, NodeId, Operand, Symbol, Unary, VariableId, length};
-use crate::touch::{self, Touch};
+use crate::touch::{self, ProbeTerms};
 use crate::variable::{Symbols, Variable};
 use crate::vectors::{self, NamedVector};
 
-/// How far an equation goes in the errors.
+/// Truncation order of an equation in the errors.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Order {
-    /// As the chain has it.
+    /// No truncation.
     #[default]
     Exact,
-    /// Coordinates up to products of two errors (squares too, where the rotations are exact); a length is still their norm.
+    /// Coordinates up to products of two errors (and squares, for exact rotations); a length is the norm of these coordinates.
     Bilinear,
     /// The value without errors and a coefficient for each error.
     First,
 }
 
-/// What form an equation takes.
+/// The form of an equation.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Options {
-    /// How far it goes in the errors.
+    /// Truncation order in the errors.
     pub order: Order,
-    /// How error angles rotate; `None` for the machine's own way.
+    /// Rotation convention of the error angles; `None` for that of the machine.
     pub rotation: Option<Rotation>,
-    /// Which names errors go by.
+    /// Naming convention of the errors.
     pub symbols: Symbols,
-    /// Whether it comes with derivatives by every error.
+    /// Whether the derivatives by every error are included.
     pub gradient: bool,
-    /// The instrument's own unknowns that are carried, by their places in its list.
+    /// Parameters of the instrument that are included, by index in its list.
     pub unknowns: Vec<usize>,
-    /// Effects that are carried, with all their coefficients.
+    /// Effects that are included, with all their coefficients.
     pub effects: Vec<Effect>,
 }
 
-/// What an equation is of.
+/// The quantity that an equation describes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Kind {
     /// The length of a ball bar.
     Length,
     /// The distance from a probe to the surface of its artefact.
     Distance,
-    /// Three coordinates that an instrument reads.
+    /// Three coordinates measured by an instrument.
     Coordinates,
     /// The error vector of the tool in the table frame.
     Volumetric,
 }
 
-/// What an equation says, in the order that was asked for.
+/// The content of an equation, by the requested order.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Form {
-    /// The named vectors, and the outputs over them.
+    /// The named vectors, and the outputs in terms of them.
     Exact,
-    /// The coordinate groups, collected by error: the bar vector of a length, the coordinates themselves otherwise.
+    /// The coordinate groups, grouped by error: the bar vector for a length, otherwise the coordinates themselves.
     Groups {
-        /// In normal form.
+        /// The normal forms.
         polynomials: Vec<Polynomial>,
-        /// As they are written.
+        /// The expressions as printed.
         layout: Vec<Tree>,
-        /// Whether nothing was left out: the chain itself has no more terms. Decided for up to twelve parameters, beyond which the
-        /// whole normal form is not built and the answer is no.
+        /// Whether the truncation omitted nothing because the chain has no further terms. This is decided for up to twelve parameters.
+        /// For more, the full normal form is not built and the value is false.
         complete: bool,
     },
-    /// The value without errors and a coefficient for each error, with the layout of each.
-    First(FirstOrder, FirstOrderLayout),
+    /// The value without errors and a coefficient for each error, with the printed expression of each.
+    First(FirstOrder, PrintedFirstOrder),
 }
 
-/// The first-order form as it is written.
+/// The first-order form as printed.
 #[derive(Clone, Debug, PartialEq)]
-pub struct FirstOrderLayout {
-    /// The coordinates without errors; of a length its square.
+pub struct PrintedFirstOrder {
+    /// The coordinates without errors; for a length, its square.
     pub nominal: Vec<Tree>,
-    /// Sign of `L₀` and what is added to it, where that is read without errors.
-    pub beside_length: Option<(f64, Tree)>,
+    /// Sign of `L₀` and the offset added to it, if the reading without errors is not `L₀` itself.
+    pub alternative_length: Option<(f64, Tree)>,
     /// The coefficients, parameter by parameter, coordinate by coordinate.
     pub coefficients: Vec<Vec<Tree>>,
-    /// For a fixed multiple of an earlier column: numerator and denominator of the factor.
+    /// For a constant multiple of an earlier column: numerator and denominator of the factor.
     pub factors: Vec<Option<(Tree, Tree)>>,
 }
 
-impl FirstOrderLayout {
-    /// With `length` in the place of the root that it is.
-    pub(crate) fn with_named_length(&self, length: &Tree) -> FirstOrderLayout {
+impl PrintedFirstOrder {
+    /// Replaces the root by the name `length`.
+    pub(crate) fn with_named_length(&self, length: &Tree) -> PrintedFirstOrder {
         let root = Tree::Unary(Unary::Sqrt, Box::new(self.nominal[0].clone()));
         let named = |trees: &Vec<Tree>| trees.iter().map(|tree| tree.replaced(&root, length)).collect();
-        FirstOrderLayout {
+        PrintedFirstOrder {
             coefficients: self.coefficients.iter().map(named).collect(),
             ..self.clone()
         }
     }
 
-    /// What is read without errors, from the length `L₀`.
+    /// The reading without errors, from the length `L₀`.
     pub(crate) fn without_errors(&self, length: Tree) -> Tree {
-        match &self.beside_length {
+        match &self.alternative_length {
             None => length,
             Some((sign, offset)) => {
                 let mut terms = vec![(*sign < 0.0, length)];
@@ -122,53 +122,53 @@ impl FirstOrderLayout {
     }
 }
 
-/// The closed form of one reading of one machine, confirmed against the chain with dual numbers.
+/// The closed form of one reading of one machine, checked against the chain over dual numbers.
 #[derive(Debug)]
 pub struct Equation {
-    /// The machine, with the rotation form that the equation has.
+    /// The machine, with the rotation convention of the equation.
     pub machine: Machine,
-    /// What form it takes.
+    /// The form of the equation.
     pub options: Options,
-    /// What it is of.
+    /// The quantity that it describes.
     pub kind: Kind,
-    /// Where its expressions live.
+    /// The arena that owns its expressions.
     pub arena: Arena,
-    /// The errors, instrument unknowns and coefficients of effects that it is written in.
+    /// The errors, instrument parameters and effect coefficients that it contains.
     pub parameters: Vec<Variable>,
-    /// The coordinates of the reading as the chain has them.
+    /// The coordinates of the reading without truncation.
     pub exact: Vec<Operand>,
-    /// The coordinates of the reading in the form that was asked for.
+    /// The coordinates of the reading in the requested form.
     pub outputs: Vec<Operand>,
-    /// The form.
+    /// The requested form.
     pub form: Form,
-    /// The vectors on the way there.
+    /// The intermediate vectors.
     pub vectors: Vec<NamedVector>,
-    /// The errors and instrument unknowns that effects alone make up, as they follow their drivers.
-    pub followers: Vec<(Variable, Operand)>,
-    /// The stated length of the bar, where a bar is read.
+    /// The errors and instrument parameters that are determined by effects alone, as functions of their drivers.
+    pub driven_errors: Vec<(Variable, Operand)>,
+    /// The stated length of the bar, for a ball bar.
     pub stated_length: Option<Operand>,
-    /// The error of the bar and of its sensor's gain, where they are carried.
+    /// The length error of the bar and the gain error of its sensor, if included.
     pub(crate) bar_unknowns: [Option<Operand>; 2],
-    /// What lies between the vectors of a probe and its reading, where one is read.
-    pub touch: Option<Touch>,
-    /// Basis functions that are written as they are, never multiplied out.
+    /// The quantities between the vectors of a probe and its reading, for a probe.
+    pub touch: Option<ProbeTerms>,
+    /// Basis functions that are kept as they are and never expanded.
     pub(crate) whole: Vec<Operand>,
-    /// Errors and unknowns that the form does not contain.
+    /// Errors and instrument parameters that the form does not contain.
     pub absent: Vec<Variable>,
-    /// How well it agrees with the chain.
+    /// Agreement with the chain.
     pub check: Check,
-    /// Between which values the lengths and the positions of moving axes lie, mm or rad: the session's range.
+    /// Ranges of the lengths and of the positions of moving axes in the session, mm or rad.
     pub range: Vec<(Variable, [f64; 2])>,
-    /// How far a truncated or small-angle form strays from the exact chain over that range.
+    /// Deviations of a truncated or small-angle form from the exact chain over that range.
     pub deviations: Vec<Deviation>,
 }
 
 impl Equation {
-    /// The equation of a reading in the named errors; other errors are exact zeros.
+    /// Derives the equation of a reading in the named errors; other errors are exactly zero.
     ///
     /// # Errors
-    /// If the machine lacks the axis of an error or the instrument an unknown, if the form has no closed polynomial, or if the
-    /// check against the dual numbers fails.
+    /// If the machine lacks the axis of an error, if the instrument lacks a parameter, if the form has no closed polynomial, or if the
+    /// check against dual numbers fails.
     pub fn of(
         machine: &Machine,
         source: &impl Source,
@@ -179,7 +179,7 @@ impl Equation {
         machine.rotation = options.rotation.unwrap_or(machine.rotation);
         let arena = Arena::new();
         let parameters = parameters(&arena, &machine, source, errors, options)?;
-        let (kind, exact, vectors, outputs, form, stated_length, followers, bar_unknowns, touch, whole) = {
+        let (kind, exact, vectors, outputs, form, stated_length, driven_errors, bar_unknowns, touch, whole) = {
             let run = Run::<Symbol<'_>>::new(
                 &machine,
                 source,
@@ -200,13 +200,13 @@ impl Equation {
             let on_the_way = vectors.clone();
             let inputs = inputs(&arena, &machine, &parameters);
             let symbol = |place: usize| arena.variable(parameters[place].clone());
-            let followers = run.followers(&symbol).into_iter();
-            let followers = followers
+            let driven_errors = run.driven_errors(&symbol).into_iter();
+            let driven_errors = driven_errors
                 .map(|(variable, value)| (variable, value.operand()))
                 .collect();
             let bar_unknowns = run.bar_unknowns().map(|unknown| unknown.map(Symbol::operand));
             let whole = curves(&run, &parameters);
-            let written = Written {
+            let written = FormContext {
                 arena: &arena,
                 inputs: &inputs,
                 parameters: &parameters,
@@ -221,15 +221,15 @@ impl Equation {
                 Subject::Station(Station::BallBar(bar)) => Some(bar.bar.operand()),
                 _ => None,
             };
-            let touch = run.sight().map(|sight| match vectors.as_slice() {
+            let touch = run.probe_geometry().map(|geometry| match vectors.as_slice() {
                 [.., stylus, step] if options.order == Order::Bilinear => {
                     let groups: Vec<Symbol<'_>> = [stylus, step]
                         .iter()
                         .flat_map(|vector| vector.components.map(|component| arena.symbol(component)))
                         .collect();
-                    Touch::of(&touch::with_groups(&sight, &groups), &on_the_way)
+                    ProbeTerms::of(&touch::with_groups(&geometry, &groups), &on_the_way)
                 }
-                _ => Touch::of(&sight, &on_the_way),
+                _ => ProbeTerms::of(&geometry, &on_the_way),
             });
             (
                 kind,
@@ -238,7 +238,7 @@ impl Equation {
                 outputs,
                 form,
                 stated,
-                followers,
+                driven_errors,
                 bar_unknowns,
                 touch,
                 whole,
@@ -254,7 +254,7 @@ impl Equation {
             outputs,
             form,
             vectors,
-            followers,
+            driven_errors,
             stated_length,
             bar_unknowns,
             touch,
@@ -273,7 +273,7 @@ impl Equation {
     }
 
     /// The parameters that the outputs do not contain. A derivative that is not zero at some point proves that its parameter is
-    /// contained; where none was met, the normal form decides.
+    /// contained; otherwise the normal form decides.
     fn absent_parameters(&self) -> Result<Vec<Variable>, CodegenError> {
         let rounding = 1e-9;
         let derivatives = self.parameters.iter().zip(&self.check.largest_derivatives);
@@ -304,7 +304,7 @@ impl Equation {
         Ok(absent)
     }
 
-    /// The error vector of the tool in the table frame, over the whole workspace.
+    /// Derives the error vector of the tool in the table frame, over the whole workspace.
     ///
     /// # Errors
     /// If the machine lacks the axis of an error.
@@ -316,9 +316,9 @@ impl Equation {
         Equation::of(machine, &ToolPoint, errors, options)
     }
 
-    /// The arguments of its programs in their order: lengths, positions of moving axes from workpiece to tool (a rotary axis by sine and
-    /// cosine, and by its angle where an effect follows that), what else effects follow, then errors, instrument unknowns and coefficients
-    /// as they were asked for.
+    /// The arguments of its programs in order. First come the lengths and the positions of moving axes from workpiece to tool. A rotary
+    /// axis is given by sine and cosine, and by its angle if an effect depends on that. Then come the other drivers of effects, then
+    /// errors, instrument parameters and coefficients in the requested order.
     pub fn inputs(&self) -> Vec<Input> {
         inputs(&self.arena, &self.machine, &self.parameters)
     }
@@ -330,8 +330,8 @@ impl Equation {
         self.outputs.iter().map(gradient).collect()
     }
 
-    /// The second derivatives of each output by each pair of parameters: output, row, column. For curvature terms of an error budget,
-    /// and for solvers that take Newton steps; printed code carries the first derivatives only.
+    /// The second derivatives of each output by each pair of parameters: output, row, column. They serve curvature terms of an error
+    /// budget and solvers with Newton steps. Printed code contains first derivatives only.
     pub fn second_derivatives(&self) -> Vec<Vec<Vec<Operand>>> {
         let parameters = self.parameter_operands();
         let second = |output: &Operand| self.arena.second_derivatives(*output, &parameters);
@@ -353,7 +353,7 @@ impl Equation {
             }
         }
         let mut labels = vectors::labels(&vectors);
-        labels.extend(self.follower_labels());
+        labels.extend(self.driven_labels());
         if let (Some(touch), false) = (&self.touch, self.options.order == Order::First) {
             labels.extend(touch.labels());
         }
@@ -363,13 +363,13 @@ impl Equation {
         Program::of(&self.arena, self.inputs(), &outputs, &labels, Naming::Shared)
     }
 
-    /// The names of errors that effects make up.
-    pub(crate) fn follower_labels(&self) -> impl Iterator<Item = (NodeId, Label)> {
+    /// The names of errors that effects determine.
+    pub(crate) fn driven_labels(&self) -> impl Iterator<Item = (NodeId, Label)> {
         let label = |(variable, value): &(Variable, Operand)| match value {
             Operand::Node(id) => Some((*id, Label::Quantity(variable.clone()))),
             Operand::Constant(_) => None,
         };
-        self.followers.iter().filter_map(label)
+        self.driven_errors.iter().filter_map(label)
     }
 
     /// The operands of the parameters.
@@ -379,7 +379,7 @@ impl Equation {
     }
 }
 
-/// The basis functions of curves: piece by piece they are hundreds of terms.
+/// The basis functions of curves; expanded interval by interval they have hundreds of terms.
 fn curves(run: &Run<'_, Symbol<'_>>, parameters: &[Variable]) -> Vec<Operand> {
     let of_curve = |parameter: &Variable| matches!(parameter, Variable::Coefficient(c) if matches!(c.effect.shape, Shape::Curve { .. }));
     let places = (0..parameters.len()).filter(|place| of_curve(&parameters[*place]));
@@ -389,7 +389,7 @@ fn curves(run: &Run<'_, Symbol<'_>>, parameters: &[Variable]) -> Vec<Operand> {
         .collect()
 }
 
-/// The errors, unknowns and effects that were asked for.
+/// The requested errors, instrument parameters and effect coefficients.
 fn parameters(
     arena: &Arena,
     machine: &Machine,
@@ -407,7 +407,7 @@ fn parameters(
     }
     let coefficients = Coefficient::of_effects(&options.effects, machine, known)?;
     parameters.extend(coefficients.into_iter().map(Variable::Coefficient));
-    // Named here, they keep the order in which they were asked for wherever terms are sorted.
+    // Naming them here fixes their order wherever terms are sorted.
     for (place, parameter) in parameters.iter().enumerate() {
         if parameters[..place].contains(parameter) {
             return Err(CodegenError::Twice {
@@ -434,7 +434,7 @@ fn inputs(arena: &Arena, machine: &Machine, parameters: &[Variable]) -> Vec<Inpu
                 AxisKind::Rotary => {
                     inputs.push(Input::Sine(position.clone()));
                     inputs.push(Input::Cosine(position.clone()));
-                    if arena.is_own_symbol(&position) {
+                    if arena.is_used_directly(&position) {
                         inputs.push(Input::Plain(position));
                     }
                 }

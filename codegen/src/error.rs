@@ -2,17 +2,17 @@
 
 use crate::symbol::Unary;
 
-/// What can keep an equation from being written.
+/// Reasons why an equation cannot be written.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum CodegenError {
-    /// An exponential, a sign, a step or a whole number of an error: it has no derivative that the chain could carry.
-    #[error("{function:?} is taken of an error; only nominal quantities may go through it")]
+    /// An exponential, a sign, a step or a rounding of an error; the chain cannot differentiate it.
+    #[error("the function {function:?} is applied to an error; only nominal quantities are allowed")]
     FunctionOfError {
         /// The function.
         function: Unary,
     },
-    /// An error of an axis that the machine lacks.
+    /// An error of an axis that the machine does not have.
     #[error("`{error}` is an error of axis `{axis}`, which `{machine}` does not have")]
     NoSuchAxis {
         /// The error.
@@ -22,29 +22,29 @@ pub enum CodegenError {
         /// The structural code.
         machine: String,
     },
-    /// An unknown that the instrument lacks.
-    #[error("the instrument has no unknown {unknown}")]
+    /// A parameter that the instrument does not have.
+    #[error("the instrument has no parameter {unknown}")]
     NoSuchUnknown {
-        /// The unknown.
+        /// The parameter.
         unknown: String,
     },
-    /// An error or unknown that was asked for more than once.
+    /// An error or parameter that is requested more than once.
     #[error("`{name}` is named twice; name it once")]
     Twice {
-        /// The error or unknown.
+        /// The error or parameter.
         name: String,
     },
-    /// Derivatives that are not written out for a reader.
+    /// Derivatives that are not printed in mathematical notation.
     #[error(
-        "the derivatives of {what} are written as code only: as rust, c, python or matlab; at the machine without errors they are the coefficients of first order"
+        "the derivatives of {what} are written as code only: as rust, c, python or matlab; at zero errors they equal the first-order coefficients"
     )]
     GradientForReaders {
-        /// What they are of.
+        /// The quantity that is differentiated.
         what: &'static str,
     },
-    /// A curve, which is hundreds of pieces, for a reader.
+    /// A curve, which has hundreds of terms, in mathematical notation.
     #[error(
-        "the curve `{effect}` is written as code only: as rust, c, python or matlab; name what to keep with --errors to leave it out"
+        "the curve `{effect}` is written as code only: as rust, c, python or matlab; to omit it, name the errors to keep"
     )]
     CurveForReaders {
         /// The effect.
@@ -53,51 +53,49 @@ pub enum CodegenError {
     /// A stated probing direction whose angle with the artefact's axis changes as the axes move.
     #[error(
         "the first order of a distance has no short form where the angle between the stated probing `direction` and the artefact's \
-         axis changes as the axes move; `--order exact` and `--order bilinear` have one"
+         axis changes as the axes move; use the exact or the bilinear order"
     )]
     ObliqueProbing,
     /// An expression that has no normal form.
-    #[error("{what} has no place in the polynomial normal form")]
+    #[error("{what} cannot be represented in the polynomial normal form")]
     NoPolynomial {
-        /// What stands in the way.
+        /// The obstacle.
         what: String,
     },
-    /// A truncation that no printed form has.
-    #[error("order {order} in the errors is not offered; the orders are first, bilinear and exact")]
+    /// A truncation order that no printed form has.
+    #[error("order {order} in the errors is not available; the orders are first, bilinear and exact")]
     OrderTooHigh {
-        /// What was asked for.
+        /// The requested order.
         order: u32,
     },
     /// An effect that has no closed form.
-    #[error(
-        "the effect `{effect}` cannot be written: {why}; name the errors to keep with --errors to leave it out"
-    )]
+    #[error("the effect `{effect}` cannot be written: {why}; to omit it, name the errors to keep")]
     EffectWithoutForm {
         /// The effect.
         effect: String,
-        /// What stands in the way.
+        /// The obstacle.
         why: String,
     },
-    /// An effect of more coefficients than an equation can carry.
+    /// An effect with more coefficients than an equation can contain.
     #[error(
-        "the effect `{effect}` has {coefficients} coefficients, more than the {most} that an equation is written with; \
-         give its shape fewer intervals, steps or powers, or name what to keep with --errors to leave it out"
+        "the effect `{effect}` has {coefficients} coefficients, more than the limit of {most}; \
+         give its shape fewer intervals, steps or powers, or omit it by naming the errors to keep"
     )]
     EffectTooLong {
         /// The effect.
         effect: String,
-        /// How many it has.
+        /// Its number of coefficients.
         coefficients: usize,
-        /// How many are written.
+        /// Largest number of coefficients.
         most: usize,
     },
-    /// A program that the chain with dual numbers does not confirm; it is not written.
+    /// A program that the check against the chain over dual numbers does not confirm; it is not written.
     #[error(
         "the equation is not written: over {points} points it differs from the chain with dual numbers by {value:.1e} (value) \
-         and {gradient:.1e} (derivatives), relative, where 1e-12 is allowed"
+         and {gradient:.1e} (derivatives), relative; the limit is 1e-12"
     )]
     Unconfirmed {
-        /// Points compared.
+        /// Number of points compared.
         points: usize,
         /// Largest relative difference of a value.
         value: f64,

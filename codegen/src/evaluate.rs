@@ -1,4 +1,4 @@
-//! Expressions at numbers: `f64`, dual numbers, a counting scalar, or symbols again.
+//! Evaluation of expressions over numbers: `f64`, dual numbers, a counting scalar, or other symbols.
 
 use abbe_model::scalar::{Nominal, Scalar};
 
@@ -6,28 +6,28 @@ use crate::error::CodegenError;
 use crate::symbol::{Arena, Binary, Node, Operand, Unary};
 use crate::variable::Variable;
 
-/// The value of a variable: nominal, or an error that derivatives are taken by.
+/// The value of a variable: nominal, or an error by which derivatives are taken.
 #[derive(Clone, Copy, Debug)]
-pub enum Value<S: Scalar> {
+pub enum VariableValue<S: Scalar> {
     /// Never differentiated.
     Nominal(S::Nominal),
     /// An error.
     Error(S),
 }
 
-impl<S: Scalar> Value<S> {
-    /// As an error, whatever it is.
+impl<S: Scalar> VariableValue<S> {
+    /// The value as a scalar, nominal or not.
     pub fn scalar(self) -> S {
         match self {
-            Value::Nominal(value) => S::nominal(value),
-            Value::Error(value) => value,
+            VariableValue::Nominal(value) => S::nominal(value),
+            VariableValue::Error(value) => value,
         }
     }
 
     fn unary(self, op: Unary) -> Option<Self> {
         Some(match self {
-            Value::Nominal(a) => Value::Nominal(op.of(a)),
-            Value::Error(a) => Value::Error(match op {
+            VariableValue::Nominal(a) => VariableValue::Nominal(op.of(a)),
+            VariableValue::Error(a) => VariableValue::Error(match op {
                 Unary::Neg => -a,
                 Unary::Sin => Scalar::sin_cos(a).0,
                 Unary::Cos => Scalar::sin_cos(a).1,
@@ -39,10 +39,10 @@ impl<S: Scalar> Value<S> {
 
     fn binary(self, op: Binary, other: Self) -> Self {
         match (self, other) {
-            (Value::Nominal(a), Value::Nominal(b)) => Value::Nominal(op.of(a, b)),
+            (VariableValue::Nominal(a), VariableValue::Nominal(b)) => VariableValue::Nominal(op.of(a, b)),
             (a, b) => {
                 let (a, b) = (a.scalar(), b.scalar());
-                Value::Error(match op {
+                VariableValue::Error(match op {
                     Binary::Add => a + b,
                     Binary::Sub => a - b,
                     Binary::Mul => a * b,
@@ -53,18 +53,18 @@ impl<S: Scalar> Value<S> {
     }
 }
 
-/// The values of `outputs`, every node computed once.
+/// Evaluates `outputs`; every node is computed once.
 ///
 /// # Errors
-/// If an exponential, a sign, a step or a whole number is taken of an error; the chain does none of it.
+/// If the expression takes an exponential, a sign, a step or a rounding of an error; the chain never does.
 pub fn evaluate<S: Scalar>(
     arena: &Arena,
     outputs: &[Operand],
-    variable: impl Fn(&Variable) -> Value<S>,
+    variable: impl Fn(&Variable) -> VariableValue<S>,
 ) -> Result<Vec<S>, CodegenError> {
-    let mut values: Vec<Option<Value<S>>> = vec![None; arena.node_count()];
-    let constant = |value: f64| Value::<S>::Nominal(S::Nominal::constant(value));
-    let normal_form_of = |values: &[Option<Value<S>>], operand: Operand| match operand {
+    let mut values: Vec<Option<VariableValue<S>>> = vec![None; arena.node_count()];
+    let constant = |value: f64| VariableValue::<S>::Nominal(S::Nominal::constant(value));
+    let normal_form_of = |values: &[Option<VariableValue<S>>], operand: Operand| match operand {
         Operand::Constant(value) => constant(value.value()),
         Operand::Node(id) => values[id.index()].unwrap_or_else(|| constant(f64::NAN)),
     };
@@ -84,14 +84,14 @@ pub fn evaluate<S: Scalar>(
         .collect())
 }
 
-/// The values of `outputs` at plain numbers.
+/// Evaluates `outputs` over plain numbers.
 ///
 /// # Errors
-/// None that plain numbers can cause.
+/// None for plain numbers.
 pub fn evaluate_f64(
     arena: &Arena,
     outputs: &[Operand],
     variable: impl Fn(&Variable) -> f64,
 ) -> Result<Vec<f64>, CodegenError> {
-    evaluate(arena, outputs, |v| Value::Nominal(variable(v)))
+    evaluate(arena, outputs, |v| VariableValue::Nominal(variable(v)))
 }

@@ -1,4 +1,4 @@
-//! First order: the reading without errors, and a coefficient for each error.
+//! First-order form: the reading without errors, and a sensitivity coefficient for each error.
 //!
 //! For a ball bar with the nominal vector `b₀`, its length `L₀ = ‖b₀‖` and `∂b/∂eᵢ = bᵢ`:
 //!
@@ -15,54 +15,55 @@ use crate::variable::Variable;
 /// The first-order form of a reading.
 #[derive(Clone, Debug, PartialEq)]
 pub struct FirstOrder {
-    /// The coordinates without errors; for a length its square `L₀²`.
+    /// The coordinates without errors; for a length, its square `L₀²`.
     pub nominal: Vec<Polynomial>,
-    /// One for each parameter.
+    /// The sensitivities, one for each parameter.
     pub sensitivities: Vec<Sensitivity>,
-    /// What is read without errors where that is not `L₀` itself.
-    pub beside_length: Option<AlternativeLength>,
+    /// The reading without errors, if it is not `L₀` itself.
+    pub alternative_length: Option<AlternativeLength>,
 }
 
-/// `±L₀ + offset`: what a probe reads without errors.
+/// `±L₀ + offset`: the reading of a probe without errors.
 #[derive(Clone, Debug, PartialEq)]
 pub struct AlternativeLength {
     /// 1 or −1.
     pub sign: f64,
-    /// What is added.
+    /// The offset.
     pub offset: Polynomial,
 }
 
-/// How the coordinates of a reading answer to one parameter.
+/// Sensitivity of the coordinates of a reading to one parameter.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Sensitivity {
-    /// The error or instrument unknown.
+    /// The error or instrument parameter.
     pub parameter: Variable,
-    /// The coefficient in each coordinate, or the numerator over L₀ of one.
+    /// The coefficient in each coordinate; for a length, the numerator over L₀.
     pub coefficients: Vec<Polynomial>,
     /// Whether the coefficient is divided by L₀.
     pub over_length: bool,
-    /// What the column is worth.
+    /// Linear dependence of the column.
     pub column: Column,
 }
 
-/// What a reading's column of sensitivities is worth.
+/// Linear dependence of a column of sensitivities on the earlier columns.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Column {
-    /// It is not zero, and no multiple of an earlier one.
+    /// Not zero, and not a multiple of an earlier column.
     Distinct,
-    /// Identically zero: the reading does not see the parameter.
+    /// Identically zero: the parameter does not affect the reading.
     Zero,
-    /// A fixed multiple of an earlier column, wherever the axes stand: the readings cannot tell the two apart.
+    /// A constant multiple of an earlier column at all positions of the axes: the two parameters are confounded.
     Multiple {
         /// The earlier parameter.
         of: Variable,
-        /// The factor: numerator and denominator, which is 1 where the one divides the other.
+        /// The factor: numerator and denominator. The denominator is 1 if it divides the numerator.
         factor: (Polynomial, Polynomial),
     },
 }
 
 impl FirstOrder {
-    /// Of a bar vector in a ring of first order; `unknowns` are the error of the bar and of its sensor's gain, as far as they are carried.
+    /// First-order form of a bar vector in a ring of first order; `unknowns` are the length error of the bar and the gain error of its
+    /// sensor, if included.
     pub(crate) fn of_length(
         ring: &mut Ring<'_>,
         vector: [Operand; 3],
@@ -101,14 +102,14 @@ impl FirstOrder {
         let mut form = FirstOrder {
             nominal: vec![square],
             sensitivities,
-            beside_length: None,
+            alternative_length: None,
         };
         form.mark(ring);
         Ok(form)
     }
 
-    /// Of a probe that goes straight to the artefact's axis: the distance from there less the radius. That errors turn its way
-    /// across the axis counts in the second order only.
+    /// First-order form of a probe that moves straight towards the artefact's axis: the distance to the axis less the radius. The
+    /// rotation of the probing direction by errors across the axis is of second order.
     pub(crate) fn of_way_to_the_axis(
         ring: &mut Ring<'_>,
         stylus: [Operand; 3],
@@ -118,15 +119,15 @@ impl FirstOrder {
         let none = Operand::constant(0.0);
         let mut form = FirstOrder::of_length(ring, stylus, none, [Some(radius), None], parameters)?;
         let radius = ring.normal_form(radius)?;
-        form.beside_length = Some(AlternativeLength {
+        form.alternative_length = Some(AlternativeLength {
             sign: 1.0,
             offset: -&without_errors(ring, &radius),
         });
         Ok(form)
     }
 
-    /// Of a probe that goes in a stated direction. With `w = v₀ + d₀·u₀` from the axis to where it touches and `L₀ = √(b₀² − a₀·c₀)`, half
-    /// of what the artefact cuts out of its way,
+    /// First-order form of a probe that moves in a stated direction. With `w = v₀ + d₀·u₀` from the axis to the point of contact and `L₀
+    /// = √(b₀² − a₀·c₀)`, half of the chord that the artefact cuts from the probing line,
     ///
     /// ```text
     /// d₀ = −(b₀ + L₀)/a₀,   ∂d/∂eᵢ = (w·(vᵢ + d₀·uᵢ) − r₀·rᵢ)/L₀
@@ -145,7 +146,7 @@ impl FirstOrder {
         let r = ring.normal_form(radius)?;
         let nominal = |vector: &[Polynomial; 3]| vector.each_ref().map(|part| without_errors(ring, part));
         let (v_0, u_0, r_0) = (nominal(&v), nominal(&u), without_errors(ring, &r));
-        // A unit vector in floating point is one but for its rounding.
+        // In floating point a unit vector has unit length only to rounding.
         if !dot(ring, &u_0, &u_0).is_about(1.0) {
             return Err(CodegenError::ObliqueProbing);
         }
@@ -171,7 +172,7 @@ impl FirstOrder {
         let mut form = FirstOrder {
             sensitivities: parameters.iter().map(sensitivity).collect(),
             nominal: vec![square],
-            beside_length: Some(AlternativeLength {
+            alternative_length: Some(AlternativeLength {
                 sign: -1.0,
                 offset: -&b,
             }),
@@ -180,7 +181,7 @@ impl FirstOrder {
         Ok(form)
     }
 
-    /// Of coordinates in a ring of first order.
+    /// First-order form of coordinates in a ring of first order.
     pub(crate) fn of_coordinates(
         ring: &mut Ring<'_>,
         coordinates: &[Operand],
@@ -205,15 +206,15 @@ impl FirstOrder {
         let mut form = FirstOrder {
             nominal: forms.iter().map(|form| without_errors(ring, form)).collect(),
             sensitivities,
-            beside_length: None,
+            alternative_length: None,
         };
         form.mark(ring);
         Ok(form)
     }
 
-    /// Marks zero columns and fixed multiples of earlier ones.
+    /// Marks zero columns and constant multiples of earlier columns.
     fn mark(&mut self, ring: &Ring<'_>) {
-        // A constant L₀ is a fixed factor like any other.
+        // A constant L₀ is a constant factor like any other.
         let fixed = self.nominal.len() == 1 && !self.nominal[0].contains(|atom| ring.moves(atom));
         for place in 0..self.sensitivities.len() {
             let (earlier, rest) = self.sensitivities.split_at_mut(place);
@@ -238,7 +239,7 @@ impl FirstOrder {
     }
 }
 
-/// The part without errors.
+/// The terms without errors.
 fn without_errors(ring: &Ring<'_>, form: &Polynomial) -> Polynomial {
     form.filtered(|monomial| monomial.degree(|atom| ring.is_small(atom)) == 0)
 }
@@ -257,7 +258,8 @@ fn dot(ring: &Ring<'_>, a: &[Polynomial; 3], b: &[Polynomial; 3]) -> Polynomial 
     products.fold(Polynomial::default(), |sum, product| &sum + &product)
 }
 
-/// `a/b` where it is the same wherever the axes stand: all minors of the coefficients by motion vanish.
+/// `a/b` if it is constant over all positions of the axes, that is, if all 2×2 minors of the coefficients, grouped by axis position,
+/// vanish.
 fn fixed_factor(ring: &Ring<'_>, a: &[Polynomial], b: &[Polynomial]) -> Option<(Polynomial, Polynomial)> {
     let by_motion = |column: &[Polynomial]| {
         let mut parts = Vec::new();
@@ -281,7 +283,7 @@ fn fixed_factor(ring: &Ring<'_>, a: &[Polynomial], b: &[Polynomial]) -> Option<(
     })
 }
 
-/// `a/b` where it is a polynomial: each term of `a` by the first of `b`, as far as they divide, and the product proves it.
+/// `a/b` if it is a polynomial. Each term of `a` is divided by the first term of `b`; the product then proves the result.
 fn quotient(ring: &Ring<'_>, a: &Polynomial, b: &Polynomial) -> Option<Polynomial> {
     let (b_first, b_factor) = b.terms().next()?;
     let mut quotient = Polynomial::default();

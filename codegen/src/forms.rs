@@ -1,10 +1,10 @@
-//! The truncated forms: built from the normal form, laid out for a reader, and put back into the arena for a compiler.
+//! Truncated forms: built from the normal form, arranged for printing, and put back into the arena for code.
 
 use abbe_model::instrument::Station;
 use abbe_model::scalar::Nominal;
 
-use crate::collect::{Layout, product, sum};
-use crate::equation::{FirstOrderLayout, Form};
+use crate::collect::{Collector, product, sum};
+use crate::equation::{Form, PrintedFirstOrder};
 use crate::error::CodegenError;
 use crate::first_order::{Column, FirstOrder};
 use crate::normal_form::Ring;
@@ -16,26 +16,26 @@ use crate::symbol::{Arena, Binary, Operand, Symbol, Unary};
 use crate::variable::Variable;
 use crate::vectors::NamedVector;
 
-type Formed = (Vec<Operand>, Form);
+type FormResult = (Vec<Operand>, Form);
 
-/// What a form is written in.
-pub(crate) struct Written<'a, 'w> {
+/// The context in which a form is written.
+pub(crate) struct FormContext<'a, 'w> {
     pub(crate) arena: &'a Arena,
     /// The inputs of its programs.
     pub(crate) inputs: &'w [Input],
     pub(crate) parameters: &'w [Variable],
-    /// Expressions that stand as they are.
+    /// Expressions that are kept as they are.
     pub(crate) whole: &'w [Operand],
 }
 
-/// Coordinates up to second order in the errors, a length still their norm.
+/// Bilinear form: coordinates up to second order in the errors; a length is their norm.
 pub(crate) fn bilinear<'a>(
     run: &Run<'_, Symbol<'a>>,
     exact: &[Operand],
     vectors: &mut Vec<NamedVector>,
-    written: &Written<'a, '_>,
-) -> Result<Formed, CodegenError> {
-    let &Written { arena, inputs, .. } = written;
+    written: &FormContext<'a, '_>,
+) -> Result<FormResult, CodegenError> {
+    let &FormContext { arena, inputs, .. } = written;
     let mut ring = Ring::truncated(arena, 2)?;
     ring.keep(written.whole);
     let read_over = read_over(run, vectors);
@@ -57,7 +57,7 @@ pub(crate) fn bilinear<'a>(
             wanted.iter().map(|group| whole.normal_form(*group)).collect();
         forms.is_ok_and(|forms| forms == groups)
     };
-    let layout = Layout { ring: &ring, inputs };
+    let layout = Collector { ring: &ring, inputs };
     let trees: Vec<Tree> = groups.iter().map(|group| layout.group(group)).collect();
     let operands = operands(arena, inputs);
     let symbols: Vec<Symbol<'a>> = trees.iter().map(|tree| tree.symbol(arena, &operands)).collect();
@@ -77,14 +77,14 @@ pub(crate) fn bilinear<'a>(
     Ok((outputs, form))
 }
 
-/// The value without errors and a coefficient for each error.
+/// First-order form: the value without errors and a coefficient for each error.
 pub(crate) fn first<'a>(
     run: &Run<'_, Symbol<'a>>,
     exact: &[Operand],
     vectors: &mut Vec<NamedVector>,
-    written: &Written<'a, '_>,
-) -> Result<Formed, CodegenError> {
-    let &Written {
+    written: &FormContext<'a, '_>,
+) -> Result<FormResult, CodegenError> {
+    let &FormContext {
         arena,
         inputs,
         parameters,
@@ -106,7 +106,9 @@ pub(crate) fn first<'a>(
         }
         ([stylus, step], Subject::Station(Station::Probe(probe))) => {
             let nominal = probe.radius.operand();
-            let radius = run.sight().map_or(nominal, |sight| sight.radius.operand());
+            let radius = run
+                .probe_geometry()
+                .map_or(nominal, |geometry| geometry.radius.operand());
             match probe.direction {
                 Some(_) => FirstOrder::of_stated_way(
                     &mut ring,
@@ -119,12 +121,12 @@ pub(crate) fn first<'a>(
         }
         _ => FirstOrder::of_coordinates(&mut ring, exact, parameters)?,
     };
-    let layout = Layout { ring: &ring, inputs };
+    let layout = Collector { ring: &ring, inputs };
     let lay_out = |polynomials: &[Polynomial]| polynomials.iter().map(|p| layout.group(p)).collect();
-    let laid_out = FirstOrderLayout {
+    let laid_out = PrintedFirstOrder {
         nominal: lay_out(&form.nominal),
-        beside_length: form
-            .beside_length
+        alternative_length: form
+            .alternative_length
             .as_ref()
             .map(|beside| (beside.sign, layout.group(&beside.offset))),
         coefficients: form
@@ -174,7 +176,7 @@ pub(crate) fn first<'a>(
     Ok((outputs, Form::First(form, laid_out)))
 }
 
-/// The vectors that the reading is a function of, where it is none of three coordinates: the bar; the stylus and the step of a probe.
+/// The vectors of which a scalar reading is a function: the bar, or the stylus and the step of a probe.
 fn read_over(run: &Run<'_, Symbol<'_>>, vectors: &[NamedVector]) -> Vec<NamedVector> {
     let last = match run.subject {
         Subject::Station(Station::BallBar(_)) => 1,
@@ -184,7 +186,7 @@ fn read_over(run: &Run<'_, Symbol<'_>>, vectors: &[NamedVector]) -> Vec<NamedVec
     vectors[vectors.len() - last..].to_vec()
 }
 
-/// The operands that a program's inputs are.
+/// The operands of the program's inputs.
 fn operands(arena: &Arena, inputs: &[Input]) -> Vec<Operand> {
     let operand = |input: &Input| {
         let symbol = match input {

@@ -1,15 +1,15 @@
-//! Equations of readings: the closed form that the model's one kinematic chain yields for symbols in the place of numbers.
+//! Closed-form equations of readings: the model's kinematic chain evaluated over symbols instead of numbers.
 //!
-//! - [`symbol`]: symbols with names, and the arena that holds their expressions and derivatives;
-//! - [`variable`], [`subject`], [`session`]: what a symbol may stand for, what an equation is of;
-//! - [`effect`]: declared effects, coefficients and what they follow;
-//! - [`mod@evaluate`]: expressions at numbers;
-//! - [`polynomial`], [`normal`]: the exact normal form, in which equality is decided;
+//! - [`symbol`]: named symbols, and the arena that holds their expressions and derivatives;
+//! - [`variable`], [`subject`], [`session`]: the meaning of a symbol, and the quantity that an equation describes;
+//! - [`effect`]: declared effects, their coefficients and drivers;
+//! - [`mod@evaluate`]: evaluation of expressions over numbers;
+//! - [`polynomial`], [`normal_form`]: the exact normal form, in which equality is decided;
 //! - [`equation`]: the closed form of a reading, with its named vectors;
-//! - [`first`]: its first order, as a table of sensitivities; [`check`]: what confirms it before it is written;
-//! - [`program`], [`mod@print`]: as a sequence of steps, and in a language.
+//! - [`first_order`]: its first-order form, as a table of sensitivities; [`check`]: the check before an equation is written;
+//! - [`program`], [`mod@print`]: an equation as a sequence of steps, and in a language.
 //!
-//! What the C test with the extended bar sees of the position of C's axis, to first order: ∂L/∂EX0C = −R·sin C/L₀.
+//! The sensitivity of the C test with the extension bar to the location error EX0C, to first order: ∂L/∂EX0C = −R·sin C/L₀.
 //!
 //! ```
 //! use std::path::Path;
@@ -49,10 +49,10 @@ pub mod touch;
 pub mod variable;
 pub mod vectors;
 
-pub use effect::{Coefficient, Followed};
+pub use effect::{Coefficient, DriverQuantity};
 pub use equation::{Equation, Form, Kind, Options, Order};
 pub use error::CodegenError;
-pub use evaluate::Value;
+pub use evaluate::VariableValue;
 pub use normal_form::Ring;
 pub use polynomial::Polynomial;
 pub use print::Language;

@@ -1,4 +1,4 @@
-//! From an expression graph to its normal form, whole or up to an order in the errors.
+//! Conversion of an expression graph to its normal form, complete or truncated at an order in the errors.
 
 use std::collections::{BTreeSet, HashMap};
 
@@ -9,7 +9,7 @@ use crate::polynomial::{Atom, Monomial, Polynomial};
 use crate::symbol::{Arena, Binary, Node, NodeId, Operand, Unary, VariableId, operands};
 use crate::variable::Variable;
 
-/// The ring that normal forms live in: the arena's variables, and the roots that were met.
+/// The ring of normal forms: the variables of an arena, and the square roots found so far.
 #[derive(Debug)]
 pub struct Ring<'a> {
     arena: &'a Arena,
@@ -20,7 +20,7 @@ pub struct Ring<'a> {
 }
 
 impl<'a> Ring<'a> {
-    /// The ring of whole expressions.
+    /// The ring of untruncated expressions.
     pub fn exact(arena: &'a Arena) -> Self {
         Ring {
             arena,
@@ -31,7 +31,7 @@ impl<'a> Ring<'a> {
         }
     }
 
-    /// The ring of expressions up to `order` in errors and instrument unknowns: `sin e` is `e`, `cos e` is `1 − e²/2`.
+    /// The ring of expressions truncated at `order` in errors and instrument parameters: `sin e` is `e`, `cos e` is `1 − e²/2`.
     ///
     /// # Errors
     /// If the order is above 2.
@@ -50,17 +50,17 @@ impl<'a> Ring<'a> {
         self.arena
     }
 
-    /// A variable by its place.
+    /// A variable by its index.
     pub fn variable(&self, id: VariableId) -> &Variable {
         &self.variables[id.0 as usize]
     }
 
-    /// What is under a root.
+    /// The radicand of a root.
     pub fn radicand(&self, root: usize) -> &Polynomial {
         &self.roots[root]
     }
 
-    /// Whether an atom is an error or an instrument unknown, or a sine or cosine of one.
+    /// Whether an atom is an error or an instrument parameter, or the sine or cosine of one.
     pub fn is_small(&self, atom: Atom) -> bool {
         match atom {
             Atom::Variable(id) | Atom::Sin(id) | Atom::Cos(id) => self.variable(id).is_small(),
@@ -68,7 +68,7 @@ impl<'a> Ring<'a> {
         }
     }
 
-    /// Whether an atom follows the position of an axis.
+    /// Whether an atom depends on the position of an axis.
     pub fn moves(&self, atom: Atom) -> bool {
         match atom {
             Atom::Variable(id) | Atom::Sin(id) | Atom::Cos(id) => self.variable(id).moves(),
@@ -82,17 +82,17 @@ impl<'a> Ring<'a> {
         }
     }
 
-    /// The atom of a variable, if the arena knows it.
+    /// The atom of a variable, if the arena contains it.
     pub fn atom_of(&self, variable: &Variable) -> Option<Atom> {
         let place = self.variables.iter().position(|known| known == variable)?;
         Some(Atom::Variable(VariableId(place as u32)))
     }
 
-    /// Whether two expressions are equal, decided by their normal forms. Of functions that the form does not look into, an exponential or
-    /// the cosine of a multiple, equal terms prove equality and different terms prove nothing.
+    /// Whether two expressions are equal, decided by their normal forms. Functions that the normal form does not expand, such as an
+    /// exponential or the cosine of a multiple, are compared as terms: equal terms prove equality, different terms prove nothing.
     ///
     /// # Errors
-    /// If one of them is no polynomial.
+    /// If one of them is not a polynomial.
     pub fn equal(&mut self, a: Operand, b: Operand) -> Result<bool, CodegenError> {
         Ok(self.normal_form(a)? == self.normal_form(b)?)
     }
@@ -100,7 +100,8 @@ impl<'a> Ring<'a> {
     /// The normal form of an expression.
     ///
     /// # Errors
-    /// If it is no polynomial: a quotient of expressions, a root of errors, a function of errors other than the sine or cosine of one.
+    /// If it is not a polynomial: a quotient of expressions, a root of errors, or a function of errors other than the sine or cosine of
+    /// one.
     pub fn normal_form(&mut self, operand: Operand) -> Result<Polynomial, CodegenError> {
         let mut wanted = BTreeSet::new();
         let mut pending = vec![operand];
@@ -120,7 +121,7 @@ impl<'a> Ring<'a> {
         Ok(self.normal_form_of(operand))
     }
 
-    /// Takes nominal expressions as they are, to be neither looked into nor multiplied out.
+    /// Keeps these nominal expressions as they are, without expanding them.
     pub(crate) fn keep(&mut self, whole: &[Operand]) {
         for operand in whole {
             if let Operand::Node(id) = operand {
@@ -129,12 +130,12 @@ impl<'a> Ring<'a> {
         }
     }
 
-    /// Whether a node is a function that the form does not look into.
+    /// Whether a node is a function that the form does not expand.
     fn is_function(&self, id: NodeId) -> bool {
         match self.arena.node(id) {
             Node::Unary(Unary::Sin | Unary::Cos, a) => {
                 let of_variable = matches!(self.arena.node_of(a), Some(Node::Variable(_)));
-                // An angle that effects make up is small; in a truncated ring its sine and cosine are series.
+                // An angle determined by effects is small; in a truncated ring its sine and cosine are series.
                 !(of_variable || self.order.is_some() && self.contains_errors(a))
             }
             Node::Unary(function, _) => !matches!(function, Unary::Neg | Unary::Sqrt),
@@ -200,7 +201,7 @@ impl<'a> Ring<'a> {
         })
     }
 
-    /// Whether an expression holds an error, an instrument unknown or a coefficient of an effect.
+    /// Whether an expression contains an error, an instrument parameter or a coefficient of an effect.
     fn contains_errors(&self, operand: Operand) -> bool {
         let variables = self.arena.variables_of(&[operand]);
         variables
@@ -213,7 +214,7 @@ impl<'a> Ring<'a> {
         let mut terms = angle.terms();
         if !terms.all(|(monomial, _)| monomial.degree(|atom| self.is_small(atom)) > 0) {
             return Err(CodegenError::NoPolynomial {
-                what: "a sine of an error and what is none".to_string(),
+                what: "the sine of a sum of an error and a nominal quantity".to_string(),
             });
         }
         if function == Unary::Sin {
@@ -223,7 +224,7 @@ impl<'a> Ring<'a> {
         Ok(&Polynomial::constant(1.0) - &self.product(angle, angle).scaled(&half))
     }
 
-    /// The sine or cosine of a variable, as a series where it is an error and the ring is truncated.
+    /// The sine or cosine of a variable; a series for an error in a truncated ring.
     fn turn(&self, function: Unary, variable: VariableId) -> Polynomial {
         let itself = Polynomial::atom(Atom::Variable(variable));
         match (self.order, self.variable(variable).is_small(), function) {
@@ -240,7 +241,7 @@ impl<'a> Ring<'a> {
         }
     }
 
-    /// The root of an expression without errors, one atom for each radicand.
+    /// The root of an expression without errors; each radicand has one atom.
     pub fn root(&mut self, radicand: Polynomial) -> Polynomial {
         if radicand.is_zero() {
             return radicand;
@@ -253,7 +254,7 @@ impl<'a> Ring<'a> {
         Polynomial::atom(Atom::Root(place))
     }
 
-    /// The product in normal form, up to the ring's order.
+    /// The product in normal form, truncated at the ring's order.
     pub fn product(&self, a: &Polynomial, b: &Polynomial) -> Polynomial {
         let beyond = |monomial: &Monomial| {
             self.order
@@ -274,7 +275,7 @@ impl<'a> Ring<'a> {
             }
             let square = match atom {
                 Atom::Root(root) => self.roots[root].clone(),
-                // Nothing is known of the square of a function; `squared` names none.
+                // `squared` never returns a function, because the square of a function has no rule.
                 Atom::Function(_) => continue,
                 Atom::Sin(variable) | Atom::Cos(variable) | Atom::Variable(variable) => {
                     let cosine = Polynomial::atom(Atom::Cos(variable));
@@ -288,7 +289,7 @@ impl<'a> Ring<'a> {
         product
     }
 
-    /// The errors and instrument unknowns among `parameters` that none of the forms contains.
+    /// The errors and instrument parameters among `parameters` that none of the forms contains.
     pub fn absent<'v>(&self, forms: &[Polynomial], parameters: &'v [Variable]) -> Vec<&'v Variable> {
         let contains = |variable: &Variable| {
             let Some(Atom::Variable(id)) = self.atom_of(variable) else {
@@ -305,7 +306,7 @@ impl<'a> Ring<'a> {
     }
 }
 
-/// The place of a sine or root that a rule applies to.
+/// The index of a sine or root to which a rule applies.
 fn squared(monomial: &Monomial) -> Option<usize> {
     let mut powers = monomial.0.iter();
     powers.position(|(atom, power)| *power >= 2 && matches!(atom, Atom::Sin(_) | Atom::Root(_)))

@@ -1,8 +1,8 @@
-//! The exact normal form: polynomials over errors, lengths, sines and cosines, with rational coefficients.
+//! Exact normal form: polynomials in errors, lengths, sines and cosines, with rational coefficients.
 //!
-//! Two rules make it unique: `sin² = 1 − cos²` for every angle, and `r² = a` for the root `r = √a` of an expression without errors.
-//! A monomial so holds each sine and each root at most once, and two expressions are equal exactly when they have the same
-//! terms; nothing is sampled. Coefficients are ratios of integers, and every `f64` is one.
+//! Two rules make the form unique: `sin² = 1 − cos²` for every angle, and `r² = a` for the root `r = √a` of an expression without errors.
+//! A monomial therefore contains each sine and each root at most once. Two expressions are equal exactly if they have the same terms; no
+//! sampling is involved. Coefficients are ratios of integers, and every finite `f64` is one.
 
 use std::collections::BTreeMap;
 use std::ops::{Add, Mul, Neg, Sub};
@@ -12,49 +12,49 @@ use num_traits::ToPrimitive;
 
 use crate::symbol::{NodeId, VariableId};
 
-/// What polynomials are in.
+/// The indeterminates of a polynomial.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
 pub enum Atom {
     /// A length, a position, an error.
     Variable(VariableId),
-    /// A root, by its place in the [`crate::normal_form::Ring`].
+    /// A root, by its index in the [`crate::normal_form::Ring`].
     Root(usize),
     /// The sine of a variable.
     Sin(VariableId),
     /// The cosine of a variable.
     Cos(VariableId),
-    /// A function of nominal quantities that the form does not look into.
+    /// A function of nominal quantities that the form does not expand.
     Function(NodeId),
 }
 
-/// A product of powers of atoms, in the order of the atoms.
+/// A product of powers of atoms, sorted by atom.
 #[derive(Clone, Debug, Default, PartialEq, Eq, Hash, PartialOrd, Ord)]
 pub struct Monomial(pub(crate) Vec<(Atom, u32)>);
 
 impl Monomial {
-    /// The product of no atoms.
+    /// The empty product.
     pub fn one() -> Self {
         Monomial::default()
     }
 
-    /// Atoms and their powers.
+    /// The atoms and their powers.
     pub fn powers(&self) -> &[(Atom, u32)] {
         &self.0
     }
 
-    /// The sum of the powers of those atoms for which `counts` holds.
+    /// The sum of the powers of the atoms for which `counts` holds.
     pub fn degree(&self, counts: impl Fn(Atom) -> bool) -> u32 {
         let counted = self.0.iter().filter(|(atom, _)| counts(*atom));
         counted.map(|(_, power)| power).sum()
     }
 
-    /// The part of the atoms for which `keep` holds, and the rest.
+    /// Splits the monomial into the atoms for which `keep` holds and the rest.
     pub fn split(&self, keep: impl Fn(Atom) -> bool) -> (Monomial, Monomial) {
         let (kept, rest) = self.0.iter().partition(|(atom, _)| keep(*atom));
         (Monomial(kept), Monomial(rest))
     }
 
-    /// The quotient, where every power of `other` is contained.
+    /// The quotient, if every power of `other` is contained.
     pub fn divided_by(&self, other: &Monomial) -> Option<Monomial> {
         let mut quotient = self.clone();
         for (atom, power) in &other.0 {
@@ -65,7 +65,7 @@ impl Monomial {
         Some(quotient)
     }
 
-    /// The powers that both contain.
+    /// The greatest common divisor.
     pub fn shared_with(&self, other: &Monomial) -> Monomial {
         let power = |atom: Atom| {
             other
@@ -78,7 +78,7 @@ impl Monomial {
         Monomial(shared.filter(|(_, n)| *n > 0).collect())
     }
 
-    /// The product, no rule applied.
+    /// The product, without applying the rules.
     fn times(&self, other: &Monomial) -> Monomial {
         let mut product = Vec::with_capacity(self.0.len() + other.0.len());
         let (mut a, mut b) = (self.0.as_slice(), other.0.as_slice());
@@ -101,11 +101,11 @@ impl Monomial {
     }
 }
 
-/// A polynomial in normal form, or on the way there: terms that are not zero, each monomial once.
+/// A polynomial, in normal form or in an intermediate state: nonzero terms, each monomial once.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Polynomial(pub(crate) BTreeMap<Monomial, BigRational>);
 
-/// The rational number that an `f64` is; zero for one that is not finite.
+/// The rational number equal to an `f64`; zero if it is not finite.
 fn exactly(value: f64) -> BigRational {
     BigRational::from_float(value).unwrap_or_else(|| BigRational::from_integer(0.into()))
 }
@@ -125,12 +125,12 @@ impl Polynomial {
         polynomial
     }
 
-    /// Whether it is zero: decided, since the normal form of zero has no term.
+    /// Whether it is zero. This is decidable, because the normal form of zero has no terms.
     pub fn is_zero(&self) -> bool {
         self.0.is_empty()
     }
 
-    /// Whether it is this constant but for rounding.
+    /// Whether it equals this constant to rounding.
     pub fn is_about(&self, value: f64) -> bool {
         let constant = match self.0.iter().next() {
             None => Some(0.0),
@@ -140,12 +140,12 @@ impl Polynomial {
         constant.is_some_and(|constant| (constant - value).abs() <= 1e-12 * value.abs().max(1.0))
     }
 
-    /// Terms: monomials and their coefficients.
+    /// The terms: monomials and their coefficients.
     pub fn terms(&self) -> impl Iterator<Item = (&Monomial, &BigRational)> {
         self.0.iter()
     }
 
-    /// How many terms there are.
+    /// Number of terms.
     pub fn len(&self) -> usize {
         self.0.len()
     }
@@ -155,13 +155,13 @@ impl Polynomial {
         self.0.is_empty()
     }
 
-    /// Whether some term holds an atom for which `wanted` holds.
+    /// Whether some term contains an atom for which `wanted` holds.
     pub fn contains(&self, wanted: impl Fn(Atom) -> bool) -> bool {
         let mut atoms = self.0.keys().flat_map(|monomial| monomial.0.iter());
         atoms.any(|(atom, _)| wanted(*atom))
     }
 
-    /// Collected by what is made of the atoms for which `by` holds: each such monomial with its coefficient.
+    /// Groups the terms by their atoms for which `by` holds: each such monomial with its coefficient.
     pub fn collect(&self, by: impl Fn(Atom) -> bool) -> BTreeMap<Monomial, Polynomial> {
         let mut collected: BTreeMap<Monomial, Polynomial> = BTreeMap::new();
         for (monomial, coefficient) in &self.0 {
@@ -172,7 +172,7 @@ impl Polynomial {
         collected
     }
 
-    /// The terms of a monomial that satisfies `keep`.
+    /// The terms whose monomial satisfies `keep`.
     pub fn filtered(&self, keep: impl Fn(&Monomial) -> bool) -> Polynomial {
         let kept = self.0.iter().filter(|(monomial, _)| keep(monomial));
         Polynomial(kept.map(|(m, c)| (m.clone(), c.clone())).collect())
@@ -187,7 +187,7 @@ impl Polynomial {
         }
     }
 
-    /// The product before the rules for sines and roots, without terms for which `drop` holds.
+    /// The product before the rules for sines and roots are applied, without terms for which `drop` holds.
     pub(crate) fn product(&self, other: &Polynomial, drop: impl Fn(&Monomial) -> bool) -> Polynomial {
         let mut product = Polynomial::default();
         for (a, c) in &self.0 {
@@ -201,7 +201,7 @@ impl Polynomial {
         product
     }
 
-    /// Each coefficient times `factor`.
+    /// Multiplies each coefficient by `factor`.
     pub fn scaled(&self, factor: &BigRational) -> Polynomial {
         let mut scaled = Polynomial::default();
         for (monomial, coefficient) in &self.0 {
@@ -238,7 +238,7 @@ impl Sub<&Polynomial> for &Polynomial {
 
 impl Mul<&Polynomial> for &Polynomial {
     type Output = Polynomial;
-    /// The product of polynomials without sines and roots; [`crate::normal_form::Ring::product`] applies their rules.
+    /// The product of polynomials without sines and roots; [`crate::normal_form::Ring::product`] applies the rules for those.
     fn mul(self, other: &Polynomial) -> Polynomial {
         self.product(other, |_| false)
     }

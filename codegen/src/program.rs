@@ -1,18 +1,18 @@
-//! From an expression graph to a sequence of named steps: what every printer prints.
+//! Conversion of an expression graph to a sequence of named steps, the input of every printer.
 
 use std::collections::HashMap;
 
 use crate::symbol::{Arena, Binary, Node, NodeId, Operand, Unary, operands};
 use crate::variable::Variable;
 
-/// An expression as it will stand on one line.
+/// An expression to be printed on one line.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Tree {
     /// A number.
     Number(f64),
-    /// An input, by its place in [`Program::inputs`].
+    /// An input, by its index in [`Program::inputs`].
     Input(usize),
-    /// An earlier step, by its place in [`Program::steps`].
+    /// An earlier step, by its index in [`Program::steps`].
     Step(usize),
     /// A function of one operand.
     Unary(Unary, Box<Tree>),
@@ -21,7 +21,7 @@ pub enum Tree {
 }
 
 impl Tree {
-    /// Whether an input stands in it.
+    /// Whether it contains an input.
     pub(crate) fn holds(&self, input: usize) -> bool {
         match self {
             Tree::Input(place) => *place == input,
@@ -31,7 +31,7 @@ impl Tree {
         }
     }
 
-    /// How many names and numbers stand in it.
+    /// Number of names and numbers in it.
     pub(crate) fn leaves(&self) -> usize {
         match self {
             Tree::Number(_) | Tree::Input(_) | Tree::Step(_) => 1,
@@ -40,7 +40,7 @@ impl Tree {
         }
     }
 
-    /// With one expression in the place of another, wherever that stands.
+    /// Replaces every occurrence of an expression by another one.
     pub(crate) fn replaced(&self, what: &Tree, by: &Tree) -> Tree {
         if self == what {
             return by.clone();
@@ -64,7 +64,7 @@ impl Tree {
     }
 }
 
-/// An argument of a program: a variable, or the sine or cosine of an axis position, which is taken once a data set.
+/// An argument of a program: a variable, or the sine or cosine of an axis position, which is computed once per data set.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Input {
     /// A variable itself.
@@ -82,47 +82,47 @@ pub enum Label {
     Vector {
         /// The letter: `p`.
         letter: &'static str,
-        /// The frame it is given in; empty where it needs none.
+        /// The frame of its coordinates; empty if it needs none.
         frame: String,
-        /// Whether the frame's own error is still to be applied: printed with a prime.
+        /// Whether the frame's own error is not yet applied; printed with a prime.
         prime: bool,
         /// 0, 1, 2.
         coordinate: usize,
     },
-    /// A quantity with a name of its own: the length.
+    /// A named scalar: the length.
     Scalar(&'static str),
-    /// An error or instrument unknown that effects make up.
+    /// An error or instrument parameter that effects determine.
     Quantity(Variable),
-    /// A common subexpression without a meaning of its own.
+    /// A common subexpression without a physical meaning.
     Temporary(usize),
 }
 
-/// One step: a name and how it is computed.
+/// One step: a name and its expression.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Step {
-    /// What it is called.
+    /// Its name.
     pub label: Label,
-    /// How it is computed from inputs and earlier steps.
+    /// Its expression in inputs and earlier steps.
     pub value: Tree,
 }
 
-/// Inputs, steps, outputs.
+/// A program: inputs, steps, outputs.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Program {
-    /// What goes in, in a fixed order: lengths, axis positions, errors, instrument unknowns.
+    /// The inputs in a fixed order: lengths, axis positions, errors, instrument parameters.
     pub inputs: Vec<Input>,
-    /// What is computed, in order.
+    /// The steps in order.
     pub steps: Vec<Step>,
-    /// What comes out.
+    /// The outputs.
     pub outputs: Vec<Tree>,
 }
 
-/// Which subexpressions get a step of their own.
+/// Which subexpressions become steps.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Naming {
-    /// Those that have a name and those used more than once: for a compiler.
+    /// Those with a name and those used more than once: for code.
     Shared,
-    /// Only those that have a name: for a reader.
+    /// Only those with a name: for readers.
     Labelled,
 }
 
@@ -133,7 +133,7 @@ struct Builder<'a> {
 }
 
 impl Builder<'_> {
-    /// The input that a node is, if it is one.
+    /// The input that a node represents, if any.
     fn input(&self, id: NodeId) -> Option<usize> {
         let input = match self.arena.node(id) {
             Node::Variable(variable) => Input::Plain(self.arena.variable_at(variable)),
@@ -165,10 +165,10 @@ impl Builder<'_> {
 
     fn expand(&self, id: NodeId) -> Tree {
         match self.arena.node(id) {
-            // Every variable is an input; the arena's caller lists them.
+            // Every variable is an input; the caller lists them.
             Node::Variable(_) => Tree::Number(f64::NAN),
             Node::Unary(Unary::Neg, a) => match self.tree(a) {
-                // −(x − y) is y − x where the difference is nobody else's.
+                // −(x − y) is y − x if nothing else uses the difference.
                 Tree::Binary(Binary::Sub, x, y) => Tree::Binary(Binary::Sub, y, x),
                 a => Tree::Unary(Unary::Neg, Box::new(a)),
             },
@@ -178,10 +178,10 @@ impl Builder<'_> {
     }
 }
 
-/// Operations of a program by kind; constants cost nothing.
+/// Number of operations of a program by kind; constants are not counted.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Operations {
-    /// Additions, subtractions and changes of sign.
+    /// Additions, subtractions and negations.
     pub sums: usize,
     /// Multiplications.
     pub products: usize,
@@ -224,7 +224,7 @@ impl Operations {
 }
 
 impl Program {
-    /// The steps that compute `outputs`. `labels` names nodes by what they are.
+    /// Derives the steps that compute `outputs`; `labels` gives the names of nodes.
     pub fn of(
         arena: &Arena,
         inputs: Vec<Input>,
@@ -251,7 +251,7 @@ impl Program {
         let mut steps = Vec::new();
         let mut temporaries = 0;
         for id in nodes {
-            // An angle whose sine and cosine are the inputs is itself none, and is not computed either.
+            // An angle that enters only by its sine and cosine is not an input and is not computed.
             if builder.input(id).is_some() || matches!(arena.node(id), Node::Variable(_)) {
                 continue;
             }
@@ -275,7 +275,7 @@ impl Program {
         }
     }
 
-    /// The outputs for the values of the inputs.
+    /// Evaluates the outputs for values of the inputs.
     pub fn run(&self, inputs: &[f64]) -> Vec<f64> {
         let mut steps = Vec::with_capacity(self.steps.len());
         for step in &self.steps {
@@ -286,7 +286,7 @@ impl Program {
         self.outputs.iter().map(value).collect()
     }
 
-    /// How many operations one run takes.
+    /// Number of operations of one evaluation.
     pub fn operations(&self) -> Operations {
         let mut operations = Operations::default();
         let values = self.steps.iter().map(|step| &step.value);

@@ -1,31 +1,31 @@
-//! One run of the chain, over symbols for the equation and over numbers for its check.
+//! Evaluation of the chain, over symbols for the equation and over numbers for its check.
 
 use abbe_model::chain::{AxisPosition, BodyErrors, Machine};
 use abbe_model::instrument::{Station, ballbar};
 use abbe_model::scalar::{Nominal, Scalar};
 
-use crate::effect::Movement;
+use crate::effect::AxisStates;
 use crate::error::CodegenError;
 use crate::subject::{Source, Subject};
 use crate::touch;
 use crate::variable::Variable;
 
-/// Everything that a reading is computed from.
+/// All quantities from which a reading is computed.
 pub(crate) struct Run<'m, S: Scalar> {
     pub(crate) machine: &'m Machine,
     pub(crate) subject: Subject<S::Nominal>,
     pub(crate) state: Vec<AxisPosition<S::Nominal>>,
     pub(crate) errors: Vec<BodyErrors<S>>,
     unknowns: Vec<(usize, S)>,
-    /// What makes up each slot, the machine's errors before the instrument's unknowns: places of parameters, and what multiplies them.
-    slots: Vec<Vec<Share<S::Nominal>>>,
+    /// The contributions to each slot, machine errors before instrument parameters: indices of parameters, and their factors.
+    slots: Vec<Vec<Contribution<S::Nominal>>>,
 }
 
-/// A parameter in a slot: its place, and its basis function where an effect gives it one.
-type Share<N> = (usize, Option<N>);
+/// A parameter in a slot: its index, and its basis function if it is a coefficient of an effect.
+type Contribution<N> = (usize, Option<N>);
 
 impl<'m, S: Scalar> Run<'m, S> {
-    /// `nominal` gives lengths and the positions of moving axes, `small` the parameters by their places.
+    /// `nominal` gives lengths and positions of moving axes, `small` the parameters by index.
     pub(crate) fn new(
         machine: &'m Machine,
         source: &impl Source,
@@ -49,7 +49,7 @@ impl<'m, S: Scalar> Run<'m, S> {
             state.push(AxisPosition::new(axis.kind, position));
         }
         let unknowns = subject.unknowns();
-        let movement = Movement {
+        let movement = AxisStates {
             machine,
             state: &state,
             held: &held,
@@ -75,7 +75,7 @@ impl<'m, S: Scalar> Run<'m, S> {
                 }
                 Variable::Coefficient(coefficient) => {
                     let effect = &coefficient.effect;
-                    // The coefficients of an effect stand side by side.
+                    // The coefficients of one effect are consecutive.
                     if coefficient.place == 0 {
                         basis.clear();
                         effect.shape.basis(&movement.sample(effect, nominal)?, &mut basis);
@@ -101,7 +101,7 @@ impl<'m, S: Scalar> Run<'m, S> {
         Ok(run)
     }
 
-    /// Other values for the parameters, everything nominal as it is.
+    /// Changes the values of the parameters and keeps the nominal quantities.
     pub(crate) fn seed(&mut self, small: &impl Fn(usize) -> S) {
         let zero = S::nominal(S::Nominal::constant(0.0));
         let value = |slot: usize| in_slot(&self.slots[slot], small);
@@ -114,7 +114,7 @@ impl<'m, S: Scalar> Run<'m, S> {
         self.unknowns = unknowns.collect();
     }
 
-    /// What a coefficient of an effect is multiplied by, in each slot that it moves.
+    /// The factor of an effect's coefficient in each slot that it changes.
     pub(crate) fn bases(&self, place: usize) -> impl Iterator<Item = S::Nominal> {
         let shares = self.slots.iter().flatten();
         shares
@@ -122,10 +122,10 @@ impl<'m, S: Scalar> Run<'m, S> {
             .filter_map(|(_, basis)| *basis)
     }
 
-    /// The errors and unknowns that effects make up, and their values.
-    pub(crate) fn followers(&self, small: &impl Fn(usize) -> S) -> Vec<(Variable, S)> {
+    /// The errors and instrument parameters that effects determine, and their values.
+    pub(crate) fn driven_errors(&self, small: &impl Fn(usize) -> S) -> Vec<(Variable, S)> {
         let first = self.machine.error_slots();
-        let mut followers = Vec::new();
+        let mut driven_errors = Vec::new();
         for (slot, shares) in self.slots.iter().enumerate() {
             let effects_alone = !shares.is_empty() && shares.iter().all(|(_, basis)| basis.is_some());
             if let (true, Some(value)) = (effects_alone, in_slot(shares, small)) {
@@ -133,19 +133,19 @@ impl<'m, S: Scalar> Run<'m, S> {
                     None => Variable::Error(self.machine.error_name(slot)),
                     Some(place) => Variable::Unknown(self.subject.unknowns()[place]),
                 };
-                followers.push((variable, value));
+                driven_errors.push((variable, value));
             }
         }
-        followers
+        driven_errors
     }
 
-    /// The instrument's unknown in a slot, if it is carried.
+    /// The instrument parameter in a slot, if included.
     pub(crate) fn unknown(&self, slot: usize) -> Option<S> {
         let found = self.unknowns.iter().find(|(known, _)| *known == slot);
         found.map(|(_, value)| *value)
     }
 
-    /// The error of the bar and of its sensor's gain, where a bar is read and they are carried.
+    /// The length error of the bar and the gain error of its sensor, if a bar is read and they are included.
     pub(crate) fn bar_unknowns(&self) -> [Option<S>; 2] {
         match self.subject {
             Subject::Station(Station::BallBar(_)) => {
@@ -161,11 +161,11 @@ impl<'m, S: Scalar> Run<'m, S> {
             .read(self.machine, &self.state, &self.errors, |slot| self.unknown(slot))
     }
 
-    /// The reading from the coordinate groups that it is a function of: the bar, or stylus and step of a probe. None where the reading is
-    /// the groups themselves.
+    /// Computes the reading from its coordinate groups: the bar, or the stylus and step of a probe. `None` if the reading is the groups
+    /// themselves.
     pub(crate) fn reading_of_groups(&self, groups: &[S]) -> Option<S> {
-        match (self.sight(), &self.subject) {
-            (Some(sight), _) => Some(touch::with_groups(&sight, groups).distance()),
+        match (self.probe_geometry(), &self.subject) {
+            (Some(geometry), _) => Some(touch::with_groups(&geometry, groups).distance()),
             (None, Subject::Station(Station::BallBar(_))) => {
                 let [x, y, z] = [groups[0], groups[1], groups[2]];
                 Some(self.length_reading((x * x + y * y + z * z).sqrt()))
@@ -174,8 +174,8 @@ impl<'m, S: Scalar> Run<'m, S> {
         }
     }
 
-    /// The reading of a ball bar from the distance between its balls, with the bar's own unknowns; the distance itself for any
-    /// other subject.
+    /// The reading of a ball bar from the distance between its balls, with the parameters of the bar; the distance itself for any other
+    /// subject.
     pub(crate) fn length_reading(&self, distance: S) -> S {
         let Subject::Station(Station::BallBar(bar)) = &self.subject else {
             return distance;
@@ -192,9 +192,9 @@ impl<'m, S: Scalar> Run<'m, S> {
     }
 }
 
-/// The sum of what makes up a slot.
-fn in_slot<S: Scalar>(shares: &[Share<S::Nominal>], small: &impl Fn(usize) -> S) -> Option<S> {
-    let value = |(place, basis): &Share<S::Nominal>| match basis {
+/// The sum of the contributions to a slot.
+fn in_slot<S: Scalar>(shares: &[Contribution<S::Nominal>], small: &impl Fn(usize) -> S) -> Option<S> {
+    let value = |(place, basis): &Contribution<S::Nominal>| match basis {
         Some(basis) => small(*place) * *basis,
         None => small(*place),
     };

@@ -1,4 +1,4 @@
-//! A test of a session as the source of an equation: its geometry as written, its axes as they move.
+//! A test of a session as the source of an equation: its geometry as written, and the positions of its axes.
 
 use abbe_model::error::ModelError;
 use abbe_model::scalar::Nominal;
@@ -7,22 +7,21 @@ use abbe_model::session::{Session, Test};
 
 use crate::subject::{Source, Subject};
 
-/// A test of a session. Named lengths stay symbols, so do the positions of axes that move; the others stand where the test
-/// says.
+/// A test of a session. Named lengths and positions of moving axes stay symbols; other axes are at their stated positions.
 #[derive(Clone, Debug)]
 pub struct SessionTest<'s> {
     session: &'s Session,
     test: &'s Test,
-    /// Least and greatest position of each axis of the machine; none of one that moves nobody knows how far.
+    /// Least and greatest position of each axis of the machine; `None` for an axis that moves over an unknown range.
     ranges: Vec<Option<[f64; 2]>>,
 }
 
 impl<'s> SessionTest<'s> {
-    /// A test, with the positions of its readings or, for a plan, of its movement. Of a test that has neither, every axis moves that the
-    /// test does not hold at a position other than zero.
+    /// From a test, with the positions of its readings or, for a plan, of its motion. Without either, every axis moves, except those that
+    /// the test holds at a nonzero position.
     ///
     /// # Errors
-    /// If a planned movement cannot be made.
+    /// If a planned motion is impossible.
     pub fn new(session: &'s Session, test: &'s Test) -> Result<Self, ModelError> {
         let range = |column: &Vec<f64>| {
             let least = column.iter().copied().fold(f64::INFINITY, f64::min);

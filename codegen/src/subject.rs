@@ -1,36 +1,36 @@
-//! What an equation is of: a reading of an instrument, or the error vector of the tool.
+//! The quantity that an equation describes: a reading of an instrument, or the error vector of the tool.
 
 use abbe_model::chain::{AxisPosition, BodyErrors, Machine};
 use abbe_model::frames::Point;
 use abbe_model::instrument::{InstrumentUnknown, Station};
 use abbe_model::scalar::{Nominal, Scalar};
 
-/// The nominal geometry of what is written down, over any nominal type: with symbols it gives the equation, with numbers its
-/// check. A session's test is one; so is [`ToolPoint`].
+/// The nominal geometry of an equation over any nominal type: symbols give the equation, numbers its check. Implemented by a test of a
+/// session and by [`ToolPoint`].
 pub trait Source {
-    /// The instrument as it is set up, or the point whose error is wanted; `length` gives the value of a named length in mm.
+    /// The instrument as set up, or the point whose error is computed; `length` gives the value of a named length in mm.
     fn subject<N: Nominal>(&self, length: &impl Fn(&str) -> N) -> Subject<N>;
 
-    /// Where an axis stands while the test runs, mm or rad; `None` for one that moves and stays a symbol.
+    /// The position at which the test holds an axis, mm or rad; `None` for a moving axis, which stays a symbol.
     fn held<N: Nominal>(&self, axis: &str, length: &impl Fn(&str) -> N) -> Option<N> {
         let _ = (axis, length);
         None
     }
 
-    /// The value of a named length, mm, where the session states it: what a truncation is judged at.
+    /// The value of a named length, mm, if the session states it; used to evaluate truncation errors.
     fn length_mm(&self, name: &str) -> Option<f64> {
         let _ = name;
         None
     }
 
-    /// Least and greatest position of a moving axis, mm or rad, where the test states it.
+    /// Least and greatest position of a moving axis, mm or rad, if the test states it.
     fn range(&self, axis: &str) -> Option<[f64; 2]> {
         let _ = axis;
         None
     }
 }
 
-/// The error vector of the tool: at the point of the tool frame with the coordinates `X_t`, `Y_t`, `Z_t`, every axis moving.
+/// The error vector of the tool at the point `X_t`, `Y_t`, `Z_t` of the tool frame; every axis moves.
 #[derive(Clone, Copy, Debug)]
 pub struct ToolPoint;
 
@@ -42,13 +42,13 @@ impl Source for ToolPoint {
     }
 }
 
-/// What is written down, with its nominal geometry.
+/// The quantity that an equation describes, with its nominal geometry.
 #[derive(Clone, Debug)]
 pub enum Subject<N> {
     /// A reading of an instrument.
     Station(Station<N>),
-    /// The error vector of a point of the tool frame, in the table frame: where the chain with errors puts it less where the
-    /// chain without puts it.
+    /// The error vector of a point of the tool frame, in the table frame: its position in the chain with errors less that in the chain
+    /// without.
     Volumetric {
         /// The point, mm.
         tool: [N; 3],
@@ -56,7 +56,7 @@ pub enum Subject<N> {
 }
 
 impl<N: Nominal> Subject<N> {
-    /// The instrument's own unknowns.
+    /// The parameters of the instrument.
     pub fn unknowns(&self) -> &'static [InstrumentUnknown] {
         match self {
             Subject::Station(station) => station.kind().unknowns(),
@@ -64,7 +64,7 @@ impl<N: Nominal> Subject<N> {
         }
     }
 
-    /// The coordinates of one reading. `unknown` gives the instrument's own unknowns.
+    /// Computes the coordinates of one reading; `unknown` gives the parameters of the instrument.
     pub fn read<S: Scalar<Nominal = N>>(
         &self,
         machine: &Machine,

@@ -1,4 +1,4 @@
-//! Symbols with names: what the model's [expressions](abbe_model::expression) stand for when they are printed.
+//! Named symbols: the model's [expressions](abbe_model::expression) over printable variables.
 
 pub use abbe_model::expression::{
     Adjoints, Binary, Constant, Node, NodeId, Operand, Unary, VariableId, operands,
@@ -6,7 +6,7 @@ pub use abbe_model::expression::{
 
 use crate::variable::Variable;
 
-/// Where named symbols live.
+/// The arena of named symbols.
 ///
 /// ```
 /// use abbe_codegen::evaluate::evaluate_f64;
@@ -23,7 +23,7 @@ use crate::variable::Variable;
 /// # Ok::<(), abbe_codegen::CodegenError>(())
 /// ```
 pub type Arena = abbe_model::expression::Arena<Variable>;
-/// A named symbol, or an expression of some.
+/// A named symbol, or an expression of named symbols.
 pub type Symbol<'arena> = abbe_model::expression::Symbol<'arena, Variable>;
 
 /// The symbol of a named length in mm.

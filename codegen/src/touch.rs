@@ -1,11 +1,12 @@
-//! What a probe's reading is made of: the stylus `v` and a step `u` of its way, both across the artefact's axis, and the radius.
+//! Quantities of a probe's reading: the stylus `v` and a step `u` in the probing direction, both perpendicular to the artefact's axis,
+//! and the radius.
 //!
 //! ```text
 //! a = u·u,   b = v·u,   c = v·v − r²,   d = −l_n·(b + √(b² − a·c))/a
 //! ```
 //!
-//! `l_n` is the length of the step in R, 1 where the way is stated. The root's sign is that of the nearer of two points wherever
-//! the artefact is met, so that nothing has to be decided.
+//! `l_n` is the length of the step in R; it is 1 for a stated direction. The sign of the root selects the nearer of the two intersections
+//! for every artefact that is hit, so that no case distinction is necessary.
 
 use abbe_model::frames::Point;
 use abbe_model::instrument::Station;
@@ -20,34 +21,34 @@ use crate::vectors::NamedVector;
 
 /// The named quantities between the vectors of a probe and its reading.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Touch {
+pub struct ProbeTerms {
     /// `a`, `b`, `c`.
     pub quadratic: [Operand; 3],
-    /// `r`: the artefact's radius, the stylus' included, with what it is off by.
+    /// `r`: the radius of the artefact including the stylus radius and its errors.
     pub radius: Operand,
     /// `l_n`.
     pub step_length: Option<Operand>,
-    /// The step in R, whose length `l_n` is.
+    /// The step in R, which has the length `l_n`.
     pub step: Option<NamedVector>,
 }
 
-/// The length of a step, in every language.
+/// The length of a step, named alike in every language.
 pub(crate) const STEP_LENGTH: Label = Label::Scalar("l_n");
 /// The coefficients of the quadratic equation.
 pub(crate) const QUADRATIC: [Label; 3] = [Label::Scalar("a"), Label::Scalar("b"), Label::Scalar("c")];
 
-impl Touch {
-    /// From stylus and step as the artefact sees them, and the vectors on the way there.
-    pub(crate) fn of(sight: &ProbeGeometry<Symbol<'_>>, vectors: &[NamedVector]) -> Self {
-        Touch {
-            quadratic: sight.quadratic().map(Symbol::operand),
-            radius: sight.radius.operand(),
-            step_length: sight.step_length.map(Symbol::operand),
+impl ProbeTerms {
+    /// From stylus and step in the frame of the artefact, and the intermediate vectors.
+    pub(crate) fn of(geometry: &ProbeGeometry<Symbol<'_>>, vectors: &[NamedVector]) -> Self {
+        ProbeTerms {
+            quadratic: geometry.quadratic().map(Symbol::operand),
+            radius: geometry.radius.operand(),
+            step_length: geometry.step_length.map(Symbol::operand),
             step: vectors.iter().find(|vector| vector.letter == "n").cloned(),
         }
     }
 
-    /// The names of those that are computed.
+    /// The names of the computed quantities.
     pub(crate) fn labels(&self) -> impl Iterator<Item = (NodeId, Label)> {
         let step = self.step_length.map(|length| (length, STEP_LENGTH));
         let named = self.quadratic.into_iter().zip(QUADRATIC).chain(step);
@@ -59,22 +60,22 @@ impl Touch {
 }
 
 impl<S: Scalar> Run<'_, S> {
-    /// What a probe's reading is made of; none of any other subject.
-    pub(crate) fn sight(&self) -> Option<ProbeGeometry<S>> {
+    /// The geometry of a probe's reading; `None` for any other subject.
+    pub(crate) fn probe_geometry(&self) -> Option<ProbeGeometry<S>> {
         match &self.subject {
             Subject::Station(Station::Probe(probe)) => {
-                Some(probe.sight(self.machine, &self.state, &self.errors, |slot| self.unknown(slot)))
+                Some(probe.geometry(self.machine, &self.state, &self.errors, |slot| self.unknown(slot)))
             }
             _ => None,
         }
     }
 }
 
-/// The same with the six coordinates of stylus and step replaced.
-pub(crate) fn with_groups<S: Scalar>(sight: &ProbeGeometry<S>, groups: &[S]) -> ProbeGeometry<S> {
+/// Replaces the six coordinates of stylus and step.
+pub(crate) fn with_groups<S: Scalar>(geometry: &ProbeGeometry<S>, groups: &[S]) -> ProbeGeometry<S> {
     ProbeGeometry {
         stylus: Point(std::array::from_fn(|i| groups[i])),
         step: Point(std::array::from_fn(|i| groups[i + 3])),
-        ..*sight
+        ..*geometry
     }
 }

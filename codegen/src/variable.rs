@@ -1,12 +1,12 @@
-//! What a symbol may stand for, and how it is written.
+//! Variables of expressions: their meaning, unit and names.
 
 use abbe_model::axis::AxisKind;
 use abbe_model::component::{ErrorKind, ErrorName};
 use abbe_model::instrument::{InstrumentUnknown, InternalUnit};
 
-use crate::effect::{Coefficient, Followed};
+use crate::effect::{Coefficient, DriverQuantity};
 
-/// A quantity that an expression is written in.
+/// A variable of an expression.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Variable {
     /// A named length of the session, mm: `R`, `Z_CA`.
@@ -15,20 +15,20 @@ pub enum Variable {
     Position {
         /// The axis.
         axis: String,
-        /// Whether it slides or turns.
+        /// Linear or rotary.
         kind: AxisKind,
     },
     /// An error of the machine, mm or rad.
     Error(ErrorName),
-    /// An unknown of the instrument itself, mm, rad or a ratio.
+    /// A parameter of the instrument, mm, rad or a ratio.
     Unknown(InstrumentUnknown),
-    /// What an effect follows, where that is not the position of an axis.
-    Driver(Followed),
+    /// The driver of an effect, if it is not the position of an axis.
+    Driver(DriverQuantity),
     /// A coefficient of an effect.
     Coefficient(Coefficient),
 }
 
-/// Which names errors go by in print.
+/// Naming convention of the errors in print.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Symbols {
     /// The short names of the literature: `e_y0a`, `θ_z0c`.
@@ -39,7 +39,7 @@ pub enum Symbols {
 }
 
 impl Variable {
-    /// Whether it is small and expressions are truncated in it: an error, an unknown of the instrument, a coefficient of an effect.
+    /// Whether it is small, so that expressions are truncated in it: an error, a parameter of the instrument, a coefficient of an effect.
     pub fn is_small(&self) -> bool {
         matches!(
             self,
@@ -47,12 +47,12 @@ impl Variable {
         )
     }
 
-    /// Whether it follows the movement, reading by reading.
+    /// Whether it varies from reading to reading.
     pub fn moves(&self) -> bool {
         matches!(self, Variable::Position { .. } | Variable::Driver(_))
     }
 
-    /// Whether it is an angle; of a coefficient, whether what it moves is one.
+    /// Whether it is an angle; for a coefficient, whether its component is one.
     pub fn is_angle(&self) -> bool {
         match self {
             Variable::Length(_) | Variable::Driver(_) => false,
@@ -63,7 +63,7 @@ impl Variable {
         }
     }
 
-    /// The unit that its values are in.
+    /// The unit of its values.
     pub fn unit(&self) -> &'static str {
         match self {
             Variable::Unknown(unknown) if unknown.unit == InternalUnit::Ratio => "1",
@@ -74,7 +74,7 @@ impl Variable {
         }
     }
 
-    /// In words.
+    /// The meaning in words.
     pub fn meaning(&self) -> String {
         match self {
             Variable::Length(_) => "length of the set-up".to_string(),
@@ -104,7 +104,7 @@ impl Variable {
         }
     }
 
-    /// As it is asked for: `EY0A`, `workpiece_ball.x`, `bar`.
+    /// The name in requests: `EY0A`, `workpiece_ball.x`, `bar`.
     pub fn name(&self) -> String {
         match self {
             Variable::Length(name) => name.clone(),
@@ -117,7 +117,7 @@ impl Variable {
         }
     }
 
-    /// In plain text: `R`, `θ_a`, `e_y0a`.
+    /// The symbol in plain text: `R`, `θ_a`, `e_y0a`.
     pub fn text(&self, symbols: Symbols) -> String {
         match self {
             Variable::Length(name) => name.clone(),
@@ -138,7 +138,7 @@ impl Variable {
         }
     }
 
-    /// Letter and subscript for typeset print: `("e", "y0a")`, `("θ", "a")`, `("R", "")`.
+    /// Letter and subscript for typeset output: `("e", "y0a")`, `("θ", "a")`, `("R", "")`.
     pub fn letter_and_subscript(&self, symbols: Symbols) -> (String, String) {
         let split = |text: String| match text.split_once('_') {
             Some((letter, subscript)) => (letter.to_string(), subscript.replace('_', " ")),
@@ -152,7 +152,7 @@ impl Variable {
         }
     }
 
-    /// In program text: ASCII, lower case.
+    /// The name in code: ASCII, lower case.
     pub fn identifier(&self, symbols: Symbols) -> String {
         let text = match self {
             Variable::Position { axis, kind } => match kind {
@@ -167,7 +167,7 @@ impl Variable {
     }
 }
 
-/// `text` with everything but ASCII letters, digits and underscores replaced, in lower case.
+/// `text` in lower case, with every character except ASCII letters, digits and underscores replaced.
 pub fn identifier(text: &str) -> String {
     let mut clean: String = text
         .chars()

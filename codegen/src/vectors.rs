@@ -1,7 +1,7 @@
-//! The points of a chain by name: the ball in the frame of each axis that it is pushed through, and the bar between the balls.
+//! Named points of a chain: the ball in the frame of each axis, and the bar between the balls.
 //!
-//! Nothing is recorded while the chain runs: equal expressions are one node, so pushing the point once more, step by step, finds
-//! the nodes that the reading is made of.
+//! The chain records nothing about them. Equal expressions are one node, so transforming the point again, step by step, finds the nodes
+//! of the reading.
 
 use std::collections::HashMap;
 
@@ -20,16 +20,16 @@ use crate::symbol::{NodeId, Operand, Symbol};
 /// A vector with a name, such as the workpiece ball in the frame of axis A.
 #[derive(Clone, Debug, PartialEq)]
 pub struct NamedVector {
-    /// `p` for a point on the workpiece side, `q` on the tool side, `b` for the bar, `u` for its unit vector; of a probe `n`, `r`, `v` and `u`
-    /// for its step in R, the point a step ahead, the stylus and the step as the artefact sees them.
+    /// `p` for a point on the workpiece side, `q` on the tool side, `b` for the bar, `u` for its unit vector. For a probe: `n`, `r`, `v`
+    /// and `u` for its step in R, the point one step ahead, the stylus and the step in the frame of the artefact.
     pub letter: &'static str,
-    /// The frame it is given in: an axis, or `R`; empty where it needs none.
+    /// The frame of its coordinates: an axis, or `R`; empty if it needs none.
     pub frame: String,
-    /// Turned by the axis, the axis' own errors still to be applied.
+    /// Whether the axis rotation is applied but the errors of the axis are not.
     pub prime: bool,
     /// The coordinates.
     pub components: [Operand; 3],
-    /// In words.
+    /// The meaning in words.
     pub meaning: String,
 }
 
@@ -45,8 +45,8 @@ impl NamedVector {
     }
 }
 
-/// What a ball or point is called.
-struct Body {
+/// The name of a ball or point.
+struct PointName {
     letter: &'static str,
     meaning: &'static str,
 }
@@ -59,11 +59,11 @@ pub(crate) fn of_subject<'a>(
     errors: &[BodyErrors<Symbol<'a>>],
     unknown: &impl Fn(usize) -> Option<Symbol<'a>>,
 ) -> Vec<NamedVector> {
-    let workpiece = Body {
+    let workpiece = PointName {
         letter: "p",
         meaning: "workpiece ball",
     };
-    let tool = |meaning| Body { letter: "q", meaning };
+    let tool = |meaning| PointName { letter: "q", meaning };
     match subject {
         Subject::Station(Station::BallBar(bar)) => {
             let p = displaced(bar.workpiece_ball, 0, unknown);
@@ -93,7 +93,7 @@ pub(crate) fn of_subject<'a>(
             let mut vectors = on_tool_side(tool("stylus"), machine, state, errors, stylus);
             let stylus = machine.tool_point(state, errors, stylus);
             let (step, _) = probe.step_at(machine, state);
-            let ahead = Body {
+            let ahead = PointName {
                 letter: "r",
                 meaning: "a step ahead",
             };
@@ -104,16 +104,20 @@ pub(crate) fn of_subject<'a>(
             vectors.push(named("n", step, meaning));
             vectors.extend(into_the_table(tool("stylus"), machine, state, errors, stylus));
             vectors.extend(into_the_table(ahead, machine, state, errors, stylus.plus(step)));
-            let sight = probe.sight(machine, state, errors, unknown);
+            let geometry = probe.geometry(machine, state, errors, unknown);
             vectors.push(named(
                 "v",
-                sight.stylus,
-                "stylus from the artefact's axis, across it",
+                geometry.stylus,
+                "position of the stylus perpendicular to the artefact's axis",
             ));
-            vectors.push(named("u", sight.step, "the step across the artefact's axis"));
+            vectors.push(named(
+                "u",
+                geometry.step,
+                "the step perpendicular to the artefact's axis",
+            ));
             vectors
         }
-        // The point that the sensors do not carry; theirs is the origin that it is counted from.
+        // The point that does not carry the sensors; the sensors' point is the origin of the difference.
         Subject::Station(Station::RTest(rtest)) => match rtest.setting {
             Setting::Table => {
                 let q = displaced(rtest.spindle_ball, 3, unknown);
@@ -121,7 +125,7 @@ pub(crate) fn of_subject<'a>(
             }
             Setting::Spindle => {
                 let p = displaced(rtest.workpiece_ball, 0, unknown);
-                let ball = Body {
+                let ball = PointName {
                     letter: "p",
                     meaning: "master ball",
                 };
@@ -145,9 +149,9 @@ fn named(letter: &'static str, vector: Point<Symbol<'_>>, meaning: &str) -> Name
     }
 }
 
-/// A point of R on its way to the table frame, axis by axis.
+/// Transforms a point of R to the table frame, axis by axis.
 fn into_the_table<'a>(
-    body: Body,
+    body: PointName,
     machine: &Machine,
     state: &[AxisPosition<Symbol<'a>>],
     errors: &[BodyErrors<Symbol<'a>>],
@@ -174,7 +178,7 @@ fn into_the_table<'a>(
 }
 
 fn on_workpiece_side<'a>(
-    body: Body,
+    body: PointName,
     machine: &Machine,
     state: &[AxisPosition<Symbol<'a>>],
     errors: &[BodyErrors<Symbol<'a>>],
@@ -188,7 +192,7 @@ fn on_workpiece_side<'a>(
 }
 
 fn on_tool_side<'a>(
-    body: Body,
+    body: PointName,
     machine: &Machine,
     state: &[AxisPosition<Symbol<'a>>],
     errors: &[BodyErrors<Symbol<'a>>],
@@ -201,9 +205,9 @@ fn on_tool_side<'a>(
     along(body, machine, state, errors, point, steps)
 }
 
-/// The point after each step; `steps` gives the axis pushed through and the axis in whose frame the point then is.
+/// The point after each step; `steps` gives the axis of the step and the axis in whose frame the point then is.
 fn along<'a>(
-    body: Body,
+    body: PointName,
     machine: &Machine,
     state: &[AxisPosition<Symbol<'a>>],
     errors: &[BodyErrors<Symbol<'a>>],
@@ -241,7 +245,7 @@ fn along<'a>(
             let origin = axis.origin_mm.map(|o| Symbol::constant(-o));
             let turned = axis.rotate(state[index].turn, point.shifted(origin));
             if turned != pushed {
-                // It is counted from where the axis lies; only then do its errors shift and tilt it.
+                // Coordinates are relative to the origin of the axis before its errors apply.
                 let from = match axis.origin_mm {
                     [0.0, 0.0, 0.0] => String::new(),
                     _ => format!(", from the origin of {}", axis.name),
@@ -259,7 +263,7 @@ fn along<'a>(
     vectors
 }
 
-/// The unit vector of the bar, carried back into each frame: the adjoints of the named points, by name.
+/// The unit vector of the bar, transformed back into each frame: the adjoints of the named points, by name.
 pub(crate) fn adjoint_vectors(vectors: &[NamedVector], adjoints: &Adjoints) -> Vec<NamedVector> {
     vectors
         .iter()
@@ -269,7 +273,7 @@ pub(crate) fn adjoint_vectors(vectors: &[NamedVector], adjoints: &Adjoints) -> V
             let components = vector.components.map(|component| adjoints.of(component));
             let meaning = match vector.letter {
                 "b" => "unit vector of the bar".to_string(),
-                _ => format!("the same carried back: derivatives by the {}", vector.meaning),
+                _ => format!("the same transformed back: derivatives by the {}", vector.meaning),
             };
             NamedVector {
                 letter: "u",
@@ -282,7 +286,7 @@ pub(crate) fn adjoint_vectors(vectors: &[NamedVector], adjoints: &Adjoints) -> V
         .collect()
 }
 
-/// The nodes that the vectors' coordinates are, each under the first name that it is given.
+/// The nodes of the vectors' coordinates, each under its first name.
 pub(crate) fn labels(vectors: &[NamedVector]) -> HashMap<NodeId, Label> {
     let mut labels = HashMap::new();
     for vector in vectors {

@@ -1,7 +1,7 @@
-//! How long a fit takes, from a thousand readings to a million: four ball-bar tests, eight errors and twenty-eight set-up unknowns with priors; how long a
-//! trace of the tests of chapter 5, and a thousand draws of their fit.
+//! Measures the duration of a fit with a thousand to a million readings: four ball-bar tests, eight errors and 28 set-up
+//! parameters with priors. Measures a trace of the tests of chapter 5, and a thousand Monte Carlo draws of their fit.
 //!
-//! `cargo bench -p abbe-identify --bench fit`; `identify/benches/peers.py` does the same with other people's tools.
+//! `cargo bench -p abbe-identify --bench fit`. `identify/benches/peers.py` measures the same with other tools.
 #![allow(missing_docs)]
 
 use std::hint::black_box;
@@ -62,7 +62,7 @@ fn monte_carlo(criterion: &mut Criterion) {
             black_box(result)
         });
     });
-    // The yardstick: to fit as often, from where the fit ended.
+    // For comparison: one fit, started at the result.
     group.bench_function("one fit of chapter 5", |bencher| {
         bencher.iter(|| black_box(fit(&problem, Some(black_box(&found.beta))).expect("a fit")));
     });

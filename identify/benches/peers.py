@@ -1,14 +1,15 @@
-"""The same work with other people's tools, in the same minute: ratios for docs/development/speed.md. `ABBE_PROFILE=checked` takes another build profile.
+"""Measures the same tasks with other tools right after Abbe: the ratios of docs/development/speed.md. `ABBE_PROFILE=checked` selects another
+build profile.
 
     pip install numpy scipy casadi jax
     python identify/benches/peers.py
 
-1. Value and eight derivatives of the tests of chapter 5, a million readings: NumPy by hand, CasADi and JAX by their own derivatives and
-   compilers.
-2. A fit of a million readings, eight errors and twenty-eight set-up unknowns with priors: SciPy `least_squares` with an analytic Jacobian in NumPy;
-   Gauss-Newton on CasADi's own compiled code. Abbe's figures are those of `cargo bench`, taken right before.
+1. Value and eight derivatives of the tests of chapter 5, a million readings: NumPy with derivatives by hand, CasADi and JAX
+   with their own derivatives and compilers.
+2. A fit of a million readings, eight errors and 28 set-up parameters with priors: SciPy `least_squares` with an analytic Jacobian in NumPy;
+   Gauss-Newton on CasADi's own compiled code. Abbe's figures come from `cargo bench`, run immediately before.
 
-CasADi is compiled by gcc -O3 -march=native -fno-math-errno. The least of a few rounds counts.
+CasADi is compiled by gcc -O3 -march=native -fno-math-errno. Each figure is the minimum of a few rounds.
 """
 
 import json
@@ -38,9 +39,9 @@ def least(work, rounds=5):
 
 
 def abbe(bench, name):
-    """Seconds that criterion found for a benchmark, run now."""
+    """Median duration of a benchmark by criterion, run now, in seconds."""
     profile = os.environ.get("ABBE_PROFILE", "bench")
-    # All three packages, as in benches/table.py: nothing is then built anew.
+    # All three packages, as in benches/table.py, so that cargo builds nothing anew.
     packages = [word for package in ("abbe-model", "abbe-identify", "abbe-codegen") for word in ("-p", package)]
     command = ["cargo", "bench", "-q", "--profile", profile, *packages, "--bench", bench, "--", "--warm-up-time", "1"]
     command.append("^" + name + "$")
@@ -51,7 +52,7 @@ def abbe(bench, name):
 
 
 def length(m, q, errors, setup, point, spindle):
-    """The bar over NumPy, JAX or CasADi: `m` has sin, cos, sqrt. The point is pushed through C and A; small angles."""
+    """The bar reading in NumPy, JAX or CasADi; the module `m` has sin, cos, sqrt. The point passes through C and A, with small angles."""
     sin_c, cos_c, sin_a, cos_a = q
     ey, ez, ty, tz, fx, fy, gx, gy = errors
     px, py, pz = (p + s for p, s in zip(point, setup[:3]))
@@ -64,7 +65,7 @@ def length(m, q, errors, setup, point, spindle):
 
 
 def gradient(q, errors, setup, point, spindle):
-    """Value and fifteen derivatives in NumPy, by hand: what a careful user of SciPy writes."""
+    """Value and fifteen derivatives in NumPy, derived by hand, as for SciPy."""
     sin_c, cos_c, sin_a, cos_a = q
     ey, ez, ty, tz, fx, fy, gx, gy = errors
     px, py, pz = (p + s for p, s in zip(point, setup[:3]))
@@ -112,7 +113,7 @@ def derivatives():
     both = jax.jit(jax.vmap(jax.value_and_grad(reading, argnums=1), in_axes=(1, None)))
     device, device_errors = jnp.asarray(q), jnp.asarray(errors)
     found["JAX, jit(vmap(value_and_grad))"] = least(lambda: jax.block_until_ready(both(device, device_errors)))
-    print(f"value and eight derivatives, {READINGS} readings, ns a reading (one thread unless the tool takes more)")
+    print(f"value and eight derivatives, {READINGS} readings, ns per reading (one thread unless the tool uses more)")
     print(f"  Abbe {ours / READINGS * 1e9:.1f}")
     for name, seconds in found.items():
         print(f"  {name} {seconds / READINGS * 1e9:.1f}: {seconds / ours:.1f} times Abbe's time")
@@ -197,7 +198,7 @@ def fits():
         start = time.perf_counter()
         beta, iterations = gauss_newton()
         results["CasADi, compiled, Gauss-Newton"] = (time.perf_counter() - start, beta, iterations)
-    print(f"fit of {READINGS} readings, 8 errors and 28 set-up unknowns, s (Abbe's with rank, outliers, held-out error and uncertainty)")
+    print(f"fit of {READINGS} readings, 8 errors and 28 set-up parameters, s (Abbe's with rank, outliers, held-out error and uncertainty)")
     print(f"  Abbe {ours:.2f}")
     for name, (seconds, x, count) in results.items():
         off = np.abs(x - results["SciPy least_squares, trf"][1]).max() * 1e3

@@ -1,4 +1,4 @@
-//! How long a plan takes: a large one analysed, and a menu of a thousand tests judged.
+//! Measures the duration of a plan: the analysis of a large plan, and the selection from a thousand candidate tests.
 //!
 //! `cargo bench -p abbe-identify --bench plan`
 
@@ -7,7 +7,7 @@ use std::hint::black_box;
 use std::path::Path;
 use std::time::Duration;
 
-use abbe_identify::plan::candidate_tests::CandidateTests;
+use abbe_identify::plan::candidate_tests::TestVariations;
 use abbe_identify::plan::criterion::Goal;
 use abbe_identify::plan::improve::{ImproveOptions, improve};
 use abbe_identify::plan::{PlanOptions, analyse, prepared, states};
@@ -19,7 +19,7 @@ fn sessions() -> std::path::PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("../sessions/hermle-c600u")
 }
 
-/// Ten tests of a thousand readings, sixty-two unknowns.
+/// Ten tests of a thousand readings, 62 parameters.
 fn large_plan() -> Session {
     let folder = tempfile::tempdir().expect("a temporary folder");
     let machine = sessions().join("machine.toml");
@@ -91,12 +91,12 @@ fn plans(criterion: &mut Criterion) {
         tests: 1,
         by_minute: false,
     };
-    let menu = CandidateTests::default();
-    let entries = improve(&problem, &menu, &next)
+    let variations = TestVariations::default();
+    let entries = improve(&problem, &variations, &next)
         .expect("a proposal")
         .candidate_tests;
     group.bench_function(format!("improve/{entries} entries"), |bench| {
-        bench.iter(|| improve(black_box(&problem), &menu, &next).expect("a proposal"));
+        bench.iter(|| improve(black_box(&problem), &variations, &next).expect("a proposal"));
     });
     group.finish();
 }

@@ -1,8 +1,10 @@
 //! The least-squares circle through points of a plane.
 //!
-//! `Σ (x² + y² − 2·a·x − 2·b·y − c)² → min`: linear in the centre `(a, b)` and in `c = ρ² − a² − b²`, so that it needs no start and knows no false
-//! minimum (the equations of Section 4.2 of the thesis). Points that scatter by σ about a circle of radius ρ give the centre of the geometric
+//! `Σ (x² + y² − 2·a·x − 2·b·y − c)² → min` is linear in the centre `(a, b)` and in `c = ρ² − a² − b²`. It needs no start value and has no
+//! local minima (Jiang 2014, Section 4.2). For points that scatter by σ about a circle of radius ρ, the centre is that of the geometric
 //! least-squares circle of ISO 230-7 up to terms of σ²/ρ.
+//!
+//! Jiang (2014): X. Jiang, *Characterising Geometric Errors in Rotary Axes of 5-axis Machine Tools*, PhD thesis, University of Birmingham.
 
 use num_dual::DualNum;
 
@@ -15,7 +17,7 @@ pub struct Circle<D> {
     pub radius: D,
 }
 
-/// The circle of least squares of `x² + y² − 2ax − 2by − c`; `None` for fewer than three points or points on a line.
+/// The least-squares circle of `x² + y² − 2ax − 2by − c`; `None` for fewer than three points or collinear points.
 pub fn through<D: DualNum<Primitive = f64> + Copy>(points: &[[D; 2]]) -> Option<Circle<D>> {
     if points.len() < 3 {
         return None;
@@ -37,7 +39,7 @@ pub fn through<D: DualNum<Primitive = f64> + Copy>(points: &[[D; 2]]) -> Option<
     }
     let determinant = sxx * syy - sxy * sxy;
     let size = (sxx.re() + syy.re()).powi(2);
-    // Below this the points lie on a line as far as double precision can tell.
+    // Below this limit the points are collinear within double precision.
     if determinant.re().is_nan() || determinant.re() <= 1e-14 * size {
         return None;
     }
@@ -56,7 +58,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_circle_is_found_from_part_of_it() {
+    fn an_arc_determines_the_circle() {
         let points: Vec<[f64; 2]> = (0..5)
             .map(|k| (0.3 * f64::from(k)).sin_cos())
             .map(|(sin, cos)| [3.0 + 2.0 * cos, -1.0 + 2.0 * sin])

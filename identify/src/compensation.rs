@@ -1,10 +1,11 @@
-//! Identified error motions as curves over their own axis: what a control compensates.
+//! Identified error motions as functions of the position of their own axis, for compensation tables.
 //!
-//! `E(q) = Σ kᵢ·bᵢ(q)` over the declared effects of one error motion that follow the position of its own axis, or its direction of travel.
-//! A curve covers the positions through which its axis moved in runs that see the error: where the axis merely stood, or no reading sees the error, the
-//! curve would be extrapolated. The uncertainty at a position follows from the covariance of the coefficients, `u²(q) = b(q)ᵀ·Cov·b(q)`.
+//! `E(q) = Σ kᵢ·bᵢ(q)` sums the declared effects of one error motion that depend on the position of its own axis or on its direction of
+//! travel. A curve covers the positions through which its axis moved in runs that observe the error. Other positions would be an
+//! extrapolation: there the axis stood still, or no reading observes the error. The covariance of the coefficients gives the uncertainty
+//! at a position, `u²(q) = b(q)ᵀ·Cov·b(q)`.
 //!
-//! What follows anything else (time, temperature, speed) no table over a position can hold; it is left out by name.
+//! A table over a position cannot hold an effect of time, temperature or speed. Such effects are listed as excluded.
 
 mod range;
 
@@ -17,38 +18,38 @@ use crate::fit::Fit;
 use crate::parameters::Role;
 use crate::problem::Problem;
 
-/// One error motion over the position of its axis.
+/// One error motion as a function of the position of its axis.
 #[derive(Clone, Debug)]
 pub struct ErrorCurve {
-    /// Which, as `EXX`.
+    /// The error, for example `EXX`.
     pub error: ErrorName,
     /// Its axis, by index in the machine.
     pub axis: usize,
-    /// The positions through which the axis moved while readings saw the error, mm or rad.
+    /// The positions through which the axis moved while readings observed the error, mm or rad.
     pub range: Range<f64>,
     terms: Vec<(Effect, Vec<f64>)>,
-    /// Where the coefficients of the terms stand among the fit's parameters, one after another.
-    places: Vec<usize>,
-    /// Covariance of the coefficients, row by row, enlarged as the fit's uncertainties are; internal units.
+    /// The indices of the terms' coefficients among the fit's parameters, term by term.
+    coefficients: Vec<usize>,
+    /// Covariance of the coefficients, row by row, with the fit's factor on uncertainties; internal units.
     covariance: Vec<Vec<f64>>,
 }
 
 impl ErrorCurve {
-    /// The basis functions of all terms at a position (mm or rad) reached in a direction (+1 or −1).
+    /// The basis functions of all terms at a position (mm or rad), approached in a direction (+1 or −1).
     fn basis(&self, position: f64, direction: f64) -> Vec<f64> {
         let sample = DriverSample {
             value: position,
             direction,
             ..DriverSample::default()
         };
-        let mut basis = Vec::with_capacity(self.places.len());
+        let mut basis = Vec::with_capacity(self.coefficients.len());
         for (effect, _) in &self.terms {
             effect.shape.basis(&sample, &mut basis);
         }
         basis
     }
 
-    /// The error at a position (mm or rad) reached in a direction (+1 or −1), mm or rad.
+    /// The error at a position (mm or rad), approached in a direction (+1 or −1), mm or rad.
     pub fn at(&self, position: f64, direction: f64) -> f64 {
         let coefficients = self.terms.iter().flat_map(|(_, coefficients)| coefficients);
         let basis = self.basis(position, direction);
@@ -88,14 +89,14 @@ impl ErrorCurve {
     }
 }
 
-/// What can be compensated, and what not.
+/// The identified errors that a control can compensate, and those that it cannot.
 #[derive(Clone, Debug, Default)]
 pub struct Compensation {
-    /// Error motions over their own axis.
+    /// Error motions as functions of their own axis.
     pub curves: Vec<ErrorCurve>,
-    /// Location errors that were identified, mm or rad.
+    /// Identified location errors, mm or rad.
     pub locations: Vec<(ErrorName, f64)>,
-    /// What was identified of the machine and is in neither, with the reason.
+    /// Identified machine errors that are in neither list, with the reason.
     pub left_out: Vec<String>,
 }
 
@@ -111,7 +112,7 @@ pub fn of_fit(problem: &Problem<'_>, fit: &Fit) -> Compensation {
         match ErrorName::parse(&parameter.id) {
             Some(name) if name.kind == ErrorKind::Location => result.locations.push((name, fit.beta[j])),
             _ => result.left_out.push(format!(
-                "{}: a constant of an error motion is no curve",
+                "{}: a constant error motion is not a function of the position",
                 parameter.id
             )),
         }
@@ -143,60 +144,63 @@ pub fn of_fit(problem: &Problem<'_>, fit: &Fit) -> Compensation {
         };
         if error.kind != ErrorKind::Motion || !fits_table {
             result.left_out.push(format!(
-                "{id}: no table over the position of its axis can hold it"
+                "{id}: a table over the position of its axis cannot represent it"
             ));
             continue;
         }
         if !effect.tests.is_empty() {
-            let why = "it is confined to some tests, and so no property of the axis";
+            let why = "it acts in some tests only, so it is not a property of the axis";
             result.left_out.push(format!("{id}: {why}"));
             continue;
         }
-        let (Some(axis), Some(places)) = (
+        let (Some(axis), Some(coefficients)) = (
             machine.axis_index(&error.axis),
             found.into_iter().collect::<Option<Vec<usize>>>(),
         ) else {
             result
                 .left_out
-                .push(format!("{id}: the readings do not tell all of it"));
+                .push(format!("{id}: not all of its coefficients are identifiable"));
             continue;
         };
-        let term = (effect.clone(), places.iter().map(|j| fit.beta[*j]).collect());
+        let term = (
+            effect.clone(),
+            coefficients.iter().map(|j| fit.beta[*j]).collect(),
+        );
         if let Some(curve) = result.curves.iter_mut().find(|curve| curve.error == *error) {
             curve.terms.push(term);
-            curve.places.extend(places);
+            curve.coefficients.extend(coefficients);
             continue;
         }
-        let Some(covered) = range::covered(problem, error, axis) else {
-            let why = "its axis stands wherever readings see it, and what lies between is not measured";
+        let Some(observed) = range::observed_range(problem, error, axis) else {
+            let why = "its axis stands still wherever readings observe it, and the positions between are not measured";
             result.left_out.push(format!("{id}: {why}"));
             continue;
         };
         let kind = machine.axes[axis].kind;
-        for apart in &covered.apart {
+        for unconnected in &observed.unconnected {
             result.left_out.push(format!(
-                "{error} from {:.3} to {:.3} {}: apart from the longest stretch that the axis moved over",
-                kind.outside(apart.start),
-                kind.outside(apart.end),
+                "{error} from {:.3} to {:.3} {}: not connected to the longest range of motion of the axis",
+                kind.to_display(unconnected.start),
+                kind.to_display(unconnected.end),
                 kind.unit()
             ));
         }
         result.curves.push(ErrorCurve {
             error: error.clone(),
             axis,
-            range: covered.range,
+            range: observed.range,
             terms: vec![term],
-            places,
+            coefficients,
             covariance: Vec::new(),
         });
     }
     let enlarged = fit.u_enlargement.powi(2);
     for curve in &mut result.curves {
         let row = |j: &usize| -> Vec<f64> {
-            let columns = curve.places.iter();
+            let columns = curve.coefficients.iter();
             columns.map(|k| fit.covariance[(*j, *k)] * enlarged).collect()
         };
-        curve.covariance = curve.places.iter().map(row).collect();
+        curve.covariance = curve.coefficients.iter().map(row).collect();
     }
     result
 }

@@ -7,22 +7,22 @@ use crate::problem::Problem;
 use crate::rank::Rank;
 use crate::results::{Covariance, NullSpace, ParameterResult};
 
-/// Covariance of the reported parameters by the law of propagation of uncertainty, in their order and units. It is enlarged as their standard uncertainties
-/// are, so that its diagonal holds their squares.
+/// Covariance of the reported parameters by the law of propagation of uncertainty, in their order and units. It has the same factor as the
+/// standard uncertainties, so its diagonal holds their squares.
 pub(crate) fn of_parameters(problem: &Problem<'_>, fit: &Fit, parameters: &[ParameterResult]) -> Covariance {
     let list = &problem.parameters.list;
     // Rows of the Jacobian of the reported quantities: their parameters, and the derivative by each.
     let mut rows: Vec<Vec<(usize, f64)>> = Vec::with_capacity(parameters.len());
     for quantity in quantities(problem, &fit.rank) {
         match quantity {
-            Quantity::Unknown(j) => rows.push(vec![(j, list[j].unit.display_per_internal)]),
+            Quantity::Parameter(j) => rows.push(vec![(j, list[j].unit.display_per_internal)]),
             Quantity::Harmonic(j) => {
                 let (a, b) = (fit.beta[j], fit.beta[j + 1]);
                 let amplitude = a.hypot(b).max(f64::MIN_POSITIVE);
-                let outside = list[j].unit.display_per_internal;
+                let display = list[j].unit.display_per_internal;
                 rows.push(vec![
-                    (j, a / amplitude * outside),
-                    (j + 1, b / amplitude * outside),
+                    (j, a / amplitude * display),
+                    (j + 1, b / amplitude * display),
                 ]);
                 let per_radian = 1.0_f64.to_degrees() / amplitude;
                 rows.push(vec![
@@ -53,8 +53,8 @@ pub(crate) fn of_parameters(problem: &Problem<'_>, fit: &Fit, parameters: &[Para
     }
 }
 
-/// Makes the diagonal of a covariance equal to the squares of standard uncertainties, so that it stays positive semidefinite: what an uncertainty holds in
-/// addition (competing explanations) is added as uncorrelated; a phase, whose uncertainty has an upper limit, is scaled.
+/// Sets the diagonal of a covariance to the squares of the standard uncertainties, and keeps the matrix positive semidefinite. An additional
+/// contribution (competing explanations) is added as uncorrelated. A phase, whose uncertainty has an upper limit, is scaled.
 fn adapt_diagonal(matrix: &mut Mat<f64>, parameters: &[ParameterResult]) {
     for (i, parameter) in parameters.iter().enumerate().take(matrix.nrows()) {
         let variance = parameter.u * parameter.u;
@@ -70,20 +70,20 @@ fn adapt_diagonal(matrix: &mut Mat<f64>, parameters: &[ParameterResult]) {
     }
 }
 
-/// The null space in reduced row echelon form, in display units: the parameters that take part in it, in their order.
+/// The null space in reduced row echelon form, in display units, over the parameters that take part in it, in their order.
 pub(crate) fn null_space(problem: &Problem<'_>, rank: &Rank) -> NullSpace {
     let list = &problem.parameters.list;
     let involved: Vec<usize> = (0..list.len())
         .filter(|j| rank.unseen.iter().any(|row| row[*j] != 0.0))
         .collect();
-    let outside = |row: &[f64], j: usize| row[j] * list[j].size * list[j].unit.display_per_internal;
+    let displayed = |row: &[f64], j: usize| row[j] * list[j].size * list[j].unit.display_per_internal;
     let vectors = rank
         .unseen
         .iter()
         .zip(&rank.pivots)
         .map(|(row, pivot)| {
-            let leading = outside(row, *pivot);
-            involved.iter().map(|j| outside(row, *j) / leading).collect()
+            let leading = displayed(row, *pivot);
+            involved.iter().map(|j| displayed(row, *j) / leading).collect()
         })
         .collect();
     NullSpace {

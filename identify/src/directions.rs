@@ -1,12 +1,13 @@
-//! One vector of an R-test in three frames: that of the sensors, that of the machine, and that of the rotary axis that turns.
+//! Components of an R-test vector in three frames: the sensor frame, the reference frame R, and the frame of the turning rotary axis.
 //!
 //! ```text
-//! x-wise, y-wise, z-wise        d · X, d · Y, d · Z       R's directions: the share of each linear axis is the same wherever it stands
+//! x-wise, y-wise, z-wise        d · X, d · Y, d · Z       R's directions: the share of each linear axis is the same at every position
 //! radial, tangential, axial     d · r, d · (a × r), d · a
 //! ```
 //!
-//! with `a` the direction of the axis that turns, as the axes beneath it carry it, and `r` the direction from it to the ball. For a C axis with the ball at
-//! +X at C = 0 the two are Eqs. (10) and (11) of Yamaji, Hamabata & Ihara (2014): radial `X cos C + Y sin C`, tangential `−X sin C + Y cos C`.
+//! `a` is the direction of the turning axis, as carried by the axes beneath it. `r` is the direction from the axis to the ball. For a C
+//! axis with the ball at +X at C = 0, radial and tangential are Eqs. (10) and (11) of Yamaji, Hamabata & Ihara (2014): radial
+//! `X cos C + Y sin C`, tangential `−X sin C + Y cos C`.
 
 use abbe_model::axis::AxisKind;
 use abbe_model::chain::{AxisPosition, BodyErrors, Machine};
@@ -20,30 +21,30 @@ use crate::error::IdentifyError;
 use crate::fit::Fit;
 use crate::problem::Problem;
 
-/// A ball nearer than this to the axis that turns has no radial direction, mm.
+/// Distance of the ball from the turning axis below which it has no radial direction, mm.
 const ON_THE_AXIS_MM: f64 = 1e-6;
 
-/// A vector, mm, in the frames in which it is looked at.
+/// The components of a vector, mm, in three frames.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct DirectionFrame {
     /// In the frame that carries the sensors.
     pub sensors: [f64; 3],
     /// Along X, Y, Z of R.
     pub wise: [f64; 3],
-    /// Radial, tangential, axial; `None` where no single rotary axis turns in the test, or the ball lies on it.
+    /// Radial, tangential, axial; `None` if no single rotary axis turns in the test, or if the ball lies on it.
     pub turning: Option<[f64; 3]>,
 }
 
-/// One reading of a test in its views.
+/// The components of one reading.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct DirectionComponents {
-    /// What was read.
+    /// The reading.
     pub reading: DirectionFrame,
-    /// What the fit leaves of it.
+    /// Its residual.
     pub residual: DirectionFrame,
 }
 
-/// The views of every reading, test by test. Sensors are turned back by their directions and by the ω₁, φ₁, θ₁ that the fit finds.
+/// The components of every reading, test by test. The sensors' directions and the fitted ω₁, φ₁, θ₁ are undone.
 ///
 /// # Errors
 /// If the session's instrument is no R-test.
@@ -54,7 +55,7 @@ pub fn views(problem: &Problem<'_>, fit: &Fit) -> Result<Vec<Vec<DirectionCompon
     for (number, test) in problem.tests.iter().enumerate() {
         let (Station::RTest(rtest), Some(readings)) = (&test.station, &test.readings) else {
             return Err(IdentifyError::Request(format!(
-                "views part the three directions of an r-test; this session's instrument is a {}",
+                "directional components need an r-test; this session's instrument is a {}",
                 problem.session.instrument.word()
             )));
         };
@@ -66,11 +67,11 @@ pub fn views(problem: &Problem<'_>, fit: &Fit) -> Result<Vec<Vec<DirectionCompon
             .map(|row| {
                 readings.state(machine, row, &mut state);
                 let frames = Frames::at(machine, rtest, &state, turning);
-                let seen = |read: &[f64]| frames.view(rtest, &orientation, read);
-                let three = 3 * row..3 * row + 3;
+                let components = |read: &[f64]| frames.view(rtest, &orientation, read);
+                let scalars = 3 * row..3 * row + 3;
                 DirectionComponents {
-                    reading: seen(&readings.observed[three.clone()]),
-                    residual: seen(&fit.residuals[number][three]),
+                    reading: components(&readings.observed[scalars.clone()]),
+                    residual: components(&fit.residuals[number][scalars]),
                 }
             })
             .collect();
@@ -79,7 +80,7 @@ pub fn views(problem: &Problem<'_>, fit: &Fit) -> Result<Vec<Vec<DirectionCompon
     Ok(all)
 }
 
-/// The one rotary axis that turns in a test.
+/// The single rotary axis that turns in a test.
 fn turning(machine: &Machine, readings: &Readings) -> Option<usize> {
     let mut turning = (0..machine.axes.len()).filter(|&axis| {
         let positions = &readings.positions[axis];
@@ -89,7 +90,7 @@ fn turning(machine: &Machine, readings: &Readings) -> Option<usize> {
     turning.next().filter(|_| turning.next().is_none())
 }
 
-/// The directions of a reading, in R, of the nominal machine.
+/// The directions of a reading in R, from the nominal machine.
 struct Frames {
     /// From the frame that carries the sensors to R.
     carrier: Matrix3<f64>,
@@ -138,7 +139,7 @@ impl Frames {
         let read = Vector3::from_row_slice(read);
         let nominal = match rtest.sensors {
             None => read,
-            // Directions that lie in a plane are refused where they are read.
+            // Reading the session rejects sensor directions that lie in a plane.
             Some(rows) => {
                 let directions = Matrix3::from_fn(|i, j| rows[i][j]);
                 directions.lu().solve(&read).unwrap_or(read)

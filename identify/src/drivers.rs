@@ -1,4 +1,4 @@
-//! What the drivers of effects do in a test, and the basis functions of shapes over them.
+//! Values of the drivers of effects in a test, and the basis functions of shapes over them.
 
 use abbe_model::chain::Machine;
 use abbe_model::effect::{Component, Driver, DriverSample, Effect, Shape};
@@ -9,7 +9,7 @@ use abbe_model::session::{Session, Test};
 
 use crate::unit::Unit;
 
-/// What the whole session shares: when it began and how warm it was.
+/// Reference time and temperature of the session.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Origin {
     /// Time of the session's first reading, s.
@@ -19,7 +19,7 @@ pub struct Origin {
 }
 
 impl Origin {
-    /// Of a session.
+    /// The reference values of a session.
     pub fn of(session: &Session) -> Origin {
         let readings = || session.tests.iter().filter_map(|test| test.readings.as_ref());
         let first = readings()
@@ -35,8 +35,8 @@ impl Origin {
     }
 }
 
-/// What a driver does in a test, row by row; `None` where the data have no such column. `component_axis` is the axis whose moment the gravity
-/// driver takes: that of a weight at the point of the instrument that the axis carries.
+/// The values of a driver in a test, row by row; `None` if the data lack its column. `component_axis` is the axis of the gravity driver.
+/// That driver is the moment of a unit weight about this axis; the weight acts at the instrument's point that the axis carries.
 pub fn samples(
     machine: &Machine,
     model: &TestModel<'_>,
@@ -85,7 +85,7 @@ pub fn samples(
     }
 }
 
-/// The basis functions of a shape over a driver: one column a coefficient.
+/// The basis functions of a shape over a driver: one column per coefficient.
 pub fn basis_columns(shape: &Shape, samples: &[DriverSample<f64>]) -> Vec<Vec<f64>> {
     let count = shape.coefficients();
     let mut columns = vec![vec![0.0; samples.len()]; count];
@@ -163,7 +163,7 @@ pub fn component_unit(session: &Session, component: &Component) -> Option<Intern
 
 /// The unit in which coefficient `k` of an effect is reported.
 pub fn coefficient_unit(session: &Session, effect: &Effect, k: usize) -> Unit {
-    let Some(inside) = component_unit(session, &effect.component) else {
+    let Some(internal_unit) = component_unit(session, &effect.component) else {
         return Unit {
             name: "ms".to_string(),
             display_per_internal: 1e3,
@@ -174,10 +174,10 @@ pub fn coefficient_unit(session: &Session, effect: &Effect, k: usize) -> Unit {
         Driver::Axis(name) => machine.axis_index(name).map(|axis| machine.axes[axis].kind),
         _ => None,
     };
-    Unit::of_coefficient(inside, &effect.driver, driver_axis, &effect.shape, k)
+    Unit::of_coefficient(internal_unit, &effect.driver, driver_axis, &effect.shape, k)
 }
 
-/// The axis that a component belongs to.
+/// The axis of a component.
 pub fn component_axis(session: &Session, component: &Component) -> Option<usize> {
     match component {
         Component::Axis(name) => session.machine.axis_index(&name.axis),

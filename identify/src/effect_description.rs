@@ -1,7 +1,8 @@
-//! Effects in words for whoever works on the machine: `C table: axial motion twice per turn`.
+//! Plain descriptions of effects for work at the machine: `C table: axial motion twice per turn`.
 //!
-//! The words follow from component × driver × shape, so that every effect of the library has them, and no two have the same. Parts are named by their place
-//! in the chain: a rotary axis on the workpiece side is a table, on the tool side a head, a linear axis a slide, an axis of a robot a joint.
+//! A description follows from component × driver × shape, so every effect of the library has its own. Machine parts are named by their
+//! position in the chain. A rotary axis on the workpiece side is a table, on the tool side a head. A linear axis is a slide, an axis of a
+//! robot a joint.
 
 use std::fmt;
 
@@ -10,7 +11,7 @@ use abbe_model::chain::Machine;
 use abbe_model::component::{ErrorKind, ErrorName, Freedom};
 use abbe_model::effect::{Component, Driver, Effect, Shape};
 
-/// What an effect means: the part of the machine or instrument, and what it does.
+/// The description of an effect: the part of the machine or instrument, and its error.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Meaning {
     /// `C table`, `X slide`, `joint J2`, `workpiece ball`.
@@ -25,34 +26,34 @@ impl fmt::Display for Meaning {
     }
 }
 
-/// What an effect means on a machine.
+/// The description of an effect on a machine.
 pub fn meaning(machine: &Machine, effect: &Effect) -> Meaning {
-    let words = Words { machine, effect };
+    let terms = EffectTerms { machine, effect };
     let tests = match effect.tests.as_slice() {
         [] => String::new(),
         [test] => format!(", in test {test}"),
         tests => format!(", in tests {}", tests.join(", ")),
     };
     Meaning {
-        part: words.part(),
-        what: format!("{}{tests}", words.what()),
+        part: terms.part(),
+        what: format!("{}{tests}", terms.what()),
     }
 }
 
-/// What a component is on a machine, whatever it follows: `C table: axial motion`.
+/// The description of a component on a machine, without a driver: `C table: axial motion`.
 pub(crate) fn component_meaning(machine: &Machine, component: &Component) -> Meaning {
     let effect = constant(component.clone());
-    let words = Words {
+    let terms = EffectTerms {
         machine,
         effect: &effect,
     };
     Meaning {
-        part: words.part(),
-        what: words.motion(),
+        part: terms.part(),
+        what: terms.motion(),
     }
 }
 
-/// Several explanations in one phrase, each part of the machine once, in the order in which the parts first occur.
+/// Joins several explanations into one phrase. Each part of the machine occurs once, in the order of first occurrence.
 pub fn explanations(meanings: &[Meaning]) -> String {
     let mut parts: Vec<(&str, Vec<&str>)> = Vec::new();
     for Meaning { part, what } in meanings {
@@ -66,7 +67,7 @@ pub fn explanations(meanings: &[Meaning]) -> String {
     parts.join("; or ")
 }
 
-/// A component that follows nothing, as an effect.
+/// A constant effect on a component.
 fn constant(component: Component) -> Effect {
     Effect {
         component,
@@ -76,7 +77,7 @@ fn constant(component: Component) -> Effect {
     }
 }
 
-/// The name of an axis as a part of its machine.
+/// The name of an axis as a machine part.
 fn part_of_axis(machine: &Machine, axis: usize) -> String {
     let Axis { name, kind, .. } = &machine.axes[axis];
     let has = |kind: AxisKind| machine.axes.iter().any(|axis| axis.kind == kind);
@@ -90,17 +91,17 @@ fn part_of_axis(machine: &Machine, axis: usize) -> String {
     }
 }
 
-/// X, Y or Z: the direction of a translation, or the one that a rotation turns about.
+/// X, Y or Z: the direction of a translation, or the axis of a rotation.
 fn direction(freedom: Freedom) -> char {
     Freedom::ALL[freedom.index() % 3].letter()
 }
 
-struct Words<'w> {
+struct EffectTerms<'w> {
     machine: &'w Machine,
     effect: &'w Effect,
 }
 
-impl Words<'_> {
+impl EffectTerms<'_> {
     fn axis_of_component(&self) -> Option<usize> {
         match &self.effect.component {
             Component::Axis(name) => self.machine.axis_index(&name.axis),
@@ -119,7 +120,7 @@ impl Words<'_> {
         self.axis_of_driver().is_some() && self.axis_of_driver() == self.axis_of_component()
     }
 
-    /// What moves.
+    /// The part that moves.
     fn part(&self) -> String {
         match &self.effect.component {
             Component::Axis(name) => match self.axis_of_component() {
@@ -135,7 +136,7 @@ impl Words<'_> {
         }
     }
 
-    /// In which way it moves.
+    /// The motion of the part.
     fn motion(&self) -> String {
         match &self.effect.component {
             Component::Axis(name) => self.axis_motion(name),
@@ -181,8 +182,8 @@ impl Words<'_> {
         }
     }
 
-    /// What it follows, as the object of a sentence: `its angle`, `the position of the X slide`, `time`.
-    fn followed(&self) -> String {
+    /// The driver as the object of a sentence: `its angle`, `the position of the X slide`, `time`.
+    fn driver_phrase(&self) -> String {
         let quantity = |axis: usize| match self.machine.axes[axis].kind {
             AxisKind::Rotary => "angle",
             AxisKind::Linear => "position",
@@ -202,8 +203,8 @@ impl Words<'_> {
         }
     }
 
-    /// ` of the X slide` where it follows another axis.
-    fn of_another(&self) -> String {
+    /// ` of the X slide` if the effect follows another axis.
+    fn of_another_axis(&self) -> String {
         match self.axis_of_driver() {
             Some(axis) if !self.follows_its_own_axis() => {
                 format!(" of the {}", part_of_axis(self.machine, axis))
@@ -212,58 +213,63 @@ impl Words<'_> {
         }
     }
 
-    /// A position, period or width of what it follows, with its unit.
-    fn place(&self, value: f64) -> String {
+    /// A position, period or width of the driver, with its unit.
+    fn at_value(&self, value: f64) -> String {
         let rotary = self
             .axis_of_driver()
             .is_some_and(|axis| self.machine.axes[axis].kind == AxisKind::Rotary);
         match self.effect.driver {
-            Driver::Time => format!("{} s", digits(value)),
-            Driver::Temperature => format!("{} °C", digits(value)),
-            Driver::Gravity => format!("{} m", digits(value)),
-            _ if rotary => format!("{}°", digits(value.to_degrees())),
-            _ => format!("{} mm", digits(value)),
+            Driver::Time => format!("{} s", four_digits(value)),
+            Driver::Temperature => format!("{} °C", four_digits(value)),
+            Driver::Gravity => format!("{} m", four_digits(value)),
+            _ if rotary => format!("{}°", four_digits(value.to_degrees())),
+            _ => format!("{} mm", four_digits(value)),
         }
     }
 
-    /// In which way it moves, and how that follows its driver.
+    /// The motion and its dependence on the driver.
     fn what(&self) -> String {
         let motion = self.motion();
         match &self.effect.shape {
             Shape::Constant => format!("{motion}, constant"),
             Shape::Power { degree, .. } => format!("{motion}{}", self.power(*degree)),
             Shape::Polynomial { degree, .. } => {
-                format!("{motion}, a polynomial of degree {degree} in {}", self.followed())
+                format!(
+                    "{motion}, a polynomial of degree {degree} in {}",
+                    self.driver_phrase()
+                )
             }
-            Shape::Harmonic { order } => format!("{motion} {} per turn{}", times(*order), self.of_another()),
+            Shape::Harmonic { order } => {
+                format!("{motion} {} per turn{}", times(*order), self.of_another_axis())
+            }
             Shape::Periodic { period } => {
                 format!(
                     "{motion}, repeating every {}{}",
-                    self.place(*period),
-                    self.of_another()
+                    self.at_value(*period),
+                    self.of_another_axis()
                 )
             }
             Shape::Curve { intervals, .. } => {
                 format!(
-                    "{motion}, a free curve over {} in {intervals} intervals",
-                    self.followed()
+                    "{motion}, a nonparametric curve over {} in {intervals} intervals",
+                    self.driver_phrase()
                 )
             }
             Shape::Backlash => self.backlash(motion),
             Shape::Lag => self.lag(motion),
             Shape::ReversalSpike { width } => format!(
-                "{motion}, a spike after reversal{} that dies away over {}",
-                self.of_another(),
-                self.place(*width)
+                "{motion}, a spike after reversal{} that decays over {}",
+                self.of_another_axis(),
+                self.at_value(*width)
             ),
-            Shape::Drift => format!("{motion}, drifting with {}", self.followed()),
+            Shape::Drift => format!("{motion}, drifting with {}", self.driver_phrase()),
             Shape::Warmup { tau_s } => {
                 format!(
                     "{motion}, warming up with a time constant of {} s",
-                    digits(*tau_s)
+                    four_digits(*tau_s)
                 )
             }
-            Shape::Steps { at } => format!("{motion}, {}{}", self.steps(at), self.of_another()),
+            Shape::Steps { at } => format!("{motion}, {}{}", self.steps(at), self.of_another_axis()),
             Shape::Local {
                 centre,
                 width,
@@ -272,27 +278,27 @@ impl Words<'_> {
                 let each_turn = if recurs.is_some() { " of each turn" } else { "" };
                 format!(
                     "{motion}, a local feature at {}{each_turn}{}, {} to either side",
-                    self.place(*centre),
-                    self.of_another(),
-                    self.place(*width)
+                    self.at_value(*centre),
+                    self.of_another_axis(),
+                    self.at_value(*width)
                 )
             }
         }
     }
 
     fn power(&self, degree: usize) -> String {
-        let followed = self.followed();
+        let driver_phrase = self.driver_phrase();
         match (degree, &self.effect.driver) {
             (1, Driver::Temperature) => ", following the temperature".to_string(),
             (1, Driver::Gravity) => " under gravity (compliance)".to_string(),
-            (1, _) => format!(" in proportion to {followed}"),
-            (2, _) => format!(" with the square of {followed}"),
-            (3, _) => format!(" with the cube of {followed}"),
-            (degree, _) => format!(" with {followed} to the power of {degree}"),
+            (1, _) => format!(" in proportion to {driver_phrase}"),
+            (2, _) => format!(" with the square of {driver_phrase}"),
+            (3, _) => format!(" with the cube of {driver_phrase}"),
+            (degree, _) => format!(" with {driver_phrase} to the power of {degree}"),
         }
     }
 
-    /// Whether the component is the error of the axis in the very freedom that it moves in.
+    /// Whether the component is the positioning error of its axis.
     fn is_positioning(&self) -> bool {
         let Component::Axis(name) = &self.effect.component else {
             return false;
@@ -309,7 +315,7 @@ impl Words<'_> {
         } else {
             format!(
                 "{motion} that changes at reversal{} (backlash)",
-                self.of_another()
+                self.of_another_axis()
             )
         }
     }
@@ -318,31 +324,31 @@ impl Words<'_> {
         if self.is_positioning() {
             "lag behind the command in proportion to the speed".to_string()
         } else {
-            format!("{motion} in proportion to the speed{}", self.of_another())
+            format!("{motion} in proportion to the speed{}", self.of_another_axis())
         }
     }
 
     fn steps(&self, at: &[f64]) -> String {
         match at {
-            [one] => format!("a step at {}", self.place(*one)),
-            [first, .., last] if at.len() > MAX_PLACES => {
+            [one] => format!("a step at {}", self.at_value(*one)),
+            [first, .., last] if at.len() > MAX_LISTED_STEPS => {
                 format!(
                     "{} steps from {} to {}",
                     at.len(),
-                    self.place(*first),
-                    self.place(*last)
+                    self.at_value(*first),
+                    self.at_value(*last)
                 )
             }
             several => {
-                let places: Vec<String> = several.iter().map(|place| self.place(*place)).collect();
-                format!("steps at {}", places.join(", "))
+                let steps_listed: Vec<String> = several.iter().map(|place| self.at_value(*place)).collect();
+                format!("steps at {}", steps_listed.join(", "))
             }
         }
     }
 }
 
-/// Steps that are listed one by one.
-const MAX_PLACES: usize = 6;
+/// Maximum number of steps in a list.
+const MAX_LISTED_STEPS: usize = 6;
 
 /// `once`, `twice`, `17 times`.
 fn times(order: f64) -> String {
@@ -356,7 +362,7 @@ fn times(order: f64) -> String {
 }
 
 /// Four significant digits, at most four decimals.
-fn digits(value: f64) -> String {
+fn four_digits(value: f64) -> String {
     let magnitude = value.abs().max(1e-3).log10().floor() as i32;
     let text = format!("{value:.*}", (3 - magnitude).clamp(0, 4) as usize);
     match text.strip_prefix('-') {

@@ -1,51 +1,51 @@
 //! The error type of this crate.
 
-/// Why an identification cannot be done.
+/// Errors of an identification.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum IdentifyError {
-    /// Something in the session.
+    /// The session is invalid.
     #[error(transparent)]
     Model(#[from] abbe_model::ModelError),
-    /// A session without readings.
+    /// The session has no readings.
     #[error(
-        "the session has no readings: no test names a `data` file; `abbe simulate` makes readings, `abbe plan` needs none"
+        "the session has no readings: no test names a `data` file; add `data` files to the tests, or simulate readings"
     )]
     NoReadings,
-    /// Nothing to identify.
+    /// The session has no parameters to estimate.
     #[error(
-        "the session has nothing to identify: `[unknowns] errors` is empty, no effect is declared and every set-up is known exactly"
+        "the session has no parameters to estimate: `[unknowns] errors` is empty, no effect is declared and every set-up quantity is known exactly"
     )]
     NoUnknowns,
-    /// Something to look for that is in no identifier of the library.
+    /// A filter text matches no identifier in the effect library.
     #[error(
-        "no effect that the library has for this session has `{text}` in its identifier, as EZC~C:h2; `abbe trace --list` shows them all"
+        "no candidate effect of this session contains `{text}` in its identifier; identifiers look like EZC~C:h2"
     )]
     NotInTheLibrary {
-        /// What was looked for.
+        /// The filter text.
         text: String,
     },
-    /// What is left out is all that was to be looked for.
+    /// The filters exclude every candidate effect.
     #[error(
-        "nothing is left to look for: what `--only` asks for is left out by `--exclude`, or everything is"
+        "no candidate effects remain: the exclusions remove every selected effect; exclude fewer effects"
     )]
     EverythingLeftOut,
-    /// The caller asked for an end; a trace that has begun its search returns the effects found until then instead.
+    /// The caller interrupted the computation. A trace that has begun its search returns the effects found so far instead.
     #[error("interrupted before there was a result")]
     Interrupted,
-    /// A declared effect that needs a column the data lack.
+    /// The data lack a column that a declared effect needs.
     #[error("effect `{effect}` follows {driver}, but the data of test `{test}` have no column `{column}`")]
     MissingDriver {
         /// The effect.
         effect: String,
-        /// What it follows.
+        /// Its driver.
         driver: String,
         /// The test.
         test: String,
-        /// The column.
+        /// The missing column.
         column: String,
     },
-    /// An effect whose component this session's instrument does not have.
+    /// The instrument of this session lacks the component of an effect.
     #[error("effect `{effect}`: a {instrument} session has no component `{component}`")]
     NoSuchComponent {
         /// The effect.
@@ -55,47 +55,47 @@ pub enum IdentifyError {
         /// The instrument.
         instrument: &'static str,
     },
-    /// Two unknowns of one name.
-    #[error("`{id}` is an unknown twice; remove one of the two declarations")]
+    /// Two parameters have the same identifier.
+    #[error("`{id}` is declared twice; remove one of the two declarations")]
     RepeatedUnknown {
         /// The identifier.
         id: String,
     },
     /// The model yields a number that is not finite.
     #[error(
-        "test `{test}`, reading {row}: the model yields {value}; two balls in one place or a coordinate that is not finite does this"
+        "test `{test}`, reading {row}: the model yields {value}; check for coinciding ball positions and for coordinates that are not finite"
     )]
     NotFinite {
         /// The test.
         test: String,
         /// The row, from 1.
         row: usize,
-        /// What it yields.
+        /// The value.
         value: f64,
     },
-    /// Iterations that do not end.
+    /// The iterations did not converge.
     #[error(
-        "no convergence after {iterations} iterations (the sum of squares stands at {sum_of_squares:e}); \
-         the start is too far off or the readings do not belong to this machine"
+        "no convergence after {iterations} iterations (the sum of squares is {sum_of_squares:e}); \
+         check that the readings belong to this machine and that the nominal geometry is right"
     )]
     NoConvergence {
-        /// How many were made.
+        /// The number of iterations.
         iterations: usize,
-        /// Where it stands.
+        /// The last sum of squares.
         sum_of_squares: f64,
     },
-    /// Readings that contradict the session.
+    /// The readings contradict the session.
     #[error("{found}; {diagnosis}")]
     Contradicted {
         /// What was found.
         found: String,
-        /// What may be wrong.
+        /// Possible causes.
         diagnosis: String,
     },
-    /// A decomposition that failed.
+    /// A matrix decomposition failed.
     #[error("a matrix of the least-squares problem has entries that are not finite")]
     Decomposition,
-    /// A request that makes no sense.
+    /// The request is invalid.
     #[error("{0}")]
     Request(String),
 }

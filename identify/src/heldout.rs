@@ -1,9 +1,10 @@
-//! The error on readings that the fit did not see.
+//! Cross-validation: the residual of readings that the fit did not use.
 //!
-//! One run at a time is left out, or contiguous blocks where there are no runs, or seeded folds where rows are independent poses. Nothing of the left-out
-//! fold enters: with `W` such that `WᵀAW = I` for the normal matrix `A` of all readings, `T = J·W` of the fold's rows `[J | r]` and `y` what is left to
-//! do in these directions, the step to the fit of the others is `W(I − TᵀT)⁻¹(y − Tᵀr)`, which takes a matrix no larger than the fold has rows
-//! (Woodbury). Where the others hardly see a direction any more, their triangles are merged and solved anew.
+//! A fold is one run, or a contiguous block where there are no runs, or a seeded set of independent poses. The fit of the other folds does
+//! not use the held-out fold. Let `A` be the normal matrix of all readings and `W` such that `WᵀAW = I`. Let `T = J·W` for the fold's rows
+//! `[J | r]`, and `y` the remaining step in these directions. The step to the fit of the other folds is `W(I − TᵀT)⁻¹(y − Tᵀr)`, with a
+//! matrix no larger than the number of the fold's rows (Woodbury). If the other folds barely determine a direction, their triangular
+//! factors are merged and solved again.
 
 mod folds;
 
@@ -15,16 +16,16 @@ use crate::problem::Problem;
 use crate::triangle::Triangle;
 pub use folds::{FoldKind, Folds, mislabelled_runs};
 
-/// The error on left-out readings.
+/// Held-out residuals.
 #[derive(Clone, Debug)]
 pub struct HeldOut {
-    /// The residual of every scalar reading under the fit that did not see it, mm, by test.
+    /// The residual of every scalar reading under the fit without its fold, mm, by test.
     pub residuals: Vec<Vec<f64>>,
-    /// Root mean square over scalar readings that count, mm.
+    /// Root mean square over the scalar readings that are not excluded, mm.
     pub rms_mm: f64,
 }
 
-/// Root mean square over the scalar readings that count, mm.
+/// Root mean square over the scalar readings that are not excluded, mm.
 pub fn rms_mm(problem: &Problem<'_>, residuals: &[Vec<f64>]) -> f64 {
     let coordinates = problem.coordinates();
     let (mut sum, mut count) = (0.0, 0_usize);
@@ -39,8 +40,8 @@ pub fn rms_mm(problem: &Problem<'_>, residuals: &[Vec<f64>]) -> f64 {
     (sum / count.max(1) as f64).sqrt()
 }
 
-/// Leaves out one fold after another. `beta` is the fit of all readings, `triangles` those of the folds there, `whole` that of all readings and priors,
-/// `basis` spans the seen directions (unknowns × rank).
+/// Holds out each fold in turn. `beta` is the fit of all readings, `triangles` are the factors of the folds there, `whole` is the factor
+/// of all readings and priors, `basis` spans the identifiable directions (parameters × rank).
 ///
 /// # Errors
 /// If the model cannot be evaluated.
@@ -71,18 +72,18 @@ pub fn held_out(
     let mut residuals: Vec<Vec<f64>> = vec![Vec::new(); problem.models.len()];
     let blocks = problem.blocks();
     let predicted = blocks.par_iter().map(|block| {
-        let own = problem.own_unknowns(block.test);
+        let of_test = problem.own_parameters(block.test);
         let rows = problem.own_rows(&values[block.test], block)?;
-        let mut residual = rows.col(own.len()).to_owned();
+        let mut residual = rows.col(of_test.len()).to_owned();
         let fold_of = &problem.folds.of_row[block.test][block.rows.clone()];
-        for (unknown, column) in own.iter().zip(rows.col_iter()) {
+        for (parameter, column) in of_test.iter().zip(rows.col_iter()) {
             for (i, residual) in residual.iter_mut().enumerate() {
-                *residual -= column[i] * steps[fold_of[i / coordinates]][*unknown];
+                *residual -= column[i] * steps[fold_of[i / coordinates]][*parameter];
             }
         }
         Ok(residual)
     });
-    // Blocks come in the order of the rows.
+    // Blocks are in the order of the rows.
     for (block, residual) in blocks
         .iter()
         .zip(predicted.collect::<Result<Vec<_>, IdentifyError>>()?)
@@ -95,15 +96,15 @@ pub fn held_out(
     })
 }
 
-/// What the others have to see of a direction, as a share of what all readings see of it, for the fit of all to lead to theirs.
+/// Least share of the information on a direction that the other folds must hold for the update formula.
 const MIN_SHARE: f64 = 1e-6;
 
-/// The seen directions, in which the normal matrix of all readings is the identity.
+/// The identifiable directions, scaled so that the normal matrix of all readings is the identity.
 struct Directions {
-    /// `W`: unknowns × rank.
-    spread: Mat<f64>,
-    /// `y`: the step that all readings still ask for.
-    left: Mat<f64>,
+    /// `W`: parameters × rank.
+    scaled_basis: Mat<f64>,
+    /// `y`: the remaining step of the fit of all readings.
+    step: Mat<f64>,
 }
 
 impl Directions {
@@ -112,39 +113,39 @@ impl Directions {
         let rank = basis.ncols();
         if rank == 0 {
             return Ok(Directions {
-                spread: Mat::zeros(basis.nrows(), 0),
-                left: Mat::zeros(0, 1),
+                scaled_basis: Mat::zeros(basis.nrows(), 0),
+                step: Mat::zeros(0, 1),
             });
         }
         let svd = (&r * basis)
             .thin_svd()
             .map_err(|_| IdentifyError::Decomposition)?;
         let singular = svd.S().column_vector();
-        let mut spread = basis * svd.V();
-        for (k, mut column) in spread.col_iter_mut().enumerate() {
-            // A direction of nothing is none: what leaves it out solves anew.
+        let mut scaled_basis = basis * svd.V();
+        for (k, mut column) in scaled_basis.col_iter_mut().enumerate() {
+            // A direction without information becomes infinite here; the folds are then solved again.
             column *= faer::Scale(1.0 / singular[k]);
         }
         let right = Mat::from_fn(c.len(), 1, |i, _| c[i]);
         Ok(Directions {
-            left: svd.U().transpose() * right,
-            spread,
+            step: svd.U().transpose() * right,
+            scaled_basis,
         })
     }
 
-    /// The step to the fit of all readings but a fold's; `None` where they hardly see a direction any more.
+    /// The step to the fit without a fold; `None` if the other folds barely determine a direction.
     fn step_without(&self, fold: &Triangle) -> Result<Option<Vec<f64>>, IdentifyError> {
-        if !self.spread.is_all_finite() {
+        if !self.scaled_basis.is_all_finite() {
             return Ok(None);
         }
         let rows = fold.rows();
-        let unknowns = fold.columns();
-        if rows.nrows() == 0 || self.spread.ncols() == 0 {
-            let step = &self.spread * &self.left;
+        let parameters = fold.columns();
+        if rows.nrows() == 0 || self.scaled_basis.ncols() == 0 {
+            let step = &self.scaled_basis * &self.step;
             return Ok(Some(step.col(0).iter().copied().collect()));
         }
-        let t = rows.subcols(0, unknowns) * &self.spread;
-        let asked = &self.left - t.transpose() * rows.subcols(unknowns, 1);
+        let t = rows.subcols(0, parameters) * &self.scaled_basis;
+        let residual_step = &self.step - t.transpose() * rows.subcols(parameters, 1);
         let leverage = &t * t.transpose();
         let eigen = leverage
             .self_adjoint_eigen(faer::Side::Lower)
@@ -158,17 +159,17 @@ impl Directions {
         if shares.iter().any(|share| *share < MIN_SHARE) {
             return Ok(None);
         }
-        let mut along = eigen.U().transpose() * (&t * &asked);
+        let mut along = eigen.U().transpose() * (&t * &residual_step);
         for (k, share) in shares.iter().enumerate() {
             along[(k, 0)] /= share;
         }
-        let step = &self.spread * (asked + t.transpose() * (eigen.U() * along));
+        let step = &self.scaled_basis * (residual_step + t.transpose() * (eigen.U() * along));
         Ok(Some(step.col(0).iter().copied().collect()))
     }
 }
 
-/// From the fit of all readings to that of the readings in `rest`: the least solution in absolute terms, so that what the remaining readings do
-/// not see goes to its nominal value and not to what the left-out ones said.
+/// The step from the fit of all readings to that of the readings in `rest`. It is the minimum-norm solution: a direction that the
+/// remaining readings do not determine returns to its nominal value.
 fn step_without(rest: &Triangle, beta: &[f64], basis: &Mat<f64>) -> Result<Vec<f64>, IdentifyError> {
     let (r, c, _) = rest.parts();
     let (n, rank) = (basis.nrows(), basis.ncols());
@@ -201,54 +202,54 @@ mod tests {
     use super::*;
     use rand::{RngExt, SeedableRng};
 
-    /// Rows of `[J | r]`, drawn.
-    fn drawn(rows: usize, unknowns: usize, random: &mut rand_pcg::Pcg64Mcg) -> Triangle {
-        let mut triangle = Triangle::new(unknowns);
-        let block = Mat::from_fn(rows, unknowns + 1, |_, _| random.random_range(-1.0..1.0));
+    /// Simulated rows of `[J | r]`.
+    fn simulated(rows: usize, parameters: usize, random: &mut rand_pcg::Pcg64Mcg) -> Triangle {
+        let mut triangle = Triangle::new(parameters);
+        let block = Mat::from_fn(rows, parameters + 1, |_, _| random.random_range(-1.0..1.0));
         triangle.absorb(block.as_ref());
         triangle
     }
 
     #[test]
-    fn a_fold_is_left_out_as_if_the_others_were_solved_anew() {
+    fn the_update_without_a_fold_equals_a_new_solution() {
         let mut random = rand_pcg::Pcg64Mcg::seed_from_u64(1);
-        let unknowns = 6;
-        // Two combinations of the unknowns are not among the directions that are fitted.
+        let parameters = 6;
+        // Two combinations of the parameters are outside the fitted directions.
         let basis = Mat::from_fn(
-            unknowns,
+            parameters,
             4,
             |i, k| if i == k { 1.0 } else { 0.1 * (i * k) as f64 },
         );
         let basis = basis.qr().compute_thin_Q();
-        let folds: Vec<Triangle> = (0..5).map(|_| drawn(9, unknowns, &mut random)).collect();
+        let folds: Vec<Triangle> = (0..5).map(|_| simulated(9, parameters, &mut random)).collect();
         let merged = |folds: &[Triangle], but: usize| {
-            let mut whole = Triangle::new(unknowns);
+            let mut whole = Triangle::new(parameters);
             let others = folds.iter().enumerate().filter(|(fold, _)| *fold != but);
             others.for_each(|(_, fold)| whole.merge(fold));
             whole
         };
         let end = Directions::of(&merged(&folds, usize::MAX), &basis).unwrap();
-        let step: Vec<f64> = (&end.spread * &end.left).col(0).iter().copied().collect();
+        let step: Vec<f64> = (&end.scaled_basis * &end.step).col(0).iter().copied().collect();
         let moved: Vec<Triangle> = folds.iter().map(|fold| fold.after(&step)).collect();
-        // From the end of the fit, where nothing is left to do, and from before it, where much is.
-        for (folds, beta) in [(moved, step), (folds, vec![0.0; unknowns])] {
+        // At the solution, where the remaining step is zero, and before it.
+        for (folds, beta) in [(moved, step), (folds, vec![0.0; parameters])] {
             let all = Directions::of(&merged(&folds, usize::MAX), &basis).unwrap();
             for (number, fold) in folds.iter().enumerate() {
-                let short = all.step_without(fold).unwrap().unwrap();
-                let anew = step_without(&merged(&folds, number), &beta, &basis).unwrap();
-                for (short, anew) in short.iter().zip(&anew) {
-                    assert!((short - anew).abs() < 1e-12, "{short} {anew}");
+                let updated = all.step_without(fold).unwrap().unwrap();
+                let solved = step_without(&merged(&folds, number), &beta, &basis).unwrap();
+                for (updated, solved) in updated.iter().zip(&solved) {
+                    assert!((updated - solved).abs() < 1e-12, "{updated} {solved}");
                 }
             }
         }
     }
 
     #[test]
-    fn what_one_fold_alone_sees_is_not_left_to_the_short_way() {
+    fn a_direction_identifiable_from_one_fold_only_is_solved_again() {
         let mut random = rand_pcg::Pcg64Mcg::seed_from_u64(2);
-        let unknowns = 3;
-        let mut others = Triangle::new(unknowns);
-        let block = Mat::from_fn(9, unknowns + 1, |_, j| {
+        let parameters = 3;
+        let mut others = Triangle::new(parameters);
+        let block = Mat::from_fn(9, parameters + 1, |_, j| {
             if j == 2 {
                 0.0
             } else {
@@ -256,11 +257,11 @@ mod tests {
             }
         });
         others.absorb(block.as_ref());
-        let alone = drawn(9, unknowns, &mut random);
+        let single_fold = simulated(9, parameters, &mut random);
         let mut whole = others.clone();
-        whole.merge(&alone);
-        let all = Directions::of(&whole, &Mat::identity(unknowns, unknowns)).unwrap();
-        assert!(all.step_without(&alone).unwrap().is_none());
+        whole.merge(&single_fold);
+        let all = Directions::of(&whole, &Mat::identity(parameters, parameters)).unwrap();
+        assert!(all.step_without(&single_fold).unwrap().is_none());
         assert!(all.step_without(&others).unwrap().is_some());
     }
 }

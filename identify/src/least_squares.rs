@@ -1,8 +1,8 @@
-//! Gauss–Newton with Levenberg's damping, on problems that hand over triangles.
+//! Gauss–Newton iteration with Levenberg–Marquardt damping, on problems in the form of triangular factors.
 //!
-//! In scaled unknowns `y = x/d` the step solves `min ‖c − R·D·η‖² + λ‖η‖²` through the singular value decomposition of `R·D`; `λ` is zero as
-//! long as full steps lower the sum of squares, so that a linear problem is solved in one step (Marquardt, J. SIAM 11 (1963) 431;
-//! Moré, Lecture Notes in Mathematics 630 (1978) 105).
+//! In scaled parameters `y = x/d` the step solves `min ‖c − R·D·η‖² + λ‖η‖²` by the singular value decomposition of `R·D`. `λ` is zero as
+//! long as full steps lower the sum of squares. A linear problem therefore takes one step (Marquardt, J. SIAM 11 (1963) 431; Moré, Lecture
+//! Notes in Mathematics 630 (1978) 105).
 
 use faer::Mat;
 
@@ -11,58 +11,58 @@ use crate::triangle::Triangle;
 
 /// A problem `min ‖r(x)‖²`.
 pub trait LeastSquares {
-    /// Number of unknowns.
-    fn unknowns(&self) -> usize;
-    /// The triangle of `[J | r]` at `x`, with `r = observed − model` and `J = ∂model/∂x`, both divided by the standard deviation.
+    /// Number of parameters.
+    fn parameters(&self) -> usize;
+    /// The triangular factor of `[J | r]` at `x`, with `r = observed − model` and `J = ∂model/∂x`, both divided by the standard deviation.
     ///
     /// # Errors
     /// If the model yields a number that is not finite.
     fn linearise(&self, x: &[f64]) -> Result<Triangle, IdentifyError>;
-    /// `‖r(x)‖²`; not finite where the model cannot be evaluated.
+    /// `‖r(x)‖²`; not finite if the model cannot be evaluated.
     fn sum_of_squares(&self, x: &[f64]) -> f64;
 }
 
-/// What the unknowns are divided by before they are compared.
+/// The scale of each parameter.
 #[derive(Clone, Debug)]
 pub enum Scaling {
-    /// The physical size of each unknown: 1 mm, 0.01 rad. Null columns stay null.
+    /// The physical size of each parameter: 1 mm, 0.01 rad. Null columns stay null.
     Physical(Vec<f64>),
-    /// The reciprocal norm of each column, the largest seen (Moré): for unknowns whose size nobody knows.
+    /// The reciprocal of the largest column norm so far (Moré), for parameters of unknown size.
     Columns,
 }
 
-/// Where the iterations ended.
+/// The solution of a least-squares problem.
 #[derive(Clone, Debug)]
-pub struct Solution {
-    /// The unknowns.
+pub struct LeastSquaresSolution {
+    /// The parameters.
     pub x: Vec<f64>,
-    /// The triangle at the solution.
+    /// The triangular factor at the solution.
     pub triangle: Triangle,
     /// `‖r‖²`.
     pub sum_of_squares: f64,
-    /// How many linearisations it took.
+    /// Number of linearisations.
     pub iterations: usize,
 }
 
 const MAX_ITERATIONS: usize = 200;
 const SMALLEST_RELATIVE_STEP: f64 = 1e-12;
-/// A step below this does not make the model nonlinear: the square of it is below rounding.
-const STRAIGHT_RELATIVE_STEP: f64 = 1e-7;
+/// Relative step below which the nonlinearity of the model is negligible: its square is below rounding.
+const LINEAR_RELATIVE_STEP: f64 = 1e-7;
 
-/// Minimises from a start value.
+/// Minimises the sum of squares from a start value.
 ///
 /// # Errors
-/// If the model cannot be evaluated at the start, or the iterations do not end.
+/// If the model cannot be evaluated at the start, or the iterations do not converge.
 pub fn minimise(
     problem: &impl LeastSquares,
     start: &[f64],
     scaling: &Scaling,
-) -> Result<Solution, IdentifyError> {
-    let n = problem.unknowns();
-    let nothing = vec![0.0; n];
+) -> Result<LeastSquaresSolution, IdentifyError> {
+    let n = problem.parameters();
+    let zero_step = vec![0.0; n];
     let mut x = start.to_vec();
     let mut triangle = problem.linearise(&x)?;
-    let mut current = triangle.sum_of_squares_after(&nothing);
+    let mut current = triangle.sum_of_squares_after(&zero_step);
     let mut scale = match scaling {
         Scaling::Physical(sizes) => sizes.clone(),
         Scaling::Columns => vec![f64::INFINITY; n],
@@ -102,9 +102,10 @@ pub fn minimise(
             }
             step
         };
-        // A step is taken if the sum of squares falls; near the end the fall drowns in rounding and the step's size decides.
+        // A step is accepted if the sum of squares falls. Near the minimum the decrease is below rounding and the size of the step
+        // decides.
         let mut accepted = false;
-        let mut smallest = false;
+        let mut converged = false;
         let mut next = None;
         for attempt in 0..60 {
             let step = step_with(damping);
@@ -124,22 +125,22 @@ pub fn minimise(
                     .abs()
                 })
                 .fold(0.0, f64::max);
-            // Steps shrink by about the same factor each time; what would be left to do after this one is then too small to matter.
-            let left = relative * (relative / step_before);
-            if damping == 0.0 && relative < STRAIGHT_RELATIVE_STEP && left < SMALLEST_RELATIVE_STEP {
+            // Successive steps shrink by about the same factor. This product estimates the next step.
+            let next_relative = relative * (relative / step_before);
+            if damping == 0.0 && relative < LINEAR_RELATIVE_STEP && next_relative < SMALLEST_RELATIVE_STEP {
                 let triangle = triangle.after(&step);
-                return Ok(Solution {
+                return Ok(LeastSquaresSolution {
                     x: trial,
-                    sum_of_squares: triangle.sum_of_squares_after(&nothing),
+                    sum_of_squares: triangle.sum_of_squares_after(&zero_step),
                     triangle,
                     iterations: iteration,
                 });
             }
-            // The first step is nearly always taken, and is linearised at next.
+            // The first attempt is nearly always accepted, so it is linearised at once.
             let sum = if attempt == 0 {
                 next = problem.linearise(&trial).ok();
                 next.as_ref()
-                    .map_or(f64::NAN, |next| next.sum_of_squares_after(&nothing))
+                    .map_or(f64::NAN, |next| next.sum_of_squares_after(&zero_step))
             } else {
                 next = None;
                 problem.sum_of_squares(&trial)
@@ -147,7 +148,7 @@ pub fn minimise(
             let close = relative < SMALLEST_RELATIVE_STEP * 100.0;
             if sum.is_finite() && (sum < current || (close && sum <= current * (1.0 + 1e-9))) {
                 x = trial;
-                smallest =
+                converged =
                     relative < SMALLEST_RELATIVE_STEP || current - sum <= 1e-15 * current && relative < 1e-7;
                 current = sum;
                 damping *= 0.1;
@@ -160,8 +161,8 @@ pub fn minimise(
             }
             next = None;
             if relative < 1e-9 && damping == 0.0 {
-                // The full step is smaller than what rounding lets us judge: this is the minimum.
-                smallest = true;
+                // The full step is below rounding: this is the minimum.
+                converged = true;
                 accepted = true;
                 break;
             }
@@ -178,8 +179,8 @@ pub fn minimise(
             Some(next) => next,
             None => problem.linearise(&x)?,
         };
-        if smallest {
-            return Ok(Solution {
+        if converged {
+            return Ok(LeastSquaresSolution {
                 x,
                 triangle,
                 sum_of_squares: current,

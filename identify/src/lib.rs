@@ -1,20 +1,22 @@
-//! Identification: from readings to errors with honest uncertainties, and from the residual to the effect that the model lacks.
+//! Identification: estimates of geometric errors with standard uncertainties, and the search for unmodelled effects in the residual.
 //!
-//! - [`least_squares`], [`triangle`], [`rank`]: the numerical core, which knows no machine;
+//! - [`least_squares`], [`triangle`], [`rank`]: numerical core, independent of any machine;
 //! - [`parameters`], [`problem`]: a session as a least-squares problem;
-//! - [`fit`]: identify; [`heldout`]: judge on readings that the fit did not see; [`noise`]: how much is noise;
-//! - [`plausibility`]: whether readings and session belong together;
-//! - [`monte_carlo`], [`propagation`]: distributions by drawing; [`repeated`]: Type A beside Type B;
-//! - [`compensation`]: identified error motions as curves over their axis;
-//! - [`circular`]: ball-bar figures of ISO 230-4 and the classical diagnosis;
-//! - [`trace`]: close the loop; [`effect_description`], [`parameter_description`]: effects and parameters in words;
-//! - [`plan`]: what tests can see before anybody measures;
+//! - [`fit`]: parameter estimation; [`heldout`]: cross-validation; [`noise`]: noise standard deviation and autocorrelation;
+//! - [`plausibility`]: consistency of readings and session;
+//! - [`monte_carlo`], [`propagation`]: propagation of distributions by Monte Carlo; [`repeated`]: Type A against Type B uncertainty;
+//! - [`compensation`]: identified error motions as functions of the axis position;
+//! - [`circular`]: ball-bar characteristics of ISO 230-4 and the diagnosis of circular tests;
+//! - [`trace`]: search for the unmodelled effect behind the residual; [`effect_description`], [`parameter_description`]: effects and parameters
+//!   in words;
+//! - [`plan`]: identifiability and expected uncertainty of a plan, before any measurement;
 //! - [`directions`]: readings and residuals of an R-test by direction;
-//! - [`simulate`]: readings from a model; [`patterns`]: what each error alone does to a test; [`quantity`]: values with their units as people write them;
-//! - [`views`]: a session reading by reading, as plots draw it;
-//! - [`results`]: what is reported, as it stands in JSON.
+//! - [`simulate`]: simulated readings; [`patterns`]: the pattern of each single error in a test; [`quantity`]: values with units;
+//! - [`series`]: the columns of a session, reading by reading, for plots;
+//! - [`results`]: the reported results, in the form of the JSON output.
 //!
-//! A bundled session, fitted as it is declared and then traced. What is in it beside noise of 0.3 µm is an axial wobble of the C table, 1.5 µm · cos(2 C + 60°):
+//! The example fits a bundled session as declared, then traces it. Beside noise of 0.3 µm the readings contain one unmodelled effect, an
+//! axial motion of the C table of 1.5 µm · cos(2 C + 60°):
 //!
 //! ```
 //! use std::path::Path;

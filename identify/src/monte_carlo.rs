@@ -1,29 +1,30 @@
-//! Propagation of distributions by drawing (JCGM 101): what a function of uncertain quantities is distributed like, linear or not.
+//! Propagation of distributions by Monte Carlo (JCGM 101): the distribution of a function of uncertain quantities, linear or nonlinear.
 //!
-//! Runs are counted into a histogram for each output and forgotten, so that memory does not grow with their number. They are drawn in blocks, each
-//! from its own stream of the generator: the result depends on the seed and the number of runs, not on how many processors there are.
+//! Each run is counted in one histogram per output and then dropped, so memory does not grow with the number of runs. Runs are drawn in
+//! blocks, each from its own stream of the generator. The result depends on the seed and the number of runs, not on the number of
+//! processors.
 
 use rand_distr::{Distribution as _, StandardNormal};
 use rand_pcg::Pcg64;
 use rayon::prelude::*;
 
-/// A function from quantities to quantities.
+/// A function from input quantities to output quantities.
 pub trait Function: Sync {
-    /// Memory that evaluations may use again and again.
+    /// Reusable memory for evaluations.
     type Scratch: Default;
-    /// Runs of a stream: fewer where a run is long, so that processors share the work.
+    /// Runs per stream. Functions with long runs use fewer, so that processors share the work.
     const BLOCK: u64 = 4096;
-    /// Runs from which the ranges of the histograms are taken.
+    /// Runs for the ranges of the histograms.
     const PILOT: u64 = 4096;
-    /// Number of quantities it takes.
+    /// Number of input quantities.
     fn inputs(&self) -> usize;
-    /// Number of quantities it gives.
+    /// Number of output quantities.
     fn outputs(&self) -> usize;
-    /// Evaluates it. An output that is not finite is counted as having none.
+    /// Evaluates the function. An output that is not finite counts as a run without a value.
     fn evaluate(&self, inputs: &[f64], outputs: &mut [f64], scratch: &mut Self::Scratch);
 }
 
-/// What is drawn, and how often.
+/// The inputs and the number of runs of a Monte Carlo propagation.
 #[derive(Clone, Copy, Debug)]
 pub struct Draws<'a> {
     /// Expectation of each input.
@@ -34,54 +35,54 @@ pub struct Draws<'a> {
     pub runs: u64,
     /// Seed.
     pub seed: u64,
-    /// Probability that a coverage interval is to hold.
+    /// Coverage probability of the intervals.
     pub coverage: f64,
 }
 
-/// How often to draw, from which seed, for which intervals.
+/// Number of runs, seed and coverage probability of a Monte Carlo propagation.
 #[derive(Clone, Copy, Debug)]
 pub struct MonteCarlo {
     /// Number of runs.
     pub runs: u64,
     /// Seed.
     pub seed: u64,
-    /// Probability that a coverage interval is to hold.
+    /// Coverage probability of the intervals.
     pub coverage: f64,
 }
 
-/// What an output is distributed like, in the output's unit.
+/// The distribution of an output, in the output's unit.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Distribution {
     /// Mean over the runs.
     pub mean: f64,
     /// Standard deviation over the runs: the standard uncertainty (JCGM 101, 7.6).
     pub u: f64,
-    /// The shortest interval that holds the coverage probability (JCGM 101, 5.3.4).
+    /// The shortest coverage interval (JCGM 101, 5.3.4).
     pub shortest: [f64; 2],
-    /// The probabilistically symmetric one (JCGM 101, 5.3.3).
+    /// The probabilistically symmetric coverage interval (JCGM 101, 5.3.3).
     pub symmetric: [f64; 2],
     /// Lower end of the first bin.
     pub from: f64,
     /// Upper end of the last bin.
     pub to: f64,
-    /// Runs in each bin.
+    /// Number of runs in each bin.
     pub counts: Vec<u64>,
-    /// Runs below the first bin, above the last, and without a value.
+    /// Number of runs below the first bin, above the last bin, and without a value.
     pub outside: [u64; 3],
 }
 
-/// Accumulators, each for every `LANES`th block: what parallel work is parted into, and a bound on memory.
+/// Number of accumulators, each for every `LANES`th block. It divides the parallel work and bounds the memory.
 const LANES: u64 = 32;
-/// Stream of the first pilot runs; blocks have their own number.
+/// Stream of the first pilot runs. A block's stream is its number.
 const PILOT_STREAM: u128 = 1 << 64;
-/// Bins of a histogram: with 16 standard deviations across, a bin is a sixtieth of one.
+/// Bins of a histogram. A range of 16 standard deviations gives bins of 1/60 standard deviation.
 const BINS: usize = 1000;
-/// Standard deviations on either side that a histogram covers at least.
+/// Half range of a histogram, at least, in standard deviations.
 const REACH: f64 = 8.0;
 
-/// Counts of one output.
+/// The histogram of one output.
 #[derive(Clone)]
-struct Count {
+struct Histogram {
     centre: f64,
     from: f64,
     per_width: f64,
@@ -91,9 +92,9 @@ struct Count {
     outside: [u64; 3],
 }
 
-impl Count {
-    fn over(centre: f64, reach: f64) -> Count {
-        Count {
+impl Histogram {
+    fn over(centre: f64, reach: f64) -> Histogram {
+        Histogram {
             centre,
             from: centre - reach,
             per_width: BINS as f64 / (2.0 * reach),
@@ -105,7 +106,7 @@ impl Count {
     }
 
     #[inline]
-    fn take(&mut self, value: f64) {
+    fn add(&mut self, value: f64) {
         if !value.is_finite() {
             self.outside[2] += 1;
             return;
@@ -123,7 +124,7 @@ impl Count {
         }
     }
 
-    fn merge(&mut self, other: &Count) {
+    fn merge(&mut self, other: &Histogram) {
         self.sum += other.sum;
         self.square += other.square;
         for (mine, theirs) in self.counts.iter_mut().zip(&other.counts) {
@@ -164,11 +165,11 @@ impl Count {
         };
         let tail = (1.0 - coverage) / 2.0;
         let symmetric = [quantile(tail), quantile(1.0 - tail)];
-        // The ends of the shortest interval have equal density; sliding the lower share over the tails finds it.
-        const SLIDES: usize = 400;
+        // The density is equal at both ends of the shortest interval. The search varies the probability of the lower tail.
+        const TAIL_STEPS: usize = 400;
         let mut shortest = symmetric;
-        for slide in 0..=SLIDES {
-            let share = 2.0 * tail * slide as f64 / SLIDES as f64;
+        for slide in 0..=TAIL_STEPS {
+            let share = 2.0 * tail * slide as f64 / TAIL_STEPS as f64;
             let interval = [quantile(share), quantile(share + coverage)];
             if interval[1] - interval[0] < shortest[1] - shortest[0] {
                 shortest = interval;
@@ -187,7 +188,7 @@ impl Count {
     }
 }
 
-/// Draws inputs and passes on the outputs.
+/// Draws inputs and passes each vector of outputs to a function.
 fn draw(function: &impl Function, draws: &Draws<'_>, stream: u128, runs: u64, mut take: impl FnMut(&[f64])) {
     let mut random = Pcg64::new(u128::from(draws.seed), stream);
     let mut inputs = vec![0.0; function.inputs()];
@@ -207,7 +208,7 @@ fn draw(function: &impl Function, draws: &Draws<'_>, stream: u128, runs: u64, mu
 pub fn propagate<F: Function>(function: &F, draws: &Draws<'_>) -> Vec<Distribution> {
     let empty = pilot(function, draws);
     let blocks = draws.runs.div_ceil(F::BLOCK);
-    let lanes: Vec<Vec<Count>> = (0..LANES.min(blocks))
+    let lanes: Vec<Vec<Histogram>> = (0..LANES.min(blocks))
         .into_par_iter()
         .map(|lane| {
             let mut counts = empty.clone();
@@ -215,7 +216,7 @@ pub fn propagate<F: Function>(function: &F, draws: &Draws<'_>) -> Vec<Distributi
                 let runs = F::BLOCK.min(draws.runs - block * F::BLOCK);
                 draw(function, draws, u128::from(block), runs, |outputs| {
                     for (count, value) in counts.iter_mut().zip(outputs) {
-                        count.take(*value);
+                        count.add(*value);
                     }
                 });
             }
@@ -234,8 +235,8 @@ pub fn propagate<F: Function>(function: &F, draws: &Draws<'_>) -> Vec<Distributi
         .collect()
 }
 
-/// Empty histograms over the ranges that a few runs show.
-fn pilot<F: Function>(function: &F, draws: &Draws<'_>) -> Vec<Count> {
+/// Empty histograms with ranges from the pilot runs.
+fn pilot<F: Function>(function: &F, draws: &Draws<'_>) -> Vec<Histogram> {
     let blocks: Vec<Vec<f64>> = (0..F::PILOT.div_ceil(F::BLOCK))
         .into_par_iter()
         .map(|block| {
@@ -269,12 +270,12 @@ fn pilot<F: Function>(function: &F, draws: &Draws<'_>) -> Vec<Count> {
                     .copied()
             };
             let (Some(low), Some(middle), Some(high)) = (at(0.1587), at(0.5), at(0.8413)) else {
-                return Count::over(0.0, 1.0);
+                return Histogram::over(0.0, 1.0);
             };
-            // Quantiles, not moments: a few runs far out are to be counted as outside rather than to coarsen the bins.
+            // Quantiles, not moments: a few extreme runs should count as outside instead of widening the bins.
             let reach = REACH * (high - low) / 2.0;
             let least = (middle.abs() * 1e-12).max(f64::MIN_POSITIVE * 1e20);
-            Count::over(middle, reach.max(least))
+            Histogram::over(middle, reach.max(least))
         })
         .collect()
 }
@@ -283,16 +284,17 @@ fn pilot<F: Function>(function: &F, draws: &Draws<'_>) -> Vec<Count> {
 mod tests {
     use super::*;
 
-    /// A triangle over 0 to 1 with its top at `m`: of the share `1 − p` that the shortest interval leaves out, `m` lies below it, so that it goes from
-    /// `m √(1 − p)` to `1 − (1 − m) √(1 − p)`. The symmetric one goes from `√(m (1 − p) / 2)` to `1 − √((1 − m) (1 − p) / 2)`.
+    /// A triangular distribution over 0 to 1 with mode `m`. Of the probability `1 − p` outside the shortest interval, the share `m` lies
+    /// below it. The shortest interval is thus `m √(1 − p)` to `1 − (1 − m) √(1 − p)`. The symmetric one is `√(m (1 − p) / 2)` to
+    /// `1 − √((1 − m) (1 − p) / 2)`.
     #[test]
-    fn a_triangle_has_the_intervals_of_its_closed_form() {
+    fn a_triangular_distribution_has_its_closed_form_intervals() {
         const DRAWS: usize = 200_000;
         let (m, p) = (0.25_f64, 0.95_f64);
-        let mut count = Count::over(0.5, 0.6);
+        let mut count = Histogram::over(0.5, 0.6);
         for k in 0..DRAWS {
             let share = (k as f64 + 0.5) / DRAWS as f64;
-            count.take(if share < m {
+            count.add(if share < m {
                 (share * m).sqrt()
             } else {
                 1.0 - ((1.0 - share) * (1.0 - m)).sqrt()
@@ -310,7 +312,7 @@ mod tests {
             1.0 - ((1.0 - m) * (1.0 - p) / 2.0).sqrt(),
             1e-3,
         );
-        // Where the interval is shortest its length hardly changes with its place.
+        // The length of the interval is stationary at its minimum.
         let root = (1.0 - p).sqrt();
         near(found.shortest[0], m * root, 0.01);
         near(found.shortest[1], 1.0 - (1.0 - m) * root, 0.01);
@@ -321,18 +323,18 @@ mod tests {
     }
 
     #[test]
-    fn what_lies_outside_is_counted_and_what_is_no_number_is_left_out() {
-        let mut count = Count::over(0.0, 1.0);
+    fn values_outside_the_range_are_counted_and_nan_is_excluded() {
+        let mut count = Histogram::over(0.0, 1.0);
         for value in [-3.0, -2.0, 0.5, 2.0, f64::NAN, f64::INFINITY] {
-            count.take(value);
+            count.add(value);
         }
-        let mut both = Count::over(0.0, 1.0);
+        let mut both = Histogram::over(0.0, 1.0);
         both.merge(&count);
         both.merge(&count);
         let found = both.distribution(0.95);
         assert_eq!(found.outside, [4, 2, 4]);
         assert!((found.mean + 2.5 / 4.0).abs() < 1e-12);
-        // Of eight values with their twins: Σ(x − x̄)² / 7.
+        // For eight values in pairs: Σ(x − x̄)² / 7.
         let square: f64 = [-3.0, -2.0, 0.5, 2.0]
             .iter()
             .map(|x: &f64| 2.0 * (x + 0.625).powi(2))

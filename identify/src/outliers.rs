@@ -1,8 +1,8 @@
-//! Wild readings: judged against their neighbours, or among independent poses against the bulk, and left out by name.
+//! Detection of outliers: along runs against neighbouring readings, among independent poses against the median residual.
 //!
-//! Structure must not be called wild. Along a run a residual is therefore compared with the medians of its neighbours on either side, not with zero
-//! (Hampel's identifier: Davies & Gather, J. Am. Stat. Assoc. 88 (1993) 782). Poses have no neighbours; there a residual is wild when it is far
-//! out of all proportion to the bulk.
+//! Structure in the residual must not be excluded. Along a run a residual is therefore compared with the medians of its neighbours on
+//! either side, not with zero (Hampel's identifier: Davies & Gather, J. Am. Stat. Assoc. 88 (1993) 782). Poses have no neighbours. A pose
+//! is an outlier if its residual is a large multiple of the median residual.
 
 use abbe_model::session::readings::Readings;
 use rayon::prelude::*;
@@ -11,15 +11,15 @@ use crate::fit::Fit;
 use crate::heldout::FoldKind;
 use crate::problem::Problem;
 
-/// Neighbours on either side that the median is taken of.
+/// Number of neighbours on either side in the median.
 const NEIGHBOURS: usize = 5;
-/// How many robust standard deviations make a reading wild along a run: expected once in 10⁷ Gaussian readings.
+/// Limit along a run, in robust standard deviations: exceeded once in 10⁷ Gaussian readings.
 const OUTLIER_ALONG_RUN: f64 = 5.3;
-/// How many times the median length of the residual makes a pose wild: once in 10⁹ if the three coordinates are Gaussian, and far beyond what
-/// unmodelled structure, which is bounded, was seen to reach.
+/// Limit for a pose, in median residual lengths: exceeded once in 10⁹ Gaussian poses of three coordinates. Unmodelled structure is bounded
+/// and stayed far below it.
 const OUTLIER_POSE: f64 = 5.0;
 
-/// Which readings of the problem are wild, by test and row.
+/// The outliers of the problem, by test and row.
 pub fn reject(problem: &Problem<'_>, fit: &Fit) -> Vec<Vec<bool>> {
     let coordinates = problem.coordinates();
     if problem.folds.kind == FoldKind::Poses {
@@ -63,7 +63,7 @@ fn reject_along_runs(readings: &Readings, residual: &[f64], coordinates: usize, 
             let middle: Vec<f64> = values.array_windows().map(|five| median_of_five(*five)).collect();
             let mut deviations: Vec<f64> = Vec::with_capacity(run.len());
             for (row, value) in values.iter().enumerate() {
-                // Beside a step (backlash at a reversal) one of the two sides agrees; an outlier agrees with neither.
+                // Beside a step (backlash at a reversal) a reading agrees with one of the two sides. An outlier agrees with neither.
                 let start = row.saturating_sub(NEIGHBOURS);
                 let end = (row + NEIGHBOURS + 1).min(values.len());
                 let from = |side: std::ops::Range<usize>| match side.len() {
@@ -81,7 +81,7 @@ fn reject_along_runs(readings: &Readings, residual: &[f64], coordinates: usize, 
                 deviations.push(deviation);
             }
             let mut sizes: Vec<f64> = deviations.iter().map(|d| d.abs()).collect();
-            // 1.4826: the standard deviation of a Gaussian in median absolute deviations.
+            // 1.4826 is the ratio of standard deviation to median absolute deviation of a Gaussian.
             let spread = (1.4826 * median(&mut sizes)).max(sigma_mm);
             for (row, deviation) in run.clone().zip(&deviations) {
                 reject[row] |= deviation.abs() > OUTLIER_ALONG_RUN * spread;
@@ -91,14 +91,14 @@ fn reject_along_runs(readings: &Readings, residual: &[f64], coordinates: usize, 
     reject
 }
 
-/// The median of five: that of the fifth and of the two of the first four that are neither their least nor their greatest.
+/// The median of five values: that of the fifth and the two middle values of the first four.
 fn median_of_five([a, b, c, d, e]: [f64; NEIGHBOURS]) -> f64 {
     let low = a.min(b).max(c.min(d));
     let high = a.max(b).min(c.max(d));
     low.min(high).max(low.max(high).min(e))
 }
 
-/// The median; the order of the values is lost. 0 of nothing.
+/// The median; reorders the values. 0 for no values.
 pub fn median(values: &mut [f64]) -> f64 {
     if values.is_empty() {
         return 0.0;
@@ -113,8 +113,8 @@ mod tests {
     use super::*;
 
     #[test]
-    fn the_median_of_five_is_the_third_of_them_in_order() {
-        // All orders of five numbers, equal ones among them.
+    fn the_median_of_five_is_the_third_in_order() {
+        // All orders of five numbers, ties included.
         for code in 0..5_usize.pow(5) {
             let values: [f64; 5] = std::array::from_fn(|place| (code / 5_usize.pow(place as u32) % 5) as f64);
             let mut sorted = values;

@@ -1,4 +1,4 @@
-//! Parameters in words for whoever works on the machine: `C table: inclination of the axis about Y (squareness to X)`, `A100: bar length`.
+//! Plain descriptions of parameters for work at the machine: `C table: inclination of the axis about Y (squareness to X)`, `A100: bar length`.
 
 use abbe_model::axis::{Axis, AxisKind};
 use abbe_model::chain::Machine;
@@ -9,7 +9,7 @@ use crate::effect_description::{component_meaning, meaning};
 use crate::parameters::Role;
 use crate::problem::Problem;
 
-/// A location error or an error motion in words; empty if the name is no error of ISO 230-1.
+/// The description of a location error or an error motion; empty if the name is not an error of ISO 230-1.
 pub fn error_meaning(machine: &Machine, id: &str) -> String {
     let Some(name) = ErrorName::parse(id) else {
         return String::new();
@@ -24,8 +24,8 @@ pub fn error_meaning(machine: &Machine, id: &str) -> String {
     )
 }
 
-/// The linear axis to which an orientation error of a rotary axis is a squareness error: a tilt about one direction across the axis turns it towards the
-/// other one.
+/// The linear axis relative to which an orientation error of a rotary axis is a squareness error. A tilt about one direction across the axis
+/// turns the axis towards the other direction across it.
 fn squareness_reference(machine: &Machine, name: &ErrorName) -> Option<String> {
     let axis = &machine.axes[machine.axis_index(&name.axis)?];
     let own = axis.own_freedom().index() % 3;
@@ -48,7 +48,7 @@ fn squareness_reference(machine: &Machine, name: &ErrorName) -> Option<String> {
         .map(|other| other.name.clone())
 }
 
-/// A set-up parameter in words: `A100: bar length`, `P1: workpiece ball, shift in X`. Empty if the identifier is no set-up parameter.
+/// The description of a set-up parameter: `A100: bar length`, `P1: workpiece ball, shift in X`. Empty if the identifier is not a set-up parameter.
 pub fn setup_meaning(machine: &Machine, id: &str) -> String {
     let (quantity, group) = match id.strip_suffix(']').and_then(|id| id.split_once('[')) {
         Some((quantity, group)) => (quantity, Some(group)),
@@ -70,7 +70,7 @@ pub fn setup_meaning(machine: &Machine, id: &str) -> String {
     }
 }
 
-/// A coefficient of an effect in words: the effect, then the coefficient if the effect has several.
+/// The description of a coefficient: the effect, then the coefficient if the effect has several.
 pub fn coefficient_meaning(machine: &Machine, effect: &Effect, coefficient: &str) -> String {
     let effect = meaning(machine, effect);
     match coefficient {
@@ -80,9 +80,9 @@ pub fn coefficient_meaning(machine: &Machine, effect: &Effect, coefficient: &str
     }
 }
 
-/// The `place`-th parameter of a problem in words. `coefficient` replaces the name of a coefficient: `amplitude`, `phase`.
-pub(crate) fn parameter_meaning(problem: &Problem<'_>, place: usize, coefficient: Option<&str>) -> String {
-    let (machine, parameter) = (&problem.session.machine, &problem.parameters.list[place]);
+/// The description of parameter `index` of a problem. `coefficient` replaces the name of a coefficient: `amplitude`, `phase`.
+pub(crate) fn parameter_meaning(problem: &Problem<'_>, index: usize, coefficient: Option<&str>) -> String {
+    let (machine, parameter) = (&problem.session.machine, &problem.parameters.list[index]);
     match parameter.role {
         Role::Error => error_meaning(machine, &parameter.id),
         Role::Setup => setup_meaning(machine, &parameter.id),

@@ -1,4 +1,4 @@
-//! The unknowns of a session, and which components of which readings each of them moves.
+//! The parameters of a session, and the components of the readings that each parameter affects.
 
 use std::collections::BTreeSet;
 use std::sync::Arc;
@@ -12,14 +12,14 @@ use crate::drivers::{self, Origin};
 use crate::error::IdentifyError;
 use crate::unit::Unit;
 
-/// Where an unknown comes from.
+/// The kind of a parameter.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Role {
-    /// A location error or a constant of an axis: a PIGE.
+    /// A location error or a constant error of an axis (PIGE).
     Error,
     /// A set-up quantity of the instrument.
     Setup,
-    /// A coefficient of an effect: which effect, which coefficient.
+    /// A coefficient of an effect.
     Coefficient {
         /// Index among the effects.
         effect: usize,
@@ -28,24 +28,24 @@ pub enum Role {
     },
 }
 
-/// One unknown.
+/// One parameter.
 #[derive(Clone, Debug)]
 pub struct Parameter {
-    /// As it stands in results: `EY0A`, `bar[A100]`, `EZC~C:h2.cos`.
+    /// Identifier in results: `EY0A`, `bar[A100]`, `EZC~C:h2.cos`.
     pub id: String,
-    /// Unit outside.
+    /// Display unit.
     pub unit: Unit,
-    /// Physical size, internal units: 1 mm, 0.01 rad, or what moves the component by that much.
+    /// Physical size, internal units: 1 mm, 0.01 rad, or the value that changes the component by that much.
     pub size: f64,
-    /// What is known before.
+    /// The prior.
     pub prior: Prior,
-    /// Where it comes from.
+    /// The kind.
     pub role: Role,
 }
 
-/// A parameter moves a slot of a test, by a constant or by a basis function row by row.
+/// The contribution of a parameter to a slot of a test: a constant, or a basis function row by row.
 #[derive(Clone, Debug)]
-pub struct Part {
+pub struct SlotContribution {
     /// Index of the parameter.
     pub parameter: usize,
     /// The slot.
@@ -54,50 +54,50 @@ pub struct Part {
     pub basis: Option<Arc<Vec<f64>>>,
 }
 
-/// What moves the readings of one test: a test of many has few of the session's unknowns.
+/// The parameters that affect the readings of one test. A test of a large session depends on few of the session's parameters.
 #[derive(Clone, Debug, Default)]
-pub struct InstrumentParameter {
-    /// The slots that some unknown moves.
+pub struct TestParameters {
+    /// The slots that depend on a parameter.
     pub slots: Vec<usize>,
-    /// The unknowns.
-    pub unknowns: Vec<usize>,
-    /// For each slot, the unknowns that move it, by their places among these, and their basis functions.
-    pub movers: Vec<Vec<(usize, Option<Arc<Vec<f64>>>)>>,
+    /// The parameters, by index in the session.
+    pub parameters: Vec<usize>,
+    /// For each slot, the parameters that it depends on (index within `parameters`) and their basis functions.
+    pub contributions: Vec<Vec<(usize, Option<Arc<Vec<f64>>>)>>,
 }
 
-impl InstrumentParameter {
-    /// From what moves what in the test.
-    pub fn of(parts: &[Part]) -> InstrumentParameter {
+impl TestParameters {
+    /// Collects the parameters and slots of a test from their contributions.
+    pub fn of(contributions: &[SlotContribution]) -> TestParameters {
         let sorted = |numbers: &mut dyn Iterator<Item = usize>| {
             let numbers: BTreeSet<usize> = numbers.collect();
             numbers.into_iter().collect::<Vec<usize>>()
         };
-        let slots = sorted(&mut parts.iter().map(|part| part.slot));
-        let unknowns = sorted(&mut parts.iter().map(|part| part.parameter));
-        let mut movers = vec![Vec::new(); slots.len()];
-        for part in parts {
-            let slot = slots.partition_point(|slot| *slot < part.slot);
-            let unknown = unknowns.partition_point(|unknown| *unknown < part.parameter);
-            movers[slot].push((unknown, part.basis.clone()));
+        let slots = sorted(&mut contributions.iter().map(|contribution| contribution.slot));
+        let parameters = sorted(&mut contributions.iter().map(|contribution| contribution.parameter));
+        let mut by_slot = vec![Vec::new(); slots.len()];
+        for contribution in contributions {
+            let slot = slots.partition_point(|slot| *slot < contribution.slot);
+            let index = parameters.partition_point(|parameter| *parameter < contribution.parameter);
+            by_slot[slot].push((index, contribution.basis.clone()));
         }
-        InstrumentParameter {
+        TestParameters {
             slots,
-            unknowns,
-            movers,
+            parameters,
+            contributions: by_slot,
         }
     }
 }
 
-/// The unknowns of a session.
+/// The parameters of a session.
 #[derive(Clone, Debug, Default)]
 pub struct Parameters {
-    /// The unknowns, errors first, then set-up quantities, then coefficients of effects.
+    /// Errors first, then set-up quantities, then coefficients of effects.
     pub list: Vec<Parameter>,
-    /// For each test with readings, what moves what.
-    pub parts: Vec<Vec<Part>>,
-    /// The effects whose coefficients are among the unknowns.
+    /// For each test with readings, the contributions of parameters to slots.
+    pub contributions: Vec<Vec<SlotContribution>>,
+    /// The effects whose coefficients are parameters.
     pub effects: Vec<Effect>,
-    /// Their identifiers: [`Effect::id`], numbered from the second of those that differ only in the numbers of their shapes.
+    /// Their identifiers: [`Effect::id`]. Effects that differ only in the numbers of their shapes are numbered from the second on.
     pub effect_ids: Vec<String>,
 }
 
@@ -111,7 +111,7 @@ pub fn physical_size(unit: InternalUnit) -> f64 {
 }
 
 impl Parameters {
-    /// The errors and set-up quantities that a session declares. `tests` are the tests with readings, `models` theirs.
+    /// The declared errors and set-up quantities of a session. `tests` are the tests with readings, `models` their models.
     ///
     /// # Errors
     /// If an error belongs to no axis of the machine or is declared twice.
@@ -121,7 +121,7 @@ impl Parameters {
         models: &[TestModel<'_>],
     ) -> Result<Parameters, IdentifyError> {
         let mut parameters = Parameters {
-            parts: vec![Vec::new(); tests.len()],
+            contributions: vec![Vec::new(); tests.len()],
             ..Parameters::default()
         };
         for name in &session.unknowns {
@@ -146,7 +146,7 @@ impl Parameters {
             })?;
             for (test, model) in models.iter().enumerate() {
                 if model.effective_slots().contains(&slot) {
-                    parameters.parts[test].push(Part {
+                    parameters.contributions[test].push(SlotContribution {
                         parameter: index,
                         slot,
                         basis: None,
@@ -155,8 +155,8 @@ impl Parameters {
             }
         }
         for (position, test) in tests.iter().enumerate() {
-            for (place, unknown) in session.instrument.unknowns().iter().enumerate() {
-                let prior = test.priors[place];
+            for (component, unknown) in session.instrument.unknowns().iter().enumerate() {
+                let prior = test.priors[component];
                 if prior == Prior::Known {
                     continue;
                 }
@@ -170,7 +170,7 @@ impl Parameters {
                 let id = format!("{}{dot}{}{bracket}", unknown.thing, unknown.coordinate);
                 let index = match parameters.list.iter().position(|p| p.id == id) {
                     Some(index) => {
-                        // Tests that share a thing state it once; the tightest statement holds.
+                        // Tests that share a component state its prior once. The smallest standard uncertainty holds.
                         let shared = &mut parameters.list[index].prior;
                         *shared = tighter(*shared, prior);
                         index
@@ -183,8 +183,8 @@ impl Parameters {
                         role: Role::Setup,
                     })?,
                 };
-                let slot = session.machine.error_slots() + place;
-                parameters.parts[position].push(Part {
+                let slot = session.machine.error_slots() + component;
+                parameters.contributions[position].push(SlotContribution {
                     parameter: index,
                     slot,
                     basis: None,
@@ -205,7 +205,7 @@ impl Parameters {
     /// Adds the coefficients of an effect.
     ///
     /// # Errors
-    /// If the data lack the driver's column, the instrument lacks the component, or the effect is there already.
+    /// If the data lack the driver's column, the instrument lacks the component, or the effect is already declared.
     pub fn add_effect(
         &mut self,
         session: &Session,
@@ -230,16 +230,16 @@ impl Parameters {
         if self.effects.contains(effect) {
             return Err(IdentifyError::RepeatedUnknown { id: effect.id() });
         }
-        let alike = self
+        let earlier = self
             .effects
             .iter()
             .filter(|other| other.id() == effect.id())
             .count();
-        let id = match alike {
+        let id = match earlier {
             0 => effect.id(),
-            _ => format!("{}#{}", effect.id(), alike + 1),
+            _ => format!("{}#{}", effect.id(), earlier + 1),
         };
-        let mut greatest = vec![0.0_f64; effect.shape.coefficients()];
+        let mut largest = vec![0.0_f64; effect.shape.coefficients()];
         for (position, (test, model)) in tests.iter().zip(models).enumerate() {
             if !effect.acts_in(&test.name) {
                 continue;
@@ -263,9 +263,9 @@ impl Parameters {
                 .map(Arc::new)
                 .collect();
             for (k, column) in columns.iter().enumerate() {
-                greatest[k] = column
+                largest[k] = column
                     .iter()
-                    .fold(greatest[k], |most, value| most.max(value.abs()));
+                    .fold(largest[k], |most, value| most.max(value.abs()));
             }
             for (slot, factor) in drivers::component_slots(session, test, readings, &effect.component) {
                 if !effective.contains(&slot) {
@@ -276,7 +276,7 @@ impl Parameters {
                         None => column.clone(),
                         Some(factor) => Arc::new(column.iter().zip(factor).map(|(b, f)| b * f).collect()),
                     };
-                    self.parts[position].push(Part {
+                    self.contributions[position].push(SlotContribution {
                         parameter: first + k,
                         slot,
                         basis: Some(basis),
@@ -289,11 +289,7 @@ impl Parameters {
             self.push(Parameter {
                 id: format!("{id}{dot}{name}"),
                 unit: drivers::coefficient_unit(session, effect, k),
-                size: if greatest[k] > 0.0 {
-                    size / greatest[k]
-                } else {
-                    size
-                },
+                size: if largest[k] > 0.0 { size / largest[k] } else { size },
                 prior: Prior::Free,
                 role: Role::Coefficient {
                     effect: number,
@@ -306,29 +302,33 @@ impl Parameters {
         Ok(())
     }
 
-    /// The components of every test at the unknowns' values (internal units).
+    /// The components of every test at the parameters `beta` (internal units).
     pub fn slot_values(&self, models: &[TestModel<'_>], beta: &[f64]) -> Vec<SlotValues> {
-        self.parts
+        self.contributions
             .iter()
             .zip(models)
-            .map(|(parts, model)| {
+            .map(|(contributions, model)| {
                 let mut values = SlotValues::zero(model.slots());
-                for part in parts {
-                    let coefficient = beta[part.parameter];
+                for contribution in contributions {
+                    let coefficient = beta[contribution.parameter];
                     if coefficient == 0.0 {
                         continue;
                     }
-                    match &part.basis {
-                        None => values.constant[part.slot] += coefficient,
+                    match &contribution.basis {
+                        None => values.constant[contribution.slot] += coefficient,
                         Some(basis) => {
-                            let place = match values.varying.iter().position(|(slot, _)| *slot == part.slot) {
-                                Some(place) => place,
+                            let index = match values
+                                .varying
+                                .iter()
+                                .position(|(slot, _)| *slot == contribution.slot)
+                            {
+                                Some(index) => index,
                                 None => {
-                                    values.varying.push((part.slot, vec![0.0; model.rows()]));
+                                    values.varying.push((contribution.slot, vec![0.0; model.rows()]));
                                     values.varying.len() - 1
                                 }
                             };
-                            let column = &mut values.varying[place].1;
+                            let column = &mut values.varying[index].1;
                             column
                                 .iter_mut()
                                 .zip(basis.iter())

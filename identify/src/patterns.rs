@@ -1,6 +1,8 @@
-//! What each error alone does to the readings of each test: the trace patterns by which a known fault is told on a plot (thesis, Figs. 3.7 and 3.8).
+//! The pattern of each single error in the readings of each test, for visual diagnosis on plots (Jiang 2014, Figs. 3.7 and 3.8).
 //!
-//! `ΔL_e = L(state; e) − L(state; 0)` by the exact chain, for one error of a stated size at a time, everything else zero.
+//! `ΔL_e = L(state; e) − L(state; 0)` by the exact chain, for one error of a stated size at a time, all others zero.
+//!
+//! Jiang (2014): X. Jiang, *Characterising Geometric Errors in Rotary Axes of 5-axis Machine Tools*, PhD thesis, University of Birmingham.
 
 use abbe_model::session::Session;
 use abbe_model::session::readings::Readings;
@@ -11,7 +13,7 @@ use crate::error::IdentifyError;
 use crate::quantity::Given;
 use crate::simulate::{Simulation, simulate};
 
-/// Size of a position error (thesis, Table 3.1).
+/// Size of a position error (Jiang 2014, Table 3.1).
 const POSITION: (f64, &str) = (10.0, "um");
 /// Size of an orientation error.
 const ORIENTATION: (f64, &str) = (0.01, "deg");
@@ -33,7 +35,7 @@ pub struct Pattern {
     pub mean_um: f64,
     /// Standard deviation about the mean, µm.
     pub standard_deviation_um: f64,
-    /// Reading by reading, a reading's coordinates together, µm.
+    /// Reading by reading, µm; the coordinates of a reading are consecutive.
     #[serde(skip)]
     pub deviations_um: Vec<f64>,
 }
@@ -47,7 +49,7 @@ pub struct Patterns {
     pub patterns: Vec<Pattern>,
 }
 
-/// The session's unknown errors, positions by 10 µm and orientations by 0.01°.
+/// The session's errors to be estimated, positions of 10 µm and orientations of 0.01°.
 pub fn usual_sizes(session: &Session) -> Vec<Given> {
     let given = |name: &abbe_model::component::ErrorName| {
         let (value, unit) = if name.freedom.is_angle() {
@@ -64,14 +66,14 @@ pub fn usual_sizes(session: &Session) -> Vec<Given> {
     session.unknowns.iter().map(given).collect()
 }
 
-/// The pattern of each error alone, along the path that each test makes or is planned to make.
+/// The pattern of each single error, along the measured or planned path of each test.
 ///
 /// # Errors
-/// If a movement cannot be made, a name or unit does not fit the session, or the model yields a number that is not finite.
+/// If a movement is impossible, a name or unit does not fit the session, or the model yields a number that is not finite.
 pub fn patterns(session: &Session, errors: &[Given]) -> Result<Patterns, IdentifyError> {
     if errors.is_empty() {
         return Err(IdentifyError::Request(
-            "no error to show: `[unknowns] errors` is empty; name one, as in `--error EY0A=10um`".into(),
+            "no error to show: `[unknowns] errors` is empty; give at least one error with its size, as in EY0A=10um".into(),
         ));
     }
     let mut exact = session.clone();

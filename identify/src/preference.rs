@@ -1,13 +1,13 @@
-//! Which parameters lead a null-space combination: an order by kind and name.
+//! The order of preference of the pivots of null-space combinations.
 
 use crate::parameters::{Parameter, Role};
 
-/// The order in which parameters are preferred as pivots of null-space combinations (see [`crate::rank`]): a pivot leads its combination, and is what one
-/// would hold at nominal to estimate the rest.
+/// The order in which parameters are preferred as pivots of null-space combinations (see [`crate::rank`]). The pivot comes first in its
+/// combination. Holding the pivots at nominal makes the other parameters identifiable.
 ///
-/// Location errors come first, coefficients of effects next, set-up quantities last: each combination says of one error of the machine what it is confounded
-/// with, and an error that is confounded with the set-up is stated in terms of it, not the set-up in terms of the machine. Within each kind the order is that of the
-/// identifiers, numbers in them by their values (`EA0J2` before `EA0J10`): not that of declarations, so that a session says the same however it lists them.
+/// Location errors come first, coefficients of effects next, set-up quantities last. A combination thus states what one machine error is
+/// confounded with, and an error that is confounded with the set-up is stated in terms of the set-up. Within each kind the order is that
+/// of the identifiers, with numbers compared by value (`EA0J2` before `EA0J10`). The order of declarations has no effect.
 pub fn pivot_preference(list: &[Parameter]) -> Vec<usize> {
     let kind = |parameter: &Parameter| match parameter.role {
         Role::Error => 0,
@@ -19,7 +19,7 @@ pub fn pivot_preference(list: &[Parameter]) -> Vec<usize> {
     order
 }
 
-/// An identifier in pieces that compare as people count: text as text, digits as the number they make.
+/// Splits an identifier into pieces for natural sorting: text compares as text, digits as a number.
 pub fn natural(id: &str) -> Vec<(u64, String)> {
     let mut pieces: Vec<(u64, String)> = Vec::new();
     let mut rest = id;

@@ -1,8 +1,8 @@
-//! A session with readings as a least-squares problem over blocks of rows.
+//! The least-squares problem of a session with readings, over blocks of rows.
 //!
-//! A block is a stretch of consecutive readings of one run. Its rows of `[J | r]` are made from one sweep of the chain times the basis
-//! functions, whitened along the run, and absorbed into the triangle of the test and fold that they belong to, which is as wide as that test has
-//! unknowns.
+//! A block is a sequence of consecutive readings of one run. One sweep of the chain times the basis functions gives its rows of `[J | r]`.
+//! The rows are whitened along the run and absorbed into the triangular factor of their test and fold. That factor has one column for each
+//! parameter of the test.
 
 use std::collections::BTreeMap;
 use std::collections::btree_map::Entry;
@@ -20,30 +20,30 @@ use crate::drivers::Origin;
 use crate::error::IdentifyError;
 use crate::heldout::Folds;
 use crate::noise::Noise;
-use crate::parameters::{InstrumentParameter, Parameters};
+use crate::parameters::{Parameters, TestParameters};
 use crate::triangle::{BLOCK_ROWS, Triangle};
 
-/// A session with readings, its unknowns, and how its readings are weighted.
+/// A session with readings, its parameters, and the weights of its readings.
 #[derive(Clone)]
 pub struct Problem<'a> {
     /// The session.
     pub session: &'a Session,
     /// The tests that have readings.
     pub tests: Vec<&'a Test>,
-    /// Those tests, ready to be evaluated.
+    /// The models of these tests.
     pub models: Vec<TestModel<'a>>,
-    /// The unknowns.
+    /// The parameters.
     pub parameters: Parameters,
-    /// When the session began.
+    /// Reference time and temperature of the session.
     pub origin: Origin,
     /// The noise of a reading.
     pub noise: Noise,
-    /// Readings that are left out, by test and row.
+    /// Excluded outliers, by test and row.
     pub rejected: Vec<Vec<bool>>,
-    /// Which readings are left out together when the model is judged.
+    /// The folds of cross-validation.
     pub folds: Folds,
-    /// What moves the readings of each test.
-    own: Vec<InstrumentParameter>,
+    /// For each test, the parameters that affect its readings.
+    test_parameters: Vec<TestParameters>,
 }
 
 /// Consecutive rows of one run of one test.
@@ -55,16 +55,16 @@ pub struct Block {
     pub rows: Range<usize>,
 }
 
-/// Triangles over the tests' own unknowns, by test and fold.
-type Narrow = BTreeMap<(usize, usize), Triangle>;
+/// Triangular factors over the parameters of each test, by test and fold.
+type FactorsByTestAndFold = BTreeMap<(usize, usize), Triangle>;
 
-/// Mean number of readings below which runs are not evaluated one by one.
+/// Mean number of readings below which runs are evaluated together.
 const SHORT_RUN: usize = 8;
-/// How many blocks one thread takes at a time.
+/// Number of blocks that one parallel task evaluates.
 const BLOCKS_PER_SEGMENT: usize = 16;
 
 impl<'a> Problem<'a> {
-    /// From a session, with its declared unknowns and effects.
+    /// The problem of a session with its declared parameters and effects.
     ///
     /// # Errors
     /// If there are no readings, or an effect cannot be evaluated.
@@ -99,36 +99,36 @@ impl<'a> Problem<'a> {
             noise,
             rejected,
             folds,
-            own: Vec::new(),
+            test_parameters: Vec::new(),
         };
-        problem.update_own();
+        problem.update_test_parameters();
         for effect in &session.effects {
             problem.add_effect(effect)?;
         }
         Ok(problem)
     }
 
-    /// Adds an effect's coefficients to the unknowns.
+    /// Adds the coefficients of an effect to the parameters.
     ///
     /// # Errors
     /// See [`Parameters::add_effect`].
     pub fn add_effect(&mut self, effect: &Effect) -> Result<(), IdentifyError> {
         self.parameters
             .add_effect(self.session, &self.tests, &self.models, &self.origin, effect)?;
-        self.update_own();
+        self.update_test_parameters();
         Ok(())
     }
 
-    fn update_own(&mut self) {
-        self.own = self
+    fn update_test_parameters(&mut self) {
+        self.test_parameters = self
             .parameters
-            .parts
+            .contributions
             .iter()
-            .map(|parts| InstrumentParameter::of(parts))
+            .map(|contributions| TestParameters::of(contributions))
             .collect();
     }
 
-    /// Number of readings that count.
+    /// Number of readings that are not excluded.
     pub fn readings(&self) -> usize {
         self.rejected
             .iter()
@@ -137,24 +137,24 @@ impl<'a> Problem<'a> {
             .count()
     }
 
-    /// Number of scalar coordinates a reading.
+    /// Number of scalar coordinates per reading.
     pub fn coordinates(&self) -> usize {
         self.session.instrument.coordinates()
     }
 
-    /// The stretches of rows that are evaluated together, in order.
+    /// The blocks of rows, in order.
     pub fn blocks(&self) -> Vec<Block> {
         let mut blocks = Vec::new();
         for (test, plan) in self.tests.iter().enumerate() {
             let Some(readings) = &plan.readings else { continue };
             let mut runs = readings.runs();
-            // Many short runs take long one by one; only a whitening filter has to keep them apart.
-            if self.noise.memory.is_empty() && readings.rows() < SHORT_RUN * runs.len() {
+            // One by one, many short runs are slow. Only a whitening filter has to separate them.
+            if self.noise.ar_coefficients.is_empty() && readings.rows() < SHORT_RUN * runs.len() {
                 runs = std::iter::once(0..readings.rows()).collect();
             }
             for run in runs {
-                // A whitening filter must not be cut; without one, blocks are what the triangle absorbs at once.
-                let most = if self.noise.memory.is_empty() {
+                // A block must not cut a whitening filter. Without a filter, a block has the number of rows that a factor absorbs at once.
+                let most = if self.noise.ar_coefficients.is_empty() {
                     (BLOCK_ROWS / self.coordinates()).max(1)
                 } else {
                     run.len().max(1)
@@ -173,40 +173,41 @@ impl<'a> Problem<'a> {
         blocks
     }
 
-    /// The components of every test at the unknowns' values (internal units).
+    /// The components of every test at the parameters `beta` (internal units).
     pub fn slot_values(&self, beta: &[f64]) -> Vec<SlotValues> {
         self.parameters.slot_values(&self.models, beta)
     }
 
-    /// Rows of `[J | r]` of a block in mm, not whitened, rejected rows included: (rows × coordinates) × (unknowns + 1).
+    /// Rows of `[J | r]` of a block in mm, not whitened, outliers included: (rows × coordinates) × (parameters + 1).
     ///
     /// # Errors
     /// If the model yields a number that is not finite.
     pub fn rows(&self, values: &[SlotValues], block: &Block) -> Result<Mat<f64>, IdentifyError> {
-        let own = &self.own[block.test].unknowns;
-        let narrow = self.own_rows(&values[block.test], block)?;
-        let mut rows = Mat::zeros(narrow.nrows(), self.parameters.list.len() + 1);
-        let places = own.iter().copied().chain([self.parameters.list.len()]);
-        for (place, column) in places.zip(narrow.col_iter()) {
-            rows.col_mut(place).copy_from(column);
+        let own = &self.test_parameters[block.test].parameters;
+        let own_rows = self.own_rows(&values[block.test], block)?;
+        let mut rows = Mat::zeros(own_rows.nrows(), self.parameters.list.len() + 1);
+        let indices = own.iter().copied().chain([self.parameters.list.len()]);
+        for (index, column) in indices.zip(own_rows.col_iter()) {
+            rows.col_mut(index).copy_from(column);
         }
         Ok(rows)
     }
 
-    /// The unknowns that move the readings of a test.
-    pub fn own_unknowns(&self, test: usize) -> &[usize] {
-        &self.own[test].unknowns
+    /// The parameters that affect the readings of a test.
+    pub fn own_parameters(&self, test: usize) -> &[usize] {
+        &self.test_parameters[test].parameters
     }
 
-    /// The columns of [`Problem::rows`] that are not zero throughout: those of [`Problem::own_unknowns`], and the residual. `values` are the test's.
+    /// The nonzero columns of [`Problem::rows`]: those of [`Problem::own_parameters`], and the residual. `values` belong to the block's
+    /// test.
     ///
     /// # Errors
     /// If the model yields a number that is not finite.
     pub fn own_rows(&self, values: &SlotValues, block: &Block) -> Result<Mat<f64>, IdentifyError> {
         let coordinates = self.coordinates();
-        let own = &self.own[block.test];
+        let own = &self.test_parameters[block.test];
         let scalars = block.rows.start * coordinates..block.rows.end * coordinates;
-        let mut rows = Mat::zeros(scalars.len(), own.unknowns.len() + 1);
+        let mut rows = Mat::zeros(scalars.len(), own.parameters.len() + 1);
         let Some(readings) = &self.tests[block.test].readings else {
             return Ok(rows);
         };
@@ -218,7 +219,7 @@ impl<'a> Problem<'a> {
         self.models[block.test].sweep(values, &own.slots, block.rows.clone(), |output, start, values| {
             let Some(by) = output.checked_sub(coordinates) else {
                 let first = start * coordinates + output;
-                let residuals = columns[own.unknowns.len()][first..]
+                let residuals = columns[own.parameters.len()][first..]
                     .iter_mut()
                     .step_by(coordinates);
                 let observed = observed[first..].iter().step_by(coordinates);
@@ -230,8 +231,8 @@ impl<'a> Problem<'a> {
                 }
                 return;
             };
-            for (unknown, basis) in &own.movers[by % own.slots.len()] {
-                let column = &mut columns[*unknown];
+            for (parameter, basis) in &own.contributions[by % own.slots.len()] {
+                let column = &mut columns[*parameter];
                 let mut add = |terms: &mut dyn Iterator<Item = f64>| {
                     let entries = column[start * coordinates + by / own.slots.len()..].iter_mut();
                     entries
@@ -240,7 +241,7 @@ impl<'a> Problem<'a> {
                         .for_each(|(entry, term)| *entry += term);
                 };
                 match basis {
-                    // The plain case is worth a loop that the compiler can turn into vector instructions.
+                    // A separate loop for the simple case, so that the compiler can vectorise it.
                     None if coordinates == 1 => {
                         let entries = column[start..].iter_mut();
                         entries.zip(values).for_each(|(entry, d)| *entry += d);
@@ -263,7 +264,8 @@ impl<'a> Problem<'a> {
         }
     }
 
-    /// The scalar rows of a block that whitening keeps: those that neither are nor remember a rejected reading.
+    /// The scalar rows of a block that remain after whitening. A row is dropped if its reading, or one within the filter's order before
+    /// it, is an outlier.
     pub fn kept_rows(&self, block: &Block) -> Vec<usize> {
         let coordinates = self.coordinates();
         let rejected = &self.rejected[block.test];
@@ -273,31 +275,31 @@ impl<'a> Problem<'a> {
         (0..block.rows.len() * coordinates)
             .filter(|i| {
                 let row = block.rows.start + i / coordinates;
-                let reach = self.noise.memory.len().min(i / coordinates);
+                let reach = self.noise.ar_coefficients.len().min(i / coordinates);
                 (row - reach..=row).all(|row| !rejected[row])
             })
             .collect()
     }
 
-    /// Divides rows by the noise: `(x_t − Σ a_k x_{t−k})/σ_innovation` along a run, and drops rejected ones. Returns the rows that remain, with
-    /// the fold of each.
+    /// Whitens rows along a run, `(x_t − Σ a_k x_{t−k})/σ_innovation`, and drops outliers. Returns the remaining rows and the fold of
+    /// each.
     pub fn whiten(&self, rows: &Mat<f64>, block: &Block) -> (Mat<f64>, Vec<usize>) {
         let kept = self.kept_rows(block);
         let folds = self.folds_of(&kept, block).collect();
         (self.whitened(rows.clone(), &kept), folds)
     }
 
-    /// The fold of each of some scalar rows of a block.
+    /// The fold of each of the given scalar rows of a block.
     pub fn folds_of(&self, rows: &[usize], block: &Block) -> impl Iterator<Item = usize> {
         let fold_of = &self.folds.of_row[block.test][block.rows.clone()];
         let coordinates = self.coordinates();
         rows.iter().map(move |i| fold_of[i / coordinates])
     }
 
-    /// The rows of [`Problem::whiten`], where it is known which are kept.
+    /// The rows of [`Problem::whiten`] for known remaining rows.
     pub fn whitened(&self, mut rows: Mat<f64>, kept: &[usize]) -> Mat<f64> {
         let coordinates = self.coordinates();
-        let memory = &self.noise.memory;
+        let memory = &self.noise.ar_coefficients;
         let innovation = 1.0 / self.noise.innovation_mm();
         let marginal = 1.0 / self.noise.sigma_mm;
         if memory.is_empty() && kept.len() == rows.nrows() {
@@ -319,36 +321,40 @@ impl<'a> Problem<'a> {
         white
     }
 
-    /// The triangle of each fold at the unknowns' values, in internal units of the unknowns.
+    /// The triangular factor of each fold at the parameters `beta`, in internal units of the parameters.
     ///
     /// # Errors
     /// If the model yields a number that is not finite.
     pub fn triangles(&self, beta: &[f64]) -> Result<Vec<Triangle>, IdentifyError> {
         let values = self.slot_values(beta);
-        // Stretches of fixed length, so that the sums do not depend on the number of threads.
-        let stretches: Vec<Narrow> = (self.blocks().par_chunks(BLOCKS_PER_SEGMENT))
-            .map(|blocks| self.narrow_triangles(&values, blocks))
+        // Segments have a fixed length, so that the sums do not depend on the number of threads.
+        let segments: Vec<FactorsByTestAndFold> = (self.blocks().par_chunks(BLOCKS_PER_SEGMENT))
+            .map(|blocks| self.factors_of_blocks(&values, blocks))
             .collect::<Result<_, IdentifyError>>()?;
-        let mut narrow = Narrow::new();
-        for ((test, fold), triangle) in stretches.into_iter().flatten() {
-            match narrow.entry((test, fold)) {
-                Entry::Vacant(place) => {
-                    place.insert(triangle);
+        let mut factors = FactorsByTestAndFold::new();
+        for ((test, fold), triangle) in segments.into_iter().flatten() {
+            match factors.entry((test, fold)) {
+                Entry::Vacant(entry) => {
+                    entry.insert(triangle);
                 }
                 Entry::Occupied(mut sum) => sum.get_mut().merge(&triangle),
             }
         }
-        let unknowns = self.parameters.list.len();
-        let mut triangles = vec![Triangle::new(unknowns); self.folds.count];
-        for ((test, fold), triangle) in narrow {
-            triangles[fold].merge(&triangle.among(&self.own[test].unknowns, unknowns));
+        let count = self.parameters.list.len();
+        let mut triangles = vec![Triangle::new(count); self.folds.count];
+        for ((test, fold), triangle) in factors {
+            triangles[fold].merge(&triangle.over_columns(&self.test_parameters[test].parameters, count));
         }
         Ok(triangles)
     }
 
-    /// The triangles of some blocks over their tests' own unknowns, by test and fold.
-    fn narrow_triangles(&self, values: &[SlotValues], blocks: &[Block]) -> Result<Narrow, IdentifyError> {
-        let mut narrow = Narrow::new();
+    /// The triangular factors of some blocks over the parameters of their tests, by test and fold.
+    fn factors_of_blocks(
+        &self,
+        values: &[SlotValues],
+        blocks: &[Block],
+    ) -> Result<FactorsByTestAndFold, IdentifyError> {
+        let mut factors = FactorsByTestAndFold::new();
         for block in blocks {
             let rows = self.own_rows(&values[block.test], block)?;
             let kept = self.kept_rows(block);
@@ -359,9 +365,9 @@ impl<'a> Problem<'a> {
             present.sort_unstable();
             present.dedup();
             for fold in &present {
-                let triangle = narrow
+                let triangle = factors
                     .entry((block.test, *fold))
-                    .or_insert_with(|| Triangle::new(self.own[block.test].unknowns.len()));
+                    .or_insert_with(|| Triangle::new(self.test_parameters[block.test].parameters.len()));
                 if present.len() == 1 {
                     triangle.absorb(white.as_ref());
                 } else {
@@ -372,41 +378,41 @@ impl<'a> Problem<'a> {
                 }
             }
         }
-        Ok(narrow)
+        Ok(factors)
     }
 
-    /// How many statements are known beforehand: the rows of [`Problem::prior_triangle`].
+    /// Number of prior observations: the rows of [`Problem::prior_triangle`].
     pub fn prior_rows(&self) -> usize {
         let gaussian = |prior: &Prior| matches!(prior, Prior::Gaussian(_));
         let list = &self.parameters.list;
         let distances = self.session.socket_distances.iter();
-        let told = distances.filter(|distance| {
+        let stated = distances.filter(|distance| {
             let mut ends = distance.between.iter();
             ends.all(|name| self.socket(name).is_some())
         });
-        list.iter().filter(|parameter| gaussian(&parameter.prior)).count() + told.count()
+        list.iter().filter(|parameter| gaussian(&parameter.prior)).count() + stated.count()
     }
 
-    /// What is known beforehand, as rows: Gaussian priors and distances between sockets.
+    /// The triangular factor of the priors: Gaussian priors and distances between sockets.
     pub fn prior_triangle(&self, beta: &[f64]) -> Triangle {
         self.prior_triangle_about(beta, |_| 0.0, |_| 0.0)
     }
 
-    /// The same with other expectations: `centre` of each unknown with a Gaussian prior, and by how much each distance between sockets is
-    /// `longer`, mm.
+    /// As [`Problem::prior_triangle`], with other prior means: `centre` for each parameter with a Gaussian prior, and an offset in mm
+    /// `longer` for each distance between sockets.
     pub fn prior_triangle_about(
         &self,
         beta: &[f64],
         centre: impl Fn(usize) -> f64,
         longer: impl Fn(usize) -> f64,
     ) -> Triangle {
-        let unknowns = self.parameters.list.len();
+        let count = self.parameters.list.len();
         let mut rows: Vec<Vec<f64>> = Vec::new();
         for (j, parameter) in self.parameters.list.iter().enumerate() {
             if let Prior::Gaussian(u) = parameter.prior {
-                let mut row = vec![0.0; unknowns + 1];
+                let mut row = vec![0.0; count + 1];
                 row[j] = 1.0 / u;
-                row[unknowns] = (centre(j) - beta[j]) / u;
+                row[count] = (centre(j) - beta[j]) / u;
                 rows.push(row);
             }
         }
@@ -416,32 +422,32 @@ impl<'a> Problem<'a> {
             let [Some((a, nominal_a)), Some((b, nominal_b))] = ends[..] else {
                 continue;
             };
-            let place = |k: usize, unknown: usize, nominal: f64| {
+            let coordinate = |k: usize, parameter: usize, nominal: f64| {
                 let mut seed = nalgebra::SVector::<f64, 6>::zeros();
                 seed[k] = 1.0;
-                num_dual::DualSVec64::<6>::new(nominal + beta[unknown], num_dual::Derivative::some(seed))
+                num_dual::DualSVec64::<6>::new(nominal + beta[parameter], num_dual::Derivative::some(seed))
             };
             let square = (0..3)
-                .map(|i| (place(i, a[i], nominal_a[i]) - place(i + 3, b[i], nominal_b[i])).powi(2))
+                .map(|i| (coordinate(i, a[i], nominal_a[i]) - coordinate(i + 3, b[i], nominal_b[i])).powi(2))
                 .fold(num_dual::DualSVec64::<6>::from(0.0), |sum, term| sum + term);
             let length = square.sqrt();
             let gradient = length
                 .eps
                 .unwrap_generic(nalgebra::Const::<6>, nalgebra::Const::<1>);
-            let mut row = vec![0.0; unknowns + 1];
+            let mut row = vec![0.0; count + 1];
             for i in 0..3 {
                 row[a[i]] += gradient[i] / distance.u_mm;
                 row[b[i]] += gradient[i + 3] / distance.u_mm;
             }
-            row[unknowns] = (distance.distance_mm + longer(number) - length.re) / distance.u_mm;
+            row[count] = (distance.distance_mm + longer(number) - length.re) / distance.u_mm;
             rows.push(row);
         }
-        let mut triangle = Triangle::new(unknowns);
-        triangle.absorb(Mat::from_fn(rows.len(), unknowns + 1, |i, j| rows[i][j]).as_ref());
+        let mut triangle = Triangle::new(count);
+        triangle.absorb(Mat::from_fn(rows.len(), count + 1, |i, j| rows[i][j]).as_ref());
         triangle
     }
 
-    /// The unknowns of a socket and where it stands nominally.
+    /// The parameters of a socket and its nominal position.
     fn socket(&self, name: &str) -> Option<([usize; 3], [f64; 3])> {
         let test = self
             .tests
@@ -450,19 +456,19 @@ impl<'a> Problem<'a> {
         let Station::Socket(station) = self.models[test].station() else {
             return None;
         };
-        let mut unknowns = [0; 3];
-        for (unknown, coordinate) in unknowns.iter_mut().zip(["x", "y", "z"]) {
+        let mut indices = [0; 3];
+        for (index, coordinate) in indices.iter_mut().zip(["x", "y", "z"]) {
             let id = format!("socket.{coordinate}[{name}]");
-            *unknown = self
+            *index = self
                 .parameters
                 .list
                 .iter()
                 .position(|parameter| parameter.id == id)?;
         }
-        Some((unknowns, station.socket))
+        Some((indices, station.socket))
     }
 
-    /// Residuals observed − model of every test, mm, rejected readings included.
+    /// Residuals observed − model of every test, mm, outliers included.
     pub fn residuals(&self, beta: &[f64]) -> Vec<Vec<f64>> {
         let values = self.slot_values(beta);
         (self.models.par_iter().zip(&self.tests).zip(&values))
@@ -490,7 +496,7 @@ impl<'a> Problem<'a> {
             white.col(0).iter().map(|value| value * value).sum::<f64>()
         });
         let readings: f64 = squares.collect::<Vec<f64>>().iter().sum();
-        let nothing = vec![0.0; beta.len()];
-        readings + self.prior_triangle(beta).sum_of_squares_after(&nothing)
+        let zero_step = vec![0.0; beta.len()];
+        readings + self.prior_triangle(beta).sum_of_squares_after(&zero_step)
     }
 }

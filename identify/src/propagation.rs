@@ -1,12 +1,12 @@
-//! The fit by Monte Carlo (JCGM 101): the readings and what is known of the set-ups are drawn about what was observed and stated, and every draw is
-//! fitted again, nonlinearly.
+//! Monte Carlo of the fit (JCGM 101): readings and set-up priors are simulated about their observed and stated values, and every simulated
+//! session is fitted again, nonlinearly.
 //!
 //! ```text
 //! Y = argmin Σ ((x_i − L_i(β))/σ)² + Σ ((s_k − β_k)/u_k)²,    x_i ~ N(observed, σ²),  s_k ~ N(stated, u_k²)
 //! ```
 //!
-//! Where the model is linear, `Y` is Gaussian with the covariance of the law of propagation. Whether it is, is judged as JCGM 101 (8.1) has it: with `u`
-//! written as `c·10^l`, one digit of `c` counting, the ends of the two coverage intervals may differ by `δ = ½·10^l`.
+//! For a linear model `Y` is Gaussian with the covariance of the law of propagation. JCGM 101 (8.1) gives the validation of that law. With
+//! `u = c·10^l`, `c` of one significant digit, the ends of the two coverage intervals may differ by `δ = ½·10^l`.
 
 use faer::Mat;
 use statrs::distribution::{Continuous, ContinuousCDF, Normal};
@@ -23,26 +23,26 @@ use crate::problem::{Block, Problem};
 use crate::results::{DrawnParameter, FitMonteCarlo, FitResult, Verdict, phases_follow_amplitudes};
 use crate::triangle::{BLOCK_ROWS, Triangle};
 
-/// Steps with the fit's own curvature before a draw is fitted with its own.
-const FEW_STEPS: usize = 8;
-/// Expected fall of the sum of squares below which a draw's fit is at its end: a hundredth of a standard uncertainty.
+/// Number of steps with the curvature of the original fit. After these the simulated session is fitted with its own curvature.
+const MAX_SHARED_STEPS: usize = 8;
+/// Expected decrease of the sum of squares below which the iteration ends: a hundredth of a standard uncertainty.
 const MIN_DECREASE: f64 = 1e-4;
 
-/// From the inputs' deviations to what the fit reports.
+/// The function from the deviations of the inputs to the reported quantities.
 struct Refit<'p, 'a> {
     problem: &'p Problem<'a>,
     fit: &'p Fit,
     blocks: Vec<Block>,
-    /// Where the readings of each test start among the inputs.
+    /// Index among the inputs of each test's first reading.
     starts: Vec<usize>,
-    /// Where the unknowns with a Gaussian prior stand among the inputs.
+    /// Index among the inputs of each parameter with a Gaussian prior.
     priors: Vec<Option<usize>>,
-    /// Where the distances between sockets start.
+    /// Index among the inputs of the first distance between sockets.
     distances: usize,
     quantities: Vec<Quantity>,
-    /// Where the fit ended, in seen directions.
+    /// The solution of the fit, in identifiable coordinates.
     end: Vec<f64>,
-    /// `(NᵀJᵀV⁻¹J N)⁻¹` there.
+    /// `(NᵀJᵀV⁻¹J N)⁻¹` at the solution.
     inverse: Mat<f64>,
     /// Standard uncertainty of each input.
     u: Vec<f64>,
@@ -50,7 +50,7 @@ struct Refit<'p, 'a> {
 
 impl<'p, 'a> Refit<'p, 'a> {
     fn new(problem: &'p Problem<'a>, fit: &'p Fit) -> Result<Self, IdentifyError> {
-        // Where χ² says that uncertainties are too small, they are enlarged here as they are in the fit.
+        // The factor on uncertainties applies here as in the fit.
         let enlarged = fit.u_enlargement;
         let mut u = Vec::new();
         let mut starts = Vec::new();
@@ -97,14 +97,14 @@ impl<'p, 'a> Refit<'p, 'a> {
             .collect()
     }
 
-    /// The seen coordinates that fit the inputs best.
+    /// The identifiable coordinates with the best fit to the inputs.
     fn fitted(&self, deviations: &[f64]) -> Result<Vec<f64>, IdentifyError> {
-        let drawn = Drawn {
+        let drawn = SimulatedFit {
             refit: self,
             deviations,
         };
         let mut z = self.end.clone();
-        for _ in 0..FEW_STEPS {
+        for _ in 0..MAX_SHARED_STEPS {
             let Ok(descent) = drawn.descent(&z) else { break };
             let step: Vec<f64> = (0..z.len())
                 .map(|i| (0..z.len()).map(|k| self.inverse[(i, k)] * descent[k]).sum())
@@ -118,7 +118,7 @@ impl<'p, 'a> Refit<'p, 'a> {
                 break;
             }
         }
-        // Too far from linear for the fit's curvature.
+        // Too nonlinear for the curvature of the original fit.
         let scale = Scaling::Physical(vec![1.0; self.end.len()]);
         Ok(minimise(&drawn, &self.end, &scale)?.x)
     }
@@ -135,7 +135,7 @@ impl Function for Refit<'_, '_> {
 
     fn outputs(&self) -> usize {
         let of = |quantity: &Quantity| match quantity {
-            Quantity::Unknown(_) => 1,
+            Quantity::Parameter(_) => 1,
             Quantity::Harmonic(_) => 2,
         };
         self.quantities.iter().map(of).sum()
@@ -156,13 +156,13 @@ impl Function for Refit<'_, '_> {
     }
 }
 
-/// One draw as a least-squares problem in the directions that are seen.
-struct Drawn<'r, 'p, 'a> {
+/// One simulated session as a least-squares problem in the identifiable directions.
+struct SimulatedFit<'r, 'p, 'a> {
     refit: &'r Refit<'p, 'a>,
     deviations: &'r [f64],
 }
 
-impl Drawn<'_, '_, '_> {
+impl SimulatedFit<'_, '_, '_> {
     fn prior_triangle(&self, beta: &[f64]) -> Triangle {
         let refit = self.refit;
         let centre = |j: usize| refit.priors[j].map_or(0.0, |place| self.deviations[place]);
@@ -170,7 +170,7 @@ impl Drawn<'_, '_, '_> {
         refit.problem.prior_triangle_about(beta, centre, longer)
     }
 
-    /// Passes on the unknowns of every block's test, and the whitened rows `[J | r]` over those.
+    /// Passes on the parameters of every block's test, and the whitened rows `[J | r]` over these parameters.
     fn rows(&self, beta: &[f64], mut take: impl FnMut(&[usize], Mat<f64>)) -> Result<(), IdentifyError> {
         let problem = self.refit.problem;
         let values = problem.slot_values(beta);
@@ -182,16 +182,16 @@ impl Drawn<'_, '_, '_> {
             for i in 0..rows.nrows() {
                 rows[(i, last)] += self.deviations[start + i];
             }
-            take(problem.own_unknowns(block.test), problem.whiten(&rows, block).0);
+            take(problem.own_parameters(block.test), problem.whiten(&rows, block).0);
         }
         Ok(())
     }
 
-    /// `Nᵀ Jᵀ V⁻¹ r`: against the slope of half the sum of squares.
+    /// `Nᵀ Jᵀ V⁻¹ r`: the negative gradient of half the sum of squares.
     fn descent(&self, z: &[f64]) -> Result<Vec<f64>, IdentifyError> {
         let beta = self.refit.beta(z);
-        let unknowns = beta.len();
-        let mut whole = vec![0.0; unknowns];
+        let count = beta.len();
+        let mut whole = vec![0.0; count];
         let mut add = |own: &[usize], rows: &Mat<f64>| {
             let residual = rows.col(own.len());
             for (j, column) in own.iter().zip(rows.col_iter()) {
@@ -199,21 +199,19 @@ impl Drawn<'_, '_, '_> {
             }
         };
         let (r, c, _) = self.prior_triangle(&beta).parts();
-        let all: Vec<usize> = (0..unknowns).collect();
-        let known = Mat::from_fn(unknowns, unknowns + 1, |i, j| {
-            if j == unknowns { c[i] } else { r[(i, j)] }
-        });
+        let all: Vec<usize> = (0..count).collect();
+        let known = Mat::from_fn(count, count + 1, |i, j| if j == count { c[i] } else { r[(i, j)] });
         add(&all, &known);
         self.rows(&beta, |own, rows| add(own, &rows))?;
         let seen = &self.refit.fit.rank.seen;
         Ok((0..seen.ncols())
-            .map(|k| (0..unknowns).map(|j| seen[(j, k)] * whole[j]).sum())
+            .map(|k| (0..count).map(|j| seen[(j, k)] * whole[j]).sum())
             .collect())
     }
 }
 
-impl LeastSquares for Drawn<'_, '_, '_> {
-    fn unknowns(&self) -> usize {
+impl LeastSquares for SimulatedFit<'_, '_, '_> {
+    fn parameters(&self) -> usize {
         self.refit.end.len()
     }
 
@@ -226,7 +224,7 @@ impl LeastSquares for Drawn<'_, '_, '_> {
                 let count = BLOCK_ROWS.min(rows.nrows() - start);
                 narrow.absorb(rows.subrows(start, count));
             }
-            whole.merge(&narrow.among(own, beta.len()));
+            whole.merge(&narrow.over_columns(own, beta.len()));
         })?;
         Ok(in_directions(&whole, &self.refit.fit.rank.seen))
     }
@@ -254,15 +252,15 @@ impl LeastSquares for Drawn<'_, '_, '_> {
                 sum += (0..white.nrows()).map(|i| white[(i, 0)].powi(2)).sum::<f64>();
             }
         }
-        let nothing = vec![0.0; beta.len()];
-        sum + self.prior_triangle(&beta).sum_of_squares_after(&nothing)
+        let zero_step = vec![0.0; beta.len()];
+        sum + self.prior_triangle(&beta).sum_of_squares_after(&zero_step)
     }
 }
 
-/// Draws, and puts into the result what is to be quoted: the Monte Carlo's `u` for every parameter at which the two do not agree.
+/// Runs the Monte Carlo and adds it to the result. Parameters for which the two methods disagree report the `u` of the Monte Carlo.
 ///
 /// # Errors
-/// If nothing is seen, or too few draws can be fitted for a distribution.
+/// If nothing is identifiable, or too few simulated sessions can be fitted for a distribution.
 pub fn add_monte_carlo(
     problem: &Problem<'_>,
     fit: &Fit,
@@ -271,7 +269,7 @@ pub fn add_monte_carlo(
 ) -> Result<(), IdentifyError> {
     if fit.rank.seen.ncols() == 0 {
         return Err(IdentifyError::Request(
-            "there is nothing to draw: these readings see none of the unknowns".into(),
+            "no parameter is identifiable from these readings, so there is nothing to propagate".into(),
         ));
     }
     let refit = Refit::new(problem, fit)?;
@@ -289,8 +287,8 @@ pub fn add_monte_carlo(
     let unconverged = distributions.iter().map(|d| d.outside[2]).max().unwrap_or(0);
     if unconverged * 2 > draws.runs {
         return Err(IdentifyError::Request(format!(
-            "{unconverged} of {} cannot be fitted: the set-ups' uncertainties reach beyond what the model can be evaluated at; state smaller \
-             ones, or fit without --monte-carlo",
+            "{unconverged} of {} cannot be fitted: the model cannot be evaluated over the range of the set-up uncertainties; state smaller \
+             ones, or fit without Monte Carlo",
             counted(draws.runs, "draw")
         )));
     }
@@ -318,7 +316,7 @@ pub fn add_monte_carlo(
     result.covariance = covariance::of_parameters(problem, fit, &result.parameters);
     if unconverged > 0 {
         result.warnings.push(format!(
-            "{unconverged} of {} could not be fitted and are in no figure",
+            "{unconverged} of {} could not be fitted and are excluded",
             counted(draws.runs, "draw")
         ));
     }
@@ -332,7 +330,7 @@ pub fn add_monte_carlo(
     Ok(())
 }
 
-/// Both propagations of one parameter.
+/// Law of propagation and Monte Carlo for one parameter.
 fn compared(
     id: &str,
     value: f64,
@@ -347,7 +345,7 @@ fn compared(
     let gum_interval = [value - factor * gum_u, value + factor * gum_u];
     let endpoint_differences = [0, 1].map(|end| (drawn.symmetric[end] - gum_interval[end]).abs());
     let tolerance = tolerance(gum_u);
-    // A quantile's standard deviation, √(q(1 − q)/M) over the density there, taken as Gaussian.
+    // Standard deviation of a quantile: √(q(1 − q)/M) over the density there, with a Gaussian density.
     let share = (tail * (1.0 - tail) / draws.runs as f64).sqrt();
     let endpoint_u = drawn.u * share / normal.pdf(factor);
     let worst = endpoint_differences[0].max(endpoint_differences[1]);
@@ -382,7 +380,7 @@ fn compared(
 ///
 /// assert_eq!(tolerance(0.00035), 0.00005);
 /// assert_eq!(tolerance(2.0), 0.5);
-/// // 9.7 is 1·10¹ with one digit.
+/// // 9.7 with one significant digit is 1·10¹.
 /// assert_eq!(tolerance(9.7), 5.0);
 /// ```
 pub fn tolerance(u: f64) -> f64 {
@@ -395,7 +393,7 @@ pub fn tolerance(u: f64) -> f64 {
     } else {
         power
     };
-    // Dividing by a whole power of ten keeps short decimals short.
+    // Dividing by a whole power of ten keeps decimals exact.
     if power < 0 {
         0.5 / 10.0_f64.powi(-power)
     } else {
@@ -412,27 +410,31 @@ mod tests {
     use super::*;
     use crate::fit::prepare;
 
-    /// The same draw three ways: its rows taken together, its residuals alone, and their slope against differences.
+    /// Three computations for one simulated session agree: the sum of squares of its rows, that of its residuals, and its gradient against
+    /// differences.
     #[test]
-    fn a_draw_has_one_sum_of_squares_and_its_slope() {
+    fn sum_of_squares_and_gradient_of_a_simulated_session_agree() {
         let file =
             Path::new(env!("CARGO_MANIFEST_DIR")).join("../sessions/hermle-c600u/measured/session.toml");
         let session = read::session(&file, &ReadOptions::default()).unwrap();
         let (problem, fit) = prepare(&session, 1).unwrap();
         let refit = Refit::new(&problem, &fit).unwrap();
-        // Deviations of a standard uncertainty, alternately up and down.
+        // Deviations of one standard uncertainty with alternating signs.
         let signs = [1.0, -1.0, 1.0, 1.0, -1.0].iter().cycle();
         let deviations: Vec<f64> = refit.u.iter().zip(signs).map(|(u, sign)| u * sign).collect();
-        let drawn = Drawn {
+        let drawn = SimulatedFit {
             refit: &refit,
             deviations: &deviations,
         };
         let z = drawn.refit.end.clone();
-        let nothing = vec![0.0; z.len()];
-        let whole = drawn.linearise(&z).unwrap().sum_of_squares_after(&nothing);
-        let alone = drawn.sum_of_squares(&z);
-        assert!(alone > 0.5 * problem.readings() as f64, "{alone}");
-        assert!((alone / whole - 1.0).abs() < 1e-9, "{alone} and {whole}");
+        let zero_step = vec![0.0; z.len()];
+        let whole = drawn.linearise(&z).unwrap().sum_of_squares_after(&zero_step);
+        let of_residuals = drawn.sum_of_squares(&z);
+        assert!(of_residuals > 0.5 * problem.readings() as f64, "{of_residuals}");
+        assert!(
+            (of_residuals / whole - 1.0).abs() < 1e-9,
+            "{of_residuals} and {whole}"
+        );
         let descent = drawn.descent(&z).unwrap();
         for k in 0..z.len() {
             let by = 1e-2 * refit.inverse[(k, k)].sqrt();

@@ -1,4 +1,4 @@
-//! Values as people give them on a command line or in a file of errors: `EY0A=35.3um`, `"bar[A100]" = "-0.4 um"`.
+//! Values with units, as users write them: `EY0A=35.3um`, `"bar[A100]" = "-0.4 um"`.
 
 use std::path::Path;
 
@@ -8,7 +8,7 @@ use abbe_model::session::read;
 use crate::error::IdentifyError;
 use crate::unit::{ARCSEC, Unit};
 
-/// A value for one unknown, with its unit.
+/// The value of one parameter, with its unit.
 ///
 /// ```
 /// use abbe_identify::quantity::Given;
@@ -19,7 +19,7 @@ use crate::unit::{ARCSEC, Unit};
 /// ```
 #[derive(Clone, Debug, PartialEq)]
 pub struct Given {
-    /// The unknown as it stands in results, or by its literature name: `EY0A`, `e_y0a`, `bar[A100]`, `EZC~C:h2.amplitude`.
+    /// The identifier in results, or the literature name: `EY0A`, `e_y0a`, `bar[A100]`, `EZC~C:h2.amplitude`.
     pub id: String,
     /// The number, in `unit`.
     pub value: f64,
@@ -27,10 +27,10 @@ pub struct Given {
     pub unit: String,
 }
 
-/// Most bytes of a number with its unit: more digits than any number has, and none that takes long to be told from its unit.
-const LONGEST: usize = 100;
+/// Maximum length of a number with its unit, in bytes. It bounds the time to separate number and unit.
+const MAX_BYTES: usize = 100;
 
-/// Units of one quantity, with how many of the first make one of each.
+/// Units of one quantity, each with its size in the first unit.
 const LENGTHS: [(&str, f64); 5] = [("um", 1.0), ("µm", 1.0), ("μm", 1.0), ("nm", 1e-3), ("mm", 1e3)];
 const ANGLES: [(&str, f64); 6] = [
     ("arcsec", 1.0),
@@ -51,7 +51,7 @@ impl Given {
     pub fn parse(text: &str) -> Result<Given, IdentifyError> {
         let Some((id, quantity)) = text.rsplit_once('=') else {
             return Err(IdentifyError::Request(format!(
-                "`{text}` gives no value; write name, number and unit as in `EY0A=35.3um`"
+                "`{text}` has no value; write name, number and unit as in `EY0A=35.3um`"
             )));
         };
         Given::of(id.trim(), quantity)
@@ -63,13 +63,13 @@ impl Given {
     /// If the text does not start with a finite number of moderate size, or has no unit.
     pub fn of(id: &str, quantity: &str) -> Result<Given, IdentifyError> {
         let quantity = quantity.trim();
-        if quantity.len() > LONGEST {
+        if quantity.len() > MAX_BYTES {
             return Err(IdentifyError::Request(format!(
-                "`{id}`: a number with its unit of {} bytes; {LONGEST} is the most, write it as in `EY0A=35.3um`",
+                "`{id}`: the number with its unit has {} bytes; the maximum is {MAX_BYTES}; write it as in `EY0A=35.3um`",
                 quantity.len()
             )));
         }
-        // The longest start that is a number: `1e3um` is a thousand, and the `e` of no unit is taken for an exponent.
+        // The longest prefix that is a number: `1e3um` is a thousand µm, and an `e` that starts a unit is no exponent.
         let number = (1..=quantity.len())
             .rev()
             .filter(|end| quantity.is_char_boundary(*end))
@@ -79,7 +79,7 @@ impl Given {
             });
         match number {
             Some((value, _)) if value.is_finite() && value.abs() > LARGEST => Err(IdentifyError::Request(
-                format!("`{id}={quantity}`: {value:e} is too large; {LARGEST:e} is the most"),
+                format!("`{id}={quantity}`: {value:e} is too large; the maximum is {LARGEST:e}"),
             )),
             Some((value, unit)) if value.is_finite() && (!unit.is_empty() || value == 0.0) => Ok(Given {
                 id: id.to_string(),
@@ -87,18 +87,18 @@ impl Given {
                 unit: unit.to_string(),
             }),
             Some((value, "")) if value.is_finite() => Err(IdentifyError::Request(format!(
-                "`{id}={quantity}` has no unit; write it behind the number, as in `{id}={quantity}um` or `{id}={quantity}arcsec`"
+                "`{id}={quantity}` has no unit; write the unit after the number, as in `{id}={quantity}um` or `{id}={quantity}arcsec`"
             ))),
             _ => Err(IdentifyError::Request(format!(
-                "`{id}={quantity}`: \"{quantity}\" is no number with a unit; write it as in `EY0A=35.3um`"
+                "`{id}={quantity}`: \"{quantity}\" is not a number with a unit; write it as in `EY0A=35.3um`"
             ))),
         }
     }
 
-    /// The value in the unit inside, for an unknown that is reported in `unit`.
+    /// The value in internal units, for a parameter with the display unit `unit`.
     ///
     /// # Errors
-    /// If the two units measure different things.
+    /// If the two units are of different quantities.
     pub fn inside(&self, unit: &Unit) -> Result<f64, IdentifyError> {
         self.in_unit(&unit.name)
             .map(|value| value / unit.display_per_internal)
@@ -107,13 +107,13 @@ impl Given {
     /// The value in another unit.
     ///
     /// # Errors
-    /// If the two units measure different things.
+    /// If the two units are of different quantities.
     pub fn in_unit(&self, wanted: &str) -> Result<f64, IdentifyError> {
         if self.value == 0.0 || self.unit == wanted {
             return Ok(self.value);
         }
         let factor = factor(&self.unit, wanted).or_else(|| {
-            // `mm/h` where `um/h` is wanted.
+            // `mm/h` to `um/h`.
             let (above, below) = self.unit.split_once('/')?;
             let (wanted_above, wanted_below) = wanted.split_once('/')?;
             (below == wanted_below).then(|| factor(above, wanted_above))?
@@ -121,14 +121,14 @@ impl Given {
         match factor {
             Some(factor) => Ok(self.value * factor),
             None => Err(IdentifyError::Request(format!(
-                "`{}` is given in `{}`; it is measured in `{wanted}`",
+                "`{}` has the unit `{}`; a unit such as `{wanted}` is expected",
                 self.id, self.unit
             ))),
         }
     }
 }
 
-/// How many of the second unit make one of the first.
+/// The size of the first unit in the second one.
 fn factor(from: &str, to: &str) -> Option<f64> {
     [&LENGTHS[..], &ANGLES[..], &TIMES[..], &RATIOS[..]]
         .into_iter()
@@ -143,10 +143,10 @@ fn factor(from: &str, to: &str) -> Option<f64> {
         })
 }
 
-/// Reads a file of values, `EY0A = "35.3 um"` a line, in its order.
+/// Reads a file of values, one `EY0A = "35.3 um"` per line, in the order of the file.
 ///
 /// # Errors
-/// If the file cannot be read, is not TOML, or a value is not text of a number with its unit: with the file, the entry and what to do.
+/// If the file cannot be read, is not TOML, or a value is not text with a number and a unit. The message names the file and the entry.
 pub fn read(path: &Path) -> Result<Vec<Given>, IdentifyError> {
     let fault = |message: String| IdentifyError::Request(format!("{}: {message}", path.display()));
     let text = read::text(path, "the file of values")?;
@@ -158,7 +158,7 @@ pub fn read(path: &Path) -> Result<Vec<Given>, IdentifyError> {
         .map(|(key, value)| match value.get_ref().as_str() {
             Some(quantity) => Given::of(key.get_ref(), quantity).map_err(|error| fault(error.to_string())),
             None => Err(fault(format!(
-                "`{key}` is no text; write number and unit in quotes, as in `{key} = \"35.3 um\"`",
+                "`{key}` is not text; write number and unit in quotes, as in `{key} = \"35.3 um\"`",
                 key = key.get_ref()
             ))),
         })

@@ -1,40 +1,41 @@
-//! Numerical rank of the readings, decided against noise, and the null space in one canonical form.
+//! Numerical rank of the readings against their noise, and the null space in canonical form.
 //!
-//! With the whitened Jacobian in physical units (1 mm, 0.01 rad) a singular value `s` says that a move by the physical size along its direction
-//! changes the readings by `s` standard deviations in all. A direction with `s < 1` is not identifiable: even a gross error along it drowns. No
-//! tolerance on floating-point numbers is involved; exact null directions of a nominal geometry come out at 10⁻¹⁰ and lower.
+//! The whitened Jacobian is in physical units (1 mm, 0.01 rad). A singular value `s` then means: a change by the physical size along its
+//! direction changes the readings by `s` standard deviations in total. A direction with `s < 1` is not identifiable, because even a gross
+//! error along it is below the noise. No floating-point tolerance is involved: exact null directions of a nominal geometry have singular
+//! values of 10⁻¹⁰ and lower.
 //!
-//! The null space is reported in reduced row echelon form (`echelon`), which depends on the space and on a fixed order of preference of the
-//! parameters alone, not on the basis that a decomposition happens to return. That order ([`Rank::decide`]) is a matter of names, so that neither
-//! rounding nor the order of declarations in a session decides anything.
+//! The null space is reported in reduced row echelon form (`echelon`). The form depends on the space and on a fixed order of preference of
+//! the parameters only, not on the basis from the decomposition. The order of preference ([`Rank::decide`]) follows from identifiers.
+//! Neither rounding nor the order of declarations in a session affects it.
 
 use faer::prelude::Solve;
 use faer::{Mat, MatRef};
 
 use crate::error::IdentifyError;
 
-/// Singular value, in standard deviations a physical size, below which a direction is not identifiable.
+/// Singular value, in standard deviations per physical size, below which a direction is not identifiable.
 pub const MIN_IDENTIFIABLE: f64 = 1.0;
 
 /// The identifiable and the null directions of a problem.
 #[derive(Clone, Debug)]
 pub struct Rank {
-    /// Singular values in descending order, standard deviations a physical size.
+    /// Singular values in descending order, standard deviations per physical size.
     pub singular_values: Vec<f64>,
-    /// Columns span what is identifiable: parameters × rank, in internal units (mm, rad), each column one physical size long.
+    /// A basis of the identifiable space: parameters × rank, in internal units (mm, rad). Each column is one physical size long.
     pub seen: Mat<f64>,
-    /// Null-space combinations in scaled parameters, in reduced row echelon form: one row a combination, with 1 at its pivot and 0 at the pivots of
-    /// the other rows.
+    /// Null-space combinations in scaled parameters, in reduced row echelon form. Each row is one combination, with 1 at its pivot and 0
+    /// at the pivots of the other rows.
     pub unseen: Vec<Vec<f64>>,
-    /// The pivot of each of these rows, in the order of preference.
+    /// The pivot of each row, in the order of preference.
     pub pivots: Vec<usize>,
-    /// Orthonormal columns that span the null space, in scaled parameters: parameters × (parameters − rank).
+    /// Orthonormal basis of the null space, in scaled parameters: parameters × (parameters − rank).
     pub null_space: Mat<f64>,
 }
 
 impl Rank {
-    /// From `R` (whitened, priors included) and the physical size of each parameter. `preference` holds every parameter once, those first that lead a
-    /// null-space combination rather than others: see `pivot_preference`.
+    /// Decides the rank from `R` (whitened, priors included) and the physical size of each parameter. `preference` lists every parameter
+    /// once, the preferred pivots of null-space combinations first: see `pivot_preference`.
     ///
     /// # Errors
     /// If `R` has entries that are not finite.
@@ -60,7 +61,7 @@ impl Rank {
         let v = svd.V();
         let null_space = Mat::from_fn(n, n - rank, |j, k| v[(j, rank + k)]);
         let (unseen, pivots) = combinations(null_space.as_ref(), scaled.as_ref(), preference, MIN_PIVOT);
-        // Full rank: the parameters themselves, so that nothing is mixed.
+        // At full rank the basis is that of the parameters themselves.
         let seen = if rank == n {
             Mat::from_fn(n, n, |i, j| if i == j { size[i] } else { 0.0 })
         } else {
@@ -75,8 +76,8 @@ impl Rank {
         })
     }
 
-    /// The identifiable coordinates of parameters in internal units; the least-squares ones where the parameters hold null-space parts. `size` as in
-    /// [`Rank::decide`].
+    /// Coordinates of parameters in the identifiable basis, by least squares; null-space parts are dropped. `size` as in [`Rank::decide`].
+    /// Internal units.
     pub fn coordinates(&self, beta: &[f64], size: &[f64]) -> Vec<f64> {
         // The columns of `seen` over `size` are orthonormal.
         (0..self.seen.ncols())
@@ -89,13 +90,13 @@ impl Rank {
     }
 
     /// Whether a parameter takes part in no null-space combination.
-    pub fn is_identifiable(&self, unknown: usize) -> bool {
-        self.unseen.iter().all(|row| row[unknown] == 0.0)
+    pub fn is_identifiable(&self, parameter: usize) -> bool {
+        self.unseen.iter().all(|row| row[parameter] == 0.0)
     }
 }
 
-/// The combinations of a null space in its canonical form (see [`echelon`]) without what they owe to the noise, and the pivot of each. `scaled` is the whitened
-/// triangle in scaled parameters.
+/// The combinations of a null space in canonical form (see [`echelon`]), without coefficients that are due to noise, and the pivot of
+/// each. `scaled` is the whitened triangular factor in scaled parameters.
 pub fn combinations(
     null_space: MatRef<'_, f64>,
     scaled: MatRef<'_, f64>,
@@ -109,8 +110,8 @@ pub fn combinations(
     (rows, pivots)
 }
 
-/// Drops the least coefficients one by one as long as what remains is still not identifiable: a combination that hides within the noise owes
-/// its small coefficients to the noise. Coefficients of one size are tried in the order of preference, the last first.
+/// Drops the smallest coefficients one by one as long as the remaining combination is not identifiable: such coefficients are due to
+/// noise. Coefficients of equal size are tried in reverse order of preference.
 fn prune(row: &mut [f64], pivot: usize, scaled: MatRef<'_, f64>, preference: &[usize]) {
     let signal = |row: &[f64]| -> f64 {
         let change: f64 = (0..scaled.nrows())
@@ -123,14 +124,14 @@ fn prune(row: &mut [f64], pivot: usize, scaled: MatRef<'_, f64>, preference: &[u
             .sum();
         change.sqrt() / row.iter().map(|v| v * v).sum::<f64>().sqrt()
     };
-    // What is named is an approximate direction; twice the limit still drowns.
+    // A reported combination is an approximate null direction. Twice the limit is still below the noise.
     let limit = 2.0 * signal(row).max(MIN_IDENTIFIABLE);
     let largest = row.iter().fold(0.0_f64, |most, value| most.max(value.abs()));
     let mut order: Vec<usize> = preference
         .iter()
         .rev()
         .copied()
-        .filter(|j| *j != pivot && row[*j] != 0.0 && row[*j].abs() < PRUNED * largest)
+        .filter(|j| *j != pivot && row[*j] != 0.0 && row[*j].abs() < MAX_PRUNED_SHARE * largest)
         .collect();
     order.sort_by_key(|j| magnitude(row[*j]));
     for j in order {
@@ -141,37 +142,38 @@ fn prune(row: &mut [f64], pivot: usize, scaled: MatRef<'_, f64>, preference: &[u
     }
 }
 
-/// How large a number is, in steps of 10⁻⁴ of itself: numbers that differ by rounding alone are alike. For lists that are put in order by figures which may
-/// be equal; a stable sort then leaves equal ones in the order of their names.
+/// The magnitude of a number in steps of 10⁻⁴ of itself, so that numbers that differ by rounding alone compare equal. It serves as a key
+/// for stable sorts, which leave equal entries in the order of their names.
 pub fn magnitude(value: f64) -> i64 {
     (value.abs().max(f64::MIN_POSITIVE).ln() * 1e4).round() as i64
 }
 
-/// Coefficients that may be pruned: below this, relative to the largest of the combination.
-const PRUNED: f64 = 0.02;
+/// Coefficients below this share of the largest coefficient of the combination may be pruned.
+const MAX_PRUNED_SHARE: f64 = 0.02;
 
-/// Coefficients below this, relative to the largest of the combination, are rounding.
-const NEGLIGIBLE: f64 = 1e-5;
+/// Coefficients below this share of the largest coefficient of the combination are rounding errors.
+const ROUNDING_SHARE: f64 = 1e-5;
 
-/// A parameter is a pivot if its part in the null space that the pivots before it have left is at least this share of the largest such part. The share is
-/// large enough for the elimination to be stable, and no round ratio of lengths: parts of a geometry stated in round numbers are equal to it by no
-/// coincidence, so that rounding cannot decide.
+/// A parameter is a pivot if its part in the remaining null space is at least this share of the largest such part. The share is large
+/// enough for a stable elimination. It is no ratio of round lengths, so that parts of a geometry in round numbers are not equal to it and
+/// rounding cannot decide.
 pub const MIN_PIVOT: f64 = 0.0937;
 
-/// The reduced row echelon form of a space, and the pivot of each row, in the order of preference; a row has 1 at its own pivot, 0 at the others, and 0 where
-/// rounding is all there is. `space` holds orthonormal columns (parameters × dimension). The form is the same for every such basis of one space: the part
-/// of a parameter is the distance of its unit vector's projection from those of the pivots before it, which no rotation of the basis changes.
+/// The reduced row echelon form of a space, and the pivot of each row, in the order of preference. Each row has 1 at its own pivot, 0 at
+/// the others, and 0 at coefficients that are rounding errors. `space` is an orthonormal basis (parameters × dimension). The form is the
+/// same for every orthonormal basis of a space. The part of a parameter is the distance of its unit vector's projection from the span of
+/// the earlier pivots' projections. No rotation of the basis changes this distance.
 ///
-/// A parameter is passed over whose part is smaller than `least` times the largest part that remains.
+/// A parameter is skipped if its part is smaller than `least` times the largest remaining part.
 pub fn echelon(space: MatRef<'_, f64>, preference: &[usize], least: f64) -> (Vec<Vec<f64>>, Vec<usize>) {
     let (n, dimension) = (space.nrows(), space.ncols());
-    // What is left of each parameter's projection: one row each.
-    let mut left: Vec<Vec<f64>> = (0..n)
+    // The remaining projection of each parameter, one row each.
+    let mut remaining: Vec<Vec<f64>> = (0..n)
         .map(|j| (0..dimension).map(|k| space[(j, k)]).collect())
         .collect();
     let mut pivots: Vec<usize> = Vec::new();
     while pivots.len() < dimension {
-        let length = |j: usize| left[j].iter().map(|v| v * v).sum::<f64>().sqrt();
+        let length = |j: usize| remaining[j].iter().map(|v| v * v).sum::<f64>().sqrt();
         let free = |j: &usize| !pivots.contains(j);
         let largest = (0..n).filter(free).map(length).fold(0.0, f64::max);
         let next = preference
@@ -179,18 +181,18 @@ pub fn echelon(space: MatRef<'_, f64>, preference: &[usize], least: f64) -> (Vec
             .copied()
             .filter(free)
             .find(|j| length(*j) >= least * largest);
-        let Some(pivot) = next.filter(|_| largest > NEGLIGIBLE) else {
+        let Some(pivot) = next.filter(|_| largest > ROUNDING_SHARE) else {
             break;
         };
         let along = length(pivot);
-        let unit: Vec<f64> = left[pivot].iter().map(|v| v / along).collect();
-        for row in &mut left {
+        let unit: Vec<f64> = remaining[pivot].iter().map(|v| v / along).collect();
+        for row in &mut remaining {
             let share: f64 = row.iter().zip(&unit).map(|(v, u)| v * u).sum();
             row.iter_mut().zip(&unit).for_each(|(v, u)| *v -= share * u);
         }
         pivots.push(pivot);
     }
-    // An earlier pivot may have been passed over until those before it had taken what was larger.
+    // A parameter that was skipped may become a pivot later, after larger parts are eliminated.
     pivots.sort_by_key(|pivot| preference.iter().position(|j| j == pivot));
     // With P the rows of the basis at the pivots, the form is (basis · P⁻¹)ᵀ.
     let count = pivots.len();
@@ -208,7 +210,7 @@ pub fn echelon(space: MatRef<'_, f64>, preference: &[usize], least: f64) -> (Vec
             (0..n)
                 .map(|j| match pivots.iter().position(|pivot| *pivot == j) {
                     Some(place) => f64::from(u8::from(place == i)),
-                    None if form[(j, i)].abs() < NEGLIGIBLE * largest => 0.0,
+                    None if form[(j, i)].abs() < ROUNDING_SHARE * largest => 0.0,
                     None => form[(j, i)],
                 })
                 .collect()
@@ -235,10 +237,10 @@ mod tests {
         })
     }
 
-    /// Five parameters of which no reading tells `x0 − x1`, `x1 + 2 x2 − x3` and `x4`: whatever basis of that space is given, and whatever rounding of
-    /// 10⁻¹⁰ it carries, the combinations are the same, and those that the equations say.
+    /// Five parameters with the null space `x0 − x1`, `x1 + 2 x2 − x3`, `x4`. The combinations are those of the equations, for every basis
+    /// of the space and for rounding errors of 10⁻¹⁰.
     #[test]
-    fn a_null_space_has_one_form_whatever_its_basis() {
+    fn the_canonical_null_space_is_independent_of_the_basis() {
         let raw = [
             [1.0, -1.0, 0.0, 0.0, 0.0],
             [0.0, 1.0, 2.0, -1.0, 0.0],
@@ -291,17 +293,17 @@ mod tests {
         }
     }
 
-    /// Readings of nine parameters that see five combinations: what is not identifiable is the same, name by name, in whatever order the parameters are
-    /// declared and with rounding of 10⁻¹¹ in every entry.
+    /// Readings of nine parameters with rank 5. The null space is the same, name by name, for every order of declaration and with rounding
+    /// errors of 10⁻¹¹ in every entry.
     #[test]
-    fn a_null_space_does_not_depend_on_the_order_of_declarations() {
+    fn the_null_space_is_independent_of_the_order_of_declarations() {
         const N: usize = 9;
-        let seen = |i: usize, j: usize| [1.0, -1.0, 2.0, 0.0, 0.5][(3 * i + 2 * j + i * j) % 5] * 1e4;
+        let entry = |i: usize, j: usize| [1.0, -1.0, 2.0, 0.0, 0.5][(3 * i + 2 * j + i * j) % 5] * 1e4;
         let order = |turn: usize| (0..N).map(move |j| (4 * j + turn) % N).collect::<Vec<usize>>();
-        let told = |turn: usize| {
+        let decide = |turn: usize| {
             let order = order(turn);
             let r = Mat::from_fn(N, N, |i, j| {
-                let exact = if i < 5 { seen(i, order[j]) } else { 0.0 };
+                let exact = if i < 5 { entry(i, order[j]) } else { 0.0 };
                 exact * (1.0 + 1e-15 * ((5 * i + 3 * j + turn) % 7) as f64)
             });
             // Preferred by name: parameter 0 first.
@@ -321,10 +323,10 @@ mod tests {
             let pivots: Vec<usize> = rank.pivots.iter().map(|pivot| order[*pivot]).collect();
             (rows, pivots)
         };
-        let (rows, pivots) = told(0);
+        let (rows, pivots) = decide(0);
         assert!(pivots.is_sorted() && !pivots.is_empty(), "{pivots:?}");
         for turn in 1..N {
-            let (others, of_others) = told(turn);
+            let (others, of_others) = decide(turn);
             assert_eq!(of_others, pivots);
             for (row, other) in rows.iter().zip(&others) {
                 for (a, b) in row.iter().zip(other) {

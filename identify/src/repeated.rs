@@ -1,14 +1,14 @@
-//! Repeated sessions of one plan: Type A beside Type B (JCGM 100, 4.2 and 4.3).
+//! Comparison of repeated sessions of one plan: Type A against Type B uncertainty (JCGM 100, 4.2 and 4.3).
 //!
-//! Of `n` sessions, each fitted by itself, with values `x_k` and standard uncertainties `u_k`:
+//! For `n` sessions, each fitted separately, with values `x_k` and standard uncertainties `u_k`:
 //!
 //! ```text
 //! mean x̄,   s² = Σ (x_k − x̄)²/(n − 1),   Type A of the mean s/√n,   Type B of one session u = √(Σ u_k²/n)
-//! (n − 1)·s²/u² ~ χ²(n − 1)    if the sessions scatter by as much as their fits say
+//! (n − 1)·s²/u² ~ χ²(n − 1)    if the sessions scatter by as much as their fits state
 //! ```
 //!
-//! Set-up quantities are not compared: every session has its own. Nor do Type A and Type B have to agree: a set-up that was not mounted anew, or a
-//! calibration that all sessions share, is in every `u_k` and in no scatter.
+//! Set-up quantities are not compared, because every session has its own. Type A and Type B need not agree: a set-up that was not
+//! remounted, or a calibration that all sessions share, contributes to every `u_k` but not to the scatter.
 
 use std::collections::BTreeSet;
 
@@ -22,22 +22,22 @@ use crate::parameters::Role;
 use crate::problem::Problem;
 use crate::results::ParameterResult;
 
-/// Probability at which one of all comparisons is called significant though nothing differs.
+/// Significance level over all comparisons together.
 const SIGNIFICANCE: f64 = 0.01;
 
-/// One session, fitted.
+/// One fitted session.
 #[derive(Clone, Debug)]
 pub struct Session {
     /// Its file.
     pub name: String,
-    /// What it was made with, in words: sessions that differ in it are not repeats.
+    /// Machine, instrument and tests in words. Sessions with different plans are not repeats.
     plan: String,
     /// Errors and coefficients of effects.
     parameters: Vec<ParameterResult>,
 }
 
 impl Session {
-    /// A fitted session by the name of its file.
+    /// A fitted session with the name of its file.
     pub fn new(name: &str, problem: &Problem<'_>, fit: &Fit) -> Session {
         let list = &problem.parameters.list;
         let setup = |id: &str| list.iter().any(|p| p.id == id && p.role == Role::Setup);
@@ -82,7 +82,7 @@ pub struct RepeatedParameter {
     pub s: f64,
     /// Standard uncertainty of the mean, Type A.
     pub u_type_a: f64,
-    /// Standard uncertainty of one session by its fit, Type B: the root mean square over the sessions.
+    /// Standard uncertainty of one session by its fit, Type B: root mean square over the sessions.
     pub u_type_b: f64,
     /// `s` over `u_type_b`; `null` where the latter is zero.
     pub ratio: Option<f64>,
@@ -96,15 +96,15 @@ pub struct RepeatedParameter {
     pub values: Vec<f64>,
 }
 
-/// Scatter of the sessions against what their fits say.
+/// Scatter of the sessions against the uncertainties of their fits.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 pub enum Scatter {
-    /// Nothing speaks against it.
+    /// Consistent with the fits.
     AsStated,
-    /// Something differs between the sessions that no fit knows of.
+    /// Significantly more: an effect differs between the sessions that no fit models.
     More,
-    /// The fits allow for something that did not change between the sessions.
+    /// Significantly less: the fits include an uncertainty that is constant over the sessions.
     Less,
 }
 
@@ -115,9 +115,9 @@ pub struct DeviatingSession {
     pub session: String,
     /// The parameter.
     pub id: String,
-    /// Value of the session less the mean over the other sessions, in `unit`.
+    /// Value of the session less the mean of the other sessions, in `unit`.
     pub deviation: f64,
-    /// Standard uncertainty of this deviation by the fits, in `unit`.
+    /// Standard uncertainty of this deviation from the fits, in `unit`.
     pub u: f64,
     /// Unit of `deviation` and `u`.
     pub unit: String,
@@ -128,7 +128,7 @@ pub struct DeviatingSession {
 /// Compares sessions of one plan.
 ///
 /// # Errors
-/// If there are fewer than two, or they are not of one plan.
+/// If there are fewer than two sessions, or their plans differ.
 pub fn compare(sessions: &[Session]) -> Result<Repeated, IdentifyError> {
     let [first, others @ ..] = sessions else {
         return Err(one_session());
@@ -149,7 +149,7 @@ pub fn compare(sessions: &[Session]) -> Result<Repeated, IdentifyError> {
         let turn = (parameter.unit == "deg").then_some(360.0);
         let of = |session: &Session| {
             let own = &session.parameters[place];
-            // A phase is the same a turn further.
+            // A phase is periodic in a turn.
             let turns = turn.map_or(0.0, |turn| ((own.value - parameter.value) / turn).round() * turn);
             (own.value - turns, own.u)
         };
@@ -177,14 +177,14 @@ pub fn compare(sessions: &[Session]) -> Result<Repeated, IdentifyError> {
 }
 
 fn one_session() -> IdentifyError {
-    IdentifyError::Request("one session has no scatter: name at least one more behind --repeat".into())
+    IdentifyError::Request("one session has no scatter; give at least two sessions".into())
 }
 
-/// That two sessions are repeats of one plan.
+/// Checks that two sessions are repeats of one plan.
 fn same_plan(first: &Session, other: &Session) -> Result<(), IdentifyError> {
     let fault = |what: String| {
         IdentifyError::Request(format!(
-            "{} is no repeat of {}: {what}; repeated sessions have the same machine, tests and unknowns",
+            "{} is not a repeat of {}: {what}; repeated sessions have the same machine, tests and parameters",
             other.name, first.name
         ))
     };
@@ -211,7 +211,7 @@ fn same_plan(first: &Session, other: &Session) -> Result<(), IdentifyError> {
         }
     };
     Err(fault(format!(
-        "its readings tell {} besides and {} not",
+        "its readings identify {} in addition, but not {}",
         list(&own, &known),
         list(&known, &own)
     )))
@@ -255,33 +255,33 @@ fn over_sessions(parameter: &ParameterResult, values: &[(f64, f64)], significanc
     }
 }
 
-/// The values that are off the mean of the rest, the clearest taken out before the next is looked for: place, by how much, with what standard
-/// uncertainty, with what probability.
+/// The values that deviate from the mean of the others, the most significant removed first: index, deviation, its standard uncertainty,
+/// its probability.
 fn deviating_from_others(values: &[(f64, f64)], significance: f64) -> Vec<(usize, f64, f64, f64)> {
     let normal = Normal::standard();
-    let mut rest: Vec<usize> = (0..values.len()).collect();
+    let mut remaining: Vec<usize> = (0..values.len()).collect();
     let mut found = Vec::new();
-    while rest.len() > 2 {
-        let others = rest.len() as f64 - 1.0;
-        let sum: f64 = rest.iter().map(|k| values[*k].0).sum();
-        let square: f64 = rest.iter().map(|k| values[*k].1.powi(2)).sum();
+    while remaining.len() > 2 {
+        let others = remaining.len() as f64 - 1.0;
+        let sum: f64 = remaining.iter().map(|k| values[*k].0).sum();
+        let square: f64 = remaining.iter().map(|k| values[*k].1.powi(2)).sum();
         let off = |k: &usize| {
             let (x, u) = values[*k];
             let by = x - (sum - x) / others;
             (*k, by, (u * u + (square - u * u) / others.powi(2)).sqrt())
         };
-        let clearest = rest
+        let most_significant = remaining
             .iter()
             .map(off)
             .max_by(|a, b| (a.1 / a.2).abs().total_cmp(&(b.1 / b.2).abs()));
-        let Some((k, by, u)) = clearest else { break };
+        let Some((k, by, u)) = most_significant else { break };
         let p_value = 2.0 * normal.sf((by / u).abs());
-        // Where uncertainties are zero there is no probability.
+        // Zero uncertainties give no probability.
         if p_value.is_nan() || p_value >= significance {
             break;
         }
         found.push((k, by, u, p_value));
-        rest.retain(|other| *other != k);
+        remaining.retain(|other| *other != k);
     }
     found
 }

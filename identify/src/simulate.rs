@@ -1,7 +1,7 @@
-//! Readings from a model: the states of a plan, errors and effects with given values, noise, and the rounding of the sensor.
+//! Simulated readings: the states of a plan, errors and effects with given values, noise, and the resolution of the sensor.
 //!
-//! `reading = round((L(state; errors, set-up, effects) + σ·ν) / r) · r`, with ν standard normal and `L` the one chain in `f64`.
-//! Values are given by the names that results use, so that what a fit prints can be simulated again.
+//! `reading = round((L(state; errors, set-up, effects) + σ·ν) / r) · r`, with ν standard normal, `r` the resolution, and `L` the chain in
+//! `f64`. The identifiers are those of the results, so that the estimates of a fit can be simulated again.
 
 use abbe_model::component::ErrorName;
 use abbe_model::effect::Shape;
@@ -17,20 +17,20 @@ use crate::error::IdentifyError;
 use crate::parameters::{Parameters, Role};
 use crate::quantity::Given;
 
-/// What to draw.
+/// The values and options of a simulation.
 #[derive(Clone, Debug, Default)]
 pub struct Simulation {
     /// Values of errors, set-up quantities and coefficients of declared effects; everything else is zero.
     pub given: Vec<Given>,
-    /// Standard deviation of a reading, mm; `None` takes the session's, or none where it states none.
+    /// Standard deviation of a reading, mm; `None` for that of the session, or zero if it states none.
     pub noise_mm: Option<f64>,
-    /// Whether set-up quantities that are not given are drawn from their priors.
+    /// Whether set-up quantities without a given value are drawn from their priors.
     pub draw_setups: bool,
-    /// Seed of noise and set-ups.
+    /// Seed of the noise and the set-ups.
     pub seed: u64,
 }
 
-/// What was drawn.
+/// The result of a simulation.
 #[derive(Clone, Debug)]
 pub struct Simulated {
     /// The readings of each test, in the order of the session.
@@ -39,16 +39,16 @@ pub struct Simulated {
     pub truth: Vec<(String, f64, String)>,
     /// Standard deviation of the noise, mm.
     pub noise_mm: f64,
-    /// What a user should know.
+    /// Warnings for the user.
     pub warnings: Vec<String>,
 }
 
-/// Stream of the generator from which set-ups are drawn; test `k` has stream `k + 1`.
+/// Stream of the generator for the set-ups; test `k` has stream `k + 1`.
 const SETUP_STREAM: u128 = 0;
 
-/// Draws the readings of every test of a session.
+/// Simulates the readings of every test of a session.
 ///
-/// What is simulated without noise is found again:
+/// A fit recovers the values of a simulation without noise:
 ///
 /// ```
 /// use std::path::Path;
@@ -83,9 +83,9 @@ pub fn simulate(session: &Session, simulation: &Simulation) -> Result<Simulated,
     }
     let planned = motion::planned_session(session)?;
     let mut given = Vec::with_capacity(simulation.given.len());
-    let mut open = opened(session, planned);
+    let mut open = with_free_setups(session, planned);
     for value in &simulation.given {
-        let id = own_name(&open, &value.id)?;
+        let id = result_id(&open, &value.id)?;
         if given.iter().any(|(known, _): &(String, &Given)| *known == id) {
             return Err(IdentifyError::Request(format!("`{}` is given twice", value.id)));
         }
@@ -126,7 +126,7 @@ pub fn simulate(session: &Session, simulation: &Simulation) -> Result<Simulated,
             }
         }
     }
-    place(&parameters, &given, &mut beta)?;
+    assign(&parameters, &given, &mut beta)?;
 
     let warnings = warnings(&parameters, &beta);
     let noise_mm = simulation.noise_mm.or(session.noise_mm).unwrap_or(0.0);
@@ -174,7 +174,7 @@ pub fn simulate(session: &Session, simulation: &Simulation) -> Result<Simulated,
     })
 }
 
-/// To the nearest multiple of a step, such that a step of 1e-4 mm leaves four decimals: dividing by the whole reciprocal keeps them short.
+/// Rounds to a multiple of a step. Dividing by the whole reciprocal of the step keeps decimals exact.
 fn rounded(value: f64, step: f64) -> f64 {
     let per_unit = 1.0 / step;
     let whole = per_unit.round();
@@ -185,8 +185,8 @@ fn rounded(value: f64, step: f64) -> f64 {
     }
 }
 
-/// The session with its planned states as readings and every set-up quantity free, so that each has a name and a slot.
-fn opened(session: &Session, planned: Vec<Readings>) -> Session {
+/// The session with its planned states as readings and every set-up quantity free, so that each has an identifier and a slot.
+fn with_free_setups(session: &Session, planned: Vec<Readings>) -> Session {
     let mut open = session.clone();
     for (test, states) in open.tests.iter_mut().zip(planned) {
         test.readings = Some(states);
@@ -199,8 +199,8 @@ fn opened(session: &Session, planned: Vec<Readings>) -> Session {
     open
 }
 
-/// The name as results have it: errors of axes by ISO 230-1, whatever name they were given by.
-fn own_name(session: &Session, id: &str) -> Result<String, IdentifyError> {
+/// The identifier in results: errors of axes by ISO 230-1.
+fn result_id(session: &Session, id: &str) -> Result<String, IdentifyError> {
     let Some(mut name) = ErrorName::parse(id) else {
         return Ok(id.to_string());
     };
@@ -225,11 +225,15 @@ fn own_name(session: &Session, id: &str) -> Result<String, IdentifyError> {
     Ok(name.to_string())
 }
 
-/// Puts the given values among the unknowns. Amplitude and phase of a harmonic become cosine and sine,
+/// Writes the given values to the parameters. Amplitude and phase of a harmonic become cosine and sine,
 /// `A·cos(nq + φ) = A cos φ · cos nq − A sin φ · sin nq`.
-fn place(parameters: &Parameters, given: &[(String, &Given)], beta: &mut [f64]) -> Result<(), IdentifyError> {
+fn assign(
+    parameters: &Parameters,
+    given: &[(String, &Given)],
+    beta: &mut [f64],
+) -> Result<(), IdentifyError> {
     let find = |id: &str| parameters.list.iter().position(|parameter| parameter.id == id);
-    let mut taken = vec![false; given.len()];
+    let mut used = vec![false; given.len()];
     for effect in &parameters.effects {
         if !matches!(effect.shape, Shape::Harmonic { .. } | Shape::Periodic { .. }) {
             continue;
@@ -244,7 +248,7 @@ fn place(parameters: &Parameters, given: &[(String, &Given)], beta: &mut [f64]) 
         let Some(amplitude) = amplitude else {
             if phase.is_some() {
                 return Err(IdentifyError::Request(format!(
-                    "`{id}.phase` is given without `{id}.amplitude`"
+                    "`{id}.phase` has a value, but not `{id}.amplitude`"
                 )));
             }
             continue;
@@ -257,11 +261,11 @@ fn place(parameters: &Parameters, given: &[(String, &Given)], beta: &mut [f64]) 
         let Some(cosine) = find(&format!("{id}.cos")) else {
             continue;
         };
-        taken[amplitude] = true;
+        used[amplitude] = true;
         let size = given[amplitude].1.inside(&parameters.list[cosine].unit)?;
         let angle = match phase {
             Some(phase) => {
-                taken[phase] = true;
+                used[phase] = true;
                 given[phase].1.in_unit("rad")?
             }
             None => 0.0,
@@ -269,20 +273,20 @@ fn place(parameters: &Parameters, given: &[(String, &Given)], beta: &mut [f64]) 
         beta[cosine] = size * angle.cos();
         beta[cosine + 1] = -size * angle.sin();
     }
-    for ((id, value), taken) in given.iter().zip(taken) {
-        if taken {
+    for ((id, value), used) in given.iter().zip(used) {
+        if used {
             continue;
         }
         let Some(index) = find(id) else {
-            return Err(unknown(parameters, &value.id));
+            return Err(unknown_identifier(parameters, &value.id));
         };
         beta[index] = value.inside(&parameters.list[index].unit)?;
     }
     Ok(())
 }
 
-/// That the session has no such quantity, with what it has.
-fn unknown(parameters: &Parameters, id: &str) -> IdentifyError {
+/// The error for an identifier that the session lacks, with those that it has.
+fn unknown_identifier(parameters: &Parameters, id: &str) -> IdentifyError {
     let of = |coefficients: bool| {
         let chosen = parameters.list.iter().filter(|parameter| match parameter.role {
             Role::Coefficient { .. } => coefficients,
@@ -305,17 +309,17 @@ fn unknown(parameters: &Parameters, id: &str) -> IdentifyError {
     IdentifyError::Request(format!("the session has no `{id}`; {known}"))
 }
 
-/// Values that move no reading, and declared effects that were given none.
+/// Warnings about values without an effect on the readings, and declared effects without a value.
 fn warnings(parameters: &Parameters, beta: &[f64]) -> Vec<String> {
     let mut warnings = Vec::new();
     for (index, (parameter, value)) in parameters.list.iter().zip(beta).enumerate() {
         let moves = parameters
-            .parts
+            .contributions
             .iter()
             .flatten()
-            .any(|part| part.parameter == index);
+            .any(|contribution| contribution.parameter == index);
         if *value != 0.0 && !moves {
-            warnings.push(format!("`{}` moves no reading of these tests", parameter.id));
+            warnings.push(format!("`{}` affects no reading of these tests", parameter.id));
         }
     }
     for (number, effect) in parameters.effects.iter().enumerate() {
@@ -324,7 +328,7 @@ fn warnings(parameters: &Parameters, beta: &[f64]) -> Vec<String> {
         );
         if own.into_iter().all(|(_, value)| *value == 0.0) {
             warnings.push(format!(
-                "the declared effect `{}` was given no value: it is zero in these readings",
+                "the declared effect `{}` has no given value: it is zero in these readings",
                 effect.id()
             ));
         }
@@ -336,12 +340,12 @@ fn warnings(parameters: &Parameters, beta: &[f64]) -> Vec<String> {
 mod tests {
     use super::rounded;
 
-    /// The readings of a plan go to files: what a step leaves has no more decimals than the step, whatever rounding the step itself brings along.
+    /// Readings are written to files: a rounded reading has no more decimals than its step.
     #[test]
-    fn a_step_leaves_its_own_decimals() {
+    fn rounding_keeps_the_decimals_of_the_step() {
         assert_eq!(rounded(100.012_349, 1e-4), 100.0123);
         assert_eq!(rounded(-0.000_05, 1e-4), -0.0001);
-        // 1/1e-5 is no whole number, and 3 · 1e-5 not 3e-5.
+        // 1/1e-5 is not a whole number in `f64`, and 3 · 1e-5 is not 3e-5.
         assert_eq!(rounded(3.2e-5, 1e-5), 3e-5);
         assert_eq!(rounded(1.0, 0.3), 0.3 * 3.0);
         assert_eq!(rounded(7.0, 3.0), 6.0);

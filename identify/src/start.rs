@@ -1,4 +1,4 @@
-//! Start values that need no user: where a tracker stands, where sockets are.
+//! Start values without user input: poses of trackers, positions of sockets.
 
 use abbe_model::chain::{BodyErrors, Machine};
 use abbe_model::frames::Point;
@@ -7,7 +7,7 @@ use abbe_model::session::readings::Readings;
 use abbe_model::session::{Session, Test};
 use nalgebra::{Matrix3, Vector3};
 
-/// The stations of the tests, with free poses and sockets at values from which the iterations converge.
+/// The stations of the tests, with start values for free poses and sockets from which the iterations converge.
 pub fn stations(session: &Session, tests: &[&Test]) -> Vec<Station<f64>> {
     let mut stations: Vec<Station<f64>> = tests.iter().map(|test| test.station.clone()).collect();
     let groups: Vec<&str> = tests
@@ -65,7 +65,7 @@ pub fn stations(session: &Session, tests: &[&Test]) -> Vec<Station<f64>> {
     stations
 }
 
-/// The instrument's point of the tool frame in R, nominal, at every row.
+/// The nominal position of the instrument's tool-frame point in R, at every row.
 pub(crate) fn nominal_points(
     machine: &Machine,
     station: &Station<f64>,
@@ -82,7 +82,7 @@ pub(crate) fn nominal_points(
         .collect()
 }
 
-/// The rotation and translation that carry `from` onto `to` with the least sum of squares (Kabsch, Acta Cryst. A32 (1976) 922).
+/// The rotation and translation that map `from` onto `to` with the least sum of squares (Kabsch, Acta Cryst. A32 (1976) 922).
 fn rigid_motion(from: &[Vector3<f64>], to: &[Vector3<f64>]) -> (Matrix3<f64>, Vector3<f64>) {
     if from.is_empty() {
         return (Matrix3::identity(), Vector3::zeros());
@@ -99,7 +99,7 @@ fn rigid_motion(from: &[Vector3<f64>], to: &[Vector3<f64>]) -> (Matrix3<f64>, Ve
     let (Some(u), Some(v_t)) = (svd.u, svd.v_t) else {
         return (Matrix3::identity(), centre_to - centre_from);
     };
-    // The sign keeps a rotation from becoming a reflection; it belongs to the least singular value.
+    // The sign on the smallest singular value makes the result a rotation, not a reflection.
     let mut signs = Matrix3::identity();
     let least = svd.singular_values.imin();
     signs[(least, least)] = (u * v_t).determinant().signum();

@@ -1,26 +1,26 @@
-//! Least squares as a stream: whatever the number of rows, what remains of them is one triangle.
+//! The triangular factor of a least-squares problem, built from a stream of rows.
 //!
-//! The augmented matrix `[J | r]` is reduced block by block by Householder QR (tall-skinny QR: Demmel, Grigori, Hoemmen, Langou, SIAM J. Sci.
-//! Comput. 34 (2012) A206), so that memory does not grow with the number of readings and two triangles of different readings merge into one.
-//! With `[J | r] = Q·[R c; 0 ρ]` the sum of squares at a step `δ` is `‖c − Rδ‖² + ρ²`.
+//! Householder QR reduces the augmented matrix `[J | r]` block by block (tall-skinny QR: Demmel, Grigori, Hoemmen, Langou, SIAM J. Sci.
+//! Comput. 34 (2012) A206). Memory does not grow with the number of readings. The factors of different readings merge into one. With
+//! `[J | r] = Q·[R c; 0 ρ]` the sum of squares after a step `δ` is `‖c − Rδ‖² + ρ²`.
 
 use faer::dyn_stack::{MemBuffer, MemStack};
 use faer::linalg::qr::no_pivoting::factor;
 use faer::{Mat, MatRef, Par};
 
-/// The triangle `[R c; 0 ρ]` of the rows absorbed so far.
+/// The triangular factor `[R c; 0 ρ]` of the rows absorbed so far.
 #[derive(Clone, Debug)]
 pub struct Triangle {
     columns: usize,
-    /// Rows that are worth the triangle: not yet reduced to it as long as they are few.
+    /// Rows with the same normal matrix as the absorbed rows. They are reduced to triangular form only when they are many.
     factor: Mat<f64>,
 }
 
-/// Rows absorbed at once: enough for the QR to work in blocks, few enough to stay in cache.
+/// Number of rows to absorb at once: enough for blocked QR, few enough for the cache.
 pub const BLOCK_ROWS: usize = 1024;
 
 impl Triangle {
-    /// Of no rows, for this many unknowns.
+    /// The factor of no rows, for the given number of parameters.
     pub fn new(columns: usize) -> Self {
         Triangle {
             columns,
@@ -28,12 +28,12 @@ impl Triangle {
         }
     }
 
-    /// Number of unknowns.
+    /// Number of parameters.
     pub fn columns(&self) -> usize {
         self.columns
     }
 
-    /// Adds rows: `block` is rows × (unknowns + 1), residuals in the last column.
+    /// Absorbs rows: `block` is rows × (parameters + 1), residuals in the last column.
     pub fn absorb(&mut self, block: MatRef<'_, f64>) {
         if block.nrows() == 0 {
             return;
@@ -43,7 +43,7 @@ impl Triangle {
         let mut stacked = Mat::zeros(kept + block.nrows(), width);
         stacked.get_mut(..kept, ..).copy_from(&self.factor);
         stacked.get_mut(kept.., ..).copy_from(block);
-        // Many small pieces, as folds of many tests are, are reduced a width of them at a time.
+        // Small blocks (folds of many tests) are collected until they are as many as the columns, then reduced together.
         self.factor = if stacked.nrows() <= 2 * width {
             stacked
         } else {
@@ -51,28 +51,29 @@ impl Triangle {
         };
     }
 
-    /// Rows of `[J | r]` that are worth those absorbed: some × (unknowns + 1).
+    /// Rows of `[J | r]` with the same normal matrix as the absorbed rows: any number × (parameters + 1).
     pub fn rows(&self) -> MatRef<'_, f64> {
         self.factor.as_ref()
     }
 
-    /// Adds the rows of another triangle.
+    /// Absorbs the rows of another factor.
     pub fn merge(&mut self, other: &Triangle) {
         self.absorb(other.factor.as_ref());
     }
 
-    /// The same rows for more unknowns: `places` says which of them these are; the rows do not depend on the others.
-    pub fn among(&self, places: &[usize], columns: usize) -> Triangle {
+    /// The same rows over more parameters. `places` gives the index of each of these parameters among all; the rows do not depend on the
+    /// others.
+    pub fn over_columns(&self, indices: &[usize], columns: usize) -> Triangle {
         let mut wide = Mat::zeros(self.factor.nrows(), columns + 1);
-        for (place, column) in places.iter().chain([&columns]).zip(self.factor.col_iter()) {
-            wide.col_mut(*place).copy_from(column);
+        for (index, column) in indices.iter().chain([&columns]).zip(self.factor.col_iter()) {
+            wide.col_mut(*index).copy_from(column);
         }
         let mut triangle = Triangle::new(columns);
         triangle.absorb(wide.as_ref());
         triangle
     }
 
-    /// The same triangle with few rows made upper-triangular, so that `R`, `c`, `ρ` can be read off.
+    /// The upper-triangular form, from which `R`, `c`, `ρ` can be read.
     fn reduced(&self) -> Mat<f64> {
         let width = self.columns + 1;
         if self.factor.nrows() == width && (0..width).all(|i| (0..i).all(|j| self.factor[(i, j)] == 0.0)) {
@@ -89,7 +90,7 @@ impl Triangle {
         upper(padded)
     }
 
-    /// `R` (unknowns × unknowns), `c`, and the sum of squares `ρ²` that no step can remove.
+    /// `R` (parameters × parameters), `c`, and the minimum `ρ²` of the sum of squares.
     pub fn parts(&self) -> (Mat<f64>, Vec<f64>, f64) {
         let reduced = self.reduced();
         let n = self.columns;
@@ -98,7 +99,7 @@ impl Triangle {
         (r, c, reduced[(n, n)] * reduced[(n, n)])
     }
 
-    /// The triangle after a step `δ` that is too small for the model to bend: `[R c−Rδ; 0 ρ]`.
+    /// The factor after a step `δ` with negligible nonlinearity: `[R c−Rδ; 0 ρ]`.
     pub fn after(&self, step: &[f64]) -> Triangle {
         let mut moved = self.clone();
         for i in 0..moved.factor.nrows() {
@@ -119,15 +120,16 @@ impl Triangle {
     }
 }
 
-/// The triangle `R` of a matrix `Q·R` with at least as many rows as columns.
+/// The factor `R` of a matrix `Q·R` with at least as many rows as columns.
 ///
-/// Few columns are reduced one at a time: blocks of them, with which the library's own choice begins at sixteen columns, take two to four times as
-/// long up to some forty.
+/// Matrices of fewer than 40 columns are reduced column by column. The library blocks from 16 columns on, which takes two to four times as
+/// long in this range.
 pub(crate) fn upper(mut matrix: Mat<f64>) -> Mat<f64> {
     let (rows, columns) = (matrix.nrows(), matrix.ncols());
-    let together = if columns < 40 { 1 } else { 16 };
-    let mut reflections = Mat::zeros(together, columns);
-    let scratch = factor::qr_in_place_scratch::<f64>(rows, columns, together, Par::Seq, Default::default());
+    let block_columns = if columns < 40 { 1 } else { 16 };
+    let mut reflections = Mat::zeros(block_columns, columns);
+    let scratch =
+        factor::qr_in_place_scratch::<f64>(rows, columns, block_columns, Par::Seq, Default::default());
     factor::qr_in_place(
         matrix.as_mut(),
         reflections.as_mut(),

@@ -1,25 +1,25 @@
-//! Units outside the program: µm, arcsec, and what effects' coefficients come in.
+//! Display units: µm, arcsec, and the units of effects' coefficients.
 
 use abbe_model::axis::AxisKind;
 use abbe_model::effect::{Driver, Shape};
 use abbe_model::instrument::InternalUnit;
 
-/// A unit that results are reported in.
+/// A unit of reported results.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Unit {
-    /// As it stands in results: `um`, `arcsec`, `um/h`.
+    /// The name in results: `um`, `arcsec`, `um/h`.
     pub name: String,
-    /// How many of it make one internal unit (mm, rad, …).
+    /// Number of display units per internal unit (mm, rad, …).
     pub display_per_internal: f64,
 }
 
-/// Arcseconds in a radian.
+/// Arcseconds per radian.
 pub const ARCSEC: f64 = 180.0 * 3600.0 / std::f64::consts::PI;
 
 impl Unit {
     /// The unit of a component.
-    pub fn of(inside: InternalUnit) -> Unit {
-        let (name, display_per_internal) = match inside {
+    pub fn of(internal_unit: InternalUnit) -> Unit {
+        let (name, display_per_internal) = match internal_unit {
             InternalUnit::Millimetre => ("um", 1e3),
             InternalUnit::Radian => ("arcsec", ARCSEC),
             InternalUnit::Ratio => ("um/m", 1e6),
@@ -30,7 +30,7 @@ impl Unit {
         }
     }
 
-    /// The unit of coefficient `k` of an effect. `driver_axis`: the kind of the axis that the effect follows, where it follows one.
+    /// The unit of coefficient `k` of an effect. `driver_axis` is the kind of the axis that the effect follows, if it follows one.
     ///
     /// | shape | unit of a coefficient, for a component in µm |
     /// |---|---|
@@ -98,7 +98,7 @@ mod tests {
             "arcsec/m^2"
         );
         assert_eq!(name(Radian, &Driver::Gravity, None, &cubic(1.0), 0), "arcsec/m");
-        // At another scale the coefficient is the component's value there.
+        // At another scale the coefficient is the value of the component there.
         assert_eq!(
             name(Millimetre, &Driver::Temperature, None, &square(5.0), 0),
             "um"
@@ -106,7 +106,7 @@ mod tests {
         let linear = Some(AxisKind::Linear);
         let rotary = Some(AxisKind::Rotary);
         assert_eq!(name(Millimetre, &axis("X"), linear, &cubic(100.0), 2), "um");
-        // A polynomial over an axis at a scale of 1 mm is still a value there, not a slope.
+        // A polynomial over an axis with a scale of 1 mm has a value there, not a slope, as its coefficient.
         assert_eq!(name(Millimetre, &axis("X"), linear, &cubic(1.0), 1), "um");
         assert_eq!(name(Millimetre, &Driver::Time, None, &cubic(3600.0), 1), "um");
         assert_eq!(name(Millimetre, &Driver::Time, None, &Shape::Drift, 0), "um/h");

@@ -1,4 +1,4 @@
-//! The corpus of the fuzzer, replayed: errors as people give them in files. What `abbe-model` reads is replayed there.
+//! Replays the fuzzer's corpus of errors as they are given in files. The corpus of `abbe-model` is replayed in that crate.
 
 #[path = "../../fuzz/errors.rs"]
 mod harness;

@@ -1,5 +1,5 @@
-//! The one generic chain over columns, beside a kernel that was written by hand and beside the same chain over num-dual's numbers, one reading at a
-//! time: value and eight derivatives of the tests of chapter 5; value and all sensitivities of a five-axis machine.
+//! Benchmark of the generic chain over columns, against a kernel written by hand and against the chain over num-dual numbers, one reading
+//! at a time: value and eight derivatives of the chapter 5 tests; value and all sensitivities of a five-axis machine.
 //!
 //! `cargo bench -p abbe-model --bench chain`
 #![allow(missing_docs)]
@@ -146,7 +146,7 @@ fn all_components(criterion: &mut Criterion) {
     machine.rotation = Rotation::Exact;
     let rows = 1_000;
     let model = TestModel::new(&machine, station(), &readings(rows));
-    // Six error motions an axis, both balls and the bar.
+    // Six error motions per axis, both balls and the bar.
     let motions = (0..machine.error_slots()).filter(|slot| slot % 12 >= 6);
     let slots: Vec<usize> = motions
         .chain(machine.error_slots()..machine.error_slots() + 7)
@@ -155,7 +155,7 @@ fn all_components(criterion: &mut Criterion) {
     let mut group = criterion.benchmark_group("value and all components of a five-axis machine");
     group.throughput(Throughput::Elements(rows as u64));
     group.bench_function(format!("{} components", slots.len()), |bencher| {
-        // A fit takes them block by block too, into a matrix that stays in the cache.
+        // A fit also processes them block by block, into a matrix that stays in the cache.
         let mut outputs = vec![vec![0.0; rows]; 1 + slots.len()];
         bencher.iter(|| {
             model.sweep(black_box(&values), &slots, 0..rows, |output, start, column| {

@@ -1,19 +1,19 @@
-//! One axis of a machine: what turns or slides, about or along which line.
+//! One axis of a machine: kind, direction, origin and travel.
 
 use crate::frames::{Coordinate, Point, SinCos, cross_nominal, turn_about_nominal};
 use crate::scalar::{Nominal, Scalar};
 
-/// Whether an axis slides or turns.
+/// Whether an axis is linear or rotary.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum AxisKind {
-    /// Slides along its direction; positions in mm.
+    /// Moves along its direction; positions in mm.
     Linear,
-    /// Turns about its direction; positions in radians.
+    /// Rotates about its direction; positions in radians.
     Rotary,
 }
 
 impl AxisKind {
-    /// The kind that ISO 841 gives a one-letter name: A, B, C turn and X, Y, Z, U, V, W slide.
+    /// The kind that ISO 841 assigns to a one-letter name: A, B, C are rotary and X, Y, Z, U, V, W linear.
     pub fn of_letter(name: &str) -> Option<AxisKind> {
         match name {
             "A" | "B" | "C" => Some(AxisKind::Rotary),
@@ -22,7 +22,7 @@ impl AxisKind {
         }
     }
 
-    /// `mm` or `deg`: the unit of a position outside the program.
+    /// `mm` or `deg`: the display unit of a position.
     pub fn unit(self) -> &'static str {
         match self {
             AxisKind::Linear => "mm",
@@ -30,16 +30,16 @@ impl AxisKind {
         }
     }
 
-    /// A position in mm or radians, from mm or degrees.
-    pub fn inside(self, position: f64) -> f64 {
+    /// Converts a position from mm or degrees to mm or radians.
+    pub fn to_internal(self, position: f64) -> f64 {
         match self {
             AxisKind::Linear => position,
             AxisKind::Rotary => position.to_radians(),
         }
     }
 
-    /// A position in mm or degrees, from mm or radians.
-    pub fn outside(self, position: f64) -> f64 {
+    /// Converts a position from mm or radians to mm or degrees.
+    pub fn to_display(self, position: f64) -> f64 {
         match self {
             AxisKind::Linear => position,
             AxisKind::Rotary => position.to_degrees(),
@@ -47,10 +47,10 @@ impl AxisKind {
     }
 }
 
-/// An axis with its line in the reference frame R, all axes at zero.
+/// An axis, as a line in the reference frame R with all axes at zero.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Axis {
-    /// The name that the structural code uses.
+    /// The name in the structural code.
     pub name: String,
     /// Linear or rotary.
     pub kind: AxisKind,
@@ -58,12 +58,12 @@ pub struct Axis {
     pub direction: [f64; 3],
     /// A point of the axis in R, mm.
     pub origin_mm: [f64; 3],
-    /// Least and greatest position where stated, mm or radians.
+    /// Least and greatest position if stated, mm or radians.
     pub travel: Option<[f64; 2]>,
 }
 
 impl Axis {
-    /// The direction that ISO 841 gives a one-letter name: R's X for A, X and U, and so on.
+    /// The direction that ISO 841 assigns to a one-letter name: R's X for A, X and U, and so on.
     pub fn direction_of_letter(name: &str) -> Option<[f64; 3]> {
         match name {
             "A" | "X" | "U" => Some([1.0, 0.0, 0.0]),
@@ -73,12 +73,12 @@ impl Axis {
         }
     }
 
-    /// The name of its column in tables of positions: `x_mm`, `c_deg`; with a suffix `x_command_mm`.
+    /// Its column name in tables of positions: `x_mm`, `c_deg`; with a suffix `x_command_mm`.
     pub fn column(&self, suffix: &str) -> String {
         format!("{}{suffix}_{}", self.name.to_lowercase(), self.kind.unit())
     }
 
-    /// R's coordinate axis that the direction lies along, with its sign, if it lies along one.
+    /// The coordinate axis of R parallel to the direction, with the sign, if there is one.
     pub fn principal(&self) -> Option<(Coordinate, f64)> {
         Coordinate::ALL.into_iter().find_map(|coordinate| {
             let along = self.direction[coordinate.index()];
@@ -86,8 +86,8 @@ impl Axis {
         })
     }
 
-    /// The freedom that the axis itself moves in: `EB` for an axis that turns about ±Y, `EX` for one that slides along ±X; the
-    /// largest component of the direction where it lies along none.
+    /// The degree of freedom in which the axis moves: `EB` for rotation about ±Y, `EX` for translation along ±X. For an oblique
+    /// direction, its largest component decides.
     pub fn own_freedom(&self) -> crate::component::Freedom {
         let mut largest = 0;
         for index in 1..3 {
@@ -102,7 +102,7 @@ impl Axis {
         crate::component::Freedom::ALL[largest + offset]
     }
 
-    /// `Rot(d, q) · point`, for a point given from the axis' origin.
+    /// `Rot(d, q) · point`, for a point relative to the origin of the axis.
     #[inline(always)]
     pub fn rotate<S: Scalar>(&self, turn: SinCos<S::Nominal>, point: Point<S>) -> Point<S> {
         if let Some((coordinate, sign)) = self.principal() {

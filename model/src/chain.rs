@@ -1,4 +1,4 @@
-//! The kinematic chain, written once.
+//! The kinematic chain of a machine over an open scalar.
 //!
 //! From the bed outwards `P_w = T_A T_C w` on the workpiece side and `P_s = T_Y T_X T_Z s` on the tool side of `w C A b Y X Z t`,
 //!
@@ -7,8 +7,8 @@
 //! linear axis:                          T(q) = Trans(o + q·d′) · E(q) · Trans(−o),   d′ = d + ω0 × d
 //! ```
 //!
-//! with `E0 = Trans(EX0k, EY0k, EZ0k) · Rx(EA0k) · Ry(EB0k) · Rz(EC0k)` the location errors, `E(q)` the error motions in the same
-//! order, and ω0 the squareness errors `(EA0k, EB0k, EC0k)` of a linear axis.
+//! with `E0 = Trans(EX0k, EY0k, EZ0k) · Rx(EA0k) · Ry(EB0k) · Rz(EC0k)` the location errors, `E(q)` the error motions in the same order,
+//! and ω0 the squareness errors `(EA0k, EB0k, EC0k)` of a linear axis.
 
 use crate::axis::{Axis, AxisKind};
 use crate::code::StructuralCode;
@@ -17,30 +17,30 @@ use crate::error::ModelError;
 use crate::frames::{Point, Rotation, SinCos, SmallMotion, cross_nominal};
 use crate::scalar::{Nominal, Scalar};
 
-/// Errors an axis can have: six location errors, then six error motions.
+/// Number of error slots per axis: six location errors, then six error motions.
 pub const ERRORS_PER_AXIS: usize = 12;
 
 /// A machine: axes in a serial chain from workpiece over bed to tool.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Machine {
-    /// A name for people.
+    /// The display name.
     pub name: String,
     /// The axes in the order of the structural code, from workpiece to tool.
     pub axes: Vec<Axis>,
-    /// How many of them lie on the workpiece side.
+    /// Number of axes on the workpiece side.
     pub workpiece_side: usize,
-    /// How error angles rotate.
+    /// Rotation convention of the error angles.
     pub rotation: Rotation,
     /// Direction of gravity in R, a unit vector.
     pub gravity: [f64; 3],
 }
 
-/// Where an axis stands: its position, and for a rotary axis its sine and cosine, taken once.
+/// Position of an axis; for a rotary axis with its sine and cosine, computed once.
 #[derive(Clone, Copy, Debug)]
 pub struct AxisPosition<N> {
     /// mm or radians.
     pub value: N,
-    /// Sine and cosine of a rotary axis; of no meaning for a linear one.
+    /// Sine and cosine of a rotary axis; unused for a linear axis.
     pub turn: SinCos<N>,
 }
 
@@ -58,7 +58,7 @@ impl<N: Nominal> AxisPosition<N> {
     }
 }
 
-/// The errors of one axis, made ready to push points through. `None` is an exact zero and costs nothing.
+/// The errors of one axis, prepared for the transformation of points. `None` is an exact zero and costs nothing.
 #[derive(Clone, Copy, Debug)]
 pub struct BodyErrors<S> {
     location: Option<SmallMotion<S>>,
@@ -93,10 +93,10 @@ impl<S: Scalar> BodyErrors<S> {
 }
 
 impl Machine {
-    /// A machine for a structural code of ISO 841 letters: R's directions, origins in R's origin, no travel stated.
+    /// A machine from a structural code of ISO 841 letters: directions of R, origins at R's origin, no travel stated.
     ///
     /// # Errors
-    /// If the code cannot be read or an axis is no ISO 841 letter.
+    /// If the code is invalid or an axis is not an ISO 841 letter.
     pub fn from_code(text: &str) -> Result<Machine, ModelError> {
         let code = StructuralCode::parse(text)?;
         let axes = code
@@ -135,17 +135,17 @@ impl Machine {
         .spaced()
     }
 
-    /// The place of an axis in [`Machine::axes`].
+    /// The index of an axis in [`Machine::axes`].
     pub fn axis_index(&self, name: &str) -> Option<usize> {
         self.axes.iter().position(|axis| axis.name == name)
     }
 
-    /// How many error slots the machine has: [`ERRORS_PER_AXIS`] for each axis, in the order of [`Machine::axes`].
+    /// Number of error slots of the machine: [`ERRORS_PER_AXIS`] per axis, in the order of [`Machine::axes`].
     pub fn error_slots(&self) -> usize {
         self.axes.len() * ERRORS_PER_AXIS
     }
 
-    /// The slot of an error, or `None` where the machine has no such axis.
+    /// The slot of an error; `None` if the machine has no such axis.
     pub fn error_slot(&self, name: &ErrorName) -> Option<usize> {
         let axis = self.axis_index(&name.axis)?;
         let kind = match name.kind {
@@ -169,8 +169,8 @@ impl Machine {
         }
     }
 
-    /// The error motions of an axis along or about its own direction, as slots with the share of the movement that each takes: what a
-    /// position that is read too late looks like.
+    /// The slots of the error motions along or about the axis' own direction, each with its direction cosine. Together they are
+    /// equivalent to an offset of the axis position, such as that of a delayed position reading.
     pub fn slots_along(&self, axis: usize) -> impl Iterator<Item = (usize, f64)> {
         let turns = usize::from(self.axes[axis].kind == AxisKind::Rotary) * 3;
         let start = axis * ERRORS_PER_AXIS + 6 + turns;
@@ -180,8 +180,8 @@ impl Machine {
             .map(move |(i, along)| (start + i, along))
     }
 
-    /// The errors of every axis, made ready, from slots for which `carried` holds; the others are exact zeros.
-    /// `slot(i)` gives the value of slot `i`.
+    /// The prepared errors of every axis, from the slots for which `carried` holds; the others are exact zeros. `slot(i)` gives the value
+    /// of slot `i`.
     pub fn body_errors<S: Scalar>(
         &self,
         carried: impl Fn(usize) -> bool,
@@ -230,8 +230,8 @@ impl Machine {
             .fold(point, |point, index| self.push(index, state, errors, point))
     }
 
-    /// A point of R in the table frame: what [`Machine::workpiece_point`] undoes. With small-angle errors the inverse of
-    /// `I + [θ]×` is `I − [θ]×`: right to first order, off by `θ²` (1e-9 of a length at 6.5″, 0.2 µm in 200 mm at 206″).
+    /// A point of R in the table frame: the inverse of [`Machine::workpiece_point`]. For small-angle errors the inverse of `I + [θ]×` is
+    /// taken as `I − [θ]×`. It is exact to first order and deviates by `θ²` (1e-9 of a length at 6.5″, 0.2 µm in 200 mm at 206″).
     pub fn table_point<S: Scalar>(
         &self,
         state: &[AxisPosition<S::Nominal>],
@@ -243,7 +243,7 @@ impl Machine {
             .fold(point, |point, index| self.pull(index, state, errors, point))
     }
 
-    /// A point of R in the tool frame: what [`Machine::tool_point`] undoes; with small-angle errors as [`Machine::table_point`].
+    /// A point of R in the tool frame: the inverse of [`Machine::tool_point`]; for small-angle errors see [`Machine::table_point`].
     pub fn spindle_point<S: Scalar>(
         &self,
         state: &[AxisPosition<S::Nominal>],
@@ -255,7 +255,7 @@ impl Machine {
         })
     }
 
-    /// A point on the moved side of axis `index`, seen from its other side: one step of the chain.
+    /// Transforms a point from the moved side of axis `index` to its bed side: one step of the chain.
     pub fn push<S: Scalar>(
         &self,
         index: usize,
@@ -266,7 +266,7 @@ impl Machine {
         push(&self.axes[index], &state[index], &errors[index], point)
     }
 
-    /// A point on the bed's side of axis `index`, seen from its moved side: what [`Machine::push`] undoes.
+    /// Transforms a point from the bed side of axis `index` to its moved side: the inverse of [`Machine::push`].
     pub fn pull<S: Scalar>(
         &self,
         index: usize,
@@ -277,8 +277,8 @@ impl Machine {
         pull(&self.axes[index], &state[index], &errors[index], point)
     }
 
-    /// The moment about axis `index` that a unit weight at `point_mm` of the tool frame (of the table frame for an axis on the
-    /// workpiece side) exerts, in mm (newton millimetre a newton): `d · ((p − o) × g)` with the nominal chain.
+    /// The moment about axis `index` of a unit weight at `point_mm` of the tool frame (of the table frame for an axis on the workpiece
+    /// side), in mm (newton millimetre per newton): `d · ((p − o) × g)` with the nominal chain.
     pub fn gravity_moment_mm(&self, index: usize, state: &[AxisPosition<f64>], point_mm: [f64; 3]) -> f64 {
         let none = vec![BodyErrors::<f64>::NONE; self.axes.len()];
         let workpiece = index < self.workpiece_side;
@@ -289,7 +289,7 @@ impl Machine {
                 self.tool_point(state, &none, Point(point)).0
             }
         };
-        // The axis' own line is carried by the bodies between it and the bed only.
+        // Only the bodies between an axis and the bed carry the axis line.
         let carried = |point: [f64; 3]| {
             let outside: Vec<usize> = if workpiece {
                 (index + 1..self.workpiece_side).collect()
@@ -312,7 +312,7 @@ impl Machine {
     }
 }
 
-/// A point on the moved side of an axis, seen from its other side.
+/// Transforms a point from the moved side of an axis to its bed side.
 #[inline]
 fn push<S: Scalar>(
     axis: &Axis,
@@ -357,7 +357,7 @@ fn push<S: Scalar>(
     }
 }
 
-/// A point on the bed's side of an axis, seen from the moved side: the inverse of [`push`].
+/// Transforms a point from the bed side of an axis to its moved side: the inverse of [`push`].
 fn pull<S: Scalar>(
     axis: &Axis,
     position: &AxisPosition<S::Nominal>,
@@ -403,7 +403,7 @@ fn pull<S: Scalar>(
     }
 }
 
-/// How far a linear axis carries a point along coordinate `i`; `None` where its direction has no part there.
+/// Displacement by a linear axis along coordinate `i`; `None` if its direction has no component there.
 fn travel<S: Scalar>(axis: &Axis, position: &AxisPosition<S::Nominal>, i: usize) -> Option<S::Nominal> {
     match axis.direction[i] {
         0.0 => None,

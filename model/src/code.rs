@@ -1,13 +1,13 @@
 //! Structural codes: the order of bodies from workpiece to tool, `b` the bed.
 //!
-//! `w C A b Y X Z t` (spaced, any axis names) and `[wCAbYXZt]` (compact, one letter an axis) say the same.
+//! `w C A b Y X Z t` (spaced, any axis names) and `[wCAbYXZt]` (compact, one letter per axis) are equivalent.
 
 use crate::error::ModelError;
 
-/// Most axes of a chain.
+/// Largest number of axes in a chain.
 const MAX_AXES: usize = 64;
 
-/// The axes of a structural code, as written.
+/// The axes of a structural code, in the order of the code.
 ///
 /// ```
 /// use abbe_model::code::StructuralCode;
@@ -27,10 +27,10 @@ pub struct StructuralCode {
 }
 
 impl StructuralCode {
-    /// Reads either form.
+    /// Parses either form.
     ///
     /// # Errors
-    /// Names what is missing: `w` at the start, `t` at the end, exactly one `b`, each axis once.
+    /// The message names what is missing: `w` at the start, `t` at the end, exactly one `b`, each axis once.
     pub fn parse(text: &str) -> Result<StructuralCode, ModelError> {
         let fault = |found: String| ModelError::StructuralCode {
             code: text.to_string(),
@@ -51,11 +51,13 @@ impl StructuralCode {
         let between = &bodies[1..bodies.len() - 1];
         let beds = between.iter().filter(|body| *body == "b").count();
         if beds != 1 {
-            return Err(fault(format!("it holds {beds} beds `b` where one is needed")));
+            return Err(fault(format!(
+                "it contains {beds} beds `b`; exactly one is needed"
+            )));
         }
         if between.len() > MAX_AXES {
             return Err(fault(format!(
-                "{} bodies; {MAX_AXES} axes are the most",
+                "{} bodies; the limit is {MAX_AXES} axes",
                 between.len()
             )));
         }
@@ -63,10 +65,10 @@ impl StructuralCode {
             let named = body.chars().next().is_some_and(char::is_alphabetic)
                 && body.chars().all(char::is_alphanumeric);
             if !named || body == "w" || body == "t" {
-                return Err(fault(format!("`{body}` is no axis name")));
+                return Err(fault(format!("`{body}` is not an axis name")));
             }
             if between[..index].contains(body) {
-                return Err(fault(format!("`{body}` stands in it twice")));
+                return Err(fault(format!("`{body}` occurs twice")));
             }
         }
         let bed = between.iter().position(|body| body == "b").unwrap_or(0);

@@ -1,11 +1,11 @@
-//! Error components by the names of ISO 230-1, and by the short names of the literature.
+//! Names of error components according to ISO 230-1, and the short names of the literature.
 //!
 //! `EX0C` is the location error of C in X (a position-independent error, PIGE), `EXC` its error motion in X
 //! (position-dependent, PDGE). The literature writes `e_x0c` for the first and `θ_x0c` for `EA0C`.
 
 use std::fmt;
 
-/// One of the six freedoms of a rigid body: translations along and rotations about R's X, Y, Z.
+/// One of the six degrees of freedom of a rigid body: translations along and rotations about R's X, Y, Z.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
 #[allow(missing_docs)]
 pub enum Freedom {
@@ -28,7 +28,7 @@ impl Freedom {
         Freedom::C,
     ];
 
-    /// 0 to 5.
+    /// The index, 0 to 5.
     pub fn index(self) -> usize {
         self as usize
     }
@@ -47,9 +47,9 @@ impl Freedom {
 /// Location error or error motion.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
 pub enum ErrorKind {
-    /// Position-independent (PIGE): where the axis lies; for a linear axis its squareness.
+    /// Position-independent (PIGE): position and orientation of the axis; squareness for a linear axis.
     Location,
-    /// Position-dependent (PDGE): how the moving body strays.
+    /// Position-dependent (PDGE): error motion of the moving body.
     Motion,
 }
 
@@ -67,15 +67,15 @@ pub enum ErrorKind {
 pub struct ErrorName {
     /// Location error or error motion.
     pub kind: ErrorKind,
-    /// Which freedom of the moved body.
+    /// The degree of freedom of the moved body.
     pub freedom: Freedom,
-    /// The axis it belongs to.
+    /// The axis of the error.
     pub axis: String,
 }
 
 impl ErrorName {
-    /// Reads an ISO 230-1 name (`EX0C`, `EBJ2`) or a literature alias (`e_x0c`, `e_x,0c`, `θ_y0a`, `theta_y0a`).
-    /// `None` when it is neither; whether the axis exists is not checked.
+    /// Parses an ISO 230-1 name (`EX0C`, `EBJ2`) or a literature alias (`e_x0c`, `e_x,0c`, `θ_y0a`, `theta_y0a`). Returns `None` for any
+    /// other text. Does not check that the axis exists.
     pub fn parse(text: &str) -> Option<ErrorName> {
         let text = text.trim();
         let iso = || {

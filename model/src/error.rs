@@ -2,36 +2,36 @@
 
 use std::path::PathBuf;
 
-/// Where in the user's files something stands.
+/// A location in the user's files.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
-pub struct Place {
+pub struct Location {
     /// The file as the user named it.
     pub file: PathBuf,
-    /// Line, from 1; 0 where the whole file is meant.
+    /// Line, from 1; 0 for the whole file.
     pub line: usize,
-    /// Bytes of the file that the message points at, where known.
+    /// The bytes of the file to which the message refers, if known.
     pub span: Option<std::ops::Range<usize>>,
 }
 
-impl Place {
-    /// A file as a whole.
-    pub fn file(file: &std::path::Path) -> Place {
-        Place {
+impl Location {
+    /// The whole file.
+    pub fn file(file: &std::path::Path) -> Location {
+        Location {
             file: file.to_path_buf(),
-            ..Place::default()
+            ..Location::default()
         }
     }
 
-    /// A line of a file.
-    pub fn line(file: &std::path::Path, line: usize) -> Place {
-        Place {
+    /// A line of the file.
+    pub fn line(file: &std::path::Path, line: usize) -> Location {
+        Location {
             line,
-            ..Place::file(file)
+            ..Location::file(file)
         }
     }
 }
 
-impl std::fmt::Display for Place {
+impl std::fmt::Display for Location {
     fn fmt(&self, formatter: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         write!(formatter, "{}", self.file.display())?;
         if self.line > 0 {
@@ -41,42 +41,53 @@ impl std::fmt::Display for Place {
     }
 }
 
-/// What can be wrong with a machine, a session or its readings.
+/// Errors of a machine, a session or its readings.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum ModelError {
-    /// A structural code that cannot be read.
+    /// An invalid structural code.
     #[error(
         "structural code `{code}`: {found}; a code goes from workpiece over bed to tool, as in `w C A b Y X Z t`"
     )]
     StructuralCode {
         /// The code as given.
         code: String,
-        /// What is wrong with it.
+        /// The fault.
         found: String,
     },
-    /// An axis whose kind its name does not tell.
+    /// An axis whose kind does not follow from its name.
     #[error(
-        "axis `{axis}` is no ISO 841 letter; state its `kind` (\"rotary\" or \"linear\") and `direction`"
+        "axis `{axis}` is not an ISO 841 letter; state its `kind` (\"rotary\" or \"linear\") and `direction`"
     )]
     UnknownAxisKind {
         /// The axis.
         axis: String,
     },
-    /// Input that cannot be used, with its place and the way out.
-    #[error("{place}: {message}")]
+    /// Unusable input, with its location and a remedy.
+    #[error("{location}: {message}")]
     Input {
         /// File and line.
-        place: Place,
+        location: Location,
         /// What was found and what was expected.
         message: String,
         /// What to do.
         help: Option<String>,
     },
+    /// A file that does not exist in the searched folders, or lies outside the folders that a session may read. Other options for reading
+    /// (a data folder, files outside allowed) may remedy it.
+    #[error("{location}: {message}")]
+    FileAccess {
+        /// File and line that name it.
+        location: Location,
+        /// What was found and what was expected.
+        message: String,
+        /// What to do.
+        help: String,
+    },
     /// A plan that the machine cannot carry out.
     #[error("{message}")]
     Plan {
-        /// Which test, and what keeps it from being carried out.
+        /// The test and the obstacle.
         message: String,
         /// What to do.
         help: String,
@@ -86,25 +97,25 @@ pub enum ModelError {
     Output {
         /// The file.
         file: PathBuf,
-        /// What the system said.
+        /// The message of the operating system.
         cause: String,
     },
 }
 
 impl ModelError {
-    /// Where the fault lies in the user's files, where it lies in one.
-    pub fn place(&self) -> Option<&Place> {
+    /// The location of the fault in the user's files, if it is in one.
+    pub fn location(&self) -> Option<&Location> {
         match self {
-            ModelError::Input { place, .. } => Some(place),
+            ModelError::Input { location, .. } | ModelError::FileAccess { location, .. } => Some(location),
             _ => None,
         }
     }
 
-    /// What to do about it, where more can be said than the message does.
+    /// The remedy, if it is not part of the message.
     pub fn help(&self) -> Option<&str> {
         match self {
             ModelError::Input { help, .. } => help.as_deref(),
-            ModelError::Plan { help, .. } => Some(help),
+            ModelError::FileAccess { help, .. } | ModelError::Plan { help, .. } => Some(help),
             _ => None,
         }
     }

@@ -1,7 +1,7 @@
-//! Points, turns and small rigid motions over the open [`Scalar`].
+//! Points, rotations and small rigid motions over the open [`Scalar`].
 //!
-//! A point is pushed through a motion; two motions are never multiplied. Pushing a point costs 4 products a turn and keeps the
-//! sparsity that a 4 × 4 matrix of dual numbers throws away.
+//! Motions transform points; motions are never multiplied. The transformation of a point takes 4 products per rotation and preserves the
+//! sparsity that a product of 4 × 4 matrices of dual numbers would lose.
 
 use crate::scalar::{Nominal, Scalar};
 
@@ -57,21 +57,21 @@ pub enum Coordinate {
 }
 
 impl Coordinate {
-    /// The three of them in order.
+    /// The three axes in order.
     pub const ALL: [Coordinate; 3] = [Coordinate::X, Coordinate::Y, Coordinate::Z];
 
-    /// 0, 1 or 2.
+    /// The index: 0, 1 or 2.
     pub fn index(self) -> usize {
         self as usize
     }
 
-    /// The two that follow cyclically: Y, Z for X. A positive turn about `self` carries the first towards the second.
+    /// The next two axes in cyclic order: Y, Z for X. A positive rotation about `self` turns the first towards the second.
     fn others(self) -> (usize, usize) {
         ((self.index() + 1) % 3, (self.index() + 2) % 3)
     }
 }
 
-/// Sine and cosine of an angle, taken once and used often.
+/// Sine and cosine of an angle, computed once.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct SinCos<S> {
     /// The sine.
@@ -81,14 +81,14 @@ pub struct SinCos<S> {
 }
 
 impl<N: Nominal> SinCos<N> {
-    /// The turn by a nominal angle in radians.
+    /// The rotation by a nominal angle in radians.
     pub fn by(angle_rad: N) -> Self {
         let (sin, cos) = angle_rad.sin_cos();
         SinCos { sin, cos }
     }
 }
 
-/// How an error's angles act on a point.
+/// Rotation convention of the error angles.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Rotation {
     /// `Rx(a)·Ry(b)·Rz(c)`, exact.
@@ -98,8 +98,8 @@ pub enum Rotation {
     SmallAngle,
 }
 
-/// A small rigid motion: translations in mm, then `Rx(a)·Ry(b)·Rz(c)` of three angles in radians, in the order in which
-/// location errors and error motions are written.
+/// A small rigid motion: translations in mm, then `Rx(a)·Ry(b)·Rz(c)` with three angles in radians, in the order of location errors and
+/// error motions.
 #[derive(Clone, Copy, Debug)]
 pub struct SmallMotion<S> {
     translation: Point<S>,
@@ -148,7 +148,7 @@ impl<S: Scalar> SmallMotion<S> {
         }
     }
 
-    /// `Rzᵀ · Ryᵀ · Rxᵀ · (point − translation)`: what takes a point back. For small angles `(I − [θ]×)·(point − translation)`.
+    /// `Rzᵀ · Ryᵀ · Rxᵀ · (point − translation)`: the inverse transformation. For small angles `(I − [θ]×)·(point − translation)`.
     #[inline(always)]
     pub fn pull(&self, point: Point<S>) -> Point<S> {
         self.rotate_back(point.minus(self.translation))
@@ -179,7 +179,7 @@ pub fn cross<S: Scalar>(a: [S; 3], b: Point<S>) -> Point<S> {
     Point([b * z - c * y, c * x - a * z, a * y - b * x])
 }
 
-/// `ω × d` with a nominal direction, zeros of `d` left out.
+/// `ω × d` with a nominal direction; zeros of `d` are skipped.
 #[inline(always)]
 pub fn cross_nominal<S: Scalar>(omega: [S; 3], direction: [f64; 3]) -> Point<S> {
     let term = |plus: (S, f64), minus: (S, f64)| {
@@ -195,7 +195,7 @@ pub fn cross_nominal<S: Scalar>(omega: [S; 3], direction: [f64; 3]) -> Point<S> 
     Point([term((b, z), (c, y)), term((c, x), (a, z)), term((a, y), (b, x))])
 }
 
-/// A turn about a coordinate axis by an error angle.
+/// A rotation about a coordinate axis by an error angle.
 #[inline(always)]
 pub fn turn_about<S: Scalar>(axis: Coordinate, turn: SinCos<S>, point: Point<S>) -> Point<S> {
     let (first, second) = axis.others();
@@ -206,7 +206,7 @@ pub fn turn_about<S: Scalar>(axis: Coordinate, turn: SinCos<S>, point: Point<S>)
     turned
 }
 
-/// A turn about a coordinate axis by a nominal angle.
+/// A rotation about a coordinate axis by a nominal angle.
 #[inline(always)]
 pub fn turn_about_nominal<S: Scalar>(
     axis: Coordinate,

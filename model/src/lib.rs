@@ -1,14 +1,14 @@
-//! The model of a machine and its tests: a kinematic chain over an open scalar, its error components, the effects that drive them, and
-//! the instruments that read it.
+//! Model of a machine and its tests: a kinematic chain over an open scalar, its error components, the effects on them, and the
+//! instruments.
 //!
-//! - [`scalar`]: what a number may be; [`expression`]: a number that is not known yet;
-//! - [`frames`], [`axis`], [`chain`]: points pushed through a machine;
-//! - [`component`], [`effect`]: errors by name, and what makes them vary; [`pattern`]: several errors by one name;
-//! - [`instrument`]: from a state of the axes to a reading;
-//! - [`sensitivity`]: readings and their derivatives by every component; [`replay`]: over columns of readings at once;
-//! - [`session`]: machine, tests and readings as they stand in files; [`words`]: counts in messages.
+//! - [`scalar`]: numeric types of the chain; [`expression`]: the symbolic scalar;
+//! - [`frames`], [`axis`], [`chain`]: transformation of points through a machine;
+//! - [`component`], [`effect`]: names of errors, and their dependence on drivers; [`pattern`]: one name for several errors;
+//! - [`instrument`]: readings from states of the axes;
+//! - [`sensitivity`]: readings and their derivatives by every component; [`replay`]: evaluation over columns of readings;
+//! - [`session`]: machine, tests and readings, and their files; [`words`]: counts in messages.
 //!
-//! A chain over plain numbers and over dual ones: what a ball bar reads, and how that changes with a location error of C, ∂L/∂EX0C = −R·sin C/L₀.
+//! The chain over plain and dual numbers: the reading of a ball bar, and its derivative by a location error of C, ∂L/∂EX0C = −R·sin C/L₀.
 //!
 //! ```
 //! use abbe_model::chain::{AxisPosition, Machine};
@@ -40,7 +40,7 @@
 //! # Ok::<(), abbe_model::ModelError>(())
 //! ```
 //!
-//! A session as it stands in its file:
+//! A session read from its file:
 //!
 //! ```
 //! use std::path::Path;

@@ -1,7 +1,7 @@
-//! Patterns that stand for several errors: `E?0C` for the six location errors of C, `E?0J*` for those of all joints.
+//! Patterns for several errors: `E?0C` for the six location errors of C, `E?0J*` for those of all joints.
 //!
-//! `?` stands for one character, `*` for any number of them, also none. A pattern is compared with the names of ISO 230-1 (`EX0C`) and with those
-//! of the literature (`e_x0c`).
+//! `?` matches one character, `*` any number of characters, including none. A pattern is compared with the names of ISO 230-1 (`EX0C`)
+//! and of the literature (`e_x0c`).
 
 use crate::axis::AxisKind;
 use crate::chain::Machine;
@@ -25,7 +25,7 @@ pub fn is_pattern(text: &str) -> bool {
 pub fn matches(pattern: &str, name: &str) -> bool {
     let (pattern, name): (Vec<char>, Vec<char>) = (pattern.chars().collect(), name.chars().collect());
     let (mut p, mut n) = (0, 0);
-    // The last `*`, and the first character of the name that it does not take.
+    // The last `*`, and the first character of the name after its match.
     let mut star: Option<(usize, usize)> = None;
     while n < name.len() {
         match pattern.get(p) {
@@ -38,7 +38,7 @@ pub fn matches(pattern: &str, name: &str) -> bool {
                 n += 1;
             }
             _ => match &mut star {
-                // The `*` takes one character more.
+                // Extend the match of `*` by one character.
                 Some((place, taken)) => {
                     *taken += 1;
                     (p, n) = (*place + 1, *taken);
@@ -50,8 +50,8 @@ pub fn matches(pattern: &str, name: &str) -> bool {
     pattern[p..].iter().all(|c| *c == '*')
 }
 
-/// Every location error and error motion that the chain applies: by axis in the chain's order, location errors first, each in the order X, Y, Z,
-/// A, B, C. The position of a linear axis is no error.
+/// Every location error and error motion that the chain applies. The order is by axis of the chain, location errors first, each in the
+/// order X, Y, Z, A, B, C. A linear axis has no position errors.
 #[must_use]
 pub fn errors(machine: &Machine) -> Vec<ErrorName> {
     let mut errors = Vec::new();
@@ -83,7 +83,7 @@ pub fn matching(machine: &Machine, pattern: &str) -> Vec<ErrorName> {
 mod tests {
     use super::*;
 
-    /// Whether a name matches, straight from what `?` and `*` mean.
+    /// Matches by the definition of `?` and `*`.
     fn by_definition(pattern: &[char], name: &[char]) -> bool {
         match (pattern.split_first(), name.split_first()) {
             (None, None) => true,

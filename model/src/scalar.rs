@@ -1,16 +1,15 @@
-//! The open scalar: the kinematic chain is written once, and what a number *is* decides what the chain yields.
+//! The open scalar: the kinematic chain is written once, and the numeric type decides what it computes.
 //!
-//! With `f64` the chain simulates, with a symbol it yields the closed form and, recorded and replayed over columns, every Jacobian; with dual numbers it
-//! yields the derivatives that both are held to.
-//! Two kinds of quantity meet in a chain. *Nominal* ones (axis positions, origins, ball positions) are never
-//! differentiated; *errors* are. A [`Scalar`] is the type of an error, [`Scalar::Nominal`] that of a nominal quantity,
-//! so that a product of two nominal quantities costs no derivative:
+//! Over `f64` the chain simulates. Over a symbol it gives the closed form and, recorded and evaluated over columns, every Jacobian. Over
+//! dual numbers it gives the reference derivatives for both. Two kinds of quantity occur in a chain. *Nominal* quantities (axis
+//! positions, origins, ball positions) are never differentiated; *errors* are. A [`Scalar`] is the type of an error, [`Scalar::Nominal`]
+//! that of a nominal quantity, so that a product of two nominal quantities carries no derivatives:
 //!
-//! | scalar | nominal | the chain yields |
+//! | scalar | nominal | result of the chain |
 //! |---|---|---|
 //! | `f64` | `f64` | readings |
 //! | a num-dual number over `f64` | `f64` | readings and derivatives |
-//! | a [symbol](crate::expression) | the same symbol | the closed form, and what is [replayed](crate::replay) |
+//! | a [symbol](crate::expression) | the same symbol | the closed form, and the recording for [`replay`](crate::replay) |
 
 use std::ops::{Add, Div, Mul, Neg, Sub};
 
@@ -28,29 +27,29 @@ pub trait Nominal:
     fn sqrt(self) -> Self;
     /// The exponential function.
     fn exp(self) -> Self;
-    /// −1, 0 or 1 by sign; a direction of travel.
+    /// The sign: −1, 0 or 1; the direction of travel.
     fn signum(self) -> Self;
-    /// 0 below zero, 1 at and above it.
+    /// The unit step: 0 below zero, 1 at and above zero.
     fn step(self) -> Self;
-    /// The greatest whole number that is not above it.
+    /// The greatest integer that is not greater.
     fn floor(self) -> Self;
-    /// The nearest whole number.
+    /// The nearest integer.
     fn round(self) -> Self;
-    /// A whole power, at least 1.
+    /// An integer power, at least 1.
     fn power(self, exponent: i32) -> Self {
         (1..exponent).fold(self, |power, _| power * self)
     }
-    /// The value, or `limit` where it is above that.
+    /// The lesser of the value and `limit`.
     fn at_most(self, limit: f64) -> Self {
         let beyond = self - Self::constant(limit);
         self - beyond.step() * beyond
     }
-    /// The value, or `limit` where it is below that.
+    /// The greater of the value and `limit`.
     fn at_least(self, limit: f64) -> Self {
         let missing = Self::constant(limit) - self;
         self + missing.step() * missing
     }
-    /// The value where it is a known constant: what lets an exact zero drop out of a printed equation.
+    /// The value of a known constant. It lets exact zeros vanish from printed equations.
     fn known(self) -> Option<f64>;
 }
 
@@ -93,7 +92,7 @@ impl Nominal for f64 {
     }
 }
 
-/// The type of an error: what a Jacobian is taken with respect to.
+/// The type of an error, by which Jacobians are taken.
 pub trait Scalar:
     Copy
     + Add<Output = Self>
@@ -105,7 +104,7 @@ pub trait Scalar:
     + Sub<Self::Nominal, Output = Self>
     + Mul<Self::Nominal, Output = Self>
 {
-    /// The type of the quantities that are not differentiated.
+    /// The type of nominal quantities.
     type Nominal: Nominal;
     /// A nominal quantity as a scalar whose derivatives are zero.
     fn nominal(value: Self::Nominal) -> Self;

@@ -1,9 +1,9 @@
-//! Readings of a test and their derivatives by every component, through the one chain.
+//! Readings of a test and their derivatives by every component, computed through the chain.
 //!
-//! A *slot* is a component that the chain can see: the machine's errors ([`crate::chain::ERRORS_PER_AXIS`] an axis), then the instrument's own
-//! unknowns. The chain is recorded once for a test, with symbols; its derivatives by all slots follow by reverse accumulation on what was recorded,
-//! at the price of a few readings however many slots there are; both are [replayed](crate::replay) over the columns of readings. An axis that stands
-//! still in a test is a constant of the recording, and a slot that is neither asked for nor different from zero is left out of it.
+//! A *slot* is a component of the chain: the machine's errors ([`crate::chain::ERRORS_PER_AXIS`] per axis), then the instrument's
+//! parameters. The chain is recorded once per test over symbols. Reverse accumulation gives its derivatives by all slots at the cost of a
+//! few readings, whatever the number of slots. Both are [evaluated](crate::replay) over the columns of readings. An axis that does not
+//! move in a test is a constant of the recording. A slot that is zero and not requested is omitted.
 
 use std::collections::HashMap;
 use std::ops::Range;
@@ -18,17 +18,17 @@ use crate::replay::Replay;
 use crate::scalar::Nominal;
 use crate::session::readings::Readings;
 
-/// What the components are, reading by reading.
+/// Values of the components for each reading.
 #[derive(Clone, Debug, Default)]
 pub struct SlotValues {
-    /// The part of each slot that is the same for all readings, mm or rad.
+    /// The constant term of each slot, mm or rad.
     pub constant: Vec<f64>,
-    /// What is added reading by reading: slot, and a value a row.
+    /// The varying terms: slot, and one value per row.
     pub varying: Vec<(usize, Vec<f64>)>,
 }
 
 impl SlotValues {
-    /// All zero, for a test with this many slots.
+    /// All zero, for a test with this number of slots.
     pub fn zero(slots: usize) -> Self {
         SlotValues {
             constant: vec![0.0; slots],
@@ -40,7 +40,7 @@ impl SlotValues {
         self.varying.iter().any(|(varied, _)| *varied == slot)
     }
 
-    /// What a varying slot is at some rows.
+    /// The values of a varying slot in a range of rows.
     fn column(&self, slot: usize, rows: Range<usize>) -> Vec<f64> {
         let mut sum = vec![self.constant[slot]; rows.len()];
         for (_, values) in self.varying.iter().filter(|(varied, _)| *varied == slot) {
@@ -55,18 +55,18 @@ impl SlotValues {
 /// Derivatives of readings by components.
 #[derive(Clone, Debug)]
 pub struct Sensitivities {
-    /// The slots, in the order asked for.
+    /// The slots in the requested order.
     pub slots: Vec<usize>,
-    /// The readings, mm: rows × coordinates, a reading's coordinates together.
+    /// The readings, mm: rows × coordinates, the coordinates of a reading together.
     pub readings_mm: Vec<f64>,
     /// For each slot, the derivative of each scalar reading: mm/mm or mm/rad.
     pub derivatives: Vec<Vec<f64>>,
 }
 
-/// What the recorded chain is a function of.
+/// Variables of the recorded chain.
 #[derive(Clone, Copy, Debug, PartialEq)]
 enum Quantity {
-    /// Position of an axis that moves, by its place in the machine.
+    /// Position of a moving axis, by its index in the machine.
     Position(usize),
     /// The sine of that position.
     Sine(usize),
@@ -76,19 +76,19 @@ enum Quantity {
     Slot { slot: usize, varies: bool },
 }
 
-/// What a recording depends on: which slots there are, whether they vary, and which of them derivatives are taken by.
+/// Key of a recording: its slots, whether they vary, and the slots of the derivatives.
 #[derive(Clone, Debug, PartialEq, Eq, Hash)]
-struct CarriedComponent {
+struct RecordingKey {
     slots: Vec<(usize, bool)>,
     derivatives: Vec<usize>,
 }
 
-/// Where an axis stands, row by row.
+/// Position of an axis in every row.
 #[derive(Clone, Debug)]
-enum DriverCourse {
-    /// The same at every row.
-    Still(AxisPosition<f64>),
-    /// Positions, and sines and cosines of a rotary axis, taken once.
+enum AxisColumn {
+    /// Equal in all rows.
+    Fixed(AxisPosition<f64>),
+    /// Positions, and for a rotary axis their sines and cosines, computed once.
     Moving {
         position: Vec<f64>,
         sine: Vec<f64>,
@@ -96,17 +96,17 @@ enum DriverCourse {
     },
 }
 
-impl DriverCourse {
-    fn new(kind: AxisKind, positions: &[f64]) -> DriverCourse {
+impl AxisColumn {
+    fn new(kind: AxisKind, positions: &[f64]) -> AxisColumn {
         let first = positions.first().copied().unwrap_or(0.0);
         if positions.iter().all(|position| *position == first) {
-            return DriverCourse::Still(AxisPosition::new(kind, first));
+            return AxisColumn::Fixed(AxisPosition::new(kind, first));
         }
         let (sine, cosine) = match kind {
             AxisKind::Rotary => positions.iter().map(|position| position.sin_cos()).unzip(),
             AxisKind::Linear => (Vec::new(), Vec::new()),
         };
-        DriverCourse::Moving {
+        AxisColumn::Moving {
             position: positions.to_vec(),
             sine,
             cosine,
@@ -115,8 +115,8 @@ impl DriverCourse {
 
     fn at(&self, row: usize) -> AxisPosition<f64> {
         match self {
-            DriverCourse::Still(position) => *position,
-            DriverCourse::Moving {
+            AxisColumn::Fixed(position) => *position,
+            AxisColumn::Moving {
                 position,
                 sine,
                 cosine,
@@ -134,25 +134,25 @@ impl DriverCourse {
     }
 }
 
-/// A test made ready: its states with sines and cosines taken once, and its chain as it was recorded.
+/// A test prepared for evaluation: its states with sines and cosines, and its recorded chain.
 #[derive(Clone, Debug)]
 pub struct TestModel<'a> {
     machine: &'a Machine,
     station: Station<f64>,
-    courses: Vec<DriverCourse>,
+    axis_columns: Vec<AxisColumn>,
     rows: usize,
-    recorded: Arc<Mutex<HashMap<CarriedComponent, Arc<Replay<Quantity>>>>>,
+    recorded: Arc<Mutex<HashMap<RecordingKey, Arc<Replay<Quantity>>>>>,
 }
 
 impl<'a> TestModel<'a> {
-    /// From the states that the readings list.
+    /// From the axis positions of the readings.
     pub fn new(machine: &'a Machine, station: Station<f64>, readings: &Readings) -> Self {
         let axes = machine.axes.iter().zip(&readings.positions);
         TestModel {
             machine,
             station,
-            courses: axes
-                .map(|(axis, positions)| DriverCourse::new(axis.kind, positions))
+            axis_columns: axes
+                .map(|(axis, positions)| AxisColumn::new(axis.kind, positions))
                 .collect(),
             rows: readings.rows(),
             recorded: Arc::default(),
@@ -169,18 +169,18 @@ impl<'a> TestModel<'a> {
         self.rows
     }
 
-    /// Scalar coordinates of a reading.
+    /// Number of scalar coordinates of a reading.
     pub fn coordinates(&self) -> usize {
         self.station.kind().coordinates()
     }
 
-    /// Number of slots: the machine's errors, then the instrument's unknowns.
+    /// Number of slots: the machine's errors, then the instrument's parameters.
     pub fn slots(&self) -> usize {
         self.machine.error_slots() + self.station.kind().unknowns().len()
     }
 
-    /// The slots that can move a reading of this test at all: errors of the axes between ball and bed that are applied (a linear axis has no
-    /// position errors), and all of the instrument's unknowns. An instrument that holds no workpiece point leaves that side out.
+    /// The slots that can affect a reading of this test: the applied errors of the axes between ball and bed (a linear axis has no
+    /// position errors), and all parameters of the instrument. Without a workpiece point, the axes on the workpiece side are excluded.
     pub fn effective_slots(&self) -> Vec<usize> {
         let two_sided = self.station.kind().is_two_sided();
         let machine = (0..self.machine.error_slots()).filter(|slot| {
@@ -192,49 +192,52 @@ impl<'a> TestModel<'a> {
         machine.chain(self.machine.error_slots()..self.slots()).collect()
     }
 
-    /// Where the axes stand at a row.
+    /// Positions of the axes in a row.
     pub fn state(&self, row: usize) -> Vec<AxisPosition<f64>> {
-        self.courses.iter().map(|course| course.at(row)).collect()
+        self.axis_columns
+            .iter()
+            .map(|axis_column| axis_column.at(row))
+            .collect()
     }
 
-    /// The recorded chain: the reading's coordinates, then for each of them its derivatives by the slots asked for.
+    /// The recorded chain: the coordinates of the reading, then for each of them its derivatives by the requested slots.
     fn recording(&self, values: &SlotValues, derivatives: &[usize]) -> Arc<Replay<Quantity>> {
-        let mut carries: Vec<bool> = values.constant.iter().map(|value| *value != 0.0).collect();
-        derivatives.iter().for_each(|slot| carries[*slot] = true);
+        let mut included: Vec<bool> = values.constant.iter().map(|value| *value != 0.0).collect();
+        derivatives.iter().for_each(|slot| included[*slot] = true);
         let slots = (0..self.slots())
-            .filter(|slot| carries[*slot] || values.varies(*slot))
+            .filter(|slot| included[*slot] || values.varies(*slot))
             .map(|slot| (slot, values.varies(slot)))
             .collect();
-        let carried = CarriedComponent {
+        let key = RecordingKey {
             slots,
             derivatives: derivatives.to_vec(),
         };
-        // A thread that panicked left whole recordings behind or none.
+        // After a panic in another thread every recording is either complete or absent.
         let mut recorded = self.recorded.lock().unwrap_or_else(PoisonError::into_inner);
-        match recorded.get(&carried) {
+        match recorded.get(&key) {
             Some(replay) => replay.clone(),
             None => {
-                let replay = Arc::new(self.record(&carried));
-                recorded.insert(carried, replay.clone());
+                let replay = Arc::new(self.record(&key));
+                recorded.insert(key, replay.clone());
                 replay
             }
         }
     }
 
-    fn record(&self, carried: &CarriedComponent) -> Replay<Quantity> {
+    fn record(&self, key: &RecordingKey) -> Replay<Quantity> {
         let arena = Arena::new();
         let constant = Symbol::constant;
         let state: Vec<AxisPosition<Symbol<'_, Quantity>>> =
-            (self.machine.axes.iter().zip(&self.courses).enumerate())
-                .map(|(index, (axis, course))| match course {
-                    DriverCourse::Still(position) => AxisPosition {
+            (self.machine.axes.iter().zip(&self.axis_columns).enumerate())
+                .map(|(index, (axis, axis_column))| match axis_column {
+                    AxisColumn::Fixed(position) => AxisPosition {
                         value: constant(position.value),
                         turn: SinCos {
                             sin: constant(position.turn.sin),
                             cos: constant(position.turn.cos),
                         },
                     },
-                    DriverCourse::Moving { .. } => AxisPosition {
+                    AxisColumn::Moving { .. } => AxisPosition {
                         value: arena.variable(Quantity::Position(index)),
                         turn: match axis.kind {
                             AxisKind::Rotary => SinCos {
@@ -249,7 +252,7 @@ impl<'a> TestModel<'a> {
                     },
                 })
                 .collect();
-        let slots: HashMap<usize, Symbol<'_, Quantity>> = (carried.slots.iter())
+        let slots: HashMap<usize, Symbol<'_, Quantity>> = (key.slots.iter())
             .map(|&(slot, varies)| (slot, arena.variable(Quantity::Slot { slot, varies })))
             .collect();
         let bodies = self
@@ -265,11 +268,7 @@ impl<'a> TestModel<'a> {
             .iter()
             .map(|value| value.operand())
             .collect();
-        let by: Vec<Operand> = carried
-            .derivatives
-            .iter()
-            .map(|slot| slots[slot].operand())
-            .collect();
+        let by: Vec<Operand> = key.derivatives.iter().map(|slot| slots[slot].operand()).collect();
         let gradients = coordinates
             .iter()
             .flat_map(|coordinate| arena.gradient(*coordinate, &by));
@@ -280,9 +279,9 @@ impl<'a> TestModel<'a> {
         })
     }
 
-    /// The readings of a range of rows and their derivatives by `slots`, block by block, for whom they need not stand in memory all at once: `put` takes
-    /// an output by its number (the reading's coordinates in mm, then for each coordinate its derivative by each slot), the first row of the block
-    /// counted from the first row asked for, and a value a row.
+    /// Computes the readings of a range of rows and their derivatives by the slots, block by block, so that they need not be in memory
+    /// together. `put` receives the index of an output, the first row of the block relative to the start of the range, and one value per
+    /// row. Outputs are the coordinates of the reading in mm, then for each coordinate its derivatives by the slots.
     pub fn sweep(
         &self,
         values: &SlotValues,
@@ -294,13 +293,13 @@ impl<'a> TestModel<'a> {
         let varying: HashMap<usize, Vec<f64>> = (values.varying.iter())
             .map(|(slot, _)| (*slot, values.column(*slot, rows.clone())))
             .collect();
-        let course = |axis: usize| match &self.courses[axis] {
-            DriverCourse::Moving {
+        let axis_column = |axis: usize| match &self.axis_columns[axis] {
+            AxisColumn::Moving {
                 position,
                 sine,
                 cosine,
             } => [position, sine, cosine].map(|column| column.as_slice()),
-            DriverCourse::Still(_) => [&[][..]; 3],
+            AxisColumn::Fixed(_) => [&[][..]; 3],
         };
         recording.run(
             rows.len(),
@@ -309,9 +308,9 @@ impl<'a> TestModel<'a> {
                 Quantity::Position(_) | Quantity::Sine(_) | Quantity::Cosine(_) => f64::NAN,
             },
             |quantity| match quantity {
-                Quantity::Position(axis) => &course(*axis)[0][rows.clone()],
-                Quantity::Sine(axis) => &course(*axis)[1][rows.clone()],
-                Quantity::Cosine(axis) => &course(*axis)[2][rows.clone()],
+                Quantity::Position(axis) => &axis_column(*axis)[0][rows.clone()],
+                Quantity::Sine(axis) => &axis_column(*axis)[1][rows.clone()],
+                Quantity::Cosine(axis) => &axis_column(*axis)[2][rows.clone()],
                 Quantity::Slot { slot, .. } => &varying[slot],
             },
             put,
@@ -323,7 +322,7 @@ impl<'a> TestModel<'a> {
         let coordinates = self.coordinates();
         let mut readings = vec![0.0; self.rows * coordinates];
         self.sweep(values, &[], 0..self.rows, |coordinate, start, column| {
-            place(&mut readings, coordinates, coordinate, start, column);
+            scatter(&mut readings, coordinates, coordinate, start, column);
         });
         readings
     }
@@ -342,20 +341,20 @@ impl<'a> TestModel<'a> {
                 None => (output, &mut result.readings_mm),
                 Some(by) => (by / slots.len(), &mut result.derivatives[by % slots.len()]),
             };
-            place(into, coordinates, coordinate, start, column);
+            scatter(into, coordinates, coordinate, start, column);
         });
         result
     }
 }
 
-/// Writes a coordinate of consecutive readings among the others: `into` is readings × coordinates.
-fn place(into: &mut [f64], coordinates: usize, coordinate: usize, start: usize, column: &[f64]) {
+/// Writes one coordinate of consecutive readings; `into` is readings × coordinates.
+fn scatter(into: &mut [f64], coordinates: usize, coordinate: usize, start: usize, column: &[f64]) {
     if coordinates == 1 {
         into[start..start + column.len()].copy_from_slice(column);
         return;
     }
-    let places = into[start * coordinates + coordinate..]
+    let targets = into[start * coordinates + coordinate..]
         .iter_mut()
         .step_by(coordinates);
-    places.zip(column).for_each(|(place, value)| *place = *value);
+    targets.zip(column).for_each(|(target, value)| *target = *value);
 }

@@ -1,6 +1,6 @@
-//! Words around numbers.
+//! Counts with correct number agreement, for messages.
 
-/// A count with its thing, which agrees with it in number.
+/// A count with its noun, singular or plural.
 ///
 /// ```
 /// use abbe_model::words::counted;

@@ -1,4 +1,4 @@
-//! The corpus of the fuzzer, replayed: every input that it keeps, among them every one that once did harm.
+//! Replays the corpus of the fuzzer: every retained input, including those that revealed a fault.
 
 #[path = "../../fuzz/harness.rs"]
 mod harness;

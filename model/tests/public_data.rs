@@ -1,4 +1,4 @@
-//! Sessions on data that others measured or simulated; skipped by name where the data are not at hand.
+//! Tests on sessions with data that others measured or simulated; skipped by name if the data are missing.
 
 use std::path::{Path, PathBuf};
 
@@ -13,7 +13,7 @@ fn workspace() -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("..")
 }
 
-/// The folder of public data: `ABBE_DATA`, else the one that may lie beside the workspace.
+/// The folder of public data: `ABBE_DATA`, else the one beside the workspace.
 fn data() -> PathBuf {
     match std::env::var_os("ABBE_DATA") {
         Some(folder) => PathBuf::from(folder),
@@ -21,7 +21,7 @@ fn data() -> PathBuf {
     }
 }
 
-/// A folder or file that has to be there for a test, else the test says that it is skipped.
+/// A folder or file that a test requires; if it is missing, the test reports that it is skipped.
 fn at_hand(test: &str, path: PathBuf) -> Option<PathBuf> {
     if path.exists() {
         return Some(path);
@@ -133,7 +133,7 @@ fn the_kuka_session_reads_and_its_sockets_nearly_close() {
     );
 }
 
-/// The ball in the tool frame and the root mean square closure, both after a fit of ball and sockets with nominal joints.
+/// The ball in the tool frame and the root mean square closure, after a fit of ball and sockets with nominal joints.
 fn fitted_ball(session: &Session) -> ([f64; 3], f64) {
     let none = vec![BodyErrors::<f64>::NONE; session.machine.axes.len()];
     let unknowns = 3 + 3 * session.tests.len();

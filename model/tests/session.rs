@@ -1,4 +1,4 @@
-//! Sessions as plans, and sessions written and read back.
+//! Tests of sessions as plans, and of sessions that are written and read back.
 
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -34,7 +34,7 @@ fn nominal(session: &Session, test: &Test, readings: &Readings) -> Vec<f64> {
         .collect()
 }
 
-/// A session with one test, its machine inside it.
+/// A session with one test and the machine in the session file.
 fn one_test(test: &str) -> Result<Session, abbe_model::ModelError> {
     let folder = tempfile::tempdir().unwrap();
     let text = format!(
@@ -273,7 +273,7 @@ fn a_plan_becomes_a_measured_session() {
     let written = folder.path().join("session.toml");
     let text = write::with_data(&original, &written, &data).unwrap();
     assert_eq!(text.lines().count(), original.lines().count() + 4);
-    // Once more over the result: the names of the files are replaced, not added.
+    // Applied again to the result, the names of the files are replaced, not added.
     assert_eq!(write::with_data(&text, &written, &data).unwrap(), text);
     fs::write(&written, text).unwrap();
     fs::copy(
@@ -292,7 +292,7 @@ fn a_plan_becomes_a_measured_session() {
             assert!(close(a, b));
         }
     }
-    // Nothing but what was asked for is left in the folder.
+    // The folder contains only the requested files.
     assert_eq!(fs::read_dir(folder.path()).unwrap().count(), 6);
 }
 
@@ -360,7 +360,7 @@ fn runs_that_the_data_lack_are_said() {
         let one_way = |runs: &[bool]| warnings_of(&forward_only, runs, true);
         let unseparated = || warnings_of(movement, &[true, false], false);
         assert!(said(&[true, false, true, false]).is_empty(), "{movement}");
-        // One direction is stated, and the other one was run as well, or instead.
+        // One direction is stated, but the other one was run as well, or instead.
         for (runs, found) in [
             (&[true, true, false][..], "2 runs forward and 1 backward"),
             (&[false, false][..], "0 runs forward and 2 backward"),
@@ -373,11 +373,11 @@ fn runs_that_the_data_lack_are_said() {
             );
         }
         assert!(one_way(&[true, true]).is_empty());
-        // Runs that are not numbered apart are not counted as none.
+        // Runs without run numbers are not counted as zero.
         let warnings = unseparated();
         assert_eq!(warnings.len(), 1, "{movement}: {warnings:?}");
         assert!(
-            warnings[0].contains("run 1 goes there and back under one number"),
+            warnings[0].contains("run 1 goes forward and backward under one number"),
             "{warnings:?}"
         );
         for (runs, found) in [

@@ -14,7 +14,6 @@ use abbe::identify::fit::Fit;
 use abbe::identify::problem::Problem;
 use abbe::model::axis::AxisKind;
 use abbe::model::chain::Machine;
-use abbe::model::component::Freedom;
 use clap::{Args, ValueEnum};
 
 use super::failure::Failure;
@@ -22,6 +21,9 @@ use super::folder::{self, NewFile};
 use super::message::{Kind, tell};
 
 mod uncertainty;
+mod words;
+
+pub use words::words;
 
 /// Maximum number of points of a table: LinuxCNC reads 256 triplets per joint, Heidenhain 256 points per table.
 const MAX_POINTS: usize = 256;
@@ -394,29 +396,4 @@ fn table(rows: &[Vec<String>]) -> String {
         cells.join(" ").trim_end().to_string()
     });
     lines.collect::<Vec<_>>().join("\n")
-}
-
-/// The meaning of an error in the words of ISO 230-1.
-pub fn words(name: &abbe::model::component::ErrorName) -> String {
-    use abbe::model::component::ErrorKind;
-    let letter = name.freedom.letter();
-    let direction = if name.freedom.is_angle() {
-        let about = Freedom::ALL[name.freedom.index() % 3].letter();
-        format!("{letter} (about {about})")
-    } else {
-        letter.to_string()
-    };
-    match (name.kind, name.freedom.is_angle()) {
-        (ErrorKind::Location, false) => {
-            format!("error of the position of {} in direction {direction}", name.axis)
-        }
-        (ErrorKind::Location, true) => format!(
-            "error of the orientation of {} in direction {direction}",
-            name.axis
-        ),
-        (ErrorKind::Motion, false) => format!("error motion of {} in direction {direction}", name.axis),
-        (ErrorKind::Motion, true) => {
-            format!("angular error motion of {} in direction {direction}", name.axis)
-        }
-    }
 }

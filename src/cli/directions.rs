@@ -36,7 +36,7 @@ pub fn write(problem: &Problem<'_>, fit: &Fit, path: &Path) -> Result<(), Failur
             let run = readings.run.get(row).map_or(String::new(), i64::to_string);
             let mut cells = vec![test.name.clone(), run];
             let at = machine.axes.iter().zip(&readings.positions);
-            cells.extend(at.map(|(axis, column)| format!("{:.6}", axis.kind.outside(column[row]))));
+            cells.extend(at.map(|(axis, column)| format!("{:.6}", axis.kind.to_display(column[row]))));
             cells.extend(micrometres(&viewed.reading));
             cells.extend(micrometres(&viewed.residual));
             rows.push(cells);

@@ -43,6 +43,9 @@ impl From<IdentifyError> for Failure {
     fn from(error: IdentifyError) -> Self {
         match error {
             IdentifyError::Model(error) => Failure::Model(error),
+            error @ IdentifyError::NotInTheLibrary { .. } => {
+                Failure::Other(format!("{error}; `abbe trace --list` lists all candidates"))
+            }
             other => Failure::Identify(other),
         }
     }
@@ -64,13 +67,14 @@ impl Failure {
             eprintln!("{message}");
             return;
         }
-        if let Failure::Model(ModelError::Input { place, message, .. }) = self
-            && let Some(span) = &place.span
-            && let Ok(source) = std::fs::read_to_string(&place.file)
+        if let Failure::Model(error) = self
+            && let Some(location) = error.location()
+            && let Some(span) = &location.span
+            && let Ok(source) = std::fs::read_to_string(&location.file)
             && span.end <= source.len()
         {
             use ariadne::{Color, Config, IndexType, Label, Report, ReportKind, Source};
-            let name = place.file.display().to_string();
+            let name = location.file.display().to_string();
             let source = visible(&source);
             let config = Config::default().with_index_type(IndexType::Byte);
             let label = Label::new((name.clone(), span.clone()))
@@ -82,7 +86,7 @@ impl Failure {
                 .finish();
             let mut excerpt = Vec::new();
             if report.write((name, Source::from(source)), &mut excerpt).is_ok() {
-                tell(Kind::Error, &format!("{place}: {message}"));
+                tell(Kind::Error, &error.to_string());
                 // The first line of the excerpt is another `Error:`.
                 let first = excerpt.iter().position(|byte| *byte == b'\n').unwrap_or(0);
                 lines(excerpt.get(first + 1..).unwrap_or_default());
@@ -96,8 +100,15 @@ impl Failure {
 
     /// Writes what to do, if the error states it.
     fn help(&self) {
-        if let Failure::Model(ModelError::Input { help: Some(help), .. }) = self {
-            tell(Kind::Help, help);
+        match self {
+            Failure::Model(ModelError::Input { help: Some(help), .. }) => tell(Kind::Help, help),
+            Failure::Model(ModelError::FileAccess { help, .. }) => tell(
+                Kind::Help,
+                &format!(
+                    "{help} (`--data DIR` names the data folder, `--allow-outside` allows files outside)"
+                ),
+            ),
+            _ => {}
         }
     }
 }

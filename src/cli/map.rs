@@ -2,7 +2,7 @@
 
 use std::path::PathBuf;
 
-use abbe::identify::volumetric::{self, MachineWithErrors, Place, Summary, functions};
+use abbe::identify::volumetric::{self, MachineWithErrors, Summary, VolumetricPoint, functions};
 use abbe::model::axis::AxisKind;
 use abbe::model::chain::Machine;
 use abbe::model::session::limits::LARGEST;
@@ -176,7 +176,7 @@ fn grid(machine: &Machine, arguments: &MapArguments) -> Result<Vec<Vec<f64>>, Fa
 }
 
 /// The map as a table: positions, the nominal point, the error; with compensation the commands and what they leave.
-fn csv(machine: &Machine, places: &[Place]) -> Result<Vec<u8>, Failure> {
+fn csv(machine: &Machine, places: &[VolumetricPoint]) -> Result<Vec<u8>, Failure> {
     let named = |suffix: &'static str| machine.axes.iter().map(move |axis| axis.column(suffix));
     let mut header: Vec<String> = named("").collect();
     header.extend(["px_mm", "py_mm", "pz_mm", "ex_um", "ey_um", "ez_um", "e_um"].map(String::from));
@@ -185,17 +185,17 @@ fn csv(machine: &Machine, places: &[Place]) -> Result<Vec<u8>, Failure> {
         header.push("left_um".into());
     }
     let norm = |e: [f64; 3]| e.iter().map(|x| x * x).sum::<f64>().sqrt() * 1e3;
-    let row = |place: &Place| {
+    let row = |place: &VolumetricPoint| {
         let at = machine.axes.iter().zip(&place.positions);
         let mut cells: Vec<String> = at
-            .map(|(axis, q)| format!("{:.6}", axis.kind.outside(*q)))
+            .map(|(axis, q)| format!("{:.6}", axis.kind.to_display(*q)))
             .collect();
         cells.extend(place.nominal_mm.iter().map(|p| format!("{p:.6}")));
         cells.extend(place.error_mm.iter().map(|e| format!("{:.6}", e * 1e3)));
         cells.push(format!("{:.6}", norm(place.error_mm)));
         if let Some(compensated) = &place.compensated {
             let at = machine.axes.iter().zip(&compensated.positions);
-            cells.extend(at.map(|(axis, q)| format!("{:.9}", axis.kind.outside(*q))));
+            cells.extend(at.map(|(axis, q)| format!("{:.9}", axis.kind.to_display(*q))));
             cells.push(format!("{:.9}", norm(compensated.error_mm)));
         }
         cells

@@ -6,7 +6,7 @@ use std::path::PathBuf;
 use std::sync::Mutex;
 use std::time::Duration;
 
-use abbe::identify::plan::candidate_tests::CandidateTests;
+use abbe::identify::plan::candidate_tests::TestVariations;
 use abbe::identify::results::EffectName;
 use abbe::identify::trace::separating_tests::separate_aliases;
 use abbe::identify::trace::{Progress, TraceOptions, library};
@@ -131,7 +131,7 @@ pub fn run(arguments: &TraceArguments) -> Result<(), Failure> {
     };
     let mut trace = abbe::identify::trace::trace(&session, &options, &report)?;
     bar.set_message("comparing candidate tests");
-    separate_aliases(&mut trace, &CandidateTests::short(), &report)?;
+    separate_aliases(&mut trace, &TestVariations::short(), &report)?;
     interrupts.end_at_once();
     bar.finish_and_clear();
     if tables {
@@ -143,7 +143,7 @@ pub fn run(arguments: &TraceArguments) -> Result<(), Failure> {
     }
     if let Some(path) = &arguments.write {
         let data = arguments.session.data.as_deref();
-        let text = rewrite::moved(&session.text, &session.file, output::folder_of(path), data)?;
+        let text = rewrite::relocated(&session.text, &session.file, output::folder_of(path), data)?;
         let mut next = write::with_effects(&text, &trace.effects, &session.machine);
         if trace.result.interrupted {
             let interruption = trace.result.interruption();
@@ -192,16 +192,16 @@ fn progress_bar(quiet: bool) -> ProgressBar {
 
 fn list(session: &abbe::model::session::Session, options: &TraceOptions) -> Result<(), Failure> {
     let families = library::families()?;
-    let entries = abbe::identify::trace::screening::entries(session, options)?;
+    let entries = abbe::identify::trace::screening::screened_effects(session, options)?;
     for (number, family) in families.iter().enumerate() {
         let of_family: Vec<_> = entries.iter().filter(|entry| entry.family == number).collect();
-        let seen = of_family.iter().filter(|entry| entry.seen).count();
+        let seen = of_family.iter().filter(|entry| entry.observable).count();
         let candidates = counted(of_family.len(), "candidate");
         say!("{}: {candidates}, {seen} detectable", family.name);
         for entry in of_family {
             say!(
                 "  {} {}",
-                if entry.seen {
+                if entry.observable {
                     "detectable    "
                 } else {
                     "not detectable"

@@ -1,6 +1,6 @@
 //! The report of `abbe plan --improve`, `--separate` and `--range`.
 
-use abbe::identify::plan::improve::{Improvement, Step};
+use abbe::identify::plan::improve::{Improvement, ProposedTest};
 use abbe::identify::plan::range::Shrinkage;
 use abbe::identify::problem::Problem;
 use abbe::model::words::counted;
@@ -119,7 +119,7 @@ fn proposed(document: &mut Document, found: &Improvement) -> Markup {
     }
 }
 
-fn row((number, step): (usize, &Step)) -> Vec<String> {
+fn row((number, step): (usize, &ProposedTest)) -> Vec<String> {
     let point = |mm: [f64; 3]| mm.map(|x| format!("{x:.1}").replace('-', "\u{2212}")).join(", ");
     vec![
         (number + 1).to_string(),

@@ -4,7 +4,7 @@ use abbe::identify::IdentifyError;
 use abbe::identify::plan::candidate_tests;
 use abbe::identify::results::{EffectName, EffectResult, TraceResult};
 use abbe::identify::series::{spectrum, views};
-use abbe::identify::trace::Trace;
+use abbe::identify::trace::TraceOutcome;
 use abbe::identify::trace::alias::CompetingEffect;
 use maud::{Markup, html};
 
@@ -69,7 +69,7 @@ fn sentence(result: &TraceResult) -> String {
 ///
 /// # Errors
 /// If the model cannot be evaluated.
-pub fn document(trace: &Trace<'_>) -> Result<Document, IdentifyError> {
+pub fn document(trace: &TraceOutcome<'_>) -> Result<Document, IdentifyError> {
     let result = &trace.result;
     let problem = &trace.after;
     let views = views(problem, &trace.after_fit, Some(&trace.before_fit.residuals))?;
@@ -137,7 +137,7 @@ pub fn document(trace: &Trace<'_>) -> Result<Document, IdentifyError> {
     Ok(document)
 }
 
-fn effects(document: &mut Document, trace: &Trace<'_>) -> Markup {
+fn effects(document: &mut Document, trace: &TraceOutcome<'_>) -> Markup {
     let result = &trace.result;
     let shown = if trace.steps.is_empty() {
         html! {}
@@ -272,7 +272,7 @@ fn curves(document: &mut Document, effects: &[EffectResult]) -> Markup {
 }
 
 /// How the held-out error fell while the search took effects up.
-fn convergence(trace: &Trace<'_>) -> Plot {
+fn convergence(trace: &TraceOutcome<'_>) -> Plot {
     let before = trace.result.before.heldout_rms_um;
     let mut points = vec![(0.0, before)];
     points.extend(
@@ -331,7 +331,7 @@ fn convergence(trace: &Trace<'_>) -> Plot {
     .plot()
 }
 
-fn other_explanations(document: &mut Document, trace: &Trace<'_>) -> Markup {
+fn other_explanations(document: &mut Document, trace: &TraceOutcome<'_>) -> Markup {
     let result = &trace.result;
     let plots: Vec<Plot> = trace
         .competing_effects

@@ -1,4 +1,4 @@
-//! A machine of any structural code with the letters of ISO 841, every axis along a direction of R through its origin, and what a ball bar reads on it.
+//! The kinematic chain of any structural code with ISO 841 letters, axes along R through its origin, and the ball-bar reading on it.
 
 use super::pose::{Axis, Joint};
 use nalgebra::Vector3;
@@ -8,34 +8,34 @@ use nalgebra::Vector3;
 pub struct Link {
     /// The letter.
     pub letter: char,
-    /// Its line.
+    /// Its direction and origin.
     pub axis: Axis,
 }
 
 /// The two sides of a machine, each from the bed outwards.
 #[derive(Clone, Debug)]
 pub struct Chain {
-    /// What carries the workpiece ball.
+    /// The axes that carry the workpiece ball.
     pub workpiece_side: Vec<Link>,
-    /// What carries the spindle ball.
+    /// The axes that carry the spindle ball.
     pub tool_side: Vec<Link>,
 }
 
-/// What is out of place: location errors `[EX, EY, EZ, EA, EB, EC]` of each axis in mm and rad, both balls and the bar in mm.
+/// Errors of machine and set-up: location errors `[EX, EY, EZ, EA, EB, EC]` of each axis in mm and rad, both balls and the bar in mm.
 #[derive(Clone, Debug, Default)]
-pub struct OutOfPlace {
-    /// By letter; axes that are not listed are where they should be.
+pub struct ChainErrors {
+    /// By letter; axes that are not listed have no error.
     pub location: Vec<(char, [f64; 6])>,
-    /// Of the workpiece ball in the table frame.
+    /// Offset of the workpiece ball in the table frame.
     pub workpiece_ball: [f64; 3],
-    /// Of the spindle ball in the tool frame.
+    /// Offset of the spindle ball in the tool frame.
     pub spindle_ball: [f64; 3],
-    /// How much longer the bar is than stated.
+    /// True minus stated bar length.
     pub bar: f64,
 }
 
 impl Chain {
-    /// From a code, spaced or compact, in brackets or not.
+    /// Builds the chain from a structural code, spaced or compact, with or without brackets.
     pub fn from_code(code: &str) -> Chain {
         let letters: Vec<char> = code.chars().filter(|c| c.is_ascii_alphabetic()).collect();
         let inner = &letters[1..letters.len() - 1];
@@ -65,13 +65,13 @@ impl Chain {
         }
     }
 
-    /// What a ball bar reads, mm, its balls stated at these points and the axes at `position` (mm and rad, by letter).
+    /// The ball-bar reading, mm, for the stated ball positions and the axes at `position` (mm and rad, by letter).
     pub fn reading_mm(
         &self,
         position: &impl Fn(char) -> f64,
         workpiece_ball_mm: [f64; 3],
         spindle_ball_mm: [f64; 3],
-        out: &OutOfPlace,
+        out: &ChainErrors,
     ) -> f64 {
         let carried = |side: &[Link], stated: [f64; 3], off: [f64; 3]| {
             let ball = Vector3::from(stated) + Vector3::from(off);

@@ -1,4 +1,4 @@
-//! Shapes by hand, noise by its statistics, files by their text.
+//! Tests of the plant: shapes against hand calculations, noise against its statistics, files against their text.
 
 use super::component::{AxisName, Cartesian, Component, Freedom};
 use super::effect::{Decay, Driver, Injected, Profile, Shape};
@@ -12,7 +12,7 @@ use rand::SeedableRng;
 use rand_pcg::Pcg64Mcg;
 use std::f64::consts::PI;
 
-/// The instant of a plan nearest to a path angle, of one traversal of one test.
+/// The `nth` instant of one traversal of one test.
 fn instant(plan: &Plan, test: usize, run: u32, nth: usize) -> Instant {
     *plan
         .instants
@@ -33,7 +33,7 @@ fn near(found: f64, expected: f64) {
 
 #[test]
 fn direction_speed_and_reversal_on_a_circle() {
-    // 1° a reading, 1,000 mm/min on a radius of 100 mm.
+    // 1° per reading, 1,000 mm/min on a radius of 100 mm.
     let plan = Plan::new(Kind::LinearCircles, 1.0, false);
     let speed_mm_s = 1000.0 / 60.0;
     let at = |run, nth| instant(&plan, 0, run, nth);
@@ -49,11 +49,11 @@ fn direction_speed_and_reversal_on_a_circle() {
     near(there.since_reversal_s[y], 100.0 * PI * 2.0 / 3.0 / speed_mm_s);
     near(there.way_since_reversal[x], 100.0 * (1.0 - (PI / 6.0).cos()));
     near(there.way_since_reversal[y], 150.0);
-    // Clockwise at the same place (360° − 330 readings): the other way.
+    // Clockwise at the same point (360° − 330 readings): opposite directions.
     let back = at(2, 330);
     near(back.commanded.position[x], there.commanded.position[x]);
     assert_eq!((back.direction[x], back.direction[y]), (1.0, -1.0));
-    // At the very point of reversal the axis still has the direction of arrival, there and back.
+    // At the point of reversal the axis has the direction of arrival, in both traversals.
     assert_eq!(at(1, 0).direction[x], 1.0);
     assert_eq!(at(1, 90).direction[y], 1.0);
     assert_eq!(at(1, 91).direction[y], -1.0);
@@ -62,7 +62,7 @@ fn direction_speed_and_reversal_on_a_circle() {
 }
 
 #[test]
-fn shapes_have_the_signs_that_their_table_says() {
+fn shapes_have_the_signs_of_their_table() {
     let plan = Plan::new(Kind::LinearCircles, 1.0, false);
     let there = instant(&plan, 0, 1, 30);
     let x_mm = 100.0 * (PI / 6.0).cos();
@@ -73,23 +73,26 @@ fn shapes_have_the_signs_that_their_table_says() {
         phase_deg: 60.0,
     };
     near(of_x(period).basis(&there), (PI + PI / 3.0).cos());
-    // 2 ms late on an axis that falls at 8.3 mm/s: it stands 16.7 µm further up.
+    // A lag of 2 ms of an axis that moves down at 8.3 mm/s: it is 16.7 µm too high.
     near(
         of_x(Shape::Lag).with_amplitude(2.0).value(&there),
         2e-3 * 1000.0 / 120.0,
     );
-    // It has just reversed at X+ and sticks there.
+    // The axis has just reversed at X+ and sticks.
     let spike = Shape::ReversalSpike {
         decay: Decay::Way(10.0),
     };
     near(of_x(spike).basis(&there), (-(100.0 - x_mm) / 10.0).exp());
-    let bump = |profile| Shape::Local {
+    let local_feature = |profile| Shape::Local {
         centre: x_mm - 5.0,
         width: 10.0,
         profile,
     };
-    near(of_x(bump(Profile::Gaussian)).basis(&there), (-0.125_f64).exp());
-    near(of_x(bump(Profile::RaisedCosine)).basis(&there), 0.5);
+    near(
+        of_x(local_feature(Profile::Gaussian)).basis(&there),
+        (-0.125_f64).exp(),
+    );
+    near(of_x(local_feature(Profile::RaisedCosine)).basis(&there), 0.5);
     let steps = Shape::Steps {
         at: vec![-50.0, 0.0, 90.0],
         heights: vec![1.0, -3.0, 7.0],
@@ -127,7 +130,7 @@ fn a_harmonic_is_spanned_by_its_cosine_and_sine() {
 }
 
 #[test]
-fn a_bump_on_a_table_goes_round_the_turn() {
+fn a_local_feature_on_a_rotary_axis_is_periodic() {
     let plan = Plan::new(Kind::Rotary, 5.0, false);
     let shape = Shape::Local {
         centre: 355.0,
@@ -140,7 +143,7 @@ fn a_bump_on_a_table_goes_round_the_turn() {
 }
 
 #[test]
-fn serial_noise_has_its_coefficient_and_wild_noise_its_share() {
+fn autocorrelated_noise_has_its_coefficient_and_outliers_their_proportion() {
     let mut random = Pcg64Mcg::seed_from_u64(1);
     let serial = Noise::Serial {
         sigma_um: 0.3,
@@ -154,17 +157,21 @@ fn serial_noise_has_its_coefficient_and_wild_noise_its_share() {
     let product = noise.windows(2).map(|pair| pair[0] * pair[1]).sum::<f64>() / noise.len() as f64;
     assert!((variance.sqrt() - 0.3).abs() < 0.005, "{variance}");
     assert!((product / variance - 0.8).abs() < 0.01, "{product}");
-    let wild = traversal(
-        Noise::Wild {
+    let outlier = traversal(
+        Noise::Outliers {
             sigma_um: 0.3,
             share: 0.01,
         },
         200_000,
         &mut random,
     );
-    let share = wild.iter().filter(|(_, wild)| *wild).count() as f64 / wild.len() as f64;
+    let share = outlier.iter().filter(|(_, outlier)| *outlier).count() as f64 / outlier.len() as f64;
     assert!((share - 0.01).abs() < 0.001, "{share}");
-    assert!(wild.iter().all(|(noise, wild)| *wild == (noise.abs() > 3.0)));
+    assert!(
+        outlier
+            .iter()
+            .all(|(noise, outlier)| *outlier == (noise.abs() > 3.0))
+    );
 }
 
 #[test]
@@ -204,13 +211,13 @@ fn a_session_depends_on_its_seed_alone_and_declares_no_effect() {
 }
 
 #[test]
-fn every_kind_has_about_as_many_readings_as_asked() {
+fn every_kind_has_about_as_many_readings_as_requested() {
     for kind in Kind::ALL {
         for readings in [1500, 6000] {
             let plan = Recipe::new(kind, 1).readings(readings).plan();
             let ratio = plan.instants.len() as f64 / readings as f64;
             assert!((0.93..1.08).contains(&ratio), "{kind:?}: {ratio}");
-            // The nominal machine reads the nominal bar, but where the circle is off centre as declared.
+            // The nominal machine reads the nominal bar length, except for a declared eccentricity.
             let zeros = vec![0.0; plan.unknowns.len()];
             for instant in &plan.instants {
                 let deviation =
@@ -223,7 +230,7 @@ fn every_kind_has_about_as_many_readings_as_asked() {
 }
 
 #[test]
-fn names_go_there_and_back() {
+fn names_parse_back_to_themselves() {
     let names = [
         "EZC",
         "EX0C",

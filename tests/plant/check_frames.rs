@@ -1,4 +1,4 @@
-//! Frames and signs against values worked out by hand.
+//! Tests of the plant: frames and signs against hand calculations.
 
 use super::component::{AxisName, Cartesian, Component, Freedom, unit_size};
 use super::machine::{Commanded, Displacement, Machine, Stated};
@@ -28,7 +28,7 @@ fn reading(position: [f64; 5], stated: &Stated, component: Component, value: f64
 #[test]
 fn a_displaced_body_turns_about_z_first_and_x_last() {
     let pose = Pose::displaced(&[1.0, 2.0, 3.0, FRAC_PI_2, 0.0, FRAC_PI_2]);
-    // x -> Rz -> y -> Rx -> z, then shifted.
+    // x -> Rz -> y -> Rx -> z, then the translation.
     near(pose.apply(Vector3::x()), [1.0, 2.0, 4.0]);
     let pose = Pose::displaced(&[0.0, 0.0, 0.0, FRAC_PI_2, FRAC_PI_2, 0.0]);
     // z -> Ry -> x -> Rx -> x.
@@ -36,7 +36,7 @@ fn a_displaced_body_turns_about_z_first_and_x_last() {
 }
 
 #[test]
-fn a_rotary_axis_turns_about_its_origin_and_its_location_error_goes_round_with_nobody() {
+fn a_rotary_axis_turns_about_its_origin_and_its_location_error_does_not_turn() {
     let axis = Axis {
         joint: Joint::Rotary,
         direction: Vector3::z(),
@@ -47,7 +47,7 @@ fn a_rotary_axis_turns_about_its_origin_and_its_location_error_goes_round_with_n
             .apply(Vector3::new(11.0, 0.0, 5.0)),
         [10.0, 1.0, 5.0],
     );
-    // EX0 stays along R's X whatever the axis' position; so does EX of the error motion, applied after the turn.
+    // EX0 is along X of R at any position of the axis; so is EX of the error motion, which is applied after the rotation.
     let shifted = [0.5, 0.0, 0.0, 0.0, 0.0, 0.0];
     near(
         axis.motion(FRAC_PI_2, &shifted, &NONE)
@@ -59,14 +59,14 @@ fn a_rotary_axis_turns_about_its_origin_and_its_location_error_goes_round_with_n
             .apply(Vector3::new(11.0, 0.0, 5.0)),
         [10.5, 1.0, 5.0],
     );
-    // A tilt of 90° about Y takes the turned point about the origin, not about R's.
+    // A tilt of 90° about Y rotates the point about the origin of the axis, not about that of R.
     let tilted = [0.0, 0.0, 0.0, 0.0, FRAC_PI_2, 0.0];
     near(
         axis.motion(0.0, &tilted, &NONE)
             .apply(Vector3::new(10.0, 0.0, 2.0)),
         [12.0, 0.0, 0.0],
     );
-    // The location error is outside of the error motion: Trans by EX0, then tilt by EB.
+    // The location error is outside the error motion: translation by EX0, then tilt by EB.
     near(
         axis.motion(0.0, &shifted, &tilted)
             .apply(Vector3::new(10.0, 0.0, 2.0)),
@@ -75,19 +75,19 @@ fn a_rotary_axis_turns_about_its_origin_and_its_location_error_goes_round_with_n
 }
 
 #[test]
-fn a_linear_axis_slides_along_its_tilted_direction_and_is_not_shortened() {
+fn a_linear_axis_moves_along_its_tilted_direction_and_is_not_shortened() {
     let axis = Axis {
         joint: Joint::Linear,
         direction: Vector3::y(),
         origin_mm: Vector3::new(0.0, 0.0, 7.0),
     };
-    // ω0 = (0, 0, 0.01): Y leans towards −X; the way along Y stays 100.
+    // ω0 = (0, 0, 0.01): Y is inclined towards −X; the component along Y remains 100.
     let squareness = [9.0, 9.0, 9.0, 0.0, 0.0, 0.01];
     near(
         axis.motion(100.0, &squareness, &NONE).apply(Vector3::zeros()),
         [-1.0, 100.0, 0.0],
     );
-    // An angular error motion turns the carried point about the axis' own origin.
+    // An angular error motion rotates the carried point about the origin of the axis.
     let rolled = [0.0, 0.0, 0.0, 0.0, FRAC_PI_2, 0.0];
     near(
         axis.motion(100.0, &NONE, &rolled)
@@ -100,7 +100,7 @@ fn a_linear_axis_slides_along_its_tilted_direction_and_is_not_shortened() {
 fn the_chain_goes_from_the_bed_outwards_on_either_side() {
     let machine = Machine::default();
     let none = Displacement::default();
-    // C by 90° takes +X to +Y, then A by 90° takes +Y to +Z.
+    // C by 90° rotates +X to +Y, then A by 90° rotates +Y to +Z.
     let position = [0.0, 0.0, 0.0, FRAC_PI_2, FRAC_PI_2];
     near(
         machine.workpiece_point(&position, &none, [100.0, 0.0, 0.0]),
@@ -110,7 +110,7 @@ fn the_chain_goes_from_the_bed_outwards_on_either_side() {
         machine.tool_point(&[1.0, 2.0, 3.0, 0.0, 0.0], &none, [0.1, 0.2, 0.3]),
         [1.1, 2.2, 3.3],
     );
-    // Y carries X and Z: a yaw of Y by 90° turns the way of X into Y.
+    // Y carries X and Z: a yaw of Y by 90° rotates the travel of X into Y.
     let mut yawed = Displacement::default();
     yawed.add(Component::Motion(Freedom::C, AxisName::Y), FRAC_PI_2);
     near(
@@ -141,13 +141,13 @@ fn readings_by_hand() {
             0.01,
             ((offset - 0.01) * (offset - 0.01) + 1e4).sqrt() - 150.0,
         ),
-        // E_Y0A lifts the ball outwards by cos of the bar's slope.
+        // E_Y0A moves the ball outwards by the cosine of the slope of the bar.
         (
             Component::Location(Freedom::Y, AxisName::A),
             0.03,
             (offset * offset + 100.03 * 100.03_f64).sqrt() - 150.0,
         ),
-        // EC0A turns the ball at +Y towards −X, towards the spindle ball.
+        // EC0A rotates the ball at +Y towards −X, towards the spindle ball.
         (
             Component::Location(Freedom::C, AxisName::A),
             1e-3,
@@ -164,13 +164,13 @@ fn readings_by_hand() {
 }
 
 #[test]
-fn the_sensor_sees_gain_about_the_stated_length_and_the_past_where_it_is_late() {
+fn the_sensor_has_a_gain_about_the_stated_length_and_a_delay() {
     let stated = Stated {
         workpiece_ball_mm: [0.5, 0.0, 0.0],
         spindle_ball_mm: [0.0; 3],
         bar_mm: 100.0,
     };
-    // Distance 99.5: half a millimetre short, seen 1 % too large.
+    // Distance 99.5 mm: 0.5 mm too short, with a gain error of 1 %.
     let gain = reading([100.0, 0.0, 0.0, 0.0, 0.0], &stated, Component::Sensor, 0.01);
     assert!((gain - (100.0 - 0.505)).abs() < 1e-12);
     let mut late = Displacement::default();
@@ -184,9 +184,9 @@ fn the_sensor_sees_gain_about_the_stated_length_and_the_past_where_it_is_late() 
 }
 
 #[test]
-fn the_weight_of_the_ball_pulls_it_down_about_a() {
+fn the_gravity_moment_about_a_lowers_the_ball() {
     let machine = Machine::default();
-    // A ball at +Y under gravity turns about X in the negative sense.
+    // Gravity rotates a ball at +Y about X in the negative sense.
     let moment = machine.gravity_moment_a_mm(&[0.0; 5], [0.0, 100.0, 0.0]);
     assert!((moment + 100.0).abs() < 1e-12);
     let moment = machine.gravity_moment_a_mm(&[0.0, 0.0, 0.0, FRAC_PI_2, 0.0], [0.0, 100.0, 0.0]);

@@ -1,4 +1,4 @@
-//! The oracle against the plant itself, and against what is known of aliases.
+//! Tests of the oracle against the plant and against known aliases.
 
 use super::component::{AxisName, Component, Freedom};
 use super::effect::{Driver, Injected, Shape};
@@ -24,7 +24,7 @@ fn harmonic(freedom: Freedom, order: u32) -> Injected {
 }
 
 #[test]
-fn columns_are_what_the_plant_does() {
+fn columns_equal_the_response_of_the_plant() {
     let mut random = Pcg64Mcg::seed_from_u64(3);
     for kind in Kind::ALL {
         let recipe = Recipe::new(kind, 0).readings(200);
@@ -50,14 +50,14 @@ fn columns_are_what_the_plant_does() {
 #[test]
 fn known_aliases_are_found_and_others_are_not() {
     let oracle = Oracle::new(&Recipe::new(Kind::Rotary, 0));
-    let cosine = |a: &Injected, b: &Injected| oracle.indistinguishability(a, b);
+    let cosine = |a: &Injected, b: &Injected| oracle.largest_angle_cosine(a, b);
     use Freedom::{A, B, C, Z};
     let table = [
         (harmonic(Z, 2), harmonic(A, 1), 0.95..=1.0),
         (harmonic(Z, 2), harmonic(B, 1), 0.95..=1.0),
         (harmonic(Z, 5), harmonic(Z, 5), 0.999..=1.0),
         (harmonic(Z, 5), harmonic(Z, 6), 0.0..=0.2),
-        // The table's own turn is not seen where the spindle ball lies on its axis (where C stands at zero, a cosine is a constant).
+        // The rotation of the table is not identifiable if the spindle ball lies on its axis (at C = 0 a cosine is a constant).
         (harmonic(C, 5), harmonic(Z, 5), 0.0..=1e-6),
     ];
     for (a, b, expected) in table {
@@ -74,17 +74,17 @@ fn known_aliases_are_found_and_others_are_not() {
         phase_deg: -90.0,
     };
     assert_eq!(oracle.smallest_significant_amplitude(&sine, 1.96), f64::INFINITY);
-    // A tilt of the table is one of the unknowns.
+    // A tilt of the table is one of the parameters.
     assert_eq!(
         oracle.smallest_significant_amplitude(&harmonic(Z, 1), 1.96),
         f64::INFINITY
     );
-    let wobble = harmonic(Z, 2).with_amplitude(2.0);
-    let class = oracle.alias_class(&wobble, 0.95, 2.0);
+    let axial_motion = harmonic(Z, 2).with_amplitude(2.0);
+    let class = oracle.alias_class(&axial_motion, 0.95, 2.0);
     for alias in &class {
         println!(
-            "{:?}: share {:.4}, behind by {:.1} sigma",
-            alias.name, alias.share, alias.behind_sigma
+            "{:?}: share {:.4}, deficit {:.1} sigma",
+            alias.name, alias.share, alias.deficit_sigma
         );
     }
     let has = |component: &str, order| {
@@ -94,13 +94,21 @@ fn known_aliases_are_found_and_others_are_not() {
     };
     assert!(has("EZC", 2) && has("EAC", 1) && has("EBC", 1) && !has("EZC", 3));
     assert!(class[0].share > 0.9999);
-    // Two tilts together do what neither of their cosines alone does; a sum with the truth in it does everything.
+    // Two tilts together explain at least as much as one; a set with the truth explains everything.
     let tilts = [harmonic(A, 1), harmonic(B, 1)];
-    assert!(oracle.explained_share_of(&wobble, &tilts) >= oracle.explained_share(&wobble, &tilts[0]) - 1e-12);
-    assert!(oracle.explained_share_of(&wobble, &[harmonic(Z, 5), harmonic(Z, 2)]) > 0.9999);
-    assert!(oracle.explained_share_of(&wobble, &[harmonic(Z, 5), harmonic(Z, 4)]) < 0.1);
-    // A smaller wobble has more that is nearly as good.
-    assert!(oracle.alias_class(&wobble.with_amplitude(0.1), 0.95, 2.0).len() > class.len());
+    assert!(
+        oracle.explained_share_of(&axial_motion, &tilts)
+            >= oracle.explained_share(&axial_motion, &tilts[0]) - 1e-12
+    );
+    assert!(oracle.explained_share_of(&axial_motion, &[harmonic(Z, 5), harmonic(Z, 2)]) > 0.9999);
+    assert!(oracle.explained_share_of(&axial_motion, &[harmonic(Z, 5), harmonic(Z, 4)]) < 0.1);
+    // A smaller amplitude has more aliases.
+    assert!(
+        oracle
+            .alias_class(&axial_motion.with_amplitude(0.1), 0.95, 2.0)
+            .len()
+            > class.len()
+    );
 }
 
 #[test]
@@ -138,7 +146,7 @@ fn pulls_are_normal_with_the_effect_and_biased_without() {
             sigma_um: 0.3,
             coefficient: 0.8,
         },
-        Noise::Wild {
+        Noise::Outliers {
             sigma_um: 0.3,
             share: 0.01,
         },
@@ -176,11 +184,11 @@ fn pulls_are_normal_with_the_effect_and_biased_without() {
 }
 
 #[test]
-fn held_out_readings_are_predicted_to_the_noise_by_who_knows_the_effect() {
+fn the_oracle_predicts_held_out_readings_to_the_noise() {
     for kind in Kind::ALL {
         let oracle = Oracle::new(&Recipe::new(kind, 0));
         let mut random = Pcg64Mcg::seed_from_u64(17 + kind as u64);
-        let effect = oracle.random_seeable(10.0, &mut random);
+        let effect = oracle.random_detectable(10.0, &mut random);
         let draw = Recipe::new(kind, 21).with(effect).draw_on(&oracle.plan);
         let with = oracle.heldout_rms_um(&draw, &draw.truth.effects);
         let without = oracle.heldout_rms_um(&draw, &[]);
@@ -194,7 +202,7 @@ fn held_out_readings_are_predicted_to_the_noise_by_who_knows_the_effect() {
 }
 
 #[test]
-fn every_family_has_a_member_that_is_seen() {
+fn every_family_has_a_detectable_member() {
     let mut random = Pcg64Mcg::seed_from_u64(5);
     for kind in Kind::ALL {
         let oracle = Oracle::new(&Recipe::new(kind, 0).readings(400));
@@ -204,9 +212,9 @@ fn every_family_has_a_member_that_is_seen() {
                 .map(|effect| oracle.smallest_significant_amplitude(&effect, 1.96))
                 .collect();
             smallest.sort_by(f64::total_cmp);
-            let seen = smallest.iter().filter(|amplitude| amplitude.is_finite()).count();
+            let detectable = smallest.iter().filter(|amplitude| amplitude.is_finite()).count();
             println!(
-                "{kind:?} {family:?}: {seen} of 40 seen, least {:.3}, median {:.3}",
+                "{kind:?} {family:?}: {detectable} of 40 detectable, smallest {:.3}, median {:.3}",
                 smallest[0], smallest[20]
             );
             assert!(smallest[0] < 10.0, "{kind:?} {family:?}: {}", smallest[0]);

@@ -1,4 +1,4 @@
-//! The samples of another independent simulator, simulated again with their truth: this pins conventions, signs and schedule.
+//! Tests of the plant against the samples of another independent simulator: conventions, signs and schedule.
 
 use super::component::{AxisName, Component, Freedom};
 use super::effect::{Driver, Injected, Shape};
@@ -11,7 +11,7 @@ use super::recipe::{Draw, Row, Truth};
 use serde_json::Value;
 use std::path::PathBuf;
 
-/// The folder of the samples: beside the one that `ABBE_DATA` names, else beside the workspace.
+/// The folder of the samples: beside the folder that `ABBE_DATA` names, otherwise beside the workspace.
 fn samples() -> PathBuf {
     let data = std::env::var_os("ABBE_DATA").map_or_else(
         || PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("../shared/data"),
@@ -20,8 +20,8 @@ fn samples() -> PathBuf {
     data.join("../sample")
 }
 
-/// Whether the samples are there; a test without them says that it is skipped, and fails in CI.
-fn at_hand(test: &str) -> bool {
+/// Whether the samples exist. Without them a test prints that it is skipped; in CI it fails.
+fn samples_exist(test: &str) -> bool {
     let found = samples().is_dir();
     assert!(
         found || std::env::var("CI").as_deref() != Ok("true"),
@@ -33,7 +33,7 @@ fn at_hand(test: &str) -> bool {
     found
 }
 
-/// The plan of a sample: one traversal there, one back.
+/// The plan of a sample: one traversal forward, one backward.
 fn plan(kind: Kind, step_deg: f64) -> Plan {
     let mut tests = kind.tests(step_deg);
     for test in &mut tests {
@@ -47,7 +47,7 @@ fn truth(name: &str) -> Value {
     serde_json::from_str(&text).unwrap()
 }
 
-/// The readings of a sample, after comparing positions (and, of rotary tests, times) with the plan's.
+/// The readings of a sample, after a comparison of its positions with those of the plan.
 fn readings(name: &str, plan: &Plan) -> Vec<Row> {
     let mut rows = Vec::new();
     for test in &plan.tests {
@@ -76,7 +76,7 @@ fn readings(name: &str, plan: &Plan) -> Vec<Row> {
     rows
 }
 
-/// Values for the plan's unknowns from a truth file.
+/// Values of the parameters of the plan from a truth file.
 fn values(truth: &Value, plan: &Plan) -> Vec<f64> {
     let number = |value: &Value| value.as_f64().unwrap();
     plan.unknowns
@@ -105,7 +105,7 @@ fn rotary_rms_um(name: &str, effects: &[Injected]) -> f64 {
     (squares.sum::<f64>() / rows.len() as f64).sqrt()
 }
 
-/// 2 µm as the truth file says. It gives no phase: 0.4 rad reproduces the readings, and a fit finds it within its uncertainty.
+/// 2 µm as in the truth file, which states no phase: 0.4 rad reproduces the readings, and a fit agrees within its uncertainty.
 fn axial_third_order() -> Injected {
     let component = Component::Motion(Freedom::Z, AxisName::C);
     let shape = Shape::Harmonic {
@@ -115,13 +115,13 @@ fn axial_third_order() -> Injected {
     Injected::new(component, Driver::Axis(AxisName::C), shape, 2.0)
 }
 
-/// Readings without a truth that the plant knows.
+/// Readings without true values.
 fn measured(rows: Vec<Row>) -> Draw {
     let truth = Truth {
         unknowns: Vec::new(),
         effects: Vec::new(),
         noise: Noise::White { sigma_um: 0.3 },
-        wild_rows: Vec::new(),
+        outlier_rows: Vec::new(),
     };
     Draw {
         files: Vec::new(),
@@ -132,7 +132,7 @@ fn measured(rows: Vec<Row>) -> Draw {
 
 #[test]
 fn rotary_clean_is_reproduced_to_its_noise() {
-    if !at_hand("rotary_clean_is_reproduced_to_its_noise") {
+    if !samples_exist("rotary_clean_is_reproduced_to_its_noise") {
         return;
     }
     let rms = rotary_rms_um("rotary-clean", &[]);
@@ -142,7 +142,7 @@ fn rotary_clean_is_reproduced_to_its_noise() {
 
 #[test]
 fn rotary_axial_h3_is_reproduced_to_its_noise_with_its_effect_only() {
-    if !at_hand("rotary_axial_h3_is_reproduced_to_its_noise_with_its_effect_only") {
+    if !samples_exist("rotary_axial_h3_is_reproduced_to_its_noise_with_its_effect_only") {
         return;
     }
     let rms = rotary_rms_um("rotary-axial-h3", &[axial_third_order()]);
@@ -156,7 +156,7 @@ fn rotary_axial_h3_is_reproduced_to_its_noise_with_its_effect_only() {
 
 #[test]
 fn a_fit_of_rotary_axial_h3_finds_amplitude_and_phase() {
-    if !at_hand("a_fit_of_rotary_axial_h3_finds_amplitude_and_phase") {
+    if !samples_exist("a_fit_of_rotary_axial_h3_finds_amplitude_and_phase") {
         return;
     }
     let plan = plan(Kind::Rotary, 0.25);
@@ -176,7 +176,7 @@ fn a_fit_of_rotary_axial_h3_finds_amplitude_and_phase() {
 
 #[test]
 fn circle_backlash_y_is_reproduced_to_its_noise_with_its_lost_motion() {
-    if !at_hand("circle_backlash_y_is_reproduced_to_its_noise_with_its_lost_motion") {
+    if !samples_exist("circle_backlash_y_is_reproduced_to_its_noise_with_its_lost_motion") {
         return;
     }
     let plan = plan(Kind::LinearCircles, 0.5);
@@ -189,7 +189,7 @@ fn circle_backlash_y_is_reproduced_to_its_noise_with_its_lost_motion() {
         Shape::Backlash,
         1.0,
     );
-    // The truth file does not tell the set-up offsets of the circles: they are fitted, and with them the amplitude.
+    // The truth file does not state the set-up offsets of the circles: they are fitted together with the amplitude.
     let fit = oracle.fit(&draw, std::slice::from_ref(&backlash));
     let (amplitude, u) = fit.get("effect 0").unwrap();
     println!(

@@ -1,4 +1,4 @@
-//! What can be out of place, and the name it has in results.
+//! The error components of the simulated machine and their names in results.
 
 use std::fmt;
 
@@ -22,18 +22,18 @@ impl AxisName {
         self as usize
     }
 
-    /// Whether it turns.
+    /// Whether the axis is rotary.
     pub fn is_rotary(self) -> bool {
         matches!(self, AxisName::A | AxisName::C)
     }
 
-    /// The freedom in which the axis itself moves: EXX, EAA, ECC are positioning errors.
+    /// The degree of freedom along which the axis moves: EXX, EAA, ECC are positioning errors.
     pub fn own_freedom(self) -> Freedom {
         [Freedom::X, Freedom::Y, Freedom::Z, Freedom::A, Freedom::C][self.index()]
     }
 }
 
-/// The freedoms of a body, in the order in which errors are applied.
+/// The degrees of freedom of a body, in the order in which errors are applied.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
 #[allow(missing_docs)]
 pub enum Freedom {
@@ -61,7 +61,7 @@ impl Freedom {
         self as usize
     }
 
-    /// Whether it is a turn.
+    /// Whether it is a rotation.
     pub fn is_angle(self) -> bool {
         self.index() >= 3
     }
@@ -77,22 +77,22 @@ impl fmt::Debug for Cartesian {
     }
 }
 
-/// What is out of place.
+/// An error component.
 #[derive(Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]
 pub enum Component {
     /// Error motion: EZC is `Motion(Freedom::Z, AxisName::C)`.
     Motion(Freedom, AxisName),
     /// Location error, or squareness of a linear axis: EX0C, EC0Y.
     Location(Freedom, AxisName),
-    /// The workpiece ball in the table frame.
+    /// Offset of the workpiece ball in the table frame.
     WorkpieceBall(Cartesian),
-    /// The spindle ball in the tool frame.
+    /// Offset of the spindle ball in the tool frame.
     SpindleBall(Cartesian),
-    /// How much longer the bar is than stated.
+    /// True minus stated bar length.
     Bar,
     /// The sensor's gain.
     Sensor,
-    /// The moment at which the sensor is read.
+    /// The delay of the sensor reading.
     Trigger,
 }
 
@@ -146,7 +146,7 @@ impl Component {
     }
 }
 
-/// How many mm, rad, s or parts of one a unit is.
+/// The size of a unit in mm, rad, s or as a ratio.
 pub fn unit_size(unit: &str) -> f64 {
     match unit {
         "um" | "ms" => 1e-3,

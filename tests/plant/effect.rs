@@ -1,4 +1,4 @@
-//! Injected effects: a component that strays, by an amplitude times a shape.
+//! Injected effects: the error of a component is an amplitude times a shape.
 //!
 //! Signs and units. Amplitudes are in the unit of the component (µm for lengths, arcsec for angles, % for the sensor's gain, ms for
 //! the trigger); of a lag they are in ms.
@@ -10,15 +10,15 @@
 //! | `Harmonic { order, phase_deg }` | `cos(order · q + phase)` |
 //! | `Periodic { period, phase_deg }` | `cos(2π q / period + phase)`, period in mm or degree |
 //! | `Backlash` | `−½ sign(velocity)`: the amplitude is the whole lost motion |
-//! | `Lag` | `−velocity`: the axis stands where it was commanded to be `amplitude` ms ago |
-//! | `ReversalSpike { decay }` | `−sign(velocity) exp(−t/T)`, t time or way since the reversal, the velocity that after it: the axis sticks |
+//! | `Lag` | `−velocity`: the axis is at its commanded position of `amplitude` ms ago |
+//! | `ReversalSpike { decay }` | `−sign(velocity) exp(−t/T)`, t time or distance since the reversal, velocity after the reversal: stick |
 //! | `Local { centre, width, profile }` | Gaussian `exp(−½ ((q − c)/w)²)`, or raised cosine `½ (1 + cos(π (q − c)/w))` inside \|q − c\| < w |
 //! | `Steps { at, heights }` | the sum of the heights of the steps at or below q |
 //! | `Drift` | `t / duration of the session` |
 //! | `Warmup { tau_s }` | `1 − exp(−t / τ)` |
 //! | `Remount { after_test }` | 1 in every test after that one, 0 until then |
 //! | `Modulated { order, period_s }` | `sin(order · q) · sin(2π t / period)` |
-//! | `Chirp { cycles }` | `sin(2π cycles (q/360°)²)`: ever faster along the axis |
+//! | `Chirp { cycles }` | `sin(2π cycles (q/360°)²)`: frequency rises along the axis |
 //! | `Plateaus { edges, levels, sharpness }` | levels joined by `tanh` edges, a different set in every test |
 
 use super::component::{AxisName, Component, unit_size};
@@ -26,31 +26,31 @@ use super::machine::Displacement;
 use super::schedule::Instant;
 use std::f64::consts::PI;
 
-/// What an effect follows.
+/// The driver of an effect.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum Driver {
     /// The position, direction of travel or speed of an axis.
     Axis(AxisName),
-    /// Time since the session began.
+    /// Time since the start of the session.
     Time,
     /// The temperature column, in kelvin above 20 °C.
     Temperature,
     /// The moment of a unit weight at the workpiece ball about the A axis.
     Gravity,
-    /// Nothing: a constant.
+    /// No driver: a constant.
     Nothing,
 }
 
-/// How a reversal spike dies away.
+/// The decay of a reversal spike.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Decay {
-    /// With time: the constant in s.
+    /// Over time: the time constant in s.
     Time(f64),
-    /// With the way that the axis has gone since: the constant in mm or degree.
+    /// Over the distance since the reversal: the decay length in mm or degree.
     Way(f64),
 }
 
-/// The form of a local bump.
+/// The profile of a local feature.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[allow(missing_docs)]
 pub enum Profile {
@@ -58,7 +58,7 @@ pub enum Profile {
     RaisedCosine,
 }
 
-/// How an effect follows its driver. The table of signs and units is at the head of this file.
+/// The shape of an effect over its driver. The head of this file has the table of signs and units.
 #[derive(Clone, Debug, PartialEq)]
 #[allow(missing_docs)]
 pub enum Shape {
@@ -109,21 +109,21 @@ pub enum Shape {
     },
 }
 
-/// One effect as injected into the plant.
+/// One effect that is injected into the plant.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Injected {
-    /// What strays.
+    /// The component.
     pub component: Component,
-    /// What it follows.
+    /// The driver.
     pub driver: Driver,
-    /// How.
+    /// The shape.
     pub shape: Shape,
-    /// How much, in [`Injected::unit`].
+    /// The amplitude, in [`Injected::unit`].
     pub amplitude: f64,
 }
 
 impl Injected {
-    /// A component that follows a driver.
+    /// An effect from component, driver, shape and amplitude.
     pub fn new(component: Component, driver: Driver, shape: Shape, amplitude: f64) -> Injected {
         Injected {
             component,
@@ -150,12 +150,12 @@ impl Injected {
         }
     }
 
-    /// What the component strays by at an instant: mm, rad, s or a ratio.
+    /// The error of the component at an instant: mm, rad, s or a ratio.
     pub fn value(&self, instant: &Instant) -> f64 {
         self.amplitude * unit_size(self.unit()) * self.basis(instant)
     }
 
-    /// Moves the bodies. A lag of the freedom in which an axis moves is a change of the axis' true position; everything else displaces
+    /// Displaces the bodies. A lag along the motion of an axis changes the true axis position; every other effect displaces
     /// its component.
     pub fn displace(&self, instant: &Instant, displacement: &mut Displacement) {
         let value = self.value(instant);
@@ -167,7 +167,7 @@ impl Injected {
         }
     }
 
-    /// The shape alone (of a lag in mm/s or rad/s).
+    /// The value of the shape (for a lag in mm/s or rad/s).
     pub fn basis(&self, instant: &Instant) -> f64 {
         let driver = &self.driver;
         match &self.shape {
@@ -194,7 +194,7 @@ impl Injected {
                 centre,
                 width,
                 profile,
-            } => bump(
+            } => local_feature(
                 distance(driver, shown(driver, instant), *centre) / width,
                 *profile,
             ),
@@ -223,7 +223,7 @@ impl Injected {
                 sharpness,
             } => {
                 let here = shown(driver, instant);
-                // Another set of levels in every test: no single function of the position explains it.
+                // The levels differ between tests, so no single function of the position explains them.
                 let level = |k: usize| levels[(k + 3 * instant.test) % levels.len()];
                 edges.iter().enumerate().fold(level(0), |sum, (k, edge)| {
                     let risen = 0.5 * (1.0 + (sharpness * (here - edge)).tanh());
@@ -233,7 +233,7 @@ impl Injected {
         }
     }
 
-    /// The effects that together span what this one can be when its phase is unknown, at unit amplitude: cosine and sine of a harmonic
+    /// The effects of unit amplitude that span this effect at any phase: cosine and sine of a harmonic
     /// or periodic error; the effect itself otherwise.
     pub fn basis_effects(&self) -> Vec<Injected> {
         let at_phase = |phase_deg: f64| {
@@ -266,7 +266,7 @@ impl Injected {
     }
 }
 
-/// The entry of the driving axis in a table by axis; 0 where no axis drives.
+/// The entry of the driving axis in a table by axis; 0 without a driving axis.
 fn of_axis(driver: &Driver, table: &[f64; 5]) -> f64 {
     match driver {
         Driver::Axis(axis) => table[axis.index()],
@@ -274,7 +274,7 @@ fn of_axis(driver: &Driver, table: &[f64; 5]) -> f64 {
     }
 }
 
-/// The driver's position in mm or rad, in kelvin above 20 °C, in mm of moment.
+/// The value of the driver: mm or rad, kelvin above 20 °C, or mm of gravity moment.
 fn position(driver: &Driver, instant: &Instant) -> f64 {
     match driver {
         Driver::Axis(axis) => instant.commanded.position[axis.index()],
@@ -285,7 +285,7 @@ fn position(driver: &Driver, instant: &Instant) -> f64 {
     }
 }
 
-/// The driver in the unit that polynomials are written in.
+/// The driver in the unit of polynomials.
 fn normalised(driver: &Driver, instant: &Instant) -> f64 {
     let scale = match driver {
         Driver::Axis(axis) if axis.is_rotary() => PI,
@@ -310,7 +310,7 @@ fn in_plant_units(driver: &Driver, value: f64) -> f64 {
     }
 }
 
-/// From centre to position; round the turn on a rotary axis.
+/// Signed distance from centre to position; modulo a turn on a rotary axis.
 fn distance(driver: &Driver, here: f64, centre: f64) -> f64 {
     match driver {
         Driver::Axis(axis) if axis.is_rotary() => (here - centre + 180.0).rem_euclid(360.0) - 180.0,
@@ -318,7 +318,7 @@ fn distance(driver: &Driver, here: f64, centre: f64) -> f64 {
     }
 }
 
-fn bump(widths: f64, profile: Profile) -> f64 {
+fn local_feature(widths: f64, profile: Profile) -> f64 {
     match profile {
         Profile::Gaussian => (-0.5 * widths * widths).exp(),
         Profile::RaisedCosine if widths.abs() < 1.0 => 0.5 * (1.0 + (PI * widths).cos()),

@@ -1,4 +1,4 @@
-//! The families of effects that each kind of session can show, drawn at random or listed.
+//! The families of effects that affect each kind of session, drawn at random or listed.
 
 use super::component::{AxisName, Cartesian, Component, Freedom};
 use super::effect::{Decay, Driver, Injected, Profile, Shape};
@@ -10,42 +10,42 @@ use rand::{Rng, RngExt};
 pub enum Family {
     /// An error motion at orders 1 to 8, 17 or 36 of a rotary axis.
     Harmonic,
-    /// An error motion as power of the axis' own position; scale and bow of a linear axis.
+    /// An error motion as a power of the position of its own axis; scale error and bow of a linear axis.
     Polynomial,
-    /// A periodic error whose period divides nothing.
+    /// A periodic error whose period divides neither a turn nor the travel.
     Periodic,
     /// Lost motion, in any component.
     Backlash,
-    /// A servo that is late.
+    /// A servo lag.
     Lag,
-    /// An axis that sticks when it reverses.
+    /// A reversal spike: the axis sticks at reversal.
     ReversalSpike,
-    /// A bump.
+    /// A local feature.
     Local,
-    /// Steps of a compensation table.
+    /// Steps, as from a compensation table.
     Steps,
     /// A location error, a ball or the bar that drifts with time.
     Drift,
-    /// The same, coming to rest.
+    /// A warm-up: the same with an exponential approach to a limit.
     Warmup,
-    /// A bar that grows with temperature.
+    /// A bar with thermal expansion.
     Temperature,
-    /// Something that gives under the weight on the table.
+    /// Compliance under the weight on the table.
     Gravity,
     /// A location error of C that depends on A.
     CrossAxis,
     /// Squareness of Y to X.
     Squareness,
-    /// A ball was moved between two tests that share its mount.
+    /// A ball that moves between two tests of one set-up.
     Remount,
     /// The sensor's gain.
     SensorGain,
-    /// The sensor is read late.
+    /// The delay of the sensor reading.
     TriggerDelay,
 }
 
 impl Family {
-    /// The families that a kind of session may show. Whether it sees a member well enough is the oracle's to say.
+    /// The families that can affect a kind of session. The oracle decides whether a member is detectable.
     pub fn of(kind: Kind) -> Vec<Family> {
         use Family::*;
         let always = [
@@ -63,7 +63,7 @@ impl Family {
         let special: &[Family] = match kind {
             Kind::Rotary => &[Harmonic, Gravity, CrossAxis],
             Kind::TiltedTable => &[Harmonic, Gravity, CrossAxis],
-            // With a mount for each test there is nothing to remount between tests that share one.
+            // With a mount for each test no mount is shared between tests.
             Kind::Chapter4 | Kind::Chapter6 => &[Harmonic, Gravity],
             Kind::LinearCircles => &[Lag, Squareness],
             Kind::SquarenessCircles => &[Lag],
@@ -78,7 +78,7 @@ impl Family {
     }
 }
 
-/// A random effect of a random family that this kind of session may show, at unit amplitude.
+/// A random effect of a random family that can affect this kind of session, at unit amplitude.
 pub fn random_effect(kind: Kind, random: &mut impl Rng) -> Injected {
     let families = Family::of(kind);
     let family = pick(&families, random);
@@ -225,8 +225,8 @@ pub fn random_member(family: Family, kind: Kind, random: &mut impl Rng) -> Injec
     }
 }
 
-/// Something that no entry of a sensible library explains, at unit amplitude: a harmonic that comes and goes with time, a chirp
-/// along a turn (which only a free curve follows), or plateaus with other levels in every test.
+/// An effect that no entry of the library describes, at unit amplitude: a harmonic whose amplitude varies with time, a chirp
+/// along a turn (which only a nonparametric curve describes), or plateaus whose levels differ between tests.
 pub fn outside_library(kind: Kind, random: &mut impl Rng) -> Injected {
     let axis = *kind.moving_axes().last().unwrap_or(&AxisName::C);
     let freedom = if axis.is_rotary() {
@@ -255,9 +255,9 @@ pub fn outside_library(kind: Kind, random: &mut impl Rng) -> Injected {
     Injected::new(component, Driver::Axis(axis), shape, 1.0)
 }
 
-/// Everything of the plant that a kind of session could take for `like`, at unit amplitude: all components of all moving axes with
-/// harmonics, polynomials, backlash and lag; location errors, balls and bar that drift, warm up, are remounted; constants; and where
-/// `like` has a shape with places or periods, that shape in every other component too.
+/// All effects of the plant that can be confounded with `like` in a kind of session, at unit amplitude: all components of all
+/// moving axes with harmonics, polynomials, backlash and lag; location errors, balls and bar that drift, warm up or are remounted;
+/// constants; and, if the shape of `like` has positions or periods, that shape in every other component.
 pub fn catalogue(kind: Kind, like: &Injected) -> Vec<Injected> {
     let mut entries = Vec::new();
     let mut shapes = vec![Shape::Backlash, Shape::Lag];
@@ -330,7 +330,7 @@ pub fn catalogue(kind: Kind, like: &Injected) -> Vec<Injected> {
     entries
 }
 
-/// What may drift: location errors of the moving axes (and squareness of Y), both balls, the bar.
+/// Components that can drift: location errors of the moving axes (and squareness of Y), both balls, the bar.
 fn thermal_components(kind: Kind) -> Vec<Component> {
     let mut components = vec![Component::Bar];
     for i in 0..3 {
@@ -348,7 +348,7 @@ fn thermal_components(kind: Kind) -> Vec<Component> {
     components
 }
 
-/// The way of an axis, mm or degree.
+/// The travel of an axis, mm or degree.
 fn range(kind: Kind, axis: AxisName) -> [f64; 2] {
     match (axis, kind) {
         (AxisName::C, _) => [0.0, 360.0],
@@ -357,7 +357,7 @@ fn range(kind: Kind, axis: AxisName) -> [f64; 2] {
     }
 }
 
-/// The shortest period of a periodic error, mm or degree, that 1,500 readings carry.
+/// The shortest period of a periodic error, mm or degree, that 1,500 readings resolve.
 fn period(kind: Kind, axis: AxisName) -> f64 {
     match (axis, kind) {
         (AxisName::A | AxisName::C, _) => 9.7,

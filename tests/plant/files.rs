@@ -9,10 +9,10 @@ use super::recipe::{Row, Truth};
 use serde_json::{Value, json};
 use std::fmt::Write;
 
-/// What the session file says of the noise, whatever it is.
+/// The noise that the session file states, independently of the true noise.
 const STATED_NOISE_UM: f64 = 0.3;
 
-/// `session.toml`, `machine.toml` and one data file a test.
+/// `session.toml`, `machine.toml` and one data file per test.
 pub fn session_files(plan: &Plan, rows: &[Row], temperature_column: bool) -> Vec<(String, String)> {
     let mut files = vec![
         ("session.toml".to_string(), session_toml(plan)),
@@ -101,12 +101,12 @@ fn machine_toml(kind: Kind) -> String {
     )
 }
 
-/// The answer: PIGEs as `[value, unit]`, set-up offsets in µm by the names of results, effects with amplitude and unit, noise.
+/// The true values: PIGEs as `[value, unit]`, set-up offsets in µm by the names of results, effects with amplitude and unit, noise.
 pub fn truth_json(truth: &Truth) -> Value {
     let noise = match truth.noise {
         Noise::White { .. } => json!({ "kind": "white" }),
         Noise::Serial { coefficient, .. } => json!({ "kind": "serial", "coefficient": coefficient }),
-        Noise::Wild { share, .. } => json!({ "kind": "wild", "share": share }),
+        Noise::Outliers { share, .. } => json!({ "kind": "outliers", "share": share }),
     };
     let piges: serde_json::Map<String, Value> = truth
         .piges()
@@ -140,6 +140,6 @@ pub fn truth_json(truth: &Truth) -> Value {
         "effects": effects,
         "noise_um": truth.noise.sigma_um(),
         "noise": noise,
-        "wild_rows": truth.wild_rows,
+        "outlier_rows": truth.outlier_rows,
     })
 }

@@ -1,4 +1,4 @@
-//! The oracle's fit: unknowns with their priors and the true effect, by least squares on the exact plant.
+//! The fit of the oracle: parameters with their priors and the true effect, by least squares on the exact plant.
 
 use super::effect::Injected;
 use super::oracle::{Oracle, WEAK_U};
@@ -6,16 +6,16 @@ use super::recipe::{Draw, Row};
 use super::whitening::whiten;
 use nalgebra::{DMatrix, DVector};
 
-/// What a fit gave.
+/// The result of a fit.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Fit {
-    /// Names: those of the unknowns, then `effect 0`, `effect 1` … for every amplitude (cosine and sine apart).
+    /// Names: those of the parameters, then `effect 0`, `effect 1` … for every amplitude (cosine and sine separately).
     pub ids: Vec<String>,
     /// Values in µm, arcsec, or the unit of the effect.
     pub values: Vec<f64>,
-    /// Standard uncertainties, likewise.
+    /// Standard uncertainties, in the same units.
     pub u: Vec<f64>,
-    /// Root mean square of what is left at the readings fitted, µm.
+    /// Root mean square of the residual of the fitted readings, µm.
     pub rms_um: f64,
 }
 
@@ -27,18 +27,18 @@ impl Fit {
     }
 }
 
-/// Rounds of Gauss–Newton with the columns of the nominal machine: after three, what is left is far below the resolution.
+/// Gauss–Newton iterations with the columns of the nominal machine: after three the error is far below the resolution.
 const ROUNDS: usize = 3;
 
 impl Oracle {
-    /// Fits all readings that are not wild, with these effects in the model.
+    /// Fits all readings except the outliers, with these effects in the model.
     pub fn fit(&self, draw: &Draw, effects: &[Injected]) -> Fit {
-        let rows: Vec<Row> = draw.rows.iter().copied().filter(|row| !row.wild).collect();
+        let rows: Vec<Row> = draw.rows.iter().copied().filter(|row| !row.outlier).collect();
         self.fit_rows(&rows, effects)
     }
 
-    /// Root mean square of readings that no fit saw, µm: of each fold the traversals of one number are left out in every test, all others
-    /// fitted. Wild readings are left aside.
+    /// Root mean square of the held-out residual, µm. Each fold holds out the traversals of one number in every test and fits all
+    /// others. Outliers are excluded.
     pub fn heldout_rms_um(&self, draw: &Draw, effects: &[Injected]) -> f64 {
         let run_of = |row: &Row| self.plan.instants[row.instant].run;
         let runs = draw.rows.iter().map(run_of).max().unwrap_or(0);
@@ -48,7 +48,7 @@ impl Oracle {
                 .rows
                 .iter()
                 .copied()
-                .filter(|row| !row.wild)
+                .filter(|row| !row.outlier)
                 .partition(|row| run_of(row) == run);
             let fit = self.fit_rows(&fitted, effects);
             let residuals = self.residuals_um(&left_out, &fit.values, effects);
@@ -58,7 +58,7 @@ impl Oracle {
         (sum / f64::from(count)).sqrt()
     }
 
-    /// Reading minus plant, µm, at values of unknowns and amplitudes in the order of [`Fit::ids`].
+    /// Reading minus plant, µm, for values of parameters and amplitudes in the order of [`Fit::ids`].
     fn residuals_um(&self, rows: &[Row], values: &[f64], effects: &[Injected]) -> DVector<f64> {
         let (unknowns, amplitudes) = values.split_at(self.plan.unknowns.len());
         let effects: Vec<Injected> = effects
@@ -105,7 +105,7 @@ impl Oracle {
             let gradient = columns.tr_mul(&whitened) - weights.component_mul(&values);
             values += &inverse * gradient;
         }
-        let left = self.residuals_um(rows, values.as_slice(), effects);
+        let residual = self.residuals_um(rows, values.as_slice(), effects);
         let names = self.plan.unknowns.iter().map(|unknown| unknown.id.clone());
         Fit {
             ids: names
@@ -117,13 +117,13 @@ impl Oracle {
                 .iter()
                 .map(|variance| variance.sqrt())
                 .collect(),
-            rms_um: (left.norm_squared() / rows.len() as f64).sqrt(),
+            rms_um: (residual.norm_squared() / rows.len() as f64).sqrt(),
         }
     }
 }
 
-/// The inverse of a symmetric matrix, its rows and columns scaled to a unit diagonal first. Something that nothing sees (zero column) gets
-/// variance zero.
+/// The inverse of a symmetric matrix whose rows and columns are first scaled to a unit diagonal. A zero column, which no reading
+/// responds to, has variance zero.
 fn inverse_scaled(mut normal: DMatrix<f64>) -> DMatrix<f64> {
     let size = normal.nrows();
     let scales = DVector::from_fn(size, |k, _| {

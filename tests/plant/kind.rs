@@ -1,4 +1,4 @@
-//! The kinds of session: which tests, which errors are unknown.
+//! The kinds of session: their tests and the errors that are parameters.
 
 use super::component::{AxisName, Component, Freedom};
 use super::machine::Stated;
@@ -10,18 +10,18 @@ use std::f64::consts::FRAC_PI_2;
 pub enum Kind {
     /// Chapter 5 of seed 000: A100, A150, C100, C150, one workpiece ball.
     Rotary,
-    /// Chapter 4 of seed 000: the ball for the A tests at +Y, remounted at +X for the C tests. (In the thesis the first stands on the
-    /// A table; here it stands on the C table, which is at zero.)
+    /// Chapter 4 of seed 000: the ball for the A tests at +Y, remounted at +X for the C tests. (In the thesis the first is mounted on
+    /// the A table; here it is mounted on the C table, which is at zero.)
     Chapter4,
     /// Chapter 6 of seed 000: A tests at X = ±550 mm, C tests at two heights, four mounts.
     Chapter6,
-    /// Four tests of C with the table tilted to A = −20°, 0°, 30°, 60°: what A does to C.
+    /// Four tests of C with the table tilted to A = −20°, 0°, 30°, 60°: the influence of A on C.
     TiltedTable,
-    /// Circles in XY at 1,000 and 3,000 mm/min, nothing unknown but the set-up.
+    /// Circles in XY at 1,000 and 3,000 mm/min; only the set-up has parameters.
     LinearCircles,
-    /// The same with the squareness EC0Y unknown.
+    /// The same with the squareness EC0Y as a parameter.
     SquarenessCircles,
-    /// The same circles about a centre that is off by (0.5, 0.3) mm, as declared: shows the sensor's gain and delay.
+    /// The same circles about a centre with a declared offset of (0.5, 0.3) mm: makes sensor gain and delay identifiable.
     EccentricCircles,
     /// BK2 of ISO 10791-6: C turns, X and Y follow; radial, tangential, axial, and tangential three times as fast.
     Simultaneous,
@@ -40,17 +40,17 @@ impl Kind {
         Kind::Simultaneous,
     ];
 
-    /// The step for about that many readings in the whole session: degrees of A (C alone steps twice as far), or of the path angle
-    /// where linear axes move.
+    /// The step for about that many readings in the whole session: degrees of A (C alone has twice that step), or of the path angle
+    /// if linear axes move.
     pub fn step_deg(self, readings: usize) -> f64 {
-        // How many quarters of 4 steps each a session has: 8 traversals of A and 8 of C at twice the step, 16 of C, 8 circles, 16 circles.
+        // Number of quarter turns of a session: 8 traversals of A and 8 of C at twice the step, 16 of C, 8 circles, 16 circles.
         let turns = match self {
             Kind::Rotary | Kind::Chapter4 | Kind::Chapter6 => 6.0,
             Kind::TiltedTable | Kind::LinearCircles => 8.0,
             Kind::SquarenessCircles | Kind::EccentricCircles => 8.0,
             Kind::Simultaneous => 16.0,
         };
-        // Whole steps in the 90° of the A tests, so that every range is a whole number of steps.
+        // The 90° of the A tests are a whole number of steps, so every range is.
         let steps_in_90_deg = (readings as f64 / turns / 4.0).round().max(1.0);
         90.0 / steps_in_90_deg
     }
@@ -163,7 +163,7 @@ impl Kind {
         }
     }
 
-    /// The errors that the session file calls unknown; `None` leaves them to the default of a ball bar on two rotary axes.
+    /// The errors that the session file lists under `[unknowns]`; `None`: the default of a ball bar on two rotary axes.
     pub fn declared_unknowns(self) -> Option<Vec<Component>> {
         match self {
             Kind::LinearCircles | Kind::EccentricCircles => Some(Vec::new()),
@@ -173,7 +173,7 @@ impl Kind {
         }
     }
 
-    /// The errors that are unknown.
+    /// The errors that are parameters.
     pub fn unknowns(self) -> Vec<Component> {
         self.declared_unknowns().unwrap_or_else(default_unknowns)
     }
@@ -190,7 +190,7 @@ impl Kind {
         }
     }
 
-    /// How far off the workpiece ball may be in any coordinate, µm (one standard uncertainty).
+    /// Standard uncertainty of each coordinate of the workpiece ball, µm.
     pub fn workpiece_ball_u_um(self) -> f64 {
         match self {
             Kind::LinearCircles | Kind::SquarenessCircles | Kind::EccentricCircles => 5.0,
@@ -199,9 +199,9 @@ impl Kind {
     }
 }
 
-/// One standard uncertainty of the spindle ball in any coordinate, µm.
+/// Standard uncertainty of each coordinate of the spindle ball, µm.
 pub const SPINDLE_BALL_U_UM: f64 = 1.0;
-/// One standard uncertainty of the bar's length, µm.
+/// Standard uncertainty of the bar length, µm.
 pub const BAR_U_UM: f64 = 0.5;
 
 fn default_unknowns() -> Vec<Component> {

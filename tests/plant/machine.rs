@@ -1,10 +1,10 @@
-//! The machine of the tests, `w C A b Y X Z t`, and how displaced bodies change the distance between the two balls.
+//! The machine of the tests, `w C A b Y X Z t`, and the distance of the two balls with displaced bodies.
 
 use super::component::{AxisName, Cartesian, Component};
 use super::pose::{Axis, Joint};
 use nalgebra::Vector3;
 
-/// Everything that stands elsewhere than the nominal machine says. Millimetre, radian and second.
+/// All deviations from the nominal machine. Millimetre, radian and second.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Displacement {
     /// Error motions by [`AxisName::index`].
@@ -13,20 +13,20 @@ pub struct Displacement {
     pub location: [[f64; 6]; 5],
     /// True minus commanded axis position, mm or rad.
     pub position: [f64; 5],
-    /// Of the workpiece ball in the table frame, mm.
+    /// Offset of the workpiece ball in the table frame, mm.
     pub workpiece_ball: [f64; 3],
-    /// Of the spindle ball in the tool frame, mm.
+    /// Offset of the spindle ball in the tool frame, mm.
     pub spindle_ball: [f64; 3],
-    /// How much longer the bar is than stated, mm.
+    /// True minus stated bar length, mm.
     pub bar: f64,
-    /// Relative error of the sensor's gain.
+    /// Relative gain error of the sensor.
     pub gain: f64,
-    /// How late the sensor is read, s.
+    /// Delay of the sensor reading, s.
     pub delay: f64,
 }
 
 impl Displacement {
-    /// Adds to one component, in mm, rad, s, or (gain) as a ratio.
+    /// Adds an error to one component, in mm, rad, s, or (gain) as a ratio.
     pub fn add(&mut self, component: Component, value: f64) {
         match component {
             Component::Motion(freedom, axis) => self.motion[axis.index()][freedom.index()] += value,
@@ -42,7 +42,7 @@ impl Displacement {
     }
 }
 
-/// Where the machine is commanded to, and how fast it goes, by [`AxisName::index`]: mm and rad, mm/s and rad/s.
+/// Commanded positions and velocities by [`AxisName::index`]: mm and rad, mm/s and rad/s.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Commanded {
     /// Axis positions.
@@ -51,7 +51,7 @@ pub struct Commanded {
     pub velocity: [f64; 5],
 }
 
-/// Both balls and the bar as stated, mm.
+/// Stated positions of both balls and stated bar length, mm.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Stated {
     /// Workpiece ball in the table frame.
@@ -70,7 +70,7 @@ pub struct Machine {
 }
 
 impl Default for Machine {
-    /// The Hermle C600U of the samples: every axis along R's directions through R's origin.
+    /// The Hermle C600U of the samples: every axis along a direction of R through its origin.
     fn default() -> Machine {
         let axis = |joint, direction| Axis {
             joint,
@@ -133,8 +133,8 @@ impl Machine {
         )
     }
 
-    /// What the sensor would read without noise and rounding, mm: the true distance less what the bar is too long, seen through the
-    /// sensor's gain about the stated length.
+    /// The reading without noise and rounding, mm: the true distance minus the error of the bar, with the gain error of the sensor
+    /// applied about the stated length.
     pub fn reading_mm(&self, commanded: &Commanded, stated: &Stated, displacement: &Displacement) -> f64 {
         let position: [f64; 5] = std::array::from_fn(|i| {
             commanded.position[i] + displacement.position[i] - commanded.velocity[i] * displacement.delay

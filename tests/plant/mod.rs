@@ -1,7 +1,8 @@
-//! The plant: an independent machine for tests, which shares nothing with `abbe-model`.
+//! The plant: an independent simulator for tests, which shares no code with `abbe-model`.
 //!
-//! Exact rigid motions of unit quaternions; errors are displaced bodies; no first-order formula anywhere. A [`Recipe`] makes a [`Draw`]:
-//! the files that Abbe reads, which declare no effect, and the answer. An [`Oracle`] knows the effect and says what can be expected.
+//! Motions are exact rigid motions with unit quaternions, errors are displaced bodies, and no formula is of first order. A [`Recipe`]
+//! makes a [`Draw`]: the files that Abbe reads, which declare no effect, and the true values. An [`Oracle`] knows the effect and gives
+//! bounds for the results.
 //!
 //! ```text
 //! let effect = Injected::new(EZC, Driver::Axis(AxisName::C), Shape::Harmonic { order: 3, phase_deg: 0.0 }, 2.0);
@@ -11,9 +12,9 @@
 //! let oracle = Oracle::new(&recipe);                      // once for a kind of session
 //! oracle.smallest_significant_amplitude(&effect, 1.96);   // µm
 //! oracle.alias_class(&effect, 0.95, 2.0);                 // EZC order 3, EAC order 2, …
-//! oracle.heldout_rms_um(&draw, &draw.truth.effects);      // the best that anybody can do
+//! oracle.heldout_rms_um(&draw, &draw.truth.effects);      // the lower bound of the held-out error
 //! ```
-#![allow(dead_code, unused_imports)] // not every test binary uses all of it
+#![allow(dead_code, unused_imports)] // a test binary uses a part of it
 
 pub mod chain;
 pub mod component;

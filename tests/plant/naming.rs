@@ -1,9 +1,9 @@
-//! The names that results give to effects, and effects from such names.
+//! The names of effects in results, and effects from such names.
 
 use super::component::{AxisName, Component};
 use super::effect::{Driver, Injected, Shape};
 
-/// An effect in the words of a result: `{"component": "EZC", "driver": "C", "shape": "harmonic", "order": 3}`.
+/// The name of an effect in a result: `{"component": "EZC", "driver": "C", "shape": "harmonic", "order": 3}`.
 #[derive(Clone, Debug, PartialEq, Eq, Hash)]
 pub struct Named {
     /// `EZC`, `EX0C`, `workpiece_ball.x`, `bar`, `gain`, `trigger`.
@@ -11,7 +11,7 @@ pub struct Named {
     /// An axis, `time`, `temperature`, `gravity`, or `none` for a constant.
     pub driver: String,
     /// `constant`, `polynomial`, `harmonic`, `periodic`, `backlash`, `lag`, `reversal-spike`, `local`, `steps`, `drift`, `warmup`; a
-    /// remount is `steps` in `time`; `outside` for what has no name.
+    /// remount is `steps` in `time`; `outside` for an effect without a name.
     pub shape: String,
     /// Order of a harmonic, degree of a polynomial.
     pub order: Option<u32>,
@@ -48,8 +48,8 @@ pub fn named(effect: &Injected) -> Named {
     }
 }
 
-/// The effect that a name means, at unit amplitude and zero phase. What a name does not say (period, centre and width, decay, places of
-/// steps, time constant) is taken from `like` where that has the same shape. `None` where the plant knows no such effect.
+/// The effect of a name, at unit amplitude and zero phase. Numbers that a name does not state (period, centre and width, decay,
+/// positions of steps, time constant) come from `like` if that has the same shape. `None` if the plant has no such effect.
 pub fn from_name(name: &Named, like: &Injected) -> Option<Injected> {
     let component = Component::parse(&name.component)?;
     let driver = match name.driver.as_str() {

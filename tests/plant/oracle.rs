@@ -1,7 +1,7 @@
-//! What somebody could know who knows the effect: the smallest amplitude that counts as significant, what looks like what, and how well
-//! readings can be predicted that nobody fitted.
+//! The oracle: bounds for an observer who knows the injected effect. It gives the smallest significant amplitude, the aliases and the
+//! attainable held-out error.
 //!
-//! Columns are central differences on the plant itself. Per kind of session, noise and step an oracle is made once; it depends on no draw.
+//! Columns are central differences on the plant. One oracle serves a kind of session, noise and step; it depends on no random draw.
 
 use super::component::{AxisName, Cartesian, Component, Freedom, unit_size};
 use super::effect::{Injected, Shape};
@@ -16,16 +16,16 @@ use nalgebra::{DMatrix, DVector};
 use rand::Rng;
 use std::collections::HashMap;
 
-/// Standard uncertainty given to errors of the machine, µm or arcsec: next to nothing known, but every design has full rank.
+/// Prior standard uncertainty of the errors of the machine, µm or arcsec: hardly informative, but every design has full rank.
 pub(super) const WEAK_U: f64 = 1000.0;
 
-/// A share of a column that is left after the present model has taken its own; less is not seen.
-const SEEN_SHARE: f64 = 1e-3;
+/// Smallest share of a column that remains after projection on the present model; a smaller one counts as not identifiable.
+const MIN_REMAINING_SHARE: f64 = 1e-3;
 
 /// Changes of a reading below this are rounding errors of the difference, µm.
 const MIN_CHANGE_UM: f64 = 1e-7;
 
-/// A signature of fewer standard deviations per unit of amplitude is a rounding error.
+/// A response of fewer standard deviations per unit of amplitude is a rounding error.
 const MIN_SIGNATURE: f64 = 1e-6;
 
 /// The oracle of one kind of session.
@@ -33,18 +33,18 @@ const MIN_SIGNATURE: f64 = 1e-6;
 pub struct Oracle {
     /// The session's plan.
     pub plan: Plan,
-    /// The noise, known.
+    /// The noise, assumed known.
     pub noise: Noise,
     /// µm of reading per unit of component, by instant.
     sensitivities: HashMap<Component, Vec<f64>>,
-    /// µm of reading per µm or arcsec of each unknown.
+    /// µm of reading per µm or arcsec of each parameter.
     pub(super) base: DMatrix<f64>,
-    /// Orthonormal columns: what unknowns with their priors can do to the whitened readings (priors are extra rows).
-    absorbed: DMatrix<f64>,
+    /// Orthonormal basis of the column space of the parameters in the whitened readings, with the priors as additional rows.
+    parameter_space: DMatrix<f64>,
 }
 
 impl Oracle {
-    /// The oracle of a recipe's plan and noise; effects and seed do not matter.
+    /// The oracle for the plan and the noise of a recipe; effects and seed have no influence.
     pub fn new(recipe: &Recipe) -> Oracle {
         Oracle::on(recipe.plan(), recipe.noise)
     }
@@ -70,13 +70,13 @@ impl Oracle {
         for (k, unknown) in plan.unknowns.iter().enumerate() {
             whitened[(every_row.len() + k, k)] = 1.0 / unknown.prior_u_um.unwrap_or(WEAK_U);
         }
-        let absorbed = whitened.qr().q();
+        let parameter_space = whitened.qr().q();
         Oracle {
             plan,
             noise,
             sensitivities,
             base,
-            absorbed,
+            parameter_space,
         }
     }
 
@@ -89,7 +89,7 @@ impl Oracle {
         })
     }
 
-    /// The columns of everything that the effect can be when its phase is unknown.
+    /// The columns that span the effect at any phase.
     pub fn columns(&self, effect: &Injected) -> DMatrix<f64> {
         let columns: Vec<_> = effect
             .basis_effects()
@@ -99,24 +99,24 @@ impl Oracle {
         DMatrix::from_columns(&columns)
     }
 
-    /// Whitened columns less what the unknowns can absorb, and how long they were before.
+    /// Whitened columns after projection off the parameters, and their lengths before it.
     fn projected(&self, effect: &Injected) -> (DMatrix<f64>, Vec<f64>) {
         let whitened = whiten(&self.plan, self.noise, &rows_of(&self.plan), self.columns(effect));
         let lengths = whitened.column_iter().map(|column| column.norm()).collect();
         let rows = whitened.nrows();
-        let mut left = whitened.insert_rows(rows, self.plan.unknowns.len(), 0.0);
+        let mut projected = whitened.insert_rows(rows, self.plan.unknowns.len(), 0.0);
         for _ in 0..2 {
-            left -= &self.absorbed * self.absorbed.tr_mul(&left);
+            projected -= &self.parameter_space * self.parameter_space.tr_mul(&projected);
         }
-        (left, lengths)
+        (projected, lengths)
     }
 
-    /// An orthonormal basis of what effects together can do to the readings beyond the unknowns; no column if none is seen.
-    fn signature(&self, effects: &[Injected]) -> DMatrix<f64> {
+    /// Orthonormal basis of the response to several effects that the parameters do not explain; no column if none is identifiable.
+    fn response(&self, effects: &[Injected]) -> DMatrix<f64> {
         let mut basis: Vec<DVector<f64>> = Vec::new();
         for effect in effects {
-            let (left, lengths) = self.projected(effect);
-            for (column, length) in left.column_iter().zip(lengths) {
+            let (projected, lengths) = self.projected(effect);
+            for (column, length) in projected.column_iter().zip(lengths) {
                 let mut rest = column.into_owned();
                 for _ in 0..2 {
                     for other in &basis {
@@ -124,27 +124,27 @@ impl Oracle {
                     }
                 }
                 let norm = rest.norm();
-                if norm > SEEN_SHARE * length && norm > MIN_SIGNATURE {
+                if norm > MIN_REMAINING_SHARE * length && norm > MIN_SIGNATURE {
                     basis.push(rest / norm);
                 }
             }
         }
         if basis.is_empty() {
-            DMatrix::zeros(self.absorbed.nrows(), 0)
+            DMatrix::zeros(self.parameter_space.nrows(), 0)
         } else {
             DMatrix::from_columns(&basis)
         }
     }
 
-    /// The amplitude, in [`Injected::unit`], at which the oracle's own test of the effect is expected to reach the level that `z`
-    /// standard deviations are for one amplitude. With an unknown phase (cosine and sine) the level is that of χ² with two degrees of
-    /// freedom at the same probability, and the amplitude that of this effect's phase. Infinite where nothing is seen.
+    /// The amplitude, in [`Injected::unit`], at which the expected test statistic of the effect reaches the critical value of `z`
+    /// standard deviations for one amplitude. With an unknown phase (cosine and sine) the critical value is that of χ² with two degrees
+    /// of freedom at the same probability, and the amplitude that of the phase of this effect. Infinite if it is not identifiable.
     pub fn smallest_significant_amplitude(&self, effect: &Injected, z: f64) -> f64 {
-        let (left, lengths) = self.projected(effect);
+        let (projected, lengths) = self.projected(effect);
         let coordinates = DVector::from_vec(effect.coordinates());
         let length: f64 = lengths.iter().map(|length| length * length).sum::<f64>().sqrt();
-        let seen = (&left * &coordinates).norm();
-        if seen <= SEEN_SHARE * length || seen == 0.0 {
+        let response = (&projected * &coordinates).norm();
+        if response <= MIN_REMAINING_SHARE * length || response == 0.0 {
             return f64::INFINITY;
         }
         let level = if coordinates.len() == 1 {
@@ -152,22 +152,22 @@ impl Oracle {
         } else {
             -2.0 * two_sided_tail(z).ln()
         };
-        level.sqrt() / seen
+        level.sqrt() / response
     }
 
-    /// How much of what the unknowns leave of this effect stands in the readings; the rest is only tension in the priors, which pulls the
-    /// set-up away from where it is said to be and leaves no structure in any residual.
+    /// The share of the projected response of this effect that lies in the readings. The rest lies in the priors: it shifts the
+    /// set-up parameters and leaves no structure in the residual.
     pub fn share_in_readings(&self, effect: &Injected) -> f64 {
         let direction = self.direction(effect);
         direction.rows(0, self.plan.instants.len()).norm_squared()
     }
 
-    /// The cosine of the largest principal angle between what two effects can do to the readings beyond the unknowns: 1 for effects that
-    /// no reading tells apart, 0 if either is not seen.
-    pub fn indistinguishability(&self, a: &Injected, b: &Injected) -> f64 {
+    /// The cosine of the largest principal angle between the projected responses of two effects: 1 for effects that are confounded, 0 if
+    /// either is not identifiable.
+    pub fn largest_angle_cosine(&self, a: &Injected, b: &Injected) -> f64 {
         let (a, b) = (
-            self.signature(std::slice::from_ref(a)),
-            self.signature(std::slice::from_ref(b)),
+            self.response(std::slice::from_ref(a)),
+            self.response(std::slice::from_ref(b)),
         );
         if a.ncols() == 0 || b.ncols() == 0 {
             return 0.0;
@@ -180,8 +180,8 @@ impl Oracle {
             .min(1.0)
     }
 
-    /// How much of this very effect (its phase included) another, with any phase, can do: the cosine of the angle between the
-    /// signature and the other's subspace.
+    /// The share of this effect (at its phase) that another effect explains at any phase: the cosine of the angle between its projected
+    /// response and the subspace of the other.
     pub fn explained_share(&self, effect: &Injected, other: &Injected) -> f64 {
         self.share(&self.direction(effect), std::slice::from_ref(other))
     }
@@ -192,32 +192,31 @@ impl Oracle {
         self.share(&self.direction(effect), others)
     }
 
-    /// Unit vector of the effect's signature, or zero.
+    /// Unit vector of the projected response, or zero.
     fn direction(&self, effect: &Injected) -> DVector<f64> {
-        let (left, lengths) = self.projected(effect);
-        let signature = left * DVector::from_vec(effect.coordinates());
+        let (projected, lengths) = self.projected(effect);
+        let response = projected * DVector::from_vec(effect.coordinates());
         let length: f64 = lengths.iter().map(|length| length * length).sum::<f64>().sqrt();
-        let norm = signature.norm();
-        if norm > SEEN_SHARE * length {
-            signature / norm
+        let norm = response.norm();
+        if norm > MIN_REMAINING_SHARE * length {
+            response / norm
         } else {
-            signature * 0.0
+            response * 0.0
         }
     }
 
     fn share(&self, direction: &DVector<f64>, others: &[Injected]) -> f64 {
-        self.signature(others).tr_mul(direction).norm().min(1.0)
+        self.response(others).tr_mul(direction).norm().min(1.0)
     }
 
-    /// How many standard deviations stand behind an effect of this amplitude beyond the unknowns: the square root of the χ² that the
-    /// truth would gain without noise.
+    /// The strength of an effect at its amplitude, in standard deviations: the square root of the χ² gain of the truth without noise.
     pub fn strength_sigma(&self, effect: &Injected) -> f64 {
-        let (left, _) = self.projected(effect);
-        (left * DVector::from_vec(effect.coordinates())).norm() * effect.amplitude.abs()
+        let (projected, _) = self.projected(effect);
+        (projected * DVector::from_vec(effect.coordinates())).norm() * effect.amplitude.abs()
     }
 
-    /// What could be named in place of this very effect: every entry of the plant's catalogue that can do at least `cosine` of it, and
-    /// every near-tie whose χ² is expected to stay behind the truth's by no more than `sigma` squared. Best first; the truth is one.
+    /// The aliases of this effect: every entry of the catalogue that explains at least `cosine` of it, and every entry whose expected χ²
+    /// gain is below that of the truth by at most `sigma` squared. Best first; the truth is one of them.
     pub fn alias_class(&self, effect: &Injected, cosine: f64, sigma: f64) -> Vec<Alias> {
         let direction = self.direction(effect);
         let strength = self.strength_sigma(effect);
@@ -225,26 +224,26 @@ impl Oracle {
             .into_iter()
             .map(|other| {
                 let share = self.share(&direction, std::slice::from_ref(&other));
-                let behind_sigma = strength * (1.0 - share * share).max(0.0).sqrt();
+                let deficit_sigma = strength * (1.0 - share * share).max(0.0).sqrt();
                 Alias {
                     name: named(&other),
                     effect: other,
                     share,
-                    behind_sigma,
+                    deficit_sigma,
                 }
             })
-            .filter(|alias| alias.share >= cosine || alias.behind_sigma <= sigma)
+            .filter(|alias| alias.share >= cosine || alias.deficit_sigma <= sigma)
             .collect();
         class.sort_by(|a, b| b.share.total_cmp(&a.share));
         class
     }
 
-    /// A random effect that this session sees, at `factor` times the smallest significant amplitude (z = 1.96). Effects that would have to
-    /// be larger than any machine shows, and those that show in priors rather than in readings, are drawn again.
-    pub fn random_seeable(&self, factor: f64, random: &mut impl Rng) -> Injected {
+    /// A random detectable effect, at `factor` times the smallest significant amplitude (z = 1.96). Effects that would need an
+    /// unrealistic amplitude, or that affect the priors rather than the readings, are drawn again.
+    pub fn random_detectable(&self, factor: f64, random: &mut impl Rng) -> Injected {
         loop {
             let effect = families::random_effect(self.plan.kind, random);
-            // A spindle ball that every test mounts anew may sit anywhere within its prior: no remount.
+            // A spindle ball with a mount for each test is anywhere within its prior: no remount.
             let allowed = self.plan.shared_mounts
                 || !matches!(
                     (&effect.shape, effect.component),
@@ -258,13 +257,12 @@ impl Oracle {
         }
     }
 
-    /// Two random effects that this session sees and does not take for each other, each at `factor` times its own smallest significant
-    /// amplitude.
+    /// Two random effects that are detectable and separable, each at `factor` times its own smallest significant amplitude.
     pub fn random_pair(&self, factor: f64, random: &mut impl Rng) -> [Injected; 2] {
         loop {
             let pair = [
-                self.random_seeable(factor, random),
-                self.random_seeable(factor, random),
+                self.random_detectable(factor, random),
+                self.random_detectable(factor, random),
             ];
             let [a, b] = &pair;
             let share = self.explained_share(a, b).max(self.explained_share(b, a));
@@ -275,23 +273,23 @@ impl Oracle {
     }
 }
 
-/// How much two effects of one session may have in common, as the cosine of an angle between their signatures, either in the other.
+/// Largest permitted collinearity of two effects of one session: cosine of the angle between the responses, in both directions.
 const PAIR_SHARE: f64 = 0.5;
 
-/// What could be named in place of a true effect.
+/// An alias of a true effect.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Alias {
-    /// In the words of results.
+    /// Its name in results.
     pub name: Named,
-    /// The same for the plant, at unit amplitude.
+    /// The effect of the plant, at unit amplitude.
     pub effect: Injected,
-    /// How much of the true effect it can do, as a cosine.
+    /// The share of the true effect that it explains, as a cosine.
     pub share: f64,
-    /// By how many standard deviations its χ² is expected to stay behind the truth's.
-    pub behind_sigma: f64,
+    /// Square root of the expected χ² deficit relative to the truth, in standard deviations.
+    pub deficit_sigma: f64,
 }
 
-/// No smallest significant amplitude above this is worth a session.
+/// Effects with a larger smallest significant amplitude are unrealistic and are not simulated.
 fn largest_sensible(unit: &str) -> f64 {
     match unit {
         "ms" => 10.0,
@@ -299,7 +297,7 @@ fn largest_sensible(unit: &str) -> f64 {
     }
 }
 
-/// Every component of an axis that may move, both balls, bar, sensor and trigger.
+/// All components of the axes that can move, both balls, bar, sensor and trigger.
 fn components() -> Vec<Component> {
     let mut components = vec![Component::Bar, Component::Sensor, Component::Trigger];
     for axis in AxisName::ALL {
@@ -333,7 +331,7 @@ fn sensitivity(plan: &Plan, component: Component) -> Vec<f64> {
         .collect()
 }
 
-/// The probability of a normal number beyond ±z, by the continued fraction of its tail (z above 1) or its series.
+/// The two-sided tail probability of the normal distribution at z, by continued fraction (z above 1) or series.
 pub fn two_sided_tail(z: f64) -> f64 {
     let density = (-0.5 * z * z).exp() / (2.0 * std::f64::consts::PI).sqrt();
     if z > 2.0 {

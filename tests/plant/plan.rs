@@ -1,4 +1,4 @@
-//! A session before anybody measures: tests, unknowns with their priors, every instant; and the reading at each.
+//! A planned session: tests, parameters with their priors, all instants, and the reading at each.
 
 use super::component::{Cartesian, Component, unit_size};
 use super::effect::Injected;
@@ -6,31 +6,31 @@ use super::kind::{BAR_U_UM, Kind, SPINDLE_BALL_U_UM};
 use super::machine::{Displacement, Machine};
 use super::schedule::{Instant, Test, instants};
 
-/// Something that the metrologist does not know: a component that is out of place by a constant in some of the tests.
+/// A parameter: a constant error of a component in some of the tests.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Unknown {
     /// `EY0A`, `workpiece_ball[P1].x`, `spindle_ball[A100].z`, `bar[C150]`.
     pub id: String,
-    /// What is out of place.
+    /// The component.
     pub component: Component,
-    /// Whether it is in each test.
+    /// For each test, whether the parameter belongs to it.
     pub in_test: Vec<bool>,
     /// Standard uncertainty of the set-up, µm; `None` for an error of the machine.
     pub prior_u_um: Option<f64>,
 }
 
-/// A session before anybody measures: its tests, what is unknown, every instant.
+/// A planned session: its tests, its parameters, all instants.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Plan {
-    /// Which kind of session.
+    /// The kind of session.
     pub kind: Kind,
-    /// Whether one mount of the spindle ball and one bar calibration serve all tests, as the session file then says.
+    /// Whether all tests share one mount of the spindle ball and one bar calibration, as the session file then states.
     pub shared_mounts: bool,
     /// The machine.
     pub machine: Machine,
     /// The tests.
     pub tests: Vec<Test>,
-    /// Errors first, set-up after.
+    /// Errors of the machine first, then set-up parameters.
     pub unknowns: Vec<Unknown>,
     /// Every reading, in the order of time.
     pub instants: Vec<Instant>,
@@ -57,12 +57,12 @@ impl Plan {
             })
             .collect();
         let mut add = |component: Component, letter: &str, name: &str, owners: &[String], u_um: f64| {
-            let mut seen: Vec<&String> = Vec::new();
+            let mut listed: Vec<&String> = Vec::new();
             for owner in owners {
-                if seen.contains(&owner) {
+                if listed.contains(&owner) {
                     continue;
                 }
-                seen.push(owner);
+                listed.push(owner);
                 unknowns.push(Unknown {
                     id: format!("{name}[{owner}]{letter}"),
                     component,
@@ -120,7 +120,7 @@ impl Plan {
         }
     }
 
-    /// What the sensor would read without noise and rounding, mm; `values` are those of [`Plan::unknowns`] in µm and arcsec.
+    /// The reading without noise and rounding, mm; `values` are those of [`Plan::unknowns`] in µm and arcsec.
     pub fn reading_mm(&self, instant: &Instant, values: &[f64], effects: &[Injected]) -> f64 {
         let mut displacement = Displacement::default();
         for (unknown, value) in self.unknowns.iter().zip(values) {

@@ -1,19 +1,19 @@
-//! Rigid motions as unit quaternion and shift, and the motion of one axis with its errors as displaced bodies.
+//! Rigid motions as unit quaternion and translation, and the motion of one axis with its errors.
 //!
-//! Nothing here is linearised: every turn, however small, is a unit quaternion `(cos φ/2, d sin φ/2)`.
+//! No step is linearised: every rotation, however small, is a unit quaternion `(cos φ/2, d sin φ/2)`.
 
 use nalgebra::{Quaternion, UnitQuaternion, Vector3};
 
-/// A rigid motion: turn first, then shift (mm).
+/// A rigid motion: rotation first, then translation (mm).
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Pose {
-    /// The turn.
+    /// The rotation.
     pub turn: UnitQuaternion<f64>,
-    /// The shift, mm.
+    /// The translation, mm.
     pub shift_mm: Vector3<f64>,
 }
 
-/// The turn by `angle_rad` about the unit vector `direction`, by the half-angle formulas.
+/// The rotation by `angle_rad` about the unit vector `direction`, by the half-angle formulas.
 pub fn turn_about(direction: Vector3<f64>, angle_rad: f64) -> UnitQuaternion<f64> {
     let (sine, cosine) = (0.5 * angle_rad).sin_cos();
     UnitQuaternion::from_quaternion(Quaternion::from_parts(cosine, direction * sine))
@@ -69,7 +69,7 @@ impl Pose {
     }
 }
 
-/// Whether an axis turns or slides.
+/// Whether an axis is rotary or linear.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Joint {
     /// Positions are rad.
@@ -81,9 +81,9 @@ pub enum Joint {
 /// One axis: its direction (unit vector in R) and a point on it (mm).
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Axis {
-    /// Turns or slides.
+    /// Rotary or linear.
     pub joint: Joint,
-    /// Unit vector along which the moving body goes for an increasing command.
+    /// Direction of the moving body for an increasing command, unit vector.
     pub direction: Vector3<f64>,
     /// Origin, mm.
     pub origin_mm: Vector3<f64>,
@@ -94,7 +94,7 @@ impl Axis {
     /// `[EX, EY, EZ, EA, EB, EC]` in mm and rad.
     ///
     /// Rotary: `Trans(o) · E0 · E(q) · Rot(d, q) · Trans(−o)`. Linear: `Trans(o + q d′) · E(q) · Trans(−o)` with `d′ = d + ω0 × d`,
-    /// where ω0 is the rotary half of the location errors, and their translations mean nothing.
+    /// where ω0 are the rotations of the location errors; their translations have no effect.
     pub fn motion(&self, position: f64, location: &[f64; 6], motion: &[f64; 6]) -> Pose {
         let back = Pose::slide(-self.origin_mm);
         match self.joint {

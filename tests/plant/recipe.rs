@@ -1,4 +1,4 @@
-//! From a recipe to a session that somebody might have measured, and the answer that only an assertion opens.
+//! Simulated measured sessions from a recipe, with the true values for assertions.
 
 use super::component::Component;
 use super::effect::{Driver, Injected};
@@ -10,30 +10,30 @@ use rand::{RngExt, SeedableRng};
 use rand_pcg::Pcg64Mcg;
 use std::path::Path;
 
-/// What to make.
+/// The specification of a simulated session.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Recipe {
-    /// Which kind of session.
+    /// The kind of session.
     pub kind: Kind,
     /// Degrees between readings; see [`Kind::step_deg`].
     pub step_deg: f64,
-    /// What is wrong with the machine and undeclared.
+    /// Undeclared effects of the machine.
     pub effects: Vec<Injected>,
     /// The noise.
     pub noise: Noise,
-    /// How many rows are missing, as a share of one.
+    /// Proportion of missing rows.
     pub dropped_share: f64,
-    /// Whether one mount of the spindle ball and one bar calibration serve all tests, as the session file then says.
+    /// Whether all tests share one mount of the spindle ball and one bar calibration, as the session file then states.
     pub shared_mounts: bool,
-    /// Whether the files have a temperature column. They always have one where an effect follows the temperature.
+    /// Whether the files have a temperature column. They always have one if an effect is driven by temperature.
     pub temperature_column: bool,
-    /// Seed of everything random.
+    /// Seed of all random numbers.
     pub seed: u64,
 }
 
 impl Recipe {
-    /// About 1,500 readings with white noise of 0.3 µm and no effect. The spindle ball stays where it is between the tests of
-    /// [`Kind::TiltedTable`]; in the others every test has its own mount and bar calibration, as in the samples.
+    /// About 1,500 readings with white noise of 0.3 µm and no effect. The spindle ball stays mounted between the tests of
+    /// [`Kind::TiltedTable`]; in the other kinds every test has its own mount and bar calibration, as in the samples.
     pub fn new(kind: Kind, seed: u64) -> Recipe {
         Recipe {
             kind,
@@ -47,18 +47,18 @@ impl Recipe {
         }
     }
 
-    /// With one more effect.
+    /// Adds an effect.
     pub fn with(mut self, effect: Injected) -> Recipe {
         self.effects.push(effect);
         self
     }
 
-    /// With other noise.
+    /// Replaces the noise.
     pub fn noise(self, noise: Noise) -> Recipe {
         Recipe { noise, ..self }
     }
 
-    /// With about that many readings.
+    /// Sets the approximate number of readings.
     pub fn readings(self, readings: usize) -> Recipe {
         Recipe {
             step_deg: self.kind.step_deg(readings),
@@ -71,12 +71,12 @@ impl Recipe {
         Plan::new(self.kind, self.step_deg, self.shared_mounts)
     }
 
-    /// Draws unknowns and noise and takes the readings.
+    /// Draws parameters and noise and simulates the readings.
     pub fn draw(&self) -> Draw {
         self.draw_on(&self.plan())
     }
 
-    /// The same on a plan made before with [`Recipe::plan`].
+    /// The same for a plan from [`Recipe::plan`].
     pub fn draw_on(&self, plan: &Plan) -> Draw {
         let mut random = Pcg64Mcg::seed_from_u64(self.seed);
         let values: Vec<f64> = plan
@@ -95,7 +95,7 @@ impl Recipe {
         let runs = plan.instants.chunk_by(|a, b| (a.test, a.run) == (b.test, b.run));
         for run in runs {
             let first = rows.len();
-            for (i, (noise_um, wild)) in traversal(self.noise, run.len(), &mut random)
+            for (i, (noise_um, outlier)) in traversal(self.noise, run.len(), &mut random)
                 .into_iter()
                 .enumerate()
             {
@@ -105,7 +105,7 @@ impl Recipe {
                 rows.push(Row {
                     instant: first + i,
                     length_mm: reading_um.round() * RESOLUTION_UM * 1e-3,
-                    wild,
+                    outlier,
                     dropped,
                 });
             }
@@ -116,7 +116,7 @@ impl Recipe {
                 .unknowns
                 .iter()
                 .zip(&values)
-                .map(|(unknown, value)| Known {
+                .map(|(unknown, value)| TrueValue {
                     id: unknown.id.clone(),
                     component: unknown.component,
                     value: *value,
@@ -125,9 +125,9 @@ impl Recipe {
                 .collect(),
             effects: self.effects.clone(),
             noise: self.noise,
-            wild_rows: rows
+            outlier_rows: rows
                 .iter()
-                .filter(|row| row.wild)
+                .filter(|row| row.outlier)
                 .map(|row| row.instant)
                 .collect(),
         };
@@ -140,63 +140,63 @@ impl Recipe {
     }
 }
 
-/// Spread of the location errors, µm.
+/// Standard deviation of the position errors, µm.
 pub const PIGE_SIGMA_UM: f64 = 20.0;
-/// Spread of the orientation errors, arcsec.
+/// Standard deviation of the orientation errors, arcsec.
 pub const PIGE_SIGMA_ARCSEC: f64 = 8.0;
 
-/// One reading as taken.
+/// One simulated reading.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Row {
-    /// Its place in [`Plan::instants`].
+    /// Its index in [`Plan::instants`].
     pub instant: usize,
-    /// The reading, mm, at the sensor's resolution.
+    /// The reading, mm, rounded to the resolution of the sensor.
     pub length_mm: f64,
-    /// Whether it was made wild.
-    pub wild: bool,
+    /// Whether it is a simulated outlier.
+    pub outlier: bool,
     dropped: bool,
 }
 
 impl Row {
-    /// A reading that somebody else took.
+    /// A reading from another source.
     pub fn taken(instant: usize, length_mm: f64) -> Row {
         Row {
             instant,
             length_mm,
-            wild: false,
+            outlier: false,
             dropped: false,
         }
     }
 }
 
-/// The true value of an unknown.
+/// The true value of a parameter.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Known {
+pub struct TrueValue {
     /// `EY0A`, `workpiece_ball[P1].x`.
     pub id: String,
-    /// What was out of place.
+    /// The component.
     pub component: Component,
-    /// By how much, in µm or arcsec.
+    /// The value, in µm or arcsec.
     pub value: f64,
     /// Whether it is a set-up offset rather than an error of the machine.
     pub is_setup: bool,
 }
 
-/// The answer.
+/// The true values of a simulated session.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Truth {
     /// PIGEs and set-up offsets in the order of [`Plan::unknowns`].
-    pub unknowns: Vec<Known>,
-    /// What was injected.
+    pub unknowns: Vec<TrueValue>,
+    /// The injected effects.
     pub effects: Vec<Injected>,
-    /// What the sensor added.
+    /// The noise of the sensor.
     pub noise: Noise,
-    /// Places in [`Plan::instants`] of the readings that were made wild.
-    pub wild_rows: Vec<usize>,
+    /// Indices in [`Plan::instants`] of the simulated outliers.
+    pub outlier_rows: Vec<usize>,
 }
 
 impl Truth {
-    /// The true value of an unknown in µm or arcsec.
+    /// The true value of a parameter in µm or arcsec.
     pub fn value(&self, id: &str) -> Option<f64> {
         self.unknowns
             .iter()
@@ -213,19 +213,19 @@ impl Truth {
     }
 }
 
-/// A session as measured, with its answer.
+/// A simulated measured session with its true values.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Draw {
     /// Names and texts of `session.toml`, `machine.toml` and the data files.
     pub files: Vec<(String, String)>,
     /// The readings, in the order of the data files.
     pub rows: Vec<Row>,
-    /// What nobody but an assertion may look at.
+    /// The true values, for assertions only.
     pub truth: Truth,
 }
 
 impl Draw {
-    /// Writes the session's folder, without the answer.
+    /// Writes the folder of the session, without the true values.
     ///
     /// # Errors
     /// If the folder or a file cannot be written.
@@ -236,7 +236,7 @@ impl Draw {
             .try_for_each(|(name, text)| std::fs::write(folder.join(name), text))
     }
 
-    /// Writes the answer to `NAME.json` in another folder.
+    /// Writes the true values to `NAME.json` in another folder.
     ///
     /// # Errors
     /// If the folder or the file cannot be written.

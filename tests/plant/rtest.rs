@@ -1,7 +1,7 @@
-//! An R-test on the plant: three sensors about a master ball, each of which counts how far the ball has gone along it.
+//! The R-test of the plant: three sensors about a master ball, each of which reads the displacement of the ball along its direction.
 //!
-//! The nest and the ball are bodies of their own: the nest is carried, displaced and turned with the table or the spindle, and a sensor counts along where its own
-//! direction then points in R. Nothing is transformed by angles.
+//! Nest and ball are separate bodies. The nest moves with the table or the spindle and is displaced and rotated with it. A sensor
+//! reads along its present direction in R. No reading is transformed by angles.
 
 use super::component::{AxisName, Component, unit_size};
 use super::effect::Injected;
@@ -15,7 +15,7 @@ use rand_pcg::Pcg64Mcg;
 use std::fmt::Write;
 use std::path::Path;
 
-/// Whose body the sensors are fixed to.
+/// The body that carries the sensors.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum NestOn {
     /// E-setting: the ball is in the spindle.
@@ -27,11 +27,11 @@ pub enum NestOn {
 /// The sensors of one mount.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Nest {
-    /// What they are fixed to.
+    /// The body that carries them.
     pub on: NestOn,
-    /// The direction along which each counts, in the frame of its body.
+    /// The direction of each sensor, in the frame of its body.
     pub directions: [Vector3<f64>; 3],
-    /// By how much the nest is turned in its place: about its body's X by −ω, then Z by −θ, then Y by −φ; rad.
+    /// Rotation of the nest on its body: about X by −ω, then Z by −θ, then Y by −φ; rad.
     pub misaligned: [f64; 3],
 }
 
@@ -46,7 +46,7 @@ impl Nest {
     }
 }
 
-/// What the three sensors count, mm: how far the point in the spindle has gone from the point on the table along each of them.
+/// The readings of the three sensors, mm: the displacement of the point in the spindle from the point on the table along each.
 pub fn reading_mm(
     machine: &Machine,
     nest: &Nest,
@@ -78,27 +78,27 @@ pub fn reading_mm(
 /// A session of R-tests on the plant.
 #[derive(Clone, Debug)]
 pub struct Session {
-    /// The tests; `stated.bar_mm` means nothing.
+    /// The tests; `stated.bar_mm` is not used.
     pub tests: Vec<Test>,
     /// The sensors, the same in every test.
     pub nest: Nest,
-    /// What is out of place in every test and may be declared: µm and arcsec.
+    /// Constant errors in all tests, which the session may declare: µm and arcsec.
     pub errors: Vec<(Component, f64)>,
-    /// What is wrong and undeclared.
+    /// Undeclared effects.
     pub effects: Vec<Injected>,
-    /// The errors that the session file calls unknown.
+    /// The errors that the session file lists under `[unknowns]`.
     pub declared: Vec<Component>,
     /// Standard deviation of a reading, µm.
     pub noise_um: f64,
-    /// Seed of the noise and of how far the mounts are off.
+    /// Seed of the noise and of the mount errors.
     pub seed: u64,
 }
 
-/// One standard uncertainty of where ball and nest are mounted, µm.
+/// Standard uncertainty of the mounts of ball and nest, µm.
 const MOUNT_U_UM: f64 = 10.0;
 
 impl Session {
-    /// Draws mounts and noise, takes the readings and writes the folder; the session file declares no effect.
+    /// Draws mounts and noise, simulates the readings and writes the folder; the session file declares no effect.
     ///
     /// # Errors
     /// If the folder or a file cannot be written.
@@ -131,7 +131,7 @@ impl Session {
         Ok(())
     }
 
-    /// What the sensors count without noise, µm.
+    /// The sensor readings without noise, µm.
     fn counted_um(&self, machine: &Machine, instant: &Instant, mount_mm: [f64; 3]) -> [f64; 3] {
         let mut displacement = Displacement {
             workpiece_ball: mount_mm,
@@ -172,6 +172,6 @@ impl Session {
     }
 }
 
-/// The Hermle C600U with an A axis that goes round, as that of Machine B in the paper does.
+/// The Hermle C600U with an A axis of unlimited travel, like that of Machine B in the paper.
 const MACHINE: &str = "name = \"Plant\"\nchain = \"w C A b Y X Z t\"\n\n[axis.C]\ndirection = [0, 0, 1]\n\n\
                        [axis.A]\ndirection = [1, 0, 0]\n\n[axis.X]\n[axis.Y]\n[axis.Z]\n";

@@ -1,40 +1,40 @@
-//! When the machine is where: the commanded path of one traversal, with velocity, direction and reversals of every axis.
+//! The schedule of a session: commanded path of each traversal over time, with velocity, direction and reversals of every axis.
 
 use super::component::AxisName;
 use super::machine::{Commanded, Machine, Stated};
 use std::f64::consts::PI;
 
-/// The state of the world at one reading.
+/// The state at one reading.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Instant {
-    /// Which test of the session.
+    /// Index of the test.
     pub test: usize,
-    /// Which traversal of that test, from 1.
+    /// Number of the traversal of that test, from 1.
     pub run: u32,
-    /// Since the session began.
+    /// Time since the start of the session.
     pub time_s: f64,
     /// Time over the duration of the session, 0 to 1.
     pub share_of_session: f64,
-    /// Where the axes are commanded to be, and how fast they go.
+    /// Commanded positions and velocities.
     pub commanded: Commanded,
-    /// Sign of travel by axis; 0 for an axis that stands. At the very point of reversal it is the direction of arrival.
+    /// Sign of travel by axis; 0 for a stationary axis. At the point of reversal it is the direction of arrival.
     pub direction: [f64; 5],
-    /// Since the axis reversed last, s.
+    /// Time since the last reversal of the axis, s.
     pub since_reversal_s: [f64; 5],
-    /// The way of the axis since it reversed last, mm or rad.
+    /// Distance since the last reversal of the axis, mm or rad.
     pub way_since_reversal: [f64; 5],
-    /// What the temperature column says.
+    /// The value of the temperature column.
     pub temperature_c: f64,
     /// See [`Machine::gravity_moment_a_mm`].
     pub gravity_moment_mm: f64,
 }
 
-/// How one axis follows the path angle.
+/// The motion of one axis as a function of the path angle.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Motion {
-    /// It stands at mm or rad.
+    /// Stationary at mm or rad.
     Stands(f64),
-    /// It is the path angle.
+    /// Equal to the path angle.
     Turns,
     /// `centre + radius · cos(angle + phase)`, mm and rad.
     Circles {
@@ -44,12 +44,12 @@ pub enum Motion {
     },
 }
 
-/// One test: traversals of one path, there and back.
+/// One test: traversals of one path, forward and backward.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Test {
     /// Its name; the data are in `NAME.csv`.
     pub name: String,
-    /// Balls and bar as stated.
+    /// Stated balls and bar.
     pub stated: Stated,
     /// Mount of the workpiece ball.
     pub setup: String,
@@ -61,18 +61,18 @@ pub struct Test {
     pub step_deg: f64,
     /// Path angle per second, degree.
     pub speed_deg_s: f64,
-    /// Traversals; every second one goes back.
+    /// Traversals; every second one is backward.
     pub traversals: u32,
 }
 
-/// Between traversals of a test, s.
+/// Pause between traversals of a test, s.
 const PAUSE_S: f64 = 8.0;
-/// Between tests, s.
+/// Pause between tests, s.
 const CHANGE_S: f64 = 120.0;
 /// A rotary axis reverses this long before the first reading of a traversal, s (an overshoot of 2° at 2 °/s).
 const OVERSHOOT_S: f64 = 1.0;
 
-/// The temperature beside the machine, °C, to the hundredth as a logger writes it: it swings and creeps upwards.
+/// Ambient temperature, °C, rounded to 0.01 °C as by a logger: an oscillation and a rising trend.
 pub fn temperature_c(time_s: f64, duration_s: f64) -> f64 {
     let temperature = 20.3 + 0.9 * (2.0 * PI * time_s / 700.0).sin() + 1.1 * time_s / duration_s;
     (temperature * 100.0).round() / 100.0
@@ -94,7 +94,7 @@ pub fn instants(machine: &Machine, tests: &[Test]) -> Vec<Instant> {
                 instants.push(at_angle(
                     machine,
                     test,
-                    Place {
+                    PathPoint {
                         test: index,
                         run: traversal + 1,
                         time_s: start_s + step * step_s,
@@ -117,8 +117,8 @@ pub fn instants(machine: &Machine, tests: &[Test]) -> Vec<Instant> {
     instants
 }
 
-/// Where on the path a reading is taken.
-struct Place {
+/// The point of the path at which a reading is taken.
+struct PathPoint {
     test: usize,
     run: u32,
     time_s: f64,
@@ -127,7 +127,7 @@ struct Place {
     rate: f64,
 }
 
-fn at_angle(machine: &Machine, test: &Test, place: Place) -> Instant {
+fn at_angle(machine: &Machine, test: &Test, place: PathPoint) -> Instant {
     let states = test.motions.map(|motion| axis_state(motion, &place));
     let commanded = Commanded {
         position: states.map(|state| state.position),
@@ -157,7 +157,7 @@ struct AxisState {
     way: f64,
 }
 
-fn axis_state(motion: Motion, place: &Place) -> AxisState {
+fn axis_state(motion: Motion, place: &PathPoint) -> AxisState {
     match motion {
         Motion::Stands(position) => AxisState {
             position,
@@ -182,7 +182,7 @@ fn axis_state(motion: Motion, place: &Place) -> AxisState {
             phase_rad,
         } => {
             let angle = place.angle_rad + phase_rad;
-            // The axis reverses at multiples of π; at the very point it has not yet done so.
+            // The axis reverses at multiples of π; at the point itself it has not reversed yet.
             let travelled = (angle * place.rate.signum()).rem_euclid(PI);
             let travelled = if travelled < 1e-9 { PI } else { travelled };
             let turning = angle - travelled * place.rate.signum();
@@ -198,7 +198,7 @@ fn axis_state(motion: Motion, place: &Place) -> AxisState {
     }
 }
 
-/// Motions for [`Test::motions`]: every axis stands at zero.
+/// Motions for [`Test::motions`]: every axis is stationary at zero.
 pub fn all_stand() -> [Motion; 5] {
     [Motion::Stands(0.0); 5]
 }

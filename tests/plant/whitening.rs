@@ -1,20 +1,20 @@
-//! Readings and columns in units of known noise, run by run.
+//! Whitening of readings and columns by the known noise, run by run.
 
 use super::noise::{Noise, RESOLUTION_UM};
 use super::plan::Plan;
 use nalgebra::DMatrix;
 
-/// The places of all readings.
+/// The indices of all readings.
 pub fn rows_of(plan: &Plan) -> Vec<usize> {
     (0..plan.instants.len()).collect()
 }
 
-/// Whitens columns whose rows are the readings at `rows` (ascending places in [`Plan::instants`]), µm: independent, variance one. A row
-/// whose neighbours are missing is whitened against the last one before it in the same run.
+/// Whitens columns in µm to independent rows of variance one. The rows are the readings at `rows` (ascending indices in
+/// [`Plan::instants`]). If its neighbour is missing, a row is whitened against the last one before it in the same run.
 pub fn whiten(plan: &Plan, noise: Noise, rows: &[usize], mut columns: DMatrix<f64>) -> DMatrix<f64> {
     let rounding = RESOLUTION_UM * RESOLUTION_UM / 12.0;
     let variance = noise.sigma_um() * noise.sigma_um();
-    // For each row: what to take of the row before, and what to divide by.
+    // For each row: the factor of the previous row and the divisor.
     let steps: Vec<(f64, f64)> = rows
         .iter()
         .enumerate()

@@ -1,13 +1,13 @@
-//! Sessions without an effect: nothing must be claimed.
+//! Sessions without an effect: the rate of false claims.
 
-use super::judging::tell;
+use super::judging::summary;
 use super::rates::Rate;
-use super::sessions::{NOISES, run, sessions, skipped, told};
+use super::sessions::{NOISES, run, sessions, skipped, verbose};
 use crate::plant::Kind;
 
 #[test]
-fn nothing_is_claimed_where_nothing_is() {
-    if skipped("nothing_is_claimed_where_nothing_is") {
+fn nothing_is_claimed_without_an_effect() {
+    if skipped("nothing_is_claimed_without_an_effect") {
         return;
     }
     let count = sessions();
@@ -21,10 +21,10 @@ fn nothing_is_claimed_where_nothing_is() {
             claimed.count(!outcome.result.effects.is_empty());
             not_clean.count(outcome.result.verdict != "clean");
             rejected.count(!outcome.result.rejected_candidates.is_empty());
-            if told() {
+            if verbose() {
                 println!(
                     "{}",
-                    tell(
+                    summary(
                         outcome,
                         if outcome.result.verdict == "clean" {
                             "ok"

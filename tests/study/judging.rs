@@ -1,4 +1,4 @@
-//! A result against the answer.
+//! Compares a result of trace with the true effects.
 
 use abbe::identify::results::{EffectName, EffectResult, ModelResult};
 
@@ -6,8 +6,8 @@ use super::rates::Pulls;
 use super::sessions::{Outcome, oracle};
 use crate::plant::{Injected, Named, Shape, from_name, named};
 
-/// A found effect's name in the plant's words.
-pub fn in_plants_words(name: &EffectName) -> Named {
+/// The name of a found effect, in the notation of the plant.
+pub fn name_in_plant(name: &EffectName) -> Named {
     Named {
         component: name.component.clone(),
         driver: name.driver.clone(),
@@ -18,10 +18,10 @@ pub fn in_plants_words(name: &EffectName) -> Named {
 
 /// Whether a name is that of the injected effect.
 pub fn is(name: &EffectName, truth: &Injected) -> bool {
-    let found = in_plants_words(name);
+    let found = name_in_plant(name);
     let expected = named(truth);
     match truth.shape {
-        // A ball that was moved after a test: its place in the tests before or after is a constant of those tests.
+        // A ball that moves after a test: its offset in the tests before or after is a constant of those tests.
         Shape::Remount { .. } => {
             found.component == expected.component && found.shape == "constant" && !name.tests.is_empty()
         }
@@ -29,7 +29,7 @@ pub fn is(name: &EffectName, truth: &Injected) -> bool {
     }
 }
 
-/// The found effect that is the truth, or has it among what looks the same. A period that divides a turn, to within what a turn resolves, is that harmonic.
+/// The found effect that is the truth or has it among its aliases. A period that divides a turn, within the resolution of a turn, is that harmonic.
 pub fn found<'r>(outcome: &'r Outcome, truth: &Injected) -> Option<&'r EffectResult> {
     let oracle = oracle(outcome.kind, outcome.noise);
     let is_truth = |name: &EffectName| {
@@ -37,7 +37,7 @@ pub fn found<'r>(outcome: &'r Outcome, truth: &Injected) -> Option<&'r EffectRes
             || name.shape == "harmonic"
                 && name.component == truth.component.to_string()
                 && matches!(truth.shape, Shape::Periodic { .. })
-                && from_name(&in_plants_words(name), truth)
+                && from_name(&name_in_plant(name), truth)
                     .is_some_and(|other| oracle.explained_share(truth, &other) > 0.99)
     };
     let effects = &outcome.result.effects;
@@ -46,22 +46,22 @@ pub fn found<'r>(outcome: &'r Outcome, truth: &Injected) -> Option<&'r EffectRes
         .find(|effect| is_truth(&effect.name) || effect.aliases.iter().any(is_truth))
 }
 
-/// The members of an alias set (the named effect included) that the plant knows and that are neither in the truth's true class nor within so many σ
-/// of it.
-pub fn strangers(outcome: &Outcome, effect: &EffectResult, truth: &Injected, sigma: f64) -> Vec<Named> {
+/// The surplus members of an alias set, the named effect included: effects of the plant that neither belong to the alias class of the
+/// truth nor lie within `sigma` standard deviations of it.
+pub fn surplus_aliases(outcome: &Outcome, effect: &EffectResult, truth: &Injected, sigma: f64) -> Vec<Named> {
     let oracle = oracle(outcome.kind, outcome.noise);
-    let mut strangers: Vec<Named> = std::iter::once(&effect.name)
+    let mut surplus_aliases: Vec<Named> = std::iter::once(&effect.name)
         .chain(&effect.aliases)
         .filter(|name| !is(name, truth))
         .filter_map(|name| {
             let remounted = matches!(truth.shape, Shape::Remount { .. }) && !name.tests.is_empty();
             let name = match remounted {
-                // A ball that was moved between tests is a constant of those tests to the program, a step in time to the plant.
+                // A ball that moves between tests is a constant of those tests in the result and a step in time in the plant.
                 true => Named {
                     component: name.component.clone(),
                     ..named(truth)
                 },
-                false => in_plants_words(name),
+                false => name_in_plant(name),
             };
             let other = from_name(&name, truth)?;
             let share = with_any_time_constant(&other)
@@ -72,11 +72,11 @@ pub fn strangers(outcome: &Outcome, effect: &EffectResult, truth: &Injected, sig
             (share < 0.95 && behind > sigma).then_some(name)
         })
         .collect();
-    strangers.dedup();
-    strangers
+    surplus_aliases.dedup();
+    surplus_aliases
 }
 
-/// A name does not say the time constant of a warm-up.
+/// Variants of an effect that its name does not distinguish: the name of a warm-up does not state its time constant.
 fn with_any_time_constant(effect: &Injected) -> Vec<Injected> {
     match effect.shape {
         Shape::Warmup { .. } => [30.0, 60.0, 120.0, 240.0, 480.0, 960.0, 1920.0, 3840.0]
@@ -89,7 +89,7 @@ fn with_any_time_constant(effect: &Injected) -> Vec<Injected> {
     }
 }
 
-/// Pulls of the machine's errors: (value − truth) / u.
+/// Pulls of the errors of the machine: (value − truth) / u.
 pub fn pulls(outcome: &Outcome, model: &ModelResult) -> Pulls {
     let pulls = outcome.draw.truth.piges().filter_map(|(id, value, _)| {
         let parameter = model.parameters.iter().find(|parameter| parameter.id == id)?;
@@ -98,7 +98,7 @@ pub fn pulls(outcome: &Outcome, model: &ModelResult) -> Pulls {
     Pulls(pulls.collect())
 }
 
-/// A name in few letters.
+/// A short form of a name.
 pub fn short(name: &EffectName) -> String {
     let order = name.order.map(|order| format!("{order}")).unwrap_or_default();
     let tests = if name.tests.is_empty() {
@@ -109,13 +109,13 @@ pub fn short(name: &EffectName) -> String {
     format!("{}~{}:{}{order}{tests}", name.component, name.driver, name.shape)
 }
 
-/// One session in a line.
-pub fn tell(outcome: &Outcome, mark: &str) -> String {
+/// A summary of one session for the terminal.
+pub fn summary(outcome: &Outcome, mark: &str) -> String {
     let oracle = oracle(outcome.kind, outcome.noise);
     let noise = match outcome.noise {
         crate::plant::Noise::White { .. } => "white",
         crate::plant::Noise::Serial { .. } => "serial",
-        crate::plant::Noise::Wild { .. } => "wild",
+        crate::plant::Noise::Outliers { .. } => "outliers",
     };
     let truth: Vec<String> = outcome
         .draw
@@ -162,7 +162,7 @@ pub fn tell(outcome: &Outcome, mark: &str) -> String {
         })
         .collect();
     format!(
-        "{mark:<5} #{} {:?} {noise} {}\n        {} noise {:.3} memory {:?} rejected {} held out {:.3} -> {:.3}, remainder p {:.3} {:?}, {:.2} s\n        {}{}",
+        "{mark:<5} #{} {:?} {noise} {}\n        {} noise {:.3} AR {:?} outliers {}  held out {:.3} -> {:.3}, remainder p {:.3} {:?}, {:.2} s\n        {}{}",
         outcome.number,
         outcome.kind,
         truth.join(" + "),

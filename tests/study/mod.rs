@@ -1,7 +1,7 @@
-//! How often trace is right: sessions from the plant, of which it gets the files and nothing else.
+//! Studies of the reliability of trace: it reads only the files of sessions that the plant simulates.
 //!
-//! The bounds that are asserted are those that the program has to reach, within the sampling error of the counts. Every run of the tests makes a few
-//! sessions of each kind; the figures in `docs/development/validation.md` are those of
+//! The tests assert the target rates within the sampling error of the counts. By default they simulate a few sessions of each kind.
+//! The figures in `docs/development/validation.md` are those of
 //!
 //! ```text
 //! ABBE_STUDY=400 cargo test --profile checked --test main study -- --nocapture --test-threads 1

@@ -1,8 +1,8 @@
-//! Two undeclared effects, each at 5 times the smallest amplitude that an oracle would call significant.
+//! Two undeclared effects, each at 5 times the smallest amplitude that is significant for the oracle.
 
-use super::judging::{found, tell};
+use super::judging::{found, summary};
 use super::rates::Rate;
-use super::sessions::{Outcome, at_multiple, case, oracle, random, run, sessions, skipped, told};
+use super::sessions::{Outcome, at_multiple, case, oracle, random, run, sessions, skipped, verbose};
 use crate::plant::{Injected, Kind, Noise};
 
 fn pair(number: usize) -> (Kind, Noise, Vec<Injected>) {
@@ -33,8 +33,8 @@ fn both_of_a_pair_are_found() {
         both.count(hits == 2);
         one.count(hits >= 1);
         more.count(outcome.result.effects.len() > 2);
-        if told() {
-            println!("{}", tell(outcome, ["NONE", "ONE", "ok"][hits]));
+        if verbose() {
+            println!("{}", summary(outcome, ["NONE", "ONE", "ok"][hits]));
         }
     }
     println!(
@@ -43,13 +43,13 @@ fn both_of_a_pair_are_found() {
     assert!(both.is_consistent_with_at_least(0.90), "{both}");
 }
 
-/// Two compliances of which each undoes part of the other: neither shows much alone (session 43). A ball that drifts leaves another cycle in every run, which is
-/// structure and no autocorrelation of the noise (session 60).
+/// Two compliances that partly cancel each other have little gain individually (session 43). A drifting ball leaves a different cycle
+/// in every run, which is structure and no autocorrelation of the noise (session 60).
 #[test]
-fn pairs_that_hide_each_other_or_look_like_slow_noise_are_found() {
+fn pairs_that_partly_cancel_or_resemble_autocorrelation_are_found() {
     for number in [43, 60] {
         for outcome in &run(number..number + 1, pair) {
-            assert_eq!(hits(outcome), 2, "{}", tell(outcome, "HIDDEN"));
+            assert_eq!(hits(outcome), 2, "{}", summary(outcome, "HIDDEN"));
         }
     }
 }

@@ -1,46 +1,46 @@
-//! Counts and what they say about rates.
+//! Counts, and tests of rates against them.
 
 use statrs::function::beta::beta_reg;
 
-/// How many of how many.
+/// A count out of a total.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Rate {
-    /// How often it happened.
+    /// Number of hits.
     pub hits: usize,
-    /// How often it could have.
+    /// Number of trials.
     pub of: usize,
 }
 
-/// Probability with which a count is allowed to lie beyond its bound by chance.
+/// Significance level at which a count contradicts a bound.
 const CHANCE: f64 = 0.005;
 
 impl Rate {
-    /// One more.
+    /// Adds one trial.
     pub fn count(&mut self, hit: bool) {
         self.hits += usize::from(hit);
         self.of += 1;
     }
 
-    /// The share.
+    /// The proportion of hits.
     pub fn share(self) -> f64 {
         self.hits as f64 / self.of.max(1) as f64
     }
 
-    /// Standard error of the share, in per cent, from a uniform prior: never zero.
+    /// Standard error of the proportion, from a uniform prior: never zero.
     pub fn standard_error(self) -> f64 {
         let n = self.of as f64;
         let p = (self.hits as f64 + 1.0) / (n + 2.0);
         (p * (1.0 - p) / (n + 3.0)).sqrt()
     }
 
-    /// Whether so few would be no surprise if the rate were `rate`.
+    /// Whether the count is consistent with a rate of at least `rate`.
     pub fn is_consistent_with_at_least(self, rate: f64) -> bool {
-        // P(at most so many) = I_{1−rate}(n − k, k + 1).
+        // P(at most k hits) = I_{1−rate}(n − k, k + 1).
         self.hits == self.of
             || beta_reg((self.of - self.hits) as f64, self.hits as f64 + 1.0, 1.0 - rate) > CHANCE
     }
 
-    /// Whether so many would be no surprise if the rate were `rate`.
+    /// Whether the count is consistent with a rate of at most `rate`.
     pub fn is_consistent_with_at_most(self, rate: f64) -> bool {
         let misses = Rate {
             hits: self.of - self.hits,
@@ -61,7 +61,7 @@ impl std::fmt::Display for Rate {
     }
 }
 
-/// Mean, standard deviation about zero, and how many.
+/// Pulls of parameters: deviation from the truth over the standard uncertainty.
 #[derive(Clone, Debug, Default)]
 pub struct Pulls(pub Vec<f64>);
 
@@ -71,7 +71,7 @@ impl Pulls {
         (self.0.iter().map(|pull| pull * pull).sum::<f64>() / self.0.len().max(1) as f64).sqrt()
     }
 
-    /// The share of absolute values above a limit.
+    /// The proportion of absolute values above a limit.
     pub fn beyond(&self, limit: f64) -> f64 {
         self.0.iter().filter(|pull| pull.abs() > limit).count() as f64 / self.0.len().max(1) as f64
     }

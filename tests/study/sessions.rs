@@ -1,4 +1,4 @@
-//! Sessions from the plant, and trace run on their files.
+//! Simulates sessions with the plant and runs trace on their files.
 
 use std::collections::HashMap;
 use std::sync::{Arc, Mutex, OnceLock};
@@ -13,31 +13,31 @@ use rayon::prelude::*;
 
 use crate::plant::{Draw, Injected, Kind, Noise, Oracle, Recipe};
 
-/// The noises of a study.
+/// The kinds of noise of a study.
 pub const NOISES: [Noise; 3] = [
     Noise::White { sigma_um: 0.3 },
     Noise::Serial {
         sigma_um: 0.3,
         coefficient: 0.8,
     },
-    Noise::Wild {
+    Noise::Outliers {
         sigma_um: 0.3,
         share: 0.01,
     },
 ];
 
-/// Standard deviations of trace's own level of significance, 0.5 % two-sided.
+/// The significance level of trace, 0.5 % two-sided, in standard deviations.
 pub const LEVEL: f64 = 2.8070;
 
-/// Sessions a kind where `ABBE_STUDY` says nothing else: enough to notice what has broken, too few for figures.
+/// Sessions per study without `ABBE_STUDY`: enough to detect a regression, too few for figures.
 const FEW: usize = 8;
 
-/// Sessions a kind in a study, as `ABBE_STUDY` says; 0 leaves studies out.
+/// Sessions per study, from `ABBE_STUDY`; 0 skips the studies.
 pub fn sessions() -> usize {
     number("ABBE_STUDY").unwrap_or(FEW)
 }
 
-/// Whether studies are left out; says so.
+/// Whether studies are skipped; prints a line if so.
 pub fn skipped(study: &str) -> bool {
     let skipped = sessions() == 0;
     if skipped {
@@ -46,27 +46,27 @@ pub fn skipped(study: &str) -> bool {
     skipped
 }
 
-/// Whether every session is to be told.
-pub fn told() -> bool {
-    number("ABBE_STUDY_TOLD").is_some()
+/// Whether to print every session.
+pub fn verbose() -> bool {
+    number("ABBE_STUDY_VERBOSE").is_some()
 }
 
 fn number(name: &str) -> Option<usize> {
     std::env::var(name).ok().and_then(|text| text.parse().ok())
 }
 
-/// One session of a study: kinds of session and of noise in turn.
+/// Kind of session and of noise of one session of a study: all combinations in turn.
 pub fn case(number: usize) -> (Kind, Noise) {
     let kinds = Kind::ALL.len();
     (Kind::ALL[number % kinds], NOISES[number / kinds % NOISES.len()])
 }
 
-/// Random choices of one session, apart from its noise.
+/// The random generator of one session, except for its noise.
 pub fn random(study: u64, number: usize) -> Pcg64Mcg {
     Pcg64Mcg::seed_from_u64(study * 1_000_003 + number as u64)
 }
 
-/// The oracle of a kind of session and noise, made once.
+/// The oracle of a kind of session and noise, computed once.
 pub fn oracle(kind: Kind, noise: Noise) -> Arc<Oracle> {
     type Shared = Mutex<HashMap<String, Arc<OnceLock<Arc<Oracle>>>>>;
     static ORACLES: OnceLock<Shared> = OnceLock::new();
@@ -83,12 +83,12 @@ pub fn oracle(kind: Kind, noise: Noise) -> Arc<Oracle> {
         .clone()
 }
 
-/// The effect at a multiple of the smallest amplitude that its oracle would call significant at trace's own level.
+/// The effect at a multiple of the smallest amplitude that is significant for the oracle at the level of trace.
 pub fn at_multiple(oracle: &Oracle, effect: &Injected, factor: f64) -> Injected {
     effect.with_amplitude(factor * oracle.smallest_significant_amplitude(effect, LEVEL))
 }
 
-/// A session as trace saw it.
+/// A simulated session and the result of trace.
 pub struct Outcome {
     /// Its number in the study.
     pub number: usize,
@@ -96,16 +96,16 @@ pub struct Outcome {
     pub kind: Kind,
     /// Its noise.
     pub noise: Noise,
-    /// The readings, with the answer.
+    /// The readings, with the true values.
     pub draw: Draw,
-    /// What trace reports.
+    /// The result of trace.
     pub result: TraceResult,
-    /// How long it took.
+    /// Duration of trace, s.
     pub seconds: f64,
 }
 
-/// Runs a study: for each number the kind, the noise and the effects. `ABBE_STUDY_FIRST` is added to every number, so that a rule is chosen on other
-/// sessions than those that judge it.
+/// Runs a study: `make` gives kind, noise and effects for each number. `ABBE_STUDY_FIRST` is added to every number, so that a rule can
+/// be tuned on other sessions than those that validate it.
 pub fn run(
     numbers: std::ops::Range<usize>,
     make: impl Fn(usize) -> (Kind, Noise, Vec<Injected>) + Sync,
@@ -138,7 +138,7 @@ pub fn run(
         .collect()
 }
 
-/// Trace on the files of a draw and on nothing else.
+/// Runs trace on the files of a simulated session.
 fn traced(draw: &Draw, session_number: usize) -> (TraceResult, f64) {
     let folder = tempfile::tempdir().unwrap();
     draw.write(folder.path()).unwrap();

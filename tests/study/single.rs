@@ -1,21 +1,21 @@
-//! One undeclared effect at 5 and at 2 times the smallest amplitude that an oracle would call significant.
+//! One undeclared effect at 5 and at 2 times the smallest amplitude that is significant for the oracle.
 
-use super::judging::{found, is, pulls, strangers, tell};
+use super::judging::{found, is, pulls, summary, surplus_aliases};
 use super::rates::{Pulls, Rate};
-use super::sessions::{Outcome, at_multiple, case, oracle, random, run, sessions, skipped, told};
+use super::sessions::{Outcome, at_multiple, case, oracle, random, run, sessions, skipped, verbose};
 use crate::plant::named;
 
 fn study(factor: f64) -> Vec<Outcome> {
     run(0..sessions(), |number| {
         let (kind, noise) = case(number);
         let oracle = oracle(kind, noise);
-        let effect = oracle.random_seeable(1.0, &mut random(factor as u64, number));
+        let effect = oracle.random_detectable(1.0, &mut random(factor as u64, number));
         let effect = at_multiple(&oracle, &effect, factor);
         (kind, noise, vec![effect])
     })
 }
 
-/// Readings give an alias its place within 2 σ of the named effect. What is more than 4 σ behind without noise comes so near in one session of fourteen.
+/// An alias lies within 2 σ of the named effect with noise. One that is more than 4 σ behind without noise does so in one session of fourteen.
 const FAR_SIGMA: f64 = 4.0;
 
 #[derive(Default)]
@@ -24,7 +24,7 @@ struct Tally {
     near: Rate,
     named_first: Rate,
     more: Rate,
-    strange: Rate,
+    surplus: Rate,
     far: Rate,
     alone: Rate,
     held_out: Vec<f64>,
@@ -44,12 +44,12 @@ fn tally(outcomes: &[Outcome]) -> Tally {
         tally.more.count(effects.len() > 1);
         if let Some(effect) = hit {
             tally.named_first.count(is(&effect.name, truth));
-            let far = strangers(outcome, effect, truth, FAR_SIGMA);
-            let strangers = strangers(outcome, effect, truth, 2.0);
-            tally.strange.count(!strangers.is_empty());
+            let far = surplus_aliases(outcome, effect, truth, FAR_SIGMA);
+            let surplus_aliases = surplus_aliases(outcome, effect, truth, 2.0);
+            tally.surplus.count(!surplus_aliases.is_empty());
             tally.far.count(!far.is_empty());
-            if told() && !strangers.is_empty() {
-                println!("STRANGE in {:?}: {strangers:?}", named(truth));
+            if verbose() && !surplus_aliases.is_empty() {
+                println!("SURPLUS in {:?}: {surplus_aliases:?}", named(truth));
             }
         }
         let best =
@@ -60,7 +60,7 @@ fn tally(outcomes: &[Outcome]) -> Tally {
         tally.before.0.extend(pulls(outcome, &outcome.result.before).0);
         tally.after.0.extend(pulls(outcome, &outcome.result.after).0);
         tally.seconds = tally.seconds.max(outcome.seconds);
-        if told() {
+        if verbose() {
             let mark = match (hit.is_some(), effects.len()) {
                 (true, 1) => "ok",
                 (true, _) => "MORE",
@@ -70,7 +70,7 @@ fn tally(outcomes: &[Outcome]) -> Tally {
             let off = outcome.result.after.heldout_rms_um / best - 1.0;
             println!(
                 "{} held out {:+.1} % of the oracle's; pulls {:.1?}",
-                tell(outcome, mark),
+                summary(outcome, mark),
                 100.0 * off,
                 pulls(outcome, &outcome.result.after).0
             );
@@ -88,11 +88,11 @@ fn print(factor: f64, tally: &Tally) {
     println!("| truth named first | {} |", tally.named_first);
     println!("| more than one effect claimed | {} |", tally.more);
     println!(
-        "| alias sets with a stranger beyond 2 sigma | {} |",
-        tally.strange
+        "| alias sets with a surplus member beyond 2 sigma | {} |",
+        tally.surplus
     );
     println!(
-        "| alias sets with a stranger beyond {FAR_SIGMA} sigma | {} |",
+        "| alias sets with a surplus member beyond {FAR_SIGMA} sigma | {} |",
         tally.far
     );
     println!("| held-out rms within 5 % of the oracle's | {} |", tally.near);
@@ -103,7 +103,7 @@ fn print(factor: f64, tally: &Tally) {
     );
     for (word, pulls) in [("before", &tally.before), ("after", &tally.after)] {
         println!(
-            "| pulls of the machine's errors {word}: rms, beyond 3 | {:.2}, {:.1} % of {} |",
+            "| pulls of the errors of the machine {word}: rms, beyond 3 | {:.2}, {:.1} % of {} |",
             pulls.rms(),
             100.0 * pulls.beyond(3.0),
             pulls.0.len()
@@ -122,13 +122,13 @@ fn an_effect_at_five_times_the_smallest_is_found() {
     assert!(tally.found.is_consistent_with_at_least(0.95), "{}", tally.found);
     assert!(tally.far.is_consistent_with_at_most(0.05), "{}", tally.far);
     assert!(tally.near.is_consistent_with_at_least(0.90), "{}", tally.near);
-    // Four standard errors of a root mean square beyond its bound.
+    // Tolerance: four standard errors of a root mean square.
     let (rms, count) = (tally.after.rms(), tally.after.0.len() as f64);
     assert!(
         rms < 1.2 * (1.0 + 4.0 / (2.0 * count).sqrt()),
         "pulls {rms} of {count}"
     );
-    // Few effects bias what they hide; a few sessions may hold none that does.
+    // Few effects bias the parameters with which they are confounded; a small study may contain none.
     let many = sessions() >= 64;
     assert!(
         !many || tally.before.rms() > rms,

@@ -1,6 +1,6 @@
-//! Another build of the same sources prints the same: every line to its last digit, and the numbers of its JSON as far as rounding lets them.
+//! Another build of the same sources gives the same output: every printed line, and the numbers of the JSON within rounding.
 //!
-//! `ABBE_OTHER` names the other binary, as `target/release/abbe`; without it there is nothing to compare with, and nothing is.
+//! `ABBE_OTHER` names the other binary, such as `target/release/abbe`. Without it the tests compare nothing and pass.
 
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -10,9 +10,9 @@ use serde_json::Value;
 
 use super::ready;
 
-/// How far numbers of two builds may lie apart, relative to the larger one: a ten-thousandth of what any table prints.
+/// Permitted relative difference of two builds: a ten-thousandth of the precision of any table.
 const RELATIVE: f64 = 1e-7;
-/// And in the unit of the number: zeros are rounding.
+/// Permitted absolute difference, in the unit of the number: zeros may differ by rounding.
 const ABSOLUTE: f64 = 1e-8;
 
 fn other() -> Option<PathBuf> {
@@ -20,7 +20,7 @@ fn other() -> Option<PathBuf> {
     Some(fs::canonicalize(&named).unwrap_or_else(|cause| panic!("ABBE_OTHER={}: {cause}", named.display())))
 }
 
-/// Where two documents differ by more than rounding, with how much; the largest gap of two numbers that do not.
+/// Collects the differences of two documents beyond rounding in `found`, and the largest difference within rounding in `gap`.
 fn differences(path: &str, a: &Value, b: &Value, found: &mut Vec<String>, gap: &mut f64) {
     match (a, b) {
         (Value::Number(a), Value::Number(b)) => {
@@ -48,8 +48,8 @@ fn differences(path: &str, a: &Value, b: &Value, found: &mut Vec<String>, gap: &
     }
 }
 
-/// Runs commands by a build in a folder; what they print, and the JSON that each writes to `out.json`.
-fn told(binary: &Path, folder: &Path, commands: &[Vec<&str>]) -> Vec<(String, Value)> {
+/// Runs commands with a build in a folder. Returns what each prints and the JSON that it writes to `out.json`.
+fn outputs(binary: &Path, folder: &Path, commands: &[Vec<&str>]) -> Vec<(String, Value)> {
     commands
         .iter()
         .map(|arguments| {
@@ -68,7 +68,7 @@ fn told(binary: &Path, folder: &Path, commands: &[Vec<&str>]) -> Vec<(String, Va
         .collect()
 }
 
-/// Runs the commands by both builds on the files of a ready session; `more` goes to the end of its plan, which is then one of few readings.
+/// Compares the outputs of both builds for a ready session with few readings; `more` is appended to its plan.
 #[track_caller]
 fn the_same(session: &str, more: &str, commands: &[Vec<&str>]) {
     let Some(other) = other() else {
@@ -85,14 +85,14 @@ fn the_same(session: &str, more: &str, commands: &[Vec<&str>]) {
         }
         let plan = folder.path().join("chapter5.toml");
         if !more.is_empty() {
-            // In steps so coarse that a search takes seconds.
+            // Coarse steps, so that a search takes seconds.
             let text = fs::read_to_string(&plan).unwrap();
             let text = text
                 .replace("step_deg = 0.25", "step_deg = 3")
                 .replace("step_deg = 0.5", "step_deg = 6");
             fs::write(&plan, text + more).unwrap();
         }
-        told(binary, folder.path(), commands)
+        outputs(binary, folder.path(), commands)
     };
     let this = copied(Path::new(env!("CARGO_BIN_EXE_abbe")));
     for ((command, this), other) in commands.iter().zip(this).zip(copied(&other)) {
@@ -137,7 +137,7 @@ fn the_plan_of_chapter_5() {
 }
 
 #[test]
-fn a_wobble_that_is_planted() {
+fn a_simulated_axial_motion() {
     let effect = "EZC~C:h2.amplitude=1.5um";
     let plan = "chapter5.toml";
     the_same(

@@ -1,4 +1,4 @@
-//! Input that cannot be used, at the command line: exit status 1, and a message that names the place, what was found and what to do.
+//! Unusable input at the command line: exit status 1, and a message that states the location, the finding and the remedy.
 
 use std::fs;
 
@@ -24,9 +24,9 @@ spindle_ball_mm = [0, 0, 0]
 const DATA: &str =
     "time_s,run,c_deg,length_mm\n0,1,0,99.9990\n1,1,90,100.0010\n2,1,180,100.0000\n3,1,270,99.9995\n";
 
-/// What `abbe fit` says about a session of three files that it cannot use.
+/// The message of `abbe fit` for an unusable session of three files.
 #[track_caller]
-fn told(machine: &str, session: &str, data: Option<&str>) -> String {
+fn message_of(machine: &str, session: &str, data: Option<&str>) -> String {
     let folder = tempfile::tempdir().unwrap();
     let write = |name: &str, text: &str| fs::write(folder.path().join(name), text).unwrap();
     write("machine.toml", machine);
@@ -35,39 +35,48 @@ fn told(machine: &str, session: &str, data: Option<&str>) -> String {
         write("C100.csv", data);
     }
     let output = abbe(&["fit", text(&folder.path().join("session.toml"))]);
-    let told = String::from_utf8(output.stderr).unwrap();
-    assert_eq!(output.status.code(), Some(1), "{told}");
+    let stderr = String::from_utf8(output.stderr).unwrap();
+    assert_eq!(output.status.code(), Some(1), "{stderr}");
     assert!(output.stdout.is_empty(), "a result beside an error");
-    told
+    stderr
 }
 
 #[track_caller]
-fn holds(told: &str, parts: &[&str]) {
+fn holds(stderr: &str, parts: &[&str]) {
     for part in parts {
-        assert!(told.contains(part), "`{part}` is not in\n{told}");
+        assert!(stderr.contains(part), "`{part}` is not in\n{stderr}");
     }
 }
 
 #[track_caller]
 fn with_session(from: &str, to: &str, parts: &[&str]) {
     assert!(SESSION.contains(from), "{from}");
-    holds(&told(MACHINE, &SESSION.replacen(from, to, 1), Some(DATA)), parts);
+    holds(
+        &message_of(MACHINE, &SESSION.replacen(from, to, 1), Some(DATA)),
+        parts,
+    );
 }
 
 #[track_caller]
 fn with_machine(from: &str, to: &str, parts: &[&str]) {
     assert!(MACHINE.contains(from), "{from}");
-    holds(&told(&MACHINE.replacen(from, to, 1), SESSION, Some(DATA)), parts);
+    holds(
+        &message_of(&MACHINE.replacen(from, to, 1), SESSION, Some(DATA)),
+        parts,
+    );
 }
 
 #[track_caller]
 fn with_data(from: &str, to: &str, parts: &[&str]) {
     assert!(DATA.contains(from), "{from}");
-    holds(&told(MACHINE, SESSION, Some(&DATA.replace(from, to))), parts);
+    holds(
+        &message_of(MACHINE, SESSION, Some(&DATA.replace(from, to))),
+        parts,
+    );
 }
 
 #[test]
-fn the_session_itself_is_good() {
+fn the_unchanged_session_is_valid() {
     let folder = tempfile::tempdir().unwrap();
     for (name, text) in [
         ("machine.toml", MACHINE),
@@ -91,7 +100,7 @@ fn an_unknown_key() {
         "nois_um",
         &[
             "session.toml:6",
-            "knows no key `nois_um`",
+            "has the unknown key `nois_um`",
             "did you mean `noise_um`?",
         ],
     );
@@ -109,7 +118,7 @@ fn an_unknown_column() {
 #[test]
 fn a_missing_data_file() {
     holds(
-        &told(MACHINE, SESSION, None),
+        &message_of(MACHINE, SESSION, None),
         &["session.toml:10", "C100.csv", "--data"],
     );
 }
@@ -127,7 +136,7 @@ fn a_decimal_comma_undeclared() {
         "data = \"C100.csv\"\nformat = { separator = \";\" }",
     );
     holds(
-        &told(MACHINE, &session, Some(comma)),
+        &message_of(MACHINE, &session, Some(comma)),
         &["C100.csv:2", "99,9990", "decimal = \",\""],
     );
 }
@@ -144,10 +153,10 @@ fn not_a_number() {
 
 #[test]
 fn an_empty_data_file() {
-    holds(&told(MACHINE, SESSION, Some("")), &["C100.csv", "empty"]);
+    holds(&message_of(MACHINE, SESSION, Some("")), &["C100.csv", "empty"]);
     let header = DATA.lines().next().unwrap();
     holds(
-        &told(MACHINE, SESSION, Some(header)),
+        &message_of(MACHINE, SESSION, Some(header)),
         &["C100.csv", "a header without readings"],
     );
 }
@@ -156,7 +165,7 @@ fn an_empty_data_file() {
 fn one_reading() {
     let one: Vec<&str> = DATA.lines().take(2).collect();
     holds(
-        &told(MACHINE, SESSION, Some(&one.join("\n"))),
+        &message_of(MACHINE, SESSION, Some(&one.join("\n"))),
         &["C100.csv", "one reading"],
     );
 }
@@ -165,7 +174,7 @@ fn one_reading() {
 fn duplicate_test_names() {
     let test = &SESSION[SESSION.find("[[test]]").unwrap()..];
     holds(
-        &told(MACHINE, &format!("{SESSION}\n{test}"), Some(DATA)),
+        &message_of(MACHINE, &format!("{SESSION}\n{test}"), Some(DATA)),
         &["session.toml:16", "C100"],
     );
 }
@@ -205,15 +214,15 @@ fn a_bar_that_cannot_reach() {
             "session.toml:8",
             "a bar of 100.0000 mm cannot reach",
             "116.619 mm apart",
-            "degrees taken for radians",
+            "degrees read as radians",
         ],
     );
-    // Degrees in a column of radians: the balls stay together at 0 only.
+    // Degrees in a column of radians: the balls keep their distance at 0 only.
     let session = SESSION.replace("spindle_ball_mm = [0, 0, 0]", "spindle_ball_mm = [0, 100, 100]");
     let data = "a_rad,length_mm\n0,100.0\n30,100.0\n60,100.0\n";
     holds(
-        &told(MACHINE, &session, Some(data)),
-        &["cannot reach", "degrees taken for radians"],
+        &message_of(MACHINE, &session, Some(data)),
+        &["cannot reach", "degrees read as radians"],
     );
 }
 
@@ -235,9 +244,9 @@ fn a_wrong_command_line_is_status_2() {
     }
 }
 
-/// What would be asked for and not done is refused.
+/// Options without effect are refused.
 #[test]
-fn options_that_do_not_go_together() {
+fn options_that_exclude_one_another() {
     for line in [
         "trace s.toml --list --json l.json",
         "trace s.toml --list --csv l.csv",
@@ -310,7 +319,7 @@ fn help_has_examples_and_status_0() {
     }
 }
 
-/// What is looked for and in no identifier would otherwise look as if it were not there; what is left out in vain is named.
+/// A text of `--only` or `--exclude` that no identifier contains is an error; otherwise the result would suggest that the effect is absent.
 #[test]
 fn an_effect_that_the_library_does_not_have() {
     let session = super::ready("hermle-c600u/measured/session.toml");
@@ -322,12 +331,12 @@ fn an_effect_that_the_library_does_not_have() {
     ] {
         let output = asked(words);
         assert_eq!(output.status.code(), Some(1), "{words:?}");
-        let told = String::from_utf8(output.stderr).unwrap();
+        let stderr = String::from_utf8(output.stderr).unwrap();
         let misspelt = words[words.len() - 1];
         holds(
-            &told,
+            &stderr,
             &[
-                &format!("has `{misspelt}` in its identifier"),
+                &format!("contains `{misspelt}` in its identifier"),
                 "abbe trace --list",
             ],
         );
@@ -337,31 +346,31 @@ fn an_effect_that_the_library_does_not_have() {
         assert_eq!(output.status.code(), Some(1), "{words:?}");
         holds(
             &String::from_utf8(output.stderr).unwrap(),
-            &["nothing is left to look for", "--exclude"],
+            &["no candidate effects remain"],
         );
     }
     let output = asked(&["--only", "gain", "--exclude", "gravitation"]);
     assert!(output.status.success());
-    let told = String::from_utf8(output.stdout).unwrap() + &String::from_utf8(output.stderr).unwrap();
-    holds(&told, &["nothing was left out by `gravitation`"]);
+    let printed = String::from_utf8(output.stdout).unwrap() + &String::from_utf8(output.stderr).unwrap();
+    holds(&printed, &["`gravitation` excludes nothing"]);
 }
 
 #[test]
-fn as_many_tests_as_nobody_would_measure() {
+fn more_tests_than_the_limit() {
     for tests in ["0", "25", "100000"] {
         let plan = super::ready("hermle-c600u/chapter5.toml");
         let output = abbe(&["plan", super::text(&plan), "--no-effects", "--improve", tests]);
         assert_eq!(output.status.code(), Some(1));
-        let told = String::from_utf8(output.stderr).unwrap();
+        let stderr = String::from_utf8(output.stderr).unwrap();
         holds(
-            &told,
+            &stderr,
             &[&format!("`--improve {tests}`: from 1 to 24 tests are proposed")],
         );
     }
 }
 
 #[test]
-fn files_that_are_none() {
+fn invalid_files() {
     for path in ["nowhere/session.toml", "."] {
         let output = abbe(&["fit", path]);
         assert_eq!(output.status.code(), Some(1));

@@ -1,4 +1,4 @@
-//! Ball-bar figures against closed forms, the independent plant and the sample that another simulator made.
+//! Ball-bar figures against closed forms, the independent plant and the sample of another simulator.
 
 use std::f64::consts::{PI, TAU};
 use std::path::Path;
@@ -12,7 +12,7 @@ const RADIUS_MM: f64 = 100.0;
 const FEED_MM_S: f64 = 20.0;
 const STEP: f64 = PI / 360.0;
 
-/// A reading of a circle: angle of the path, its direction, which way either axis travels; angle since either turned round, and at which end.
+/// A reading of a circle: path angle, path direction, direction of each axis, path angle since the reversal of each axis, and the end of that reversal.
 struct At {
     angle: f64,
     path: f64,
@@ -20,7 +20,7 @@ struct At {
     turned: [Option<(f64, f64)>; 2],
 }
 
-/// The session of a circle in XY whose tool is off by what `error` says, mm along X and Y: exact geometry, no formula of the diagnosis.
+/// Writes a session of a circle in XY with the tool displaced by `error`, mm along X and Y: exact geometry, no formula of the diagnosis.
 fn circle(folder: &Path, directions: &[f64], time: bool, error: impl Fn(&At) -> [f64; 2]) -> Value {
     let mut rows = String::from(if time { "time_s," } else { "" });
     rows.push_str("run,x_mm,y_mm,length_mm\n");
@@ -34,7 +34,7 @@ fn circle(folder: &Path, directions: &[f64], time: bool, error: impl Fn(&At) -> 
                 } else {
                     TAU - k as f64 * STEP
                 };
-                // The reading at an end still belongs to the travel that led there.
+                // The reading at a reversal belongs to the travel before it.
                 let middle = angle - path * STEP / 2.0;
                 let middle = if k == 0 { angle + path * STEP / 2.0 } else { middle };
                 let travels = [-path * middle.sin(), path * middle.cos()].map(f64::signum);
@@ -70,7 +70,7 @@ fn circle(folder: &Path, directions: &[f64], time: bool, error: impl Fn(&At) -> 
     figures(&session)[0].clone()
 }
 
-/// What `abbe fit` says of the circles of a session.
+/// The ball-bar figures of `abbe fit` for a session.
 fn figures(session: &Path) -> Vec<Value> {
     let folder = tempfile::tempdir().unwrap();
     let file = folder.path().join("fit.json");
@@ -106,7 +106,7 @@ fn um(test: &Value, key: &str) -> f64 {
     test[key].as_f64().unwrap()
 }
 
-/// A cubic of one axis is no cyclic error of the other; a screw's pitch still is one.
+/// A cubic error of one axis is not reported as a cyclic error of the other; a screw pitch error is.
 #[test]
 fn a_cubic_is_not_called_cyclic() {
     let folder = tempfile::tempdir().unwrap();
@@ -115,7 +115,7 @@ fn a_cubic_is_not_called_cyclic() {
             let mut drawn = 12345_u64;
             let drawn = std::cell::RefCell::new(&mut drawn);
             let test = circle(folder.path(), &[1.0, -1.0], true, |at| {
-                // A plain congruential generator: noise that nothing else in the workspace makes.
+                // A linear congruential generator, independent of the generators of the workspace.
                 let mut state = drawn.borrow_mut();
                 **state = state
                     .wrapping_mul(6364136223846793005)
@@ -131,13 +131,13 @@ fn a_cubic_is_not_called_cyclic() {
                 assert!(fault(&test, "reversal spike", name).is_none(), "{test}");
             }
             is(&test, "third-order positioning", "XY", "sum", 4.0, 0.1);
-            // cos⁴θ is ⅜ + ½cos 2θ + ⅛cos 4θ: the rest stands where a linear error does, 4 µm over 100 mm by one axis.
+            // cos⁴θ is ⅜ + ½cos 2θ + ⅛cos 4θ: the second term is that of a linear error, 4 µm over 100 mm by one axis.
             let sign = if axis == 0 { 1.0 } else { -1.0 };
             is(&test, "scale mismatch", "XY", "ratio", sign * 40.0, 0.5);
-            let told = test["not_identifiable"].to_string();
+            let undetermined = test["not_identifiable"].to_string();
             assert!(
-                told.contains("third-order error of X is confounded with one of Y"),
-                "{told}"
+                undetermined.contains("third-order error of X is confounded with one of Y"),
+                "{undetermined}"
             );
         }
     }
@@ -147,7 +147,7 @@ fn a_cubic_is_not_called_cyclic() {
     is(&test, "third-order straightness", "XY", "difference", 2.0, 0.05);
 }
 
-/// Signs in the diagnosis are those of the effects of the same name, whichever way the axes count and whichever side they move.
+/// Signs in the diagnosis are those of the effects of the same name, for either direction of the axes and either side of the machine.
 #[test]
 fn figures_have_the_signs_of_error_motions() {
     let folder = tempfile::tempdir().unwrap();
@@ -200,9 +200,9 @@ fn figures_have_the_signs_of_error_motions() {
     }
 }
 
-/// A chip on the ball is no error of the machine: a single reading that stands out moves no figure.
+/// A chip on the ball is no error of the machine: a single outlier changes no figure.
 #[test]
-fn a_wild_reading_is_left_out() {
+fn an_outlier_is_excluded() {
     let folder = tempfile::tempdir().unwrap();
     let ellipse = |at: &At| {
         [
@@ -233,12 +233,12 @@ fn a_wild_reading_is_left_out() {
 }
 
 #[test]
-fn every_fault_is_told_by_its_closed_form() {
+fn every_fault_agrees_with_its_closed_form() {
     let folder = tempfile::tempdir().unwrap();
     let both = [1.0, -1.0];
     let q = |at: &At| [RADIUS_MM * at.angle.cos(), RADIUS_MM * at.angle.sin()];
 
-    // X is 30 ppm longer than Y: an ellipse.
+    // The scale of X exceeds that of Y by 30 ppm: an ellipse.
     let test = circle(folder.path(), &both, true, |at| {
         [40e-6 * q(at)[0], 10e-6 * q(at)[1]]
     });
@@ -258,7 +258,7 @@ fn every_fault_is_told_by_its_closed_form() {
     assert!(test["diagnosis"][0]["fault"] == "scale mismatch");
     assert!(um(&test["diagnosis"][0], "share_percent") > 99.0, "{test}");
 
-    // Y leans 20 µm/m towards −X: the angle between the positive axes is more than 90°.
+    // Y is inclined by 20 µm/m towards −X: the angle between the positive axes exceeds 90°.
     let test = circle(folder.path(), &both, true, |at| [-20e-6 * q(at)[1], 0.0]);
     is(&test, "squareness", "XY", "angle", 20.0, 0.01);
     assert!((um(&test, "bidirectional_circular_deviation_um") - 2.0).abs() < 0.006);
@@ -273,7 +273,7 @@ fn every_fault_is_told_by_its_closed_form() {
     });
     is(&test, "servo mismatch", "XY", "delay", 0.2, 1e-3);
     assert!((um(&test, "feed_mm_min") - 1200.0).abs() < 1.0);
-    // ½v·Δτ·sin 2θ with either sign: twice 2 µm apart.
+    // ½v·Δτ·sin 2θ in both signs: a difference of twice 2 µm.
     assert!((um(&test, "hysteresis_um") - 4.0).abs() < 0.01, "{test}");
 
     // X loses 3 µm at its positive end and 1 µm at the other.
@@ -284,7 +284,7 @@ fn every_fault_is_told_by_its_closed_form() {
     is(&test, "backlash", "X", "X-", 1.0, 0.02);
     is(&test, "backlash", "Y", "Y+", 0.0, 0.02);
 
-    // X moves the tool 2 µm along Y when it turns round, and bows by 5 µm.
+    // X has a lateral play of 2 µm along Y and a bow of 5 µm.
     let test = circle(folder.path(), &both, true, |at| {
         [0.0, -0.5 * 2e-3 * at.travels[0] + 5e-3 * at.angle.cos().powi(2)]
     });
@@ -292,7 +292,7 @@ fn every_fault_is_told_by_its_closed_form() {
     is(&test, "straightness", "X", "sagitta", 5.0, 0.02);
     is(&test, "straightness", "Y", "sagitta", 0.0, 0.02);
 
-    // Y sticks for 2° when it turns round at its positive end.
+    // Y sticks for 2° at the reversal at its positive end.
     let test = circle(folder.path(), &both, true, |at| match at.turned[1] {
         Some((since, end)) if end > 0.0 && since < 0.5 => [0.0, 6e-3 * (-since / 2f64.to_radians()).exp()],
         _ => [0.0, 0.0],
@@ -300,7 +300,7 @@ fn every_fault_is_told_by_its_closed_form() {
     is(&test, "reversal spike", "Y", "Y+", 6.0, 0.2);
     is(&test, "reversal spike", "Y", "width", 2.0, 1e-9);
 
-    // A screw of 5 mm pitch under X, 1.2 µm forward and 0.8 µm backward.
+    // A cyclic error of X with a pitch of 5 mm, 1.2 µm forward and 0.8 µm backward.
     let test = circle(folder.path(), &both, true, |at| {
         let size = if at.travels[0] > 0.0 { 1.2e-3 } else { 0.8e-3 };
         [size * (TAU * q(at)[0] / 5.0 + 0.7).cos(), 0.0]
@@ -312,28 +312,32 @@ fn every_fault_is_told_by_its_closed_form() {
 }
 
 #[test]
-fn what_one_direction_cannot_tell_is_said() {
+fn quantities_that_one_direction_does_not_determine_are_listed() {
     let folder = tempfile::tempdir().unwrap();
     let test = circle(folder.path(), &[1.0], false, |at| {
         [-20e-6 * RADIUS_MM * at.angle.sin(), 0.0]
     });
     assert!(fault(&test, "servo mismatch", "XY").is_none() && fault(&test, "lateral play", "X").is_none());
     is(&test, "squareness", "XY", "angle", 20.0, 0.01);
-    let told = test["not_identifiable"].to_string();
+    let undetermined = test["not_identifiable"].to_string();
     assert!(
-        told.contains("servo mismatch is in the squareness") && told.contains("hysteresis need"),
-        "{told}"
+        undetermined.contains("servo mismatch is confounded with squareness")
+            && undetermined.contains("hysteresis require"),
+        "{undetermined}"
     );
     assert!(test.get("hysteresis_um").is_none() && test.get("feed_mm_min").is_none());
-    // Without time a lag is a length.
+    // Without time a lag is stated as a length.
     let test = circle(folder.path(), &[1.0, -1.0], false, |_| [0.0, 0.0]);
-    let told = test["not_identifiable"].to_string();
-    assert!(told.contains("not in ms") && told.contains("one feed"), "{told}");
+    let undetermined = test["not_identifiable"].to_string();
+    assert!(
+        undetermined.contains("not in ms") && undetermined.contains("one feed"),
+        "{undetermined}"
+    );
     figure(&test, "servo mismatch", "XY", "lag");
 }
 
 #[test]
-fn the_plant_s_faults_are_found_within_their_uncertainty() {
+fn the_faults_of_the_plant_are_found_within_their_uncertainty() {
     let motion = |freedom, axis, shape, size| {
         Injected::new(Component::Motion(freedom, axis), Driver::Axis(axis), shape, size)
     };
@@ -391,7 +395,7 @@ fn the_plant_s_faults_are_found_within_their_uncertainty() {
 
 #[test]
 fn rotary_axes_have_figures_without_a_diagnosis() {
-    let wobble = Injected::new(
+    let axial_motion = Injected::new(
         Component::Motion(Freedom::X, AxisName::C),
         Driver::Axis(AxisName::C),
         Shape::Harmonic {
@@ -402,7 +406,7 @@ fn rotary_axes_have_figures_without_a_diagnosis() {
     );
     let folder = tempfile::tempdir().unwrap();
     Recipe::new(Kind::Rotary, 7)
-        .with(wobble)
+        .with(axial_motion)
         .draw()
         .write(folder.path())
         .unwrap();
@@ -410,7 +414,7 @@ fn rotary_axes_have_figures_without_a_diagnosis() {
     let c = tests.iter().find(|test| test["test"] == "C100").unwrap();
     assert_eq!(c["axes"], "C");
     assert!(c.get("diagnosis").is_none() && c.get("radius_mm").is_none());
-    // EXC of order 3 is orders 2 and 4 of half its size each across a bar that stands: 5·cos 3θ·cos θ less its centre, twice 5 µm with the noise.
+    // EXC of order 3 along a stationary bar gives orders 2 and 4 of half its size: 5·cos 3θ·cos θ, a range of twice 5 µm plus the noise.
     let g = um(c, "bidirectional_circular_deviation_um");
     assert!((8.0..12.5).contains(&g), "{c}");
 }
@@ -434,7 +438,7 @@ fn the_sample_of_another_simulator_is_diagnosed() {
 }
 
 #[test]
-fn a_short_arc_is_said_to_be_one() {
+fn a_short_arc_is_reported_as_an_arc() {
     let folder = tempfile::tempdir().unwrap();
     circle(folder.path(), &[1.0, -1.0], true, |at| {
         [40e-6 * RADIUS_MM * at.angle.cos(), 0.0]
@@ -452,12 +456,13 @@ fn a_short_arc_is_said_to_be_one() {
     let test = figures(&folder.path().join("session.toml"))[0].clone();
     assert!((um(&test, "arc_deg") - 120.0).abs() < 0.6, "{test}");
     assert!(test.get("diagnosis").is_none(), "{test}");
-    let told = test["not_identifiable"].to_string();
+    let undetermined = test["not_identifiable"].to_string();
     assert!(
-        told.contains("ISO 230-4 asks for a full circle") && told.contains("an arc of 120° is too short"),
-        "{told}"
+        undetermined.contains("ISO 230-4 requires a full circle")
+            && undetermined.contains("an arc of 120° is too short"),
+        "{undetermined}"
     );
-    // 40 µm/m of X alone, from the set-up's centre: 40·cos²θ·R, between 30° and 90°.
+    // 40 µm/m of X alone, from the centre of the set-up: 40·cos²θ·R, between 30° and 90°.
     let direction = &test["directions"][0];
     assert!(
         (um(direction, "circular_deviation_um") - 3.0).abs() < 0.06,

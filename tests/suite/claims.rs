@@ -1,5 +1,5 @@
-//! What a trace claims: an effect that scores better than readings without structure *and* lowers the error on held-out readings by more than the standard
-//! error of the fall. Nothing else, whatever the run column says.
+//! The rule of a claim: an effect exceeds the null distribution *and* lowers the held-out error by more than the standard error of the fall. It
+//! holds for any run column.
 
 use abbe::identify::results::{EffectName, TraceResult};
 use abbe::identify::trace::{TraceOptions, trace};
@@ -25,7 +25,7 @@ fn traced(session: &Session, significance: f64) -> TraceResult {
     trace(session, &options, &|_| true).unwrap().result
 }
 
-/// What the lines of one result say has to agree.
+/// Asserts that the parts of a result agree.
 fn assert_consistent(result: &TraceResult, what: &str) {
     let found = !result.effects.is_empty();
     let named = matches!(result.verdict.as_str(), "explained" | "partly-explained");
@@ -51,8 +51,7 @@ fn assert_consistent(result: &TraceResult, what: &str) {
     }
 }
 
-/// Noise of 0.3 µm of which backlash of 0.076 ± 0.020 µm scores better than all draws of the null distribution. It was reported as the explanation of a
-/// residual without structure, and the held-out error did not fall.
+/// Noise of 0.3 µm for which a backlash of 0.076 ± 0.020 µm exceeds the whole null distribution, although the held-out error does not fall.
 #[test]
 fn an_effect_that_does_not_lower_the_held_out_error_is_not_claimed() {
     let recipe = Recipe::new(Kind::TiltedTable, 27_035);
@@ -62,10 +61,10 @@ fn an_effect_that_does_not_lower_the_held_out_error_is_not_claimed() {
     assert_consistent(&result, &result.residual_before);
 }
 
-/// White noise of 0.20 µm and nothing else. At a level of significance at which the null distribution lets candidates through, the held-out error has to
-/// stop them.
+/// White noise of 0.20 µm without an effect. At a significance level at which candidates exceed the null distribution, the held-out error must
+/// reject them.
 #[test]
-fn noise_that_passes_the_null_does_not_pass_the_held_out_readings() {
+fn noise_beyond_the_null_distribution_fails_the_held_out_rule() {
     let mut rejected = 0;
     for seed in [1, 2, 3] {
         let recipe = Recipe::new(Kind::Rotary, seed).noise(Noise::White { sigma_um: 0.20 });
@@ -77,7 +76,7 @@ fn noise_that_passes_the_null_does_not_pass_the_held_out_readings() {
     assert!(rejected > 0, "no candidate was let through");
 }
 
-/// How the run column of a test may be wrong.
+/// Mistakes in the run column of a test.
 const MISLABELLED: [&str; 4] = ["shuffled", "all one", "alternating", "one each"];
 
 fn mislabel(session: &mut Session, how: &str) {
@@ -93,10 +92,10 @@ fn mislabel(session: &mut Session, how: &str) {
     }
 }
 
-/// The verdict does not depend on the numbers of the runs, and a column that numbers no traversals is named.
+/// The verdict does not depend on the numbers of the runs, and a warning names a column that does not number traversals.
 #[test]
-fn mislabelled_runs_yield_no_false_claim_and_hide_no_effect() {
-    let wobble = Injected::new(
+fn mislabelled_runs_cause_neither_false_claims_nor_missed_effects() {
+    let axial_motion = Injected::new(
         Component::Motion(Freedom::Z, AxisName::C),
         Driver::Axis(AxisName::C),
         Shape::Harmonic {
@@ -105,9 +104,9 @@ fn mislabelled_runs_yield_no_false_claim_and_hide_no_effect() {
         },
         1.0,
     );
-    let is_wobble =
+    let is_axial_motion =
         |name: &EffectName| name.component == "EZC" && name.shape == "harmonic" && name.order == Some(3);
-    for effects in [vec![], vec![wobble]] {
+    for effects in [vec![], vec![axial_motion]] {
         let recipe = Recipe {
             effects,
             ..Recipe::new(Kind::Rotary, 11)
@@ -122,7 +121,7 @@ fn mislabelled_runs_yield_no_false_claim_and_hide_no_effect() {
             assert_consistent(&result, &what);
             assert_eq!(result.effects.len(), recipe.effects.len(), "{what}");
             if let Some(effect) = result.effects.first() {
-                let alike = is_wobble(&effect.name) || effect.aliases.iter().any(is_wobble);
+                let alike = is_axial_motion(&effect.name) || effect.aliases.iter().any(is_axial_motion);
                 assert!(alike, "{what}: {:?}", effect.name);
                 assert_eq!(result.verdict, "explained", "{what}");
             } else {

@@ -1,4 +1,4 @@
-//! Structural codes: what is read, and what the message says where it cannot be.
+//! Structural codes: accepted forms, and the messages for invalid codes.
 
 use abbe::model::chain::Machine;
 use abbe::model::code::StructuralCode;
@@ -27,12 +27,12 @@ fn sides_are_from_the_workpiece_and_from_the_bed() {
     let robot = StructuralCode::parse("w b J1 J2 J3 J4 J5 J6 t").unwrap();
     assert!(robot.workpiece_side.is_empty());
     assert_eq!(robot.tool_side.len(), 6);
-    // A bare bed between workpiece and tool is a machine without axes.
+    // Only a bed between workpiece and tool: a machine without axes.
     assert_eq!(StructuralCode::parse("wbt").unwrap().axes().count(), 0);
 }
 
 #[test]
-fn what_is_wrong_is_said() {
+fn invalid_codes_are_refused_with_the_reason() {
     for (code, message) in [
         ("", "does not start with the workpiece"),
         ("C A b Y X Z t", "does not start with the workpiece"),
@@ -40,16 +40,16 @@ fn what_is_wrong_is_said() {
         ("w", "does not end with the tool"),
         ("w C A Y X Z t", "it holds 0 beds"),
         ("w C b A b Y t", "it holds 2 beds"),
-        ("w C C b Y t", "`C` stands in it twice"),
-        ("[wBAXYbZABBt]", "stands in it twice"),
-        ("w C w b Y t", "`w` is no axis name"),
-        ("w 1 b Y t", "`1` is no axis name"),
-        ("w C-1 b Y t", "`C-1` is no axis name"),
+        ("w C C b Y t", "`C` occurs twice"),
+        ("[wBAXYbZABBt]", "occurs twice"),
+        ("w C w b Y t", "`w` is not an axis name"),
+        ("w 1 b Y t", "`1` is not an axis name"),
+        ("w C-1 b Y t", "`C-1` is not an axis name"),
     ] {
-        let told = StructuralCode::parse(code).unwrap_err().to_string();
-        assert!(told.contains(message), "{code}: {told}");
-        assert!(told.contains("as in `w C A b Y X Z t`"), "{told}");
+        let stderr = StructuralCode::parse(code).unwrap_err().to_string();
+        assert!(stderr.contains(message), "{code}: {stderr}");
+        assert!(stderr.contains("as in `w C A b Y X Z t`"), "{stderr}");
     }
-    let told = Machine::from_code("w b J1 t").unwrap_err().to_string();
-    assert!(told.contains("axis `J1` is no ISO 841 letter"), "{told}");
+    let stderr = Machine::from_code("w b J1 t").unwrap_err().to_string();
+    assert!(stderr.contains("axis `J1` is not an ISO 841 letter"), "{stderr}");
 }

@@ -1,4 +1,4 @@
-//! Compensation tables read back as the control reads them: what is added to the command is the identified curve with the opposite sign.
+//! Compensation tables evaluated as by the control: the correction of the command is the identified curve with the opposite sign.
 
 use std::path::Path;
 
@@ -6,7 +6,7 @@ use serde_json::Value;
 
 use super::{abbe, text};
 
-/// A session of circles and a rotary sweep with known error motions, simulated without noise; what was put in, mm or rad, by axis position.
+/// A session of circles and a rotary sweep with known error motions, simulated without noise.
 fn identified(folder: &Path) -> std::path::PathBuf {
     let plan = folder.join("plan.toml");
     let text_of = "[machine]\nchain = \"w C b X Y Z t\"\naxis.C = {}\naxis.X = {}\naxis.Y = { direction = [0, -1, 0] }\naxis.Z = {}\n\
@@ -49,7 +49,7 @@ fn identified(folder: &Path) -> std::path::PathBuf {
     out.join("session.toml")
 }
 
-/// The coefficients that `abbe fit` reports: the curves below are made of these alone.
+/// The coefficients that `abbe fit` reports; the expected curves use only these.
 fn coefficients(folder: &Path, session: &Path) -> impl Fn(&str) -> f64 {
     let file = folder.join("fit.json");
     assert!(
@@ -89,12 +89,12 @@ fn numbers(line: &str) -> Vec<f64> {
 }
 
 #[test]
-fn tables_read_back_are_the_curves_with_the_opposite_sign() {
+fn tables_correct_by_the_negative_identified_curve() {
     let folder = tempfile::tempdir().unwrap();
     let folder = folder.path();
     let session = identified(folder);
     let value = coefficients(folder, &session);
-    // Outside units to mm and rad; a polynomial is over 100 mm.
+    // Display units to mm and rad; a polynomial has the scale 100 mm.
     let exx = |x: f64| {
         let q = x / 100.0;
         1e-3 * (value("EXX~X:p3.1") * q + value("EXX~X:p3.2") * q * q + value("EXX~X:p3.3") * q.powi(3))
@@ -105,21 +105,24 @@ fn tables_read_back_are_the_curves_with_the_opposite_sign() {
         value("ECC~C:h3.amplitude") * phase.cos() / 3600.0
     };
 
-    // LinuxCNC adds nominal less actual (`comp_forward = nom - fwd` where the type is 0).
+    // LinuxCNC adds nominal minus actual (`comp_forward = nom - fwd` for type 0).
     let out = folder.join("linuxcnc");
-    let said = tables(&session, &out, "linuxcnc");
-    assert!(said.contains("COMP_FILE_TYPE = 0"), "{said}");
+    let printed = tables(&session, &out, "linuxcnc");
+    assert!(printed.contains("COMP_FILE_TYPE = 0"), "{printed}");
     assert!(
-        said.contains("EYX: COMP_FILE corrects the positioning of a joint only"),
-        "{said}"
+        printed.contains("EYX: COMP_FILE corrects the positioning of a joint only"),
+        "{printed}"
     );
-    assert!(said.contains("EXX~X:lag: no table over the position"), "{said}");
     assert!(
-        said.contains("EX0C: a location error belongs in the kinematics"),
-        "{said}"
+        printed.contains("EXX~X:lag: no table over the position"),
+        "{printed}"
+    );
+    assert!(
+        printed.contains("EX0C: a location error belongs in the kinematics"),
+        "{printed}"
     );
     type Curve<'c> = &'c dyn Fn(f64, f64) -> f64;
-    // Y counts against R's Y: where its body is off by +e in R, its own position is off by −e.
+    // Y counts against Y of R: an error of +e of its body in R is a positioning error of −e.
     let expected: [(&str, Curve<'_>); 3] = [
         ("X", &|x, _| exx(x)),
         ("Y", &|_, direction| -eyy(direction)),
@@ -127,13 +130,13 @@ fn tables_read_back_are_the_curves_with_the_opposite_sign() {
     ];
     for (axis, error) in expected {
         let table = std::fs::read_to_string(out.join(format!("{axis}.comp"))).unwrap();
-        // Behind the three numbers that the control reads stands the uncertainty.
+        // The uncertainty follows the three numbers that the control reads.
         let rows: Vec<Vec<f64>> = table
             .lines()
             .map(|line| numbers(&line.replace("# u", "")))
             .collect();
         assert_eq!(rows.len(), 41);
-        // A polynomial is known where it is zero.
+        // The uncertainty of a polynomial is zero at its zero.
         assert!(rows.iter().all(|row| (0.0..1e-3).contains(&row[3])) && rows[0][3] > 0.0);
         assert!(rows.iter().all(|row| row.len() == 4) && rows.windows(2).all(|pair| pair[0][0] < pair[1][0]));
         for row in rows {
@@ -149,7 +152,7 @@ fn tables_read_back_are_the_curves_with_the_opposite_sign() {
         }
     }
 
-    // Heidenhain takes points of the error curve, and corrects against them.
+    // Heidenhain reads points of the error curve and applies the opposite.
     let out = folder.join("heidenhain");
     tables(&session, &out, "heidenhain");
     let table = std::fs::read_to_string(out.join("X.COM")).unwrap();
@@ -174,12 +177,12 @@ fn tables_read_back_are_the_curves_with_the_opposite_sign() {
         );
     }
 
-    // Beckhoff: the errors themselves, mm and rad, blocks parted by #.
+    // Beckhoff reads the errors, mm and rad, in blocks separated by #.
     let out = folder.join("beckhoff");
-    let said = tables(&session, &out, "beckhoff");
+    let printed = tables(&session, &out, "beckhoff");
     assert!(
-        said.contains("EYY: what depends on the direction; the mean of both"),
-        "{said}"
+        printed.contains("EYY: what depends on the direction; the mean of both"),
+        "{printed}"
     );
     let file = std::fs::read_to_string(out.join("volcomp.csv")).unwrap();
     assert!(
@@ -212,7 +215,7 @@ fn tables_read_back_are_the_curves_with_the_opposite_sign() {
 }
 
 #[test]
-fn results_as_csv_hold_what_the_json_holds() {
+fn csv_and_json_hold_the_same_results() {
     let folder = tempfile::tempdir().unwrap();
     let folder = folder.path();
     let session = identified(folder);
@@ -248,7 +251,7 @@ fn results_as_csv_hold_what_the_json_holds() {
 }
 
 #[test]
-fn what_has_no_curve_makes_no_table() {
+fn effects_without_a_curve_have_no_table() {
     let measured = super::ready("hermle-c600u/measured/session.toml");
     let folder = tempfile::tempdir().unwrap();
     let out = folder.path().join("tables");
@@ -263,7 +266,8 @@ fn what_has_no_curve_makes_no_table() {
     assert_eq!(run.status.code(), Some(1));
     let message = String::from_utf8_lossy(&run.stderr).into_owned();
     assert!(
-        message.contains("no error can be compensated in this format") && message.contains("EY0A: a location error"),
+        message.contains("no error can be compensated in this format")
+            && message.contains("EY0A: a location error"),
         "{message}"
     );
     assert!(!out.exists());
@@ -282,7 +286,7 @@ fn what_has_no_curve_makes_no_table() {
     assert!(String::from_utf8_lossy(&run.stderr).contains("--points 1: from 2 to 256"));
 }
 
-/// A session in which X moves over ±100 mm in one test and merely stands at −300 mm in another; EXX is a polynomial over X.
+/// A session in which X moves over ±100 mm in one test and is stationary at −300 mm in another; EXX is a polynomial over X.
 fn standing_apart(folder: &Path, seed: u64) -> std::path::PathBuf {
     let plan = folder.join("plan.toml");
     let text_of = "[machine]\nchain = \"w C b X Y Z t\"\naxis.C = { origin_mm = [-300, 0, 0] }\naxis.X = {}\naxis.Y = {}\naxis.Z = {}\n\
@@ -330,7 +334,7 @@ fn points(out: &Path) -> Vec<(String, f64, String, f64, f64)> {
 }
 
 #[test]
-fn a_table_ends_where_its_axis_stopped_and_says_how_sure_it_is() {
+fn a_table_ends_at_the_travel_of_its_axis_and_states_its_uncertainty() {
     let folder = tempfile::tempdir().unwrap();
     let mut pulls = Vec::new();
     for seed in 0..6 {
@@ -342,7 +346,7 @@ fn a_table_ends_where_its_axis_stopped_and_says_how_sure_it_is() {
             .lines()
             .map(|line| numbers(&line.replace("# u", ""))[0])
             .collect();
-        // The circle leads X from −100 to 100 mm; at −300 mm it stands.
+        // The circle moves X from −100 to 100 mm; at −300 mm it is stationary.
         assert!(
             (at[0] + 100.0).abs() < 1.5 && (at[40] - 100.0).abs() < 1.5,
             "{at:?}"
@@ -353,7 +357,7 @@ fn a_table_ends_where_its_axis_stopped_and_says_how_sure_it_is() {
             assert_eq!((error.as_str(), direction.as_str()), ("EXX", "both"));
             let q = position / 100.0;
             assert!(u > 0.0 || q == 0.0, "{position}");
-            // One point at each end of each session is a pull of its own.
+            // Each end point of each session gives one pull.
             if (q.abs() - 1.0).abs() < 0.02 {
                 pulls.push((value - (6.0 * q + 8.0 * q * q)) / u);
             }
@@ -365,7 +369,7 @@ fn a_table_ends_where_its_axis_stopped_and_says_how_sure_it_is() {
 }
 
 #[test]
-fn an_axis_that_merely_stands_has_no_table() {
+fn a_stationary_axis_has_no_table() {
     let folder = tempfile::tempdir().unwrap();
     let session = standing_apart(folder.path(), 7);
     let text_of = std::fs::read_to_string(&session).unwrap();
@@ -381,12 +385,12 @@ fn an_axis_that_merely_stands_has_no_table() {
         "--control",
         "linuxcnc",
     ]);
-    let said = String::from_utf8_lossy(&run.stderr).into_owned();
-    assert_eq!(run.status.code(), Some(1), "{said}");
+    let printed = String::from_utf8_lossy(&run.stderr).into_owned();
+    assert_eq!(run.status.code(), Some(1), "{printed}");
     assert!(
-        said.contains("no error can be compensated in this format")
-            && said.contains("EXX~X:p1: its axis stands wherever readings see it"),
-        "{said}"
+        printed.contains("no error can be compensated in this format")
+            && printed.contains("EXX~X:p1: its axis stands still wherever readings observe it"),
+        "{printed}"
     );
     assert!(!out.exists());
 }

@@ -1,8 +1,8 @@
-//! Where public data lie: `ABBE_DATA`, else `../shared/data` beside the workspace.
+//! The folder of the public data: `ABBE_DATA`, otherwise `../shared/data` beside the workspace.
 
 use std::path::PathBuf;
 
-/// A file or folder of the public data. Where it is not there the test is skipped by name, except in CI, where it fails.
+/// A file or folder of the public data. If it does not exist, the test prints that it is skipped; in CI it fails.
 pub fn data(test: &str, path: &str) -> Option<PathBuf> {
     let folder = std::env::var_os("ABBE_DATA")
         .map_or_else(|| super::workspace().join("../shared/data"), PathBuf::from);

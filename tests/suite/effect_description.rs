@@ -1,4 +1,4 @@
-//! Effects in words: every candidate of the library has some, no two of a session have the same, and none is an identifier.
+//! Descriptions of effects: every candidate of the library has one, unique in its session, without identifiers.
 
 use std::collections::{BTreeSet, HashMap};
 use std::fmt::Write;
@@ -14,7 +14,7 @@ use abbe::model::session::read::{ReadOptions, session as read};
 
 use super::plan_help::{noise_um, ready};
 
-/// A circle of X and Y on a machine with a table C and a head B, with time and temperature, in both directions.
+/// A circle of X and Y in both directions on a machine with a table C and a head B, with time and temperature.
 fn circle() -> Session {
     let folder = tempfile::tempdir().unwrap();
     let mut table = String::from("time_s,run,x_mm,y_mm,temperature_c,length_mm\n");
@@ -34,7 +34,7 @@ fn circle() -> Session {
     read_in(&folder, session)
 }
 
-/// A robot of three joints before a tracker, which goes to poses at random.
+/// A robot of three joints before a tracker, at random poses.
 fn robot() -> Session {
     let folder = tempfile::tempdir().unwrap();
     let mut table = String::from("J1_deg,J2_deg,J3_deg,px_mm,py_mm,pz_mm\n");
@@ -64,7 +64,7 @@ fn read_in(folder: &tempfile::TempDir, text: &str) -> Session {
 }
 
 #[test]
-fn every_candidate_of_the_library_has_words_of_its_own() {
+fn every_candidate_of_the_library_has_its_own_description() {
     let mut families = BTreeSet::new();
     for session in [
         ready("hermle-c600u/measured/session.toml"),
@@ -74,7 +74,7 @@ fn every_candidate_of_the_library_has_words_of_its_own() {
         robot(),
     ] {
         let problem = Problem::new(&session, noise_um(0.3), 1).unwrap();
-        let mut seen: HashMap<String, Effect> = HashMap::new();
+        let mut described: HashMap<String, Effect> = HashMap::new();
         for candidate in library::candidates(&problem).unwrap() {
             families.insert(candidate.family);
             let effect = candidate.effect;
@@ -94,11 +94,11 @@ fn every_candidate_of_the_library_has_words_of_its_own() {
                 "{}: {text}",
                 effect.id()
             );
-            if let Some(other) = seen.insert(text.clone(), effect.clone()) {
+            if let Some(other) = described.insert(text.clone(), effect.clone()) {
                 panic!("{text}: {effect:?} and {other:?}");
             }
         }
-        assert!(seen.len() > 100, "{}", seen.len());
+        assert!(described.len() > 100, "{}", described.len());
     }
     let missing: Vec<String> = library::families()
         .unwrap()
@@ -110,9 +110,9 @@ fn every_candidate_of_the_library_has_words_of_its_own() {
     assert!(missing.is_empty(), "no session has {missing:?}");
 }
 
-/// What whoever works on the machine reads, for one of each kind.
+/// The expected description of one effect of each kind.
 #[test]
-fn words_name_the_part_and_what_it_does() {
+fn descriptions_name_the_part_and_its_motion() {
     let machine = circle().machine;
     let words = |machine: &Machine, component: &str, driver: &str, shape: Shape| {
         let effect = Effect {
@@ -221,9 +221,9 @@ fn words_name_the_part_and_what_it_does() {
     );
 }
 
-/// Each part is named once, in the order in which the parts first occur.
+/// Each part of the machine is named once, in the order of first occurrence.
 #[test]
-fn explanations_are_gathered_by_part() {
+fn explanations_are_grouped_by_part() {
     let machine = circle().machine;
     let of = |freedom: Freedom, axis: &str, order: f64| {
         let name = abbe::model::component::ErrorName {

@@ -1,4 +1,4 @@
-//! `abbe equation` and `abbe volumetric` as a user meets them: every language, every option, and what is said where it cannot be.
+//! The commands `abbe equation` and `abbe volumetric`: every language, every option, and the messages for invalid requests.
 
 use std::fs;
 use std::path::PathBuf;
@@ -19,28 +19,28 @@ fn machine() -> PathBuf {
     ready("hermle-c600u/machine.toml")
 }
 
-/// What a command that succeeds prints; nothing else is said.
+/// Standard output of a command that succeeds without a message.
 #[track_caller]
 pub(super) fn printed(arguments: &[&str]) -> String {
     let output = abbe(arguments);
-    let told = String::from_utf8(output.stderr).unwrap();
-    assert!(output.status.success() && told.is_empty(), "{told}");
+    let stderr = String::from_utf8(output.stderr).unwrap();
+    assert!(output.status.success() && stderr.is_empty(), "{stderr}");
     String::from_utf8(output.stdout).unwrap()
 }
 
-/// What a command that fails says.
+/// Asserts that a command fails with these parts in its message.
 #[track_caller]
 pub(super) fn refused(arguments: &[&str], parts: &[&str]) {
     let output = abbe(arguments);
-    let told = String::from_utf8(output.stderr).unwrap();
-    assert_eq!(output.status.code(), Some(1), "{told}");
+    let stderr = String::from_utf8(output.stderr).unwrap();
+    assert_eq!(output.status.code(), Some(1), "{stderr}");
     assert!(output.stdout.is_empty(), "a result beside an error");
     for part in parts {
-        assert!(told.contains(part), "`{part}` is not in\n{told}");
+        assert!(stderr.contains(part), "`{part}` is not in\n{stderr}");
     }
 }
 
-/// What the library prints of the test A150, options given.
+/// The equation of the test A150 from the library.
 fn of_library(language: Language, errors: &[&str], options: &Options) -> String {
     let session = read::session(&plan(), &ReadOptions::default()).unwrap();
     let test = session.tests.iter().find(|test| test.name == "A150").unwrap();
@@ -111,7 +111,7 @@ fn every_option_reaches_the_library_in_every_language() {
     }
 }
 
-/// A signature in each language that nothing but that language has.
+/// Each language is recognised by a signature of its own.
 #[test]
 fn the_error_vector_in_every_language() {
     let machine = machine();
@@ -141,10 +141,10 @@ fn the_error_vector_in_every_language() {
         "EX0C,EXX,EZC",
     ]);
     for line in [
-        // By hand at the machine without errors: Δ = Rz(−C)·Rx(−A)·(what moves the tool less what moves the table).
+        // By hand at the machine without errors: Δ = Rz(−C)·Rx(−A)·(displacement of the tool − displacement of the table).
         "∂Δ.x/∂e_x0c = −c_c\n",
         "∂Δ.y/∂e_x0c = s_c\n",
-        "∂Δ.x/∂e_xx  = c_c   (a fixed multiple of that of e_x0c)",
+        "∂Δ.x/∂e_xx  = c_c   (a constant multiple of that of e_x0c)",
         "∂Δ.z/∂e_zc  = −1\n",
         "e_xx is confounded with e_x0c",
     ] {
@@ -152,8 +152,8 @@ fn the_error_vector_in_every_language() {
     }
 }
 
-/// First order of the C test without extension, by hand: L₀ = R, ∂L/∂e = the unit vector of the bar, (−sin C, cos C, 0), times what
-/// the error moves; H = Z_CA is no reason to drop H − Z_CA.
+/// First order of the C test without extension, by hand: L₀ = R, and ∂L/∂e is the unit vector of the bar, (−sin C, cos C, 0), times the
+/// displacement by the error. H − Z_CA stays a symbol although H = Z_CA.
 #[test]
 fn the_first_order_is_a_sum_and_a_table() {
     let found = printed(&[
@@ -170,8 +170,8 @@ fn the_first_order_is_a_sum_and_a_table() {
         "L    ≈ L_0 + S/L_0",
         "∂L/∂e_y0a = (R·c_a − (H − Z_CA)·s_a)/L_0\n",
         "∂L/∂e_z0a = (R·s_a + (H − Z_CA)·c_a)/L_0\n",
-        "∂L/∂θ_y0a = 0   (not seen)",
-        "∂L/∂e_x0c = 0   (not seen)",
+        "∂L/∂θ_y0a = 0   (not observable)",
+        "∂L/∂e_x0c = 0   (not observable)",
         "Not contained: ",
         "Largest deviation from the exact chain over A −20° to 70°: ",
         " µm at errors of ±10 µm and ±0.01°, ",
@@ -180,9 +180,9 @@ fn the_first_order_is_a_sum_and_a_table() {
     }
 }
 
-/// The coordinates that a length is the norm of, and u = b/L carried back: what a reader can follow by hand.
+/// The vector whose norm is the length, and its unit vector u = b/L propagated back through the chain.
 #[test]
-fn derivatives_are_written_out_for_a_reader() {
+fn derivatives_are_printed_as_a_propagated_unit_vector() {
     let a150 = [
         "equation",
         text(&plan()),
@@ -213,16 +213,16 @@ fn derivatives_are_written_out_for_a_reader() {
     );
 }
 
-/// Unknowns of the bar beside errors of the machine: the length that is read is less by what the bar is longer.
+/// Parameters of the bar beside errors of the machine: a longer bar reduces the reading by the same amount.
 #[test]
-fn unknowns_of_the_instrument_are_kept_by_name() {
+fn instrument_parameters_are_kept_by_name() {
     let kept = ["--errors", "EY0A,bar,workpiece_ball.y"];
     let found = printed(&[&["equation", text(&plan()), "--test", "C100"][..], &kept].concat());
     assert!(found.contains("L = √(b.x² + b.y² + b.z²) − δ_bar"), "{found}");
     assert!(found.contains("error of the workpiece ball in y"), "{found}");
 }
 
-/// Readings say which axes move and how far; where they are not there, what is not held moves.
+/// Readings determine which axes move and how far. Without readings every axis moves that the test does not hold.
 #[test]
 fn a_measured_session_has_equations_too() {
     let measured = ready("hermle-c600u/measured/session.toml");
@@ -236,11 +236,11 @@ fn a_measured_session_has_equations_too() {
     }
     let alone = folder.path().join("session.toml");
     let output = abbe(&[&["equation", text(&alone)][..], &asked].concat());
-    let told = String::from_utf8(output.stderr).unwrap();
-    assert!(output.status.success(), "{told}");
+    let stderr = String::from_utf8(output.stderr).unwrap();
+    assert!(output.status.success(), "{stderr}");
     assert!(
-        told.contains("A100.csv") && told.contains("made without readings"),
-        "{told}"
+        stderr.contains("A100.csv") && stderr.contains("made without readings"),
+        "{stderr}"
     );
     let found = String::from_utf8(output.stdout).unwrap();
     assert!(found.contains("position of axis X"), "{found}");
@@ -255,7 +255,7 @@ fn a_file_is_written_whole_or_not_at_all() {
     let shown = printed(&latex);
     assert_eq!(printed(&[&latex[..], &["--out", text(&file)]].concat()), "");
     assert_eq!(fs::read_to_string(&file).unwrap().trim_end(), shown.trim_end());
-    // What cannot be written leaves the old file as it is and nothing beside it.
+    // If the file cannot be written, the old file is unchanged and no temporary file remains.
     refused(
         &[&latex[..], &["--errors", "EX0B", "--out", text(&file)]].concat(),
         &["EX0B"],
@@ -277,7 +277,7 @@ fn a_file_is_written_whole_or_not_at_all() {
     assert_eq!(fs::read_dir(folder.path()).unwrap().count(), 1);
 }
 
-/// By hand: a stylus at (x, y) is √(x² + y²) from the axis, and a shift of the cylinder along X brings the surface nearer by its part along the way.
+/// By hand: a stylus at (x, y) is √(x² + y²) from the axis; a shift of the cylinder along X reduces the reading by its component along the probing direction.
 #[test]
 fn the_reading_of_a_probe_in_every_language() {
     let session = ready("self-calibration/session.toml");
@@ -291,7 +291,7 @@ fn the_reading_of_a_probe_in_every_language() {
         "L_0² = y² + x²",
         "d    ≈ L_0 − R + S/L_0 − δ_radius",
         "∂d/∂e_x0c    = −x/L_0",
-        "∂d/∂e_xx     = x/L_0   (a fixed multiple of that of e_x0c)",
+        "∂d/∂e_xx     = x/L_0   (a constant multiple of that of e_x0c)",
     ] {
         assert!(first.contains(line), "{first}");
     }
@@ -327,13 +327,13 @@ fn the_reading_of_a_probe_in_every_language() {
 }
 
 #[test]
-fn what_cannot_be_is_said() {
+fn invalid_requests_are_refused_with_the_reason() {
     let (plan, machine) = (plan(), machine());
     let a150 = |more: &[&'static str]| -> Vec<String> {
         let start = ["equation", text(&plan), "--test", "A150"];
         start.iter().chain(more).map(|word| (*word).to_string()).collect()
     };
-    let told = |more: &[&'static str], parts: &[&str]| {
+    let refused_with = |more: &[&'static str], parts: &[&str]| {
         let arguments = a150(more);
         refused(&arguments.iter().map(String::as_str).collect::<Vec<_>>(), parts);
     };
@@ -341,13 +341,16 @@ fn what_cannot_be_is_said() {
         &["equation", text(&plan), "--test", "A200"],
         &["no test `A200`", "A100, A150, C100, C150"],
     );
-    told(&["--errors", "EQ0C"], &["`EQ0C` is no parameter of an equation", "EX0C"]);
-    told(
+    refused_with(
+        &["--errors", "EQ0C"],
+        &["`EQ0C` is no parameter of an equation", "EX0C"],
+    );
+    refused_with(
         &["--errors", "EX0B"],
         &["`EX0B` is an error of axis `B`", "does not have"],
     );
-    told(&["--errors", "EX0C,e_x0c"], &["`EX0C` is named twice"]);
-    told(
+    refused_with(&["--errors", "EX0C,e_x0c"], &["`EX0C` is named twice"]);
+    refused_with(
         &["--errors", "tracker.a"],
         &["another instrument", "workpiece_ball.x"],
     );
@@ -377,7 +380,7 @@ fn what_cannot_be_is_said() {
     }
 }
 
-/// A Python with NumPy: that of `ABBE_PYTHON`, else the system's. Without one the test that asks is skipped by name, but in CI.
+/// A Python with NumPy: that of `ABBE_PYTHON`, otherwise that of the system. Without one the test prints that it is skipped; in CI it fails.
 pub(super) fn python(test: &str) -> Option<String> {
     let own = std::env::var("ABBE_PYTHON").unwrap_or_default();
     let runs = |name: &String| {
@@ -395,11 +398,11 @@ pub(super) fn python(test: &str) -> Option<String> {
     found
 }
 
-/// The printed Python of a session's test, run by Python alone, against the length of a triangle: without errors the balls of the C test
-/// without extension are R apart whatever C; with the axis 0.3 mm off in X the length is √(R² + 0.09 − 2·0.3·R·sin C).
+/// The printed Python, run by Python, against the length of a triangle. Without errors the balls of the C test without extension are R
+/// apart at any C. With the axis displaced by 0.3 mm in X the length is √(R² + 0.09 − 2·0.3·R·sin C).
 #[test]
-fn printed_code_runs_as_it_is_written() {
-    let Some(python) = python("printed_code_runs_as_it_is_written") else {
+fn printed_code_runs_unchanged() {
+    let Some(python) = python("printed_code_runs_unchanged") else {
         return;
     };
     let folder = tempfile::tempdir().unwrap();

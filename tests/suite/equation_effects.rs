@@ -1,4 +1,4 @@
-//! `abbe equation` of sessions that declare effects: what a user meets, and the printed code against geometry by hand.
+//! `abbe equation` of sessions that declare effects: the output, and the printed code against geometry by hand.
 
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -36,7 +36,7 @@ fn session(folder: &Path, effects: &str) -> PathBuf {
 }
 
 #[test]
-fn declared_effects_are_written_in_where_they_act() {
+fn declared_effects_appear_where_they_act() {
     let folder = tempfile::tempdir().unwrap();
     let file = session(folder.path(), EFFECTS);
     let asked = |test: &'static str, more: &[&'static str]| {
@@ -54,7 +54,7 @@ fn declared_effects_are_written_in_where_they_act() {
     }
     assert!(!c100.contains("EBA~A"), "{c100}");
     assert!(asked("A150", &[]).contains("(EBA~A:backlash[A150])"));
-    // What is not named is zero.
+    // Effects that are not named are zero.
     let one = asked("C100", &["--errors", "EX0C,bar~time:warmup", "--order", "first"]);
     assert!(one.contains("exp(−t/900)"), "{one}");
     assert!(!one.contains("EZC") && !one.contains("θ_x0c"), "{one}");
@@ -78,11 +78,11 @@ fn declared_effects_are_written_in_where_they_act() {
     );
 }
 
-/// Python alone runs what is printed: the ball of the C test wobbles in Z by e = k₁ cos 2C + k₂ sin 2C on a radius of 100 mm, and the bar has
-/// grown by k₃ (1 − exp(−t/900)), so that it reads √(R² + e²) less what it has grown.
+/// Python runs the printed code. The ball of the C test moves in Z by e = k₁ cos 2C + k₂ sin 2C on a radius of 100 mm, and the bar expands by
+/// k₃ (1 − exp(−t/900)), so the reading is √(R² + e²) minus the expansion.
 #[test]
-fn printed_effects_run_as_they_are_written() {
-    let Some(python) = python("printed_effects_run_as_they_are_written") else {
+fn printed_effects_run_unchanged() {
+    let Some(python) = python("printed_effects_run_unchanged") else {
         return;
     };
     let folder = tempfile::tempdir().unwrap();

@@ -1,5 +1,5 @@
-//! Faults around the program: full disks, outputs that cannot be written, pipes, files that lead elsewhere. The work is done, or a message
-//! says why not; what was there before still is.
+//! Faults of the environment: full disks, outputs that cannot be written, pipes, links. The command succeeds, or a message states the reason and
+//! existing files are unchanged.
 #![cfg(unix)]
 
 use std::fs;
@@ -65,7 +65,7 @@ impl Place {
         abbe(&[&["fit", text(&session)], arguments].concat())
     }
 
-    /// A shell's line in the folder, `abbe` being the program.
+    /// Runs a shell line in the folder, with `abbe` as the program.
     pub fn shell(&self, line: &str) -> Output {
         let path = std::env::var("PATH").unwrap_or_default();
         let folder = Path::new(PROGRAM).parent().unwrap();
@@ -88,13 +88,13 @@ impl Place {
     }
 }
 
-/// The message of a command that could not do its work.
+/// Asserts exit status 1 and these parts of the message.
 #[track_caller]
 fn refused(output: &Output, parts: &[&str]) {
-    let told = String::from_utf8_lossy(&output.stderr);
-    assert_eq!(output.status.code(), Some(1), "{told}");
+    let stderr = String::from_utf8_lossy(&output.stderr);
+    assert_eq!(output.status.code(), Some(1), "{stderr}");
     for part in parts {
-        assert!(told.contains(part), "`{part}` is not in\n{told}");
+        assert!(stderr.contains(part), "`{part}` is not in\n{stderr}");
     }
 }
 
@@ -108,7 +108,7 @@ fn done(output: &Output) {
 }
 
 #[test]
-fn a_session_that_reads_outside_has_to_be_allowed_to() {
+fn a_session_that_reads_outside_its_folder_needs_permission() {
     let place = Place::new();
     fs::create_dir(place.at("inner")).unwrap();
     place.put(
@@ -128,13 +128,13 @@ fn a_session_that_reads_outside_has_to_be_allowed_to() {
             &output,
             &[
                 "session.toml:",
-                "leads out of the session's folder",
+                "is outside the session's folder",
                 "--allow-outside",
             ],
         );
         done(&place.shell(&format!("abbe {command} --allow-outside")));
     }
-    // The folder that the command line names is the user's own word.
+    // A folder on the command line is permitted.
     done(&place.shell("abbe fit inner/session.toml --data inner/.."));
 }
 
@@ -146,7 +146,7 @@ fn a_full_standard_output() {
 }
 
 #[test]
-fn a_reader_that_has_seen_enough() {
+fn a_closed_pipe_ends_without_a_message() {
     let place = Place::new();
     let output = place.shell("abbe fit session.toml | head -n 1");
     assert!(
@@ -168,8 +168,8 @@ fn a_full_device_for_a_file() {
 }
 
 #[test]
-fn a_full_disk_leaves_what_was_there() {
-    // Files of at most one block can be written: what a full disk says, said without a disk to fill.
+fn a_full_disk_leaves_existing_files_unchanged() {
+    // The limit on the file size is one block: the same error as on a full disk.
     for (option, file) in [
         ("--report", "out.html"),
         ("--json", "out.json"),
@@ -285,7 +285,7 @@ fn an_output_that_would_replace_an_input() {
 }
 
 #[test]
-fn a_folder_that_is_not_there() {
+fn a_missing_folder() {
     let place = Place::new();
     let output = place.fit(&["--csv", text(&place.at("nowhere/out.csv"))]);
     refused(
@@ -320,7 +320,7 @@ fn a_folder_for_a_file() {
 
 #[test]
 #[cfg(target_os = "linux")]
-fn a_folder_in_which_nobody_may_write() {
+fn a_write_protected_folder() {
     let place = Place::new();
     refused(
         &place.fit(&["--json", "/proc/out.json"]),
@@ -353,7 +353,7 @@ fn a_pipe_for_a_session() {
     let fitted = place.shell("cat session.toml | abbe fit /dev/stdin --data .");
     done(&fitted);
     assert_eq!(fitted.stdout, place.fit(&[]).stdout);
-    // What comes through a pipe is written from what was read, and has no checksum afterwards.
+    // Input from a pipe is used as read, and has no checksum afterwards.
     done(&place.shell("cat session.toml | abbe simulate /dev/stdin --data . --out new"));
     assert!(
         fs::read_to_string(place.at("new/session.toml"))
@@ -385,7 +385,7 @@ fn cells_at_opposite_corners_of_a_sheet() {
     );
     refused(
         &place.fit(&[]),
-        &["far.xlsx: cells from column 1 to column 16384; 1000 columns are the most"],
+        &["far.xlsx: cells from column 1 to column 16384; the limit is 1000 columns"],
     );
 }
 
@@ -409,13 +409,13 @@ fn names_that_are_formulas_are_text_in_a_spreadsheet() {
             "{name}: {:?}",
             rows[0]
         );
-        // Numbers stay numbers, those below zero too.
+        // Numbers stay numbers, including negative ones.
         assert!(rows.iter().any(|row| row[row.len() - 1].starts_with('-')));
     }
 }
 
 #[test]
-fn what_steers_a_terminal_is_not_shown_to_one() {
+fn control_characters_are_not_shown() {
     let place = Place::new();
     let table = fs::read_to_string(place.at("circle.csv")).unwrap();
     place.put(

@@ -1,4 +1,4 @@
-//! Files of the field: the same readings from a spreadsheet, from other people's columns and from ball-bar XML give the same fit.
+//! Foreign files: the same readings from a spreadsheet, from other column names and from ball-bar XML give the same fit.
 
 use std::path::{Path, PathBuf};
 
@@ -8,7 +8,7 @@ use serde_json::Value;
 use super::{abbe, text};
 use crate::plant::{AxisName, Component, Driver, Freedom, Injected, Kind, Recipe, Shape};
 
-/// A session of circles in a folder: its rows by column, test by test.
+/// Writes a session of circles and returns for each test its name, its columns and its rows.
 fn circles(folder: &Path) -> Vec<(String, Vec<String>, Vec<Vec<f64>>)> {
     let backlash = Injected::new(
         Component::Motion(Freedom::Y, AxisName::Y),
@@ -38,8 +38,8 @@ fn fit(session: &Path) -> Value {
     serde_json::from_slice(&std::fs::read(&file).unwrap()).unwrap()
 }
 
-/// What a session that cannot be used is told.
-fn told(session: &Path) -> String {
+/// The error message of a session that is refused.
+fn message_of(session: &Path) -> String {
     let run = abbe(&["fit", text(session)]);
     assert_eq!(
         run.status.code(),
@@ -58,12 +58,12 @@ fn rewritten(folder: &Path, name: &str, change: impl Fn(String) -> String) -> Pa
 }
 
 #[test]
-fn a_spreadsheet_reads_as_its_rows() {
+fn a_spreadsheet_gives_the_same_fit() {
     let folder = tempfile::tempdir().unwrap();
     let folder = folder.path();
     let tests = circles(folder);
     let expected = fit(&folder.join("session.toml"));
-    // Other names, another order, a title nobody reads among comments, both tests in one book.
+    // Other names, another order, a title as a comment, both tests in one spreadsheet.
     let theirs = ["Zeit", "Lauf", "X-Position", "Y-Position", "Z", "A", "C", "Länge"];
     let mut book = Workbook::new();
     for (test, _, rows) in &tests {
@@ -102,17 +102,17 @@ fn a_spreadsheet_reads_as_its_rows() {
     let several = rewritten(folder, "several.toml", |session| {
         in_book(session).replace("format = { sheet = \"XY-F1000\" }", "")
     });
-    let message = told(&several);
+    let message = message_of(&several);
     assert!(
-        message.contains("several sheets hold cells: XY-F1000, XY-F3000") && message.contains("sheet = "),
+        message.contains("several sheets contain cells: XY-F1000, XY-F3000") && message.contains("sheet = "),
         "{message}"
     );
     let none = rewritten(folder, "none.toml", |session| {
         in_book(session).replace("sheet = \"XY-F1000\"", "sheet = \"YZ\"")
     });
-    assert!(told(&none).contains("there is no sheet `YZ`"));
+    assert!(message_of(&none).contains("there is no sheet `YZ`"));
     std::fs::write(folder.join("circles.xlsx"), "no zip at all").unwrap();
-    let message = told(&rewritten(folder, "broken.toml", in_book));
+    let message = message_of(&rewritten(folder, "broken.toml", in_book));
     assert!(
         message.contains("circles.xlsx: the spreadsheet cannot be read"),
         "{message}"
@@ -120,7 +120,7 @@ fn a_spreadsheet_reads_as_its_rows() {
 }
 
 #[test]
-fn a_cell_that_is_no_number_is_named_by_row_and_column() {
+fn a_cell_without_a_number_is_an_error_with_row_and_column() {
     let folder = tempfile::tempdir().unwrap();
     let folder = folder.path();
     let (test, header, rows) = circles(folder).swap_remove(0);
@@ -136,7 +136,7 @@ fn a_cell_that_is_no_number_is_named_by_row_and_column() {
     }
     sheet.write_string(7, 2, "about 99").unwrap();
     book.save(folder.join("one.xlsx")).unwrap();
-    let message = told(&rewritten(folder, "one.toml", |session| {
+    let message = message_of(&rewritten(folder, "one.toml", |session| {
         session.replace(&format!("{test}.csv"), "one.xlsx")
     }));
     assert!(
@@ -145,7 +145,7 @@ fn a_cell_that_is_no_number_is_named_by_row_and_column() {
     );
 }
 
-/// Ball-bar XML of a test's runs: deviations from 100 mm in µm.
+/// Ball-bar XML of the runs of a test: deviations from 100 mm in µm.
 fn xml(rows: &[Vec<f64>], run: &dyn Fn(usize, &str, &str) -> String) -> String {
     let mut text = String::from(
         "<?xml version=\"1.0\"?>\n<BALLBAR_TEST>\n<OPERATOR>N.N.</OPERATOR><PLANE TEST_PLANE=\"XY\"/>\n",
@@ -166,7 +166,7 @@ fn xml(rows: &[Vec<f64>], run: &dyn Fn(usize, &str, &str) -> String) -> String {
 }
 
 #[test]
-fn ball_bar_xml_reads_as_its_rows() {
+fn ball_bar_xml_gives_the_same_fit() {
     let folder = tempfile::tempdir().unwrap();
     let folder = folder.path();
     let tests = circles(folder);
@@ -228,7 +228,7 @@ fn ball_bar_xml_reads_as_its_rows() {
             "{warnings}"
         );
     }
-    // UTF-16, as programs of one system write it.
+    // UTF-16, as some programs write it.
     let (test, _, rows) = &tests[0];
     let wide: Vec<u8> = std::iter::once(0xfeff)
         .chain(xml(rows, &in_elements).encode_utf16())
@@ -238,12 +238,12 @@ fn ball_bar_xml_reads_as_its_rows() {
     std::fs::write(&file, wide).unwrap();
     fit(&rewritten(folder, "wide.toml", path));
 
-    // What the file does not say is asked for, not guessed.
+    // Information that the file lacks is requested, not guessed.
     let session = rewritten(folder, "xml.toml", path);
     let says = |contents: &str, message: &str| {
         std::fs::write(&file, contents).unwrap();
-        let said = told(&session);
-        assert!(said.contains(message), "{message}: {said}");
+        let stderr = message_of(&session);
+        assert!(stderr.contains(message), "{message}: {stderr}");
     };
     let good = xml(rows, &in_elements);
     says(
@@ -265,7 +265,7 @@ fn ball_bar_xml_reads_as_its_rows() {
         &good.replace("<READINGS>", "<READINGS>dropout "),
         "READINGS: `dropout` is not a number",
     );
-    says(&good.replace("READINGS", "VALUES"), "no element READINGS in it");
+    says(&good.replace("READINGS", "VALUES"), "it has no element READINGS");
     says(
         &good[..good.find("<READINGS>").unwrap() + 40],
         "it ends within <READINGS>",
@@ -281,19 +281,19 @@ fn ball_bar_xml_reads_as_its_rows() {
         )
     }));
     std::fs::write(&file, &good).unwrap();
-    let message = told(&rewritten(folder, "unit.toml", |session| {
+    let message = message_of(&rewritten(folder, "unit.toml", |session| {
         path(session).replace("columns = { deviation_um = \"READINGS\" }", "")
     }));
     assert!(
-        message.contains("in which unit its READINGS are") && message.contains("deviation_um = "),
+        message.contains("does not state the unit of its READINGS") && message.contains("deviation_um = "),
         "{message}"
     );
 }
 
-/// The direction of a run as files say it: whatever is stated for other words, CCW and CW speak for themselves; numbers and truth values are the stated one
-/// or the other. A session that runs forward only is told of runs backward.
+/// The direction of a run in files: CCW and CW have their meaning whatever the session states for other words; numbers and booleans are the stated
+/// value or the opposite. A session that states forward runs only is warned of backward runs.
 #[test]
-fn the_direction_of_a_run_is_read_as_it_is_meant() {
+fn the_direction_of_a_run_is_read_from_words_numbers_and_booleans() {
     let folder = tempfile::tempdir().unwrap();
     let folder = folder.path();
     let tests = circles(folder);
@@ -337,7 +337,7 @@ fn the_direction_of_a_run_is_read_as_it_is_meant() {
             .replace(">+<", &format!(">{}<", words[0]));
         std::fs::write(folder.join(format!("{test}.b5r")), file).unwrap();
         let read = fit(&session(more, true));
-        // Backlash of Y, 4 µm, has the sign of the direction; a wrong one would turn it.
+        // The backlash of Y, 4 µm, has the sign of the direction; a wrong direction would invert it.
         let values = [&read, &expected].map(|fit| figure(&g(fit), "backlash", "Y+"));
         assert!(
             (values[0] - values[1]).abs() < 0.01 && values[0] > 3.0,
@@ -347,7 +347,7 @@ fn the_direction_of_a_run_is_read_as_it_is_meant() {
         assert!(!warnings.contains("forward"), "{warnings}");
         let warnings = fit(&session(more, false))["warnings"].to_string();
         assert!(
-            warnings.contains("backward where the session states runs = 1, both_directions = false"),
+            warnings.contains("backward, but the session states runs = 1, both_directions = false"),
             "{warnings}"
         );
     }
@@ -356,14 +356,14 @@ fn the_direction_of_a_run_is_read_as_it_is_meant() {
         .replace(">CCW<", ">0<")
         .replace(">CW<", ">1<");
     std::fs::write(folder.join(format!("{test}.b5r")), three).unwrap();
-    let said = told(&session("format = { anticlockwise = \"0\" }", true));
+    let stderr = message_of(&session("format = { anticlockwise = \"0\" }", true));
     assert!(
-        said.contains("RUN_DIRECTION is `") && said.contains("the other one in this file"),
-        "{said}"
+        stderr.contains("RUN_DIRECTION is `") && stderr.contains("the other word in this file"),
+        "{stderr}"
     );
 }
 
-/// Notes of the measurement, and the ball-bar figures, stand in the report; the notes in JSON as well.
+/// The report contains the notes of the measurement and the ball-bar figures; the JSON contains the notes.
 #[test]
 fn notes_and_ball_bar_figures_are_in_the_report() {
     let folder = tempfile::tempdir().unwrap();
@@ -421,9 +421,9 @@ fn notes_and_ball_bar_figures_are_in_the_report() {
     }
 }
 
-/// A report offers `--improve` where it is taken, and nowhere else: another instrument than a ball bar, or no rotary axis, is refused.
+/// A report suggests `--improve` only if the command accepts it: it is refused for other instruments than a ball bar and without a rotary axis.
 #[test]
-fn a_report_offers_no_command_that_is_refused() {
+fn a_report_suggests_no_command_that_is_refused() {
     let folder = tempfile::tempdir().unwrap();
     let report = folder.path().join("report.html");
     let offers = |session: &Path| {

@@ -1,4 +1,4 @@
-//! The geometric methods of the thesis on lengths that plain matrices give: what they find, what they miss by their own making, and which printed signs fail.
+//! The geometric methods of the thesis on lengths from plain matrices: their results, their bias, and the printed signs that are wrong.
 
 use abbe::identify::circle;
 use abbe::identify::fit::prepare;
@@ -73,7 +73,7 @@ fn plan(chapter: &str) -> Session {
     session
 }
 
-/// Lengths by Eqs. 3.2 and 3.3 as homogeneous transformations: location errors, then the turn. `moved` displaces the workpiece ball.
+/// Lengths by Eqs. 3.2 and 3.3 as homogeneous transformations: location errors, then the rotation. `moved` displaces the workpiece ball.
 fn measured(plan: &Session, errors: &Errors, moved: [f64; 3], noise: Option<(f64, u64)>) -> Session {
     let mut session = plan.clone();
     let machine = plan.machine.clone();
@@ -114,7 +114,7 @@ fn problem(session: &Session) -> Problem<'_> {
     Problem::new(session, Noise::white(0.3e-3, NoiseSource::Stated), 1).unwrap()
 }
 
-/// Errors by a method, µm and arcsec, in the order of [`IDS`]; NaN where it tells none.
+/// Errors by a method, µm and arcsec, in the order of [`IDS`]; NaN if the method gives no value.
 fn by(session: &Session, method: Method) -> [f64; 8] {
     let problem = problem(session);
     let estimator = Estimator::new(&problem, method).unwrap();
@@ -142,7 +142,8 @@ fn by(session: &Session, method: Method) -> [f64; 8] {
 fn centre(session: &Session, test: &str) -> [f64; 2] {
     let problem = problem(session);
     let place = problem.tests.iter().position(|known| known.name == test).unwrap();
-    let layout = abbe::identify::geometric::Layout::of(&session.machine, &problem.models[place]).unwrap();
+    let layout =
+        abbe::identify::geometric::CircleGeometry::of(&session.machine, &problem.models[place]).unwrap();
     let observed = &problem.tests[place].readings.as_ref().unwrap().observed;
     let left_out = vec![false; observed.len()];
     layout
@@ -152,11 +153,11 @@ fn centre(session: &Session, test: &str) -> [f64; 2] {
         .map(|mm| mm * 1e3)
 }
 
-/// A ball displaced by `t` along its path is plotted `t²/R` off the true circle; over an arc of 90° the centre follows by 1.75 times as much at most.
-/// The axes pass within 50 µm of the ball (0.044 µm), within 64 µm at the second places of Chapter 6 (0.07 µm); an angle is a difference of two
-/// centres over its lever.
+/// A ball that is displaced by `t` along its path is plotted `t²/R` off the true circle; over an arc of 90° the centre shifts by at most 1.75 times as
+/// much. The axes pass within 50 µm of the ball (0.044 µm), within 64 µm at the second positions of Chapter 6 (0.07 µm). An angle is the difference of
+/// two centres over its lever.
 #[test]
-fn the_tables_of_the_thesis_come_back_by_each_method_within_its_own_bias() {
+fn each_method_recovers_its_table_of_the_thesis_within_its_bias() {
     for (chapter, method, values) in TABLES {
         let session = measured(&plan(chapter), &table(values), [0.0; 3], None);
         for (k, (found, given)) in by(&session, method).into_iter().zip(values).enumerate() {
@@ -168,7 +169,7 @@ fn the_tables_of_the_thesis_come_back_by_each_method_within_its_own_bias() {
                 IDS[k]
             );
         }
-        // The plain circle tells positions as well, from the planes at the origin.
+        // The circle method also gives positions, from the planes at the origin.
         if chapter != "chapter6" {
             for (k, (found, given)) in by(&session, Method::Circle).into_iter().zip(values).enumerate() {
                 if k % 4 >= 2 {
@@ -185,10 +186,10 @@ fn the_tables_of_the_thesis_come_back_by_each_method_within_its_own_bias() {
     }
 }
 
-/// What a circle makes of orientation errors where its plane lies off the origin is the lever times the angle, and nothing else: the conversion
-/// between local and reference position errors.
+/// If its plane is off the origin, the circle method adds the lever times the angle to a position: the conversion between local and reference position
+/// errors.
 #[test]
-fn local_position_errors_are_those_of_the_reference_and_the_lever() {
+fn local_position_errors_are_reference_errors_plus_lever_times_angle() {
     let (_, _, values) = TABLES[2];
     let errors = table(values);
     let session = measured(&plan("chapter6"), &errors, [0.0; 3], None);
@@ -222,14 +223,14 @@ fn local_position_errors_are_those_of_the_reference_and_the_lever() {
 
 /// Sections 4.2.1 and 5.2 take the angles from the foot point E of the cone: `O'E = O'P − EP`.
 #[test]
-fn of_the_cone_chapter_4_has_the_right_axes_chapter_5_swaps_them() {
+fn the_cone_has_the_axes_of_chapter_4_and_chapter_5_exchanges_them() {
     let lever = (149.9946_f64.powi(2) - 100.0_f64.powi(2)).sqrt();
     let errors = table([35.3, -33.4, 12.0, -5.0, 0.0, 0.0, 0.0, 0.0]);
     let session = measured(&plan("chapter5"), &errors, [0.0; 3], None);
     let (plane, cone) = (centre(&session, "A100"), centre(&session, "A150"));
     let foot = [plane[0] - cone[0], plane[1] - cone[1]];
     let angle = |offset_um: f64| (offset_um * 1e-3 / lever).atan() / ARCSEC;
-    // As it holds: θ_z0a = +Y/D, θ_y0a = −Z/D.
+    // The correct relations: θ_z0a = +Y/D, θ_y0a = −Z/D.
     assert!((angle(foot[0]) - -5.0).abs() < 0.05, "{foot:?}");
     assert!((-angle(foot[1]) - 12.0).abs() < 0.05, "{foot:?}");
     // Chapter 4 prints +Z/D for θ_y0a; Chapter 5 takes it from Y.
@@ -242,11 +243,11 @@ fn of_the_cone_chapter_4_has_the_right_axes_chapter_5_swaps_them() {
     );
 }
 
-/// Eq. 4.1: a pivot that was found 0.4 mm along its path starts `δ = atan(0.4/100)` further. Stated where it was found, the angle is right.
+/// Eq. 4.1: a pivot that is 0.4 mm further along its path starts at `δ = atan(0.4/100)`. With its true position stated, the angle is correct.
 #[test]
-fn a_start_angle_is_corrected_by_saying_where_the_ball_was_found() {
+fn stating_the_true_ball_position_corrects_the_start_angle() {
     let errors = table([35.3, -33.4, 0.0, 0.0, 1.3, -52.9, 0.0, 0.0]);
-    // The plan's ball lies at 100 mm along Y; off by 0.4 mm along −X for C.
+    // The ball of the plan is at 100 mm along Y, displaced by 0.4 mm along −X for C.
     let moved = [-0.4, 0.0, 0.0];
     let mut session = measured(&plan("chapter5"), &errors, moved, None);
     let uncorrected = centre(&session, "C100");
@@ -260,7 +261,7 @@ fn a_start_angle_is_corrected_by_saying_where_the_ball_was_found() {
     for (found, expected) in corrected.iter().zip(expected) {
         assert!((found - expected).abs() < 0.005, "{corrected:?}");
     }
-    // Uncorrected, the centre is turned by δ about the origin.
+    // Without correction the centre is rotated by δ about the origin.
     let delta = (0.4_f64 / 100.0).atan();
     let turned = [
         delta.cos() * expected[0] + delta.sin() * expected[1],
@@ -272,9 +273,9 @@ fn a_start_angle_is_corrected_by_saying_where_the_ball_was_found() {
     assert!((uncorrected[0] - expected[0]).abs() > 0.05);
 }
 
-/// Section 4.2: the distortion is below 0.2 µm for eccentricities below 100 µm. A ball off by `t` along its path is read `t²/2R` long and plotted `t²/R` off the
-/// circle: 0.10 µm at 100 µm and R = 100 mm, 0.2 µm at 141 µm. Over a full turn the centre does not follow; over 90° it does, by 0.17 µm at 100 µm
-/// and 0.2 µm at 107 µm.
+/// Section 4.2: the distortion is below 0.2 µm for eccentricities below 100 µm. A ball displaced by `t` along its path reads `t²/2R` long and is plotted
+/// `t²/R` off the circle: 0.10 µm at 100 µm and R = 100 mm, 0.2 µm at 141 µm. A full turn does not shift the centre; an arc of 90° shifts it by 0.17 µm
+/// at 100 µm and by 0.2 µm at 107 µm.
 #[test]
 fn the_distortion_by_eccentricity_is_below_a_fifth_of_a_micrometre_up_to_141_micrometres() {
     let radius = 100.0;
@@ -322,7 +323,7 @@ fn the_distortion_by_eccentricity_is_below_a_fifth_of_a_micrometre_up_to_141_mic
 }
 
 #[test]
-fn uncertainties_of_the_cone_cover_what_noise_and_set_ups_do() {
+fn uncertainties_of_the_cone_cover_noise_and_set_ups() {
     let mut plan = plan("chapter5");
     for test in &mut plan.tests {
         if let Some(Motion::Sweep { step, .. }) = &mut test.motion {
@@ -360,13 +361,13 @@ fn uncertainties_of_the_cone_cover_what_noise_and_set_ups_do() {
         }
     }
     for (id, square) in IDS.iter().zip(squares) {
-        // Three standard deviations of the mean of as many squares, and the bias of an arc.
+        // Three standard deviations of the mean of that many squares, and the bias of an arc.
         assert!((square - 1.0).abs() < 0.5, "{id}: {square}");
     }
 }
 
 #[test]
-fn one_command_shows_both_on_the_same_readings() {
+fn one_command_shows_method_and_full_fit_on_the_same_readings() {
     let session = measured(
         &plan("chapter5"),
         &table(TABLES[1].2),
@@ -385,14 +386,14 @@ fn one_command_shows_both_on_the_same_readings() {
             .unwrap();
         let unit = problem.parameters.list[place].unit.display_per_internal;
         assert!((row.full_value.unwrap() - full.beta[place] * unit).abs() < 1e-9);
-        // The full fit uses every reading for every error: it knows no less.
+        // The full fit uses every reading for every error: its uncertainty is not larger.
         assert!(row.full_u.unwrap() <= row.u.unwrap() * 1.001, "{row:?}");
         assert!(
             row.bias.unwrap().abs() < 0.08 && row.full_bias.unwrap().abs() < 1e-6,
             "{row:?}"
         );
     }
-    // Compensation (Figs. 5.3, 5.4): what is left is the noise.
+    // Compensation (Figs. 5.3, 5.4): the residual is the noise.
     assert!(comparison.nominal_rms_um > 20.0 && comparison.method_rms_um < 0.33);
 
     let folder = tempfile::tempdir().unwrap();
@@ -417,9 +418,9 @@ fn one_command_shows_both_on_the_same_readings() {
     assert!(String::from_utf8_lossy(&refused.stderr).contains("two tests in planes apart"));
 }
 
-/// Chapter 7 (Figs. 7.1, 7.2): the method of Chapter 5 where rotary axes carry the spindle. The values are those that the sessions' own notes give.
+/// Chapter 7 (Figs. 7.1, 7.2): the method of Chapter 5 with rotary axes that carry the spindle. The true values are in the comments of the sessions.
 #[test]
-fn heads_that_tilt_are_identified_by_both_ways() {
+fn tilting_heads_are_identified_by_method_and_full_fit() {
     let cases = [
         (
             "tilting-head",
@@ -463,7 +464,7 @@ fn heads_that_tilt_are_identified_by_both_ways() {
             assert!(row.bias.unwrap().abs() < 0.02, "{name}: {row:?}");
         }
     }
-    // Where A lies along Y from where C lies is all that a table and a head show: with both errors unknown neither way gives a number.
+    // For a table and a head only the offset of A from C along Y is identifiable: with both errors as parameters neither method gives a value.
     let path = ready("table-and-head/measured/session.toml");
     let mut session = read::session(&path, &ReadOptions::default()).unwrap();
     session

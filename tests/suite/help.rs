@@ -1,4 +1,4 @@
-//! The help teaches by examples, and every one of them runs.
+//! Every example of the help texts runs.
 
 use std::path::Path;
 use std::process::Command;
@@ -7,7 +7,7 @@ use super::{abbe, workspace};
 
 /// The lines of a help that begin with `abbe`.
 fn examples(help: &str) -> Vec<String> {
-    // A backslash at the end of a line goes on, as in a shell.
+    // A backslash at the end of a line continues it, as in a shell.
     help.replace("\\\n", "")
         .lines()
         .filter_map(|line| line.strip_prefix("  "))
@@ -16,7 +16,7 @@ fn examples(help: &str) -> Vec<String> {
         .collect()
 }
 
-/// Arguments as a shell parts them: by spaces, outside quotes.
+/// Arguments separated as by a shell: at spaces outside quotes.
 fn words(line: &str) -> Vec<String> {
     let mut words = vec![String::new()];
     let mut quoted = false;
@@ -61,7 +61,7 @@ fn every_example_of_the_help_runs() {
     assert!(commands.len() >= 9, "{commands:?}");
     let mut lines = examples(&whole);
     assert!(lines.len() >= 6, "{whole}");
-    // What an example reads another one writes: readings come first.
+    // Some examples read the outputs of others: simulated readings come first.
     let mut later = Vec::new();
     for command in commands {
         let of_command = examples(&help(&[command, "--help"]));
@@ -102,7 +102,7 @@ fn completions_are_written_for_every_shell() {
             assert!(script.contains(word), "{shell} does not complete {word}");
         }
     }
-    // bash takes what is meant for it.
+    // bash accepts its completion script.
     let mut bash = Command::new("bash")
         .arg("-n")
         .stdin(std::process::Stdio::piped())

@@ -1,4 +1,4 @@
-//! Ctrl-C: an interrupted trace hands over the effects found until then and says everywhere that it is incomplete.
+//! Ctrl-C: an interrupted trace reports the effects found until then, and every output states that it is incomplete.
 #![cfg(unix)]
 
 use std::io::{BufRead, BufReader, Read};
@@ -9,13 +9,13 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 use std::time::{Duration, Instant};
 
 use abbe::identify::results::TraceResult;
-use abbe::identify::trace::{Progress, Trace, TraceOptions, trace};
+use abbe::identify::trace::{Progress, TraceOptions, TraceOutcome, trace};
 use abbe::model::session::Session;
 use abbe::model::session::read::{self, ReadOptions};
 
 use super::{ready, text};
 
-/// As shells give it for SIGINT.
+/// The exit status of shells for SIGINT.
 const INTERRUPTED: i32 = 130;
 
 fn start(arguments: &[&str]) -> Child {
@@ -35,28 +35,28 @@ fn interrupt(child: &Child) {
     assert!(sent.unwrap().success());
 }
 
-/// What a program says until its search has found the first effect, and its messages from then on.
+/// The messages of a program until its search has found the first effect, and the reader of its later messages.
 fn until_the_first_effect(child: &mut Child) -> (BufReader<ChildStderr>, String) {
     let mut messages = BufReader::new(child.stderr.take().unwrap());
-    let mut said = String::new();
-    while !said.lines().any(|line| line.starts_with("  + ")) {
+    let mut stderr = String::new();
+    while !stderr.lines().any(|line| line.starts_with("  + ")) {
         assert!(
-            messages.read_line(&mut said).unwrap() > 0,
-            "no effect is found: {said}"
+            messages.read_line(&mut stderr).unwrap() > 0,
+            "no effect is found: {stderr}"
         );
     }
-    (messages, said)
+    (messages, stderr)
 }
 
-/// Interrupts a program when its search has found the first effect; what it says.
+/// Interrupts a program when its search has found the first effect. Returns exit status, standard output and messages.
 fn interrupted_in_the_search(arguments: &[&str]) -> (ExitStatus, String, String) {
     let mut child = start(arguments);
-    let (mut messages, mut said) = until_the_first_effect(&mut child);
+    let (mut messages, mut stderr) = until_the_first_effect(&mut child);
     interrupt(&child);
-    messages.read_to_string(&mut said).unwrap();
+    messages.read_to_string(&mut stderr).unwrap();
     let mut result = String::new();
     child.stdout.take().unwrap().read_to_string(&mut result).unwrap();
-    (child.wait().unwrap(), result, said)
+    (child.wait().unwrap(), result, stderr)
 }
 
 #[test]
@@ -65,7 +65,7 @@ fn an_interrupted_trace_exits_with_130_and_every_output_says_so() {
     let at = |name: &str| folder.path().join(name);
     let [json, csv, next, report] = ["t.json", "t.csv", "next.toml", "t.html"].map(at);
     let session = ready("hermle-c600u/measured/session.toml");
-    let (status, result, said) = interrupted_in_the_search(&[
+    let (status, result, stderr) = interrupted_in_the_search(&[
         "trace",
         text(&session),
         "--json",
@@ -77,9 +77,9 @@ fn an_interrupted_trace_exits_with_130_and_every_output_says_so() {
         "--report",
         text(&report),
     ]);
-    assert_eq!(status.code(), Some(INTERRUPTED), "{said}");
+    assert_eq!(status.code(), Some(INTERRUPTED), "{stderr}");
     assert!(result.starts_with("Verdict: incomplete, 1 effect\n"), "{result}");
-    assert!(said.contains("interrupted after 1 effect\n"), "{said}");
+    assert!(stderr.contains("interrupted after 1 effect\n"), "{stderr}");
     let read = |path: &Path| std::fs::read_to_string(path).unwrap();
     let result: serde_json::Value = serde_json::from_str(&read(&json)).unwrap();
     assert_eq!(result["interrupted"], true);
@@ -90,7 +90,7 @@ fn an_interrupted_trace_exits_with_130_and_every_output_says_so() {
         (effects[0]["component"].as_str(), effects[0]["order"].as_f64()),
         (Some("EZC"), Some(2.0))
     );
-    // What was found is fitted: 1.5 µm were put in.
+    // The found effect is fitted: the simulated amplitude is 1.5 µm.
     let amplitude = effects[0]["parameters"][0]["value"].as_f64().unwrap();
     assert!((amplitude - 1.5).abs() < 0.1, "{amplitude}");
     assert!(
@@ -102,7 +102,7 @@ fn an_interrupted_trace_exits_with_130_and_every_output_says_so() {
     assert!(read(&report).contains("interrupted after 1 effect"));
 }
 
-/// A pipe that nobody reads holds the program where it writes its results: there a second Ctrl-C comes.
+/// A pipe without a reader blocks the program while it writes its results. The second Ctrl-C arrives then.
 #[test]
 fn a_second_interruption_ends_the_program_at_once() {
     let folder = tempfile::tempdir().unwrap();
@@ -124,13 +124,16 @@ fn a_second_interruption_ends_the_program_at_once() {
         }
         std::thread::sleep(Duration::from_millis(10));
     }
-    let mut said = String::new();
-    messages.read_to_string(&mut said).unwrap();
-    assert_eq!(child.wait().unwrap().code(), Some(INTERRUPTED), "{said}");
-    assert!(said.contains("interrupted; nothing more is written"), "{said}");
+    let mut stderr = String::new();
+    messages.read_to_string(&mut stderr).unwrap();
+    assert_eq!(child.wait().unwrap().code(), Some(INTERRUPTED), "{stderr}");
+    assert!(
+        stderr.contains("interrupted; nothing more is written"),
+        "{stderr}"
+    );
 }
 
-/// A fit has nothing to hand over before it ends: the signal ends the program, as it does any other, and nothing is written.
+/// A fit has no partial result: the signal ends the program, and nothing is written.
 #[test]
 fn an_interrupted_fit_ends_by_the_signal() {
     let folder = tempfile::tempdir().unwrap();
@@ -150,8 +153,8 @@ fn an_interrupted_fit_ends_by_the_signal() {
     assert!(!json.exists());
 }
 
-/// A whole trace asks so many times whether to go on.
-fn traced(session: &Session, until: usize) -> (Trace<'_>, usize) {
+/// Runs a trace that is interrupted at the `until`-th query. Returns the number of queries.
+fn traced(session: &Session, until: usize) -> (TraceOutcome<'_>, usize) {
     let asked = AtomicUsize::new(0);
     let progress = |progress: Progress| match progress {
         Progress::Working => asked.fetch_add(1, Ordering::Relaxed) < until,
@@ -165,11 +168,11 @@ fn traced(session: &Session, until: usize) -> (Trace<'_>, usize) {
     (found, asked.into_inner())
 }
 
-fn ids(trace: &Trace<'_>) -> Vec<String> {
+fn ids(trace: &TraceOutcome<'_>) -> Vec<String> {
     trace.effects.iter().map(|effect| effect.id()).collect()
 }
 
-/// Wherever it is interrupted, a trace ends soon, and what it reports belongs together.
+/// A trace that is interrupted at any point ends soon, and its result is consistent.
 #[test]
 fn a_trace_can_be_interrupted_anywhere() {
     let file = ready("hermle-c600u/measured/session.toml");
@@ -180,7 +183,7 @@ fn a_trace_can_be_interrupted_anywhere() {
     let mut effects = Vec::new();
     for until in [0, 1, 2, 3, 4, asked / 4, asked / 2, 3 * asked / 4, asked - 1] {
         let (found, asked) = traced(&session, until);
-        // Models that are trained side by side may ask at the same time.
+        // Models that are trained in parallel may query at the same time.
         assert!(asked <= until + 16, "asked {} times more", asked - until);
         let result: &TraceResult = &found.result;
         assert!(
@@ -204,7 +207,7 @@ fn a_trace_can_be_interrupted_anywhere() {
                 .any(|warning| warning.contains("interrupted"))
         );
         assert_eq!(found.after.parameters.effects, found.effects);
-        // The session states its noise of 0.3 µm; what was put in leaves 0.55 µm as long as it is not found.
+        // The session states its noise of 0.3 µm; the residual is 0.55 µm until the effect is found.
         let found_it = ids(&found) == ["EZC~C:h2"];
         assert!(found_it || found.effects.is_empty(), "{:?}", ids(&found));
         assert_eq!(

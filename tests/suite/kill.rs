@@ -1,7 +1,7 @@
-//! Killed at whatever moment, `abbe` leaves the old file or the whole new one.
+//! Killed at any time, `abbe` leaves the old file or the complete new one.
 //!
-//! `ABBE_KILLS` says how often it is killed (24 times unless it does). Half of the moments lie anywhere in the run, half within a few
-//! milliseconds of the first sign that something is being written.
+//! `ABBE_KILLS` is the number of kills (24 by default). Half of them occur at a random time of the run, half within a few milliseconds after the
+//! first output file appears.
 #![cfg(unix)]
 
 use std::collections::BTreeMap;
@@ -15,7 +15,7 @@ use rand_pcg::Pcg64Mcg;
 
 use super::faults::Place;
 
-/// What is run, and the files and folders that it writes.
+/// The commands, with the files and folders that each writes.
 const COMMANDS: [(&str, &[&str]); 3] = [
     (
         "fit session.toml --json out.json --csv out.csv --report out.html --plots plots --quiet",
@@ -33,7 +33,7 @@ const COMMANDS: [(&str, &[&str]); 3] = [
 
 type Files = BTreeMap<String, Vec<u8>>;
 
-/// Every file below a folder, by its name from there.
+/// Every file below a folder, by its relative name.
 fn files(folder: &Path) -> Files {
     fn add(folder: &Path, before: &str, files: &mut Files) {
         for entry in fs::read_dir(folder).unwrap() {
@@ -51,7 +51,7 @@ fn files(folder: &Path) -> Files {
     found
 }
 
-/// The folder as it is before the command.
+/// The folder before the command.
 fn prepared(outputs: &[&str]) -> Place {
     let place = Place::new();
     for name in outputs {
@@ -74,15 +74,15 @@ fn start(place: &Place, command: &str) -> Child {
         .unwrap()
 }
 
-/// What lies there only because the program was killed: temporary files and folders, by the beginning of their names.
-fn remaining_structure(name: &str) -> bool {
+/// Whether a name is that of a temporary file or folder that a killed program leaves behind.
+fn is_temporary(name: &str) -> bool {
     name.split('/')
         .any(|part| part.starts_with(".tmp") || part.starts_with(".abbe-"))
 }
 
-/// Each file is the old or the new one; how many are new.
+/// Asserts that each file is the old or the complete new one. Returns the number of new files.
 fn whole(found: &Files, old: &Files, new: &Files, command: &str) -> usize {
-    for (name, bytes) in found.iter().filter(|(name, _)| !remaining_structure(name)) {
+    for (name, bytes) in found.iter().filter(|(name, _)| !is_temporary(name)) {
         assert!(
             old.get(name) == Some(bytes) || new.get(name) == Some(bytes),
             "{command}: {name} is neither the old file nor the whole new one ({} bytes)",
@@ -93,7 +93,7 @@ fn whole(found: &Files, old: &Files, new: &Files, command: &str) -> usize {
         old.keys().all(|name| found.contains_key(name)),
         "{command}: a file is gone"
     );
-    // Plots come all at once.
+    // The folder of plots appears in one step.
     let plots = |files: &Files| files.keys().filter(|name| name.starts_with("plots/")).count();
     assert!(
         [0, plots(new)].contains(&plots(found)),
@@ -107,7 +107,7 @@ fn whole(found: &Files, old: &Files, new: &Files, command: &str) -> usize {
 }
 
 #[test]
-fn a_program_that_is_killed_leaves_old_files_or_whole_new_ones() {
+fn a_killed_program_leaves_old_files_or_complete_new_ones() {
     let kills: usize =
         std::env::var("ABBE_KILLS").map_or(24, |text| text.parse().expect("ABBE_KILLS is a number"));
     let mut random = Pcg64Mcg::seed_from_u64(9);
@@ -124,7 +124,7 @@ fn a_program_that_is_killed_leaves_old_files_or_whole_new_ones() {
             .filter(|(name, bytes)| old.get(*name) != Some(*bytes))
             .count();
         assert!(
-            written >= outputs.len() && !new.keys().any(|name| remaining_structure(name)),
+            written >= outputs.len() && !new.keys().any(|name| is_temporary(name)),
             "{command}: {:?}",
             new.keys()
         );

@@ -1,6 +1,6 @@
-//! The measured session that the README starts from. The plant makes it, not `abbe simulate`: what traces its effect shares no code with what made it.
+//! The measured session of the README. The plant simulates it, not `abbe simulate`, so trace and simulator share no code.
 //!
-//! `ABBE_WRITE_SESSIONS=1 cargo test --profile checked measured` writes it anew.
+//! `ABBE_WRITE_SESSIONS=1 cargo test --profile checked measured` writes it again.
 
 use abbe::model::session::read::{self, ReadOptions};
 
@@ -14,8 +14,8 @@ const ABOUT: &str = "\
 
 ";
 
-/// An axial wobble of C, twice a turn: 1.5 µm · cos(2 C + 60°).
-fn wobble() -> Injected {
+/// An axial error motion of C of second order: 1.5 µm · cos(2 C + 60°).
+fn axial_motion() -> Injected {
     let shape = Shape::Harmonic {
         order: 2,
         phase_deg: 60.0,
@@ -28,9 +28,12 @@ fn wobble() -> Injected {
     )
 }
 
-/// The session with its answer.
+/// The session with its true values.
 fn draw() -> Draw {
-    let mut draw = Recipe::new(Kind::Rotary, 5).with(wobble()).readings(2400).draw();
+    let mut draw = Recipe::new(Kind::Rotary, 5)
+        .with(axial_motion())
+        .readings(2400)
+        .draw();
     for (name, text) in &mut draw.files {
         if name == "session.toml" {
             text.insert_str(0, ABOUT);
@@ -40,7 +43,7 @@ fn draw() -> Draw {
 }
 
 #[test]
-fn the_bundled_session_is_what_the_plant_measures() {
+fn the_bundled_session_is_that_of_the_plant() {
     let folder = super::ready(FOLDER);
     let draw = draw();
     if std::env::var_os("ABBE_WRITE_SESSIONS").is_some() {
@@ -56,13 +59,13 @@ fn the_bundled_session_is_what_the_plant_measures() {
     assert_eq!(names.iter().collect::<Vec<_>>(), expected);
     for (name, text) in &draw.files {
         let found = std::fs::read_to_string(folder.join(name)).unwrap();
-        // Not `assert_eq!`: nobody reads two thousand lines.
+        // Not `assert_eq!`, which would print two thousand lines.
         assert!(found == *text, "{name} is not what the plant measures");
     }
 }
 
 #[test]
-fn it_reads_and_declares_no_effect() {
+fn the_bundled_session_is_valid_and_declares_no_effect() {
     let session = read::session(
         &super::ready(FOLDER).join("session.toml"),
         &ReadOptions::default(),

@@ -1,4 +1,4 @@
-//! Messages on standard error: one form, colour on a terminal alone, and counts that agree in number.
+//! Messages on standard error: one form, colour on a terminal only, and counts that agree in number.
 
 use std::fs;
 use std::path::Path;
@@ -21,7 +21,7 @@ fn run(place: &Place, arguments: &[&str], environment: &[(&str, &str)]) -> Outpu
         .unwrap()
 }
 
-/// Sessions that are refused at a line, refused as a whole, and warned of.
+/// Sessions that are refused at a line, refused as a whole, or accepted with a warning.
 fn place() -> Place {
     let place = Place::new();
     let session = fs::read_to_string(place.at("session.toml")).unwrap();
@@ -57,23 +57,23 @@ fn messages_have_one_form() {
     let place = place();
     for (arguments, starts) in MESSAGES {
         let output = run(&place, arguments, &[]);
-        let said = String::from_utf8(output.stderr).unwrap();
-        assert!(said.starts_with(starts[0]), "{arguments:?}: {said}");
+        let stderr = String::from_utf8(output.stderr).unwrap();
+        assert!(stderr.starts_with(starts[0]), "{arguments:?}: {stderr}");
         for start in *starts {
             assert!(
-                said.lines().any(|line| line.starts_with(start)),
-                "{start}: {said}"
+                stderr.lines().any(|line| line.starts_with(start)),
+                "{start}: {stderr}"
             );
         }
         for other in ["Error:", "Help:", "Warning:"] {
-            assert!(!said.contains(other), "{arguments:?}: {said}");
+            assert!(!stderr.contains(other), "{arguments:?}: {stderr}");
         }
     }
-    // The line that is meant is shown.
-    let said = String::from_utf8(run(&place, &["fit", "key.toml"], &[]).stderr).unwrap();
+    // The message shows the line.
+    let stderr = String::from_utf8(run(&place, &["fit", "key.toml"], &[]).stderr).unwrap();
     assert!(
-        said.contains("key.toml:8") && said.contains("noise_umm = 0.3"),
-        "{said}"
+        stderr.contains("key.toml:8") && stderr.contains("noise_umm = 0.3"),
+        "{stderr}"
     );
 }
 
@@ -115,13 +115,16 @@ fn a_terminal_has_colour() {
             .unwrap();
         String::from_utf8(output.stdout).unwrap()
     };
-    let said = on_terminal(&[]);
+    let stderr = on_terminal(&[]);
     assert!(
-        said.starts_with('\u{1b}') && plain(&said).starts_with("error: "),
-        "{said}"
+        stderr.starts_with('\u{1b}') && plain(&stderr).starts_with("error: "),
+        "{stderr}"
     );
-    let said = on_terminal(&[("NO_COLOR", "1")]);
-    assert!(said.starts_with("error: ") && !said.contains('\u{1b}'), "{said}");
+    let stderr = on_terminal(&[("NO_COLOR", "1")]);
+    assert!(
+        stderr.starts_with("error: ") && !stderr.contains('\u{1b}'),
+        "{stderr}"
+    );
 }
 
 #[test]
@@ -129,8 +132,8 @@ fn one_test_and_two_tests() {
     let place = Place::new();
     let simulate = |out: &str, session: &str| {
         let output = run(&place, &["simulate", session, "--out", out], &[]);
-        let said = String::from_utf8_lossy(&output.stderr).into_owned();
-        assert!(output.status.success(), "{said}");
+        let stderr = String::from_utf8_lossy(&output.stderr).into_owned();
+        assert!(output.status.success(), "{stderr}");
         String::from_utf8(output.stdout).unwrap()
     };
     let one = fs::read_to_string(place.at("session.toml")).unwrap();

@@ -1,4 +1,4 @@
-//! What the program promises, one file a promise.
+//! Tests of the command and of the library, one file per subject.
 
 mod another_build;
 mod bad_input;

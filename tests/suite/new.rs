@@ -1,4 +1,4 @@
-//! `abbe new`: every template is a session that reads.
+//! `abbe new`: every template is a readable session.
 
 use abbe::identify::volumetric::functions;
 use abbe::model::session::read::{self, ReadOptions};
@@ -48,7 +48,7 @@ fn every_template_is_copied_and_reads() {
             }
         }
         assert!(sessions > 0, "{name}");
-        // What is there is not overwritten unasked.
+        // Existing files are not overwritten without `--force`.
         let again = abbe(&["new", text(&made), "--template", name]);
         assert_eq!(again.status.code(), Some(1));
         assert!(String::from_utf8_lossy(&again.stderr).contains("exists and is not empty"));
@@ -63,19 +63,19 @@ fn every_template_is_copied_and_reads() {
 }
 
 #[test]
-fn an_unknown_template_names_those_there_are() {
+fn an_unknown_template_is_refused_with_the_list_of_templates() {
     let folder = tempfile::tempdir().unwrap();
-    let told = abbe(&["new", text(&folder.path().join("a")), "--template", "hermle"]);
-    assert_eq!(told.status.code(), Some(1));
-    let told = String::from_utf8_lossy(&told.stderr).into_owned();
+    let output = abbe(&["new", text(&folder.path().join("a")), "--template", "hermle"]);
+    assert_eq!(output.status.code(), Some(1));
+    let stderr = String::from_utf8_lossy(&output.stderr).into_owned();
     assert!(
-        told.contains("no template `hermle`") && told.contains("kuka-iiwa14"),
-        "{told}"
+        stderr.contains("no template `hermle`") && stderr.contains("kuka-iiwa14"),
+        "{stderr}"
     );
 }
 
 #[test]
-fn any_structural_code_is_laid_out_and_plans_at_once() {
+fn any_structural_code_gives_a_plan_that_runs() {
     use super::topologies::{FIGURE_1_1, TABLE_1_1};
     let folder = tempfile::tempdir().unwrap();
     let mut codes: Vec<String> = TABLE_1_1
@@ -119,9 +119,9 @@ fn any_structural_code_is_laid_out_and_plans_at_once() {
             "{code}: {}",
             String::from_utf8_lossy(&plan.stderr)
         );
-        let told = String::from_utf8_lossy(&plan.stderr).into_owned();
-        assert!(!told.contains("warning"), "{code}: {told}");
-        // Every line that says something has its reason above it or beside it.
+        let stderr = String::from_utf8_lossy(&plan.stderr).into_owned();
+        assert!(!stderr.contains("warning"), "{code}: {stderr}");
+        // Every line with a value has a comment above it or beside it.
         for file in ["machine.toml", "plan.toml"] {
             let written = std::fs::read_to_string(made.join(file)).unwrap();
             let lines: Vec<&str> = written.lines().collect();
@@ -157,20 +157,20 @@ fn any_structural_code_is_laid_out_and_plans_at_once() {
         ),
         ("wbt", "has no axis"),
     ] {
-        let told = abbe(&["new", text(&folder.path().join("no")), "--from-code", code]);
-        assert_eq!(told.status.code(), Some(1));
-        let told = String::from_utf8_lossy(&told.stderr).into_owned();
-        assert!(told.contains(message), "{code}: {told}");
+        let output = abbe(&["new", text(&folder.path().join("no")), "--from-code", code]);
+        assert_eq!(output.status.code(), Some(1));
+        let stderr = String::from_utf8_lossy(&output.stderr).into_owned();
+        assert!(stderr.contains(message), "{code}: {stderr}");
     }
     assert!(!folder.path().join("no").exists());
 }
 
 #[test]
-fn the_templates_are_listed_without_arguments() {
+fn without_arguments_the_templates_are_listed() {
     let listed = abbe(&["new"]);
     assert!(listed.status.success());
     assert_eq!(listed.stdout, abbe(&["new", "--list"]).stdout);
-    let told = abbe(&["new", "somewhere"]);
-    assert_eq!(told.status.code(), Some(2));
-    assert!(String::from_utf8_lossy(&told.stderr).contains("--from-code"));
+    let output = abbe(&["new", "somewhere"]);
+    assert_eq!(output.status.code(), Some(2));
+    assert!(String::from_utf8_lossy(&output.stderr).contains("--from-code"));
 }

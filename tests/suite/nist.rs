@@ -1,4 +1,4 @@
-//! Certified nonlinear regressions of NIST's StRD through the same Gauss–Newton that fits machines.
+//! Certified nonlinear regressions of the NIST StRD, solved by the Gauss–Newton iteration that fits machines.
 
 use abbe::identify::IdentifyError;
 use abbe::identify::least_squares::{LeastSquares, Scaling, minimise};
@@ -8,7 +8,7 @@ use num_dual::{Derivative, DualNum, DualSVec64};
 
 use super::data::data;
 
-/// A data set: start values and certified values line by line, then the readings.
+/// A data set: lines of start values and certified values, then the readings.
 struct Certified<const N: usize> {
     starts: [[f64; N]; 2],
     values: [f64; N],
@@ -63,7 +63,7 @@ struct Regression<'a, const N: usize, F> {
 }
 
 impl<const N: usize, F: Fn(&[Dual<N>; N], f64) -> Dual<N>> LeastSquares for Regression<'_, N, F> {
-    fn unknowns(&self) -> usize {
+    fn parameters(&self) -> usize {
         N
     }
 
@@ -94,7 +94,7 @@ impl<const N: usize, F: Fn(&[Dual<N>; N], f64) -> Dual<N>> LeastSquares for Regr
     }
 }
 
-/// Digits that agree: the log relative error that NIST judges by.
+/// Number of agreeing digits: the log relative error of NIST.
 fn digits(found: f64, certified: f64) -> f64 {
     -((found - certified) / certified).abs().max(1e-16).log10()
 }

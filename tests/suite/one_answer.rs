@@ -1,4 +1,4 @@
-//! A trace and the fit of the session that it writes are of one model: they state one noise, one rank and one set of figures.
+//! A trace and the fit of the session that it writes have the same model and state the same noise, rank and figures.
 
 use std::fs;
 use std::path::Path;
@@ -8,11 +8,11 @@ use serde_json::Value;
 use super::data::data;
 use super::{abbe, ready, text};
 
-/// Runs a command that has to succeed; its standard output and the JSON that it writes.
-fn told(arguments: &[&str], json: &Path) -> (String, Value) {
+/// Runs a command and asserts its success. Returns its standard output and its JSON.
+fn run(arguments: &[&str], json: &Path) -> (String, Value) {
     let output = abbe(&[arguments, &["--json", text(json)]].concat());
-    let said = String::from_utf8_lossy(&output.stderr);
-    assert!(output.status.success(), "{arguments:?}: {said}");
+    let stderr = String::from_utf8_lossy(&output.stderr);
+    assert!(output.status.success(), "{arguments:?}: {stderr}");
     let document = serde_json::from_str(&fs::read_to_string(json).unwrap()).unwrap();
     (String::from_utf8(output.stdout).unwrap(), document)
 }
@@ -21,7 +21,7 @@ fn number(value: &Value) -> f64 {
     value.as_f64().unwrap()
 }
 
-/// What both say of the model, figure by figure. Uncertainties of a trace may be larger: they cover aliases.
+/// Asserts equal figures of the model. Uncertainties of a trace may be larger, because they cover aliases.
 #[track_caller]
 fn of_one_model(trace: &Value, fit: &Value) {
     for field in ["noise_source", "readings", "unobservable"] {
@@ -52,9 +52,9 @@ fn of_one_model(trace: &Value, fit: &Value) {
 }
 
 #[test]
-fn among_poses() {
-    let Some(folder) =
-        data("one_answer::among_poses", "mukca").map(|found| found.parent().unwrap().to_owned())
+fn trace_and_fit_agree_for_poses() {
+    let Some(folder) = data("one_answer::trace_and_fit_agree_for_poses", "mukca")
+        .map(|found| found.parent().unwrap().to_owned())
     else {
         return;
     };
@@ -64,7 +64,7 @@ fn among_poses() {
     }
     let at = |name: &str| out.path().join(name);
     let (session, next) = (at("session.toml"), at("next.toml"));
-    let (printed, trace) = told(
+    let (printed, trace) = run(
         &[
             "trace",
             text(&session),
@@ -78,12 +78,12 @@ fn among_poses() {
         &at("trace.json"),
     );
     assert!(!trace["effects"].as_array().unwrap().is_empty());
-    let (of_fit, fit) = told(
+    let (of_fit, fit) = run(
         &["fit", text(&next), "--data", text(&folder), "--allow-outside"],
         &at("fit.json"),
     );
     of_one_model(&trace, &fit);
-    // The residual is not called noise, by neither, and it is that of the effects.
+    // Neither calls the residual noise, and both state the residual of the model with the effects.
     assert_eq!(trace["noise_source"], "residual");
     let [before, after] = ["before", "after"].map(|model| number(&trace[model]["noise_um"]));
     assert!(
@@ -99,10 +99,10 @@ fn among_poses() {
     }
 }
 
-/// One run there and one back repeat nothing: an effect of 5 µm stands in the residual of the declared model, and no longer in that of the found one, which is
-/// the 0.3 µm of noise that was simulated.
+/// One run in each direction has no repeats. An effect of 5 µm remains in the residual of the declared model. The residual of the found model is the
+/// simulated noise of 0.3 µm.
 #[test]
-fn along_runs_without_repeats() {
+fn trace_and_fit_agree_for_runs_without_repeats() {
     let out = tempfile::tempdir().unwrap();
     let at = |name: &str| out.path().join(name);
     let plan = fs::read_to_string(ready("hermle-c600u/chapter5.toml")).unwrap();
@@ -140,7 +140,7 @@ fn along_runs_without_repeats() {
     assert!(written.contains("noise_um = 0.3\n"));
     fs::write(&session, written.replace("noise_um = 0.3\n", "")).unwrap();
     let next = at("run").join("next.toml");
-    let (_, trace) = told(
+    let (_, trace) = run(
         &[
             "trace",
             text(&session),
@@ -151,12 +151,12 @@ fn along_runs_without_repeats() {
         ],
         &at("trace.json"),
     );
-    let (_, fit) = told(&["fit", text(&next)], &at("fit.json"));
+    let (_, fit) = run(&["fit", text(&next)], &at("fit.json"));
     of_one_model(&trace, &fit);
     assert_eq!(trace["noise_source"], "residual");
     let before = number(&trace["before"]["noise_um"]);
     let after = number(&trace["after"]["noise_um"]);
-    // Rounding to 0.1 µm adds 0.03 µm; χ² of the readings scatters by √(2/n).
+    // Rounding to 0.1 µm adds 0.03 µm; the relative standard deviation of χ² is √(2/n).
     let sigma = 0.3_f64.hypot(0.1 / 12.0_f64.sqrt());
     let scatter = sigma / (2.0 * number(&trace["readings"])).sqrt();
     assert!(

@@ -35,7 +35,7 @@ fn the_patterns_of_the_a_axis_are_those_of_the_thesis() {
             .find(|(name, _)| *name == pattern.test)
             .unwrap();
         let axis = session.machine.axis_index("A").unwrap();
-        // The ball stands at R although the bar is calibrated a little shorter: the length without errors is that of the geometry.
+        // The ball is at R although the calibrated bar is slightly shorter: the length without errors is that of the geometry.
         let d = match pattern.test.as_str() {
             "A100" => 0.0,
             _ => (BARS[1].powi(2) - R * R).sqrt(),
@@ -55,7 +55,7 @@ fn the_patterns_of_the_a_axis_are_those_of_the_thesis() {
             );
             compared += 1;
         }
-        // Fig. 3.7 (c), (d): without the extension the orientation errors leave the circle as it is.
+        // Fig. 3.7 (c), (d): without the extension the orientation errors do not change the circle.
         if pattern.test == "A100" && matches!(pattern.error.as_str(), "EB0A" | "EC0A") {
             assert!(pattern.largest_um < 1e-9);
         }
@@ -96,7 +96,7 @@ fn the_file_holds_every_reading_of_every_error() {
         let cells: Vec<&str> = line.split(',').collect();
         assert_eq!(cells.len(), 11, "{line}");
         if cells[1] == "bar[A150]" {
-            // A bar that is longer than stated reads short by as much, in its own test only.
+            // A bar that is longer than stated reduces the readings by the same amount, in its own test only.
             let expected = if cells[0] == "A150" {
                 "-1.000000"
             } else {
@@ -110,7 +110,7 @@ fn the_file_holds_every_reading_of_every_error() {
 }
 
 #[test]
-fn what_cannot_be_drawn_is_said() {
+fn invalid_patterns_are_refused_with_the_reason() {
     let session = ready("hermle-c600u/chapter5.toml");
     let folder = tempfile::tempdir().unwrap();
     let file = folder.path().join("patterns.csv");
@@ -118,15 +118,15 @@ fn what_cannot_be_drawn_is_said() {
         let mut all = vec!["plan", text(&session), "--patterns", text(&file)];
         all.extend(arguments);
         let output = abbe(&all);
-        let said = String::from_utf8(output.stderr).unwrap();
-        assert_eq!(output.status.code(), Some(1), "{said}");
-        assert!(said.contains(part), "{said}");
+        let stderr = String::from_utf8(output.stderr).unwrap();
+        assert_eq!(output.status.code(), Some(1), "{stderr}");
+        assert!(stderr.contains(part), "{stderr}");
         assert!(!file.exists());
     };
-    refused(&["--error", "EY0A"], "gives no value");
+    refused(&["--error", "EY0A"], "has no value");
     refused(&["--error", "EY0A=10"], "has no unit");
     refused(&["--error", "EY0B=10um"], "has no axis `B`");
-    refused(&["--error", "EY0A=10arcsec"], "it is measured in `um`");
+    refused(&["--error", "EY0A=10arcsec"], "a unit such as `um` is expected");
     let alone = abbe(&["plan", text(&session), "--error", "EY0A=10um"]);
     assert_eq!(alone.status.code(), Some(2));
 }

@@ -1,4 +1,4 @@
-//! `abbe plan` as a user meets it.
+//! The command `abbe plan`.
 
 use serde_json::Value;
 
@@ -24,7 +24,7 @@ fn json(arguments: &[&str]) -> Value {
 }
 
 #[test]
-fn the_screen_and_the_json_say_the_same() {
+fn the_terminal_and_the_json_agree() {
     let session = chapter_5();
     let plan = json(&[&session]);
     assert_eq!(plan["errors"].as_array().unwrap().len(), 8);
@@ -35,7 +35,7 @@ fn the_screen_and_the_json_say_the_same() {
         assert!(error["u"].as_f64().unwrap() > 0.0);
         assert!(screen.contains(error["id"].as_str().unwrap()));
     }
-    assert!(screen.contains("A150 contributes all of EB0A, EC0A"));
+    assert!(screen.contains("only A150 makes EB0A, EC0A identifiable"));
     assert!(
         screen.contains("EC0A is confounded with y of the spindle ball in A150: 1″ : −0.54 µm"),
         "{screen}"
@@ -44,7 +44,7 @@ fn the_screen_and_the_json_say_the_same() {
         screen.lines().all(|line| line.chars().count() < 170),
         "a line too long for a screen"
     );
-    // Twice the same.
+    // A second run gives the same.
     assert_eq!(
         screen,
         String::from_utf8(abbe(&["plan", &session, "--all"]).stdout).unwrap()
@@ -52,7 +52,7 @@ fn the_screen_and_the_json_say_the_same() {
 }
 
 #[test]
-fn the_effects_say_what_a_clean_residual_does_not_exclude() {
+fn the_effects_list_what_a_clean_residual_does_not_exclude() {
     let plan = json(&[&chapter_5()]);
     let effects = plan["effects"]["effects"].as_array().unwrap();
     let verdict = |id: &str| {
@@ -61,10 +61,10 @@ fn the_effects_say_what_a_clean_residual_does_not_exclude() {
             .find(|effect| effect["id"] == id)
             .map(|effect| effect["verdict"].clone())
     };
-    // One height and one radius: the wobble of C at order 1 is the axial motion at order 2.
+    // At one height and one radius the tilt of C at order 1 is confounded with the axial motion at order 2.
     assert_eq!(verdict("EZC~C:h3").unwrap(), "detectable");
     assert_eq!(verdict("EZC~C:h1").unwrap(), "confounded");
-    // The spindle ball lies on the C axis: the C tests do not see it turn, the A tests see it at C = 0 as a constant.
+    // The spindle ball lies on the C axis: C tests do not respond to ECC, and in A tests it is a constant at C = 0.
     assert_eq!(verdict("ECC~C:h2").unwrap(), "confounded");
     let bound = |id: &str| {
         effects.iter().find(|effect| effect["id"] == id).unwrap()["detectable_amplitude"]
@@ -85,7 +85,7 @@ fn the_effects_say_what_a_clean_residual_does_not_exclude() {
 }
 
 #[test]
-fn what_cannot_be_asked_is_said_and_fails() {
+fn invalid_requests_fail_with_the_reason() {
     let session = chapter_5();
     for (arguments, words) in [
         (
@@ -140,12 +140,12 @@ fn sweeps_can_shrink_until_an_uncertainty_doubles() {
 }
 
 #[test]
-fn a_test_beyond_the_travel_of_the_sensor_is_warned_of() {
+fn a_warning_names_a_test_beyond_the_travel_of_the_sensor() {
     let folder = tempfile::tempdir().unwrap();
     let machine = ready("hermle-c600u/machine.toml");
     std::fs::copy(machine, folder.path().join("machine.toml")).unwrap();
     let text = std::fs::read_to_string(chapter_5()).unwrap();
-    // Two millimetres farther along a bar that lies askew by 48° are 1.5 mm of its length.
+    // An offset of 2 mm at 48° to the bar changes its length by 1.5 mm.
     let farther = text.replace("\"-sqrt(R_e^2 - R^2)\"", "\"-sqrt(R_e^2 - R^2) - 2\"");
     assert_ne!(text, farther);
     let file = folder.path().join("session.toml");

@@ -1,4 +1,4 @@
-//! What the tests of plans share: sessions from text.
+//! Helpers for the tests of plans: sessions from text.
 
 use abbe::identify::noise::{Noise, NoiseSource};
 use abbe::identify::plan::linear::Linearisation;
@@ -6,7 +6,7 @@ use abbe::identify::plan::states;
 use abbe::model::session::Session;
 use abbe::model::session::read::{ReadOptions, session as read};
 
-/// The `[machine]` of a structural code, every axis as ISO 841 has it, with the travel of rotary axes where it is stated.
+/// The `[machine]` table of a structural code with the axis directions of ISO 841 and, if stated, the travel of rotary axes.
 pub fn machine(code: &str, travel_deg: Option<[i32; 2]>) -> String {
     let mut text = format!("[machine]\nname = \"{code}\"\nchain = \"{code}\"\n");
     for letter in code.chars().filter(char::is_ascii_uppercase) {
@@ -41,7 +41,7 @@ pub fn noise_um(um: f64) -> Noise {
     Noise::white(um * 1e-3, NoiseSource::Stated)
 }
 
-/// A plan linearised.
+/// The linearisation of a plan, with the names of its parameters.
 pub fn linearised(session: &Session) -> (Vec<String>, Linearisation) {
     let complete = states::complete(session, true).unwrap();
     let problem =

@@ -1,4 +1,4 @@
-//! The three methods of the thesis: what each can see, and why chapters 4 and 5 disagree on θ_y0a and θ_y0c.
+//! The three methods of the thesis: identifiability and uncertainty, and the disagreement of chapters 4 and 5 on θ_y0a and θ_y0c.
 
 use abbe::identify::plan::results::PlanAnalysis;
 use abbe::identify::plan::{PlanOptions, analyse};
@@ -6,7 +6,7 @@ use abbe::model::session::{Prior, Session};
 
 use super::plan_help::ready;
 
-/// A method with every set-up length known within this, µm; 0 is exactly.
+/// The plan of a method with this standard uncertainty of every set-up length, µm; 0: exactly known.
 fn method(chapter: usize, setup_um: f64) -> Session {
     let mut session = ready(&format!("hermle-c600u/chapter{chapter}.toml"));
     for test in &mut session.tests {
@@ -82,7 +82,7 @@ const REPEATED: [(&str, [f64; 3]); 8] = [
 ];
 
 #[test]
-fn each_method_sees_all_eight_within_what_is_known_of_its_set_up() {
+fn each_method_identifies_all_eight_errors_with_the_set_up_priors() {
     for chapter in [4, 5, 6] {
         let plan = analysis(chapter, 1.0, false);
         assert!(plan.unidentifiable.is_empty());
@@ -94,7 +94,7 @@ fn each_method_sees_all_eight_within_what_is_known_of_its_set_up() {
                 "{chapter} {id}: shares come to {total}"
             );
             let noise = error.budget.iter().find(|part| part.source == "noise").unwrap().u;
-            // White noise of 0.3 µm would repeat better than the thesis did, and a new set-up would repeat worse.
+            // The repeatability of the thesis lies between that of white noise of 0.3 µm and that of a new set-up.
             assert!(noise < repeated[chapter - 4], "{chapter} {id}: {noise}");
             assert!(
                 u(&plan, id) > repeated[chapter - 4],
@@ -106,12 +106,12 @@ fn each_method_sees_all_eight_within_what_is_known_of_its_set_up() {
 }
 
 #[test]
-fn chapters_4_and_5_measure_the_sum_and_differ_in_how_they_part_it() {
+fn chapters_4_and_5_agree_on_the_sum_and_disagree_on_its_parts() {
     // Tables 4.3 and 5.3.
     let (y0a, y0c): ([f64; 2], [f64; 2]) = ([6.62, -1.29], [-3.75, 4.48]);
     let difference = [y0a[0] - y0a[1], y0c[0] - y0c[1]];
     assert!(difference[0] > 7.0 && difference[1] < -8.0);
-    // What the C test with the longer bar sees is the sum of the two: it agrees.
+    // The C test with the longer bar determines the sum of the two, which agrees.
     assert!((difference[0] + difference[1]).abs() < 0.4);
 
     let plans = [analysis(4, 1.0, false), analysis(5, 1.0, false)];
@@ -123,9 +123,9 @@ fn chapters_4_and_5_measure_the_sum_and_differ_in_how_they_part_it() {
         );
     }
     let both = |id: &str| u(&plans[0], id).hypot(u(&plans[1], id));
-    // The repetitions do not account for it …
+    // The repeatability does not explain the difference.
     assert!(difference[0] / 0.557_f64.hypot(0.427) > 10.0);
-    // … a spindle ball known within 1 µm in every test does, at some two standard deviations.
+    // A spindle ball with u = 1 µm in every test explains it at about two standard deviations.
     let ratio = [difference[0] / both("EB0A"), difference[1] / both("EB0C")];
     println!(
         "difference over predicted: EB0A {:+.2}, EB0C {:+.2}",
@@ -135,7 +135,7 @@ fn chapters_4_and_5_measure_the_sum_and_differ_in_how_they_part_it() {
 }
 
 #[test]
-fn an_offset_of_the_spindle_ball_between_two_tests_makes_both_differences_and_leaves_no_trace() {
+fn an_offset_of_the_spindle_ball_between_two_tests_explains_both_differences_without_a_residual() {
     let plan = analysis(5, 0.0, true);
     let (a, c) = ("EB0A", "EB0C");
     let height = "spindle_ball.z~none:constant[A150]";
@@ -146,7 +146,7 @@ fn an_offset_of_the_spindle_ball_between_two_tests_makes_both_differences_and_le
     let sideways = "spindle_ball.x~none:constant[C150]";
     assert!(bias(&plan, sideways, a).abs() < 1e-3);
     assert!((bias(&plan, sideways, c).abs() - 1.845).abs() < 0.01);
-    // Each hides entirely: the residual is clean whatever its size.
+    // Each is completely confounded: the residual is clean at any size.
     for effect in [height, sideways] {
         let found = plan
             .effects
@@ -167,7 +167,7 @@ fn an_offset_of_the_spindle_ball_between_two_tests_makes_both_differences_and_le
 }
 
 #[test]
-fn a_straightness_of_x_that_repeats_biases_both_chapters_alike() {
+fn a_repeatable_straightness_of_x_biases_both_chapters_alike() {
     let effect = "EZX~X:power2";
     let [four, five] = [analysis(4, 0.0, true), analysis(5, 0.0, true)];
     for error in ["EB0A", "EB0C"] {
@@ -181,7 +181,7 @@ fn a_straightness_of_x_that_repeats_biases_both_chapters_alike() {
 }
 
 #[test]
-fn the_table_in_the_docs_is_what_is_computed() {
+fn the_table_in_the_docs_agrees_with_the_computation() {
     let docs = std::fs::read_to_string(super::workspace().join("docs/guide/compare-methods.md")).unwrap();
     for (column, chapter) in [4, 5, 6].into_iter().enumerate() {
         let plan = analysis(chapter, 1.0, false);

@@ -1,6 +1,6 @@
-//! The next test: better than the published methods, and what tells two effects apart.
+//! The next test: improvement over the published methods, and separation of two effects.
 
-use abbe::identify::plan::candidate_tests::{CandidateTests, entries};
+use abbe::identify::plan::candidate_tests::{TestVariations, candidate_tests};
 use abbe::identify::plan::criterion::Goal;
 use abbe::identify::plan::improve::{ImproveOptions, improve};
 use abbe::identify::plan::{PlanOptions, analyse, separation, states};
@@ -38,7 +38,7 @@ fn worst(session: &Session) -> f64 {
 }
 
 #[test]
-fn one_test_more_than_chapter_5_beats_the_best_published_method_by_a_third() {
+fn one_test_more_than_chapter_5_reduces_the_uncertainty_by_a_third() {
     let best = [4, 5, 6]
         .map(|chapter| worst(&with_setups_of_1_um(chapter)))
         .into_iter()
@@ -51,11 +51,11 @@ fn one_test_more_than_chapter_5_beats_the_best_published_method_by_a_third() {
         by_minute: false,
     };
     for follow in [true, false] {
-        // Like the published methods, every test has a spindle ball of its own; no linear axis follows where its errors would enter.
-        let menu = CandidateTests {
+        // As in the published methods, every test has its own spindle ball. No linear axis follows, so its errors have no influence.
+        let menu = TestVariations {
             keep_spindle_ball: false,
             follow,
-            ..CandidateTests::default()
+            ..TestVariations::default()
         };
         let found = improve(&problem, &menu, &options).unwrap();
         let after = found.steps[0].after;
@@ -65,8 +65,8 @@ fn one_test_more_than_chapter_5_beats_the_best_published_method_by_a_third() {
         );
         assert!(after < 0.7 * best, "{after} against {best}");
 
-        // The information agrees with the plan analysed anew, the test among the others.
-        let entry = entries(&complete, &menu)
+        // The updated information agrees with a new analysis of the plan that includes the test.
+        let entry = candidate_tests(&complete, &menu)
             .unwrap()
             .into_iter()
             .find(|entry| entry.name == found.steps[0].test);
@@ -81,7 +81,7 @@ fn one_test_more_than_chapter_5_beats_the_best_published_method_by_a_third() {
 }
 
 #[test]
-fn a_blind_spot_is_opened() {
+fn a_proposed_test_makes_a_combination_identifiable() {
     let known = "sweep = { axis = \"C\", from_deg = 0, to_deg = 360, step_deg = 2, runs = 1, both_directions = true }";
     let text = format!(
         "{}[instrument]\nkind = \"ballbar\"\nnoise_um = 0.3\n[[test]]\nname = \"C100\"\nbar_mm = 100\nworkpiece_ball_mm = [0, 100, 50]\n\
@@ -97,9 +97,9 @@ fn a_blind_spot_is_opened() {
     };
     let found = improve(
         &problem,
-        &CandidateTests {
+        &TestVariations {
             thin: 4,
-            ..CandidateTests::default()
+            ..TestVariations::default()
         },
         &options,
     )
@@ -115,7 +115,7 @@ fn a_blind_spot_is_opened() {
 }
 
 #[test]
-fn wobble_and_axial_motion_are_told_apart_at_a_second_radius() {
+fn a_second_radius_separates_tilt_and_axial_motion() {
     let session = ready("hermle-c600u/chapter5.toml");
     let complete = states::complete(&session, true).unwrap();
     let problem = states::problem_by_test(&complete, noise_um(0.3)).unwrap();
@@ -126,8 +126,8 @@ fn wobble_and_axial_motion_are_told_apart_at_a_second_radius() {
         tests: Vec::new(),
     };
     let beta = vec![0.0; problem.parameters.list.len()];
-    let menu = CandidateTests::short();
-    // 1.5 µm of EZC order 2 against EAC order 1, which at one radius is the same.
+    let menu = TestVariations::short();
+    // 1.5 µm of EZC order 2 against EAC order 1; the two are confounded at one radius.
     let found = separation(
         &problem,
         &beta,
@@ -150,8 +150,8 @@ fn wobble_and_axial_motion_are_told_apart_at_a_second_radius() {
     );
 }
 
-/// A curve is the sensitivity along a test; the largest that any test has is told beside it. A unit of a length moves a reading by its like at most, a
-/// second of arc by 5 nm a millimetre of lever.
+/// A curve is the sensitivity along a test; the result also states the largest of all tests. A length changes a reading by at most its own size, an
+/// angle of 1″ by 5 nm per millimetre of lever.
 #[test]
 fn curves_reach_the_largest_sensitivity() {
     let options = PlanOptions {
@@ -168,7 +168,7 @@ fn curves_reach_the_largest_sensitivity() {
             .filter(|curve| curve.test == error.sensitivity.largest_in_test)
             .flat_map(|curve| &curve.values)
             .fold(0.0_f64, |most, value| most.max(value.abs()));
-        // A curve is thinned.
+        // A curve holds a subset of the readings.
         assert!(
             reached <= largest * (1.0 + 1e-9) && reached > 0.99 * largest,
             "{}: {reached} {largest}",
@@ -185,16 +185,16 @@ fn curves_reach_the_largest_sensitivity() {
     assert!(lengths >= 3 && angles >= 3, "{lengths} {angles}");
 }
 
-/// No test is proposed of which a bar's sensor would leave its travel; with more travel there are more tests.
+/// No proposed test exceeds the travel of the bar sensor; with more travel there are more candidate tests.
 #[test]
-fn what_is_proposed_stays_within_the_reach_of_the_bar() {
+fn proposed_tests_stay_within_the_travel_of_the_bar() {
     let complete = states::complete(&with_setups_of_1_um(5), true).unwrap();
     let within = |reach_mm: f64| {
-        let menu = CandidateTests {
+        let menu = TestVariations {
             reach_mm,
-            ..CandidateTests::short()
+            ..TestVariations::short()
         };
-        let found = entries(&complete, &menu).unwrap();
+        let found = candidate_tests(&complete, &menu).unwrap();
         for entry in &found {
             let Station::BallBar(bar) = &entry.test.station else {
                 panic!("{}", entry.name)
@@ -205,7 +205,7 @@ fn what_is_proposed_stays_within_the_reach_of_the_bar() {
                 .map(|reading| (reading - bar.bar).abs())
                 .fold(0.0, f64::max);
             assert!(most <= reach_mm, "{}: {most}", entry.name);
-            // Only axes that do not stand at zero are told.
+            // The description names only axes that are not at zero.
             assert!(!entry.name.contains(" at 0°"), "{}", entry.name);
         }
         found.len()
@@ -216,17 +216,17 @@ fn what_is_proposed_stays_within_the_reach_of_the_bar() {
 }
 
 #[test]
-fn by_the_minute_a_short_test_is_taken() {
+fn gain_per_minute_selects_a_short_test() {
     let complete = states::complete(&with_setups_of_1_um(5), true).unwrap();
     let problem = states::problem_by_test(&complete, noise_um(0.3)).unwrap();
-    let menu = CandidateTests {
+    let menu = TestVariations {
         bars_mm: vec![100.0, 150.0],
         radii_mm: vec![100.0],
         heights_mm: vec![0.0],
         standing_deg: vec![0.0],
         ranges: vec![1.0, 0.5],
         both_directions: vec![true, false],
-        ..CandidateTests::default()
+        ..TestVariations::default()
     };
     let proposed = |by_minute| {
         let options = ImproveOptions {
@@ -237,10 +237,18 @@ fn by_the_minute_a_short_test_is_taken() {
         improve(&problem, &menu, &options).unwrap()
     };
     let [best, quick] = [proposed(false), proposed(true)];
-    // A part never sees more than the whole, …
-    assert!(!best.steps[0].test.contains("one way"), "{}", best.steps[0].test);
-    // … and where set-ups decide, it sees nearly as much in less time.
-    assert!(quick.steps[0].test.contains("one way"), "{}", quick.steps[0].test);
+    // A part never has more information than the whole, …
+    assert!(
+        !best.steps[0].test.contains("in one direction"),
+        "{}",
+        best.steps[0].test
+    );
+    // … and if set-ups dominate, it has nearly as much in less time.
+    assert!(
+        quick.steps[0].test.contains("in one direction"),
+        "{}",
+        quick.steps[0].test
+    );
     let gain = |found: &abbe::identify::plan::improve::Improvement| {
         (found.before / found.steps[0].after).ln() / found.steps[0].duration_min
     };

@@ -1,4 +1,4 @@
-//! Powers of an axis position: one name, one scale, whatever the travel of a test.
+//! Powers of an axis position: one name has one scale, independent of the travel of a test.
 
 use std::f64::consts::PI;
 
@@ -13,10 +13,10 @@ use super::plan_help::{machine, noise_um, session};
 
 const NOISE_UM: f64 = 0.3;
 const BAR_U_UM: f64 = 0.5;
-/// `(z_0.995 + z_0.95)²`: the noncentrality that a two-sided normal test at 1 % finds with 95 % power.
+/// `(z_0.995 + z_0.95)²`: the noncentrality at which a two-sided normal test at 1 % has 95 % power.
 const NONCENTRALITY: f64 = 17.814_164;
 
-/// A bar of 100 mm along C while one axis moves, its length the only thing that is not known.
+/// A bar of 100 mm along C while one axis moves; the bar length is the only parameter.
 fn upright(sweep: &str) -> Session {
     let mut text = machine("[wCbXYZt]", None);
     text.push_str(&format!(
@@ -43,14 +43,14 @@ fn judged(plan: &Session) -> Vec<EffectDetectability> {
     effects(&problem).unwrap().effects
 }
 
-/// The amplitude that is found, µm, of an effect that lengthens the bar by `signal` of it at each position: least squares with the bar's length as
-/// the other unknown, in numbers.
+/// The detectable amplitude, µm, of an effect whose response at each position is `signal`: numerical least squares with the bar length as the second
+/// parameter.
 fn closed_form(positions: impl Iterator<Item = f64>, signal: impl Fn(f64) -> [f64; 2]) -> f64 {
     let weight = 1.0 / NOISE_UM.powi(2);
     let (mut own, mut cross, mut bar) = (0.0, 0.0, 1.0 / BAR_U_UM.powi(2));
     for position in positions {
         let [effect, length] = signal(position);
-        // There and back.
+        // Forward and backward.
         own += 2.0 * weight * effect * effect;
         cross += 2.0 * weight * effect * length;
         bar += 2.0 * weight * length * length;
@@ -96,7 +96,7 @@ fn a_power_of_a_linear_axis_is_stated_at_100_mm() {
         let judged = judged(&plan);
         for power in 1..=3 {
             let positions = (2 * from..=2 * to).map(|half| 0.5 * f64::from(half));
-            // The bar leans: it reads the cosine of what happens along Z.
+            // The bar is inclined: the reading is the cosine of the displacement along Z.
             let signal = |x: f64| [(x / 100.0).powi(power) * 100.0 / x.hypot(100.0), 1.0];
             check(
                 &judged,

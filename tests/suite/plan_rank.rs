@@ -1,4 +1,4 @@
-//! What tests can see, against an independent calculation.
+//! Rank and identifiability of tests against an independent calculation.
 
 use super::plan_help::{linearised, machine, session};
 
@@ -14,7 +14,7 @@ fn head(errors: &str) -> String {
     format!("{machine}\n[instrument]\nkind = \"ballbar\"\nnoise_um = 0.3\n{unknowns}")
 }
 
-/// A sweep with everything known: the bar is as long as the balls are apart.
+/// A sweep with an exactly known set-up: the bar length is the distance of the balls.
 fn known(name: &str, axis: &str, ball: [f64; 3], spindle: [f64; 3]) -> String {
     let [from, to] = if axis == "A" { [-20, 70] } else { [0, 360] };
     let apart: f64 = (0..3).map(|i| (ball[i] - spindle[i]).powi(2)).sum::<f64>().sqrt();
@@ -24,7 +24,7 @@ fn known(name: &str, axis: &str, ball: [f64; 3], spindle: [f64; 3]) -> String {
     )
 }
 
-/// Rank of the eight PIGEs with the spindle ball at the given places in A and C sweeps.
+/// Rank of the eight PIGEs with the spindle ball at the given positions in A and C sweeps.
 fn rank(height: f64, spindles: &[(&str, [f64; 3])]) -> (usize, Vec<String>) {
     let mut text = head("");
     for (number, (axis, spindle)) in spindles.iter().enumerate() {
@@ -36,34 +36,34 @@ fn rank(height: f64, spindles: &[(&str, [f64; 3])]) -> (usize, Vec<String>) {
         ));
     }
     let (ids, linear) = linearised(&session(&text));
-    let unseen = ids
+    let not_identifiable = ids
         .iter()
         .enumerate()
         .filter(|(j, _)| !linear.rank.is_identifiable(*j))
         .map(|(_, id)| id.clone());
-    (linear.rank.seen.ncols(), unseen.collect())
+    (linear.rank.seen.ncols(), not_identifiable.collect())
 }
 
 #[test]
 fn the_eight_errors_have_rank_six_seven_and_eight() {
     let side = [-D, 0.0, 0.0];
     let four = [("A", [0.0; 3]), ("A", side), ("C", [0.0; 3]), ("C", side)];
-    let (flat, unseen) = rank(0.0, &four);
-    assert_eq!(flat, 6, "{unseen:?}");
+    let (flat, not_identifiable) = rank(0.0, &four);
+    assert_eq!(flat, 6, "{not_identifiable:?}");
     assert!(
-        unseen.contains(&"EA0C".to_string()) && unseen.contains(&"EB0C".to_string()),
-        "{unseen:?}"
+        not_identifiable.contains(&"EA0C".to_string()) && not_identifiable.contains(&"EB0C".to_string()),
+        "{not_identifiable:?}"
     );
-    let (high, unseen) = rank(50.0, &four);
-    assert_eq!((high, unseen), (7, vec!["EA0C".to_string()]));
+    let (high, not_identifiable) = rank(50.0, &four);
+    assert_eq!((high, not_identifiable), (7, vec!["EA0C".to_string()]));
     let mut five = four.to_vec();
     five.push(("C", [0.0, 0.0, D]));
     assert_eq!(rank(50.0, &five), (8, Vec::new()));
 }
 
-/// PDGEs of C of orders 1 to 3 in one test at one radius and one height, set-ups free, readings radial, tangential and axial together: which
-/// coefficients are seen by themselves.
-fn seen_by_itself(orders: std::ops::RangeInclusive<usize>) -> (usize, usize, Vec<String>) {
+/// PDGEs of C of orders 1 to 3 in one test at one radius and one height, with free set-ups and radial, tangential and axial readings: rank, number of
+/// parameters, and the coefficients that are identifiable individually.
+fn individually_identifiable(orders: std::ops::RangeInclusive<usize>) -> (usize, usize, Vec<String>) {
     let mut text = head("\"EX0C\", \"EY0C\", \"EA0C\", \"EB0C\"");
     for offset in ["radial", "tangential", "axial"] {
         text.push_str(&format!(
@@ -80,18 +80,18 @@ fn seen_by_itself(orders: std::ops::RangeInclusive<usize>) -> (usize, usize, Vec
         }
     }
     let (ids, linear) = linearised(&session(&text));
-    let seen = ids
+    let identifiable = ids
         .iter()
         .enumerate()
         .filter(|(j, _)| linear.rank.is_identifiable(*j))
         .map(|(_, id)| id.clone())
         .collect();
-    (linear.rank.seen.ncols(), ids.len(), seen)
+    (linear.rank.seen.ncols(), ids.len(), identifiable)
 }
 
 #[test]
-fn one_height_and_radius_leave_third_order_of_the_own_rotation_alone() {
-    let (rank, unknowns, seen) = seen_by_itself(1..=3);
-    println!("rank {rank} of {unknowns}; seen by themselves: {seen:?}");
-    assert_eq!(seen, ["ECC~C:h3.cos", "ECC~C:h3.sin"]);
+fn at_one_height_and_radius_only_third_order_of_ecc_is_identifiable() {
+    let (rank, parameters, identifiable) = individually_identifiable(1..=3);
+    println!("rank {rank} of {parameters}; individually identifiable: {identifiable:?}");
+    assert_eq!(identifiable, ["ECC~C:h3.cos", "ECC~C:h3.sin"]);
 }

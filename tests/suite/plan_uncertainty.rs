@@ -1,4 +1,4 @@
-//! Predicted uncertainties against those of simulated fits, for every topology of Table 1.1 of the thesis and those of its Fig. 1.1.
+//! Predicted uncertainties against the scatter of simulated fits, for every topology of Table 1.1 and of Fig. 1.1 of the thesis.
 
 use abbe::identify::fit::fit;
 use abbe::identify::plan::states;
@@ -16,12 +16,12 @@ use rayon::prelude::*;
 use super::plan_help::{linearised, machine, noise_um, session};
 use super::topologies::{FIGURE_1_1, TABLE_1_1};
 
-/// Simulated fits a topology.
+/// Simulated fits per topology.
 const FITS: usize = 500;
-/// Spread of the errors that are drawn, µm and arcsec. Their nonlinearity in one linear step is a few hundredths of a µm.
+/// Standard deviation of the drawn errors, µm and arcsec. Their nonlinearity in one linear step is a few hundredths of a µm.
 const ERRORS_UM: f64 = 10.0;
 
-/// Every rotary axis swept twice: the other ball at the foot of the circle, and beside it.
+/// Every rotary axis is swept twice: with the other ball at the centre of the circle, and offset from it.
 fn plan(code: &str) -> Session {
     let mut text = machine(code, None);
     text.push_str("[instrument]\nkind = \"ballbar\"\nnoise_um = 0.3\n");
@@ -51,7 +51,7 @@ fn plan(code: &str) -> Session {
     session(&text)
 }
 
-/// One step from the nominal machine.
+/// One Gauss–Newton step from the nominal machine.
 fn linear_step(problem: &Problem<'_>, basis: &Mat<f64>) -> Vec<f64> {
     let nominal = vec![0.0; problem.parameters.list.len()];
     let mut whole = problem.prior_triangle(&nominal);
@@ -67,11 +67,11 @@ fn linear_step(problem: &Problem<'_>, basis: &Mat<f64>) -> Vec<f64> {
     (0..nominal.len()).map(|j| step[(j, 0)]).collect()
 }
 
-/// Sum over fits of `((estimate − truth)/predicted)²` of every unknown that is seen, and their names.
-fn squares(code: &str, first_seed: usize, whole_fit: bool) -> Vec<(String, f64)> {
+/// Sum over fits of `((estimate − truth)/predicted)²` for every identifiable parameter, by name.
+fn squares(code: &str, first_seed: usize, complete_fit: bool) -> Vec<(String, f64)> {
     let plan = plan(code);
     let (ids, linear) = linearised(&plan);
-    let seen: Vec<usize> = (0..ids.len())
+    let identifiable: Vec<usize> = (0..ids.len())
         .filter(|j| linear.rank.is_identifiable(*j))
         .collect();
     let of_fit = |number: usize| -> Vec<f64> {
@@ -105,7 +105,7 @@ fn squares(code: &str, first_seed: usize, whole_fit: bool) -> Vec<(String, f64)>
         }
         let mut problem = Problem::new(&measured, noise_um(0.3), 1).unwrap();
         states::fold_by_test(&mut problem);
-        let found = if whole_fit {
+        let found = if complete_fit {
             fit(&problem, None).unwrap().beta
         } else {
             linear_step(&problem, &linear.rank.seen)
@@ -120,21 +120,23 @@ fn squares(code: &str, first_seed: usize, whole_fit: bool) -> Vec<(String, f64)>
                 }
             })
         };
-        seen.iter()
+        identifiable
+            .iter()
             .map(|&j| ((found[j] - truth(&ids[j])).powi(2)) / linear.covariance[(j, j)])
             .collect()
     };
     let sums = (0..FITS).into_par_iter().map(of_fit).reduce(
-        || vec![0.0; seen.len()],
+        || vec![0.0; identifiable.len()],
         |a, b| a.iter().zip(&b).map(|(a, b)| a + b).collect(),
     );
-    seen.iter()
+    identifiable
+        .iter()
         .zip(sums)
         .map(|(j, sum)| (ids[*j].clone(), sum))
         .collect()
 }
 
-/// That every sum is χ² with `FITS` degrees of freedom: over some 400 of them 4.5 standard deviations are exceeded once in 400 suites.
+/// Asserts that every sum is χ² with `FITS` degrees of freedom. Of some 400 sums one exceeds 4.5 standard deviations in 400 suites.
 fn check(code: &str, sums: &[(String, f64)]) {
     let spread = (2.0 * FITS as f64).sqrt();
     let errors = sums.iter().filter(|(id, _)| id.starts_with('E')).count();
@@ -154,7 +156,7 @@ fn check(code: &str, sums: &[(String, f64)]) {
             "{code} {id}: χ² {sum:.0} over {FITS}"
         );
     }
-    // With one axis in the head and one in the table only their lines' distance and angle are seen: two pairs of errors are one each.
+    // With one axis in the head and one in the table only the relative location of the two lines is identifiable: two pairs of errors are confounded.
     let divided = code.starts_with("[wC") && !code.starts_with("[wCA") && !code.starts_with("[wCB");
     assert_eq!(errors, if divided { 4 } else { 8 }, "{code}");
 }
@@ -167,12 +169,12 @@ fn predicted_uncertainties_are_those_of_simulated_fits() {
 }
 
 #[test]
-fn predicted_uncertainties_are_those_of_whole_fits() {
+fn predicted_uncertainties_are_those_of_complete_fits() {
     check("[wCAbYXZt]", &squares("[wCAbYXZt]", 50_000, true));
 }
 
 #[test]
-fn with_an_axis_in_head_and_table_two_pairs_are_one_each() {
+fn with_axes_in_head_and_table_two_pairs_are_confounded() {
     for code in ["[wCXYbZAt]", "[wCXYbZBt]", "[wCXbYZAt]"] {
         let (ids, linear) = linearised(&plan(code));
         let pairs: Vec<Vec<&str>> = linear

@@ -1,4 +1,4 @@
-//! The full fit by Monte Carlo: the GUM's figures where the model is linear, a closed form where it is not.
+//! The full fit by Monte Carlo: the law of propagation for a linear model, a closed form for a nonlinear one.
 
 use abbe::identify::fit::{prepare, report};
 use abbe::identify::monte_carlo::MonteCarlo;
@@ -11,7 +11,7 @@ use abbe::model::session::read::{self, ReadOptions};
 
 use super::{abbe, ready, text};
 
-/// A session from the text of its file, beside the machine of chapter 5.
+/// A session from the text of its file, with the machine of chapter 5.
 fn session(contents: &str) -> Session {
     let folder = tempfile::tempdir().unwrap();
     std::fs::copy(
@@ -57,7 +57,7 @@ fn drawn(session: &Session, runs: u64, seed: u64) -> FitMonteCarlo {
     drawn
 }
 
-/// Chapter 5 with a reading every 15°.
+/// The plan of chapter 5 with a reading every 15°.
 fn linear() -> Session {
     let whole = std::fs::read_to_string(ready("hermle-c600u/chapter5.toml")).unwrap();
     let coarse = whole
@@ -77,13 +77,13 @@ fn linear() -> Session {
 }
 
 #[test]
-fn they_agree_where_the_model_is_linear() {
+fn monte_carlo_and_propagation_agree_for_a_linear_model() {
     let session = linear();
     let found = drawn(&session, 20_000, 3);
     assert_eq!(found.unconverged_runs, 0);
     assert!(found.parameters.len() > 8);
     for parameter in &found.parameters {
-        // A standard deviation of 20,000 has a relative one of 0.005.
+        // The standard deviation of 20,000 draws has a relative standard uncertainty of 0.005.
         let ratio = parameter.u / parameter.gum_u;
         assert!((ratio - 1.0).abs() < 0.025, "{}: {ratio}", parameter.id);
         let off = (parameter.mean - parameter.value) / parameter.gum_u;
@@ -115,11 +115,11 @@ fn the_same_bytes_for_any_number_of_threads() {
     assert_ne!(one, serde_json::to_string(&drawn(&session, 1000, 10)).unwrap());
 }
 
-/// The radius of the ball's circle, mm, and how well it is known where along the axis the spindle ball stands.
+/// Radius of the circle of the ball, and standard uncertainty of the spindle ball along the axis, mm.
 const R: f64 = 50.0;
 const U_MM: f64 = 0.8;
 
-/// A short bar whose spindle ball stands anywhere within 0.8 mm along the axis of C: what the bar is longer than stated follows the square of that.
+/// A short bar whose spindle ball has u = 0.8 mm along the axis of C: the estimated error of the bar length depends on the square of that offset.
 fn bent() -> Session {
     session(&format!(
         "[machine]\nfile = \"machine.toml\"\n[instrument]\nkind = \"ballbar\"\nnoise_um = 0.3\n[unknowns]\nerrors = [\"EX0C\", \"EY0C\"]\n\
@@ -133,18 +133,18 @@ fn bar(found: &FitMonteCarlo) -> &DrawnParameter {
     found.parameters.iter().find(|p| p.id.starts_with("bar")).unwrap()
 }
 
-/// `√(R² + z²) − R` at `z = k·u`, µm: by how much the bar is longer than the readings say.
+/// `√(R² + z²) − R` at `z = k·u`, µm: the error of the bar length.
 fn longer_um(k: f64) -> f64 {
     (R.hypot(k * U_MM) - R) * 1e3
 }
 
 #[test]
-fn they_differ_where_a_set_up_counts_by_its_square() {
+fn monte_carlo_and_propagation_differ_for_a_quadratic_set_up() {
     let (session, _) = measured(&bent(), &Simulation::default());
     let found = drawn(&session, 20_000, 4);
     let bar = bar(&found);
     assert_eq!(bar.verdict, Verdict::Differ, "{bar:?}");
-    // The noise of the mean of twelve readings.
+    // Standard deviation of the mean of twelve readings.
     assert!((bar.gum_u - 0.3 / 12.0_f64.sqrt()).abs() < 1e-3, "{}", bar.gum_u);
     // z is Gaussian: |z| is below 2.2414 u with 97.5 %, below 0.0313 u with 2.5 %.
     assert!(
@@ -162,7 +162,7 @@ fn they_differ_where_a_set_up_counts_by_its_square() {
     );
     let mean = U_MM.powi(2) / (2.0 * R) * 1e3;
     assert!((bar.mean - bar.value - mean).abs() < 0.2, "{bar:?}");
-    // What the square does not touch still agrees.
+    // The parameters with a linear response still agree.
     let others = found.parameters.iter().filter(|p| p.id.starts_with('E'));
     for parameter in others {
         assert_eq!(parameter.verdict, Verdict::Agree, "{parameter:?}");
@@ -170,7 +170,7 @@ fn they_differ_where_a_set_up_counts_by_its_square() {
 }
 
 #[test]
-fn the_command_quotes_one_of_the_two() {
+fn the_command_states_which_uncertainty_to_quote() {
     let folder = tempfile::tempdir().unwrap();
     let plan = folder.path().join("plan.toml");
     std::fs::copy(
@@ -224,9 +224,9 @@ fn the_command_quotes_one_of_the_two() {
         let mut all = vec!["fit", text(&session)];
         all.extend(arguments);
         let output = abbe(&all);
-        let said = String::from_utf8(output.stderr).unwrap();
-        assert_eq!(output.status.code(), Some(status), "{said}");
-        assert!(said.contains(part), "{said}");
+        let stderr = String::from_utf8(output.stderr).unwrap();
+        assert_eq!(output.status.code(), Some(status), "{stderr}");
+        assert!(stderr.contains(part), "{stderr}");
     };
     refused(1, &["--monte-carlo", "100"], "at least 10000 runs are needed");
     refused(

@@ -1,5 +1,5 @@
-//! What holds for the fit of every session, whatever its machine: results depend on what was measured, not on the order in which it is
-//! written down, nor on the unit or the hand of the frame.
+//! Properties of the fit of every session on any machine: results depend on the measurement, not on the order of tests, rows or
+//! parameters, nor on the unit or the handedness of the frame.
 
 #[path = "../../model/tests/properties/machines.rs"]
 mod machines;
@@ -35,7 +35,7 @@ const TESTS: usize = 3;
 const RUNS: usize = 2;
 const ROWS_A_RUN: usize = 14;
 
-/// A session as if it had been read: a few tests of a bar or an R-test at random places of a random machine, with readings.
+/// A random session in memory: a few tests of a bar or an R-test at random positions of a random machine, with readings.
 fn sessions() -> impl Strategy<Value = Session> {
     let balls = vec((point(), point()), TESTS);
     (machines(), balls, any::<bool>(), any::<u64>())
@@ -82,7 +82,7 @@ fn session(drawn: &Drawn, balls: &[([f64; 3], [f64; 3])], bar: bool, seed: u64) 
         };
         let model = TestModel::new(machine, station.clone(), &readings);
         let mut values = SlotValues::zero(model.slots());
-        // A tenth of what is drawn: 10 µm and 0.2 mrad. What is to be identified is there; the error motions are not.
+        // A tenth of the drawn errors: 10 µm and 0.2 mrad. The location errors are applied, the error motions are not.
         for (slot, error) in drawn.errors.iter().enumerate().filter(|(slot, _)| slot % 12 < 6) {
             values.constant[slot] = 0.1 * error;
         }
@@ -105,7 +105,7 @@ fn session(drawn: &Drawn, balls: &[([f64; 3], [f64; 3])], bar: bool, seed: u64) 
             .map(|slot| machine.error_name(slot))
             .collect(),
         tests,
-        // What is said of files belongs to a session that was read.
+        // File names exist only in a session that was read from a file.
         ..read::session(&ready, &ReadOptions::default()).unwrap()
     }
 }
@@ -133,7 +133,7 @@ fn test(number: usize, station: Station<f64>, readings: Readings, axes: usize) -
     }
 }
 
-/// What a fit says of a session, in outside units; outliers are not what these sessions are about.
+/// The result of a fit, in display units, without the outlier test.
 fn fitted(session: &Session) -> FitResult {
     let (problem, fit) = prepare(session, 1).unwrap();
     let result = report(&problem, &fit);
@@ -141,8 +141,8 @@ fn fitted(session: &Session) -> FitResult {
     result
 }
 
-/// The same fit, up to rounding: every value `within` so many of its uncertainties, since iterations end somewhere, `expected` giving what the other
-/// session should say of a value.
+/// Asserts equal fits: every value agrees with `expected` of the other session within `within` standard uncertainties, the tolerance of the
+/// iteration.
 #[track_caller]
 fn same(
     one: &FitResult,
@@ -179,7 +179,7 @@ proptest! {
     #![proptest_config(cases(48))]
 
     #[test]
-    fn the_order_of_tests_and_of_rows_in_a_run_does_not_count(session in sessions(), turn in any::<Index>(), seed in any::<u64>()) {
+    fn the_order_of_tests_and_of_rows_in_a_run_has_no_influence(session in sessions(), turn in any::<Index>(), seed in any::<u64>()) {
         let mut other = session.clone();
         other.tests.rotate_left(turn.index(TESTS));
         let mut random = Pcg64::seed_from_u64(seed);
@@ -200,7 +200,7 @@ proptest! {
     }
 
     #[test]
-    fn the_order_of_parameters_does_not_count(session in sessions(), turn in any::<Index>()) {
+    fn the_order_of_parameters_has_no_influence(session in sessions(), turn in any::<Index>()) {
         let mut other = session.clone();
         other.unknowns.rotate_left(turn.index(session.unknowns.len()));
         other.unknowns.reverse();
@@ -236,7 +236,7 @@ proptest! {
         close(one.heldout_rms_um, other.heldout_rms_um)?;
     }
 
-    /// Readings do not change by an effect whose coefficients are zero, nor by one on a test that is not there.
+    /// An effect with zero coefficients, or on a test that does not exist, changes no reading.
     #[test]
     fn an_effect_of_zero_size_changes_nothing(session in sessions(), axis in any::<Index>(), freedom in 0_usize..6) {
         let axis = &session.machine.axes[axis.index(session.machine.axes.len())];
@@ -259,7 +259,7 @@ proptest! {
         wider.resize(other.parameters.list.len(), 0.0);
         prop_assert_eq!(wider.len(), beta.len() + 2);
         for (a, b) in one.residuals(&beta).iter().flatten().zip(other.residuals(&wider).iter().flatten()) {
-            // Left out of the chain, or carried through it as a zero.
+            // The effect is absent from the chain, or present with zero coefficients.
             prop_assert!((a - b).abs() <= 1e-10, "{a} {b}");
         }
         let mut elsewhere = session.clone();
@@ -269,8 +269,8 @@ proptest! {
 }
 
 #[test]
-fn the_drawn_errors_come_back() {
-    // That the properties above are about fits that find something: the pulls of what is seen, over a few sessions, have unit variance.
+fn the_drawn_errors_are_recovered() {
+    // The fits of the properties above find the errors: the pulls of the identifiable parameters of a few sessions have unit variance.
     let mut runner = proptest::test_runner::TestRunner::new(cases(1));
     let (mut square, mut count) = (0.0, 0);
     for _ in 0..40 {
@@ -298,7 +298,7 @@ fn the_drawn_errors_come_back() {
     let variance = square / f64::from(count);
     println!("{count} errors, mean square of pulls {variance:.3}");
     assert!(count > 100);
-    // Pulls of one session are correlated: five standard deviations of as many independent ones.
+    // Pulls of one session are correlated, so the tolerance is five standard deviations of independent pulls.
     assert!(
         (variance - 1.0).abs() < 5.0 * (2.0 / f64::from(count)).sqrt(),
         "{variance}"

@@ -1,4 +1,4 @@
-//! What was put into a simulated session comes back out of it: exactly without noise, and with it as often as its uncertainty says.
+//! The fit of a simulated session recovers the simulated errors: exactly without noise, and within the stated uncertainty with noise.
 
 use abbe::identify::fit::{Fit, prepare};
 use abbe::identify::problem::Problem;
@@ -36,7 +36,7 @@ fn given() -> Vec<Given> {
     THESIS.map(|text| Given::parse(text).unwrap()).to_vec()
 }
 
-/// The session with readings drawn, and what was put into them.
+/// The session with simulated readings, and the simulated values.
 fn measured(plan: &Session, simulation: &Simulation) -> (Session, Vec<(String, f64, String)>) {
     let simulated = simulate(plan, simulation).unwrap();
     assert!(simulated.warnings.is_empty(), "{:?}", simulated.warnings);
@@ -47,11 +47,11 @@ fn measured(plan: &Session, simulation: &Simulation) -> (Session, Vec<(String, f
     (session, simulated.truth)
 }
 
-/// Value and uncertainty of an unknown in its outside unit.
+/// Value and uncertainty of a parameter in its display unit.
 fn found(problem: &Problem<'_>, fit: &Fit, id: &str) -> (f64, f64) {
     let list = &problem.parameters.list;
     let place = list.iter().position(|parameter| parameter.id == id).unwrap();
-    assert!(fit.rank.is_identifiable(place), "{id} is not seen");
+    assert!(fit.rank.is_identifiable(place), "{id} is not identifiable");
     let outside = list[place].unit.display_per_internal;
     (
         fit.beta[place] * outside,
@@ -60,10 +60,10 @@ fn found(problem: &Problem<'_>, fit: &Fit, id: &str) -> (f64, f64) {
 }
 
 #[test]
-fn the_errors_of_the_thesis_come_back_exactly_where_there_is_no_noise() {
+fn without_noise_the_errors_of_the_thesis_are_recovered_exactly() {
     for chapter in ["chapter4", "chapter5", "chapter6"] {
         let mut plan = plan(chapter);
-        // The balls lie where they should, and the session knows it no better than it says.
+        // The balls are at their nominal positions, with the priors of the session.
         plan.noise_mm = Some(0.3e-3);
         let simulation = Simulation {
             given: given(),
@@ -133,7 +133,7 @@ fn pulls_have_mean_0_and_standard_deviation_1_over_200_draws() {
             .sum::<f64>();
         let deviation = (square / (count - 1.0)).sqrt();
         println!("{:24} mean {mean:6.3} sd {deviation:.3}", parameter.id);
-        // Three standard deviations of a mean and of a standard deviation of that many.
+        // Three standard deviations of the mean and of the standard deviation of that many values.
         assert!(mean.abs() < 3.0 / count.sqrt(), "{}: mean {mean}", parameter.id);
         assert!(
             (deviation - 1.0).abs() < 3.0 / (2.0 * count).sqrt(),

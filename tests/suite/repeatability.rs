@@ -1,7 +1,7 @@
-//! The same input, seed and binary give the same bytes, however many threads there are.
+//! The same input, seed and binary give the same bytes for any number of threads.
 //!
-//! Every command runs twice, each time in a folder of its own with the same files, once with one thread and once with two; standard output and every
-//! file that lies there afterwards are compared byte by byte. Each run is a process, so that hash tables are seeded differently as well.
+//! Every command runs twice with the same files, once with one thread and once with two, each in a folder of its own. Standard output and all files
+//! of the folder are compared byte by byte. Each run is a process, so hash tables have different seeds.
 
 use std::collections::BTreeMap;
 use std::fs;
@@ -10,7 +10,7 @@ use std::process::Command;
 
 use super::ready;
 
-/// All files below a folder, with what is in them.
+/// All files below a folder, with their contents.
 fn contents(folder: &Path, files: &mut BTreeMap<PathBuf, Vec<u8>>, root: &Path) {
     for entry in fs::read_dir(folder).unwrap() {
         let path = entry.unwrap().path();
@@ -25,17 +25,13 @@ fn contents(folder: &Path, files: &mut BTreeMap<PathBuf, Vec<u8>>, root: &Path) 
     }
 }
 
-/// What a command leaves behind with that many threads: its standard output under the name `-`, and all files.
-fn left_behind(
-    input: &[(&str, String)],
-    threads: &str,
-    commands: &[Vec<&str>],
-) -> BTreeMap<PathBuf, Vec<u8>> {
+/// The outputs of a command with that many threads: its standard output under the name `-`, and all files.
+fn outputs(input: &[(&str, String)], threads: &str, commands: &[Vec<&str>]) -> BTreeMap<PathBuf, Vec<u8>> {
     let folder = tempfile::tempdir().unwrap();
     for (name, text) in input {
         fs::write(folder.path().join(name), text).unwrap();
     }
-    let mut told = Vec::new();
+    let mut printed = Vec::new();
     for arguments in commands {
         let output = Command::new(env!("CARGO_BIN_EXE_abbe"))
             .args(arguments)
@@ -48,19 +44,19 @@ fn left_behind(
             "{arguments:?}: {}",
             String::from_utf8_lossy(&output.stderr)
         );
-        told.extend(output.stdout);
-        told.extend(output.stderr);
+        printed.extend(output.stdout);
+        printed.extend(output.stderr);
     }
-    let mut files = BTreeMap::from([(PathBuf::from("-"), told)]);
+    let mut files = BTreeMap::from([(PathBuf::from("-"), printed)]);
     contents(folder.path(), &mut files, folder.path());
     files
 }
 
-/// Runs the commands with one thread and with two, and wants the same bytes. How many files were compared.
+/// Runs the commands with one thread and with two and asserts equal bytes. Returns the number of compared files.
 #[track_caller]
 fn the_same(input: &[(&str, String)], commands: &[Vec<&str>]) -> usize {
-    let one = left_behind(input, "1", commands);
-    let two = left_behind(input, "2", commands);
+    let one = outputs(input, "1", commands);
+    let two = outputs(input, "2", commands);
     assert_eq!(
         one.keys().collect::<Vec<_>>(),
         two.keys().collect::<Vec<_>>(),
@@ -78,7 +74,7 @@ fn the_same(input: &[(&str, String)], commands: &[Vec<&str>]) -> usize {
     one.len()
 }
 
-/// The plan of chapter 5 in steps so coarse that a search takes seconds, its machine beside it.
+/// The plan of chapter 5 with coarse steps, so that a search takes seconds, and its machine.
 fn plan() -> Vec<(&'static str, String)> {
     let read = |name: &str| fs::read_to_string(ready(&format!("hermle-c600u/{name}"))).unwrap();
     let plan = read("chapter5.toml")
@@ -87,8 +83,8 @@ fn plan() -> Vec<(&'static str, String)> {
     vec![("plan.toml", plan), ("machine.toml", read("machine.toml"))]
 }
 
-/// The same with a wobble, which the simulated session does not declare.
-fn wobbling() -> Vec<(&'static str, String)> {
+/// The same with an axial error motion that the simulated session does not declare.
+fn with_axial_motion() -> Vec<(&'static str, String)> {
     let mut input = plan();
     input[0]
         .1
@@ -119,7 +115,7 @@ fn simulate(seed: &str) -> Vec<&str> {
 fn a_fit() {
     for seed in SEEDS {
         let files = the_same(
-            &wobbling(),
+            &with_axial_motion(),
             &[
                 simulate(seed),
                 vec![
@@ -154,7 +150,7 @@ fn a_fit() {
 fn a_trace() {
     for seed in SEEDS {
         let files = the_same(
-            &wobbling(),
+            &with_axial_motion(),
             &[
                 simulate(seed),
                 vec![
@@ -213,7 +209,7 @@ fn a_plan() {
 
 #[test]
 fn monte_carlo() {
-    // Two tests of the four: a run is a whole fit.
+    // Two tests of the four, because each draw is a complete fit.
     let mut input = plan();
     let (head, tests) = input[0].1.split_once("[[test]]").unwrap();
     let tests: Vec<&str> = tests

@@ -1,4 +1,4 @@
-//! Repeated sessions: the scatter of their fits beside what the fits say of themselves.
+//! Repeated sessions: the scatter of their fits against the standard uncertainties of the fits.
 
 use abbe::identify::fit::prepare;
 use abbe::identify::quantity::Given;
@@ -11,7 +11,7 @@ use rayon::prelude::*;
 use super::recovery::THESIS;
 use super::{abbe, ready, text};
 
-/// Chapter 5 with a reading every 10°.
+/// The plan of chapter 5 with a reading every 10°.
 fn plan() -> Session {
     let whole = std::fs::read_to_string(ready("hermle-c600u/chapter5.toml")).unwrap();
     let coarse = whole
@@ -30,7 +30,7 @@ fn plan() -> Session {
     session
 }
 
-/// One session, its set-ups mounted anew or as they should be, and what is given on top of the thesis' errors.
+/// The fit of one session with drawn or nominal set-ups, the errors of the thesis and an optional additional error.
 fn session(plan: &Session, seed: u64, draw_setups: bool, changed: Option<&str>) -> Fitted {
     let mut given: Vec<Given> = THESIS.iter().map(|text| Given::parse(text).unwrap()).collect();
     if let Some(changed) = changed.map(|text| Given::parse(text).unwrap()) {
@@ -66,12 +66,12 @@ fn all_as_stated(result: &Repeated) -> bool {
 }
 
 #[test]
-fn sessions_that_are_set_up_anew_scatter_as_their_fits_say() {
+fn sessions_with_new_set_ups_scatter_by_the_stated_uncertainty() {
     let plan = plan();
     let all = sessions(&plan, 0..200, true);
     let result = compare(&all).unwrap();
     assert_eq!(result.parameters.len(), 8, "set-ups are not compared");
-    // The standard deviation of 200 has a relative one of 1/√(2·199) = 0.05.
+    // The standard deviation of 200 values has a relative standard deviation of 1/√(2·199) = 0.05.
     for parameter in &result.parameters {
         let ratio = parameter.ratio.unwrap();
         assert!((ratio - 1.0).abs() < 4.0 * 0.05, "{}: {ratio}", parameter.id);
@@ -88,7 +88,7 @@ fn sessions_that_are_set_up_anew_scatter_as_their_fits_say() {
             parameter.id
         );
     }
-    // In groups of five, one in a hundred may be called off, and one in a hundred scatter; of forty groups hardly more than two.
+    // Both tests of a group of five have a level of 1 %; of forty groups hardly more than two exceed it.
     let groups: Vec<Repeated> = all.chunks(5).map(|group| compare(group).unwrap()).collect();
     let called = groups.iter().filter(|group| !all_as_stated(group)).count();
     assert!(called <= 4, "{called} of {} groups", groups.len());
@@ -107,7 +107,7 @@ fn literature(id: &str) -> &'static str {
 #[test]
 fn a_session_with_a_bias_is_named() {
     let plan = plan();
-    // 10 µm on a position that one session knows within 1 µm.
+    // 10 µm on a position with u = 1 µm in one session.
     for biased in [0_u64, 3] {
         let one = |seed| {
             session(
@@ -131,7 +131,7 @@ fn a_session_with_a_bias_is_named() {
     }
 }
 
-/// What stays mounted is in every fit's uncertainty and in no scatter.
+/// A set-up that stays mounted contributes to the uncertainty of every fit but not to the scatter.
 #[test]
 fn sessions_on_one_mounting_scatter_less() {
     let plan = plan();
@@ -203,13 +203,13 @@ fn the_command_compares_files() {
         let mut all = vec!["fit", text(&files[0])];
         all.extend(arguments);
         let output = abbe(&all);
-        let said = String::from_utf8(output.stderr).unwrap();
-        assert_eq!(output.status.code(), Some(status), "{said}");
-        assert!(said.contains(part), "{said}");
+        let stderr = String::from_utf8(output.stderr).unwrap();
+        assert_eq!(output.status.code(), Some(status), "{stderr}");
+        assert!(stderr.contains(part), "{stderr}");
     };
     refused(1, &["--repeat", text(&files[0])], "is named twice");
     let other = ready("hermle-c600u/measured/session.toml");
-    refused(1, &["--repeat", text(&other)], "is no repeat of");
+    refused(1, &["--repeat", text(&other)], "is not a repeat of");
     refused(
         2,
         &["--repeat", text(&files[1]), "--method", "cone"],

@@ -8,7 +8,7 @@ use abbe::model::session::read::{self, ReadOptions};
 use super::data::data;
 use super::ready;
 
-/// The session on public data, or `None` where they are not there.
+/// The session with public data, or `None` without the data.
 pub fn session_on_public_data(test: &str, name: &str, path: &str) -> Option<Session> {
     let found = data(test, path)?;
     let depth = path.split('/').count();
@@ -54,12 +54,12 @@ fn ur10_with_every_location_error() {
     assert!(held_out <= 0.44, "{held_out}");
     assert_eq!((result.rank, result.parameter_count), (25, 45));
     assert_eq!(result.unobservable.len(), 20);
-    // What is not seen is named and comes with no value.
-    for unseen in &result.unobservable {
-        assert!(!unseen.combination.is_empty() && !unseen.why.is_empty());
+    // Parameters that are not identifiable are named and have no value.
+    for unobservable in &result.unobservable {
+        assert!(!unobservable.combination.is_empty() && !unobservable.why.is_empty());
         for parameter in &result.parameters {
             assert!(
-                !unseen.combination.contains_key(&parameter.id),
+                !unobservable.combination.contains_key(&parameter.id),
                 "{}",
                 parameter.id
             );
@@ -68,14 +68,14 @@ fn ur10_with_every_location_error() {
 }
 
 #[test]
-fn kuka_closes_and_names_the_two_badly_seated_poses() {
-    let name = "kuka_closes_and_names_the_two_badly_seated_poses";
+fn kuka_is_fitted_and_two_badly_seated_poses_are_outliers() {
+    let name = "kuka_is_fitted_and_two_badly_seated_poses_are_outliers";
     let Some(session) = session_on_public_data(name, "kuka-iiwa14/session.toml", "mukca") else {
         return;
     };
     let result = fitted(&session);
     let held_out = result.heldout_rms_3d_um.unwrap() * 1e-3;
-    println!("KUKA: {held_out:.4} mm held out; left out: {:?}", result.outliers);
+    println!("KUKA: {held_out:.4} mm held out; outliers: {:?}", result.outliers);
     assert!(held_out <= 0.25, "{held_out}");
     assert_eq!(result.outliers.len(), 2, "{:?}", result.outliers);
 }

@@ -42,7 +42,7 @@ fn near(found: [f64; 3], expected: [f64; 3], most: f64) {
 }
 
 #[test]
-fn equations_1_to_3_are_the_product_in_the_order_of_the_text_not_in_that_of_the_print() {
+fn equations_1_to_3_are_the_product_in_the_order_of_the_text_not_of_the_printed_matrices() {
     let mut random = Pcg64::seed_from_u64(1);
     let mut furthest_from_print = 0.0_f64;
     for _ in 0..100 {
@@ -66,7 +66,7 @@ fn equations_1_to_3_are_the_product_in_the_order_of_the_text_not_in_that_of_the_
     assert!(furthest_from_print > 0.5, "{furthest_from_print}");
 }
 
-/// Numbers worked out by hand: sin 35.264° = 1/√3 and cos 35.264° = √(2/3) to five decimals.
+/// Hand calculation: sin 35.264° = 1/√3 and cos 35.264° = √(2/3) to five decimals.
 #[test]
 fn equations_4_to_6_have_their_constants() {
     let angles = [135.0_f64, -35.264, 0.0].map(f64::to_radians);
@@ -80,9 +80,9 @@ fn equations_4_to_6_have_their_constants() {
     }
 }
 
-/// What Eqs. (7) to (9) leave out is half the squares of the angles times the coordinate itself, and what is of third order.
+/// Eqs. (7) to (9) omit half the squares of the angles times the coordinate itself, and terms of third order.
 #[test]
-fn equations_7_to_9_are_the_small_angle_form_and_miss_the_squares_alone() {
+fn equations_7_to_9_are_the_small_angle_form_and_omit_only_the_squares() {
     let [x, y, z] = [0.7, -0.4, 0.9];
     for size in [1e-2, 1e-3] {
         let [omega, phi, theta] = [0.6, -1.0, 0.8].map(|angle| angle * size);
@@ -102,12 +102,12 @@ fn equations_7_to_9_are_the_small_angle_form_and_miss_the_squares_alone() {
         let squares = [x * half(phi, theta), y * half(theta, omega), z * half(phi, omega)];
         let rest: [f64; 3] = std::array::from_fn(|i| exact[i] - printed[i] + squares[i]);
         near(rest, [0.0; 3], 2.0 * size.powi(3));
-        // Of the order that is left out, not smaller.
+        // The difference has the order of the omitted terms.
         assert!((exact[0] - printed[0]).abs() > 0.3 * size * size);
     }
 }
 
-/// Everything that can be out of place by up to a tenth of a millimetre and half a milliradian, in the plant and in the model's slots.
+/// All errors drawn up to 0.1 mm and 0.5 mrad, for the plant and for the slots of the model.
 fn everything(machine: &Machine, random: &mut Pcg64) -> (Displacement, SlotValues) {
     let unknowns = InstrumentKind::RTest.unknowns().len();
     let mut slots = SlotValues::zero(machine.error_slots() + unknowns);
@@ -136,7 +136,7 @@ fn everything(machine: &Machine, random: &mut Pcg64) -> (Displacement, SlotValue
 }
 
 #[test]
-fn both_settings_read_what_the_plant_reads() {
+fn both_settings_agree_with_the_plant() {
     let machine = Machine::from_code("w C A b Y X Z t").unwrap();
     let mut random = Pcg64::seed_from_u64(2);
     for case in 0..200 {
@@ -200,7 +200,7 @@ fn both_settings_read_what_the_plant_reads() {
     }
 }
 
-/// With C under the nest and the nest at +X, the two views are Eqs. (10) and (11), whichever body carries the sensors.
+/// With C under the nest and the nest at +X, the two views are Eqs. (10) and (11), in both settings.
 #[test]
 fn radial_and_tangential_are_equations_10_and_11() {
     for on in [NestOn::Table, NestOn::Spindle] {
@@ -223,7 +223,7 @@ fn radial_and_tangential_are_equations_10_and_11() {
                 [x * cos + y * sin, -x * sin + y * cos, z],
                 1e-12,
             );
-            // The readings themselves: on the table they turn with C, in the spindle they do not.
+            // The readings: with sensors on the table they rotate with C, with sensors in the spindle they do not.
             let read = &readings.observed[3 * row..3 * row + 3];
             let expected = match on {
                 NestOn::Table => [radial, tangential, axial],
@@ -234,7 +234,7 @@ fn radial_and_tangential_are_equations_10_and_11() {
     }
 }
 
-/// Eq. (12): where a control counts a degree as a millimetre, one turn is as long as the diagonal of its 2πR mm and its 360°.
+/// Eq. (12): if a control counts a degree as a millimetre, the length of one turn is the diagonal of 2πR mm and 360°.
 #[test]
 fn a_programmed_feed_takes_the_time_of_the_diagonal() {
     let session = read::session(&ready("r-test/plan.toml"), &ReadOptions::default()).unwrap();

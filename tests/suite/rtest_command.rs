@@ -2,11 +2,11 @@
 
 use super::{abbe, ready, text};
 
-/// First order, worked out by hand for the nest on a C table: a table that lies δ too far in X has its point there, so the tool lies −δ from it, seen
-/// from a table that has turned by C.
+/// First order by hand for the nest on a C table: an error δ of the table in X displaces its point, so the tool lies at −δ from it, in the frame of a
+/// table rotated by C.
 #[test]
-fn the_equation_of_bk2_is_what_a_turning_table_shows() {
-    let told = abbe(&[
+fn the_equation_of_bk2_agrees_with_a_rotating_table() {
+    let output = abbe(&[
         "equation",
         text(&ready("r-test/plan.toml")),
         "--test",
@@ -16,8 +16,12 @@ fn the_equation_of_bk2_is_what_a_turning_table_shows() {
         "--errors",
         "EX0C,EC0C,sensor.theta",
     ]);
-    assert!(told.status.success(), "{}", String::from_utf8_lossy(&told.stderr));
-    let printed = String::from_utf8_lossy(&told.stdout);
+    assert!(
+        output.status.success(),
+        "{}",
+        String::from_utf8_lossy(&output.stderr)
+    );
+    let printed = String::from_utf8_lossy(&output.stdout);
     let printed = printed.split_whitespace().collect::<Vec<_>>().join(" ");
     for line in [
         "∂m.x/∂e_x0c = −c_c",
@@ -29,12 +33,12 @@ fn the_equation_of_bk2_is_what_a_turning_table_shows() {
     }
 }
 
-/// In every order and with the sensors on either body the printed form is checked against the chain over dual numbers, or nothing is printed.
+/// Every order, with the sensors on either body: the command prints a form only after its check against dual numbers.
 #[test]
 fn equations_of_raw_sensors_are_printed_in_every_order() {
     for test in ["BK1", "BK1-Es"] {
         for order in ["exact", "bilinear", "first"] {
-            let printed = said(&[
+            let printed = stdout_of(&[
                 "equation",
                 text(&ready("r-test/machine-b.toml")),
                 "--test",
@@ -44,9 +48,9 @@ fn equations_of_raw_sensors_are_printed_in_every_order() {
                 "--errors",
                 "EY0A,EA0Z,sensor.omega,workpiece_ball.x",
             ]);
-            // cos 35.264°: what sensor u counts of X.
+            // cos 35.264°: the component of sensor u along X.
             assert!(printed.contains("0.816500507611"), "{test} {order}: {printed}");
-            // X need not move and does not.
+            // X need not move and is stationary.
             assert!(
                 !printed.contains("position of axis X"),
                 "{test} {order}: {printed}"
@@ -55,8 +59,8 @@ fn equations_of_raw_sensors_are_printed_in_every_order() {
     }
 }
 
-/// A command that has to succeed; what it says.
-fn said(arguments: &[&str]) -> String {
+/// The standard output of a successful command.
+fn stdout_of(arguments: &[&str]) -> String {
     let outcome = abbe(arguments);
     assert!(
         outcome.status.success(),
@@ -74,7 +78,7 @@ fn a_planned_session_is_simulated_and_fitted_with_raw_sensors_in_both_settings()
         folder.path().join("fit.json"),
         folder.path().join("views.csv"),
     );
-    said(&[
+    stdout_of(&[
         "simulate",
         text(&ready("r-test/machine-b.toml")),
         "--out",
@@ -92,7 +96,7 @@ fn a_planned_session_is_simulated_and_fitted_with_raw_sensors_in_both_settings()
         data.lines().next().unwrap().ends_with("du_mm,dv_mm,dw_mm"),
         "{data:.80}"
     );
-    said(&[
+    stdout_of(&[
         "fit",
         text(&run.join("session.toml")),
         "--json",
@@ -116,26 +120,27 @@ fn a_planned_session_is_simulated_and_fitted_with_raw_sensors_in_both_settings()
         (rms[1] - rms[0] * 3.0_f64.sqrt()).abs() < 1e-6 && rms[2] < 0.56,
         "{rms:?}"
     );
-    let seen = std::fs::read_to_string(&csv).unwrap();
-    let header = seen.lines().next().unwrap();
+    let views = std::fs::read_to_string(&csv).unwrap();
+    let header = views.lines().next().unwrap();
     assert!(
         header.starts_with("test,run,a_deg,b_deg,") && header.ends_with("residual_axial_um"),
         "{header}"
     );
-    assert_eq!(seen.lines().count(), 1 + data.lines().skip(1).count() * 3);
+    assert_eq!(views.lines().count(), 1 + data.lines().skip(1).count() * 3);
 }
 
 #[test]
-fn the_ready_session_is_planned_and_its_clearance_judged_where_the_device_stands() {
-    let told = abbe(&[
+fn the_bundled_session_is_planned_and_its_clearance_checked_in_its_setting() {
+    let output = abbe(&[
         "plan",
         text(&ready("r-test/plan.toml")),
         "--no-effects",
         "--clearance-mm",
         "290,500,100,120,100,100",
     ]);
-    assert!(told.status.success());
-    let warned = String::from_utf8_lossy(&told.stdout).into_owned() + &String::from_utf8_lossy(&told.stderr);
+    assert!(output.status.success());
+    let warned =
+        String::from_utf8_lossy(&output.stdout).into_owned() + &String::from_utf8_lossy(&output.stderr);
     assert!(
         warned.contains("device on the table: shaft and jig, 200 mm"),
         "{warned}"
@@ -146,13 +151,16 @@ fn the_ready_session_is_planned_and_its_clearance_judged_where_the_device_stands
 #[test]
 fn views_of_a_ball_bar_are_refused() {
     let folder = tempfile::tempdir().unwrap();
-    let told = abbe(&[
+    let output = abbe(&[
         "fit",
         text(&ready("hermle-c600u/measured/session.toml")),
         "--views",
         text(&folder.path().join("views.csv")),
     ]);
-    assert_eq!(told.status.code(), Some(1));
-    let told = String::from_utf8_lossy(&told.stderr).into_owned();
-    assert!(told.contains("r-test") && told.contains("ballbar"), "{told}");
+    assert_eq!(output.status.code(), Some(1));
+    let stderr = String::from_utf8_lossy(&output.stderr).into_owned();
+    assert!(
+        stderr.contains("r-test") && stderr.contains("ballbar"),
+        "{stderr}"
+    );
 }

@@ -1,9 +1,9 @@
-//! What Yamaji, Hamabata & Ihara (HPC 2014, Section 7) found with an R-test, found again by trace in readings of the plant. The session files declare no
-//! effect; what was put in is known to the assertions alone.
+//! The effects that Yamaji, Hamabata & Ihara (HPC 2014, Section 7) found with an R-test, found by trace in readings of the plant. The session files
+//! declare no effect; only the assertions use the true effects.
 
 use std::f64::consts::FRAC_PI_2;
 
-use abbe::identify::trace::{Trace, TraceOptions, trace};
+use abbe::identify::trace::{TraceOptions, TraceOutcome, trace};
 use abbe::model::session::read::{self, ReadOptions};
 
 use crate::plant::machine::Stated;
@@ -39,7 +39,7 @@ fn test(name: &str, workpiece_ball_mm: [f64; 3], motions: [Motion; 5]) -> Test {
     }
 }
 
-/// X, Y and C: the nest goes round C, X and Y go with it.
+/// BK2: C turns the nest, and X and Y follow.
 fn bk2() -> Test {
     let motions = with(all_stand(), AxisName::C, Motion::Turns);
     let motions = with(motions, AxisName::X, circles(0.0));
@@ -61,7 +61,7 @@ fn c_alone() -> Test {
     )
 }
 
-/// Y, Z and A.
+/// BK1: A turns the nest, and Y and Z follow.
 fn bk1() -> Test {
     let motions = with(all_stand(), AxisName::A, Motion::Turns);
     let motions = with(motions, AxisName::Y, circles(0.0));
@@ -113,7 +113,7 @@ fn steps(at: &[f64], heights: &[f64]) -> Shape {
     }
 }
 
-/// Pitch-error compensation in coarse increments, as the control of Machine A had it.
+/// Pitch-error compensation in coarse increments, as in the control of Machine A.
 const X_STEPS_MM: [f64; 3] = [-62.0, 18.0, 71.0];
 const X_HEIGHTS_UM: [f64; 3] = [3.0, -4.0, 3.0];
 const Y_STEPS_MM: [f64; 2] = [-41.0, 37.0];
@@ -126,8 +126,8 @@ fn pitch_compensation() -> Vec<Injected> {
     ]
 }
 
-/// Reads a session of the plant and traces it, whatever may have been meant by it.
-fn traced<T>(session: &Session, told: impl FnOnce(&Trace<'_>) -> T) -> T {
+/// Writes a session of the plant, reads it and traces it.
+fn traced<T>(session: &Session, examine: impl FnOnce(&TraceOutcome<'_>) -> T) -> T {
     let folder = tempfile::tempdir().unwrap();
     session.write(folder.path()).unwrap();
     let session = read::session(&folder.path().join("session.toml"), &ReadOptions::default()).unwrap();
@@ -140,11 +140,11 @@ fn traced<T>(session: &Session, told: impl FnOnce(&Trace<'_>) -> T) -> T {
     for effect in &result.effects {
         println!("  {:?} {:?}", effect.name, effect.parameters);
     }
-    told(&outcome)
+    examine(&outcome)
 }
 
-/// The staircase that trace has found for a component: where and how high, µm.
-fn staircase(outcome: &Trace<'_>, component: &str) -> Option<Vec<(f64, f64)>> {
+/// The staircase that trace finds for a component: positions and heights, µm.
+fn staircase(outcome: &TraceOutcome<'_>, component: &str) -> Option<Vec<(f64, f64)>> {
     let number = outcome
         .effects
         .iter()
@@ -159,7 +159,7 @@ fn staircase(outcome: &Trace<'_>, component: &str) -> Option<Vec<(f64, f64)>> {
     Some(at.values.iter().copied().zip(heights).collect())
 }
 
-/// How high a staircase stands at a position, µm.
+/// The value of a staircase at a position, µm.
 fn height(stairs: &[(f64, f64)], at: f64) -> f64 {
     stairs
         .iter()
@@ -168,7 +168,7 @@ fn height(stairs: &[(f64, f64)], at: f64) -> f64 {
         .sum()
 }
 
-/// Wherever no step is near, the staircases stand equally high, but for their common zero; µm.
+/// The largest difference of two staircases away from their steps, after a common offset is removed, µm.
 fn furthest(found: &[(f64, f64)], truth: &[(f64, f64)]) -> f64 {
     let places: Vec<f64> = (-95..=95)
         .map(f64::from)
@@ -210,9 +210,9 @@ fn steps_of_pitch_compensation_are_found_in_x_and_in_y() {
     });
 }
 
-/// A C axis that jumps where X passes 18 mm shows in BK2 what a step of X would: only the test of C alone tells (Figs. 13, 14).
+/// In BK2 a C axis that jumps where X passes 18 mm is confounded with a step of X: only the test of C alone separates them (Figs. 13, 14).
 #[test]
-fn steps_of_c_itself_are_told_from_steps_of_x_by_c_alone() {
+fn the_test_of_c_alone_separates_steps_of_c_from_steps_of_x() {
     let jump_deg = (18.0 / R_MM).acos().to_degrees();
     let jumps = steps(&[jump_deg, 360.0 - jump_deg], &[-4.0, 4.0]);
     let effects = vec![motion(Freedom::X, AxisName::C, jumps, 1.0)];
@@ -233,7 +233,7 @@ fn steps_of_c_itself_are_told_from_steps_of_x_by_c_alone() {
     });
 }
 
-/// Fig. 13: a ball bar on a circle of X and Y, C at rest, shows the same steps of X.
+/// Fig. 13: a ball bar on a circle of X and Y with C at rest responds to the same steps of X.
 #[test]
 fn a_ball_bar_on_x_and_y_alone_shows_the_same_steps() {
     let recipe = Recipe::new(Kind::LinearCircles, 11).with(pitch_compensation()[0].clone());
@@ -269,7 +269,7 @@ fn squareness_and_cyclic_straightness_of_y_are_found_in_bk1() {
             let result = &outcome.result;
             assert_eq!(result.verdict, "explained");
             assert_eq!(result.effects.len(), 2);
-            // BK1 shows by how much Y and Z miss the right angle, not which of them does.
+            // BK1 determines the squareness of Y and Z, not which of the two axes is tilted.
             let square = &result.effects[0];
             let mut names = std::iter::once(&square.name).chain(&square.aliases);
             assert!(
@@ -279,12 +279,12 @@ fn squareness_and_cyclic_straightness_of_y_are_found_in_bk1() {
             assert!(square.name.shape == "constant" && square.name.component.starts_with("EA0"));
             let angle = &square.parameters[0];
             assert!((angle.value.abs() - 25.0).abs() < 4.0 * angle.u, "{angle:?}");
-            let wave = result
+            let harmonic = result
                 .effects
                 .iter()
                 .find(|effect| effect.name.component == "EZY" && effect.name.shape == "periodic")
                 .unwrap();
-            let [amplitude, phase] = [0, 1].map(|k| &wave.parameters[k]);
+            let [amplitude, phase] = [0, 1].map(|k| &harmonic.parameters[k]);
             assert!((amplitude.value - 1.5).abs() < 4.0 * amplitude.u, "{amplitude:?}");
             assert!((phase.value - 40.0).abs() < 4.0 * phase.u, "{phase:?}");
             assert!(

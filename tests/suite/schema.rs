@@ -105,7 +105,7 @@ fn known_to_the_reader(session: &str) -> BTreeSet<String> {
     std::fs::write(&file, session).unwrap();
     let told = abbe(&["plan", text(&file), "--no-effects"]);
     let told = String::from_utf8_lossy(&told.stderr).replace('\n', " ");
-    assert!(told.contains("knows no key `zz`"), "{told}\n{session}");
+    assert!(told.contains("has the unknown key `zz`"), "{told}\n{session}");
     let list = told.split("known: ").nth(1).unwrap();
     list.split([' ', ','])
         .take_while(|word| !word.starts_with('─') && !word.starts_with('╯'))

@@ -1,4 +1,4 @@
-//! Self-calibration by probing (Zimmermann & Ibaraki 2020) against the paper's tables and against touches computed by plane geometry alone.
+//! Self-calibration by probing (Zimmermann & Ibaraki 2020) against the tables of the paper and against readings from plane geometry.
 
 use abbe::identify::self_calibration::{
     Calibration, Equations, Function, MonteCarlo, Reference, calibrate, conditions, rank_before, reduce,
@@ -29,7 +29,7 @@ const TABLE_5: [[f64; 4]; 7] = [
     [5.07, 6.19, 4.60, 4.61],
 ];
 const ANGLES_OF_TABLE_5: [f64; 7] = [-180.0, -135.0, -90.0, -45.0, 45.0, 90.0, 135.0];
-/// By how much a cell may differ, µm.
+/// Permitted difference of a cell, µm.
 const CELL: f64 = 0.35;
 
 /// The ready plan with `count` angles and test 1b at `second_deg`.
@@ -69,7 +69,7 @@ fn unmoved(count: usize, second_deg: f64) -> Session {
     session
 }
 
-/// The radius known, so that the readings are referred to the first as in the paper.
+/// Sets the radius as known, so that all readings refer to the first one, as in the paper.
 fn as_in_the_paper(session: &mut Session) {
     for test in &mut session.tests {
         test.priors[abbe::model::instrument::probe::RADIUS] = abbe::model::session::Prior::Known;
@@ -89,7 +89,7 @@ fn expanded_um(calibration: &Calibration, covariance: &faer::Mat<f64>) -> [[f64;
     })
 }
 
-/// Cells of Table 5 that are off by more than allowed, and the worst.
+/// Number of cells of Table 5 beyond the permitted difference, and the largest difference.
 fn off(found: &[[f64; 4]; 7]) -> (usize, f64) {
     let differences: Vec<f64> = found
         .iter()
@@ -116,8 +116,8 @@ fn table_5_is_reproduced_in_every_cell() {
         assert_eq!(calibration.equations.columns(), 32);
         assert_eq!(calibration.rank_before, 30);
         assert_eq!(calibration.conditions.len(), 6);
-        assert_eq!(calibration.solution.unknowns, unknowns);
-        assert!(calibration.solution.seen.iter().all(|seen| *seen));
+        assert_eq!(calibration.solution.parameters, unknowns);
+        assert!(calibration.solution.identifiable.iter().all(|seen| *seen));
         let (cells, worst) = off(&expanded_um(&calibration, &calibration.solution.covariance));
         assert_eq!(cells, 0, "{reference:?}: worst {worst}");
         assert!(worst < worst_cell, "{reference:?}: {worst}");
@@ -145,8 +145,8 @@ fn the_printed_sign_of_test_3_does_not_reproduce_table_5() {
     assert!(worst > 2.5, "{worst}");
 }
 
-/// Table 6 prints 3.68 and 3.10 µm. They come out of the algebraic circle through draws about readings of zero: the circle has no radius of its own there,
-/// only that of the noise. About a circle as wide as that of Table 4 the same fit gives 2.93 and 3.10 µm.
+/// Table 6 prints 3.68 and 3.10 µm. The algebraic circle of draws about readings of zero reproduces them: there the radius of the circle is due to
+/// noise alone. About a circle with the radius of that of Table 4 the same fit gives 2.93 and 3.10 µm.
 #[test]
 fn table_6_is_the_circle_through_draws_about_zero() {
     let mut session = unmoved(8, 45.0);
@@ -177,12 +177,12 @@ fn table_6_is_the_circle_through_draws_about_zero() {
     assert!((x - 2.93).abs() < 0.05 && (y - 3.10).abs() < 0.05, "{x} {y}");
 }
 
-/// What moves in a plane: the table's axis, the artefact on the table, the linear axes.
+/// Errors in a plane: of the table axis, the artefact on the table, and the linear axes.
 #[derive(Default)]
 struct Touched {
-    /// Where the axis of the table passes the plane, mm.
+    /// Position of the table axis in the plane, mm.
     axis: [f64; 2],
-    /// Centre of the cylinder while the table stands at 0, mm.
+    /// Centre of the cylinder at table position 0, mm.
     cylinder: [f64; 2],
     /// Squareness of X and Y, rad.
     squareness: f64,
@@ -190,7 +190,7 @@ struct Touched {
     noise: (f64, u64),
 }
 
-/// Touches by plane geometry: the ray from the machine's origin at the angle of the probe meets the circle of the cylinder, which the table has carried along.
+/// Readings by plane geometry: intersection of the ray from the origin at the angle of the probe with the circle of the rotated cylinder.
 fn touched(session: &mut Session, case: &Touched) {
     let radius = 45.0;
     let mut random = Pcg64::seed_from_u64(case.noise.1);
@@ -200,7 +200,7 @@ fn touched(session: &mut Session, case: &Touched) {
         let mut readings = abbe::model::session::motion::planned(&machine, test).unwrap();
         for row in 0..readings.rows() {
             let (commanded_x, commanded_y) = (readings.positions[x][row], readings.positions[y][row]);
-            // The table turns clockwise by C.
+            // The table rotates clockwise by C.
             let (sin, cos) = readings.positions[c][row].sin_cos();
             let from = [case.cylinder[0] - case.axis[0], case.cylinder[1] - case.axis[1]];
             let centre = [
@@ -209,7 +209,7 @@ fn touched(session: &mut Session, case: &Touched) {
             ];
             let angle = commanded_y.atan2(commanded_x);
             let direction = [angle.cos(), angle.sin()];
-            // A squareness of Y carries the tip along X as Y goes.
+            // A squareness of Y displaces the tip along X in proportion to Y.
             let tip = [commanded_x - case.squareness * commanded_y, commanded_y];
             let from = [tip[0] - centre[0], tip[1] - centre[1]];
             let along = from[0] * direction[0] + from[1] * direction[1];
@@ -222,7 +222,7 @@ fn touched(session: &mut Session, case: &Touched) {
     }
 }
 
-/// A probe that does not move straight towards the axis, on a table turned by 30° with its axis 0.2 mm off: line and circle in the plane.
+/// A probe that does not move straight towards the axis, on a table at 30° whose axis is displaced by 0.2 mm: line and circle in the plane.
 #[test]
 fn a_declared_direction_is_the_one_that_is_probed_along() {
     let machine = plan(8, 45.0).machine;
@@ -253,7 +253,7 @@ fn a_declared_direction_is_the_one_that_is_probed_along() {
     assert!((found - expected).abs() < 1e-11, "{found} {expected}");
 }
 
-/// Section 5.2 and Table 9: the origin is shifted to eight places of a 40 µm square, so that axis and artefact lie off it by as much the other way.
+/// Section 5.2 and Table 9: the origin moves to eight points of a 40 µm square, so axis and artefact have the opposite offset.
 #[test]
 fn shifted_origins_come_back_within_their_uncertainty() {
     let shifts = [
@@ -283,12 +283,12 @@ fn shifted_origins_come_back_within_their_uncertainty() {
             for parameters in [&report.parameters, &report.parameters_by_turn] {
                 for (parameter, axis) in parameters.iter().zip(axis) {
                     let miss = (parameter.value - axis * 1e3).abs();
-                    // Without noise: what the equations leave out, of the order of (90 µm)²/45 mm = 0.18 µm.
+                    // Without noise: the omitted second order, (90 µm)²/45 mm = 0.18 µm.
                     assert!(miss < 0.18 + k * parameter.u, "{x} {y}: {parameter:?}");
                     inside += usize::from(noise > 0.0 && miss < 2.0 * parameter.u);
                 }
             }
-            // The linear axes have not moved: a squareness is all there is.
+            // The errors of the linear axes have not changed: there is only a squareness.
             for (angle, value) in calibration.equations.angles[2]
                 .iter()
                 .zip(calibration.values_mm(Function::Linear))
@@ -299,7 +299,7 @@ fn shifted_origins_come_back_within_their_uncertainty() {
             }
         }
     }
-    // 32 intervals of about 95 %.
+    // 32 intervals with a coverage of about 95 %.
     assert!(inside >= 27, "{inside} of 32");
 }
 
@@ -324,7 +324,10 @@ fn any_number_of_angles_and_any_second_direction() {
         let calibration = calibrate(&session).unwrap();
         assert_eq!(calibration.equations.columns(), 4 * count);
         assert_eq!(calibration.rank_before, 4 * count - 2, "N = {count}");
-        assert!(calibration.solution.seen.iter().all(|seen| *seen), "N = {count}");
+        assert!(
+            calibration.solution.identifiable.iter().all(|seen| *seen),
+            "N = {count}"
+        );
         let report = calibration.report(&session, None);
         for (parameter, expected) in report.parameters.iter().zip([4.0, -3.0]) {
             assert!(
@@ -335,17 +338,17 @@ fn any_number_of_angles_and_any_second_direction() {
     }
 }
 
-/// A second direction at 90° of eight angles ties only every second angle to the next: one more combination is not told.
+/// With eight angles, a second direction at 90° connects only every second angle: one further combination is not identifiable.
 #[test]
-fn what_a_direction_that_divides_the_angles_leaves_untold_is_named() {
+fn a_direction_that_divides_the_angles_leaves_named_combinations_unidentified() {
     let session = unmoved(8, 90.0);
     let calibration = calibrate(&session).unwrap();
     assert_eq!(calibration.rank_before, 29);
     let report = calibration.report(&session, None);
     assert_eq!(report.unobservable.len(), 1);
     assert!(report.unobservable[0].combination.len() > 4);
-    let told = report.functions.iter().flat_map(|function| &function.points);
-    assert!(told.clone().any(|point| point.value_um.is_none()));
+    let stderr = report.functions.iter().flat_map(|function| &function.points);
+    assert!(stderr.clone().any(|point| point.value_um.is_none()));
     assert!(report.parameters.is_empty());
     assert!(
         report
@@ -356,7 +359,7 @@ fn what_a_direction_that_divides_the_angles_leaves_untold_is_named() {
 }
 
 #[test]
-fn drawing_agrees_with_the_law_of_propagation_and_with_itself() {
+fn monte_carlo_agrees_with_the_law_of_propagation_and_is_repeatable() {
     let mut session = plan(8, 45.0);
     let case = Touched {
         axis: [0.3, 0.51],
@@ -392,7 +395,7 @@ fn drawing_agrees_with_the_law_of_propagation_and_with_itself() {
             assert!((half - 1.96).abs() < 0.03, "{k}: {half}");
         }
     }
-    // The circle is wide: its centre is as good as linear in the readings.
+    // The circle is large compared with the noise, so its centre is practically linear in the readings.
     let report = calibration.report(&session, None);
     let by_law = report.parameters.iter().chain(&report.parameters_by_turn);
     for (distribution, parameter) in drawn[calibration.solution.values_mm.len()..].iter().zip(by_law) {
@@ -401,14 +404,14 @@ fn drawing_agrees_with_the_law_of_propagation_and_with_itself() {
             "{parameter:?}"
         );
     }
-    // The same seed, on one thread, gives the same to the last bit; another does not.
+    // The same seed on one thread gives the same bits; another seed does not.
     let alone = rayon::ThreadPoolBuilder::new().num_threads(1).build().unwrap();
     assert_eq!(drawn, alone.install(|| calibration.monte_carlo(&draws(1))));
     assert_ne!(drawn, calibration.monte_carlo(&draws(2)));
 }
 
 #[test]
-fn noise_that_is_not_stated_is_what_repeated_cycles_leave_over() {
+fn noise_that_is_not_stated_follows_from_repeated_cycles() {
     let mut random = Pcg64::seed_from_u64(5);
     let mut ratios = Vec::new();
     for _ in 0..20 {
@@ -438,7 +441,7 @@ fn noise_that_is_not_stated_is_what_repeated_cycles_leave_over() {
 }
 
 #[test]
-fn a_session_of_another_kind_is_refused_with_the_way_out() {
+fn a_session_of_another_kind_is_refused_with_a_remedy() {
     let refused = |session: &Session| Equations::of(session).unwrap_err().to_string();
     let bar = read::session(
         &ready("hermle-c600u/measured/session.toml"),

@@ -13,17 +13,17 @@ fn chapter5() -> PathBuf {
     ready("hermle-c600u/chapter5.toml")
 }
 
-/// Runs `abbe simulate` on a plan; what it says on standard output.
+/// Runs `abbe simulate` on a plan and returns its standard output.
 #[track_caller]
 fn simulated(plan: &Path, out: &Path, more: &[&str]) -> String {
     let arguments = [&["simulate", text(plan), "--out", text(out)], more].concat();
     let output = abbe(&arguments);
-    let told = String::from_utf8_lossy(&output.stderr).into_owned();
-    assert!(output.status.success(), "{told}");
+    let stderr = String::from_utf8_lossy(&output.stderr).into_owned();
+    assert!(output.status.success(), "{stderr}");
     String::from_utf8(output.stdout).unwrap()
 }
 
-/// Runs it where it has to fail; what it says on standard error.
+/// Runs it, asserts that it fails, and returns its standard error.
 #[track_caller]
 fn refused(plan: &Path, out: &Path, more: &[&str]) -> String {
     let arguments = [&["simulate", text(plan), "--out", text(out)], more].concat();
@@ -36,12 +36,12 @@ fn session(folder: &Path) -> Session {
     read::session(&folder.join("session.toml"), &ReadOptions::default()).unwrap()
 }
 
-/// A plan of one coarse C test with a declared effect, beside its machine.
+/// Writes a plan of one coarse C test with a declared effect, and its machine.
 fn small_plan(folder: &Path) -> PathBuf {
     let plan = fs::read_to_string(chapter5()).unwrap();
     let head = &plan[..plan.find("[[test]]").unwrap()];
     let text = format!(
-        "{head}[[effect]] # a wobble\ncomponent = \"EZC\"\nshape = \"harmonic\"\norder = 2\n\n[[test]]\nname = \"C 150\"\n\
+        "{head}[[effect]] # an axial motion\ncomponent = \"EZC\"\nshape = \"harmonic\"\norder = 2\n\n[[test]]\nname = \"C 150\"\n\
          bar_mm = \"R_e\"\nworkpiece_ball_mm = [0, \"R\", 0]\nspindle_ball_mm = [0, 0, 0]\nbar_u_um = 0.5\n\
          at = {{ z_mm = \"sqrt(R_e^2 - R^2)\" }}\nsweep = {{ axis = \"C\", from_deg = 0, to_deg = 360, step_deg = 5 }}\n"
     );
@@ -124,7 +124,7 @@ fn amplitude_and_phase_are_those_of_the_independent_plant() {
     let readings = moved.tests[0].readings.as_ref().unwrap();
     let c = &readings.positions[moved.machine.axis_index("C").unwrap()];
     for (row, c) in c.iter().enumerate() {
-        // The plant's own axes: X, Y, Z, A, C.
+        // The axes of the plant: X, Y, Z, A, C.
         let position = [0.0, 0.0, height, 0.0, *c];
         let mut displacement = plant::machine::Displacement::default();
         displacement.add(
@@ -139,32 +139,32 @@ fn amplitude_and_phase_are_those_of_the_independent_plant() {
 }
 
 #[test]
-fn what_the_plan_says_stays_and_what_has_to_change_changes() {
+fn the_text_of_the_plan_is_kept_except_for_data_and_noise() {
     let folder = tempfile::tempdir().unwrap();
     let plan = small_plan(folder.path());
     let out = folder.path().join("deep/er/out");
-    let told = simulated(&plan, &out, &["--noise-um", "0.5"]);
+    let printed = simulated(&plan, &out, &["--noise-um", "0.5"]);
     assert!(
-        told.contains("146 readings of 1 test,") && told.contains("noise 0.500 µm"),
-        "{told}"
+        printed.contains("146 readings of 1 test,") && printed.contains("noise 0.500 µm"),
+        "{printed}"
     );
     let text = fs::read_to_string(out.join("session.toml")).unwrap();
     for part in [
         "# test radius: pivot from the axis (Table 3.1)",
         "noise_um = 0.5\n",
-        "[[effect]] # a wobble",
+        "[[effect]] # an axial motion",
         "data = \"C-150.csv\"",
         "sweep = { axis = \"C\"",
     ] {
         assert!(text.contains(part), "{part}\n{text}");
     }
     assert!(session(&out).tests[0].readings.is_some());
-    // A measured session is a plan too.
+    // A measured session can serve as a plan.
     simulated(&out.join("session.toml"), &folder.path().join("again"), &[]);
 }
 
 #[test]
-fn errors_come_from_a_file_and_the_command_line_has_the_last_word() {
+fn errors_come_from_a_file_and_the_command_line_overrides_it() {
     let folder = tempfile::tempdir().unwrap();
     let plan = small_plan(folder.path());
     let errors = folder.path().join("errors.toml");
@@ -173,32 +173,36 @@ fn errors_come_from_a_file_and_the_command_line_has_the_last_word() {
         "e_y0c = \"10 um\"\n\"bar[C 150]\" = \"0.4um\"\nEB0C = \"1 arcsec\"\n",
     )
     .unwrap();
-    let told = simulated(
+    let printed = simulated(
         &plan,
         &folder.path().join("out"),
         &["--errors", text(&errors), "--error", "EB0C=-2arcsec"],
     );
     let row = |id: &str| {
-        told.lines()
+        printed
+            .lines()
             .find(|line| line.trim().starts_with(id))
             .map(str::to_string)
     };
-    assert!(row("EY0C").unwrap().contains("10.0000"), "{told}");
-    assert!(row("bar[C 150]").unwrap().contains("0.4000"), "{told}");
-    assert!(row("EB0C").unwrap().contains("-2.0000"), "{told}");
+    assert!(row("EY0C").unwrap().contains("10.0000"), "{printed}");
+    assert!(row("bar[C 150]").unwrap().contains("0.4000"), "{printed}");
+    assert!(row("EB0C").unwrap().contains("-2.0000"), "{printed}");
     for (bad, message) in [
-        ("EY0C = 10", "`EY0C` is no text"),
+        ("EY0C = 10", "`EY0C` is not text"),
         ("EY0C = \"10\"", "has no unit"),
         ("EY0C = ", "errors.toml: "),
     ] {
         fs::write(&errors, bad).unwrap();
-        let told = refused(&plan, &folder.path().join("bad"), &["--errors", text(&errors)]);
-        assert!(told.contains(message) && told.contains("errors.toml"), "{told}");
+        let stderr = refused(&plan, &folder.path().join("bad"), &["--errors", text(&errors)]);
+        assert!(
+            stderr.contains(message) && stderr.contains("errors.toml"),
+            "{stderr}"
+        );
     }
 }
 
 #[test]
-fn what_cannot_be_simulated_is_said_and_nothing_is_written() {
+fn invalid_simulations_are_refused_and_nothing_is_written() {
     let folder = tempfile::tempdir().unwrap();
     let plan = small_plan(folder.path());
     let out = folder.path().join("out");
@@ -208,11 +212,11 @@ fn what_cannot_be_simulated_is_said_and_nothing_is_written() {
             "has no axis `Q`; its axes are C, A, Y, X, Z",
         ),
         (&["--error", "EY0A=1"], "`EY0A=1` has no unit"),
-        (&["--error", "EY0A=onemm"], "is no number with a unit"),
-        (&["--error", "EY0A"], "gives no value"),
+        (&["--error", "EY0A=onemm"], "is not a number with a unit"),
+        (&["--error", "EY0A"], "has no value"),
         (
             &["--error", "EY0A=1arcsec"],
-            "`EY0A` is given in `arcsec`; it is measured in `um`",
+            "`EY0A` has the unit `arcsec`; a unit such as `um` is expected",
         ),
         (&["--error", "e_y0a=1um", "--error", "EY0A=2um"], "is given twice"),
         (&["--error", "bra=1um"], "the session has no `bra`"),
@@ -226,25 +230,28 @@ fn what_cannot_be_simulated_is_said_and_nothing_is_written() {
         ),
         (&["--noise-um", "-1"], "a standard deviation in µm is expected"),
     ] {
-        let told = refused(&plan, &out, more);
-        assert!(told.contains(message), "{told}");
+        let stderr = refused(&plan, &out, more);
+        assert!(stderr.contains(message), "{stderr}");
         assert!(!out.exists());
     }
     fs::create_dir(&out).unwrap();
     fs::write(out.join("notes.txt"), "mine").unwrap();
-    let told = refused(&plan, &out, &[]);
+    let stderr = refused(&plan, &out, &[]);
     assert!(
-        told.contains("exists and is not empty") && told.contains("--force"),
-        "{told}"
+        stderr.contains("exists and is not empty") && stderr.contains("--force"),
+        "{stderr}"
     );
     assert_eq!(fs::read_dir(&out).unwrap().count(), 1);
     fs::remove_dir_all(&out).unwrap();
     let before = fs::read(&plan).unwrap();
-    let told = refused(&plan, folder.path(), &["--force"]);
-    assert!(told.contains("this folder contains the plan itself"), "{told}");
+    let stderr = refused(&plan, folder.path(), &["--force"]);
+    assert!(
+        stderr.contains("this folder contains the plan itself"),
+        "{stderr}"
+    );
     assert_eq!(fs::read(&plan).unwrap(), before);
-    let told = refused(&ready("kuka-iiwa14/session.toml"), &out, &["--data", "nowhere"]);
-    assert!(told.contains("nowhere"), "{told}");
+    let stderr = refused(&ready("kuka-iiwa14/session.toml"), &out, &["--data", "nowhere"]);
+    assert!(stderr.contains("nowhere"), "{stderr}");
     let left: Vec<_> = fs::read_dir(folder.path()).unwrap().collect();
     assert_eq!(left.len(), 2, "temporary folders are left behind");
 }

@@ -1,4 +1,4 @@
-//! What goes to standard output: tables for people, or one document for a program and nothing else.
+//! Standard output: tables for users, or one document for a program and nothing else.
 
 use std::fs;
 
@@ -6,7 +6,7 @@ use super::abbe;
 use super::faults::Place;
 use super::text;
 
-/// Commands that print a table and write JSON, on files of [`place`].
+/// Commands that print a table and write JSON, for the files of [`place`].
 const COMMANDS: &[&str] = &[
     "fit session.toml",
     "fit session.toml --repeat again/session.toml",
@@ -48,16 +48,16 @@ fn place() -> Place {
 
 /// Standard output and standard error of a command that succeeds.
 #[track_caller]
-fn told(place: &Place, line: &str) -> (String, String) {
+fn run(place: &Place, line: &str) -> (String, String) {
     let output = place.shell(&format!("abbe {line}"));
-    let said = String::from_utf8(output.stderr).unwrap();
-    assert!(output.status.success(), "{line}: {said}");
-    (String::from_utf8(output.stdout).unwrap(), said)
+    let stderr = String::from_utf8(output.stderr).unwrap();
+    assert!(output.status.success(), "{line}: {stderr}");
+    (String::from_utf8(output.stdout).unwrap(), stderr)
 }
 
 /// The warnings and notes of a command, without its progress.
-fn warnings(said: &str) -> Vec<&str> {
-    said.lines().filter(|line| !line.starts_with("  + ")).collect()
+fn warnings(stderr: &str) -> Vec<&str> {
+    stderr.lines().filter(|line| !line.starts_with("  + ")).collect()
 }
 
 #[test]
@@ -65,14 +65,14 @@ fn json_goes_to_standard_output_and_nothing_else_does() {
     let place = place();
     let before = place.names();
     for command in COMMANDS {
-        let (piped, piped_said) = told(&place, &format!("{command} --json -"));
+        let (piped, piped_stderr) = run(&place, &format!("{command} --json -"));
         let document: serde_json::Value =
             serde_json::from_str(&piped).unwrap_or_else(|fault| panic!("{command}: {fault}\n{piped}"));
         assert!(document.is_object() || document.is_array(), "{command}");
         assert!(!place.at("-").exists(), "{command} makes a file named `-`");
 
-        // In a file the JSON is the same, and the terminal has the tables and the same warnings.
-        let (tables, said) = told(&place, &format!("{command} --json out.json"));
+        // With a file the JSON is the same, and the terminal shows the tables and the same warnings.
+        let (tables, stderr) = run(&place, &format!("{command} --json out.json"));
         assert_eq!(
             fs::read_to_string(place.at("out.json")).unwrap(),
             piped,
@@ -82,7 +82,7 @@ fn json_goes_to_standard_output_and_nothing_else_does() {
             tables.lines().count() > 1 || command.starts_with("simulate"),
             "{command}: {tables}"
         );
-        assert_eq!(warnings(&said), warnings(&piped_said), "{command}");
+        assert_eq!(warnings(&stderr), warnings(&piped_stderr), "{command}");
         fs::remove_file(place.at("out.json")).unwrap();
     }
     let made = ["map.csv", "patterns.csv", "run"];
@@ -97,7 +97,7 @@ fn json_goes_to_standard_output_and_nothing_else_does() {
 #[test]
 fn quiet_suppresses_tables_and_not_warnings() {
     let place = place();
-    // The noise is ten times what this session states.
+    // The true noise is ten times the stated one.
     let wrong = fs::read_to_string(place.at("session.toml"))
         .unwrap()
         .replace("noise_um = 0.3", "noise_um = 0.03");
@@ -106,27 +106,27 @@ fn quiet_suppresses_tables_and_not_warnings() {
         .iter()
         .chain(&["fit wrong.toml", "fit wrong.toml --csv fit.csv"])
     {
-        let (_, loud) = told(&place, command);
+        let (_, loud) = run(&place, command);
         for quiet in [format!("{command} -q"), format!("--quiet {command}")] {
-            let (printed, said) = told(&place, &quiet);
+            let (printed, stderr) = run(&place, &quiet);
             assert_eq!(printed, "", "{quiet}");
-            assert_eq!(warnings(&said), warnings(&loud), "{quiet}");
+            assert_eq!(warnings(&stderr), warnings(&loud), "{quiet}");
         }
         if command.contains("wrong") {
             assert!(loud.contains("warning"), "{command}: {loud}");
         }
     }
     for command in ["new --template ur10 mine", "new --from-code [wbXYZt] other"] {
-        assert_eq!(told(&place, &format!("{command} -q")).0, "", "{command}");
+        assert_eq!(run(&place, &format!("{command} -q")).0, "", "{command}");
     }
-    // An equation, a schema and a list are no tables: they are what was asked for.
+    // An equation, a schema and a list are the requested output, not tables.
     for command in [
         "equation session.toml --test XY",
         "schema fit",
         "new",
         "completions bash",
     ] {
-        let (loud, quiet) = (told(&place, command).0, told(&place, &format!("{command} -q")).0);
+        let (loud, quiet) = (run(&place, command).0, run(&place, &format!("{command} -q")).0);
         assert!(!loud.is_empty() && loud == quiet, "{command}");
     }
 }
@@ -152,7 +152,7 @@ fn other_outputs_go_to_standard_output_too() {
             "x_mm,y_mm,z_mm",
         ),
     ] {
-        let (printed, _) = told(&place, command);
+        let (printed, _) = run(&place, command);
         assert!(printed.starts_with(first), "{command}: {printed}");
         assert!(!place.at("-").exists(), "{command}");
     }
@@ -173,11 +173,11 @@ fn standard_output_takes_one_output_and_no_folder() {
         (&compensation, "standard output, which cannot contain a folder"),
     ] {
         let output = abbe(&[&["fit", text(&session)], arguments].concat());
-        let said = String::from_utf8(output.stderr).unwrap();
-        assert_eq!(output.status.code(), Some(2), "{arguments:?}: {said}");
+        let stderr = String::from_utf8(output.stderr).unwrap();
+        assert_eq!(output.status.code(), Some(2), "{arguments:?}: {stderr}");
         assert!(
-            said.contains(words) && output.stdout.is_empty(),
-            "{arguments:?}: {said}"
+            stderr.contains(words) && output.stdout.is_empty(),
+            "{arguments:?}: {stderr}"
         );
     }
 }

@@ -1,6 +1,6 @@
-//! What is built into Abbe: licences, sources and duplicates as `deny.toml` allows them, and a page that says what each direct dependency is for.
+//! Dependencies: licences, sources and duplicates conform to `deny.toml`, and docs/development/dependencies.md names each direct dependency.
 //!
-//! `cargo deny` reads the same file where it is installed; this asks cargo itself and needs no database and no network.
+//! `cargo deny` reads the same file if it is installed. These tests use cargo only and need neither a database nor a network.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::fs;
@@ -8,14 +8,14 @@ use std::process::Command;
 
 use super::workspace;
 
-/// A crate that is built for any machine, tests and build scripts included.
+/// A crate that is built for some platform, including tests and build scripts.
 struct Built {
     name: String,
     version: String,
     licence: String,
 }
 
-/// What `cargo tree` lists.
+/// The crates that `cargo tree` lists.
 fn built(more: &[&str]) -> Vec<Built> {
     let output = Command::new(env!("CARGO"))
         .args([
@@ -45,7 +45,7 @@ fn built(more: &[&str]) -> Vec<Built> {
         Some(Built {
             name: words.next()?.to_string(),
             version: words.next()?.to_string(),
-            // What is listed twice has a star.
+            // A star marks a crate that is listed twice.
             licence: licence.trim_end_matches(" (*)").to_string(),
         })
     });
@@ -59,7 +59,7 @@ fn policy() -> toml::Table {
         .unwrap()
 }
 
-/// Whether a licence expression (SPDX) can be met: `OR` binds less than `AND`, `/` is an old `OR`, an exception only adds rights.
+/// Whether the allowed licences satisfy an SPDX expression. `OR` binds less than `AND`, `/` is an old `OR`, an exception only adds rights.
 fn is_met(expression: &str, allowed: &BTreeSet<&str>) -> bool {
     let spaced = expression
         .replace('(', " ( ")
@@ -168,7 +168,7 @@ fn everything_comes_from_the_registry_with_a_checksum() {
 }
 
 #[test]
-fn no_crate_is_built_twice_unless_it_is_said() {
+fn no_crate_is_built_twice_unless_deny_toml_permits_it() {
     let policy = policy();
     let skipped: BTreeSet<&str> = policy["bans"]["skip"]
         .as_array()
@@ -191,7 +191,7 @@ fn no_crate_is_built_twice_unless_it_is_said() {
     );
 }
 
-/// The first cell of each row of the page's tables, without its ticks.
+/// The first cell of each table row of the page, without backticks.
 fn explained() -> BTreeSet<String> {
     let page = fs::read_to_string(workspace().join("docs/development/dependencies.md")).unwrap();
     let cells = page
@@ -224,7 +224,7 @@ fn licences_citation_and_changelog_are_in_the_project() {
     );
 }
 
-/// A page that relies on the thesis says once which it is.
+/// A page that uses the thesis cites it in full once.
 #[test]
 fn the_thesis_is_cited_in_full_once_a_page() {
     let mut pages = vec![workspace().join("README.md")];
@@ -242,7 +242,7 @@ fn the_thesis_is_cited_in_full_once_a_page() {
     assert!(pages.len() > 20, "{pages:?}");
     let full = "Xiaogeng Jiang, *Characterising Geometric Errors in Rotary Axes of 5-axis Machine Tools*, PhD thesis, University of Birmingham, 2014";
     for page in pages {
-        // Lines are broken anywhere.
+        // The citation may contain line breaks.
         let text = fs::read_to_string(&page).unwrap();
         let text = text.split_whitespace().collect::<Vec<_>>().join(" ");
         let times = text.matches(full).count();

@@ -1,7 +1,7 @@
-//! The guided tour prints what it says it prints.
+//! The commands of docs/guide/tour.md print the output that the page shows.
 //!
-//! In each `console` block of docs/guide/tour.md a line after `$ ` is a command, lines after `> ` go on with it, and what follows is
-//! what a reader sees; `…` alone in a line stands for any lines.
+//! In each `console` block a line after `$ ` is a command, lines after `> ` continue it, and the following lines are its output. A line `…`
+//! stands for any lines.
 #![cfg(unix)]
 
 use std::path::Path;
@@ -9,18 +9,18 @@ use std::process::{Command, Stdio};
 
 use super::workspace;
 
-const LEFT_OUT: &str = "…";
+const ELLIPSIS: &str = "…";
 
-/// A command of the tour and what it says that it prints.
-struct Step {
+/// A command of the tour and the output that the page shows.
+struct TourCommand {
     line: usize,
     command: String,
     shown: Vec<String>,
 }
 
 /// The commands of all `console` blocks, in order.
-fn steps(document: &str) -> Vec<Step> {
-    let mut steps: Vec<Step> = Vec::new();
+fn steps(document: &str) -> Vec<TourCommand> {
+    let mut steps: Vec<TourCommand> = Vec::new();
     let mut inside = false;
     for (index, line) in document.lines().enumerate() {
         if line.starts_with("```") {
@@ -31,7 +31,7 @@ fn steps(document: &str) -> Vec<Step> {
             continue;
         }
         if let Some(command) = line.strip_prefix("$ ") {
-            steps.push(Step {
+            steps.push(TourCommand {
                 line: index + 1,
                 command: command.to_string(),
                 shown: Vec::new(),
@@ -39,7 +39,7 @@ fn steps(document: &str) -> Vec<Step> {
             continue;
         }
         let step = steps.last_mut().expect("a block begins with a command");
-        // An empty line of a here-document is `>` without its space.
+        // An empty line of a here-document is `>` without a space.
         match line.strip_prefix('>') {
             Some(more) if step.shown.is_empty() => {
                 step.command.push('\n');
@@ -51,19 +51,19 @@ fn steps(document: &str) -> Vec<Step> {
     steps
 }
 
-/// Whether `printed` is what is `shown`, any lines standing for `…`.
-fn agrees(shown: &[String], printed: &[String]) -> bool {
+/// Whether `printed` equals `shown`, where `…` stands for any lines.
+fn matches_output(shown: &[String], printed: &[String]) -> bool {
     match shown.split_first() {
         None => printed.is_empty(),
-        Some((first, rest)) if first == LEFT_OUT => {
-            (0..=printed.len()).any(|skipped| agrees(rest, &printed[skipped..]))
+        Some((first, rest)) if first == ELLIPSIS => {
+            (0..=printed.len()).any(|skipped| matches_output(rest, &printed[skipped..]))
         }
-        Some((first, rest)) => printed.first() == Some(first) && agrees(rest, &printed[1..]),
+        Some((first, rest)) => printed.first() == Some(first) && matches_output(rest, &printed[1..]),
     }
 }
 
-/// What a reader sees who types the command in `folder`, and whether it succeeded.
-fn typed(command: &str, folder: &Path) -> (Vec<String>, bool) {
+/// The output of a command in `folder`, and whether it succeeded.
+fn run_in(command: &str, folder: &Path) -> (Vec<String>, bool) {
     let program = Path::new(env!("CARGO_BIN_EXE_abbe"));
     let path = std::env::var("PATH").unwrap_or_default();
     let run = Command::new("sh")
@@ -80,7 +80,7 @@ fn typed(command: &str, folder: &Path) -> (Vec<String>, bool) {
 }
 
 #[test]
-fn the_tour_prints_what_it_shows() {
+fn the_tour_shows_the_output_of_its_commands() {
     let document = std::fs::read_to_string(workspace().join("docs/guide/tour.md")).unwrap();
     let steps = steps(&document);
     let commands = ["new", "plan", "simulate", "fit", "trace"];
@@ -91,10 +91,10 @@ fn the_tour_prints_what_it_shows() {
         );
     }
     let folder = tempfile::tempdir().unwrap();
-    for Step { line, command, shown } in steps {
-        let (printed, success) = typed(&command, folder.path());
+    for TourCommand { line, command, shown } in steps {
+        let (printed, success) = run_in(&command, folder.path());
         assert!(
-            agrees(&shown, &printed),
+            matches_output(&shown, &printed),
             "docs/guide/tour.md:{line}: {command}\nprints\n{}\nand not\n{}",
             printed.join("\n"),
             shown.join("\n")
@@ -108,13 +108,13 @@ fn the_tour_prints_what_it_shows() {
 }
 
 #[test]
-fn left_out_lines_are_any_and_no_others() {
+fn an_ellipsis_matches_any_lines_and_nothing_else_does() {
     let lines = |text: &str| text.lines().map(str::to_string).collect::<Vec<_>>();
     let printed = lines("a\nb\nc\nd");
     for shown in ["a\nb\nc\nd", "a\n…\nd", "…\nc\n…", "a\nb\n…\nc\nd", "…"] {
-        assert!(agrees(&lines(shown), &printed), "{shown}");
+        assert!(matches_output(&lines(shown), &printed), "{shown}");
     }
     for shown in ["a\nb\nc", "a\n…\nc", "…\nb\nd", "", "a\n…\nd\n…\nd"] {
-        assert!(!agrees(&lines(shown), &printed), "{shown}");
+        assert!(!matches_output(&lines(shown), &printed), "{shown}");
     }
 }

@@ -1,5 +1,5 @@
-//! The loop, closed: on sessions of an independent simulator and on real robots. The program gets the readings; what is in them stands in
-//! other files, or was found by others.
+//! Trace on sessions of an independent simulator and on real robots. The program reads the readings only; the true effects are in other
+//! files or in the literature.
 
 use abbe::identify::results::{EffectName, TraceResult};
 use abbe::identify::trace::{TraceOptions, trace};
@@ -14,7 +14,7 @@ fn traced(session: &Session, options: &TraceOptions) -> TraceResult {
     trace(session, options, &|_| true).unwrap().result
 }
 
-/// A session of the samples that lie beside the public data.
+/// A session of the samples beside the public data.
 fn sample(test: &str, name: &str) -> Option<Session> {
     let folder = data(test, ".")?.join("../sample").join(name);
     Some(read::session(&folder.join("session.toml"), &ReadOptions::default()).unwrap())
@@ -24,7 +24,7 @@ fn is(effect: &EffectName, component: &str, shape: &str, order: Option<usize>) -
     effect.component == component && effect.shape == shape && effect.order == order
 }
 
-/// Whether an effect is named, or stands among the aliases of a named one.
+/// Whether an effect is named or is among the aliases of a named effect.
 fn named_or_alias(result: &TraceResult, wanted: &dyn Fn(&EffectName) -> bool) -> bool {
     result
         .effects
@@ -33,8 +33,8 @@ fn named_or_alias(result: &TraceResult, wanted: &dyn Fn(&EffectName) -> bool) ->
 }
 
 #[test]
-fn a_clean_session_is_called_clean() {
-    let Some(session) = sample("a_clean_session_is_called_clean", "rotary-clean") else {
+fn a_clean_session_has_the_verdict_clean() {
+    let Some(session) = sample("a_clean_session_has_the_verdict_clean", "rotary-clean") else {
         return;
     };
     let result = traced(&session, &TraceOptions::default());
@@ -43,11 +43,11 @@ fn a_clean_session_is_called_clean() {
     assert_eq!(result.before.parameters, result.after.parameters);
 }
 
-/// Made to add effects where there are none, a search gains on the readings that it sees and not on those that it does not: nothing is claimed.
+/// Without an effect, additions lower the residual of the fitted readings but not that of the held-out readings: nothing is claimed.
 #[test]
-fn what_is_no_effect_does_not_lower_the_error_held_out() {
+fn without_an_effect_no_addition_lowers_the_held_out_error() {
     let Some(session) = sample(
-        "what_is_no_effect_does_not_lower_the_error_held_out",
+        "without_an_effect_no_addition_lowers_the_held_out_error",
         "rotary-clean",
     ) else {
         return;
@@ -72,8 +72,8 @@ fn what_is_no_effect_does_not_lower_the_error_held_out() {
 }
 
 #[test]
-fn an_axial_wobble_is_found_or_stands_among_what_looks_the_same() {
-    let name = "an_axial_wobble_is_found_or_stands_among_what_looks_the_same";
+fn an_axial_motion_is_found_or_is_among_the_aliases() {
+    let name = "an_axial_motion_is_found_or_is_among_the_aliases";
     let Some(session) = sample(name, "rotary-axial-h3") else {
         return;
     };
@@ -86,7 +86,7 @@ fn an_axial_wobble_is_found_or_stands_among_what_looks_the_same() {
         "harmonic",
         Some(3)
     )));
-    // One ball radius cannot tell it from a tilt of one order less (EFFECTS, METHOD).
+    // At one ball radius it is confounded with a tilt of one order less (docs/reference/effects.md).
     assert!(named_or_alias(&result, &|effect| is(
         effect,
         "EAC",
@@ -97,8 +97,8 @@ fn an_axial_wobble_is_found_or_stands_among_what_looks_the_same() {
 }
 
 #[test]
-fn lost_motion_is_found_with_its_size() {
-    let Some(session) = sample("lost_motion_is_found_with_its_size", "circle-backlash-y") else {
+fn lost_motion_is_found_with_its_amplitude() {
+    let Some(session) = sample("lost_motion_is_found_with_its_amplitude", "circle-backlash-y") else {
         return;
     };
     let result = traced(&session, &TraceOptions::default());
@@ -106,15 +106,15 @@ fn lost_motion_is_found_with_its_size() {
     assert_eq!(result.effects.len(), 1);
     assert!(is(&result.effects[0].name, "EYY", "backlash", None));
     let lost = &result.effects[0].parameters[0];
-    // 4 µm were put in.
+    // The simulated lost motion is 4 µm.
     assert!((lost.value - 4.0).abs() < 4.0 * lost.u, "{lost:?}");
 }
 
-/// EZC of order n looks like a tilt of order n − 1 at one radius; a second radius tells them apart (first order: the one is the same at all radii, the
-/// other grows with the radius).
+/// At one radius EZC of order n is confounded with a tilt of order n − 1. A second radius separates them: to first order the response to EZC does
+/// not depend on the radius, and that to the tilt is proportional to it.
 #[test]
-fn another_radius_is_proposed_to_tell_an_axial_wobble_from_a_tilt() {
-    let name = "another_radius_is_proposed_to_tell_an_axial_wobble_from_a_tilt";
+fn another_radius_is_proposed_to_separate_an_axial_motion_from_a_tilt() {
+    let name = "another_radius_is_proposed_to_separate_an_axial_motion_from_a_tilt";
     let Some(folder) = data(name, ".") else {
         return;
     };
@@ -127,10 +127,10 @@ fn another_radius_is_proposed_to_tell_an_axial_wobble_from_a_tilt() {
     let effect = &result["effects"][0];
     assert_eq!(effect["component"], "EZC");
     let separation = &effect["separation"];
-    // Both tilts look the same: the first of them by name is told.
+    // Both tilts are equivalent: the first by name is proposed.
     assert_eq!(separation["from"]["component"], "EAC");
     assert_eq!(separation["from"]["order"], 2);
-    // The session's ball sits at 100 mm.
+    // The ball of the session is at 100 mm.
     let test = effect["separated_by"].as_str().unwrap();
     let radius = test
         .split("radius ")
@@ -143,10 +143,10 @@ fn another_radius_is_proposed_to_tell_an_axial_wobble_from_a_tilt() {
     assert!(separation["after_sigma"].as_f64().unwrap() > 10.0, "{separation}");
 }
 
-/// A tilt of A under the moment of a ball that stands at y = R cos C on the table lifts it by a · y²  = a R² (1 + cos 2C) / 2, as EZC of second order does
-/// with that phase. One number says it for gravity, two for a wave, and no reading tells them apart.
+/// A tilt of A under the moment of a ball at y = R cos C on the table raises the ball by a · y² = a R² (1 + cos 2C) / 2, as EZC of second order does
+/// at that phase. Gravity needs one coefficient, the harmonic two, and the two are confounded.
 #[test]
-fn a_wave_is_named_beside_a_compliance_that_looks_the_same() {
+fn a_harmonic_is_listed_as_alias_of_a_compliance() {
     let folder = tempfile::tempdir().unwrap();
     let plan = folder.path().join("chapter5.toml");
     let machine = ready("hermle-c600u/machine.toml");
@@ -155,8 +155,8 @@ fn a_wave_is_named_beside_a_compliance_that_looks_the_same() {
     let declared = std::fs::read_to_string(ready("hermle-c600u/chapter5.toml")).unwrap() + effect;
     std::fs::write(&plan, declared).unwrap();
     let run = folder.path().join("run");
-    let planted = ["--effect", "EZC~C:h2.cos=1.5um", "--hide-effects", "--seed", "7"];
-    let outcome = abbe(&[&["simulate", text(&plan), "--out", text(&run)], &planted[..]].concat());
+    let simulated = ["--effect", "EZC~C:h2.cos=1.5um", "--hide-effects", "--seed", "7"];
+    let outcome = abbe(&[&["simulate", text(&plan), "--out", text(&run)], &simulated[..]].concat());
     assert!(
         outcome.status.success(),
         "{}",
@@ -218,7 +218,7 @@ fn the_bundled_session_is_explained_at_the_command_line() {
         written.contains("[[effect]]") && written.contains("EZC"),
         "{written}"
     );
-    // The written session lies elsewhere than machine and data, and finds them where it is let.
+    // The written session is in another folder than machine and data; `--allow-outside` permits it to read them.
     let again = folder.path().join("fit.json");
     let refused = abbe(&["fit", text(&next), "-q"]);
     assert!(!refused.status.success());
@@ -231,16 +231,16 @@ fn the_bundled_session_is_explained_at_the_command_line() {
         "--json",
         text(&again),
     ]);
-    let said = String::from_utf8_lossy(&outcome.stderr);
-    assert!(outcome.status.success(), "{said}");
+    let stderr = String::from_utf8_lossy(&outcome.stderr);
+    assert!(outcome.status.success(), "{stderr}");
     let fit: serde_json::Value = serde_json::from_str(&std::fs::read_to_string(&again).unwrap()).unwrap();
     let [traced, fitted] = [&result["after"], &fit].map(|model| model["rms_um"].as_f64().unwrap());
     assert!((traced - fitted).abs() < 1e-6, "{traced} {fitted}");
 }
 
 #[test]
-fn ur10_shows_the_seventeenth_harmonic_of_its_second_joint_first() {
-    let name = "ur10_shows_the_seventeenth_harmonic_of_its_second_joint_first";
+fn ur10_has_the_seventeenth_harmonic_of_its_second_joint_first() {
+    let name = "ur10_has_the_seventeenth_harmonic_of_its_second_joint_first";
     let Some(session) = session_on_public_data(name, "ur10/session.toml", "landgraf_ur10") else {
         return;
     };
@@ -266,8 +266,8 @@ fn ur10_shows_the_seventeenth_harmonic_of_its_second_joint_first() {
 }
 
 #[test]
-fn kuka_gives_under_gravity_and_has_no_harmonics() {
-    let name = "kuka_gives_under_gravity_and_has_no_harmonics";
+fn kuka_has_a_compliance_under_gravity_and_no_harmonics() {
+    let name = "kuka_has_a_compliance_under_gravity_and_no_harmonics";
     let Some(session) = session_on_public_data(name, "kuka-iiwa14/session.toml", "mukca") else {
         return;
     };

@@ -1,8 +1,8 @@
-//! What a trace reports belongs together: effects, their coefficients, the errors before and after, and uncertainties that cover what looks the same.
+//! Consistency of the result of a trace: effects, coefficients, residuals before and after, and uncertainties that cover aliases.
 
 use abbe::identify::fit::fit;
 use abbe::identify::noise::Noise;
-use abbe::identify::plan::candidate_tests::{CandidateTests, entries};
+use abbe::identify::plan::candidate_tests::{TestVariations, candidate_tests};
 use abbe::identify::problem::Problem;
 use abbe::identify::quantity::Given;
 use abbe::identify::results::EffectName;
@@ -24,7 +24,7 @@ fn of_c(component: &str, shape: Shape) -> Effect {
     }
 }
 
-/// The session of chapter 5 as measured on a machine with some effects, of which it declares the first few.
+/// The session of chapter 5 with readings of a machine with some effects, of which it declares the first `declared`.
 fn measured(effects: Vec<Effect>, values: &[&str], declared: usize) -> Session {
     let plan = ready("hermle-c600u/chapter5.toml");
     let mut session = read::session(&plan, &ReadOptions::default()).unwrap();
@@ -42,7 +42,7 @@ fn measured(effects: Vec<Effect>, values: &[&str], declared: usize) -> Session {
     session
 }
 
-/// EZC of order 2 and EAC of order 3, of which the first few are declared.
+/// EZC of order 2 and EAC of order 3, of which the first `declared` are declared.
 fn wave_and_tilt(declared: usize) -> Session {
     let waves = vec![
         of_c("EZC", Shape::Harmonic { order: 2.0 }),
@@ -56,9 +56,9 @@ fn wave_and_tilt(declared: usize) -> Session {
     measured(waves, &values, declared)
 }
 
-/// Where the library is a wave and, as a last resort, a curve, a bump is first taken for the wave and then for the curve in its place.
+/// With a library of a harmonic and a nonparametric curve, a local feature is first attributed to the harmonic, which the curve then replaces.
 #[test]
-fn the_model_that_is_reported_has_the_effects_that_are_reported() {
+fn the_reported_model_has_the_reported_effects() {
     let bump = Shape::Local {
         centre: 150_f64.to_radians(),
         width: 12_f64.to_radians(),
@@ -83,7 +83,7 @@ fn the_model_that_is_reported_has_the_effects_that_are_reported() {
     assert_eq!(shapes(&trace.effects), reported);
     assert_eq!(shapes(&trace.after.parameters.effects), reported);
     assert!(!trace.result.effects[0].curve.is_empty());
-    // The noise is 0.3 µm, and the curve takes the bump off.
+    // The noise is 0.3 µm, and the curve describes the local feature.
     let result = &trace.result;
     assert!(
         result.before.rms_um > 0.4 && result.after.rms_um < 0.32,
@@ -93,10 +93,10 @@ fn the_model_that_is_reported_has_the_effects_that_are_reported() {
     assert_eq!(result.verdict, "explained");
 }
 
-/// At radius R, EAC = a cos 3C lifts the ball by a R sin C cos 3C = a R (sin 4C − sin 2C) / 2: no reading tells it from EZC of order 4 beside EZC of
-/// order 2. Where the latter is declared and the former is the truth, the named effect moves the declared one, whose uncertainty has to say so.
+/// At radius R, EAC = a cos 3C raises the ball by a R sin C cos 3C = a R (sin 4C − sin 2C) / 2. It is confounded with EZC of order 4 together with EZC
+/// of order 2. If the latter is declared and EAC is the truth, the found effect changes the declared one, whose uncertainty must cover the change.
 #[test]
-fn the_uncertainty_of_a_declared_wave_covers_what_looks_like_the_found_effect() {
+fn the_uncertainty_of_a_declared_harmonic_covers_the_aliases_of_the_found_effect() {
     let session = wave_and_tilt(1);
     let result = trace(&session, &TraceOptions::default(), &|_| true)
         .unwrap()
@@ -118,7 +118,7 @@ fn the_uncertainty_of_a_declared_wave_covers_what_looks_like_the_found_effect() 
         let parameter = parameters.find(|parameter| parameter.id == id).unwrap();
         (parameter.value, parameter.u)
     };
-    // 4″ at 100 mm are 1.94 µm, and half of that goes to order 2.
+    // 4″ at 100 mm are 1.94 µm, of which half is of order 2.
     let (amplitude, u) = found("EZC~C:h2.amplitude");
     assert!((amplitude - 1.5).abs() > 0.5, "{amplitude}");
     assert!((amplitude - 1.5).abs() < 2.0 * u && u < 2.0, "{amplitude} ± {u}");
@@ -129,9 +129,9 @@ fn the_uncertainty_of_a_declared_wave_covers_what_looks_like_the_found_effect() 
     );
 }
 
-/// The same with nothing declared: both waves are found, and what looks like the one moves the other.
+/// The same without a declaration: both harmonics are found, and an alias of one changes the other.
 #[test]
-fn the_uncertainty_of_a_found_wave_covers_what_looks_like_another_found_effect() {
+fn the_uncertainty_of_a_found_harmonic_covers_the_aliases_of_another_effect() {
     let session = wave_and_tilt(0);
     let options = TraceOptions {
         only: ["EZC~C:h", "EAC~C:h3"].map(String::from).to_vec(),
@@ -167,7 +167,7 @@ fn the_uncertainty_of_a_found_wave_covers_what_looks_like_another_found_effect()
     }
 }
 
-/// The readings of a session replaced by those of a machine that has one effect and nothing else.
+/// Replaces the readings of a session by those of a machine with one effect and no other error.
 fn as_with_effect(session: &Session, noise: &Noise, effect: &Effect, coefficients: &[f64]) -> Session {
     let mut problem = Problem::new(session, noise.clone(), 1).unwrap();
     problem.add_effect(effect).unwrap();
@@ -186,7 +186,7 @@ fn as_with_effect(session: &Session, noise: &Noise, effect: &Effect, coefficient
     changed
 }
 
-/// What another effect, refitted in its place with everything else, leaves of it, standard deviations.
+/// The residual of an effect after a refit of the model with another effect in its place, in standard deviations.
 fn left_by(session: &Session, noise: &Noise, alternative: &Effect) -> f64 {
     let mut problem = Problem::new(session, noise.clone(), 1).unwrap();
     problem.add_effect(alternative).unwrap();
@@ -194,16 +194,16 @@ fn left_by(session: &Session, noise: &Noise, alternative: &Effect) -> f64 {
     problem.sum_of_squares(&fit.beta).sqrt()
 }
 
-/// What the bundled session shows has other explanations. Each is told, in words, with how well a further test separates it: as well as a refit of the readings
-/// with that test added says.
+/// The effect of the bundled session has aliases. The result describes each in words and states how well a further test separates it. The figure agrees
+/// with a refit that includes the readings of that test.
 #[test]
-fn each_explanation_is_told_with_how_well_a_further_test_separates_it() {
+fn each_explanation_states_its_separation_by_a_further_test() {
     let file = ready("hermle-c600u/measured/session.toml");
     let session = read::session(&file, &ReadOptions::default()).unwrap();
     let mut trace = trace(&session, &TraceOptions::default(), &|_| true).unwrap();
-    let menu = CandidateTests {
+    let menu = TestVariations {
         thin: 1,
-        ..CandidateTests::short()
+        ..TestVariations::short()
     };
     separate_aliases(&mut trace, &menu, &|_| true).unwrap();
     let effect = &trace.result.effects[0];
@@ -219,7 +219,7 @@ fn each_explanation_is_told_with_how_well_a_further_test_separates_it() {
         );
     }
 
-    // The first test answers for all aliases, nearest first, each other one for those that are left.
+    // The first test lists all aliases, nearest first; each further test lists the remaining ones.
     let tests = &effect.separating_tests;
     let named: Vec<&EffectName> = tests[0].alternatives.iter().map(|one| &one.name).collect();
     assert_eq!(named, effect.aliases.iter().collect::<Vec<_>>());
@@ -245,7 +245,7 @@ fn each_explanation_is_told_with_how_well_a_further_test_separates_it() {
     let coefficients = &trace.after_fit.beta[trace.after_fit.beta.len() - 2..];
     let alternatives = &trace.alias_effects[0];
     let menu = menu.for_effects(std::iter::once(found).chain(alternatives));
-    let proposed = entries(&session, &menu).unwrap();
+    let proposed = candidate_tests(&session, &menu).unwrap();
     let proposed = proposed.iter().find(|entry| entry.name == tests[0].test).unwrap();
     let mut longer = session.clone();
     longer.tests.push(proposed.test.clone());
@@ -253,7 +253,7 @@ fn each_explanation_is_told_with_how_well_a_further_test_separates_it() {
         [&session, &longer].map(|session| as_with_effect(session, noise, found, coefficients));
     for (one, alternative) in tests[0].alternatives.iter().zip(alternatives) {
         let [before, after] = [&before, &after].map(|session| left_by(session, noise, alternative));
-        let alike = |told: f64, refitted: f64| (told - refitted).abs() < 0.05 * refitted + 0.05;
+        let alike = |stderr: f64, refitted: f64| (stderr - refitted).abs() < 0.05 * refitted + 0.05;
         assert!(
             alike(one.before_sigma, before) && alike(one.after_sigma, after),
             "{one:?}: refitted {before} and {after}"
@@ -262,7 +262,7 @@ fn each_explanation_is_told_with_how_well_a_further_test_separates_it() {
 }
 
 #[test]
-fn an_effect_without_an_alternative_is_unique() {
+fn an_effect_without_an_alias_is_unique() {
     let file = ready("hermle-c600u/measured/session.toml");
     let session = read::session(&file, &ReadOptions::default()).unwrap();
     let options = TraceOptions {
@@ -270,16 +270,16 @@ fn an_effect_without_an_alternative_is_unique() {
         ..TraceOptions::default()
     };
     let mut trace = trace(&session, &options, &|_| true).unwrap();
-    separate_aliases(&mut trace, &CandidateTests::short(), &|_| true).unwrap();
+    separate_aliases(&mut trace, &TestVariations::short(), &|_| true).unwrap();
     let effect = &trace.result.effects[0];
     assert!(effect.unique && effect.explanation_count == 1 && effect.aliases.is_empty());
     assert_eq!(effect.explanations, effect.name.meaning);
     assert!(effect.separating_tests.is_empty() && effect.separated_by.is_none());
 }
 
-/// The second line says whether there is another explanation, before any figure.
+/// The second line states whether the explanation is unique, before any figure.
 #[test]
-fn the_line_below_the_verdict_says_whether_an_effect_is_unique() {
+fn the_line_below_the_verdict_states_whether_an_effect_is_unique() {
     let session = ready("hermle-c600u/measured/session.toml");
     let output = |only: &[&str]| {
         let outcome = abbe(&[&["trace", text(&session), "--all"], only].concat());
@@ -301,8 +301,8 @@ fn the_line_below_the_verdict_says_whether_an_effect_is_unique() {
             .starts_with("indistinguishable explanations: C table: axial motion twice per turn, or "),
         "{second}"
     );
-    let told = all.lines().filter(|line| line.starts_with("     or ")).count();
-    assert_eq!(told + 1, count.0.parse::<usize>().unwrap());
+    let stderr = all.lines().filter(|line| line.starts_with("     or ")).count();
+    assert_eq!(stderr + 1, count.0.parse::<usize>().unwrap());
     assert!(all.contains(" separates it from "), "{all}");
     let one = output(&["--only", "EZC~C:h"]);
     let second = one.lines().nth(1).unwrap();

@@ -1,4 +1,4 @@
-//! Which errors a session asks for: by name, by pattern, and where it says nothing.
+//! The errors that a session estimates: by name, by pattern and by default.
 
 use std::fs;
 use std::path::Path;
@@ -39,7 +39,7 @@ fn names(session: &Session) -> Vec<String> {
     session.unknowns.iter().map(ToString::to_string).collect()
 }
 
-/// `EX0J1` to `EC0J1`, `EX0J2` and so on.
+/// The six location errors of each axis: `EX0J1` to `EC0J1`, `EX0J2` and so on.
 fn six_each(axes: &[&str]) -> Vec<String> {
     let of = |axis: &&str| {
         "XYZABC"
@@ -52,7 +52,7 @@ fn six_each(axes: &[&str]) -> Vec<String> {
 
 fn robot(name: &str) -> String {
     let file = ready(&format!("{name}/machine.toml"));
-    // The machine stands in the session itself.
+    // The session contains its machine.
     let machine = fs::read_to_string(file)
         .unwrap()
         .replace("[axis.", "[machine.axis.");
@@ -62,7 +62,7 @@ fn robot(name: &str) -> String {
 const TABLE: &str = "[machine]\nchain = \"w C b X t\"\n[machine.axis.C]\n[machine.axis.X]\n";
 
 #[test]
-fn a_robot_that_states_no_unknowns_has_all_location_errors_of_all_joints() {
+fn by_default_a_robot_has_all_location_errors_of_all_joints() {
     let folder = tempfile::tempdir().unwrap();
     let ur10 = ["J1", "J2", "J3", "J4", "J5", "J6"];
     for (machine, instrument, test, joints) in [
@@ -79,7 +79,7 @@ fn a_robot_that_states_no_unknowns_has_all_location_errors_of_all_joints() {
             let session = read(folder.path(), &machine, instrument, unknowns, test).unwrap();
             assert_eq!(names(&session), six_each(joints));
         }
-        // None is asked for where it says so.
+        // An empty list estimates none.
         let none = read(
             folder.path(),
             &machine,
@@ -90,18 +90,18 @@ fn a_robot_that_states_no_unknowns_has_all_location_errors_of_all_joints() {
         .unwrap();
         assert_eq!(none.unknowns, []);
     }
-    // A linear axis has squarenesses; the rotation about its own direction moves nothing.
+    // A linear axis has squarenesses; a rotation about its own direction changes no reading.
     let mixed = read(folder.path(), TABLE, "tracker", "", TARGET).unwrap();
     let mut expected = six_each(&["C"]);
     expected.extend(["EB0X", "EC0X"].map(String::from));
     assert_eq!(names(&mixed), expected);
-    // A ball bar sees the position and orientation errors of rotary axes.
+    // A ball bar estimates the position and orientation errors of rotary axes.
     let bar = read(folder.path(), TABLE, "ballbar", "", BAR).unwrap();
     assert_eq!(names(&bar), ["EX0C", "EY0C", "EA0C", "EB0C"]);
 }
 
 #[test]
-fn the_ready_robots_ask_for_them_by_a_pattern() {
+fn the_bundled_robots_list_their_errors_by_a_pattern() {
     let ur10 = ["J1", "J2", "J3", "J4", "J5", "J6"];
     let options = ReadOptions {
         read_data: false,
@@ -116,7 +116,7 @@ fn the_ready_robots_ask_for_them_by_a_pattern() {
 }
 
 #[test]
-fn a_pattern_stands_for_the_errors_that_it_matches() {
+fn a_pattern_selects_the_errors_that_it_matches() {
     let folder = tempfile::tempdir().unwrap();
     let asked = |errors: &str| {
         let unknowns = format!("[unknowns]\nerrors = [{errors}]\n");
@@ -127,7 +127,7 @@ fn a_pattern_stands_for_the_errors_that_it_matches() {
         ("\"e_?0c\"", &["EX0C", "EY0C", "EZ0C"]),
         ("\"E?X\"", &["EXX", "EYX", "EZX", "EAX", "EBX", "ECX"]),
         ("\"E?0X\"", &["EA0X", "EB0X", "EC0X"]),
-        // What is asked for twice is estimated once.
+        // An error that is listed twice is estimated once.
         (
             "\"EC0X\", \"E?0X\", \"EB0X\", \"EB*X\"",
             &["EC0X", "EA0X", "EB0X", "EBX"],
@@ -148,7 +148,7 @@ fn a_pattern_stands_for_the_errors_that_it_matches() {
 }
 
 #[test]
-fn an_equation_takes_the_same_patterns() {
+fn an_equation_accepts_the_same_patterns() {
     let session = workspace().join("sessions/hermle-c600u/chapter5.toml");
     let machine = workspace().join("sessions/hermle-c600u/machine.toml");
     let of = |errors: &str| {
@@ -184,7 +184,10 @@ fn an_equation_takes_the_same_patterns() {
         (first, second)
     };
     assert_eq!(of("E?0C"), of("EX0C,EY0C,EZ0C,EA0C,EB0C,EC0C"));
-    let ((status, _, said), _) = of("E?0B");
+    let ((status, _, stderr), _) = of("E?0B");
     assert_eq!(status, Some(1));
-    assert!(said.contains("`E?0B` matches no error of the machine"), "{said}");
+    assert!(
+        stderr.contains("`E?0B` matches no error of the machine"),
+        "{stderr}"
+    );
 }

@@ -1,4 +1,4 @@
-//! The volumetric error and its compensation, against plain matrices and over every topology.
+//! The volumetric error and its compensation against plain matrices and over every topology.
 
 use abbe::identify::volumetric::{self, ErrorFunction, Form, MachineWithErrors, functions};
 use abbe::model::axis::AxisKind;
@@ -54,7 +54,7 @@ fn by_matrices(machine: &Machine, slots: &[f64], positions: &[f64], tool: [f64; 
 }
 
 #[test]
-fn the_33_errors_of_the_ready_machine_move_the_tool_as_matrices_do() {
+fn the_33_errors_of_the_bundled_machine_agree_with_matrices() {
     let machine = machine();
     let functions = errors(&machine);
     let mut kinds: Vec<usize> = functions.iter().map(|function| function.slot).collect();
@@ -86,14 +86,14 @@ fn the_33_errors_of_the_ready_machine_move_the_tool_as_matrices_do() {
             &positions,
             tool,
         );
-        let place = erring.place(&positions);
+        let place = erring.error_at(&positions);
         let expected = actual - nominal;
         assert!(
             (Vector3::from(place.error_mm) - expected).norm() < 1e-10,
             "{place:?} {expected}"
         );
         assert!(expected.norm() > 1e-3);
-        // The corrected commands put the independent machine where it should be.
+        // The corrected commands move the independent machine to the nominal point.
         let commands = erring.compensate(&positions).unwrap().positions;
         let corrected = by_matrices(&machine, &slots(&machine, &functions, &commands), &commands, tool);
         assert!(
@@ -109,7 +109,7 @@ fn every_topology_is_compensated() {
     let mut random = Pcg64::seed_from_u64(4);
     let mut compensated = 0;
     for machine in topologies::all(&mut random) {
-        // Every error that the chain applies, as a straight line over its axis.
+        // Every error of the chain, as a straight line over its axis.
         let mut functions = Vec::new();
         for slot in 0..machine.error_slots() {
             let (axis, within) = (slot / ERRORS_PER_AXIS, slot % ERRORS_PER_AXIS);
@@ -221,8 +221,8 @@ fn the_command_writes_map_and_summary_and_names_what_is_wrong() {
         "--json",
         text(&json),
     ];
-    let (status, told) = run(text(&errors), &more);
-    assert_eq!(status, Some(0), "{told}");
+    let (status, printed) = run(text(&errors), &more);
+    assert_eq!(status, Some(0), "{printed}");
     let table = std::fs::read_to_string(&map).unwrap();
     assert_eq!(table.lines().count(), 1 + 27 * 4);
     assert!(
@@ -234,11 +234,14 @@ fn the_command_writes_map_and_summary_and_names_what_is_wrong() {
     let file = folder.path().join("errors.toml");
     for (written, expected) in [
         ("[constant]\nEX0W = \"1 um\"\n", "no axis `W`"),
-        ("[constant]\nEX0X = \"1 um\"\n", "a linear axis has squarenesses"),
+        (
+            "[constant]\nEX0X = \"1 um\"\n",
+            "a linear axis has squareness errors",
+        ),
         ("[constant]\nEX0C = \"1 arcsec\"\n", "arcsec"),
         (
             "[[function]]\nerror = \"EXX\"\n",
-            "[[function]] 1 (`EXX`): it is one of",
+            "[[function]] 1 (`EXX`): give exactly one of",
         ),
         (
             "[[function]]\nerror = \"EXX\"\ntable = { at_deg = [0, 1], um = [0, 1] }\n",
@@ -259,13 +262,13 @@ fn the_command_writes_map_and_summary_and_names_what_is_wrong() {
         ("[[function]]\nerror = \"EXX\"\nspline = 1\n", "line 3"),
     ] {
         std::fs::write(&file, written).unwrap();
-        let (status, told) = run(text(&file), &[]);
+        let (status, printed) = run(text(&file), &[]);
         assert_eq!(status, Some(1));
         assert!(
-            told.contains(expected) && told.contains("errors.toml"),
-            "{written}: {told}"
+            printed.contains(expected) && printed.contains("errors.toml"),
+            "{written}: {printed}"
         );
     }
-    let (status, told) = run(text(&errors), &["--axis", "Q=3"]);
-    assert!(status == Some(1) && told.contains("no axis `Q`"), "{told}");
+    let (status, printed) = run(text(&errors), &["--axis", "Q=3"]);
+    assert!(status == Some(1) && printed.contains("no axis `Q`"), "{printed}");
 }

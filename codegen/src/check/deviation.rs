@@ -1,8 +1,8 @@
-//! What a truncated or small-angle form leaves out, measured.
+//! Truncation error of first-order, bilinear and small-angle forms against the exact chain.
 
 use abbe_model::frames::Rotation;
 
-use crate::check::points::{Draws, Point};
+use crate::check::points::{CheckPoint, PseudoRandom};
 use crate::check::worst;
 use crate::equation::{Equation, Order};
 use crate::error::CodegenError;
@@ -11,21 +11,21 @@ use crate::run::Run;
 use crate::subject::Source;
 use crate::variable::Variable;
 
-/// How far a form strays from the chain with exact rotations, at errors of a stated size.
+/// Deviation of a form from the chain with exact rotations, at errors of a stated size.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Deviation {
-    /// Every translation, µm.
+    /// Size of every translation error, µm.
     pub shift_um: f64,
-    /// Every angle, degrees.
+    /// Size of every angular error, degrees.
     pub tilt_deg: f64,
-    /// The largest deviation that was found over signs and positions, µm.
+    /// Largest deviation found over signs and positions, µm.
     pub largest_um: f64,
 }
 
 impl Equation {
-    /// How far the form strays from the chain with exact rotations: errors of 10 µm and 0.01°, then ten times those, all signs (256
-    /// draws of them for more than eight errors), 60 positions between the ends of the range, at which every fourth coordinate stands. Empty
-    /// for a form that is exact.
+    /// Computes the deviations of a form from the chain with exact rotations. Errors are 10 µm and 0.01°, then ten times those. All sign
+    /// combinations are evaluated (256 random ones for more than eight errors) at 60 positions within the range; one coordinate in four
+    /// is at an end of its range. The result is empty for an exact form.
     pub(crate) fn deviations(
         &self,
         source: &impl Source,
@@ -38,9 +38,9 @@ impl Equation {
         let mut exact = self.machine.clone();
         exact.rotation = Rotation::Exact;
         let count = self.parameters.len();
-        // What an effect adds reaches the stated size where it is largest.
+        // The contribution of an effect reaches the stated size where it is largest.
         let mut reach = vec![f64::MIN_POSITIVE; count];
-        let mut draws = Draws::new(6);
+        let mut draws = PseudoRandom::new(6);
         for _ in 0..60 {
             let point = drawn_between(range, count, &mut draws);
             let at = |variable: Variable| point.nominal(&variable);
@@ -56,13 +56,13 @@ impl Equation {
         }
         let mut deviations = Vec::new();
         for (shift_um, tilt_deg) in [(10.0, 0.01), (100.0, 0.1_f64)] {
-            let mut draws = Draws::new(5);
+            let mut draws = PseudoRandom::new(5);
             let mut largest = 0.0_f64;
             for _ in 0..60 {
                 let point = drawn_between(range, count, &mut draws);
                 let at = |variable: Variable| point.nominal(&variable);
                 let mut run = Run::<f64>::new(&exact, source, &self.parameters, &at, &|_| 0.0)?;
-                // The parameters are the last of the inputs, in their order.
+                // The parameters are the last inputs, in their order.
                 let mut inputs = point.inputs(program, &self.parameters);
                 let first = inputs.len() - count;
                 for pattern in 0..(1u64 << count.min(8)) {
@@ -82,7 +82,7 @@ impl Equation {
                     }
                     run.seed(&|place| inputs[first + place]);
                     let found = program.run(&inputs);
-                    // Where a probe misses its artefact nothing is read.
+                    // Skip points at which the probe misses the artefact.
                     let expected = run.read();
                     for (found, expected) in found.iter().zip(expected).filter(|(_, e)| e.is_finite()) {
                         largest = largest.max(worst(*found, expected) * 1e3);
@@ -99,13 +99,13 @@ impl Equation {
     }
 }
 
-/// A point between the ends of the range, at which every fourth coordinate stands, without errors.
-fn drawn_between(range: &[(Variable, [f64; 2])], count: usize, draws: &mut Draws) -> Point {
+/// A random point without errors within the range; one coordinate in four is at an end of its range.
+fn drawn_between(range: &[(Variable, [f64; 2])], count: usize, draws: &mut PseudoRandom) -> CheckPoint {
     let nominal = range.iter().map(|(variable, [low, high])| {
         let along = draws.between(-1.0 / 6.0, 7.0 / 6.0).clamp(0.0, 1.0);
         (variable.clone(), low + (high - low) * along)
     });
-    Point {
+    CheckPoint {
         nominal: nominal.collect(),
         small: vec![0.0; count],
     }

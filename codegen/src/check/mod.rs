@@ -1,4 +1,4 @@
-//! What a program computes against what the chain computes with dual numbers. Nothing is written that this does not confirm.
+//! Check of a program against the chain over dual numbers. A program that fails the check is not written.
 
 mod deviation;
 mod points;
@@ -6,48 +6,49 @@ mod reference;
 
 pub use deviation::Deviation;
 
-use crate::check::points::{Draws, Point};
+use crate::check::points::{CheckPoint, PseudoRandom};
 use crate::equation::Equation;
 use crate::error::CodegenError;
 use crate::program::Program;
 use crate::subject::Source;
 use crate::variable::Variable;
 
-/// Points that every program is checked at.
+/// Number of points at which every program is checked.
 const POINTS: usize = 40;
-/// Largest relative difference that passes.
+/// Largest relative difference that is accepted.
 const TOLERANCE: f64 = 1e-12;
-/// Errors of the points: mm and rad, far larger than any machine's, so that a wrong term of any order shows.
+/// Sizes of the errors at the check points, mm and rad. They are far larger than real errors, so that a wrong term of any order is
+/// detected.
 const SIZES: [f64; 2] = [10.0, 0.1];
 
-/// How well a program agrees with the chain.
+/// Agreement of a program with the chain.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Check {
-    /// Points compared, at errors of ±10 mm and ±0.1 rad.
+    /// Number of points compared, with errors of up to ±10 mm and ±0.1 rad.
     pub points: usize,
     /// Largest difference of a value, relative to the largest value.
     pub value: f64,
-    /// Largest difference of a derivative, relative to the largest derivative by the same parameter (to 1 mm/mm
-    /// or 1 mm/rad where that is less: a parameter that is not seen has rounding alone).
+    /// Largest difference of a derivative, relative to the largest derivative by the same parameter. Below 1 mm/mm or 1 mm/rad the
+    /// reference is 1, because the derivatives by an unobservable parameter are rounding errors only.
     pub gradient: f64,
-    /// Largest derivative by each parameter over the points, mm/mm and mm/rad.
+    /// Largest derivative by each parameter over all points, mm/mm and mm/rad.
     pub largest_derivatives: Vec<f64>,
 }
 
 impl Check {
-    /// The larger of the two.
+    /// The larger of the value and gradient differences.
     pub fn largest(&self) -> f64 {
         self.value.max(self.gradient)
     }
 }
 
 impl Equation {
-    /// Runs programs (without derivatives, or with) at points of large errors against the chain with dual numbers.
+    /// Compares programs, with or without derivatives, with the chain over dual numbers at points with large errors.
     ///
     /// # Errors
-    /// If they disagree: then nothing may be written.
+    /// If they disagree; the program must then not be written.
     pub(crate) fn confirm(&self, source: &impl Source, programs: &[&Program]) -> Result<Check, CodegenError> {
-        let mut draws = Draws::new(4);
+        let mut draws = PseudoRandom::new(4);
         let mut check = Check::default();
         let count = self.parameters.len();
         let mut value_scale = f64::MIN_POSITIVE;
@@ -60,12 +61,12 @@ impl Equation {
             let nominal = self.draw_anywhere(source, &mut draws);
             let size = |variable: &Variable| SIZES[usize::from(variable.is_angle())];
             let small = self.parameters.iter().map(|p| draws.between(-size(p), size(p)));
-            let point = Point {
+            let point = CheckPoint {
                 small: small.collect(),
                 nominal,
             };
             let (values, gradient) = self.expected(source, &point)?;
-            // A set-up that cannot be, such as the root of a negative length, is no point to compare at.
+            // Skip an impossible set-up, such as the root of a negative length.
             if !values
                 .iter()
                 .chain(gradient.iter().flatten())
@@ -88,7 +89,7 @@ impl Equation {
                 for (found, expected) in found_values.iter().zip(&values) {
                     difference = difference.max(worst(*found, *expected));
                 }
-                // A program without derivatives has none to compare.
+                // A program without derivatives has no derivatives to compare.
                 for (place, (found, expected)) in
                     found_slopes.iter().zip(gradient.iter().flatten()).enumerate()
                 {
@@ -113,7 +114,7 @@ impl Equation {
     }
 }
 
-/// The absolute difference; infinite where one of the two is no number.
+/// The absolute difference; infinite if either value is not a number.
 fn worst(found: f64, expected: f64) -> f64 {
     let difference = (found - expected).abs();
     if difference.is_nan() {

@@ -1,28 +1,28 @@
-//! What a form's value and derivatives must be: the chain over dual numbers.
+//! Reference value and derivatives of a form, from the chain over dual numbers.
 
 use abbe_model::instrument::Station;
 use num_dual::{Derivative, Dual64, DualNum, DualSVec64, HyperDual64};
 
-use crate::check::points::Point;
+use crate::check::points::CheckPoint;
 use crate::equation::{Equation, Order};
 use crate::error::CodegenError;
 use crate::run::Run;
 use crate::subject::{Source, Subject};
 use crate::variable::Variable;
 
-/// Parameters seeded at once.
+/// Number of parameters seeded per dual-number evaluation.
 const PACK: usize = 8;
 type Pack = DualSVec64<PACK>;
 
-/// Outputs, and each output's derivatives by every parameter.
+/// The outputs, and the derivatives of each output by every parameter.
 pub(crate) type ValueAndGradient = (Vec<f64>, Vec<Vec<f64>>);
 
 impl Equation {
-    /// The reading, and the coordinate groups that it is made of.
+    /// The reading, and the coordinate groups from which it is computed.
     fn run<S>(
         &self,
         source: &impl Source,
-        point: &Point,
+        point: &CheckPoint,
         small: impl Fn(usize) -> S,
     ) -> Result<(Vec<S>, Vec<S>), CodegenError>
     where
@@ -37,9 +37,9 @@ impl Equation {
                 p.minus(q).0.to_vec()
             }
             Subject::Station(Station::Probe(_)) => {
-                let sight = run.sight().into_iter();
-                sight
-                    .flat_map(|sight| [sight.stylus.0, sight.step.0].concat())
+                let geometry = run.probe_geometry().into_iter();
+                geometry
+                    .flat_map(|geometry| [geometry.stylus.0, geometry.step.0].concat())
                     .collect()
             }
             _ => run.read(),
@@ -47,11 +47,11 @@ impl Equation {
         Ok((run.read(), groups))
     }
 
-    /// What the outputs of a program must be.
+    /// The reference outputs of a program.
     pub(crate) fn expected(
         &self,
         source: &impl Source,
-        point: &Point,
+        point: &CheckPoint,
     ) -> Result<ValueAndGradient, CodegenError> {
         match self.options.order {
             Order::Exact => self.by_duals(source, point, &point.small),
@@ -68,11 +68,11 @@ impl Equation {
         }
     }
 
-    /// The reading and its derivatives at the given parameters.
+    /// The reading and its derivatives at the given parameter values.
     fn by_duals(
         &self,
         source: &impl Source,
-        point: &Point,
+        point: &CheckPoint,
         at: &[f64],
     ) -> Result<ValueAndGradient, CodegenError> {
         let values = self.run(source, point, |i| at[i])?.0;
@@ -99,11 +99,11 @@ impl Equation {
         Ok((values, gradient))
     }
 
-    /// The Taylor series of the coordinate groups to second order, by hyper-dual numbers, and its derivatives.
+    /// The second-order Taylor series of the coordinate groups and its derivatives, from hyper-dual numbers.
     fn expected_bilinear(
         &self,
         source: &impl Source,
-        point: &Point,
+        point: &CheckPoint,
     ) -> Result<ValueAndGradient, CodegenError> {
         let count = self.parameters.len();
         let mut base = Vec::new();
@@ -149,11 +149,12 @@ impl Equation {
         Ok((values, gradient))
     }
 
-    /// The reading from its coordinate groups: themselves, the length with the bar's own unknowns, or the distance of a probe.
+    /// Computes the reading from its coordinate groups: the groups themselves, the length with the parameters of the bar, or the distance
+    /// of a probe.
     fn reading_of_groups(
         &self,
         source: &impl Source,
-        point: &Point,
+        point: &CheckPoint,
         groups: &[Dual64],
         small: &impl Fn(usize) -> Dual64,
     ) -> Result<Vec<Dual64>, CodegenError> {

@@ -1,16 +1,16 @@
-//! What a reader is given, before any language spells it: named vectors, coordinate groups or coefficients, symbols, notes.
+//! Content of an equation for readers, independent of the language: named vectors, coordinate groups or coefficients, symbols, notes.
 
 use std::collections::HashMap;
 
 use crate::collect::{product, sum};
-use crate::equation::{Equation, FirstOrderLayout, Form, Kind, Order};
+use crate::equation::{Equation, Form, Kind, Order, PrintedFirstOrder};
 use crate::first_order::{Column, FirstOrder};
 use crate::print::{exact, notes, touch};
 use crate::program::{Input, Label, Naming, Program, Step, Tree};
 use crate::symbol::{Binary, Operand, Unary};
 use crate::variable::Variable;
 
-/// The left-hand side of a row.
+/// The left-hand side of an equation line.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) enum LeftSide {
     /// A named quantity.
@@ -23,39 +23,39 @@ pub(crate) enum LeftSide {
     Slope(usize, Variable),
 }
 
-/// One equation.
+/// One printed equation.
 #[derive(Clone, Debug)]
-pub(crate) struct Row {
+pub(crate) struct EquationLine {
     pub(crate) left: LeftSide,
-    /// `≈` in the place of `=`.
+    /// `≈` instead of `=`.
     pub(crate) approximate: bool,
     pub(crate) right: Tree,
-    /// A word on it, such as "not seen".
+    /// A remark on the coefficient.
     pub(crate) remark: Option<NoteKind>,
 }
 
-/// A word on a coefficient.
+/// A remark on a coefficient.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) enum NoteKind {
-    /// Identically zero.
-    NotSeen,
-    /// A fixed multiple of another parameter's.
+    /// Identically zero: the parameter is not observable.
+    NotObservable,
+    /// A constant multiple of another parameter's coefficient.
     MultipleOf(Variable),
 }
 
-/// Equations that belong together.
+/// A group of related equations.
 #[derive(Clone, Debug)]
 pub(crate) struct Section {
     pub(crate) heading: String,
-    pub(crate) rows: Vec<Row>,
+    pub(crate) rows: Vec<EquationLine>,
 }
 
-/// The whole.
+/// The complete content.
 pub(crate) struct Article {
-    /// Inputs and names that the rows' expressions refer to.
+    /// The inputs and names to which the expressions refer.
     pub(crate) program: Program,
     pub(crate) sections: Vec<Section>,
-    /// Inputs with unit and meaning: for a rotary axis its angle, once, with the letters of its sine and cosine.
+    /// Inputs with unit and meaning. A rotary axis is listed once, by its angle, with the symbols of its sine and cosine.
     pub(crate) symbols: Vec<(Input, String, &'static str)>,
 }
 
@@ -67,7 +67,7 @@ impl Article {
             Form::First(first, layout) => first_order(equation, first, layout),
         };
         let told = |place: usize, input: &Input| match input {
-            // A length or position that the form is free of is not explained.
+            // Omit a length or position that the form does not contain.
             Input::Plain(variable) if variable.is_small() => true,
             Input::Plain(_) => uses(&sections, place),
             Input::Sine(_) => uses(&sections, place) || uses(&sections, place + 1),
@@ -95,14 +95,14 @@ impl Article {
     }
 }
 
-/// Whether an input stands in any of the rows.
+/// Whether any of the equations uses an input.
 fn uses(sections: &[Section], place: usize) -> bool {
     let rows = sections.iter().flat_map(|section| &section.rows);
     rows.into_iter().any(|row| row.right.holds(place))
 }
 
-pub(crate) fn row(left: LeftSide, right: Tree) -> Row {
-    Row {
+pub(crate) fn row(left: LeftSide, right: Tree) -> EquationLine {
+    EquationLine {
         left,
         approximate: false,
         right,
@@ -110,7 +110,7 @@ pub(crate) fn row(left: LeftSide, right: Tree) -> Row {
     }
 }
 
-pub(crate) fn what_is_read(equation: &Equation) -> &'static str {
+pub(crate) fn quantity_heading(equation: &Equation) -> &'static str {
     match equation.kind {
         Kind::Length => "length of the bar",
         Kind::Distance => "distance read",
@@ -119,7 +119,7 @@ pub(crate) fn what_is_read(equation: &Equation) -> &'static str {
     }
 }
 
-/// A program that only names: its steps are the coordinates of the bar vector or nothing.
+/// A program that only assigns names: its steps are the coordinates of the bar vector, or none.
 pub(crate) fn naming(equation: &Equation, labels: Vec<Label>) -> Program {
     let step = |label| Step {
         label,
@@ -145,18 +145,18 @@ pub(crate) fn norm_of_steps(start: usize) -> Tree {
     )
 }
 
-/// The coordinate groups, and the length over them.
+/// The coordinate groups, and the length as a function of them.
 fn groups(equation: &Equation, trees: &[Tree], complete: bool) -> (Program, Vec<Section>) {
     if let (Kind::Distance, Some(touch)) = (equation.kind, &equation.touch) {
         return touch::groups(equation, touch, trees, complete);
     }
     if equation.kind != Kind::Length {
-        let rows = trees.iter().enumerate().map(|(place, tree)| Row {
+        let rows = trees.iter().enumerate().map(|(place, tree)| EquationLine {
             approximate: !complete,
             ..row(LeftSide::Output(place), tree.clone())
         });
         let section = Section {
-            heading: what_is_read(equation).to_string(),
+            heading: quantity_heading(equation).to_string(),
             rows: rows.collect(),
         };
         return (naming(equation, Vec::new()), vec![section]);
@@ -175,8 +175,8 @@ fn groups(equation: &Equation, trees: &[Tree], complete: bool) -> (Program, Vec<
             rows: rows.collect(),
         },
         Section {
-            heading: what_is_read(equation).to_string(),
-            rows: vec![Row {
+            heading: quantity_heading(equation).to_string(),
+            rows: vec![EquationLine {
                 approximate: !complete,
                 ..row(LeftSide::Output(0), length)
             }],
@@ -185,9 +185,9 @@ fn groups(equation: &Equation, trees: &[Tree], complete: bool) -> (Program, Vec<
     (program, sections)
 }
 
-/// `d − δ_bar + δ_gain·(d − bar)`, as far as these unknowns are carried.
+/// `d − δ_bar + δ_gain·(d − bar)`, with the parameters that are included.
 pub(crate) fn with_bar_unknowns(equation: &Equation, program: &Program, distance: Tree) -> Tree {
-    let tree = |operand: Operand| as_it_stands(equation, program, operand);
+    let tree = |operand: Operand| named_or_expanded(equation, program, operand);
     let [bar, gain] = equation.bar_unknowns;
     let mut terms = vec![(false, distance.clone())];
     if let Some(bar) = bar {
@@ -200,9 +200,9 @@ pub(crate) fn with_bar_unknowns(equation: &Equation, program: &Program, distance
     sum(terms)
 }
 
-/// An operand by the name that effects give it or, where they give it none, as it stands.
-pub(crate) fn as_it_stands(equation: &Equation, program: &Program, operand: Operand) -> Tree {
-    let follower = equation.followers.iter().find(|(_, value)| *value == operand);
+/// An operand by the name that effects give it, or as its own expression.
+pub(crate) fn named_or_expanded(equation: &Equation, program: &Program, operand: Operand) -> Tree {
+    let follower = equation.driven_errors.iter().find(|(_, value)| *value == operand);
     let named = follower.and_then(|(variable, _)| {
         let label = Label::Quantity(variable.clone());
         program.steps.iter().position(|step| step.label == label)
@@ -222,7 +222,7 @@ const S: Label = Label::Scalar("S");
 fn first_order(
     equation: &Equation,
     first: &FirstOrder,
-    layout: &FirstOrderLayout,
+    layout: &PrintedFirstOrder,
 ) -> (Program, Vec<Section>) {
     let is_length = matches!(equation.kind, Kind::Length | Kind::Distance);
     let program = naming(equation, if is_length { vec![L_0, S] } else { Vec::new() });
@@ -240,7 +240,7 @@ fn first_order(
         let mut all = terms_of(&layout.without_errors(l_0.clone()));
         all.push((false, slope));
         all.extend(terms(equation, first, layout, 0, false));
-        sum_rows.push(Row {
+        sum_rows.push(EquationLine {
             approximate: true,
             ..row(LeftSide::Output(0), sum(all))
         });
@@ -251,7 +251,7 @@ fn first_order(
                 all.push((false, nominal.clone()));
             }
             all.extend(terms(equation, first, layout, place, false));
-            sum_rows.push(Row {
+            sum_rows.push(EquationLine {
                 approximate: true,
                 ..row(LeftSide::Output(place), sum(all))
             });
@@ -261,13 +261,13 @@ fn first_order(
     for (sensitivity, coefficients) in first.sensitivities.iter().zip(&layout.coefficients) {
         let remark = match &sensitivity.column {
             Column::Distinct => None,
-            Column::Zero => Some(NoteKind::NotSeen),
+            Column::Zero => Some(NoteKind::NotObservable),
             Column::Multiple { of, .. } => Some(NoteKind::MultipleOf(of.clone())),
         };
         let zero = |tree: &Tree| *tree == Tree::Number(0.0);
         let all_zero = coefficients.iter().all(zero);
         for (place, coefficient) in coefficients.iter().enumerate() {
-            // A vector's zero coordinates are left out; of a column that is zero altogether one stands for all.
+            // Zero coordinates of a vector are omitted; of an identically zero column, one coordinate remains.
             if zero(coefficient) && !is_length && !(all_zero && place == 0) {
                 continue;
             }
@@ -276,7 +276,7 @@ fn first_order(
             } else {
                 coefficient.clone()
             };
-            table.push(Row {
+            table.push(EquationLine {
                 remark: remark.clone(),
                 ..row(LeftSide::Slope(place, sensitivity.parameter.clone()), right)
             });
@@ -284,7 +284,7 @@ fn first_order(
     }
     let sections = vec![
         Section {
-            heading: format!("{}, {}", what_is_read(equation), order_words(Order::First)),
+            heading: format!("{}, {}", quantity_heading(equation), order_words(Order::First)),
             rows: sum_rows,
         },
         Section {
@@ -295,7 +295,7 @@ fn first_order(
     (program, sections)
 }
 
-/// `a/b`, or `(1/b)·a` where the numerator is too long to be kept on one line.
+/// `a/b`, or `(1/b)·a` if the numerator is too long for one line.
 fn over(numerator: Tree, denominator: Tree) -> Tree {
     if terms_of(&numerator).len() > 4 || numerator.leaves() > 20 {
         product(vec![
@@ -320,11 +320,11 @@ fn order_words(order: Order) -> &'static str {
     }
 }
 
-/// `Σ cᵢ·(eᵢ + Σ fₖ·eₖ)` over the distinct columns, with their fixed multiples in the parentheses.
+/// `Σ cᵢ·(eᵢ + Σ fₖ·eₖ)` over the linearly independent columns, with their constant multiples in the parentheses.
 fn terms(
     equation: &Equation,
     first: &FirstOrder,
-    layout: &FirstOrderLayout,
+    layout: &PrintedFirstOrder,
     coordinate: usize,
     over_length: bool,
 ) -> Vec<(bool, Tree)> {
@@ -336,8 +336,8 @@ fn terms(
     let mut terms = Vec::new();
     for (place, sensitivity) in first.sensitivities.iter().enumerate() {
         let coefficient = &layout.coefficients[place][coordinate];
-        // A multiple of a column that is divided by L₀ where it is not, or the other way round, stands by itself; so does one whose
-        // factor is a fraction, which is no shorter.
+        // A multiple stays a separate term if only one of the two columns is divided by L₀, or if its factor is a fraction, which is not
+        // shorter.
         let stands = match &sensitivity.column {
             Column::Distinct => true,
             Column::Zero => false,
@@ -385,12 +385,12 @@ fn terms(
     terms
 }
 
-/// Whether the factor of a multiple has a denominator.
+/// Whether the factor of a multiple has a denominator other than 1.
 fn is_fraction(factor: &Option<(Tree, Tree)>) -> bool {
     matches!(factor, Some((_, denominator)) if *denominator != Tree::Number(1.0))
 }
 
-/// A leading minus, taken off a product or a name.
+/// Splits a leading minus from a product or a name.
 fn without_minus(tree: &Tree) -> (bool, Tree) {
     match tree {
         Tree::Unary(Unary::Neg, inner) => (true, (**inner).clone()),
@@ -399,7 +399,7 @@ fn without_minus(tree: &Tree) -> (bool, Tree) {
     }
 }
 
-/// The terms of a sum with their signs: true for minus.
+/// The terms of a sum with their signs; true means minus.
 pub(crate) fn terms_of(tree: &Tree) -> Vec<(bool, Tree)> {
     fn flatten(tree: &Tree, minus: bool, terms: &mut Vec<(bool, Tree)>) {
         match tree {

@@ -1,4 +1,4 @@
-//! C99, for one reading and for columns of readings in one block that vectorises.
+//! Printer for C99: one function for one reading, and one for columns of readings with a loop that vectorises.
 
 use std::fmt::Write;
 
@@ -37,7 +37,7 @@ impl Dialect for C<'_, '_> {
     }
 }
 
-/// The file.
+/// Prints the file.
 pub(crate) fn print(equation: &Equation) -> String {
     let value = Code::new(equation, false);
     let whole = Code::new(equation, equation.options.gradient);
@@ -48,7 +48,7 @@ pub(crate) fn print(equation: &Equation) -> String {
     let advice = match whole.program.operations().roots {
         0 => "",
         _ => {
-            " * Compile with -O3 -fno-math-errno, or the square root keeps the loop over readings from being vectorised.\n"
+            " * Compile with -O3 -fno-math-errno, otherwise the square root prevents vectorisation of the loop over readings.\n"
         }
     };
     let _ = writeln!(
@@ -105,7 +105,7 @@ fn kernel(file: &mut String, code: &Code<'_>, gradient: bool) {
         "void {name}_columns(size_t n, const double *restrict lengths, const double *restrict axes, const double *restrict errors, double *restrict value{slopes})"
     );
     let _ = writeln!(file, "/* {what} of n readings. */\n{many};\n\n{many}\n{{");
-    // Each column is a pointer of its own, so that the compiler sees that no two of them overlap.
+    // Each column is a pointer of its own, so that the compiler knows that no two overlap.
     for (number, place) in code.groups[1].clone().enumerate() {
         if code.uses(place) {
             let _ = writeln!(
@@ -128,7 +128,7 @@ fn kernel(file: &mut String, code: &Code<'_>, gradient: bool) {
         file.push_str("    (void)axes;\n");
     }
     declare(file, code, "    ", &[0, 2]);
-    // So many columns are more than gcc tests for overlap; the pragma tells it that there is none.
+    // gcc tests only a limited number of columns for overlap; the pragma asserts that there is none.
     file.push_str("#if defined(__GNUC__) && !defined(__clang__)\n#pragma GCC ivdep\n#endif\n");
     file.push_str("    for (size_t i = 0; i < n; ++i) {\n");
     for place in code.groups[1].clone() {
@@ -151,7 +151,7 @@ fn kernel(file: &mut String, code: &Code<'_>, gradient: bool) {
     file.push_str("    }\n}\n\n");
 }
 
-/// The used arguments of the given groups by name; a group without any is marked as unused.
+/// Declares the used arguments of the given groups by name; marks a group without any as unused.
 fn declare(file: &mut String, code: &Code<'_>, indent: &str, groups: &[usize]) {
     for group in groups {
         let mut used = false;

@@ -1,4 +1,4 @@
-//! What the languages for compilers and interpreters share: names of arguments and steps, and the header.
+//! Common part of the printers for compilers and interpreters: names of arguments and steps, and the header.
 
 use std::collections::HashSet;
 use std::ops::Range;
@@ -9,7 +9,7 @@ use crate::print::notes;
 use crate::program::{Input, Label, Program};
 use crate::variable::{Symbols, Variable, identifier};
 
-/// Words that are no names in Rust, C, Python or MATLAB, or that the printed code uses itself.
+/// Names that are reserved in Rust, C, Python or MATLAB, or that the printed code uses itself.
 const RESERVED_WORDS: &[&str] = &[
     "as",
     "and",
@@ -129,18 +129,18 @@ const RESERVED_WORDS: &[&str] = &[
     "log",
 ];
 
-/// A program with names for everything in it.
+/// A program with names for all its quantities.
 pub(crate) struct Code<'e> {
     pub(crate) equation: &'e Equation,
-    /// The reading, and with it its derivatives where they were asked for.
+    /// The reading and, if requested, its derivatives.
     pub(crate) program: Program,
     pub(crate) inputs: Vec<String>,
     pub(crate) steps: Vec<String>,
-    /// Places of the lengths, of the axes and of the errors among the inputs.
+    /// Index ranges of the lengths, the axes and the errors among the inputs.
     pub(crate) groups: [Range<usize>; 3],
 }
 
-/// What the three groups of arguments are called.
+/// Names of the three groups of arguments.
 pub(crate) const GROUPS: [&str; 3] = ["lengths", "axes", "errors"];
 
 impl<'e> Code<'e> {
@@ -190,17 +190,17 @@ impl<'e> Code<'e> {
         }
     }
 
-    /// Scalar outputs of one reading.
+    /// Number of scalar outputs of one reading.
     pub(crate) fn outputs(&self) -> usize {
         self.equation.outputs.len()
     }
 
-    /// Errors and unknowns.
+    /// Number of errors and instrument parameters.
     pub(crate) fn errors(&self) -> usize {
         self.equation.parameters.len()
     }
 
-    /// What the function is called.
+    /// Name of the function.
     pub(crate) fn function(&self) -> &'static str {
         match self.equation.kind {
             Kind::Length => "bar_length",
@@ -210,13 +210,13 @@ impl<'e> Code<'e> {
         }
     }
 
-    /// Whether an input is used by the program.
+    /// Whether the program uses an input.
     pub(crate) fn uses(&self, place: usize) -> bool {
         let steps = self.program.steps.iter().map(|step| &step.value);
         steps.chain(&self.program.outputs).any(|tree| tree.holds(place))
     }
 
-    /// The steps, one text each, by a language's way to write an assignment.
+    /// The steps as text; `assign` writes an assignment in the language.
     pub(crate) fn lines(&self, dialect: &impl Dialect, assign: impl Fn(&str, &str) -> String) -> Vec<String> {
         let steps = self.steps.iter().zip(&self.program.steps);
         steps
@@ -230,7 +230,7 @@ impl<'e> Code<'e> {
         outputs.map(|tree| dialect::write(tree, dialect)).collect()
     }
 
-    /// The header, a line each, without comment signs. Places of arguments count from `first` and stand between `brackets`.
+    /// The lines of the header, without comment signs. Indices of arguments start at `first` and are enclosed in `brackets`.
     pub(crate) fn header(&self, first: usize, brackets: [char; 2]) -> Vec<String> {
         let at =
             |group: &str, number: usize| format!("{group}{}{}{}", brackets[0], number + first, brackets[1]);
@@ -278,7 +278,7 @@ impl<'e> Code<'e> {
             "Value"
         };
         lines.push(format!(
-            "{with}: {} operations a reading ({} + and −, {} ·, {} /, {} √{functions}).",
+            "{with}: {} operations per reading ({} + and −, {} ·, {} /, {} √{functions}).",
             operations.arithmetic(),
             operations.sums,
             operations.products,

@@ -1,9 +1,9 @@
-//! Expressions on one line, in any language: where the parentheses go.
+//! Expressions on one line in any language, with the necessary parentheses.
 
 use crate::program::Tree;
 use crate::symbol::{Binary, Unary};
 
-/// How a language spells what expressions are made of.
+/// Notation of a language for the elements of expressions.
 pub trait Dialect {
     /// A number that is not negative.
     fn number(&self, value: f64) -> String;
@@ -11,37 +11,37 @@ pub trait Dialect {
     fn input(&self, place: usize) -> String;
     /// The name of a step.
     fn step(&self, place: usize) -> String;
-    /// A product of two factors that already carry the parentheses they need.
+    /// A product of two factors that already have the necessary parentheses.
     fn product(&self, a: &str, b: &str) -> String;
-    /// A quotient, and whether it stands by itself (as a built-up fraction does) so that its parts need no parentheses.
+    /// A quotient.
     fn quotient(&self, a: &str, b: &str) -> String {
         format!("{a} / {b}")
     }
-    /// Whether [`Dialect::quotient`] sets a built-up fraction.
+    /// Whether [`Dialect::quotient`] sets a built-up fraction, whose parts need no parentheses.
     fn fractions(&self) -> bool {
         false
     }
-    /// A function of an expression without parentheses.
+    /// A function of an argument without parentheses.
     fn call(&self, function: Unary, argument: &str) -> String;
     /// An expression in parentheses.
     fn group(&self, inside: &str) -> String {
         format!("({inside})")
     }
-    /// The sign for minus.
+    /// The minus sign.
     fn minus(&self) -> &str {
         "-"
     }
-    /// The square of a factor, where the language writes one; otherwise it is multiplied out.
+    /// The square of a factor, if the language has a notation for it; otherwise the factor is multiplied by itself.
     fn square(&self, _factor: &str) -> Option<String> {
         None
     }
-    /// Whether `a + (b + c)` must keep its parentheses: true for a compiler, which would round otherwise, false for a reader.
+    /// Whether `a + (b + c)` keeps its parentheses: true for code, where the order affects rounding, false for readers.
     fn keeps_order(&self) -> bool {
         true
     }
 }
 
-/// How tightly an expression binds.
+/// Operator precedence of an expression.
 #[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 enum Binding {
     Sum,
@@ -54,7 +54,7 @@ pub fn write(tree: &Tree, dialect: &impl Dialect) -> String {
     bound(tree, dialect).0
 }
 
-/// The expression as a factor or a term after a minus: in parentheses where it is a sum.
+/// The expression as a factor or as a term after a minus: in parentheses if it is a sum.
 pub fn write_term(tree: &Tree, dialect: &impl Dialect) -> String {
     let (text, binding) = bound(tree, dialect);
     if binding < Binding::Product {
@@ -64,8 +64,8 @@ pub fn write_term(tree: &Tree, dialect: &impl Dialect) -> String {
     }
 }
 
-/// A sum on lines of at most `width` visible signs where it can be broken: before a plus or minus in no braces and in as few
-/// parentheses as the width allows. `visible` counts the signs of a piece. Every line but the first starts with its sign.
+/// Breaks a sum into lines of at most `width` visible characters if possible. Breaks lie before a plus or minus outside braces, in as few
+/// parentheses as the width allows. `visible` counts the characters of a piece. Every line except the first starts with its sign.
 pub fn lines(
     terms: &[(bool, Tree)],
     dialect: &impl Dialect,
@@ -80,7 +80,7 @@ pub fn lines(
             (_, false) => " + ".to_string(),
             (_, true) => format!(" {} ", dialect.minus()),
         };
-        // A sum that is a term of its own needs its parentheses only after a minus.
+        // A nested sum needs parentheses only after a minus.
         let text = if *minus {
             write_term(tree, dialect)
         } else {
@@ -112,7 +112,7 @@ pub fn lines(
     lines
 }
 
-/// The text before each plus and minus in at most `parentheses` parentheses and in no braces.
+/// Splits the text before each plus and minus that is in at most `parentheses` parentheses and in no braces.
 fn split(text: &str, dialect: &impl Dialect, parentheses: i32) -> Vec<String> {
     let signs = [" + ".to_string(), format!(" {} ", dialect.minus())];
     let mut pieces = Vec::new();
@@ -173,7 +173,7 @@ fn bound(tree: &Tree, dialect: &impl Dialect) -> (String, Binding) {
                 (format!("{left} {sign} {right}"), Binding::Sum)
             }
             Binary::Mul => {
-                // A reader is given the number first.
+                // For readers the number comes first.
                 if let (false, Tree::Binary(Binary::Mul, number, rest)) = (dialect.keeps_order(), &**b)
                     && matches!(
                         (&**number, &**a),
@@ -208,7 +208,7 @@ fn bound(tree: &Tree, dialect: &impl Dialect) -> (String, Binding) {
     }
 }
 
-/// A number without the last digits, which are rounding: 0.6 where nominal lengths give 0.5999999999999996.
+/// Rounds the last digits of a number: 0.6 where nominal lengths give 0.5999999999999996.
 pub(crate) fn for_readers(value: f64) -> f64 {
     format!("{value:.11e}").parse().unwrap_or(value)
 }

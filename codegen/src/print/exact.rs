@@ -1,22 +1,24 @@
-//! The exact form for a reader: the named vectors, the outputs over them and, where they are asked for, the derivatives of a length:
+//! Exact form for readers: the named vectors, the outputs in terms of them and, if requested, the derivatives of a length:
 //!
 //! ```text
 //! u = b/L, carried back through the chain frame by frame;   ∂L/∂e = a product with the vectors of the frame that e is an error of
 //! ```
 
 use crate::equation::{Equation, Kind};
-use crate::print::article::{LeftSide, Row, Section, norm_of_steps, row, what_is_read, with_bar_unknowns};
+use crate::print::article::{
+    EquationLine, LeftSide, Section, norm_of_steps, quantity_heading, row, with_bar_unknowns,
+};
 use crate::program::{Label, Naming, Program, Step, Tree};
 use crate::symbol::{Binary, Operand, Symbol};
-use crate::touch::{self, Touch};
+use crate::touch::{self, ProbeTerms};
 use crate::vectors::{self, NamedVector};
 
-/// What the program and the sections are made of: the vectors on the way to the outputs, and those on the way back.
+/// The program and the sections: the intermediate vectors of the outputs, and the adjoint vectors.
 pub(crate) fn sections(equation: &Equation) -> (Program, Vec<Section>) {
     let forth = &equation.vectors;
     let mut labels = vectors::labels(forth);
-    labels.extend(equation.follower_labels());
-    labels.extend(equation.touch.iter().flat_map(Touch::labels));
+    labels.extend(equation.driven_labels());
+    labels.extend(equation.touch.iter().flat_map(ProbeTerms::labels));
     let mut back: Vec<NamedVector> = Vec::new();
     let mut slopes: Vec<Operand> = Vec::new();
     if let (Kind::Length, true, Some(Operand::Node(distance))) =
@@ -34,9 +36,9 @@ pub(crate) fn sections(equation: &Equation) -> (Program, Vec<Section>) {
         for mut vector in vectors::adjoint_vectors(forth, &adjoints) {
             if vector.frame.is_empty() && !unit {
                 vector.meaning =
-                    "derivatives by the bar: its unit vector times what the sensor makes of it".to_string();
+                    "derivatives by the bar vector: its unit vector times the gain of the sensor".to_string();
             }
-            // Where the chain only shifts, the vector that is carried back stays the same and keeps its name.
+            // A pure translation leaves the adjoint vector and its name unchanged.
             let new =
                 |component: &Operand| matches!(component, Operand::Node(id) if !labels.contains_key(id));
             if vector.components.iter().any(new) {
@@ -54,7 +56,7 @@ pub(crate) fn sections(equation: &Equation) -> (Program, Vec<Section>) {
     let mut asked: Vec<Operand> = equation.outputs.clone();
     asked.extend(forth.iter().chain(&back).flat_map(|vector| vector.components));
     asked.extend(&slopes);
-    asked.extend(equation.followers.iter().map(|(_, value)| *value));
+    asked.extend(equation.driven_errors.iter().map(|(_, value)| *value));
     let mut program = Program::of(
         &equation.arena,
         equation.inputs(),
@@ -63,14 +65,14 @@ pub(crate) fn sections(equation: &Equation) -> (Program, Vec<Section>) {
         Naming::Labelled,
     );
     let (outputs, rest) = program.outputs.split_at(equation.outputs.len());
-    let (rest, followers) = rest.split_at(rest.len() - equation.followers.len());
+    let (rest, driven_errors) = rest.split_at(rest.len() - equation.driven_errors.len());
     let (vectors, slopes) = rest.split_at(rest.len() - slopes.len());
-    let followers = equation.followers.iter().zip(followers);
-    let followers = followers.map(|((variable, _), tree)| {
+    let driven_errors = equation.driven_errors.iter().zip(driven_errors);
+    let driven_errors = driven_errors.map(|((variable, _), tree)| {
         let label = Label::Quantity(variable.clone());
         row(LeftSide::Named(label.clone()), value_of(&program, &label, tree))
     });
-    let followers: Vec<Row> = followers.collect();
+    let driven_errors: Vec<EquationLine> = driven_errors.collect();
     let mut vectors = forth
         .iter()
         .chain(&back)
@@ -83,16 +85,16 @@ pub(crate) fn sections(equation: &Equation) -> (Program, Vec<Section>) {
             }
         });
     let mut sections: Vec<Section> = vectors.by_ref().take(forth.len()).collect();
-    if !followers.is_empty() {
+    if !driven_errors.is_empty() {
         let follow = Section {
-            heading: "errors that effects make up".to_string(),
-            rows: followers,
+            heading: "errors as functions of drivers".to_string(),
+            rows: driven_errors,
         };
         sections.insert(0, follow);
     }
     let outputs = outputs.iter().enumerate();
     let mut read = Section {
-        heading: what_is_read(equation).to_string(),
+        heading: quantity_heading(equation).to_string(),
         rows: outputs
             .map(|(place, tree)| row(LeftSide::Output(place), tree.clone()))
             .collect(),
@@ -103,15 +105,15 @@ pub(crate) fn sections(equation: &Equation) -> (Program, Vec<Section>) {
             let own = program.steps.iter().find(|step| step.label == label)?;
             Some(row(LeftSide::Named(label), own.value.clone()))
         });
-        read.rows.splice(0..0, between.collect::<Vec<Row>>());
+        read.rows.splice(0..0, between.collect::<Vec<EquationLine>>());
     }
     let back: Vec<Section> = vectors.collect();
     let slopes = equation.parameters.iter().zip(slopes);
-    let slopes: Vec<Row> = slopes
+    let slopes: Vec<EquationLine> = slopes
         .map(|(parameter, tree)| row(LeftSide::Slope(0, parameter.clone()), tree.clone()))
         .collect();
     if let (Kind::Length, Some(bar)) = (equation.kind, forth.last()) {
-        // The norm of the bar by the names of its own coordinates, whichever of them are aliases.
+        // The norm of the bar in terms of its own coordinates, even if some of them are aliases.
         let start = program.steps.len();
         let aliases = (0..3).map(|coordinate| Step {
             label: bar.label(coordinate),
@@ -148,20 +150,20 @@ pub(crate) fn sections(equation: &Equation) -> (Program, Vec<Section>) {
     (program, sections)
 }
 
-/// A coordinate of a named vector. One that is an input, a constant or another name is written as that.
-fn component(program: &Program, vector: &NamedVector, trees: &[Tree], coordinate: usize) -> Row {
+/// A coordinate of a named vector. An input, a constant or another name is written as such.
+fn component(program: &Program, vector: &NamedVector, trees: &[Tree], coordinate: usize) -> EquationLine {
     let label = vector.label(coordinate);
     let right = value_of(program, &label, &trees[coordinate]);
     row(LeftSide::Named(label), as_quotient(right))
 }
 
-/// How a name is computed: by its own step or, where it has none, as it stands.
+/// The expression of a name: that of its own step or, without one, the given expression.
 fn value_of(program: &Program, label: &Label, stands: &Tree) -> Tree {
     let own = program.steps.iter().find(|step| step.label == *label);
     own.map_or_else(|| stands.clone(), |step| step.value.clone())
 }
 
-/// `x/y` for `(1/y)·x`, which is what a compiler is given to share.
+/// `x/y` for `(1/y)·x`; code uses the second form to share the reciprocal.
 fn as_quotient(tree: Tree) -> Tree {
     let over = |x: &Tree, y: &Tree| Tree::Binary(Binary::Div, Box::new(x.clone()), Box::new(y.clone()));
     let one_over = |tree: &Tree| match tree {
@@ -183,7 +185,7 @@ fn as_quotient(tree: Tree) -> Tree {
     }
 }
 
-/// The distance between the balls, before the bar's own unknowns.
+/// The distance between the balls, before the parameters of the bar are applied.
 fn distance(equation: &Equation) -> Option<Operand> {
     let bar = equation.vectors.last()?;
     let [x, y, z] = bar.components.map(|component| equation.arena.symbol(component));

@@ -1,19 +1,19 @@
-//! LaTeX: a fragment for a paper that loads `amsmath`, broken at the coordinate groups, with a table of symbols.
+//! Printer for LaTeX: a fragment for a document that loads `amsmath`, broken at the coordinate groups, with a table of symbols.
 
 use std::f64::consts::{PI, TAU};
 use std::fmt::Write;
 
 use crate::equation::{Equation, Kind};
-use crate::print::article::{Article, LeftSide, NoteKind, Row, terms_of};
+use crate::print::article::{Article, EquationLine, LeftSide, NoteKind, terms_of};
 use crate::print::dialect::{self, Dialect};
 use crate::print::notes;
 use crate::program::{Input, Label, Program};
 use crate::symbol::Unary;
 use crate::variable::{Symbols, Variable};
 
-/// Visible signs on a line: what fits into a column of 16 cm at ten points.
+/// Visible characters per line: the width of a 16 cm column at ten points.
 const WIDTH: usize = 70;
-/// Rows of a table on a page.
+/// Table rows per page.
 const ROWS: usize = 40;
 
 struct Latex<'a> {
@@ -46,7 +46,7 @@ impl Dialect for Latex<'_> {
         label(&self.program.steps[place].label, self.symbols)
     }
     fn product(&self, a: &str, b: &str) -> String {
-        // Between digits a space would be read as a separator of thousands.
+        // Between digits a space would be read as a thousands separator.
         if a.ends_with(|c: char| c.is_ascii_digit()) && b.starts_with(|c: char| c.is_ascii_digit()) {
             format!("{a} \\cdot {b}")
         } else {
@@ -84,7 +84,7 @@ impl Dialect for Latex<'_> {
     }
 }
 
-/// The argument of a sine or cosine: in parentheses where it is more than one name.
+/// The argument of a sine or cosine: in parentheses if it is more than one name.
 pub(crate) fn of_sin_cos(dialect: &impl Dialect, argument: &str) -> String {
     if argument.contains([' ', '^']) || argument.starts_with(dialect.minus()) {
         dialect.group(argument)
@@ -163,7 +163,7 @@ fn output(kind: Kind, place: usize) -> String {
     }
 }
 
-/// Words with the signs that TeX reads otherwise.
+/// Escapes the special characters of TeX.
 fn escape(text: &str) -> String {
     let mut escaped = String::new();
     for character in text.chars() {
@@ -188,7 +188,7 @@ fn escape(text: &str) -> String {
     escaped
 }
 
-/// How many signs a reader sees, roughly: commands are one, braces and subscript marks none.
+/// Approximate number of visible characters: a command counts as one, braces and subscript marks as none.
 fn visible(text: &str) -> usize {
     let mut count = 0;
     let mut rest = text.chars().peekable();
@@ -210,7 +210,7 @@ fn visible(text: &str) -> usize {
     count
 }
 
-/// The fragment.
+/// Prints the fragment.
 pub(crate) fn print(equation: &Equation) -> String {
     let article = Article::new(equation);
     let symbols = equation.options.symbols;
@@ -228,7 +228,7 @@ pub(crate) fn print(equation: &Equation) -> String {
             let _ = writeln!(
                 page,
                 "{}{end}",
-                write_row(equation, &article.program, row, symbols)
+                write_line(equation, &article.program, row, symbols)
             );
         }
         page.push_str("\\end{align}\n");
@@ -259,7 +259,7 @@ pub(crate) fn print(equation: &Equation) -> String {
     page
 }
 
-fn write_row(equation: &Equation, program: &Program, row: &Row, symbols: Symbols) -> String {
+fn write_line(equation: &Equation, program: &Program, row: &EquationLine, symbols: Symbols) -> String {
     let spelling = Latex { program, symbols };
     let left = match &row.left {
         LeftSide::Named(name) => label(name, symbols),
@@ -275,7 +275,7 @@ fn write_row(equation: &Equation, program: &Program, row: &Row, symbols: Symbols
     let lines = dialect::lines(&terms_of(&row.right), &spelling, WIDTH, visible);
     let remark = match &row.remark {
         None => String::new(),
-        Some(NoteKind::NotSeen) => " \\quad\\text{(not seen)}".to_string(),
+        Some(NoteKind::NotObservable) => " \\quad\\text{(not observable)}".to_string(),
         Some(NoteKind::MultipleOf(other)) => {
             format!(" \\quad\\text{{(multiple of ${}$)}}", variable(other, symbols))
         }
@@ -284,7 +284,7 @@ fn write_row(equation: &Equation, program: &Program, row: &Row, symbols: Symbols
     format!("  {left} &{relation} {joined}{remark}")
 }
 
-/// With a capital at the start.
+/// The text with a capital first letter.
 pub(crate) fn capital(text: &str) -> String {
     let mut characters = text.chars();
     match characters.next() {

@@ -1,4 +1,4 @@
-//! MATLAB and Octave: one function file, for one reading and for rows of readings.
+//! Printer for MATLAB and Octave: one function file, for one reading and for rows of readings.
 
 use std::fmt::Write;
 
@@ -40,7 +40,7 @@ impl Dialect for Matlab<'_, '_> {
     }
 }
 
-/// The file; it must be saved under the name of its function.
+/// Prints the file, which must have the name of its function.
 pub(crate) fn print(equation: &Equation) -> String {
     let code = Code::new(equation, equation.options.gradient);
     let dialect = Matlab(&code);
@@ -82,7 +82,7 @@ pub(crate) fn print(equation: &Equation) -> String {
     for line in code.lines(&dialect, |name, value| format!("  {name} = {value};")) {
         let _ = writeln!(file, "{line}");
     }
-    // Constants take the shape of the readings.
+    // Constants get the shape of the readings.
     file.push_str("  readings = zeros(1, max(size(axes, 2), 1));\n");
     let rows = |items: &[String]| {
         let rows: Vec<String> = items

@@ -1,7 +1,7 @@
-//! Printers: one file for each language.
+//! Printers, one file per language.
 //!
-//! A new language is one file here: a [`dialect::Dialect`] says how names, numbers, products and functions are spelt, and the file
-//! lays out what stands around the expressions.
+//! A new language is one file. A [`dialect::Dialect`] defines names, numbers, products and functions; the file defines the text around
+//! the expressions.
 
 mod article;
 mod c;
@@ -24,7 +24,7 @@ use abbe_model::effect::{Effect, Shape};
 use crate::equation::{Equation, Kind, Order};
 use crate::error::CodegenError;
 
-/// A language that equations are printed in.
+/// A language in which equations are printed.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum Language {
     /// Plain text, UTF-8.
@@ -44,7 +44,7 @@ pub enum Language {
 }
 
 impl Language {
-    /// All of them.
+    /// All languages.
     pub const ALL: [Language; 7] = [
         Language::Text,
         Language::Latex,
@@ -55,7 +55,7 @@ impl Language {
         Language::Matlab,
     ];
 
-    /// The word on the command line.
+    /// The identifier of the language.
     pub fn word(self) -> &'static str {
         match self {
             Language::Text => "text",
@@ -68,17 +68,17 @@ impl Language {
         }
     }
 
-    /// The language of a word on the command line.
+    /// The language with this identifier.
     pub fn of_word(word: &str) -> Option<Language> {
         Language::ALL.into_iter().find(|language| language.word() == word)
     }
 }
 
 impl Equation {
-    /// The equation in a language.
+    /// Prints the equation in a language.
     ///
     /// # Errors
-    /// If the form that was asked for cannot be written in that language.
+    /// If the requested form cannot be written in that language.
     pub fn print(&self, language: Language) -> Result<String, CodegenError> {
         let for_readers = matches!(language, Language::Text | Language::Latex | Language::Typst);
         let curve = |effect: &&Effect| matches!(effect.shape, Shape::Curve { .. });

@@ -1,13 +1,13 @@
-//! Sentences about an equation that every printer needs.
+//! Sentences about an equation, common to all printers.
 
 use abbe_model::frames::Rotation;
 
-use crate::effect::Followed;
+use crate::effect::DriverQuantity;
 use crate::equation::{Equation, Form, Kind, Order};
 use crate::first_order::Column;
 use crate::variable::Variable;
 
-/// What it is: two lines.
+/// The title: two lines.
 pub(crate) fn title(equation: &Equation) -> Vec<String> {
     let what = match equation.kind {
         Kind::Length => "Length read by a ball bar",
@@ -21,7 +21,7 @@ pub(crate) fn title(equation: &Equation) -> Vec<String> {
         Order::First => "first order in the errors",
     };
     let order = match &equation.form {
-        Form::Groups { complete: true, .. } => "up to products of two errors, which is all there is",
+        Form::Groups { complete: true, .. } => "up to products of two errors, which is complete",
         _ => order,
     };
     let rotation = match (equation.options.order, equation.machine.rotation) {
@@ -40,13 +40,13 @@ pub(crate) fn title(equation: &Equation) -> Vec<String> {
     ]
 }
 
-/// What it was checked against, what it leaves out, what it does not contain, in plain text.
+/// The notes in plain text: the check, the truncation error, and the parameters that the equation does not contain.
 pub(crate) fn notes(equation: &Equation) -> Vec<String> {
     let symbols = equation.options.symbols;
     notes_spelt(equation, &str::to_string, &|variable| variable.text(symbols))
 }
 
-/// The same, `escape` spelling the words and `name` the names.
+/// The notes, with `escape` for words and `name` for names.
 pub(crate) fn notes_spelt(
     equation: &Equation,
     escape: &dyn Fn(&str) -> String,
@@ -89,7 +89,7 @@ pub(crate) fn notes_spelt(
                     name(&sensitivity.parameter),
                     escape("is confounded with"),
                     name(of),
-                    escape(": a fixed multiple wherever the axes stand.")
+                    escape(": a constant multiple at all positions of the axes.")
                 ));
             }
         }
@@ -97,7 +97,7 @@ pub(crate) fn notes_spelt(
     notes
 }
 
-/// Where a truncation was judged: the ranges of the moving axes, and lengths that the session does not state.
+/// The range over which the truncation error was evaluated: moving axes, and lengths that the session does not state.
 fn range(equation: &Equation) -> String {
     let degrees = |angle: f64| two_places(angle.to_degrees());
     let axes = equation
@@ -112,7 +112,7 @@ fn range(equation: &Equation) -> String {
                 two_places(*low),
                 two_places(*high)
             )),
-            Variable::Driver(Followed::Direction(_)) => None,
+            Variable::Driver(DriverQuantity::Direction(_)) => None,
             Variable::Driver(followed) => Some(format!(
                 "{} {low} {unit} to {high} {unit}",
                 followed.text(),
@@ -133,13 +133,13 @@ fn range(equation: &Equation) -> String {
     }
 }
 
-/// A number rounded to two decimals, without those that say nothing.
+/// A number rounded to two decimals, without trailing zeros.
 fn two_places(value: f64) -> String {
     let rounded = (value * 100.0).round() / 100.0;
     format!("{}", rounded + 0.0).replace('-', "−")
 }
 
-/// A positive number with two digits that count; what is less than a millionth is rounding.
+/// A positive number with two significant digits; a value below 1e-6 is rounding.
 fn two_digits(value: f64) -> String {
     if value < 1e-6 {
         return "less than 0.000001".to_string();
@@ -149,7 +149,7 @@ fn two_digits(value: f64) -> String {
     format!("{value:.decimals$}")
 }
 
-/// What a variable stands for: in the error vector of the tool its lengths are the coordinates of a point.
+/// The meaning of a variable; in the error vector of the tool, lengths are the coordinates of a point.
 pub(crate) fn meaning(equation: &Equation, variable: &Variable) -> String {
     match variable {
         Variable::Length(name) if equation.kind == Kind::Volumetric => {

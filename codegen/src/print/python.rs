@@ -1,4 +1,4 @@
-//! Python with NumPy: one function for one reading and for arrays of readings.
+//! Printer for Python with NumPy: one function for one reading and for arrays of readings.
 
 use std::fmt::Write;
 
@@ -37,7 +37,7 @@ impl Dialect for Python<'_, '_> {
     }
 }
 
-/// The file.
+/// Prints the file.
 pub(crate) fn print(equation: &Equation) -> String {
     let value = Code::new(equation, false);
     let whole = Code::new(equation, equation.options.gradient);
@@ -87,7 +87,7 @@ fn function(file: &mut String, code: &Code<'_>, gradient: bool) {
         let _ = writeln!(file, "{line}");
     }
     let results = code.results(&dialect);
-    // Constants take the shape of the readings.
+    // Constants get the shape of the readings.
     let _ = writeln!(
         file,
         "    shape = np.broadcast_shapes(*(np.shape(argument) for group in (lengths, axes, errors) for argument in group))"

@@ -1,4 +1,4 @@
-//! Rust without dependencies, for one reading and for columns of readings. Nothing but the elementary functions needs `std`.
+//! Printer for Rust without dependencies, for one reading and for columns of readings. Only the elementary functions need `std`.
 
 use std::fmt::Write;
 
@@ -38,7 +38,7 @@ impl Dialect for Rust<'_, '_> {
     }
 }
 
-/// The file.
+/// Prints the file.
 pub(crate) fn print(equation: &Equation) -> String {
     let value = Code::new(equation, false);
     let whole = Code::new(equation, equation.options.gradient);
@@ -54,9 +54,9 @@ pub(crate) fn print(equation: &Equation) -> String {
                 "Positions of moving axes: sine and cosine of a rotary one."
             }
             "AXES" => {
-                "Positions of moving axes: sine and cosine of a rotary one; and what else effects follow."
+                "Positions of moving axes (sine and cosine of a rotary one), and other drivers of effects."
             }
-            _ => "Errors and instrument unknowns.",
+            _ => "Errors and instrument parameters.",
         };
         let _ = writeln!(file, "/// {what}\npub const {name}: usize = {};", places.len());
     }
@@ -124,7 +124,7 @@ fn single(file: &mut String, code: &Code<'_>, gradient: bool) {
     }
     let mut lines = code.lines(&dialect, |name, value| format!("    let {name} = {value};"));
     let results = code.results(&dialect);
-    // A last step that is all that is returned needs no name.
+    // If the last step is the only result, it needs no name.
     if let (false, [only], Some(last)) = (gradient, results.as_slice(), lines.last())
         && let Some(value) = last.strip_prefix(&format!("    let {only} = "))
     {
@@ -156,8 +156,8 @@ fn single(file: &mut String, code: &Code<'_>, gradient: bool) {
     file.push_str("}\n\n");
 }
 
-/// Readings four at a time: the arrays of a block cannot overlap, so that the loop over its lanes is vectorised, and they are small
-/// enough to stay in registers.
+/// Evaluates four readings at a time. The arrays of a block cannot overlap, so that the loop over its lanes is vectorised, and they are
+/// small enough to stay in registers.
 fn columns(file: &mut String, code: &Code<'_>, gradient: bool) {
     let name = function(code, gradient);
     let (outputs, errors) = (code.outputs(), code.errors());
@@ -253,7 +253,7 @@ fn columns(file: &mut String, code: &Code<'_>, gradient: bool) {
     file.push_str("    }\n}\n\n");
 }
 
-/// The functions that `core` lacks, as far as the code calls them.
+/// The functions that `core` lacks, if the code calls them.
 fn elementary(file: &mut String, code: &Code<'_>) {
     let dialect = Rust(code);
     let mut text = code.lines(&dialect, |_, value| value.to_string()).concat();
@@ -275,7 +275,7 @@ fn elementary(file: &mut String, code: &Code<'_>) {
     if used.is_empty() {
         return;
     }
-    file.push_str("/// What `core` lacks. In a crate without `std` put the functions of `libm` here; nothing else needs it.\nmod elementary {\n");
+    file.push_str("/// Functions that `core` lacks. In a crate without `std` replace them by those of `libm`; nothing else needs `std`.\nmod elementary {\n");
     for (place, (name, body)) in used.iter().enumerate() {
         let gap = if place == 0 { "" } else { "\n" };
         let _ = write!(

@@ -1,4 +1,4 @@
-//! Plain text, UTF-8.
+//! Printer for plain text, UTF-8.
 
 use std::f64::consts::{PI, TAU};
 use std::fmt::Write;
@@ -11,10 +11,10 @@ use crate::program::{Input, Label, Program};
 use crate::symbol::Unary;
 use crate::variable::{Symbols, Variable};
 
-/// Signs on a line.
+/// Characters per line.
 const WIDTH: usize = 100;
 
-/// Spells expressions for a reader of plain text.
+/// Notation of expressions in plain text.
 struct Text<'a> {
     program: &'a Program,
     symbols: Symbols,
@@ -64,7 +64,7 @@ impl Dialect for Text<'_> {
     }
 }
 
-/// `s_a` for the sine of θ_a, and so on.
+/// The symbol of an input, such as `s_a` for the sine of θ_a.
 fn input(input: &Input, symbols: Symbols) -> String {
     let turn = |letter: &str, variable: &Variable| match variable {
         Variable::Position { axis, .. } => format!("{letter}_{}", axis.to_lowercase()),
@@ -78,7 +78,7 @@ fn input(input: &Input, symbols: Symbols) -> String {
     }
 }
 
-/// `p_A.x` for a coordinate of the point p in the frame of A.
+/// The symbol of a step, such as `p_A.x` for a coordinate of the point p in the frame of A.
 fn label(label: &Label, symbols: Symbols) -> String {
     match label {
         Label::Vector {
@@ -110,7 +110,7 @@ fn output(kind: Kind, place: usize) -> String {
     }
 }
 
-/// The whole equation.
+/// Prints the equation.
 pub(crate) fn print(equation: &Equation) -> String {
     let article = Article::new(equation);
     let symbols = equation.options.symbols;
@@ -145,9 +145,13 @@ pub(crate) fn print(equation: &Equation) -> String {
             );
             match &row.remark {
                 None => page.push('\n'),
-                Some(NoteKind::NotSeen) => page.push_str("   (not seen)\n"),
+                Some(NoteKind::NotObservable) => page.push_str("   (not observable)\n"),
                 Some(NoteKind::MultipleOf(other)) => {
-                    let _ = writeln!(page, "   (a fixed multiple of that of {})", other.text(symbols));
+                    let _ = writeln!(
+                        page,
+                        "   (a constant multiple of that of {})",
+                        other.text(symbols)
+                    );
                 }
             }
         }

@@ -1,10 +1,10 @@
-//! Typst: a fragment for a document, broken at the coordinate groups, with a table of symbols.
+//! Printer for Typst: a fragment for a document, broken at the coordinate groups, with a table of symbols.
 
 use std::f64::consts::{PI, TAU};
 use std::fmt::Write;
 
 use crate::equation::{Equation, Kind};
-use crate::print::article::{Article, LeftSide, NoteKind, Row, terms_of};
+use crate::print::article::{Article, EquationLine, LeftSide, NoteKind, terms_of};
 use crate::print::dialect::{self, Dialect};
 use crate::print::latex::{capital, of_sin_cos};
 use crate::print::notes;
@@ -12,7 +12,7 @@ use crate::program::{Input, Label, Program};
 use crate::symbol::Unary;
 use crate::variable::{Symbols, Variable};
 
-/// Visible signs on a line.
+/// Visible characters per line.
 const WIDTH: usize = 72;
 
 struct Typst<'a> {
@@ -61,7 +61,7 @@ impl Dialect for Typst<'_> {
         }
     }
     fn group(&self, inside: &str) -> String {
-        // Escaped, so that a line may end between them.
+        // Escaped, so that a line can break between them.
         format!("\\({inside}\\)")
     }
     fn square(&self, factor: &str) -> Option<String> {
@@ -134,7 +134,7 @@ fn output(kind: Kind, place: usize) -> String {
     }
 }
 
-/// Words with the signs that Typst reads otherwise.
+/// Escapes the special characters of Typst.
 fn escape(text: &str) -> String {
     let mut escaped = String::new();
     for character in text.chars() {
@@ -150,7 +150,7 @@ fn visible(text: &str) -> usize {
     text.chars().filter(|c| !"\"_^\\ ".contains(*c)).count()
 }
 
-/// The fragment.
+/// Prints the fragment.
 pub(crate) fn print(equation: &Equation) -> String {
     let article = Article::new(equation);
     let symbols = equation.options.symbols;
@@ -162,7 +162,7 @@ pub(crate) fn print(equation: &Equation) -> String {
         let rows: Vec<String> = section
             .rows
             .iter()
-            .map(|row| write_row(equation, &article.program, row, symbols))
+            .map(|row| write_line(equation, &article.program, row, symbols))
             .collect();
         let heading = escape(&capital(&section.heading));
         let _ = writeln!(page, "\n{heading}:\n$\n{}\n$", rows.join(" \\\n"));
@@ -185,7 +185,7 @@ pub(crate) fn print(equation: &Equation) -> String {
     page
 }
 
-fn write_row(equation: &Equation, program: &Program, row: &Row, symbols: Symbols) -> String {
+fn write_line(equation: &Equation, program: &Program, row: &EquationLine, symbols: Symbols) -> String {
     let spelling = Typst { program, symbols };
     let left = match &row.left {
         LeftSide::Named(name) => label(name, symbols),
@@ -201,7 +201,7 @@ fn write_row(equation: &Equation, program: &Program, row: &Row, symbols: Symbols
     let lines = dialect::lines(&terms_of(&row.right), &spelling, WIDTH, visible);
     let remark = match &row.remark {
         None => String::new(),
-        Some(NoteKind::NotSeen) => " quad #[(not seen)]".to_string(),
+        Some(NoteKind::NotObservable) => " quad #[(not observable)]".to_string(),
         Some(NoteKind::MultipleOf(other)) => {
             format!(" quad #[(multiple of ${}$)]", variable(other, symbols))
         }

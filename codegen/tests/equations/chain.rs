@@ -1,4 +1,4 @@
-//! The chain over symbols against the chain over numbers.
+//! Tests of the chain over symbols against the chain over numbers.
 
 use abbe_codegen::evaluate::evaluate_f64;
 use abbe_codegen::{Equation, Options, Variable};

@@ -1,12 +1,12 @@
-//! What is printed, compiled or interpreted, against the dual numbers: every topology of Table 1.1 at random errors of 0.1 rad and
-//! 10 mm, value and gradient, one reading at a time and in columns.
+//! Compiles or interprets printed code and compares it with dual numbers: every topology of Table 1.1 at random errors of 0.1 rad and 10
+//! mm, value and gradient, one reading at a time and in columns.
 
 use std::fmt::Write;
 use std::path::Path;
 use std::process::Command;
 
 use abbe_codegen::program::Input;
-use abbe_codegen::{Equation, Followed, Language, Options, Variable};
+use abbe_codegen::{DriverQuantity, Equation, Language, Options, Variable};
 use abbe_model::chain::Machine;
 use abbe_model::component::ErrorName;
 use abbe_model::frames::Rotation;
@@ -19,7 +19,7 @@ use crate::topologies::{AnyBar, CODES, Case, What, all_errors, cases, disagreeme
 
 const CASES: usize = 19;
 
-/// One printed equation and what it must yield.
+/// One printed equation and its expected values.
 struct Printed {
     name: String,
     function: &'static str,
@@ -68,7 +68,7 @@ fn all(language: Language) -> Vec<Printed> {
     printed
 }
 
-/// Compound operands under every operator: three coordinates that shift with three errors.
+/// Compound operands under every operator: three coordinates, each shifted by one of three errors.
 fn operators(language: Language, random: &mut impl rand::Rng) -> Vec<Printed> {
     let machine = Machine::from_code("w b X t").expect("a code");
     let errors: Vec<ErrorName> = ["EXX", "EYX", "EZX"]
@@ -102,7 +102,7 @@ fn operators(language: Language, random: &mut impl rand::Rng) -> Vec<Printed> {
     printed
 }
 
-/// A bar with an effect of every shape, against the steps that the dual numbers confirmed.
+/// A bar with an effect of every shape, against the program that dual numbers confirmed.
 fn effects(language: Language, random: &mut impl rand::Rng) -> Printed {
     let machine = Machine::from_code("w C b X t").expect("a code");
     let options = Options {
@@ -124,9 +124,11 @@ fn effects(language: Language, random: &mut impl rand::Rng) -> Printed {
                     Variable::Length(_) => (0, random.random_range(90.0..110.0)),
                     Variable::Position { axis, .. } if axis == "C" => (1, angle),
                     Variable::Position { .. } => (1, random.random_range(-150.0..-50.0)),
-                    Variable::Driver(Followed::Direction(_)) => (1, if random.random() { 1.0 } else { -1.0 }),
-                    Variable::Driver(Followed::Time) => (1, random.random_range(0.0..4000.0)),
-                    Variable::Driver(Followed::SinceReversal(..)) => (1, random.random_range(0.0..0.5)),
+                    Variable::Driver(DriverQuantity::Direction(_)) => {
+                        (1, if random.random() { 1.0 } else { -1.0 })
+                    }
+                    Variable::Driver(DriverQuantity::Time) => (1, random.random_range(0.0..4000.0)),
+                    Variable::Driver(DriverQuantity::SinceReversal(..)) => (1, random.random_range(0.0..0.5)),
                     Variable::Driver(_) => (1, random.random_range(-2.0..2.0)),
                     _ => (2, random.random_range(-0.1..0.1)),
                 },
@@ -148,7 +150,7 @@ fn effects(language: Language, random: &mut impl rand::Rng) -> Printed {
     }
 }
 
-/// Values and gradients of the cases against rows of numbers, twice: one reading at a time, then in columns.
+/// Compares values and gradients of the cases with rows of numbers, twice: one reading at a time, then in columns.
 fn compare(printed: &Printed, single: &str, columns: &str) {
     for text in [single, columns] {
         let worst = disagreement(&printed.cases, &tools::rows(text), true);
@@ -210,7 +212,7 @@ fn rust() {
         }}
         println!(\"columns\");
         for row in &rows {{
-            // The errors are one set for a column: each row is a column set of its own, thrice the block and a rest.
+            // A column has one set of errors, so each case becomes columns of its own: three blocks and a remainder.
             let (l, rest) = row.split_at({lengths}); let (a, e) = rest.split_at({axes});
             let x: Vec<Vec<f64>> = a.iter().map(|a| vec![*a; 19]).collect();
             let x: Vec<&[f64]> = x.iter().map(Vec::as_slice).collect();
@@ -239,7 +241,7 @@ fn rust() {
     let _ = std::fs::remove_dir_all(&folder);
 }
 
-/// Output of all printed equations: rows, the word `columns`, rows, the word `next`.
+/// Compares the output of all printed equations: rows, the word `columns`, rows, the word `next`.
 fn check_all(all: &[Printed], output: &str) {
     let parts: Vec<&str> = output.split("next\n").collect();
     assert_eq!(parts.len(), all.len() + 1);

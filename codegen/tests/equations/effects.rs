@@ -1,16 +1,18 @@
-//! Declared effects in equations: every shape against its closed form by hand, forms, refusals.
+//! Tests of declared effects in equations: every shape against its closed form by hand, printed forms, refusals.
 
 use std::f64::consts::{PI, TAU};
 
 use abbe_codegen::evaluate::evaluate_f64;
-use abbe_codegen::{CodegenError, Equation, Followed, Language, Options, Order, Source, Subject, Variable};
+use abbe_codegen::{
+    CodegenError, DriverQuantity, Equation, Language, Options, Order, Source, Subject, Variable,
+};
 use abbe_model::chain::Machine;
 use abbe_model::component::ErrorName;
 use abbe_model::effect::{Component, Driver, Effect, Shape};
 use abbe_model::instrument::{Station, ballbar::BallBar, socket::Socket};
 use abbe_model::scalar::Nominal;
 
-/// A ball in the tool frame's origin, in a socket there: what is read is where the ball is.
+/// A ball at the tool frame's origin in a socket at R's origin: the reading is the position of the ball.
 #[derive(Clone, Copy)]
 struct Ball;
 
@@ -40,7 +42,7 @@ fn with(effects: Vec<Effect>) -> Options {
     }
 }
 
-/// What a driver does at a point: position, direction, rate, way since the turn.
+/// State of a driver at a point: position, direction, rate, distance since the reversal.
 #[derive(Clone, Copy)]
 struct At {
     q: f64,
@@ -49,17 +51,19 @@ struct At {
     way: f64,
 }
 
-/// What the linear axis X of a machine that has nothing else reads in Y where its error EYX follows a driver: the derivatives are the basis
-/// functions, and the reading their sum.
+/// Basis functions of an effect on EYX of a machine with the single axis X. The derivatives of the reading in Y are the basis functions,
+/// and the reading is their sum.
 fn bases(driver: &str, shape: Shape, at: At) -> Vec<f64> {
     let machine = Machine::from_code("w b X t").expect("a code");
     let options = with(vec![effect("EYX", driver, shape)]);
     let equation = Equation::of(&machine, &Ball, &[], &options).expect("an equation");
     let variable = |variable: &Variable| match variable {
-        Variable::Position { .. } | Variable::Driver(Followed::Time | Followed::Temperature) => at.q,
-        Variable::Driver(Followed::Direction(_)) => at.direction,
-        Variable::Driver(Followed::Rate(..)) => at.rate,
-        Variable::Driver(Followed::SinceReversal(..)) => at.way,
+        Variable::Position { .. } | Variable::Driver(DriverQuantity::Time | DriverQuantity::Temperature) => {
+            at.q
+        }
+        Variable::Driver(DriverQuantity::Direction(_)) => at.direction,
+        Variable::Driver(DriverQuantity::Rate(..)) => at.rate,
+        Variable::Driver(DriverQuantity::SinceReversal(..)) => at.way,
         Variable::Coefficient(coefficient) => coefficient.number as f64,
         other => panic!("{other:?} has no place here"),
     };
@@ -148,7 +152,8 @@ fn shapes_with_edges_by_hand_on_both_sides() {
     near(&bases("X", bump(Some(100.0)), here(180.0)), &[0.0]);
 }
 
-/// The cardinal cubic B-spline by its truncated powers (de Boor, ch. IX), which the shape does not use: N(s) = Σ (−1)^k (4 over k) (s − k)₊³ / 6.
+/// The cardinal cubic B-spline by its truncated powers (de Boor, ch. IX), independent of the implementation: N(s) = Σ (−1)^k (4 over k)
+/// (s − k)₊³ / 6.
 fn cardinal(s: f64) -> f64 {
     let terms = [1.0, -4.0, 6.0, -4.0, 1.0].into_iter().enumerate();
     let sum: f64 = terms.map(|(k, c)| c * (s - k as f64).max(0.0).powi(3)).sum();
@@ -163,7 +168,7 @@ fn curves_by_truncated_powers() {
         intervals: 5,
         closed: false,
     };
-    // Beyond its ends a curve stands where it ended.
+    // Beyond its ends a curve is constant.
     for (q, place) in [(10.0, 0.0), (22.5, 1.25), (37.0, 2.7), (59.9, 4.99), (-20.0, 0.0)] {
         let expected: Vec<f64> = (0..8).map(|j| cardinal(place - j as f64 + 3.0)).collect();
         near(&bases("X", open(), here(q)), &expected);
@@ -190,7 +195,7 @@ fn curves_by_truncated_powers() {
     }
 }
 
-/// One of each shape on a machine with a rotary axis, an instrument unknown and a delay among the components.
+/// One effect of each shape on a machine with a rotary axis; the components include an instrument parameter and a delay.
 pub fn every_shape() -> Vec<Effect> {
     let polynomial = |degree, scale| Shape::Polynomial { degree, scale };
     let local = Shape::Local {
@@ -225,7 +230,7 @@ pub fn every_shape() -> Vec<Effect> {
     ]
 }
 
-/// A curve, which is for compilers.
+/// A curve, which is printed as code only.
 pub fn curve() -> Effect {
     let shape = Shape::Curve {
         from: 0.0,
@@ -236,7 +241,7 @@ pub fn curve() -> Effect {
     effect("EYC", "C", shape)
 }
 
-/// A bar between balls at stated places.
+/// A bar between balls at stated positions.
 #[derive(Clone, Copy)]
 pub struct Bar;
 
@@ -293,7 +298,7 @@ fn an_equation_names_what_effects_make_up_and_what_they_follow() {
     let equation = Equation::of(&machine, &Bar, &[], &with(effects)).expect("an equation");
     let text = equation.print(Language::Text).expect("a text");
     for line in [
-        "errors that effects make up\n",
+        "errors as functions of drivers\n",
         "  e_zc  = k_1·cos(2·θ_c) + k_2·sin(2·θ_c)\n",
         "  δ_bar = k_3·(1 − exp(−t/900))\n",
         " − δ_bar\n",
@@ -309,7 +314,7 @@ fn an_equation_names_what_effects_make_up_and_what_they_follow() {
     );
 }
 
-/// A harmonic of the first order in X and Y of C is where the ball's own eccentricity shows: one column, twice.
+/// A first-order harmonic in X and Y of C is confounded with the eccentricity of the ball: the same column twice.
 #[test]
 fn an_effect_that_is_a_location_error_is_marked() {
     let machine = Machine::from_code("w C b X t").expect("a code");

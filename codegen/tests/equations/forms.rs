@@ -1,4 +1,4 @@
-//! Every form of one test, as a reviewer reads it in the snapshots, and small facts about the printed code.
+//! Snapshots of every form of one test, and small checks of the printed code.
 
 use std::process::Command;
 
@@ -13,7 +13,7 @@ fn chapter5(options: &Options) -> Equation {
     Equation::of(&machine, &Chapter5 { extended: true }, &eight(), options).expect("an equation")
 }
 
-/// One snapshot of each language and form. Numbers of the check differ in their last digit from one machine to another.
+/// One snapshot per language and form. The last digits of the check differ between machines and are masked.
 fn snapshot(name: &str, text: &str) {
     let mut settings = insta::Settings::clone_current();
     settings.set_snapshot_path("../../../snapshots");
@@ -22,7 +22,7 @@ fn snapshot(name: &str, text: &str) {
     settings.bind(|| insta::assert_snapshot!(format!("codegen__{name}"), without_rounding(text)));
 }
 
-/// `2e-16` and the like as `…`.
+/// Replaces `2e-16` and the like by `…`.
 fn without_rounding(text: &str) -> String {
     let word = |word: &str| {
         let digits = |part: &str| !part.is_empty() && part.chars().all(|c| c.is_ascii_digit());
@@ -82,7 +82,7 @@ fn derivatives_of_the_chapter_5_test() {
     snapshot("chapter5_text_derivatives", &text);
 }
 
-/// Value and gradient of the chapter 5 test take at most 70 operations: the printed Rust is run over a scalar that counts.
+/// Value and gradient of the chapter 5 test take at most 70 operations, counted by running the printed Rust over a counting scalar.
 #[test]
 fn operations_counted_by_running_the_printed_code() {
     let rustc = std::env::var("RUSTC").unwrap_or_else(|_| "rustc".to_string());
@@ -96,7 +96,7 @@ fn operations_counted_by_running_the_printed_code() {
     let equation = chapter5(&options);
     let counted = equation.program(true).operations();
     let printed = equation.print(Language::Rust).expect("code");
-    // The kernel of one reading alone, over the counting scalar in the place of f64.
+    // Only the kernel of one reading, over the counting scalar instead of `f64`.
     let from = printed
         .find("/// Value and gradient of one reading.")
         .expect("the kernel");
@@ -149,7 +149,7 @@ fn main() {{
     assert!(ran <= 70, "{ran}");
 }
 
-/// The code that the benches run is what the printers write. `ABBE_WRITE_BENCHES=1` writes it anew.
+/// The benchmark code is the printer's output. `ABBE_WRITE_BENCHES=1` writes it again.
 #[test]
 fn the_benches_run_what_is_printed() {
     let options = Options {
@@ -170,7 +170,7 @@ fn the_benches_run_what_is_printed() {
     }
 }
 
-/// The printed Rust needs nothing of `std` but the functions in its last module.
+/// The printed Rust needs `std` only for the functions in its last module.
 #[test]
 fn the_printed_rust_builds_without_std() {
     let rustc = std::env::var("RUSTC").unwrap_or_else(|_| "rustc".to_string());
@@ -183,7 +183,9 @@ fn the_printed_rust_builds_without_std() {
         ..Options::default()
     };
     let printed = chapter5(&options).print(Language::Rust).expect("code");
-    let end = printed.find("/// What `core` lacks").expect("the last module");
+    let end = printed
+        .find("/// Functions that `core` lacks")
+        .expect("the last module");
     let stub = |name: &str| format!("pub fn {name}(x: f64) -> f64 {{ x }} ");
     let stubs: String = ["sqrt", "sin", "cos"].map(stub).concat();
     let text = format!(

@@ -1,5 +1,4 @@
-//! Every operator with compound operands on either side, as the nominal coordinates of a ball: the printed code must put its
-//! parentheses where the meaning asks for them.
+//! Every operator with compound operands on either side, as the nominal coordinates of a ball: tests the parentheses of the printed code.
 
 use abbe_codegen::{Source, Subject};
 use abbe_model::instrument::{Station, socket::Socket};
@@ -9,7 +8,7 @@ use abbe_model::scalar::Nominal;
 const OPERANDS: usize = 13;
 /// Operators between two operands.
 const OPERATORS: usize = 4;
-/// Expressions in a coordinate.
+/// Number of expressions per coordinate.
 const TERMS: usize = 12;
 
 /// All pairs of operands under all operators.
@@ -35,7 +34,7 @@ fn operand<N: Nominal>(kind: usize, a: N, b: N) -> N {
 }
 
 fn expression<N: Nominal>(number: usize, [a, b, c, d]: [N; 4]) -> N {
-    // Operands of its own for each expression: a shared one would get a name and stand alone.
+    // Each expression has its own operands: a shared operand would get a name and be a single token.
     let own = |x: N, step: f64| x + N::constant(step * (number + 1) as f64);
     let left = operand(number % OPERANDS, own(a, 0.01), own(b, 0.02));
     let right = operand(number / OPERANDS % OPERANDS, own(c, 0.03), own(d, 0.04));
@@ -47,12 +46,12 @@ fn expression<N: Nominal>(number: usize, [a, b, c, d]: [N; 4]) -> N {
     }
 }
 
-/// One batch of expressions: three coordinates with so many terms each.
+/// One batch of expressions: three coordinates with this many terms each.
 #[derive(Clone, Copy)]
 pub struct Batch(pub usize);
 
 impl Batch {
-    /// Batches that hold all expressions.
+    /// The batches that cover all expressions.
     pub fn all() -> impl Iterator<Item = Batch> {
         (0..EXPRESSIONS.div_ceil(3 * TERMS)).map(Batch)
     }
@@ -62,7 +61,7 @@ impl Batch {
         std::array::from_fn(|coordinate| {
             let first = (self.0 * 3 + coordinate) * TERMS;
             let numbers = first..(first + TERMS).min(EXPRESSIONS);
-            // A factor of its own for each, so that no two errors can cancel.
+            // Each term has its own factor, so that no two errors cancel.
             let term = |number: usize| {
                 expression(number, lengths) * (lengths[number % 4] + N::constant(number as f64))
             };

@@ -1,4 +1,5 @@
-//! The reading of a probe against geometry with whole matrices: where the line of the probe enters the cylinder, found by bisection.
+//! Tests of the probe's reading against geometry with 4 × 4 matrices: the intersection of the probing line with the cylinder, found by
+//! bisection.
 
 use abbe_codegen::program::Input;
 use abbe_codegen::{CodegenError, Equation, Language, Options, Order, Source, Subject, Variable};
@@ -12,7 +13,7 @@ use rand::{RngExt, SeedableRng};
 
 use crate::topologies::Case;
 
-/// A cylinder on the table and a probe that goes straight to it, or in a stated direction.
+/// A cylinder on the table and a probe that moves straight towards it, or in a stated direction.
 #[derive(Clone, Copy)]
 pub struct Touch {
     pub stated: bool,
@@ -28,7 +29,7 @@ const LENGTHS: [(&str, f64); 8] = [
     ("S_z", 25.0),
     ("D", 70.0),
 ];
-/// Where the probe stands that goes in a stated direction.
+/// Position of the probe that moves in a stated direction.
 const HELD: [(&str, f64); 2] = [("Y", -8.0), ("Z", -7.0)];
 const STATED: [f64; 3] = [-0.96, 0.28, 0.0];
 const TILTED: [f64; 3] = [0.28, 0.0, 0.96];
@@ -47,7 +48,7 @@ impl Touch {
         let mut machine = Machine::from_code(code).expect("a code");
         for axis in &mut machine.axes {
             if axis.kind == AxisKind::Rotary {
-                // In a stated direction the cylinder is met only where the table does not carry it away.
+                // In a stated direction the probe hits the cylinder only if the table does not carry it away.
                 axis.origin_mm = if self.stated {
                     [1.0, -3.5, 41.25]
                 } else {
@@ -106,14 +107,14 @@ fn options(order: Order) -> Options {
     }
 }
 
-/// Positions of the axes in the machine's order, and errors in the equation's.
-struct Point {
+/// Positions of the axes in the machine's order, and errors in the equation's order.
+struct State {
     lengths: Vec<(String, f64)>,
     positions: Vec<f64>,
     small: Vec<f64>,
 }
 
-impl Point {
+impl State {
     fn length(&self, name: &str) -> f64 {
         self.lengths
             .iter()
@@ -122,7 +123,7 @@ impl Point {
             .1
     }
 
-    /// The arguments of a program, in its order and in its three groups.
+    /// The arguments of a program, in its order and its three groups.
     fn arguments(&self, machine: &Machine, inputs: &[Input], parameters: &[Variable]) -> [Vec<f64>; 3] {
         let mut groups = [Vec::new(), Vec::new(), Vec::new()];
         let position = |variable: &Variable| match variable {
@@ -159,8 +160,8 @@ fn six(error: [f64; 6]) -> Matrix4<f64> {
     shift(Vector3::new(x, y, z)) * turn(Vector3::x(), a) * turn(Vector3::y(), b) * turn(Vector3::z(), c)
 }
 
-/// Where the line of the probe enters the cylinder, mm from the stylus.
-fn geometry(touch: Touch, parameters: &[Variable], point: &Point) -> f64 {
+/// Distance from the stylus to the intersection of the probing line with the cylinder, mm.
+fn geometry(touch: Touch, parameters: &[Variable], point: &State) -> f64 {
     let machine = touch.machine();
     let error = |axis: &str, kind: ErrorKind| -> [f64; 6] {
         let mut six = [0.0; 6];
@@ -230,7 +231,7 @@ fn geometry(touch: Touch, parameters: &[Variable], point: &Point) -> f64 {
         let p = place(to_artefact, start + direction * t);
         (p - axis * p.dot(&axis)).norm() - radius
     };
-    // The distance from the axis is convex along the line: its least by thirds, then the crossing before that by halves.
+    // The distance from the axis is convex along the line: ternary search for its minimum, then bisection for the crossing before it.
     let (mut low, mut high) = (-2000.0, 2000.0);
     for _ in 0..200 {
         let third = (high - low) / 3.0;
@@ -255,7 +256,7 @@ fn geometry(touch: Touch, parameters: &[Variable], point: &Point) -> f64 {
     inside
 }
 
-fn point(touch: Touch, parameters: &[Variable], size: [f64; 2], random: &mut impl rand::Rng) -> Point {
+fn point(touch: Touch, parameters: &[Variable], size: [f64; 2], random: &mut impl rand::Rng) -> State {
     let lengths: Vec<(String, f64)> = LENGTHS
         .iter()
         .map(|(name, value)| (name.to_string(), value * random.random_range(0.9..1.1)))
@@ -280,7 +281,7 @@ fn point(touch: Touch, parameters: &[Variable], size: [f64; 2], random: &mut imp
         draw(-size, size)
     });
     let small: Vec<f64> = small.collect();
-    Point {
+    State {
         lengths,
         positions,
         small,
@@ -315,7 +316,7 @@ fn the_exact_form_is_where_the_line_enters_the_cylinder() {
     }
 }
 
-/// Central differences of the geometry, on a step of 1 µm and 1e-5 rad.
+/// Central differences of the geometry, with steps of 1 µm and 1e-5 rad.
 #[test]
 fn the_first_order_is_the_slope_of_the_geometry() {
     let mut random = rand_pcg::Pcg64::seed_from_u64(22);
@@ -349,7 +350,7 @@ fn the_first_order_is_the_slope_of_the_geometry() {
     }
 }
 
-/// To second order in `v` and `u` the distance is right to second order: a tenth of the errors leaves a thousandth.
+/// The distance is exact to second order in `v` and `u`: a tenth of the errors gives a thousandth of the deviation.
 #[test]
 fn the_bilinear_form_is_off_by_the_third_order() {
     let touch = Touch { stated: false };
@@ -393,7 +394,7 @@ fn a_direction_that_the_table_tilts_away_from_has_no_first_order() {
     );
 }
 
-/// What is compiled and run: every language, and what the dual numbers confirmed of it within 1e-12.
+/// Printed code to compile and run: every language, with the values that dual numbers confirmed to 1e-12.
 pub fn printed(
     language: Language,
     count: usize,
@@ -409,7 +410,7 @@ pub fn printed(
             let point = point(touch, &equation.parameters, [5.0, 0.05], random);
             let arguments = point.arguments(&equation.machine, &program.inputs, &equation.parameters);
             let found = program.run(&arguments.concat());
-            // Near the edge of the artefact a rounding is as large as one likes.
+            // Near the edge of the artefact rounding errors are unbounded.
             if found.iter().all(|value| value.is_finite() && value.abs() < 300.0) {
                 cases.push(Case {
                     arguments,

@@ -1,7 +1,7 @@
-//! Second derivatives: their own expressions against central differences of the gradient that dual numbers give at large random errors.
+//! Tests of second derivatives against central differences of the dual-number gradient at large random errors.
 
 use abbe_codegen::evaluate::evaluate;
-use abbe_codegen::{Equation, Options, Source, Subject, Value, Variable};
+use abbe_codegen::{Equation, Options, Source, Subject, Variable, VariableValue};
 use abbe_model::chain::{AxisPosition, Machine};
 use abbe_model::component::ErrorName;
 use abbe_model::frames::Rotation;
@@ -40,15 +40,15 @@ impl Source for AnySocket {
     }
 }
 
-/// A value of every variable.
-struct Point {
+/// Values of all variables.
+struct State {
     lengths: Vec<(String, f64)>,
     positions: Vec<(String, f64)>,
     small: Vec<f64>,
 }
 
-fn draw(equation: &Equation, random: &mut impl rand::Rng) -> Point {
-    let mut point = Point {
+fn draw(equation: &Equation, random: &mut impl rand::Rng) -> State {
+    let mut point = State {
         lengths: Vec::new(),
         positions: Vec::new(),
         small: Vec::new(),
@@ -86,7 +86,7 @@ fn named(values: &[(String, f64)], name: &str) -> f64 {
 }
 
 /// The gradient by dual numbers through the model's chain: output, parameter.
-fn gradient(source: &impl Source, machine: &Machine, errors: &[ErrorName], at: &Point) -> Vec<Vec<f64>> {
+fn gradient(source: &impl Source, machine: &Machine, errors: &[ErrorName], at: &State) -> Vec<Vec<f64>> {
     let length = |name: &str| named(&at.lengths, name);
     let subject = source.subject(&length);
     let state: Vec<_> = machine
@@ -137,7 +137,7 @@ fn agrees(what: &str, source: &impl Source, machine: &Machine, errors: &[ErrorNa
     for _ in 0..5 {
         let mut point = draw(&equation, &mut random);
         let value = |variable: &Variable| {
-            Value::<f64>::Nominal(match variable {
+            VariableValue::<f64>::Nominal(match variable {
                 Variable::Length(name) => named(&point.lengths, name),
                 Variable::Position { axis, .. } => named(&point.positions, axis),
                 small => {
@@ -155,7 +155,7 @@ fn agrees(what: &str, source: &impl Source, machine: &Machine, errors: &[ErrorNa
             })
             .collect();
         for (k, parameter) in equation.parameters.iter().enumerate() {
-            // The error of a central difference is h²/6 of the third derivative beside rounding over h.
+            // The error of a central difference is h²/6 of the third derivative plus rounding over h.
             let step = if parameter.is_angle() { 1e-5 } else { 1e-3 };
             let here = point.small[k];
             point.small[k] = here + step;
@@ -177,7 +177,7 @@ fn agrees(what: &str, source: &impl Source, machine: &Machine, errors: &[ErrorNa
                         errors[l],
                         errors[k]
                     );
-                    // Twice by reverse accumulation in either order: the same to rounding.
+                    // Reverse accumulation twice, in either order, gives the same value to rounding.
                     assert!((own - found[output][k][l]).abs() <= 1e-10 * scale);
                 }
             }
@@ -198,7 +198,7 @@ fn second_derivatives_agree_with_differences_of_dual_numbers() {
         let bar = Chapter5 { extended: true };
         agrees("chapter 5", &bar, &hermle(rotation), &eight());
     }
-    // One error of each kind, of axes on either side of the bed and of every kind.
+    // One error of each kind, for axes on either side of the bed and of every kind.
     let table = errors(&["EX0C", "EB0C", "EC0A", "EAA", "EZC", "EC0X", "EBY", "EZZ"]);
     for code in ["[wCAXYbZt]", "[wXYbZCAt]", "[wCXYbZAt]"] {
         agrees(code, &AnyBar, &machine(code), &table);

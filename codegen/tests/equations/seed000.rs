@@ -63,7 +63,7 @@ impl<'a> Printed<'a> {
         }
     }
 
-    /// The three groups under the root of Eq. 3.20, in its order; `shift` is what Eq. 3.21 has more in its first group.
+    /// The three groups under the root of Eq. 3.20, in its order; `shift` is the additional term of Eq. 3.21 in its first group.
     fn groups(&self, shift: Symbol<'a>) -> [Symbol<'a>; 3] {
         let Printed {
             e_y0a,
@@ -109,7 +109,7 @@ fn chapter5(extended: bool) -> Equation {
     Equation::of(&machine, &Chapter5 { extended }, &eight(), &Options::default()).expect("an equation")
 }
 
-/// L² of the chain.
+/// L² from the chain.
 fn square<'a>(equation: &'a Equation) -> Symbol<'a> {
     let length = equation.arena.symbol(equation.exact[0]);
     length * length
@@ -121,7 +121,7 @@ fn eq_3_20_is_the_chain() {
     let printed = Printed::new(&equation.arena).groups(equation.arena.symbol(Operand::constant(0.0)));
     let mut ring = Ring::exact(&equation.arena);
     let bar = &equation.vectors.last().expect("vectors").components;
-    // Group by group: the printed order is y, −x, z.
+    // Group by group; the printed order is y, −x, z.
     assert!(ring.equal(printed[0].operand(), bar[1]).expect("a polynomial"));
     assert!(ring.equal((-printed[1]).operand(), bar[0]).expect("a polynomial"));
     assert!(ring.equal(printed[2].operand(), bar[2]).expect("a polynomial"));
@@ -132,7 +132,7 @@ fn eq_3_20_is_the_chain() {
         ring.equal(printed.operand(), chain.operand())
             .expect("a polynomial")
     );
-    // The length is the root of that very sum.
+    // The length is the root of that same sum.
     assert_eq!(chain.sqrt().operand(), equation.exact[0]);
 }
 
@@ -162,7 +162,7 @@ fn eq_3_21_is_the_chain_for_any_d() {
     );
 }
 
-/// Chapter 5 with D typed as printed, or following from the length of the bar.
+/// Chapter 5 with D as printed, or derived from the length of the bar.
 #[derive(Clone, Copy)]
 struct Bar {
     printed: bool,
@@ -220,10 +220,10 @@ fn eq_3_21_with_the_printed_d_and_with_the_right_one() {
                 .expect("a polynomial")
         );
 
-        // Without errors, at C = 0 and H = Z_CA, the bar must be as long as it is: only the right D has it so.
+        // Without errors, at C = 0 and H = Z_CA, the distance must equal the length of the bar; only the correct D satisfies this.
         let nominal = evaluate::<Symbol<'_>>(arena, &[chain.operand()], |variable| {
             let zero = arena.symbol(Operand::constant(0.0));
-            abbe_codegen::Value::Nominal(match variable {
+            abbe_codegen::VariableValue::Nominal(match variable {
                 Variable::Error(_) | Variable::Unknown(_) => zero,
                 Variable::Position { axis, .. } if axis == "C" => zero,
                 Variable::Length(name) if name == "H" => length(arena, "Z_CA"),
@@ -234,7 +234,7 @@ fn eq_3_21_with_the_printed_d_and_with_the_right_one() {
         let is_the_bar = Ring::exact(arena).equal(nominal.operand(), (l * l).operand());
         assert_eq!(is_the_bar.expect("a polynomial"), !printed);
     }
-    // What the printed D gives: √(100² + (50√2)²) mm.
+    // The length that results from the printed D: √(100² + (50√2)²) mm.
     assert!((15000.0_f64.sqrt() - 122.474).abs() < 1e-3);
 }
 
@@ -243,7 +243,7 @@ fn the_length_holds_no_error_beyond_the_eight() {
     let equation = chapter5(false);
     let mut ring = Ring::exact(&equation.arena);
     let form = ring.normal_form(square(&equation).operand());
-    // L·L is L² = the sum of squares only where the root may be squared away; errors stand under it.
+    // L·L equals L², the sum of squares, only if the root can be squared; its radicand contains errors.
     assert!(form.is_err());
     let bar = equation.vectors.last().expect("vectors").components;
     let forms: Vec<_> = bar
@@ -253,7 +253,7 @@ fn the_length_holds_no_error_beyond_the_eight() {
     assert!(ring.absent(&forms, &equation.parameters).is_empty());
 }
 
-/// Rows of Eqs. 3.2 and 3.3 as printed: where a point goes, and the first-order form without products.
+/// Rows of Eqs. 3.2 and 3.3 as printed: the transformed point, and the first-order form without products.
 #[test]
 fn the_matrices_of_eqs_3_2_and_3_3() {
     use abbe_model::chain::AxisPosition;
@@ -307,7 +307,7 @@ fn the_matrices_of_eqs_3_2_and_3_3() {
     );
 }
 
-/// The first order of the A and C tests, from an independent calculation:
+/// The paper's δx(X), ∂X_C … are defined against R in T_X, T_C and T_A; β₁ is −EB0Z, β₂ is EA0Z, α is EC0X.
 ///
 /// ```text
 /// L − L0 ≈ [ (R cc ca − h sa)(e_y0a − D θz0a) + (R cc sa + h ca)(e_z0a + D θy0a) + (D − R sc) e_x0c + R cc e_y0c + D h θy0c ] / L0
@@ -373,7 +373,7 @@ fn the_first_order_term_for_term() {
     assert_eq!(multiples, [false, false, true, true, false, false, false, false]);
 }
 
-/// What truncation costs, against figures from an independent calculation: 10 µm and 0.01°, then ten times those.
+/// Truncation errors against figures from an independent calculation: 10 µm and 0.01°, then ten times those.
 #[test]
 fn what_truncation_costs() {
     use abbe_codegen::Order;
@@ -392,11 +392,11 @@ fn what_truncation_costs() {
         assert!((low..high).contains(&found[0]), "{found:?}");
         assert!((95.0..105.0).contains(&(found[1] / found[0])), "{found:?}");
     };
-    // Independent: 0.014 µm for all second order on axis, 0.006 µm for small angles. Here worst over 60 drawn positions.
+    // Independent: 0.014 µm for all second-order terms on axis, 0.006 µm for small angles. Here: the worst of 60 random positions.
     within(worst(Order::First, Rotation::Exact, false), 0.007, 0.015);
     within(worst(Order::Exact, Rotation::SmallAngle, true), 0.004, 0.007);
     within(worst(Order::Bilinear, Rotation::SmallAngle, true), 0.004, 0.007);
-    // With exact rotations only third order is left out, and with everything kept, nothing.
+    // With exact rotations the bilinear form omits only third-order terms; the exact form omits nothing.
     let third = worst(Order::Bilinear, Rotation::Exact, true);
     assert!(third[0] < 1e-5 && third[1] / third[0] > 900.0, "{third:?}");
     assert!(worst(Order::Exact, Rotation::Exact, true).is_empty());

@@ -1,5 +1,5 @@
-//! Section VI of seed 003 (volumetric errors of machines with two rotary axes on the table) against the chain, and the
-//! same for every arrangement, with the nominal turns that the paper leaves out.
+//! Tests of Section VI of seed 003 (volumetric errors of machines with two rotary axes on the table) against the chain, and of every
+//! arrangement, with the nominal rotations that the paper omits.
 
 use abbe_codegen::symbol::length;
 use abbe_codegen::{Arena, Equation, Operand, Options, Ring, Source, Subject, Symbol, ToolPoint, Variable};
@@ -48,7 +48,7 @@ fn position<'a>(arena: &'a Arena, axis: &str) -> Symbol<'a> {
 
 #[test]
 fn the_three_expressions_of_section_vi() {
-    // R_X[R_A[R_C·p + T_C] + T_A] + T_X = R_Y[R_Z·t + T_Z] + T_Y: X carries the table and counts against R's X.
+    // R_X[R_A[R_C·p + T_C] + T_A] + T_X = R_Y[R_Z·t + T_Z] + T_Y: X carries the table and moves against R's X.
     let mut machine = Machine::from_code("w C A X b Y Z t").expect("a code");
     machine.axes[2].direction = [-1.0, 0.0, 0.0];
     let mut errors = motions(&machine);
@@ -103,8 +103,8 @@ fn the_three_expressions_of_section_vi() {
     }
 }
 
-/// Orders of X, Y, Z with the bed anywhere among them, behind the two rotary axes of the table. The paper speaks of ten without
-/// listing them; these are all there are.
+/// Orders of X, Y, Z with the bed at any place among them, after the two rotary axes of the table. The paper mentions ten without a list;
+/// this is the complete list.
 fn arrangements() -> Vec<String> {
     let orders = ["XYZ", "XZY", "YXZ", "YZX", "ZXY", "ZYX"];
     let mut codes = Vec::new();
@@ -134,7 +134,7 @@ fn times<'a>(a: Vector<'a>, b: Vector<'a>) -> Vector<'a> {
     ]
 }
 
-/// A turn back about A (X) or C (Z).
+/// The inverse rotation about A (X) or C (Z).
 fn back<'a>(arena: &'a Arena, axis: &str, v: Vector<'a>) -> Vector<'a> {
     let (s, c) = turn(arena, axis);
     match axis {
@@ -143,8 +143,8 @@ fn back<'a>(arena: &'a Arena, axis: &str, v: Vector<'a>) -> Vector<'a> {
     }
 }
 
-/// The first order by rigid-body kinematics: every error motion displaces the point that its axis carries by δ + ε × r, seen from the
-/// bed outwards on the tool side and with the opposite sign on the table side, and the sum is turned back into the table frame.
+/// The first order by rigid-body kinematics. Every error motion displaces the point that its axis carries by δ + ε × r, from the bed
+/// outwards on the tool side and with the opposite sign on the table side. The sum is rotated into the table frame.
 fn by_rigid_bodies<'a>(arena: &'a Arena, machine: &Machine) -> Vector<'a> {
     let zero = arena.symbol(Operand::constant(0.0));
     let six = |axis: &str| {

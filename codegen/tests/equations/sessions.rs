@@ -1,4 +1,4 @@
-//! Equations of the sessions that come with the program.
+//! Tests of the equations of the sessions that come with the program.
 
 use std::path::PathBuf;
 
@@ -56,7 +56,7 @@ fn every_test_of_the_self_calibration() {
     }
 }
 
-/// The distance that follows from the bar's length stands in the equation as that expression.
+/// A distance derived from the length of the bar remains an expression in the equation.
 #[test]
 fn lengths_that_follow_from_the_bar_stay_expressions() {
     let path = file("hermle-c600u/chapter5.toml");

@@ -1,4 +1,4 @@
-//! What the tests of this crate share.
+//! Shared support of this crate's integration tests.
 #![allow(dead_code)]
 
 use abbe_codegen::{Source, Subject};
@@ -18,7 +18,7 @@ pub fn hermle(rotation: Rotation) -> Machine {
 /// The A and C tests of chapter 5 of seed 000, with the lengths as symbols.
 #[derive(Clone, Copy)]
 pub struct Chapter5 {
-    /// With the extension bar the spindle ball stands at (−D, 0, 0).
+    /// With the extension bar the spindle ball is at (−D, 0, 0).
     pub extended: bool,
 }
 

@@ -1,15 +1,14 @@
-//! Compilers and interpreters that a machine may lack.
+//! Compilers and interpreters that may be missing on a machine.
 
 use std::path::{Path, PathBuf};
 use std::process::Command;
 
-/// Whether missing tools fail a test: on a build server, which installs them.
+/// Whether a missing tool fails a test: on a build server, which installs the tools.
 fn required() -> bool {
     std::env::var("CI").is_ok_and(|value| value == "true")
 }
 
-/// The first of the programs that runs with these arguments; without one the test is skipped by name, or fails where tools are
-/// required.
+/// The first program that runs with these arguments. Without one, the test is skipped with a message, or fails if tools are required.
 pub fn find(test: &str, programs: &[&str], probe: &[&str]) -> Option<PathBuf> {
     for program in programs.iter().filter(|program| !program.is_empty()) {
         let ran = Command::new(program).args(probe).output();
@@ -22,7 +21,7 @@ pub fn find(test: &str, programs: &[&str], probe: &[&str]) -> Option<PathBuf> {
     None
 }
 
-/// A fresh folder for a test's files.
+/// A new folder for a test's files.
 pub fn folder(test: &str) -> PathBuf {
     let folder = std::env::temp_dir().join(format!("abbe-codegen-{}-{test}", std::process::id()));
     let _ = std::fs::remove_dir_all(&folder);
@@ -35,11 +34,11 @@ pub fn write(path: &Path, text: &str) {
     std::fs::write(path, text).expect("a file in a temporary folder");
 }
 
-/// Runs a command that must succeed without a word on standard error, and returns what it prints.
+/// Runs a command that must succeed without output on standard error, and returns its output.
 pub fn run(command: &mut Command) -> String {
     let output = command.output().expect("a command that starts");
     let error = String::from_utf8_lossy(&output.stderr);
-    // Octave without a terminal says this of itself as it leaves, after a script of one line as after any other.
+    // Octave without a terminal prints this message at exit, whatever the script.
     let error: String = error
         .lines()
         .filter(|line| !line.contains("while preparing to exit"))
@@ -58,7 +57,7 @@ pub fn rows(text: &str) -> Vec<Vec<f64>> {
         .collect()
 }
 
-/// Numbers on a line, to the last bit.
+/// Numbers on a line, exact to the last bit.
 pub fn line(numbers: impl IntoIterator<Item = f64>) -> String {
     let words: Vec<String> = numbers.into_iter().map(|number| format!("{number:?}")).collect();
     words.join(" ")

@@ -1,4 +1,4 @@
-//! The ten structural codes of Table 1.1 of seed 000 (three are misprinted there with a doubled A), and a ball bar on each.
+//! The ten structural codes of Table 1.1 of seed 000 (three of them are misprinted with a doubled axis), and a ball bar on each.
 
 use abbe_codegen::{Source, Subject};
 use abbe_model::axis::AxisKind;
@@ -24,7 +24,7 @@ pub const CODES: [&str; 10] = [
     "[wCXYbZBt]",
 ];
 
-/// A machine of this code whose rotary axes do not lie in R's origin, and one of whose axes counts against R.
+/// A machine of this code with rotary axes away from R's origin and one axis that counts against R.
 pub fn machine(code: &str) -> Machine {
     let mut machine = Machine::from_code(code).expect("a code of the table");
     for (place, axis) in machine.axes.iter_mut().enumerate() {
@@ -36,7 +36,7 @@ pub fn machine(code: &str) -> Machine {
     machine
 }
 
-/// Every error of every axis: twelve of a rotary one, three squareness errors and six motions of a linear one.
+/// Every error of every axis: twelve of a rotary axis; three squareness errors and six error motions of a linear one.
 pub fn all_errors(machine: &Machine) -> Vec<ErrorName> {
     let mut names = Vec::new();
     for axis in &machine.axes {
@@ -59,7 +59,7 @@ pub fn all_errors(machine: &Machine) -> Vec<ErrorName> {
 
 const LENGTHS: [&str; 6] = ["W_x", "W_y", "W_z", "S_x", "S_y", "S_z"];
 
-/// Both balls anywhere.
+/// A bar with both balls at arbitrary positions.
 #[derive(Clone, Copy)]
 pub struct AnyBar;
 
@@ -73,7 +73,7 @@ impl Source for AnyBar {
     }
 }
 
-/// A point of the test: values in the order of the printed arguments, and what must come out.
+/// A test case: values in the order of the printed arguments, and the expected outputs.
 pub struct Case {
     /// Lengths, axes (sine and cosine of a rotary one), errors.
     pub arguments: [Vec<f64>; 3],
@@ -85,7 +85,7 @@ pub struct Case {
 
 type Pack = DualSVec64<8>;
 
-/// What is read.
+/// The quantity that is read.
 #[derive(Clone, Copy, PartialEq)]
 pub enum What {
     Bar,
@@ -210,7 +210,7 @@ pub fn disagreement(cases: &[Case], found: &[Vec<f64>], gradient: bool) -> f64 {
     worst
 }
 
-/// A name for files and modules.
+/// A short name for files and modules.
 pub fn short(code: &str) -> String {
     code.trim_matches(['[', ']']).to_lowercase()
 }

@@ -1,4 +1,4 @@
-//! LaTeX and Typst through a real engine, without a warning; plain text by its lines.
+//! Tests of typeset output: LaTeX and Typst through a real engine without warnings; plain text by its lines.
 
 use std::fmt::Write;
 use std::process::Command;
@@ -13,8 +13,7 @@ use crate::support::{Chapter5, eight, hermle};
 use crate::tools;
 use crate::topologies::{AnyBar, CODES, all_errors, machine};
 
-/// Every form of the chapter 5 test, and for every topology the exact length, its first order, and the first order of the
-/// volumetric error.
+/// Every form of the chapter 5 test. For every topology the exact length, its first order, and the first order of the volumetric error.
 fn fragments(language: Language) -> Vec<String> {
     let mut fragments = Vec::new();
     let mut add = |equation: Equation| fragments.push(equation.print(language).expect("a fragment"));
@@ -65,13 +64,13 @@ fn fragments(language: Language) -> Vec<String> {
     fragments
 }
 
-/// Plain text has no engine to complain: lines fit a page, and nothing that was not known stands in them.
+/// Plain text has no engine to report errors: lines must fit the page and contain no undefined value.
 #[test]
 fn text() {
     for fragment in fragments(Language::Text) {
         let equations = fragment.split("\nsymbols\n").next().expect("equations");
         for line in equations.lines().skip(2) {
-            // A remark on a coefficient stands behind it.
+            // A remark on a coefficient follows it.
             let line = line.split("   (").next().unwrap_or(line);
             assert!(line.chars().count() <= 140, "{line}");
             assert!(!line.contains("NaN") && !line.contains("inf"), "{line}");
@@ -119,7 +118,7 @@ fn latex() {
     let _ = std::fs::remove_dir_all(&folder);
 }
 
-/// Typst by the typst compiler, which PyPI has ready-built (the crate itself takes a quarter of an hour of processor time).
+/// Typst by the typst compiler, which PyPI provides prebuilt (the crate takes a quarter of an hour to build).
 #[test]
 fn typst() {
     let own = std::env::var("ABBE_PYTHON").unwrap_or_default();

@@ -1,4 +1,4 @@
-//! Sessions that are as large as one likes: ball-bar tests of a five-axis machine, drawn with some errors.
+//! Generates sessions of any size: ball-bar tests of a five-axis machine, simulated with some errors.
 
 use std::fmt::Write;
 use std::path::Path;
@@ -8,7 +8,7 @@ use abbe_identify::simulate::{Simulation, simulate};
 use abbe_model::session::Session;
 use abbe_model::session::read::{ReadOptions, session as read};
 
-/// The session of chapter 5 with about 3,616 readings and nothing to find.
+/// The session of chapter 5 with about 3,616 readings and no undeclared effect.
 pub fn chapter_5() -> Session {
     let plan = read(&sessions().join("chapter5.toml"), &ReadOptions::default()).expect("the ready session");
     drawn(plan, &["EY0A=35.3um", "EX0C=12um", "EB0A=-5arcsec"])
@@ -18,7 +18,7 @@ fn sessions() -> std::path::PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("../sessions/hermle-c600u")
 }
 
-/// A session with its readings, drawn with some values.
+/// A session with readings simulated at given values.
 fn drawn(plan: Session, given: &[&str]) -> Session {
     let simulation = Simulation {
         given: given
@@ -37,7 +37,8 @@ fn drawn(plan: Session, given: &[&str]) -> Session {
     session
 }
 
-/// The tests of chapter 5, each set up anew, with about this many readings in all: eight errors and seven set-up unknowns a test.
+/// The tests of chapter 5, each with its own set-up, with about this many readings in total: eight errors, and seven set-up
+/// parameters per test.
 pub fn ball_bar(count: usize, readings: usize) -> Session {
     let folder = tempfile::tempdir().expect("a temporary folder");
     let machine = sessions().join("machine.toml");

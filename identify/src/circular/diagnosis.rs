@@ -1,45 +1,45 @@
-//! The classical diagnosis: which faults of two linear axes make up the deviation of a circle.
+//! Diagnosis of a circular test of two linear axes: the contribution of each classical fault to the radial deviation.
 //!
-//! Figures have the signs of the error motions `E` of ISO 230-1, along R: `backlash` of X has the sign of the effect `EXX~X:backlash`, whichever way X counts.
-//! What only a difference or a sum of both axes shows (scale mismatch, servo mismatch, third-order positioning) is counted along the travel of the axes: positive
-//! where an axis travels too far, or lags.
+//! Values have the signs of the error motions `E` of ISO 230-1, along R. For example, the backlash of X has the sign of the effect
+//! `EXX~X:backlash`, whatever the counting direction of X. Faults that follow from a difference or a sum over both axes (scale mismatch,
+//! servo mismatch, third-order positioning) refer to the axes' positive directions. They are positive if an axis travels too far or lags.
 //!
-//! The terms of [`super::terms`] are fitted together by least squares with radius and centre, which the set-up absorbs. Reversal spikes
-//! and cyclic errors have a width and a pitch that are searched for; they are taken in only where chance would not give as good a one in
-//! a thousand circles. A share is the range of a fault's own `δL` over the sum of all ranges.
+//! One least-squares fit estimates all terms of [`super::terms`], the radius and the centre. Radius and centre absorb the set-up. The
+//! width of reversal spikes and the pitch of cyclic errors are searched. These faults are added only if chance gives as large a gain in
+//! fewer than one of a thousand circles. The share of a fault is the range of its own `δL` over the sum of all ranges.
 //!
-//! Uncertainties follow from the noise, or from the residual where that is more; where neighbouring readings err alike with the
-//! correlation r, they are enlarged by √((1 + r)/(1 − r)).
+//! The uncertainties follow from the noise, or from the residual if that is larger. If neighbouring residuals have the correlation r, the
+//! uncertainties are enlarged by √((1 + r)/(1 − r)).
 
 use abbe_model::chain::Machine;
 
 use super::fault::Fault;
-use super::path::{Moves, Path};
+use super::path::{MovingAxes, Path};
 use super::regression::Regression;
 use super::results::{CircularTest, Diagnosis};
 use super::search::{cyclic, is_separable, is_third_order, spikes, third_order};
-use super::terms::Rows;
+use super::terms::PathRows;
 use crate::results::ParameterResult;
 
-/// A single reading beyond this many standard deviations is wild.
+/// Limit for a single outlier, in robust standard deviations.
 const OUTLIER_SIGMA: f64 = 6.0;
-/// An arc shorter than this is not taken apart.
-const SHORTEST_ARC_DEG: f64 = 180.0;
+/// Least arc for a diagnosis.
+const MIN_ARC_DEG: f64 = 180.0;
 /// Arc of a full circle.
 const FULL_CIRCLE_DEG: f64 = 360.0;
 
-/// A circle taken apart.
-struct Model {
+/// The decomposition of one circle.
+struct Decomposition {
     names: [String; 2],
-    rows: Rows,
+    rows: PathRows,
     faults: Vec<Fault>,
     regression: Regression,
 }
 
-impl Model {
-    /// Of a path; or why it has none, in words where it is a circle of linear axes.
-    fn of(machine: &Machine, path: &Path) -> Result<Model, Option<String>> {
-        let Moves::Linear {
+impl Decomposition {
+    /// Decomposes a path. The error holds the reason in words if the path is a circle of linear axes.
+    fn of(machine: &Machine, path: &Path) -> Result<Decomposition, Option<String>> {
+        let MovingAxes::Linear {
             axes,
             radius_mm,
             radial,
@@ -53,21 +53,21 @@ impl Model {
                 "no diagnosis: the bar does not lie in the plane of the circle".into(),
             ));
         }
-        if arc_deg < SHORTEST_ARC_DEG * 0.99 {
+        if arc_deg < MIN_ARC_DEG * 0.99 {
             return Err(Some(format!(
                 "no diagnosis: an arc of {arc_deg:.0}° is too short for it"
             )));
         }
         let names = axes.map(|axis| machine.axes[axis].name.clone());
-        let rows = Rows::of(path);
+        let rows = PathRows::of(path);
         let mut faults = standard(path, &rows, &names, radius_mm);
         let Some(mut regression) = solve(&rows, &faults) else {
             return Err(Some(
-                "no diagnosis: the readings cannot tell the faults apart".into(),
+                "no diagnosis: the faults are not separable with these readings".into(),
             ));
         };
-        // Errors of third order are in the model while spikes and cyclic errors are searched for, and stay where they stand out beside those. Over part of a
-        // circle they are nearly collinear with scale and straightness.
+        // Third-order errors are in the model during the search for spikes and cyclic errors, and remain if they are significant. On a
+        // partial circle they are nearly collinear with scale mismatch and straightness.
         if arc_deg > FULL_CIRCLE_DEG * 0.99 {
             let found = third_order(&rows, &names);
             add_faults(&rows, &mut faults, &mut regression, found);
@@ -86,7 +86,7 @@ impl Model {
                 regression = without;
             }
         }
-        Ok(Model {
+        Ok(Decomposition {
             names,
             rows,
             faults,
@@ -95,15 +95,15 @@ impl Model {
     }
 }
 
-/// The outliers of a circle: single ones that stand out of the residual of the diagnosis; `None` where there is no diagnosis.
+/// The outliers of a circle: single readings with a large residual of the diagnosis; `None` if there is no diagnosis.
 pub(super) fn reject_outliers(machine: &Machine, path: &Path) -> Option<Vec<bool>> {
-    let model = Model::of(machine, path).ok()?;
+    let model = Decomposition::of(machine, path).ok()?;
     let residual = &model.regression.residual;
     let mut sizes: Vec<f64> = residual.iter().map(|r| r.abs()).collect();
     sizes.sort_by(f64::total_cmp);
-    // Of a normal distribution the median size is 0.6745 σ.
+    // The median of |x| for a normal distribution is 0.6745 σ.
     let limit = OUTLIER_SIGMA * sizes[sizes.len() / 2] / 0.6745;
-    let mut reject_outliers = path.left_out.clone();
+    let mut outliers = path.left_out.clone();
     for (i, value) in residual.iter().enumerate() {
         let neighbours = [i.checked_sub(1), Some(i + 1)];
         let alone = neighbours
@@ -111,22 +111,22 @@ pub(super) fn reject_outliers(machine: &Machine, path: &Path) -> Option<Vec<bool
             .filter_map(|j| residual.get(j?))
             .all(|other| other.abs() < 0.5 * value.abs());
         if value.abs() > limit && alone {
-            reject_outliers[model.rows.row[i]] = true;
+            outliers[model.rows.row[i]] = true;
         }
     }
-    Some(reject_outliers)
+    Some(outliers)
 }
 
-/// Adds the diagnosis to a result, and what the test cannot tell.
+/// Adds the diagnosis and its limitations to a result.
 pub(super) fn add(machine: &Machine, path: &Path, noise_mm: f64, result: &mut CircularTest) {
-    match Model::of(machine, path) {
+    match Decomposition::of(machine, path) {
         Ok(model) => {
             let sigma = scatter(&model.rows, &model.regression, noise_mm);
             report(&model.rows, &model.faults, &model.regression, sigma, result);
             limits(path, &model.regression, sigma, &model.names, result);
             if model.faults.iter().any(is_third_order) {
                 result.not_identifiable.push(format!(
-                    "a third-order error of {} is confounded with one of {}: the figure is that of both together",
+                    "the third-order errors of {} and {} are confounded: the value is that of their combination",
                     model.names[0], model.names[1]
                 ));
             }
@@ -135,8 +135,8 @@ pub(super) fn add(machine: &Machine, path: &Path, noise_mm: f64, result: &mut Ci
     }
 }
 
-/// Takes further faults into the model, where the readings can tell them from the others.
-fn add_faults(rows: &Rows, faults: &mut Vec<Fault>, regression: &mut Regression, found: Vec<Fault>) {
+/// Adds those of the given faults that are separable from the others.
+fn add_faults(rows: &PathRows, faults: &mut Vec<Fault>, regression: &mut Regression, found: Vec<Fault>) {
     if found.is_empty() {
         return;
     }
@@ -148,18 +148,18 @@ fn add_faults(rows: &Rows, faults: &mut Vec<Fault>, regression: &mut Regression,
     }
 }
 
-pub(super) fn columns(rows: &Rows, faults: &[Fault]) -> Vec<Vec<f64>> {
+pub(super) fn columns(rows: &PathRows, faults: &[Fault]) -> Vec<Vec<f64>> {
     let mut columns = rows.setup();
     columns.extend(faults.iter().flat_map(|fault| fault.columns.iter().cloned()));
     columns
 }
 
-fn solve(rows: &Rows, faults: &[Fault]) -> Option<Regression> {
+fn solve(rows: &PathRows, faults: &[Fault]) -> Option<Regression> {
     Regression::solve(&columns(rows, faults), &rows.y)
 }
 
-/// The faults that every circle is asked for.
-fn standard(path: &Path, rows: &Rows, names: &[String; 2], radius_mm: f64) -> Vec<Fault> {
+/// The faults that every diagnosis contains.
+fn standard(path: &Path, rows: &PathRows, names: &[String; 2], radius_mm: f64) -> Vec<Fault> {
     let plane = names.concat();
     let ppm = 1e6 / radius_mm;
     let mut faults = vec![
@@ -218,8 +218,8 @@ fn standard(path: &Path, rows: &Rows, names: &[String; 2], radius_mm: f64) -> Ve
     faults
 }
 
-/// Variance of the residual, and the correlation of neighbours in it.
-pub(super) fn variance_and_correlation(rows: &Rows, regression: &Regression) -> (f64, f64) {
+/// Variance of the residual, and the correlation of neighbouring residuals.
+pub(super) fn variance_and_correlation(rows: &PathRows, regression: &Regression) -> (f64, f64) {
     let residual = &regression.residual;
     let sum = regression.sum_of_squares();
     let neighbours: f64 = (1..residual.len())
@@ -235,13 +235,13 @@ pub(super) fn variance_and_correlation(rows: &Rows, regression: &Regression) -> 
     (sum / freedom as f64, correlation)
 }
 
-/// The standard deviation that uncertainties follow from, mm.
-fn scatter(rows: &Rows, regression: &Regression, noise_mm: f64) -> f64 {
+/// The standard deviation for the uncertainties, mm.
+fn scatter(rows: &PathRows, regression: &Regression, noise_mm: f64) -> f64 {
     let (variance, r) = variance_and_correlation(rows, regression);
     (variance.max(noise_mm * noise_mm) * (1.0 + r) / (1.0 - r)).sqrt()
 }
 
-fn report(rows: &Rows, faults: &[Fault], regression: &Regression, sigma: f64, result: &mut CircularTest) {
+fn report(rows: &PathRows, faults: &[Fault], regression: &Regression, sigma: f64, result: &mut CircularTest) {
     let mut first = rows.setup().len();
     for fault in faults {
         let mut values: Vec<ParameterResult> = fault
@@ -301,16 +301,16 @@ fn report(rows: &Rows, faults: &[Fault], regression: &Regression, sigma: f64, re
     result.diagnosis_rms_um = Some((regression.sum_of_squares() / rows.count() as f64).sqrt() * 1e3);
 }
 
-/// What these readings confound.
+/// States the limitations: confounded faults and missing data.
 fn limits(path: &Path, regression: &Regression, sigma: f64, names: &[String; 2], result: &mut CircularTest) {
     let (radius_um, u) = (regression.beta[0] * 1e3, regression.u(&[(0, 1e3)], sigma));
     result.not_identifiable.push(format!(
-        "the mean radius is off by {radius_um:.2} µm (u {u:.2}): the bar's length, the mean scale of {} and {}, and what both axes lag \
-         (that grows with the square of the feed) do the same",
+        "the mean radius deviates by {radius_um:.2} µm (u {u:.2}): it combines the bar length, the mean scale of {} and {}, and the mean lag of both axes \
+         (proportional to the square of the feed)",
         names[0], names[1]
     ));
     if !path.both_directions() {
-        let why = "one direction only: servo mismatch is in the squareness, lateral play in radius and scale, and neither is separable";
+        let why = "one direction only: servo mismatch is confounded with squareness, and lateral play with radius and scale";
         result.not_identifiable.push(why.into());
     } else if path.feed_mm_s.is_none() {
         let why = "no time in the data: servo mismatch is given as a lag in µm at this feed, not in ms";

@@ -1,8 +1,8 @@
-//! A fault as columns of a regression, and the figures that are read off its coefficients.
+//! A fault as columns of a regression, and the values that follow from its coefficients.
 
 use crate::results::ParameterResult;
 
-/// A value of a fault: its name, a weight for each of its columns, what one internal unit (mm) is in its unit.
+/// A value of a fault: its name, a weight per column, and the conversion from internal units (mm) to its unit.
 pub(super) struct Figure {
     pub name: String,
     pub weights: Vec<(usize, f64)>,
@@ -10,15 +10,15 @@ pub(super) struct Figure {
     pub unit: &'static str,
 }
 
-/// A fault with its columns and its figures.
+/// A fault with its columns and values.
 pub(super) struct Fault {
     pub fault: &'static str,
     pub axes: String,
     pub columns: Vec<Vec<f64>>,
     pub figures: Vec<Figure>,
-    /// Figures of its amplitude over pairs of columns, by direction.
+    /// Amplitudes over pairs of columns, by direction.
     pub amplitudes: Vec<(String, usize)>,
-    /// Numbers that were searched for.
+    /// Parameters found by search.
     pub searched: Vec<ParameterResult>,
 }
 

@@ -1,38 +1,38 @@
-//! The figures of ISO 230-4: circular deviation G, bidirectional circular deviation G(b), radial deviation F, mean bidirectional radial
-//! deviation D, circular hysteresis H (of the edition of 1996).
+//! Characteristics of ISO 230-4: circular deviation G, bidirectional circular deviation G(b), radial deviation F, mean bidirectional
+//! radial deviation D, and circular hysteresis H (edition of 1996).
 //!
 //! ```text
 //! p(θ) = L(θ)·(cos θ, sin θ)     c, ρ: least-squares circle through p     G = max ‖p − c‖ − min ‖p − c‖     F(θ) = ‖p − c‖ − L_nominal
 //! ```
 //!
-//! The standard's minimum-zone circles may be replaced by the least-squares circle (its clause 3); that is what is done here, so that
-//! G is never smaller than the standard's.
+//! The standard permits the least-squares circle in place of the minimum-zone circles (clause 3). This module uses the least-squares
+//! circle, so G is never smaller than with minimum-zone circles.
 
 use std::f64::consts::{PI, TAU};
 
 use abbe_model::chain::Machine;
 use abbe_model::session::Test;
 
-use super::path::{Moves, Path};
+use super::path::{MovingAxes, Path};
 use super::results::{CircularTest, DirectionFigures};
 use crate::circle;
 
-/// A path as points: angle, deviation of the length from nominal, nominal length.
-struct Trace(Vec<[f64; 3]>);
+/// A path in polar form: angle, deviation of the length from nominal, nominal length.
+struct PolarPath(Vec<[f64; 3]>);
 
-/// The figures of a path.
+/// The characteristics of a path.
 pub(super) fn figures(machine: &Machine, test: &Test, path: &Path) -> CircularTest {
     let name = |axis: usize| machine.axes[axis].name.clone();
     let (axes, radius_mm) = match path.moves {
-        Moves::Linear { axes, radius_mm, .. } => (axes.map(name).concat(), Some(radius_mm)),
-        Moves::Rotary(axis) => (name(axis), None),
+        MovingAxes::Linear { axes, radius_mm, .. } => (axes.map(name).concat(), Some(radius_mm)),
+        MovingAxes::Rotary(axis) => (name(axis), None),
     };
     let traces = [1.0, -1.0].map(|direction| mean(path, direction));
     let mut not_identifiable = Vec::new();
     let arc = path.arc();
     if arc < TAU * 0.99 {
         not_identifiable.push(format!(
-            "an arc of {:.0}°: the figures are of that arc, ISO 230-4 asks for a full circle",
+            "an arc of {:.0}°: the characteristics refer to this arc; ISO 230-4 requires a full circle",
             arc.to_degrees()
         ));
     }
@@ -68,7 +68,7 @@ pub(super) fn figures(machine: &Machine, test: &Test, path: &Path) -> CircularTe
     };
     match &traces {
         [Some((there, _)), Some((back, _))] => {
-            let both = Trace(there.0.iter().chain(&back.0).copied().collect());
+            let both = PolarPath(there.0.iter().chain(&back.0).copied().collect());
             let around = about(path, &both);
             let (least, most) = range(&around.deviations_mm);
             result.bidirectional_circular_deviation_um = Some((most - least) * 1e3);
@@ -78,14 +78,14 @@ pub(super) fn figures(machine: &Machine, test: &Test, path: &Path) -> CircularTe
         }
         _ => result
             .not_identifiable
-            .push("one direction only: G(b), D and hysteresis need the other one too".into()),
+            .push("one direction only: G(b), D and hysteresis require both directions".into()),
     }
     result
 }
 
-/// The mean path of the runs in one direction, on the angles of the first of them; and how many they are.
-fn mean(path: &Path, direction: f64) -> Option<(Trace, usize)> {
-    let runs: Vec<Trace> = path
+/// The mean path of the runs in one direction, at the angles of the first run, and the number of these runs.
+fn mean(path: &Path, direction: f64) -> Option<(PolarPath, usize)> {
+    let runs: Vec<PolarPath> = path
         .runs
         .iter()
         .filter(|run| run.direction == direction)
@@ -98,7 +98,7 @@ fn mean(path: &Path, direction: f64) -> Option<(Trace, usize)> {
                 .map(|row| [path.angle[row], path.deviation_mm[row], path.nominal_mm[row]])
                 .collect();
             points.sort_by(|a, b| a[0].total_cmp(&b[0]));
-            Trace(points)
+            PolarPath(points)
         })
         .collect();
     let first = runs.first()?;
@@ -107,11 +107,11 @@ fn mean(path: &Path, direction: f64) -> Option<(Trace, usize)> {
         let sum = p[1] + others.iter().sum::<f64>();
         [p[0], sum / (1 + others.len()) as f64, p[2]]
     });
-    Some((Trace(points.collect()), runs.len()))
+    Some((PolarPath(points.collect()), runs.len()))
 }
 
-impl Trace {
-    /// The deviation at an angle or at one that differs by whole turns, between the neighbouring readings.
+impl PolarPath {
+    /// The deviation at an angle (modulo whole turns), interpolated between the neighbouring readings.
     fn at(&self, angle: f64) -> Option<f64> {
         const SAME: f64 = 1e-6;
         let points = &self.0;
@@ -131,19 +131,19 @@ impl Trace {
     }
 }
 
-/// A path about the centre of its least-squares circle.
-struct SpokeAngles {
+/// Radial deviations about the centre of the least-squares circle.
+struct RadialDeviations {
     /// Distance from the centre less the nominal length, mm.
     deviations_mm: Vec<f64>,
     /// Radius of the circle less the nominal length, mm.
     radius_mm: f64,
 }
 
-/// Takes out the centre. What a rotary axis turns need not read a radius; there it is the first harmonic of the reading.
-fn about(path: &Path, trace: &Trace) -> SpokeAngles {
+/// Removes the centre. If a rotary axis turns, the reading need not be a radius; the centre is then the first harmonic of the reading.
+fn about(path: &Path, trace: &PolarPath) -> RadialDeviations {
     let mean = |values: &mut dyn Iterator<Item = f64>| values.sum::<f64>() / trace.0.len() as f64;
     let nominal = mean(&mut trace.0.iter().map(|p| p[2]));
-    let radial = matches!(path.moves, Moves::Linear { radial: true, .. });
+    let radial = matches!(path.moves, MovingAxes::Linear { radial: true, .. });
     let points: Vec<[f64; 2]> = trace
         .0
         .iter()
@@ -152,18 +152,18 @@ fn about(path: &Path, trace: &Trace) -> SpokeAngles {
             [length * p[0].cos(), length * p[0].sin()]
         })
         .collect();
-    // The centre of a short arc is confounded with its radius.
+    // On a short arc the centre is confounded with the radius.
     let found = (path.arc() >= PI * 0.99)
         .then(|| circle::through(&points))
         .flatten();
     let Some(circle) = found else {
-        return SpokeAngles {
+        return RadialDeviations {
             deviations_mm: trace.0.iter().map(|p| p[1]).collect(),
             radius_mm: mean(&mut trace.0.iter().map(|p| p[1])),
         };
     };
     let distance = |p: &[f64; 2]| (p[0] - circle.centre[0]).hypot(p[1] - circle.centre[1]);
-    SpokeAngles {
+    RadialDeviations {
         deviations_mm: points
             .iter()
             .zip(&trace.0)

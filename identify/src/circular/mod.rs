@@ -1,8 +1,8 @@
-//! Ball-bar figures of ISO 230-4 and the classical diagnosis of a circle.
+//! Characteristics of ISO 230-4 and the diagnosis of circular ball-bar tests.
 //!
-//! A bar between spindle and workpiece ball reads the radius of the path, `L(θ) = R + δL(θ)`. Figures are taken of the path as it is;
-//! the diagnosis takes `δL` apart, by least squares, into what each classical fault of two linear axes does to it (module `diagnosis`).
-//! Both are of the readings alone: no error that the fit identifies is taken off first.
+//! A ball bar between spindle ball and workpiece ball measures the radius of the path, `L(θ) = R + δL(θ)`. The characteristics describe
+//! the measured path. The diagnosis decomposes `δL` by least squares into the contributions of the classical faults of two linear axes
+//! (module `diagnosis`). Both use the readings only: fitted errors are not subtracted.
 
 mod diagnosis;
 mod fault;
@@ -17,10 +17,10 @@ pub use results::{CircularTest, Diagnosis, DirectionFigures};
 
 use abbe_model::session::Session;
 
-/// The figures of every ball-bar test whose path is a circle, and of every one in which a rotary axis turns.
+/// The characteristics of every ball-bar test with a circular path, and of every one in which a rotary axis turns.
 ///
-/// `noise_mm` is the standard deviation of a reading; `left_out[test][row]` names outliers. A circle of linear axes is judged by its own
-/// diagnosis instead: what the fit of a machine without these faults calls wild may be a spike.
+/// `noise_mm` is the standard deviation of a reading; `left_out[test][row]` marks outliers. The outliers of a circle of linear axes come
+/// from its own diagnosis instead: what a fit without these faults rejects may be a reversal spike.
 pub fn of_session(session: &Session, noise_mm: f64, left_out: &[Vec<bool>]) -> Vec<CircularTest> {
     let measured = session.tests.iter().filter(|test| test.readings.is_some());
     let mut results: Vec<CircularTest> = measured
@@ -38,12 +38,12 @@ pub fn of_session(session: &Session, noise_mm: f64, left_out: &[Vec<bool>]) -> V
     results
 }
 
-/// Feeds that differ by less than this factor tell nothing apart.
+/// Feeds within this factor count as equal.
 const OTHER_FEED: f64 = 1.2;
 
-/// Says of every diagnosis what another feed tells or would tell.
+/// Adds a limitation to every diagnosis: what tests at other feeds separate.
 fn compare_feeds(results: &mut [CircularTest]) {
-    let told: Vec<Option<String>> = results
+    let limitations: Vec<Option<String>> = results
         .iter()
         .map(|result| {
             if result.diagnosis.is_empty() {
@@ -55,16 +55,16 @@ fn compare_feeds(results: &mut [CircularTest]) {
             };
             let others: Vec<&str> = results.iter().filter(differs).map(|other| other.test.as_str()).collect();
             Some(if others.is_empty() {
-                "one feed: what of a lag changes sign with the direction is in the backlash; a test at another feed tells them apart".into()
+                "one feed: backlash is confounded with the part of a lag that changes sign with the direction; a test at another feed separates them".into()
             } else {
                 format!(
-                    "backlash from lag in this test alone: what stays the same at the feed of {} is backlash, what grows with it lag",
+                    "backlash is confounded with lag in this test alone: compare with {} at another feed; backlash is independent of the feed, lag is proportional to it",
                     others.join(", ")
                 )
             })
         })
         .collect();
-    for (result, told) in results.iter_mut().zip(told) {
-        result.not_identifiable.extend(told);
+    for (result, limitations) in results.iter_mut().zip(limitations) {
+        result.not_identifiable.extend(limitations);
     }
 }

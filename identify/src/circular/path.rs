@@ -12,57 +12,57 @@ use abbe_model::session::Test;
 
 use crate::circle;
 
-/// Readings that a run needs.
+/// Least number of readings of a run.
 const MIN_READINGS: usize = 8;
-/// How far positions may lie off a circle, as a share of its radius.
+/// Tolerance of positions about a circle, as a share of its radius.
 const OFF_CIRCLE: f64 = 1e-3;
-/// How much the nominal length may differ from the radius where the bar lies in the plane of the circle, as a share.
+/// Tolerance of the nominal length about the radius for a bar in the plane of the circle, as a share.
 const OFF_PLANE: f64 = 0.02;
 
-/// What moves.
+/// The axes that move.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) enum Moves {
-    /// Two linear axes, by index, about a circle of this radius, mm.
+pub(super) enum MovingAxes {
+    /// Two linear axes, by index, on a circle of this radius, mm.
     Linear {
         axes: [usize; 2],
         radius_mm: f64,
-        /// Whether the bar lies along the radius, so that it reads the path's radius.
+        /// Whether the bar lies along the radius and thus measures the radius of the path.
         radial: bool,
     },
     /// A rotary axis, by index.
     Rotary(usize),
 }
 
-/// How two linear axes count, as factors between what the path shows (the tool against the workpiece, as the axes count) and the error motions
-/// `E` of the axes' bodies along R.
+/// Sign factors of two linear axes between the measured path (tool relative to workpiece, in the axes' positive directions) and the error
+/// motions `E` of the axes' bodies along R.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Signs {
-    /// +1 where the body of the axis moves along R for an increasing command, −1 where it moves against R.
+    /// +1 if the body of the axis moves along R for an increasing command, −1 if it moves against R.
     direction: [f64; 2],
-    /// +1 on the tool's side, −1 on the workpiece's.
+    /// +1 for an axis on the tool side, −1 on the workpiece side.
     side: [f64; 2],
 }
 
 impl Signs {
-    fn of(machine: &Machine, moves: &Moves) -> Signs {
+    fn of(machine: &Machine, moves: &MovingAxes) -> Signs {
         match moves {
-            Moves::Linear { axes, .. } => Signs {
+            MovingAxes::Linear { axes, .. } => Signs {
                 direction: axes.map(|axis| machine.axes[axis].principal().map_or(1.0, |(_, sign)| sign)),
                 side: axes.map(|axis| if axis < machine.workpiece_side { -1.0 } else { 1.0 }),
             },
-            Moves::Rotary(_) => Signs {
+            MovingAxes::Rotary(_) => Signs {
                 direction: [1.0; 2],
                 side: [1.0; 2],
             },
         }
     }
 
-    /// Of an error of axis `of` along axis `along`: a deviation `δ` of the path along `along` is an error motion of `factor·δ`.
+    /// The factor of an error of axis `of` along axis `along`: a deviation `δ` of the path along `along` is an error motion of `factor·δ`.
     pub fn error(&self, of: usize, along: usize) -> f64 {
         self.side[of] * self.side[along] * self.direction[along]
     }
 
-    /// Of the angle between the two axes.
+    /// The factor of the squareness error of the two axes.
     pub fn squareness(&self) -> f64 {
         (0..2)
             .map(|axis| self.side[axis] * self.direction[axis])
@@ -70,33 +70,33 @@ impl Signs {
     }
 }
 
-/// One run in one direction.
+/// The readings of one run in one direction.
 #[derive(Clone, Debug)]
-pub(super) struct Run {
+pub(super) struct DirectionRun {
     /// Its rows.
     pub rows: Range<usize>,
-    /// +1 where the angle grows.
+    /// +1 if the angle increases.
     pub direction: f64,
 }
 
 /// A test's path.
 #[derive(Clone, Debug)]
 pub(super) struct Path {
-    pub moves: Moves,
-    pub runs: Vec<Run>,
-    /// Angle of each row, rad, without jumps inside a run.
+    pub moves: MovingAxes,
+    pub runs: Vec<DirectionRun>,
+    /// Angle of each row, rad, unwrapped within a run.
     pub angle: Vec<f64>,
     /// Observed less nominal length, mm.
     pub deviation_mm: Vec<f64>,
     /// Nominal length, mm.
     pub nominal_mm: Vec<f64>,
-    /// Wild readings.
+    /// Outliers.
     pub left_out: Vec<bool>,
-    /// Of the two linear axes: where they stand and travel.
+    /// Positions and velocities of the two linear axes.
     pub samples: [Vec<DriverSample<f64>>; 2],
-    /// Of the two linear axes: whether they count along or against R, and on which side they move.
+    /// Sign factors of the two linear axes.
     pub signs: Signs,
-    /// Speed along the path, mm/s, where the data have time and linear axes move.
+    /// Speed along the path, mm/s, if the data have times and linear axes move.
     pub feed_mm_s: Option<f64>,
 }
 
@@ -112,27 +112,27 @@ impl Path {
         let nominal_mm = model.readings_mm(&SlotValues::zero(model.slots()));
         let moves = moves(machine, &readings.positions, &nominal_mm)?;
         let mut angle = match moves {
-            Moves::Rotary(axis) => readings.positions[axis].clone(),
-            Moves::Linear { axes, .. } => around(&readings.positions, axes)?,
+            MovingAxes::Rotary(axis) => readings.positions[axis].clone(),
+            MovingAxes::Linear { axes, .. } => around(&readings.positions, axes)?,
         };
         let mut runs = Vec::new();
         for rows in readings.runs() {
             for row in rows.start + 1..rows.end {
-                if let Moves::Linear { .. } = moves {
+                if let MovingAxes::Linear { .. } = moves {
                     angle[row] -= ((angle[row] - angle[row - 1]) / TAU).round() * TAU;
                 }
             }
             if rows.len() >= MIN_READINGS {
                 let direction = (angle[rows.end - 1] - angle[rows.start]).signum();
-                runs.push(Run { rows, direction });
+                runs.push(DirectionRun { rows, direction });
             }
         }
         if runs.is_empty() {
             return None;
         }
         let samples = match moves {
-            Moves::Linear { axes, .. } => axes.map(|axis| readings.axis_samples(axis, AxisKind::Linear)),
-            Moves::Rotary(_) => [Vec::new(), Vec::new()],
+            MovingAxes::Linear { axes, .. } => axes.map(|axis| readings.axis_samples(axis, AxisKind::Linear)),
+            MovingAxes::Rotary(_) => [Vec::new(), Vec::new()],
         };
         let signs = Signs::of(machine, &moves);
         let feed_mm_s = feed(&samples, !readings.time_s.is_empty());
@@ -154,14 +154,14 @@ impl Path {
         })
     }
 
-    /// Whether the path was run in both directions.
+    /// Whether the path was traversed in both directions.
     pub fn both_directions(&self) -> bool {
         self.runs.iter().any(|run| run.direction > 0.0) && self.runs.iter().any(|run| run.direction < 0.0)
     }
 
-    /// How far round the longest run goes, rad, not beyond a full turn.
+    /// Arc of the longest run, rad, at most one full turn.
     pub fn arc(&self) -> f64 {
-        let of = |run: &Run| {
+        let of = |run: &DirectionRun| {
             let angles = &self.angle[run.rows.clone()];
             let (least, most) = angles
                 .iter()
@@ -174,8 +174,8 @@ impl Path {
     }
 }
 
-/// What moves in a test, if that makes a circle.
-fn moves(machine: &Machine, positions: &[Vec<f64>], nominal_mm: &[f64]) -> Option<Moves> {
+/// The moving axes of a test, if they make a circle.
+fn moves(machine: &Machine, positions: &[Vec<f64>], nominal_mm: &[f64]) -> Option<MovingAxes> {
     let range = |column: &[f64]| {
         let least = column.iter().copied().fold(f64::INFINITY, f64::min);
         column.iter().copied().fold(f64::NEG_INFINITY, f64::max) - least
@@ -187,7 +187,7 @@ fn moves(machine: &Machine, positions: &[Vec<f64>], nominal_mm: &[f64]) -> Optio
     };
     let (linear, rotary) = (moving(AxisKind::Linear, 1e-3), moving(AxisKind::Rotary, 1e-4));
     match (&linear[..], &rotary[..]) {
-        (_, [axis]) => Some(Moves::Rotary(*axis)),
+        (_, [axis]) => Some(MovingAxes::Rotary(*axis)),
         (&[first, second], []) => {
             let points: Vec<[f64; 2]> = points(positions, [first, second]);
             let circle = circle::through(&points)?;
@@ -195,7 +195,7 @@ fn moves(machine: &Machine, positions: &[Vec<f64>], nominal_mm: &[f64]) -> Optio
                 .iter()
                 .map(|p| ((p[0] - circle.centre[0]).hypot(p[1] - circle.centre[1]) - circle.radius).abs())
                 .fold(0.0, f64::max);
-            (off < OFF_CIRCLE * circle.radius).then(|| Moves::Linear {
+            (off < OFF_CIRCLE * circle.radius).then(|| MovingAxes::Linear {
                 axes: ordered(machine, [first, second]),
                 radius_mm: circle.radius,
                 radial: nominal_mm

@@ -1,10 +1,10 @@
-//! Linear least squares with named columns, and which of them the rows cannot tell apart.
+//! Linear least squares over columns, with detection of collinear columns.
 
 use faer::Mat;
 
 use crate::triangle::Triangle;
 
-/// Singular values below this share of the largest, columns at unit length, are no information.
+/// Singular values below this share of the largest (columns of unit length) count as zero.
 const NEGLIGIBLE: f64 = 1e-7;
 
 /// A solved regression `y ≈ Σ βⱼ·xⱼ`.
@@ -62,7 +62,7 @@ impl Regression {
         self.residual.iter().map(|v| v * v).sum()
     }
 
-    /// Standard deviation of `Σ wⱼ·βⱼ` for readings that scatter by `sigma`.
+    /// Standard uncertainty of `Σ wⱼ·βⱼ` for readings with the standard deviation `sigma`.
     pub fn u(&self, weights: &[(usize, f64)], sigma: f64) -> f64 {
         let variance: f64 = weights
             .iter()
@@ -72,11 +72,11 @@ impl Regression {
     }
 }
 
-/// Columns made orthonormal, to look for what else a residual holds.
+/// An orthonormal basis of columns, for the gain from further columns.
 pub(super) struct Orthonormal(Vec<Vec<f64>>);
 
 impl Orthonormal {
-    /// Of these columns.
+    /// Orthonormalises columns.
     pub fn of(columns: &[Vec<f64>]) -> Orthonormal {
         let mut basis = Orthonormal(Vec::new());
         for column in columns {
@@ -87,24 +87,24 @@ impl Orthonormal {
 
     fn push(&mut self, column: Vec<f64>) -> bool {
         let before = dot(&column, &column).sqrt();
-        let mut rest = column;
-        // Twice is enough (Giraud, Langou & Rozložník 2005).
+        let mut remainder = column;
+        // Two passes suffice (Giraud, Langou & Rozložník 2005).
         for _ in 0..2 {
             for q in &self.0 {
-                let along = dot(q, &rest);
-                rest.iter_mut().zip(q).for_each(|(r, q)| *r -= along * q);
+                let along = dot(q, &remainder);
+                remainder.iter_mut().zip(q).for_each(|(r, q)| *r -= along * q);
             }
         }
-        let norm = dot(&rest, &rest).sqrt();
-        let seen = norm > 1e-6 * before.max(f64::MIN_POSITIVE);
-        if seen {
-            rest.iter_mut().for_each(|r| *r /= norm);
-            self.0.push(rest);
+        let norm = dot(&remainder, &remainder).sqrt();
+        let independent = norm > 1e-6 * before.max(f64::MIN_POSITIVE);
+        if independent {
+            remainder.iter_mut().for_each(|r| *r /= norm);
+            self.0.push(remainder);
         }
-        seen
+        independent
     }
 
-    /// By how much further columns lower the sum of squares of a residual that is orthogonal to these.
+    /// The decrease of the sum of squares of a residual, orthogonal to these columns, by further columns.
     pub fn gain(&mut self, residual: &[f64], further: Vec<Vec<f64>>) -> f64 {
         let kept = self.0.len();
         for column in further {

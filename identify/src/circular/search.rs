@@ -1,7 +1,7 @@
-//! Faults with a number that has to be searched for: the width of a reversal spike, the pitch of a cyclic error.
+//! Faults with a nonlinear parameter: the width of a reversal spike, the pitch of a cyclic error.
 //!
-//! One is taken for found where `P(χ² ≥ gain / s²)` times the number of looks is below one in a thousand, `s²` the variance of the residual, enlarged
-//! for the correlation of neighbours.
+//! A fault is significant if `P(χ² ≥ gain / s²)` times the number of candidates is below one in a thousand. `s²` is the variance of the
+//! residual, enlarged for the correlation of neighbours.
 
 use statrs::distribution::{ChiSquared, ContinuousCDF};
 
@@ -9,27 +9,28 @@ use super::diagnosis::{columns, variance_and_correlation};
 use super::fault::Fault;
 use super::path::Path;
 use super::regression::{Orthonormal, Regression};
-use super::terms::Rows;
+use super::terms::PathRows;
 use crate::results::ParameterResult;
 
-/// Probability with which chance may yield a spike or a cyclic error.
-const CHANCE: f64 = 1e-3;
-/// Below this, 2 nm, no bar reads and the terms are no longer right: they are of first order, and 20 µm across a radius of 100 mm are 2 nm along it.
+/// Significance level of a spike or cyclic error.
+const SIGNIFICANCE: f64 = 1e-3;
+/// Least amplitude, 2 nm. Smaller values are below the resolution of a ball bar, and the terms are of first order only: 20 µm across a
+/// radius of 100 mm change it by 2 nm.
 const MIN_MM: f64 = 2e-6;
-/// Widths of reversal spikes that are tried, degrees of the path.
+/// Candidate widths of reversal spikes, degrees of the path.
 const SPIKE_WIDTHS_DEG: [f64; 6] = [0.5, 1.0, 2.0, 3.0, 5.0, 8.0];
 
-/// How the faults of third order are called.
+/// Names of the third-order faults.
 const THIRD_ORDER: [&str; 2] = ["third-order positioning", "third-order straightness"];
 
-/// Whether a fault is one of third order.
+/// Whether a fault is a third-order fault.
 pub(super) fn is_third_order(fault: &Fault) -> bool {
     THIRD_ORDER.contains(&fault.fault)
 }
 
-/// Errors that grow with the third power of the position: with radius, centre and scale they leave `cos 4θ` and `sin 4θ`, which a cyclic error of few
-/// periods would stand in for.
-pub(super) fn third_order(rows: &Rows, names: &[String; 2]) -> Vec<Fault> {
+/// Errors that grow with the third power of the position. Beside radius, centre and scale they contribute `cos 4θ` and `sin 4θ`, with
+/// which a cyclic error of few periods is confounded.
+pub(super) fn third_order(rows: &PathRows, names: &[String; 2]) -> Vec<Fault> {
     let figures = ["sum", "difference"];
     let columns = rows.third_order().into_iter().zip(THIRD_ORDER).zip(figures);
     columns
@@ -39,42 +40,47 @@ pub(super) fn third_order(rows: &Rows, names: &[String; 2]) -> Vec<Fault> {
         .collect()
 }
 
-/// Whether a fault of one column stands out of the noise beside all the others.
-pub(super) fn is_separable(rows: &Rows, faults: &[Fault], fault: &Fault, regression: &Regression) -> bool {
+/// Whether a fault of one column is significant beside all the others.
+pub(super) fn is_separable(
+    rows: &PathRows,
+    faults: &[Fault],
+    fault: &Fault,
+    regression: &Regression,
+) -> bool {
     let before = faults.iter().take_while(|other| !std::ptr::eq(*other, fault));
     let place = rows.setup().len() + before.map(|other| other.columns.len()).sum::<usize>();
     let u = regression.u(&[(place, 1.0)], 1.0);
     u > 0.0
         && is_significant(
             (regression.beta[place] / u).powi(2),
-            unit_of_gain(rows, regression),
+            gain_variance(rows, regression),
             1,
             2,
         )
 }
 
-/// The variance in which a gain is counted: that of the residual, enlarged for the correlation of neighbours.
-fn unit_of_gain(rows: &Rows, regression: &Regression) -> f64 {
+/// The variance of the gain test: that of the residual, enlarged for the correlation of neighbours.
+fn gain_variance(rows: &PathRows, regression: &Regression) -> f64 {
     let (variance, r) = variance_and_correlation(rows, regression);
     variance.max(MIN_MM * MIN_MM) * (1.0 + r) / (1.0 - r)
 }
 
-/// Whether chance would seldom give so large a gain, by this many columns, in this many looks.
-fn is_significant(gain: f64, unit: f64, columns: usize, looks: usize) -> bool {
-    let chance = ChiSquared::new(columns as f64).map_or(1.0, |chi| chi.sf(gain / unit));
-    unit > 0.0 && chance * looks as f64 <= CHANCE
+/// Whether a gain of this many columns is significant after this many candidates.
+fn is_significant(gain: f64, variance: f64, columns: usize, candidates: usize) -> bool {
+    let chance = ChiSquared::new(columns as f64).map_or(1.0, |chi| chi.sf(gain / variance));
+    variance > 0.0 && chance * candidates as f64 <= SIGNIFICANCE
 }
 
-/// Reversal spikes of each axis, at the width that explains most.
+/// The reversal spikes of each axis, at the width with the largest gain.
 pub(super) fn spikes(
     path: &Path,
-    rows: &Rows,
+    rows: &PathRows,
     names: &[String; 2],
     faults: &[Fault],
     regression: &Regression,
 ) -> Vec<Fault> {
     let mut basis = Orthonormal::of(&columns(rows, faults));
-    let unit = unit_of_gain(rows, regression);
+    let variance = gain_variance(rows, regression);
     let step = path.arc() / (rows.count() as f64 / path.runs.len() as f64);
     let mut found = Vec::new();
     for axis in 0..2 {
@@ -90,7 +96,7 @@ pub(super) fn spikes(
             })
             .max_by(|a, b| a.0.total_cmp(&b.0));
         let Some((gain, width)) = best else { continue };
-        if !is_significant(gain, unit, 2, 2 * tried.len()) {
+        if !is_significant(gain, variance, 2, 2 * tried.len()) {
             continue;
         }
         let name = &names[axis];
@@ -103,15 +109,15 @@ pub(super) fn spikes(
     found
 }
 
-/// The cyclic error of each axis, at the pitch that explains most.
+/// The cyclic error of each axis, at the pitch with the largest gain.
 pub(super) fn cyclic(
-    rows: &Rows,
+    rows: &PathRows,
     names: &[String; 2],
     faults: &[Fault],
     regression: &Regression,
 ) -> Vec<Fault> {
     let mut basis = Orthonormal::of(&columns(rows, faults));
-    let unit = unit_of_gain(rows, regression);
+    let variance = gain_variance(rows, regression);
     let mut found = Vec::new();
     for axis in 0..2 {
         let q = &rows.q[axis];
@@ -123,7 +129,7 @@ pub(super) fn cyclic(
             .map(|i| (q[i] - q[i - 1]).abs())
             .fold(0.0, f64::max);
         let travel = most - least;
-        // From four periods over the travel to two and a half readings a period.
+        // From four periods over the travel to 2.5 readings per period.
         let (slowest, fastest) = (4.0, travel / (2.5 * spacing.max(1e-3)));
         let tried = (((fastest - slowest) * 4.0).max(0.0) as usize).min(1000);
         let best = (0..tried)
@@ -136,10 +142,10 @@ pub(super) fn cyclic(
             })
             .max_by(|a, b| a.0.total_cmp(&b.0));
         let Some((gain, pitch)) = best else { continue };
-        if unit <= 0.0 || (-0.5 * gain / unit).exp() * (2 * tried) as f64 > CHANCE {
+        if variance <= 0.0 || (-0.5 * gain / variance).exp() * (2 * tried) as f64 > SIGNIFICANCE {
             continue;
         }
-        // Once found, each direction of travel has its own amplitude.
+        // A significant cyclic error has a separate amplitude for each direction of travel.
         let both = rows.cyclic(axis, pitch);
         let (mut columns, mut amplitudes) = (Vec::new(), Vec::new());
         for (direction, name) in [(1.0, "forward"), (-1.0, "backward")] {
@@ -164,7 +170,7 @@ pub(super) fn cyclic(
     found
 }
 
-/// A number that was searched for on a grid, and has no uncertainty of its own.
+/// A parameter from a grid search, without an uncertainty of its own.
 fn searched(id: &str, value: f64, unit: &str) -> ParameterResult {
     ParameterResult::new(id, value, 0.0, unit)
 }

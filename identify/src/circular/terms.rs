@@ -1,18 +1,18 @@
-//! What each classical fault of two linear axes does to the radius of a circle.
+//! The contribution of each classical fault of two linear axes to the radius of a circle.
 //!
-//! With `u₁ = cos θ`, `u₂ = sin θ`, `dᵢ` the direction in which axis i travels, `s` that of the path, `v` the feed, the radius changes by
-//! `δL = u₁·δ₁ + u₂·δ₂`, where `δᵢ` is how far the tool is off along axis i, as the axes count:
+//! Notation: `u₁ = cos θ`, `u₂ = sin θ`, `dᵢ` the direction of travel of axis i, `s` that of the path, `v` the feed. The radius changes by
+//! `δL = u₁·δ₁ + u₂·δ₂`. `δᵢ` is the deviation of the tool along the positive direction of axis i.
 //!
 //! ```text
 //! scale mismatch   δᵢ = mᵢ·qᵢ                 ½(m₁ − m₂)·R·cos 2θ
 //! squareness       δ₁ = −γ·q₂                 −½γ·R·sin 2θ            the angle between the positive axes is 90° + γ
 //! servo mismatch   δᵢ = −τᵢ·q̇ᵢ                ½s·v·(τ₁ − τ₂)·sin 2θ   positive: the first axis lags more
-//! backlash         δᵢ = −½Bᵢ·dᵢ               −½Bᵢ·dᵢ·uᵢ              Bᵢ = mean + slope·uᵢ: one at either end
+//! backlash         δᵢ = −½Bᵢ·dᵢ               −½Bᵢ·dᵢ·uᵢ              Bᵢ = mean + slope·uᵢ: one value at each end
 //! lateral play     δⱼ = −½Pᵢ·dᵢ               −½Pᵢ·dᵢ·uⱼ
 //! straightness     δⱼ = κᵢ·qᵢ²                κᵢR²·uᵢ²·uⱼ             κᵢR²: sagitta over the diameter
-//! third order      δᵢ = cᵢ·(qᵢ/R)³            ⅛(c₁ + c₂)·cos 4θ           beside radius and scale, which absorb the rest
+//! third order      δᵢ = cᵢ·(qᵢ/R)³            ⅛(c₁ + c₂)·cos 4θ           beside radius and scale, which absorb the other terms
 //!                  δⱼ = kᵢ·(qᵢ/R)³            ⅛(k₁ − k₂)·sin 4θ           beside squareness
-//! reversal spike   δL = H·exp(−φ/w)           φ: angle of the path since axis i turned round
+//! reversal spike   δL = H·exp(−φ/w)           φ: angle of the path since the reversal of axis i
 //! cyclic error     δᵢ = A·cos(2πqᵢ/p + …)     uᵢ·…
 //! ```
 
@@ -20,8 +20,8 @@ use std::f64::consts::TAU;
 
 use super::path::Path;
 
-/// The rows of a path that count, as the terms need them.
-pub(super) struct Rows {
+/// The rows of a path that are not outliers, in the quantities of the terms.
+pub(super) struct PathRows {
     /// cos θ and sin θ.
     pub u: [Vec<f64>; 2],
     /// Direction of the path.
@@ -30,20 +30,21 @@ pub(super) struct Rows {
     pub d: [Vec<f64>; 2],
     /// Position of each axis, mm.
     pub q: [Vec<f64>; 2],
-    /// Angle of the path since each axis turned round in this run; infinite before it has, and the end at which it did.
+    /// Angle of the path since the last reversal of each axis in this run, and the end of that reversal; infinite before the first
+    /// reversal.
     pub since: [Vec<(f64, f64)>; 2],
     /// Deviation of the length, mm.
     pub y: Vec<f64>,
-    /// Whether the one before is of the same run.
+    /// Whether the preceding row belongs to the same run.
     pub follows: Vec<bool>,
-    /// Which row of the test it is.
+    /// The row of the test.
     pub row: Vec<usize>,
 }
 
-impl Rows {
-    /// Of the path's rows that count.
-    pub fn of(path: &Path) -> Rows {
-        let mut rows = Rows {
+impl PathRows {
+    /// Collects the rows of a path that are not outliers.
+    pub fn of(path: &Path) -> PathRows {
+        let mut rows = PathRows {
             u: Default::default(),
             s: Vec::new(),
             d: Default::default(),
@@ -61,7 +62,7 @@ impl Rows {
                 for axis in 0..2 {
                     let travels = path.samples[axis][row].direction;
                     if row > run.rows.start && path.samples[axis][row - 1].direction != travels {
-                        // It turns where it stands at an end, between this reading and the one before.
+                        // The axis reverses between this reading and the one before.
                         let quarter = std::f64::consts::FRAC_PI_2;
                         let offset = quarter * axis as f64;
                         let end = offset + ((angle - offset) / (2.0 * quarter)).round() * 2.0 * quarter;
@@ -118,44 +119,44 @@ impl Rows {
         (0..self.count()).map(of).collect()
     }
 
-    /// Mean radius and centre: what the set-up absorbs.
+    /// Mean radius and centre, which absorb the set-up.
     pub fn setup(&self) -> Vec<Vec<f64>> {
         vec![vec![1.0; self.count()], self.u[0].clone(), self.u[1].clone()]
     }
 
-    /// ½cos 2θ, of (m₁ − m₂)·R.
+    /// ½cos 2θ, for (m₁ − m₂)·R.
     pub fn scale(&self) -> Vec<f64> {
         self.column(|i| 0.5 * (self.u[0][i].powi(2) - self.u[1][i].powi(2)))
     }
 
-    /// −½sin 2θ, of γ·R.
+    /// −½sin 2θ, for γ·R.
     pub fn squareness(&self) -> Vec<f64> {
         self.column(|i| -self.u[0][i] * self.u[1][i])
     }
 
-    /// ½s·sin 2θ, of v·(τ₁ − τ₂).
+    /// ½s·sin 2θ, for v·(τ₁ − τ₂).
     pub fn servo(&self) -> Vec<f64> {
         self.column(|i| self.s[i] * self.u[0][i] * self.u[1][i])
     }
 
-    /// −½d·u and −½d·u², of the mean backlash of an axis and how much more it is at the positive end.
+    /// −½d·u and −½d·u², for the mean backlash of an axis and its increase towards the positive end.
     pub fn backlash(&self, axis: usize) -> [Vec<f64>; 2] {
         let mean = self.column(|i| -0.5 * self.d[axis][i] * self.u[axis][i]);
         let slope = self.column(|i| -0.5 * self.d[axis][i] * self.u[axis][i].powi(2));
         [mean, slope]
     }
 
-    /// −½d·(the other u), of the lateral play of an axis.
+    /// −½d·(the other u), for the lateral play of an axis.
     pub fn lateral(&self, axis: usize) -> Vec<f64> {
         self.column(|i| -0.5 * self.d[axis][i] * self.u[1 - axis][i])
     }
 
-    /// u²·(the other u), of the sagitta of an axis.
+    /// u²·(the other u), for the sagitta of an axis.
     pub fn straightness(&self, axis: usize) -> Vec<f64> {
         self.column(|i| self.u[axis][i].powi(2) * self.u[1 - axis][i])
     }
 
-    /// ⅛cos 4θ and ⅛sin 4θ, of errors that grow with the third power of the position.
+    /// ⅛cos 4θ and ⅛sin 4θ, for errors that grow with the third power of the position.
     pub fn third_order(&self) -> [Vec<f64>; 2] {
         // cos 2θ = u₁² − u₂², sin 2θ = 2u₁u₂.
         let double = |i: usize| {

@@ -1,4 +1,4 @@
-//! The positions over which an error motion was seen while its axis moved: beyond them a curve would be extrapolated.
+//! The range of positions over which an error motion was observed while its axis moved.
 
 use std::ops::Range;
 
@@ -8,28 +8,28 @@ use abbe_model::sensitivity::SlotValues;
 
 use crate::problem::Problem;
 
-/// A reading that sees an error with less than this share of the best one's sensitivity does not see it.
+/// A reading observes an error if its sensitivity is at least this share of the largest one.
 const MOVED_SHARE: f64 = 0.01;
-/// Stretches that lie further apart than this many of their steps are two.
+/// Ranges that are more than this number of steps unconnected are separate.
 const GAP_STEPS: f64 = 1.5;
 
-/// A stretch that an axis moved over, and the longest step in it.
+/// A range of motion of an axis, and its longest step.
 #[derive(Clone, Debug, PartialEq)]
-struct Stretch {
+struct MotionRange {
     range: Range<f64>,
     step: f64,
 }
 
-/// Where the axis of an error moved, in runs that see the error.
-pub(super) struct Covered {
-    /// The longest stretch, mm or rad.
+/// The ranges of motion of an error's axis, in runs that observe the error.
+pub(super) struct ObservedRange {
+    /// The longest range, mm or rad.
     pub range: Range<f64>,
-    /// Others that lie apart from it.
-    pub apart: Vec<Range<f64>>,
+    /// Other, unconnected ranges.
+    pub unconnected: Vec<Range<f64>>,
 }
 
-/// Where an axis moved while readings saw its error; `None` where it stood.
-pub(super) fn covered(problem: &Problem<'_>, error: &ErrorName, axis: usize) -> Option<Covered> {
+/// The ranges in which an axis moved while readings observed its error; `None` if it stood still.
+pub(super) fn observed_range(problem: &Problem<'_>, error: &ErrorName, axis: usize) -> Option<ObservedRange> {
     let machine = &problem.session.machine;
     let slot = machine.error_slot(error)?;
     let sensitivity: Vec<Vec<f64>> = problem
@@ -51,53 +51,53 @@ pub(super) fn covered(problem: &Problem<'_>, error: &ErrorName, axis: usize) -> 
     if best <= 0.0 {
         return None;
     }
-    // Positions in a file are rounded; a change below this is no movement.
+    // Positions in a file are rounded; a smaller change is no movement.
     let still = match machine.axes[axis].kind {
         AxisKind::Linear => 1e-6,
         AxisKind::Rotary => 1e-9,
     };
-    let mut stretches = Vec::new();
+    let mut ranges_of_runs = Vec::new();
     for (test, sensitivity) in problem.tests.iter().zip(&sensitivity) {
         let Some(readings) = &test.readings else { continue };
         let positions = &readings.positions[axis];
         for run in readings.runs() {
-            let seen: Vec<usize> = run
+            let observing: Vec<usize> = run
                 .filter(|row| sensitivity[*row] >= MOVED_SHARE * best)
                 .collect();
-            let mut moved: Option<Stretch> = None;
-            for pair in seen.windows(2) {
+            let mut moved: Option<MotionRange> = None;
+            for pair in observing.windows(2) {
                 let (a, b) = (positions[pair[0]], positions[pair[1]]);
-                // Where readings between do not see the error, the axis still moved through.
+                // The axis moves through readings in between that do not observe the error.
                 if (b - a).abs() <= still {
                     continue;
                 }
-                let stretch = moved.get_or_insert(Stretch {
+                let motion = moved.get_or_insert(MotionRange {
                     range: a.min(b)..a.max(b),
                     step: 0.0,
                 });
-                stretch.range = stretch.range.start.min(a.min(b))..stretch.range.end.max(a.max(b));
-                stretch.step = stretch.step.max((b - a).abs());
+                motion.range = motion.range.start.min(a.min(b))..motion.range.end.max(a.max(b));
+                motion.step = motion.step.max((b - a).abs());
             }
-            stretches.extend(moved);
+            ranges_of_runs.extend(moved);
         }
     }
-    let mut merged = merged(stretches);
+    let mut merged = merged(ranges_of_runs);
     merged.sort_by(|a, b| {
-        let length = |stretch: &Stretch| stretch.range.end - stretch.range.start;
+        let length = |motion: &MotionRange| motion.range.end - motion.range.start;
         length(b).total_cmp(&length(a))
     });
-    let mut ranges = merged.into_iter().map(|stretch| stretch.range);
-    Some(Covered {
+    let mut ranges = merged.into_iter().map(|motion| motion.range);
+    Some(ObservedRange {
         range: ranges.next()?,
-        apart: ranges.collect(),
+        unconnected: ranges.collect(),
     })
 }
 
-/// Stretches that touch as one.
-fn merged(mut stretches: Vec<Stretch>) -> Vec<Stretch> {
-    stretches.sort_by(|a, b| a.range.start.total_cmp(&b.range.start));
-    let mut merged: Vec<Stretch> = Vec::new();
-    for next in stretches {
+/// Merges ranges that touch.
+fn merged(mut ranges_of_runs: Vec<MotionRange>) -> Vec<MotionRange> {
+    ranges_of_runs.sort_by(|a, b| a.range.start.total_cmp(&b.range.start));
+    let mut merged: Vec<MotionRange> = Vec::new();
+    for next in ranges_of_runs {
         match merged.last_mut() {
             Some(last) if next.range.start - last.range.end <= GAP_STEPS * last.step.max(next.step) => {
                 last.range.end = last.range.end.max(next.range.end);
@@ -114,17 +114,17 @@ mod tests {
     use super::*;
 
     #[test]
-    fn stretches_that_touch_are_one() {
-        let stretch = |start: f64, end: f64| Stretch {
+    fn touching_ranges_are_merged() {
+        let motion = |start: f64, end: f64| MotionRange {
             range: start..end,
             step: 5.0,
         };
         let found = merged(vec![
-            stretch(5.0, 100.0),
-            stretch(300.0, 350.0),
-            stretch(-100.0, 0.0),
-            stretch(-50.0, 20.0),
+            motion(5.0, 100.0),
+            motion(300.0, 350.0),
+            motion(-100.0, 0.0),
+            motion(-50.0, 20.0),
         ]);
-        assert_eq!(found, [stretch(-100.0, 100.0), stretch(300.0, 350.0)]);
+        assert_eq!(found, [motion(-100.0, 100.0), motion(300.0, 350.0)]);
     }
 }

@@ -1,14 +1,17 @@
-//! The centre of the circle that one ball describes about a turning axis while the other ball stands.
+//! The centre of the circle that one ball describes about a turning axis while the other ball is fixed.
 //!
-//! With `m` the moving ball from the standing one, `h` its part along the axis and φ the angle of the rest, all nominal, a reading `L` is laid out as
+//! Let `m` be the vector from the fixed ball to the moving one, `h` its component along the axis, and φ the angle of its transverse
+//! component, all nominal. A reading `L` gives the point
 //!
 //! ```text
 //! (u, v) = √(L² − h²) · (cos φ, sin φ)
 //! ```
 //!
-//! and the centre of the least-squares circle through these points is where the axis passes the standing ball. Without extension bar `h = 0` (Section
-//! 4.2 of the thesis); with it the lengths are brought down to the bottom of the cone (Sections 4.2.1 and 5.2). A start angle that is off (Eq. 4.1) is
-//! in φ as soon as `workpiece_ball_mm` says where the ball was found.
+//! The axis passes the fixed ball at the centre of the least-squares circle through these points. Without an extension bar `h = 0` (Jiang
+//! 2014, Section 4.2). With an extension bar the lengths are projected onto the base plane of the cone (Sections 4.2.1 and 5.2).
+//! `workpiece_ball_mm` states the measured ball position; φ then includes the deviation of the start angle (Eq. 4.1).
+//!
+//! Jiang (2014): full reference in [`super`].
 
 use abbe_model::axis::AxisKind;
 use abbe_model::chain::{BodyErrors, Machine};
@@ -20,50 +23,50 @@ use num_dual::{Derivative, DualNum, DualSVec64};
 
 use crate::circle;
 
-/// How far an axis may nominally move beside the one that sweeps, and a direction lie off its own, mm or rad.
-const STILL: f64 = 1e-6;
-/// Readings differentiated at once.
+/// Tolerance of other axes' nominal motion and of directions, mm or rad.
+const MOTION_TOLERANCE: f64 = 1e-6;
+/// Number of readings per differentiation.
 const PACK: usize = 8;
 
-/// How one test sees its axis.
+/// The geometry of a circular test about one rotary axis.
 #[derive(Clone, Debug)]
-pub struct Layout {
+pub struct CircleGeometry {
     /// The axis that turns, by index.
     pub axis: usize,
-    /// The two directions of R across it: 0, 1, 2 for X, Y, Z.
+    /// The two directions of R across the axis: 0, 1, 2 for X, Y, Z.
     pub across: [usize; 2],
-    /// Where the axis nominally passes the standing ball, mm across.
+    /// Nominal position of the axis relative to the fixed ball, mm, in the directions across.
     pub nominal_mm: [f64; 2],
-    /// Of the moving ball from the standing one, along the axis, mm: what an extension bar makes room for.
+    /// Position of the moving ball relative to the fixed one, along the axis, mm; nonzero with an extension bar.
     pub height_mm: f64,
-    /// Of the circle's plane from the origin of the axis, along the axis, mm.
+    /// Position of the circle's plane relative to the origin of the axis, along the axis, mm.
     pub plane_mm: f64,
     /// Sine and cosine of φ, reading by reading.
     angle: Vec<[f64; 2]>,
 }
 
-/// The centre that readings of a test give.
+/// The circle centre from the readings of a test.
 #[derive(Clone, Debug)]
 pub struct Centre {
-    /// Of the fitted circle from where the axis nominally is, mm across.
+    /// Position of the circle's centre relative to the nominal axis, mm, in the directions across.
     pub offset_mm: [f64; 2],
     /// Radius of the fitted circle, mm.
     pub radius_mm: f64,
-    /// Derivative of each offset by each reading; 0 for those that are left out.
+    /// Derivative of each offset by each reading; 0 for excluded readings.
     pub by_reading: [Vec<f64>; 2],
 }
 
-impl Layout {
-    /// From the nominal machine; or why a test is no circle.
-    pub fn of(machine: &Machine, model: &TestModel<'_>) -> Result<Layout, String> {
+impl CircleGeometry {
+    /// From the nominal machine. The error states why the path is no circle.
+    pub fn of(machine: &Machine, model: &TestModel<'_>) -> Result<CircleGeometry, String> {
         let Station::BallBar(bar) = model.station() else {
-            return Err("it is no ball-bar test".into());
+            return Err("it is not a ball-bar test".into());
         };
         let axis = turning(machine, model)?;
         let on_table = axis < machine.workpiece_side;
         let balls = |row| balls(machine, model, bar, row, on_table);
         let (origin, along) = line(machine, model, axis);
-        let Some(principal) = (0..3).find(|k| (along[*k].abs() - 1.0).abs() < STILL) else {
+        let Some(principal) = (0..3).find(|k| (along[*k].abs() - 1.0).abs() < MOTION_TOLERANCE) else {
             return Err(format!(
                 "axis `{}` does not lie along X, Y or Z while it turns",
                 machine.axes[axis].name
@@ -74,8 +77,8 @@ impl Layout {
         let mut angle = Vec::with_capacity(model.rows());
         let (mut height_mm, mut plane_mm) = (0.0, 0.0);
         for row in 0..model.rows() {
-            let (moving, stands) = balls(row);
-            let from: [f64; 3] = std::array::from_fn(|k| moving[k] - stands[k]);
+            let (moving, fixed) = balls(row);
+            let from: [f64; 3] = std::array::from_fn(|k| moving[k] - fixed[k]);
             if row == 0 {
                 height_mm = from[principal];
                 plane_mm = moving[principal] - origin[principal];
@@ -83,11 +86,11 @@ impl Layout {
             let [u, v] = across.map(|k| from[k]);
             let radius = u.hypot(v);
             if radius < 1.0 {
-                return Err("the moving ball stands over the other: its angle says nothing".into());
+                return Err("the moving ball lies on the axis direction through the other ball, so its angle is undefined".into());
             }
             angle.push([v / radius, u / radius]);
         }
-        Ok(Layout {
+        Ok(CircleGeometry {
             axis,
             nominal_mm: across.map(|k| origin[k] - standing[k]),
             across,
@@ -97,12 +100,12 @@ impl Layout {
         })
     }
 
-    /// The centre that readings give, those left out for which `left_out` holds.
+    /// The circle centre of the readings, without those marked in `left_out`.
     pub fn centre(&self, lengths_mm: &[f64], left_out: &[bool]) -> Result<Centre, String> {
         let kept: Vec<usize> = (0..lengths_mm.len()).filter(|row| !left_out[*row]).collect();
         if let Some(row) = kept.iter().find(|row| lengths_mm[**row] <= self.height_mm.abs()) {
             return Err(format!(
-                "reading {} is {:.3} mm, shorter than the balls are nominally apart along the axis ({:.3} mm)",
+                "reading {} is {:.3} mm, not longer than the nominal distance of the balls along the axis ({:.3} mm)",
                 row + 1,
                 lengths_mm[*row],
                 self.height_mm.abs()
@@ -128,7 +131,7 @@ impl Layout {
                 points.push([radius * cos, radius * sin]);
             }
             let Some(circle) = circle::through(&points) else {
-                return Err("its readings lie on no circle".into());
+                return Err("its readings do not lie on a circle".into());
             };
             centre.radius_mm = circle.radius.re;
             for (which, coordinate) in circle.centre.iter().enumerate() {
@@ -145,11 +148,11 @@ impl Layout {
     }
 }
 
-/// The one axis that turns in a test.
+/// The single axis that turns in a test.
 fn turning(machine: &Machine, model: &TestModel<'_>) -> Result<usize, String> {
     let moves = |axis: &usize| {
         let first = model.state(0)[*axis].value;
-        (1..model.rows()).any(|row| (model.state(row)[*axis].value - first).abs() > STILL)
+        (1..model.rows()).any(|row| (model.state(row)[*axis].value - first).abs() > MOTION_TOLERANCE)
     };
     let moving: Vec<usize> = (0..machine.axes.len()).filter(moves).collect();
     match moving[..] {
@@ -160,7 +163,7 @@ fn turning(machine: &Machine, model: &TestModel<'_>) -> Result<usize, String> {
                 .map(|axis| machine.axes[*axis].name.as_str())
                 .collect();
             Err(format!(
-                "one rotary axis alone has to turn, and {} {}",
+                "exactly one rotary axis has to turn, but {} {}",
                 if names.is_empty() {
                     "none".into()
                 } else {
@@ -172,7 +175,7 @@ fn turning(machine: &Machine, model: &TestModel<'_>) -> Result<usize, String> {
     }
 }
 
-/// The moving ball and the standing one in R, nominal.
+/// Nominal positions of the moving ball and the fixed one in R.
 fn balls(
     machine: &Machine,
     model: &TestModel<'_>,
@@ -189,7 +192,7 @@ fn balls(
     }
 }
 
-/// A point of an axis and its direction in R, carried by the axes between it and the bed as they stand in the first reading.
+/// A point of an axis and its direction in R, at the positions of the first reading.
 fn line(machine: &Machine, model: &TestModel<'_>, axis: usize) -> ([f64; 3], [f64; 3]) {
     let none = vec![BodyErrors::<f64>::NONE; machine.axes.len()];
     let state = &model.state(0);

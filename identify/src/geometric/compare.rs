@@ -1,4 +1,4 @@
-//! A geometric method and the full fit on the same readings: value, uncertainty, and bias on readings simulated with known errors.
+//! Comparison of a geometric method with the full fit on the same readings: value, uncertainty, and bias.
 
 use abbe_model::session::Session;
 use schemars::JsonSchema;
@@ -10,7 +10,7 @@ use crate::fit::{self, Fit};
 use crate::parameters::Role;
 use crate::problem::Problem;
 
-/// The centre of one test.
+/// The circle centre of one test.
 #[derive(Clone, Debug, PartialEq, Serialize, JsonSchema)]
 pub struct CentreResult {
     /// The test.
@@ -21,9 +21,9 @@ pub struct CentreResult {
     pub offsets: Vec<CentreOffset>,
     /// Radius of the circle, mm.
     pub radius_mm: f64,
-    /// Of the circle's plane along the axis, mm from the axis' origin.
+    /// Position of the circle's plane along the axis, mm from the axis' origin.
     pub plane_mm: f64,
-    /// Height of the cone, mm; 0 where both balls lie in the plane.
+    /// Height of the cone, mm; 0 if both balls lie in the plane.
     pub height_mm: f64,
 }
 
@@ -51,28 +51,28 @@ pub struct OffsetSensitivity {
     pub unit: String,
 }
 
-/// One error by both ways, in its own unit.
+/// One error by the method and by the full fit, in its display unit.
 #[derive(Clone, Debug, PartialEq, Serialize, JsonSchema)]
 pub struct ComparisonRow {
     /// The error.
     pub id: String,
-    /// Unit of all figures.
+    /// Unit of all values.
     pub unit: String,
-    /// By the method; `None` where it does not tell the error.
+    /// Estimate of the method; `None` if the method does not identify the error.
     pub value: Option<f64>,
-    /// Its standard uncertainty from noise and set-ups, enlarged as that of the full fit.
+    /// Its standard uncertainty from noise and set-ups, with the factor of the full fit.
     pub u: Option<f64>,
-    /// By the method on noise-free readings simulated with the full fit's errors, less those errors.
+    /// Bias of the method: its estimate from noise-free readings simulated with the full fit's errors, minus those errors.
     pub bias: Option<f64>,
-    /// By the full fit; `None` where it does not see the error.
+    /// Estimate of the full fit; `None` if the error is not identifiable.
     pub full_value: Option<f64>,
     /// Its standard uncertainty.
     pub full_u: Option<f64>,
-    /// As `bias`, for the full fit.
+    /// Bias of the full fit.
     pub full_bias: Option<f64>,
 }
 
-/// A method beside the full fit.
+/// Comparison of a method with the full fit.
 #[derive(Clone, Debug, PartialEq, Serialize, JsonSchema)]
 pub struct Comparison {
     /// `circle`, `cone`, `two-plane`.
@@ -81,19 +81,19 @@ pub struct Comparison {
     pub readings: usize,
     /// Standard uncertainty of a reading, µm.
     pub noise_um: f64,
-    /// Where that comes from.
+    /// Source of the noise standard deviation.
     pub noise_source: String,
     /// Residual of the full fit, µm.
     pub rms_um: f64,
-    /// Residual of the method's errors on the readings that it took, set-ups nominal, µm.
+    /// Residual of the readings of the method with its estimates, set-ups nominal, µm.
     pub method_rms_um: f64,
-    /// Residual of the nominal machine on the same readings, µm: before compensation.
+    /// Residual of the same readings with the nominal machine, µm: before compensation.
     pub nominal_rms_um: f64,
     /// The centres.
     pub centres: Vec<CentreResult>,
     /// The errors.
     pub errors: Vec<ComparisonRow>,
-    /// What a user should know.
+    /// Warnings for the user.
     pub warnings: Vec<String>,
 }
 
@@ -108,7 +108,7 @@ pub fn compare(session: &Session, method: Method, seed: u64) -> Result<Compariso
     let estimate = estimator.estimate(&problem, &observed)?;
     let list = &problem.parameters.list;
 
-    // Known errors: the full fit's, set-ups and effects left out.
+    // The known errors are those of the full fit, without set-up quantities and effects.
     let mut known = vec![0.0; list.len()];
     for (p, parameter) in list.iter().enumerate() {
         if parameter.role == Role::Error && full.rank.is_identifiable(p) {
@@ -125,18 +125,19 @@ pub fn compare(session: &Session, method: Method, seed: u64) -> Result<Compariso
         if parameter.role != Role::Error {
             continue;
         }
-        let outside = parameter.unit.display_per_internal;
-        let place = estimator.errors.iter().position(|error| *error == p);
-        let seen = full.rank.is_identifiable(p).then_some(());
+        let display = parameter.unit.display_per_internal;
+        let index = estimator.errors.iter().position(|error| *error == p);
+        let identifiable = full.rank.is_identifiable(p).then_some(());
         errors.push(ComparisonRow {
             id: parameter.id.clone(),
             unit: parameter.unit.name.clone(),
-            value: place.map(|k| estimate.values[k] * outside),
-            u: place.map(|k| estimate.covariance[(k, k)].max(0.0).sqrt() * full.u_enlargement * outside),
-            bias: place.map(|k| (again.values[k] - known[p]) * outside),
-            full_value: seen.map(|()| full.beta[p] * outside),
-            full_u: seen.map(|()| full.covariance[(p, p)].max(0.0).sqrt() * full.u_enlargement * outside),
-            full_bias: seen.map(|()| (full_again[p] - known[p]) * outside),
+            value: index.map(|k| estimate.values[k] * display),
+            u: index.map(|k| estimate.covariance[(k, k)].max(0.0).sqrt() * full.u_enlargement * display),
+            bias: index.map(|k| (again.values[k] - known[p]) * display),
+            full_value: identifiable.map(|()| full.beta[p] * display),
+            full_u: identifiable
+                .map(|()| full.covariance[(p, p)].max(0.0).sqrt() * full.u_enlargement * display),
+            full_bias: identifiable.map(|()| (full_again[p] - known[p]) * display),
         });
     }
     let mut by_method = vec![0.0; list.len()];
@@ -160,7 +161,7 @@ pub fn compare(session: &Session, method: Method, seed: u64) -> Result<Compariso
     warnings.extend(fit::enlargement_warning(full.u_enlargement));
     if !problem.parameters.effects.is_empty() {
         warnings.push(format!(
-            "the {} method knows nothing of the declared effects: what they move is in its errors",
+            "the {} method does not model the declared effects: their contributions bias its estimates",
             method.word()
         ));
     }
@@ -187,21 +188,21 @@ fn observed<'p>(problem: &'p Problem<'_>) -> Vec<&'p [f64]> {
     problem.tests.iter().map(of).collect()
 }
 
-/// Noise-free readings for values of the unknowns, test by test, mm.
+/// Noise-free readings at given parameters, test by test, mm.
 fn readings(problem: &Problem<'_>, beta: &[f64]) -> Vec<Vec<f64>> {
     let values = problem.slot_values(beta);
     let models = problem.models.iter().zip(&values);
     models.map(|(model, values)| model.readings_mm(values)).collect()
 }
 
-/// The full fit on other readings of the same tests: its unknowns.
+/// The parameters of the full fit to other readings of the same tests.
 fn refitted(problem: &Problem<'_>, readings: &[Vec<f64>], full: &Fit) -> Result<Vec<f64>, IdentifyError> {
     let mut session = problem.session.clone();
-    let mut left = readings.iter();
+    let mut remaining = readings.iter();
     for test in &mut session.tests {
         if let (Some(known), Some(drawn)) = (
             &mut test.readings,
-            test_has(problem, &test.name).then(|| left.next()).flatten(),
+            test_has(problem, &test.name).then(|| remaining.next()).flatten(),
         ) {
             known.observed.clone_from(drawn);
         }
@@ -227,33 +228,34 @@ fn centres(
     let tests = estimator
         .tests
         .iter()
-        .zip(&estimator.layouts)
+        .zip(&estimator.geometries)
         .zip(&estimate.centres);
     tests
         .enumerate()
-        .map(|(place, ((test, layout), centre))| {
+        .map(|(test_index, ((test, geometry), centre))| {
             let u = |which: usize| {
-                let row = 2 * place + which;
+                let row = 2 * test_index + which;
                 estimate.centre_covariance[(row, row)].max(0.0).sqrt() * u_enlargement * 1e3
             };
             let sensitivity = |which: usize, p: usize| OffsetSensitivity {
                 id: list[p].id.clone(),
-                value: estimator.shares[(2 * place + which, p)] * 1e3 / list[p].unit.display_per_internal,
+                value: estimator.sensitivities[(2 * test_index + which, p)] * 1e3
+                    / list[p].unit.display_per_internal,
                 unit: format!("um/{}", list[p].unit.name),
             };
             let offset = |which: usize| CentreOffset {
-                direction: letter(layout.across[which]),
+                direction: letter(geometry.across[which]),
                 offset_um: centre.offset_mm[which] * 1e3,
                 u_um: u(which),
                 sensitivities: declared.iter().map(|p| sensitivity(which, *p)).collect(),
             };
             CentreResult {
                 test: problem.tests[*test].name.clone(),
-                axis: problem.session.machine.axes[layout.axis].name.clone(),
+                axis: problem.session.machine.axes[geometry.axis].name.clone(),
                 offsets: (0..2).map(offset).collect(),
                 radius_mm: centre.radius_mm,
-                plane_mm: layout.plane_mm,
-                height_mm: layout.height_mm,
+                plane_mm: geometry.plane_mm,
+                height_mm: geometry.height_mm,
             }
         })
         .collect()

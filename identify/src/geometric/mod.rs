@@ -1,15 +1,16 @@
-//! The geometric methods of the thesis beside the full fit: errors of rotary axes from the centres of circles (Chapters 4 to 6).
+//! Geometric methods beside the full fit: errors of rotary axes from the centres of circles.
 //!
-//! Each test gives the place where an axis passes the standing ball. To first order that place is a linear combination of position and orientation
-//! errors,
+//! The methods are those of Jiang (2014), Chapters 4 to 6: X. Jiang, *Characterising Geometric Errors in Rotary Axes of 5-axis Machine
+//! Tools*, PhD thesis, University of Birmingham. Each test gives the position of an axis relative to the fixed ball. To first order this
+//! position is a linear combination of position and orientation errors,
 //!
 //! ```text
 //! centre = Σ S·error,    S = ∂centre/∂L · ∂L/∂error
 //! ```
 //!
-//! with the derivative of the length from the chain and that of the centre from the circle's own equations. `S` holds what the thesis
-//! derives by hand: the levers of the cone and of the two planes, the share that axis A's errors have in the centres of axis C, and
-//! the conversion from local to reference position errors. No sign is typed in.
+//! The chain gives the derivative of the length, and the equations of the circle give that of the centre. `S` thus contains what the
+//! reference derives by hand: the levers of the cone and of the two planes, the contributions of axis A's errors to the centres of axis C,
+//! and the conversion from local to reference position errors. All signs follow from the chain.
 
 mod centre;
 mod compare;
@@ -17,7 +18,7 @@ mod compare;
 use abbe_model::component::ErrorName;
 use faer::Mat;
 
-pub use centre::{Centre, Layout};
+pub use centre::{Centre, CircleGeometry};
 pub use compare::{CentreResult, Comparison, ComparisonRow, compare};
 
 use crate::error::IdentifyError;
@@ -26,19 +27,19 @@ use crate::problem::{Block, Problem};
 use abbe_model::session::Prior;
 use abbe_model::words::counted;
 
-/// Which tests a method takes, and what it makes of them.
+/// The geometric methods. Each uses its own kind of tests.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Method {
-    /// Position errors from one plane for each axis, as if there were no orientation errors (Section 4.2).
+    /// Position errors from one plane per axis, with orientation errors assumed zero (Section 4.2).
     Circle,
-    /// Position errors from the plane, orientation errors from the cone of the bar with its extension (Sections 4.2.1, 5.2).
+    /// Position errors from the plane, orientation errors from the cone of the extension bar (Sections 4.2.1, 5.2).
     Cone,
     /// Position and orientation errors from two planes along each axis (Section 6.1.2).
     TwoPlane,
 }
 
 impl Method {
-    /// As it stands on the command line and in results.
+    /// The name in requests and results.
     pub fn word(self) -> &'static str {
         match self {
             Method::Circle => "circle",
@@ -48,56 +49,57 @@ impl Method {
     }
 }
 
-/// Height of a cone, and distance of two planes, below which they are none, mm.
+/// Least height of a cone and least distance of two planes, mm.
 const MIN_LEVER_MM: f64 = 1.0;
 
-/// A method made ready: its tests, its errors, and how the errors follow from the centres.
+/// A method prepared for a session: its tests, its errors, and the linear map from centres to errors.
 #[derive(Clone, Debug)]
 pub struct Estimator {
     /// The method.
     pub method: Method,
-    /// The tests it takes, by place among the problem's.
+    /// The tests, by index among the problem's tests.
     pub tests: Vec<usize>,
-    /// How each sees its axis.
-    pub layouts: Vec<Layout>,
-    /// The errors that it tells, by place among the problem's parameters.
+    /// The geometry of each test.
+    pub geometries: Vec<CircleGeometry>,
+    /// The errors that the method identifies, by index among the problem's parameters.
     pub errors: Vec<usize>,
-    /// `S`: two rows a test, a column for each of the problem's parameters, mm or rad.
-    pub shares: Mat<f64>,
+    /// `S`: two rows per test, one column per parameter of the problem, mm or rad.
+    pub sensitivities: Mat<f64>,
     /// Errors from centres: errors × rows.
     pub inverse: Mat<f64>,
 }
 
-/// What a method found.
+/// The estimates of a method.
 #[derive(Clone, Debug)]
 pub struct Estimate {
     /// The centre of each test.
     pub centres: Vec<Centre>,
     /// Each error, mm or rad.
     pub values: Vec<f64>,
-    /// Covariance of the centres from noise and from what is known of the set-ups, mm².
+    /// Covariance of the centres from noise and set-up priors, mm².
     pub centre_covariance: Mat<f64>,
     /// Covariance of the errors.
     pub covariance: Mat<f64>,
 }
 
 impl Estimator {
-    /// For a session.
+    /// Prepares a method for a session.
     ///
     /// # Errors
-    /// If the session has no tests for the method, or they leave errors undetermined.
+    /// If the session lacks tests for the method, or the errors are not identifiable from them.
     pub fn new(problem: &Problem<'_>, method: Method) -> Result<Estimator, IdentifyError> {
         let machine = &problem.session.machine;
-        let no = |message: String| IdentifyError::Request(format!("--method {}: {message}", method.word()));
+        let refuse = |message: String| IdentifyError::Request(format!("method {}: {message}", method.word()));
         let mut circles = Vec::new();
         let mut refused = Vec::new();
         for (test, model) in problem.models.iter().enumerate() {
-            match Layout::of(machine, model) {
-                Ok(layout) => circles.push((test, layout)),
+            match CircleGeometry::of(machine, model) {
+                Ok(geometry) => circles.push((test, geometry)),
                 Err(why) => refused.push(format!("test \"{}\": {why}", problem.tests[test].name)),
             }
         }
-        let (tests, layouts): (Vec<usize>, Vec<Layout>) = chosen(method, circles).into_iter().unzip();
+        let (tests, geometries): (Vec<usize>, Vec<CircleGeometry>) =
+            chosen(method, circles).into_iter().unzip();
         if tests.is_empty() {
             let wanted = match method {
                 Method::Circle => {
@@ -113,29 +115,29 @@ impl Estimator {
             } else {
                 format!("; {}", refused.join("; "))
             };
-            return Err(no(format!("the session lacks {wanted}{refused}")));
+            return Err(refuse(format!("the session lacks {wanted}{refused}")));
         }
-        let errors = errors(problem, method, &layouts);
-        let shares = shares(problem, &tests, &layouts)?;
-        let of_errors = Mat::from_fn(shares.nrows(), errors.len(), |i, k| {
-            // An angle moves a centre by its lever: radians times 100 mm compare with mm.
-            shares[(i, errors[k])] * problem.parameters.list[errors[k]].size
+        let errors = errors(problem, method, &geometries);
+        let sensitivities = sensitivities(problem, &tests, &geometries)?;
+        let of_errors = Mat::from_fn(sensitivities.nrows(), errors.len(), |i, k| {
+            // An angle moves a centre by its lever. The physical sizes make radians times 100 mm comparable with mm.
+            sensitivities[(i, errors[k])] * problem.parameters.list[errors[k]].size
         });
         let svd = of_errors.svd().map_err(|_| IdentifyError::Decomposition)?;
         let singular: Vec<f64> = svd.S().column_vector().iter().copied().collect();
-        let seen = singular.iter().filter(|s| **s > 1e-6 * singular[0]).count();
-        if seen < errors.len() {
-            let hidden: Vec<&str> = (0..errors.len())
-                .filter(|k| (seen..errors.len()).any(|j| svd.V()[(*k, j)].abs() > 1e-3))
+        let rank = singular.iter().filter(|s| **s > 1e-6 * singular[0]).count();
+        if rank < errors.len() {
+            let confounded: Vec<&str> = (0..errors.len())
+                .filter(|k| (rank..errors.len()).any(|j| svd.V()[(*k, j)].abs() > 1e-3))
                 .map(|k| problem.parameters.list[errors[k]].id.as_str())
                 .collect();
-            return Err(no(format!(
-                "the centres of {} do not tell {} apart",
+            return Err(refuse(format!(
+                "the centres of {} do not separate the errors {}",
                 counted(tests.len(), "test"),
-                hidden.join(", ")
+                confounded.join(", ")
             )));
         }
-        let inverse = Mat::from_fn(errors.len(), shares.nrows(), |k, i| {
+        let inverse = Mat::from_fn(errors.len(), sensitivities.nrows(), |k, i| {
             let sum: f64 = (0..errors.len())
                 .map(|j| svd.V()[(k, j)] * svd.U()[(i, j)] / singular[j])
                 .sum();
@@ -144,21 +146,21 @@ impl Estimator {
         Ok(Estimator {
             method,
             tests,
-            layouts,
+            geometries,
             errors,
-            shares,
+            sensitivities,
             inverse,
         })
     }
 
-    /// From readings, test by test as the problem has them, mm.
+    /// Estimates the errors from readings, test by test in the order of the problem, mm.
     ///
     /// # Errors
-    /// If the readings of a test lie on no circle.
+    /// If the readings of a test do not lie on a circle.
     pub fn estimate(&self, problem: &Problem<'_>, observed: &[&[f64]]) -> Result<Estimate, IdentifyError> {
         let mut centres = Vec::new();
-        for (test, layout) in self.tests.iter().zip(&self.layouts) {
-            let centre = layout
+        for (test, geometry) in self.tests.iter().zip(&self.geometries) {
+            let centre = geometry
                 .centre(observed[*test], &problem.rejected[*test])
                 .map_err(|why| {
                     IdentifyError::Request(format!("test \"{}\": {why}", problem.tests[*test].name))
@@ -187,7 +189,8 @@ impl Estimator {
             };
             for i in 0..rows {
                 for j in 0..rows {
-                    centre_covariance[(i, j)] += self.shares[(i, p)] * u * u * self.shares[(j, p)];
+                    centre_covariance[(i, j)] +=
+                        self.sensitivities[(i, p)] * u * u * self.sensitivities[(j, p)];
                 }
             }
         }
@@ -201,13 +204,13 @@ impl Estimator {
     }
 }
 
-/// The tests of a method.
-fn chosen(method: Method, circles: Vec<(usize, Layout)>) -> Vec<(usize, Layout)> {
-    let plane = |layout: &Layout| layout.height_mm.abs() < MIN_LEVER_MM;
-    let of = |axis: usize| circles.iter().filter(move |(_, layout)| layout.axis == axis);
-    let taken = |(_, layout): &&(usize, Layout)| {
+/// The tests that a method uses.
+fn chosen(method: Method, circles: Vec<(usize, CircleGeometry)>) -> Vec<(usize, CircleGeometry)> {
+    let plane = |geometry: &CircleGeometry| geometry.height_mm.abs() < MIN_LEVER_MM;
+    let of = |axis: usize| circles.iter().filter(move |(_, geometry)| geometry.axis == axis);
+    let selected = |(_, geometry): &&(usize, CircleGeometry)| {
         let planes = || {
-            of(layout.axis)
+            of(geometry.axis)
                 .map(|(_, other)| other)
                 .filter(|other| plane(other))
         };
@@ -216,27 +219,28 @@ fn chosen(method: Method, circles: Vec<(usize, Layout)>) -> Vec<(usize, Layout)>
                 let nearest = planes()
                     .map(|other| other.plane_mm.abs())
                     .fold(f64::INFINITY, f64::min);
-                plane(layout) && layout.plane_mm.abs() <= nearest + MIN_LEVER_MM
+                plane(geometry) && geometry.plane_mm.abs() <= nearest + MIN_LEVER_MM
             }
-            Method::Cone => planes().next().is_some() && of(layout.axis).any(|(_, other)| !plane(other)),
+            Method::Cone => planes().next().is_some() && of(geometry.axis).any(|(_, other)| !plane(other)),
             Method::TwoPlane => {
-                plane(layout) && planes().any(|other| (other.plane_mm - layout.plane_mm).abs() > MIN_LEVER_MM)
+                plane(geometry)
+                    && planes().any(|other| (other.plane_mm - geometry.plane_mm).abs() > MIN_LEVER_MM)
             }
         }
     };
-    circles.iter().filter(taken).cloned().collect()
+    circles.iter().filter(selected).cloned().collect()
 }
 
-/// The declared errors of the axes that turn which the method tells.
-fn errors(problem: &Problem<'_>, method: Method, layouts: &[Layout]) -> Vec<usize> {
+/// The declared errors of the turning axes that the method identifies.
+fn errors(problem: &Problem<'_>, method: Method, geometries: &[CircleGeometry]) -> Vec<usize> {
     let machine = &problem.session.machine;
     let of_method = |id: &str| {
         let Some(name) = ErrorName::parse(id) else {
             return false;
         };
-        let turns = layouts
+        let turns = geometries
             .iter()
-            .any(|layout| machine.axes[layout.axis].name == name.axis);
+            .any(|geometry| machine.axes[geometry.axis].name == name.axis);
         turns && (method != Method::Circle || !name.freedom.is_angle())
     };
     let list = &problem.parameters.list;
@@ -246,18 +250,24 @@ fn errors(problem: &Problem<'_>, method: Method, layouts: &[Layout]) -> Vec<usiz
 }
 
 /// `S` at the nominal machine.
-fn shares(problem: &Problem<'_>, tests: &[usize], layouts: &[Layout]) -> Result<Mat<f64>, IdentifyError> {
+fn sensitivities(
+    problem: &Problem<'_>,
+    tests: &[usize],
+    geometries: &[CircleGeometry],
+) -> Result<Mat<f64>, IdentifyError> {
     let parameters = problem.parameters.list.len();
     let nominal = problem.slot_values(&vec![0.0; parameters]);
-    let mut shares = Mat::zeros(2 * tests.len(), parameters);
-    for (k, (test, layout)) in tests.iter().zip(layouts).enumerate() {
+    let mut sensitivities = Mat::zeros(2 * tests.len(), parameters);
+    for (k, (test, geometry)) in tests.iter().zip(geometries).enumerate() {
         let lengths = problem.models[*test].readings_mm(&nominal[*test]);
-        let centre = layout.centre(&lengths, &problem.rejected[*test]).map_err(|why| {
-            IdentifyError::Request(format!(
-                "test \"{}\", nominally: {why}",
-                problem.tests[*test].name
-            ))
-        })?;
+        let centre = geometry
+            .centre(&lengths, &problem.rejected[*test])
+            .map_err(|why| {
+                IdentifyError::Request(format!(
+                    "test \"{}\", nominally: {why}",
+                    problem.tests[*test].name
+                ))
+            })?;
         let block = Block {
             test: *test,
             rows: 0..problem.models[*test].rows(),
@@ -265,7 +275,7 @@ fn shares(problem: &Problem<'_>, tests: &[usize], layouts: &[Layout]) -> Result<
         let rows = problem.rows(&nominal, &block)?;
         for (which, by_reading) in centre.by_reading.iter().enumerate() {
             for p in 0..parameters {
-                shares[(2 * k + which, p)] = by_reading
+                sensitivities[(2 * k + which, p)] = by_reading
                     .iter()
                     .enumerate()
                     .map(|(row, by)| by * rows[(row, p)])
@@ -273,5 +283,5 @@ fn shares(problem: &Problem<'_>, tests: &[usize], layouts: &[Layout]) -> Result<
             }
         }
     }
-    Ok(shares)
+    Ok(sensitivities)
 }

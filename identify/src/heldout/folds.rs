@@ -1,4 +1,4 @@
-//! Which readings are left out together: runs, groups of runs, blocks, or folds of poses.
+//! The folds of cross-validation: runs, groups of runs, blocks, or sets of poses.
 
 use std::collections::BTreeSet;
 
@@ -7,12 +7,12 @@ use abbe_model::session::{Session, Test};
 use rand::SeedableRng;
 use rand::seq::SliceRandom;
 
-/// How readings are grouped for judging.
+/// The kind of folds.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum FoldKind {
     /// Each run of each test.
     Runs,
-    /// Groups of consecutive runs of each test, where there are very many runs.
+    /// Groups of consecutive runs of each test, if there are very many runs.
     RunGroups,
     /// Five contiguous blocks of each test.
     Blocks,
@@ -21,7 +21,7 @@ pub enum FoldKind {
 }
 
 impl FoldKind {
-    /// In words.
+    /// The kind in words.
     pub fn words(self) -> &'static str {
         match self {
             FoldKind::Runs => "one run at a time",
@@ -32,10 +32,10 @@ impl FoldKind {
     }
 }
 
-/// Which readings are left out together.
+/// The folds of a session.
 #[derive(Clone, Debug)]
 pub struct Folds {
-    /// How they were made.
+    /// Their kind.
     pub kind: FoldKind,
     /// Number of folds.
     pub count: usize,
@@ -45,9 +45,10 @@ pub struct Folds {
 
 const BLOCKS_PER_TEST: usize = 5;
 const FOLDS_OF_POSES: usize = 10;
-/// The most folds of runs: more cost time and say no more. Where the run column changes from reading to reading, each reading would be a fold.
+/// Maximum number of folds of single runs. More folds cost time without better estimates. If the run column changes at every reading, each
+/// reading would be a fold.
 const MAX_FOLDS_OF_RUNS: usize = 64;
-/// Into how many folds they are grouped where there are more.
+/// Number of folds for sessions with more runs.
 const FOLDS_OF_MANY_RUNS: usize = 32;
 
 impl Folds {
@@ -125,12 +126,12 @@ impl Folds {
     }
 }
 
-/// Runs of fewer readings than this on average are no traversals, if their numbers come back.
+/// Mean number of readings below which runs with recurring numbers are no traversals.
 const SHORT_RUN: f64 = 4.0;
-/// The fewest readings of a test whose run column is judged.
+/// Least number of readings for a check of the run column.
 const MIN_READINGS: usize = 24;
 
-/// A warning for each test whose run column does not number traversals: the number changes from reading to reading.
+/// A warning for each test whose run column does not number traversals: its number changes from reading to reading.
 pub fn mislabelled_runs(tests: &[&Test]) -> Vec<String> {
     let warning = |test: &&Test| {
         let readings = test.readings.as_ref()?;
@@ -183,7 +184,7 @@ mod tests {
     }
 
     #[test]
-    fn runs_are_folds_until_there_are_very_many() {
+    fn each_run_is_a_fold_up_to_a_maximum_number() {
         let as_measured = folds(&numbered(|_, run| run));
         assert_eq!((as_measured.kind, as_measured.count), (FoldKind::Runs, 16));
         assert_eq!(folds(&numbered(|_, _| 1)).kind, FoldKind::Blocks);
@@ -197,7 +198,7 @@ mod tests {
                 (folds.kind, folds.count),
                 (FoldKind::RunGroups, FOLDS_OF_MANY_RUNS)
             );
-            // Each fold is a stretch of one test, no run is divided, and none is empty.
+            // Each fold is a sequence of rows of one test. No run is divided and no fold is empty.
             let mut next = 0;
             for (test, fold_of) in session.tests.iter().zip(&folds.of_row) {
                 assert!(fold_of.is_sorted());
@@ -212,11 +213,11 @@ mod tests {
     }
 
     #[test]
-    fn a_run_column_that_numbers_no_traversals_is_named() {
+    fn a_run_column_that_does_not_number_traversals_gives_a_warning() {
         let warnings = |session: &Session| mislabelled_runs(&session.tests.iter().collect::<Vec<_>>()).len();
         assert_eq!(warnings(&numbered(|_, run| run)), 0);
         assert_eq!(warnings(&numbered(|_, _| 1)), 0);
-        // Forward runs are 1 and backward runs 2, and short runs are numbered on and on.
+        // Forward runs have number 1 and backward runs 2; then short runs with increasing numbers.
         assert_eq!(warnings(&numbered(|_, run| run % 2)), 0);
         assert_eq!(warnings(&numbered(|row, _| row as i64 / 3)), 0);
         assert_eq!(warnings(&numbered(|row, _| row as i64)), 4);

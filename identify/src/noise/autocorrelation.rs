@@ -1,4 +1,4 @@
-//! How the deviations of repeats remember each other along runs.
+//! Autocorrelation of the noise along runs, from the deviations of repeats.
 
 use std::collections::BTreeMap;
 
@@ -8,27 +8,32 @@ use super::PureError;
 use super::trends::{TERMS, trend_terms};
 
 impl PureError {
-    /// How the deviations remember each other along runs: autoregressive coefficients by Yule–Walker, of the least order up to three whose successor
-    /// adds nothing. `None` without enough repeats to tell.
+    /// Autocorrelation along runs: autoregressive coefficients by Yule–Walker. The order is the least one, up to three, whose successor is
+    /// insignificant. `None` without enough repeats.
     ///
-    /// The trend that was taken out of every run took slow noise with it: with 0.8 between neighbours and a hundred readings a run, more than half of
-    /// what is slow. Covariances are therefore corrected until noise of the found memory, treated alike, would show those that were seen (indirect inference:
-    /// Gouriéroux, Monfort & Renault, J. Appl. Econometrics 8 (1993) S85).
-    pub fn memory(&self, tests: &[&Test], kept: impl Fn(usize, usize) -> bool) -> Option<Autocorrelation> {
-        self.autocorrelation_up_to(MAX, tests, kept)
+    /// Removing a trend from every run removes slow noise too: with a coefficient of 0.8 and a hundred readings per run, more than half of
+    /// its slow part. The autocovariances are therefore corrected. The correction ends when noise with the estimated coefficients, after
+    /// the same treatment, has the observed autocovariances (indirect inference: Gouriéroux, Monfort & Renault, J. Appl. Econometrics 8
+    /// (1993) S85).
+    pub fn autocorrelation(
+        &self,
+        tests: &[&Test],
+        kept: impl Fn(usize, usize) -> bool,
+    ) -> Option<Autocorrelation> {
+        self.autocorrelation_up_to(MAX_ORDER, tests, kept)
     }
 
-    /// The same with no more than so many coefficients.
+    /// As [`PureError::autocorrelation`], with a maximum order.
     pub(super) fn autocorrelation_up_to(
         &self,
         order: usize,
         tests: &[&Test],
         kept: impl Fn(usize, usize) -> bool,
     ) -> Option<Autocorrelation> {
-        // Deviations as the trends have left them: what these take of the noise depends on its memory.
-        let mut covariance = [0.0; MAX + 1];
+        // Deviations before their rescaling for the trends: the variance that trends remove depends on the autocorrelation.
+        let mut covariance = [0.0; MAX_ORDER + 1];
         let mut enlarged = 0.0;
-        let mut pairs = [0_usize; MAX + 1];
+        let mut pairs = [0_usize; MAX_ORDER + 1];
         let mut lengths: BTreeMap<usize, usize> = BTreeMap::new();
         for (number, test) in tests.iter().enumerate() {
             let readings = test.readings.as_ref()?;
@@ -36,14 +41,14 @@ impl PureError {
                 return None;
             }
             for run in readings.runs() {
-                for lag in 0..=MAX {
+                for lag in 0..=MAX_ORDER {
                     for row in run.start + lag..run.end {
                         let both = self.deviations[number][row].zip(self.deviations[number][row - lag]);
                         if let Some((now, before)) = both
                             && kept(number, row)
                             && kept(number, row - lag)
                         {
-                            covariance[lag] += now * before / self.for_trends[number].powi(2);
+                            covariance[lag] += now * before / self.rescaling_of_tests[number].powi(2);
                             pairs[lag] += 1;
                             if lag == 0 {
                                 enlarged += now * before;
@@ -54,21 +59,24 @@ impl PureError {
                 *lengths.entry(run.len()).or_default() += run.len();
             }
         }
-        if pairs[MAX] < 100 || covariance[0] <= 0.0 {
+        if pairs[MAX_ORDER] < 100 || covariance[0] <= 0.0 {
             return None;
         }
-        let seen: [f64; MAX + 1] = std::array::from_fn(|lag| covariance[lag] / pairs[lag] as f64);
-        // Two repeats hold the same deviation twice; half the pairs are independent.
+        let observed: [f64; MAX_ORDER + 1] = std::array::from_fn(|lag| covariance[lag] / pairs[lag] as f64);
+        // Two repeats hold the same deviation twice, so half of the pairs are independent.
         let insignificant = 3.0 / (0.5 * pairs[0] as f64).sqrt();
-        let (coefficients, variance) = without_trends_taken(&seen, order, insignificant, &lengths);
-        // Bartlett's standard error of the correlation between neighbours, carried through the correction.
-        let neighbours = seen[1] / seen[0];
-        let u = SCATTER * ((1.0 - neighbours * neighbours).max(0.0) / self.freedom.max(1) as f64).sqrt();
-        let mut slower = seen;
-        slower[1..].iter_mut().for_each(|value| *value += u * seen[0]);
-        let (of_slower, _) = without_trends_taken(&slower, order, insignificant, &lengths);
+        let (coefficients, variance) = without_detrending(&observed, order, insignificant, &lengths);
+        // Bartlett's standard error of the lag-1 correlation, propagated through the correction.
+        let neighbours = observed[1] / observed[0];
+        let u =
+            SCATTER_RATIO * ((1.0 - neighbours * neighbours).max(0.0) / self.freedom.max(1) as f64).sqrt();
+        let mut shifted = observed;
+        shifted[1..]
+            .iter_mut()
+            .for_each(|value| *value += u * observed[0]);
+        let (of_shifted, _) = without_detrending(&shifted, order, insignificant, &lengths);
         let total = |coefficients: &[f64]| coefficients.iter().sum::<f64>();
-        let sum_u = (total(&of_slower) - total(&coefficients)).abs();
+        let sum_u = (total(&of_shifted) - total(&coefficients)).abs();
         Some(Autocorrelation {
             sum_u: if coefficients.is_empty() { 0.0 } else { sum_u },
             coefficients,
@@ -77,19 +85,19 @@ impl PureError {
     }
 }
 
-/// Coefficients and variance of the noise whose deviations from trends have these autocovariances.
-fn without_trends_taken(
-    seen: &[f64; MAX + 1],
+/// Coefficients and variance of the noise whose detrended deviations have these autocovariances.
+fn without_detrending(
+    observed: &[f64; MAX_ORDER + 1],
     order: usize,
     insignificant: f64,
     lengths: &BTreeMap<usize, usize>,
 ) -> (Vec<f64>, f64) {
-    let mut coefficients = autoregression(seen, order, insignificant);
-    let mut variance = seen[0];
+    let mut coefficients = autoregression(observed, order, insignificant);
+    let mut variance = observed[0];
     for _ in 0..CORRECTIONS {
-        let (process, shown) = with_trends_out(&coefficients, lengths);
-        variance = seen[0] / shown[0];
-        let corrected = std::array::from_fn(|lag| seen[lag] + variance * (process[lag] - shown[lag]));
+        let (process, shown) = detrended(&coefficients, lengths);
+        variance = observed[0] / shown[0];
+        let corrected = std::array::from_fn(|lag| observed[lag] + variance * (process[lag] - shown[lag]));
         let next = autoregression(&corrected, order, insignificant);
         if next == coefficients {
             break;
@@ -99,45 +107,45 @@ fn without_trends_taken(
     (coefficients, variance)
 }
 
-/// The highest order of a memory.
-const MAX: usize = 3;
+/// Maximum autoregressive order.
+const MAX_ORDER: usize = 3;
 const CORRECTIONS: usize = 8;
-/// By how much memories scatter beyond Bartlett's formula, for trends that were taken out and orders that were chosen: 0.034 was seen over 64 simulated
-/// sessions of memory 0.8.
-const SCATTER: f64 = 1.6;
-/// Runs longer than this lose next to nothing with a trend.
-const LONG: usize = 600;
+/// Ratio of the actual scatter of the lag-1 correlation to Bartlett's formula. The excess is due to removed trends and selected orders.
+/// Over 64 simulated sessions with a coefficient of 0.8 the scatter was 0.034.
+const SCATTER_RATIO: f64 = 1.6;
+/// Run length beyond which detrending removes a negligible part of the noise.
+const LONG_RUN: usize = 600;
 
-/// How readings remember each other along runs.
+/// Autocorrelation of the noise along runs.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Autocorrelation {
-    /// Autoregressive coefficients; empty where readings are as good as white.
+    /// Autoregressive coefficients; empty for white noise.
     pub coefficients: Vec<f64>,
     /// Standard uncertainty of their sum.
     pub sum_u: f64,
-    /// By how much the noise is larger than its deviations show, which are enlarged as if they were white.
+    /// Ratio of the noise standard deviation to that of the deviations, which are rescaled as white noise.
     pub inflation: f64,
 }
 
-/// Coefficients from autocovariances (Durbin–Levinson); the last coefficient of each order is its partial autocorrelation.
-fn autoregression(covariance: &[f64; MAX + 1], most: usize, insignificant: f64) -> Vec<f64> {
+/// Coefficients from autocovariances (Durbin–Levinson). The last coefficient of each order is its partial autocorrelation.
+fn autoregression(covariance: &[f64; MAX_ORDER + 1], most: usize, insignificant: f64) -> Vec<f64> {
     let correlation = covariance.map(|value| value / covariance[0]);
     let mut coefficients: Vec<f64> = Vec::new();
     let mut accepted = Vec::new();
-    let mut left = 1.0;
+    let mut unexplained = 1.0;
     for order in 1..=most {
         let predicted: f64 = coefficients
             .iter()
             .enumerate()
             .map(|(k, a)| a * correlation[order - 1 - k])
             .sum();
-        let partial = ((correlation[order] - predicted) / left).clamp(-0.99, 0.99);
+        let partial = ((correlation[order] - predicted) / unexplained).clamp(-0.99, 0.99);
         let previous = coefficients.clone();
         for k in 0..previous.len() {
             coefficients[k] = previous[k] - partial * previous[previous.len() - 1 - k];
         }
         coefficients.push(partial);
-        left *= 1.0 - partial * partial;
+        unexplained *= 1.0 - partial * partial;
         if partial.abs() > insignificant {
             accepted = coefficients.clone();
         }
@@ -145,20 +153,20 @@ fn autoregression(covariance: &[f64; MAX + 1], most: usize, insignificant: f64) 
     accepted
 }
 
-/// Autocorrelations of a process, and what is seen of them once a trend is taken out of runs of these lengths (and how many readings are in
-/// runs of each).
-fn with_trends_out(
+/// Autocorrelations of a process, and their expectation after detrending of runs with these lengths. `lengths` gives the number of
+/// readings in runs of each length.
+fn detrended(
     coefficients: &[f64],
     lengths: &BTreeMap<usize, usize>,
-) -> ([f64; MAX + 1], [f64; MAX + 1]) {
+) -> ([f64; MAX_ORDER + 1], [f64; MAX_ORDER + 1]) {
     let longest = lengths
         .keys()
         .copied()
-        .filter(|n| *n <= LONG)
+        .filter(|n| *n <= LONG_RUN)
         .max()
         .unwrap_or(0)
-        .max(MAX + 1);
-    // Impulse response, long enough for any memory that is not a drift.
+        .max(MAX_ORDER + 1);
+    // Impulse response, long enough for every autocorrelation short of a drift.
     let mut response = vec![0.0; longest + 2000];
     response[0] = 1.0;
     for t in 1..response.len() {
@@ -181,13 +189,13 @@ fn with_trends_out(
         })
         .collect();
     let process = std::array::from_fn(|lag| correlation[lag]);
-    let mut shown = [0.0; MAX + 1];
+    let mut shown = [0.0; MAX_ORDER + 1];
     let mut total = 0.0;
     for (&n, &readings) in lengths {
         let weight = readings as f64;
         total += weight;
-        if !(MAX + 1..=LONG).contains(&n) {
-            (0..=MAX).for_each(|lag| shown[lag] += weight * process[lag]);
+        if !(MAX_ORDER + 1..=LONG_RUN).contains(&n) {
+            (0..=MAX_ORDER).for_each(|lag| shown[lag] += weight * process[lag]);
             continue;
         }
         // d = e − Q Qᵀe with orthonormal terms Q, so Cov d = Γ − Q(QᵀΓ) − (ΓQ)Qᵀ + Q(QᵀΓQ)Qᵀ.
@@ -201,7 +209,7 @@ fn with_trends_out(
             .collect();
         let qgq: [[f64; TERMS]; TERMS] =
             std::array::from_fn(|i| std::array::from_fn(|j| (0..n).map(|t| q[t][i] * gq[t][j]).sum()));
-        for lag in 0..=MAX {
+        for lag in 0..=MAX_ORDER {
             let sum: f64 = (lag..n)
                 .map(|t| {
                     let s = t - lag;
@@ -225,7 +233,7 @@ fn with_trends_out(
 mod tests {
     use super::*;
 
-    /// Autocorrelations by their own recursion: `ρ₁ = a₁/(1 − a₂)`, then `ρ_k = a₁ ρ_{k−1} + a₂ ρ_{k−2}`.
+    /// Autocorrelations by their recursion: `ρ₁ = a₁/(1 − a₂)`, then `ρ_k = a₁ ρ_{k−1} + a₂ ρ_{k−2}`.
     fn correlations(a: [f64; 2], count: usize) -> Vec<f64> {
         let mut correlation = vec![1.0, a[0] / (1.0 - a[1])];
         for k in 2..count {
@@ -235,11 +243,11 @@ mod tests {
     }
 
     #[test]
-    fn coefficients_come_back_from_their_autocovariances_and_no_more_of_them() {
+    fn autoregression_returns_the_coefficients_and_the_order() {
         for a in [[0.8, 0.0], [1.1, -0.4], [-0.5, 0.3]] {
-            let correlation = correlations(a, MAX + 1);
+            let correlation = correlations(a, MAX_ORDER + 1);
             let covariance = std::array::from_fn(|lag| 2.5 * correlation[lag]);
-            let found = autoregression(&covariance, MAX, 1e-6);
+            let found = autoregression(&covariance, MAX_ORDER, 1e-6);
             let wanted = if a[1] == 0.0 { &a[..1] } else { &a[..] };
             assert_eq!(found.len(), wanted.len());
             assert!(
@@ -247,30 +255,31 @@ mod tests {
                 "{found:?}"
             );
             assert_eq!(autoregression(&covariance, 1, 1e-6).len(), 1);
-            assert!(autoregression(&covariance, MAX, 1.0).is_empty());
+            assert!(autoregression(&covariance, MAX_ORDER, 1.0).is_empty());
         }
     }
 
-    /// `Cov d = P Γ P` with `P = 1 − Q Qᵀ`, multiplied out; a run that is too long for a trend to matter shows the process itself.
+    /// Compares with `Cov d = P Γ P`, `P = 1 − Q Qᵀ`, as explicit products. A run of negligible trend shows the autocorrelations of the
+    /// process itself.
     #[test]
-    fn what_trends_leave_is_the_projected_covariance() {
+    fn detrended_autocovariances_equal_the_projected_covariance() {
         let a = [1.1, -0.4];
         let correlation = correlations(a, 60);
-        let mut wanted = [0.0; MAX + 1];
-        let lengths = BTreeMap::from([(30, 90), (47, 47), (LONG + 1, 601)]);
+        let mut wanted = [0.0; MAX_ORDER + 1];
+        let lengths = BTreeMap::from([(30, 90), (47, 47), (LONG_RUN + 1, 601)]);
         for (n, readings) in [(30_usize, 90.0), (47, 47.0)] {
             let q = trend_terms(&(0..n).map(|t| t as f64).collect::<Vec<_>>());
             let q = faer::Mat::from_fn(n, TERMS, |t, i| q[t][i]);
             let p = faer::Mat::<f64>::identity(n, n) - &q * q.transpose();
             let gamma = faer::Mat::from_fn(n, n, |t, s| correlation[t.abs_diff(s)]);
-            let left = &p * gamma * &p;
+            let projected = &p * gamma * &p;
             for (lag, wanted) in wanted.iter_mut().enumerate() {
-                let mean = (lag..n).map(|t| left[(t, t - lag)]).sum::<f64>() / (n - lag) as f64;
+                let mean = (lag..n).map(|t| projected[(t, t - lag)]).sum::<f64>() / (n - lag) as f64;
                 *wanted += readings * mean;
             }
         }
-        let (process, shown) = with_trends_out(&a, &lengths);
-        for lag in 0..=MAX {
+        let (process, shown) = detrended(&a, &lengths);
+        for lag in 0..=MAX_ORDER {
             assert!((process[lag] - correlation[lag]).abs() < 1e-12);
             let wanted = (wanted[lag] + 601.0 * correlation[lag]) / 738.0;
             assert!(
@@ -281,14 +290,14 @@ mod tests {
         }
     }
 
-    /// The way back: noise of a memory, shown by runs that lost their trends, is found again with its size.
+    /// The inverse problem: coefficients and standard deviation follow from the autocovariances of detrended runs.
     #[test]
-    fn memory_and_size_are_found_behind_the_trends_that_were_taken() {
+    fn coefficients_and_variance_are_recovered_from_detrended_runs() {
         for (a, sigma) in [(vec![0.8], 1.5), (vec![0.6, 0.25], 0.7)] {
             let lengths = BTreeMap::from([(100, 100)]);
-            let (_, shown) = with_trends_out(&a, &lengths);
-            let seen = shown.map(|value| value * sigma * sigma);
-            let (found, variance) = without_trends_taken(&seen, MAX, 0.05, &lengths);
+            let (_, shown) = detrended(&a, &lengths);
+            let observed = shown.map(|value| value * sigma * sigma);
+            let (found, variance) = without_detrending(&observed, MAX_ORDER, 0.05, &lengths);
             assert_eq!(found.len(), a.len(), "{found:?}");
             for (found, wanted) in found.iter().zip(&a) {
                 assert!((found - wanted).abs() < 0.02, "{found} instead of {wanted}");

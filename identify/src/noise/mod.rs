@@ -1,13 +1,13 @@
-//! How much of a reading is noise: its size and its memory.
+//! Noise of the readings: standard deviation and autocorrelation.
 //!
-//! Readings at the same test, direction and position in repeated runs differ by noise alone (pure error: Box, Hunter & Hunter, Statistics for
-//! Experimenters, ch. 10). What they differ by from their mean needs no model of the structure. A trend is taken out of every run first: drift and warming
-//! up are structure and would be taken for slow noise, and a ball that has moved from one run to the next leaves a cycle along each turn. A long run loses
-//! a parabola and one cycle, a short one fewer terms.
+//! Readings at the same test, direction and position in repeated runs differ by noise alone (pure error: Box, Hunter & Hunter, Statistics
+//! for Experimenters, ch. 10). Their deviations from their mean do not depend on a model. Every run is first detrended. Drift and warm-up
+//! are structure that would count as slow noise, and a ball that moves between two runs adds one cycle per turn. A long run loses a
+//! parabola and one cycle, a short run fewer terms.
 //!
-//! Means and trends take degrees of freedom. With `P` the projector that takes the trends out of the runs and `M` the one that takes the means out of the
-//! groups of repeats, the deviations of noise of variance σ² have the expected sum of squares `σ²·tr(M·P)`; that trace, and not the number of
-//! deviations, is what their sum of squares is divided by.
+//! Means and trends use degrees of freedom. Let `P` be the projector that removes the trends of the runs, and `M` the projector that
+//! removes the means of the groups of repeats. The deviations of noise of variance σ² have the expected sum of squares `σ²·tr(M·P)`. Their
+//! sum of squares is therefore divided by that trace, not by the number of deviations.
 
 mod autocorrelation;
 mod trends;
@@ -27,26 +27,27 @@ pub struct Noise {
     /// Standard deviation, mm.
     pub sigma_mm: f64,
     /// Autoregressive coefficients along a run; empty for white noise.
-    pub memory: Vec<f64>,
-    /// Standard uncertainty of the sum of these coefficients: how slow noise is, which decides how large it is where it is slow.
+    pub ar_coefficients: Vec<f64>,
+    /// Standard uncertainty of the sum of these coefficients. The sum determines how slow the noise is, and thus the uncertainty of its
+    /// slow part.
     pub ar_sum_u: f64,
-    /// Where the size comes from.
+    /// Source of the standard deviation.
     pub source: NoiseSource,
 }
 
-/// Where a noise figure comes from.
+/// Source of a noise standard deviation.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum NoiseSource {
-    /// The session states it.
+    /// Stated in the session.
     Stated,
-    /// Repeated readings.
+    /// Repeated readings (pure error).
     Repeats,
-    /// The residual of the model itself: noise and everything that the model lacks.
+    /// The residual of the model: noise and unmodelled effects.
     Residual,
 }
 
 impl NoiseSource {
-    /// As it stands in results.
+    /// The name in results.
     pub fn word(self) -> &'static str {
         match self {
             NoiseSource::Stated => "stated",
@@ -61,18 +62,17 @@ impl Noise {
     pub fn white(sigma_mm: f64, source: NoiseSource) -> Noise {
         Noise {
             sigma_mm,
-            memory: Vec::new(),
+            ar_coefficients: Vec::new(),
             ar_sum_u: 0.0,
             source,
         }
     }
 
-    /// Standard deviation of what a reading adds to the readings before it, mm: the innovation.
+    /// Standard deviation of the innovation, mm: the part of a reading that earlier readings of its run do not predict.
     pub fn innovation_mm(&self) -> f64 {
-        // Yule–Walker: γ0 (1 − Σ a_k ρ_k) with ρ of the process itself; for the orders used here by the recursion on simulated
-        // autocovariances is not needed, since ρ follows from the coefficients (Durbin–Levinson run backwards).
+        // The innovation variance is γ0 Π(1 − κ²) with the reflection coefficients κ, from the Durbin–Levinson recursion run backwards.
         let mut variance_ratio = 1.0;
-        let mut coefficients = self.memory.clone();
+        let mut coefficients = self.ar_coefficients.clone();
         while let Some(reflection) = coefficients.last().copied() {
             let bound = 1.0 - reflection * reflection;
             variance_ratio *= bound;
@@ -85,21 +85,21 @@ impl Noise {
     }
 }
 
-/// Readings that differ by noise alone: the residuals (rows × coordinates, mm) less the trend of their run and less their mean over repeats, rescaled for what
-/// these take of the noise; `None` for readings without a partner.
+/// Pure error: residuals (rows × coordinates, mm) without the trend of their run and their mean over repeats, rescaled for the variance
+/// that these remove. `None` for readings without repeats.
 pub struct PureError {
-    /// For each test, one value a scalar reading. The mean square of a test's has the variance of white noise as its expectation.
+    /// For each test, one value per scalar reading. The expected mean square within a test is the variance of white noise.
     pub deviations: Vec<Vec<Option<f64>>>,
-    /// Degrees of freedom that means and trends have left, rounded down.
+    /// Degrees of freedom after means and trends, rounded down.
     pub freedom: usize,
     /// Degrees of freedom of each test.
-    of_tests: Vec<f64>,
-    /// By how much the deviations of each test are enlarged for the trends.
-    for_trends: Vec<f64>,
+    freedom_of_tests: Vec<f64>,
+    /// For each test, the factor on its deviations for the removed trends.
+    rescaling_of_tests: Vec<f64>,
 }
 
 impl PureError {
-    /// From residuals of any model (a model that is wrong alike in all repeats does no harm). `kept(test, row)` leaves rejected readings out.
+    /// From the residuals of any model. A model error that is equal in all repeats cancels. `kept(test, row)` is false for outliers.
     pub fn of(tests: &[&Test], residuals: &[Vec<f64>], kept: impl Fn(usize, usize) -> bool) -> PureError {
         let readings: Vec<Option<&Readings>> = tests.iter().map(|test| test.readings.as_ref()).collect();
         PureError::of_readings(&readings, residuals, kept)
@@ -113,8 +113,8 @@ impl PureError {
         let mut pure = PureError {
             deviations: Vec::new(),
             freedom: 0,
-            of_tests: Vec::new(),
-            for_trends: Vec::new(),
+            freedom_of_tests: Vec::new(),
+            rescaling_of_tests: Vec::new(),
         };
         for (number, (readings, residual)) in tests.iter().zip(residuals).enumerate() {
             let (mut deviation, mut freedom, mut enlarged) = (vec![None; residual.len()], 0.0, 1.0);
@@ -122,22 +122,22 @@ impl PureError {
                 (freedom, enlarged) = deviations(readings, residual, |row| kept(number, row), &mut deviation);
             }
             pure.deviations.push(deviation);
-            pure.of_tests.push(freedom);
-            pure.for_trends.push(enlarged);
+            pure.freedom_of_tests.push(freedom);
+            pure.rescaling_of_tests.push(enlarged);
         }
         pure.count();
         pure
     }
 
     fn count(&mut self) {
-        // Rounding of a trace does not take a degree of freedom.
-        self.freedom = (self.of_tests.iter().sum::<f64>() + 1e-6).floor() as usize;
+        // The small term keeps rounding of a trace from costing a degree of freedom.
+        self.freedom = (self.freedom_of_tests.iter().sum::<f64>() + 1e-6).floor() as usize;
     }
 
     /// The standard deviation, mm, if there are at least ten degrees of freedom.
     pub fn sigma_mm(&self) -> Option<f64> {
         let (mut sum, mut freedom) = (0.0, 0.0);
-        for (deviations, of_test) in self.deviations.iter().zip(&self.of_tests) {
+        for (deviations, of_test) in self.deviations.iter().zip(&self.freedom_of_tests) {
             let values = deviations.iter().flatten();
             let (squares, count) = values.fold((0.0, 0_usize), |(sum, count), value| {
                 (sum + value * value, count + 1)
@@ -151,8 +151,8 @@ impl PureError {
     }
 }
 
-/// Puts the deviations of a test's repeats in their places; returns their degrees of freedom, and by how much they are enlarged for the trends. There are
-/// none where the trends leave nothing.
+/// Writes the deviations of a test's repeats. Returns their degrees of freedom, and their rescaling factor for the trends. There are no
+/// deviations if the trends remove nearly all variance.
 fn deviations(
     readings: &Readings,
     residual: &[f64],
@@ -161,11 +161,11 @@ fn deviations(
 ) -> (f64, f64) {
     let coordinates = readings.coordinates;
     let trends = Trends::of(readings, &kept);
-    let level = trends.taken_out(residual, coordinates);
-    let keys = Keys::of(readings);
+    let level = trends.removed_from(residual, coordinates);
+    let keys = RepeatKeys::of(readings);
     let mut order: Vec<usize> = (0..readings.rows()).filter(|row| kept(*row)).collect();
     order.sort_by(|a, b| keys.of_row(*a).cmp(keys.of_row(*b)));
-    // Over one coordinate: the trace, what is expected of the squares of deviations rescaled for the means alone, and how many there are.
+    // Over one coordinate: the trace, the expected sum of squares of deviations rescaled for the means alone, and their number.
     let (mut freedom, mut expected, mut count) = (0.0, 0.0, 0_usize);
     for rows in order
         .chunk_by(|a, b| keys.of_row(*a) == keys.of_row(*b))
@@ -185,7 +185,7 @@ fn deviations(
             }
         }
     }
-    if expected < MIN_LEFT * count as f64 {
+    if expected < MIN_VARIANCE_SHARE * count as f64 {
         deviation.fill(None);
         return (0.0, 1.0);
     }
@@ -197,17 +197,17 @@ fn deviations(
     (freedom * coordinates as f64, enlarged)
 }
 
-/// Share of the deviations' variance that trends have to leave for it to say anything.
-const MIN_LEFT: f64 = 0.05;
+/// Least share of the variance that the trends must leave.
+const MIN_VARIANCE_SHARE: f64 = 0.05;
 
-/// Where a reading was taken, as numbers that are equal for repeats: positions and directions of travel.
-struct Keys {
+/// The position of a reading as integers that are equal for repeats: axis positions and directions of travel.
+struct RepeatKeys {
     columns: usize,
     keys: Vec<i64>,
 }
 
-impl Keys {
-    fn of(readings: &Readings) -> Keys {
+impl RepeatKeys {
+    fn of(readings: &Readings) -> RepeatKeys {
         let directions = directions(readings);
         let columns = readings.positions.len() + 1;
         let mut keys = Vec::with_capacity(readings.rows() * columns);
@@ -217,7 +217,7 @@ impl Keys {
             keys.extend(positions.map(|column| (column[row] * 1e4).round() as i64));
             keys.push(if readings.run.is_empty() { 0 } else { *direction });
         }
-        Keys { columns, keys }
+        RepeatKeys { columns, keys }
     }
 
     fn of_row(&self, row: usize) -> &[i64] {
@@ -225,13 +225,13 @@ impl Keys {
     }
 }
 
-/// Beyond this factor a stated noise and that of repeats disagree in what matters.
-const DISAGREEMENT: f64 = 2.0;
-/// Probability of a false word on that.
+/// Ratio beyond which stated noise and noise of repeats disagree.
+const DISAGREEMENT_RATIO: f64 = 2.0;
+/// Significance level of this disagreement.
 const DISAGREEMENT_P: f64 = 0.001;
 
-/// A warning where repeated readings scatter by more than twice or less than half of what the session states, and not by chance; `residuals` are those of
-/// any model, mm, test by test.
+/// A warning if repeated readings scatter by more than twice or less than half of the stated noise, significantly. `residuals` are those
+/// of any model, mm, test by test.
 pub fn stated_against_repeats(problem: &Problem<'_>, residuals: &[Vec<f64>]) -> Option<String> {
     let stated_mm = problem.session.noise_mm.filter(|sigma| *sigma > 0.0)?;
     let pure = PureError::of(&problem.tests, residuals, |test, row| {
@@ -243,10 +243,10 @@ pub fn stated_against_repeats(problem: &Problem<'_>, residuals: &[Vec<f64>]) -> 
     let freedom = pure.freedom as f64;
     let below = ChiSquared::new(freedom).ok()?.cdf(freedom * ratio * ratio);
     let by_chance = below.min(1.0 - below) > DISAGREEMENT_P / 2.0;
-    (!by_chance && !(1.0 / DISAGREEMENT..=DISAGREEMENT).contains(&ratio)).then(|| {
+    (!by_chance && !(1.0 / DISAGREEMENT_RATIO..=DISAGREEMENT_RATIO).contains(&ratio)).then(|| {
         format!(
-            "the session states a noise of {} µm, and repeated readings scatter by {:.3} µm ({} degrees of freedom): the uncertainties of a fit follow from \
-             what is stated; correct `noise_um`, or leave it out",
+            "the session states a noise of {} µm, and the repeatability is {:.3} µm ({} degrees of freedom): the uncertainties of a fit follow from \
+             the stated noise; correct `noise_um`, or omit it",
             stated_mm * 1e3,
             sigma_mm * 1e3,
             pure.freedom
@@ -254,7 +254,7 @@ pub fn stated_against_repeats(problem: &Problem<'_>, residuals: &[Vec<f64>]) -> 
     })
 }
 
-/// The direction of travel of every axis as one number a row.
+/// The direction of travel of every axis, one number per row.
 fn directions(readings: &Readings) -> Vec<i64> {
     let mut code = vec![0_i64; readings.rows()];
     for axis in 0..readings.positions.len() {
@@ -273,9 +273,9 @@ mod tests {
 
     use super::*;
 
-    /// With the impulse response ψ of `x_t = Σ a_k x_{t−k} + e_t` the variance of x is that of e times `Σ ψ²`.
+    /// With the impulse response ψ of `x_t = Σ a_k x_{t−k} + e_t`, the variance of x is that of e times `Σ ψ²`.
     #[test]
-    fn what_a_reading_adds_is_what_the_impulse_response_says() {
+    fn innovation_follows_from_the_impulse_response() {
         for memory in [vec![], vec![0.8], vec![1.1, -0.4], vec![0.5, 0.2, -0.3]] {
             let mut response = vec![1.0];
             for t in 1..2000 {
@@ -284,7 +284,7 @@ mod tests {
             }
             let power: f64 = response.iter().map(|r| r * r).sum();
             let noise = Noise {
-                memory,
+                ar_coefficients: memory,
                 ..Noise::white(2.0, NoiseSource::Stated)
             };
             let innovation = noise.innovation_mm();
@@ -295,7 +295,7 @@ mod tests {
         }
     }
 
-    /// A test of runs over the same places, one after another.
+    /// A test of consecutive runs over the same positions.
     fn repeated(places: usize, runs: usize) -> Readings {
         let rows = || (0..runs).flat_map(|run| (0..places).map(move |place| (run, place)));
         Readings {
@@ -306,7 +306,7 @@ mod tests {
         }
     }
 
-    /// Sessions of a study, as `ABBE_STUDY` says.
+    /// Number of simulated sessions, from `ABBE_STUDY`.
     fn sessions() -> usize {
         let stated = std::env::var("ABBE_STUDY")
             .ok()
@@ -314,10 +314,11 @@ mod tests {
         stated.filter(|count| *count > 1).unwrap_or(200)
     }
 
-    /// White noise of 0.5 µm over structure and over runs that lie apart by what a ball moves: the mean of σ² over many sessions is its truth, and their
-    /// scatter that of χ² with the degrees of freedom that are left, `(R − 1)(n − K)` a test of R runs of n readings which lose K terms each.
+    /// White noise of 0.5 µm over structure, and over runs with different ball positions. The mean of σ² over many sessions is the true
+    /// one. The scatter of σ² is that of χ² with the remaining degrees of freedom, `(R − 1)(n − K)` for a test of R runs of n readings
+    /// which lose K terms each.
     #[test]
-    fn the_noise_of_repeats_is_that_of_the_readings_in_short_runs_and_long_ones() {
+    fn pure_error_is_unbiased_for_short_and_long_runs() {
         const SIGMA: f64 = 0.5e-3;
         const TESTS: usize = 4;
         let sessions = sessions();
@@ -331,13 +332,13 @@ mod tests {
                 for _ in 0..sessions {
                     let residuals: Vec<Vec<f64>> = (0..TESTS)
                         .map(|_| {
-                            let apart: Vec<f64> =
+                            let offsets: Vec<f64> =
                                 (0..runs).map(|_| generator.sample(StandardNormal)).collect();
                             (0..runs * places)
                                 .map(|row| {
                                     let noise: f64 = generator.sample(StandardNormal);
                                     let structure = (1.0 + (row % places) as f64).ln();
-                                    SIGMA * (noise + 3.0 * structure + 5.0 * apart[row / places])
+                                    SIGMA * (noise + 3.0 * structure + 5.0 * offsets[row / places])
                                 })
                                 .collect()
                         })
@@ -368,8 +369,8 @@ mod tests {
         }
     }
 
-    /// The degrees of freedom against the trace of both projectors multiplied out, where they do not commute: a run that comes to its places three times, one
-    /// that comes once, and readings that are left out.
+    /// The degrees of freedom against the trace of the explicit product of both projectors, in a case where they do not commute: one run
+    /// visits its positions three times, another once, and some readings are excluded.
     #[test]
     fn degrees_of_freedom_are_the_trace_of_both_projectors() {
         let places: Vec<usize> = (0..36).map(|row| row % 12).chain(0..12).collect();

@@ -1,19 +1,19 @@
-//! The trend that is taken out of every run before repeats are compared.
+//! The trend that is removed from every run before repeats are compared.
 
 use abbe_model::session::readings::Readings;
 
-/// Coefficients of the trend of a long run: constant, slope, curvature, and one cycle over the run.
+/// Terms of the trend of a long run: constant, slope, curvature, and sine and cosine of one cycle over the run.
 pub(super) const TERMS: usize = 5;
-/// How many of them are powers of time.
+/// Number of powers of time among the terms.
 const POWERS: usize = 3;
-/// The fewest readings of a run whose waves are looked at.
+/// Least number of readings of a run for the cycle and for the search for waves.
 pub(super) const MIN_RUN: usize = 24;
-/// Readings of a run for each of its powers: shorter runs lose fewer terms.
+/// Readings per power: shorter runs lose fewer powers.
 const READINGS_PER_POWER: usize = 5;
-/// The fewest readings of a run that loses its mean.
+/// Least number of readings of a run that loses its mean.
 const MIN_TREND: usize = 4;
 
-/// How many powers of time are taken out of a run of so many readings: 1 from 4 readings on, 2 from 10, 3 from 15.
+/// Number of powers of time for a run of so many readings: 1 from 4 readings on, 2 from 10, 3 from 15.
 fn powers(readings: usize) -> usize {
     match readings {
         0..MIN_TREND => 0,
@@ -21,7 +21,7 @@ fn powers(readings: usize) -> usize {
     }
 }
 
-/// The terms of a trend, orthonormal over given times (Gram–Schmidt, twice); those that the times are too few for are zero.
+/// The terms of a trend, orthonormal over the given times (Gram–Schmidt, twice). Terms that need more times are zero.
 pub(super) fn trend_terms(times: &[f64]) -> Vec<[f64; TERMS]> {
     let n = times.len() as f64;
     let powers = powers(times.len());
@@ -61,14 +61,14 @@ pub(super) fn trend_terms(times: &[f64]) -> Vec<[f64; TERMS]> {
 pub(super) struct Trends {
     /// The run of each row.
     run: Vec<usize>,
-    /// The terms of that run's trend at each row; zero for rows that do not count.
+    /// The terms of that run's trend at each row; zero for excluded rows.
     terms: Vec<[f64; TERMS]>,
-    /// The rows of each run that count.
+    /// The rows of each run that are not excluded.
     rows: Vec<Vec<usize>>,
 }
 
 impl Trends {
-    /// Of the rows that count. Readings without runs have no trend.
+    /// The trends over the rows that are not excluded. Readings without runs have no trend.
     pub fn of(readings: &Readings, kept: impl Fn(usize) -> bool) -> Trends {
         let mut trends = Trends {
             run: vec![0; readings.rows()],
@@ -92,8 +92,8 @@ impl Trends {
         trends
     }
 
-    /// Residuals less the trend of each run (and coordinate).
-    pub fn taken_out(&self, residual: &[f64], coordinates: usize) -> Vec<f64> {
+    /// Residuals without the trend of each run and coordinate.
+    pub fn removed_from(&self, residual: &[f64], coordinates: usize) -> Vec<f64> {
         let mut level = residual.to_vec();
         for rows in &self.rows {
             for coordinate in 0..coordinates {
@@ -112,12 +112,12 @@ impl Trends {
         level
     }
 
-    /// What a group of repeats contributes to the trace of `M·P`: `Σ_t P_tt − (1/R)·Σ_ts P_ts` over its R rows, with `P_ts = δ_ts − Σ_i q_ti q_si` for rows of
-    /// one run and `δ_ts` for others.
+    /// Contribution of a group of repeats to the trace of `M·P`: `Σ_t P_tt − (1/R)·Σ_ts P_ts` over its R rows. `P_ts` is
+    /// `δ_ts − Σ_i q_ti q_si` for rows of one run, and `δ_ts` for others.
     pub fn freedom_of(&self, group: &[usize]) -> f64 {
         let repeats = group.len() as f64;
         let mut own = 0.0;
-        // Σ_ts of the trends' part: for each run the squared length of the sum of its rows' terms.
+        // The trends' part of Σ_ts: for each run, the squared norm of the sum of its rows' terms.
         let mut sums: Vec<(usize, [f64; TERMS])> = Vec::new();
         for row in group {
             let terms = &self.terms[*row];
@@ -127,8 +127,8 @@ impl Trends {
                 None => sums.push((self.run[*row], *terms)),
             }
         }
-        let together: f64 = sums.iter().flat_map(|(_, sum)| sum).map(|q| q * q).sum();
-        (repeats - own) - (repeats - together) / repeats
+        let of_trends: f64 = sums.iter().flat_map(|(_, sum)| sum).map(|q| q * q).sum();
+        (repeats - own) - (repeats - of_trends) / repeats
     }
 }
 
@@ -137,10 +137,10 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_trend_is_a_parabola_and_one_cycle_and_nothing_else() {
+    fn a_trend_is_a_parabola_and_one_cycle() {
         let times: Vec<f64> = (0..60).map(|t| f64::from(t) * 1.5 + 7.0).collect();
         let q = trend_terms(&times);
-        let left = |of: &dyn Fn(f64) -> f64| -> f64 {
+        let remaining_share = |of: &dyn Fn(f64) -> f64| -> f64 {
             let values: Vec<f64> = times.iter().map(|t| of(*t)).collect();
             let along: [f64; TERMS] =
                 std::array::from_fn(|i| values.iter().zip(&q).map(|(value, q)| value * q[i]).sum());
@@ -148,18 +148,18 @@ mod tests {
                 .iter()
                 .zip(&q)
                 .map(|(value, q)| value - along.iter().zip(q).map(|(a, q)| a * q).sum::<f64>());
-            let (left, whole) = (
+            let (remaining, total) = (
                 rest.map(|r| r * r).sum::<f64>(),
                 values.iter().map(|v| v * v).sum::<f64>(),
             );
-            (left / whole).sqrt()
+            (remaining / total).sqrt()
         };
         // One cycle from the first reading to the last.
         let angle = |t: f64| std::f64::consts::TAU * (t - 7.0) / 88.5;
-        assert!(left(&|t| 3.0 - 0.2 * t + 0.01 * t * t) < 1e-12);
-        assert!(left(&|t| (angle(t) + 0.7).cos()) < 1e-12);
-        assert!(left(&|t| (4.0 * angle(t) + 0.7).cos()) > 0.9);
-        // A run of few readings loses no cycle, and one of fewer still no parabola, no slope, nothing.
+        assert!(remaining_share(&|t| 3.0 - 0.2 * t + 0.01 * t * t) < 1e-12);
+        assert!(remaining_share(&|t| (angle(t) + 0.7).cos()) < 1e-12);
+        assert!(remaining_share(&|t| (4.0 * angle(t) + 0.7).cos()) > 0.9);
+        // A run of few readings loses no cycle. Shorter runs also lose no parabola, no slope, or nothing.
         for (readings, terms) in [(23, 3), (15, 3), (14, 2), (10, 2), (9, 1), (4, 1), (3, 0), (1, 0)] {
             let few = trend_terms(&times[..readings]);
             let count: f64 = few.iter().flatten().map(|q| q * q).sum();

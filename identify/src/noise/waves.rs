@@ -1,7 +1,8 @@
-//! What comes and goes from run to run: waves along a run that no memory explains.
+//! Waves along runs that vary from run to run and that no autocorrelation explains.
 //!
-//! A wave whose size swells and fades is no line in a spectrum but a hump, some cycles wide, and an autoregression of two or three terms can imitate one.
-//! Deviations are therefore whitened with one term, whose spectrum only falls, and a hump is looked for in bands.
+//! A wave of varying amplitude has no line in the spectrum but a hump of some cycles' width. An autoregression of order two or three can
+//! imitate such a hump. The deviations are therefore whitened with order one, whose spectrum is monotonic, and the search for humps is by
+//! bands.
 
 use std::ops::Range;
 
@@ -12,78 +13,79 @@ use super::trends::MIN_RUN;
 use super::{Autocorrelation, PureError};
 use crate::outliers::median;
 
-/// Half cycles along a run where the bands may begin that are looked at in deviations, and how many half cycles wide they are.
+/// Half cycles along a run at which the candidate bands begin, and the widths of the bands in half cycles.
 const FIRST: std::ops::RangeInclusive<usize> = 2..=40;
 const WIDTHS: [usize; 3] = [1, 4, 8];
-/// Half cycles up to which the level is taken that a band has to stand out from.
+/// Half cycles up to which the median level is computed.
 const HIGHEST: usize = 100;
-/// The most bands that are taken out of a test.
+/// Maximum number of bands to remove from a test.
 const MAX_BANDS: usize = 4;
-/// Probability that anything is taken out of a test's noise.
+/// Significance level of a band, over all candidate bands.
 const BAND_SIGNIFICANCE: f64 = 1e-4;
 
-/// Rows of a test that were read in one go.
+/// Consecutive rows of one run of a test.
 #[derive(Clone)]
-struct Run {
+struct RunRows {
     test: usize,
     rows: Range<usize>,
 }
 
 impl PureError {
-    /// The same less waves along runs that no memory explains: what comes and goes from run to run is structure, and would be taken for noise. A band is taken
-    /// out of all tests, or of one, where the periodogram of their whitened deviations, summed over runs, stands out from the median of all ordinates.
+    /// Removes waves along runs that no autocorrelation explains: they vary from run to run, so they are structure that would count as
+    /// noise. A band is removed from all tests or from one. The criterion is the periodogram of the whitened deviations, summed over runs,
+    /// against the median of all ordinates.
     pub fn without_waves(mut self, tests: &[&Test], kept: impl Fn(usize, usize) -> bool) -> PureError {
-        let Some(mut memory) = self.autocorrelation_up_to(1, tests, &kept) else {
+        let Some(mut autocorrelation) = self.autocorrelation_up_to(1, tests, &kept) else {
             return self;
         };
-        let of_tests: Vec<Vec<Run>> = tests
+        let runs_of_tests: Vec<Vec<RunRows>> = tests
             .iter()
             .enumerate()
             .map(|(test, of)| {
                 let runs = of.readings.iter().flat_map(|readings| readings.runs());
                 let long = runs.filter(|run| run.len() >= MIN_RUN);
-                long.map(|rows| Run { test, rows }).collect()
+                long.map(|rows| RunRows { test, rows }).collect()
             })
             .collect();
-        for runs in std::iter::once(of_tests.concat()).chain(of_tests) {
+        for runs in std::iter::once(runs_of_tests.concat()).chain(runs_of_tests) {
             for _ in 0..MAX_BANDS {
-                let Some(band) = self.band(&runs, &memory) else {
+                let Some(band) = self.band(&runs, &autocorrelation) else {
                     break;
                 };
-                let independent: Vec<f64> = (self.deviations.iter().zip(&self.of_tests))
+                let independent: Vec<f64> = (self.deviations.iter().zip(&self.freedom_of_tests))
                     .map(|(deviations, freedom)| freedom / deviations.iter().flatten().count().max(1) as f64)
                     .collect();
                 for run in &runs {
-                    // Half cycles overlap: every second one of a band holds all of it.
+                    // Half cycles overlap: every second one of a band represents the whole band.
                     for half_cycles in band.clone().step_by(2) {
-                        if take_out(&mut self.deviations[run.test][run.rows.clone()], half_cycles) {
-                            // Of deviations that repeats hold more than once, their share of two degrees of freedom.
-                            self.of_tests[run.test] -= 2.0 * independent[run.test];
+                        if remove_wave(&mut self.deviations[run.test][run.rows.clone()], half_cycles) {
+                            // Repeats hold a deviation more than once, so a wave uses only its share of two degrees of freedom.
+                            self.freedom_of_tests[run.test] -= 2.0 * independent[run.test];
                         }
                     }
                 }
-                self.of_tests
+                self.freedom_of_tests
                     .iter_mut()
                     .for_each(|freedom| *freedom = freedom.max(0.0));
                 self.count();
-                let Some(of_rest) = self.autocorrelation_up_to(1, tests, &kept) else {
+                let Some(of_remaining) = self.autocorrelation_up_to(1, tests, &kept) else {
                     return self;
                 };
-                memory = of_rest;
+                autocorrelation = of_remaining;
             }
         }
         self
     }
 
-    /// The band, in half cycles, that stands out most in runs, if any does.
-    fn band(&self, runs: &[Run], memory: &Autocorrelation) -> Option<Range<usize>> {
+    /// The most significant band of runs, in half cycles, if any is significant.
+    fn band(&self, runs: &[RunRows], autocorrelation: &Autocorrelation) -> Option<Range<usize>> {
         let shortest = runs.iter().map(|run| run.rows.len()).min()?;
         let whitened: Vec<Vec<f64>> = runs
             .iter()
-            .map(|Run { test, rows }| {
+            .map(|RunRows { test, rows }| {
                 let deviation = |row: usize| self.deviations[*test][row].unwrap_or(0.0);
                 let past = |row: usize| -> f64 {
-                    let lags = memory.coefficients.iter().enumerate();
+                    let lags = autocorrelation.coefficients.iter().enumerate();
                     lags.filter(|(lag, _)| row > rows.start + lag)
                         .map(|(lag, a)| a * deviation(row - lag - 1))
                         .sum()
@@ -103,35 +105,35 @@ impl PureError {
         let sums: Vec<f64> = (first..HIGHEST.min(shortest))
             .map(|half_cycles| whitened.iter().map(|run| ordinate(run, half_cycles)).sum())
             .collect();
-        // Repeats hold the same deviation more than once: so many of these runs are independent.
-        let seen = self.deviations.iter().flatten().flatten().count().max(1);
-        let independent = runs.len() as f64 * self.freedom as f64 / seen as f64;
-        // Wilson and Hilferty's median of a gamma distribution.
+        // Repeats hold the same deviation more than once: this is the number of independent runs.
+        let deviations_count = self.deviations.iter().flatten().flatten().count().max(1);
+        let independent = runs.len() as f64 * self.freedom as f64 / deviations_count as f64;
+        // Median of a gamma distribution (Wilson and Hilferty).
         let median_of_gamma = independent * (1.0 - 1.0 / (9.0 * independent)).powi(3);
         let level = median(&mut sums.clone()) / median_of_gamma;
         if level <= 0.0 {
             return None;
         }
-        let looks = (FIRST.count() * WIDTHS.len()) as f64;
+        let candidates = (FIRST.count() * WIDTHS.len()) as f64;
         WIDTHS
             .into_iter()
             .flat_map(|width| sums.windows(width).take(FIRST.count()).enumerate())
             .map(|(begin, band)| {
-                // Of ordinates half a cycle apart every second one is independent.
+                // Of ordinates half a cycle apart, every second one is independent.
                 let cycles = (0.5 * band.len() as f64).max(1.0);
                 let mean = band.iter().sum::<f64>() / (band.len() as f64 * level);
-                let by_chance = gamma_ur(independent * cycles, mean * cycles);
-                (first + begin..first + begin + band.len(), by_chance)
+                let p_value = gamma_ur(independent * cycles, mean * cycles);
+                (first + begin..first + begin + band.len(), p_value)
             })
             .min_by(|a, b| a.1.total_cmp(&b.1))
-            .filter(|(_, by_chance)| *by_chance < BAND_SIGNIFICANCE / looks)
+            .filter(|(_, p_value)| *p_value < BAND_SIGNIFICANCE / candidates)
             .map(|(band, _)| band)
     }
 }
 
-/// Takes a wave of so many half cycles out of the deviations of a run, by least squares; what is left is rescaled for what the wave took of the noise.
-/// Returns whether there was anything to take it from.
-fn take_out(run: &mut [Option<f64>], half_cycles: usize) -> bool {
+/// Removes a wave of so many half cycles from the deviations of a run, by least squares. Rescales the rest for the variance that the wave
+/// removes. Returns whether the run has enough deviations.
+fn remove_wave(run: &mut [Option<f64>], half_cycles: usize) -> bool {
     let step = std::f64::consts::PI * half_cycles as f64 / run.len() as f64;
     let (mut cc, mut cs, mut ss, mut cy, mut sy) = (0.0, 0.0, 0.0, 0.0, 0.0);
     for (t, value) in run.iter().enumerate() {
@@ -167,25 +169,25 @@ fn take_out(run: &mut [Option<f64>], half_cycles: usize) -> bool {
 mod tests {
     use super::*;
 
-    /// Waves of whole cycles are orthogonal along a run: one goes, the other stays and is rescaled by `√(n/(n − 2))`.
+    /// Waves of whole cycles are orthogonal along a run: one is removed, the other remains, rescaled by `√(n/(n − 2))`.
     #[test]
-    fn a_wave_is_taken_out_and_no_other() {
+    fn only_the_wave_of_the_given_frequency_is_removed() {
         const N: usize = 48;
         let wave = |half_cycles: f64, t: usize| {
             (std::f64::consts::PI * half_cycles * t as f64 / N as f64 + 0.4).cos()
         };
         let mut run: Vec<Option<f64>> = (0..N).map(|t| Some(3.0 * wave(4.0, t) + wave(10.0, t))).collect();
-        take_out(&mut run, 4);
+        remove_wave(&mut run, 4);
         let rescale = (N as f64 / (N as f64 - 2.0)).sqrt();
-        for (t, left) in run.iter().enumerate() {
-            assert!((left.unwrap() - rescale * wave(10.0, t)).abs() < 1e-12);
+        for (t, value) in run.iter().enumerate() {
+            assert!((value.unwrap() - rescale * wave(10.0, t)).abs() < 1e-12);
         }
-        // Gaps stay gaps, and half a cycle may be taken out beside them.
+        // Gaps remain gaps, and half a cycle can be removed beside them.
         let mut run: Vec<Option<f64>> = (0..N).map(|t| (t % 5 != 0).then(|| wave(5.0, t))).collect();
-        take_out(&mut run, 5);
-        for (t, left) in run.iter().enumerate() {
-            assert_eq!(left.is_none(), t % 5 == 0);
-            assert!(left.unwrap_or(0.0).abs() < 1e-12);
+        remove_wave(&mut run, 5);
+        for (t, value) in run.iter().enumerate() {
+            assert_eq!(value.is_none(), t % 5 == 0);
+            assert!(value.unwrap_or(0.0).abs() < 1e-12);
         }
     }
 }

@@ -1,10 +1,10 @@
-//! The analysis of a plan: everything that can be said before anybody measures.
+//! The analysis of a plan: predicted uncertainties, identifiability and efficiency before the measurement.
 
 use abbe_model::instrument::Station;
 use abbe_model::sensitivity::SlotValues;
 use abbe_model::session::Session;
 
-use super::linear::{Linearisation, is_wanted};
+use super::linear::{Linearisation, is_of_interest};
 use super::results::{Correlation, ErrorAnalysis, LeaveOneOut, PlanAnalysis, TestSummary, VarianceInflation};
 use super::{budget, effects, identifiability, indices, sensitivity, states};
 use crate::error::IdentifyError;
@@ -15,18 +15,18 @@ use crate::problem::Problem;
 /// How a plan is analysed.
 #[derive(Clone, Debug)]
 pub struct PlanOptions {
-    /// Standard deviation of a reading, mm, in place of the session's.
+    /// Standard deviation of a reading, mm. It replaces that of the session.
     pub noise_mm: Option<f64>,
-    /// Pass over data where a test has a movement of its own.
+    /// Whether a test with a movement is analysed at its planned states even if it has data.
     pub planned_only: bool,
-    /// Whether undeclared effects of the library are looked at.
+    /// Whether the library's undeclared effects are screened.
     pub effects: bool,
-    /// Travel of the bar's sensor either way, mm, beyond which a test is warned of.
+    /// Travel of the bar's sensor in either direction, mm. A test that exceeds it causes a warning.
     pub reach_mm: f64,
 }
 
 impl Default for PlanOptions {
-    /// The session's noise, its data where there are any, effects, and the sensor's usual travel.
+    /// The session's noise, its data if present, effects included, and the usual sensor travel.
     fn default() -> Self {
         PlanOptions {
             noise_mm: None,
@@ -37,15 +37,15 @@ impl Default for PlanOptions {
     }
 }
 
-/// Travel of a ball bar's sensor either way.
+/// Travel of a ball bar's sensor in either direction.
 pub const BAR_TRAVEL_MM: f64 = 1.0;
-/// A variance that grows less than this without a test is not worth a word.
-const REPORT_RATIO: f64 = 1.5;
+/// Variance ratio below which the loss of a test is not reported.
+const MIN_REPORTED_RATIO: f64 = 1.5;
 
-/// Analyses a plan, or the states of a measured session.
+/// Analyses a plan or the states of a measured session.
 ///
 /// # Errors
-/// If a test has neither data nor a movement, a movement leaves the travel, or the model cannot be evaluated.
+/// If a test has neither data nor a movement, if a movement leaves the travel, or if the model cannot be evaluated.
 pub fn analyse(session: &Session, options: &PlanOptions) -> Result<PlanAnalysis, IdentifyError> {
     let (complete, noise) = prepared(session, options)?;
     let problem = states::problem_by_test(&complete, noise)?;
@@ -54,10 +54,10 @@ pub fn analyse(session: &Session, options: &PlanOptions) -> Result<PlanAnalysis,
         let found = if problem.noise.source == NoiseSource::Stated {
             "is assumed"
         } else {
-            "is what its data show"
+            "is estimated from its data"
         };
         let sigma_um = problem.noise.sigma_mm * 1e3;
-        let warning = format!("the session states no `noise_um`; {sigma_um:.2} µm {found}");
+        let warning = format!("the session states no `noise_um`: {sigma_um:.2} µm {found}");
         analysis.warnings.push(warning);
     }
     if options.effects {
@@ -66,7 +66,7 @@ pub fn analyse(session: &Session, options: &PlanOptions) -> Result<PlanAnalysis,
     Ok(analysis)
 }
 
-/// The complete session (see [`states::complete`]) and the noise that a plan is judged with.
+/// The complete session (see [`states::complete`]) and the noise model of the plan.
 ///
 /// # Errors
 /// If a test has neither data nor a movement, or a movement leaves the travel.
@@ -78,8 +78,8 @@ pub fn prepared(session: &Session, options: &PlanOptions) -> Result<(Session, No
     Ok((states::complete(session, options.planned_only)?, noise))
 }
 
-/// Analyses a problem whose folds are its tests (see [`states::problem_by_test`]), without effects; tests whose readings differ from the
-/// bar by more than `travel_mm` are warned of.
+/// Analyses a problem whose folds are its tests (see [`states::problem_by_test`]), without effects. A test causes a warning if
+/// the distance of its balls differs from the bar length by more than `travel_mm`.
 ///
 /// # Errors
 /// If the model cannot be evaluated.
@@ -87,10 +87,10 @@ pub fn analyse_problem(problem: &Problem<'_>, travel_mm: f64) -> Result<PlanAnal
     let list = &problem.parameters.list;
     let nominal = vec![0.0; list.len()];
     let linear = Linearisation::of(problem, &nominal)?;
-    let wanted: Vec<usize> = (0..list.len()).filter(|j| is_wanted(&list[*j])).collect();
+    let of_interest: Vec<usize> = (0..list.len()).filter(|j| is_of_interest(&list[*j])).collect();
     let found = sensitivity::sensitivities(problem, &nominal, &linear.covariance)?;
-    let conditional_u = budget::conditional_u(&linear, &wanted)?;
-    let errors = wanted
+    let conditional_u = budget::conditional_u(&linear, &of_interest)?;
+    let errors = of_interest
         .iter()
         .zip(conditional_u)
         .map(|(&j, conditional_u)| {
@@ -119,7 +119,7 @@ pub fn analyse_problem(problem: &Problem<'_>, travel_mm: f64) -> Result<PlanAnal
     for test in &tests {
         if let Some(reach_mm) = test.reach_mm.filter(|reach_mm| *reach_mm > travel_mm) {
             warnings.push(format!(
-                "{}: the balls come {reach_mm:.2} mm nearer or farther than the bar is long; its sensor travels {travel_mm} mm either way",
+                "{}: the distance of the balls differs from the bar length by up to {reach_mm:.2} mm; the sensor travels ±{travel_mm} mm",
                 test.name
             ));
         }
@@ -135,21 +135,21 @@ pub fn analyse_problem(problem: &Problem<'_>, travel_mm: f64) -> Result<PlanAnal
         errors,
         unidentifiable: identifiability::unidentifiable(problem, &linear.rank),
         determined_by_prior: identifiability::determined_by_prior(problem, &linear)?,
-        nearly_collinear: identifiability::nearly_collinear(problem, &linear, &wanted)?,
-        correlation: correlation(problem, &linear, &wanted),
+        nearly_collinear: identifiability::nearly_collinear(problem, &linear, &of_interest)?,
+        correlation: correlation(problem, &linear, &of_interest),
         indices: indices::indices(
             &linear,
-            &wanted,
+            &of_interest,
             problem.readings() * problem.coordinates(),
             found.g_efficiency,
         )?,
-        leave_one_out: leave_one_out(problem, &linear, &wanted)?,
+        leave_one_out: leave_one_out(problem, &linear, &of_interest)?,
         effects: None,
         warnings,
     })
 }
 
-/// What is mounted for a test: the workpiece ball or tracker, or the socket.
+/// The mounted object of a test: the workpiece ball or tracker, or the socket.
 fn mounted(test: &abbe_model::session::Test) -> &str {
     test.socket.as_deref().unwrap_or(&test.setup)
 }
@@ -180,28 +180,30 @@ fn summary(problem: &Problem<'_>, number: usize) -> TestSummary {
     }
 }
 
-fn correlation(problem: &Problem<'_>, linear: &Linearisation, wanted: &[usize]) -> Correlation {
-    let both_seen = |i: usize, j: usize| linear.rank.is_identifiable(i) && linear.rank.is_identifiable(j);
+fn correlation(problem: &Problem<'_>, linear: &Linearisation, of_interest: &[usize]) -> Correlation {
+    let both_identifiable =
+        |i: usize, j: usize| linear.rank.is_identifiable(i) && linear.rank.is_identifiable(j);
     Correlation {
-        ids: wanted
+        ids: of_interest
             .iter()
             .map(|j| problem.parameters.list[*j].id.clone())
             .collect(),
-        matrix: wanted
+        matrix: of_interest
             .iter()
             .map(|&i| {
-                let entry = |j: usize| both_seen(i, j).then(|| budget::correlation(&linear.covariance, i, j));
-                wanted.iter().map(|&j| entry(j)).collect()
+                let entry =
+                    |j: usize| both_identifiable(i, j).then(|| budget::correlation(&linear.covariance, i, j));
+                of_interest.iter().map(|&j| entry(j)).collect()
             })
             .collect(),
     }
 }
 
-/// Leaves out one test after another.
+/// Determines the uncertainties without each test in turn.
 fn leave_one_out(
     problem: &Problem<'_>,
     linear: &Linearisation,
-    wanted: &[usize],
+    of_interest: &[usize],
 ) -> Result<Vec<LeaveOneOut>, IdentifyError> {
     let list = &problem.parameters.list;
     if problem.tests.len() < 2 {
@@ -210,7 +212,7 @@ fn leave_one_out(
     (0..problem.tests.len())
         .map(|test| {
             let (rank, covariance) = linear.without(&[test])?;
-            let variance_inflation: Vec<VarianceInflation> = wanted
+            let variance_inflation: Vec<VarianceInflation> = of_interest
                 .iter()
                 .filter(|j| linear.rank.is_identifiable(**j))
                 .map(|&j| {
@@ -230,20 +232,23 @@ fn leave_one_out(
                 .iter()
                 .filter_map(|VarianceInflation { id, factor }| {
                     factor
-                        .filter(|factor| *factor >= REPORT_RATIO)
+                        .filter(|factor| *factor >= MIN_REPORTED_RATIO)
                         .map(|factor| format!("{id} {factor:.1} times"))
                 })
                 .collect();
             let name = &problem.tests[test].name;
             let mut words = Vec::new();
             if !all.is_empty() {
-                words.push(format!("{name} contributes all of {}", all.join(", ")));
+                words.push(format!("only {name} makes {} identifiable", all.join(", ")));
             }
             if !much.is_empty() {
-                words.push(format!("without {name} the variance grows: {}", much.join(", ")));
+                words.push(format!(
+                    "without {name} the variance increases: {}",
+                    much.join(", ")
+                ));
             }
             if words.is_empty() {
-                words.push(format!("without {name} no variance grows by half"));
+                words.push(format!("without {name} no variance increases by 50 %"));
             }
             Ok(LeaveOneOut {
                 test: name.clone(),

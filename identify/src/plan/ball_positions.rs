@@ -1,32 +1,32 @@
-//! Where a menu puts the carried ball, and where the axes that do not sweep stand.
+//! Positions of the carried ball in candidate tests, and positions of the rotary axes that do not sweep.
 
 use abbe_model::instrument::Station;
 use abbe_model::session::Session;
 
-use super::candidate_tests::CandidateTests;
+use super::candidate_tests::TestVariations;
 
-/// A ball nearer than this to one that is mounted already is that one, mm.
-const SAME_PLACE_MM: f64 = 0.5;
+/// Distance below which a ball position counts as one that is already mounted, mm.
+const SAME_POSITION_MM: f64 = 0.5;
 
-/// A place of the carried ball: where, and under which set-up.
-pub(super) struct Place {
+/// A position of the carried ball, with its set-up.
+pub(super) struct BallPosition {
     /// Centre, mm.
     pub ball: [f64; 3],
-    /// The set-up that it has in the session; empty where it is mounted anew.
+    /// The set-up of this position in the session. Empty for a new mount.
     pub setup: String,
-    /// Whether it is mounted anew.
+    /// Whether the ball has to be mounted for it.
     pub new: bool,
 }
 
-/// Where the carried ball may be: as it is mounted in the session, or anew about each rotary axis of its side.
-pub(super) fn places(
+/// The positions of the carried ball: as mounted in the session, or newly mounted about each rotary axis of its side.
+pub(super) fn ball_positions(
     session: &Session,
-    menu: &CandidateTests,
+    variations: &TestVariations,
     rotary: &[usize],
     on_table: bool,
-) -> Vec<Place> {
+) -> Vec<BallPosition> {
     let machine = &session.machine;
-    let mut places: Vec<Place> = Vec::new();
+    let mut positions: Vec<BallPosition> = Vec::new();
     for test in &session.tests {
         let Station::BallBar(bar) = &test.station else {
             continue;
@@ -36,8 +36,8 @@ pub(super) fn places(
         } else {
             (bar.spindle_ball, test.spindle_setup.clone())
         };
-        if on_table && !places.iter().any(|place| place.setup == setup) {
-            places.push(Place {
+        if on_table && !positions.iter().any(|position| position.setup == setup) {
+            positions.push(BallPosition {
                 ball,
                 setup,
                 new: false,
@@ -51,8 +51,8 @@ pub(super) fn places(
         let axis = &machine.axes[about];
         let across = across(axis.direction);
         let carries_table = on_table && about == 0;
-        for &radius in &menu.radii_mm {
-            for &height in &menu.heights_mm {
+        for &radius in &variations.radii_mm {
+            for &height in &variations.heights_mm {
                 let both = if carries_table || height == 0.0 {
                     &[1.0][..]
                 } else {
@@ -63,11 +63,11 @@ pub(super) fn places(
                     let ball: [f64; 3] = std::array::from_fn(|i| {
                         axis.origin_mm[i] + up * sign * height * axis.direction[i] + radius * across[i]
                     });
-                    let taken = places
+                    let present = positions
                         .iter()
-                        .any(|place| distance(place.ball, ball) < SAME_PLACE_MM);
-                    if !taken {
-                        places.push(Place {
+                        .any(|position| distance(position.ball, ball) < SAME_POSITION_MM);
+                    if !present {
+                        positions.push(BallPosition {
                             ball,
                             setup: String::new(),
                             new: true,
@@ -77,10 +77,10 @@ pub(super) fn places(
             }
         }
     }
-    places
+    positions
 }
 
-/// A unit vector square to an axis: R's Y where it can be, else Z.
+/// A unit vector perpendicular to an axis: the projection of R's Y, or of Z if the axis is close to Y.
 fn across(direction: [f64; 3]) -> [f64; 3] {
     let start = if direction[1].abs() < 0.5 {
         [0.0, 1.0, 0.0]
@@ -93,10 +93,10 @@ fn across(direction: [f64; 3]) -> [f64; 3] {
     rest.map(|x| x / length)
 }
 
-/// The positions of all axes with the other rotary ones where the menu has them stand.
-pub(super) fn standings(
+/// The positions of all axes, with the rotary axes other than the swept one at the candidate positions.
+pub(super) fn axis_positions(
     session: &Session,
-    menu: &CandidateTests,
+    variations: &TestVariations,
     rotary: &[usize],
     swept: usize,
 ) -> Vec<Vec<f64>> {
@@ -105,7 +105,7 @@ pub(super) fn standings(
     for &other in rotary.iter().filter(|axis| **axis != swept) {
         let mut more = Vec::new();
         for at in &all {
-            for degrees in &menu.standing_deg {
+            for degrees in &variations.standing_deg {
                 let position = degrees.to_radians();
                 let [low, high] = machine.axes[other]
                     .travel

@@ -1,30 +1,31 @@
-//! Where an uncertainty comes from.
+//! The uncertainty budget of each error.
 //!
-//! With the least-squares estimator `β̂ = Cov·(JᵀV⁻¹y + Σ e_s m_s/u_s²)` — `y` the readings, `m_s` what is known beforehand of set-up quantity `s` —
-//! the law of propagation (JCGM 100, 5.1.2) splits the covariance without remainder:
+//! The least-squares estimator is `β̂ = Cov·(JᵀV⁻¹y + Σ e_s m_s/u_s²)`, with `y` the readings and `m_s` the prior value of set-up
+//! quantity `s`. The law of propagation (JCGM 100, 5.1.2) divides the covariance without remainder:
 //!
 //! ```text
 //! Cov = Cov·JᵀV⁻¹J·Cov  +  Σ_s (Cov e_s)(Cov e_s)ᵀ/u_s²
 //!       noise               set-up quantity s
 //! ```
 //!
-//! Other errors have no spread of their own. What they cost is correlation: if error `j` were known, the variance of error `i` would fall by
-//! the share `ρ_ij²`; if all others were, to the reciprocal of `i`'s own entry in the information on the errors.
+//! Other errors contribute no variance of their own. They contribute through correlation. If error `j` were known, the variance
+//! of error `i` would decrease by the share `ρ_ij²`. If all other errors were known, it would be the reciprocal of `i`'s diagonal
+//! entry in the information on the errors.
 
 use faer::Mat;
 
-use super::linear::{Linearisation, is_wanted, marginal, prior_u};
+use super::linear::{Linearisation, is_of_interest, marginal, prior_u};
 use super::ranking::largest_first;
 use super::results::{Contribution, CorrelatedWith};
 use crate::error::IdentifyError;
 use crate::problem::Problem;
 
-/// Shares of the variance below this are not listed.
+/// Shares of the variance below this value are not listed.
 const MIN_SHARE: f64 = 1e-4;
-/// Correlations below this are not listed.
+/// Correlations below this value are not listed.
 const MIN_CORRELATION: f64 = 0.1;
 
-/// The parts of an error's uncertainty, the largest first.
+/// The contributions to an error's uncertainty, largest first.
 pub fn budget(problem: &Problem<'_>, linear: &Linearisation, error: usize) -> Vec<Contribution> {
     let list = &problem.parameters.list;
     let covariance = &linear.covariance;
@@ -51,7 +52,7 @@ pub fn budget(problem: &Problem<'_>, linear: &Linearisation, error: usize) -> Ve
     parts
 }
 
-/// `‖R·Cov·e‖²`, `R` the triangle of the readings alone.
+/// `‖R·Cov·e‖²`, with `R` the triangular factor of the readings alone.
 fn noise_variance(linear: &Linearisation, error: usize) -> f64 {
     let (r, _, _) = linear.readings.parts();
     let n = r.ncols();
@@ -65,7 +66,7 @@ fn noise_variance(linear: &Linearisation, error: usize) -> f64 {
         .sum()
 }
 
-/// The other errors that share an error's variance, the most correlated first.
+/// The errors that are correlated with an error, the most correlated first.
 pub fn correlated_with(problem: &Problem<'_>, linear: &Linearisation, error: usize) -> Vec<CorrelatedWith> {
     let mut shared: Vec<CorrelatedWith> = problem
         .parameters
@@ -73,7 +74,7 @@ pub fn correlated_with(problem: &Problem<'_>, linear: &Linearisation, error: usi
         .iter()
         .enumerate()
         .filter(|(other, parameter)| {
-            *other != error && is_wanted(parameter) && linear.rank.is_identifiable(*other)
+            *other != error && is_of_interest(parameter) && linear.rank.is_identifiable(*other)
         })
         .map(|(other, parameter)| CorrelatedWith {
             id: parameter.id.clone(),
@@ -85,7 +86,7 @@ pub fn correlated_with(problem: &Problem<'_>, linear: &Linearisation, error: usi
     shared
 }
 
-/// Correlation of two unknowns.
+/// Correlation of two parameters.
 pub fn correlation(covariance: &Mat<f64>, i: usize, j: usize) -> f64 {
     let product = covariance[(i, i)] * covariance[(j, j)];
     if product > 0.0 {
@@ -95,13 +96,13 @@ pub fn correlation(covariance: &Mat<f64>, i: usize, j: usize) -> f64 {
     }
 }
 
-/// The conditional standard uncertainty of each wanted error, all other wanted errors known, internal units.
+/// The conditional standard uncertainty of each error: all other errors of the list known, internal units.
 ///
 /// # Errors
 /// If the decomposition fails.
-pub fn conditional_u(linear: &Linearisation, wanted: &[usize]) -> Result<Vec<f64>, IdentifyError> {
-    let r = marginal(linear.whole.parts().0.as_ref(), wanted, &linear.size)?;
-    Ok((0..wanted.len())
+pub fn conditional_u(linear: &Linearisation, of_interest: &[usize]) -> Result<Vec<f64>, IdentifyError> {
+    let r = marginal(linear.whole.parts().0.as_ref(), of_interest, &linear.size)?;
+    Ok((0..of_interest.len())
         .map(|j| 1.0 / (0..=j).map(|i| r[(i, j)].powi(2)).sum::<f64>().sqrt())
         .collect())
 }

@@ -1,9 +1,9 @@
-//! A menu made ready: the information of every entry, evaluated once.
+//! The information of every candidate test, evaluated once.
 
 use rayon::prelude::*;
 
-use super::candidate_tests::{CandidateTests, Entry};
-use super::information::{Root, Shared, sum};
+use super::candidate_tests::{CandidateTest, TestVariations};
+use super::information::{Root, SharedParameters, sum};
 use super::linear::{Linearisation, merged};
 use super::ranking::smallest_first;
 use crate::error::IdentifyError;
@@ -11,76 +11,77 @@ use crate::parameters::{Parameter, Role};
 use crate::problem::Problem;
 use crate::triangle::Triangle;
 
-/// A menu made ready: the information of every entry on the shared unknowns.
-pub struct Prepared {
-    /// The shared unknowns.
-    pub shared: Shared,
-    /// The plan's own information.
+/// The information of every candidate test on the shared parameters.
+pub struct PreparedCandidates {
+    /// The shared parameters.
+    pub shared: SharedParameters,
+    /// The information of the plan itself.
     pub base: Root,
-    /// The entries.
-    pub entries: Vec<CandidateInformation>,
+    /// The candidate tests.
+    pub candidates: Vec<CandidateInformation>,
 }
 
-/// An entry with its information.
+/// A candidate test with its information.
 pub struct CandidateInformation {
-    /// The entry; its name says what is left mounted.
-    pub entry: Entry,
+    /// The test. Its name states which ball stays mounted.
+    pub test: CandidateTest,
     /// Its information.
     pub root: Root,
 }
 
-impl Prepared {
-    /// The menu of a problem whose folds are its tests, at the unknowns' values `beta`. `asked` are the unknowns that the goal is about.
+impl PreparedCandidates {
+    /// Evaluates the candidate tests for a problem whose folds are its tests, at the parameter values `beta`. `targets` are the
+    /// parameters of the goal.
     ///
     /// # Errors
     /// If the model cannot be evaluated.
     pub fn new(
         problem: &Problem<'_>,
         beta: &[f64],
-        entries: Vec<Entry>,
-        menu: &CandidateTests,
-        asked: &[usize],
-    ) -> Result<Prepared, IdentifyError> {
+        tests: Vec<CandidateTest>,
+        variations: &TestVariations,
+        targets: &[usize],
+    ) -> Result<PreparedCandidates, IdentifyError> {
         let list = &problem.parameters.list;
         let kept: Vec<usize> = (0..list.len())
-            .filter(|j| !asked.contains(j) && may_be_shared(problem, &list[*j]))
+            .filter(|j| !targets.contains(j) && may_be_shared(problem, &list[*j]))
             .collect();
-        let shared = Shared::of(problem, &kept, asked);
+        let shared = SharedParameters::of(problem, &kept, targets);
         let linear = Linearisation::of(problem, beta)?;
         let base = shared.root_of(problem, &linear)?;
-        let ready: Vec<Vec<CandidateInformation>> = entries
+        let ready: Vec<Vec<CandidateInformation>> = tests
             .into_par_iter()
-            .map(|entry| ready(problem, &shared, entry, menu))
+            .map(|candidate| ready(problem, &shared, candidate, variations))
             .collect::<Result<_, IdentifyError>>()?;
-        Ok(Prepared {
+        Ok(PreparedCandidates {
             shared,
             base,
-            entries: ready.into_iter().flatten().collect(),
+            candidates: ready.into_iter().flatten().collect(),
         })
     }
 
-    /// The plan with some entries added.
-    pub fn with(&self, entries: &[usize]) -> Root {
-        entries.iter().fold(self.base.clone(), |root, entry| {
-            sum(root.as_ref(), self.entries[*entry].root.as_ref())
+    /// The plan with some candidate tests added.
+    pub fn with(&self, candidates: &[usize]) -> Root {
+        candidates.iter().fold(self.base.clone(), |root, candidate| {
+            sum(root.as_ref(), self.candidates[*candidate].root.as_ref())
         })
     }
 
-    /// Some information with an entry added.
-    pub fn added(&self, root: &Root, entry: usize) -> Root {
-        sum(root.as_ref(), self.entries[entry].root.as_ref())
+    /// The information `root` with a candidate test added.
+    pub fn added(&self, root: &Root, candidate: usize) -> Root {
+        sum(root.as_ref(), self.candidates[candidate].root.as_ref())
     }
 
-    /// A figure of some information with each entry added.
+    /// A figure of the information with each candidate test added.
     pub fn figures<T: Send>(&self, root: &Root, figure: &(impl Fn(&Root) -> T + Sync)) -> Vec<T> {
-        (0..self.entries.len())
+        (0..self.candidates.len())
             .into_par_iter()
-            .map(|entry| figure(&self.added(root, entry)))
+            .map(|candidate| figure(&self.added(root, candidate)))
             .collect()
     }
 
-    /// The entry after which a figure (the smaller the better) stands best, and the figures of all. Of equal ones the first of the menu, which lists
-    /// mounted balls before those that are mounted anew.
+    /// The candidate test with the smallest figure, and the figures of all. Of equal tests the first counts. Mounted balls come
+    /// before newly mounted ones.
     pub fn best(&self, root: &Root, figure: &(impl Fn(&Root) -> f64 + Sync)) -> Option<(usize, Vec<f64>)> {
         let figures = self.figures(root, figure);
         let best = (0..figures.len()).min_by(|a, b| smallest_first(figures[*a], figures[*b]))?;
@@ -88,7 +89,8 @@ impl Prepared {
     }
 }
 
-/// Whether a new test can share an unknown: errors and effects, a mounted workpiece ball, the spindle ball of the last test, the sensor.
+/// Whether a new test can share a parameter: errors and effects, a mounted workpiece ball, the spindle ball of the last test, the
+/// sensor.
 fn may_be_shared(problem: &Problem<'_>, parameter: &Parameter) -> bool {
     if parameter.role != Role::Setup {
         return true;
@@ -102,20 +104,20 @@ fn may_be_shared(problem: &Problem<'_>, parameter: &Parameter) -> bool {
         || !parameter.id.contains('[')
 }
 
-/// The information of an entry, with a spindle ball mounted for it and, where the menu allows it, with the one that is left mounted. The
-/// readings are the same.
+/// The information of a candidate test with a newly mounted spindle ball and, if permitted, with the spindle ball that stays
+/// mounted. The readings are the same.
 fn ready(
     problem: &Problem<'_>,
-    shared: &Shared,
-    entry: Entry,
-    menu: &CandidateTests,
+    shared: &SharedParameters,
+    candidate: CandidateTest,
+    variations: &TestVariations,
 ) -> Result<Vec<CandidateInformation>, IdentifyError> {
     let mut session = problem.session.clone();
-    session.tests = vec![entry.test.clone()];
+    session.tests = vec![candidate.test.clone()];
     session.effects = Vec::new();
     session.socket_distances = Vec::new();
     let mut noise = problem.noise.clone();
-    noise.sigma_mm /= (menu.thin.max(1) as f64).sqrt();
+    noise.sigma_mm /= (variations.thin.max(1) as f64).sqrt();
     let mut alone = Problem::new(&session, noise, 0)?;
     alone.origin = problem.origin;
     for effect in &problem.parameters.effects {
@@ -126,22 +128,32 @@ fn ready(
     let r = triangle.parts().0;
     let mut ready = Vec::new();
     let last = problem.tests.last().filter(|last| {
-        menu.keep_spindle_ball && last.station.tool_point_mm() == entry.test.station.tool_point_mm()
+        variations.keep_spindle_ball && last.station.tool_point_mm() == candidate.test.station.tool_point_mm()
     });
     if let Some(last) = last {
-        let [own, left] = [&entry.test.spindle_setup, &last.spindle_setup].map(|setup| format!("[{setup}]"));
+        let [own, mounted_setup] =
+            [&candidate.test.spindle_setup, &last.spindle_setup].map(|setup| format!("[{setup}]"));
         let root = shared.root_of_test(&alone, r.as_ref(), |id| match id.strip_suffix(&own) {
-            Some(id_stem) if id.starts_with("spindle_ball.") => format!("{id_stem}{left}"),
+            Some(id_stem) if id.starts_with("spindle_ball.") => format!("{id_stem}{mounted_setup}"),
             _ => id.to_string(),
         });
-        let mut entry = entry.clone();
-        entry.test.spindle_setup = last.spindle_setup.clone();
-        entry
+        let mut candidate = candidate.clone();
+        candidate.test.spindle_setup = last.spindle_setup.clone();
+        candidate
             .name
-            .push_str(&format!(", spindle ball left as in {}", last.name));
-        ready.push(CandidateInformation { entry, root });
+            .push_str(&format!(", spindle ball left mounted as in {}", last.name));
+        ready.push(CandidateInformation {
+            test: candidate,
+            root,
+        });
     }
     let root = shared.root_of_test(&alone, r.as_ref(), str::to_string);
-    ready.insert(0, CandidateInformation { entry, root });
+    ready.insert(
+        0,
+        CandidateInformation {
+            test: candidate,
+            root,
+        },
+    );
     Ok(ready)
 }

@@ -1,4 +1,4 @@
-//! The choices of a menu laid out as tests: where the ball is, which axis sweeps, where the others stand, which bar, on which side.
+//! Generates the candidate tests: ball position, swept axis, positions of the other axes, bar, and side.
 
 use abbe_model::axis::AxisKind;
 use abbe_model::instrument::Station;
@@ -7,27 +7,28 @@ use abbe_model::session::expression::Length;
 use abbe_model::session::motion::{FollowOffset, Motion};
 use abbe_model::session::{Prior, Session, Test, placing};
 
-use super::ball_positions::{Place, dot, norm, places, standings};
-use super::candidate_tests::CandidateTests;
+use super::ball_positions::{BallPosition, axis_positions, ball_positions, dot, norm};
+use super::candidate_tests::TestVariations;
 use super::sweep::{Sweep, sweep_of};
 
-/// Least radius about a swept axis that a test is made at, mm: nearer, the bar hardly moves.
+/// Least radius about the swept axis, mm. At smaller radii the bar hardly moves.
 const MIN_RADIUS_MM: f64 = 10.0;
-/// Shortest bar with which linear axes follow, mm: the shortest of the kits, less what calibration may take off. Nearer, the cups touch.
+/// Shortest bar with which linear axes follow, mm: the shortest nominal length less its calibration deviation. With a shorter bar
+/// the cups touch.
 const MIN_FOLLOWING_MM: f64 = 49.0;
 
-/// An entry before its states are planned.
+/// A candidate test without its states.
 pub(super) struct Draft {
-    /// The test, without its states.
+    /// The test without its states.
     pub test: Test,
-    /// In words.
+    /// Description of the test.
     pub name: String,
-    /// Whether a ball has to be mounted anew.
+    /// Whether a ball has to be mounted for it.
     pub new_setup: bool,
 }
 
-/// Everything that the menu's choices come to, before travel and reach are checked.
-pub(super) fn drafts(session: &Session, menu: &CandidateTests, last: &Test) -> Vec<Draft> {
+/// All combinations of the permitted choices, before travel and reach are checked.
+pub(super) fn drafts(session: &Session, variations: &TestVariations, last: &Test) -> Vec<Draft> {
     let machine = &session.machine;
     let rotary: Vec<usize> = (0..machine.axes.len())
         .filter(|axis| machine.axes[*axis].kind == AxisKind::Rotary)
@@ -35,39 +36,46 @@ pub(super) fn drafts(session: &Session, menu: &CandidateTests, last: &Test) -> V
     let mut drafts = Vec::new();
     for &axis in &rotary {
         let whole = sweep_of(session, axis);
-        let sweeps: Vec<Sweep> = menu
+        let sweeps: Vec<Sweep> = variations
             .ranges
             .iter()
-            .flat_map(|share| menu.both_directions.iter().map(|both| whole.part(*share, *both)))
+            .flat_map(|share| {
+                variations
+                    .both_directions
+                    .iter()
+                    .map(|both| whole.part(*share, *both))
+            })
             .collect();
         let on_table = axis < machine.workpiece_side;
-        for place in places(session, menu, &rotary, on_table) {
-            for at in standings(session, menu, &rotary, axis) {
+        for ball in ball_positions(session, variations, &rotary, on_table) {
+            for at in axis_positions(session, variations, &rotary, axis) {
                 for (sweep, &feed) in sweeps
                     .iter()
-                    .flat_map(|sweep| menu.feeds.iter().map(|feed| (*sweep, feed)))
+                    .flat_map(|sweep| variations.feeds.iter().map(|feed| (*sweep, feed)))
                 {
-                    let place = &place;
+                    let ball = &ball;
                     let mut at = at.clone();
                     at[axis] = sweep.from;
-                    let base = Base {
+                    let choice = Choice {
                         session,
                         last,
                         axis,
                         sweep,
                         feed,
                         on_table,
-                        place,
+                        ball,
                         at: &at,
                     };
                     drafts.extend(
-                        menu.bars_mm
+                        variations
+                            .bars_mm
                             .iter()
-                            .flat_map(|nominal| base.on_axis(menu, *nominal)),
+                            .flat_map(|nominal| choice.on_axis(variations, *nominal)),
                     );
                     let upright = at.iter().enumerate().all(|(k, q)| k == axis || *q == 0.0);
-                    if let Some(nominal) = following_bar(menu).filter(|_| menu.follow && upright) {
-                        drafts.extend(base.following(menu, nominal));
+                    if let Some(nominal) = following_bar(variations).filter(|_| variations.follow && upright)
+                    {
+                        drafts.extend(choice.following(variations, nominal));
                     }
                 }
             }
@@ -76,11 +84,12 @@ pub(super) fn drafts(session: &Session, menu: &CandidateTests, last: &Test) -> V
     drafts
 }
 
-/// The bar for tests in which linear axes follow, where its length changes nothing but how far the balls are apart: the shortest that keeps
-/// them 100 mm apart, else the longest that keeps their cups apart.
-fn following_bar(menu: &CandidateTests) -> Option<f64> {
+/// The bar for tests in which linear axes follow. Its length only sets the distance of the balls. It is the shortest bar of at
+/// least 99 mm, otherwise the longest bar that keeps the cups apart.
+fn following_bar(variations: &TestVariations) -> Option<f64> {
     let bars = || {
-        menu.bars_mm
+        variations
+            .bars_mm
             .iter()
             .copied()
             .filter(|bar| *bar >= MIN_FOLLOWING_MM)
@@ -91,20 +100,20 @@ fn following_bar(menu: &CandidateTests) -> Option<f64> {
         .or_else(|| bars().max_by(f64::total_cmp))
 }
 
-struct Base<'b> {
+struct Choice<'b> {
     session: &'b Session,
     last: &'b Test,
     axis: usize,
     sweep: Sweep,
-    /// Times the speed of the sweep.
+    /// Multiple of the sweep's speed.
     feed: f64,
     on_table: bool,
-    place: &'b Place,
+    ball: &'b BallPosition,
     at: &'b [f64],
 }
 
-impl Base<'_> {
-    /// The bar of the kit as the session has calibrated it, if it has.
+impl Choice<'_> {
+    /// The calibrated length of the bar in the session, or its nominal length.
     fn length(&self, nominal: f64) -> f64 {
         let bars = self.session.tests.iter().filter_map(|test| match &test.station {
             Station::BallBar(bar) => Some(bar.bar),
@@ -126,9 +135,9 @@ impl Base<'_> {
         };
         bar.bar = self.length(nominal);
         if self.on_table {
-            bar.workpiece_ball = self.place.ball;
+            bar.workpiece_ball = self.ball.ball;
         } else {
-            bar.spindle_ball = self.place.ball;
+            bar.spindle_ball = self.ball.ball;
         }
         bar
     }
@@ -163,17 +172,17 @@ impl Base<'_> {
         if self.sweep.is_part || !self.sweep.both_directions {
             let [from, to] = [self.sweep.from, self.sweep.to].map(f64::to_degrees);
             let ways = if self.sweep.both_directions {
-                "both ways"
+                "in both directions"
             } else {
-                "one way"
+                "in one direction"
             };
             name.push_str(&format!(", swept {from:.0} … {to:.0}° {ways}").replace('-', "−"));
         }
         if self.feed != 1.0 {
             name.push_str(&format!(", at {} times the feed", self.feed));
         }
-        if !self.place.new {
-            name.push_str(&format!(" ({ball} as in {})", self.place.setup));
+        if !self.ball.new {
+            name.push_str(&format!(" ({ball} as in {})", self.ball.setup));
         }
         let geometry = Station::BallBar(BallBar {
             workpiece_ball: station.workpiece_ball.map(Length::Number),
@@ -181,8 +190,8 @@ impl Base<'_> {
             bar: Length::Number(station.bar),
         });
         let unique = "proposed".to_string();
-        let setup = match (self.on_table, self.place.new) {
-            (true, false) => self.place.setup.clone(),
+        let setup = match (self.on_table, self.ball.new) {
+            (true, false) => self.ball.setup.clone(),
             (true, true) => unique.clone(),
             (false, _) => self.last.setup.clone(),
         };
@@ -204,11 +213,11 @@ impl Base<'_> {
         Draft {
             test,
             name,
-            new_setup: self.place.new,
+            new_setup: self.ball.new,
         }
     }
 
-    /// What is known of the set-up: as in the session's tests; of the bar, as of the same bar there.
+    /// The set-up priors: those of the session's last test, and for the bar those of the same bar.
     fn priors(&self, nominal: f64) -> Vec<Prior> {
         let mut priors = self.last.priors.clone();
         let same_bar = self.session.tests.iter().find(|test| match &test.station {
@@ -221,8 +230,9 @@ impl Base<'_> {
         priors
     }
 
-    /// The other ball on the swept axis: at the foot of the circle where the bar is as long as the radius, else beside it.
-    fn on_axis(&self, menu: &CandidateTests, nominal: f64) -> Vec<Draft> {
+    /// Places the other ball on the swept axis: in the plane of the circle if the bar is as long as the radius, otherwise beside
+    /// that plane.
+    fn on_axis(&self, variations: &TestVariations, nominal: f64) -> Vec<Draft> {
         let machine = &self.session.machine;
         let station = self.station(nominal);
         let (origin, along) = placing::axis_line(machine, self.at, self.axis);
@@ -232,10 +242,10 @@ impl Base<'_> {
         let height = dot(from, along);
         let radial: [f64; 3] = std::array::from_fn(|i| from[i] - height * along[i]);
         let radius = norm(radial);
-        if radius < MIN_RADIUS_MM || station.bar < radius - menu.reach_mm {
+        if radius < MIN_RADIUS_MM || station.bar < radius - variations.reach_mm {
             return Vec::new();
         }
-        let beside = if (station.bar - radius).abs() <= menu.reach_mm {
+        let beside = if (station.bar - radius).abs() <= variations.reach_mm {
             vec![0.0]
         } else {
             let beside = (station.bar.powi(2) - radius.powi(2)).sqrt();
@@ -245,18 +255,18 @@ impl Base<'_> {
         beside
             .into_iter()
             .filter_map(|beside| {
-                // From the carried ball to the other one.
+                // The vector from the carried ball to the other one.
                 let across: [f64; 3] = std::array::from_fn(|i| beside * along[i] - radial[i]);
                 let wanted = if self.on_table { across } else { across.map(|x| -x) };
                 if outward.is_some_and(|outward| dot(wanted, outward) < -MIN_RADIUS_MM) {
                     return None;
                 }
-                let at = placing::standing(machine, &station, self.at, wanted)?;
+                let at = placing::positions_for_bar(machine, &station, self.at, wanted)?;
                 let motion = Motion::Sweep {
                     axis: self.axis,
                     from: self.sweep.from,
                     to: self.sweep.to,
-                    step: self.sweep.step * menu.thin.max(1) as f64,
+                    step: self.sweep.step * variations.thin.max(1) as f64,
                     speed: self.sweep.speed * self.feed,
                     runs: self.sweep.runs,
                     both_directions: self.sweep.both_directions,
@@ -276,7 +286,7 @@ impl Base<'_> {
             .collect()
     }
 
-    /// Where the table's axis stands on end and carries the ball itself, the way out of the table: no other ball lies below it.
+    /// The outward direction of a vertical table axis that carries the ball itself. No other ball can be below the table.
     fn outward(&self) -> Option<[f64; 3]> {
         let machine = &self.session.machine;
         let table = machine
@@ -290,8 +300,8 @@ impl Base<'_> {
         })
     }
 
-    /// The linear axes keep the bar radial, tangential or axial.
-    fn following(&self, menu: &CandidateTests, nominal: f64) -> Vec<Draft> {
+    /// Tests in which the linear axes keep the bar radial, tangential or axial.
+    fn following(&self, variations: &TestVariations, nominal: f64) -> Vec<Draft> {
         let offsets = [
             (FollowOffset::Radial, "radial"),
             (FollowOffset::Tangential, "tangential"),
@@ -304,7 +314,7 @@ impl Base<'_> {
                     axis: self.axis,
                     from: self.sweep.from,
                     to: self.sweep.to,
-                    step: self.sweep.step * menu.thin.max(1) as f64,
+                    step: self.sweep.step * variations.thin.max(1) as f64,
                     speed: self.sweep.speed * self.feed,
                     runs: self.sweep.runs,
                     both_directions: self.sweep.both_directions,

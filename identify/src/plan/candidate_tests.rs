@@ -1,8 +1,9 @@
-//! The menu of ball-bar tests from which a next one is proposed: what may be varied, and which of it the machine can do.
+//! The candidate ball-bar tests for the next measurement: the permitted variations, and those that the machine can perform.
 //!
-//! An entry sweeps one rotary axis while the other ball stands on that axis (at the foot of the circle or beside it, as the bar's length
-//! demands), or lets the linear axes keep the bar radial, tangential or axial. A part of the range, or one direction, never sees more than
-//! the whole: they are tried where gain is judged by the minute. What an axis' travel forbids, or a bar cannot reach, is not among the candidate tests.
+//! A candidate test sweeps one rotary axis. The other ball is on that axis, in the plane of the circle or beside it, as the bar
+//! length requires. Alternatively the linear axes keep the bar radial, tangential or axial. A part of the range, or one
+//! direction, never gives more information than the whole. Such tests are candidates only if the gain per minute decides. Tests
+//! beyond the travel of an axis or the reach of the bar are not candidates.
 
 use abbe_model::axis::AxisKind;
 use abbe_model::effect::{Component, Driver, Effect, Shape};
@@ -16,41 +17,42 @@ use crate::error::IdentifyError;
 use crate::parameters::Role;
 use crate::problem::Problem;
 
-/// What may be varied. Lengths in mm, times in min.
+/// The permitted variations. Lengths in mm, times in min.
 #[derive(Clone, Debug)]
-pub struct CandidateTests {
+pub struct TestVariations {
     /// Bars of the kit, nominal lengths.
     pub bars_mm: Vec<f64>,
-    /// Distances of the ball from the axis that it is mounted about.
+    /// Distances of the ball from the axis about which it is mounted.
     pub radii_mm: Vec<f64>,
-    /// Heights of the ball along that axis, both ways except below the table.
+    /// Heights of the ball along that axis, in both directions except below the table.
     pub heights_mm: Vec<f64>,
-    /// Where the other rotary axis stands.
+    /// Positions of the other rotary axis.
     pub standing_deg: Vec<f64>,
-    /// Feeds, as multiples of that of the session's tests; more than one where something depends on it (see [`CandidateTests::for_effects`]).
+    /// Feeds as multiples of that of the session's tests. Several if an effect depends on the feed (see
+    /// [`TestVariations::for_effects`]).
     pub feeds: Vec<f64>,
-    /// Shares of the swept range, about its middle.
+    /// Shares of the sweep range, about its middle.
     pub ranges: Vec<f64>,
-    /// Whether each run comes back: `true` both ways, `false` one way.
+    /// Directions of travel: `true` for both, `false` for one.
     pub both_directions: Vec<bool>,
-    /// Whether linear axes may follow.
+    /// Whether linear axes may follow the swept axis.
     pub follow: bool,
-    /// Whether a test may leave the spindle ball mounted from the last test before it.
+    /// Whether a test may use the spindle ball of the last test without a new mount.
     pub keep_spindle_ball: bool,
-    /// Travel of a bar's sensor either way.
+    /// Travel of a bar's sensor in either direction.
     pub reach_mm: f64,
-    /// Mounting a ball anew.
+    /// Time to mount a ball.
     pub setup_min: f64,
-    /// Preparing a test: bar, position, feed-in.
+    /// Time to prepare a test: bar, position, feed-in.
     pub test_min: f64,
-    /// Evaluate every n-th position only, its information counted n times.
+    /// Only every n-th position is evaluated, and its information counts n times.
     pub thin: usize,
 }
 
-impl Default for CandidateTests {
-    /// A kit of 50, 100, 150 and 300 mm; a set-up takes five minutes, preparing a test one.
+impl Default for TestVariations {
+    /// A kit of 50, 100, 150 and 300 mm. A new mount takes five minutes, the preparation of a test one minute.
     fn default() -> Self {
-        CandidateTests {
+        TestVariations {
             bars_mm: vec![50.0, 100.0, 150.0, 300.0],
             radii_mm: vec![50.0, 75.0, 100.0, 150.0],
             heights_mm: vec![0.0, 50.0, 100.0, 200.0],
@@ -68,9 +70,9 @@ impl Default for CandidateTests {
     }
 }
 
-impl CandidateTests {
-    /// The same menu with a second feed, if one of the effects depends on speed or time.
-    pub fn for_effects<'e>(mut self, effects: impl IntoIterator<Item = &'e Effect>) -> CandidateTests {
+impl TestVariations {
+    /// The same variations with a second feed, if one of the effects depends on speed or time.
+    pub fn for_effects<'e>(mut self, effects: impl IntoIterator<Item = &'e Effect>) -> TestVariations {
         let depends = |effect: &Effect| {
             effect.shape == Shape::Lag
                 || effect.driver == Driver::Time
@@ -82,15 +84,15 @@ impl CandidateTests {
         self
     }
 
-    /// A short menu, every fourth position: to name a test beside a result, not to choose the last per cent.
-    pub fn short() -> CandidateTests {
-        CandidateTests {
+    /// Fewer variations and every fourth position: enough to name a test with a result, not to optimise it.
+    pub fn short() -> TestVariations {
+        TestVariations {
             radii_mm: vec![50.0, 100.0, 150.0],
             heights_mm: vec![0.0, 100.0],
             standing_deg: vec![0.0],
             keep_spindle_ball: false,
             thin: 4,
-            ..CandidateTests::default()
+            ..TestVariations::default()
         }
     }
 }
@@ -98,20 +100,21 @@ impl CandidateTests {
 /// The second feed, as a multiple of the first.
 const SECOND_FEED: f64 = 3.0;
 
-/// A test that can be made.
+/// A candidate test.
 #[derive(Clone, Debug)]
-pub struct Entry {
-    /// In words: `C150 with the workpiece ball at radius 50 mm`.
+pub struct CandidateTest {
+    /// Description, for example `C150 with the workpiece ball at radius 50 mm`.
     pub name: String,
     /// The test with its planned states.
     pub test: Test,
-    /// Whether a ball has to be mounted anew.
+    /// Whether a ball has to be mounted for it.
     pub new_setup: bool,
-    /// What it takes, min.
+    /// Duration, min.
     pub minutes: f64,
 }
 
-/// Whether tests can be proposed for a problem: it has errors to identify, the instrument is a ball bar, and a rotary axis can be swept.
+/// Whether candidate tests exist for a problem: it has errors to identify, the instrument is a ball bar, and a rotary axis can be
+/// swept.
 pub fn has_candidates(problem: &Problem<'_>) -> bool {
     let session = problem.session;
     let has_errors = problem
@@ -129,36 +132,40 @@ pub fn has_candidates(problem: &Problem<'_>) -> bool {
             .any(|axis| axis.kind == AxisKind::Rotary)
 }
 
-/// The entries that a session's machine can do. The session is complete (see [`states::complete`]).
+/// The candidate tests that a session's machine can perform. The session is complete (see [`states::complete`]).
 ///
 /// # Errors
 /// If the instrument is no ball bar, or no rotary axis can be swept.
-pub fn entries(session: &Session, menu: &CandidateTests) -> Result<Vec<Entry>, IdentifyError> {
+pub fn candidate_tests(
+    session: &Session,
+    variations: &TestVariations,
+) -> Result<Vec<CandidateTest>, IdentifyError> {
     let Some(last) = session
         .tests
         .last()
         .filter(|test| matches!(test.station, Station::BallBar(_)))
     else {
         return Err(IdentifyError::Request(
-            "a next test can be proposed for ball bars only; this session has another instrument".to_string(),
+            "candidate tests are available for ball bars only; this session uses another instrument"
+                .to_string(),
         ));
     };
-    let drafts = drafts(session, menu, last);
-    let entries: Vec<Entry> = drafts
+    let drafts = drafts(session, variations, last);
+    let tests: Vec<CandidateTest> = drafts
         .into_par_iter()
-        .filter_map(|draft| finished(session, menu, draft))
+        .filter_map(|draft| finished(session, variations, draft))
         .collect();
-    if entries.is_empty() {
+    if tests.is_empty() {
         return Err(IdentifyError::Request(
-            "no candidate test can be made on this machine: no bar reaches, or the travel is too short"
+            "no candidate test is feasible on this machine: no bar reaches, or the travel is too short"
                 .to_string(),
         ));
     }
-    Ok(entries)
+    Ok(tests)
 }
 
-/// Plans an entry's states; `None` where the travel forbids them or the bar does not reach.
-fn finished(session: &Session, menu: &CandidateTests, draft: Draft) -> Option<Entry> {
+/// Plans the states of a candidate test. `None` if the travel forbids them or the bar does not reach.
+fn finished(session: &Session, variations: &TestVariations, draft: Draft) -> Option<CandidateTest> {
     let Draft {
         mut test,
         name,
@@ -172,7 +179,7 @@ fn finished(session: &Session, menu: &CandidateTests, draft: Draft) -> Option<En
     if readings
         .observed
         .iter()
-        .any(|reading| (reading - length).abs() > menu.reach_mm)
+        .any(|reading| (reading - length).abs() > variations.reach_mm)
     {
         return None;
     }
@@ -185,7 +192,7 @@ fn finished(session: &Session, menu: &CandidateTests, draft: Draft) -> Option<En
     readings
         .time_s
         .iter_mut()
-        .for_each(|time| *time += start + menu.test_min * 60.0);
+        .for_each(|time| *time += start + variations.test_min * 60.0);
     if session.tests.iter().any(|test| {
         test.readings
             .as_ref()
@@ -195,8 +202,8 @@ fn finished(session: &Session, menu: &CandidateTests, draft: Draft) -> Option<En
         readings.temperature_c = vec![mean; readings.rows()];
     }
     test.readings = Some(readings);
-    let minutes = menu.test_min + moving_s / 60.0 + if new_setup { menu.setup_min } else { 0.0 };
-    Some(Entry {
+    let minutes = variations.test_min + moving_s / 60.0 + if new_setup { variations.setup_min } else { 0.0 };
+    Some(CandidateTest {
         name,
         test,
         new_setup,

@@ -1,17 +1,17 @@
-//! Whether spindle and table stay clear of one another when a tilting table stands on end: Yamaji, Hamabata & Ihara, Evaluation of linear axis
+//! The clearance between spindle and table of a tilting table turned by 90°: Yamaji, Hamabata & Ihara, Evaluation of linear axis
 //! motion error of machine tools using an R-test device (HPC 2014), Section 6, Figs. 7 to 10.
 //!
-//! With `H` and `W` the height and width of the device, `L` the shaft from jig to ball, `T` the jig, `Ds` and `Dt` the diameters of spindle and
-//! table:
+//! `H` and `W` are the height and width of the device, `L` the shaft from jig to ball, `T` the jig, `Ds` and `Dt` the diameters
+//! of spindle and table:
 //!
-//! | device on | when | needed |
+//! | device on | condition | requirement |
 //! |---|---|---|
 //! | table | `Ds/2 ≥ H` | `L + T > Dt/2` |
 //! | table | `Ds/2 < H` | `L > W/2` |
 //! | spindle | `Ds/2 ≥ L` | `H ≥ Dt/2` and `L > W/2` |
-//! | spindle | `Ds/2 < L` | nothing: the paper prints `H ≤ Dt/2 should be satisfied`, which is what is then allowed, not needed |
+//! | spindle | `Ds/2 < L` | nothing: Yamaji et al. print `H ≤ Dt/2 should be satisfied`, which is permitted and not required |
 
-/// Sizes that decide, mm.
+/// The relevant dimensions, mm.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Clearance {
     /// `Ds`: diameter of the spindle.
@@ -26,12 +26,12 @@ pub struct Clearance {
     pub shaft_mm: f64,
     /// `T`: the jig that holds the ball.
     pub jig_mm: f64,
-    /// Whether the device stands on the table and the ball in the spindle.
+    /// Whether the device is on the table and the ball in the spindle.
     pub device_on_table: bool,
 }
 
 impl Clearance {
-    /// What is too short, in words; empty where all stays clear with the table turned by 90°.
+    /// Each dimension that is too short, as a sentence. Empty if the clearance is sufficient with the table turned by 90°.
     pub fn faults(&self) -> Vec<String> {
         let Clearance {
             spindle_mm,
@@ -79,7 +79,7 @@ impl Clearance {
 mod tests {
     use super::*;
 
-    /// Machine A of the paper: a spindle of 290 mm and a table of 500 mm.
+    /// Machine A of Yamaji et al.: a spindle of 290 mm and a table of 500 mm.
     fn machine_a(device_on_table: bool) -> Clearance {
         Clearance {
             spindle_mm: 290.0,
@@ -93,7 +93,7 @@ mod tests {
     }
 
     #[test]
-    fn a_flat_device_on_the_table_takes_a_long_shaft() {
+    fn a_flat_device_on_the_table_requires_a_long_shaft() {
         assert_eq!(machine_a(true).faults().len(), 1);
         assert!(
             Clearance {

@@ -1,57 +1,58 @@
-//! What a next test is for, as a figure of the information.
+//! The goal of a next test, and its figure of merit.
 
 use faer::Mat;
 
-use super::information::{Root, Shared};
-use super::linear::is_wanted;
+use super::information::{Root, SharedParameters};
+use super::linear::is_of_interest;
 use crate::parameters::{Parameter, Role};
 use crate::problem::Problem;
 
-/// What a next test is for.
+/// The goal of a next test.
 #[derive(Clone, Debug)]
 pub enum Goal {
-    /// The least worst standard uncertainty of the errors, 1 µm weighing as much as 1″.
+    /// The smallest maximum standard uncertainty of the errors. 1 µm has the same weight as 1″.
     WorstUncertainty,
-    /// The greatest distance in standard deviations between an effect of these coefficients (internal units; none: of one outside unit, at
-    /// the worst phase) and the best that everything else, the other effect included, can make of it.
+    /// The largest separation, in standard deviations, of an effect from the best approximation by all other parameters, the
+    /// other effect included. `coefficients` are in internal units. If they are empty, the effect has one display unit at the
+    /// worst phase.
     Separation {
-        /// The effect that is there.
+        /// The effect that is present.
         effect: String,
         /// Its coefficients.
         coefficients: Vec<f64>,
     },
 }
 
-/// The unknowns that a goal is about.
-pub fn asked(problem: &Problem<'_>, goal: &Goal) -> Vec<usize> {
+/// Indices of the target parameters of a goal.
+pub fn targets(problem: &Problem<'_>, goal: &Goal) -> Vec<usize> {
     let list = &problem.parameters.list;
-    let is_asked = |parameter: &Parameter| match (goal, parameter.role) {
-        (Goal::WorstUncertainty, _) => is_wanted(parameter),
+    let is_target = |parameter: &Parameter| match (goal, parameter.role) {
+        (Goal::WorstUncertainty, _) => is_of_interest(parameter),
         (Goal::Separation { effect, .. }, Role::Coefficient { effect: index, .. }) => {
             problem.parameters.effects[index].id() == *effect
         }
         _ => false,
     };
-    (0..list.len()).filter(|j| is_asked(&list[*j])).collect()
+    (0..list.len()).filter(|j| is_target(&list[*j])).collect()
 }
 
-/// The figure of a goal, the smaller the better.
-pub fn figure(shared: &Shared, root: &Root, goal: &Goal) -> f64 {
+/// The figure of merit of a goal. Smaller values are better.
+pub fn figure(shared: &SharedParameters, root: &Root, goal: &Goal) -> f64 {
     match goal {
         Goal::WorstUncertainty => shared.uncertainties(root).into_iter().fold(0.0, f64::max),
         Goal::Separation { coefficients, .. } => -separation(shared, root, coefficients),
     }
 }
 
-/// How many standard deviations what is asked about, with these coefficients, stands from the best that all others can make of it; without
-/// coefficients that of one outside unit at the worst phase.
-pub fn separation(shared: &Shared, root: &Root, coefficients: &[f64]) -> f64 {
+/// The distance, in standard deviations, of the target parameters at these coefficients from the best approximation by all others.
+/// Without coefficients it is that of one display unit at the worst phase.
+pub fn separation(shared: &SharedParameters, root: &Root, coefficients: &[f64]) -> f64 {
     let block = shared.criterion_block(root);
-    let first = shared.ids.len() - shared.asked;
-    if coefficients.len() == shared.asked {
-        return (0..shared.asked)
+    let first = shared.ids.len() - shared.targets;
+    if coefficients.len() == shared.targets {
+        return (0..shared.targets)
             .map(|i| {
-                (i..shared.asked)
+                (i..shared.targets)
                     .map(|j| block[(i, j)] * coefficients[j])
                     .sum::<f64>()
                     .powi(2)
@@ -60,7 +61,7 @@ pub fn separation(shared: &Shared, root: &Root, coefficients: &[f64]) -> f64 {
             .sqrt();
     }
     let one = 1.0 / shared.display_per_internal[first];
-    let square = Mat::from_fn(shared.asked, shared.asked, |i, j| block[(i, j)] * one);
+    let square = Mat::from_fn(shared.targets, shared.targets, |i, j| block[(i, j)] * one);
     match square.svd() {
         Ok(svd) => svd
             .S()
@@ -72,7 +73,7 @@ pub fn separation(shared: &Shared, root: &Root, coefficients: &[f64]) -> f64 {
     }
 }
 
-/// A figure as it is reported: the larger the better for separations.
+/// A figure as it is reported. Larger separations are better.
 pub fn reported(figure: f64, goal: &Goal) -> f64 {
     match goal {
         Goal::WorstUncertainty => figure,

@@ -1,13 +1,13 @@
-//! What effects that the session does not declare would do: be seen, or hide and bias the errors.
+//! The undeclared effects of the library in a plan: whether they are detectable, and by how much they bias the errors.
 //!
-//! With `X` the whitened columns of the unknowns, `Cov` their covariance and `C` those of an effect,
+//! With `X` the whitened columns of the parameters, `Cov` their covariance and `C` the columns of an effect,
 //!
 //! ```text
-//! S = CᵀC − CᵀX·Cov·XᵀC      information on the effect beside the unknowns: what is left of it in the residual
-//! B = Cov·XᵀC                what an undeclared effect adds to the unknowns, per unit of each coefficient
+//! S = CᵀC − CᵀX·Cov·XᵀC      information on the effect with the parameters eliminated
+//! B = Cov·XᵀC                bias of the parameters by the undeclared effect, per unit of each coefficient
 //! ```
 //!
-//! An effect of several coefficients (cosine and sine) is judged at its worst phase.
+//! An effect with several coefficients (cosine and sine) is judged at its worst phase.
 
 use std::collections::{BTreeMap, HashMap};
 
@@ -17,36 +17,37 @@ use nalgebra::DMatrix;
 use rayon::prelude::*;
 
 use super::detectability::{POWER, SIGNIFICANCE, corrected, noncentrality};
-use super::linear::{Linearisation, is_wanted};
+use super::linear::{Linearisation, is_of_interest};
 use super::ranking::{largest_first, smallest_first};
 use super::results::{Bias, EffectDetectability, EffectsAnalysis};
 use crate::drivers;
 use crate::error::IdentifyError;
 use crate::parameters::physical_size;
 use crate::problem::Problem;
-use crate::trace::columns::{Columns, Layout, chunked};
+use crate::trace::columns::{Columns, EffectColumns, chunked};
 use crate::trace::library::{self, Candidate};
 use crate::unit::Unit;
 
-/// Share of the signal below which an effect counts as hidden.
+/// Share of the signal below which an effect counts as confounded.
 const CONFOUNDED_BELOW: f64 = 0.01;
-/// Harmonics up to this order are looked at one by one; of the higher ones those of [`HIGH_ORDERS`].
+/// Harmonics up to this order are all screened. Of the higher orders those of [`HIGH_ORDERS`] are screened.
 const LOW_ORDERS: f64 = 12.0;
-/// Higher orders that stand for those between them.
+/// Higher orders that represent those between them.
 const HIGH_ORDERS: [f64; 8] = [16.0, 20.0, 30.0, 40.0, 60.0, 80.0, 100.0, 120.0];
-/// Longest periods of a component and driver, each of which is looked at: the longer, the harder it is to tell from the unknowns.
+/// Number of longest periods of a component and driver that are all screened. Longer periods are harder to separate from the
+/// parameters.
 const LONG_PERIODS: usize = 24;
-/// Of the shorter ones, one in so many.
+/// Of the shorter periods, one in this number is screened.
 const EVERY_SHORT_PERIOD: usize = 8;
-/// Coefficients of one effect beyond which it is left out: a free curve holds the constants and slopes that the unknowns hold too, so that
-/// its worst member is always hidden.
+/// Maximum number of coefficients of a screened effect. A nonparametric curve contains the constants and slopes of the
+/// parameters, so that its worst direction is always confounded.
 const MAX_COEFFICIENTS: usize = 2;
-/// Biases listed for an effect.
-const BIASES: usize = 4;
-/// Biases below this, in outside units a unit, are not listed.
+/// Maximum number of biases listed for an effect.
+const MAX_BIASES: usize = 4;
+/// Biases below this value, in display units per display unit, are not listed.
 const MIN_BIAS: f64 = 1e-3;
 
-/// What the effects of the library would do to a plan.
+/// The detectability and biases of the library's effects in a plan.
 ///
 /// # Errors
 /// If the model or the library cannot be evaluated.
@@ -59,13 +60,13 @@ pub fn effects(problem: &Problem<'_>) -> Result<EffectsAnalysis, IdentifyError> 
     let all = library::candidates(problem)?;
     let searched = all.len();
     let mut periods: HashMap<String, usize> = HashMap::new();
-    let (candidates, layouts): (Vec<Candidate>, Vec<Layout>) = all
+    let (candidates, column_sets): (Vec<Candidate>, Vec<EffectColumns>) = all
         .into_iter()
         .filter(|candidate| is_screened(&candidate.effect, &mut periods))
         .filter_map(|candidate| {
             columns
-                .layout(&candidate.effect)
-                .map(|layout| (candidate, layout))
+                .effect_columns(&candidate.effect)
+                .map(|column_set| (candidate, column_set))
         })
         .unzip();
     let significance_corrected = corrected(searched);
@@ -77,12 +78,12 @@ pub fn effects(problem: &Problem<'_>) -> Result<EffectsAnalysis, IdentifyError> 
             ]
         })
         .collect();
-    let chunks = chunked(&layouts);
+    let chunks = chunked(&column_sets);
     let judged: Vec<Vec<EffectDetectability>> = chunks
         .into_par_iter()
         .map(|chunk| {
-            let chosen: Vec<&Layout> = layouts[chunk.clone()].iter().collect();
-            let width: usize = chosen.iter().map(|layout| layout.count).sum();
+            let chosen: Vec<&EffectColumns> = column_sets[chunk.clone()].iter().collect();
+            let width: usize = chosen.iter().map(|column_set| column_set.count).sum();
             let mut block = Mat::zeros(columns.rows(), width);
             columns.fill(&chosen, block.as_mut());
             let cross = model.as_ref().subcols(0, nominal.len()).transpose() * &block;
@@ -90,16 +91,16 @@ pub fn effects(problem: &Problem<'_>) -> Result<EffectsAnalysis, IdentifyError> 
             let mut start = 0;
             chunk
                 .map(|index| {
-                    let count = layouts[index].count;
+                    let count = column_sets[index].count;
                     let range = start..start + count;
                     start = range.end;
                     let name = &families[candidates[index].family].name;
-                    let products = Products {
+                    let products = EffectProjection {
                         own: block.subcols(range.start, count),
                         cross: cross.subcols(range.start, count),
                         moved: moved.subcols(range.start, count),
                     };
-                    let greatest = layouts[index].greatest();
+                    let greatest = column_sets[index].greatest();
                     judge(
                         problem,
                         &candidates[index],
@@ -121,7 +122,7 @@ pub fn effects(problem: &Problem<'_>) -> Result<EffectsAnalysis, IdentifyError> 
     })
 }
 
-/// Whether an effect is judged; `periods` counts those of one component and driver, the longest first.
+/// Whether an effect is screened. `periods` counts those of one component and driver, longest first.
 fn is_screened(effect: &Effect, periods: &mut HashMap<String, usize>) -> bool {
     if effect.shape.coefficients() > MAX_COEFFICIENTS {
         return false;
@@ -139,27 +140,28 @@ fn is_screened(effect: &Effect, periods: &mut HashMap<String, usize>) -> bool {
     }
 }
 
-struct Products<'m> {
+struct EffectProjection<'m> {
     own: MatRef<'m, f64>,
     cross: MatRef<'m, f64>,
     moved: MatRef<'m, f64>,
 }
 
-/// Phases whose information differs by less than this share of the strongest one's are as weak as each other.
+/// Phases whose information differs by less than this share of the largest count as equally weak.
 const EQUAL_WITHIN: f64 = 1e-6;
 
 fn judge(
     problem: &Problem<'_>,
     candidate: &Candidate,
     family: &str,
-    products: &Products<'_>,
+    products: &EffectProjection<'_>,
     greatest: f64,
     threshold: &[f64; 2],
 ) -> EffectDetectability {
     let session = problem.session;
     let effect = &candidate.effect;
     let unit = drivers::coefficient_unit(session, effect, 0);
-    // What moves the component by its physical size somewhere in the tests, whatever the scale of the coefficient.
+    // The coefficient that moves the component by its physical size somewhere in the tests, whatever the scale of the
+    // coefficient.
     let size = match drivers::component_unit(session, &effect.component) {
         Some(inside) if greatest > 0.0 => physical_size(inside) / greatest,
         Some(inside) => physical_size(inside),
@@ -172,7 +174,7 @@ fn judge(
     let worst = eigen.eigenvalues.imin();
     let weakest = eigen.eigenvalues[worst].max(0.0);
     let strongest = eigen.eigenvalues.max().max(0.0);
-    // Where several phases are equally weak, the one of which least survives, and not the one that rounding picks.
+    // Of several equally weak phases, the one with the least surviving share counts, so that rounding does not decide.
     let equally_weak: Vec<usize> = (0..eigen.eigenvalues.len())
         .filter(|k| eigen.eigenvalues[*k] <= weakest + EQUAL_WITHIN * strongest)
         .collect();
@@ -226,7 +228,7 @@ fn biases(problem: &Problem<'_>, moved: MatRef<'_, f64>, unit: &Unit) -> Vec<Bia
         .list
         .iter()
         .enumerate()
-        .filter(|(_, parameter)| is_wanted(parameter))
+        .filter(|(_, parameter)| is_of_interest(parameter))
         .map(|(j, parameter)| {
             let worst = match moved.ncols() {
                 1 => moved[(j, 0)],
@@ -241,11 +243,12 @@ fn biases(problem: &Problem<'_>, moved: MatRef<'_, f64>, unit: &Unit) -> Vec<Bia
         .filter(|bias| bias.per_unit.abs() >= MIN_BIAS)
         .collect();
     biases.sort_by(|a, b| largest_first((a.per_unit, &a.id), (b.per_unit, &b.id)));
-    biases.truncate(BIASES);
+    biases.truncate(MAX_BIASES);
     biases
 }
 
-/// One entry for an effect, or for all members of a grid (periods, centres, time constants, high orders): the member that is hardest to see.
+/// One result for each effect, or for all members of a grid (periods, centres, time constants, high orders): the member that is
+/// hardest to detect.
 fn grouped(
     judged: impl Iterator<Item = EffectDetectability>,
     candidates: &[Candidate],
@@ -262,7 +265,8 @@ fn grouped(
         };
         match groups.get_mut(&key) {
             Some(present) => {
-                // Where equally much of several is needed, or none would do, the one of which least survives, and not the one that rounding or order picks.
+                // Of members with equal amplitudes, or without detectable amplitude, the one with the least surviving share
+                // counts, so that neither rounding nor order decides.
                 let needed = |entry: &EffectDetectability| {
                     entry.detectable_amplitude_screened.unwrap_or(f64::INFINITY)
                 };
@@ -281,7 +285,7 @@ fn grouped(
     order.into_iter().filter_map(|key| groups.remove(&key)).collect()
 }
 
-/// The hidden effects that bias each error most, by error: what a clean residual does not exclude.
+/// The confounded effects that bias each error most, by error. A small residual does not exclude these.
 pub fn confounded_by_error(analysis: &EffectsAnalysis) -> BTreeMap<String, Vec<(String, f64, String)>> {
     let mut by_error: BTreeMap<String, Vec<(String, f64, String)>> = BTreeMap::new();
     for effect in analysis

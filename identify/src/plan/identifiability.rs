@@ -1,8 +1,9 @@
-//! Blind spots by name: what no reading sees, what only the set-up's priors hold, and what is nearly collinear.
+//! Identifiability: null-space combinations, errors determined by set-up priors only, and near collinearity, each described in
+//! words.
 
 use faer::Mat;
 
-use super::linear::{Linearisation, is_wanted, marginal};
+use super::linear::{Linearisation, is_of_interest, marginal};
 use super::ranking::smallest_first;
 use super::results::{DeterminedByPrior, NearDependency};
 use crate::error::IdentifyError;
@@ -11,43 +12,43 @@ use crate::problem::Problem;
 use crate::rank::{Rank, combinations};
 use crate::results::Unobservable;
 
-/// Coefficients below this, relative to the largest, are rounding.
+/// Coefficients below this value, relative to the largest, are rounding errors.
 const NEGLIGIBLE: f64 = 1e-5;
-/// Condition index from which a dependency is named: moderate from 10, strong from 30 (Belsley, Kuh & Welsch, Regression Diagnostics,
-/// 1980, ch. 3).
-const NAMED_FROM: f64 = 10.0;
-/// Share of the largest part in the null space that an error needs to lead a combination with set-up quantities.
+/// Condition index from which a near dependency is reported: moderate from 10, strong from 30 (Belsley, Kuh & Welsch, Regression
+/// Diagnostics, 1980, ch. 3).
+const MIN_CONDITION_INDEX: f64 = 10.0;
+/// Least share of the largest entry of the null space for an error to be the pivot of a combination with set-up quantities.
 const MIN_ERROR: f64 = 1.37e-3;
-/// Things that a combination names in words.
+/// Maximum number of quantities that a description names.
 const MAX_NAMED: usize = 5;
-/// The verb of a combination that no reading sees.
+/// The verb of a combination that leaves every reading unchanged.
 const CONFOUNDED: &str = "is confounded with";
-/// Share of the largest coefficient below which an unknown is left out of a near dependency.
+/// Share of the largest coefficient below which a parameter is omitted from a near dependency.
 const MIN_PART: f64 = 0.1;
 
-/// A thing and the group that it belongs to, in words: `spindle_ball.z[A150]` is `z of the spindle ball` in `A150`.
-fn called<'i>(list: &[Parameter], id: &'i str) -> (String, Option<&'i str>) {
+/// The name of a quantity and its group: `spindle_ball.z[A150]` is `z of the spindle ball` in `A150`.
+fn name_of<'i>(list: &[Parameter], id: &'i str) -> (String, Option<&'i str>) {
     let setup = list
         .iter()
         .any(|parameter| parameter.id == id && parameter.role == Role::Setup);
     if !setup {
         return (id.to_string(), None);
     }
-    let (thing, group) = id.split_once('[').unwrap_or((id, ""));
-    let (thing, coordinate) = thing.split_once('.').unwrap_or((thing, ""));
+    let (quantity, group) = id.split_once('[').unwrap_or((id, ""));
+    let (quantity, coordinate) = quantity.split_once('.').unwrap_or((quantity, ""));
     let of = if coordinate.is_empty() {
         String::new()
     } else {
         format!("{coordinate} of ")
     };
     (
-        format!("{of}the {}", thing.replace('_', " ")),
+        format!("{of}the {}", quantity.replace('_', " ")),
         group.strip_suffix(']'),
     )
 }
 
-/// A combination in words: what is confounded with what, and in which proportion, with units where they differ. One thing in several tests is
-/// named once, and of a long combination only the first.
+/// Describes a combination: the confounded quantities and their proportion, with units if they differ. A quantity that occurs in
+/// several tests is named once. A long combination is shortened.
 fn describe(list: &[Parameter], combination: &[(String, f64)], verb: &str) -> String {
     let unit_of = |id: &str| {
         list.iter()
@@ -56,34 +57,36 @@ fn describe(list: &[Parameter], combination: &[(String, f64)], verb: &str) -> St
     };
     let first_unit = combination.first().map_or("", |(id, _)| unit_of(id));
     let mixed = combination.iter().any(|(id, _)| unit_of(id) != first_unit);
-    let mut things: Vec<(String, Vec<&str>, String)> = Vec::new();
+    let mut quantities: Vec<(String, Vec<&str>, String)> = Vec::new();
     for (id, value) in combination {
-        let (thing, group) = called(list, id);
+        let (quantity, group) = name_of(list, id);
         let value = if mixed {
-            format!("{} {}", short(*value), unit_of(id))
+            format!("{} {}", format_short(*value), unit_of(id))
         } else {
-            short(*value)
+            format_short(*value)
         };
-        match things
+        match quantities
             .iter_mut()
-            .find(|(other, groups, v)| *other == thing && *v == value && !groups.is_empty())
+            .find(|(other, groups, v)| *other == quantity && *v == value && !groups.is_empty())
         {
             Some((_, groups, _)) => groups.extend(group),
-            None => things.push((thing, group.into_iter().collect(), value)),
+            None => quantities.push((quantity, group.into_iter().collect(), value)),
         }
     }
-    // One more than is named is named too: it takes no more room than to say so.
-    let unnamed = match things.len() {
+    // A single further quantity is named, because the count would take as much space.
+    let unnamed = match quantities.len() {
         count if count > MAX_NAMED + 1 => count - MAX_NAMED,
         _ => 0,
     };
-    things.truncate(things.len() - unnamed);
-    let mut words = things.iter().map(|(thing, groups, _)| match groups.as_slice() {
-        [] => thing.clone(),
-        [one] => format!("{thing} in {one}"),
-        [first @ .., last] => format!("{thing} in {} and {last}", first.join(", ")),
-    });
-    let proportion: Vec<&str> = things.iter().map(|(_, _, value)| value.as_str()).collect();
+    quantities.truncate(quantities.len() - unnamed);
+    let mut words = quantities
+        .iter()
+        .map(|(quantity, groups, _)| match groups.as_slice() {
+            [] => quantity.clone(),
+            [one] => format!("{quantity} in {one}"),
+            [first @ .., last] => format!("{quantity} in {} and {last}", first.join(", ")),
+        });
+    let proportion: Vec<&str> = quantities.iter().map(|(_, _, value)| value.as_str()).collect();
     let first = words.next().unwrap_or_default();
     let others: Vec<String> = words.collect();
     let (others, proportion) = (others.join(", "), proportion.join(" : "));
@@ -93,26 +96,26 @@ fn describe(list: &[Parameter], combination: &[(String, f64)], verb: &str) -> St
     }
 }
 
-/// Two decimals, or two digits of a small number.
-fn short(value: f64) -> String {
+/// Two decimals, or two significant digits of a small number.
+fn format_short(value: f64) -> String {
     let places = (1.0 - value.abs().max(1e-9).log10().floor()).clamp(1.0, 9.0) as usize;
     let text = format!("{value:.*}", places.max(if value.abs() < 10.0 { 2 } else { 1 }));
     text.trim_end_matches('0').trim_end_matches('.').replace('-', "−")
 }
 
-/// Combinations that no reading sees, priors included.
+/// Null-space combinations: they leave every reading unchanged, and no prior determines them.
 pub fn unidentifiable(problem: &Problem<'_>, rank: &Rank) -> Vec<Unobservable> {
     let list = &problem.parameters.list;
     rank.unseen
         .iter()
         .zip(&rank.pivots)
         .map(|(row, pivot)| {
-            let combination = outside(problem, row, *pivot);
+            let combination = in_display_units(problem, row, *pivot);
             let why = match combination.as_slice() {
                 [(id, _)] => {
-                    let (thing, group) = called(list, id);
+                    let (quantity, group) = name_of(list, id);
                     let place = group.map_or(String::new(), |group| format!(" in {group}"));
-                    format!("no reading of these tests changes with {thing}{place}")
+                    format!("no reading of these tests changes with {quantity}{place}")
                 }
                 _ => describe(list, &combination, CONFOUNDED),
             };
@@ -124,8 +127,8 @@ pub fn unidentifiable(problem: &Problem<'_>, rank: &Rank) -> Vec<Unobservable> {
         .collect()
 }
 
-/// A row over scaled unknowns in outside units: its pivot first, with 1, then the others in the order of the unknowns.
-fn outside(problem: &Problem<'_>, row: &[f64], pivot: usize) -> Vec<(String, f64)> {
+/// A row over scaled parameters in display units: the pivot first, with 1, then the others in the order of the parameters.
+fn in_display_units(problem: &Problem<'_>, row: &[f64], pivot: usize) -> Vec<(String, f64)> {
     let list = &problem.parameters.list;
     let largest = row.iter().fold(0.0_f64, |most, value| most.max(value.abs()));
     let others = (0..row.len()).filter(|j| *j != pivot && row[*j].abs() > NEGLIGIBLE * largest);
@@ -146,8 +149,9 @@ fn outside(problem: &Problem<'_>, row: &[f64], pivot: usize) -> Vec<(String, f64
         .collect()
 }
 
-/// Errors that the readings alone cannot tell from set-up quantities, one sparse combination each: the null space of the readings
-/// without priors, reduced with errors as pivots, so that each combination holds one error and set-up quantities.
+/// The errors that the readings alone confound with set-up quantities, one sparse combination each. They follow from the null
+/// space of the readings without priors. It is reduced with errors as pivots, so that each combination contains one error and
+/// set-up quantities.
 ///
 /// # Errors
 /// If the decomposition fails.
@@ -159,26 +163,26 @@ pub fn determined_by_prior(
     let r = linear.readings.parts().0;
     let alone = Rank::decide(r.as_ref(), &linear.size, &linear.preference)?;
     let (errors, setups): (Vec<usize>, Vec<usize>) =
-        (linear.preference.iter()).partition(|j| is_wanted(&list[**j]));
+        (linear.preference.iter()).partition(|j| is_of_interest(&list[**j]));
     let order = [errors, setups].concat();
     let scaled = Mat::from_fn(r.nrows(), r.ncols(), |i, j| r[(i, j)] * linear.size[j]);
     let (rows, pivots) = combinations(alone.null_space.as_ref(), scaled.as_ref(), &order, MIN_ERROR);
     let (mut of_errors, of_setups): (Vec<usize>, Vec<usize>) =
-        (0..rows.len()).partition(|row| is_wanted(&list[pivots[*row]]));
-    // Listed as the errors are declared.
+        (0..rows.len()).partition(|row| is_of_interest(&list[pivots[*row]]));
+    // In the order of declaration.
     of_errors.sort_by_key(|row| pivots[*row]);
     let setups: Vec<Vec<f64>> = of_setups.iter().map(|row| rows[*row].clone()).collect();
     let mut held = Vec::new();
     for row in of_errors {
         let error = pivots[row];
-        // What is not seen even with the priors is blind, and named there.
+        // A combination that is not identifiable even with the priors is reported as such elsewhere.
         let sparse = sparser(rows[row].clone(), &setups);
         let setup_only =
-            (0..list.len()).all(|j| j == error || !is_wanted(&list[j]) || sparse[j].abs() < NEGLIGIBLE);
+            (0..list.len()).all(|j| j == error || !is_of_interest(&list[j]) || sparse[j].abs() < NEGLIGIBLE);
         if !linear.rank.is_identifiable(error) || !setup_only {
             continue;
         }
-        let combination = outside(problem, &sparse, error);
+        let combination = in_display_units(problem, &sparse, error);
         if combination.len() < 2 {
             continue;
         }
@@ -200,7 +204,7 @@ fn subtract(row: &mut [f64], factor: f64, other: &[f64]) {
     }
 }
 
-/// A row less multiples of others such that fewer entries remain, as long as that succeeds.
+/// A row less multiples of others, as long as this reduces the number of nonzero entries.
 fn sparser(mut row: Vec<f64>, others: &[Vec<f64>]) -> Vec<f64> {
     let support = |row: &[f64]| row.iter().filter(|value| value.abs() > NEGLIGIBLE).count();
     loop {
@@ -208,38 +212,38 @@ fn sparser(mut row: Vec<f64>, others: &[Vec<f64>]) -> Vec<f64> {
         let mut best: Option<(usize, Vec<f64>)> = None;
         for other in others {
             for column in (0..row.len()).filter(|c| row[*c].abs() > NEGLIGIBLE && other[*c].abs() > 1e-3) {
-                let mut trial = row.clone();
-                subtract(&mut trial, row[column] / other[column], other);
-                let count = support(&trial);
+                let mut reduced_row = row.clone();
+                subtract(&mut reduced_row, row[column] / other[column], other);
+                let count = support(&reduced_row);
                 if count < best.as_ref().map_or(before, |(count, _)| *count) {
-                    best = Some((count, trial));
+                    best = Some((count, reduced_row));
                 }
             }
         }
         match best {
-            Some((_, trial)) => row = trial,
+            Some((_, reduced_row)) => row = reduced_row,
             None => return row,
         }
     }
 }
 
-/// Combinations of errors that are seen, but badly: small singular values of the information on the errors with columns of unit length.
+/// Near dependencies of identifiable errors: small singular values of the information on the errors, with columns of unit length.
 ///
 /// # Errors
 /// If the decomposition fails.
 pub fn nearly_collinear(
     problem: &Problem<'_>,
     linear: &Linearisation,
-    wanted: &[usize],
+    of_interest: &[usize],
 ) -> Result<Vec<NearDependency>, IdentifyError> {
     let list = &problem.parameters.list;
-    let seen: Vec<usize> = wanted
+    let identifiable: Vec<usize> = of_interest
         .iter()
         .copied()
         .filter(|j| linear.rank.is_identifiable(*j))
         .collect();
-    let r = marginal(linear.whole.parts().0.as_ref(), &seen, &linear.size)?;
-    let n = seen.len();
+    let r = marginal(linear.whole.parts().0.as_ref(), &identifiable, &linear.size)?;
+    let n = identifiable.len();
     let norm: Vec<f64> = (0..n)
         .map(|j| {
             (0..n)
@@ -252,7 +256,8 @@ pub fn nearly_collinear(
     let unit = Mat::from_fn(n, n, |i, j| r[(i, j)] / norm[j]);
     let svd = unit.svd().map_err(|_| IdentifyError::Decomposition)?;
     let singular: Vec<f64> = svd.S().column_vector().iter().copied().collect();
-    // Equal singular values share a space of which the decomposition returns any basis: the reduced one is the same everywhere.
+    // Equal singular values share a subspace, and the decomposition returns an arbitrary basis of it. The reduced basis is
+    // unique.
     let mut directions: Vec<(f64, Vec<f64>)> = Vec::new();
     let mut first = 0;
     while first < n {
@@ -268,10 +273,10 @@ pub fn nearly_collinear(
     }
     let mut found = Vec::new();
     for (condition_index, direction) in directions {
-        if condition_index < NAMED_FROM {
+        if condition_index < MIN_CONDITION_INDEX {
             continue;
         }
-        // A move along the direction, in outside units.
+        // The direction in display units.
         let parts: Vec<(usize, f64)> = direction.into_iter().enumerate().collect();
         let largest = parts.iter().fold(0.0_f64, |most, (_, v)| most.max(v.abs()));
         let chosen: Vec<(usize, f64)> = parts
@@ -282,7 +287,7 @@ pub fn nearly_collinear(
             continue;
         }
         let raw = chosen.iter().map(|(j, v)| {
-            let parameter = &list[seen[*j]];
+            let parameter = &list[identifiable[*j]];
             (
                 parameter.id.clone(),
                 v / norm[*j] * parameter.unit.display_per_internal,
@@ -305,7 +310,7 @@ pub fn nearly_collinear(
     Ok(found)
 }
 
-/// The reduced row echelon form of independent rows, pivots in the order of the columns.
+/// The reduced row echelon form of independent rows, with pivots in column order.
 fn reduced(mut rows: Vec<Vec<f64>>) -> Vec<Vec<f64>> {
     let width = rows.first().map_or(0, Vec::len);
     let mut done = 0;
@@ -334,7 +339,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn any_basis_of_a_space_reduces_to_one() {
+    fn all_bases_of_a_subspace_reduce_to_the_same_rows() {
         let plane = [[1.0, 0.0, 2.0, -1.0], [0.0, 1.0, 0.5, 3.0]];
         for turn in 0..16 {
             let (sin, cos) = (0.3 + f64::from(turn)).sin_cos();

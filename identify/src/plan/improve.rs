@@ -1,34 +1,35 @@
-//! The next test: from a menu, greedily and by exchange, by what it does to the information. Nothing is refitted.
+//! Selects the next tests from the candidate tests by their information, greedily and by exchange. Nothing is refitted.
 //!
-//! Greedy: the entry after which the goal stands best, again and again. Exchange: each proposed test is taken away in turn and the best entry for
-//! its place looked for, until no place changes (Fedorov's algorithm: Atkinson, Donev & Tobias, Optimum Experimental Designs, 2007, ch. 12).
+//! Greedy: the candidate test with the best figure is added, repeatedly. Exchange: each proposed test is removed in turn and
+//! replaced by the best candidate test, until no test changes (Fedorov's algorithm: Atkinson, Donev & Tobias, Optimum
+//! Experimental Designs, 2007, ch. 12).
 
 use schemars::JsonSchema;
 use serde::Serialize;
 
-use super::candidate_information::Prepared;
-use super::candidate_tests::CandidateTests;
-use super::criterion::{Goal, asked, figure, reported};
-use super::information::{Root, Shared};
+use super::candidate_information::PreparedCandidates;
+use super::candidate_tests::TestVariations;
+use super::criterion::{Goal, figure, reported, targets};
+use super::information::{Root, SharedParameters};
 use super::ranking::smallest_first;
 use crate::error::IdentifyError;
 use crate::problem::Problem;
 
-/// How proposals are sought.
+/// Options of the selection of next tests.
 #[derive(Clone, Debug)]
 pub struct ImproveOptions {
-    /// What for.
+    /// The goal.
     pub goal: Goal,
-    /// How many tests are proposed.
+    /// Number of proposed tests.
     pub tests: usize,
-    /// Whether the gain is judged a minute.
+    /// Whether the gain per minute decides.
     pub by_minute: bool,
 }
 
-/// What is proposed.
+/// The proposed tests.
 #[derive(Clone, Debug, Serialize, JsonSchema)]
 pub struct Improvement {
-    /// The criterion and the unit of its values: `worst standard uncertainty, um or arcsec`, or `separation, standard deviations`.
+    /// The criterion and of unit of its values: `worst standard uncertainty, um or arcsec`, or `separation, standard deviations`.
     pub criterion: String,
     /// Number of candidate tests that were evaluated.
     pub candidate_tests: usize,
@@ -38,19 +39,19 @@ pub struct Improvement {
     /// The errors and their standard uncertainties before.
     pub uncertainties_before: Vec<NamedUncertainty>,
     /// The proposed tests, in the order in which they are added.
-    pub steps: Vec<Step>,
-    /// The exchanges of proposed tests, in words.
+    pub steps: Vec<ProposedTest>,
+    /// The exchanges of proposed tests, a sentence.
     pub exchanged: Vec<String>,
-    /// The best candidate tests by themselves, in the order of the criterion, or of its gain per minute. Of tests with equal readings, one.
-    pub alternatives: Vec<Alternative>,
+    /// The best candidate tests by tests, in order of the criterion, or of its gain per minute. Of tests with equal readings, one is listed.
+    pub alternatives: Vec<AlternativeTest>,
 }
 
 /// A proposed test.
 #[derive(Clone, Debug, Serialize, JsonSchema)]
-pub struct Step {
-    /// In words.
+pub struct ProposedTest {
+    /// Description of the test.
     pub test: String,
-    /// Value of the criterion with it; infinite (`null` in JSON) where an error is not identifiable.
+    /// Value of the criterion with this test and those before it; infinite (`null` in JSON) where an error is not identifiable.
     #[schemars(with = "Option<f64>")]
     pub after: f64,
     /// Duration of the test, min.
@@ -81,10 +82,10 @@ pub struct NamedUncertainty {
     pub unit: String,
 }
 
-/// A candidate test that comes close.
+/// A candidate test the best candidate tests.
 #[derive(Clone, Debug, Serialize, JsonSchema)]
-pub struct Alternative {
-    /// In words.
+pub struct AlternativeTest {
+    /// Description of the test.
     pub test: String,
     /// Value of the criterion with it; infinite (`null` in JSON) where an error is not identifiable.
     #[schemars(with = "Option<f64>")]
@@ -93,32 +94,32 @@ pub struct Alternative {
     pub duration_min: f64,
 }
 
-/// An uncertainty of this share of the physical size is that of a blind spot.
+/// Share of the physical size above which the uncertainty of an error means that the error is not identifiable.
 const UNIDENTIFIABLE_SHARE: f64 = 0.1;
-/// Gain below which an exchange is not made.
+/// Relative gain below which a test is neither added nor exchanged.
 const MIN_GAIN: f64 = 1e-6;
-/// Alternatives that are listed.
-const ALTERNATIVES: usize = 5;
-/// Rounds of exchange at most.
-const ROUNDS: usize = 10;
+/// Maximum number of listed alternatives.
+const MAX_ALTERNATIVES: usize = 5;
+/// Maximum number of exchange rounds.
+const MAX_ROUNDS: usize = 10;
 
 /// Proposes tests for a problem whose folds are its tests.
 ///
 /// # Errors
-/// If there is nothing to propose or the model cannot be evaluated.
+/// If there is no candidate test or the model cannot be evaluated.
 pub fn improve(
     problem: &Problem<'_>,
-    menu: &CandidateTests,
+    variations: &TestVariations,
     options: &ImproveOptions,
 ) -> Result<Improvement, IdentifyError> {
     let list = &problem.parameters.list;
-    let entries = super::candidate_tests::entries(problem.session, menu)?;
+    let tests = super::candidate_tests::candidate_tests(problem.session, variations)?;
     let nominal = vec![0.0; list.len()];
-    let asked = asked(problem, &options.goal);
-    if asked.is_empty() {
+    let targets = targets(problem, &options.goal);
+    if targets.is_empty() {
         return Err(IdentifyError::NoUnknowns);
     }
-    let prepared = Prepared::new(problem, &nominal, entries, menu, &asked)?;
+    let prepared = PreparedCandidates::new(problem, &nominal, tests, variations, &targets)?;
     let shared = &prepared.shared;
     let figure = |root: &Root| figure(shared, root, &options.goal);
     let mut chosen: Vec<usize> = Vec::new();
@@ -130,14 +131,14 @@ pub fn improve(
             break;
         };
         let best = if options.by_minute {
-            best_a_minute(&prepared, now, &figures).unwrap_or(best)
+            best_per_minute(&prepared, now, &figures).unwrap_or(best)
         } else {
             best
         };
         if place == 0 {
-            let score = |entry: usize| match options.by_minute {
-                true => -gain_a_minute(&prepared, now, &figures, entry),
-                false => figures[entry],
+            let score = |candidate: usize| match options.by_minute {
+                true => -gain_per_minute(&prepared, now, &figures, candidate),
+                false => figures[candidate],
             };
             alternatives = listed(&prepared, &figures, &options.goal, score);
         }
@@ -151,7 +152,7 @@ pub fn improve(
     } else {
         exchange(&prepared, &mut chosen, &figure)
     };
-    // An uncertainty that is that of the physical size is none.
+    // An uncertainty near the physical size counts as infinite.
     let outside = |root: &Root| match options.goal {
         Goal::WorstUncertainty => named_uncertainties(shared, root)
             .into_iter()
@@ -176,7 +177,7 @@ pub fn improve(
             Goal::WorstUncertainty => "worst standard uncertainty, um or arcsec".to_string(),
             Goal::Separation { .. } => "separation, standard deviations".to_string(),
         },
-        candidate_tests: prepared.entries.len(),
+        candidate_tests: prepared.candidates.len(),
         before: outside(&prepared.base),
         uncertainties_before: with_units(named_uncertainties(shared, &prepared.base)),
         steps,
@@ -189,50 +190,50 @@ fn is_no_gain(before: f64, after: f64) -> bool {
     before - after <= MIN_GAIN * before.abs()
 }
 
-/// By how much an entry lowers the logarithm of the figure a minute.
-fn gain_a_minute(prepared: &Prepared, now: f64, figures: &[f64], entry: usize) -> f64 {
-    // A separation is negative here: the ratio is turned round.
+/// The decrease of the logarithm of the figure per minute.
+fn gain_per_minute(prepared: &PreparedCandidates, now: f64, figures: &[f64], candidate: usize) -> f64 {
+    // A separation is negative here, so the ratio is inverted.
     let ratio = if now > 0.0 {
-        now / figures[entry]
+        now / figures[candidate]
     } else {
-        figures[entry].abs() / now.abs().max(1e-12)
+        figures[candidate].abs() / now.abs().max(1e-12)
     };
-    ratio.max(1e-12).ln() / prepared.entries[entry].entry.minutes.max(1e-3)
+    ratio.max(1e-12).ln() / prepared.candidates[candidate].test.minutes.max(1e-3)
 }
 
-/// The entry that gains most a minute.
-fn best_a_minute(prepared: &Prepared, now: f64, figures: &[f64]) -> Option<usize> {
-    let gain = |entry: usize| gain_a_minute(prepared, now, figures, entry);
+/// The candidate test with the largest gain per minute.
+fn best_per_minute(prepared: &PreparedCandidates, now: f64, figures: &[f64]) -> Option<usize> {
+    let gain = |candidate: usize| gain_per_minute(prepared, now, figures, candidate);
     (0..figures.len()).min_by(|a, b| smallest_first(-gain(*a), -gain(*b)))
 }
 
-/// The entries with the least scores, each name once.
+/// The candidate tests with the smallest scores, each name once.
 fn listed(
-    prepared: &Prepared,
+    prepared: &PreparedCandidates,
     figures: &[f64],
     goal: &Goal,
     score: impl Fn(usize) -> f64,
-) -> Vec<Alternative> {
+) -> Vec<AlternativeTest> {
     let mut order: Vec<usize> = (0..figures.len()).collect();
     order.sort_by(|a, b| smallest_first(score(*a), score(*b)));
-    let of = |entry: usize| Alternative {
-        test: prepared.entries[entry].entry.name.clone(),
-        after: reported(figures[entry], goal),
-        duration_min: prepared.entries[entry].entry.minutes,
+    let of = |candidate: usize| AlternativeTest {
+        test: prepared.candidates[candidate].test.name.clone(),
+        after: reported(figures[candidate], goal),
+        duration_min: prepared.candidates[candidate].test.minutes,
     };
-    let mut listed: Vec<Alternative> = Vec::new();
+    let mut listed: Vec<AlternativeTest> = Vec::new();
     for alternative in order.into_iter().map(of) {
-        // Entries that are mirror images of one another read alike and are as good.
-        if listed.len() < ALTERNATIVES && !listed.iter().any(|other| other.test == alternative.test) {
+        // Mirror-image tests have equal names and figures.
+        if listed.len() < MAX_ALTERNATIVES && !listed.iter().any(|other| other.test == alternative.test) {
             listed.push(alternative);
         }
     }
     listed
 }
 
-/// Takes each proposed test away in turn and puts the best entry in its place.
+/// Removes each proposed test in turn and replaces it by the best candidate test.
 fn exchange(
-    prepared: &Prepared,
+    prepared: &PreparedCandidates,
     chosen: &mut [usize],
     figure: &(impl Fn(&Root) -> f64 + Sync),
 ) -> Vec<String> {
@@ -240,14 +241,14 @@ fn exchange(
     if chosen.len() < 2 {
         return words;
     }
-    for _ in 0..ROUNDS {
+    for _ in 0..MAX_ROUNDS {
         let mut changed = false;
         for place in 0..chosen.len() {
             let others: Vec<usize> = chosen
                 .iter()
                 .enumerate()
                 .filter(|(k, _)| *k != place)
-                .map(|(_, entry)| *entry)
+                .map(|(_, candidate)| *candidate)
                 .collect();
             let now = figure(&prepared.with(chosen));
             let Some((best, figures)) = prepared.best(&prepared.with(&others), figure) else {
@@ -258,7 +259,7 @@ fn exchange(
             }
             words.push(format!(
                 "{} in place of {}",
-                prepared.entries[best].entry.name, prepared.entries[chosen[place]].entry.name
+                prepared.candidates[best].test.name, prepared.candidates[chosen[place]].test.name
             ));
             chosen[place] = best;
             changed = true;
@@ -271,31 +272,31 @@ fn exchange(
 }
 
 fn step(
-    prepared: &Prepared,
+    prepared: &PreparedCandidates,
     chosen: &[usize],
     outside: &impl Fn(&Root) -> f64,
     with_units: &impl Fn(Vec<(String, f64)>) -> Vec<NamedUncertainty>,
-) -> Step {
+) -> ProposedTest {
     let shared = &prepared.shared;
-    let entry = &prepared.entries[chosen[chosen.len() - 1]].entry;
+    let candidate = &prepared.candidates[chosen[chosen.len() - 1]].test;
     let root = prepared.with(chosen);
     let before = prepared.with(&chosen[..chosen.len() - 1]);
-    let first = shared.ids.len() - shared.asked;
+    let first = shared.ids.len() - shared.targets;
     let unidentifiable = |u: &[f64], j: usize| is_unidentifiable(shared, u, j);
     let (u_before, u_after) = (shared.uncertainties(&before), shared.uncertainties(&root));
-    let makes_identifiable = (0..shared.asked)
+    let makes_identifiable = (0..shared.targets)
         .filter(|j| unidentifiable(&u_before, *j) && !unidentifiable(&u_after, *j))
         .map(|j| shared.ids[first + j].clone())
         .collect();
-    let (workpiece_ball_mm, spindle_ball_mm, bar_mm) = match &entry.test.station {
+    let (workpiece_ball_mm, spindle_ball_mm, bar_mm) = match &candidate.test.station {
         abbe_model::instrument::Station::BallBar(bar) => (bar.workpiece_ball, bar.spindle_ball, bar.bar),
         _ => ([0.0; 3], [0.0; 3], 0.0),
     };
-    Step {
-        test: entry.name.clone(),
+    ProposedTest {
+        test: candidate.name.clone(),
         after: outside(&root),
-        duration_min: entry.minutes,
-        new_setup: entry.new_setup,
+        duration_min: candidate.minutes,
+        new_setup: candidate.new_setup,
         makes_identifiable,
         uncertainties: with_units(named_uncertainties(shared, &root)),
         workpiece_ball_mm,
@@ -304,25 +305,26 @@ fn step(
     }
 }
 
-/// Whether an uncertainty, the `j`-th of what is asked about, is that of a parameter which no reading tells and which is held at its physical size instead.
-fn is_unidentifiable(shared: &Shared, u: &[f64], j: usize) -> bool {
-    let place = shared.ids.len() - shared.asked + j;
+/// Whether the `j`-th target parameter is not identifiable. Its uncertainty is then that of the regularisation at its physical
+/// size.
+fn is_unidentifiable(shared: &SharedParameters, u: &[f64], j: usize) -> bool {
+    let place = shared.ids.len() - shared.targets + j;
     u[j] > UNIDENTIFIABLE_SHARE * shared.size[place] * shared.display_per_internal[place]
 }
 
-/// What is asked about, with its uncertainties: infinite where the figure would be that of the physical size at which [`Shared`] holds what is not
-/// identifiable.
-fn named_uncertainties(shared: &Shared, root: &Root) -> Vec<(String, f64)> {
-    let first = shared.ids.len() - shared.asked;
+/// The target parameters with their uncertainties. They are infinite for parameters that [`SharedParameters`] regularises because
+/// they are not identifiable.
+fn named_uncertainties(shared: &SharedParameters, root: &Root) -> Vec<(String, f64)> {
+    let first = shared.ids.len() - shared.targets;
     let u = shared.uncertainties(root);
-    (0..shared.asked)
+    (0..shared.targets)
         .map(|j| {
-            let told = if is_unidentifiable(shared, &u, j) {
+            let u_reported = if is_unidentifiable(shared, &u, j) {
                 f64::INFINITY
             } else {
                 u[j]
             };
-            (shared.ids[first + j].clone(), told)
+            (shared.ids[first + j].clone(), u_reported)
         })
         .collect()
 }

@@ -1,11 +1,11 @@
 //! Scalar figures of merit: observability indices O1 to O5, condition number, D-, A-, E- and G-efficiency.
 //!
-//! They are those of the information on the errors once the set-up quantities are unknown within their priors, `RᵀR`, in standard deviations
-//! a physical size (1 mm, 0.01 rad): with `σ1 ≥ … ≥ σm` the singular values of `R`.
+//! They refer to the information `RᵀR` on the errors with the set-up quantities eliminated within their priors. The unit is
+//! standard deviations per physical size (1 mm, 0.01 rad). `σ1 ≥ … ≥ σm` are the singular values of `R`.
 //!
-//! An efficiency compares with errors that do not disturb one another: with `C = D⁻¹ᐟ²RᵀRD⁻¹ᐟ²`, `D` its diagonal (so that the size of an
-//! error does not matter), `D = det(C)^(1/m)`, `A = m/tr(C⁻¹)`, `E = λ_min(C)`; all are 1 for uncorrelated errors (Atkinson, Donev & Tobias,
-//! Optimum Experimental Designs, 2007, ch. 10). `G` is the mean leverage of a reading over the greatest.
+//! An efficiency compares with uncorrelated errors. With `C = D⁻¹ᐟ²RᵀRD⁻¹ᐟ²` and `D` the diagonal of `RᵀR` (so that the scale of
+//! an error does not matter), `D = det(C)^(1/m)`, `A = m/tr(C⁻¹)`, `E = λ_min(C)`. All are 1 for uncorrelated errors (Atkinson,
+//! Donev & Tobias, Optimum Experimental Designs, 2007, ch. 10). `G` is the mean leverage of a reading over the greatest.
 
 use faer::{Mat, MatRef};
 
@@ -13,23 +13,23 @@ use super::linear::{Linearisation, marginal};
 use super::results::Indices;
 use crate::error::IdentifyError;
 
-/// The figures of a plan.
+/// The indices of a plan.
 ///
 /// # Errors
 /// If the decomposition fails.
 pub fn indices(
     linear: &Linearisation,
-    wanted: &[usize],
+    of_interest: &[usize],
     readings: usize,
     g_efficiency: f64,
 ) -> Result<Indices, IdentifyError> {
-    let errors = wanted.len();
-    let seen: Vec<usize> = wanted
+    let errors = of_interest.len();
+    let identifiable: Vec<usize> = of_interest
         .iter()
         .copied()
         .filter(|j| linear.rank.is_identifiable(*j))
         .collect();
-    let m = seen.len();
+    let m = identifiable.len();
     if m == 0 {
         return Ok(Indices {
             error_count: errors,
@@ -37,8 +37,8 @@ pub fn indices(
             ..Indices::default()
         });
     }
-    let r = marginal(linear.whole.parts().0.as_ref(), &seen, &linear.size)?;
-    let size: Vec<f64> = seen.iter().map(|j| linear.size[*j]).collect();
+    let r = marginal(linear.whole.parts().0.as_ref(), &identifiable, &linear.size)?;
+    let size: Vec<f64> = identifiable.iter().map(|j| linear.size[*j]).collect();
     Ok(Indices {
         error_count: errors,
         g_efficiency,
@@ -46,7 +46,8 @@ pub fn indices(
     })
 }
 
-/// The figures of the triangle of the errors that are seen, in internal units; `size` is the physical size of each.
+/// The indices from the triangular factor of the identifiable errors, in internal units. `size` is the physical size of each
+/// error.
 fn of_triangle(r: MatRef<'_, f64>, size: &[f64], readings: usize) -> Result<Indices, IdentifyError> {
     let m = size.len();
     let scaled = Mat::from_fn(m, m, |i, j| r[(i, j)] * size[j]);
@@ -83,13 +84,13 @@ fn singular_values(matrix: MatRef<'_, f64>) -> Result<Vec<f64>, IdentifyError> {
 mod tests {
     use super::*;
 
-    fn near(found: f64, wanted: f64) {
-        assert!((found - wanted).abs() < 1e-12, "{found} instead of {wanted}");
+    fn near(found: f64, expected: f64) {
+        assert!((found - expected).abs() < 1e-12, "{found} instead of {expected}");
     }
 
     /// Singular values 8 and 2 over 16 readings.
     #[test]
-    fn observability_indices_of_two_errors_that_do_not_disturb_one_another() {
+    fn observability_indices_of_two_uncorrelated_errors() {
         let r = Mat::from_fn(2, 2, |i, j| if i == j { [4.0, 0.2][i] } else { 0.0 });
         let found = of_triangle(r.as_ref(), &[2.0, 10.0], 16).unwrap();
         near(found.o1, 1.0);
@@ -103,7 +104,7 @@ mod tests {
         }
     }
 
-    /// Two columns at an angle whose cosine is c: the eigenvalues of C are 1 ± c, whatever the lengths of the columns.
+    /// Two columns at an angle with cosine c. The eigenvalues of C are 1 ± c, whatever the lengths of the columns.
     #[test]
     fn efficiencies_of_two_errors_at_an_angle() {
         let c = 0.6_f64;

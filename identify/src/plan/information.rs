@@ -1,7 +1,7 @@
-//! Information as a number of named unknowns share it, so that a test can be added or taken away without a fit.
+//! Square roots of the information on named shared parameters, so that tests can be added or removed without a fit.
 //!
-//! Of every test what remains is a square root of its information on the unknowns that it shares with others; its own (a ball mounted for it
-//! alone, its bar) are eliminated first, within what is known of them. Two such roots are added by one orthogonal reduction.
+//! Of each test only a square root of its information on the shared parameters remains. Its own parameters (a ball mounted for it
+//! alone, its bar) are eliminated first, within their priors. Two such roots are added by one orthogonal reduction.
 
 use std::collections::HashMap;
 
@@ -13,53 +13,53 @@ use crate::error::IdentifyError;
 use crate::problem::Problem;
 use crate::triangle::upper;
 
-/// The unknowns that tests share, in the order of the columns; what is asked about stands last.
+/// The parameters that tests share, in column order. The target parameters are last.
 #[derive(Clone, Debug)]
-pub struct Shared {
+pub struct SharedParameters {
     /// Their identifiers.
     pub ids: Vec<String>,
     /// Physical sizes, internal units.
     pub size: Vec<f64>,
-    /// Outside units in an internal unit.
+    /// Display units per internal unit.
     pub display_per_internal: Vec<f64>,
-    /// How many of the last columns are asked about.
-    pub asked: usize,
+    /// Number of target parameters: the last columns.
+    pub targets: usize,
 }
 
 /// A square root of information: `RᵀR`, upper triangular.
 pub type Root = Mat<f64>;
 
-impl Shared {
-    /// Unknowns of a problem by index, the first `kept` for their own sake not, the `asked` ones last.
-    pub fn of(problem: &Problem<'_>, kept: &[usize], asked: &[usize]) -> Shared {
+impl SharedParameters {
+    /// Parameters of a problem by index: the `kept` ones first, the `targets` ones last.
+    pub fn of(problem: &Problem<'_>, kept: &[usize], targets: &[usize]) -> SharedParameters {
         let list = &problem.parameters.list;
-        let order: Vec<usize> = kept.iter().chain(asked).copied().collect();
-        Shared {
+        let order: Vec<usize> = kept.iter().chain(targets).copied().collect();
+        SharedParameters {
             ids: order.iter().map(|j| list[*j].id.clone()).collect(),
             size: order.iter().map(|j| list[*j].size).collect(),
             display_per_internal: order.iter().map(|j| list[*j].unit.display_per_internal).collect(),
-            asked: asked.len(),
+            targets: targets.len(),
         }
     }
 
-    /// Of these unknowns those in some columns, which include all that are asked about.
-    pub fn part(&self, columns: &[usize]) -> Shared {
-        Shared {
+    /// The parameters in some columns, which include all target parameters.
+    pub fn part(&self, columns: &[usize]) -> SharedParameters {
+        SharedParameters {
             ids: columns.iter().map(|j| self.ids[*j].clone()).collect(),
             size: columns.iter().map(|j| self.size[*j]).collect(),
             display_per_internal: columns.iter().map(|j| self.display_per_internal[*j]).collect(),
-            asked: self.asked,
+            targets: self.targets,
         }
     }
 
-    /// The root of a whole plan, priors included. What is asked about and not seen is held at its physical size, so that a blind spot is
-    /// a very large uncertainty and not a special case.
+    /// The root of a whole plan, priors included. Parameters are regularised at their physical size, so that a parameter that is
+    /// not identifiable has a very large uncertainty and needs no special case.
     ///
     /// # Errors
-    /// If an unknown is not the problem's.
+    /// If a parameter does not belong to the problem.
     pub fn root_of(&self, problem: &Problem<'_>, linear: &Linearisation) -> Result<Root, IdentifyError> {
         let list = &problem.parameters.list;
-        let place: HashMap<&str, usize> = list
+        let index: HashMap<&str, usize> = list
             .iter()
             .enumerate()
             .map(|(j, parameter)| (parameter.id.as_str(), j))
@@ -67,22 +67,22 @@ impl Shared {
         let columns = self
             .ids
             .iter()
-            .map(|id| place.get(id.as_str()).copied())
+            .map(|id| index.get(id.as_str()).copied())
             .collect::<Option<Vec<usize>>>()
-            .ok_or_else(|| IdentifyError::Request("an unknown is not one of this plan".to_string()))?;
+            .ok_or_else(|| IdentifyError::Request("a parameter does not belong to this plan".to_string()))?;
         let root = marginal(linear.whole.parts().0.as_ref(), &columns, &linear.size)?;
-        Ok(self.held(&root))
+        Ok(self.regularised(&root))
     }
 
-    /// Every unknown held at its physical size besides.
-    fn held(&self, root: &Root) -> Root {
+    /// Adds a prior of the physical size to every parameter.
+    fn regularised(&self, root: &Root) -> Root {
         let k = self.ids.len();
-        let held = Mat::from_fn(k, k, |i, j| if i == j { 1.0 / self.size[i] } else { 0.0 });
-        sum(root.as_ref(), held.as_ref())
+        let priors = Mat::from_fn(k, k, |i, j| if i == j { 1.0 / self.size[i] } else { 0.0 });
+        sum(root.as_ref(), priors.as_ref())
     }
 
-    /// The root of the readings of a problem with one test, from their triangle `r`; its unknowns that are not shared are eliminated within
-    /// their priors. `as_shared` gives an unknown the name that the shared ones have for it.
+    /// The root of the readings of a problem with one test, from their triangular factor `r`. Parameters that are not shared are
+    /// eliminated within their priors. `as_shared` maps a parameter's identifier to that of the shared parameter.
     pub fn root_of_test(
         &self,
         problem: &Problem<'_>,
@@ -94,11 +94,11 @@ impl Shared {
             let name = as_shared(id);
             self.ids.iter().position(|shared| *shared == name)
         };
-        let place: Vec<Option<usize>> = list.iter().map(|parameter| column_of(&parameter.id)).collect();
-        let own: Vec<usize> = (0..list.len()).filter(|j| place[*j].is_none()).collect();
+        let index: Vec<Option<usize>> = list.iter().map(|parameter| column_of(&parameter.id)).collect();
+        let own: Vec<usize> = (0..list.len()).filter(|j| index[*j].is_none()).collect();
         let (m, k) = (own.len(), self.ids.len());
         let mut stacked = Mat::zeros((list.len() + m).max(m + k), m + k);
-        for (j, column) in place.iter().enumerate() {
+        for (j, column) in index.iter().enumerate() {
             let target = match column {
                 Some(column) => m + column,
                 None => own.iter().position(|own| *own == j).unwrap_or(0),
@@ -107,31 +107,31 @@ impl Shared {
                 stacked[(i, target)] = r[(i, j)];
             }
         }
-        for (place, j) in own.iter().enumerate() {
+        for (index, j) in own.iter().enumerate() {
             let u = match list[*j].prior {
                 Prior::Gaussian(u) => u,
                 _ => list[*j].size,
             };
-            stacked[(list.len() + place, place)] = 1.0 / u;
+            stacked[(list.len() + index, index)] = 1.0 / u;
         }
         let upper = upper(stacked);
         Mat::from_fn(k, k, |i, j| if i <= j { upper[(m + i, m + j)] } else { 0.0 })
     }
 
-    /// The root on what is asked about, the others being unknown too.
+    /// The root of the information on the target parameters, with the others eliminated.
     pub fn criterion_block<'r>(&self, root: &'r Root) -> MatRef<'r, f64> {
-        let first = self.ids.len() - self.asked;
-        root.as_ref().submatrix(first, first, self.asked, self.asked)
+        let first = self.ids.len() - self.targets;
+        root.as_ref().submatrix(first, first, self.targets, self.targets)
     }
 
-    /// Standard uncertainties of what is asked about, outside units.
+    /// Standard uncertainties of the target parameters, display units.
     pub fn uncertainties(&self, root: &Root) -> Vec<f64> {
         let block = self.criterion_block(root);
         let inverse = inverted(block);
-        let first = self.ids.len() - self.asked;
-        (0..self.asked)
+        let first = self.ids.len() - self.targets;
+        (0..self.targets)
             .map(|i| {
-                let row = (i..self.asked)
+                let row = (i..self.targets)
                     .map(|j| inverse[(i, j)].powi(2))
                     .sum::<f64>()
                     .sqrt();
@@ -141,7 +141,7 @@ impl Shared {
     }
 }
 
-/// The root of two pieces of information together.
+/// The root of the sum of two information matrices.
 pub fn sum(a: MatRef<'_, f64>, b: MatRef<'_, f64>) -> Root {
     let k = a.ncols();
     let stacked = Mat::from_fn(a.nrows() + b.nrows(), k, |i, j| {
@@ -154,7 +154,7 @@ pub fn sum(a: MatRef<'_, f64>, b: MatRef<'_, f64>) -> Root {
     upper(stacked)
 }
 
-/// The inverse of an upper triangle; a pivot of nothing yields infinity.
+/// The inverse of an upper triangular matrix. A zero pivot yields infinity.
 fn inverted(r: MatRef<'_, f64>) -> Mat<f64> {
     let n = r.ncols();
     let mut inverse = Mat::zeros(n, n);

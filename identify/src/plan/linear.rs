@@ -1,8 +1,8 @@
-//! A plan linearised: the triangle of every test, what is known before, and what follows for the unknowns.
+//! A linearised plan: the triangular factor of every test, the priors, and the resulting covariance.
 //!
-//! Everything that `abbe plan` says comes from here. Triangles are square roots of information, `RᵀR = JᵀV⁻¹J`: they are merged and
-//! reduced by orthogonal transformations, so that nothing is lost by squaring (Bierman, Factorization Methods for Discrete Sequential
-//! Estimation, 1977, ch. V).
+//! All predictions of a plan follow from it. A triangular factor is a square root of information, `RᵀR = JᵀV⁻¹J`. Factors are
+//! merged and reduced by orthogonal transformations, so that squaring loses no precision (Bierman, Factorization Methods for
+//! Discrete Sequential Estimation, 1977, ch. V).
 
 use abbe_model::session::Prior;
 use faer::{Mat, MatRef};
@@ -15,28 +15,28 @@ use crate::problem::Problem;
 use crate::rank::{MIN_IDENTIFIABLE, Rank};
 use crate::triangle::{Triangle, upper};
 
-/// A plan at its nominal state.
+/// A plan, linearised at nominal parameters.
 pub struct Linearisation {
-    /// Readings of each test, without what is known before.
+    /// Triangular factor of each test's readings, without priors.
     pub tests: Vec<Triangle>,
-    /// What is known before.
+    /// Triangular factor of the priors.
     pub prior: Triangle,
-    /// All readings, without what is known before.
+    /// Triangular factor of all readings, without priors.
     pub readings: Triangle,
-    /// Everything together.
+    /// Triangular factor of all readings and priors.
     pub whole: Triangle,
-    /// What is seen and what is not.
+    /// Rank: identifiable directions and null space.
     pub rank: Rank,
-    /// Covariance of the unknowns, seen part, internal units.
+    /// Covariance of the parameters over the identifiable directions, internal units.
     pub covariance: Mat<f64>,
-    /// Physical size of each unknown.
+    /// Physical size of each parameter.
     pub size: Vec<f64>,
     /// The parameters in the order in which they are preferred as pivots.
     pub preference: Vec<usize>,
 }
 
 impl Linearisation {
-    /// Of a problem whose folds are its tests, at the unknowns' values `beta`.
+    /// Linearises a problem whose folds are its tests, at the parameter values `beta`.
     ///
     /// # Errors
     /// If the model cannot be evaluated.
@@ -66,11 +66,11 @@ impl Linearisation {
         })
     }
 
-    /// Standard uncertainty of an unknown, internal unit; `None` where it takes part in an unseen combination.
-    pub fn u(&self, unknown: usize) -> Option<f64> {
+    /// Standard uncertainty of a parameter, internal unit. `None` if the parameter is not identifiable.
+    pub fn u(&self, parameter: usize) -> Option<f64> {
         self.rank
-            .is_identifiable(unknown)
-            .then(|| self.covariance[(unknown, unknown)].max(0.0).sqrt())
+            .is_identifiable(parameter)
+            .then(|| self.covariance[(parameter, parameter)].max(0.0).sqrt())
     }
 
     /// The same plan without some of its tests.
@@ -91,22 +91,24 @@ impl Linearisation {
     }
 }
 
-/// A triangle with others merged into it.
+/// A triangular factor with others merged into it.
 pub fn merged<'t>(mut whole: Triangle, others: impl Iterator<Item = &'t Triangle>) -> Triangle {
     others.for_each(|triangle| whole.merge(triangle));
     whole
 }
 
-/// Whether an unknown is what a plan is made for: an error of the machine or a coefficient of a declared effect, not a set-up quantity.
-pub fn is_wanted(parameter: &Parameter) -> bool {
+/// Whether a parameter is a target of the plan: an error of the machine or a coefficient of a declared effect, not a set-up
+/// quantity.
+pub fn is_of_interest(parameter: &Parameter) -> bool {
     parameter.role != Role::Setup
 }
 
-/// The square-root information on `kept` unknowns once the others are unknown too: the lower right block of the triangle of
-/// `[R_dropped R_kept]` (the Schur complement, without squaring).
+/// The square-root information on the `kept` parameters with the others eliminated: the lower right block of the triangular
+/// factor of `[R_dropped R_kept]` (the Schur complement, without squaring).
 ///
-/// Directions of the dropped unknowns of which `r` tells less than one standard deviation a physical size stay at their nominal values, as in a fit (see
-/// [`crate::rank`]): a column of zeros would take a row of information along. Nothing is added to what `r` says.
+/// Directions of the dropped parameters on which `r` has less information than one standard deviation per physical size stay at
+/// their nominal values, as in a fit (see [`crate::rank`]). A column of zeros would otherwise remove a row of information. No
+/// information is added to that of `r`.
 ///
 /// # Errors
 /// If `r` has entries that are not finite.
@@ -126,12 +128,12 @@ pub fn marginal(r: MatRef<'_, f64>, kept: &[usize], size: &[f64]) -> Result<Mat<
         let svd = scaled.thin_svd().map_err(|_| IdentifyError::Decomposition)?;
         let singular: Vec<f64> = svd.S().column_vector().iter().copied().collect();
         let rounding = singular.first().copied().unwrap_or(0.0) * 1e-13 * size.len() as f64;
-        // What the dropped unknowns can explain is taken out of every column.
-        let told = singular
+        // The column space of the dropped parameters is projected out of every column.
+        let informed = singular
             .iter()
             .filter(|s| **s >= MIN_IDENTIFIABLE && **s > rounding)
             .count();
-        let directions = svd.U().subcols(0, told);
+        let directions = svd.U().subcols(0, informed);
         let along = directions.transpose() * &rows;
         rows -= directions * along;
     }
@@ -149,17 +151,17 @@ pub fn prior_u(parameter: &Parameter) -> Option<f64> {
 mod tests {
     use super::*;
 
-    /// A reading of 0.1 µm sees an error and a ball together, and the ball is known to 300 µm: that is what is known of the error, all other errors being known,
-    /// for there is none. A ball that nobody has placed and no reading sees takes nothing away.
+    /// A reading with 0.1 µm noise depends on the sum of an error and a ball position with a prior of 300 µm. The prior then
+    /// determines the error. A second ball position, with neither prior nor readings, removes no information.
     #[test]
-    fn what_is_dropped_is_known_by_its_prior_and_no_better() {
+    fn dropped_parameters_are_limited_by_their_priors() {
         let r = Mat::from_fn(3, 3, |i, j| {
             [[1e4, 1e4, 0.0], [0.0, 1.0 / 0.3, 0.0], [0.0; 3]][i][j]
         });
         let left = marginal(r.as_ref(), &[0], &[1.0; 3]).unwrap();
         let u = 1.0 / left[(0, 0)].abs();
         assert!((u / 0.3_f64.hypot(1e-4) - 1.0).abs() < 1e-9, "{u}");
-        // Nothing dropped but that ball: the readings themselves.
+        // Only the second ball position is dropped: the information of the readings remains.
         let both = marginal(r.as_ref(), &[0, 1], &[1.0; 3]).unwrap();
         let information = both.transpose() * &both;
         let whole = r.transpose() * &r;

@@ -1,13 +1,14 @@
-//! Plan: what tests can see before anybody measures, and which test to make next.
+//! Plan: which errors a set of tests identifies, before the measurement, and which test to add next.
 //!
-//! A plan has no data; it is given nominal readings at its planned states and becomes the same least-squares problem as a measured session, so
-//! that there is one Jacobian in the house.
+//! A plan has no data. It receives nominal readings at its planned states, and becomes the same least-squares problem as a
+//! measured session. Fit and plan therefore share one Jacobian.
 //!
-//! - [`analyse`]: uncertainties, budgets, blind spots, indices, and what each test contributes;
-//! - [`effects`]: what undeclared effects would do;
-//! - [`menu`], [`mod@prepared`], [`information`], [`goal`], [`mod@improve`], [`mod@separate`]: the next test; [`mod@range`]: how far a sweep can shrink;
-//! - [`states`], [`linear`], [`sensitivity`], [`budget`], [`blind`], [`indices`]: the parts of it;
-//! - [`results`]: what is reported, as it stands in JSON.
+//! - [`analyse`]: uncertainties, budgets, identifiability, indices, and the contribution of each test;
+//! - [`effects`]: detectability and bias of undeclared effects;
+//! - [`candidate_tests`], [`candidate_information`], [`information`], [`criterion`], [`mod@improve`], [`separate`]: the next
+//!   test; [`mod@range`]: how far a sweep can shrink;
+//! - [`states`], [`linear`], [`sensitivity`], [`budget`], [`identifiability`], [`indices`]: the parts of the analysis;
+//! - [`results`]: the results, as they are written to JSON.
 
 mod analysis;
 mod ball_positions;

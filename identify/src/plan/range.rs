@@ -1,10 +1,10 @@
-//! How far a sweep can shrink, about its middle, before an uncertainty doubles.
+//! The smallest range of a sweep, about its middle, at which no uncertainty doubles.
 
 use faer::Mat;
 use schemars::JsonSchema;
 use serde::Serialize;
 
-use super::linear::{Linearisation, is_wanted, merged};
+use super::linear::{Linearisation, is_of_interest, merged};
 use crate::error::IdentifyError;
 use crate::fit;
 use crate::problem::Problem;
@@ -22,7 +22,7 @@ pub struct Shrinkage {
     pub range: Interval,
     /// Unit of the ranges: `deg`, `mm`.
     pub unit: String,
-    /// The least range at which no uncertainty has doubled, in `unit`; `null` where the test can be left out.
+    /// The smallest range at which no uncertainty has doubled, in `unit`; `null` if the test can be left out.
     pub minimum_range: Option<Interval>,
     /// The error whose uncertainty doubles first.
     pub first_to_double: Option<String>,
@@ -31,18 +31,18 @@ pub struct Shrinkage {
 /// The position of an axis at each whitened row, and the rows.
 type PlacedRows = (Vec<f64>, Mat<f64>);
 
-/// Bisections of the range: to a thousandth.
+/// Number of bisections of the range, for a resolution of one thousandth.
 const BISECTIONS: usize = 10;
 
-/// Of every test in which one axis does most of the moving.
+/// The smallest range of every test in which a single axis moves.
 ///
 /// # Errors
 /// If the model cannot be evaluated.
 pub fn shrinkages(problem: &Problem<'_>) -> Result<Vec<Shrinkage>, IdentifyError> {
     let nominal = vec![0.0; problem.parameters.list.len()];
     let linear = Linearisation::of(problem, &nominal)?;
-    let wanted: Vec<usize> = (0..problem.parameters.list.len())
-        .filter(|j| is_wanted(&problem.parameters.list[*j]) && linear.rank.is_identifiable(*j))
+    let of_interest: Vec<usize> = (0..problem.parameters.list.len())
+        .filter(|j| is_of_interest(&problem.parameters.list[*j]) && linear.rank.is_identifiable(*j))
         .collect();
     let mut found = Vec::new();
     for test in 0..problem.tests.len() {
@@ -59,7 +59,7 @@ pub fn shrinkages(problem: &Problem<'_>) -> Result<Vec<Shrinkage>, IdentifyError
                 .map(|(_, triangle)| triangle),
         );
         let rows = whitened(problem, test, axis)?;
-        // The worst ratio of uncertainties at a share of the range, and whose it is.
+        // The largest ratio of uncertainties at a share of the range, and its parameter.
         let worst = |share: f64| -> Result<(f64, usize), IdentifyError> {
             let (middle, half) = (0.5 * (low + high), 0.5 * share * (high - low) + 1e-9);
             let mut whole = rest.clone();
@@ -71,7 +71,7 @@ pub fn shrinkages(problem: &Problem<'_>) -> Result<Vec<Shrinkage>, IdentifyError
             }
             let rank = Rank::decide(whole.parts().0.as_ref(), &linear.size, &linear.preference)?;
             let covariance = fit::covariance(&whole, &rank.seen)?;
-            let ratios = wanted.iter().map(|&j| {
+            let ratios = of_interest.iter().map(|&j| {
                 let ratio = (covariance[(j, j)] / linear.covariance[(j, j)]).sqrt();
                 (
                     if rank.is_identifiable(j) {
@@ -85,7 +85,7 @@ pub fn shrinkages(problem: &Problem<'_>) -> Result<Vec<Shrinkage>, IdentifyError
             Ok(ratios.fold((0.0, 0), |most, next| if next.0 > most.0 { next } else { most }))
         };
         let kind = problem.session.machine.axes[axis].kind;
-        let (outside, unit) = match kind {
+        let (display_per_internal, unit) = match kind {
             abbe_model::axis::AxisKind::Rotary => (1.0_f64.to_degrees(), "deg"),
             abbe_model::axis::AxisKind::Linear => (1.0, "mm"),
         };
@@ -93,32 +93,38 @@ pub fn shrinkages(problem: &Problem<'_>) -> Result<Vec<Shrinkage>, IdentifyError
         let mut shrinkage = Shrinkage {
             test: problem.tests[test].name.clone(),
             axis: problem.session.machine.axes[axis].name.clone(),
-            range: [low * outside, high * outside].into(),
+            range: [low * display_per_internal, high * display_per_internal].into(),
             unit: unit.to_string(),
             minimum_range: None,
             first_to_double: None,
         };
         if none.0 >= 2.0 {
-            let (mut enough, mut too_little, mut who) = (1.0, 0.0, none.1);
+            let (mut enough, mut too_little, mut parameter) = (1.0, 0.0, none.1);
             for _ in 0..BISECTIONS {
                 let share = 0.5 * (enough + too_little);
                 let (ratio, j) = worst(share)?;
                 if ratio < 2.0 {
                     enough = share;
                 } else {
-                    (too_little, who) = (share, j);
+                    (too_little, parameter) = (share, j);
                 }
             }
             let (middle, half) = (0.5 * (low + high), 0.5 * enough * (high - low));
-            shrinkage.minimum_range = Some([(middle - half) * outside, (middle + half) * outside].into());
-            shrinkage.first_to_double = Some(problem.parameters.list[who].id.clone());
+            shrinkage.minimum_range = Some(
+                [
+                    (middle - half) * display_per_internal,
+                    (middle + half) * display_per_internal,
+                ]
+                .into(),
+            );
+            shrinkage.first_to_double = Some(problem.parameters.list[parameter].id.clone());
         }
         found.push(shrinkage);
     }
     Ok(found)
 }
 
-/// The axis that alone moves in a test, and how far.
+/// The axis that moves alone in a test, and its limits.
 fn swept(problem: &Problem<'_>, test: usize) -> Option<(usize, f64, f64)> {
     let readings = problem.tests[test].readings.as_ref()?;
     let mut moving = readings

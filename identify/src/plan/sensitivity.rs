@@ -1,4 +1,5 @@
-//! What the readings do when one unknown moves: largest, root mean square, along each test; and the leverage of every reading.
+//! The sensitivity of the readings to each parameter (largest, root mean square, along each test), and the leverage of the
+//! readings.
 
 use faer::Mat;
 use rayon::prelude::*;
@@ -7,16 +8,17 @@ use super::results::{Curve, Sensitivity};
 use crate::error::IdentifyError;
 use crate::problem::{Block, Problem};
 
-/// Points of a curve at most.
+/// Maximum number of points of a curve.
 const CURVE_POINTS: usize = 60;
 
-/// Sensitivities of every unknown, internal units (mm of reading a mm or rad), and the leverages of readings.
+/// Sensitivities to every parameter, internal units (mm of reading per mm or rad), and the leverages of the readings.
 pub struct Sensitivities {
-    /// By unknown: the largest with its sign, the test where, and the root mean square.
+    /// By parameter: the largest with its sign, its test, and the root mean square.
     pub summary: Vec<(f64, usize, f64)>,
-    /// By unknown and test: along the first run.
+    /// By parameter and test: along the first run.
     pub curves: Vec<Vec<Vec<f64>>>,
-    /// Mean over greatest leverage: `xᵀ Cov x` of a whitened row `x` is by how much the fit follows that reading.
+    /// Mean over greatest leverage. The leverage `xᵀ Cov x` of a whitened row `x` is the response of the fitted value to that
+    /// reading.
     pub g_efficiency: f64,
 }
 
@@ -40,21 +42,21 @@ pub fn sensitivities(
     covariance: &Mat<f64>,
 ) -> Result<Sensitivities, IdentifyError> {
     let values = problem.slot_values(beta);
-    let unknowns = beta.len();
+    let parameters = beta.len();
     let parts: Vec<BlockSensitivity> = problem
         .blocks()
         .par_iter()
         .map(|block| {
             let rows = problem.rows(&values, block)?;
-            Ok(of_block(problem, block, &rows, unknowns, covariance))
+            Ok(of_block(problem, block, &rows, parameters, covariance))
         })
         .collect::<Result<_, IdentifyError>>()?;
     let tests = problem.tests.len();
-    let mut summary = vec![(0.0_f64, 0_usize, 0.0_f64); unknowns];
-    let mut curves = vec![vec![Vec::new(); tests]; unknowns];
+    let mut summary = vec![(0.0_f64, 0_usize, 0.0_f64); parameters];
+    let mut curves = vec![vec![Vec::new(); tests]; parameters];
     let (mut sum, mut most, mut rows) = (0.0, 0.0_f64, 0);
     for part in parts {
-        for j in 0..unknowns {
+        for j in 0..parameters {
             if part.largest[j].abs() > summary[j].0.abs() {
                 (summary[j].0, summary[j].1) = (part.largest[j], part.test);
             }
@@ -84,7 +86,7 @@ fn of_block(
     problem: &Problem<'_>,
     block: &Block,
     rows: &Mat<f64>,
-    unknowns: usize,
+    parameters: usize,
     covariance: &Mat<f64>,
 ) -> BlockSensitivity {
     let coordinates = problem.coordinates();
@@ -101,10 +103,10 @@ fn of_block(
             first_run.contains(&row) && (row - first_run.start).is_multiple_of(every)
         })
         .collect();
-    let mut largest = vec![0.0_f64; unknowns];
-    let mut squares = vec![0.0; unknowns];
-    let mut curve = vec![Vec::with_capacity(picked.len()); unknowns];
-    for j in 0..unknowns {
+    let mut largest = vec![0.0_f64; parameters];
+    let mut squares = vec![0.0; parameters];
+    let mut curve = vec![Vec::with_capacity(picked.len()); parameters];
+    for j in 0..parameters {
         for i in 0..rows.nrows() {
             let value = rows[(i, j)];
             if value.abs() > largest[j].abs() {
@@ -124,9 +126,13 @@ fn of_block(
         }
     }
     let (white, _) = problem.whiten(rows, block);
-    let spread = white.as_ref().subcols(0, unknowns) * covariance;
+    let spread = white.as_ref().subcols(0, parameters) * covariance;
     let leverages = (0..white.nrows())
-        .map(|i| (0..unknowns).map(|j| spread[(i, j)] * white[(i, j)]).sum::<f64>())
+        .map(|i| {
+            (0..parameters)
+                .map(|j| spread[(i, j)] * white[(i, j)])
+                .sum::<f64>()
+        })
         .collect::<Vec<f64>>();
     BlockSensitivity {
         test: block.test,
@@ -139,25 +145,25 @@ fn of_block(
     }
 }
 
-/// The summary of an unknown in outside units: µm of reading per unit of it.
-pub fn reported(problem: &Problem<'_>, found: &Sensitivities, unknown: usize) -> Sensitivity {
-    let (largest, test, rms) = found.summary[unknown];
-    let scale = outside(problem, unknown);
+/// The summary of a parameter in display units: µm of reading per display unit.
+pub fn reported(problem: &Problem<'_>, found: &Sensitivities, parameter: usize) -> Sensitivity {
+    let (largest, test, rms) = found.summary[parameter];
+    let scale = display_scale(problem, parameter);
     Sensitivity {
         largest: largest * scale,
         largest_in_test: problem.tests[test].name.clone(),
         rms: rms * scale,
-        unit: format!("um/{}", problem.parameters.list[unknown].unit.name),
+        unit: format!("um/{}", problem.parameters.list[parameter].unit.name),
     }
 }
 
-/// The curves of an unknown in outside units; tests that do not change with it are left out.
-pub fn curves(problem: &Problem<'_>, found: &Sensitivities, unknown: usize) -> Vec<Curve> {
-    let scale = outside(problem, unknown);
-    found.curves[unknown]
+/// The curves of a parameter in display units, without tests that do not depend on it.
+pub fn curves(problem: &Problem<'_>, found: &Sensitivities, parameter: usize) -> Vec<Curve> {
+    let scale = display_scale(problem, parameter);
+    found.curves[parameter]
         .iter()
         .enumerate()
-        .filter(|(_, values)| values.iter().any(|value| value.abs() > NOTHING))
+        .filter(|(_, values)| values.iter().any(|value| value.abs() > MIN_SENSITIVITY))
         .map(|(test, values)| Curve {
             test: problem.tests[test].name.clone(),
             values: values.iter().map(|value| value * scale).collect(),
@@ -165,10 +171,10 @@ pub fn curves(problem: &Problem<'_>, found: &Sensitivities, unknown: usize) -> V
         .collect()
 }
 
-/// Sensitivities below this are rounding, mm a mm or rad.
-const NOTHING: f64 = 1e-9;
+/// Sensitivities below this value are rounding errors, mm per mm or rad.
+const MIN_SENSITIVITY: f64 = 1e-9;
 
-/// From mm of reading an internal unit to µm per unit outside.
-fn outside(problem: &Problem<'_>, unknown: usize) -> f64 {
-    1e3 / problem.parameters.list[unknown].unit.display_per_internal
+/// Converts mm of reading per internal unit into µm per display unit.
+fn display_scale(problem: &Problem<'_>, parameter: usize) -> f64 {
+    1e3 / problem.parameters.list[parameter].unit.display_per_internal
 }

@@ -1,18 +1,19 @@
 //! Further tests that separate a found effect from its alternatives.
 //!
-//! The alternatives are weighed one at a time: the separation of an effect from one of them is its distance, in standard deviations, from the best that the
-//! rest of the model and that alternative can make of it. The information of every candidate test holds the coefficients of all alternatives; to leave one
-//! out of the model is to leave its columns out of the root, so that one evaluation of the candidate tests serves them all.
+//! The alternatives are compared one at a time. The separation of an effect from one of them is its distance, in standard
+//! deviations, from the best approximation by that alternative and the rest of the model. The information of every candidate test
+//! contains the coefficients of all alternatives. To remove one from the model, its columns are removed from the root. One
+//! evaluation of the candidate tests therefore serves all alternatives.
 
 use abbe_model::effect::Effect;
 use faer::Mat;
 use schemars::JsonSchema;
 use serde::Serialize;
 
-use super::candidate_information::Prepared;
-use super::candidate_tests::CandidateTests;
+use super::candidate_information::PreparedCandidates;
+use super::candidate_tests::TestVariations;
 use super::criterion;
-use super::information::{Root, Shared};
+use super::information::{Root, SharedParameters};
 use super::ranking::{rounded, smallest_first};
 use super::states;
 use crate::error::IdentifyError;
@@ -20,19 +21,19 @@ use crate::parameters::Role;
 use crate::problem::Problem;
 use crate::triangle::upper;
 
-/// Relative gain below which a test adds nothing.
+/// Relative gain below which a test adds no information.
 const MIN_GAIN: f64 = 1e-6;
-/// Share of the best separation that a quicker test must reach to be preferred.
+/// Share of the best separation that a shorter test must reach to be preferred.
 const EQUIVALENT_SHARE: f64 = 0.9;
-/// Standard deviations from which on two effects count as separated.
+/// Standard deviations from which two effects count as separated.
 pub const SEPARATED_SIGMA: f64 = 3.0;
-/// Tests that are proposed at most.
+/// Maximum number of proposed tests.
 const MAX_TESTS: usize = 3;
 
-/// A test that separates an effect from one that looks like it.
+/// A test that separates an effect from an alias.
 #[derive(Clone, Debug, PartialEq, Serialize, JsonSchema)]
 pub struct SeparationAnalysis {
-    /// In words: `C150 with the workpiece ball at radius 50 mm`.
+    /// Description, for example `C150 with the workpiece ball at radius 50 mm`.
     pub test: String,
     /// Separation by the present readings, standard deviations.
     pub before_sigma: f64,
@@ -45,145 +46,149 @@ pub struct SeparationAnalysis {
 /// A test that separates an effect from some of its alternatives.
 #[derive(Clone, Debug, PartialEq)]
 pub struct SeparatingTest {
-    /// In words: `C150 with the workpiece ball at radius 50 mm`.
+    /// Description, for example `C150 with the workpiece ball at radius 50 mm`.
     pub test: String,
-    /// What it takes, min.
+    /// Duration, min.
     pub minutes: f64,
-    /// The alternatives that no test before it separates, in their order.
-    pub alternatives: Vec<Alternative>,
+    /// The alternatives that no previous test separates, in their order.
+    pub alternatives: Vec<AlternativeSeparation>,
 }
 
 impl SeparatingTest {
-    /// How many of its alternatives it separates.
+    /// Number of alternatives that it separates.
     pub fn separates(&self) -> usize {
         self.alternatives.iter().filter(|one| one.is_separated()).count()
     }
 }
 
-/// How well a test separates an effect from one alternative.
+/// The separation of an effect from one alternative by a test.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Alternative {
-    /// Its place among the alternatives that were asked about.
+pub struct AlternativeSeparation {
+    /// Index among the given alternatives.
     pub number: usize,
-    /// Separation by the readings that there are and the tests before, standard deviations.
+    /// Separation by the present readings and the previous tests, standard deviations.
     pub before: f64,
-    /// Separation with the test as well.
+    /// Separation with the test added.
     pub after: f64,
 }
 
-impl Alternative {
-    /// Whether the test separates them.
+impl AlternativeSeparation {
+    /// Whether the test separates the two.
     pub fn is_separated(&self) -> bool {
         self.after >= SEPARATED_SIGMA
     }
 }
 
-/// For a found effect and one that looks like it, the candidate test that separates them best; `None` where no candidate test adds to what
-/// the readings tell. `coefficients` are those of the found effect, internal units.
+/// The candidate test that best separates a found effect from an alias. `None` if no candidate test adds to the separation.
+/// `coefficients` are those of the found effect, internal units.
 ///
 /// # Errors
-/// If an effect cannot be laid over the session, or there is no menu for its instrument.
+/// If the columns of an effect cannot be computed for the session, or if there are no candidate tests for its instrument.
 pub fn separation(
     problem: &Problem<'_>,
     beta: &[f64],
     found: &Effect,
     coefficients: &[f64],
     alias: &Effect,
-    menu: &CandidateTests,
+    variations: &TestVariations,
 ) -> Result<Option<SeparationAnalysis>, IdentifyError> {
-    let contest = Contest::new(
+    let comparison = SeparationComparison::new(
         problem,
         beta,
         found,
         coefficients,
         std::slice::from_ref(alias),
-        menu,
+        variations,
     )?;
-    let base = &contest.prepared.base;
-    let before = contest.sigma(base, 0);
-    let sigmas = contest.with_each(base, &[0]);
-    let Some(best) = contest.best(&sigmas, f64::MIN_POSITIVE) else {
+    let base = &comparison.prepared.base;
+    let before = comparison.sigma(base, 0);
+    let sigmas = comparison.with_each(base, &[0]);
+    let Some(best) = comparison.best(&sigmas, f64::MIN_POSITIVE) else {
         return Ok(None);
     };
-    let entry = &contest.prepared.entries[best].entry;
+    let candidate = &comparison.prepared.candidates[best].test;
     let after = sigmas[best][0];
     Ok((after > before * (1.0 + MIN_GAIN)).then(|| SeparationAnalysis {
-        test: entry.name.clone(),
+        test: candidate.name.clone(),
         before_sigma: before,
         after_sigma: after,
-        duration_min: entry.minutes,
+        duration_min: candidate.minutes,
     }))
 }
 
-/// For a found effect and its alternatives, tests of a menu that separate it from them: the first separates most of them, each further one most of those that
-/// are left. Empty where no test separates any. `coefficients` are those of the found effect, internal units.
+/// The tests that separate a found effect from its alternatives. The first test separates the largest number, each further test
+/// the largest number of the remaining ones. Empty if no test separates any. `coefficients` are those of the found effect,
+/// internal units.
 ///
 /// # Errors
-/// If an effect cannot be laid over the session, or there is no menu for its instrument.
+/// If the columns of an effect cannot be computed for the session, or if there are no candidate tests for its instrument.
 pub fn separating_tests(
     problem: &Problem<'_>,
     beta: &[f64],
     found: &Effect,
     coefficients: &[f64],
     alternatives: &[Effect],
-    menu: &CandidateTests,
+    variations: &TestVariations,
 ) -> Result<Vec<SeparatingTest>, IdentifyError> {
     if alternatives.is_empty() {
         return Ok(Vec::new());
     }
-    let contest = Contest::new(problem, beta, found, coefficients, alternatives, menu)?;
-    let mut left: Vec<usize> = (0..alternatives.len()).collect();
-    let mut root = contest.prepared.base.clone();
+    let comparison = SeparationComparison::new(problem, beta, found, coefficients, alternatives, variations)?;
+    let mut remaining: Vec<usize> = (0..alternatives.len()).collect();
+    let mut root = comparison.prepared.base.clone();
     let mut tests: Vec<SeparatingTest> = Vec::new();
-    while !left.is_empty() && tests.len() < MAX_TESTS {
-        let before: Vec<f64> = left.iter().map(|one| contest.sigma(&root, *one)).collect();
-        let sigmas = contest.with_each(&root, &left);
-        let Some(best) = contest.best(&sigmas, SEPARATED_SIGMA) else {
+    while !remaining.is_empty() && tests.len() < MAX_TESTS {
+        let before: Vec<f64> = remaining
+            .iter()
+            .map(|one| comparison.sigma(&root, *one))
+            .collect();
+        let sigmas = comparison.with_each(&root, &remaining);
+        let Some(best) = comparison.best(&sigmas, SEPARATED_SIGMA) else {
             break;
         };
-        let entry = &contest.prepared.entries[best].entry;
-        let of = |((number, before), after): ((&usize, &f64), &f64)| Alternative {
+        let candidate = &comparison.prepared.candidates[best].test;
+        let of = |((number, before), after): ((&usize, &f64), &f64)| AlternativeSeparation {
             number: *number,
             before: *before,
             after: *after,
         };
         let test = SeparatingTest {
-            test: entry.name.clone(),
-            minutes: entry.minutes,
-            alternatives: left.iter().zip(&before).zip(&sigmas[best]).map(of).collect(),
+            test: candidate.name.clone(),
+            minutes: candidate.minutes,
+            alternatives: remaining.iter().zip(&before).zip(&sigmas[best]).map(of).collect(),
         };
-        // What the readings separate already needs no test.
-        let gained = |one: &Alternative| one.is_separated() && one.before < SEPARATED_SIGMA;
+        // Alternatives that the readings separate already need no test.
+        let gained = |one: &AlternativeSeparation| one.is_separated() && one.before < SEPARATED_SIGMA;
         if !test.alternatives.iter().any(gained) {
             break;
         }
-        left = (test.alternatives.iter())
+        remaining = (test.alternatives.iter())
             .filter(|one| !one.is_separated())
             .map(|one| one.number)
             .collect();
-        root = contest.prepared.added(&root, best);
+        root = comparison.prepared.added(&root, best);
         tests.push(test);
     }
     Ok(tests)
 }
 
-/// A found effect against each of its alternatives, with the information of every candidate test.
-struct Contest {
-    prepared: Prepared,
+/// The separation of a found effect from each of its alternatives by every candidate test.
+struct SeparationComparison {
+    prepared: PreparedCandidates,
     coefficients: Vec<f64>,
-    /// For each alternative the columns that stay when it alone is in the model, and the parameters that they are.
-    pairs: Vec<(Vec<usize>, Shared)>,
+    /// For each alternative, the columns that remain when it alone is in the model, and their parameters.
+    pairs: Vec<(Vec<usize>, SharedParameters)>,
 }
 
-impl Contest {
+impl SeparationComparison {
     fn new(
         problem: &Problem<'_>,
         beta: &[f64],
         found: &Effect,
         coefficients: &[f64],
         alternatives: &[Effect],
-        menu: &CandidateTests,
-    ) -> Result<Contest, IdentifyError> {
+        variations: &TestVariations,
+    ) -> Result<SeparationComparison, IdentifyError> {
         let mut all = problem.clone();
         states::fold_by_test(&mut all);
         let mut values = beta.to_vec();
@@ -200,15 +205,15 @@ impl Contest {
             _ => None,
         };
         let found_at = place(found);
-        let asked: Vec<usize> = (0..all.parameters.list.len())
+        let targets: Vec<usize> = (0..all.parameters.list.len())
             .filter(|j| effect_of(*j).is_some() && effect_of(*j) == found_at)
             .collect();
-        let menu = &menu
+        let variations = &variations
             .clone()
             .for_effects(std::iter::once(found).chain(alternatives));
-        let entries = super::candidate_tests::entries(all.session, menu)?;
-        let prepared = Prepared::new(&all, &values, entries, menu, &asked)?;
-        // An alternative that is part of the model stays in it, whichever one is weighed.
+        let tests = super::candidate_tests::candidate_tests(all.session, variations)?;
+        let prepared = PreparedCandidates::new(&all, &values, tests, variations, &targets)?;
+        // An alternative that is part of the model always remains in it.
         let is_added = |effect: usize| effect >= known && Some(effect) != found_at;
         let added: Vec<Option<usize>> = (prepared.shared.ids.iter())
             .map(|id| {
@@ -230,45 +235,45 @@ impl Contest {
                 (columns, shared)
             })
             .collect();
-        Ok(Contest {
+        Ok(SeparationComparison {
             prepared,
             coefficients: coefficients.to_vec(),
             pairs,
         })
     }
 
-    /// How far the effect is from an alternative by some information, standard deviations.
+    /// The separation of the effect from an alternative under some information, standard deviations.
     fn sigma(&self, root: &Root, alternative: usize) -> f64 {
         let (columns, shared) = &self.pairs[alternative];
         let stays = Mat::from_fn(root.nrows(), columns.len(), |i, j| root[(i, columns[j])]);
         criterion::separation(shared, &upper(stays), &self.coefficients)
     }
 
-    /// The same with each candidate test added, for some alternatives: by test, by alternative.
+    /// The separations with each candidate test added, by test and alternative.
     fn with_each(&self, root: &Root, alternatives: &[usize]) -> Vec<Vec<f64>> {
         self.prepared.figures(root, &|root: &Root| {
             alternatives.iter().map(|one| self.sigma(root, *one)).collect()
         })
     }
 
-    /// The candidate test that separates most alternatives by so many standard deviations; of several the quickest whose least separation comes near the
-    /// largest. Ties are decided by names.
+    /// The candidate test that separates the largest number of alternatives by at least `least` standard deviations. Of several,
+    /// the shortest test whose least separation is close to the largest. Names decide ties.
     fn best(&self, sigmas: &[Vec<f64>], least: f64) -> Option<usize> {
-        let count = |entry: usize| sigmas[entry].iter().filter(|sigma| **sigma >= least).count();
-        let worst = |entry: usize| {
-            let separated = sigmas[entry].iter().filter(|sigma| **sigma >= least);
+        let count = |candidate: usize| sigmas[candidate].iter().filter(|sigma| **sigma >= least).count();
+        let worst = |candidate: usize| {
+            let separated = sigmas[candidate].iter().filter(|sigma| **sigma >= least);
             rounded(separated.copied().fold(f64::INFINITY, f64::min))
         };
         let most = (0..sigmas.len()).map(count).max().filter(|most| *most > 0)?;
-        let with_most = || (0..sigmas.len()).filter(|entry| count(*entry) == most);
+        let with_most = || (0..sigmas.len()).filter(|candidate| count(*candidate) == most);
         let best = with_most().map(worst).fold(0.0, f64::max);
-        let entry = |entry: usize| &self.prepared.entries[entry].entry;
+        let candidate = |candidate: usize| &self.prepared.candidates[candidate].test;
         with_most()
             .filter(|one| worst(*one) >= EQUIVALENT_SHARE * best)
             .min_by(|a, b| {
-                smallest_first(entry(*a).minutes, entry(*b).minutes)
+                smallest_first(candidate(*a).minutes, candidate(*b).minutes)
                     .then(worst(*b).total_cmp(&worst(*a)))
-                    .then_with(|| entry(*a).name.cmp(&entry(*b).name))
+                    .then_with(|| candidate(*a).name.cmp(&candidate(*b).name))
             })
     }
 }

@@ -1,4 +1,4 @@
-//! A plan as a session with readings: the states that it goes to, each with the reading of a machine without errors.
+//! Completes a plan to a session with readings: its planned states, each with the reading of a machine without errors.
 
 use abbe_model::sensitivity::{SlotValues, TestModel};
 use abbe_model::session::readings::Readings;
@@ -9,11 +9,11 @@ use crate::heldout::{FoldKind, Folds};
 use crate::noise::{Noise, NoiseSource};
 use crate::problem::Problem;
 
-/// Pause between two tests where nothing else is known, s.
+/// Assumed pause between two tests, s.
 const BETWEEN_TESTS_S: f64 = 120.0;
 
-/// A session in which every test has readings: the data where there are any, else the planned states with nominal readings. With
-/// `planned_only` the data are passed over wherever the test has a movement of its own.
+/// A session in which every test has readings: its data, or its planned states with nominal readings. With `planned_only`, a test
+/// with a movement uses its planned states even if it has data.
 ///
 /// # Errors
 /// If a test has neither data nor a movement, or a movement leaves the travel.
@@ -48,7 +48,7 @@ pub fn planned(session: &Session, test: &Test) -> Result<Readings, IdentifyError
     Ok(readings)
 }
 
-/// The least-squares problem of a complete session, its folds the tests, so that every test has a triangle of its own.
+/// The least-squares problem of a complete session. Its folds are the tests, so that every test has its own triangular factor.
 ///
 /// # Errors
 /// See [`Problem::new`].
@@ -72,13 +72,14 @@ pub fn fold_by_test(problem: &mut Problem<'_>) {
     };
 }
 
-/// Noise of a reading where neither the session nor its data tell: 1 µm, the accuracy that makers of ball bars state.
+/// Assumed noise of a reading if neither the session nor its data determine it: 1 µm, the accuracy that makers of ball bars
+/// state.
 pub const ASSUMED_NOISE_MM: f64 = 1e-3;
 
-/// The noise that a plan is judged with: what the session states, what its data show, or [`ASSUMED_NOISE_MM`].
+/// The noise model of a plan: that of the session, that of its data, or [`ASSUMED_NOISE_MM`].
 ///
 /// # Errors
-/// If there are data and they cannot be fitted.
+/// If the data cannot be fitted.
 pub fn noise_of(session: &Session) -> Result<Noise, IdentifyError> {
     if let Some(sigma) = session.noise_mm.filter(|sigma| *sigma > 0.0) {
         return Ok(Noise::white(sigma, NoiseSource::Stated));

@@ -1,9 +1,9 @@
-//! How an axis is swept in the tests that there are, so that a new test sweeps it alike.
+//! The sweep of an axis in the present tests, as the model of a new test.
 
 use abbe_model::session::Session;
 use abbe_model::session::motion::Motion;
 
-/// How an axis is swept in the tests that there are.
+/// A sweep of an axis.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Sweep {
     /// rad.
@@ -14,11 +14,11 @@ pub(super) struct Sweep {
     pub step: f64,
     /// rad/s.
     pub speed: f64,
-    /// There, and back where it goes both ways.
+    /// Number of runs; each covers both directions if `both_directions`.
     pub runs: usize,
-    /// Whether each run comes back.
+    /// Whether each run returns.
     pub both_directions: bool,
-    /// Whether it is less than the whole.
+    /// Whether it covers less than the whole range.
     pub is_part: bool,
 }
 
@@ -36,7 +36,7 @@ impl Sweep {
     }
 }
 
-/// How an axis is swept: as the session does it, else as far as its travel goes, within half a turn either way.
+/// The sweep of an axis: as in the session, otherwise over its travel, limited to half a turn in either direction.
 pub(super) fn sweep_of(session: &Session, axis: usize) -> Sweep {
     let planned = session.tests.iter().find_map(|test| match &test.motion {
         Some(Motion::Sweep {
@@ -75,7 +75,7 @@ pub(super) fn sweep_of(session: &Session, axis: usize) -> Sweep {
         })
 }
 
-/// How an axis was swept in the data.
+/// The sweep of an axis in the data.
 fn sweep_of_data(session: &Session, axis: usize) -> Option<Sweep> {
     session
         .tests

@@ -175,7 +175,7 @@ fn excess(problem: &Problem<'_>, fit: &Fit) -> f64 {
     let freedom = count.saturating_sub(free.count()).max(1) as f64;
     let ratio = (squares / freedom / problem.noise.sigma_mm.powi(2)).max(1.0);
     let poses = problem.folds.kind == crate::heldout::FoldKind::Poses;
-    if poses || pairs <= 0.0 || !problem.noise.memory.is_empty() {
+    if poses || pairs <= 0.0 || !problem.noise.ar_coefficients.is_empty() {
         return ratio;
     }
     let correlation = (products / pairs).clamp(0.0, MAX_CORRELATED);

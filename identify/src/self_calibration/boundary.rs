@@ -1,7 +1,8 @@
-//! What has to be agreed upon before the functions have values: the boundary conditions of the method.
+//! Boundary conditions of the self-calibration, without which the functions are not identifiable.
 //!
-//! A shift `(a, b)` of the machine's coordinates changes no reading: `E_radial` and `W_radial` absorb `a·(1 − cos θ) + b·sin θ`, the table's
-//! displacements its opposite. The first four conditions refer every function to its value at 0; the other two settle the shift.
+//! A shift `(a, b)` of the machine coordinates leaves every reading unchanged: `E_radial` and `W_radial` absorb `a·(1 − cos θ) + b·sin θ`,
+//! and the displacements of the table its opposite. The first four conditions refer every function to its value at 0. The other two fix
+//! the shift.
 
 use std::f64::consts::{FRAC_PI_2, PI, TAU};
 
@@ -13,7 +14,7 @@ use crate::error::IdentifyError;
 /// A condition `Σ a·f(angle) = 0`.
 #[derive(Clone, Debug)]
 pub struct Condition {
-    /// As it is reported.
+    /// The condition in results.
     pub words: String,
     /// Column and coefficient.
     pub terms: Vec<(usize, f64)>,
@@ -21,18 +22,18 @@ pub struct Condition {
 
 /// The six conditions.
 ///
-/// `E_radial` at an angle that no reading meets is interpolated between its neighbours, so that any number of angles will do; where the angle is met, the
-/// condition is that of the paper.
+/// `E_radial` is interpolated at an angle without readings, so that any set of angles is valid. At an angle with readings the condition is
+/// exactly that of Zimmermann & Ibaraki (2020).
 ///
 /// # Errors
-/// If a function is not met at 0.
+/// If a function has no readings at 0.
 pub fn conditions(equations: &Equations, axis: &str) -> Result<Vec<Condition>, IdentifyError> {
     let name = |function| equations.name(function, axis);
     let mut conditions = Vec::new();
     for function in Function::ALL {
         let Some(column) = equations.column(function, 0.0) else {
             return Err(IdentifyError::Request(format!(
-                "self-calibration: no reading meets {} at 0°; every function is referred to its value there",
+                "self-calibration: no reading determines {} at 0°; add a reading there, because every function is referred to its value at 0°",
                 name(function)
             )));
         };
@@ -59,7 +60,7 @@ pub fn conditions(equations: &Equations, axis: &str) -> Result<Vec<Condition>, I
     Ok(conditions)
 }
 
-/// `E_radial` at an angle, between its neighbours.
+/// `E_radial` at an angle, interpolated between its neighbours.
 fn at(equations: &Equations, angle: f64) -> Vec<(usize, f64)> {
     if let Some(column) = equations.column(Function::Linear, angle) {
         return vec![(column, 1.0)];
@@ -68,9 +69,9 @@ fn at(equations: &Equations, angle: f64) -> Vec<(usize, f64)> {
     let angles = &equations.angles[Function::Linear as usize];
     let ahead = |k: &usize| (angles[*k] - angle).rem_euclid(TAU);
     let behind = |k: &usize| (angle - angles[*k]).rem_euclid(TAU);
-    let nearest = |way: &dyn Fn(&usize) -> f64| {
+    let nearest = |distance: &dyn Fn(&usize) -> f64| {
         (0..angles.len())
-            .min_by(|a, b| way(a).total_cmp(&way(b)))
+            .min_by(|a, b| distance(a).total_cmp(&distance(b)))
             .unwrap_or(0)
     };
     let (next, last) = (nearest(&ahead), nearest(&behind));
@@ -79,18 +80,18 @@ fn at(equations: &Equations, angle: f64) -> Vec<(usize, f64)> {
     vec![(offset + next, to_last / width), (offset + last, to_next / width)]
 }
 
-/// The values that remain free, and all values in terms of them: columns × free.
+/// The free values, and all values as linear combinations of them: columns × free.
 #[derive(Clone, Debug)]
 pub struct Reduction {
-    /// The columns that remain.
+    /// The free columns.
     pub free: Vec<usize>,
-    /// All columns from those.
+    /// All columns from the free ones.
     pub spread: Mat<f64>,
 }
 
-/// Solves each condition for one of its values (Gauss–Jordan) and leaves it out.
+/// Eliminates one value per condition (Gauss–Jordan).
 pub fn reduce(columns: usize, conditions: &[Condition]) -> Reduction {
-    // Row k expresses column pivots[k] as minus the rest of the row.
+    // Row k expresses column pivots[k] as the negative of the rest of the row.
     let mut rows: Vec<Vec<f64>> = Vec::new();
     let mut pivots: Vec<usize> = Vec::new();
     for condition in conditions {

@@ -12,21 +12,21 @@ use abbe_model::session::{Prior, Session, Test};
 
 use crate::error::IdentifyError;
 
-/// Angles nearer than this are one, rad: positions in files are rounded to 0.1 µm or so.
-const SAME_ANGLE: f64 = 1e-4;
-/// Sine of the angle up to which a probing direction counts as radial.
-const RADIAL: f64 = 1e-6;
+/// Angles nearer than this are equal, rad: positions in files are rounded to about 0.1 µm.
+const ANGLE_TOLERANCE: f64 = 1e-4;
+/// Sine of the angle up to which a probing direction is radial.
+const DIRECTION_TOLERANCE: f64 = 1e-6;
 
-/// The four functions, in the order of their columns.
+/// The four unknown functions, in the order of their columns.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Function {
-    /// Displacement of the table along the first direction across its axis, over the axis' position: `E_XC,total`.
+    /// Displacement of the table along the first direction across its axis, as a function of the axis' position: `E_XC,total`.
     First,
     /// The same along the second direction: `E_YC,total`.
     Second,
-    /// Positioning error of the linear axes away from the rotary axis, over the angle of the place: `E_radial`.
+    /// Positioning error of the linear axes away from the rotary axis, as a function of the machine angle: `E_radial`.
     Linear,
-    /// What the artefact's surface stands out by, over the angle on the artefact: `W_radial`.
+    /// Form deviation of the artefact's surface, as a function of the angle on the artefact: `W_radial`.
     Artefact,
 }
 
@@ -40,31 +40,32 @@ impl Function {
     ];
 }
 
-/// Equations `Σ a·f(angle) = Δr`, one a reading.
+/// Equations `Σ a·f(angle) = Δr`, one per reading.
 #[derive(Clone, Debug)]
 pub struct Equations {
     /// Index of the rotary axis in the machine.
     pub axis: usize,
-    /// The two directions of R across the axis: 0, 1, 2 for X, Y, Z; a positive turn carries the first towards the second.
+    /// The two directions of R across the axis: 0, 1, 2 for X, Y, Z. A positive rotation turns the first towards the second.
     pub across: [usize; 2],
-    /// 1 where the axis turns from the first direction towards the second for an increasing command, else −1.
+    /// 1 if the axis turns from the first direction towards the second for an increasing command, else −1.
     pub sense: f64,
-    /// The angles at which each function is met, rad in (−π, π], ascending.
+    /// The angles of each function, rad in (−π, π], ascending.
     pub angles: [Vec<f64>; 4],
-    /// One row a reading, one column an angle of a function.
+    /// One row per reading, one column per angle of a function.
     pub rows: Vec<Vec<f64>>,
-    /// By how much further out than nominal the surface was met, mm: `Δr`.
+    /// Outward deviation of the measured surface from nominal, mm: `Δr`.
     pub outward_mm: Vec<f64>,
-    /// What the readings are referred to.
+    /// The reference of the readings.
     pub reference: Reference,
 }
 
-/// What the radius of an uncalibrated artefact is taken from.
+/// The source of an uncalibrated artefact's radius.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Reference {
-    /// An unknown of its own, from all readings.
+    /// A parameter, estimated from all readings.
     Estimated,
-    /// The first reading at which every angle is 0, as in the paper: it is taken off all readings, and its own noise is not propagated.
+    /// The first reading at which every angle is 0, as in Zimmermann & Ibaraki (2020). It is subtracted from all readings, and its own
+    /// noise is not propagated.
     FirstReading,
 }
 
@@ -79,28 +80,28 @@ impl Equations {
         self.angles.iter().map(Vec::len).sum()
     }
 
-    /// The column of a function at an angle, if some reading meets it there.
+    /// The column of a function at an angle, if a reading determines it there.
     pub fn column(&self, function: Function, angle: f64) -> Option<usize> {
-        let place = self.angles[function as usize]
+        let index = self.angles[function as usize]
             .iter()
-            .position(|known| apart(*known, angle) < SAME_ANGLE)?;
-        Some(self.offset(function) + place)
+            .position(|known| angular_distance(*known, angle) < ANGLE_TOLERANCE)?;
+        Some(self.offset(function) + index)
     }
 
     /// Function and angle of a column.
     pub fn node(&self, column: usize) -> (Function, f64) {
-        let mut place = column;
+        let mut index = column;
         for function in Function::ALL {
             let angles = &self.angles[function as usize];
-            if let Some(angle) = angles.get(place) {
+            if let Some(angle) = angles.get(index) {
                 return (function, *angle);
             }
-            place -= angles.len();
+            index -= angles.len();
         }
         (Function::Artefact, f64::NAN)
     }
 
-    /// What a function is called: `EXC`, `EYC` with the axis' own letters, `E_radial`, `W_radial`.
+    /// The name of a function: `EXC`, `EYC` with the axis' own letters, `E_radial`, `W_radial`.
     pub fn name(&self, function: Function, axis: &str) -> String {
         let letter = |k: usize| ["X", "Y", "Z"][self.across[k]];
         match function {
@@ -111,15 +112,15 @@ impl Equations {
         }
     }
 
-    /// From the readings of a session: the coefficients are the chain's own derivatives.
+    /// The equations of a session. The coefficients are the derivatives of the chain.
     ///
     /// # Errors
-    /// If the session is none of this kind: another instrument, no or several rotary axes that turn under the artefact, another rotary
-    /// axis off its zero, artefacts that are not one and the same, a probing direction that is not radial, no readings.
+    /// If the session does not fit the method: another instrument, no or several rotary axes that turn under the artefact, another
+    /// rotary axis that is not at zero, several artefacts or set-ups, a probing direction that is not radial, no readings.
     pub fn of(session: &Session) -> Result<Equations, IdentifyError> {
-        let no = |message: String| IdentifyError::Request(format!("self-calibration: {message}"));
+        let refuse = |message: String| IdentifyError::Request(format!("self-calibration: {message}"));
         if session.instrument != InstrumentKind::Probe {
-            return Err(no(format!(
+            return Err(refuse(format!(
                 "the session's instrument is a {}; the method takes a probe",
                 session.instrument.word()
             )));
@@ -133,14 +134,14 @@ impl Equations {
             return Err(IdentifyError::NoReadings);
         };
         if let Some(other) = tests.iter().find(|test| test.setup != first.setup) {
-            return Err(no(format!(
-                "tests \"{}\" and \"{}\" have different set-ups; all tests touch one artefact in one clamping: give them the same `setup`",
+            return Err(refuse(format!(
+                "tests \"{}\" and \"{}\" have different set-ups; all tests must probe one artefact in one clamping: give them the same `setup`",
                 first.name, other.name
             )));
         }
-        let axis = turning_axis(session, &tests).map_err(no)?;
+        let axis = turning_axis(session, &tests).map_err(refuse)?;
         let Some((coordinate, sense)) = session.machine.axes[axis].principal() else {
-            return Err(no(format!(
+            return Err(refuse(format!(
                 "axis `{}` does not lie along X, Y or Z",
                 session.machine.axes[axis].name
             )));
@@ -160,11 +161,14 @@ impl Equations {
         };
         let mut touches = Vec::new();
         for test in &tests {
-            touches.extend(equations.touches(session, test).map_err(no)?);
+            touches.extend(equations.touches(session, test).map_err(refuse)?);
         }
         for touch in &touches {
             for (known, angle) in equations.angles.iter_mut().zip(touch.angles) {
-                if known.iter().all(|known| apart(*known, angle) >= SAME_ANGLE) {
+                if known
+                    .iter()
+                    .all(|known| angular_distance(*known, angle) >= ANGLE_TOLERANCE)
+                {
                     known.push(angle);
                 }
             }
@@ -173,11 +177,16 @@ impl Equations {
             known.sort_by(f64::total_cmp);
         }
         if equations.reference == Reference::FirstReading {
-            let at_zero = |touch: &&Touch| touch.angles.iter().all(|angle| apart(*angle, 0.0) < SAME_ANGLE);
+            let at_zero = |touch: &&TouchEquation| {
+                touch
+                    .angles
+                    .iter()
+                    .all(|angle| angular_distance(*angle, 0.0) < ANGLE_TOLERANCE)
+            };
             let Some(first) = touches.iter().find(at_zero).map(|touch| touch.outward_mm) else {
-                return Err(no(
-                    "no reading at 0° of axis, machine and artefact, to which the others could be referred; \
-                     `radius_u_um = inf` makes the radius an unknown instead"
+                return Err(refuse(
+                    "no reading at 0° of axis, machine and artefact as reference; \
+                     `radius_u_um = inf` makes the radius a parameter instead"
                         .into(),
                 ));
             };
@@ -198,8 +207,8 @@ impl Equations {
         Ok(equations)
     }
 
-    /// What each reading of a test touches.
-    fn touches(&self, session: &Session, test: &Test) -> Result<Vec<Touch>, String> {
+    /// The probed points of a test, one per reading.
+    fn touches(&self, session: &Session, test: &Test) -> Result<Vec<TouchEquation>, String> {
         let (Station::Probe(probe), Some(readings)) = (&test.station, &test.readings) else {
             return Ok(Vec::new());
         };
@@ -211,48 +220,53 @@ impl Equations {
             motions + self.across[1],
             machine.error_slots() + FORM,
         ];
-        let places: Vec<Place> = (0..model.rows())
-            .map(|row| self.place(machine, probe, &model, row))
+        let touched: Vec<TouchAngles> = (0..model.rows())
+            .map(|row| self.touch_angles(machine, probe, &model, row))
             .collect();
-        // Eq. (2): a table that stands at 0 throughout has no displacement but that to which all are referred. Eq. (3): nor has a spot at 0 of the
-        // artefact, touched throughout, any form.
-        let varies = |angle: fn(&Place) -> f64| {
-            let stays = places.iter().all(|place| apart(angle(place), 0.0) < SAME_ANGLE);
+        // Eq. (2): a table that stays at 0 has no displacement beyond the reference. Eq. (3): nor has a spot at 0 of the artefact, probed
+        // throughout, a form deviation.
+        let varies = |angle: fn(&TouchAngles) -> f64| {
+            let stays = touched
+                .iter()
+                .all(|angles| angular_distance(angle(angles), 0.0) < ANGLE_TOLERANCE);
             f64::from(u8::from(!stays))
         };
-        let (turns, wanders) = (varies(|place| place.position), varies(|place| place.on_artefact));
+        let (axis_varies, spot_varies) = (
+            varies(|angles| angles.position),
+            varies(|angles| angles.on_artefact),
+        );
         let nominal = SlotValues::zero(model.slots());
         let sensitivities = model.sensitivities(&nominal, &slots, 0..model.rows());
         (0..model.rows())
             .map(|row| {
-                let place = &places[row];
-                if place.beside > RADIAL {
+                let angles = &touched[row];
+                if angles.direction_error > DIRECTION_TOLERANCE {
                     return Err(format!(
-                        "test \"{}\", reading {}: the probe does not move straight towards axis `{}`; the method takes radial touches",
+                        "test \"{}\", reading {}: the probe does not move straight towards axis `{}`; the method requires radial probing",
                         test.name,
                         row + 1,
                         machine.axes[self.axis].name
                     ));
                 }
-                // The measured radius grows as the distance shrinks.
+                // The measured radius increases as the distance decreases.
                 let by = |slot: usize| -sensitivities.derivatives[slot][row];
-                Ok(Touch {
-                    angles: [place.position, place.position, place.angle, place.on_artefact],
-                    coefficients: [turns * by(0), turns * by(1), -1.0, wanders * by(2)],
+                Ok(TouchEquation {
+                    angles: [angles.position, angles.position, angles.angle, angles.on_artefact],
+                    coefficients: [axis_varies * by(0), axis_varies * by(1), -1.0, spot_varies * by(2)],
                     outward_mm: sensitivities.readings_mm[row] - readings.observed[row],
                 })
             })
             .collect()
     }
 
-    /// Where a reading touches.
-    fn place(
+    /// The angles of a probed point.
+    fn touch_angles(
         &self,
         machine: &abbe_model::chain::Machine,
         probe: &Probe<f64>,
         model: &TestModel<'_>,
         row: usize,
-    ) -> Place {
+    ) -> TouchAngles {
         let state = &model.state(row);
         let none = vec![BodyErrors::<f64>::NONE; machine.axes.len()];
         let origin = machine.axes[self.axis].origin_mm;
@@ -265,28 +279,29 @@ impl Equations {
         let angle = angle_of(stylus);
         let direction = probe.direction_at::<f64>(machine, state).0;
         let [first, second] = self.across.map(|k| direction[k]);
-        Place {
+        TouchAngles {
             position: wrapped(state[self.axis].value),
             angle: wrapped(angle),
             on_artefact: wrapped(angle_of(on_table)),
-            // Inwards, the direction is minus the unit vector at the angle.
-            beside: (first + angle.cos()).hypot(second + angle.sin()),
+            // For inward probing the direction is minus the unit vector at the angle.
+            direction_error: (first + angle.cos()).hypot(second + angle.sin()),
         }
     }
 }
 
-/// One reading.
-struct Touch {
+/// The equation of one reading.
+struct TouchEquation {
     angles: [f64; 4],
     coefficients: [f64; 4],
     outward_mm: f64,
 }
 
-struct Place {
+/// The angles of a probed point, rad, and the sine of the angle between probing direction and radius.
+struct TouchAngles {
     position: f64,
     angle: f64,
     on_artefact: f64,
-    beside: f64,
+    direction_error: f64,
 }
 
 /// The rotary axis that turns under the artefact.
@@ -298,7 +313,9 @@ fn turning_axis(session: &Session, tests: &[&Test]) -> Result<usize, String> {
             .filter_map(|test| test.readings.as_ref())
             .any(|readings| {
                 let positions = &readings.positions[axis];
-                positions.iter().any(|q| (q - positions[0]).abs() > SAME_ANGLE)
+                positions
+                    .iter()
+                    .any(|q| (q - positions[0]).abs() > ANGLE_TOLERANCE)
             })
     };
     let rotary = |axis: &usize| machine.axes[*axis].kind == AxisKind::Rotary;
@@ -312,13 +329,13 @@ fn turning_axis(session: &Session, tests: &[&Test]) -> Result<usize, String> {
             .map(|axis| machine.axes[*axis].name.as_str())
             .collect();
         return Err(match names.len() {
-            0 => "no rotary axis turns in these tests".into(),
+            0 => "no rotary axis axis_varies in these tests".into(),
             _ => format!("axes {} turn; the method is for one", names.join(" and ")),
         });
     };
     if axis >= machine.workpiece_side {
         return Err(format!(
-            "axis `{}` turns the tool; the method is for an axis that turns the table",
+            "axis `{}` axis_varies the tool; the method is for an axis that axis_varies the table",
             machine.axes[axis].name
         ));
     }
@@ -329,7 +346,7 @@ fn turning_axis(session: &Session, tests: &[&Test]) -> Result<usize, String> {
         let readings = tests.iter().filter_map(|test| test.readings.as_ref());
         if readings
             .flat_map(|readings| &readings.positions[other])
-            .any(|q| q.abs() > SAME_ANGLE)
+            .any(|q| q.abs() > ANGLE_TOLERANCE)
         {
             return Err(format!(
                 "axis `{}` does not stand at zero; the directions across axis `{}` are then not those of R",
@@ -343,15 +360,15 @@ fn turning_axis(session: &Session, tests: &[&Test]) -> Result<usize, String> {
 /// An angle in (−π, π].
 fn wrapped(angle: f64) -> f64 {
     let turned = angle.rem_euclid(TAU);
-    if turned > PI + SAME_ANGLE / 2.0 {
+    if turned > PI + ANGLE_TOLERANCE / 2.0 {
         turned - TAU
     } else {
         turned
     }
 }
 
-/// By how much two angles differ, whole turns aside.
-fn apart(a: f64, b: f64) -> f64 {
+/// The distance of two angles, modulo whole turns.
+fn angular_distance(a: f64, b: f64) -> f64 {
     let turned = (a - b).rem_euclid(TAU);
     turned.min(TAU - turned)
 }

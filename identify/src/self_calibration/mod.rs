@@ -1,13 +1,13 @@
-//! Self-calibration of a rotary axis and two linear axes by probing an uncalibrated cylinder (Zimmermann & Ibaraki, Int. J. Adv. Manuf. Technol.
-//! 107 (2020) 2107): four functions of an angle that the tests mix differently come apart.
+//! Self-calibration of a rotary axis and two linear axes by probing an uncalibrated cylinder (Zimmermann & Ibaraki, Int. J. Adv. Manuf.
+//! Technol. 107 (2020) 2107). The tests combine four functions of an angle differently, which makes the functions separable.
 //!
 //! ```text
 //! Δr = e(φ)·E_total(C) + W_radial(angle on the artefact) − E_radial(φ)
 //! ```
 //!
-//! for a touch at the angle φ of the machine while the table stands at C. The coefficients are the chain's own derivatives, so that the sense in
-//! which the table turns is that of the machine file and no sign is typed in. In test 3 the touch goes with the table: on a table that turns clockwise
-//! `e(φ) = (cos C, −sin C)`, where the paper's Eq. (3) prints `+sin C`.
+//! φ is the angle of the probed point in the machine while the table is at C. The coefficients are the derivatives of the chain, so all
+//! signs follow from the machine file. In test 3 the probed point turns with the table. For a table that turns clockwise
+//! `e(φ) = (cos C, −sin C)`; Eq. (3) of the reference prints `+sin C`.
 
 mod boundary;
 mod equations;
@@ -23,58 +23,58 @@ pub use equations::{Equations, Function, Reference};
 pub use results::{
     DistributionResult, FunctionPoint, FunctionResult, Histogram, MonteCarloResult, SelfCalibration,
 };
-pub use solve::{Solution, rank_before, solve};
+pub use solve::{CalibrationSolution, rank_before, solve};
 
 use crate::error::IdentifyError;
 use crate::monte_carlo;
 pub use crate::monte_carlo::MonteCarlo;
 
-/// A session's equations, solved.
+/// The solved equations of a session.
 #[derive(Clone, Debug)]
 pub struct Calibration {
     /// The equations.
     pub equations: Equations,
     /// The boundary conditions.
     pub conditions: Vec<Condition>,
-    /// Rank of the equations without them.
+    /// Rank of the equations without the boundary conditions.
     pub rank_before: usize,
     /// The solution.
-    pub solution: Solution,
+    pub solution: CalibrationSolution,
     /// Standard uncertainty of a reading, mm.
     pub sigma_mm: f64,
-    /// `√(χ²/ν)` where a stated uncertainty is significantly less than the readings scatter, else 1; the solution's uncertainties are enlarged by it.
+    /// Factor on the uncertainties of the solution: `√(χ²/ν)` if the readings scatter significantly more than stated, else 1.
     pub u_enlargement: f64,
-    /// The columns of the equations that the conditions leave free.
+    /// The free columns of the equations under the boundary conditions.
     pub free: Vec<usize>,
-    /// Whether the session states it; else it is the residual of the solution.
+    /// Whether the session states the noise; else it is the residual of the solution.
     pub sigma_stated: bool,
 }
 
-/// Guess of the noise from which the rank is decided where nothing is known, mm.
-const FIRST_GUESS_MM: f64 = 1e-3;
+/// Noise standard deviation for the decision on the rank if the session states none, mm.
+const START_NOISE_MM: f64 = 1e-3;
 
-/// Solves the equations of a session. The uncertainty of a reading is the session's `noise_um`, or the residual of the solution.
+/// Solves the equations of a session. The noise is the session's `noise_um`, or the residual of the solution.
 ///
 /// # Errors
-/// See [`Equations::of`] and [`conditions`]; also if the session states no noise and the readings leave nothing over to tell it from.
+/// See [`Equations::of`] and [`conditions`]; also if the session states no noise and the residual has no degrees of freedom.
 pub fn calibrate(session: &Session) -> Result<Calibration, IdentifyError> {
     let equations = Equations::of(session)?;
     let conditions = conditions(&equations, &session.machine.axes[equations.axis].name)?;
     let reduction = reduce(equations.columns(), &conditions);
     let stated = session.noise_mm.filter(|sigma| *sigma > 0.0);
-    // The residual tells of the noise only with the radius as an unknown: referred to one reading, all rows have that reading's noise.
+    // The residual estimates the noise only if the radius is a parameter: relative to one reading, all rows share that reading's noise.
     let free_radius = Equations {
         reference: Reference::Estimated,
         ..equations.clone()
     };
-    let left = solve(&free_radius, &reduction, stated.unwrap_or(FIRST_GUESS_MM))?;
-    let square = left.rms_mm.powi(2) * equations.rows.len() as f64;
-    let freedom = left.freedom as f64;
+    let unreferenced = solve(&free_radius, &reduction, stated.unwrap_or(START_NOISE_MM))?;
+    let square = unreferenced.rms_mm.powi(2) * equations.rows.len() as f64;
+    let freedom = unreferenced.freedom as f64;
     let (sigma_mm, u_enlargement) = match stated {
         Some(sigma) => (sigma, crate::fit::u_enlargement(square / sigma.powi(2), freedom)),
-        None if left.freedom == 0 => {
+        None if unreferenced.freedom == 0 => {
             return Err(IdentifyError::Request(
-                "self-calibration: the session states no `noise_um`, and there are no more readings than unknowns to tell it from; \
+                "self-calibration: the session states no `noise_um`, and there are no more readings than parameters to estimate it from; \
                  state it, or repeat the cycle"
                     .into(),
             ));
@@ -104,10 +104,11 @@ impl Calibration {
         &self.solution.values_mm[offset..offset + self.equations.angles[function as usize].len()]
     }
 
-    /// Whether the displacements of the table are seen at every position of the axis, so that it has a position.
+    /// Whether readings determine the displacements of the table at every position of the axis, so that the axis position can be
+    /// estimated.
     pub fn has_position(&self) -> bool {
         let count = 2 * self.equations.angles[0].len();
-        self.solution.seen[..count].iter().all(|seen| *seen)
+        self.solution.identifiable[..count].iter().all(|seen| *seen)
     }
 
     /// Sine and cosine of each position of the axis.
@@ -116,13 +117,13 @@ impl Calibration {
         self.equations.angles[0].iter().map(turn).collect()
     }
 
-    /// The distribution of every value, then of the axis' position by circle (two) and by turn (two).
+    /// The distribution of every value, then of the axis position by circle (two) and by rotation (two).
     pub fn monte_carlo(&self, draws: &MonteCarlo) -> Vec<monte_carlo::Distribution> {
         let zero = vec![0.0; self.solution.u_inputs_mm.len()];
         let outputs = self.solution.values_mm.len();
         let propagated = Propagated {
             calibration: self,
-            // By column, so that an input's share is added to all values at once.
+            // By column, so that an input contributes to all values at once.
             columns: columns_of(&self.solution.estimator),
             turns: self.turns(),
             outputs,
@@ -146,7 +147,7 @@ fn columns_of(matrix: &Mat<f64>) -> Vec<Vec<f64>> {
         .collect()
 }
 
-/// From deviations of the readings to values and position.
+/// The function from deviations of the readings to values and axis position.
 struct Propagated<'a> {
     calibration: &'a Calibration,
     columns: Vec<Vec<f64>>,

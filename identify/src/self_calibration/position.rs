@@ -1,31 +1,32 @@
-//! Where the rotary axis lies, from the displacements of the table over a turn.
+//! The position of the rotary axis, from the displacements of the table over a turn.
 //!
-//! The displacements are referred to the table at 0. A table that turns about `c` instead of the origin is displaced by `c − R(C)·c`: the
-//! displacements go round a circle about `c` which passes through the origin. The paper takes the centre of the least-squares circle; the
-//! displacements also say it directly, by
+//! The displacements are relative to the table at 0. A table that turns about `c` instead of the origin is displaced by `c − R(C)·c`. The
+//! displacements lie on a circle about `c` through the origin. Zimmermann & Ibaraki (2020) use the centre of the least-squares circle. A
+//! direct estimate from the displacements is
 //!
 //! ```text
 //! a = Σ[(1 − cos C)·X − s·sin C·Y] / Σ2(1 − cos C),    b = Σ[s·sin C·X + (1 − cos C)·Y] / Σ2(1 − cos C)
 //! ```
 //!
-//! with `s` the sense of rotation, which knows the angle of every point and that the circle passes through the origin, and is linear in the readings.
+//! `s` is the sense of rotation. This estimate uses the angle of every point and the known point at the origin, and is linear in the
+//! readings.
 
 use num_dual::{Dual64, DualNum};
 
 use crate::circle;
 
-/// Estimates of the axis' position: of the circle, and of the turn.
+/// Estimates of the axis position: by the circle and by the rotation.
 #[derive(Clone, Copy, Debug)]
 pub struct Position<D> {
-    /// Centre of the least-squares circle; not a number where the points have none.
+    /// Centre of the least-squares circle; NaN if the points have none.
     pub circle: [D; 2],
     /// Its radius.
     pub radius: D,
-    /// From the angles.
+    /// The estimate by the rotation.
     pub turn: [D; 2],
 }
 
-/// From the displacements at the positions of the axis, given by `[sine, cosine]`; `displacement(k)` is that at position `k`.
+/// Estimates from the displacements at the positions of the axis, given as `[sine, cosine]`. `displacement(k)` is that at position `k`.
 pub fn position<D: DualNum<Primitive = f64> + Copy>(
     turns: &[[f64; 2]],
     sense: f64,
@@ -51,7 +52,8 @@ pub fn position<D: DualNum<Primitive = f64> + Copy>(
     }
 }
 
-/// The estimates and their derivatives by each displacement: circle `x, y`, turn `x, y`; columns are the first displacements, then the second.
+/// The estimates and their derivatives by each displacement: circle `x, y`, rotation `x, y`. Columns are the first displacements, then the
+/// second.
 pub fn jacobian(turns: &[[f64; 2]], sense: f64, first: &[f64], second: &[f64]) -> [Vec<f64>; 4] {
     let mut rows: [Vec<f64>; 4] = Default::default();
     let mut points = Vec::new();

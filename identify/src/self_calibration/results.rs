@@ -193,16 +193,18 @@ impl Calibration {
                 .iter()
                 .map(|condition| condition.words.clone())
                 .collect(),
-            parameter_count: self.solution.unknowns,
+            parameter_count: self.solution.parameters,
             rank: self.solution.rank.seen.ncols(),
             functions: Function::ALL
                 .map(|function| self.function(function, &axis))
                 .to_vec(),
-            radius: (self.solution.values_mm.len() > columns && self.solution.seen[columns]).then(|| {
-                let value = self.solution.values_mm[columns] * 1e3;
-                ParameterResult::new("radius", value, self.u_mm(columns) * 1e3, "um")
-                    .with_meaning("artefact: deviation of the radius from the stated one")
-            }),
+            radius: (self.solution.values_mm.len() > columns && self.solution.identifiable[columns]).then(
+                || {
+                    let value = self.solution.values_mm[columns] * 1e3;
+                    ParameterResult::new("radius", value, self.u_mm(columns) * 1e3, "um")
+                        .with_meaning("artefact: deviation of the radius from the stated one")
+                },
+            ),
             parameters: parameters(0),
             parameters_by_turn: parameters(1),
             circle_radius_um: position.as_ref().map(|position| position.radius_mm * 1e3),
@@ -234,11 +236,11 @@ impl Calibration {
         let offset = self.equations.offset(function);
         let angles = &self.equations.angles[function as usize];
         let points = angles.iter().enumerate().map(|(k, angle)| {
-            let seen = self.solution.seen[offset + k];
+            let identifiable = self.solution.identifiable[offset + k];
             FunctionPoint {
                 at_deg: degrees(*angle),
-                value_um: seen.then(|| self.solution.values_mm[offset + k] * 1e3),
-                u_um: seen.then(|| self.u_mm(offset + k) * 1e3),
+                value_um: identifiable.then(|| self.solution.values_mm[offset + k] * 1e3),
+                u_um: identifiable.then(|| self.u_mm(offset + k) * 1e3),
             }
         });
         FunctionResult {
@@ -341,7 +343,7 @@ impl Calibration {
         let mut quantities = Vec::new();
         for (k, distribution) in distributions.iter().enumerate() {
             let id = match k.checked_sub(values) {
-                None if !self.solution.seen[k] || self.u_mm(k) <= 1e-9 * self.sigma_mm => continue,
+                None if !self.solution.identifiable[k] || self.u_mm(k) <= 1e-9 * self.sigma_mm => continue,
                 None => self.id(k, axis),
                 Some(_) if !with_position => continue,
                 Some(place @ 0..2) => self.location(place, axis),

@@ -1,4 +1,4 @@
-//! The functions' values from the equations: linear least squares in what the boundary conditions leave free.
+//! Linear least-squares solution for the functions' values under the boundary conditions.
 
 use faer::Mat;
 
@@ -8,10 +8,10 @@ use crate::error::IdentifyError;
 use crate::rank::Rank;
 use crate::triangle::Triangle;
 
-/// Values of the functions, mm, and how they follow from the readings.
+/// Values of the functions, mm, and their linear dependence on the readings.
 #[derive(Clone, Debug)]
-pub struct Solution {
-    /// Every column of the equations, then the radius where it is estimated.
+pub struct CalibrationSolution {
+    /// Every column of the equations, then the radius if it is estimated.
     pub values_mm: Vec<f64>,
     /// Their covariance, mm².
     pub covariance: Mat<f64>,
@@ -19,15 +19,15 @@ pub struct Solution {
     pub estimator: Mat<f64>,
     /// Standard uncertainty of each input, mm.
     pub u_inputs_mm: Vec<f64>,
-    /// What is seen of the free values.
+    /// Identifiable directions of the free values.
     pub rank: Rank,
-    /// Whether each of the values is seen.
-    pub seen: Vec<bool>,
-    /// Number of free values, the radius included where it is one.
-    pub unknowns: usize,
-    /// Square root of the mean square residual over the readings, mm.
+    /// Whether each of the values is identifiable.
+    pub identifiable: Vec<bool>,
+    /// Number of free values, with the radius if it is estimated.
+    pub parameters: usize,
+    /// Root mean square of the residual, mm.
     pub rms_mm: f64,
-    /// Readings that say something, less what is seen.
+    /// Degrees of freedom: readings with information, minus the rank.
     pub freedom: usize,
 }
 
@@ -35,18 +35,22 @@ pub struct Solution {
 ///
 /// # Errors
 /// If an equation holds a number that is not finite.
-pub fn solve(equations: &Equations, reduction: &Reduction, sigma_mm: f64) -> Result<Solution, IdentifyError> {
+pub fn solve(
+    equations: &Equations,
+    reduction: &Reduction,
+    sigma_mm: f64,
+) -> Result<CalibrationSolution, IdentifyError> {
     let columns = equations.columns();
     let free = reduction.free.len();
     let radius = equations.reference == Reference::Estimated;
-    let unknowns = free + usize::from(radius);
+    let parameters = free + usize::from(radius);
     let inputs = &equations.outward_mm;
     let u_inputs_mm = vec![sigma_mm; inputs.len()];
     let rows: Vec<Vec<f64>> = equations
         .rows
         .iter()
         .map(|row| {
-            let mut reduced = vec![0.0; unknowns];
+            let mut reduced = vec![0.0; parameters];
             for (column, coefficient) in row.iter().enumerate().filter(|(_, a)| **a != 0.0) {
                 for k in 0..free {
                     reduced[k] += coefficient * reduction.spread[(column, k)];
@@ -58,31 +62,31 @@ pub fn solve(equations: &Equations, reduction: &Reduction, sigma_mm: f64) -> Res
             reduced
         })
         .collect();
-    let white = Mat::from_fn(rows.len(), unknowns + 1, |i, j| {
-        let entry = if j == unknowns { inputs[i] } else { rows[i][j] };
+    let white = Mat::from_fn(rows.len(), parameters + 1, |i, j| {
+        let entry = if j == parameters { inputs[i] } else { rows[i][j] };
         entry / u_inputs_mm[i]
     });
-    let mut triangle = Triangle::new(unknowns);
+    let mut triangle = Triangle::new(parameters);
     triangle.absorb(white.as_ref());
-    // The unknowns stand in the order of their functions and angles.
-    let preference: Vec<usize> = (0..unknowns).collect();
-    let rank = Rank::decide(triangle.parts().0.as_ref(), &vec![1.0; unknowns], &preference)?;
+    // The parameters are in the order of their functions and angles.
+    let preference: Vec<usize> = (0..parameters).collect();
+    let rank = Rank::decide(triangle.parts().0.as_ref(), &vec![1.0; parameters], &preference)?;
     let of_free = crate::fit::covariance(&triangle, &rank.seen)?;
 
     let outputs = columns + usize::from(radius);
-    let spread = Mat::from_fn(outputs, unknowns, |i, k| match (i < columns, k < free) {
+    let spread = Mat::from_fn(outputs, parameters, |i, k| match (i < columns, k < free) {
         (true, true) => reduction.spread[(i, k)],
         (false, false) => 1.0,
         _ => 0.0,
     });
-    let weighted = Mat::from_fn(unknowns, rows.len(), |k, i| rows[i][k] / u_inputs_mm[i].powi(2));
+    let weighted = Mat::from_fn(parameters, rows.len(), |k, i| rows[i][k] / u_inputs_mm[i].powi(2));
     let estimator = &spread * (&of_free * weighted);
     let covariance = &spread * of_free * spread.transpose();
     let values_mm: Vec<f64> = (0..outputs)
         .map(|i| (0..inputs.len()).map(|j| estimator[(i, j)] * inputs[j]).sum())
         .collect();
-    let seen = (0..outputs)
-        .map(|i| (0..unknowns).all(|k| spread[(i, k)] == 0.0 || rank.is_identifiable(k)))
+    let identifiable = (0..outputs)
+        .map(|i| (0..parameters).all(|k| spread[(i, k)] == 0.0 || rank.is_identifiable(k)))
         .collect();
 
     let residual = |(row, observed): (&Vec<f64>, &f64)| {
@@ -100,20 +104,20 @@ pub fn solve(equations: &Equations, reduction: &Reduction, sigma_mm: f64) -> Res
         .sum();
     let informative = rows.iter().filter(|row| row.iter().any(|a| *a != 0.0)).count();
     let freedom = informative.saturating_sub(rank.seen.ncols());
-    Ok(Solution {
+    Ok(CalibrationSolution {
         values_mm,
         covariance,
         estimator,
         u_inputs_mm,
         rank,
-        seen,
-        unknowns,
+        identifiable,
+        parameters,
         rms_mm: (sum / count.max(1) as f64).sqrt(),
         freedom,
     })
 }
 
-/// Rank of the equations before any condition is agreed upon.
+/// Rank of the equations without the boundary conditions.
 ///
 /// # Errors
 /// If an equation holds a number that is not finite.
@@ -123,6 +127,6 @@ pub fn rank_before(equations: &Equations) -> Result<usize, IdentifyError> {
     let svd = matrix.svd().map_err(|_| IdentifyError::Decomposition)?;
     let singular: Vec<f64> = svd.S().column_vector().iter().copied().collect();
     let largest = singular.first().copied().unwrap_or(0.0);
-    // Coefficients are sines and cosines: what is dependent comes out at rounding, what is not at a hundredth or more.
+    // Coefficients are sines and cosines: singular values of dependent columns are at rounding level, others at a hundredth or more.
     Ok(singular.iter().filter(|s| **s > 1e-9 * largest).count())
 }

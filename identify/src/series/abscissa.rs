@@ -1,4 +1,4 @@
-//! What a test goes along: the angle about which its trace is drawn, or the axis that moves most.
+//! The abscissa of a test: the angle of a circular path, or the axis that moves most.
 
 use std::ops::Range;
 
@@ -8,15 +8,15 @@ use abbe_model::session::readings::Readings;
 
 use crate::circle;
 
-/// Positions nearer than this are one: mm or rad.
-const STANDS: f64 = 1e-6;
-/// More stretches than one in this many readings: no traversals, but poses.
-const MIN_STRETCH: usize = 10;
+/// Tolerance of equal positions: mm or rad.
+const POSITION_TOLERANCE: f64 = 1e-6;
+/// Readings per segment below which the test consists of poses, not of traversals.
+const MIN_READINGS_PER_SEGMENT: usize = 10;
 
-/// What a test goes along.
+/// The abscissa of a test.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Abscissa {
-    /// `C`, or `XY` for the angle about the middle of a circle.
+    /// `C`, or `XY` for the angle about the centre of a circle.
     pub name: String,
     /// Whether it is an angle.
     pub is_angle: bool,
@@ -24,18 +24,18 @@ pub struct Abscissa {
     pub axis: Option<usize>,
     /// Row by row: degrees, or mm.
     pub values: Vec<f64>,
-    /// All axes that move: their places among the machine's.
+    /// All axes that move, by index in the machine.
     pub moving: Vec<usize>,
 }
 
 /// Consecutive readings of one run in one direction.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Stretch {
+pub struct PathSegment {
     /// The number of the run in the file, or 1.
     pub run: i64,
     /// Its rows.
     pub rows: Range<usize>,
-    /// Whether the way's values grow; `None` for poses.
+    /// Whether the abscissa increases; `None` for poses.
     pub forward: Option<bool>,
 }
 
@@ -46,11 +46,11 @@ fn range(values: &[f64]) -> f64 {
 }
 
 impl Abscissa {
-    /// Of a test's readings: the rotary axis that turns most; else the angle about the circle of two linear axes; else the linear axis that
-    /// moves most; else the number of the reading.
+    /// The abscissa of a test's readings: the rotary axis with the largest travel; else the angle about the circle of two linear axes;
+    /// else the linear axis with the largest travel; else the number of the reading.
     pub fn of(machine: &Machine, readings: &Readings) -> Abscissa {
         let moving: Vec<usize> = (0..machine.axes.len())
-            .filter(|axis| range(&readings.positions[*axis]) > STANDS)
+            .filter(|axis| range(&readings.positions[*axis]) > POSITION_TOLERANCE)
             .collect();
         let most = |kind: AxisKind| {
             moving
@@ -100,46 +100,47 @@ impl Abscissa {
         }
     }
 
-    /// The stretches of one direction of each run; for `poses`, and where the direction changes at every other reading, whole runs without one.
-    pub fn stretches(&self, readings: &Readings, poses: bool) -> Vec<Stretch> {
+    /// The segments of one direction of each run. For `poses`, and if the direction changes at every other reading, whole runs without a
+    /// direction.
+    pub fn stretches(&self, readings: &Readings, poses: bool) -> Vec<PathSegment> {
         let runs = readings.runs();
         let number = |row: usize| readings.run.get(row).copied().unwrap_or(1);
-        let whole = |rows: &Range<usize>| Stretch {
+        let whole_run = |rows: &Range<usize>| PathSegment {
             run: number(rows.start),
             rows: rows.clone(),
             forward: None,
         };
         if poses {
-            return runs.iter().map(whole).collect();
+            return runs.iter().map(whole_run).collect();
         }
         let mut stretches = Vec::new();
         for run in &runs {
-            let mut parts: Vec<Stretch> = Vec::new();
+            let mut parts: Vec<PathSegment> = Vec::new();
             for row in run.start + 1..run.end {
                 let step = self.values[row] - self.values[row - 1];
-                if step.abs() <= STANDS {
+                if step.abs() <= POSITION_TOLERANCE {
                     continue;
                 }
                 let forward = Some(step > 0.0);
                 match parts.last_mut() {
                     Some(last) if last.forward != forward => {
                         last.rows.end = row;
-                        parts.push(Stretch {
+                        parts.push(PathSegment {
                             run: number(run.start),
                             rows: row..run.end,
                             forward,
                         });
                     }
                     Some(_) => {}
-                    None => parts.push(Stretch {
+                    None => parts.push(PathSegment {
                         run: number(run.start),
                         rows: run.clone(),
                         forward,
                     }),
                 }
             }
-            if parts.is_empty() || parts.len() > 1 + run.len() / MIN_STRETCH {
-                stretches.push(whole(run));
+            if parts.is_empty() || parts.len() > 1 + run.len() / MIN_READINGS_PER_SEGMENT {
+                stretches.push(whole_run(run));
             } else {
                 stretches.extend(parts);
             }
@@ -148,7 +149,7 @@ impl Abscissa {
     }
 }
 
-/// The unwrapped angle (degrees) about the circle that two axes go along; `None` where they go along none.
+/// The unwrapped angle (degrees) about the circle of two axes; `None` if they describe none.
 fn about_a_circle(first: &[f64], second: &[f64]) -> Option<Vec<f64>> {
     let points: Vec<[f64; 2]> = first.iter().zip(second).map(|(x, y)| [*x, *y]).collect();
     let circle = circle::through(&points)?;
@@ -179,7 +180,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_circle_of_two_axes_is_an_angle_that_goes_on() {
+    fn a_circle_of_two_axes_gives_an_unwrapped_angle() {
         let wanted: Vec<f64> = (0..=72).map(|k| 10.0 * f64::from(k)).collect();
         let at = |k: &f64| k.to_radians();
         let x: Vec<f64> = wanted.iter().map(|k| 5.0 + 100.0 * at(k).cos()).collect();
@@ -192,7 +193,7 @@ mod tests {
     }
 
     #[test]
-    fn a_run_there_and_back_has_two_stretches() {
+    fn a_forward_and_backward_run_has_two_segments() {
         let machine = Machine::from_code("wCbt").unwrap();
         let there = (0..=20).chain((0..20).rev()).map(f64::from);
         let positions: Vec<f64> = there.map(f64::to_radians).collect();

@@ -1,12 +1,13 @@
-//! A session reading by reading: the columns that plots draw.
+//! A session reading by reading: the columns for plots.
 //!
-//! With `L` the reading and `β` the fitted unknowns, the deviation of a reading from the nominal machine is, to first order, a sum of *shares*:
+//! Let `L` be the reading and `β` the fitted parameters. The deviation of a reading from the nominal machine is, to first order, a sum of
+//! *shares*:
 //!
 //! ```text
 //! d = observed − L(0) = Σ_k J_k β_k + residual + O(β²)
 //! ```
 //!
-//! so that what a trace would look like without an error is `d` less that error's share. [`SessionSeries::second_order_um`] says how large the last term is.
+//! The deviation without one error is thus `d` minus the share of that error. [`SessionSeries::second_order_um`] bounds the last term.
 
 pub mod abscissa;
 pub mod sensitivities;
@@ -19,48 +20,48 @@ use crate::fit::Fit;
 use crate::heldout::{FoldKind, rms_mm};
 use crate::parameters::Role;
 use crate::problem::Problem;
-use abscissa::{Abscissa, Stretch};
+use abscissa::{Abscissa, PathSegment};
 
-/// What a share belongs to.
+/// The source of a share.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Cause {
     /// An identified error of the machine.
     Error,
     /// An effect, declared or found.
     Effect,
-    /// Everything of the set-up together: balls, bar, pose of a tracker.
+    /// All set-up quantities together: balls, bar, pose of a tracker.
     Setup,
-    /// Unknowns that the readings cannot tell apart, together.
+    /// All confounded parameters together.
     Unseen,
 }
 
-/// What takes a part in the deviation of readings.
+/// A contribution to the deviation of the readings.
 #[derive(Clone, Debug)]
 pub struct Share {
     /// `EY0A`, `EZC~C:h2`, `set-up`, `confounded`.
     pub id: String,
-    /// What it belongs to.
+    /// The source.
     pub cause: Cause,
-    /// Places of its unknowns.
+    /// The indices of its parameters.
     pub unknowns: Vec<usize>,
 }
 
-/// One test, row by row; scalars of a reading together, µm.
+/// One test, row by row, µm; the coordinates of a reading are consecutive.
 #[derive(Clone, Debug)]
 pub struct TestSeries {
     /// Its name.
     pub name: String,
-    /// What it goes along.
+    /// Its abscissa.
     pub way: Abscissa,
-    /// Stretches in one direction of one run.
-    pub stretches: Vec<Stretch>,
-    /// Observed less nominal; for instruments with three coordinates less the set-up's share too, for there a frame of reference comes with it.
+    /// Segments of one run in one direction.
+    pub stretches: Vec<PathSegment>,
+    /// Observed minus nominal. For instruments with three coordinates without the set-up's share, which includes the frame of reference.
     pub deviation_um: Vec<f64>,
-    /// What the model before leaves.
+    /// Residual of the model before.
     pub before_um: Vec<f64>,
-    /// What the model after leaves.
+    /// Residual of the model after.
     pub after_um: Vec<f64>,
-    /// What each share adds to the deviation.
+    /// Contribution of each share to the deviation.
     pub shares_um: Vec<Vec<f64>>,
 }
 
@@ -73,25 +74,25 @@ pub struct SessionSeries {
     pub tests: Vec<TestSeries>,
     /// Scalar coordinates of a reading.
     pub coordinates: usize,
-    /// The greatest that the sum of shares misses any reading of the model by, µm.
+    /// The largest difference between the sum of shares and the model over all readings, µm.
     pub second_order_um: f64,
 }
 
 impl SessionSeries {
-    /// Root mean square of the residual of the model before over the scalar readings that count, µm.
+    /// Root mean square of the residual of the model before over the scalar readings that are not excluded, µm.
     pub fn rms_before_um(&self, problem: &Problem<'_>) -> f64 {
         let before: Vec<Vec<f64>> = self.tests.iter().map(|test| test.before_um.clone()).collect();
         rms_mm(problem, &before)
     }
 
-    /// How much a share takes part in: the sum of its squares, µm².
+    /// The size of a share: its sum of squares, µm².
     pub fn weight_of(&self, share: usize) -> f64 {
         let of = |test: &TestSeries| test.shares_um[share].iter().map(|v| v * v).sum::<f64>();
         self.tests.iter().map(of).sum()
     }
 }
 
-/// The shares of a fit: each identified error, each effect, the set-up, and what is confounded.
+/// The shares of a fit: each identified error, each effect, the set-up, and the confounded parameters.
 fn shares(problem: &Problem<'_>, fit: &Fit) -> Vec<Share> {
     let mut shares: Vec<Share> = Vec::new();
     let mut add =
@@ -116,7 +117,8 @@ fn shares(problem: &Problem<'_>, fit: &Fit) -> Vec<Share> {
     shares
 }
 
-/// The views of a fit, beside the residuals (mm) that another model of the same session leaves; without one, the nominal machine stands before.
+/// The series of a fit, with the residuals (mm) of another model of the same session as `before`. The default for `before` is the nominal
+/// machine.
 ///
 /// # Errors
 /// If the model cannot be evaluated.
@@ -194,7 +196,7 @@ fn shares_of_readings(
     Ok(of_tests)
 }
 
-/// Lengths of readings' vectors; readings of one scalar as they are.
+/// Lengths of vector readings; scalar readings unchanged.
 pub fn lengths(values: &[f64], coordinates: usize) -> Vec<f64> {
     if coordinates == 1 {
         return values.to_vec();
@@ -203,8 +205,8 @@ pub fn lengths(values: &[f64], coordinates: usize) -> Vec<f64> {
     values.chunks(coordinates).map(length).collect()
 }
 
-/// Correlation of the identified errors and effects' coefficients, by identifier: row by row. Unknowns of the set-up and what is confounded are
-/// left out.
+/// Correlation matrix of the identified errors and effects' coefficients, with identifiers, row by row. Set-up parameters and confounded
+/// parameters are excluded.
 pub fn correlation(problem: &Problem<'_>, fit: &Fit) -> (Vec<String>, Vec<Vec<f64>>) {
     let list = &problem.parameters.list;
     let chosen: Vec<usize> = (0..list.len())
@@ -223,7 +225,7 @@ pub fn correlation(problem: &Problem<'_>, fit: &Fit) -> (Vec<String>, Vec<Vec<f6
     (ids, matrix)
 }
 
-/// Whether readings of this instrument are lengths about a nominal one, which a circle can show.
+/// Whether this instrument measures a length about a nominal one, for polar plots.
 pub fn is_round(instrument: InstrumentKind) -> bool {
     instrument.coordinates() == 1
 }

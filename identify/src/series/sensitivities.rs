@@ -1,5 +1,7 @@
-//! What each single error does to each test: `∂L/∂error` along the first run (Figs. 3.7, 3.8 of the thesis are such patterns); of poses, which follow
-//! no way, its root mean square.
+//! Sensitivity of each test to each error: `∂L/∂error` along the first run (as in Jiang 2014, Figs. 3.7, 3.8). For poses, which have no
+//! path, its root mean square.
+//!
+//! Jiang (2014): X. Jiang, *Characterising Geometric Errors in Rotary Axes of 5-axis Machine Tools*, PhD thesis, University of Birmingham.
 
 use abbe_model::instrument::Station;
 use abbe_model::sensitivity::TestModel;
@@ -7,39 +9,40 @@ use abbe_model::sensitivity::TestModel;
 use super::abscissa::Abscissa;
 use crate::error::IdentifyError;
 use crate::parameters::Parameter;
-use crate::plan::linear::is_wanted;
+use crate::plan::linear::is_of_interest;
 use crate::problem::{Block, Problem};
 
-/// Points along a run at most.
+/// Maximum number of points along a run.
 const MAX_POINTS: usize = 181;
-/// µm of reading a unit below which an error does nothing to a test: what other errors make of it, second order, is not its pattern.
-const NOTHING: f64 = 1e-3;
+/// Sensitivity below which an error does not affect a test, µm per unit. Smaller values are second-order contributions of other errors.
+const MIN_SENSITIVITY_UM: f64 = 1e-3;
 
 /// The sensitivities of one test.
 #[derive(Clone, Debug)]
 pub struct TestSensitivities {
     /// Its name.
     pub test: String,
-    /// What it goes along, thinned like the columns.
+    /// Its abscissa, thinned as the columns.
     pub way: Abscissa,
-    /// Which of a reading's three coordinates the columns are of; `None` for a length.
+    /// The coordinate of the columns for vector readings; `None` for a length.
     pub coordinate: Option<&'static str>,
-    /// The errors that move it.
+    /// The errors that affect the test.
     pub columns: Vec<Sensitivity>,
 }
 
-/// One error's sensitivity along one test.
+/// The sensitivity of one test to one error.
 #[derive(Clone, Debug)]
 pub struct Sensitivity {
     /// The error.
     pub id: String,
     /// Its unit.
     pub unit: String,
-    /// µm of reading a unit: along the way, or one root mean square.
+    /// µm per unit: along the abscissa, or one root mean square.
     pub values: Vec<f64>,
 }
 
-/// The sensitivity to every error that is to be identified along the tests' runs, at the values `beta` of the unknowns; of three coordinates one after the other.
+/// The sensitivity of the tests' first runs to every error to be estimated, at the parameters `beta`; for vector readings coordinate by
+/// coordinate.
 ///
 /// # Errors
 /// If the model cannot be evaluated.
@@ -55,7 +58,7 @@ pub fn sensitivities(problem: &Problem<'_>, beta: &[f64]) -> Result<Vec<TestSens
         };
         let every = run.len().div_ceil(MAX_POINTS).max(1);
         let mut picked: Vec<usize> = (0..run.len()).step_by(every).collect();
-        // A closed trace has to close.
+        // A closed path has to close.
         if picked.last() != Some(&(run.len() - 1)) {
             picked.push(run.len() - 1);
         }
@@ -69,12 +72,12 @@ pub fn sensitivities(problem: &Problem<'_>, beta: &[f64]) -> Result<Vec<TestSens
         let names = names(&test.station);
         for coordinate in 0..coordinates {
             let columns = (0..list.len())
-                .filter(|j| is_wanted(&list[*j]))
+                .filter(|j| is_of_interest(&list[*j]))
                 .filter_map(|j| {
                     let scale = 1e3 / list[j].unit.display_per_internal;
                     let value = |i: &usize| rows[(i * coordinates + coordinate, j)] * scale;
                     let values: Vec<f64> = picked.iter().map(value).collect();
-                    let moves = values.iter().any(|value| value.abs() > NOTHING);
+                    let moves = values.iter().any(|value| value.abs() > MIN_SENSITIVITY_UM);
                     moves.then(|| sensitivity(&list[j], values))
                 })
                 .collect();
@@ -89,7 +92,7 @@ pub fn sensitivities(problem: &Problem<'_>, beta: &[f64]) -> Result<Vec<TestSens
     Ok(of_tests)
 }
 
-/// The root mean square over all poses of the length by which every error that is to be identified moves a reading, at the values `beta` of the unknowns.
+/// The sensitivity of the poses to every error to be estimated: the root mean square length over all poses, at the parameters `beta`.
 ///
 /// # Errors
 /// If the model cannot be evaluated.
@@ -107,13 +110,13 @@ pub fn over_poses(problem: &Problem<'_>, beta: &[f64]) -> Result<Vec<Sensitivity
     let wanted = list
         .iter()
         .zip(squares)
-        .filter(|(parameter, _)| is_wanted(parameter));
+        .filter(|(parameter, _)| is_of_interest(parameter));
     Ok(wanted
         .map(|(parameter, square)| {
             let rms_um = (square / readings).sqrt() * 1e3 / parameter.unit.display_per_internal;
             sensitivity(parameter, vec![rms_um])
         })
-        .filter(|found| found.values[0] > NOTHING)
+        .filter(|found| found.values[0] > MIN_SENSITIVITY_UM)
         .collect())
 }
 
@@ -125,7 +128,7 @@ fn sensitivity(parameter: &Parameter, values: Vec<f64>) -> Sensitivity {
     }
 }
 
-/// What the coordinates of a vector are called.
+/// The names of the coordinates of a vector reading.
 fn names(station: &Station<f64>) -> [&'static str; 3] {
     match station {
         Station::RTest(rtest) if rtest.sensors.is_some() => ["du", "dv", "dw"],

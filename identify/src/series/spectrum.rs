@@ -1,7 +1,8 @@
 //! The spectrum of a residual by order over an angle.
 //!
-//! For each order `h` by itself, what `a + b·cos hφ + c·sin hφ` explains beyond the constant, as the amplitude `√(2·S/n)` of a wave with that sum of
-//! squares `S` over `n` readings: over whole turns the amplitude of the Fourier series, over a part of a turn never more than the residual holds.
+//! Each order `h` is fitted separately, `a + b·cos hφ + c·sin hφ`. `S` is its sum of squares beyond the constant, over `n` readings. The
+//! amplitude is `√(2·S/n)`. Over whole turns this is the amplitude of the Fourier series. Over a part of a turn it never exceeds the
+//! residual.
 
 use abbe_model::axis::AxisKind;
 use faer::Mat;
@@ -11,23 +12,23 @@ use rayon::prelude::*;
 use super::SessionSeries;
 use crate::problem::Problem;
 
-/// The highest order: what is higher is seldom geometry.
+/// The highest order. Higher orders are seldom geometric errors.
 pub const HIGHEST_ORDER: usize = 40;
 
-/// A spectrum of the residuals before and after.
+/// Spectrum of the residuals before and after.
 #[derive(Clone, Debug)]
 pub struct Spectrum {
     /// The test, or `all poses`.
     pub of: String,
     /// The axis, or `XY` for a circle of two.
     pub over: String,
-    /// Amplitude of orders 1, 2, … of the residual before, µm; for three coordinates the length of the three amplitudes.
+    /// Amplitude of orders 1, 2, … of the residual before, µm; for vector readings the length of the three amplitudes.
     pub before_um: Vec<f64>,
     /// The same after.
     pub after_um: Vec<f64>,
 }
 
-/// The amplitude of each order from 1 in values over an angle in degrees; `coordinates` values a reading.
+/// The amplitude of each order from 1 in values over an angle in degrees; `coordinates` values per reading.
 pub fn amplitudes(angle_deg: &[f64], values: &[f64], coordinates: usize) -> Vec<f64> {
     (1..=HIGHEST_ORDER)
         .into_par_iter()
@@ -47,7 +48,7 @@ pub fn amplitudes(angle_deg: &[f64], values: &[f64], coordinates: usize) -> Vec<
 fn explained(basis: &[[f64; 3]], values: &[f64], coordinates: usize) -> f64 {
     let count = basis.len().max(1) as f64;
     let gram = Mat::from_fn(3, 3, |i, j| {
-        // Over a short arc the three functions are nearly one: a trace of the diagonal keeps the solution small.
+        // Over a short arc the three functions are nearly collinear. A ridge term bounds the solution.
         let ridge = if i == j { 1e-9 * count } else { 0.0 };
         basis.iter().map(|row| row[i] * row[j]).sum::<f64>() + ridge
     });
@@ -68,7 +69,7 @@ fn explained(basis: &[[f64; 3]], values: &[f64], coordinates: usize) -> f64 {
     (2.0 * sum.max(0.0) / count).sqrt()
 }
 
-/// The spectra of a session: of each test over the angle it goes along; of poses over every rotary axis.
+/// The spectra of a session: each test over its angular abscissa, poses over every rotary axis.
 pub fn spectra(problem: &Problem<'_>, views: &SessionSeries) -> Vec<Spectrum> {
     let machine = &problem.session.machine;
     let coordinates = views.coordinates;
@@ -116,7 +117,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_wave_over_whole_turns_has_its_amplitude_at_its_order_alone() {
+    fn a_wave_over_whole_turns_has_one_nonzero_order() {
         let angle: Vec<f64> = (0..720).map(f64::from).collect();
         let values: Vec<f64> = angle
             .iter()
@@ -129,7 +130,7 @@ mod tests {
     }
 
     #[test]
-    fn over_a_short_arc_no_order_claims_more_than_there_is() {
+    fn amplitudes_over_a_short_arc_do_not_exceed_the_residual() {
         let angle: Vec<f64> = (0..50).map(|k| 0.5 * f64::from(k)).collect();
         let values: Vec<f64> = angle.iter().map(|a| (0.7 * a).sin()).collect();
         let most = 2.0_f64.sqrt() * (values.iter().map(|v| v * v).sum::<f64>() / 50.0).sqrt();

@@ -1,8 +1,9 @@
-//! What else would look the same.
+//! Aliases of a found effect: other effects that explain the residual equally well.
 //!
-//! Two candidates are aliases where the readings cannot tell them apart: in place of the named effect, beside the same model, the other explains
-//! the residual as well within 2 of log-likelihood, whether or not the numbers and places that were chosen in its shape are held against it, and it does
-//! at least half of what the named effect did to the readings. The search names the one that is the shortest to say; the others are told, nearest first.
+//! Two candidates are aliases if the readings do not separate them. The alias replaces the found effect in the same model.
+//! Its log-likelihood is then at most 2 lower, with or without the penalty for selected shape numbers and positions. It also
+//! reproduces at least half of the found effect's signature in the readings. The search reports the candidate with the shortest
+//! description. The others are listed, nearest first.
 
 use std::cmp::Ordering;
 use std::collections::HashSet;
@@ -12,55 +13,55 @@ use abbe_model::effect::Shape;
 use super::score::{Gain, TrainedModel};
 use super::search::{ALL, Search};
 
-/// Difference in `−ln P` below which two candidates are confounded: 2 σ for one column.
+/// Difference in `−ln P` below which two candidates are confounded. It corresponds to 2 σ for one column.
 pub(super) const INDISTINGUISHABLE: f64 = 2.0;
-/// Least cosine between the named effect's signature and what an alias can do: at least half of it. What is nearer than the evidence can tell is an
-/// alias however small the angle; what explains as much of something else is none.
+/// Least cosine between the signature of the found effect and the column space of an alias, which then reproduces at least half
+/// of the squared signature. The evidence alone does not suffice: a candidate may explain as much of a different structure.
 const MIN_COSINE: f64 = std::f64::consts::FRAC_1_SQRT_2;
 
-/// An alias of a taken effect.
+/// An alias of a selected effect.
 #[derive(Clone, Debug)]
 pub(super) struct Alias {
-    /// Its candidate.
+    /// Index of the candidate.
     pub candidate: usize,
-    /// Cosine of the angle between the named effect's signature and what the alias can do, beside the model.
+    /// Cosine of the angle between the found effect's signature and the column space of the alias, after projection on the model.
     pub cosine: f64,
-    /// Coefficients of the model's base columns if the alias stands in the effect's place.
+    /// Coefficients of the model's base columns if the alias replaces the effect.
     pub model_coefficients: Vec<f64>,
 }
 
-/// A candidate in a named effect's place.
+/// A candidate that competes with a found effect.
 #[derive(Clone, Debug, PartialEq)]
 pub struct CompetingEffect {
-    /// Its identifier; one member stands for all of a name.
+    /// Its identifier. One candidate represents all candidates with this identifier.
     pub id: String,
-    /// `−ln P` of its gain in that place, less the price of its places.
+    /// `−ln P` of its gain in place of the found effect, less its selection penalty.
     pub evidence: f64,
-    /// Whether it is the named effect itself.
+    /// Whether it is the found effect itself.
     pub named: bool,
-    /// Whether the readings cannot tell it from the named effect.
+    /// Whether it is confounded with the found effect.
     pub alias: bool,
 }
 
-/// How many rivals are kept.
+/// Maximum number of competing explanations.
 const MAX_COMPETING: usize = 16;
 
-/// To six decimals: lists are in the order of these, so that rounding decides no tie.
+/// Rounds to six decimals. Lists are sorted by this value, so that rounding errors decide no tie.
 fn to_six_decimals(value: f64) -> f64 {
     (value * 1e6).round() / 1e6
 }
 
-/// The order of two candidates that are equally good: by what they cost, then by name, then by their place in the library.
+/// The order of two equally good candidates: by description length, then by identifier, then by index.
 fn simplest_first(search: &Search<'_>, a: usize, b: usize) -> Ordering {
     let [first, second] = [a, b].map(|candidate| &search.candidates[candidate]);
     first
-        .length()
-        .total_cmp(&second.length())
+        .description_length()
+        .total_cmp(&second.description_length())
         .then_with(|| first.effect.id().cmp(&second.effect.id()))
         .then(a.cmp(&b))
 }
 
-/// What stands highest in the place of the `k`-th taken effect, the best first: that effect, its aliases, and what loses.
+/// The competing explanations of the `k`-th selected effect, best first: that effect, its aliases, and rejected candidates.
 fn competing_effects(
     search: &Search<'_>,
     k: usize,
@@ -68,30 +69,30 @@ fn competing_effects(
     variance: f64,
     aliases: &[Alias],
 ) -> Vec<CompetingEffect> {
-    let taken = search.taken()[k].candidate;
-    let named = search.candidates[taken].effect.id();
-    let alike: HashSet<String> = aliases
+    let selected = search.selected()[k].candidate;
+    let named = search.candidates[selected].effect.id();
+    let alias_ids: HashSet<String> = aliases
         .iter()
         .map(|alias| search.candidates[alias.candidate].effect.id())
         .collect();
-    let others: Vec<usize> = search.taken().iter().map(|t| t.candidate).collect();
-    let mut standing: Vec<(f64, usize)> = gains
+    let others: Vec<usize> = search.selected().iter().map(|t| t.candidate).collect();
+    let mut ranked: Vec<(f64, usize)> = gains
         .iter()
         .enumerate()
         .filter(|(candidate, gain)| {
             gain.freedom > 0
-                && (*candidate == taken || !others.contains(candidate))
+                && (*candidate == selected || !others.contains(candidate))
                 && !search.candidates[*candidate].last_resort
-                && search.is_open(*candidate, &search.tracks[ALL].folds)
+                && search.may_be_added(*candidate, &search.branches[ALL].folds)
         })
         .map(|(candidate, gain)| {
             let evidence = search.evidence_for(candidate, gain, variance);
             (to_six_decimals(evidence), candidate)
         })
         .collect();
-    standing.sort_by(|a, b| b.0.total_cmp(&a.0).then_with(|| simplest_first(search, a.1, b.1)));
+    ranked.sort_by(|a, b| b.0.total_cmp(&a.0).then_with(|| simplest_first(search, a.1, b.1)));
     let mut competing_effects: Vec<CompetingEffect> = Vec::new();
-    for (evidence, candidate) in standing {
+    for (evidence, candidate) in ranked {
         let id = search.candidates[candidate].effect.id();
         if competing_effects.iter().any(|rival| rival.id == id) {
             continue;
@@ -101,7 +102,7 @@ fn competing_effects(
         }
         competing_effects.push(CompetingEffect {
             named: id == named,
-            alias: alike.contains(&id),
+            alias: alias_ids.contains(&id),
             id,
             evidence,
         });
@@ -109,32 +110,33 @@ fn competing_effects(
     competing_effects
 }
 
-/// The aliases of the `k`-th taken effect, nearest first, and what stands highest in its place, beside the model without it.
+/// The aliases of the `k`-th selected effect, nearest first, and its competing explanations. `model` is the model without that
+/// effect.
 pub(super) fn aliases(
     search: &Search<'_>,
     k: usize,
     model: &TrainedModel<'_>,
     variance: f64,
 ) -> (Vec<Alias>, Vec<CompetingEffect>) {
-    let taken = &search.taken()[k];
-    let of_named = model.gain(taken.candidate);
-    let least = search.evidence_for(taken.candidate, &of_named, variance) - INDISTINGUISHABLE;
+    let selected = &search.selected()[k];
+    let of_named = model.gain(selected.candidate);
+    let least = search.evidence_for(selected.candidate, &of_named, variance) - INDISTINGUISHABLE;
     let least_unpriced = search.evidence(&of_named, variance) - INDISTINGUISHABLE;
     let least_gain = of_named.gain / variance - 2.0 * INDISTINGUISHABLE;
     let columns = |candidate: usize| search.moments.count[candidate];
-    // A wave has two columns because its phase is unknown: one that looks the same is no less alike for that.
+    // A harmonic has two columns because its phase is estimated. It still counts as an alias of an effect with one column.
     let no_more_said = |candidate: usize| {
-        columns(candidate) <= columns(taken.candidate)
+        columns(candidate) <= columns(selected.candidate)
             || matches!(search.candidates[candidate].effect.shape, Shape::Harmonic { .. })
     };
-    let (_, coefficients) = model.joined(taken.candidate);
-    // Base columns are unit-length copies of the candidate's own; the signature is what they do together.
-    let norms = search.norms(taken.candidate);
+    let (_, coefficients) = model.with_candidate(selected.candidate);
+    // Base columns are the candidate's columns at unit length. The signature is their linear combination.
+    let norms = search.norms(selected.candidate);
     let signature: Vec<(usize, f64)> = search
-        .places(taken.candidate)
+        .places(selected.candidate)
         .zip(coefficients.iter().zip(&norms).map(|(c, norm)| c * norm))
         .collect();
-    let others: Vec<usize> = search.taken().iter().map(|t| t.candidate).collect();
+    let others: Vec<usize> = search.selected().iter().map(|t| t.candidate).collect();
     let gains = model.gains();
     let mut aliases: Vec<Alias> = gains
         .iter()
@@ -142,7 +144,7 @@ pub(super) fn aliases(
         .filter(|(candidate, gain)| {
             !others.contains(candidate)
                 && !search.candidates[*candidate].last_resort
-                && search.is_open(*candidate, &model.folds)
+                && search.may_be_added(*candidate, &model.folds)
                 && gain.freedom > 0
                 && (search.evidence_for(*candidate, gain, variance) >= least
                     || search.evidence(gain, variance) >= least_unpriced
@@ -153,7 +155,7 @@ pub(super) fn aliases(
             (cosine >= MIN_COSINE).then(|| Alias {
                 candidate,
                 cosine,
-                model_coefficients: model.joined(candidate).0,
+                model_coefficients: model.with_candidate(candidate).0,
             })
         })
         .collect();
@@ -162,10 +164,11 @@ pub(super) fn aliases(
             .total_cmp(&to_six_decimals(a.cosine))
             .then_with(|| simplest_first(search, a.candidate, b.candidate))
     });
-    // Of one name the nearest member stands for all; those that bear the winner's own name are the winner.
-    let named = search.candidates[taken.candidate].effect.id();
-    let mut seen = HashSet::from([named]);
-    aliases.retain(|alias| seen.insert(search.candidates[alias.candidate].effect.id()));
+    // The nearest candidate represents all candidates with its identifier. Candidates with the found effect's own identifier are
+    // excluded.
+    let named = search.candidates[selected.candidate].effect.id();
+    let mut ids = HashSet::from([named]);
+    aliases.retain(|alias| ids.insert(search.candidates[alias.candidate].effect.id()));
     let competing_effects = competing_effects(search, k, &gains, variance, &aliases);
     (aliases, competing_effects)
 }

@@ -1,4 +1,4 @@
-//! The tail of the χ² distribution in logarithms: at real effect sizes the tail itself underflows.
+//! The logarithm of the tail of the χ² distribution. At real effect sizes the tail itself underflows.
 
 use statrs::function::gamma::{gamma_ur, ln_gamma};
 
@@ -11,7 +11,7 @@ pub fn ln_chi_square_tail(x: f64, k: usize) -> f64 {
     if z < a + 1.0 {
         return gamma_ur(a, z).max(f64::MIN_POSITIVE).ln();
     }
-    // Γ(a, z) by its continued fraction (Lentz; Abramowitz & Stegun 6.5.31), logarithm taken before anything underflows.
+    // Γ(a, z) by its continued fraction (Lentz; Abramowitz & Stegun 6.5.31). The logarithm is taken before any underflow.
     let tiny = 1e-300;
     let mut b = z + 1.0 - a;
     let mut c = 1.0 / tiny;
@@ -35,8 +35,8 @@ pub fn ln_chi_square_tail(x: f64, k: usize) -> f64 {
     -z + a * z.ln() - ln_gamma(a) + h.ln()
 }
 
-/// No less than `−ln P(χ²ₖ > x)`, and quick: the tail of two degrees of freedom is `e^(−x/2)`, that of more is larger, that of one at least
-/// `√(2/π) √x/(1 + x) e^(−x/2)`.
+/// An upper bound of `−ln P(χ²ₖ > x)` that is fast to compute. For two degrees of freedom the tail is `e^(−x/2)`, for more it is
+/// larger, and for one it is at least `√(2/π) √x/(1 + x) e^(−x/2)`.
 pub(super) fn most_evidence(x: f64, k: usize) -> f64 {
     if k == 1 && x > 0.0 {
         0.5 * x + ((1.0 + x) / x.sqrt()).ln() + 0.5 * std::f64::consts::FRAC_PI_2.ln()
@@ -50,7 +50,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn the_quick_bound_is_a_bound() {
+    fn the_fast_bound_is_an_upper_bound() {
         for k in 1..6 {
             for x in [1e-6, 0.01, 0.5, 1.0, 3.0, 20.0, 200.0, 4000.0] {
                 let evidence = -ln_chi_square_tail(x, k);

@@ -1,8 +1,9 @@
-//! Effects that are composed of several places: the steps of a compensation table.
+//! Step tables: effects with several step positions, such as the steps of a compensation table.
 //!
-//! The library holds, for each component, a dictionary of all places. From it the places that count are chosen one after another, each choice
-//! followed by a sweep of exchanges (best-subset selection by splicing: Zhu et al., PNAS 117 (2020) 33117). What `n` of `m` places gain is priced by
-//! the number of ways to choose them, `ln (m over n)`: by the union bound the price is enough for the level of the search to hold.
+//! For each component the library holds a dictionary of all step positions. Positions are selected one at a time. An exchange
+//! sweep follows each selection (best-subset selection by splicing: Zhu et al., PNAS 117 (2020) 33117). The evidence of `n`
+//! selected out of `m` positions is reduced by `ln C(m, n)`, the logarithm of the number of possible selections. By the union
+//! bound this penalty keeps the significance level of the search.
 
 use abbe_model::effect::{Effect, Shape};
 use faer::Mat;
@@ -11,32 +12,33 @@ use statrs::function::gamma::ln_gamma;
 
 use super::chi_square_tail::ln_chi_square_tail;
 use super::library::Candidate;
-use super::observable::MIN_VISIBLE;
+use super::observable::MIN_OBSERVABLE;
 use super::score::TrainedModel;
 
-/// The most places of one effect: what takes more is a curve.
-const MAX_PLACES: usize = 6;
-/// The most sweeps of exchanges after a choice.
+/// Maximum number of positions of one effect. An effect with more positions is a curve.
+const MAX_POSITIONS: usize = 6;
+/// Maximum number of exchange sweeps after a selection.
 const MAX_SWEEPS: usize = 4;
 
-/// An effect composed of places.
+/// An effect with several step positions.
 #[derive(Clone, Debug)]
 pub struct StepTable {
-    /// As a candidate, with the price of the choice.
+    /// The effect as a candidate, with its selection penalty.
     pub candidate: Candidate,
-    /// `−ln P` of its gain, less that price.
+    /// `−ln P` of its gain, less the selection penalty.
     pub evidence: f64,
 }
 
 impl StepTable {
-    /// What it is compared by.
+    /// Evidence less cost: the criterion of comparison.
     pub fn score(&self) -> f64 {
         self.evidence - self.candidate.cost
     }
 }
 
-/// The best that can be composed of a dictionary beside a model: of two places or more, for one alone is an entry of the library by itself.
-pub fn composed(
+/// The best step table of a dictionary for addition to a model, with at least two positions. A single step is an effect of the
+/// library itself.
+pub fn best_step_table(
     model: &TrainedModel<'_>,
     number: usize,
     dictionary: &Candidate,
@@ -53,31 +55,31 @@ pub fn composed(
     };
     let mut chosen: Vec<usize> = Vec::new();
     let mut best: Option<StepTable> = None;
-    while chosen.len() < MAX_PLACES {
-        let Some((place, _)) = subset.best_addition(&chosen) else {
+    while chosen.len() < MAX_POSITIONS {
+        let Some((position, _)) = subset.best_addition(&chosen) else {
             break;
         };
-        chosen.push(place);
+        chosen.push(position);
         let gain = subset.splice(&mut chosen);
         let n = chosen.len();
         if n < 2 {
             continue;
         }
-        let price = ln_choices(at.len(), n);
-        let evidence = -ln_chi_square_tail(gain / variance, n) - price;
+        let selection_penalty = ln_choices(at.len(), n);
+        let evidence = -ln_chi_square_tail(gain / variance, n) - selection_penalty;
         if best
             .as_ref()
             .is_none_or(|best| evidence - dictionary.cost > best.score())
         {
-            let mut places: Vec<f64> = chosen.iter().map(|k| at[*k]).collect();
-            places.sort_by(f64::total_cmp);
+            let mut positions: Vec<f64> = chosen.iter().map(|k| at[*k]).collect();
+            positions.sort_by(f64::total_cmp);
             let effect = Effect {
-                shape: Shape::Steps { at: places },
+                shape: Shape::Steps { at: positions },
                 ..dictionary.effect.clone()
             };
             let candidate = Candidate {
                 effect,
-                price,
+                selection_penalty,
                 dictionary: false,
                 ..dictionary.clone()
             };
@@ -87,13 +89,13 @@ pub fn composed(
     best
 }
 
-/// `ln (m over n)`.
+/// `ln C(m, n)`, the logarithm of the binomial coefficient.
 fn ln_choices(m: usize, n: usize) -> f64 {
     let ln_factorial = |k: usize| ln_gamma(k as f64 + 1.0);
     ln_factorial(m) - ln_factorial(n) - ln_factorial(m - n)
 }
 
-/// Products of a dictionary beside a model.
+/// Products of a dictionary, projected on the complement of a model.
 struct Subset<'d> {
     d: &'d Mat<f64>,
     g: &'d [f64],
@@ -101,7 +103,7 @@ struct Subset<'d> {
 }
 
 impl Subset<'_> {
-    /// The place that gains most beside those chosen, and what it gains.
+    /// The position with the largest gain in addition to those chosen, and its gain.
     fn best_addition(&self, chosen: &[usize]) -> Option<(usize, f64)> {
         let n = chosen.len();
         let m = self.g.len();
@@ -123,13 +125,13 @@ impl Subset<'_> {
         for j in (0..m).filter(|j| !chosen.contains(j)) {
             let with =
                 |column: usize| -> f64 { (0..n).map(|i| self.d[(chosen[i], j)] * solved[(i, column)]).sum() };
-            let left = self.d[(j, j)] - with(j);
-            // A place that is all but a sum of the others adds rounding, not evidence.
-            if left <= MIN_VISIBLE.sqrt() * self.own[(j, j)] {
+            let projected = self.d[(j, j)] - with(j);
+            // A position that is nearly a linear combination of the others adds rounding errors and no evidence.
+            if projected <= MIN_OBSERVABLE.sqrt() * self.own[(j, j)] {
                 continue;
             }
             let along = self.g[j] - with(m);
-            let gain = along * along / left;
+            let gain = along * along / projected;
             if best.is_none_or(|(_, most)| gain > most) {
                 best = Some((j, gain));
             }
@@ -137,7 +139,7 @@ impl Subset<'_> {
         best
     }
 
-    /// Exchanges chosen places while that gains anything; what all of them gain.
+    /// Exchanges chosen positions as long as the gain increases. Returns the gain of all chosen positions.
     fn splice(&self, chosen: &mut Vec<usize>) -> f64 {
         let mut gain = self.gain(chosen);
         for _ in 0..MAX_SWEEPS {
@@ -146,9 +148,9 @@ impl Subset<'_> {
                 let out = chosen.remove(0);
                 let rest = self.gain(chosen);
                 match self.best_addition(chosen) {
-                    Some((place, more)) if rest + more > gain * (1.0 + 1e-9) => {
+                    Some((position, more)) if rest + more > gain * (1.0 + 1e-9) => {
                         gain = rest + more;
-                        chosen.push(place);
+                        chosen.push(position);
                         changed = true;
                     }
                     _ => chosen.push(out),
@@ -178,10 +180,10 @@ mod tests {
     use super::*;
 
     #[test]
-    fn the_subset_that_gains_most_is_found() {
-        // Steps over forty readings, the second and fourth of five real: the best pair by trying all.
-        let places = [5, 12, 20, 28, 35];
-        let column = |k: usize, i: usize| f64::from(u8::from(i >= places[k]));
+    fn the_subset_with_the_largest_gain_is_found() {
+        // Steps over forty readings. The second and fourth of five are real. The reference is the best pair by exhaustive search.
+        let positions = [5, 12, 20, 28, 35];
+        let column = |k: usize, i: usize| f64::from(u8::from(i >= positions[k]));
         let y = |i: usize| 1.5 * column(1, i) - column(3, i) + 0.1 * ((i * i) % 7) as f64;
         let d = Mat::from_fn(5, 5, |k, l| (0..40).map(|i| column(k, i) * column(l, i)).sum());
         let g: Vec<f64> = (0..5)

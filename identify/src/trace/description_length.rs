@@ -1,31 +1,31 @@
-//! Description length: several effects that follow one axis are attributed to one that says as much, or are given back where they explain nothing.
+//! Description length: merges effects that follow one axis into one effect, and withdraws effects that explain nothing.
 //!
-//! A group of effects is worth what it explains together, `−ln P(χ²)`, less what it takes to say it: each effect's cost, and `ln n` for having been chosen
-//! among the `n` entries of the library that the session can see.
+//! The value of a group of effects is its joint evidence `−ln P(χ²)` less its description length. The description length of an
+//! effect is its cost plus `ln n`, where `n` is the number of detectable effects in the library.
 
 use abbe_model::effect::{Driver, Shape};
 use rayon::prelude::*;
 
-use super::columns::Layout;
+use super::columns::EffectColumns;
 use super::library::Candidate;
 use super::score::Gain;
 use super::search::{Search, SearchBranch, SelectedEffect};
 use crate::error::IdentifyError;
 
-/// How finely the curves without a name are divided, one after another.
+/// Numbers of intervals of the nonparametric curves.
 const INTERVALS: [usize; 3] = [8, 16, 32];
 
 impl Search<'_> {
-    /// Puts several effects that follow one axis down to one, where that one explains as much with a shorter description. From three effects or places on, a free curve may
-    /// be that one.
+    /// Merges several effects that follow one axis into one effect, if it explains as much with a shorter description. For three
+    /// or more effects or positions, a nonparametric curve is a candidate too.
     pub fn merge(&mut self) -> Result<(), IdentifyError> {
         if self.stop.in_residual_variance {
             return Ok(());
         }
         let mut merged = false;
-        for track in 0..self.tracks.len() {
-            for driver in self.axes_followed(track) {
-                let whole = self.following(&driver, &self.tracks[track].chosen()).0;
+        for branch in 0..self.branches.len() {
+            for driver in self.axes_followed(branch) {
+                let whole = self.following(&driver, &self.branches[branch].chosen()).0;
                 let mut groups = vec![whole.clone()];
                 if whole.len() > 2 {
                     let without =
@@ -33,7 +33,7 @@ impl Search<'_> {
                     groups.extend(whole.iter().map(without));
                 }
                 for group in groups {
-                    if self.merge_group(track, &group)? {
+                    if self.merge_group(branch, &group)? {
                         merged = true;
                         break;
                     }
@@ -46,10 +46,10 @@ impl Search<'_> {
         Ok(())
     }
 
-    /// The axes that effects follow which a search has added, each once.
-    fn axes_followed(&self, track: usize) -> Vec<Driver> {
+    /// The axes that the selected effects follow, each once.
+    fn axes_followed(&self, branch: usize) -> Vec<Driver> {
         let mut drivers: Vec<Driver> = Vec::new();
-        for candidate in self.tracks[track].chosen() {
+        for candidate in self.branches[branch].chosen() {
             let driver = &self.candidates[candidate].effect.driver;
             if matches!(driver, Driver::Axis(_)) && !drivers.contains(driver) {
                 drivers.push(driver.clone());
@@ -58,39 +58,43 @@ impl Search<'_> {
         drivers
     }
 
-    /// Puts a group of effects down to one, if one explains as much with a shorter description. Returns whether it did.
-    fn merge_group(&mut self, track: usize, group: &[usize]) -> Result<bool, IdentifyError> {
+    /// Merges a group of effects into one effect, if it explains as much with a shorter description. Returns whether it did.
+    fn merge_group(&mut self, branch: usize, group: &[usize]) -> Result<bool, IdentifyError> {
         let columns: usize = group.iter().map(|c| self.moments.count[*c]).sum();
         let curves = group.len() > 2 || columns > 2 && self.is_composed(group);
         if group.len() < 2 && !curves {
             return Ok(false);
         }
-        let SearchBranch { folds, taken } = self.tracks[track].clone();
-        let (grouped, kept): (Vec<SelectedEffect>, Vec<SelectedEffect>) = taken
+        let SearchBranch { folds, selected } = self.branches[branch].clone();
+        let (grouped, kept): (Vec<SelectedEffect>, Vec<SelectedEffect>) = selected
             .into_iter()
-            .partition(|taken| group.contains(&taken.candidate));
-        let rest: Vec<usize> = kept.iter().map(|taken| taken.candidate).collect();
+            .partition(|selected| group.contains(&selected.candidate));
+        let rest: Vec<usize> = kept.iter().map(|selected| selected.candidate).collect();
         if group.len() > 1 {
             self.refine(&rest, &folds)?;
         }
         if curves {
             self.add_reserve_candidates();
         }
-        let is_open = |c: &usize| {
-            self.is_open(*c, &folds) || curves && self.candidates[*c].last_resort && self.is_own(*c, &folds)
+        let may_be_added = |c: &usize| {
+            self.may_be_added(*c, &folds)
+                || curves && self.candidates[*c].last_resort && self.may_be_used(*c, &folds)
         };
         let pool: Vec<usize> = (0..self.candidates.len())
-            .filter(is_open)
+            .filter(may_be_added)
             .filter(|c| !rest.contains(c))
             .collect();
         let Some(candidate) = self.shorter_description(group, &rest, &pool, &folds)? else {
             return Ok(false);
         };
-        self.materialise(&[candidate]);
-        let p_value = grouped.iter().map(|taken| taken.p_value).fold(1.0, f64::min);
-        self.tracks[track].taken = kept;
-        self.tracks[track]
-            .taken
+        self.add_to_base(&[candidate]);
+        let p_value = grouped
+            .iter()
+            .map(|selected| selected.p_value)
+            .fold(1.0, f64::min);
+        self.branches[branch].selected = kept;
+        self.branches[branch]
+            .selected
             .push(SelectedEffect { candidate, p_value });
         Ok(true)
     }
@@ -101,18 +105,18 @@ impl Search<'_> {
         group.iter().any(composed)
     }
 
-    /// Gives back effects that follow one axis where they are no explanation: where curves over that axis, another in every test and in no component's name,
-    /// say as much with a shorter description. One simple effect is asked only where structure remains beside it.
+    /// Withdraws effects that follow one axis if curves over that axis, one for each test and without a component, explain as
+    /// much with a shorter description. A single simple effect is compared only if significant structure remains.
     pub fn withdraw(&mut self, structured: bool) -> Result<(), IdentifyError> {
-        for track in 0..self.tracks.len() {
-            for driver in self.axes_followed(track) {
-                let (group, rest) = self.following(&driver, &self.tracks[track].chosen());
+        for branch in 0..self.branches.len() {
+            for driver in self.axes_followed(branch) {
+                let (group, rest) = self.following(&driver, &self.branches[branch].chosen());
                 let is_curve = |c: &usize| matches!(self.candidates[*c].effect.shape, Shape::Curve { .. });
                 let few = group.len() < 2 && !self.is_composed(&group) && !structured;
                 if few || group.iter().all(is_curve) {
                     continue;
                 }
-                let folds = self.tracks[track].folds.clone();
+                let folds = self.branches[branch].folds.clone();
                 let of_group = self.evidence_of(&group, &rest, &folds)? - self.description_length(&group);
                 let mut of_curves = f64::NEG_INFINITY;
                 for intervals in INTERVALS {
@@ -120,16 +124,17 @@ impl Search<'_> {
                     of_curves = one.map_or(of_curves, |one| of_curves.max(one));
                 }
                 if of_curves > of_group {
-                    self.tracks[track]
-                        .taken
-                        .retain(|taken| !group.contains(&taken.candidate));
+                    self.branches[branch]
+                        .selected
+                        .retain(|selected| !group.contains(&selected.candidate));
                 }
             }
         }
         self.note_held_out()
     }
 
-    /// What curves over an axis say, another in every test: `None` where no test carries one. They are one choice, that of the axis.
+    /// The joint evidence of curves over an axis, one for each test, less their description length. `None` if no test permits
+    /// such a curve. They count as one choice, that of the axis.
     fn evidence_of_test_curves(
         &mut self,
         driver: &Driver,
@@ -141,11 +146,11 @@ impl Search<'_> {
         if curves.is_empty() {
             return Ok(None);
         }
-        self.materialise(&curves);
+        self.add_to_base(&curves);
         Ok(Some(self.evidence_of(&curves, rest, folds)? - self.choice()))
     }
 
-    /// Curves over an axis, one in each test: laid over the readings when they are first asked for.
+    /// Curves over an axis, one for each test. Their columns are computed at the first call.
     fn test_curve(&mut self, driver: &Driver, intervals: usize) -> Vec<usize> {
         let fresh = self.columns.curves_of_tests(driver, intervals);
         let effects: Vec<_> = fresh.iter().map(|(effect, _)| effect.clone()).collect();
@@ -156,27 +161,27 @@ impl Search<'_> {
             return present;
         }
         let first = self.candidates.len();
-        let test_curve: Vec<(Candidate, Layout)> = fresh
+        let test_curve: Vec<(Candidate, EffectColumns)> = fresh
             .into_iter()
-            .map(|(effect, layout)| (Candidate::test_curve(effect), layout))
+            .map(|(effect, column_set)| (Candidate::test_curve(effect), column_set))
             .collect();
         self.append(test_curve, &[]);
         (first..self.candidates.len()).collect()
     }
 
-    /// What it costs to have chosen one entry of the library.
+    /// Description length of the choice of one effect in the library.
     fn choice(&self) -> f64 {
-        (self.seen_entries().max(1) as f64).ln()
+        (self.detectable_effects().max(1) as f64).ln()
     }
 
     pub(super) fn description_length(&self, group: &[usize]) -> f64 {
         group
             .iter()
-            .map(|c| self.candidates[*c].length() + self.choice())
+            .map(|c| self.candidates[*c].description_length() + self.choice())
             .sum()
     }
 
-    /// `−ln P` of what candidates gain together.
+    /// `−ln P` of the joint gain of candidates.
     pub(super) fn evidence_of(
         &self,
         group: &[usize],
@@ -184,17 +189,17 @@ impl Search<'_> {
         folds: &[usize],
     ) -> Result<f64, IdentifyError> {
         let all: Vec<usize> = rest.iter().chain(group).copied().collect();
-        self.evidence_of_gain(self.lean_model_of(&all, folds)?.explained(), group, rest, folds)
+        self.evidence_of_gain(self.projection_of(&all, folds)?.explained(), group, rest, folds)
     }
 
-    /// The same of some and one more, which need not have a place in the base.
+    /// `−ln P` of the joint gain of candidates and one more, which need not be in the base.
     pub(super) fn evidence_with(
         &self,
         some: &[usize],
         one: usize,
         folds: &[usize],
     ) -> Result<f64, IdentifyError> {
-        let model = self.lean_model_of(some, folds)?;
+        let model = self.projection_of(some, folds)?;
         let all: Vec<usize> = some.iter().copied().chain([one]).collect();
         self.evidence_of_gain(model.explained() + model.gain(one).gain, &all, &[], folds)
     }
@@ -206,7 +211,7 @@ impl Search<'_> {
         rest: &[usize],
         folds: &[usize],
     ) -> Result<f64, IdentifyError> {
-        let without = self.lean_model_of(rest, folds)?;
+        let without = self.projection_of(rest, folds)?;
         let gain = Gain {
             gain: explained - without.explained(),
             freedom: group
@@ -217,14 +222,14 @@ impl Search<'_> {
         Ok(self.evidence(&gain, self.variance(&without)))
     }
 
-    /// Which of the chosen follow a driver, and which do not.
+    /// Divides the chosen candidates into those that follow a driver and the others.
     fn following(&self, driver: &Driver, chosen: &[usize]) -> (Vec<usize>, Vec<usize>) {
         chosen
             .iter()
             .partition(|candidate| self.candidates[**candidate].effect.driver == *driver)
     }
 
-    /// The one of a pool that says more than a group, if there is one.
+    /// The candidate of a pool with a larger value than a group, if there is one.
     fn shorter_description(
         &self,
         group: &[usize],

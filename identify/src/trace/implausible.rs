@@ -1,9 +1,9 @@
-//! A trace of a session that its readings contradict: it says so first, does not search where the readings are those of another session, and
-//! claims no effect that only stands for a wrong statement of the set-up.
+//! A trace of a session whose readings contradict it. The trace states the contradiction first. It does not search if the
+//! readings belong to another session. It accepts no effect that only represents a wrong set-up value.
 
 use abbe_model::effect::Effect;
 
-use super::Trace;
+use super::TraceOutcome;
 use super::result::unsearched;
 use crate::error::IdentifyError;
 use crate::fit::{self, Fit};
@@ -11,20 +11,20 @@ use crate::plausibility::{self, Plausibility, Pulls, is_another_session, with_se
 use crate::problem::Problem;
 use crate::results::{Remainder, TraceResult};
 
-/// What the readings of a session contradict.
+/// The contradictions between the readings and a session.
 pub(super) struct Contradicted<'a> {
     plausibility: Plausibility,
-    /// The identifiers of the set-up parameters whose statements are contradicted.
+    /// Identifiers of the set-up parameters whose stated values are contradicted.
     parameters: Vec<String>,
-    /// The problem that takes nothing as known of them, and its fit; `None` where there are none.
+    /// The problem without the priors of these parameters, and its fit. `None` if no set-up value is contradicted.
     pub freed: Option<(Problem<'a>, Fit)>,
 }
 
 impl<'a> Contradicted<'a> {
-    /// Examines a fit.
+    /// Examines a fit for contradictions.
     ///
     /// # Errors
-    /// If the problem cannot be fitted without what is known of the set-up.
+    /// If the problem cannot be fitted without the set-up priors.
     pub fn of(problem: &Problem<'a>, fit: &Fit) -> Result<Contradicted<'a>, IdentifyError> {
         let mut contradicted = Contradicted {
             plausibility: plausibility::examine(problem, fit),
@@ -32,7 +32,7 @@ impl<'a> Contradicted<'a> {
             freed: None,
         };
         let mut freed = problem.clone();
-        if !contradicted.stops()
+        if !contradicted.forbids_search()
             && let Some((parameters, found)) = with_set_ups_freed(&mut freed, fit)?
         {
             contradicted.parameters = parameters;
@@ -41,7 +41,7 @@ impl<'a> Contradicted<'a> {
         Ok(contradicted)
     }
 
-    /// Whether the set-up is still contradicted beside effects that were found without it.
+    /// Whether the set-up is still contradicted in a model with effects that were found without its priors.
     ///
     /// # Errors
     /// If the model with the effects cannot be fitted.
@@ -64,17 +64,17 @@ impl<'a> Contradicted<'a> {
         Ok(!Pulls::of(&with, &found).contradicted().is_empty())
     }
 
-    /// Whether there is nothing to search: the readings are those of another session.
-    pub fn stops(&self) -> bool {
+    /// Whether the readings belong to another session, so that a search has no purpose.
+    pub fn forbids_search(&self) -> bool {
         is_another_session(&self.plausibility)
     }
 
-    /// Writes the conflicts into a result, in front of its other warnings.
-    pub fn tell(&self, result: &mut TraceResult) {
+    /// Adds the contradictions to a result, before its other warnings.
+    pub fn add_warnings(&self, result: &mut TraceResult) {
         let mut warnings = plausibility::warnings(&self.plausibility);
         if !self.parameters.is_empty() {
             warnings.push(format!(
-                "the search takes nothing as known of {}: no effect is claimed that only stands for a wrong statement of the set-up",
+                "the search uses no prior of {}, so that it accepts no effect that only represents a wrong set-up value",
                 self.parameters.join(", ")
             ));
         }
@@ -84,7 +84,7 @@ impl<'a> Contradicted<'a> {
     }
 
     /// The trace that ends before its search.
-    pub fn stopped(&self, problem: Problem<'a>, fit: Fit) -> Trace<'a> {
+    pub fn outcome_without_search(&self, problem: Problem<'a>, fit: Fit) -> TraceOutcome<'a> {
         let mut result = TraceResult {
             verdict: "unexplained".to_string(),
             remainder: Remainder {
@@ -97,7 +97,7 @@ impl<'a> Contradicted<'a> {
             residual_before: "the readings contradict the session".to_string(),
             ..unsearched(&problem, &fit)
         };
-        self.tell(&mut result);
-        Trace::of_declared(problem, fit, result)
+        self.add_warnings(&mut result);
+        TraceOutcome::of_declared(problem, fit, result)
     }
 }

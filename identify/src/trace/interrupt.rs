@@ -1,7 +1,7 @@
-//! Interruption of a trace: whoever waits for it can end it at any time and gets the effects found until then.
+//! Interrupts a trace: the caller can stop it at any time and gets the effects found so far.
 
 use super::result::unsearched;
-use super::{Progress, Trace};
+use super::{Progress, TraceOutcome};
 use crate::error::IdentifyError;
 use crate::fit::Fit;
 use crate::problem::Problem;
@@ -10,13 +10,15 @@ use crate::results::TraceResult;
 /// The verdict of a trace that was interrupted.
 const INCOMPLETE: &str = "incomplete";
 
-/// Asks whoever waits for a trace whether it is to go on.
+/// Asks the caller of a trace whether to continue.
 #[derive(Clone, Copy)]
 pub(super) struct Interrupt<'t>(pub &'t (dyn Fn(Progress) -> bool + Sync));
 
 impl Interrupt<'_> {
+    /// Returns if the trace continues.
+    ///
     /// # Errors
-    /// [`IdentifyError::Interrupted`] where it is not.
+    /// [`IdentifyError::Interrupted`] if the caller stops the trace.
     pub fn check(&self) -> Result<(), IdentifyError> {
         if (self.0)(Progress::Working) {
             Ok(())
@@ -27,7 +29,7 @@ impl Interrupt<'_> {
 }
 
 impl TraceResult {
-    /// Marks a result as that of an interrupted trace: a field, the verdict, and a warning that every output shows.
+    /// Marks a result as that of an interrupted trace: a field, the verdict, and a warning.
     pub(super) fn mark_interrupted(&mut self) {
         self.interrupted = true;
         self.verdict = INCOMPLETE.to_string();
@@ -37,7 +39,7 @@ impl TraceResult {
         ));
     }
 
-    /// How far an interrupted trace came: `interrupted after 2 effects`.
+    /// The state at the interruption, for example `interrupted after 2 effects`.
     pub fn interruption(&self) -> String {
         let effects = match self.effects.len() {
             1 => "1 effect".to_string(),
@@ -47,17 +49,17 @@ impl TraceResult {
     }
 }
 
-impl<'a> Trace<'a> {
-    /// A trace that was interrupted before its search began: the declared model and nothing else.
-    pub(super) fn unsearched(problem: Problem<'a>, fit: Fit) -> Trace<'a> {
+impl<'a> TraceOutcome<'a> {
+    /// A trace that was interrupted before its search began. It contains the declared model only.
+    pub(super) fn unsearched(problem: Problem<'a>, fit: Fit) -> TraceOutcome<'a> {
         let mut result = unsearched(&problem, &fit);
         result.mark_interrupted();
-        Trace::of_declared(problem, fit, result)
+        TraceOutcome::of_declared(problem, fit, result)
     }
 
-    /// The declared model and nothing else, with its result.
-    pub(super) fn of_declared(problem: Problem<'a>, fit: Fit, result: TraceResult) -> Trace<'a> {
-        Trace {
+    /// A trace that contains the declared model only, with its result.
+    pub(super) fn of_declared(problem: Problem<'a>, fit: Fit, result: TraceResult) -> TraceOutcome<'a> {
+        TraceOutcome {
             after: problem.clone(),
             after_fit: fit.clone(),
             before: problem,

@@ -1,28 +1,29 @@
-//! The found effects judged: everything refitted together, and what that leaves.
+//! Refits all parameters with the found effects, and tests the residual for remaining structure.
 
 use abbe_model::effect::Effect;
 
 use super::columns::Columns;
+use super::noise_model::SCATTER;
 use super::remainder::{self, Structure};
 use super::search::Search;
 use super::start::Start;
-use super::{SCATTER, TraceOptions, draws_of, null};
+use super::{TraceOptions, null, null_draw_count};
 use crate::error::IdentifyError;
 use crate::fit::{Fit, fit, prepare_with};
 use crate::noise::NoiseSource;
 use crate::problem::Problem;
 
-/// The model with what the search has taken, refitted, and what it leaves.
+/// The refitted model with the selected effects, and the remaining structure.
 pub(super) struct RefittedModel<'a> {
     pub after: Problem<'a>,
     pub after_fit: Fit,
     pub effects: Vec<Effect>,
-    /// `None` where no structure was looked for before either.
+    /// Remaining structure. `None` if the residual of the declared model was not tested either.
     pub structure: Option<Structure>,
 }
 
 impl<'a> RefittedModel<'a> {
-    /// Of what a search has taken; `structure_before` is what the declared model leaves.
+    /// Refits with the selected effects of a search. `structure_before` is the structure in the residual of the declared model.
     pub fn of(
         problem: &Problem<'a>,
         before_fit: &Fit,
@@ -30,7 +31,7 @@ impl<'a> RefittedModel<'a> {
         options: &TraceOptions,
         structure_before: Option<&Structure>,
     ) -> Result<RefittedModel<'a>, IdentifyError> {
-        let effects: Vec<Effect> = taken_effects(search).cloned().collect();
+        let effects: Vec<Effect> = selected_effects(search).cloned().collect();
         if effects.is_empty() {
             return Ok(RefittedModel {
                 after: problem.clone(),
@@ -39,8 +40,8 @@ impl<'a> RefittedModel<'a> {
                 structure: structure_before.cloned(),
             });
         }
-        // Noise, outliers and rank are found anew, as the fit of a session that declares these effects finds them: what remained of the declared model
-        // was not noise.
+        // Noise, outliers and rank are determined anew, as in a fit of a session that declares these effects. The residual of the
+        // declared model contains the effects and overstates the noise.
         let (mut after, mut after_fit) = prepare_with(problem.session, &effects, options.seed)?;
         if noise_is_from_residual(problem, &after) {
             after.noise = problem.noise.clone();
@@ -57,31 +58,33 @@ impl<'a> RefittedModel<'a> {
         })
     }
 
-    /// Whether this is of what the search has added now, in that order. Exchanges leave the number of effects as it is, so the number says nothing.
+    /// Whether this model has the effects that the search selects now, in the same order. Exchanges keep the number of effects,
+    /// so the number alone does not decide.
     pub fn is_of(&self, search: &Search<'_>) -> bool {
-        self.effects.iter().eq(taken_effects(search))
+        self.effects.iter().eq(selected_effects(search))
     }
 
-    /// Whether structure was looked for and found.
+    /// Whether the residual was tested and has significant structure.
     pub fn is_structured(&self) -> bool {
         self.structure.as_ref().is_some_and(Structure::is_significant)
     }
 }
 
-/// What a search has added, in its order.
-fn taken_effects<'s>(search: &'s Search<'_>) -> impl Iterator<Item = &'s Effect> {
-    let taken = search.taken().iter();
-    taken.map(|taken| &search.candidates[taken.candidate].effect)
+/// The effects that a search has selected, in its order.
+fn selected_effects<'s>(search: &'s Search<'_>) -> impl Iterator<Item = &'s Effect> {
+    let selected = search.selected().iter();
+    selected.map(|selected| &search.candidates[selected.candidate].effect)
 }
 
-/// Whether the noise of the search is not what a fit would take, but what repeats show along runs: autocorrelated, or of another size.
+/// Whether the search used a noise model from repeats along runs that differs from that of a fit: autocorrelated, or with another
+/// standard deviation.
 fn noise_is_from_residual(search: &Problem<'_>, fit: &Problem<'_>) -> bool {
     let (of_search, of_fit) = (&search.noise, &fit.noise);
     let of_one_size = (of_search.sigma_mm / of_fit.sigma_mm - 1.0).abs() < SCATTER;
-    of_search.source == NoiseSource::Repeats && !(of_search.memory.is_empty() && of_one_size)
+    of_search.source == NoiseSource::Repeats && !(of_search.ar_coefficients.is_empty() && of_one_size)
 }
 
-/// What a fit leaves, beside its model.
+/// The remaining structure in the residual of a fit.
 fn remaining_structure(
     problem: &Problem<'_>,
     fit: &Fit,
@@ -89,7 +92,7 @@ fn remaining_structure(
 ) -> Result<Structure, IdentifyError> {
     let columns = Columns::new(problem, &fit.beta);
     let start = Start::of(problem, &columns, fit)?;
-    let (count, seed) = (draws_of(options), options.seed.wrapping_add(1));
+    let (count, seed) = (null_draw_count(options), options.seed.wrapping_add(1));
     let draws = null::draws(
         problem,
         &columns,

@@ -1,12 +1,15 @@
 //! Find the unmodelled effect behind the residual of a fitted model.
 //!
-//! 1. Noise first: size and memory from repeats ([`crate::noise`]), outliers left out by name ([`crate::outliers`]).
-//! 2. The library of effects ([`library`]) is laid over the session (`columns`) and multiplied once with model, residual and null draws (`moments`).
-//! 3. The search (`search`) adds, removes and exchanges effects; its p-values come from the same search on readings without structure (`null`).
-//!    An effect is claimed where its p-value is below the level of significance and the held-out error falls by more than the standard error of the fall,
-//!    which follows from paired differences over runs, blocks or poses (`paired`).
-//! 4. Everything is refitted together (`judge`), and reported before and after (`report`) on readings that neither fit nor search saw.
-//! 5. For each effect, what would look the same ([`alias`]); for the rest, whether it has structure (`remainder`).
+//! 1. The noise standard deviation and autocorrelation follow from repeats ([`crate::noise`]). Outliers are excluded by name
+//!    ([`crate::outliers`]).
+//! 2. The basis columns of the library's effects ([`library`]) are computed for the session (`columns`). Their products with the
+//!    model, the residual and the null draws are computed once (`moments`).
+//! 3. The search (`search`) adds, removes and exchanges effects. Its p-values come from the same search on readings without
+//!    structure (`null`). An effect is accepted if its p-value is below the significance level and the held-out error decreases by
+//!    more than the standard error of the decrease. That standard error follows from paired differences over runs, blocks or
+//!    poses (`paired`).
+//! 4. All parameters are refitted together (`judge`). The result (`result`) states the held-out error before and after.
+//! 5. For each effect the trace lists its aliases ([`alias`]). It tests the residual for remaining structure (`remainder`).
 
 pub mod alias;
 mod chi_square_tail;
@@ -18,6 +21,7 @@ mod interrupt;
 mod judge;
 pub mod library;
 mod moments;
+mod noise_model;
 mod null;
 mod observable;
 mod paired;
@@ -39,34 +43,34 @@ use abbe_model::session::Session;
 use crate::error::IdentifyError;
 use crate::fit::{Fit, fit, prepare};
 use crate::heldout::FoldKind;
-use crate::noise::{NoiseSource, PureError};
 use crate::problem::Problem;
 use crate::results::TraceResult;
-use columns::{Columns, Layout};
+use columns::{Columns, EffectColumns};
 use implausible::Contradicted;
 use interrupt::Interrupt;
 use judge::RefittedModel;
 use library::Candidate;
 use moments::Moments;
-use rounds::{Account, search_on};
-use search::{Search, Stop};
+use noise_model::estimate_noise_model;
+use rounds::{SearchRecord, search_on};
+use search::{Search, StoppingRule};
 use start::Start;
 
-/// What a user can ask of a trace.
+/// Options of a trace.
 #[derive(Clone, Debug)]
 pub struct TraceOptions {
-    /// Seed of folds and null draws.
+    /// Seed of the folds and the null draws.
     pub seed: u64,
-    /// The most effects; `None` for default: until the held-out error stops improving.
+    /// Maximum number of effects. `None`: until the held-out error stops improving.
     pub max_effects: Option<usize>,
-    /// If not empty, only candidates whose identifier contains one of these.
+    /// If not empty, only candidates whose identifier contains one of these strings are searched.
     pub only: Vec<String>,
-    /// Candidates whose identifier contains one of these are left out.
+    /// Candidates whose identifier contains one of these strings are excluded.
     pub exclude: Vec<String>,
     /// Number of null draws.
     pub draws: usize,
-    /// Probability that a session without structure is claimed to have an effect, if the null were exact. What is estimated of the noise makes it larger: see
-    /// the rates in the documentation of the method.
+    /// Probability that the trace accepts an effect on readings without structure, if the null distribution is exact. The noise
+    /// model is estimated, which increases this probability. The documentation of the method gives measured rates.
     pub significance: f64,
 }
 
@@ -83,61 +87,63 @@ impl Default for TraceOptions {
     }
 }
 
-/// How far a trace has come, for those who wait.
+/// Progress of a trace.
 #[derive(Clone, Debug)]
 pub enum Progress {
     /// The declared model is being fitted.
     Fitting,
-    /// The library is being multiplied with the readings: how many candidates.
+    /// The candidates are being screened: the number of candidates.
     Screening(usize),
-    /// An effect was taken: its number, its identifier, the held-out rms in µm.
+    /// An effect was added: the number of effects, its identifier, the held-out rms in µm.
     SelectedEffect(usize, String, f64),
-    /// The found effects are being refitted and judged.
+    /// The model with the found effects is being refitted, and its residual tested.
     Judging,
-    /// Nothing new: asked often, so that an end is heeded soon.
+    /// No new event. Reported often, so that the caller can stop the trace soon.
     Working,
 }
 
-/// Sessions along runs have few effects; more than this says that something else is meant.
+/// Maximum number of effects for readings along runs. A larger number indicates a different cause.
 const MAX_ALONG_RUNS: usize = 12;
-/// Poses of a robot have many.
+/// Maximum number of effects for independent poses.
 const MAX_OF_POSES: usize = 200;
 
-/// One addition of a search.
+/// One addition of the search.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Step {
-    /// The effect that was added, by its identifier; later rounds may have let it go or exchanged it.
+pub struct SearchStep {
+    /// Identifier of the added effect. A later round may have removed or exchanged it.
     pub id: String,
-    /// How many effects there were then.
+    /// Number of effects after this addition.
     pub effects: usize,
-    /// Held-out rms then, µm.
+    /// Held-out rms after this addition, µm.
     pub heldout_rms_um: f64,
 }
 
-/// Everything that a trace knows when it ends.
-pub struct Trace<'a> {
+/// The outcome of a trace: the models before and after, and the result.
+pub struct TraceOutcome<'a> {
     /// The declared model.
     pub before: Problem<'a>,
-    /// Its fit.
+    /// The fit of the declared model.
     pub before_fit: Fit,
     /// The model with the found effects.
     pub after: Problem<'a>,
-    /// Its fit.
+    /// The fit of the model with the found effects.
     pub after_fit: Fit,
     /// The found effects.
     pub effects: Vec<Effect>,
-    /// For each of them what the readings cannot tell from it, nearest first.
+    /// For each found effect its aliases, nearest first.
     pub alias_effects: Vec<Vec<Effect>>,
-    /// For each of them what stands highest in its place, the best first.
+    /// For each found effect the competing explanations, best first.
     pub competing_effects: Vec<Vec<alias::CompetingEffect>>,
-    /// How the search came to them.
-    pub steps: Vec<Step>,
-    /// As it is reported.
+    /// The additions of the search, in order.
+    pub steps: Vec<SearchStep>,
+    /// The result as it is reported.
     pub result: TraceResult,
 }
 
-/// Closes the loop on a session. `progress` is told how far it has come and says whether to go on; where it says no, the trace ends within a fraction of a
-/// second after the fit of the declared model, with the effects found until then, and is marked as interrupted.
+/// Finds the unmodelled effects behind the residual of a session.
+///
+/// `progress` receives the progress and returns whether to continue. If it returns `false`, the trace ends within a fraction of a
+/// second after the fit of the declared model. It then returns the effects found so far and marks the result as interrupted.
 ///
 /// # Errors
 /// If the session cannot be fitted.
@@ -145,44 +151,45 @@ pub fn trace<'a>(
     session: &'a Session,
     options: &TraceOptions,
     progress: &(dyn Fn(Progress) -> bool + Sync),
-) -> Result<Trace<'a>, IdentifyError> {
+) -> Result<TraceOutcome<'a>, IdentifyError> {
     progress(Progress::Fitting);
     let (problem, fitted) = prepare(session, options.seed)?;
     let contradicted = Contradicted::of(&problem, &fitted)?;
-    if contradicted.stops() {
-        return Ok(contradicted.stopped(problem, fitted));
+    if contradicted.forbids_search() {
+        return Ok(contradicted.outcome_without_search(problem, fitted));
     }
     if let Some((problem_freed, fit_freed)) = &contradicted.freed {
         let mut found = with_noise_of_repeats(problem_freed.clone(), fit_freed.clone(), options, progress)?;
         if found.result.interrupted || contradicted.contradicted_by(&problem, &fitted, &found.effects)? {
-            contradicted.tell(&mut found.result);
+            contradicted.add_warnings(&mut found.result);
             return Ok(found);
         }
-        // The effects that were found without the set-up explain what seemed wrong with it.
+        // The effects found without the set-up priors explain the apparent contradiction. The search therefore runs with these
+        // priors.
         return with_noise_of_repeats(problem, fitted, options, progress);
     }
     let mut found = with_noise_of_repeats(problem, fitted, options, progress)?;
-    contradicted.tell(&mut found.result);
+    contradicted.add_warnings(&mut found.result);
     Ok(found)
 }
 
-/// Searches with the noise that repeats show, and once more where the effects that are found change it.
+/// Searches with the noise model estimated from repeats. Searches once more if the found effects change that noise model.
 fn with_noise_of_repeats<'a>(
     mut problem: Problem<'a>,
     mut before_fit: Fit,
     options: &TraceOptions,
     progress: &(dyn Fn(Progress) -> bool + Sync),
-) -> Result<Trace<'a>, IdentifyError> {
-    if give_noise_autocorrelation(&mut problem, &before_fit.residuals) {
+) -> Result<TraceOutcome<'a>, IdentifyError> {
+    if estimate_noise_model(&mut problem, &before_fit.residuals) {
         before_fit = fit(&problem, Some(&before_fit.beta))?;
     }
     let residuals = before_fit.residuals.clone();
     let first = trace_with(problem, before_fit, &residuals, options, progress)?;
-    // What moved between runs was taken for noise as long as the model lacked it.
+    // Variation between runs counts as noise as long as the model lacks its cause.
     let mut problem = first.before.clone();
     if first.result.interrupted
         || first.effects.is_empty()
-        || !give_noise_autocorrelation(&mut problem, &first.after_fit.residuals)
+        || !estimate_noise_model(&mut problem, &first.after_fit.residuals)
     {
         return Ok(first);
     }
@@ -191,34 +198,34 @@ fn with_noise_of_repeats<'a>(
     if !again.result.interrupted {
         return Ok(again);
     }
-    // The first search is whole, if with a noise that is less well known.
+    // The first search is complete, although its noise model is less accurate.
     let mut first = first;
     first.result.mark_interrupted();
     Ok(first)
 }
 
-/// Closes the loop with a given noise; `pure` are the residuals whose repeats show it.
+/// Traces with a given noise model. The repeats in the residuals `pure` determine the null distribution.
 fn trace_with<'a>(
     problem: Problem<'a>,
     before_fit: Fit,
     pure: &[Vec<f64>],
     options: &TraceOptions,
     progress: &(dyn Fn(Progress) -> bool + Sync),
-) -> Result<Trace<'a>, IdentifyError> {
-    match searched(&problem, &before_fit, pure, options, progress) {
-        Err(IdentifyError::Interrupted) => Ok(Trace::unsearched(problem, before_fit)),
-        searched => searched,
+) -> Result<TraceOutcome<'a>, IdentifyError> {
+    match trace_or_interrupted(&problem, &before_fit, pure, options, progress) {
+        Err(IdentifyError::Interrupted) => Ok(TraceOutcome::unsearched(problem, before_fit)),
+        traced => traced,
     }
 }
 
-/// The same, and [`IdentifyError::Interrupted`] if it was interrupted before the search began.
-fn searched<'a>(
+/// Traces with a given noise model, and returns [`IdentifyError::Interrupted`] if it was interrupted before the search began.
+fn trace_or_interrupted<'a>(
     problem: &Problem<'a>,
     before_fit: &Fit,
     pure: &[Vec<f64>],
     options: &TraceOptions,
     progress: &(dyn Fn(Progress) -> bool + Sync),
-) -> Result<Trace<'a>, IdentifyError> {
+) -> Result<TraceOutcome<'a>, IdentifyError> {
     let interrupt = Interrupt(progress);
     interrupt.check()?;
     let poses = problem.folds.kind == FoldKind::Poses;
@@ -226,7 +233,7 @@ fn searched<'a>(
     let start = Start::of(problem, &columns, before_fit)?;
     interrupt.check()?;
     let null = |block: usize| {
-        let (count, seed) = (draws_of(options), options.seed);
+        let (count, seed) = (null_draw_count(options), options.seed);
         null::draws(problem, &columns, pure, &start.residual, count, block, seed)
     };
     let structure_before = || {
@@ -239,30 +246,39 @@ fn searched<'a>(
     let structure_before = structure_before.transpose()?;
     interrupt.check()?;
 
-    let laid = screening::laid(problem, &columns, options)?;
-    let looked_for = laid.len();
-    progress(Progress::Screening(looked_for));
-    let (reserve, laid): (Vec<_>, Vec<_>) =
-        laid.into_iter().partition(|(candidate, _)| candidate.last_resort);
-    let (candidates, layouts): (Vec<Candidate>, Vec<Layout>) = laid.into_iter().unzip();
+    let searched = screening::searched_candidates(problem, &columns, options)?;
+    let candidate_count = searched.len();
+    progress(Progress::Screening(candidate_count));
+    let (reserve, searched): (Vec<_>, Vec<_>) = searched
+        .into_iter()
+        .partition(|(candidate, _)| candidate.last_resort);
+    let (candidates, column_sets): (Vec<Candidate>, Vec<EffectColumns>) = searched.into_iter().unzip();
     let (model, prior) = (start.model.clone(), start.prior());
     let go_on = || interrupt.check().is_ok();
-    let moments = Moments::new(&columns, &layouts, model, &start.residual, draws, &go_on)
+    let moments = Moments::new(&columns, &column_sets, model, &start.residual, draws, &go_on)
         .ok_or(IdentifyError::Interrupted)?;
-    let most = if poses { MAX_OF_POSES } else { MAX_ALONG_RUNS };
-    let stop = Stop {
+    let max_effects = if poses { MAX_OF_POSES } else { MAX_ALONG_RUNS };
+    let stop = StoppingRule {
         significance: options.significance,
-        most: options.max_effects.unwrap_or(most),
+        max_effects: options.max_effects.unwrap_or(max_effects),
         in_residual_variance: poses,
     };
-    let plain = start.plain(&columns, &before_fit.beta, problem.noise.sigma_mm)?;
-    let mut search = Search::new(&columns, candidates, layouts, moments, prior, plain, stop)?;
+    let unwhitened = start.unwhitened(&columns, &before_fit.beta, problem.noise.sigma_mm)?;
+    let mut search = Search::new(
+        &columns,
+        candidates,
+        column_sets,
+        moments,
+        prior,
+        unwhitened,
+        stop,
+    )?;
     search.reserve = reserve;
     search.interrupt = Some(interrupt);
     let gains = search.model_without(None)?.gains();
-    let seen = gains.iter().filter(|gain| gain.freedom > 0).count();
+    let observable = gains.iter().filter(|gain| gain.freedom > 0).count();
 
-    let mut account = Account {
+    let mut record = SearchRecord {
         steps: Vec::new(),
         noise_um: problem.noise.sigma_mm * 1e3,
         progress,
@@ -270,7 +286,7 @@ fn searched<'a>(
     let structure_before = structure_before.as_ref();
     let judge =
         |search: &Search<'_>| RefittedModel::of(problem, before_fit, search, options, structure_before);
-    let found = match found(&mut search, &mut account, judge) {
+    let found = match search_and_refit(&mut search, &mut record, judge) {
         Err(IdentifyError::Interrupted) => {
             search.roll_back();
             None
@@ -278,11 +294,11 @@ fn searched<'a>(
         found => Some(found?),
     };
     let interrupted = found.is_none();
-    // What the search came to is reported whole.
+    // The report of the selected effects is not interrupted.
     search.interrupt = None;
     let (ended, judged) = match found {
         Some((p_value, judged)) => (Some(p_value), judged),
-        // The effects found until then are fitted; what they leave is not looked at.
+        // The effects found so far are fitted. Their residual is not tested for structure.
         None => (
             None,
             RefittedModel::of(problem, before_fit, &search, options, None)?,
@@ -304,10 +320,10 @@ fn searched<'a>(
         structure_before,
         structure_after: structure_after.as_ref(),
         last_p_value: ended.unwrap_or(1.0),
-        stopped_early: ended.is_none() || search.taken().len() >= stop.most,
+        stopped_early: ended.is_none() || search.selected().len() >= stop.max_effects,
         interrupted,
-        candidates: looked_for,
-        candidates_seen: seen,
+        candidates: candidate_count,
+        candidates_seen: observable,
     })?;
     reported
         .result
@@ -315,7 +331,7 @@ fn searched<'a>(
         .extend(screening::unused_exclusions(problem, options)?);
     drop(search);
     drop(columns);
-    Ok(Trace {
+    Ok(TraceOutcome {
         before: problem.clone(),
         before_fit: before_fit.clone(),
         after,
@@ -323,30 +339,30 @@ fn searched<'a>(
         effects,
         alias_effects: reported.alias_effects,
         competing_effects: reported.competing_effects,
-        steps: account.steps,
+        steps: record.steps,
         result: reported.result,
     })
 }
 
-/// Searches and judges; where structure remains that nothing simpler explains, searches on with free curves; gives back what explains nothing. Returns how
-/// the search ended ([`search_on`]) and what it came to.
+/// Searches and refits. If significant structure remains, the search continues with nonparametric curves. Effects that explain
+/// nothing are withdrawn. Returns the p-value at which the search ended ([`search_on`]) and the refitted model.
 ///
 /// # Errors
-/// [`IdentifyError::Interrupted`] if the user has seen enough.
-fn found<'a>(
+/// [`IdentifyError::Interrupted`] if the caller stopped the trace.
+fn search_and_refit<'a>(
     search: &mut Search<'_>,
-    account: &mut Account<'_>,
+    record: &mut SearchRecord<'_>,
     judge: impl Fn(&Search<'_>) -> Result<RefittedModel<'a>, IdentifyError>,
 ) -> Result<(f64, RefittedModel<'a>), IdentifyError> {
-    let mut ended = search_on(search, account)?;
-    (account.progress)(Progress::Judging);
+    let mut ended = search_on(search, record)?;
+    (record.progress)(Progress::Judging);
     let mut judged = judge(search)?;
-    // Among poses structure is looked for effect by effect, and never ends.
+    // For poses the residual always has structure, so the structure test cannot decide.
     let poses = search.stop.in_residual_variance;
-    if (poses || judged.is_structured()) && search.taken().len() < search.stop.most {
+    if (poses || judged.is_structured()) && search.selected().len() < search.stop.max_effects {
         search.add_reserve_candidates();
         search.last_resort = true;
-        ended = search_on(search, account)?;
+        ended = search_on(search, record)?;
         if !judged.is_of(search) {
             judged = judge(search)?;
         }
@@ -361,43 +377,8 @@ fn found<'a>(
     Ok((ended, judged))
 }
 
-/// As many draws as are asked for, and as many as the significance needs: fewer could not show it.
-fn draws_of(options: &TraceOptions) -> usize {
+/// The number of null draws: the requested number, but at least as many as the significance level needs.
+fn null_draw_count(options: &TraceOptions) -> usize {
     let least = (1.0 / options.significance.max(1e-6)).ceil() as usize;
     options.draws.max(least - 1)
-}
-
-/// By how much estimates of a coefficient of the memory, and relatively of the size of the noise, scatter anyway.
-const SCATTER: f64 = 0.02;
-
-/// Takes size and autocorrelation of the noise from repeats, where there are enough. Returns whether that changed them by more than estimates of the noise
-/// scatter anyway.
-fn give_noise_autocorrelation(problem: &mut Problem<'_>, residuals: &[Vec<f64>]) -> bool {
-    if problem.folds.kind == FoldKind::Poses {
-        return false;
-    }
-    let kept = |test: usize, row: usize| !problem.rejected[test][row];
-    let pure = PureError::of(&problem.tests, residuals, kept).without_waves(&problem.tests, kept);
-    let Some(memory) = pure.memory(&problem.tests, kept) else {
-        return false;
-    };
-    let mut noise = problem.noise.clone();
-    noise.memory = memory.coefficients;
-    noise.ar_sum_u = memory.sum_u;
-    if let Some(sigma) = pure.sigma_mm() {
-        noise.sigma_mm = sigma * memory.inflation;
-        noise.source = NoiseSource::Repeats;
-    }
-    let present = &problem.noise;
-    let same_memory = noise.memory.len() == present.memory.len()
-        && noise
-            .memory
-            .iter()
-            .zip(&present.memory)
-            .all(|(a, b)| (a - b).abs() < SCATTER);
-    if same_memory && (noise.sigma_mm / present.sigma_mm - 1.0).abs() < SCATTER {
-        return false;
-    }
-    problem.noise = noise;
-    true
 }

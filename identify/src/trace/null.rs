@@ -1,8 +1,9 @@
-//! Readings without structure, to repeat the search on.
+//! Readings without structure: the null distribution of the search.
 //!
-//! Along runs, the null is drawn from the pure error: whitened deviations of repeats from their mean, in blocks that keep what memory whitening
-//! has left, each block with a sign of its own. Poses have no repeats to speak of; there the residual itself is drawn, each pose with a sign of its own
-//! (the wild bootstrap), which keeps the size of every pose and destroys every dependence on position.
+//! Along runs, the draws come from the pure error: whitened deviations of repeats from their mean, in blocks with random signs.
+//! The blocks keep the autocorrelation that whitening leaves. Independent poses have few repeats. For them the residual is drawn
+//! with a random sign for each pose (the wild bootstrap). This keeps the magnitude of each pose and removes every dependence on
+//! position.
 
 use std::collections::HashMap;
 
@@ -17,18 +18,19 @@ use crate::noise::{Noise, PureError};
 use crate::outliers::median;
 use crate::problem::Problem;
 
-/// Readings in a block for the search: structure that comes and goes stays in, and is not claimed as an effect.
+/// Readings per block for the search. A block keeps intermittent structure, so that the search does not accept it as an effect.
 pub const BLOCK: usize = 20;
-/// Readings in a block for what is left: noise of the found memory and nothing else, so that what comes and goes shows.
+/// Readings per block for the test of the remaining structure. Single readings leave only noise with the estimated
+/// autocorrelation.
 pub const SINGLE: usize = 1;
-/// The largest sum of the coefficients of a draw's memory.
-const SLOWEST: f64 = 0.98;
-/// The fewest deviations that are worth drawing from; below, Gaussian noise is drawn.
+/// Largest sum of the AR coefficients of a draw.
+const MAX_AR_SUM: f64 = 0.98;
+/// Least number of deviations to draw from. With fewer, Gaussian noise is drawn.
 const MIN_POOL: usize = 200;
-/// Readings on either side over which a residual without repeats is smoothed to take out structure.
+/// Readings on either side of the running median that removes structure from a residual without repeats.
 const SMOOTHING: usize = 7;
 
-/// Draws (whitened rows in the order of the folds × draws), of blocks of that many readings.
+/// Null draws (whitened rows in fold order × draws), in blocks of `block` readings.
 pub fn draws(
     problem: &Problem<'_>,
     columns: &Columns<'_, '_>,
@@ -40,12 +42,12 @@ pub fn draws(
 ) -> Mat<f64> {
     let mut generator = Pcg64::seed_from_u64(seed ^ 0x6e75_6c6c);
     if problem.folds.kind == FoldKind::Poses {
-        return turned(columns, whitened, count, &mut generator);
+        return sign_flipped(columns, whitened, count, &mut generator);
     }
     let pool = pool(problem, residuals);
     let mut draws = Mat::zeros(columns.rows(), count);
     for draw in 0..count {
-        let mut values = drawn(&pool, columns.rows(), block, &mut generator);
+        let mut values = block_draws(&pool, columns.rows(), block, &mut generator);
         with_noise_spectrum(&mut values, &problem.noise, &mut generator);
         for (i, value) in columns.placed(&values).into_iter().enumerate() {
             draws[(i, draw)] = value;
@@ -54,8 +56,13 @@ pub fn draws(
     draws
 }
 
-/// The residual itself, each pose with a sign of its own.
-fn turned(columns: &Columns<'_, '_>, whitened: &[f64], count: usize, generator: &mut Pcg64) -> Mat<f64> {
+/// The residual with a random sign for each pose.
+fn sign_flipped(
+    columns: &Columns<'_, '_>,
+    whitened: &[f64],
+    count: usize,
+    generator: &mut Pcg64,
+) -> Mat<f64> {
     let origins = columns.origin_of_rows();
     let mut draws = Mat::zeros(columns.rows(), count);
     for draw in 0..count {
@@ -72,47 +79,48 @@ fn sign(generator: &mut Pcg64) -> f64 {
     if generator.random::<bool>() { 1.0 } else { -1.0 }
 }
 
-/// So many deviations from the pool, block after block, each with a sign of its own; Gaussian noise where the pool is too small.
-fn drawn(pool: &[Vec<f64>], rows: usize, block: usize, generator: &mut Pcg64) -> Vec<f64> {
+/// Draws `rows` deviations from the pool in blocks with random signs. Draws Gaussian noise if the pool is too small.
+fn block_draws(pool: &[Vec<f64>], rows: usize, block: usize, generator: &mut Pcg64) -> Vec<f64> {
     let total: usize = pool.iter().map(Vec::len).sum();
     if total < MIN_POOL {
         return (0..rows).map(|_| generator.sample(StandardNormal)).collect();
     }
     let mut values = Vec::with_capacity(rows + block);
     while values.len() < rows {
-        // A stretch is chosen with the chance of its length, a place in it evenly.
-        let mut place = generator.random_range(0..total);
+        // A stretch is chosen with probability proportional to its length, and a start within it uniformly.
+        let mut start = generator.random_range(0..total);
         let stretch = pool.iter().find(|stretch| {
-            if place < stretch.len() {
+            if start < stretch.len() {
                 true
             } else {
-                place -= stretch.len();
+                start -= stretch.len();
                 false
             }
         });
         let Some(stretch) = stretch else { continue };
         let sign = sign(generator);
-        let end = (place + block).min(stretch.len());
-        values.extend(stretch[place..end].iter().map(|value| sign * value));
+        let end = (start + block).min(stretch.len());
+        values.extend(stretch[start..end].iter().map(|value| sign * value));
     }
     values.truncate(rows);
     values
 }
 
-/// What is whitened with a memory that is not quite its own stays slow, or becomes hasty. The memory of each draw differs from the one that was found by
-/// as much as that may be wrong: with `A` the polynomial of the found one and `A*` that of the draw, `A* w = A ε`.
+/// Gives each draw the spectrum that an inaccurate whitening leaves. Whitening with an inaccurate autocorrelation under- or
+/// over-whitens. The AR coefficients of each draw differ from the estimate by its uncertainty. With `A` the estimated polynomial
+/// and `A*` that of the draw, `A* w = A ε`.
 fn with_noise_spectrum(values: &mut [f64], noise: &Noise, generator: &mut Pcg64) {
-    if noise.memory.is_empty() || noise.ar_sum_u <= 0.0 {
+    if noise.ar_coefficients.is_empty() || noise.ar_sum_u <= 0.0 {
         return;
     }
     let standard: f64 = generator.sample(StandardNormal);
-    let sum: f64 = noise.memory.iter().sum();
-    let mut own = noise.memory.clone();
-    own[0] += (noise.ar_sum_u * standard).min(SLOWEST - sum);
+    let sum: f64 = noise.ar_coefficients.iter().sum();
+    let mut own = noise.ar_coefficients.clone();
+    own[0] += (noise.ar_sum_u * standard).min(MAX_AR_SUM - sum);
     let drawn = values.to_vec();
     for t in 0..values.len() {
         let mut value = drawn[t];
-        for (lag, (found, own)) in noise.memory.iter().zip(&own).enumerate() {
+        for (lag, (found, own)) in noise.ar_coefficients.iter().zip(&own).enumerate() {
             if let Some(before) = t.checked_sub(lag + 1) {
                 value += own * values[before] - found * drawn[before];
             }
@@ -121,7 +129,7 @@ fn with_noise_spectrum(values: &mut [f64], noise: &Noise, generator: &mut Pcg64)
     }
 }
 
-/// Whitened deviations without structure, in stretches that whitening kept together, of unit variance.
+/// Whitened deviations without structure, of unit variance, in uninterrupted stretches.
 fn pool(problem: &Problem<'_>, residuals: &[Vec<f64>]) -> Vec<Vec<f64>> {
     let kept = |test: usize, row: usize| !problem.rejected[test][row];
     let pure = PureError::of(&problem.tests, residuals, kept).without_waves(&problem.tests, kept);
@@ -135,13 +143,13 @@ fn pool(problem: &Problem<'_>, residuals: &[Vec<f64>]) -> Vec<Vec<f64>> {
         } else {
             without_smooth(&residuals[block.test][scalars], coordinates)
         };
-        let memory = problem.noise.memory.len() * coordinates;
+        let memory = problem.noise.ar_coefficients.len() * coordinates;
         let mut stretch = Vec::new();
         for i in memory..deviations.len() {
             let row = block.rows.start + i / coordinates;
             let past: Option<f64> = problem
                 .noise
-                .memory
+                .ar_coefficients
                 .iter()
                 .enumerate()
                 .map(|(lag, a)| deviations[i - (lag + 1) * coordinates].map(|value| a * value))
@@ -168,14 +176,15 @@ fn pool(problem: &Problem<'_>, residuals: &[Vec<f64>]) -> Vec<Vec<f64>> {
             (sum + value * value, count + 1)
         });
     if count > 0 && sum > 0.0 {
-        // The noise may be stated smaller or larger than it is; whitened readings are what the search sees, so their scatter counts.
+        // The stated noise may differ from the true noise. The search uses whitened readings, so their own variance is
+        // normalised.
         let scale = if repeats { 1.0 } else { (count as f64 / sum).sqrt() };
         stretches.iter_mut().flatten().for_each(|value| *value *= scale);
     }
     stretches
 }
 
-/// A residual less its running median, rescaled for the readings that the median uses.
+/// A residual less its running median.
 fn without_smooth(residual: &[f64], coordinates: usize) -> Vec<Option<f64>> {
     let rows = residual.len() / coordinates;
     let mut rough = vec![None; residual.len()];
@@ -196,9 +205,10 @@ fn without_smooth(residual: &[f64], coordinates: usize) -> Vec<Option<f64>> {
 mod tests {
     use super::*;
 
-    /// Of three coordinates that rise at their own rates nothing is left in the middle, and of a spike all but what its neighbours differ by.
+    /// Three coordinates rise at their own rates. Nothing of the rise remains away from the ends. The spike remains up to the
+    /// difference of its neighbours.
     #[test]
-    fn what_is_smooth_goes_coordinate_by_coordinate() {
+    fn smooth_structure_is_removed_from_each_coordinate() {
         const ROWS: usize = 60;
         let (spiked, coordinate) = (30, 1);
         let residual: Vec<f64> = (0..3 * ROWS)
@@ -217,7 +227,7 @@ mod tests {
                 } else {
                     0.0
                 };
-                // A spike among an odd number of neighbours moves their median by one place at most.
+                // A spike among an odd number of neighbours moves their median by at most one order statistic.
                 assert!((left - spike).abs() <= 2.0 + 1e-9, "{row} {k}: {left}");
                 if k != coordinate {
                     assert!(left.abs() < 1e-9);

@@ -1,28 +1,30 @@
-//! What of a candidate the readings see: the inverse of its projected product on the directions that are left beside a model.
+//! The observable subspace of a candidate: the directions that remain after projection on the model, and the inverse of the
+//! projected product on them.
 
 use faer::Mat;
 
 use crate::error::IdentifyError;
 
-/// Share of a candidate's own length that has to remain beside the model for it to count as seen.
-pub const MIN_VISIBLE: f64 = 1e-7;
+/// Least share of a candidate's squared column length that has to remain after projection for the candidate to count as
+/// observable.
+pub const MIN_OBSERVABLE: f64 = 1e-7;
 
-/// `gᵀ D⁻¹ g` on the directions that are seen.
+/// `gᵀ D⁻¹ g` on the observable directions.
 pub fn quadratic_gain(d: &Mat<f64>, own: &Mat<f64>, g: &[f64]) -> f64 {
-    Visible::of(d, own).quadratic(g)
+    ObservableSubspace::of(d, own).quadratic(g)
 }
 
-/// The inverse of a candidate's projected product on the directions that are seen.
-pub(super) struct Visible {
+/// The inverse of a candidate's projected product on its observable directions.
+pub(super) struct ObservableSubspace {
     vectors: Mat<f64>,
     values: Vec<f64>,
     scale: Vec<f64>,
-    /// Number of directions that are seen.
+    /// Number of observable directions.
     pub freedom: usize,
 }
 
-impl Visible {
-    pub fn of(d: &Mat<f64>, own: &Mat<f64>) -> Visible {
+impl ObservableSubspace {
+    pub fn of(d: &Mat<f64>, own: &Mat<f64>) -> ObservableSubspace {
         let n = d.nrows();
         let scale: Vec<f64> = (0..n)
             .map(|k| {
@@ -35,20 +37,20 @@ impl Visible {
             .collect();
         let scaled = Mat::from_fn(n, n, |i, j| d[(i, j)] * scale[i] * scale[j]);
         if n == 1 {
-            let seen = scaled[(0, 0)] > MIN_VISIBLE;
-            let values = vec![if seen { 1.0 / scaled[(0, 0)] } else { 0.0 }];
-            return Visible {
+            let observable = scaled[(0, 0)] > MIN_OBSERVABLE;
+            let values = vec![if observable { 1.0 / scaled[(0, 0)] } else { 0.0 }];
+            return ObservableSubspace {
                 vectors: Mat::identity(1, 1),
                 values,
                 scale,
-                freedom: usize::from(seen),
+                freedom: usize::from(observable),
             };
         }
         if n == 2 {
-            return Visible::of_two(scaled, scale);
+            return ObservableSubspace::of_two(scaled, scale);
         }
         let Ok(eigen) = scaled.self_adjoint_eigen(faer::Side::Lower) else {
-            return Visible {
+            return ObservableSubspace {
                 vectors: Mat::identity(n, n),
                 values: vec![0.0; n],
                 scale,
@@ -59,10 +61,10 @@ impl Visible {
             .S()
             .column_vector()
             .iter()
-            .map(|value| if *value > MIN_VISIBLE { 1.0 / value } else { 0.0 })
+            .map(|value| if *value > MIN_OBSERVABLE { 1.0 / value } else { 0.0 })
             .collect();
         let freedom = values.iter().filter(|value| **value > 0.0).count();
-        Visible {
+        ObservableSubspace {
             vectors: eigen.U().to_owned(),
             values,
             scale,
@@ -70,8 +72,8 @@ impl Visible {
         }
     }
 
-    /// Of two columns, as sine and cosine have: by one rotation (Jacobi; Golub & Van Loan 8.5).
-    fn of_two(scaled: Mat<f64>, scale: Vec<f64>) -> Visible {
+    /// For two columns, as sine and cosine have: one Jacobi rotation (Golub & Van Loan, section 8.5).
+    fn of_two(scaled: Mat<f64>, scale: Vec<f64>) -> ObservableSubspace {
         let (a, b, c) = (scaled[(0, 0)], scaled[(1, 0)], scaled[(1, 1)]);
         let tangent = if b == 0.0 {
             0.0
@@ -83,9 +85,9 @@ impl Visible {
         let sin = tangent * cos;
         let values = vec![a - tangent * b, c + tangent * b].into_iter();
         let values: Vec<f64> = values
-            .map(|value| if value > MIN_VISIBLE { 1.0 / value } else { 0.0 })
+            .map(|value| if value > MIN_OBSERVABLE { 1.0 / value } else { 0.0 })
             .collect();
-        Visible {
+        ObservableSubspace {
             vectors: Mat::from_fn(2, 2, |i, k| match (i, k) {
                 (0, 1) => sin,
                 (1, 0) => -sin,
@@ -121,7 +123,7 @@ impl Visible {
     }
 }
 
-/// Inverse of a symmetric product, directions below rounding left out.
+/// Inverse of a symmetric product. Directions below rounding are excluded.
 ///
 /// # Errors
 /// If the product has entries that are not finite.
@@ -148,7 +150,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn the_inverse_undoes_the_product_on_what_is_seen() {
+    fn the_pseudo_inverse_inverts_the_product_on_its_range() {
         // Rank 2: the third column is the sum of the first two.
         let columns = Mat::from_fn(4, 3, |i, j| {
             let of = |j: usize| ((i + 1) as f64).powi(j as i32);
@@ -163,7 +165,7 @@ mod tests {
     }
 
     #[test]
-    fn entries_that_are_not_finite_are_an_error() {
+    fn non_finite_entries_are_an_error() {
         let gram = Mat::from_fn(3, 3, |i, j| if i + j == 2 { f64::NAN } else { 1.0 });
         assert!(matches!(pseudo_inverse(&gram), Err(IdentifyError::Decomposition)));
     }

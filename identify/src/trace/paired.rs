@@ -1,17 +1,18 @@
-//! Paired comparison of two models on held-out readings: by how much the held-out error falls, and the standard error of that fall.
+//! Compares two models on held-out readings by paired differences: the decrease of the held-out error and its standard error.
 //!
-//! Neighbouring readings are not independent: noise is autocorrelated along a run, and one fit predicts a whole fold. The differences between the squared
-//! held-out residuals of two models are therefore summed over units that are independent (runs, blocks, or poses). Units of one test are replicates of each
-//! other, and tests differ because an effect need not act in all of them. The variance of the sum follows from the scatter of the units within their test.
+//! Neighbouring readings are not independent. Noise is autocorrelated along a run, and one fit predicts a whole fold. The
+//! differences between the squared held-out residuals of two models are therefore summed over independent units (runs, blocks or
+//! poses). Units of one test are replicates of each other. Tests are strata, because an effect need not act in all of them. The
+//! variance of the sum follows from the scatter of the units within their test.
 
 use std::collections::BTreeMap;
 
-/// Degrees of freedom below which the scatter of whole folds says little; folds are then divided into blocks.
+/// Degrees of freedom below which the scatter of whole folds is unreliable. Folds are then divided into blocks.
 const MIN_FREEDOM: usize = 6;
-/// The fewest rows of a block: many times the length over which noise is autocorrelated.
+/// Least number of rows of a block: many times the correlation length of the noise.
 const MIN_BLOCK: usize = 16;
 
-/// Which unit each row belongs to, and which stratum each unit belongs to.
+/// The unit of each row and the stratum of each unit.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Units {
     of_row: Vec<usize>,
@@ -19,7 +20,7 @@ pub struct Units {
 }
 
 impl Units {
-    /// From the stratum and the unit of each row.
+    /// Numbers the units by the stratum and the unit of each row.
     pub fn of<K: Ord>(rows: impl Iterator<Item = (usize, K)>) -> Units {
         let mut numbers: BTreeMap<(usize, K), usize> = BTreeMap::new();
         let mut units = Units::default();
@@ -34,7 +35,7 @@ impl Units {
         units
     }
 
-    /// The same with each unit divided into blocks of consecutive rows, where there are too few units for a standard error.
+    /// Divides each unit into blocks of consecutive rows if there are too few units for a standard error.
     pub fn divided(self) -> Units {
         let strata = self.stratum.iter().max().map_or(0, |last| last + 1);
         let freedom = self.stratum.len().saturating_sub(strata);
@@ -44,11 +45,11 @@ impl Units {
         let wanted = (MIN_FREEDOM + strata).div_ceil(self.stratum.len());
         let mut rows = vec![0; self.stratum.len()];
         self.of_row.iter().for_each(|unit| rows[*unit] += 1);
-        let mut seen = vec![0; self.stratum.len()];
+        let mut counted = vec![0; self.stratum.len()];
         let parts = self.of_row.iter().map(|unit| {
             let blocks = wanted.min(rows[*unit] / MIN_BLOCK).max(1);
-            let block = seen[*unit] * blocks / rows[*unit];
-            seen[*unit] += 1;
+            let block = counted[*unit] * blocks / rows[*unit];
+            counted[*unit] += 1;
             (self.stratum[*unit], (*unit, block))
         });
         Units::of(parts)
@@ -63,7 +64,7 @@ impl Units {
         sums
     }
 
-    /// From the sums of squares by unit under one model to those under another.
+    /// The decrease from the sums of squares by unit under one model to those under another.
     pub fn decrease(&self, before: &[f64], after: &[f64]) -> HeldOutDecrease {
         let differences = before.iter().zip(after).map(|(before, after)| before - after);
         let mut strata: BTreeMap<usize, Vec<f64>> = BTreeMap::new();
@@ -77,7 +78,7 @@ impl Units {
             let sum: f64 = differences.iter().sum();
             decrease.by += sum;
             variance += match differences[..] {
-                // One unit alone has no scatter: its whole difference is its uncertainty.
+                // A single unit has no scatter. Its whole difference counts as its uncertainty.
                 [alone] => alone * alone,
                 _ => {
                     let squares = differences.iter().map(|d| (d - sum / count).powi(2));
@@ -90,22 +91,22 @@ impl Units {
     }
 }
 
-/// The fall of a sum of squares of held-out residuals over the variance of the noise.
+/// The decrease of the sum of squares of held-out residuals, divided by the noise variance.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct HeldOutDecrease {
-    /// How much lower the sum is; negative if it has risen.
+    /// The decrease; negative if the sum increases.
     pub by: f64,
-    /// Standard error of that, from the paired differences of the units.
+    /// Standard error of the decrease, from the paired differences of the units.
     pub standard_error: f64,
 }
 
 impl HeldOutDecrease {
-    /// Whether the held-out error falls by more than the standard error of the fall.
+    /// Whether the held-out error decreases by more than the standard error.
     pub fn is_significant(self) -> bool {
         self.by > self.standard_error
     }
 
-    /// Whether it rises by more than that.
+    /// Whether the held-out error increases by more than the standard error.
     pub fn is_increase(self) -> bool {
         -self.by > self.standard_error
     }
@@ -118,7 +119,8 @@ mod tests {
 
     use super::*;
 
-    /// Two tests of three runs, of which only the first test shows an effect: the scatter within tests counts, not the difference between them.
+    /// Two tests of three runs. Only the first test shows an effect. The scatter within tests counts, not the difference between
+    /// them.
     #[test]
     fn the_standard_error_comes_from_the_scatter_within_tests() {
         let rows = [(0, 0), (0, 1), (0, 2), (1, 3), (1, 4), (1, 5)];
@@ -135,15 +137,15 @@ mod tests {
         assert!(!same.is_significant() && !same.is_increase());
     }
 
-    /// The standard error is that of the sum: over many drawn sets of units the fall scatters by as much as it says.
+    /// Over many simulated sets of units, the scatter of the decrease equals its standard error.
     #[test]
-    fn the_fall_scatters_by_its_standard_error() {
+    fn the_decrease_scatters_by_its_standard_error() {
         let mut random = rand_pcg::Pcg64Mcg::seed_from_u64(5);
         let units = Units::of((0..16).map(|unit| (unit / 4, unit)));
         let (mut squares, mut variances) = (0.0, 0.0);
         const SETS: usize = 4000;
         for _ in 0..SETS {
-            // Test k falls by k with a scatter of 1 + k.
+            // Test k decreases by k with a standard deviation of 1 + k.
             let differences: Vec<f64> = (0..16)
                 .map(|unit| {
                     let test = f64::from(unit / 4);
@@ -155,7 +157,7 @@ mod tests {
             squares += (decrease.by - 24.0).powi(2);
             variances += decrease.standard_error.powi(2);
         }
-        // 4 · (1 + 4 + 9 + 16); the sampling error of a variance of so many sets is 2 %.
+        // 4 · (1 + 4 + 9 + 16). The relative standard error of the variance from this number of sets is 2 %.
         for variance in [squares, variances] {
             assert!((variance / SETS as f64 / 120.0 - 1.0).abs() < 0.08, "{variance}");
         }

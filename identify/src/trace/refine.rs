@@ -1,7 +1,7 @@
-//! Shapes with a number in them (a period, a time constant, a place, a width): the library holds a grid, here the grid is left.
+//! Tunes shapes with numbers (a period, a time constant, a centre, a width) off the grid of the library.
 //!
-//! It is left before candidates are compared with each other: between grid points one component may do better than another that at its own best
-//! explains more. So every component that comes near the best is given its own best numbers first.
+//! Candidates are tuned before they are compared. On the grid, a wrong component may have a larger gain than the true one, which
+//! gains more at its own optimum. Every component near the best is therefore tuned first.
 
 use std::collections::HashMap;
 use std::ops::Range;
@@ -14,24 +14,25 @@ use super::library::Candidate;
 use super::score::{Gain, TrainedModel};
 use super::search::Search;
 
-/// Steps of a line search, each to 0.62 of the interval: to name a period, and to predict a fold.
+/// Iterations of a line search, each reducing the interval to 0.62: on all readings, and with one fold left out.
 const STEPS: usize = 12;
-const STEPS_TO_PREDICT: usize = 6;
-/// The share of the best evidence that a candidate has to have on the grid to be sharpened: a bump between two grid points loses a third.
-const NEAR: f64 = 0.5;
-/// The most candidates that are sharpened at a time: enough to name one of them, and where one fold is left out, to predict that.
-const MAX: usize = 10;
-const MAX_TO_PREDICT: usize = 2;
-/// What a composed effect may lack of the best evidence and still be told as what it might be.
-const BEHIND: f64 = 4.0;
+const STEPS_WITHOUT_A_FOLD: usize = 6;
+/// Share of the best evidence that a candidate needs on the grid to be tuned. A local feature between two grid points loses a
+/// third of its evidence.
+const MIN_EVIDENCE_SHARE: f64 = 0.5;
+/// Maximum number of candidates that are tuned at a time: on all readings, and with one fold left out.
+const MAX_TUNED: usize = 10;
+const MAX_WITHOUT_A_FOLD: usize = 2;
+/// Evidence by which a step table may fall short of the best and still be reported as an alternative.
+const MAX_EVIDENCE_DEFICIT: f64 = 4.0;
 
-/// Whether a candidate has numbers or places that can be chosen better than the library's grid has them.
+/// Whether a candidate has shape numbers or positions that can be tuned off the library's grid.
 pub(super) fn can_be_tuned(candidate: &Candidate) -> bool {
     candidate.dictionary || brackets(candidate).is_some()
 }
 
-/// Candidates with the best numbers that they can have beside a model, of those that come near the best; with what has been composed. `gains` are those of
-/// all candidates beside the model.
+/// The candidates near the best, each with its best shape numbers for addition to a model, and the step tables near the best.
+/// `gains` are those of all candidates added to the model.
 pub fn refined(
     search: &Search<'_>,
     model: &TrainedModel<'_>,
@@ -39,15 +40,15 @@ pub fn refined(
     composed: &[StepTable],
 ) -> Vec<Candidate> {
     let variance = search.variance(model);
-    let most = if search.identifies_all(&model.folds) {
-        MAX
+    let most = if search.has_all_folds(&model.folds) {
+        MAX_TUNED
     } else {
-        MAX_TO_PREDICT
+        MAX_WITHOUT_A_FOLD
     };
     let mut nearest: HashMap<String, (usize, f64)> = HashMap::new();
     let mut best = 0.0_f64;
     for (candidate, gain) in gains.iter().enumerate() {
-        if gain.freedom == 0 || !search.is_open(candidate, &model.folds) {
+        if gain.freedom == 0 || !search.may_be_added(candidate, &model.folds) {
             continue;
         }
         let evidence = search.evidence(gain, variance);
@@ -56,14 +57,14 @@ pub fn refined(
         if brackets(&search.candidates[candidate]).is_none() {
             continue;
         }
-        let place = nearest.entry(effect.id()).or_insert((candidate, evidence));
-        if evidence > place.1 {
-            *place = (candidate, evidence);
+        let best_of_id = nearest.entry(effect.id()).or_insert((candidate, evidence));
+        if evidence > best_of_id.1 {
+            *best_of_id = (candidate, evidence);
         }
     }
     let mut near: Vec<(usize, f64)> = nearest
         .into_values()
-        .filter(|(_, evidence)| *evidence >= NEAR * best)
+        .filter(|(_, evidence)| *evidence >= MIN_EVIDENCE_SHARE * best)
         .collect();
     near.sort_by(|a, b| b.1.total_cmp(&a.1).then(a.0.cmp(&b.0)));
     near.truncate(most);
@@ -81,14 +82,14 @@ pub fn refined(
     fresh.extend(moved(search, model, composed, best, most));
     fresh.retain(|candidate| {
         let is_same = |present: usize| {
-            search.candidates[present].effect == candidate.effect && search.is_own(present, &model.folds)
+            search.candidates[present].effect == candidate.effect && search.may_be_used(present, &model.folds)
         };
         !(0..search.candidates.len()).any(is_same)
     });
     fresh
 }
 
-/// What has been composed and comes near the best evidence, with its places where they gain most.
+/// The step tables near the best evidence, with their positions tuned.
 fn moved(
     search: &Search<'_>,
     model: &TrainedModel<'_>,
@@ -97,7 +98,10 @@ fn moved(
     most: usize,
 ) -> Vec<Candidate> {
     let variance = search.variance(model);
-    let mut nearest: Vec<&StepTable> = composed.iter().filter(|c| c.evidence >= NEAR * best).collect();
+    let mut nearest: Vec<&StepTable> = composed
+        .iter()
+        .filter(|c| c.evidence >= MIN_EVIDENCE_SHARE * best)
+        .collect();
     nearest.sort_by(|a, b| b.evidence.total_cmp(&a.evidence));
     nearest.truncate(most);
     nearest
@@ -109,7 +113,8 @@ fn moved(
                 freedom: effect.shape.coefficients() + effect.shape.numbers(),
             };
             let evidence = search.evidence(&gain, variance);
-            let near = evidence >= best - BEHIND || evidence - composed.candidate.cost >= NEAR * best;
+            let near = evidence >= best - MAX_EVIDENCE_DEFICIT
+                || evidence - composed.candidate.cost >= MIN_EVIDENCE_SHARE * best;
             near.then(|| Candidate {
                 effect,
                 ..composed.candidate.clone()
@@ -118,7 +123,7 @@ fn moved(
         .collect()
 }
 
-/// Looks around an effect for the numbers of its shape that gain most; `None` where nothing is gained.
+/// Tunes the shape numbers of an effect for the largest gain. `None` if the gain does not increase.
 pub(super) fn refine(
     search: &Search<'_>,
     model: &TrainedModel<'_>,
@@ -128,30 +133,30 @@ pub(super) fn refine(
     let mut effect = original.effect.clone();
     let brackets = brackets(original)?;
     let mut best = before;
-    let steps = if search.identifies_all(&model.folds) {
+    let steps = if search.has_all_folds(&model.folds) {
         STEPS
     } else {
-        STEPS_TO_PREDICT
+        STEPS_WITHOUT_A_FOLD
     };
-    // Numbers of one shape are looked for in turn.
+    // The numbers of one shape are tuned in turn.
     for _ in 0..brackets.len() {
         for (which, low, high) in &brackets {
             let value_at = |share: f64| low + (high - low) * share;
             let gain_at = |share: f64| {
-                let trial = with_number(&effect, *which, value_at(share));
-                (search.gain_beside(model, &trial).unwrap_or(0.0), trial)
+                let tuned = with_number(&effect, *which, value_at(share));
+                (search.gain_beside(model, &tuned).unwrap_or(0.0), tuned)
             };
-            let (gain, trial) = highest(gain_at, steps);
+            let (gain, tuned) = highest(gain_at, steps);
             if gain > best {
                 best = gain;
-                effect = trial;
+                effect = tuned;
             }
         }
     }
     (best > before * (1.0 + 1e-6)).then_some(effect)
 }
 
-/// The highest value that a line search between 0 and 1 comes to, and what has it. By golden section (Kiefer, Proc. Am. Math. Soc. 4 (1953) 502).
+/// The maximum of a line search between 0 and 1, and its argument, by golden section (Kiefer, Proc. Am. Math. Soc. 4 (1953) 502).
 fn highest<T>(value_at: impl Fn(f64) -> (f64, T), steps: usize) -> (f64, T) {
     let golden = 0.5 * (5.0_f64.sqrt() - 1.0);
     let (mut a, mut b) = (0.0, 1.0);
@@ -173,43 +178,46 @@ fn highest<T>(value_at: impl Fn(f64) -> (f64, T), steps: usize) -> (f64, T) {
     if at_c.0 > at_d.0 { at_c } else { at_d }
 }
 
-/// Moves each step by parts of the grid to where all together gain most; what that is.
+/// Moves each step position by fractions of the grid for the largest joint gain. Returns the effect and its gain.
 fn moved_steps(search: &Search<'_>, model: &TrainedModel<'_>, candidate: &Candidate) -> (Effect, f64) {
     let original = &candidate.effect;
-    let (Shape::Steps { at }, Some(mut present)) = (&original.shape, search.trial(model, original)) else {
+    let (Shape::Steps { at }, Some(mut present)) = (&original.shape, search.tuned_effect(model, original))
+    else {
         return (original.clone(), 0.0);
     };
     let mut best = present.gain(model);
-    let mut places = at.clone();
-    let with = |places: &[f64]| Effect {
-        shape: Shape::Steps { at: places.to_vec() },
+    let mut positions = at.clone();
+    let with = |positions: &[f64]| Effect {
+        shape: Shape::Steps {
+            at: positions.to_vec(),
+        },
         ..original.clone()
     };
     let trained: Vec<Range<usize>> = (model.folds.iter())
         .map(|fold| search.columns.fold_rows[*fold].clone())
         .collect();
     for _ in 0..2 {
-        for k in 0..places.len() {
-            let middle = places[k];
+        for k in 0..positions.len() {
+            let middle = positions[k];
             for part in -3..=3 {
-                let place = middle + candidate.grid * f64::from(part) / 4.0;
-                let Some(moved) = search.trial(model, &with(&[place])) else {
+                let position = middle + candidate.grid * f64::from(part) / 4.0;
+                let Some(moved) = search.tuned_effect(model, &with(&[position])) else {
                     continue;
                 };
                 let gain = present.gain_with(k, &moved, &trained, model);
                 if gain > best * (1.0 + 1e-9) {
                     best = gain;
-                    places[k] = place;
+                    positions[k] = position;
                     present.exchange(k, &moved, &trained);
                 }
             }
         }
     }
-    places.sort_by(f64::total_cmp);
-    (with(&places), best)
+    positions.sort_by(f64::total_cmp);
+    (with(&positions), best)
 }
 
-/// The numbers of a shape with the interval around each that the grid leaves open.
+/// The shape numbers that can be tuned, each with the interval between its neighbours on the grid.
 fn brackets(candidate: &Candidate) -> Option<Vec<(usize, f64, f64)>> {
     match &candidate.effect.shape {
         Shape::Periodic { period } => {

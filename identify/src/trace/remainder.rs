@@ -1,7 +1,8 @@
-//! What is left when the search has ended: whether it has structure, what it looks like, and where it lies.
+//! Tests the residual after the search for remaining structure, and describes and locates it.
 //!
-//! The detectors look at readings, not at components: a wave over an axis' position in one test or one run of it, or opposite in the two directions, a
-//! curve, a feature at a place, a drift over time. They are tested against draws from the same pure error as the search.
+//! The detectors act on readings, not on components: a wave over an axis position in one test or one run, a wave with opposite
+//! sign in the two directions, a curve, a local feature, a drift over time. Their null distribution comes from the same pure
+//! error as that of the search.
 
 use std::ops::Range;
 
@@ -10,7 +11,7 @@ use abbe_model::effect::{Component, Driver, Effect, Shape};
 use abbe_model::session::readings::Readings;
 
 use super::chi_square_tail::ln_chi_square_tail;
-use super::columns::{Columns, Layout};
+use super::columns::{Columns, EffectColumns};
 use super::moments::Moments;
 use super::score::{PriorMoments, TrainedModel};
 use crate::error::IdentifyError;
@@ -19,19 +20,20 @@ use crate::problem::Problem;
 /// Structure in a residual.
 #[derive(Clone, Debug)]
 pub struct Structure {
-    /// Probability of as much in readings without structure.
+    /// Probability of at least as large a maximum in readings without structure.
     pub p_value: f64,
-    /// What the best detector takes off the sum of squares beyond what it would of noise: its `χ²` less its degrees of freedom.
+    /// Decrease of the sum of squares by the best detector in excess of its expectation for noise: its `χ²` less its degrees of
+    /// freedom.
     pub excess: f64,
-    /// In words: which test, over what, how large.
-    pub words: String,
+    /// Description: the test, the driver, and the amplitude.
+    pub description: String,
 }
 
-/// Significance below which a remainder counts as structured.
+/// Significance level of the structure test.
 const STRUCTURED: f64 = 0.01;
 
 impl Structure {
-    /// Whether there is any beyond noise.
+    /// Whether the structure is significant.
     pub fn is_significant(&self) -> bool {
         self.p_value <= STRUCTURED
     }
@@ -39,8 +41,8 @@ impl Structure {
 
 /// One detector.
 struct Detector {
-    layout: Layout,
-    words: String,
+    column_set: EffectColumns,
+    description: String,
 }
 
 fn detectors(problem: &Problem<'_>, columns: &Columns<'_, '_>) -> Vec<Detector> {
@@ -68,7 +70,7 @@ fn detectors(problem: &Problem<'_>, columns: &Columns<'_, '_>) -> Vec<Detector> 
     detectors
 }
 
-/// The detectors of one test, as they are made.
+/// Collects the detectors of one test.
 struct TestResidual<'t, 'p, 'a> {
     columns: &'t Columns<'p, 'a>,
     number: usize,
@@ -78,19 +80,19 @@ struct TestResidual<'t, 'p, 'a> {
 }
 
 impl TestResidual<'_, '_, '_> {
-    /// A shape over each coordinate of the readings.
-    fn add(&mut self, driver: &Driver, shape: Shape, words: String) {
-        self.add_confined(driver, shape, false, None, words);
+    /// Adds a shape over each coordinate of the readings.
+    fn add(&mut self, driver: &Driver, shape: Shape, description: String) {
+        self.add_confined(driver, shape, false, None, description);
     }
 
-    /// The same with a sign that turns with the direction of travel, or in some rows only.
+    /// Adds a shape that changes sign with the direction of travel, or that acts in some rows only.
     fn add_confined(
         &mut self,
         driver: &Driver,
         shape: Shape,
         by_direction: bool,
         rows: Option<&Range<usize>>,
-        words: String,
+        description: String,
     ) {
         let effect = Effect {
             component: Component::TriggerDelay,
@@ -99,16 +101,18 @@ impl TestResidual<'_, '_, '_> {
             tests: vec![self.name.to_string()],
         };
         for coordinate in 0..self.readings.coordinates {
-            let layout = self
-                .columns
-                .reading_layout(&effect, self.number, coordinate, by_direction, rows);
-            let words = if self.readings.coordinates == 3 {
-                format!("{words} in {}", ["x", "y", "z"][coordinate])
+            let column_set =
+                self.columns
+                    .reading_columns(&effect, self.number, coordinate, by_direction, rows);
+            let description = if self.readings.coordinates == 3 {
+                format!("{description} in {}", ["x", "y", "z"][coordinate])
             } else {
-                words.clone()
+                description.clone()
             };
-            self.detectors
-                .extend(layout.map(|layout| Detector { layout, words }));
+            self.detectors.extend(column_set.map(|column_set| Detector {
+                column_set,
+                description,
+            }));
         }
     }
 
@@ -136,7 +140,11 @@ impl TestResidual<'_, '_, '_> {
                     width,
                     recurs: None,
                 };
-                self.add(&driver, shape, format!("a feature at {name} = {place} in {test}"));
+                self.add(
+                    &driver,
+                    shape,
+                    format!("a local feature at {name} = {place} in {test}"),
+                );
             }
         }
         self.add(
@@ -157,14 +165,14 @@ impl TestResidual<'_, '_, '_> {
                 AxisKind::Rotary => format!("{:.1}°", period.to_degrees()),
                 AxisKind::Linear => format!("{period:.2} mm"),
             };
-            let words = format!("a wave over {name} with a period of {length} in {test}");
-            self.add(driver, wave(half_cycles), words.clone());
+            let description = format!("a wave over {name} with a period of {length} in {test}");
+            self.add(driver, wave(half_cycles), description.clone());
             if half_cycles <= 16 {
-                let words = format!("{words}, opposite in the two directions");
-                self.add_confined(driver, wave(half_cycles), true, None, words);
+                let description = format!("{description}, opposite in the two directions");
+                self.add_confined(driver, wave(half_cycles), true, None, description);
             }
         }
-        // What comes and goes with time is in no mean over runs.
+        // A structure that changes with time cancels in the mean over runs.
         let runs = self.readings.runs();
         let most = if runs.len() > 1 {
             MAX_HALF_CYCLES_OF_A_RUN
@@ -174,11 +182,11 @@ impl TestResidual<'_, '_, '_> {
         for half_cycles in 2..=most {
             let shows = |run: &&Range<usize>| half_cycles <= most_half_cycles(run.len());
             for (k, run) in runs.iter().enumerate().filter(|(_, run)| shows(run)) {
-                let words = format!(
-                    "a wave over {name}, {half_cycles} half cycles over its way, in run {} of {test}",
+                let description = format!(
+                    "a wave over {name}, {half_cycles} half cycles over its travel, in run {} of {test}",
                     k + 1
                 );
-                self.add_confined(driver, wave(half_cycles), false, Some(run), words);
+                self.add_confined(driver, wave(half_cycles), false, Some(run), description);
             }
         }
     }
@@ -205,10 +213,10 @@ impl TestResidual<'_, '_, '_> {
     }
 }
 
-/// The most half cycles that are looked for in one run.
+/// Maximum number of half cycles that is tested in one run.
 const MAX_HALF_CYCLES_OF_A_RUN: usize = 40;
 
-/// The most half cycles that so many readings show: 2.4 readings a cycle, as for the candidates of the library.
+/// Maximum number of half cycles for a number of readings: 2.4 readings per cycle, as for the candidates of the library.
 fn most_half_cycles(readings: usize) -> usize {
     readings * 10 / 12
 }
@@ -222,7 +230,7 @@ fn curve(from: f64, to: f64, intervals: usize) -> Shape {
     }
 }
 
-/// Looks for structure in a residual, beside a model given by its orthonormal columns.
+/// Tests a residual for structure that a model, given by its orthonormal columns, does not explain.
 ///
 /// # Errors
 /// If products are not finite.
@@ -239,13 +247,16 @@ pub fn structure(
         return Ok(Structure {
             p_value: 1.0,
             excess: 0.0,
-            words: "nothing to look at".to_string(),
+            description: "no detector applies to these readings".to_string(),
         });
     }
-    let layouts: Vec<Layout> = detectors.iter().map(|detector| detector.layout.clone()).collect();
+    let column_sets: Vec<EffectColumns> = detectors
+        .iter()
+        .map(|detector| detector.column_set.clone())
+        .collect();
     let rank = model.ncols();
-    let moments =
-        Moments::new(columns, &layouts, model, residual, null, &|| true).ok_or(IdentifyError::Interrupted)?;
+    let moments = Moments::new(columns, &column_sets, model, residual, null, &|| true)
+        .ok_or(IdentifyError::Interrupted)?;
     let folds = (0..columns.fold_rows.len()).collect();
     let trained = TrainedModel::new(&moments, prior, (0..rank).collect(), folds)?;
     let mut best = (0, f64::NEG_INFINITY, 0.0);
@@ -258,15 +269,18 @@ pub fn structure(
             best = (index, score, gain.gain - gain.freedom as f64);
         }
     }
-    let null_best = trained.null_best(&vec![0.0; layouts.len()], 1.0);
+    let null_best = trained.null_best(&vec![0.0; column_sets.len()], 1.0);
     let above = null_best.iter().filter(|score| **score >= best.1).count();
     let p_value = (above + 1) as f64 / (null_best.len() + 1) as f64;
     let size_um =
         (2.0 * best.2.max(0.0) / columns.rows().max(1) as f64).sqrt() * problem.noise.sigma_mm * 1e3;
-    let words = format!("{} ({size_um:.2} µm over all readings)", detectors[best.0].words);
+    let description = format!(
+        "{} ({size_um:.2} µm over all readings)",
+        detectors[best.0].description
+    );
     Ok(Structure {
         p_value,
         excess: best.2.max(0.0),
-        words,
+        description,
     })
 }

@@ -1,30 +1,31 @@
-//! How much a candidate gains, compared across numbers of columns.
+//! The gain of a candidate, and a score that compares candidates with different numbers of columns.
 //!
-//! A candidate with `k` visible columns lowers the sum of squares of whitened residuals by a `χ²ₖ` variate if it is not there. What is compared
-//! is `−ln P(χ²ₖ > gain)` less the candidate's cost in the library. The tail is computed in logarithms: at real effect sizes it underflows.
+//! If a candidate with `k` observable columns is absent, its gain follows a `χ²ₖ` distribution. The gain is the decrease of the
+//! sum of squares of whitened residuals. The score is `−ln P(χ²ₖ > gain)` less the candidate's cost in the library. The tail is
+//! computed in logarithms, because it underflows at real effect sizes.
 
 use std::borrow::Cow;
 use std::ops::Range;
 
 use super::chi_square_tail::{ln_chi_square_tail, most_evidence};
 use super::moments::{FoldMoments, Moments};
-use super::observable::{Visible, pseudo_inverse};
+use super::observable::{ObservableSubspace, pseudo_inverse};
 use crate::error::IdentifyError;
 use faer::{Mat, MatRef};
 use rayon::prelude::*;
 
-/// A model over the base: which base columns it has, and which folds it is trained on.
+/// A model over the base: its base columns and its training folds.
 pub struct TrainedModel<'m> {
     moments: &'m Moments,
-    /// The base columns it has.
+    /// Indices of its base columns.
     pub base: Vec<usize>,
-    /// The folds it is trained on.
+    /// The training folds.
     pub folds: Vec<usize>,
     /// `(XᵀX)⁻¹`.
     pub inverse: Mat<f64>,
-    /// `Xᵀ C` and `(XᵀX)⁻¹ Xᵀ C` of all candidates, or none yet: many models are asked for few candidates or for none.
+    /// `Xᵀ C` and `(XᵀX)⁻¹ Xᵀ C` of all candidates. `None` for a model that evaluates few candidates.
     all: Option<(Mat<f64>, Mat<f64>)>,
-    /// The products that are summed: which, and with what sign. Nearly all folds are all of them less a few.
+    /// The summed products, each with its sign. A sum over most folds is the sum over all folds less the others.
     parts: Vec<(&'m FoldMoments, f64)>,
     /// `Xᵀ y`.
     pub base_y: Vec<f64>,
@@ -32,7 +33,7 @@ pub struct TrainedModel<'m> {
     pub coefficients: Vec<f64>,
 }
 
-/// What is known beforehand, as products with the first base columns.
+/// The priors as products with the first base columns.
 pub struct PriorMoments {
     /// Base with base.
     pub base: Mat<f64>,
@@ -40,20 +41,20 @@ pub struct PriorMoments {
     pub base_y: Vec<f64>,
 }
 
-/// What a candidate would gain.
+/// The gain of a candidate.
 #[derive(Clone, Debug, Default)]
 pub struct Gain {
-    /// Fall of the sum of squares.
+    /// Decrease of the sum of squares.
     pub gain: f64,
-    /// Directions that it adds, and numbers of its shape that were chosen.
+    /// Number of added directions and tuned shape numbers.
     pub freedom: usize,
 }
 
-/// `Xᵀ C` and `(XᵀX)⁻¹ Xᵀ C` of a candidate: among those of all candidates, or made for this one.
+/// `Xᵀ C` and `(XᵀX)⁻¹ Xᵀ C` of a candidate, borrowed from those of all candidates or computed for this one.
 struct GivenModel<'t> {
     cross: Cow<'t, Mat<f64>>,
     solved: Cow<'t, Mat<f64>>,
-    /// Its columns among theirs.
+    /// Its columns within these matrices.
     columns: Range<usize>,
 }
 
@@ -79,7 +80,7 @@ fn dot(a: &[f64], b: &[f64]) -> f64 {
 }
 
 impl<'m> TrainedModel<'m> {
-    /// Trains a model that will be asked for every candidate.
+    /// Trains a model for the evaluation of every candidate.
     ///
     /// # Errors
     /// If products are not finite.
@@ -100,7 +101,7 @@ impl<'m> TrainedModel<'m> {
         Ok(trained)
     }
 
-    /// Trains a model that will be asked for few candidates.
+    /// Trains a model for the evaluation of few candidates.
     ///
     /// # Errors
     /// If products are not finite.
@@ -191,7 +192,7 @@ impl<'m> TrainedModel<'m> {
         }
     }
 
-    /// `D` and `g` of a candidate, and its product with itself.
+    /// `D`, `g` and the product with itself of a candidate.
     pub fn projected(&self, candidate: usize) -> (Mat<f64>, Vec<f64>, Mat<f64>) {
         self.projected_with(candidate, &self.beside(candidate))
     }
@@ -207,7 +208,7 @@ impl<'m> TrainedModel<'m> {
         let mut g: Vec<f64> = (0..count)
             .map(|k| over_parts(&|part| part.cross_y[first + k]))
             .collect();
-        // What is left of a difference by rounding is nothing.
+        // A difference at the rounding level counts as zero.
         let whole = &self.moments.whole.own[candidate];
         for k in 0..count {
             if own[(k, k)] <= 1e-12 * whole[(k, k)] {
@@ -225,7 +226,7 @@ impl<'m> TrainedModel<'m> {
         (d, g, own)
     }
 
-    /// How much the model lowers the sum of squares, priors included.
+    /// The decrease of the sum of squares by the model, priors included.
     pub fn explained(&self) -> f64 {
         self.base_y
             .iter()
@@ -234,33 +235,33 @@ impl<'m> TrainedModel<'m> {
             .sum()
     }
 
-    /// What the gain of a candidate is judged by: its directions that are seen, and the numbers of its shape. Without the latter whatever may be tuned would
-    /// be preferred to what may not.
-    fn freedom(&self, candidate: usize, seen: usize) -> usize {
-        if seen == 0 {
+    /// The degrees of freedom of a candidate's gain: its observable directions and its tuned shape numbers. Without the latter,
+    /// tunable candidates would be preferred.
+    fn freedom(&self, candidate: usize, observable: usize) -> usize {
+        if observable == 0 {
             0
         } else {
-            seen + self.moments.numbers[candidate]
+            observable + self.moments.numbers[candidate]
         }
     }
 
-    /// What a candidate would gain.
+    /// The gain of a candidate.
     pub fn gain(&self, candidate: usize) -> Gain {
         let (d, g, own) = self.projected(candidate);
-        let inverse = Visible::of(&d, &own);
+        let inverse = ObservableSubspace::of(&d, &own);
         Gain {
             gain: inverse.quadratic(&g),
             freedom: self.freedom(candidate, inverse.freedom),
         }
     }
 
-    /// What every candidate would gain.
+    /// The gains of all candidates.
     pub fn gains(&self) -> Vec<Gain> {
-        self.more_gains(Vec::new())
+        self.remaining_gains(Vec::new())
     }
 
-    /// The same, where those of the first candidates are known from the same model.
-    pub fn more_gains(&self, mut known: Vec<Gain>) -> Vec<Gain> {
+    /// The gains of all candidates. `known` are those of the first candidates with the same model.
+    pub fn remaining_gains(&self, mut known: Vec<Gain>) -> Vec<Gain> {
         known.par_extend(
             (known.len()..self.moments.count.len())
                 .into_par_iter()
@@ -269,7 +270,7 @@ impl<'m> TrainedModel<'m> {
         known
     }
 
-    /// The best score that each null draw gives to any candidate: `cost` and the inflation of the variance as in the real search.
+    /// The best score of each null draw over all candidates. `costs` and `variance` are those of the real search.
     pub fn null_best(&self, costs: &[f64], variance: f64) -> Vec<f64> {
         let draws = self.moments.null_cross.nrows();
         let h = Mat::from_fn(draws, self.base.len(), |d, i| {
@@ -284,7 +285,7 @@ impl<'m> TrainedModel<'m> {
                 for &candidate in chunk.iter().filter(|candidate| costs[**candidate].is_finite()) {
                     let beside = self.beside(candidate);
                     let (d, _, own) = self.projected_with(candidate, &beside);
-                    let inverse = Visible::of(&d, &own);
+                    let inverse = ObservableSubspace::of(&d, &own);
                     let freedom = self.freedom(candidate, inverse.freedom);
                     if freedom == 0 {
                         continue;
@@ -297,7 +298,7 @@ impl<'m> TrainedModel<'m> {
                             |k: usize| self.moments.null_cross[(draw, first + k)] - modelled[(draw, k)];
                         g.extend((0..count).map(left));
                         let gain = inverse.quadratic(&g) / variance;
-                        // The tail is worth computing only where it can be the best.
+                        // The tail is computed only if it can exceed the best score.
                         if most_evidence(gain, freedom) - costs[candidate] <= best[draw] {
                             continue;
                         }
@@ -315,8 +316,8 @@ impl<'m> TrainedModel<'m> {
         best
     }
 
-    /// The share of a signature in the base (coefficients over base columns that are not in this model) that a candidate can imitate, beside the
-    /// model: `cos²` of the angle between the two.
+    /// The share of a signature that a candidate can reproduce in addition to the model: `cos²` of the angle between the two. The
+    /// signature is given by coefficients of base columns that are not in this model.
     pub fn explained_by_signature(&self, candidate: usize, signature: &[(usize, f64)]) -> f64 {
         let (d, _, own) = self.projected(candidate);
         let (first, count) = (self.moments.first[candidate], self.moments.count[candidate]);
@@ -340,7 +341,7 @@ impl<'m> TrainedModel<'m> {
         for k in 0..count {
             g[k] -= dot(beside.solved(k), &gram_with);
         }
-        let inverse = Visible::of(&d, &own);
+        let inverse = ObservableSubspace::of(&d, &own);
         let projected = length - self.model_share(&gram_with);
         if projected <= 0.0 {
             0.0
@@ -359,10 +360,10 @@ impl<'m> TrainedModel<'m> {
             .sum()
     }
 
-    /// Coefficients of the model's base columns and of a candidate's columns if the candidate joins.
-    pub fn joined(&self, candidate: usize) -> (Vec<f64>, Vec<f64>) {
+    /// Coefficients of the model's base columns and of a candidate's columns if the candidate is added.
+    pub fn with_candidate(&self, candidate: usize) -> (Vec<f64>, Vec<f64>) {
         let (d, g, own) = self.projected(candidate);
-        let of_candidate = Visible::of(&d, &own).solve(&g);
+        let of_candidate = ObservableSubspace::of(&d, &own).solve(&g);
         let beside = self.beside(candidate);
         let of_model = (0..self.base.len())
             .map(|i| {

@@ -1,11 +1,12 @@
-//! The library as a session sees it: every entry that can be laid over the readings, and whether they show it beside the declared unknowns.
+//! Screens the library for a session: which effects apply to its readings, and which are observable in addition to the declared
+//! parameters.
 
 use abbe_model::session::Session;
 use faer::Mat;
 use rayon::prelude::*;
 
 use super::TraceOptions;
-use super::columns::{Columns, Layout};
+use super::columns::{Columns, EffectColumns};
 use super::library::{self, Candidate};
 use super::moments::Moments;
 use super::score::TrainedModel;
@@ -14,82 +15,96 @@ use crate::error::IdentifyError;
 use crate::fit::prepare;
 use crate::problem::Problem;
 
-/// An entry of the library.
+/// An effect of the library, screened for a session.
 #[derive(Clone, Debug)]
-pub struct Entry {
+pub struct ScreenedEffect {
     /// Its identifier.
     pub id: String,
-    /// Index of its family.
+    /// Index of its family in the library.
     pub family: usize,
-    /// Whether the session's readings can see it beside the declared unknowns.
-    pub seen: bool,
+    /// Whether the effect is observable in addition to the declared parameters.
+    pub observable: bool,
 }
 
-/// The entries that a session has what they follow for, in the order of the library.
+/// The library's effects for which the session has driver data, in the order of the library.
 ///
 /// # Errors
 /// If the session cannot be fitted.
-pub fn entries(session: &Session, options: &TraceOptions) -> Result<Vec<Entry>, IdentifyError> {
+pub fn screened_effects(
+    session: &Session,
+    options: &TraceOptions,
+) -> Result<Vec<ScreenedEffect>, IdentifyError> {
     let (problem, fit) = prepare(session, options.seed)?;
     let columns = Columns::new(&problem, &fit.beta);
     let start = Start::of(&problem, &columns, &fit)?;
     let prior = start.prior();
-    let laid = laid(&problem, &columns, options)?;
-    let (candidates, layouts): (Vec<Candidate>, Vec<Layout>) = laid.into_iter().unzip();
+    let searched = searched_candidates(&problem, &columns, options)?;
+    let (candidates, column_sets): (Vec<Candidate>, Vec<EffectColumns>) = searched.into_iter().unzip();
     let none = Mat::zeros(columns.rows(), 0);
-    let moments = Moments::new(&columns, &layouts, start.model, &start.residual, none, &|| true)
-        .ok_or(IdentifyError::Interrupted)?;
+    let moments = Moments::new(
+        &columns,
+        &column_sets,
+        start.model,
+        &start.residual,
+        none,
+        &|| true,
+    )
+    .ok_or(IdentifyError::Interrupted)?;
     let rank = moments.base();
     let folds = (0..columns.fold_rows.len()).collect();
     let trained = TrainedModel::new(&moments, &prior, (0..rank).collect(), folds)?;
     Ok(candidates
         .into_iter()
         .zip(trained.gains())
-        .map(|(candidate, gain)| Entry {
+        .map(|(candidate, gain)| ScreenedEffect {
             id: candidate.effect.id(),
             family: candidate.family,
-            seen: gain.freedom > 0,
+            observable: gain.freedom > 0,
         })
         .collect())
 }
 
-/// The candidates that a user wants to be looked for, laid over the readings: those that the data have what they follow for, in the order of the library.
-/// An error if what is wanted is in no identifier: misspelt, it would look as if nothing were there to be found.
-pub(super) fn laid(
+/// The requested candidates for which the data have driver values, in the order of the library, with their basis columns.
+///
+/// # Errors
+/// If a requested string occurs in no identifier: a misspelt string would otherwise look like an absent effect.
+pub(super) fn searched_candidates(
     problem: &Problem<'_>,
     columns: &Columns<'_, '_>,
     options: &TraceOptions,
-) -> Result<Vec<(Candidate, Layout)>, IdentifyError> {
+) -> Result<Vec<(Candidate, EffectColumns)>, IdentifyError> {
     let mut candidates = library::candidates(problem)?;
     if let Some(text) = matching_no_candidate(&candidates, &options.only).next() {
         return Err(IdentifyError::NotInTheLibrary { text: text.clone() });
     }
     let all = candidates.len();
-    candidates.retain(|candidate| wanted(options, &candidate.effect.id()));
+    candidates.retain(|candidate| is_requested(options, &candidate.effect.id()));
     if candidates.is_empty() && all > 0 {
         return Err(IdentifyError::EverythingLeftOut);
     }
     Ok(candidates
         .into_par_iter()
         .filter_map(|candidate| {
-            let layout = columns.layout(&candidate.effect)?;
-            Some((candidate, layout))
+            let column_set = columns.effect_columns(&candidate.effect)?;
+            Some((candidate, column_set))
         })
         .collect())
 }
 
-/// What a user wanted to leave out and is in no identifier, a warning each.
+/// A warning for each exclusion that matches no candidate.
 pub(super) fn unused_exclusions(
     problem: &Problem<'_>,
     options: &TraceOptions,
 ) -> Result<Vec<String>, IdentifyError> {
     let candidates = library::candidates(problem)?;
     Ok(matching_no_candidate(&candidates, &options.exclude)
-        .map(|text| format!("nothing was left out by `{text}`: no effect that the library has for this session is called so"))
+        .map(|text| {
+            format!("`{text}` excludes nothing: no candidate of this session has it in its identifier")
+        })
         .collect())
 }
 
-/// Of some texts those that no candidate has in its identifier.
+/// The texts that occur in no candidate's identifier.
 fn matching_no_candidate<'t>(
     candidates: &[Candidate],
     texts: &'t [String],
@@ -100,7 +115,7 @@ fn matching_no_candidate<'t>(
         .filter(move |text| !ids.iter().any(|id| id.contains(text.as_str())))
 }
 
-fn wanted(options: &TraceOptions, id: &str) -> bool {
+fn is_requested(options: &TraceOptions, id: &str) -> bool {
     let matches = |patterns: &[String]| patterns.iter().any(|pattern| id.contains(pattern.as_str()));
     (options.only.is_empty() || matches(&options.only)) && !matches(&options.exclude)
 }

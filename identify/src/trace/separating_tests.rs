@@ -4,24 +4,25 @@ use abbe_model::effect::Effect;
 
 use super::interrupt::Interrupt;
 use super::result::effect_name;
-use super::{Progress, Trace};
+use super::{Progress, TraceOutcome};
 use crate::error::IdentifyError;
 use crate::parameters::Role;
-use crate::plan::candidate_tests::CandidateTests;
-use crate::plan::separate::{Alternative, SeparatingTest, separating_tests};
+use crate::plan::candidate_tests::TestVariations;
+use crate::plan::separate::{AlternativeSeparation, SeparatingTest, separating_tests};
 use crate::results::{AlternativeResult, EffectResult, SeparatingTestResult, SeparationResult};
 
-/// Aliases that are weighed against an effect, the nearest first: each takes columns of its own.
+/// Maximum number of aliases that are compared with an effect, the nearest first. Each alias adds columns.
 const MAX_COMPARED_TESTS: usize = 24;
 
-/// Fills in, for each found effect, the tests among the candidate tests that separate it from its aliases. Without a menu for the session's instrument nothing is filled
-/// in. Where `progress` says that no more is wanted, the trace is marked as interrupted, with the tests that were found until then.
+/// Adds to each found effect the candidate tests that separate it from its aliases. Adds nothing if there are no candidate tests
+/// for the session's instrument. If `progress` returns `false`, the trace is marked as interrupted and keeps the tests found so
+/// far.
 ///
 /// # Errors
-/// If an effect cannot be laid over the session.
+/// If the basis columns of an effect cannot be computed for the session.
 pub fn separate_aliases(
-    trace: &mut Trace<'_>,
-    menu: &CandidateTests,
+    trace: &mut TraceOutcome<'_>,
+    variations: &TestVariations,
     progress: &(dyn Fn(Progress) -> bool + Sync),
 ) -> Result<(), IdentifyError> {
     if trace.result.interrupted {
@@ -29,7 +30,7 @@ pub fn separate_aliases(
     }
     let interrupt = Interrupt(progress);
     for k in 0..trace.effects.len() {
-        match interrupt.check().and_then(|()| tests_for(trace, k, menu)) {
+        match interrupt.check().and_then(|()| tests_for(trace, k, variations)) {
             Ok(tests) => fill_in(
                 &mut trace.result.effects[k],
                 &trace.alias_effects[k],
@@ -49,9 +50,9 @@ pub fn separate_aliases(
 
 /// The tests that separate the `k`-th found effect from its aliases.
 fn tests_for(
-    trace: &Trace<'_>,
+    trace: &TraceOutcome<'_>,
     k: usize,
-    menu: &CandidateTests,
+    variations: &TestVariations,
 ) -> Result<Vec<SeparatingTest>, IdentifyError> {
     let number = trace.before.parameters.effects.len() + k;
     let is_own = |role: &Role| matches!(role, Role::Coefficient { effect, .. } if *effect == number);
@@ -69,18 +70,18 @@ fn tests_for(
         &trace.effects[k],
         &coefficients,
         weighed,
-        menu,
+        variations,
     )
 }
 
-/// Puts tests into an effect's result.
+/// Writes tests into an effect's result.
 fn fill_in(
     effect: &mut EffectResult,
     aliases: &[Effect],
     session: &abbe_model::session::Session,
     tests: Vec<SeparatingTest>,
 ) {
-    let name = |one: &Alternative| effect_name(&session.machine, &aliases[one.number]);
+    let name = |one: &AlternativeSeparation| effect_name(&session.machine, &aliases[one.number]);
     if let Some(first) = tests.first() {
         effect.separated_by = Some(first.test.clone());
         let nearest = first.alternatives.iter().find(|one| one.is_separated());
@@ -91,7 +92,7 @@ fn fill_in(
             duration_min: first.minutes,
         });
     }
-    let alternative = |one: &Alternative| AlternativeResult {
+    let alternative = |one: &AlternativeSeparation| AlternativeResult {
         name: name(one),
         before_sigma: one.before,
         after_sigma: one.after,

@@ -1,82 +1,82 @@
-//! Where a search starts: the fitted model in orthonormal columns, priors included.
+//! The start of a search: the fitted model in orthonormal columns, priors included.
 //!
-//! With `J` the model's rows, `V` the directions that are seen and `R` the triangle of `J V` with its prior rows, the columns are `J V R⁻¹`: normal
-//! equations over them lose nothing.
+//! `J` is the Jacobian, `V` the basis of the identifiable directions, and `R` the triangular factor of `J V` with its prior rows.
+//! The columns are `J V R⁻¹`. Normal equations over orthonormal columns lose no precision.
 
 use faer::Mat;
 
 use super::columns::Columns;
 use super::score::PriorMoments;
-use super::search::Plain;
+use super::search::UnwhitenedModel;
 use crate::error::IdentifyError;
 use crate::fit::{Fit, in_directions};
 use crate::problem::Problem;
 use crate::triangle::Triangle;
 
-/// The fitted model as the search takes it: orthonormal columns and the residual, whitened, in the order of the folds.
+/// The fitted model for the search: orthonormal columns and residual, whitened, in fold order.
 pub(super) struct Start {
     /// Rows × rank.
     pub model: Mat<f64>,
-    /// One a row.
+    /// One value per row.
     pub residual: Vec<f64>,
-    /// Orthonormal coordinates to unknowns in internal units: unknowns × rank.
-    pub to_unknowns: Mat<f64>,
+    /// Maps orthonormal coordinates to parameters in internal units: parameters × rank.
+    pub to_parameters: Mat<f64>,
     prior_rows: Mat<f64>,
     prior_residual: Vec<f64>,
 }
 
 impl Start {
-    /// From a fit, whose triangles hold its readings.
+    /// Computes the start from a fit, whose triangular factors contain the readings.
     pub fn of(problem: &Problem<'_>, columns: &Columns<'_, '_>, fit: &Fit) -> Result<Start, IdentifyError> {
-        let unknowns = fit.beta.len();
+        let parameters = fit.beta.len();
         let basis = &fit.rank.seen;
         let rank = basis.ncols();
         let rows = columns.model_rows(&fit.beta)?;
-        let residual = (0..rows.nrows()).map(|i| rows[(i, unknowns)]).collect();
+        let residual = (0..rows.nrows()).map(|i| rows[(i, parameters)]).collect();
         let prior = problem.prior_triangle(&fit.beta);
-        let mut whole = Triangle::new(unknowns);
+        let mut whole = Triangle::new(parameters);
         whole.merge(&prior);
         fit.triangles.iter().for_each(|triangle| whole.merge(triangle));
         let (r, _, _) = in_directions(&whole, basis).parts();
         let inverse = inverse_of_triangle(&r);
-        let to_unknowns = basis * &inverse;
-        let model = rows.as_ref().subcols(0, unknowns) * &to_unknowns;
+        let to_parameters = basis * &inverse;
+        let model = rows.as_ref().subcols(0, parameters) * &to_parameters;
         let (of_prior, prior_residual, _) = prior.parts();
-        let prior_rows = &of_prior * &to_unknowns;
+        let prior_rows = &of_prior * &to_parameters;
         debug_assert_eq!(model.ncols(), rank);
         Ok(Start {
             model,
             residual,
-            to_unknowns,
+            to_parameters,
             prior_rows,
             prior_residual,
         })
     }
 
-    /// The same model and residual, not whitened.
-    pub fn plain(
+    /// The same model and residual without whitening.
+    pub fn unwhitened(
         &self,
         columns: &Columns<'_, '_>,
         beta: &[f64],
         sigma_mm: f64,
-    ) -> Result<Plain, IdentifyError> {
-        let rows = columns.plain_model_rows(beta)?;
-        let unknowns = beta.len();
-        let base = rows.as_ref().subcols(0, unknowns) * &self.to_unknowns;
-        Ok(Plain {
+    ) -> Result<UnwhitenedModel, IdentifyError> {
+        let rows = columns.unwhitened_model_rows(beta)?;
+        let parameters = beta.len();
+        let base = rows.as_ref().subcols(0, parameters) * &self.to_parameters;
+        Ok(UnwhitenedModel {
             base: Mat::from_fn(base.nrows(), base.ncols(), |i, j| base[(i, j)] / sigma_mm),
             residual: (0..rows.nrows())
-                .map(|i| rows[(i, unknowns)] / sigma_mm)
+                .map(|i| rows[(i, parameters)] / sigma_mm)
                 .collect(),
-            folds: columns.plain_folds(),
-            units: columns.plain_units(),
+            folds: columns.unwhitened_folds(),
+            units: columns.unwhitened_units(),
             sigma_mm,
         })
     }
 
-    /// What is known beforehand, as products with the columns.
+    /// The priors as products with the orthonormal columns.
     pub fn prior(&self) -> PriorMoments {
-        let rank = self.to_unknowns.ncols();
+        let rank = self.to_parameters.ncols();
         PriorMoments {
             base: self.prior_rows.transpose() * &self.prior_rows,
             base_y: (0..rank)
@@ -89,7 +89,7 @@ impl Start {
     }
 }
 
-/// The inverse of an upper triangle by back substitution.
+/// The inverse of an upper triangular matrix by back substitution.
 fn inverse_of_triangle(r: &Mat<f64>) -> Mat<f64> {
     let n = r.nrows();
     let mut inverse = Mat::zeros(n, n);

@@ -1,9 +1,12 @@
-//! What a search that only adds would miss: an effect that took the place of another, and a pair that hid behind one.
+//! Exchanges that a purely additive search misses: a wrong effect in place of the true one, and one effect in place of a pair.
 //!
-//! Each effect is exchanged for what explains clearly better beside the others. When nothing more is to be added, effects with numbers or places of
-//! their own are fitted anew beside each of the next best: steps with many places, or a warm-up with its own time constant, can swallow most of a second
-//! effect, which shows only when both are there. Two effects are also looked for together in the place of two, or of one: where each undoes part of the
-//! other, neither shows much alone, and something that does a little of both is found in their place.
+//! Each effect is exchanged for a candidate that explains clearly more together with the others. When no addition is significant,
+//! effects with tunable shape numbers or positions are tuned again together with each of the next best candidates. A step table
+//! or a warm-up with a free time constant can absorb most of a second effect. The second effect becomes significant only when
+//! both are in the model.
+//!
+//! Pairs of effects are also searched jointly as replacements of two effects or of one. If two effects partly cancel each other,
+//! neither is significant alone, and the search finds a single effect that approximates both.
 
 use std::collections::HashSet;
 
@@ -17,35 +20,35 @@ use super::score::TrainedModel;
 use super::search::{ALL, Search, SearchBranch, SelectedEffect};
 use crate::error::IdentifyError;
 
-/// The most effects whose places and periods are looked at again whenever one is added.
+/// Maximum number of effects whose positions and periods are tuned again after an addition.
 const MAX_REFINED: usize = 4;
-/// How many are tried beside an effect that is fitted anew: on all readings, and where one fold is left out.
+/// Candidates tried together with an effect that is tuned again: on all readings, and with one fold left out.
 const MAX_TRIED: usize = 6;
-const MAX_TRIED_TO_PREDICT: usize = 2;
-/// How many are tried as the first of two that are looked for together: in the place of two, and in the place of one or to predict a fold.
+const MAX_TRIED_WITHOUT_A_FOLD: usize = 2;
+/// Candidates tried as the first of a pair: in place of two effects, and in place of one or with one fold left out.
 const MAX_FIRST_MEMBERS: usize = 32;
 const FEW_FIRST_MEMBERS: usize = 8;
-/// The most effects that are fitted anew beside others.
-const MAX_RESTARTS: usize = 3;
-/// Relative difference of scores below which two candidates do the same.
-const SAME: f64 = 1e-6;
+/// Maximum number of selected effects for which effects are tuned again.
+const MAX_RETUNED: usize = 3;
+/// Relative difference of scores below which two candidates count as equivalent.
+const EQUIVALENT: f64 = 1e-6;
 
-/// Sets of effects against what a search has added.
+/// A comparison of sets of effects with the selected set.
 #[derive(Clone)]
-struct Contest {
-    /// The folds that the search sees.
+struct SetComparison {
+    /// The training folds of the search.
     folds: Vec<usize>,
-    /// What it has added.
+    /// The selected effects.
     chosen: Vec<usize>,
-    /// The score that readings without structure hardly reach.
+    /// The score that readings without structure exceed with the probability of the significance level.
     threshold: f64,
-    /// What a set has to say more than: what the best so far says, and for what was there what is confounded.
+    /// The value that a set has to exceed: the best value so far, at first that of the selected set plus the confounding margin.
     most: f64,
-    /// The best that does.
+    /// The best set that exceeds it.
     best: Option<Vec<usize>>,
 }
 
-impl Contest {
+impl SetComparison {
     fn accept_set(&mut self, set: Vec<usize>, value: f64) {
         self.most = value;
         self.best = Some(set);
@@ -53,21 +56,21 @@ impl Contest {
 }
 
 impl Search<'_> {
-    /// Exchanges effects for candidates that explain clearly better what they stand for.
+    /// Exchanges effects for candidates that explain clearly more.
     pub fn exchange(&mut self) -> Result<(), IdentifyError> {
-        for track in 0..self.tracks.len() {
-            for k in 0..self.tracks[track].taken.len() {
-                self.exchange_one(track, k)?;
+        for branch in 0..self.branches.len() {
+            for k in 0..self.branches[branch].selected.len() {
+                self.exchange_one(branch, k)?;
             }
         }
         self.note_held_out()
     }
 
-    /// Exchanges one effect for what explains clearly better beside the others. A change has to be worth more than what is confounded, so that
-    /// exchanges end.
-    fn exchange_one(&mut self, track: usize, k: usize) -> Result<(), IdentifyError> {
-        let SearchBranch { folds, .. } = self.tracks[track].clone();
-        let mut others = self.tracks[track].chosen();
+    /// Exchanges one effect for a candidate that explains clearly more together with the others. The improvement has to exceed the
+    /// confounding margin, so that exchanges end.
+    fn exchange_one(&mut self, branch: usize, k: usize) -> Result<(), IdentifyError> {
+        let SearchBranch { folds, .. } = self.branches[branch].clone();
+        let mut others = self.branches[branch].chosen();
         let present = others.remove(k);
         let known = if (1..MAX_REFINED).contains(&others.len()) && !self.stop.in_residual_variance {
             self.refine(&others, &folds)?
@@ -75,97 +78,98 @@ impl Search<'_> {
             Vec::new()
         };
         let model = self.model_of(&others, &folds)?;
-        let gains = model.more_gains(known);
+        let gains = model.remaining_gains(known);
         let score = self.score(present, &gains[present], self.variance(&model));
         let better = self
             .best_of(&model, &gains, &others)
             .filter(|(best, most)| *best != present && *most > score + INDISTINGUISHABLE)
-            .map(|(best, _)| self.named_first(&model, &gains, best, &others));
+            .map(|(best, _)| self.simplest_confounded(&model, &gains, best, &others));
         if let Some(better) = better {
-            self.materialise(&[better]);
-            self.tracks[track].taken[k].candidate = better;
+            self.add_to_base(&[better]);
+            self.branches[branch].selected[k].candidate = better;
         }
         Ok(())
     }
 
-    /// Fits effects with numbers or places of their own anew beside each of the next best, in addition to the others or in the place of one, and takes the
-    /// best of these sets if it says clearly more than the present one. Returns whether the search on all readings did.
+    /// Tunes effects with shape numbers or positions again together with each of the next best candidates, in addition to the
+    /// others or in place of one. Selects the best of these sets if it has clearly more evidence than the present one. Returns
+    /// whether the search on all readings changed.
     pub fn retune_all(&mut self) -> Result<bool, IdentifyError> {
         if self.stop.in_residual_variance {
             return Ok(false);
         }
-        let changed: Vec<bool> = (0..self.tracks.len())
-            .map(|track| self.retune_one(track))
+        let changed: Vec<bool> = (0..self.branches.len())
+            .map(|branch| self.retune_one(branch))
             .collect::<Result<_, _>>()?;
         self.note_held_out()?;
         Ok(changed[ALL])
     }
 
-    fn retune_one(&mut self, track: usize) -> Result<bool, IdentifyError> {
-        let Some(mut contest) = self.contest(track)? else {
+    fn retune_one(&mut self, branch: usize) -> Result<bool, IdentifyError> {
+        let Some(mut comparison) = self.comparison(branch)? else {
             return Ok(false);
         };
-        let Contest { folds, chosen, .. } = contest.clone();
-        let flexible: Vec<usize> = chosen.iter().copied().filter(|c| self.is_flexible(*c)).collect();
-        for flexible in flexible {
-            let given_up = chosen.iter().copied().filter(|c| *c != flexible).map(Some);
-            for given_up in given_up.chain([None]) {
-                let kept = |c: &&usize| **c != flexible && Some(**c) != given_up;
+        let SetComparison { folds, chosen, .. } = comparison.clone();
+        let tunable: Vec<usize> = chosen.iter().copied().filter(|c| self.is_tunable(*c)).collect();
+        for tunable in tunable {
+            let removed = chosen.iter().copied().filter(|c| *c != tunable).map(Some);
+            for removed in removed.chain([None]) {
+                let kept = |c: &&usize| **c != tunable && Some(**c) != removed;
                 let base: Vec<usize> = chosen.iter().filter(kept).copied().collect();
-                if given_up.is_none() && chosen.len() >= self.stop.most {
+                if removed.is_none() && chosen.len() >= self.stop.max_effects {
                     continue;
                 }
-                let tried = self.next_best(&base, flexible, &folds)?;
-                self.materialise(&tried);
+                let tried = self.next_best(&base, tunable, &folds)?;
+                self.add_to_base(&tried);
                 for other in tried {
                     let beside: Vec<usize> = base.iter().copied().chain([other]).collect();
-                    let Some(restart) = self.restart(flexible, &beside, &folds)? else {
+                    let Some(retuned) = self.retuned(tunable, &beside, &folds)? else {
                         continue;
                     };
-                    let set: Vec<usize> = beside.iter().copied().chain([restart]).collect();
-                    let value = self.evidence_with(&beside, restart, &folds)? - self.description_length(&set);
-                    if value <= contest.most {
+                    let set: Vec<usize> = beside.iter().copied().chain([retuned]).collect();
+                    let value = self.evidence_with(&beside, retuned, &folds)? - self.description_length(&set);
+                    if value <= comparison.most {
                         continue;
                     }
-                    self.materialise(&[restart]);
-                    // What is added has to hold its own against readings without structure.
-                    if self.is_significant_in(other, &set, &contest)? {
-                        contest.accept_set(set, value);
+                    self.add_to_base(&[retuned]);
+                    // The added effect has to be significant against readings without structure.
+                    if self.is_significant_in(other, &set, &comparison)? {
+                        comparison.accept_set(set, value);
                     }
                 }
             }
         }
-        Ok(self.replace(track, contest.best))
+        Ok(self.replace(branch, comparison.best))
     }
 
-    /// Looks for two effects together in the place of one or two, and takes the best two if they say clearly more. Returns whether the search on all
-    /// readings did.
-    pub fn merge_groups(&mut self) -> Result<bool, IdentifyError> {
+    /// Searches two effects jointly in place of one or two, and selects the best pair if it has clearly more evidence. Returns
+    /// whether the search on all readings changed.
+    pub fn exchange_pairs(&mut self) -> Result<bool, IdentifyError> {
         if self.stop.in_residual_variance {
             return Ok(false);
         }
-        // Where all readings say no more in another pair, those of a fold have no reason to.
-        if !self.merge_group_once(ALL)? {
+        // If all readings do not prefer another pair, the folds are not searched.
+        if !self.exchange_pair(ALL)? {
             return Ok(false);
         }
-        for track in ALL + 1..self.tracks.len() {
-            self.merge_group_once(track)?;
+        for branch in ALL + 1..self.branches.len() {
+            self.exchange_pair(branch)?;
         }
         self.note_held_out()?;
         Ok(true)
     }
 
-    fn merge_group_once(&mut self, track: usize) -> Result<bool, IdentifyError> {
-        let Some(mut contest) = self.contest(track)? else {
+    fn exchange_pair(&mut self, branch: usize) -> Result<bool, IdentifyError> {
+        let Some(mut comparison) = self.comparison(branch)? else {
             return Ok(false);
         };
-        let Contest { folds, chosen, .. } = contest.clone();
+        let SetComparison { folds, chosen, .. } = comparison.clone();
         let places = 0..chosen.len();
-        let given_up = places
+        let removed = places
             .clone()
             .flat_map(|i| places.clone().filter(move |j| i <= *j).map(move |j| (i, j)));
-        for (i, j) in given_up {
-            if i == j && chosen.len() >= self.stop.most {
+        for (i, j) in removed {
+            if i == j && chosen.len() >= self.stop.max_effects {
                 continue;
             }
             let base: Vec<usize> = places
@@ -173,58 +177,61 @@ impl Search<'_> {
                 .filter(|k| *k != i && *k != j)
                 .map(|k| chosen[k])
                 .collect();
-            let in_place_of_two = i != j && track == ALL;
+            let in_place_of_two = i != j && branch == ALL;
             let count = if in_place_of_two {
                 MAX_FIRST_MEMBERS
             } else {
                 FEW_FIRST_MEMBERS
             };
-            let firsts = self.simple_firsts(&base, &folds, count)?;
-            self.materialise(&firsts);
+            let firsts = self.untunable_candidates(&base, &folds, count)?;
+            self.add_to_base(&firsts);
             for first in firsts {
                 let beside: Vec<usize> = base.iter().copied().chain([first]).collect();
                 let second = {
                     let model = self.model_of(&beside, &folds)?;
                     let gains = model.gains();
                     self.best_of(&model, &gains, &beside)
-                        .map(|(best, _)| self.named_first(&model, &gains, best, &beside))
+                        .map(|(best, _)| self.simplest_confounded(&model, &gains, best, &beside))
                 };
                 let Some(second) = second else { continue };
                 let set: Vec<usize> = beside.iter().copied().chain([second]).collect();
                 let value = self.evidence_with(&beside, second, &folds)? - self.description_length(&set);
-                if value <= contest.most {
+                if value <= comparison.most {
                     continue;
                 }
-                self.materialise(&[second]);
-                if self.is_significant_in(first, &set, &contest)?
-                    && self.is_significant_in(second, &set, &contest)?
+                self.add_to_base(&[second]);
+                if self.is_significant_in(first, &set, &comparison)?
+                    && self.is_significant_in(second, &set, &comparison)?
                 {
-                    contest.accept_set(set, value);
+                    comparison.accept_set(set, value);
                 }
             }
         }
-        Ok(self.replace(track, contest.best))
+        Ok(self.replace(branch, comparison.best))
     }
 
-    /// Puts a set, if there is one, in the place of what a search has added; it is no more certain than the least certain of that. Returns whether there
-    /// was one.
-    fn replace(&mut self, track: usize, set: Option<Vec<usize>>) -> bool {
+    /// Replaces the selected effects by a set, if there is one. The largest p-value of the replaced effects applies to all of the
+    /// set. Returns whether the effects were replaced.
+    fn replace(&mut self, branch: usize, set: Option<Vec<usize>>) -> bool {
         let Some(set) = set else { return false };
-        let taken = &mut self.tracks[track].taken;
-        let p_value = taken.iter().map(|taken| taken.p_value).fold(0.0, f64::max);
-        let restart = |candidate: usize| SelectedEffect { candidate, p_value };
-        *taken = set.into_iter().map(restart).collect();
+        let selected = &mut self.branches[branch].selected;
+        let p_value = selected
+            .iter()
+            .map(|selected| selected.p_value)
+            .fold(0.0, f64::max);
+        let retuned = |candidate: usize| SelectedEffect { candidate, p_value };
+        *selected = set.into_iter().map(retuned).collect();
         true
     }
 
-    /// Opens a contest for the place of what a search has added; none where that is nothing, or too much to be fitted anew.
-    fn contest(&self, track: usize) -> Result<Option<Contest>, IdentifyError> {
-        let SearchBranch { folds, .. } = self.tracks[track].clone();
-        let chosen = self.tracks[track].chosen();
-        if !(1..=MAX_RESTARTS).contains(&chosen.len()) {
+    /// Starts a comparison with the selected set. `None` if the set is empty or too large to be tuned again.
+    fn comparison(&self, branch: usize) -> Result<Option<SetComparison>, IdentifyError> {
+        let SearchBranch { folds, .. } = self.branches[branch].clone();
+        let chosen = self.branches[branch].chosen();
+        if !(1..=MAX_RETUNED).contains(&chosen.len()) {
             return Ok(None);
         }
-        Ok(Some(Contest {
+        Ok(Some(SetComparison {
             threshold: self.thresholds.last().copied().unwrap_or(f64::INFINITY),
             most: self.evidence_of(&chosen, &[], &folds)? - self.description_length(&chosen)
                 + INDISTINGUISHABLE,
@@ -234,108 +241,113 @@ impl Search<'_> {
         }))
     }
 
-    /// Whether one of a set scores beside the others what readings without structure do not give.
-    fn is_significant_in(&self, one: usize, set: &[usize], contest: &Contest) -> Result<bool, IdentifyError> {
+    /// Whether one effect of a set scores at least the null threshold in addition to the others.
+    fn is_significant_in(
+        &self,
+        one: usize,
+        set: &[usize],
+        comparison: &SetComparison,
+    ) -> Result<bool, IdentifyError> {
         let others: Vec<usize> = set.iter().copied().filter(|c| *c != one).collect();
-        let model = self.lean_model_of(&others, &contest.folds)?;
-        Ok(self.score(one, &model.gain(one), self.variance(&model)) >= contest.threshold)
+        let model = self.projection_of(&others, &comparison.folds)?;
+        Ok(self.score(one, &model.gain(one), self.variance(&model)) >= comparison.threshold)
     }
 
-    /// Effects without numbers or places of their own that explain anything beside some others, the best first; of those that do the very same to the
-    /// readings one.
-    fn simple_firsts(
+    /// Effects without tunable shape numbers or positions that have a positive score in addition to some others, best first. Of
+    /// equivalent effects one is kept.
+    fn untunable_candidates(
         &self,
         base: &[usize],
         folds: &[usize],
         most: usize,
     ) -> Result<Vec<usize>, IdentifyError> {
-        let mut ranked = self.ranked(base, folds, |candidate| !self.is_flexible(candidate))?;
+        let mut ranked = self.ranked(base, folds, |candidate| !self.is_tunable(candidate))?;
         ranked.truncate(most);
         Ok(ranked)
     }
 
-    /// What explains anything beside some effects, the best first, as far as it is asked for; of those that do the very same to the readings one.
-    /// `asked_for` is asked of the best before the others.
+    /// The candidates with a positive score in addition to some effects, restricted to those that `accepts` accepts, best first.
+    /// Of equivalent candidates one is kept. `accepts` is called in order of decreasing score.
     fn ranked(
         &self,
         base: &[usize],
         folds: &[usize],
-        mut asked_for: impl FnMut(usize) -> bool,
+        mut accepts: impl FnMut(usize) -> bool,
     ) -> Result<Vec<usize>, IdentifyError> {
         let model = self.model_of(base, folds)?;
         let variance = self.variance(&model);
         let gains = model.gains();
         let mut scored: Vec<(usize, f64)> = (0..self.candidates.len())
-            .filter(|c| self.is_open(*c, folds) && !base.contains(c))
+            .filter(|c| self.may_be_added(*c, folds) && !base.contains(c))
             .map(|c| (c, self.score(c, &gains[c], variance)))
             .filter(|(_, score)| *score > 0.0)
             .collect();
         scored.sort_by(|a, b| b.1.total_cmp(&a.1).then(a.0.cmp(&b.0)));
-        scored.retain(|(c, _)| asked_for(*c));
+        scored.retain(|(c, _)| accepts(*c));
         scored.dedup_by(|a, b| {
-            (a.1 - b.1).abs() < SAME * b.1.abs() && gains[a.0].freedom == gains[b.0].freedom
+            (a.1 - b.1).abs() < EQUIVALENT * b.1.abs() && gains[a.0].freedom == gains[b.0].freedom
         });
         Ok(scored.into_iter().map(|(c, _)| c).collect())
     }
 
-    fn is_flexible(&self, candidate: usize) -> bool {
-        self.moments.numbers[candidate] > 0 || self.has_places(candidate)
+    fn is_tunable(&self, candidate: usize) -> bool {
+        self.moments.numbers[candidate] > 0 || self.has_positions(candidate)
     }
 
-    fn has_places(&self, candidate: usize) -> bool {
+    fn has_positions(&self, candidate: usize) -> bool {
         matches!(self.candidates[candidate].effect.shape, Shape::Steps { .. })
     }
 
-    /// The best beside some effects, each component, driver and shape once, and what does the very same to the readings once.
+    /// The best candidates in addition to some effects: one for each identifier, and one of equivalent candidates.
     fn next_best(&self, base: &[usize], but: usize, folds: &[usize]) -> Result<Vec<usize>, IdentifyError> {
-        let mut seen: HashSet<String> = HashSet::from([self.candidates[but].effect.id()]);
+        let mut ids: HashSet<String> = HashSet::from([self.candidates[but].effect.id()]);
         let mut ranked = self.ranked(base, folds, |candidate| {
-            seen.insert(self.candidates[candidate].effect.id())
+            ids.insert(self.candidates[candidate].effect.id())
         })?;
-        let most = if self.identifies_all(folds) {
+        let most = if self.has_all_folds(folds) {
             MAX_TRIED
         } else {
-            MAX_TRIED_TO_PREDICT
+            MAX_TRIED_WITHOUT_A_FOLD
         };
         ranked.truncate(most);
         Ok(ranked)
     }
 
-    /// An effect with the numbers or places that are best beside others.
-    fn restart(
+    /// An effect with the shape numbers or positions that are best together with others.
+    fn retuned(
         &mut self,
-        flexible: usize,
+        tunable: usize,
         beside: &[usize],
         folds: &[usize],
     ) -> Result<Option<usize>, IdentifyError> {
         let fresh = {
-            let model = self.lean_model_of(beside, folds)?;
-            let original = &self.candidates[flexible];
-            if self.has_places(flexible) {
-                self.composed_anew(&model, &original.effect.id())
+            let model = self.projection_of(beside, folds)?;
+            let original = &self.candidates[tunable];
+            if self.has_positions(tunable) {
+                self.best_step_table(&model, &original.effect.id())
             } else {
-                let before = model.gain(flexible).gain;
+                let before = model.gain(tunable).gain;
                 match refine::refine(self, &model, original, before) {
                     Some(effect) => Some(Candidate {
                         effect,
                         ..original.clone()
                     }),
-                    None => return Ok(Some(flexible)),
+                    None => return Ok(Some(tunable)),
                 }
             }
         };
         Ok(fresh.and_then(|fresh| self.add_tuned(fresh, folds)))
     }
 
-    /// The best that the dictionary of an effect's name holds beside a model.
-    fn composed_anew(&self, model: &TrainedModel<'_>, id: &str) -> Option<Candidate> {
+    /// The best step table of an effect's dictionary for addition to a model.
+    fn best_step_table(&self, model: &TrainedModel<'_>, id: &str) -> Option<Candidate> {
         let dictionary = self.candidates.iter().position(|candidate| {
             candidate.dictionary
                 && candidate.effect.id() == id
                 && matches!(candidate.effect.shape, Shape::Steps { .. })
         })?;
         let variance = self.variance(model);
-        let composed = compose::composed(model, dictionary, &self.candidates[dictionary], variance)?;
+        let composed = compose::best_step_table(model, dictionary, &self.candidates[dictionary], variance)?;
         Some(composed.candidate)
     }
 }

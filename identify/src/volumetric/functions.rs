@@ -13,12 +13,12 @@ use crate::error::IdentifyError;
 use crate::quantity::Given;
 use crate::unit::{ARCSEC, Unit};
 
-/// How an error follows an axis; values in mm or rad.
+/// The form of an error function; values in mm or rad.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Form {
-    /// The same everywhere.
+    /// Constant.
     Constant(f64),
-    /// Linear between given positions (ascending), and level beyond them.
+    /// Linear interpolation between given positions (ascending), constant beyond them.
     Table {
         /// mm or rad.
         at: Vec<f64>,
@@ -44,7 +44,7 @@ pub enum Form {
 }
 
 impl Form {
-    /// The value where the axis stands.
+    /// The value at a position of the axis.
     pub fn at(&self, q: f64) -> f64 {
         match self {
             Form::Constant(value) => *value,
@@ -72,14 +72,14 @@ impl Form {
     }
 }
 
-/// One function: which error, of which axis' position, how.
+/// One error as a function of one axis' position.
 #[derive(Clone, Debug, PartialEq)]
 pub struct ErrorFunction {
     /// The error's slot in the machine.
     pub slot: usize,
-    /// The axis that it follows, by index.
+    /// The axis of the position, by index.
     pub over: usize,
-    /// How.
+    /// The form.
     pub form: Form,
 }
 
@@ -89,12 +89,12 @@ struct File {
     #[serde(default)]
     constant: BTreeMap<String, String>,
     #[serde(default)]
-    function: Vec<Entry>,
+    function: Vec<FunctionEntry>,
 }
 
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
-struct Entry {
+struct FunctionEntry {
     error: String,
     over: Option<String>,
     table: Option<TableEntry>,
@@ -152,23 +152,23 @@ struct HarmonicEntry {
 /// polynomial = { scale_mm = 250, arcsec = [0.5, 2.0, -1.0] }
 /// ```
 ///
-/// Several functions of one error add up.
+/// Several functions of one error are summed.
 ///
 /// # Errors
-/// If the file cannot be read, is not of this form, holds a number beyond [`limits::LARGEST`], or names what the machine lacks: with the file, the
-/// entry and what to do.
+/// If the file cannot be read, is not of this form, holds a number beyond [`limits::LARGEST`], or names something that the machine lacks.
+/// The message names the file and the entry.
 pub fn read(path: &Path, machine: &Machine) -> Result<Vec<ErrorFunction>, IdentifyError> {
     let fault = |message: String| IdentifyError::Request(format!("{}: {message}", path.display()));
     let text = read::text(path, "the file of error functions")?;
     parse(&text, machine).map_err(fault)
 }
 
-/// As [`read`], from text; an error is a message.
+/// As [`read`], from text; the error is a message.
 fn parse(text: &str, machine: &Machine) -> Result<Vec<ErrorFunction>, String> {
     let file: File = toml::from_str(text).map_err(|cause| cause.to_string())?;
     let mut functions = Vec::new();
     for (id, quantity) in &file.constant {
-        let (slot, over, angle) = placed(machine, id)?;
+        let (slot, over, angle) = error_slot_of(machine, id)?;
         let unit = Unit::of(if angle {
             abbe_model::instrument::InternalUnit::Radian
         } else {
@@ -182,14 +182,14 @@ fn parse(text: &str, machine: &Machine) -> Result<Vec<ErrorFunction>, String> {
         });
     }
     for (number, entry) in file.function.iter().enumerate() {
-        let called = format!("[[function]] {} (`{}`)", number + 1, entry.error);
-        functions.push(function(machine, entry).map_err(|message| format!("{called}: {message}"))?);
+        let label = format!("[[function]] {} (`{}`)", number + 1, entry.error);
+        functions.push(function(machine, entry).map_err(|message| format!("{label}: {message}"))?);
     }
     Ok(functions)
 }
 
-fn function(machine: &Machine, entry: &Entry) -> Result<ErrorFunction, String> {
-    let (slot, own, angle) = placed(machine, &entry.error)?;
+fn function(machine: &Machine, entry: &FunctionEntry) -> Result<ErrorFunction, String> {
+    let (slot, own, angle) = error_slot_of(machine, &entry.error)?;
     let over = match &entry.over {
         None => own,
         Some(name) => machine.axis_index(name).ok_or_else(|| no_axis(machine, name))?,
@@ -198,17 +198,17 @@ fn function(machine: &Machine, entry: &Entry) -> Result<ErrorFunction, String> {
     let form = match (&entry.table, &entry.polynomial, &entry.harmonic) {
         (Some(table), None, None) => {
             let at = position(kind, table.at_mm.clone(), table.at_deg.clone(), "at")?
-                .ok_or_else(|| format!("a table says where: `at_{}`", unit_word(kind)))?;
+                .ok_or_else(|| format!("a table needs positions: `at_{}`", unit_suffix(kind)))?;
             let values = values(angle, table.um.clone(), table.arcsec.clone())?;
             if at.len() != values.len() || at.len() < 2 {
                 return Err(format!(
-                    "{} positions and {} values; a table has as many of both, two at least",
+                    "{} positions and {} values; a table needs the same number of both, at least two",
                     at.len(),
                     values.len()
                 ));
             }
             if at.windows(2).any(|pair| pair[1] <= pair[0]) {
-                return Err("the positions of a table ascend".into());
+                return Err("the positions of a table must ascend".into());
             }
             Form::Table { at, values }
         }
@@ -222,7 +222,7 @@ fn function(machine: &Machine, entry: &Entry) -> Result<ErrorFunction, String> {
             )?
             .map_or(1.0, |scale| scale[0]);
             if scale <= 0.0 {
-                return Err("the scale of a polynomial is above 0".into());
+                return Err("the scale of a polynomial must be above 0".into());
             }
             let coefficients = values(angle, polynomial.um.clone(), polynomial.arcsec.clone())?;
             Form::Polynomial { scale, coefficients }
@@ -235,41 +235,41 @@ fn function(machine: &Machine, entry: &Entry) -> Result<ErrorFunction, String> {
                 single(harmonic.period_deg),
                 "period",
             )?;
-            moderate(harmonic.order.as_slice())?;
+            check_finite(harmonic.order.as_slice())?;
             let period = match (period, harmonic.order, kind) {
                 (Some(period), None, _) => period[0],
                 (None, Some(order), AxisKind::Rotary) => std::f64::consts::TAU / order,
                 _ => {
                     return Err(
-                        "a harmonic has either a `period_…` or, over a rotary axis, an `order` (cycles a turn)".into(),
+                        "a harmonic needs either a `period_…` or, over a rotary axis, an `order` (cycles per turn)".into(),
                     );
                 }
             };
             if period.is_nan() || period <= 0.0 || period.is_infinite() {
-                return Err("the period of a harmonic is a length or an angle above 0".into());
+                return Err("the period of a harmonic must be a length or an angle above 0".into());
             }
             let amplitude = values(
                 angle,
                 single(harmonic.amplitude_um),
                 single(harmonic.amplitude_arcsec),
             )?;
-            moderate(&[harmonic.phase_deg])?;
+            check_finite(&[harmonic.phase_deg])?;
             Form::Harmonic {
                 period,
                 amplitude: amplitude[0],
                 phase: harmonic.phase_deg.to_radians(),
             }
         }
-        _ => return Err("it is one of `table`, `polynomial` and `harmonic`".into()),
+        _ => return Err("give exactly one of `table`, `polynomial` and `harmonic`".into()),
     };
     Ok(ErrorFunction { slot, over, form })
 }
 
-/// Slot and own axis of an error, and whether it is an angle.
-fn placed(machine: &Machine, id: &str) -> Result<(usize, usize, bool), String> {
+/// Slot and axis of an error, and whether it is an angle.
+fn error_slot_of(machine: &Machine, id: &str) -> Result<(usize, usize, bool), String> {
     let Some(name) = ErrorName::parse(id) else {
         return Err(format!(
-            "`{id}` is no error's name; ISO 230-1 names are, as EXX, EB0A"
+            "`{id}` is not the name of an error; use ISO 230-1 names such as EXX, EB0A"
         ));
     };
     let Some(slot) = machine.error_slot(&name) else {
@@ -279,7 +279,7 @@ fn placed(machine: &Machine, id: &str) -> Result<(usize, usize, bool), String> {
     let angle = name.freedom.is_angle();
     if machine.axes[axis].kind == AxisKind::Linear && name.kind == ErrorKind::Location && !angle {
         return Err(format!(
-            "`{id}`: a linear axis has squarenesses (angles) and no position errors"
+            "`{id}`: a linear axis has squareness errors (angles) but no position errors"
         ));
     }
     Ok((slot, axis, angle))
@@ -293,7 +293,7 @@ fn no_axis(machine: &Machine, name: &str) -> String {
     )
 }
 
-fn unit_word(kind: AxisKind) -> &'static str {
+fn unit_suffix(kind: AxisKind) -> &'static str {
     match kind {
         AxisKind::Linear => "mm",
         AxisKind::Rotary => "deg",
@@ -314,9 +314,12 @@ fn position(
         ),
     };
     if wrong.is_some() {
-        return Err(format!("`{id_stem}_{}` is meant over this axis", unit_word(kind)));
+        return Err(format!(
+            "`{id_stem}_{}` is expected for this axis",
+            unit_suffix(kind)
+        ));
     }
-    moderate(right.as_deref().unwrap_or_default())?;
+    check_finite(right.as_deref().unwrap_or_default())?;
     Ok(right)
 }
 
@@ -328,20 +331,20 @@ fn values(angle: bool, um: Option<Vec<f64>>, arcsec: Option<Vec<f64>>) -> Result
     };
     let values = match (right, wrong) {
         (Some(values), None) if !values.is_empty() => values,
-        _ => return Err(format!("the values of this error are in `{word}`")),
+        _ => return Err(format!("the values of this error must be in `{word}`")),
     };
-    moderate(&values)?;
+    check_finite(&values)?;
     Ok(values
         .into_iter()
         .map(|value| value / display_per_internal)
         .collect())
 }
 
-/// That numbers are numbers within the limits of all files.
-fn moderate(values: &[f64]) -> Result<(), String> {
+/// Checks that numbers are finite and within the limits of all files.
+fn check_finite(values: &[f64]) -> Result<(), String> {
     for value in values {
         if !value.is_finite() {
-            return Err(format!("`{value}` is no finite number"));
+            return Err(format!("`{value}` is not a finite number"));
         }
         if let Some(fault) = limits::too_large(*value) {
             return Err(fault);

@@ -1,12 +1,12 @@
-//! The volumetric error: where the tool point is in the table frame, less where it should be, anywhere in the workspace.
+//! The volumetric error: the deviation of the tool point from its nominal position in the table frame, anywhere in the workspace.
 //!
 //! ```text
 //! e(q) = T_w(q, E(q))⁻¹ T_t(q, E(q)) p − T_w(q)⁻¹ T_t(q) p
 //! ```
 //!
-//! with the errors `E` functions of the axes. Compensation looks for commands `q′` at which the machine with its errors is where the
-//! machine without them is at `q`: Newton's iteration on the chain, `q′ ← q′ − J⁻¹ r`, with `J` the directions in which the linear axes move the tool
-//! over the table. The errors, which change by a few parts in 10⁵ of the way, are left out of `J`, so that every step gains four digits or so.
+//! The errors `E` are functions of the axes. Compensation computes commands `q′` at which the machine with errors is where the error-free
+//! machine is at `q`. Newton's iteration on the chain is `q′ ← q′ − J⁻¹ r`. `J` holds the motions of the tool over the table per motion of
+//! the linear axes, without errors. The errors change by a few parts in 10⁵ of the travel, so each step gains about four digits.
 
 pub mod functions;
 mod results;
@@ -23,12 +23,12 @@ pub use results::{AxisShare, Coordinates, MapPosition, Size, Summary};
 
 use crate::error::IdentifyError;
 
-/// Most points of a map.
+/// Maximum number of points of a map.
 pub const MAX_POINTS: usize = 1_000_000;
-/// Most steps of a compensation.
+/// Maximum number of iterations of a compensation.
 const MAX_STEPS: usize = 20;
-/// Residual at which a compensation has ended, mm.
-const SETTLED_MM: f64 = 1e-10;
+/// Residual at which the iteration ends, mm.
+const CONVERGENCE_MM: f64 = 1e-10;
 
 /// A machine with errors.
 #[derive(Clone, Debug)]
@@ -41,25 +41,25 @@ pub struct MachineWithErrors<'a> {
     pub tool_mm: [f64; 3],
 }
 
-/// The error at one place, mm.
+/// The volumetric error at one point, mm.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Place {
+pub struct VolumetricPoint {
     /// Positions of the axes, mm or rad.
     pub positions: Vec<f64>,
-    /// Where the tool point should be in the table frame.
+    /// Nominal position of the tool point in the table frame.
     pub nominal_mm: [f64; 3],
-    /// Where it is, less that.
+    /// Its deviation from nominal.
     pub error_mm: [f64; 3],
-    /// The commands that cancel it and what they leave, where asked for.
+    /// The compensating commands and their residual error, if requested.
     pub compensated: Option<Compensated>,
 }
 
 /// Corrected commands.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Compensated {
-    /// Positions to command, mm or rad; rotary axes as they were.
+    /// Positions to command, mm or rad; rotary axes unchanged.
     pub positions: Vec<f64>,
-    /// The error that remains, mm.
+    /// The residual error, mm.
     pub error_mm: [f64; 3],
 }
 
@@ -88,10 +88,10 @@ impl MachineWithErrors<'_> {
         Vector3::from(machine.table_point(&state, &errors, tool).0)
     }
 
-    /// The error vector where the axes stand.
-    pub fn place(&self, positions: &[f64]) -> Place {
+    /// The error vector at given axis positions.
+    pub fn error_at(&self, positions: &[f64]) -> VolumetricPoint {
         let nominal = self.point(positions, false, None);
-        Place {
+        VolumetricPoint {
             positions: positions.to_vec(),
             nominal_mm: nominal.into(),
             error_mm: (self.point(positions, true, None) - nominal).into(),
@@ -104,25 +104,25 @@ impl MachineWithErrors<'_> {
         (self.point(positions, true, Some(axis)) - self.point(positions, false, None)).into()
     }
 
-    /// Where the axes stand, as people write it, mm or degrees.
-    fn stands(&self, positions: &[f64]) -> String {
+    /// Axis positions in display units, mm or degrees.
+    fn position_text(&self, positions: &[f64]) -> String {
         let axes = self.machine.axes.iter().zip(positions);
         let each: Vec<String> = axes
-            .map(|(axis, q)| format!("{} {:.3}", axis.name, axis.kind.outside(*q)))
+            .map(|(axis, q)| format!("{} {:.3}", axis.name, axis.kind.to_display(*q)))
             .collect();
         each.join(", ")
     }
 
-    /// The commands of the linear axes that bring the tool where it should be.
+    /// The commands of the linear axes that bring the tool to its nominal position.
     ///
     /// # Errors
-    /// If the linear axes do not span the space, or the iteration does not settle.
+    /// If the linear axes do not span the space, or the iteration does not converge.
     pub fn compensate(&self, positions: &[f64]) -> Result<Compensated, IdentifyError> {
         let linear: Vec<usize> = (0..self.machine.axes.len())
             .filter(|axis| self.machine.axes[*axis].kind == AxisKind::Linear)
             .collect();
         let wanted = self.point(positions, false, None);
-        // The nominal point is affine in the linear axes: a step of a millimetre gives the derivative itself.
+        // The nominal point is affine in the linear axes, so a difference over one millimetre is the derivative.
         let columns: Vec<Vector3<f64>> = linear
             .iter()
             .map(|axis| {
@@ -146,7 +146,7 @@ impl MachineWithErrors<'_> {
         let mut commands = positions.to_vec();
         for _ in 0..MAX_STEPS {
             let residual = self.point(&commands, true, None) - wanted;
-            if residual.norm() <= SETTLED_MM {
+            if residual.norm() <= CONVERGENCE_MM {
                 return Ok(Compensated {
                     positions: commands,
                     error_mm: residual.into(),
@@ -158,29 +158,29 @@ impl MachineWithErrors<'_> {
             }
         }
         Err(IdentifyError::Request(format!(
-            "compensation: no settling within {MAX_STEPS} steps; the errors are not small"
+            "compensation: no convergence within {MAX_STEPS} iterations; the errors are too large"
         )))
     }
 }
 
-/// A map: every place of a grid, in the order of the axes, the last one fastest.
+/// The volumetric error at every point of a grid, in the order of the axes, the last one fastest.
 ///
 /// # Errors
-/// If the grid has too many places, an error is beyond all limits, or a compensation fails.
+/// If the grid has too many points, an error exceeds the limits, or a compensation fails.
 pub fn map(
-    erring: &MachineWithErrors<'_>,
+    machine_with_errors: &MachineWithErrors<'_>,
     grid: &[Vec<f64>],
     compensate: bool,
-) -> Result<(Vec<Place>, Summary), IdentifyError> {
+) -> Result<(Vec<VolumetricPoint>, Summary), IdentifyError> {
     let total = grid
         .iter()
         .try_fold(1_usize, |total, axis| total.checked_mul(axis.len()));
     let Some(total) = total.filter(|total| *total > 0 && *total <= MAX_POINTS) else {
         return Err(IdentifyError::Request(format!(
-            "a map has at least one and at most {MAX_POINTS} places"
+            "a map needs 1 to {MAX_POINTS} points"
         )));
     };
-    let places: Vec<(Place, Vec<f64>)> = (0..total)
+    let points: Vec<(VolumetricPoint, Vec<f64>)> = (0..total)
         .into_par_iter()
         .map(|number| {
             let mut rest = number;
@@ -189,28 +189,28 @@ pub fn map(
                 positions[axis] = values[rest % values.len()];
                 rest /= values.len();
             }
-            let mut place = erring.place(&positions);
-            if !place.error_mm.iter().all(|error| error.abs() <= LARGEST) {
+            let mut point = machine_with_errors.error_at(&positions);
+            if !point.error_mm.iter().all(|error| error.abs() <= LARGEST) {
                 return Err(IdentifyError::Request(format!(
-                    "the errors move the tool by {:e} mm at {}; polynomials grow fast beyond their scale",
-                    norm(place.error_mm),
-                    erring.stands(&positions)
+                    "the errors displace the tool by {:e} mm at {}; polynomials grow fast beyond their scale",
+                    norm(point.error_mm),
+                    machine_with_errors.position_text(&positions)
                 )));
             }
             if compensate {
-                place.compensated = Some(erring.compensate(&positions)?);
+                point.compensated = Some(machine_with_errors.compensate(&positions)?);
             }
             let by_axis = (0..grid.len())
-                .map(|axis| norm(erring.of_axis(&positions, axis)))
+                .map(|axis| norm(machine_with_errors.of_axis(&positions, axis)))
                 .collect();
-            Ok((place, by_axis))
+            Ok((point, by_axis))
         })
-        // Of several faults the first in order is told, whichever thread comes upon one first.
+        // With several failures, the first one in grid order is reported, independent of threads.
         .collect::<Vec<Result<_, IdentifyError>>>()
         .into_iter()
         .collect::<Result<_, _>>()?;
-    let machine = erring.machine;
-    let largest = places
+    let machine = machine_with_errors.machine;
+    let largest = points
         .iter()
         .max_by(|(a, _), (b, _)| norm(a.error_mm).total_cmp(&norm(b.error_mm)));
     let outside = |axis: usize, q: f64| match machine.axes[axis].kind {
@@ -218,15 +218,15 @@ pub fn map(
         AxisKind::Rotary => q.to_degrees(),
     };
     let residual = compensate.then(|| {
-        let left = places.iter().filter_map(|(place, _)| place.compensated.as_ref());
-        Size::of(left.map(|compensated| norm(compensated.error_mm)))
+        let compensated_points = points.iter().filter_map(|(point, _)| point.compensated.as_ref());
+        Size::of(compensated_points.map(|compensated| norm(compensated.error_mm)))
     });
-    let coordinate = |k: usize| Size::of(places.iter().map(|(place, _)| place.error_mm[k]));
+    let coordinate = |k: usize| Size::of(points.iter().map(|(point, _)| point.error_mm[k]));
     let summary = Summary {
         points: total,
-        error: Size::of(places.iter().map(|(place, _)| norm(place.error_mm))),
-        largest_at: largest.map_or(Vec::new(), |(place, _)| {
-            let named = machine.axes.iter().zip(&place.positions).enumerate();
+        error: Size::of(points.iter().map(|(point, _)| norm(point.error_mm))),
+        largest_at: largest.map_or(Vec::new(), |(point, _)| {
+            let named = machine.axes.iter().zip(&point.positions).enumerate();
             named
                 .map(|(k, (axis, q))| MapPosition {
                     axis: axis.name.clone(),
@@ -249,12 +249,12 @@ pub fn map(
             .enumerate()
             .map(|(k, axis)| AxisShare {
                 axis: axis.name.clone(),
-                size: Size::of(places.iter().map(|(_, by_axis)| by_axis[k])),
+                size: Size::of(points.iter().map(|(_, by_axis)| by_axis[k])),
             })
             .collect(),
         residual,
     };
-    Ok((places.into_iter().map(|(place, _)| place).collect(), summary))
+    Ok((points.into_iter().map(|(point, _)| point).collect(), summary))
 }
 
 fn norm(vector: [f64; 3]) -> f64 {

@@ -1,4 +1,5 @@
-//! What effects do to readings, by the exact chain: the readings with one unit of a coefficient less those without, nothing linearised.
+//! Computes the response of readings to effects from the exact chain: the readings with one unit of a coefficient less those
+//! without, not linearised.
 
 use std::f64::consts::TAU;
 
@@ -9,7 +10,7 @@ use abbe_model::effect::Effect;
 use abbe_model::session::{Prior, Session};
 use nalgebra::DMatrix;
 
-/// Things whose place on the machine nobody knows better than the readings do.
+/// Set-up components whose position is a free parameter.
 const MOUNTED: [&str; 9] = [
     "workpiece_ball",
     "spindle_ball",
@@ -22,13 +23,13 @@ const MOUNTED: [&str; 9] = [
     "artefact",
 ];
 
-/// Share of a unit by which a coefficient is changed: so little that its square is nothing.
+/// Share of a unit by which a coefficient is changed. It is small enough for its square to be negligible.
 const STEP: f64 = 0.01;
 
-/// What rounding and second order leave of a change that is none, µm per unit.
+/// Bound of rounding and second-order terms for a zero response, µm per unit.
 const ROUNDED: f64 = 1e-5;
 
-/// Where a scalar reading stands.
+/// The position of a scalar reading in the session.
 #[derive(Clone, Copy)]
 pub struct At {
     pub test: usize,
@@ -36,24 +37,25 @@ pub struct At {
     pub coordinate: usize,
 }
 
-/// Changes of all readings of a session, µm per unit, a column a coefficient.
+/// Responses of all readings of a session, µm per unit, one column per coefficient.
 pub struct Changes {
     pub session: Session,
     pub at: Vec<At>,
-    /// Names of the set-up quantities.
+    /// Identifiers of the set-up parameters.
     mounted: Vec<String>,
     setup: DMatrix<f64>,
     effects: Vec<DMatrix<f64>>,
 }
 
-/// One unit of each coefficient of each effect, and of each set-up quantity; of a ratio 0.1 %.
+/// Computes the response to one unit of each coefficient of each effect and of each set-up parameter. The unit of a ratio is 0.1
+/// %.
 pub fn changes(mut session: Session, effects: &[Effect]) -> Changes {
     session.unknowns.clear();
     session.effects = effects.to_vec();
-    let unknowns = session.instrument.unknowns();
+    let components = session.instrument.unknowns();
     for test in &mut session.tests {
-        for (prior, unknown) in test.priors.iter_mut().zip(unknowns) {
-            *prior = if MOUNTED.contains(&unknown.thing) {
+        for (prior, component) in test.priors.iter_mut().zip(components) {
+            *prior = if MOUNTED.contains(&component.thing) {
                 Prior::Free
             } else {
                 Prior::Known
@@ -123,7 +125,7 @@ pub fn changes(mut session: Session, effects: &[Effect]) -> Changes {
     }
 }
 
-/// How much of an effect something else explains: the share of the square, at the phase at which it explains least and most.
+/// Share of the square of an effect that another one explains, at the phase with the smallest and the largest share.
 #[derive(Clone, Copy)]
 pub struct Share {
     pub least: f64,
@@ -131,20 +133,21 @@ pub struct Share {
 }
 
 impl Changes {
-    /// The change that an effect makes at some of the readings.
+    /// The response of some of the readings to an effect.
     pub fn of(&self, effect: usize, wanted: impl Fn(&At) -> bool) -> DMatrix<f64> {
         let rows: Vec<usize> = (0..self.at.len()).filter(|row| wanted(&self.at[*row])).collect();
         self.effects[effect].select_rows(&rows)
     }
 
-    /// The greatest rms over phases, µm per unit.
+    /// The largest rms over all phases, µm per unit.
     pub fn rms(&self, effect: usize, wanted: impl Fn(&At) -> bool) -> f64 {
         let change = self.of(effect, wanted);
         let rows = change.nrows() as f64;
         greatest(&change) / rows.sqrt()
     }
 
-    /// What the mounts take of each effect, those called `known` excepted, and, of what they leave, what each other effect explains.
+    /// The shares of each effect that the mounts explain, without those called `known`, and the shares of the remainder that each
+    /// other effect explains.
     pub fn shares(&self, wanted: impl Fn(&At) -> bool, known: Option<&str>) -> (Vec<Share>, Vec<Vec<Share>>) {
         let rows: Vec<usize> = (0..self.at.len()).filter(|row| wanted(&self.at[*row])).collect();
         let is_known = |name: &str| known.is_some_and(|known| name.starts_with(known));
@@ -153,7 +156,7 @@ impl Changes {
             .collect();
         let setup = basis(&self.setup.select_rows(&rows).select_columns(&open), 1e-5);
         let changes: Vec<DMatrix<f64>> = self.effects.iter().map(|e| e.select_rows(&rows)).collect();
-        let taken: Vec<Share> = changes.iter().map(|change| share(change, &setup)).collect();
+        let by_setup: Vec<Share> = changes.iter().map(|change| share(change, &setup)).collect();
         let left: Vec<DMatrix<f64>> = changes
             .iter()
             .map(|change| change - &setup * (setup.transpose() * change))
@@ -167,11 +170,11 @@ impl Changes {
             .iter()
             .map(|own| bases.iter().map(|other| share(own, other)).collect())
             .collect();
-        (taken, between)
+        (by_setup, between)
     }
 
-    /// Amplitude by order of a test whose runs are full turns in equal steps: `[same, opposite]` in both directions, µm per unit, the
-    /// greatest over phases.
+    /// Amplitudes by order of a test whose runs are full turns in equal steps: `[same, opposite]` in the two directions, µm per
+    /// unit, the largest over all phases.
     pub fn orders(&self, effect: usize, test: usize, coordinate: usize, most: usize) -> [Vec<f64>; 2] {
         let run = |run: usize| {
             self.of(effect, |at| {
@@ -208,7 +211,7 @@ impl Changes {
     }
 }
 
-/// The greatest singular value.
+/// The largest singular value.
 fn greatest(matrix: &DMatrix<f64>) -> f64 {
     if matrix.is_empty() {
         return 0.0;
@@ -216,7 +219,8 @@ fn greatest(matrix: &DMatrix<f64>) -> f64 {
     matrix.clone().svd(false, false).singular_values.max()
 }
 
-/// Orthonormal columns of what a matrix spans, columns scaled to one; columns of less than [`ROUNDED`] rms are nothing.
+/// Orthonormal columns of the span of a matrix whose columns are scaled to unit length. Columns with less than [`ROUNDED`] rms
+/// count as zero.
 fn basis(matrix: &DMatrix<f64>, relative: f64) -> DMatrix<f64> {
     let mut scaled = matrix.clone();
     for mut column in scaled.column_iter_mut() {
@@ -227,7 +231,7 @@ fn basis(matrix: &DMatrix<f64>, relative: f64) -> DMatrix<f64> {
     part(&scaled, relative)
 }
 
-/// Orthonormal columns of what stands out by more than `least`.
+/// Orthonormal columns of the directions with singular values above `least`.
 fn part(matrix: &DMatrix<f64>, least: f64) -> DMatrix<f64> {
     if matrix.ncols() == 0 {
         return matrix.clone();
@@ -239,7 +243,7 @@ fn part(matrix: &DMatrix<f64>, least: f64) -> DMatrix<f64> {
     svd.u.unwrap().select_columns(&kept)
 }
 
-/// Share of the square of what `change` spans that lies in the span of the orthonormal columns of `other`.
+/// Share of the square of the span of `change` that lies in the span of the orthonormal columns of `other`.
 fn share(change: &DMatrix<f64>, other: &DMatrix<f64>) -> Share {
     let own = basis(change, 1e-6);
     if own.ncols() == 0 || other.ncols() == 0 {

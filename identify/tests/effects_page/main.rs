@@ -1,9 +1,13 @@
-//! docs/reference/effects.md says of each effect what it does to each kind of test and what it is mistaken for. Every cell is computed here from the
-//! exact chain, and compared.
+//! Compares every cell of docs/reference/effects.md with the exact chain: the response of each kind of test to each effect, and
+//! the aliases of each effect.
 //!
-//! A section of the page holds a session and a table. Its columns: `effect`; `in TEST`, amplitude by order of a full turn (`±` where it changes sign
-//! with the direction); `rms in TEST`; `like, in TESTS` (`, one way`: forward runs alone; `, spindle ball known`), what explains at least 90 % of the
-//! square of what the mounts leave of the effect.
+//! A section of the page contains a session and a table. Its columns are:
+//!
+//! - `effect`;
+//! - `in TEST`: amplitude by order of a full turn (`±` if it changes sign with the direction);
+//! - `rms in TEST`;
+//! - `aliases in TESTS` (`, one way`: forward runs alone; `, spindle ball known`): the effects that explain at least 90 % of the
+//!   square of the effect that remains after projection on the mounts.
 
 mod changes;
 mod page;
@@ -18,18 +22,18 @@ use abbe_model::session::read::{self, ReadOptions};
 use changes::{At, Changes, Share, changes};
 use page::{Section, effect, sections};
 
-/// Highest order that is looked at.
+/// Highest order of the comparison.
 const ORDERS: usize = 24;
-/// What is less than this share of the greatest amplitude of a test is left out.
+/// Share of the greatest amplitude of a test below which an amplitude is omitted.
 const SHOWN: f64 = 0.2;
-/// Orders shown before `…`.
+/// Number of orders shown before `…`.
 const MAX_SHOWN: usize = 3;
-/// Shares of the square that count as the same and as alike.
+/// Shares of the square from which an alias counts as equal, and as an alias at all.
 const SAME: f64 = 0.9999;
-const ALIKE: f64 = 0.9;
-/// Least change that is one, µm per unit.
+const ALIAS: f64 = 0.9;
+/// Smallest significant change, µm per unit.
 const NOTHING: f64 = 2e-3;
-/// Aliases shown before `…`.
+/// Number of aliases shown before `…`.
 const MAX_ALIASES: usize = 6;
 
 fn workspace() -> PathBuf {
@@ -39,7 +43,7 @@ fn workspace() -> PathBuf {
         .to_path_buf()
 }
 
-/// The session of a section, with its planned states as readings, warming up by 1 K an hour.
+/// The session of a section. Its planned states are its readings, and its temperature rises by 1 K per hour.
 fn session(toml: &str) -> Session {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("session.toml");
@@ -63,7 +67,7 @@ fn session(toml: &str) -> Session {
     session
 }
 
-/// Two digits.
+/// A number with two significant digits.
 fn number(value: f64) -> String {
     let rounded: f64 = format!("{value:.1e}").parse().unwrap();
     let decimals = (1 - rounded.log10().floor() as i32).clamp(0, 6) as usize;
@@ -75,7 +79,7 @@ fn test_named(session: &Session, name: &str) -> usize {
     found.unwrap_or_else(|| panic!("no test {name}"))
 }
 
-/// `1: 0.71, ±2: 0.30`: amplitude by order.
+/// Amplitudes by order, for example `1: 0.71, ±2: 0.30`.
 fn orders(changes: &Changes, effect: usize, test: usize) -> String {
     let coordinates = changes
         .at
@@ -121,7 +125,8 @@ fn orders(changes: &Changes, effect: usize, test: usize) -> String {
     parts.join("; ")
 }
 
-/// What follows time or temperature is its component at rest, ever more of it: checked reading by reading, with time functions of this test's own.
+/// The cell of an effect that follows time or temperature. Each reading is checked against the constant effect of the component
+/// times the time function, which this test computes itself.
 fn over_time(
     changes: &Changes,
     effects: &[Effect],
@@ -174,30 +179,36 @@ fn over_time(
     Some(format!("`{}`, over time", own.component))
 }
 
-/// What explains an effect, nearest first.
-fn like(own: usize, ids: &[String], seen: &[bool], taken: &[Share], between: &[Vec<Share>]) -> String {
-    if !seen[own] {
-        return "not seen".into();
+/// The aliases of an effect, nearest first.
+fn aliases(
+    own: usize,
+    ids: &[String],
+    observable: &[bool],
+    by_setup: &[Share],
+    between: &[Vec<Share>],
+) -> String {
+    if !observable[own] {
+        return "not observable".into();
     }
     let mut found: Vec<(bool, String)> = Vec::new();
-    let mut weigh = |share: Share, name: String| {
-        if share.least >= ALIKE {
+    let mut add = |share: Share, name: String| {
+        if share.least >= ALIAS {
             let same = share.least >= SAME;
             found.push((!same, format!("{} {name}", if same { "=" } else { "≈" })));
         }
     };
-    weigh(taken[own], "set-up".into());
-    if taken[own].least < SAME {
+    add(by_setup[own], "set-up".into());
+    if by_setup[own].least < SAME {
         for (other, share) in between[own].iter().enumerate().filter(|(other, _)| *other != own) {
-            if seen[other] && taken[other].least < SAME {
-                weigh(*share, ids[other].clone());
+            if observable[other] && by_setup[other].least < SAME {
+                add(*share, ids[other].clone());
             }
         }
     }
-    if taken[own].least < ALIKE && taken[own].most >= SAME {
+    if by_setup[own].least < ALIAS && by_setup[own].most >= SAME {
         found.push((true, "at one phase set-up".into()));
     }
-    found.sort_by_key(|(alike, _)| *alike);
+    found.sort_by_key(|(inexact, _)| *inexact);
     let more = found.len() > MAX_ALIASES;
     let mut found: Vec<String> = found
         .into_iter()
@@ -214,7 +225,7 @@ fn like(own: usize, ids: &[String], seen: &[bool], taken: &[Share], between: &[V
     }
 }
 
-/// The rows of a section's table as the chain has them.
+/// The rows of a section's table, computed from the chain.
 fn computed(section: &Section) -> Vec<Vec<String>> {
     let table = section.tables.last().unwrap();
     let session = session(section.toml.as_ref().unwrap());
@@ -236,7 +247,7 @@ fn computed(section: &Section) -> Vec<Vec<String>> {
                 let rms = changes.rms(own, |at| at.test == test);
                 row.push(if rms < NOTHING { "–".into() } else { number(rms) });
             }
-        } else if let Some(names) = title.strip_prefix("like, in ") {
+        } else if let Some(names) = title.strip_prefix("aliases in ") {
             let (names, known) = match names.split_once(", ") {
                 Some((names, words)) => (
                     names,
@@ -250,20 +261,20 @@ fn computed(section: &Section) -> Vec<Vec<String>> {
                 names => names.split(" + ").map(|name| test_named(session, name)).collect(),
             };
             let wanted = |at: &At| tests.contains(&at.test) && !(one_way && at.run % 2 == 1);
-            let (taken, between) = changes.shares(wanted, known.as_deref());
+            let (by_setup, between) = changes.shares(wanted, known.as_deref());
             let of_orders = |test: usize| table.header.contains(&format!("in {}", session.tests[test].name));
             let shows = |own: usize, test: usize| match of_orders(test) {
                 true => orders(&changes, own, test) != "–",
                 false => changes.rms(own, |at| at.test == test) >= NOTHING,
             };
-            let seen: Vec<bool> = (0..ids.len())
+            let observable: Vec<bool> = (0..ids.len())
                 .map(|own| tests.iter().any(|test| shows(own, *test)))
                 .collect();
             for (own, row) in rows.iter_mut().enumerate() {
-                row.push(like(own, &ids, &seen, &taken, &between));
+                row.push(aliases(own, &ids, &observable, &by_setup, &between));
             }
         } else {
-            // What words say is not computed.
+            // Columns in words are not computed.
             for (row, written) in rows.iter_mut().zip(&table.rows) {
                 row.push(written.get(column).cloned().unwrap_or_default());
             }
@@ -273,7 +284,7 @@ fn computed(section: &Section) -> Vec<Vec<String>> {
 }
 
 #[test]
-fn the_page_says_what_the_chain_does() {
+fn the_page_agrees_with_the_chain() {
     let text = std::fs::read_to_string(workspace().join("docs/reference/effects.md")).unwrap();
     let mut wrong = String::new();
     for section in sections(&text).iter().filter(|section| section.toml.is_some()) {
@@ -287,12 +298,12 @@ fn the_page_says_what_the_chain_does() {
     }
     assert!(
         wrong.is_empty(),
-        "docs/reference/effects.md is not what the chain does, which is{wrong}"
+        "docs/reference/effects.md differs from the chain, which gives{wrong}"
     );
 }
 
 #[test]
-fn every_entry_of_the_library_is_on_the_page() {
+fn every_family_of_the_library_is_on_the_page() {
     let text = std::fs::read_to_string(workspace().join("docs/reference/effects.md")).unwrap();
     let sections = sections(&text);
     let listed = &sections
@@ -319,7 +330,7 @@ fn every_entry_of_the_library_is_on_the_page() {
     }
 }
 
-/// Closed forms of a circle of X and Y with radius R at feed v: δL at path angle θ in direction s, µm per unit.
+/// Closed forms for a circle of X and Y with radius R at feed v: δL at path angle θ in direction s, µm per unit.
 #[test]
 fn circles_follow_their_closed_forms() {
     const R: f64 = 100.0;
@@ -350,7 +361,8 @@ fn circles_follow_their_closed_forms() {
         for (run, direction) in [(0, 1.0), (1, -1.0)] {
             let change = changes.of(own, |at| at.test == test && at.run == run);
             let turn = change.nrows() - 1;
-            // A run's first and last direction and speed are those beside them, and where an axis turns round it has none.
+            // The first and last reading of a run take direction and speed from their neighbours, and an axis has no
+            // direction where it reverses.
             for k in (1..turn).filter(|k| 2 * k % turn != 0) {
                 let along = if direction > 0.0 { k } else { turn - k };
                 let angle = std::f64::consts::TAU * along as f64 / turn as f64;

@@ -1,4 +1,4 @@
-//! The page: sections with a session, and a table of what its effects do there.
+//! Parses the page: its sections with their session and tables.
 
 use std::f64::consts::PI;
 
@@ -6,20 +6,20 @@ use abbe_model::axis::AxisKind;
 use abbe_model::chain::Machine;
 use abbe_model::effect::{Component, Driver, Effect, Shape};
 
-/// A table of Markdown: header and rows, cells trimmed.
+/// A Markdown table: header and rows, with trimmed cells.
 pub struct Table {
     pub header: Vec<String>,
     pub rows: Vec<Vec<String>>,
 }
 
-/// A part of the page under a heading of the second rank.
+/// A part of the page under a second-level heading.
 pub struct Section {
     pub title: String,
     pub toml: Option<String>,
     pub tables: Vec<Table>,
 }
 
-/// Sections of a page.
+/// The sections of a page.
 pub fn sections(text: &str) -> Vec<Section> {
     let mut sections: Vec<Section> = Vec::new();
     let mut fence: Option<Option<String>> = None;
@@ -67,7 +67,7 @@ pub fn sections(text: &str) -> Vec<Section> {
     sections
 }
 
-/// An effect as the page writes it: `EXX~X:power2`, numbers of a shape in mm, degrees or seconds after it: `EXX~X:periodic 8`.
+/// Parses an effect of the page: `EXX~X:power2`, or with shape numbers in mm, degrees or seconds: `EXX~X:periodic 8`.
 pub fn effect(machine: &Machine, cell: &str) -> Effect {
     let text = cell.trim_matches('`');
     let plain = |component: &str| Component::parse(component).unwrap_or_else(|| panic!("{text}"));
@@ -92,7 +92,7 @@ pub fn effect(machine: &Machine, cell: &str) -> Effect {
     };
     let numbers: Vec<f64> = words.map(|word| word.parse().unwrap()).collect();
     let inside = |number: f64| if rotary { number.to_radians() } else { number };
-    // Half a travel of 200 mm or of a turn.
+    // Half of a travel of 200 mm, or of a turn.
     let scale = match &driver {
         Driver::Axis(_) if rotary => PI,
         Driver::Axis(_) => 100.0,

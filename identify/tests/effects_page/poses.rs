@@ -1,5 +1,5 @@
-//! Poses for the tests of the page that take their states from a file: a robot's joints drawn at random, for a socket such that the ball
-//! stays where the first pose puts it.
+//! Generates poses for tests whose states come from a file: random joint positions of a robot. For a socket, the ball stays where
+//! the first pose places it.
 
 use std::path::Path;
 
@@ -12,10 +12,10 @@ use rand::RngExt;
 use rand_pcg::Pcg64;
 
 const POSES: usize = 150;
-/// How far a joint is drawn from zero, to either side.
+/// Largest joint position in either direction.
 const REACH_DEG: f64 = 150.0;
 
-/// Writes what the `data` of the session's tests name.
+/// Writes the `data` files of the session's tests.
 pub fn write(folder: &Path, session: &Path) {
     let toml: toml::Table = std::fs::read_to_string(session).unwrap().parse().unwrap();
     let machine = read::machine(Path::new(toml["machine"]["file"].as_str().unwrap())).unwrap();
@@ -75,7 +75,8 @@ fn tool_point(machine: &Machine, joints: &DVector<f64>, point: Vector3<f64>) -> 
     Vector3::from(machine.tool_point(&state, &none, Point(point.into())).0)
 }
 
-/// Turns the joints by the least that brings the point to its place: Newton's method; `false` where it does not arrive.
+/// Moves the joints by the smallest change that brings the point to its place, by Newton's method. Returns `false` if it does not
+/// converge.
 fn reach(machine: &Machine, joints: &mut DVector<f64>, point: Vector3<f64>, place: Vector3<f64>) -> bool {
     for _ in 0..50 {
         let here = tool_point(machine, joints, point);

@@ -1,4 +1,4 @@
-//! The basis functions of shapes, written once over an open scalar: a fit takes them at numbers, a printed equation at symbols.
+//! Basis functions of the shapes over an open scalar: numbers for a fit, symbols for a printed equation.
 //!
 //! | shape | basis |
 //! |---|---|
@@ -9,14 +9,14 @@
 //! | curve | periodic or clamped cubic B-splines on equal knots |
 //! | backlash | −½ · direction: the coefficient is the full lost motion |
 //! | lag | −rate: the coefficient is the delay in s |
-//! | reversal-spike | direction · exp(−distance since the turn / width) |
+//! | reversal-spike | direction · exp(−distance since reversal / width) |
 //! | drift | t/h, hours |
 //! | warmup(τ) | 1 − exp(−t/τ) |
 //! | steps | one at and beyond each position |
 //! | local(centre, width) | (1 + cos(π(q − centre)/width))/2 within ±width, else 0 |
 //!
-//! A number knows on which side of an edge it lies, so that only the piece there is computed; a symbol does not, and carries every piece times
-//! a step that is 0 or 1.
+//! Numbers select one piece of a piecewise function. Symbols cannot, so a symbolic basis function contains every piece times a step of 0
+//! or 1.
 
 use std::f64::consts::{PI, TAU};
 
@@ -26,7 +26,7 @@ use crate::scalar::Nominal;
 const SECONDS_PER_HOUR: f64 = 3600.0;
 
 impl Shape {
-    /// The basis functions at one reading, pushed onto `basis` in the order of the coefficients.
+    /// Appends the values of the basis functions at one reading to `basis`, in the order of the coefficients.
     pub fn basis<N: Nominal>(&self, sample: &DriverSample<N>, basis: &mut Vec<N>) {
         let q = sample.value;
         let constant = N::constant;
@@ -88,7 +88,7 @@ fn bump<N: Nominal>(within: N) -> N {
     }
 }
 
-/// Uniform cubic B-splines (de Boor, A Practical Guide to Splines, ch. IX): four of them are not zero at any place.
+/// Uniform cubic B-splines (de Boor, A Practical Guide to Splines, ch. IX): four of them are nonzero at any position.
 fn b_splines<N: Nominal>(q: N, ends: [f64; 2], intervals: usize, closed: bool, basis: &mut Vec<N>) {
     let constant = N::constant;
     let start = basis.len();
@@ -130,7 +130,7 @@ fn b_splines<N: Nominal>(q: N, ends: [f64; 2], intervals: usize, closed: bool, b
     }
 }
 
-/// The four cubics of an interval at `u` from its beginning, in intervals.
+/// The four cubic pieces of an interval at `u`, the position within the interval as a fraction of its length.
 fn pieces<N: Nominal>(u: N) -> [N; 4] {
     let constant = N::constant;
     let six = constant(6.0);

@@ -1,9 +1,9 @@
 //! Effects: `component × driver × shape`.
 //!
-//! A *component* is what moves (an error of an axis, a ball, the bar), a *driver* what it follows (an axis position, its direction,
-//! time, temperature, the gravity moment), a *shape* how. The chain sees only components, so the Jacobian column of an effect is the
-//! sensitivity to its component times the shape's basis function: `∂L/∂k = (∂L/∂component) · b_k(driver)`.
-//! A PIGE is `component × constant`.
+//! A *component* is the error or set-up quantity that changes (an error of an axis, a ball, the bar). A *driver* is the independent
+//! variable (an axis position, its direction, time, temperature, the gravity moment). A *shape* is the functional form. The chain depends
+//! on components only, so the Jacobian column of an effect is the sensitivity to its component times the shape's basis function: `∂L/∂k =
+//! (∂L/∂component) · b_k(driver)`. A PIGE is `component × constant`.
 
 mod basis;
 mod shape;
@@ -16,24 +16,24 @@ use crate::axis::AxisKind;
 use crate::chain::Machine;
 use crate::component::ErrorName;
 
-/// What moves.
+/// The quantity that an effect changes.
 #[derive(Clone, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
 pub enum Component {
     /// An error of an axis.
     Axis(ErrorName),
-    /// One of the instrument's unknowns: `workpiece_ball.x`, `bar`.
+    /// One of the instrument's parameters: `workpiece_ball.x`, `bar`.
     Instrument {
-        /// The thing, as in [`crate::instrument::InstrumentUnknown::thing`].
+        /// The object, as in [`crate::instrument::InstrumentUnknown::thing`].
         thing: String,
         /// Its coordinate, or empty.
         coordinate: String,
     },
-    /// A delay between the axes' positions and the reading, in seconds: every moving axis errs by its speed times the delay.
+    /// A delay between the axis positions and the reading, in seconds: every moving axis has an error of its speed times the delay.
     TriggerDelay,
 }
 
 impl Component {
-    /// Reads `EZC`, `e_x0c`, `workpiece_ball.x`, `bar`, `trigger`.
+    /// Parses `EZC`, `e_x0c`, `workpiece_ball.x`, `bar`, `trigger`.
     pub fn parse(text: &str) -> Option<Component> {
         if text == "trigger" {
             return Some(Component::TriggerDelay);
@@ -66,25 +66,25 @@ impl fmt::Display for Component {
     }
 }
 
-/// What a component follows.
+/// The independent variable of an effect.
 #[derive(Clone, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
 pub enum Driver {
-    /// Nothing: the driver of a constant.
+    /// No driver, for a constant.
     None,
-    /// The position (and with it the direction and speed) of an axis.
+    /// The position of an axis, with its direction and speed.
     Axis(String),
     /// Time since the session's first reading, s.
     Time,
     /// A temperature column, °C above the session's mean.
     Temperature,
-    /// The moment that a unit weight exerts about the component's own axis, in m. For an axis on the tool's side the weight hangs at the instrument's
-    /// point in the tool frame (spindle ball, stylus, target); for an axis on the workpiece's side at the instrument's point in the table frame (workpiece
-    /// ball, point of the artefact), not at the centre of mass of table and workpiece.
+    /// The moment of a unit weight about the component's own axis, in m. For an axis on the tool side the weight acts at the instrument's
+    /// point in the tool frame (spindle ball, stylus, target). For an axis on the workpiece side it acts at the instrument's point in the
+    /// table frame (workpiece ball, point of the artefact), not at the centre of mass of table and workpiece.
     Gravity,
 }
 
 impl Driver {
-    /// Reads `none`, `time`, `temperature`, `gravity`; anything else is the name of an axis.
+    /// Parses `none`, `time`, `temperature`, `gravity`; any other text is the name of an axis.
     pub fn parse(text: &str) -> Driver {
         match text {
             "none" => Driver::None,
@@ -95,8 +95,9 @@ impl Driver {
         }
     }
 
-    /// What polynomials and powers divide the driver by where a session states no `scale_…`, in the driver's internal unit: 100 mm of a linear axis,
-    /// half a turn of a rotary one, an hour, 1 °C, 1 m. Coefficients of one name are then comparable, whatever the travel of a test.
+    /// The divisor of the driver in polynomials and powers if a session states no `scale_…`, in the driver's internal unit: 100 mm for a
+    /// linear axis, half a revolution for a rotary one, an hour, 1 °C, 1 m. Coefficients of one name are then comparable between tests of
+    /// different travel.
     pub fn default_scale(&self, machine: &Machine) -> f64 {
         match self {
             Driver::Axis(name) => match machine.axis_index(name).map(|index| machine.axes[index].kind) {
@@ -121,18 +122,18 @@ impl fmt::Display for Driver {
     }
 }
 
-/// Everything a driver tells about one reading, in the units of [`Driver`]: mm or rad for an axis.
+/// State of a driver at one reading, in the units of [`Driver`]: mm or rad for an axis.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct DriverSample<N> {
-    /// The value that the driver has.
+    /// The value of the driver.
     pub value: N,
-    /// −1, 0 or 1: the direction in which it last moved.
+    /// Direction of its last movement: −1, 0 or 1.
     pub direction: N,
-    /// Its rate, a second.
+    /// Its rate per second.
     pub rate: N,
-    /// How far it has moved since it last turned round, in its own unit; 0 at the turn. Signless.
+    /// Distance travelled since the last reversal, in the driver's unit; 0 at the reversal, never negative.
     pub since_reversal: N,
-    /// Seconds since it last turned round.
+    /// Seconds since the last reversal.
     pub since_reversal_s: N,
 }
 
@@ -156,13 +157,13 @@ pub struct DriverSample<N> {
 /// ```
 #[derive(Clone, Debug, PartialEq)]
 pub struct Effect {
-    /// What moves.
+    /// The component.
     pub component: Component,
-    /// What it follows.
+    /// The driver.
     pub driver: Driver,
-    /// How.
+    /// The shape.
     pub shape: Shape,
-    /// The tests it is confined to; empty for all.
+    /// The tests in which the effect acts; empty for all.
     pub tests: Vec<String>,
 }
 

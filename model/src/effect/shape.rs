@@ -1,32 +1,33 @@
-//! Shapes: how a component follows its driver.
+//! Shapes: the functional dependence of a component on its driver.
 //!
 //! A shape is linear in its coefficients: `component = Σ c_k · b_k(driver; shape parameters)`. Shape parameters (a period, a time
-//! constant, a centre, a width, knots) are fixed numbers of the shape; the coefficients are what a fit finds.
+//! constant, a centre, a width, knots) are fixed numbers; a fit estimates the coefficients.
 //!
-//! [`super::basis`] has the basis functions.
+//! [`super::basis`] contains the basis functions.
 
-/// How a component follows its driver. Positions, periods and widths are in the driver's internal unit: mm, rad, s, °C, m.
+/// Functional dependence of a component on its driver. Positions, periods and widths are in the driver's internal unit: mm, rad, s, °C,
+/// m.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Shape {
-    /// Does not vary: a PIGE.
+    /// Constant: a PIGE.
     Constant,
     /// Powers 1 … `degree` of the driver over `scale`.
     Polynomial {
         /// Highest power, at least 1.
         degree: usize,
-        /// What the driver is divided by, so that coefficients are comparable: see [`super::Driver::default_scale`].
+        /// The divisor of the driver, which makes coefficients comparable: see [`super::Driver::default_scale`].
         scale: f64,
     },
     /// The power `degree` alone, over `scale`.
     Power {
         /// The power, at least 1.
         degree: usize,
-        /// What the driver is divided by.
+        /// The divisor of the driver.
         scale: f64,
     },
     /// Cosine and sine of `order` times a rotary position.
     Harmonic {
-        /// Cycles a turn.
+        /// Cycles per revolution.
         order: f64,
     },
     /// Cosine and sine with a period of any length.
@@ -34,27 +35,27 @@ pub enum Shape {
         /// The period, in the driver's unit.
         period: f64,
     },
-    /// A free curve: cubic B-splines on equal knots from `from` to `to`.
+    /// A nonparametric curve (spline): cubic B-splines on equal knots from `from` to `to`.
     Curve {
-        /// Where the curve begins.
+        /// Start of the curve.
         from: f64,
-        /// Where it ends.
+        /// End of the curve.
         to: f64,
         /// Number of intervals.
         intervals: usize,
-        /// Whether the end joins the beginning.
+        /// Whether the curve is periodic.
         closed: bool,
     },
     /// Lost motion on reversal; the coefficient is the full lost motion.
     Backlash,
     /// The component trails in proportion to the driver's rate; the coefficient is a delay in seconds.
     Lag,
-    /// A peak after each reversal that dies away with the distance moved.
+    /// A peak after each reversal that decays with the distance moved.
     ReversalSpike {
-        /// Distance over which it falls to 1/e.
+        /// Distance over which it decays to 1/e.
         width: f64,
     },
-    /// Linear in time, a coefficient an hour.
+    /// Linear in time; the coefficient is the change per hour.
     Drift,
     /// Exponential approach; the coefficient is the final value.
     Warmup {
@@ -63,27 +64,27 @@ pub enum Shape {
     },
     /// A step at each position: 0 below, 1 at and beyond.
     Steps {
-        /// Where the steps are.
+        /// Positions of the steps.
         at: Vec<f64>,
     },
     /// A raised-cosine bump.
     Local {
-        /// Its centre.
+        /// The centre.
         centre: f64,
-        /// Its half width.
+        /// The half width.
         width: f64,
-        /// The period at which it recurs: a full turn of a rotary axis, or none.
+        /// The period of recurrence: a full revolution of a rotary axis, or `None`.
         recurs: Option<f64>,
     },
 }
 
-/// A shape whose numbers make no sense.
+/// Invalid shape parameters.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[error("{0}")]
 pub struct ShapeFault(pub String);
 
 impl Shape {
-    /// The word that files and results use.
+    /// The identifier in files and results.
     pub fn word(&self) -> &'static str {
         match self {
             Shape::Constant => "constant",
@@ -120,7 +121,7 @@ impl Shape {
         }
     }
 
-    /// How many coefficients the shape has.
+    /// Number of coefficients.
     pub fn coefficients(&self) -> usize {
         match self {
             Shape::Polynomial { degree, .. } => *degree,
@@ -139,8 +140,8 @@ impl Shape {
         }
     }
 
-    /// How many numbers of the shape itself are free besides its coefficients where it is searched for: a period, a time constant, a width, a place. The
-    /// places of several steps are not counted.
+    /// Number of shape parameters that a search varies, besides the coefficients: a period, a time constant, a width, a position. The
+    /// positions of several steps are not counted.
     pub fn numbers(&self) -> usize {
         match self {
             Shape::Periodic { .. } | Shape::Warmup { .. } | Shape::ReversalSpike { .. } => 1,
@@ -150,7 +151,7 @@ impl Shape {
         }
     }
 
-    /// Names of the coefficients, for identifiers: `cos`, `sin`, `1`, …; empty for a shape with one.
+    /// Names of the coefficients in identifiers: `cos`, `sin`, `1`, …; empty for a single coefficient.
     pub fn coefficient_names(&self) -> Vec<String> {
         match self {
             Shape::Harmonic { .. } | Shape::Periodic { .. } => vec!["cos".into(), "sin".into()],
@@ -159,17 +160,17 @@ impl Shape {
         }
     }
 
-    /// Whether the numbers make sense.
+    /// Checks the shape parameters.
     ///
     /// # Errors
-    /// Says which number does not and what it has to be.
+    /// The message names the invalid number and the requirement.
     pub fn check(&self) -> Result<(), ShapeFault> {
         let positive = |value: f64, what: &str| {
             if value.is_finite() && value > 0.0 {
                 Ok(())
             } else {
                 Err(ShapeFault(format!(
-                    "{what} is {value}; it has to be a positive number"
+                    "{what} is {value}; it must be a positive number"
                 )))
             }
         };
@@ -178,7 +179,7 @@ impl Shape {
                 positive(*degree as f64, "the degree of a polynomial")?;
                 if *degree > 30 {
                     return Err(ShapeFault(format!(
-                        "a polynomial of degree {degree} cannot be fitted; 30 is the most"
+                        "a polynomial of degree {degree} cannot be fitted; the limit is 30"
                     )));
                 }
                 positive(*scale, "the scale of a polynomial")
@@ -195,7 +196,7 @@ impl Shape {
                 let least = if *closed { 4 } else { 1 };
                 if *intervals < least || *intervals > 500 {
                     return Err(ShapeFault(format!(
-                        "a curve of {intervals} intervals; it takes {least} to 500"
+                        "a curve has {intervals} intervals; {least} to 500 are allowed"
                     )));
                 }
                 Ok(())

@@ -1,25 +1,25 @@
 //! Derivatives of an expression by reverse accumulation on its graph.
 //!
-//! From the output backwards every node passes its adjoint `w = ∂output/∂node` on to its operands:
+//! From the output backwards, every node adds its adjoint `w = ∂output/∂node` to its operands:
 //!
 //! ```text
 //! n = a + b: a += w, b += w        n = a·b: a += w·b, b += w·a        n = √a: a += w·(½/n)
 //! n = a − b: a += w, b −= w        n = a/b: a += w/b, b −= w·n/b      n = sin a: a += w·cos a
 //! ```
 //!
-//! The length of the bar so yields its unit vector first, then that vector carried back through the chain, frame by frame, and the
-//! derivative by every error on the way: nothing is expanded and nothing computed twice.
+//! For the length of the bar, the first adjoint is the unit vector of the bar. It is then transformed back through the chain, frame by
+//! frame, and gives the derivative by every error on the way. Nothing is expanded and nothing is computed twice.
 
 use std::collections::HashMap;
 
 use super::{Arena, Binary, Node, NodeId, Operand, Symbol, Unary, operands};
 
-/// `∂output/∂node` for the nodes that the variables of interest reach.
+/// `∂output/∂node` for the nodes that depend on the requested variables.
 #[derive(Clone, Debug, Default)]
 pub struct Adjoints(HashMap<NodeId, Operand>);
 
 impl Adjoints {
-    /// The derivative by the node that an operand is; zero where the output does not depend on it.
+    /// The derivative by the node of an operand; zero if the output does not depend on it.
     pub fn of(&self, operand: Operand) -> Operand {
         match operand {
             Operand::Node(id) => self.0.get(&id).copied().unwrap_or(Operand::constant(0.0)),
@@ -140,7 +140,7 @@ mod tests {
     use super::*;
     use crate::scalar::Nominal;
 
-    /// ∂(b·exp(a·x))/∂x = b·exp(a·x)·a, ∂/∂b = exp(a·x): the same nodes, for nodes are recorded once.
+    /// ∂(b·exp(a·x))/∂x = b·exp(a·x)·a and ∂/∂b = exp(a·x) use the same nodes, because equal nodes are recorded once.
     #[test]
     fn an_exponential_is_its_own_derivative() {
         let arena = Arena::default();

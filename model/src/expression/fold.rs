@@ -1,7 +1,8 @@
-//! What is simplified while an expression is built: only what a floating-point evaluation cannot tell apart.
+//! Simplification of expressions while they are built, limited to changes that do not alter the floating-point result.
 //!
-//! Constants are computed, 0, 1 and −1 drop out, and a minus sign moves outwards until a difference takes it up. Signs and powers
-//! of two move without rounding, so a folded expression evaluates to the same bits as the unfolded one (but for the sign of zero).
+//! Constants are computed; 0, 1 and −1 are eliminated; a minus sign moves outwards until it becomes part of a difference. Signs and
+//! powers of two move without rounding. A folded expression therefore evaluates to the same bits as the unfolded one, except for the sign
+//! of zero.
 
 use super::{Arena, Binary, Node, Operand, Unary};
 
@@ -80,14 +81,14 @@ fn mul<V: Clone + PartialEq>(arena: &Arena<V>, a: Operand, b: Operand) -> Operan
         Some(1.0) => return b,
         Some(-1.0) => return unary(arena, Unary::Neg, b),
         Some(outer) => {
-            // c₁·(c₂·x) and c₁·(c₂/x), where the product of the constants is exact.
+            // c₁·(c₂·x) and c₁·(c₂/x), if the product of the constants is exact.
             if let Some(Node::Binary(op @ (Binary::Mul | Binary::Div), inner, x)) = arena.node_of(b)
                 && let Some(inner) = inner.known()
                 && (is_power_of_two(outer) || is_power_of_two(inner))
             {
                 return binary(arena, op, Operand::constant(outer * inner), x);
             }
-            // c₁·(x·(c₂/y)), as the square root of a sum of squares leaves it.
+            // c₁·(x·(c₂/y)), which results from the square root of a sum of squares.
             if let Some(Node::Binary(Binary::Mul, x, y)) = arena.node_of(b)
                 && let Some(Node::Binary(Binary::Div, inner, _)) = arena.node_of(y)
                 && inner.known().is_some()
@@ -136,7 +137,7 @@ fn div<V: Clone + PartialEq>(arena: &Arena<V>, a: Operand, b: Operand) -> Operan
     arena.intern(Node::Binary(Binary::Div, a, b))
 }
 
-/// `x` where the operand is `−x` in so many words: a negation, a negative constant, a product with one.
+/// `x` if the operand is explicitly `−x`: a negation, a negative constant, a product with one.
 fn without_minus<V: Clone + PartialEq>(arena: &Arena<V>, operand: Operand) -> Option<Operand> {
     if let Some(value) = operand.known() {
         return (value < 0.0).then(|| Operand::constant(-value));
@@ -151,7 +152,7 @@ fn without_minus<V: Clone + PartialEq>(arena: &Arena<V>, operand: Operand) -> Op
     }
 }
 
-/// Whether a product with `value` only shifts the exponent (±2ⁿ, within the normal range).
+/// Whether a product with `value` changes only the exponent (±2ⁿ, within the normal range).
 fn is_power_of_two(value: f64) -> bool {
     let fraction = value.to_bits() & ((1 << 52) - 1);
     value.is_normal() && fraction == 0

@@ -1,9 +1,8 @@
-//! The symbolic scalar: hash-consed, `Copy`, owned by an arena that the caller holds.
+//! The symbolic scalar: hash-consed and `Copy`; expressions are owned by an arena of the caller.
 //!
-//! A [`Symbol`] goes through the chain in the place of a number. What the chain computes is recorded as a graph in an
-//! [`Arena`]; equal expressions are one node, so a common subexpression is found when it is built. Constants are kept in the symbol
-//! itself, and 0, 1 and −1 are folded away as a hand would. What a variable stands for is the caller's: a name that is printed
-//! (`abbe-codegen`), or a column of numbers ([`crate::sensitivity`]).
+//! A [`Symbol`] takes the place of a number in the chain. The calculation is recorded as a graph in an [`Arena`]. Equal expressions are
+//! one node, so a common subexpression is found when it is built. A symbol contains constants directly, and 0, 1 and −1 are eliminated.
+//! The caller defines the meaning of a variable: a printed name (`abbe-codegen`), or a column of numbers ([`crate::sensitivity`]).
 
 mod derivative;
 mod fold;
@@ -16,7 +15,7 @@ use std::ops::{Add, Div, Mul, Neg, Sub};
 
 use crate::scalar::{Nominal, Scalar};
 
-/// A constant, comparable bit by bit; −0 is stored as 0.
+/// A constant, compared bit by bit; −0 is stored as 0.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
 pub struct Constant(u64);
 
@@ -36,18 +35,18 @@ impl Constant {
     }
 }
 
-/// The place of a node in its arena. A node's operands have smaller numbers than the node itself.
+/// The index of a node in its arena. The operands of a node have smaller indices than the node.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
 pub struct NodeId(u32);
 
 impl NodeId {
-    /// Its number, from 0.
+    /// The index, from 0.
     pub fn index(self) -> usize {
         self.0 as usize
     }
 }
 
-/// The place of a variable in its arena.
+/// The index of a variable in its arena.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
 pub struct VariableId(pub u32);
 
@@ -66,7 +65,7 @@ impl Operand {
         Operand::Constant(Constant::new(value))
     }
 
-    /// The value of a constant.
+    /// The value, if the operand is a constant.
     pub fn known(self) -> Option<f64> {
         match self {
             Operand::Constant(constant) => Some(constant.value()),
@@ -91,7 +90,7 @@ pub enum Unary {
 }
 
 impl Unary {
-    /// Its value.
+    /// Evaluates the function.
     pub fn of<N: Nominal>(self, a: N) -> N {
         match self {
             Unary::Neg => -a,
@@ -118,7 +117,7 @@ pub enum Binary {
 }
 
 impl Binary {
-    /// Its value.
+    /// Evaluates the operation.
     pub fn of<N: Nominal>(self, a: N, b: N) -> N {
         match self {
             Binary::Add => a + b,
@@ -129,7 +128,7 @@ impl Binary {
     }
 }
 
-/// One step of the recorded calculation.
+/// One operation of the recorded calculation.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum Node {
     /// A variable.
@@ -140,7 +139,7 @@ pub enum Node {
     Binary(Binary, Operand, Operand),
 }
 
-/// Where symbols live. Nothing outlives it, nothing is shared between two of them.
+/// The owner of symbols. Symbols cannot outlive it, and arenas share nothing.
 #[derive(Debug)]
 pub struct Arena<V> {
     nodes: RefCell<Vec<Node>>,
@@ -159,7 +158,7 @@ impl<V> Default for Arena<V> {
 }
 
 impl<V: Clone + PartialEq> Arena<V> {
-    /// An empty one.
+    /// An empty arena.
     pub fn new() -> Self {
         Arena::default()
     }
@@ -186,12 +185,12 @@ impl<V: Clone + PartialEq> Arena<V> {
         })
     }
 
-    /// A node by its place.
+    /// A node by its index.
     pub fn node(&self, id: NodeId) -> Node {
         self.nodes.borrow()[id.0 as usize]
     }
 
-    /// The node of an operand that is none of the constants.
+    /// The node of an operand, unless it is a constant.
     pub fn node_of(&self, operand: Operand) -> Option<Node> {
         match operand {
             Operand::Constant(_) => None,
@@ -199,22 +198,22 @@ impl<V: Clone + PartialEq> Arena<V> {
         }
     }
 
-    /// How many nodes there are.
+    /// Number of nodes.
     pub fn node_count(&self) -> usize {
         self.nodes.borrow().len()
     }
 
-    /// A variable by its place.
+    /// A variable by its index.
     pub fn variable_at(&self, id: VariableId) -> V {
         self.variables.borrow()[id.0 as usize].clone()
     }
 
-    /// All variables in the order in which they were named.
+    /// All variables in the order of their creation.
     pub fn variables(&self) -> Vec<V> {
         self.variables.borrow().clone()
     }
 
-    /// The node, recorded once however often it is asked for. `a + b` and `b + a` are one node, so are the products.
+    /// Returns the node and records it if it is new. `a + b` and `b + a` are one node, and likewise the products.
     fn intern(&self, node: Node) -> Operand {
         let mut places = self.places.borrow_mut();
         if let Some(id) = places.get(&node) {
@@ -232,8 +231,8 @@ impl<V: Clone + PartialEq> Arena<V> {
         Operand::Node(id)
     }
 
-    /// Whether anything but a sine or a cosine is taken of a variable.
-    pub fn is_own_symbol(&self, variable: &V) -> bool {
+    /// Whether the variable itself is used, not only its sine or cosine.
+    pub fn is_used_directly(&self, variable: &V) -> bool {
         let nodes = self.nodes.borrow();
         let variables = self.variables.borrow();
         let itself = |operand: Operand| {
@@ -246,7 +245,7 @@ impl<V: Clone + PartialEq> Arena<V> {
         nodes.iter().any(plain)
     }
 
-    /// The variables that `outputs` are made of.
+    /// The variables on which `outputs` depend.
     pub fn variables_of(&self, outputs: &[Operand]) -> Vec<VariableId> {
         let variable = |id: NodeId| match self.node(id) {
             Node::Variable(variable) => Some(variable),
@@ -255,7 +254,7 @@ impl<V: Clone + PartialEq> Arena<V> {
         self.reachable(outputs).into_iter().filter_map(variable).collect()
     }
 
-    /// The nodes that `outputs` rest on, operands before what is made of them.
+    /// The nodes on which `outputs` depend; operands precede the nodes that use them.
     pub fn reachable(&self, outputs: &[Operand]) -> Vec<NodeId> {
         let mut used = vec![false; self.node_count()];
         for output in outputs {
@@ -280,7 +279,7 @@ impl<V: Clone + PartialEq> Arena<V> {
     }
 }
 
-/// What a node is made of.
+/// The operands of a node.
 pub fn operands(node: Node) -> impl Iterator<Item = Operand> {
     let pair = match node {
         Node::Variable(_) => [None, None],
@@ -290,7 +289,7 @@ pub fn operands(node: Node) -> impl Iterator<Item = Operand> {
     pair.into_iter().flatten()
 }
 
-/// A number that is not known yet: an expression in an [`Arena`], or a constant.
+/// A symbolic number: an expression in an [`Arena`], or a constant.
 pub struct Symbol<'arena, V>(Repr<'arena, V>);
 
 enum Repr<'arena, V> {
@@ -315,7 +314,7 @@ impl<V> Clone for Repr<'_, V> {
 impl<V> Copy for Repr<'_, V> {}
 
 impl<'arena, V: Clone + PartialEq> Symbol<'arena, V> {
-    /// The operand, which outlives the borrow of the arena.
+    /// The operand, which is independent of the borrow of the arena.
     pub fn operand(self) -> Operand {
         match self.0 {
             Repr::Constant(value) => Operand::constant(value),
@@ -359,8 +358,7 @@ impl<'arena, V: Clone + PartialEq> Symbol<'arena, V> {
 }
 
 impl<V> PartialEq for Symbol<'_, V> {
-    /// The same constant or the same node of the same arena. Equality as expressions is decided by
-    /// the normal form of `abbe-codegen`, not here.
+    /// Equality of constants or of nodes of the same arena. Algebraic equality is decided by the normal form of `abbe-codegen`.
     fn eq(&self, other: &Self) -> bool {
         match (self.0, other.0) {
             (Repr::Constant(a), Repr::Constant(b)) => a == b,

@@ -1,6 +1,6 @@
 //! The double ball bar: `L = ‖P_w − P_s‖`, the distance between a ball on the table and a ball in the spindle.
 //!
-//! The reading uses the stated length of the bar: a bar that is `δ` longer than stated reads `L − δ`. A sensor whose gain is off by
+//! The reading refers to the stated length of the bar: a bar that is `δ` longer than stated reads `L − δ`. A sensor with the gain error
 //! `k` adds `k·(L − L_bar)`.
 
 use super::{InstrumentUnknown, InternalUnit, SharedBy, displaced};
@@ -8,7 +8,7 @@ use crate::chain::{AxisPosition, BodyErrors, Machine};
 use crate::frames::Point;
 use crate::scalar::Scalar;
 
-/// Both balls, the bar's length, the sensor's gain.
+/// Both balls, the length of the bar, the gain of the sensor.
 pub const UNKNOWNS: [InstrumentUnknown; 8] = [
     InstrumentUnknown::length("workpiece_ball", "x", SharedBy::Setup),
     InstrumentUnknown::length("workpiece_ball", "y", SharedBy::Setup),
@@ -20,9 +20,9 @@ pub const UNKNOWNS: [InstrumentUnknown; 8] = [
     InstrumentUnknown::new("gain", "", InternalUnit::Ratio, SharedBy::Session),
 ];
 
-/// Place of the bar's length among [`UNKNOWNS`].
+/// Index of the length of the bar in [`UNKNOWNS`].
 pub const BAR: usize = 6;
-/// Place of the sensor's gain among [`UNKNOWNS`].
+/// Index of the gain of the sensor in [`UNKNOWNS`].
 pub const GAIN: usize = 7;
 
 /// A ball bar as set up for one test, lengths in mm.

@@ -1,6 +1,6 @@
-//! Instruments: functions from chain and state to readings, over the open scalar.
+//! Instruments: readings as functions of chain and state, over the open scalar.
 //!
-//! A new instrument is one file here: its nominal geometry, its unknowns in a fixed order, and `read`.
+//! A new instrument is one file: its nominal geometry, its parameters in a fixed order, and `read`.
 
 pub mod ballbar;
 pub mod probe;
@@ -12,7 +12,7 @@ use crate::chain::{AxisPosition, BodyErrors, Machine};
 use crate::frames::{Point, Rotation, SmallMotion};
 use crate::scalar::Scalar;
 
-/// The scalar coordinates of one reading: one length, or three coordinates; mm.
+/// The scalar coordinates of one reading in mm: one length, or three coordinates.
 #[derive(Clone, Copy, Debug)]
 pub struct Reading<S> {
     values: [S; 3],
@@ -40,7 +40,7 @@ impl<S: Scalar> Reading<S> {
     }
 }
 
-/// What kind of instrument a session uses.
+/// The kind of instrument of a session.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum InstrumentKind {
     /// A double ball bar.
@@ -65,7 +65,7 @@ impl InstrumentKind {
         InstrumentKind::RTest,
     ];
 
-    /// Whether a reading lies between a point of the table and one of the tool, so that errors of both sides move it.
+    /// Whether a reading connects a point of the table and a point of the tool, so that errors of both sides affect it.
     pub fn is_two_sided(self) -> bool {
         match self {
             InstrumentKind::BallBar | InstrumentKind::Probe | InstrumentKind::RTest => true,
@@ -73,7 +73,7 @@ impl InstrumentKind {
         }
     }
 
-    /// The word that a session file uses.
+    /// The identifier in session files.
     pub fn word(self) -> &'static str {
         match self {
             InstrumentKind::BallBar => "ballbar",
@@ -84,7 +84,7 @@ impl InstrumentKind {
         }
     }
 
-    /// Scalar coordinates of a reading.
+    /// Number of scalar coordinates of a reading.
     pub fn coordinates(self) -> usize {
         match self {
             InstrumentKind::BallBar | InstrumentKind::Probe => 1,
@@ -92,7 +92,7 @@ impl InstrumentKind {
         }
     }
 
-    /// The instrument's own unknowns in the order of its slots.
+    /// The instrument's parameters in the order of its slots.
     pub fn unknowns(self) -> &'static [InstrumentUnknown] {
         match self {
             InstrumentKind::BallBar => &ballbar::UNKNOWNS,
@@ -104,34 +104,35 @@ impl InstrumentKind {
     }
 }
 
-/// What an instrument's unknown belongs to: tests that share the thing share the unknown.
+/// The tests that share an instrument parameter: those that use the same mounted object.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum SharedBy {
-    /// Tests of one `setup`: the workpiece ball as it is mounted.
+    /// Tests with the same `setup`: the mounted workpiece ball.
     Setup,
-    /// Tests of one `spindle_setup`: the spindle ball as it is mounted.
+    /// Tests with the same `spindle_setup`: the mounted spindle ball.
     SpindleSetup,
-    /// Tests of one `bar_setup`: the bar as it is assembled.
+    /// Tests with the same `bar_setup`: the assembled bar.
     BarSetup,
-    /// Tests of one mount of an R-test's sensors: of one `setup` where they stand on the table, of one `spindle_setup` where they sit in the spindle.
+    /// Tests with the same mount of an R-test's sensors: the same `setup` if they are on the table, the same `spindle_setup` if they are
+    /// in the spindle.
     Sensors,
-    /// Tests of one `socket`.
+    /// Tests with the same `socket`.
     Socket,
     /// All tests of the session.
     Session,
 }
 
-/// One of an instrument's own unknowns.
+/// One parameter of an instrument.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct InstrumentUnknown {
-    /// The thing: `workpiece_ball`, `spindle_ball`, `bar`, `tracker`, `target`, `socket`, `ball`, `artefact`, `radius`,
-    /// `form`, `stylus`, `sensor`, `gain`.
+    /// The object: `workpiece_ball`, `spindle_ball`, `bar`, `tracker`, `target`, `socket`, `ball`, `artefact`, `radius`, `form`,
+    /// `stylus`, `sensor`, `gain`.
     pub thing: &'static str,
     /// Its coordinate, `x` … `c`, `omega`, `phi`, `theta`, or empty.
     pub coordinate: &'static str,
-    /// The unit inside.
+    /// The internal unit.
     pub unit: InternalUnit,
-    /// Which tests share it.
+    /// The tests that share it.
     pub shared_by: SharedBy,
 }
 
@@ -159,14 +160,14 @@ impl InstrumentUnknown {
     }
 }
 
-/// Unit of a quantity inside the program.
+/// Internal unit of a quantity.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum InternalUnit {
-    /// mm; printed in µm.
+    /// mm; displayed in µm.
     Millimetre,
-    /// rad; printed in arcsec.
+    /// rad; displayed in arcsec.
     Radian,
-    /// Dimensionless; printed in µm/m.
+    /// Dimensionless; displayed in µm/m.
     Ratio,
 }
 
@@ -186,7 +187,7 @@ pub enum Station<N> {
 }
 
 impl<N> Station<N> {
-    /// The same set-up with every nominal coordinate replaced: expressions by numbers, or by symbols.
+    /// Converts every nominal coordinate of the set-up: expressions to numbers or symbols.
     pub fn map<M>(&self, to: impl Fn(&N) -> M) -> Station<M> {
         let point = |point: &[N; 3]| point.each_ref().map(&to);
         match self {
@@ -220,7 +221,7 @@ impl<N> Station<N> {
         }
     }
 
-    /// What kind it is.
+    /// The kind of the instrument.
     pub fn kind(&self) -> InstrumentKind {
         match self {
             Station::BallBar(_) => InstrumentKind::BallBar,
@@ -231,8 +232,8 @@ impl<N> Station<N> {
         }
     }
 
-    /// The reading for a state of the axes, errors of the machine, and values of the instrument's own unknowns (mm, rad, in
-    /// the order of [`InstrumentKind::unknowns`]; `None` is an exact zero).
+    /// Computes the reading from the state of the axes, the errors of the machine and the parameters of the instrument (mm, rad, in the
+    /// order of [`InstrumentKind::unknowns`]; `None` is an exact zero).
     pub fn read<S: Scalar<Nominal = N>>(
         &self,
         machine: &Machine,
@@ -252,7 +253,7 @@ impl<N> Station<N> {
         }
     }
 
-    /// The point of the table frame that the instrument holds, mm, if it holds one.
+    /// The instrument's point in the table frame, mm, if it has one.
     pub fn table_point_mm(&self) -> Option<[N; 3]>
     where
         N: Copy,
@@ -265,7 +266,7 @@ impl<N> Station<N> {
         }
     }
 
-    /// The point of the tool frame that the instrument holds, mm.
+    /// The instrument's point in the tool frame, mm.
     pub fn tool_point_mm(&self) -> [N; 3]
     where
         N: Copy,
@@ -280,7 +281,7 @@ impl<N> Station<N> {
     }
 }
 
-/// A nominal point, displaced by three unknowns where they are carried.
+/// A nominal point, displaced by three parameters if they are included.
 pub fn displaced<S: Scalar>(
     nominal: [S::Nominal; 3],
     first: usize,
@@ -292,8 +293,8 @@ pub fn displaced<S: Scalar>(
     }))
 }
 
-/// The small motion of what the first six unknowns place and turn, where one of them is carried.
-fn moved<S: Scalar>(unknown: &impl Fn(usize) -> Option<S>) -> Option<SmallMotion<S>> {
+/// The small motion given by the first six parameters, if one of them is included.
+fn pose_error<S: Scalar>(unknown: &impl Fn(usize) -> Option<S>) -> Option<SmallMotion<S>> {
     let carried = (0..6).any(|i| unknown(i).is_some());
     carried.then(|| {
         let six = std::array::from_fn(|i| unknown(i).unwrap_or_else(|| S::constant(0.0)));

@@ -1,21 +1,22 @@
 //! The touch probe: the signed distance from the stylus to the artefact's surface along the probing direction.
 //!
-//! With `P_s` the stylus in R, `n` the probing direction and the artefact a cylinder of radius ρ about the line through `c` along `e`, both
-//! seen from the table through the inverse chain, `v = p − c`, `u` the probing direction there and `⊥` what is left across `e`,
+//! `P_s` is the stylus in R and `n` the probing direction. The artefact is a cylinder of radius ρ about the line through `c` along `e`.
+//! Both are transformed to the table frame through the inverse chain: `v = p − c`, `u` the probing direction there and `⊥` the component
+//! perpendicular to `e`,
 //!
 //! ```text
 //! d = −(B + √(B² − A·C)) / A,    A = u⊥·u⊥,   B = v⊥·u⊥,   C = v⊥·v⊥ − (ρ + δρ + w)²
 //! ```
 //!
-//! the nearer of the two points in which the line meets the surface. The distance is positive while the surface is still ahead. A surface that
-//! stands out by `w` is met `w` earlier: what the literature calls the measured radius less the target is `−d`.
+//! This is the nearer of the two intersections of the line with the surface. The distance is positive if the surface lies ahead. A form
+//! deviation of `w` outwards reduces the distance by `w`. The "measured radius less the target" of the literature is `−d`.
 
-use super::{InstrumentUnknown, SharedBy, displaced, moved};
+use super::{InstrumentUnknown, SharedBy, displaced, pose_error};
 use crate::chain::{AxisPosition, BodyErrors, Machine};
 use crate::frames::Point;
 use crate::scalar::{Nominal, Scalar};
 
-/// The artefact's pose on the table, its radius, what its surface stands out by; the stylus in the tool frame.
+/// The pose of the artefact on the table, its radius, its form deviation; the stylus in the tool frame.
 pub const UNKNOWNS: [InstrumentUnknown; 11] = [
     InstrumentUnknown::length("artefact", "x", SharedBy::Setup),
     InstrumentUnknown::length("artefact", "y", SharedBy::Setup),
@@ -30,11 +31,11 @@ pub const UNKNOWNS: [InstrumentUnknown; 11] = [
     InstrumentUnknown::length("stylus", "z", SharedBy::SpindleSetup),
 ];
 
-/// Place of the artefact's radius among [`UNKNOWNS`].
+/// Index of the radius of the artefact in [`UNKNOWNS`].
 pub const RADIUS: usize = 6;
-/// Place of what the surface stands out by among [`UNKNOWNS`].
+/// Index of the form deviation in [`UNKNOWNS`].
 pub const FORM: usize = 7;
-/// Place of the stylus' first coordinate among [`UNKNOWNS`].
+/// Index of the first stylus coordinate in [`UNKNOWNS`].
 pub const STYLUS: usize = 8;
 
 /// A probe and a cylindrical artefact as set up for one test, lengths in mm.
@@ -44,24 +45,24 @@ pub struct Probe<N> {
     pub artefact: [N; 3],
     /// Direction of the cylinder's axis in the table frame, of unit length.
     pub axis: [N; 3],
-    /// Radius of the surface that the stylus' centre moves on: the artefact's and the stylus' together.
+    /// Radius of the surface on which the stylus centre moves: the sum of the radii of artefact and stylus.
     pub radius: N,
     /// Centre of the stylus in the tool frame.
     pub stylus: [N; 3],
-    /// Probing direction in R, of unit length; `None` is straight towards the cylinder's nominal axis.
+    /// Probing direction in R, of unit length; `None` for straight towards the cylinder's nominal axis.
     pub direction: Option<[N; 3]>,
 }
 
-/// What decides a reading, seen from the artefact's axis and across it.
+/// The quantities of a reading, relative to the artefact's axis and perpendicular to it.
 #[derive(Clone, Copy, Debug)]
 pub struct ProbeGeometry<S> {
     /// The stylus, mm: `v⊥`.
     pub stylus: Point<S>,
-    /// A step of the probe on its way to the surface, mm: `u⊥` times the step's length.
+    /// A step of the probe towards the surface, mm: `u⊥` times the length of the step.
     pub step: Point<S>,
-    /// How far the stylus is from the axis where it touches, mm: `ρ + δρ + w`.
+    /// Distance of the stylus centre from the axis at contact, mm: `ρ + δρ + w`.
     pub radius: S,
-    /// Length of the step in R, mm; `None` where it is 1 mm.
+    /// Length of the step in R, mm; `None` for 1 mm.
     pub step_length: Option<S>,
 }
 
@@ -72,7 +73,7 @@ impl<S: Scalar> ProbeGeometry<S> {
         [dot(u, u), dot(v, u), dot(v, v) - self.radius * self.radius]
     }
 
-    /// The reading: how many steps it takes, times their length. Not a number where the line misses the artefact.
+    /// The reading: the number of steps to the surface times their length. NaN if the line misses the artefact.
     pub fn distance(&self) -> S {
         let [a, b, c] = self.quadratic();
         let steps = -(b + (b * b - a * c).sqrt()) / a;
@@ -84,8 +85,8 @@ impl<S: Scalar> ProbeGeometry<S> {
 }
 
 impl<N: Nominal> Probe<N> {
-    /// A step of the probing way in R at a state of the axes, and its length: the stated direction, or all the way to the artefact's
-    /// nominal axis.
+    /// A step in the probing direction in R at a state of the axes, and its length: the stated direction, or the whole distance to the
+    /// artefact's nominal axis.
     pub fn step_at<S: Scalar<Nominal = N>>(
         &self,
         machine: &Machine,
@@ -101,7 +102,7 @@ impl<N: Nominal> Probe<N> {
         let along = machine
             .workpiece_point(state, &none, Point::nominal(tip))
             .minus(foot);
-        let inward = across(foot.minus(stylus), along);
+        let inward = perpendicular(foot.minus(stylus), along);
         (inward, Some(inward.norm()))
     }
 
@@ -117,8 +118,8 @@ impl<N: Nominal> Probe<N> {
         }
     }
 
-    /// Stylus and probing way as the artefact sees them.
-    pub fn sight<S: Scalar<Nominal = N>>(
+    /// Stylus and probing direction in the frame of the artefact.
+    pub fn geometry<S: Scalar<Nominal = N>>(
         &self,
         machine: &Machine,
         state: &[AxisPosition<N>],
@@ -131,7 +132,7 @@ impl<N: Nominal> Probe<N> {
         let stylus = machine.table_point(state, errors, stylus);
         let mut from_artefact = stylus.minus(Point::nominal(self.artefact));
         let mut direction = ahead.minus(stylus);
-        if let Some(pose) = moved(&unknown) {
+        if let Some(pose) = pose_error(&unknown) {
             from_artefact = pose.pull(from_artefact);
             direction = pose.rotate_back(direction);
         }
@@ -143,14 +144,14 @@ impl<N: Nominal> Probe<N> {
             }
         }
         ProbeGeometry {
-            stylus: across(from_artefact, axis),
-            step: across(direction, axis),
+            stylus: perpendicular(from_artefact, axis),
+            step: perpendicular(direction, axis),
             radius,
             step_length,
         }
     }
 
-    /// The reading: the signed distance to the surface, mm. Not a number where the line misses the artefact.
+    /// The reading: the signed distance to the surface, mm. NaN if the line misses the artefact.
     pub fn read<S: Scalar<Nominal = N>>(
         &self,
         machine: &Machine,
@@ -158,7 +159,7 @@ impl<N: Nominal> Probe<N> {
         errors: &[BodyErrors<S>],
         unknown: impl Fn(usize) -> Option<S>,
     ) -> S {
-        self.sight(machine, state, errors, unknown).distance()
+        self.geometry(machine, state, errors, unknown).distance()
     }
 }
 
@@ -167,8 +168,8 @@ fn dot<S: Scalar>(a: Point<S>, b: Point<S>) -> S {
     a * x + b * y + c * z
 }
 
-/// What of `v` lies across the unit vector `along`.
-fn across<S: Scalar>(v: Point<S>, along: Point<S>) -> Point<S> {
+/// The component of `v` perpendicular to the unit vector `along`.
+fn perpendicular<S: Scalar>(v: Point<S>, along: Point<S>) -> Point<S> {
     let part = dot(v, along);
     v.minus(Point(along.0.map(|x| x * part)))
 }

@@ -1,15 +1,16 @@
-//! The R-test: three displacement sensors in a nest about a master ball read where the ball lies, as the vector `P_s − P_w`.
+//! The R-test: three displacement sensors in a nest around a master ball measure its position, as the vector `P_s − P_w`.
 //!
-//! With the nest on the table (E-setting) the vector is given in the table frame, with the nest in the spindle (Es-setting) in the tool frame:
+//! The vector is in the table frame if the nest is on the table (E-setting), and in the tool frame if the nest is in the spindle
+//! (Es-setting):
 //!
 //! ```text
 //! E:   m = T_w⁻¹·P_s − w          Es:   m = s − T_s⁻¹·P_w          r = D · Rᵀ(ω₁, φ₁, θ₁) · m
 //! ```
 //!
-//! `w` and `s` are the points of table and tool that nominally coincide, ω₁, φ₁, θ₁ the orientation error of the nest, and the rows of `D` the
-//! directions along which the sensors count (without them the reading has been turned into X, Y, Z already). Yamaji, Hamabata & Ihara, Evaluation of
-//! linear axis motion error of machine tools using an R-test device (HPC 2014), Section 4: sensor outputs become machine coordinates by
-//! `R = R_φ·R_θ·R_ω` (Eqs. 1–3; the matrices above Eq. 1 are printed in another order than the expanded equations and the text have).
+//! `w` and `s` are the points of table and tool that nominally coincide. ω₁, φ₁, θ₁ are the orientation errors of the nest. The rows of
+//! `D` are the measuring directions of the sensors; without `D` the reading is already in X, Y, Z. Yamaji, Hamabata & Ihara, Evaluation
+//! of linear axis motion error of machine tools using an R-test device (HPC 2014), Section 4: sensor outputs become machine coordinates
+//! by `R = R_φ·R_θ·R_ω` (Eqs. 1–3). The matrices above Eq. 1 are printed in a different order from the expanded equations and the text.
 
 use super::{InstrumentUnknown, SharedBy, displaced};
 use crate::chain::{AxisPosition, BodyErrors, Machine};
@@ -29,10 +30,10 @@ pub const UNKNOWNS: [InstrumentUnknown; 9] = [
     InstrumentUnknown::angle("sensor", "theta", SharedBy::Sensors),
 ];
 
-/// Place of ω₁ among [`UNKNOWNS`].
+/// Index of ω₁ in [`UNKNOWNS`].
 pub const SENSOR: usize = 6;
 
-/// What carries the sensors.
+/// The body that carries the sensors.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Setting {
     /// E: the sensors on the table, the master ball in the spindle.
@@ -44,17 +45,17 @@ pub enum Setting {
 /// An R-test as set up for one test, lengths in mm.
 #[derive(Clone, Debug, PartialEq)]
 pub struct RTest<N> {
-    /// What carries the sensors.
+    /// The body that carries the sensors.
     pub setting: Setting,
     /// The point on the table, in the table frame: the centre of the nest in E, of the master ball in Es.
     pub workpiece_ball: [N; 3],
     /// The point in the spindle, in the tool frame: the centre of the master ball in E, of the nest in Es.
     pub spindle_ball: [N; 3],
-    /// The direction along which each sensor counts, in the carrying frame, row by row; `None` where readings are given in that frame.
+    /// The measuring direction of each sensor in the carrying frame, row by row; `None` if readings are in that frame.
     pub sensors: Option<[[N; 3]; 3]>,
 }
 
-/// Three turns between sensors and machine: `R = R_φ·R_θ·R_ω` with
+/// Three rotations between sensors and machine: `R = R_φ·R_θ·R_ω` with
 ///
 /// ```text
 ///       ⎛ 1    0     0   ⎞        ⎛ cos φ  0  −sin φ ⎞        ⎛  cos θ  sin θ  0 ⎞
@@ -79,8 +80,8 @@ pub struct Orientation<S> {
 }
 
 impl<S: Scalar> Orientation<S> {
-    /// From ω, φ, θ in radians. The small-angle form has the angle for its sine and 1 for its cosine: Eqs. (7) to (9), which keep the products of
-    /// two angles and leave out their squares.
+    /// From ω, φ, θ in radians. The small-angle form replaces the sine by the angle and the cosine by 1, as in Eqs. (7) to (9), which
+    /// keep products of two angles and omit their squares.
     pub fn new(angles: [S; 3], rotation: Rotation) -> Self {
         let [omega, phi, theta] = angles.map(|angle| match rotation {
             Rotation::Exact => {
@@ -95,7 +96,7 @@ impl<S: Scalar> Orientation<S> {
         Orientation { omega, phi, theta }
     }
 
-    /// `R · v`: from the sensors' coordinates to those of the frame that carries them.
+    /// `R · v`: from sensor coordinates to the frame that carries the sensors.
     pub fn to_machine(&self, sensors: Point<S>) -> Point<S> {
         let [omega, phi, theta] = [self.omega, self.phi, self.theta].map(|turn| SinCos {
             sin: -turn.sin,
@@ -106,7 +107,7 @@ impl<S: Scalar> Orientation<S> {
         turn_about(Coordinate::Y, phi, about_w)
     }
 
-    /// `Rᵀ · v`: from the carrying frame to the sensors.
+    /// `Rᵀ · v`: from the carrying frame to sensor coordinates.
     pub fn to_sensors(&self, machine: Point<S>) -> Point<S> {
         let about_v = turn_about(Coordinate::Y, self.phi, machine);
         let about_w = turn_about(Coordinate::Z, self.theta, about_v);
@@ -137,7 +138,7 @@ impl<N: Nominal> RTest<N> {
         }
     }
 
-    /// The reading: what the three sensors count, or the vector in the carrying frame, mm.
+    /// The reading: the three sensor values, or the vector in the carrying frame, mm.
     pub fn read<S: Scalar<Nominal = N>>(
         &self,
         machine: &Machine,
@@ -163,7 +164,7 @@ impl<N: Nominal> RTest<N> {
 mod tests {
     use super::*;
 
-    /// Each angle of the sensors turns the reading by its own matrix above, transposed, and by nothing else.
+    /// Each sensor angle transforms the reading by the transpose of its own matrix above, and by nothing else.
     #[test]
     fn sensors_that_stand_askew_turn_the_reading() {
         let machine = Machine {

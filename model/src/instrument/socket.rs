@@ -1,6 +1,6 @@
-//! A ball in fixed sockets: the tool's ball sits in one of a few places, so every pose of one socket is the same point.
+//! A ball in fixed sockets: the tool's ball is at the same point in every pose of one socket.
 //!
-//! The reading is the closure `P_s − s`, the ball in R less the socket in R; what is observed is zero.
+//! The reading is the closure `P_s − s`, the ball in R less the socket in R; the observed value is zero.
 
 use super::{InstrumentUnknown, SharedBy, displaced};
 use crate::chain::{AxisPosition, BodyErrors, Machine};
@@ -17,7 +17,7 @@ pub const UNKNOWNS: [InstrumentUnknown; 6] = [
     InstrumentUnknown::length("ball", "z", SharedBy::SpindleSetup),
 ];
 
-/// A ball and the socket it sits in, mm.
+/// A ball and its socket, mm.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Socket<N> {
     /// Centre of the ball in the tool frame.

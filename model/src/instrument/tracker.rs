@@ -1,9 +1,9 @@
-//! The laser tracker: a target's three coordinates in the tracker's own frame, wherever that stands.
+//! The laser tracker: three coordinates of a target in the tracker's own frame.
 //!
-//! `m = B · E · P`, with `P` the target in R through the chain, `E` a small motion (the pose's unknowns) and `B` a fixed rigid
-//! motion, so that the unknown angles stay small however the tracker is turned.
+//! `m = B · E · P`: `P` is the target in R through the chain, `E` a small motion (the pose parameters) and `B` a fixed rigid motion. `B`
+//! keeps the estimated angles small for any orientation of the tracker.
 
-use super::{InstrumentUnknown, SharedBy, displaced, moved};
+use super::{InstrumentUnknown, SharedBy, displaced, pose_error};
 use crate::chain::{AxisPosition, BodyErrors, Machine};
 use crate::frames::Point;
 use crate::scalar::{Nominal, Scalar};
@@ -53,7 +53,7 @@ impl<N: Nominal> Tracker<N> {
         unknown: impl Fn(usize) -> Option<S>,
     ) -> Point<S> {
         let mut point = self.target_point(machine, state, errors, &unknown);
-        if let Some(pose) = moved(&unknown) {
+        if let Some(pose) = pose_error(&unknown) {
             point = pose.push(point);
         }
         let [x, y, z] = point.0;

@@ -1,5 +1,5 @@
-//! TOML files as the readers of this crate want them: every key and value knows where it stands, a table says which keys nobody asked
-//! for, and a wrong value says what it is and what was wanted.
+//! TOML files with source locations: every key and value has its location, a table reports unknown keys, and a wrong value is reported
+//! with the expected type.
 
 mod value;
 
@@ -12,58 +12,57 @@ use toml::de::DeTable;
 
 use super::spelling::known_names;
 use super::stamp::FileStamp;
-use crate::error::{ModelError, Place};
+use crate::error::{Location, ModelError};
 pub(crate) use value::Value;
 
-/// Most bytes of a machine or session file.
+/// Largest size of a machine or session file, bytes.
 const MAX_BYTES: u64 = 8 << 20;
-/// How deep the parser of TOML goes.
+/// Largest nesting depth that the TOML parser accepts.
 const MAX_DEPTH: usize = 80;
-/// Most items of a list or a table of names: far more than anybody measures, few enough to be compared with each other.
+/// Largest number of items in a list or a table of names. It exceeds every practical measurement and allows pairwise comparison.
 const MAX_ITEMS: usize = 1000;
 
 /// A file's text with its name.
 pub(crate) struct Source {
     /// As the user named it.
     pub file: PathBuf,
-    /// Its text, without a byte order mark.
+    /// The text, without a byte order mark.
     pub text: String,
-    /// Bytes of the file before the text: those of a byte order mark.
+    /// Length of the byte order mark before the text, bytes.
     pub skipped: usize,
-    /// The file as it was; `None` for a text that was read from none.
+    /// The state of the file when it was read; `None` for a text from no file.
     pub stamp: Option<FileStamp>,
 }
 
 impl Source {
-    /// Reads a text file; `what` says in messages what it is.
+    /// Reads a text file; `what` names its content in messages.
     pub fn read(file: &Path, what: &str) -> Result<Source, ModelError> {
         let fault = |message: String, help: &str| ModelError::Input {
-            place: Place::file(file),
+            location: Location::file(file),
             message,
             help: Some(help.to_string()),
         };
         if file.is_dir() {
             return Err(fault(
-                format!("this is a folder; {what} is a file"),
+                format!("this is a folder; {what} must be a file"),
                 "name the .toml file in it",
             ));
         }
         let unreadable = |cause: std::io::Error| {
-            let help = "check the name; a relative one starts from the file that mentions it, or from where \
-                        the command was called";
+            let help = "check the name; a relative name starts from the file that contains it, or from the working directory";
             fault(format!("{what} cannot be read: {cause}"), help)
         };
         let opened = File::open(file).map_err(unreadable)?;
         let stamp = FileStamp::of(file, &opened.metadata().map_err(unreadable)?);
         let mut bytes = Vec::new();
-        // A pipe does not say how much there is to come.
+        // The length of a pipe is unknown in advance.
         (&opened)
             .take(MAX_BYTES + 1)
             .read_to_end(&mut bytes)
             .map_err(unreadable)?;
         if bytes.len() as u64 > MAX_BYTES {
             return Err(fault(
-                format!("{what} has more than {MAX_BYTES} bytes, the most that is read"),
+                format!("{what} has more than {MAX_BYTES} bytes, which is the limit"),
                 "readings belong in CSV files named by `data`",
             ));
         }
@@ -71,7 +70,7 @@ impl Source {
         let text = String::from_utf8(bytes).map_err(|cause| {
             fault(
                 format!(
-                    "byte {} is not UTF-8, which TOML is written in",
+                    "byte {} is not UTF-8, the encoding of TOML",
                     cause.utf8_error().valid_up_to() + 1
                 ),
                 "save the file as UTF-8",
@@ -83,7 +82,7 @@ impl Source {
         })
     }
 
-    /// A text that stands in a file.
+    /// A given text of a file.
     pub fn new(file: &Path, text: &str) -> Source {
         let content = text.strip_prefix('\u{feff}').unwrap_or(text);
         Source {
@@ -101,17 +100,17 @@ impl Source {
                 fault.span().unwrap_or(0..0),
                 format!("not valid TOML: {}", fault.message()),
                 fault.message().contains("recursion").then(|| {
-                    format!("tables, lists and the parts of a key go {MAX_DEPTH} levels deep at most")
+                    format!("tables, lists and the parts of a key may be nested {MAX_DEPTH} levels deep")
                 }),
             )
         })?;
         Ok(Table::new(self, String::new(), 0..0, root.into_inner()))
     }
 
-    /// The place of some bytes of the text.
-    pub fn place(&self, span: Range<usize>) -> Place {
+    /// The location of some bytes of the text.
+    pub fn location(&self, span: Range<usize>) -> Location {
         let until = span.start.min(self.text.len());
-        Place {
+        Location {
             file: self.file.clone(),
             line: 1 + self.text.as_bytes()[..until]
                 .iter()
@@ -121,23 +120,23 @@ impl Source {
         }
     }
 
-    /// An error at a place of this file.
+    /// An error at a location of this file.
     pub fn error(&self, span: Range<usize>, message: impl Into<String>, help: Option<String>) -> ModelError {
         ModelError::Input {
-            place: self.place(span),
+            location: self.location(span),
             message: message.into(),
             help,
         }
     }
 }
 
-/// A table that is being read: keys are taken out of it one by one, and what is left was not asked for.
+/// A table during reading: known keys are removed one by one, and the remaining keys are unknown.
 pub(crate) struct Table<'a> {
     /// The file.
     pub source: &'a Source,
-    /// How messages name the table: `[instrument]`, `test "A100"`; empty for the file itself.
+    /// The name of the table in messages: `[instrument]`, `test "A100"`; empty for the file itself.
     pub name: String,
-    /// Where it stands.
+    /// Its location.
     pub span: Range<usize>,
     entries: Vec<Value<'a>>,
     asked: Vec<&'static str>,
@@ -165,30 +164,30 @@ impl<'a> Table<'a> {
         }
     }
 
-    /// The value of a key, if it is there.
+    /// The value of a key, if present.
     pub fn take(&mut self, key: &'static str) -> Option<Value<'a>> {
         self.asked.push(key);
         let index = self.entries.iter().position(|entry| entry.key == key)?;
         Some(self.entries.remove(index))
     }
 
-    /// The value of a key that has to be there; `wanted` says what it is.
-    pub fn need(&mut self, key: &'static str, wanted: &str) -> Result<Value<'a>, ModelError> {
+    /// The value of a required key; `expected` names the expected value.
+    pub fn require(&mut self, key: &'static str, expected: &str) -> Result<Value<'a>, ModelError> {
         match self.take(key) {
             Some(value) => Ok(value),
             None => Err(self.error(
-                format!("{} has no `{key}`", self.called()),
-                Some(format!("add `{key}`: {wanted}")),
+                format!("{} has no `{key}`", self.display_name()),
+                Some(format!("add `{key}`: {expected}")),
             )),
         }
     }
 
-    /// Every entry, in the order of the file: for tables whose keys are names.
+    /// Every remaining value, in the order of the file: for tables whose keys are names.
     pub fn remaining_values(&mut self) -> Result<Vec<Value<'a>>, ModelError> {
         if self.entries.len() > MAX_ITEMS {
             let message = format!(
-                "{} has {} entries; {MAX_ITEMS} are the most",
-                self.called(),
+                "{} has {} entries; the limit is {MAX_ITEMS}",
+                self.display_name(),
                 self.entries.len()
             );
             return Err(self.error(message, None));
@@ -196,7 +195,7 @@ impl<'a> Table<'a> {
         Ok(std::mem::take(&mut self.entries))
     }
 
-    /// An error unless every key was asked for.
+    /// Returns an error if a key remains.
     pub fn finish(self) -> Result<(), ModelError> {
         match self.entries.first() {
             None => Ok(()),
@@ -204,7 +203,7 @@ impl<'a> Table<'a> {
                 let mut known: Vec<&str> = self.asked.clone();
                 known.sort_unstable();
                 known.dedup();
-                let message = format!("{} knows no key `{}`", self.called(), entry.key);
+                let message = format!("{} has the unknown key `{}`", self.display_name(), entry.key);
                 Err(self.source.error(
                     entry.key_span.clone(),
                     message,
@@ -214,8 +213,8 @@ impl<'a> Table<'a> {
         }
     }
 
-    /// How a message calls the table.
-    pub fn called(&self) -> &str {
+    /// The name of the table in messages.
+    pub fn display_name(&self) -> &str {
         if self.name.is_empty() {
             "the file"
         } else {

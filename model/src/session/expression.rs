@@ -1,4 +1,4 @@
-//! Lengths as a session writes them: numbers, or expressions over the session's constants.
+//! Lengths in a session: numbers, or expressions in the session's constants.
 
 use crate::scalar::Nominal;
 
@@ -23,13 +23,13 @@ pub enum Length {
     Root(Box<Length>),
 }
 
-/// Most characters of an expression.
+/// Largest length of an expression, characters.
 const MAX_CHARACTERS: usize = 400;
-/// Most nested parentheses, signs and roots.
+/// Largest nesting depth of parentheses, signs and roots.
 const MAX_DEPTH: usize = 40;
 
 impl Length {
-    /// The value over any nominal type, `constant` giving that of a named constant.
+    /// Evaluates the length over any nominal type; `constant` gives the value of a named constant.
     pub fn evaluate<N: Nominal>(&self, constant: &impl Fn(&str) -> N) -> N {
         match self {
             Length::Number(value) => N::constant(*value),
@@ -43,7 +43,7 @@ impl Length {
         }
     }
 
-    /// How many numbers and names stand in it.
+    /// Number of numbers and names in the expression.
     fn size(&self) -> usize {
         match self {
             Length::Number(_) | Length::Constant(_) => 1,
@@ -54,7 +54,7 @@ impl Length {
         }
     }
 
-    /// Reads numbers, names, `+ - * /`, `^2`, `sqrt( )` and parentheses.
+    /// Parses numbers, names, `+ - * /`, `^2`, `sqrt( )` and parentheses.
     ///
     /// ```
     /// use abbe_model::session::expression::Length;
@@ -67,18 +67,18 @@ impl Length {
     /// ```
     ///
     /// # Errors
-    /// Says what was found where, or which constant is not among the `known` ones.
+    /// The message tells what was found and where, or which constant is not among the `known` ones.
     pub fn parse(text: &str, known: &[&str]) -> Result<Length, String> {
         let characters: Vec<char> = text.chars().collect();
         if characters.len() > MAX_CHARACTERS {
             return Err(format!(
-                "an expression of {} characters; {MAX_CHARACTERS} is the most",
+                "an expression of {} characters; the limit is {MAX_CHARACTERS}",
                 characters.len()
             ));
         }
         let mut reader = Reader {
             characters,
-            place: 0,
+            position: 0,
             depth: 0,
             known,
         };
@@ -92,23 +92,27 @@ impl Length {
 
 struct Reader<'a> {
     characters: Vec<char>,
-    place: usize,
+    position: usize,
     depth: usize,
     known: &'a [&'a str],
 }
 
 impl Reader<'_> {
-    /// The next character that is no space.
+    /// The next character that is not a space.
     fn peek(&mut self) -> Option<char> {
-        while self.characters.get(self.place).is_some_and(|c| c.is_whitespace()) {
-            self.place += 1;
+        while self
+            .characters
+            .get(self.position)
+            .is_some_and(|c| c.is_whitespace())
+        {
+            self.position += 1;
         }
-        self.characters.get(self.place).copied()
+        self.characters.get(self.position).copied()
     }
 
     fn accept(&mut self, wanted: char) -> bool {
         let found = self.peek() == Some(wanted);
-        self.place += usize::from(found);
+        self.position += usize::from(found);
         found
     }
 
@@ -155,17 +159,17 @@ impl Reader<'_> {
             return Ok(base);
         }
         if base.size() > MAX_CHARACTERS {
-            return Err("squares of squares beyond all use".into());
+            return Err("too many nested squares".into());
         }
         if self.accept('2')
             && !self
                 .characters
-                .get(self.place)
+                .get(self.position)
                 .is_some_and(|c| c.is_alphanumeric())
         {
             return Ok(Length::Product(Box::new(base.clone()), Box::new(base)));
         }
-        Err("`^` with another power than 2; only squares are known".into())
+        Err("`^` with a power other than 2; only squares are allowed".into())
     }
 
     fn factor(&mut self) -> Result<Length, String> {
@@ -193,32 +197,32 @@ impl Reader<'_> {
     }
 
     fn number(&mut self) -> Result<Length, String> {
-        let start = self.place;
-        while let Some(&c) = self.characters.get(self.place) {
+        let start = self.position;
+        while let Some(&c) = self.characters.get(self.position) {
             let exponent = matches!(c, 'e' | 'E');
-            let sign = matches!(c, '+' | '-') && matches!(self.characters[self.place - 1], 'e' | 'E');
-            if !(c.is_ascii_digit() || c == '.' || exponent || (sign && self.place > start)) {
+            let sign = matches!(c, '+' | '-') && matches!(self.characters[self.position - 1], 'e' | 'E');
+            if !(c.is_ascii_digit() || c == '.' || exponent || (sign && self.position > start)) {
                 break;
             }
-            self.place += 1;
+            self.position += 1;
         }
-        let text: String = self.characters[start..self.place].iter().collect();
+        let text: String = self.characters[start..self.position].iter().collect();
         match text.parse::<f64>() {
             Ok(value) if value.is_finite() => Ok(Length::Number(value)),
-            _ => Err(format!("`{text}` is no number")),
+            _ => Err(format!("`{text}` is not a number")),
         }
     }
 
     fn named(&mut self) -> Result<Length, String> {
-        let start = self.place;
+        let start = self.position;
         while self
             .characters
-            .get(self.place)
+            .get(self.position)
             .is_some_and(|c| c.is_alphanumeric() || *c == '_')
         {
-            self.place += 1;
+            self.position += 1;
         }
-        let name: String = self.characters[start..self.place].iter().collect();
+        let name: String = self.characters[start..self.position].iter().collect();
         if name == "sqrt" {
             return Ok(Length::Root(Box::new(self.parenthesis()?)));
         }

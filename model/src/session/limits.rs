@@ -1,19 +1,20 @@
-//! What numbers from outside may be, whatever they say: within these limits nothing overflows and angles keep their meaning.
+//! Limits of numbers in input. Within them nothing overflows and angles remain accurate.
 
-/// The largest number that a file or an argument may hold, in whatever unit its name says. A position of 10¹² is resolved to 10⁻⁴; in degrees that is
-/// three thousand million turns.
+/// The largest number that input may contain, in the unit of its name. A position of 10¹² is resolved to 10⁻⁴; in degrees it is three
+/// thousand million revolutions.
 pub const LARGEST: f64 = 1e12;
 
-/// The least standard deviation or step other than zero, µm: a millionth of what any sensor resolves.
+/// The least nonzero standard deviation or step, µm: a millionth of the resolution of any sensor.
 pub const MIN_UM: f64 = 1e-6;
 
-/// What is wrong with a number that is larger than [`LARGEST`].
+/// The fault of a number that is larger than [`LARGEST`].
 pub fn too_large(number: f64) -> Option<String> {
     (number.is_finite() && number.abs() > LARGEST)
-        .then(|| format!("{number:e}, which is too large; {LARGEST:e} is the most"))
+        .then(|| format!("{number:e}, which is too large; the limit is {LARGEST:e}"))
 }
 
-/// What is wrong with a standard deviation or step in µm that is neither zero nor at least [`LEAST_UM`].
+/// The fault of a standard deviation or step in µm that is neither zero nor at least [`MIN_UM`].
 pub fn too_small_um(number: f64) -> Option<String> {
-    (number > 0.0 && number < MIN_UM).then(|| format!("{number:e} µm; {MIN_UM:e} µm is the least besides 0"))
+    (number > 0.0 && number < MIN_UM)
+        .then(|| format!("{number:e} µm; the least value other than 0 is {MIN_UM:e} µm"))
 }

@@ -1,6 +1,6 @@
-//! Sessions: a machine, a plan of tests, and the readings if the tests have been run.
+//! Sessions: a machine, a plan of tests, and the readings of the tests that were run.
 //!
-//! A session file is read by [`read::session`]; what comes out has been checked, is in mm, rad and s, and names no unit again.
+//! [`read::session`] reads a session file. The result is validated and in mm, rad and s.
 
 mod document;
 pub mod expression;
@@ -8,7 +8,7 @@ pub mod limits;
 pub mod motion;
 pub mod placing;
 mod plan;
-mod reach;
+mod plausibility;
 pub mod read;
 pub mod readings;
 pub mod rewrite;
@@ -29,28 +29,28 @@ use crate::instrument::{InstrumentKind, SharedBy, Station};
 use readings::Readings;
 use stamp::FileStamp;
 
-/// A session, checked. Lengths in mm, angles in rad.
+/// A validated session. Lengths in mm, angles in rad.
 #[derive(Clone, Debug)]
 pub struct Session {
     /// The session file.
     pub file: PathBuf,
-    /// What stands in it, as it was read.
+    /// The text of the session file.
     pub text: String,
-    /// What stands in the machine's file, where the session names one.
+    /// The text of the machine file, if the session names one.
     pub machine_text: Option<String>,
-    /// Every file that was read: the session, its machine, its data.
+    /// All files that were read: the session, its machine, its data.
     pub files: Vec<FileStamp>,
     /// The machine.
     pub machine: Machine,
     /// Named lengths in the order of the file, mm.
     pub constants: Vec<(String, f64)>,
-    /// What reads.
+    /// The instrument.
     pub instrument: InstrumentKind,
-    /// Standard deviation of one scalar reading, mm; `None` where it is to be estimated.
+    /// Standard deviation of one scalar reading, mm; `None` if it is to be estimated.
     pub noise_mm: Option<f64>,
-    /// Least step of a reading, mm.
+    /// Resolution of a reading, mm.
     pub resolution_mm: Option<f64>,
-    /// The errors to be identified.
+    /// The errors to be estimated.
     pub unknowns: Vec<ErrorName>,
     /// The effects that the user declares.
     pub effects: Vec<Effect>,
@@ -58,10 +58,10 @@ pub struct Session {
     pub tests: Vec<Test>,
     /// Known distances between sockets.
     pub socket_distances: Vec<SocketDistance>,
-    /// What a user should know although the session can be used.
+    /// Warnings about a usable session.
     pub warnings: Vec<String>,
-    /// What `[about]` says of the measurement, by name in the order of the file: `serial_number`, `operator`, `date`, `comment` and others.
-    /// No calculation uses it; reports and results repeat it.
+    /// Notes of `[about]` on the measurement, by name in the order of the file: `serial_number`, `operator`, `date`, `comment` and
+    /// others. No calculation uses them; reports and results repeat them.
     pub about: Vec<(String, String)>,
 }
 
@@ -70,32 +70,32 @@ pub struct Session {
 pub struct Test {
     /// Its name, unique in the session.
     pub name: String,
-    /// The instrument as set up, nominal.
+    /// The nominal set-up of the instrument.
     pub station: Station<f64>,
-    /// The same over the session's constants, as written.
+    /// The same as expressions in the session's constants.
     pub geometry: Station<expression::Length>,
-    /// What is known of each of the instrument's unknowns, in their order.
+    /// The prior of each parameter of the instrument, in their order.
     pub priors: Vec<Prior>,
-    /// Which tests share the mounted workpiece ball (or tracker).
+    /// Name shared by tests with the same mounted workpiece ball (or tracker).
     pub setup: String,
-    /// Which tests share the mounted spindle ball (or target).
+    /// Name shared by tests with the same mounted spindle ball (or target).
     pub spindle_setup: String,
-    /// Which tests share the assembled bar.
+    /// Name shared by tests with the same assembled bar.
     pub bar_setup: String,
-    /// The socket, for that instrument.
+    /// The socket, for a socket instrument.
     pub socket: Option<String>,
-    /// How the axes move, for a plan.
+    /// The motion of the axes, for a plan.
     pub motion: Option<motion::Motion>,
-    /// Axis positions that neither the data nor the motion list, by axis of the machine, mm or rad.
+    /// Positions of axes that neither the data nor the motion contain, by axis of the machine, mm or rad.
     pub at: Vec<f64>,
-    /// The same as written, for linear axes that the file states in mm: what an equation keeps in symbols.
+    /// The same as expressions, for linear axes stated in mm; equations keep them as symbols.
     pub at_written: Vec<Option<expression::Length>>,
-    /// What was read.
+    /// The measured readings.
     pub readings: Option<Readings>,
 }
 
 impl Test {
-    /// The name of the group of tests that shares an unknown: the `setup`, the `bar_setup`, …; empty for the whole session.
+    /// The name of the group of tests that shares a parameter: the `setup`, the `bar_setup`, …; empty for the whole session.
     pub fn group(&self, by: SharedBy) -> &str {
         match by {
             SharedBy::Setup => &self.setup,
@@ -111,14 +111,14 @@ impl Test {
     }
 }
 
-/// What is known of a set-up quantity before the readings.
+/// Prior of a set-up quantity.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Prior {
-    /// Exactly the nominal value.
+    /// Known exactly: the nominal value.
     Known,
     /// Gaussian about the nominal value with this standard uncertainty, mm or rad.
     Gaussian(f64),
-    /// Nothing.
+    /// No prior.
     Free,
 }
 

@@ -1,4 +1,4 @@
-//! How the axes move in a planned test.
+//! Motion of the axes in a planned test.
 
 use super::readings::Readings;
 use super::{Session, Test, plan};
@@ -6,30 +6,30 @@ use crate::chain::Machine;
 use crate::error::ModelError;
 use crate::instrument::Station;
 
-/// Most readings of one planned test.
+/// Largest number of readings of one planned test.
 pub const MAX_READINGS: usize = 1_000_000;
 
 /// Pause between the tests of a planned session, s.
 const BETWEEN_TESTS_S: f64 = 120.0;
 
-/// The movement of a planned test, positions in mm and rad.
+/// The motion of a planned test, positions in mm and rad.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Motion {
-    /// One axis sweeps, the others stand.
+    /// One axis moves, the others are fixed.
     Sweep {
         /// Index of the axis in the machine.
         axis: usize,
-        /// Where it starts.
+        /// Start position.
         from: f64,
-        /// Where it ends.
+        /// End position.
         to: f64,
         /// The step between readings.
         step: f64,
         /// Speed in mm/s or rad/s.
         speed: f64,
-        /// How often it goes.
+        /// Number of runs.
         runs: usize,
-        /// Whether each run goes there and back as two traversals.
+        /// Whether each run consists of a forward and a backward traversal.
         both_directions: bool,
     },
     /// Two linear axes move on a circle.
@@ -38,43 +38,43 @@ pub enum Motion {
         first: usize,
         /// The second.
         second: usize,
-        /// mm.
+        /// Radius, mm.
         radius: f64,
-        /// Centre, counted from the workpiece ball in the directions of R, mm.
+        /// Centre relative to the workpiece ball, along the directions of R, mm.
         centre: [f64; 3],
-        /// rad.
+        /// Start angle, rad.
         from: f64,
-        /// rad.
+        /// End angle, rad.
         to: f64,
-        /// rad.
+        /// Angular step between readings, rad.
         step: f64,
         /// Path speed, mm/s.
         speed: f64,
-        /// How often it goes.
+        /// Number of runs.
         runs: usize,
-        /// Whether each run goes there and back as two traversals.
+        /// Whether each run consists of a forward and a backward traversal.
         both_directions: bool,
     },
-    /// A rotary axis turns and the linear axes keep the spindle ball at a constant offset from the workpiece ball.
+    /// A rotary axis rotates and the linear axes keep the spindle ball at a constant offset from the workpiece ball.
     Follow {
         /// The rotary axis, by index.
         axis: usize,
-        /// rad.
+        /// Start angle, rad.
         from: f64,
-        /// rad.
+        /// End angle, rad.
         to: f64,
-        /// rad.
+        /// Angular step between readings, rad.
         step: f64,
-        /// rad/s.
+        /// Speed of the rotary axis, rad/s.
         speed: f64,
-        /// How often it goes.
+        /// Number of runs.
         runs: usize,
-        /// Whether each run goes there and back as two traversals.
+        /// Whether each run consists of a forward and a backward traversal.
         both_directions: bool,
         /// Direction of the bar.
         offset: FollowOffset,
     },
-    /// The states come from the data file.
+    /// The data file contains the states.
     List,
 }
 
@@ -87,21 +87,21 @@ pub enum FollowOffset {
     Tangential,
     /// Along the axis.
     Axial,
-    /// No bar: the tool point stays on the point of the table over which it stands before the axis turns.
+    /// No bar: the tool point follows the point of the table below it at the start.
     None,
-    /// No bar: the tool point stays on the instrument's point of the table.
+    /// No bar: the tool point follows the instrument's point of the table.
     Touching,
 }
 
-/// How many times the speed of the ball on its circle of `radius_mm` the programmed feed is, where a control reads a degree as a millimetre: with
-/// the ball at `v = R·ω` and the rotary axis at `v·180/(π·R)` degrees,
+/// Ratio of the programmed feed to the speed of the ball on its circle of `radius_mm`, for a control that treats a degree as a
+/// millimetre. The ball moves at `v = R·ω` and the rotary axis at `v·180/(π·R)` degrees,
 ///
 /// ```text
 /// F = v · √(1 + (180/(π·R))²)
 /// ```
 ///
-/// so that the ball goes at `F` *divided* by the root. Eq. (12) of Yamaji, Hamabata & Ihara (2014) multiplies: it gives the feed to be programmed
-/// for a wanted speed, not the actual speed under a programmed feed.
+/// so that the speed of the ball is `F` *divided* by the root. Eq. (12) of Yamaji, Hamabata & Ihara (2014) multiplies: it gives the feed
+/// to be programmed for a desired speed, not the actual speed for a programmed feed.
 ///
 /// ```
 /// use abbe_model::session::motion::programmed_over_path_feed;
@@ -113,17 +113,17 @@ pub fn programmed_over_path_feed(radius_mm: f64) -> f64 {
     1.0_f64.hypot(180.0 / (std::f64::consts::PI * radius_mm))
 }
 
-/// The states that a test is planned to read at: positions, runs and times, with nothing observed yet.
+/// The planned states of a test: positions, runs and times, with no observations.
 ///
-/// A test without a movement of its own (`path = { kind = "list" }`) gives those of its data.
+/// For a test without a motion of its own (`path = { kind = "list" }`), the states of its data.
 ///
 /// # Errors
-/// If an axis would leave its travel, the balls cannot be kept where the path wants them, or there is no plan.
+/// If an axis would exceed its travel, if the balls cannot be placed on the path, or if there is no plan.
 pub fn planned(machine: &Machine, test: &Test) -> Result<Readings, ModelError> {
     checked_plan(machine, test).map_err(|(message, help)| ModelError::Plan { message, help })
 }
 
-/// The plan of every test of a session, one after the other in time.
+/// The planned states of every test of a session, consecutive in time.
 ///
 /// # Errors
 /// As [`planned`].
@@ -145,14 +145,14 @@ pub fn planned_session(session: &Session) -> Result<Vec<Readings>, ModelError> {
         .collect()
 }
 
-/// As [`planned`], a fault as message and help.
+/// As [`planned`], with an error as message and help.
 pub(crate) fn checked_plan(machine: &Machine, test: &Test) -> Result<Readings, (String, String)> {
     let mut readings = match &test.motion {
         Some(Motion::List) | None => {
             let Some(data) = &test.readings else {
                 return Err((
                     format!(
-                        "test \"{}\" has no movement to plan and no data to take its states from",
+                        "test \"{}\" has neither a motion nor data from which its states follow",
                         test.name
                     ),
                     "add `sweep = { … }` or `path = { … }`, or read its data".into(),
@@ -173,7 +173,7 @@ pub(crate) fn checked_plan(machine: &Machine, test: &Test) -> Result<Readings, (
     }
 }
 
-/// What an axis does beyond its travel, if one does.
+/// A description of the first axis that exceeds its travel.
 pub(crate) fn beyond_travel(machine: &Machine, readings: &Readings) -> Option<String> {
     machine
         .axes
@@ -185,20 +185,20 @@ pub(crate) fn beyond_travel(machine: &Machine, readings: &Readings) -> Option<St
             let beyond = positions
                 .iter()
                 .find(|&&q| q < least - slack || q > greatest + slack)?;
-            let outside = |q: f64| axis.kind.outside(q);
+            let displayed = |q: f64| axis.kind.to_display(q);
             Some(format!(
                 "axis `{}` goes to {:.3} {unit}; its travel is {} to {} {unit}",
                 axis.name,
-                outside(*beyond),
-                outside(least),
-                outside(greatest),
+                displayed(*beyond),
+                displayed(least),
+                displayed(greatest),
                 unit = axis.kind.unit(),
             ))
         })
 }
 
-/// The axes that a movement names.
-pub(crate) fn moved(motion: Option<&Motion>) -> Vec<usize> {
+/// The axes that a motion names.
+pub(crate) fn named_axes(motion: Option<&Motion>) -> Vec<usize> {
     match motion {
         Some(Motion::Sweep { axis, .. } | Motion::Follow { axis, .. }) => vec![*axis],
         Some(Motion::Circle { first, second, .. }) => vec![*first, *second],
@@ -206,8 +206,8 @@ pub(crate) fn moved(motion: Option<&Motion>) -> Vec<usize> {
     }
 }
 
-/// Puts linear axes that a circle does not move, and that the test leaves open, where the circle's centre lies in its plane.
-pub(crate) fn stand(
+/// Sets linear axes that a circle does not move, and that the test does not state, so that the centre of the circle lies in its plane.
+pub(crate) fn centre_circle(
     machine: &Machine,
     station: &Station<f64>,
     motion: Option<&Motion>,
@@ -222,13 +222,13 @@ pub(crate) fn stand(
             centre,
             ..
         }),
-    ) = (plan::pair(station), motion)
+    ) = (plan::bar_between_points(station), motion)
     {
         let open: Vec<usize> = plan::linear_axes(machine)
             .into_iter()
             .filter(|axis| !listed[*axis] || axis == first || axis == second)
             .collect();
-        let placed = plan::placed(machine, &pair, at, &open, *centre);
+        let placed = plan::solve_linear_axes(machine, &pair, at, &open, *centre);
         for axis in open {
             if axis != *first && axis != *second {
                 at[axis] = placed.0[axis];

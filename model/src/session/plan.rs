@@ -1,4 +1,4 @@
-//! From a movement to the states of the axes at each reading.
+//! Conversion of a motion to the states of the axes at each reading.
 
 use nalgebra::{DMatrix, DVector};
 
@@ -13,16 +13,16 @@ use crate::instrument::ballbar::BallBar;
 
 /// Pause between two traversals, s.
 const BETWEEN_RUNS_S: f64 = 3.0;
-/// Steps in a millimetre to which planned positions are rounded: far finer than a control resolves and far coarser than a solve rounds, so that an axis that
-/// need not move does not.
+/// Planned positions are rounded to this fraction of a millimetre. It is far finer than the resolution of a control and far coarser than
+/// the rounding of the solver, so that an axis that need not move does not.
 const STEPS_PER_MM: f64 = 1e10;
-/// How far the balls may miss the path that was asked for, mm.
-const MISSED_MM: f64 = 1e-6;
+/// Largest accepted deviation of the balls from the requested path, mm.
+const POSITION_TOLERANCE_MM: f64 = 1e-6;
 
-/// What went wrong and what to do.
+/// A message and what to do.
 type Fault = (String, String);
 
-/// Positions, runs and times of a movement.
+/// Positions, runs and times of a motion.
 pub(super) fn states(machine: &Machine, test: &Test, motion: &Motion) -> Result<Readings, Fault> {
     match motion {
         Motion::Sweep {
@@ -53,7 +53,7 @@ pub(super) fn states(machine: &Machine, test: &Test, motion: &Motion) -> Result<
             runs,
             both_directions,
         } => {
-            let bar = pair(&test.station).unwrap_or(BallBar {
+            let bar = bar_between_points(&test.station).unwrap_or(BallBar {
                 workpiece_ball: [0.0; 3],
                 spindle_ball: [0.0; 3],
                 bar: 0.0,
@@ -75,33 +75,32 @@ pub(super) fn states(machine: &Machine, test: &Test, motion: &Motion) -> Result<
             both_directions,
             offset,
         } => {
-            let Some(mut bar) = pair(&test.station) else {
+            let Some(mut bar) = bar_between_points(&test.station) else {
                 return Err((
-                    format!("test \"{}\" follows no point of the table", test.name),
+                    format!("test \"{}\" has no point of the table to follow", test.name),
                     "a path of kind \"follow\" needs a ball bar, an R-test or a probe".into(),
                 ));
             };
             if *offset == FollowOffset::None {
-                bar.workpiece_ball = under_the_tool(machine, &bar, &test.at);
+                bar.workpiece_ball = table_point_at_tool(machine, &bar, &test.at);
             }
             let linear = linear_axes(machine);
             let along = steps(*from, *to, *step);
             traversals(machine, &along, *speed, *runs, *both_directions, |q| {
                 let mut at = test.at.clone();
                 at[*axis] = q;
-                let wanted = offset_vector(machine, &bar, &at, *axis, *offset)?;
-                let (mut state, missed) = placed(machine, &bar, &at, &linear, wanted);
+                let requested = offset_vector(machine, &bar, &at, *axis, *offset)?;
+                let (mut state, missed) = solve_linear_axes(machine, &bar, &at, &linear, requested);
                 for axis in &linear {
                     state[*axis] = (state[*axis] * STEPS_PER_MM).round() / STEPS_PER_MM + 0.0;
                 }
-                if missed > MISSED_MM {
+                if missed > POSITION_TOLERANCE_MM {
                     return Err((
                         format!(
-                            "test \"{}\": the linear axes cannot keep the balls where the path wants them; they miss \
-                             by {missed:.3} mm",
+                            "test \"{}\": the linear axes cannot keep the balls on the path; the deviation is {missed:.3} mm",
                             test.name
                         ),
-                        "a path of kind \"follow\" takes linear axes that span the space".into(),
+                        "a path of kind \"follow\" needs linear axes that span the space".into(),
                     ));
                 }
                 Ok(state)
@@ -111,8 +110,8 @@ pub(super) fn states(machine: &Machine, test: &Test, motion: &Motion) -> Result<
     }
 }
 
-/// The point of the table and the point of the tool that an instrument holds together, as the ends of a bar.
-pub(super) fn pair(station: &Station<f64>) -> Option<BallBar<f64>> {
+/// The instrument's points of table and tool, as the ends of a bar.
+pub(super) fn bar_between_points(station: &Station<f64>) -> Option<BallBar<f64>> {
     if let Station::BallBar(bar) = station {
         return Some(bar.clone());
     }
@@ -123,8 +122,8 @@ pub(super) fn pair(station: &Station<f64>) -> Option<BallBar<f64>> {
     })
 }
 
-/// The point of the table frame at which the tool point stands.
-fn under_the_tool(machine: &Machine, bar: &BallBar<f64>, at: &[f64]) -> [f64; 3] {
+/// The point of the table frame at the tool point.
+fn table_point_at_tool(machine: &Machine, bar: &BallBar<f64>, at: &[f64]) -> [f64; 3] {
     let state = positions(machine, at);
     let none = vec![BodyErrors::<f64>::NONE; machine.axes.len()];
     let tool = machine.tool_point::<f64>(&state, &none, Point(bar.spindle_ball));
@@ -147,7 +146,7 @@ fn steps(from: f64, to: f64, step: f64) -> Vec<f64> {
         .collect()
 }
 
-/// Goes along a way `runs` times, and back each time where both directions are asked for.
+/// Follows a path `runs` times, and back each time if both directions are requested.
 fn traversals(
     machine: &Machine,
     along: &[f64],
@@ -182,7 +181,7 @@ fn traversals(
     Ok(readings)
 }
 
-/// Where the axes stand at these angles of a test's circle; `None` for another movement.
+/// Positions of the axes at these angles of a test's circle; `None` for another motion.
 pub(super) fn on_circle(
     machine: &Machine,
     test: &Test,
@@ -198,18 +197,18 @@ pub(super) fn on_circle(
     else {
         return None;
     };
-    let bar = pair(&test.station)?;
+    let bar = bar_between_points(&test.station)?;
     let circle = Circle::new(machine, &bar, &test.at, [*first, *second], *centre);
     Some(circle.map(|circle| angles.iter().map(|angle| circle.state(*radius, *angle)).collect()))
 }
 
-/// A circle of two linear axes.
+/// A circular motion of two linear axes.
 struct Circle {
     at: Vec<f64>,
     axes: [usize; 2],
     /// Positions of the two axes at the centre.
     centre: [f64; 2],
-    /// How far an axis goes for a millimetre of the path.
+    /// Axis travel per millimetre of the path, mm/mm.
     scale: [f64; 2],
 }
 
@@ -226,14 +225,11 @@ impl Circle {
         if dot.abs() > 1e-9 {
             let names = axes.map(|axis| machine.axes[axis].name.clone());
             return Err((
-                format!(
-                    "axes `{}` and `{}` do not stand at right angles",
-                    names[0], names[1]
-                ),
-                "a circle takes two linear axes at right angles".into(),
+                format!("axes `{}` and `{}` are not at right angles", names[0], names[1]),
+                "a circle needs two linear axes at right angles".into(),
             ));
         }
-        let (state, _) = placed(machine, bar, at, &axes, centre);
+        let (state, _) = solve_linear_axes(machine, bar, at, &axes, centre);
         Ok(Circle {
             at: state.clone(),
             axes,
@@ -258,17 +254,18 @@ pub(super) fn linear_axes(machine: &Machine) -> Vec<usize> {
         .collect()
 }
 
-/// Moves the `open` axes so that the spindle ball lies at `wanted` from the workpiece ball, nominally and as well as they can: the
-/// positions of all axes, and by how much they miss, mm. The balls' distance is affine in linear axes, so this is one linear solve.
-pub(super) fn placed(
+/// Moves the `open` axes so that the spindle ball is nominally at `requested` from the workpiece ball, in the least-squares sense. Returns
+/// the positions of all axes, and the remaining distance, mm. The difference of the balls is affine in the linear axes, so this is one
+/// linear solve.
+pub(super) fn solve_linear_axes(
     machine: &Machine,
     bar: &BallBar<f64>,
     at: &[f64],
     open: &[usize],
-    wanted: [f64; 3],
+    requested: [f64; 3],
 ) -> (Vec<f64>, f64) {
     let apart = spindle_from_workpiece(machine, bar, at);
-    let rest = DVector::from_iterator(3, (0..3).map(|i| wanted[i] - apart[i]));
+    let rest = DVector::from_iterator(3, (0..3).map(|i| requested[i] - apart[i]));
     let moves: Vec<[f64; 3]> = open
         .iter()
         .map(|&axis| relative_move(machine, bar, at, axis))
@@ -296,7 +293,7 @@ fn spindle_from_workpiece(machine: &Machine, bar: &BallBar<f64>, at: &[f64]) -> 
     spindle.minus(workpiece).0
 }
 
-/// How the spindle ball moves from the workpiece ball for a millimetre of a linear axis.
+/// Movement of the spindle ball relative to the workpiece ball per millimetre of a linear axis.
 fn relative_move(machine: &Machine, bar: &BallBar<f64>, at: &[f64], axis: usize) -> [f64; 3] {
     let apart = |position: f64| {
         let mut state = at.to_vec();
@@ -306,7 +303,7 @@ fn relative_move(machine: &Machine, bar: &BallBar<f64>, at: &[f64], axis: usize)
     let (zero, one) = (apart(0.0), apart(1.0));
     std::array::from_fn(|i| {
         let step = one[i] - zero[i];
-        // Differences of positions carry their rounding; a direction along R's axes is meant to be exact.
+        // Differences of positions contain rounding errors; a direction along R's axes is exact.
         if (step - step.round()).abs() < 1e-12 {
             step.round()
         } else {
@@ -324,8 +321,8 @@ pub(super) fn positions(machine: &Machine, at: &[f64]) -> Vec<AxisPosition<f64>>
         .collect()
 }
 
-/// From workpiece ball to spindle ball while the linear axes follow a rotary axis: as long as the bar, away from the axis, along the
-/// path of the carried ball, or along the axis.
+/// From workpiece ball to spindle ball while the linear axes follow a rotary axis. The vector has the length of the bar and points away
+/// from the axis, along the path of the carried ball, or along the axis.
 fn offset_vector(
     machine: &Machine,
     bar: &BallBar<f64>,
@@ -337,7 +334,7 @@ fn offset_vector(
     let none = vec![BodyErrors::<f64>::NONE; machine.axes.len()];
     let (workpiece, spindle) = bar.balls::<f64>(machine, &state, &none, &|_| None);
     let on_workpiece_side = axis < machine.workpiece_side;
-    // A turning head carries the spindle ball: the workpiece ball then lies on the far side of it.
+    // A rotating head carries the spindle ball: the workpiece ball is then on the opposite side.
     let (carried, sign) = if on_workpiece_side {
         (workpiece.0, 1.0)
     } else {
@@ -354,10 +351,10 @@ fn offset_vector(
         _ if radius < 1e-6 => {
             return Err((
                 format!(
-                    "the ball lies on axis `{}`: it goes round no circle",
+                    "the ball lies on axis `{}` and does not move on a circle",
                     machine.axes[axis].name
                 ),
-                "a radial or tangential bar takes a ball away from the axis".into(),
+                "a radial or tangential bar needs a ball away from the axis".into(),
             ));
         }
         FollowOffset::Radial => radial.map(|x| x / radius),
@@ -366,7 +363,7 @@ fn offset_vector(
     Ok(unit.map(|x| sign * bar.bar * x))
 }
 
-/// A point of an axis and its direction in R, as the axes between it and the bed carry it.
+/// A point of an axis and its direction in R, carried by the axes between it and the bed.
 pub(super) fn axis_line(machine: &Machine, state: &[AxisPosition<f64>], axis: usize) -> ([f64; 3], [f64; 3]) {
     let between = if axis < machine.workpiece_side {
         axis + 1..machine.workpiece_side
@@ -403,7 +400,7 @@ pub(super) fn axis_line(machine: &Machine, state: &[AxisPosition<f64>], axis: us
 mod tests {
     use super::*;
 
-    /// The last step ends at the end to the last digit where the way is a whole number of steps, and short of it where it is not.
+    /// The last step ends exactly at the end if the path is a whole number of steps, and before it otherwise.
     #[test]
     fn steps_end_where_they_should() {
         // Three times 0.1 is not 0.3, nor is 0.7 seven times 0.1.

@@ -1,4 +1,4 @@
-//! Readings as columns, with what the drivers of effects need: time, direction of travel, speed.
+//! Readings as columns, with the driver quantities of effects: time, direction of travel, speed.
 
 use std::path::PathBuf;
 
@@ -7,26 +7,26 @@ use crate::chain::{AxisPosition, Machine};
 use crate::effect::DriverSample;
 use crate::session::stamp::FileStamp;
 
-/// The readings of one test, one row a reading, in mm, rad, s, °C.
+/// The readings of one test, one row per reading, in mm, rad, s, °C.
 #[derive(Clone, Debug, Default)]
 pub struct Readings {
-    /// The file they were read from.
+    /// The file from which they were read.
     pub file: PathBuf,
-    /// That file as it was; `None` for readings that come from no file.
+    /// The state of that file when it was read; `None` for readings that come from no file.
     pub stamp: Option<FileStamp>,
     /// Line of each row in that file, from 1.
     pub line: Vec<usize>,
-    /// Which traversal each row belongs to, as numbered in the file; empty where there is no such column.
+    /// The traversal of each row, as numbered in the file; empty without such a column.
     pub run: Vec<i64>,
-    /// Time of each row, s; empty where there is no such column.
+    /// Time of each row, s; empty without such a column.
     pub time_s: Vec<f64>,
-    /// Temperature of each row, °C; empty where there is no such column.
+    /// Temperature of each row, °C; empty without such a column.
     pub temperature_c: Vec<f64>,
     /// Position of every axis of the machine: `positions[axis][row]`.
     pub positions: Vec<Vec<f64>>,
-    /// Scalar coordinates of a reading: 1 or 3.
+    /// Number of scalar coordinates of a reading: 1 or 3.
     pub coordinates: usize,
-    /// What was observed, row by row, `coordinates` each, mm.
+    /// The observed values, row by row, `coordinates` each, mm.
     pub observed: Vec<f64>,
 }
 
@@ -36,7 +36,7 @@ impl Readings {
         self.positions.first().map_or(0, Vec::len)
     }
 
-    /// Some of the rows, in the order given.
+    /// A selection of rows, in the given order.
     pub fn of_rows(&self, rows: &[usize]) -> Readings {
         fn of<T: Copy>(column: &[T], rows: &[usize]) -> Vec<T> {
             if column.is_empty() {
@@ -64,7 +64,7 @@ impl Readings {
         }
     }
 
-    /// Where the axes stand at a row.
+    /// Writes the positions of the axes in a row to `state`.
     pub fn state(&self, machine: &Machine, row: usize, state: &mut Vec<AxisPosition<f64>>) {
         state.clear();
         state.extend(
@@ -76,7 +76,7 @@ impl Readings {
         );
     }
 
-    /// The rows of each run: half-open ranges of consecutive rows with one number. Without a run column, one range.
+    /// The rows of each run: half-open ranges of consecutive rows with the same number. Without a run column, one range.
     pub fn runs(&self) -> Vec<std::ops::Range<usize>> {
         let rows = self.rows();
         if self.run.is_empty() {
@@ -93,13 +93,13 @@ impl Readings {
         runs
     }
 
-    /// What an axis tells the effects that follow it, row by row: position, direction, speed, way and time since it turned round.
+    /// Driver samples of an axis for every row: position, direction, speed, distance and time since the last reversal.
     ///
-    /// Direction is taken from the positions inside a run: backward difference, the first row from the second; a standing axis keeps the
-    /// direction in which it came to rest. Speed is the central difference over time, 0 where there is no time column.
+    /// The direction is the sign of the backward difference of the positions within a run; the first row uses the second. An axis at rest
+    /// keeps its last direction. The speed is the central difference over time, 0 without a time column.
     pub fn axis_samples(&self, axis: usize, kind: AxisKind) -> Vec<DriverSample<f64>> {
         let positions = &self.positions[axis];
-        // Positions in a file are rounded; a change below this is no movement.
+        // Positions in a file are rounded; a smaller change is not a movement.
         let still = match kind {
             AxisKind::Linear => 1e-6,
             AxisKind::Rotary => 1e-9,

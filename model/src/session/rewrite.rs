@@ -1,4 +1,4 @@
-//! A session's text with a few things changed and the rest, comments and all, as it was: what a simulation leaves behind.
+//! Edits of a session's text that preserve comments and everything else, as a simulation needs them.
 
 use std::ops::Range;
 use std::path::{Path, PathBuf};
@@ -7,10 +7,10 @@ use super::document::{Source, Value};
 use super::write::quoted;
 use crate::error::ModelError;
 
-/// The text with its machine read from another file; a text that holds the machine itself stays as it is.
+/// The text with its machine read from another file; a text with the machine's own tables is unchanged.
 ///
 /// # Errors
-/// If the text is no session.
+/// If the text is not a session.
 pub fn with_machine_file(original: &str, file: &Path, machine: &str) -> Result<String, ModelError> {
     let source = Source::new(file, original);
     let span = match source.parse()?.take("machine") {
@@ -29,7 +29,7 @@ pub fn with_machine_file(original: &str, file: &Path, machine: &str) -> Result<S
 /// The text with `noise_um` of its instrument set.
 ///
 /// # Errors
-/// If the text is no session.
+/// If the text is not a session.
 pub fn with_noise(original: &str, file: &Path, noise_um: f64) -> Result<String, ModelError> {
     let source = Source::new(file, original);
     let Some(instrument) = source.parse()?.take("instrument") else {
@@ -39,18 +39,18 @@ pub fn with_noise(original: &str, file: &Path, noise_um: f64) -> Result<String, 
     let (noise, kind) = (table.take("noise_um"), table.take("kind"));
     let text = match (noise, kind) {
         (Some(noise), _) => replaced(&source.text, noise.span, &noise_um.to_string()),
-        (None, Some(kind)) => behind(&source.text, &kind, &format!("noise_um = {noise_um}")),
+        (None, Some(kind)) => insert_after(&source.text, &kind, &format!("noise_um = {noise_um}")),
         (None, None) => source.text.clone(),
     };
     Ok(text)
 }
 
-/// The text of session `file` as it has to read in `folder`: names of the machine file and of data files start from there. Absolute names stay, and so do those
-/// that are found in `data_directory`, which the reader looks into first.
+/// The text of session `file` for use in `folder`: relative names of the machine file and of data files are adapted. Absolute names are
+/// unchanged, and so are names found in `data_directory`, which the reader searches first.
 ///
 /// # Errors
-/// If the text is no session, or one of the two folders is not there.
-pub fn moved(
+/// If the text is not a session, or if one of the two folders does not exist.
+pub fn relocated(
     original: &str,
     file: &Path,
     folder: &Path,
@@ -88,7 +88,7 @@ pub fn moved(
     Ok(text)
 }
 
-/// The folder that a file lies in.
+/// The folder of a file.
 fn parent(file: &Path) -> &Path {
     match file.parent() {
         Some(folder) if !folder.as_os_str().is_empty() => folder,
@@ -96,7 +96,7 @@ fn parent(file: &Path) -> &Path {
     }
 }
 
-/// The name of a file from a folder; the whole name where they share no folder but the root.
+/// The name of a file relative to a folder; the absolute name if they share only the root.
 fn relative_path(folder: &Path, file: &Path) -> Result<String, ModelError> {
     let whole = |path: &Path| {
         path.canonicalize().map_err(|cause| ModelError::Output {
@@ -123,7 +123,7 @@ fn relative_path(folder: &Path, file: &Path) -> Result<String, ModelError> {
     Ok(parts.join("/"))
 }
 
-/// The text without the tables of these names: `[name]`, `[[name]]` and what lies in them.
+/// The text without the tables of these names: `[name]`, `[[name]]` and their content.
 ///
 /// ```
 /// use abbe_model::session::rewrite::without_tables;
@@ -161,8 +161,8 @@ fn replaced(text: &str, span: Range<usize>, new: &str) -> String {
     text
 }
 
-/// A new key behind a value: on its own line, or after a comma inside an inline table.
-fn behind(text: &str, value: &Value<'_>, new: &str) -> String {
+/// Inserts a new key after a value: on its own line, or after a comma in an inline table.
+fn insert_after(text: &str, value: &Value<'_>, new: &str) -> String {
     let end = value.span.end;
     let line_end = end + text[end..].find('\n').unwrap_or(text.len() - end);
     let rest = text[end..line_end].trim_start();
@@ -208,14 +208,14 @@ mod tests {
                        [[test]]\nname = \"B\"\ndata = \"b.csv\"\n\n[[test]]\nname = \"C\"\ndata = \"/c.csv\"\n";
         let file = at("ours/session.toml");
         let elsewhere = at("ours/elsewhere");
-        let moved = |folder: &str| moved(session, &file, &at(folder), Some(&elsewhere)).unwrap();
+        let relocated_to = |folder: &str| relocated(session, &file, &at(folder), Some(&elsewhere)).unwrap();
         let there = session
             .replace("../machine.toml", "../../machine.toml")
             .replace("data/a.csv", "../../ours/data/a.csv");
-        assert_eq!(moved("theirs/next"), there);
-        assert_eq!(moved("ours"), session);
+        assert_eq!(relocated_to("theirs/next"), there);
+        assert_eq!(relocated_to("ours"), session);
         assert_eq!(
-            moved("ours/data"),
+            relocated_to("ours/data"),
             session.replace("../", "../../").replace("data/a", "a")
         );
     }

@@ -1,4 +1,4 @@
-//! Whether the runs of measured data are those that the session states.
+//! Comparison of the runs of measured data with those that the session states.
 
 use std::ops::Range;
 
@@ -6,11 +6,12 @@ use super::motion::Motion;
 use super::readings::Readings;
 use crate::words::counted;
 
-/// A run of which less than this share of its way leads on goes there and back.
-const ONE_WAY: f64 = 0.5;
+/// A run is a forward and backward run if its net advance is less than this fraction of its path length.
+const MIN_ADVANCE: f64 = 0.5;
 
-/// What the runs of a test's data lack, or have beyond what its movement states, if anything. Data without a `run` column tell nothing.
-pub(crate) fn unlike_stated(motion: Option<&Motion>, readings: &Readings) -> Option<String> {
+/// A description of the difference between the runs of the data and those of the stated motion, if any. Data without a `run` column are
+/// not compared.
+pub(crate) fn difference_from_stated(motion: Option<&Motion>, readings: &Readings) -> Option<String> {
     let (Motion::Sweep {
         runs,
         both_directions,
@@ -34,8 +35,8 @@ pub(crate) fn unlike_stated(motion: Option<&Motion>, readings: &Readings) -> Opt
     }
     let (mut forward, mut backward, mut turning) = (0, 0, Vec::new());
     for run in readings.runs() {
-        let (net, whole) = way(motion?, readings, &run);
-        if whole > 0.0 && net.abs() < ONE_WAY * whole {
+        let (net, whole) = advance_and_length(motion?, readings, &run);
+        if whole > 0.0 && net.abs() < MIN_ADVANCE * whole {
             turning.push(readings.run[run.start].to_string());
         } else if net > 0.0 {
             forward += 1;
@@ -48,10 +49,10 @@ pub(crate) fn unlike_stated(motion: Option<&Motion>, readings: &Readings) -> Opt
         let numbers = turning.join(", ");
         return Some(match turning.len() {
             1 => format!(
-                "run {numbers} goes there and back under one number: `run` numbers each traversal in one direction; {states}"
+                "run {numbers} goes forward and backward under one number: `run` numbers each traversal in one direction; {states}"
             ),
             _ => format!(
-                "runs {numbers} go there and back under one number each: `run` numbers each traversal in one direction; {states}"
+                "runs {numbers} go forward and backward under one number each: `run` numbers each traversal in one direction; {states}"
             ),
         });
     }
@@ -59,14 +60,14 @@ pub(crate) fn unlike_stated(motion: Option<&Motion>, readings: &Readings) -> Opt
     let only_forward = *both_directions || backward == 0;
     (!(enough && only_forward)).then(|| {
         format!(
-            "the data hold {} forward and {backward} backward where {states}",
+            "the data contain {} forward and {backward} backward, but {states}",
             counted(forward, "run")
         )
     })
 }
 
-/// How far a run goes on in the direction of the movement, and how far it goes in all: along an axis, or round by the area that it sweeps.
-fn way(motion: &Motion, readings: &Readings, run: &Range<usize>) -> (f64, f64) {
+/// Net advance of a run in the direction of the motion, and its total path length: along an axis, or around a circle by the swept area.
+fn advance_and_length(motion: &Motion, readings: &Readings, run: &Range<usize>) -> (f64, f64) {
     let sum = |steps: &mut dyn Iterator<Item = f64>| {
         steps.fold((0.0, 0.0), |(net, whole), step| (net + step, whole + step.abs()))
     };

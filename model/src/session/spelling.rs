@@ -1,35 +1,35 @@
-//! The name that may be meant by a misspelt one.
+//! Suggestions for misspelt names.
 
 use strsim::osa_distance;
 
-/// The nearest of the known names where one is near, and all of them.
+/// The most similar known name if one is similar, and all of them.
 pub(crate) fn known_names(found: &str, known: &[&str]) -> String {
     let all = if known.is_empty() {
-        "no key is known here".to_string()
+        "no key is allowed here".to_string()
     } else {
         format!("known: {}", known.join(", "))
     };
-    match nearest(found, known) {
+    match most_similar(found, known) {
         Some(near) => format!("did you mean `{near}`? ({all})"),
         None => all,
     }
 }
 
-/// How a help begins: with the known name that may be meant, or with nothing.
-pub(crate) fn meant(found: &str, known: &[impl AsRef<str>]) -> String {
-    nearest(found, known).map_or(String::new(), |near| format!("did you mean `{near}`? "))
+/// The start of a help text: a suggestion of the most similar known name, or nothing.
+pub(crate) fn suggestion(found: &str, known: &[impl AsRef<str>]) -> String {
+    most_similar(found, known).map_or(String::new(), |near| format!("did you mean `{near}`? "))
 }
 
-/// The known name that is nearest to a misspelt one, if any is near.
-fn nearest<'k>(found: &str, known: &'k [impl AsRef<str>]) -> Option<&'k str> {
-    // No name is longer, and a key of a million letters is no slip.
+/// The most similar known name, if any is similar.
+fn most_similar<'k>(found: &str, known: &'k [impl AsRef<str>]) -> Option<&'k str> {
+    // No name is longer; the limit bounds the cost for very long keys.
     let lower: String = found.chars().take(64).collect::<String>().to_lowercase();
     known
         .iter()
         .map(|name| {
             let name = name.as_ref();
             let other = name.to_lowercase();
-            // `c_degree` for `c_deg`: what begins alike and goes on counts as one slip.
+            // `c_degree` for `c_deg`: a common prefix counts as one edit.
             let begins =
                 lower.len().min(other.len()) >= 3 && (lower.starts_with(&other) || other.starts_with(&lower));
             (if begins { 1 } else { osa_distance(&lower, &other) }, name)
@@ -47,7 +47,7 @@ mod tests {
 
     #[test]
     fn a_slip_is_told_from_another_name() {
-        // A letter too many, too few, another one, two that changed places, capitals: one slip each.
+        // An extra, missing, wrong or transposed letter, or another case, is one edit each.
         for (found, near) in [
             ("barr_mm", "bar_mm"),
             ("bar_m", "bar_mm"),
@@ -59,15 +59,15 @@ mod tests {
             ("noise", "noise_um"),
             ("y", "x"),
         ] {
-            assert_eq!(nearest(found, &KEYS), Some(near), "{found}");
+            assert_eq!(most_similar(found, &KEYS), Some(near), "{found}");
         }
-        // Short names allow of one slip, longer ones of one more for every four letters.
-        assert_eq!(nearest("zz", &KEYS), None);
-        assert_eq!(nearest("nosieum", &KEYS), Some("noise_um"));
-        assert_eq!(nearest("noise_abc", &KEYS), Some("noise_um"));
-        assert_eq!(nearest("no1234um", &KEYS), None);
-        assert_eq!(nearest(&"s".repeat(100_000), &KEYS), None);
-        assert_eq!(nearest("sweep", &[""; 0]), None);
+        // Short names allow one edit, longer ones one more per four letters.
+        assert_eq!(most_similar("zz", &KEYS), None);
+        assert_eq!(most_similar("nosieum", &KEYS), Some("noise_um"));
+        assert_eq!(most_similar("noise_abc", &KEYS), Some("noise_um"));
+        assert_eq!(most_similar("no1234um", &KEYS), None);
+        assert_eq!(most_similar(&"s".repeat(100_000), &KEYS), None);
+        assert_eq!(most_similar("sweep", &[""; 0]), None);
     }
 
     #[test]
@@ -77,8 +77,8 @@ mod tests {
             "did you mean `sweep`? (known: sweep, path)"
         );
         assert_eq!(known_names("at", &["sweep", "path"]), "known: sweep, path");
-        assert_eq!(known_names("at", &[]), "no key is known here");
-        assert_eq!(meant("swep", &["sweep"]), "did you mean `sweep`? ");
-        assert_eq!(meant("at", &["sweep"]), "");
+        assert_eq!(known_names("at", &[]), "no key is allowed here");
+        assert_eq!(suggestion("swep", &["sweep"]), "did you mean `sweep`? ");
+        assert_eq!(suggestion("at", &["sweep"]), "");
     }
 }

@@ -1,4 +1,4 @@
-//! Writing what the readers read: tables of readings, and sessions with more effects declared.
+//! Writer for tables of readings, and for sessions with additional effects or data.
 
 use std::fmt::Write as _;
 use std::io::Write as _;
@@ -12,12 +12,12 @@ use crate::effect::{Driver, Effect, Shape};
 use crate::error::ModelError;
 use crate::instrument::Station;
 
-/// Writes readings as a CSV file with our column names: whole or not at all.
+/// Writes readings as a CSV file with our column names, atomically.
 ///
-/// Numbers have up to twelve decimals of mm, degree or s: what a file rounds away is far below any reading.
+/// Numbers have up to twelve decimals of mm, degree or s, so that the rounding is far below any resolution.
 ///
 /// # Errors
-/// If the file cannot be written; then what was there before still is.
+/// If the file cannot be written; the previous file then remains.
 pub fn readings(
     path: &Path,
     machine: &Machine,
@@ -45,7 +45,7 @@ pub fn readings_text(machine: &Machine, station: &Station<f64>, readings: &Readi
     match station {
         Station::BallBar(_) => header.push("length_mm".into()),
         Station::Tracker(_) => header.extend(["px_mm", "py_mm", "pz_mm"].map(String::from)),
-        // A pose of a socket is the axes' positions and nothing else.
+        // A pose of a socket consists of axis positions only.
         Station::Socket(_) => {}
         Station::Probe(_) => header.push("distance_mm".into()),
         Station::RTest(rtest) => {
@@ -63,7 +63,7 @@ pub fn readings_text(machine: &Machine, station: &Station<f64>, readings: &Readi
             cells.push(run.to_string());
         }
         for (axis, column) in machine.axes.iter().zip(&readings.positions) {
-            cells.push(decimal(axis.kind.outside(column[row])));
+            cells.push(decimal(axis.kind.to_display(column[row])));
         }
         if let Some(temperature) = readings.temperature_c.get(row) {
             cells.push(decimal(*temperature));
@@ -80,17 +80,17 @@ pub fn readings_text(machine: &Machine, station: &Station<f64>, readings: &Readi
     text
 }
 
-/// A number with as many decimals as it has, twelve at most.
+/// A number with the necessary decimals, at most twelve.
 fn decimal(value: f64) -> String {
     let text = format!("{value:.12}");
     let text = text.trim_end_matches('0').trim_end_matches('.');
     if text == "-0" { "0".into() } else { text.into() }
 }
 
-/// Writes a file whole or not at all: beside its place, then renamed into it.
+/// Writes a file atomically: a temporary file in the same folder is renamed.
 ///
 /// # Errors
-/// If it cannot be written; then what was there before still is.
+/// If it cannot be written; the previous file then remains.
 pub fn whole_file(path: &Path, text: &str) -> Result<(), ModelError> {
     let fault = |cause: std::io::Error| ModelError::Output {
         file: path.to_path_buf(),
@@ -105,13 +105,13 @@ pub fn whole_file(path: &Path, text: &str) -> Result<(), ModelError> {
     });
     let renamed = written.and_then(|()| std::fs::rename(&part, path));
     renamed.map_err(|cause| {
-        // What is left of the attempt is of no use; that it cannot be removed is no second fault.
+        // Remove the incomplete file; a failure to remove it is not reported.
         let _ = std::fs::remove_file(&part);
         fault(cause)
     })
 }
 
-/// A session's text with more effects declared at its end; what was there stays, comments and all.
+/// A session's text with additional effects at its end; the existing text and its comments are unchanged.
 ///
 /// ```
 /// use abbe_model::chain::Machine;
@@ -185,7 +185,7 @@ fn effect_table(effect: &Effect, machine: &Machine) -> String {
         Shape::ReversalSpike { width } => quantity("width", *width),
         Shape::Warmup { tau_s } => line("tau_s", tau_s.to_string()),
         Shape::Steps { at } => {
-            // All positions in one unit: degrees where every one of them comes back the same.
+            // All positions in one unit: degrees if every one of them converts exactly both ways.
             let all: Vec<(&str, String)> = at.iter().map(|position| in_unit(unit, *position)).collect();
             let fallback = all.iter().any(|(suffix, _)| *suffix == "rad");
             let suffix = if fallback {
@@ -232,7 +232,7 @@ fn unit(driver: &Driver, machine: &Machine) -> &'static str {
     }
 }
 
-/// A number in a driver's unit, such that it reads back to the same bits: round degrees where they do, else radians.
+/// A number in a driver's unit that reads back to the same bits: degrees if they do, else radians.
 fn in_unit(unit: &'static str, value: f64) -> (&'static str, String) {
     if unit != "deg" {
         return (unit, value.to_string());
@@ -247,7 +247,7 @@ fn in_unit(unit: &'static str, value: f64) -> (&'static str, String) {
     ("rad", value.to_string())
 }
 
-/// A TOML string: JSON's escapes are TOML's.
+/// A TOML string: JSON escapes are valid in TOML.
 pub(super) fn quoted(text: &str) -> String {
     let mut quoted = String::from("\"");
     for c in text.chars() {
@@ -264,19 +264,18 @@ pub(super) fn quoted(text: &str) -> String {
     quoted
 }
 
-/// A plan's text with a data file for each test named, the rest as it was: what a simulation leaves behind. A test that names a data
-/// file already gets the new one.
+/// A plan's text with a data file for each named test, otherwise unchanged. An existing data file of a test is replaced.
 ///
 /// # Errors
-/// If the text is no session, or names its tests in inline tables.
+/// If the text is not a session, or has its tests in inline tables.
 pub fn with_data(original: &str, file: &Path, data: &[(String, String)]) -> Result<String, ModelError> {
     let source = Source::new(file, original);
-    // What is to be put where: replaced bytes and the text in their place.
+    // Edits: the bytes to replace and their new text.
     let mut edits: Vec<(std::ops::Range<usize>, String)> = Vec::new();
     if let Some(tests) = source.parse()?.take("test") {
         for item in tests.list("tables [[test]]")? {
             let mut table = item.table("[[test]]".into())?;
-            let name = table.need("name", "a name")?;
+            let name = table.require("name", "a name")?;
             let text = name.text()?;
             let Some((_, data)) = data.iter().find(|(test, _)| *test == text) else {
                 continue;

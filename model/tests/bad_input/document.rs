@@ -1,4 +1,4 @@
-//! What any file can get wrong, whatever it says: no file, no text, no TOML, unknown keys, numbers that are none.
+//! Tests of faults that any file can have: missing file, no text, no TOML, unknown keys, invalid numbers.
 
 use std::fs;
 use std::path::Path;
@@ -37,13 +37,16 @@ fn text_that_is_no_toml() {
 fn unknown_keys() {
     holds(
         &with_session("bar_mm", "bar_length = 1\nbar_mm"),
-        &["session.toml:11", "test \"C100\" knows no key `bar_length`"],
+        &[
+            "session.toml:11",
+            "test \"C100\" has the unknown key `bar_length`",
+        ],
     );
     holds(
         &with_session("noise_um", "nois_um"),
         &[
             "session.toml:6",
-            "[instrument] knows no key `nois_um`",
+            "[instrument] has the unknown key `nois_um`",
             "did you mean `noise_um`?",
         ],
     );
@@ -53,13 +56,13 @@ fn unknown_keys() {
     );
     holds(
         &with_session("[machine]", "extra = 1\n[machine]"),
-        &["session.toml:1", "the file knows no key `extra`"],
+        &["session.toml:1", "the file has the unknown key `extra`"],
     );
     holds(
         &with_machine("direction = [1, 0, 0]", "directon = [1, 0, 0]"),
         &[
             "machine.toml:8",
-            "knows no key `directon`",
+            "has the unknown key `directon`",
             "did you mean `direction`?",
         ],
     );
@@ -85,7 +88,7 @@ fn numbers_that_are_none() {
     );
     holds(
         &with_machine("[1, 0, 0]", "[0, 0, 0]"),
-        &["machine.toml:8", "has no length"],
+        &["machine.toml:8", "is zero"],
     );
 }
 
@@ -93,7 +96,7 @@ fn numbers_that_are_none() {
 fn spans_count_the_byte_order_mark() {
     let marked = format!("\u{feff}{}", SESSION.replace("100.0", "nan"));
     let fault = session(MACHINE, &marked, Some(DATA)).unwrap_err();
-    let span = fault.place().unwrap().span.clone().unwrap();
+    let span = fault.location().unwrap().span.clone().unwrap();
     assert_eq!(&marked[span], "nan");
 }
 

@@ -1,4 +1,4 @@
-//! Foreign files: encodings, lines above the header, inches; and what must not be lost or misread of them.
+//! Tests of foreign files: encodings, lines above the header, inches; nothing may be lost or misread.
 
 use std::fs;
 
@@ -54,7 +54,7 @@ fn latin_1_and_utf_16_are_read_as_utf_8_is() {
         );
         assert_eq!(read.tests[0].readings.as_ref().unwrap().line, [2, 3, 4]);
     }
-    // A header that is not what the file is said to be written in.
+    // A header in another encoding than the stated one.
     let fault = told(with_bytes(&format!("{COLUMNS}encoding = \"utf-8\""), &latin));
     holds(
         &fault,
@@ -66,7 +66,10 @@ fn latin_1_and_utf_16_are_read_as_utf_8_is() {
     ));
     holds(&fault, &["no column `Länge`", "read as Latin-1", "encoding = "]);
     let fault = told(with_bytes(&format!("{COLUMNS}encoding = \"latin-one\""), &latin));
-    holds(&fault, &["session.toml", "which no encoding is called", "latin1"]);
+    holds(
+        &fault,
+        &["session.toml", "which is not a known encoding", "latin1"],
+    );
 }
 
 #[test]
@@ -123,7 +126,7 @@ fn a_file_without_a_header_keeps_its_first_reading() {
         &told(with_bytes("", rows.as_bytes())),
         &["C100.csv:1", "header = false"],
     );
-    // Names that look like numbers are names where [columns] says so.
+    // Names that look like numbers are names if [columns] says so.
     let numbered = "1,2,3\n0,0,99.9990\n1,90,100.0010\n";
     let columns = "[columns]\ntime_s = \"1\"\nc_deg = \"2\"\nlength_mm = \"3\"\n";
     assert_eq!(
@@ -141,13 +144,13 @@ fn a_column_is_one_column() {
         &fault,
         &[
             "session.toml",
-            "2 columns called `reading`: 2, 3",
-            "number of the one",
+            "2 columns with the name `reading`: 2, 3",
+            "number of one of them",
         ],
     );
     let read = with_bytes(&columns.replace("\"reading\"", "3"), twice.as_bytes()).unwrap();
     assert_eq!(observed(&read), [100.0, 100.0]);
-    // One of theirs cannot be two of ours, by name or by number.
+    // One foreign column cannot be two of ours, by name or by number.
     let one = "t,angle,reading\n0,0,100.0\n1,90,100.1\n";
     for both in [
         "run = \"t\"\ntime_s = \"t\"",
@@ -190,7 +193,7 @@ fn copies_of_rows_are_named_and_are_no_repeats() {
         (read.tests[0].readings.as_ref().unwrap().rows(), read.warnings)
     };
     assert_eq!(copied(DATA), (4, Vec::new()));
-    // With time: each of two rows once more.
+    // With time: each of two rows repeated.
     let mut lines: Vec<&str> = DATA.lines().collect();
     lines.insert(2, lines[1]);
     lines.insert(5, lines[4]);
@@ -204,10 +207,10 @@ fn copies_of_rows_are_named_and_are_no_repeats() {
             "C100.csv",
             "2 rows are copies",
             "line 3, 6",
-            "not taken as repeats",
+            "not treated as repeats",
         ],
     );
-    // Without time: the whole file once more behind itself.
+    // Without time: the whole file repeated after itself.
     let mut timeless = "run,c_deg,length_mm\n".to_string();
     let mut reading = 100.0;
     for run in 1..=2 {
@@ -221,12 +224,12 @@ fn copies_of_rows_are_named_and_are_no_repeats() {
     let (rows, warnings) = copied(&(timeless.clone() + &body));
     assert_eq!((rows, warnings.len()), (16, 1), "{warnings:?}");
     holds(&warnings[0], &["16 rows", "…"]);
-    // Repeats at standing axes, some of which read the same by rounding, stay; so does a closed path that ends as it began.
+    // Repeats at fixed axes, some equal by rounding, are kept; so is a closed path that ends as it began.
     let dwell = "run,c_deg,length_mm\n1,0,100.000\n1,0,100.000\n1,0,100.001\n1,90,100.000\n1,90,100.000\n";
     assert_eq!(copied(dwell), (5, Vec::new()));
     let closed = "run,c_deg,x_mm,length_mm\n1,0,0,100.000\n1,90,0,100.002\n1,0,0,100.000\n";
     assert_eq!(copied(closed), (3, Vec::new()));
-    // A column that nobody reads tells rows apart as well.
+    // A column that is not read distinguishes rows as well.
     let counted = "t,angle,reading,n\n0,0,100.0,1\n0,0,100.0,2\n1,90,100.1,3\n";
     let read = with_bytes(
         "[columns]\ntime_s = \"t\"\nc_deg = \"angle\"\nlength_mm = \"reading\"\n",
@@ -258,13 +261,13 @@ fn notes_of_the_measurement_are_kept_in_order() {
 
 #[test]
 fn the_sign_of_an_axis_is_suggested_as_its_unit_is() {
-    // X carries the ball away from the axis of C: turned the other way, the bar reaches.
+    // X moves the ball away from the axis of C; with the opposite sign the bar fits.
     let with = |column: &str, value: &dyn Fn(f64) -> f64| {
         let mut data = format!("run,{column},x_mm,y_mm,length_mm\n");
         for k in 0..12 {
             let angle = f64::from(k) * 7.0;
             let (sin, cos) = angle.to_radians().sin_cos();
-            // C turns the ball at [0, 100, 0] about Z; the spindle keeps 100 mm in X from it.
+            // C rotates the ball at [0, 100, 0] about Z; the spindle keeps a distance of 100 mm in X.
             let (x, y) = (-100.0 * sin + 100.0, 100.0 * cos);
             data += &format!("1,{},{x},{y},100\n", value(angle));
         }
@@ -274,20 +277,20 @@ fn the_sign_of_an_axis_is_suggested_as_its_unit_is() {
     let fault = told(session(MACHINE, SESSION, Some(&with("c_deg", &|angle| -angle))));
     holds(
         &fault,
-        &["cannot reach", "positions of C were taken with the opposite sign"],
+        &["cannot reach", "positions of C were read with the opposite sign"],
     );
     let fault = told(session(MACHINE, SESSION, Some(&with("c_deg", &f64::to_radians))));
     holds(
         &fault,
         &[
             "cannot reach",
-            "positions of C were taken in radians rather than degrees",
+            "positions of C were read in radians rather than degrees",
         ],
     );
     let inches = with("c_deg", &|angle| angle).replace("x_mm,y_mm", "x_in,y_in");
     let fault = told(session(MACHINE, SESSION, Some(&inches)));
     holds(
         &fault,
-        &["positions of Y and X were taken in mm rather than inches"],
+        &["positions of Y and X were read in mm rather than inches"],
     );
 }

@@ -1,4 +1,4 @@
-//! Input that somebody made to do harm: names that lead elsewhere, nesting and growth without end, files beyond every limit.
+//! Tests of malicious input: names that lead elsewhere, unlimited nesting and growth, files beyond every limit.
 
 use std::fs;
 use std::path::Path;
@@ -9,7 +9,7 @@ use abbe_model::session::read::{self, ReadOptions};
 
 use super::{DATA, MACHINE, SESSION, holds, session, told, with_data, with_machine, with_session};
 
-/// One test for each input: its name, what is told of it, what that has to hold.
+/// One test per input: its name, the resulting message, and the text that it must contain.
 macro_rules! refused {
     ($($name:ident: $told:expr => [$($part:expr),+ $(,)?])+) => {
         $(#[test]
@@ -20,15 +20,15 @@ macro_rules! refused {
 }
 
 /// A folder with the session in `inner` and its data both in `inner/sub` and outside, beside `inner`.
-struct Place(tempfile::TempDir);
+struct Sandbox(tempfile::TempDir);
 
-impl Place {
-    fn new() -> Place {
-        let place = Place(tempfile::tempdir().unwrap());
-        fs::create_dir_all(place.at("inner/sub")).unwrap();
-        fs::create_dir(place.at("other")).unwrap();
+impl Sandbox {
+    fn new() -> Sandbox {
+        let sandbox = Sandbox(tempfile::tempdir().unwrap());
+        fs::create_dir_all(sandbox.at("inner/sub")).unwrap();
+        fs::create_dir(sandbox.at("other")).unwrap();
         for file in ["inner/machine.toml", "machine.toml"] {
-            fs::write(place.at(file), MACHINE).unwrap();
+            fs::write(sandbox.at(file), MACHINE).unwrap();
         }
         for file in [
             "inner/C100.csv",
@@ -36,9 +36,9 @@ impl Place {
             "other/C100.csv",
             "C100.csv",
         ] {
-            fs::write(place.at(file), DATA).unwrap();
+            fs::write(sandbox.at(file), DATA).unwrap();
         }
-        place
+        sandbox
     }
 
     fn at(&self, name: &str) -> std::path::PathBuf {
@@ -69,45 +69,45 @@ impl Place {
 }
 
 fn data_at(name: &str) -> String {
-    told(Place::new().data(name))
+    told(Sandbox::new().data(name))
 }
 
 fn machine_at(name: &str) -> String {
-    told(Place::new().machine(name))
+    told(Sandbox::new().machine(name))
 }
 
-const OUTSIDE: &str = "leads out of the session's folder, to ";
+const OUTSIDE: &str = "is outside the session's folder: ";
 
 refused! {
-    data_above: data_at("../C100.csv") => ["session.toml:10", "`data = \"../C100.csv\"`", OUTSIDE, "--allow-outside"]
+    data_above: data_at("../C100.csv") => ["session.toml:10", "`data = \"../C100.csv\"`", OUTSIDE, "allow files outside"]
     data_above_by_a_detour: data_at("sub/../../C100.csv") => ["session.toml:10", OUTSIDE]
     data_in_another_branch: data_at("../other/C100.csv") => ["session.toml:10", OUTSIDE, "other"]
-    data_that_are_not_there_above: data_at("../nowhere.csv") => ["session.toml:10", "`../nowhere.csv` is not there"]
+    data_that_are_not_there_above: data_at("../nowhere.csv") => ["session.toml:10", "`../nowhere.csv` does not exist"]
     data_that_are_a_folder: data_at("sub") => ["sub:0", "it is a folder"]
     data_without_a_name: data_at("") => ["it is a folder"]
     data_with_a_nul: data_at("a\\u0000b") => ["session.toml:10", "control character U+0000"]
     a_machine_above: machine_at("../machine.toml") => ["session.toml:2", "`file = \"../machine.toml\"`", OUTSIDE]
-    a_machine_that_is_a_folder: machine_at("sub") => ["this is a folder; the machine file is a file"]
+    a_machine_that_is_a_folder: machine_at("sub") => ["this is a folder; the machine file must be a file"]
     a_machine_that_is_data: machine_at("C100.csv") => ["C100.csv:1", "not valid TOML"]
 }
 
 #[test]
 fn an_absolute_name_outside() {
-    let place = Place::new();
-    let outside = place.absolute("C100.csv").replace('\\', "/");
+    let sandbox = Sandbox::new();
+    let outside = sandbox.absolute("C100.csv").replace('\\', "/");
     holds(
-        &told(place.data(&outside)),
-        &["session.toml:10", OUTSIDE, "--allow-outside"],
+        &told(sandbox.data(&outside)),
+        &["session.toml:10", OUTSIDE, "allow files outside"],
     );
 }
 
 #[cfg(unix)]
 #[test]
 fn a_symbolic_link_that_leads_out() {
-    let place = Place::new();
-    std::os::unix::fs::symlink(place.at("C100.csv"), place.at("inner/link.csv")).unwrap();
+    let sandbox = Sandbox::new();
+    std::os::unix::fs::symlink(sandbox.at("C100.csv"), sandbox.at("inner/link.csv")).unwrap();
     holds(
-        &told(place.data("link.csv")),
+        &told(sandbox.data("link.csv")),
         &["session.toml:10", "`data = \"link.csv\"`", OUTSIDE],
     );
 }
@@ -115,19 +115,22 @@ fn a_symbolic_link_that_leads_out() {
 #[cfg(unix)]
 #[test]
 fn a_folder_that_is_a_symbolic_link_out() {
-    let place = Place::new();
-    std::os::unix::fs::symlink(place.at("other"), place.at("inner/link")).unwrap();
-    holds(&told(place.data("link/C100.csv")), &["session.toml:10", OUTSIDE]);
+    let sandbox = Sandbox::new();
+    std::os::unix::fs::symlink(sandbox.at("other"), sandbox.at("inner/link")).unwrap();
+    holds(
+        &told(sandbox.data("link/C100.csv")),
+        &["session.toml:10", OUTSIDE],
+    );
 }
 
 #[cfg(unix)]
 #[test]
 fn a_symbolic_link_that_leads_in_a_circle() {
-    let place = Place::new();
-    std::os::unix::fs::symlink(place.at("inner/loop.csv"), place.at("inner/loop.csv")).unwrap();
+    let sandbox = Sandbox::new();
+    std::os::unix::fs::symlink(sandbox.at("inner/loop.csv"), sandbox.at("inner/loop.csv")).unwrap();
     holds(
-        &told(place.data("loop.csv")),
-        &["session.toml:10", "`loop.csv` is not there"],
+        &told(sandbox.data("loop.csv")),
+        &["session.toml:10", "`loop.csv` does not exist"],
     );
 }
 
@@ -135,32 +138,32 @@ fn a_symbolic_link_that_leads_in_a_circle() {
 #[test]
 fn a_device() {
     holds(&data_at("/dev/zero"), &["session.toml:10", OUTSIDE]);
-    let place = Place::new();
+    let sandbox = Sandbox::new();
     let options = ReadOptions {
         allow_outside: true,
         ..ReadOptions::default()
     };
-    let endless = place.read("\"C100.csv\"", "\"/dev/zero\"", &options);
+    let endless = sandbox.read("\"C100.csv\"", "\"/dev/zero\"", &options);
     holds(&told(endless), &["zero:1", "a line of more than 1048576 bytes"]);
 }
 
 #[test]
 fn above_the_data_directory_is_outside_too() {
-    let place = Place::new();
+    let sandbox = Sandbox::new();
     let options = ReadOptions {
-        data_directory: Some(place.at("other")),
+        data_directory: Some(sandbox.at("other")),
         ..ReadOptions::default()
     };
     holds(
-        &told(place.read("\"C100.csv\"", "\"../C100.csv\"", &options)),
+        &told(sandbox.read("\"C100.csv\"", "\"../C100.csv\"", &options)),
         &["session.toml:10", OUTSIDE],
     );
 }
 
 #[test]
 fn what_lies_inside_is_read_by_whatever_name() {
-    let place = Place::new();
-    let inside = place.absolute("inner/sub/C100.csv").replace('\\', "/");
+    let sandbox = Sandbox::new();
+    let inside = sandbox.absolute("inner/sub/C100.csv").replace('\\', "/");
     for name in [
         "C100.csv",
         "./C100.csv",
@@ -169,24 +172,24 @@ fn what_lies_inside_is_read_by_whatever_name() {
         "../inner/C100.csv",
         &inside,
     ] {
-        assert!(place.data(name).is_ok(), "{name}");
+        assert!(sandbox.data(name).is_ok(), "{name}");
     }
     #[cfg(unix)]
     {
-        std::os::unix::fs::symlink("sub/C100.csv", place.at("inner/link.csv")).unwrap();
-        assert!(place.data("link.csv").is_ok());
+        std::os::unix::fs::symlink("sub/C100.csv", sandbox.at("inner/link.csv")).unwrap();
+        assert!(sandbox.data("link.csv").is_ok());
     }
     let elsewhere = ReadOptions {
-        data_directory: Some(place.at("other")),
+        data_directory: Some(sandbox.at("other")),
         ..ReadOptions::default()
     };
-    fs::remove_file(place.at("inner/C100.csv")).unwrap();
-    assert!(place.read("kind", "kind", &elsewhere).is_ok());
+    fs::remove_file(sandbox.at("inner/C100.csv")).unwrap();
+    assert!(sandbox.read("kind", "kind", &elsewhere).is_ok());
     let trusted = ReadOptions {
         allow_outside: true,
         ..ReadOptions::default()
     };
-    assert!(place.read("\"C100.csv\"", "\"../C100.csv\"", &trusted).is_ok());
+    assert!(sandbox.read("\"C100.csv\"", "\"../C100.csv\"", &trusted).is_ok());
 }
 
 fn ball(expression: &str) -> String {
@@ -198,42 +201,42 @@ fn nested(open: &str, close: &str, times: usize) -> String {
 }
 
 refused! {
-    lists_nested_without_end: told(session(MACHINE, &format!("x = {}", nested("[", "]", 100_000)), None)) => ["session.toml:1", "not valid TOML", "recursion", "80 levels deep at most"]
-    tables_nested_without_end: told(session(MACHINE, &format!("x = {}", nested("{a=", "}", 100_000)), None)) => ["session.toml:1", "not valid TOML", "recursion", "80 levels deep at most"]
-    keys_of_many_parts: told(session(MACHINE, &format!("a{} = 1", ".a".repeat(100_000)), None)) => ["session.toml:1", "not valid TOML", "recursion", "80 levels deep at most"]
-    headers_of_many_parts: told(session(MACHINE, &format!("[a{}]\nx = 1", ".a".repeat(100_000)), None)) => ["session.toml:1", "not valid TOML", "recursion", "80 levels deep at most"]
+    lists_nested_without_end: told(session(MACHINE, &format!("x = {}", nested("[", "]", 100_000)), None)) => ["session.toml:1", "not valid TOML", "recursion", "nested 80 levels deep"]
+    tables_nested_without_end: told(session(MACHINE, &format!("x = {}", nested("{a=", "}", 100_000)), None)) => ["session.toml:1", "not valid TOML", "recursion", "nested 80 levels deep"]
+    keys_of_many_parts: told(session(MACHINE, &format!("a{} = 1", ".a".repeat(100_000)), None)) => ["session.toml:1", "not valid TOML", "recursion", "nested 80 levels deep"]
+    headers_of_many_parts: told(session(MACHINE, &format!("[a{}]\nx = 1", ".a".repeat(100_000)), None)) => ["session.toml:1", "not valid TOML", "recursion", "nested 80 levels deep"]
     a_key_twice: with_session("noise_um = 0.3", "noise_um = 0.3\nnoise_um = 0.4") => ["session.toml:7", "not valid TOML", "duplicate key"]
-    an_expression_beyond_all_length: ball(&"1+".repeat(300)) => ["session.toml:12", "an expression of 600 characters; 400 is the most"]
+    an_expression_beyond_all_length: ball(&"1+".repeat(300)) => ["session.toml:12", "an expression of 600 characters; the limit is 400"]
     parentheses_beyond_all_depth: ball(&nested("(", ")", 60)) => ["session.toml:12", "nested deeper than 40"]
     roots_beyond_all_depth: ball(&nested("sqrt(", ")", 60)) => ["session.toml:12", "nested deeper than 40"]
     signs_beyond_all_depth: ball(&nested("-", "", 60)) => ["session.toml:12", "nested deeper than 40"]
-    squares_that_double_each_time: ball(&nested("(", ")^2", 38)) => ["session.toml:12", "squares of squares"]
-    a_power_that_is_none: ball("2^3") => ["`^` with another power than 2"]
-    a_division_by_zero: ball("1/0") => ["session.toml:12", "comes to inf"]
-    a_root_of_less_than_nothing: ball("sqrt(0-1)") => ["session.toml:12", "comes to NaN"]
+    squares_that_double_each_time: ball(&nested("(", ")^2", 38)) => ["session.toml:12", "too many nested squares"]
+    a_power_that_is_none: ball("2^3") => ["`^` with a power other than 2"]
+    a_division_by_zero: ball("1/0") => ["session.toml:12", "evaluates to inf"]
+    a_root_of_less_than_nothing: ball("sqrt(0-1)") => ["session.toml:12", "evaluates to NaN"]
     an_expression_that_breaks_off: ball("1+") => ["the expression ends where a number or a constant is expected"]
     an_expression_that_goes_on: ball("1 1") => ["`1` where the expression should end"]
     a_call_of_another_function: ball("exec(1)") => ["no constant `exec`"]
-    a_constant_with_the_name_of_the_root: with_session("[[test]]", "[constants]\nsqrt = 1\n[[test]]") => ["a constant cannot be called `sqrt`"]
-    more_constants_than_anybody_names: with_session("[[test]]", &format!("[constants]\n{}\n[[test]]", (0..1200).map(|k| format!("c{k} = 1\n")).collect::<String>())) => ["[constants] has 1200 entries; 1000 are the most"]
-    more_tests_than_anybody_runs: told(session(MACHINE, &format!("{SESSION}{}", "[[test]]\n".repeat(1200)), Some(DATA))) => ["`test` is a list of 1201; 1000 are the most"]
-    more_effects_than_anybody_declares: with_session("[[test]]", &format!("{}\n[[test]]", "[[effect]]\n".repeat(1200))) => ["`effect` is a list of 1200; 1000 are the most"]
-    more_axes_than_any_machine_has: with_machine("w C A b Y X Z t", &format!("w {}b t", (0..80).map(|k| format!("J{k} ")).collect::<String>())) => ["machine.toml:2", "81 bodies; 64 axes are the most"]
-    an_axis_with_a_name_of_other_signs: with_machine("w C A b Y X Z t", "w =cmd() b t") => ["machine.toml:2", "`=cmd()` is no axis name"]
+    a_constant_with_the_name_of_the_root: with_session("[[test]]", "[constants]\nsqrt = 1\n[[test]]") => ["a constant cannot have the name `sqrt`"]
+    more_constants_than_anybody_names: with_session("[[test]]", &format!("[constants]\n{}\n[[test]]", (0..1200).map(|k| format!("c{k} = 1\n")).collect::<String>())) => ["[constants] has 1200 entries; the limit is 1000"]
+    more_tests_than_anybody_runs: told(session(MACHINE, &format!("{SESSION}{}", "[[test]]\n".repeat(1200)), Some(DATA))) => ["`test` is a list of 1201; the limit is 1000"]
+    more_effects_than_anybody_declares: with_session("[[test]]", &format!("{}\n[[test]]", "[[effect]]\n".repeat(1200))) => ["`effect` is a list of 1200; the limit is 1000"]
+    more_axes_than_any_machine_has: with_machine("w C A b Y X Z t", &format!("w {}b t", (0..80).map(|k| format!("J{k} ")).collect::<String>())) => ["machine.toml:2", "81 bodies; the limit is 64 axes"]
+    an_axis_with_a_name_of_other_signs: with_machine("w C A b Y X Z t", "w =cmd() b t") => ["machine.toml:2", "`=cmd()` is not an axis name"]
     a_name_that_steers_the_terminal: with_session("\"C100\"", "\"\\u001b[2J\"") => ["session.toml:9", "control character U+001B"]
     a_name_of_several_lines: with_session("\"C100\"", "\"a\\nb\"") => ["session.toml:9", "control character U+000A"]
     a_name_of_nothing: with_session("\"C100\"", "\"  \"") => ["session.toml:9", "a test without a name"]
-    a_whole_number_of_forty_digits: with_session("noise_um = 0.3", &format!("noise_um = -{}", "9".repeat(40))) => ["session.toml:6", "too large; 1e12 is the most"]
+    a_whole_number_of_forty_digits: with_session("noise_um = 0.3", &format!("noise_um = -{}", "9".repeat(40))) => ["session.toml:6", "too large; the limit is 1e12"]
     a_number_beyond_all_numbers: with_session("noise_um = 0.3", "noise_um = 1e999") => ["session.toml:6", "`noise_um` is infinite"]
     a_list_where_a_number_belongs: with_session("noise_um = 0.3", "noise_um = [0.3]") => ["session.toml:6", "`noise_um` is a list of 1; a number is expected"]
     a_date_where_a_number_belongs: with_session("noise_um = 0.3", "noise_um = 2026-01-01") => ["session.toml:6", "`noise_um` is a date"]
     a_point_of_two_coordinates: with_session("[0, 100, 0]", "[0, 100]") => ["session.toml:12", "a list of 2; a list of three lengths is expected"]
-    a_sweep_of_steps_beyond_count: with_session("data = \"C100.csv\"", "sweep = { axis = \"C\", from_deg = 0, to_deg = 360, step_deg = 1e-9 }") => ["session.toml:10", "1000000 readings is the most"]
-    a_sweep_without_a_step: with_session("data = \"C100.csv\"", "sweep = { axis = \"C\", from_deg = 0, to_deg = 360, step_deg = 0 }") => ["session.toml:10", "`step_deg` has to be above 0"]
-    runs_beyond_count: with_session("data = \"C100.csv\"", "sweep = { axis = \"C\", from_deg = 0, to_deg = 360, step_deg = 1, runs = 1000000 }") => ["session.toml:10", "1000000 readings is the most"]
+    a_sweep_of_steps_beyond_count: with_session("data = \"C100.csv\"", "sweep = { axis = \"C\", from_deg = 0, to_deg = 360, step_deg = 1e-9 }") => ["session.toml:10", "the limit is 1000000 readings"]
+    a_sweep_without_a_step: with_session("data = \"C100.csv\"", "sweep = { axis = \"C\", from_deg = 0, to_deg = 360, step_deg = 0 }") => ["session.toml:10", "`step_deg` must be greater than 0"]
+    runs_beyond_count: with_session("data = \"C100.csv\"", "sweep = { axis = \"C\", from_deg = 0, to_deg = 360, step_deg = 1, runs = 1000000 }") => ["session.toml:10", "the limit is 1000000 readings"]
 }
 
-/// A data file that is not text of today.
+/// Reads a data file of arbitrary bytes.
 fn with_bytes(bytes: &[u8]) -> String {
     let folder = tempfile::tempdir().unwrap();
     let at = |name: &str| folder.path().join(name);
@@ -255,13 +258,13 @@ refused! {
     a_cell_that_is_not_utf8: with_bytes(&DATA.replace("100.0010", "100.0~").bytes().map(|b| if b == b'~' { 0xe4 } else { b }).collect::<Vec<_>>()) => ["C100.csv:3", "column 4", "is not a number"]
     a_cell_with_a_nul: with_data(&DATA.replace("100.0010", "100\0")) => ["C100.csv:3", "column 4", "is not a number"]
     a_cell_with_a_formula: with_data(&DATA.replace("100.0010", "=1+1")) => ["C100.csv:3", "`=1+1` is not a number"]
-    a_quote_without_its_end: with_data(&DATA.replace("100.0010", "\"100.0010")) => ["C100.csv:3", "a quote without its end"]
-    a_run_that_is_no_whole_number: with_data(&DATA.replace("1,1,90", "1,1.5,90")) => ["C100.csv:3", "`1.5` numbers no run"]
+    a_quote_without_its_end: with_data(&DATA.replace("100.0010", "\"100.0010")) => ["C100.csv:3", "a quote is not closed"]
+    a_run_that_is_no_whole_number: with_data(&DATA.replace("1,1,90", "1,1.5,90")) => ["C100.csv:3", "`1.5` is not a run number"]
     a_column_twice: with_data(&DATA.replace("time_s", "run")) => ["C100.csv:1", "`run`"]
     a_cell_too_many: with_data(&DATA.replace("100.0010", "100.0010,7")) => ["C100.csv:3", "5 cells", "4 columns"]
 }
 
-/// A file of that many bytes, all of them NUL, that takes no room.
+/// A sparse file of this number of NUL bytes, which occupies no disk space.
 fn sparse(name: &str, bytes: u64) -> String {
     let folder = tempfile::tempdir().unwrap();
     let at = |name: &str| folder.path().join(name);
@@ -280,8 +283,8 @@ fn sparse(name: &str, bytes: u64) -> String {
 
 refused! {
     a_gigabyte_in_one_line: sparse("C100.csv", 1 << 30) => ["C100.csv:1", "a line of more than 1048576 bytes"]
-    a_table_beyond_the_limit: sparse("C100.csv", (2 << 30) + 1) => ["C100.csv:0", "a data file of 2147483649 bytes; 2147483648 is the most that is read", "split the file"]
-    a_spreadsheet_beyond_the_limit: sparse("C100.xlsx", (64 << 20) + 1) => ["C100.xlsx:0", "a spreadsheet of 67108865 bytes; 67108864 is the most"]
+    a_table_beyond_the_limit: sparse("C100.csv", (2 << 30) + 1) => ["C100.csv:0", "a data file of 2147483649 bytes; the limit is 2147483648", "split the file"]
+    a_spreadsheet_beyond_the_limit: sparse("C100.xlsx", (64 << 20) + 1) => ["C100.xlsx:0", "a spreadsheet of 67108865 bytes; the limit is 67108864"]
     a_ball_bar_file_beyond_the_limit: sparse("C100.b5r", (64 << 20) + 1) => ["C100.b5r:0", "more than 67108864 bytes"]
     a_session_beyond_the_limit: sparse("other.toml", (8 << 20) + 1) => ["other.toml:0", "the session file has more than 8388608 bytes", "readings belong in CSV files"]
 }
@@ -322,7 +325,7 @@ fn nesting_up_to_the_limit_is_read() {
         ))
     };
     holds(&deep(79), &["has no `machine`"]);
-    holds(&deep(81), &["80 levels deep at most"]);
+    holds(&deep(81), &["nested 80 levels deep"]);
 }
 
 fn with_xml(text: &str) -> String {
@@ -336,25 +339,25 @@ fn with_xml(text: &str) -> String {
 }
 
 refused! {
-    elements_nested_without_end: with_xml(&"<a>\n".repeat(100_000)) => ["C.b5r:101", "elements nested deeper than 100"]
-    entities_that_multiply: with_xml("<!DOCTYPE a [<!ENTITY x \"yyyyyyyy\"><!ENTITY z \"&x;&x;&x;&x;\">]><a>&z;</a>") => ["C.b5r:0", "no element READINGS"]
+    elements_nested_without_end: with_xml(&"<a>\n".repeat(100_000)) => ["C.b5r:101", "elements are nested deeper than 100"]
+    entities_that_multiply: with_xml("<!DOCTYPE a [<!ENTITY x \"yyyyyyyy\"><!ENTITY z \"&x;&x;&x;&x;\">]><a>&z;</a>") => ["C.b5r:0", "it has no element READINGS"]
     elements_that_cross: with_xml("<a><b></a></b>") => ["C.b5r:1", "not valid XML"]
     an_element_without_its_end: with_xml("<a>\n<b>") => ["C.b5r:2", "it ends within <b>"]
 }
 
-/// A pipe is read once, as it comes.
+/// A pipe is read once, as a stream.
 #[cfg(unix)]
 #[test]
 fn a_pipe_is_read_as_it_comes() {
-    let place = Place::new();
-    let pipe = place.at("inner/pipe.csv");
+    let sandbox = Sandbox::new();
+    let pipe = sandbox.at("inner/pipe.csv");
     let made = std::process::Command::new("mkfifo").arg(&pipe).status().unwrap();
     assert!(made.success());
     let writer = std::thread::spawn({
         let pipe = pipe.clone();
         move || fs::write(pipe, DATA).unwrap()
     });
-    let session = place.data("pipe.csv").unwrap();
+    let session = sandbox.data("pipe.csv").unwrap();
     writer.join().unwrap();
     assert_eq!(session.tests[0].readings.as_ref().unwrap().rows(), 4);
     let stamp = session.files.iter().find(|stamp| stamp.file == pipe).unwrap();
@@ -363,8 +366,8 @@ fn a_pipe_is_read_as_it_comes() {
 
 #[test]
 fn what_was_read_is_known_to_be_the_same_or_changed() {
-    let place = Place::new();
-    let session = place.data("C100.csv").unwrap();
+    let sandbox = Sandbox::new();
+    let session = sandbox.data("C100.csv").unwrap();
     let names: Vec<_> = session
         .files
         .iter()
@@ -372,17 +375,17 @@ fn what_was_read_is_known_to_be_the_same_or_changed() {
         .collect();
     assert_eq!(names, ["session.toml", "machine.toml", "C100.csv"]);
     assert!(session.files.iter().all(|stamp| stamp.changed().is_none()));
-    fs::write(place.at("inner/C100.csv"), format!("{DATA}4,1,300,100\n")).unwrap();
+    fs::write(sandbox.at("inner/C100.csv"), format!("{DATA}4,1,300,100\n")).unwrap();
     assert_eq!(
         session.files[2].changed().unwrap(),
         "it has changed since it was read"
     );
-    fs::remove_file(place.at("inner/C100.csv")).unwrap();
+    fs::remove_file(sandbox.at("inner/C100.csv")).unwrap();
     assert!(
         session.files[2]
             .changed()
             .unwrap()
-            .starts_with("it is no longer there")
+            .starts_with("it no longer exists")
     );
 }
 

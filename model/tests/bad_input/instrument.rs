@@ -1,4 +1,4 @@
-//! Instruments as a test sets them up.
+//! Tests of instrument set-ups.
 
 use super::{DATA, MACHINE, SESSION, holds, session, told, with_data, with_session, without_tests};
 
@@ -39,10 +39,10 @@ fn a_bar_that_cannot_reach() {
             "session.toml:8",
             "a bar of 100.0000 mm cannot reach",
             "116.619 mm apart",
-            "degrees taken for radians",
+            "degrees read as radians",
         ],
     );
-    // A follows from both balls: turned by degrees read as radians the balls come apart.
+    // A depends on both balls: degrees misread as radians separate the balls.
     let both = SESSION.replace("spindle_ball_mm = [0, 0, 0]", "spindle_ball_mm = [0, 100, 100]");
     let data = radians
         .replace("a_deg", "a_rad")
@@ -79,13 +79,9 @@ at = { x_mm = 45, y_mm = 0, z_mm = 0, a_deg = 0 }
         (
             "radius_mm = 45",
             "radius_mm = 30",
-            "stands 15.000 mm before the artefact's nominal surface",
+            "is 15.000 mm from the artefact's nominal surface",
         ),
-        (
-            "x_mm = 45",
-            "x_mm = 0",
-            "looks past the artefact, or stands on its axis",
-        ),
+        ("x_mm = 45", "x_mm = 0", "misses the artefact, or is on its axis"),
         (
             "stylus_mm = [0, 0, 0]",
             "stylus_mm = [0, 0, 0]\ndirection = [0, 1, 0]\nartefact_axis = [0, 1, 0]",
@@ -94,13 +90,9 @@ at = { x_mm = 45, y_mm = 0, z_mm = 0, a_deg = 0 }
         (
             "stylus_mm = [0, 0, 0]",
             "stylus_mm = [0, 0, 0]\ndirection = [0, 0, 0]",
-            "`direction` has no length",
+            "`direction` is zero",
         ),
-        (
-            "radius_mm = 45",
-            "radius_mm = 0",
-            "a cylinder has a radius above 0",
-        ),
+        ("radius_mm = 45", "radius_mm = 0", "it must be greater than 0"),
         (
             "radius_mm = 45",
             "radius_mm = 45\nbar_mm = 100",
@@ -111,10 +103,10 @@ at = { x_mm = 45, y_mm = 0, z_mm = 0, a_deg = 0 }
         assert!(told.contains(expected), "{to}: {told}");
     }
     let named = session(MACHINE, &probe, Some("c_deg,length_mm\n0,1\n90,2\n"));
-    assert!(told(named).contains("`length_mm`, which is not known"));
+    assert!(told(named).contains("unknown name `length_mm`"));
 }
 
-/// An R-test that cannot be: what is changed in a good one, and what is told.
+/// An invalid R-test: the change in a valid one, and the message.
 #[test]
 fn sensors_that_cannot_read() {
     const TEST: &str = r#"[[test]]
@@ -187,7 +179,7 @@ at = { y_mm = 0, z_mm = 50, a_deg = 0 }
         (
             angles,
             "sensor_directions = [[1, 0, 0], [0, 0, 0], [1, 1, 0.01]]",
-            &["session.toml:14", "`sensor_directions` has no length"],
+            &["session.toml:14", "`sensor_directions` is zero"],
         ),
         (
             angles,
@@ -199,7 +191,7 @@ at = { y_mm = 0, z_mm = 50, a_deg = 0 }
             "",
             &[
                 "C100.csv:1",
-                "column 4 is called `du_um`",
+                "column 4 has the unknown name `du_um`",
                 "needs `dx_um`, `dy_um` and `dz_um`",
             ],
         ),
@@ -218,7 +210,7 @@ at = { y_mm = 0, z_mm = 50, a_deg = 0 }
             &[
                 "session.toml:14",
                 "`offset` is the direction of a bar",
-                "leave it out",
+                "remove it",
             ],
         ),
         (
@@ -236,10 +228,10 @@ at = { y_mm = 0, z_mm = 50, a_deg = 0 }
         (
             "dw_um",
             "dz_um",
-            &["C100.csv:1", "`dz_um`, which is not known", "what they count"][..],
+            &["C100.csv:1", "unknown name `dz_um`", "the sensor values"][..],
         ),
         (",dw_um", ",temperature_c", &["C100.csv:1", "no column `dw_um`"]),
-        ("dv_um", "du_mm", &["C100.csv:1", "tell the same"]),
+        ("dv_um", "du_mm", &["C100.csv:1", "have the same meaning"]),
         (
             "_um",
             "_m",
@@ -256,7 +248,7 @@ at = { y_mm = 0, z_mm = 50, a_deg = 0 }
         &told(session(MACHINE, &on_axis, Some(DATA))),
         &[
             "session.toml:14",
-            "`programmed_feed_mm_min` of a ball that lies on the axis",
+            "`programmed_feed_mm_min` of a ball that lies on its axis of rotation",
             "feed_deg_min",
         ],
     );

@@ -1,4 +1,4 @@
-//! Machines: the chain and its axes.
+//! Tests of machines: the chain and its axes.
 
 use super::{DATA, MACHINE, SESSION, holds, session, told, with_machine};
 

@@ -1,4 +1,4 @@
-//! What a user can get wrong in a session, one test each, by what is read: the message names the file, the line and the way out.
+//! Tests of user errors in a session, one test each. The message names the file, the line and what to do.
 
 mod document;
 mod foreign;
@@ -58,7 +58,7 @@ fn session(machine: &str, session: &str, data: Option<&str>) -> Result<Session, 
     read::session(&folder.path().join("session.toml"), &ReadOptions::default())
 }
 
-/// The session up to its tests.
+/// The session before its tests.
 fn without_tests() -> &'static str {
     &SESSION[..SESSION.find("[[test]]").unwrap()]
 }
@@ -66,10 +66,14 @@ fn without_tests() -> &'static str {
 /// The error as `file:line: message | help`, the file without its folder.
 fn told(result: Result<Session, ModelError>) -> String {
     let fault = result.expect_err("this input is bad");
-    let place = fault.place().expect("a place in a file").clone();
-    let name = place.file.file_name().unwrap().to_string_lossy().into_owned();
-    let message = fault.to_string().replace(&place.to_string(), &name);
-    format!("{name}:{} {message} | {}", place.line, fault.help().unwrap_or(""))
+    let location = fault.location().expect("a location in a file").clone();
+    let name = location.file.file_name().unwrap().to_string_lossy().into_owned();
+    let message = fault.to_string().replace(&location.to_string(), &name);
+    format!(
+        "{name}:{} {message} | {}",
+        location.line,
+        fault.help().unwrap_or("")
+    )
 }
 
 #[track_caller]

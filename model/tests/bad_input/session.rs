@@ -1,4 +1,4 @@
-//! Sessions: the files they name, their tests, unknowns, effects and expressions.
+//! Tests of sessions: their files, tests, estimated errors, effects and expressions.
 
 use super::{DATA, MACHINE, SESSION, holds, session, told, with_session, without_tests};
 
@@ -6,7 +6,7 @@ use super::{DATA, MACHINE, SESSION, holds, session, told, with_session, without_
 fn missing_machine_file() {
     holds(
         &with_session("\"machine.toml\"", "\"engine.toml\""),
-        &["session.toml:2", "the machine file `engine.toml` is not there"],
+        &["session.toml:2", "the machine file `engine.toml` does not exist"],
     );
 }
 
@@ -16,9 +16,9 @@ fn missing_data_file() {
         &told(session(MACHINE, SESSION, None)),
         &[
             "session.toml:10",
-            "the data file `C100.csv` is not there",
+            "the data file `C100.csv` does not exist",
             "looked for",
-            "--data DIR",
+            "state the data folder",
         ],
     );
 }
@@ -28,7 +28,7 @@ fn test_names_twice_and_tests_absent() {
     let twice = SESSION.to_string() + &SESSION[without_tests().len()..];
     holds(
         &told(session(MACHINE, &twice, Some(DATA))),
-        &["session.toml:15", "two tests are called \"C100\""],
+        &["session.toml:15", "two tests have the name \"C100\""],
     );
     holds(
         &told(session(MACHINE, without_tests(), None)),
@@ -40,7 +40,7 @@ fn test_names_twice_and_tests_absent() {
 fn tests_that_do_not_say_how_they_move() {
     holds(
         &with_session("data = \"C100.csv\"\n", ""),
-        &["session.toml:8", "neither data nor a movement"],
+        &["session.toml:8", "neither data nor a motion"],
     );
     let both = SESSION.to_string()
         + "sweep = { axis = \"C\", from_deg = 0, to_deg = 10, step_deg = 1 }\npath = { kind = \"list\" }\n";
@@ -59,7 +59,7 @@ fn unknowns_that_the_machine_cannot_have() {
         )
     };
     holds(&unknown("EX0B"), &["session.toml:9", "has no axis `B`"]);
-    holds(&unknown("error"), &["\"error\" is no error's name"]);
+    holds(&unknown("error"), &["\"error\" is not the name of an error"]);
 }
 
 #[test]
@@ -81,7 +81,7 @@ fn effects_that_the_machine_cannot_have() {
     );
     holds(
         &effect("component = \"EZC\"\nshape = \"harmonics\"\norder = 2"),
-        &["\"harmonics\" is no shape", "did you mean `harmonic`?"],
+        &["\"harmonics\" is not a shape", "did you mean `harmonic`?"],
     );
     holds(
         &effect("component = \"EZC\"\nshape = \"harmonic\""),
@@ -89,7 +89,7 @@ fn effects_that_the_machine_cannot_have() {
     );
     holds(
         &effect("component = \"EXX\"\nshape = \"harmonic\"\norder = 1"),
-        &["cannot follow \"X\"", "rotary"],
+        &["cannot have the driver \"X\"", "rotary"],
     );
     holds(
         &effect("component = \"EXX\"\nshape = \"periodic\"\nperiod_deg = 10"),
@@ -101,7 +101,7 @@ fn effects_that_the_machine_cannot_have() {
     );
     holds(
         &effect("component = \"EZC\"\nshape = \"harmonic\"\norder = 2\ntests = [\"C10\"]"),
-        &["no test is called \"C10\"", "did you mean `C100`?"],
+        &["no test has the name \"C10\"", "did you mean `C100`?"],
     );
 }
 
@@ -126,7 +126,7 @@ fn expressions_over_unknown_constants() {
             &constants.replace("[0, 100, 0]", "[0, \"sqrt(H - R)\", 0]"),
             Some(DATA),
         )),
-        &["comes to NaN"],
+        &["evaluates to NaN"],
     );
     let deep = format!("[0, \"{}R{}\", 0]", "(".repeat(60), ")".repeat(60));
     holds(
@@ -148,6 +148,6 @@ fn expressions_over_unknown_constants() {
             &constants.replace("[0, 100, 0]", &wide),
             Some(DATA),
         )),
-        &["squares of squares"],
+        &["too many nested squares"],
     );
 }

@@ -1,4 +1,4 @@
-//! Tables of readings: columns, cells, lines.
+//! Tests of tables of readings: columns, cells, lines.
 
 use super::{DATA, MACHINE, SESSION, holds, session, told, with_data};
 
@@ -8,7 +8,7 @@ fn unknown_column() {
         &with_data(&DATA.replace("c_deg", "c_degree")),
         &[
             "C100.csv:1",
-            "column 3 is called `c_degree`",
+            "column 3 has the unknown name `c_degree`",
             "did you mean `c_deg`?",
             "[columns]",
         ],
@@ -59,7 +59,7 @@ fn columns_of_other_peoples_files() {
             &with("[columns]\nc_degree = \"angle\"\nlength_mm = 3\n"),
             Some(foreign),
         )),
-        &["knows no column `c_degree`", "did you mean `c_deg`?"],
+        &["has the unknown column `c_degree`", "did you mean `c_deg`?"],
     );
     holds(
         &told(session(
@@ -131,7 +131,7 @@ fn time_running_backwards() {
         &[
             "C100.csv:4",
             "column 1 (`time_s`)",
-            "time runs backwards: 0.5 s after 1 s",
+            "time decreases: 0.5 s after 1 s",
         ],
     );
 }

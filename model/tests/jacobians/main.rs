@@ -1,5 +1,5 @@
-//! Derivatives of the recorded chain against dual numbers and against central differences, over every topology, and against the closed form of the
-//! first order.
+//! Tests of the derivatives of the recorded chain against dual numbers, central differences and the closed form of first order, over
+//! every topology.
 
 mod topologies;
 
@@ -35,7 +35,7 @@ fn tracker(target: [f64; 3]) -> Station<f64> {
     })
 }
 
-/// A stylus in a cylinder so wide that it is met from any place.
+/// A stylus in a cylinder wide enough to be hit from any position.
 fn probe(artefact: [f64; 3], stylus: [f64; 3]) -> Station<f64> {
     Station::Probe(Probe {
         artefact,
@@ -46,7 +46,7 @@ fn probe(artefact: [f64; 3], stylus: [f64; 3]) -> Station<f64> {
     })
 }
 
-/// Sensors that point three ways, far from where the other point is.
+/// Sensors in three directions, far from the other point.
 fn r_test(setting: Setting, workpiece_ball: [f64; 3], spindle_ball: [f64; 3]) -> Station<f64> {
     Station::RTest(RTest {
         setting,
@@ -67,7 +67,7 @@ fn every_station(table: [f64; 3], tool: [f64; 3]) -> [Station<f64>; 5] {
     ]
 }
 
-/// States anywhere in reach.
+/// Random states within reach.
 fn states(machine: &Machine, rows: usize, random: &mut impl Rng) -> Readings {
     let positions = machine.axes.iter().map(|axis| {
         let most = match axis.kind {
@@ -82,7 +82,7 @@ fn states(machine: &Machine, rows: usize, random: &mut impl Rng) -> Readings {
     }
 }
 
-/// A tenth of a millimetre and a tenth of a degree: large enough that second derivatives count.
+/// A tenth of a millimetre and a tenth of a degree: large enough that second derivatives matter.
 fn errors(slots: usize, machine: &Machine, kind: InstrumentKind, random: &mut impl Rng) -> SlotValues {
     let mut values = SlotValues::zero(slots);
     for (slot, value) in values.constant.iter_mut().enumerate() {
@@ -99,7 +99,7 @@ fn is_angle(machine: &Machine, kind: InstrumentKind, slot: usize) -> bool {
     }
 }
 
-/// The worst relative difference between the derivatives of the recorded chain and central differences.
+/// The largest relative difference between the derivatives of the recorded chain and central differences.
 fn worst(machine: &Machine, station: Station<f64>, random: &mut impl Rng) -> f64 {
     let readings = states(machine, 6, random);
     let kind = station.kind();
@@ -143,7 +143,7 @@ fn derivatives_agree_with_central_differences_on_every_topology() {
             for station in every_station(table, tool) {
                 let kind = station.kind();
                 let worst = worst(&machine, station, &mut random);
-                // Differences over 1e-4 rad miss by that squared times the lever: 5 m of a cylinder in place of 300 mm.
+                // Differences over 1e-4 rad deviate by its square times the lever arm: 5 m of a cylinder instead of 300 mm.
                 let most = if kind == InstrumentKind::Probe { 1e-5 } else { 1e-6 };
                 assert!(worst < most, "{} with a {}: {worst:e}", machine.name, kind.word());
                 all = all.max(worst);
@@ -153,12 +153,12 @@ fn derivatives_agree_with_central_differences_on_every_topology() {
     println!("worst relative difference {all:.1e}");
 }
 
-/// The worst difference between the recorded chain and the chain over dual numbers, relative to the largest value or derivative, with errors of 10 mm and
-/// 0.1 rad, some of which differ from row to row, over more rows than are replayed at once.
+/// The largest difference between the recorded chain and the chain over dual numbers, relative to the largest value or derivative. Errors
+/// are 10 mm and 0.1 rad, some of them vary between rows, and the rows exceed one block.
 fn worst_beside_duals(machine: &Machine, station: Station<f64>, random: &mut impl Rng) -> f64 {
     let rows = 131;
     let mut readings = states(machine, rows, random);
-    // An axis that stands still is a constant of the recording.
+    // An axis that does not move is a constant of the recording.
     readings.positions[machine.axes.len() - 1].fill(0.3);
     let kind = station.kind();
     let model = TestModel::new(machine, station.clone(), &readings);
@@ -213,7 +213,7 @@ fn the_recorded_chain_is_the_chain_over_dual_numbers_at_large_errors() {
             for station in every_station(table, tool) {
                 let kind = station.kind();
                 let worst = worst_beside_duals(&machine, station, &mut random);
-                // The normal of a cylinder under 10 mm and 0.1 rad can be far from where it was: cancellation, not another formula.
+                // Under 10 mm and 0.1 rad the normal of a cylinder can change strongly: the cause is cancellation, not another formula.
                 let most = if kind == InstrumentKind::Probe {
                     1e-9
                 } else {

@@ -1,11 +1,11 @@
-//! Machines of every kind of chain, with random lines of their axes and random errors.
+//! Machines of every topology, with random axis lines and random errors.
 
 use abbe_model::axis::{Axis, AxisKind};
 use abbe_model::chain::Machine;
 use abbe_model::frames::Rotation;
 use rand::{Rng, RngExt};
 
-/// Table 1.1 of the thesis, as it must read: the print doubles the `A` of [wXYbZBAt] and of [wXYbZCAt], and the `B` of [wXYbZCBt].
+/// Table 1.1 of the thesis, corrected: the print doubles the `A` of [wXYbZBAt] and of [wXYbZCAt], and the `B` of [wXYbZCBt].
 pub const TABLE_1_1: [&str; 10] = [
     "[wXYbZABt]",
     "[wXYbZBAt]",
@@ -22,7 +22,8 @@ pub const TABLE_1_1: [&str; 10] = [
 /// The machines of Fig. 1.1.
 pub const FIGURE_1_1: [&str; 3] = ["[wXbYZCBt]", "[wCXbYZAt]", "[wCAYbXZt]"];
 
-/// One machine of each topology: the ten, the three, the one of the thesis, a robot; with axes that lie anywhere near their nominal line.
+/// One machine of each topology: the ten of the table, the three of the figure, the one of the thesis, and a robot. The axes are near
+/// their nominal lines.
 pub fn all(random: &mut impl Rng) -> Vec<Machine> {
     let codes = TABLE_1_1.iter().chain(&FIGURE_1_1).chain(&["[wCAbYXZt]"]);
     let mut machines: Vec<Machine> = codes.map(|code| Machine::from_code(code).unwrap()).collect();
@@ -35,7 +36,7 @@ pub fn all(random: &mut impl Rng) -> Vec<Machine> {
             if axis.kind == AxisKind::Rotary {
                 axis.origin_mm = [(); 3].map(|()| uniform(random, 200.0));
             }
-            // Half of the axes along R's own directions, either way; half askew.
+            // Half of the axes along R's own directions, either way; half oblique.
             if random.random::<bool>() {
                 let skew: [f64; 3] = std::array::from_fn(|i| axis.direction[i] + uniform(random, 0.3));
                 let length = skew.iter().map(|v| v * v).sum::<f64>().sqrt();
@@ -48,7 +49,7 @@ pub fn all(random: &mut impl Rng) -> Vec<Machine> {
     machines
 }
 
-/// Six rotary axes, named freely.
+/// Six rotary axes with free names.
 pub fn robot() -> Machine {
     let lines = [
         ([0.0, 0.0, 1.0], [0.0, 0.0, 0.0]),
@@ -77,7 +78,7 @@ pub fn robot() -> Machine {
     }
 }
 
-/// Between −`most` and `most`.
+/// A random number between −`most` and `most`.
 pub fn uniform(random: &mut impl Rng, most: f64) -> f64 {
     most * (2.0 * random.random::<f64>() - 1.0)
 }

@@ -1,4 +1,4 @@
-//! Points pushed through random chains.
+//! Properties of points transformed through random chains.
 
 use abbe_model::axis::AxisKind;
 use abbe_model::component::ErrorKind;
@@ -21,8 +21,9 @@ fn apart(a: [f64; 3], b: [f64; 3]) -> f64 {
     (0..3).map(|i| (a[i] - b[i]).powi(2)).sum::<f64>().sqrt()
 }
 
-/// What a gap of second order may be with errors of `factor` times the drawn ones, and what is left of it once four times that of half the errors is
-/// taken away: with Θ the sum of all error angles and L the longest way from the bed to a point, Θ²·L and Θ³·L, mm.
+/// Bounds of second-order gaps, mm. The first is for errors of `factor` times the random ones; the second is for the remainder after four
+/// times the gap of half the errors is subtracted. With Θ the sum of all error angles and L the longest distance from the bed to a point,
+/// they are Θ²·L and Θ³·L.
 fn second_and_third_order(drawn: &Drawn, factor: f64) -> (f64, f64) {
     let angles = drawn.errors.iter().enumerate();
     let sum: f64 = angles
@@ -42,7 +43,7 @@ fn second_and_third_order(drawn: &Drawn, factor: f64) -> (f64, f64) {
 
 const ROUNDING_MM: f64 = 1e-10;
 
-/// The chain once more, of nalgebra's rigid motions: no point is pushed, bodies are multiplied.
+/// The chain computed with nalgebra's rigid motions: bodies are multiplied instead of transforming points.
 fn rigid(drawn: &Drawn, axes: &[usize]) -> Isometry3<f64> {
     let turn = |six: &[f64]| {
         let about = |i: usize, angle: f64| Rotation3::from_axis_angle(&Vector3::ith_axis(i), angle);
@@ -91,7 +92,7 @@ proptest! {
 
     #[test]
     fn an_axis_that_is_elsewhere_errs_along_itself(drawn in machines(), table in point(), tool in point(), late in 1e-7..1e-6_f64) {
-        // Error motions in the shares of `slots_along` and a position that is off by as much: the same to first order.
+        // Error motions in the proportions of `slots_along` equal an offset of the position, to first order.
         let drawn = drawn.with(Rotation::Exact);
         let nothing = vec![0.0; drawn.errors.len()];
         for axis in 0..drawn.machine.axes.len() {
@@ -123,7 +124,7 @@ proptest! {
         }
     }
 
-    /// `I − [θ]×` undoes `I + [θ]×` to second order: half the errors, a quarter of the gap.
+    /// `I − [θ]×` is the inverse of `I + [θ]×` to second order: half the errors give a quarter of the gap.
     #[test]
     fn frames_of_small_angles_invert_to_second_order(drawn in machines(), table in point()) {
         let drawn = drawn.with(Rotation::SmallAngle);
@@ -165,14 +166,14 @@ proptest! {
         }
     }
 
-    /// A power of two is exact in every step, so that the results must be the same to the bit.
+    /// A power of two is exact in every step, so that the results are equal to the bit.
     #[test]
     fn lengths_scale(drawn in machines(), table in point(), tool in point(), power in -20_i32..20) {
         let factor = 2.0_f64.powi(power);
         let of = |lengths: [f64; 3]| lengths.map(|length| factor * length);
         let scaled = both(&drawn.scaled(factor), 1.0, of(table), of(tool));
         prop_assert_eq!(scaled, both(&drawn, 1.0, table, tool).map(of));
-        // Inches are no power of two.
+        // The inch factor is not a power of two.
         let inches = |lengths: [f64; 3]| lengths.map(|length| length / 25.4);
         let scaled = both(&drawn.scaled(1.0 / 25.4), 1.0, inches(table), inches(tool));
         for (scaled, plain) in scaled.into_iter().zip(both(&drawn, 1.0, table, tool)) {
@@ -195,7 +196,7 @@ proptest! {
         for (found, plain) in found.into_iter().zip(both(&drawn, 1.0, table, tool)) {
             prop_assert!(apart(found, mirror(plain)) < 1e-10, "{found:?} {plain:?}");
         }
-        // A weight turns an axis the same way in the mirror: both the moment and the axis change hands.
+        // The moment about a rotary axis is unchanged in the mirror image, because the moment and the axis both change sign.
         let tool_in_the_mirror = mirror(tool);
         for index in 0..drawn.machine.axes.len() {
             let moment = drawn.machine.gravity_moment_mm(index, &drawn.state(), tool);

@@ -1,4 +1,5 @@
-//! Random calculations: recorded, folded, differentiated and replayed, they are what plain numbers and dual numbers say.
+//! Properties of random calculations: recorded, folded, differentiated and evaluated over columns, they agree with plain and dual
+//! numbers.
 
 use abbe_model::expression::{Arena, Operand, Symbol};
 use abbe_model::replay::Replay;
@@ -9,17 +10,17 @@ use proptest::prelude::*;
 
 use super::machines::cases;
 
-/// Numbers that folding treats each in its own way.
+/// Numbers that folding treats differently.
 const CONSTANTS: [f64; 8] = [0.0, 1.0, -1.0, 2.0, 0.5, -0.25, 3.0, 0.7];
 const VARIABLES: usize = 3;
 const ROWS: usize = 300;
 
-/// Operations one after another, each on two of the places before it: constants, variables, what was computed.
+/// A sequence of operations, each on two earlier values: constants, variables and results.
 fn calculated<S: Scalar>(operations: &[(u8, u16, u16)], variables: [S; VARIABLES]) -> Vec<S> {
     let mut places: Vec<S> = CONSTANTS.map(S::constant).into();
     places.extend(variables);
     for (operation, a, b) in operations {
-        // Recent places more often than old ones, else nothing grows.
+        // Recent values more often than old ones, so that expressions grow.
         let of = |place: &u16| {
             let near = usize::from(*place) % places.len().min(24);
             places[if place.is_multiple_of(2) {
@@ -29,7 +30,7 @@ fn calculated<S: Scalar>(operations: &[(u8, u16, u16)], variables: [S; VARIABLES
             }]
         };
         let (x, y) = (of(a), of(b));
-        // Nothing grows beyond bounds, and no root or quotient is near its end.
+        // Values stay bounded, and roots and quotients stay away from their singularities.
         let positive = S::constant(1.0) + y * y;
         places.push(match operation % 8 {
             0 => x + y,
@@ -62,7 +63,7 @@ proptest! {
         let by = variables.map(|variable| variable.operand());
         let gradient = arena.gradient(outputs[outputs.len() - 1], &by);
         let all: Vec<Operand> = outputs.iter().copied().chain(gradient).collect();
-        // The first variable differs from row to row, over more than two blocks and no whole number of them.
+        // The first variable varies between rows, over more than two blocks and not a whole number of them.
         let replay = Replay::new(&arena, &all, |number| *number == 0);
         let column: Vec<f64> = (0..ROWS).map(|row| values[0] + 0.01 * row as f64).collect();
         let mut found = vec![vec![f64::NAN; ROWS]; all.len()];
@@ -88,7 +89,7 @@ proptest! {
     fn limits_hold_on_either_side(value in -3.0..3.0_f64, limit in -3.0..3.0_f64) {
         prop_assert_eq!(Nominal::at_most(value, limit), value.min(limit));
         prop_assert_eq!(Nominal::at_least(value, limit), value.max(limit));
-        // Of symbols, which have no least and greatest, they are made of steps.
+        // Symbols have no order, so their minimum and maximum consist of steps.
         let arena = Arena::new();
         let variable: Symbol<'_, ()> = arena.variable(());
         let outputs = [variable.at_most(limit), variable.at_least(limit)].map(|symbol| symbol.operand());

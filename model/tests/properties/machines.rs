@@ -1,6 +1,6 @@
-//! Random machines, states and errors: the strategies that every property test of the workspace draws from.
+//! Random machines, states and errors: the strategies of all property tests of the workspace.
 //!
-//! Axes are drawn one by one, each with where it stands and what is wrong with it, so that a failing machine shrinks axis by axis.
+//! Axes are drawn one by one, each with its position and its errors, so that a failing machine shrinks axis by axis.
 
 #![allow(dead_code)] // each test binary uses what it needs
 
@@ -11,7 +11,7 @@ use proptest::collection::vec;
 use proptest::prelude::*;
 use proptest::test_runner::{Config, RngSeed};
 
-/// Cases of a property, drawn from a fixed seed: the same on every machine and every day.
+/// Number of cases of a property, drawn from a fixed seed: the same on every machine and every day.
 pub fn cases(cases: u32) -> Config {
     Config {
         cases,
@@ -21,7 +21,7 @@ pub fn cases(cases: u32) -> Config {
     }
 }
 
-/// A machine, where its axes stand, and its errors in mm and rad, slot by slot.
+/// A machine, the positions of its axes, and its errors in mm and rad, slot by slot.
 #[derive(Clone, Debug)]
 pub struct Drawn {
     pub machine: Machine,
@@ -36,7 +36,7 @@ impl Drawn {
             .collect()
     }
 
-    /// The errors, made ready, all of them times a factor.
+    /// The prepared errors, multiplied by a factor.
     pub fn bodies(&self, factor: f64) -> Vec<BodyErrors<f64>> {
         let errors = &self.errors;
         self.machine
@@ -49,7 +49,7 @@ impl Drawn {
         other
     }
 
-    /// The same in a unit of length of which `factor` are a millimetre.
+    /// The same with lengths multiplied by `factor`, a change of the length unit.
     pub fn scaled(&self, factor: f64) -> Drawn {
         let mut other = self.clone();
         for axis in &mut other.machine.axes {
@@ -68,8 +68,9 @@ impl Drawn {
         other
     }
 
-    /// As a mirror in the plane across `coordinate` shows it. Lengths along the mirror's normal change sign; turns about the other two
-    /// coordinates do. A turning axis points the other way than its mirror image, since a mirrored right hand is a left one.
+    /// The mirror image in the plane perpendicular to `coordinate`. Translations along the normal change sign, and so do rotations about
+    /// the other two coordinates. The direction of a rotary axis is opposite to its mirror image, because a mirrored right hand is a left
+    /// one.
     pub fn mirrored(&self, coordinate: usize) -> Drawn {
         let mut other = self.clone();
         other.machine = mirrored(&self.machine, coordinate);
@@ -80,7 +81,7 @@ impl Drawn {
     }
 }
 
-/// The sign that a mirror across `coordinate` gives to one of the six freedoms `EX … EC`.
+/// The sign of one of the six degrees of freedom `EX … EC` in a mirror perpendicular to `coordinate`.
 pub fn mirror_sign(freedom: usize, coordinate: usize) -> f64 {
     let along = freedom % 3 == coordinate;
     let turns = freedom >= 3;
@@ -105,12 +106,12 @@ pub fn is_angle(slot: usize) -> bool {
     slot % ERRORS_PER_AXIS % 6 >= 3
 }
 
-/// A point that an instrument may hold, mm.
+/// A random point of an instrument, mm.
 pub fn point() -> impl Strategy<Value = [f64; 3]> {
     [-300.0..300.0, -300.0..300.0, -300.0..300.0]
 }
 
-/// A unit vector: along one of R's coordinates either way, or anywhere.
+/// A unit vector: along one of R's coordinates either way, or in any direction.
 pub fn direction() -> impl Strategy<Value = [f64; 3]> {
     let principal = (0_usize..3, any::<bool>()).prop_map(|(along, back)| {
         let mut unit = [0.0; 3];
@@ -127,7 +128,7 @@ fn norm(v: [f64; 3]) -> f64 {
     v.iter().map(|part| part * part).sum::<f64>().sqrt()
 }
 
-/// An axis with its place in its travel and its errors, both from −1 to 1.
+/// An axis with its position in its travel and its errors, both from −1 to 1.
 fn axis() -> impl Strategy<Value = (Axis, f64, Vec<f64>)> {
     let line = (any::<bool>(), direction(), point());
     (line, -1.0..1.0, vec(-1.0..1.0, ERRORS_PER_AXIS)).prop_map(
@@ -144,7 +145,7 @@ fn axis() -> impl Strategy<Value = (Axis, f64, Vec<f64>)> {
     )
 }
 
-/// Machines of one to six axes with errors of up to 0.1 mm and 2 mrad, which is gross.
+/// Machines of one to six axes with errors of up to 0.1 mm and 2 mrad, which is very large.
 pub fn machines() -> impl Strategy<Value = Drawn> {
     let rotation = prop_oneof![Just(Rotation::Exact), Just(Rotation::SmallAngle)];
     (vec(axis(), 1..=6), any::<prop::sample::Index>(), rotation).prop_map(|(axes, split, rotation)| {

@@ -1,4 +1,4 @@
-//! What holds for every machine, whatever its axes and errors.
+//! Properties that hold for every machine, axes and errors.
 
 mod chain;
 mod expressions;

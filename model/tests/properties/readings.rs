@@ -1,4 +1,4 @@
-//! Readings of random tests and their derivatives.
+//! Properties of readings of random tests and of their derivatives.
 
 use abbe_model::axis::AxisKind;
 use abbe_model::instrument::ballbar::BallBar;
@@ -13,7 +13,7 @@ use proptest::prelude::*;
 
 use super::machines::{Drawn, cases, machines, point};
 
-/// A test of a few rows at random places: all axes move at once.
+/// A test with a few rows at random positions: all axes move simultaneously.
 #[derive(Clone, Debug)]
 struct DrawnTest {
     drawn: Drawn,
@@ -122,7 +122,7 @@ proptest! {
                 prop_assert!((a - b).abs() <= 1e-9 * b.abs().max(1.0), "slot {slot}: {a} {b}");
             }
         }
-        // A stretch of rows is that stretch of all rows.
+        // Derivatives of a range of rows equal that range of the derivatives of all rows.
         let some = model.sensitivities(&test.values, &slots, 1..model.rows());
         let skipped = test.readings.coordinates;
         prop_assert_eq!(&some.readings_mm[..], &one.readings_mm[skipped..]);
@@ -146,7 +146,7 @@ proptest! {
         let slot = slot.index(model.slots());
         let mut with = test.values.clone();
         with.varying.push((slot, vec![0.0; model.rows()]));
-        // What is exactly zero is left out of the chain; carried along, its zero multiplies and is added.
+        // An exact zero is omitted from the chain; if included, it multiplies and adds zeros.
         let mut without = test.values.clone();
         without.constant[slot] = 0.0;
         with.constant[slot] = 0.0;

@@ -1,4 +1,4 @@
-//! Random sessions as files: what is written reads back the same.
+//! Properties of random sessions as files: written sessions read back equal.
 
 use std::fmt::Write as _;
 use std::fs;
@@ -21,7 +21,7 @@ use proptest::prelude::*;
 use super::machines::{Drawn, cases, machines};
 use super::shapes::shapes;
 
-/// A session of a tracker as a person writes it: whatever a machine is, a tracker can look at its tool.
+/// A session of a tracker as a user writes it: a tracker can observe the tool of any machine.
 fn text(machine: &Machine) -> String {
     let mut text = format!(
         "[machine]\nname = \"{}\"\nchain = \"{}\"\nrotation = \"{}\"\n",
@@ -52,7 +52,7 @@ fn read(folder: &Path) -> Result<Session, ModelError> {
     read::session(&folder.join("session.toml"), &ReadOptions::default())
 }
 
-/// Readings with times, runs and whatever positions and coordinates were drawn.
+/// Readings with times, runs, and the random positions and coordinates.
 fn readings(machine: &Machine, rows: &[Vec<f64>]) -> Readings {
     let count = rows.len();
     Readings {
@@ -80,7 +80,7 @@ fn readings(machine: &Machine, rows: &[Vec<f64>]) -> Readings {
     }
 }
 
-/// An effect on any error motion, following any axis.
+/// Effects on any error motion with any axis as driver.
 fn effects() -> impl Strategy<Value = Vec<(usize, usize, usize, Shape, Shape)>> {
     let places = (0_usize..6, 0_usize..6, 0_usize..6);
     let one = (places, shapes(AxisKind::Linear), shapes(AxisKind::Rotary));
@@ -144,7 +144,7 @@ proptest! {
         prop_assert_eq!(back.machine.rotation, machine.rotation);
         for (back, axis) in back.machine.axes.iter().zip(&machine.axes) {
             prop_assert_eq!((&back.name, back.kind, back.origin_mm), (&axis.name, axis.kind, axis.origin_mm));
-            // A direction is given its unit length anew.
+            // Reading normalises a direction again.
             for (back, part) in back.direction.iter().zip(axis.direction) {
                 prop_assert!((back - part).abs() < 1e-15);
             }
@@ -164,7 +164,7 @@ proptest! {
             prop_assert!(found.iter().zip(written).all(|(a, b)| near(*a, *b)));
         }
 
-        // Once more: what was read is written the same, to the byte.
+        // Written again, the result is equal to the byte.
         let first = fs::read(&data).unwrap();
         write::readings(&data, &back.machine, &back.tests[0].station, found).unwrap();
         let again = read(folder.path()).unwrap();
@@ -173,7 +173,7 @@ proptest! {
         prop_assert_eq!(first, fs::read(&data).unwrap());
     }
 
-    /// The unit stands in the column's name: degrees or radians, mm or µm, the same readings come in.
+    /// The unit is part of the column name: degrees or radians, mm or µm give the same readings.
     #[test]
     fn a_column_in_another_unit_is_the_same_column(angles in vec(-360.0..360.0, 4..12), lengths in vec(-1.0..1.0, 12)) {
         let machine = "[machine]\nchain = \"w C b X t\"\n[machine.axis.C]\n[machine.axis.X]\n\n[instrument]\nkind = \"ballbar\"\n\n\

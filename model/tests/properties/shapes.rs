@@ -1,4 +1,4 @@
-//! Random shapes of effects over the position of an axis, in its internal unit.
+//! Properties of random shapes of effects over the position of an axis, in its internal unit.
 
 use abbe_model::axis::AxisKind;
 use abbe_model::effect::{Component, Driver, DriverSample, Effect, Shape};
@@ -7,7 +7,7 @@ use proptest::prelude::*;
 
 use super::machines::cases;
 
-/// Shapes with numbers as files may state them: lengths up to 400 mm, angles up to a turn.
+/// Shapes with parameters as files may state them: lengths up to 400 mm, angles up to a revolution.
 pub fn shapes(kind: AxisKind) -> impl Strategy<Value = Shape> {
     let far = match kind {
         AxisKind::Linear => 400.0,
@@ -78,7 +78,7 @@ proptest! {
         prop_assert_eq!(found.len(), shape.coefficient_names().len());
         prop_assert!(found.iter().all(|value| value.is_finite()), "{shape:?} {found:?}");
         match shape {
-            // Splines share out a unit; a bump and a step lie between nothing and one; cosine and sine on the circle.
+            // B-splines sum to one; a bump and a step are between zero and one; cosine and sine are on the unit circle.
             Shape::Curve { .. } => prop_assert!((found.iter().sum::<f64>() - 1.0).abs() < 1e-12),
             Shape::Local { .. } | Shape::Steps { .. } => {
                 prop_assert!(found.iter().all(|value| (0.0..=1.0).contains(value)));
@@ -94,7 +94,7 @@ proptest! {
         }
     }
 
-    /// What recurs is the same a period further on.
+    /// A periodic shape has the same value one period further on.
     #[test]
     fn what_recurs_recurs(shape in shapes(AxisKind::Rotary), value in -3.0..3.0, turns in -3_i32..=3) {
         let period = match &shape {

@@ -1,7 +1,7 @@
 //! `abbe plan --improve`, `--separate`, `--range`.
 
 use abbe::identify::IdentifyError;
-use abbe::identify::plan::candidate_tests::CandidateTests;
+use abbe::identify::plan::candidate_tests::TestVariations;
 use abbe::identify::plan::criterion::Goal;
 use abbe::identify::plan::improve::{ImproveOptions, Improvement, improve};
 use abbe::identify::plan::range::Shrinkage;
@@ -118,10 +118,10 @@ impl ImproveArguments {
         self.setup_min.is_some() || self.test_min.is_some()
     }
 
-    fn candidate_tests(&self) -> Result<CandidateTests, Failure> {
-        let mut candidates = CandidateTests {
+    fn candidate_tests(&self) -> Result<TestVariations, Failure> {
+        let mut candidates = TestVariations {
             reach_mm: self.reach_mm()?,
-            ..CandidateTests::default()
+            ..TestVariations::default()
         };
         let checked = |flag: &str, list: &[f64], least: f64| match list
             .iter()

@@ -140,7 +140,7 @@ fn csv(found: &Patterns, session: &Session) -> Result<Vec<u8>, Failure> {
             // Rounded to 1e-9 to omit rounding errors of the last digits.
             let shown = |position: f64| (position * 1e9).round() / 1e9 + 0.0;
             let at = axes.iter().zip(&states.positions);
-            cells.extend(at.map(|(axis, column)| shown(axis.kind.outside(column[row])).to_string()));
+            cells.extend(at.map(|(axis, column)| shown(axis.kind.to_display(column[row])).to_string()));
             cells.extend(deviations.iter().map(|deviation| format!("{deviation:.6}")));
             rows.push(cells);
         }

@@ -1,7 +1,7 @@
 //! The first screen of `abbe trace`: verdict and uniqueness, the residual before and after, the effects with their aliases, the next measurement.
 
 use abbe::identify::results::{EffectResult, ModelResult, TraceResult};
-use abbe::identify::trace::Trace;
+use abbe::identify::trace::TraceOutcome;
 use abbe::model::words::counted;
 
 use super::name;
@@ -9,7 +9,7 @@ use crate::cli::screen::{self, Estimates, Step, command};
 use crate::cli::{SessionArguments, fit, plausibility, table, uniqueness};
 
 /// Prints the result of a trace of a session. With `all`, no list is folded.
-pub fn print(trace: &Trace<'_>, session: &SessionArguments, all: bool) {
+pub fn print(trace: &TraceOutcome<'_>, session: &SessionArguments, all: bool) {
     let result = &trace.result;
     verdict(result);
     plausibility::print(&result.plausibility);

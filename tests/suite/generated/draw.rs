@@ -1,4 +1,4 @@
-//! Errors and set-ups that are drawn, and what the plant reads.
+//! Draws errors and set-ups and simulates the readings with the plant.
 
 use abbe::model::session::motion::planned_session;
 use abbe::model::session::{Prior, Session, Test};
@@ -7,20 +7,20 @@ use rand_distr::{Distribution, StandardNormal};
 use rand_pcg::Pcg64;
 
 use super::bar;
-use crate::plant::chain::{Chain, OutOfPlace};
+use crate::plant::chain::{Chain, ChainErrors};
 
 /// Standard deviation of drawn errors, µm and arcsec.
 const ERRORS: f64 = 20.0;
 const ARCSEC: f64 = std::f64::consts::PI / (180.0 * 3600.0);
 
-/// What is drawn of a session, by the names that results use, in µm and arcsec.
+/// The drawn values of a session, by the names of results, in µm and arcsec.
 pub struct Draw {
     pub values: Vec<(String, f64)>,
     pub measured: Session,
 }
 
-/// What the plant has out of place in a test.
-fn out_of_place(plan: &Session, test: &Test, values: &[(String, f64)]) -> OutOfPlace {
+/// The errors of the plant in a test.
+fn out_of_place(plan: &Session, test: &Test, values: &[(String, f64)]) -> ChainErrors {
     let value = |id: String| {
         values
             .iter()
@@ -42,7 +42,7 @@ fn out_of_place(plan: &Session, test: &Test, values: &[(String, f64)]) -> OutOfP
         let [a, b, c] = angles;
         (letter, [x, y, z, a, b, c])
     });
-    OutOfPlace {
+    ChainErrors {
         location: location.collect(),
         workpiece_ball: ball("workpiece_ball", &test.setup),
         spindle_ball: ball("spindle_ball", &test.spindle_setup),
@@ -50,7 +50,7 @@ fn out_of_place(plan: &Session, test: &Test, values: &[(String, f64)]) -> OutOfP
     }
 }
 
-/// Draws errors and set-ups, and lets the plant read; `noise_um` of white noise, rounded to the resolution where there is noise.
+/// Draws errors and set-ups and simulates readings with white noise of `noise_um`, rounded to the resolution unless the noise is zero.
 pub fn draw(code: &str, plan: &Session, seed: u64, noise_um: f64) -> Draw {
     let mut random = Pcg64::seed_from_u64(seed);
     let mut normal = || -> f64 { StandardNormal.sample(&mut random) };

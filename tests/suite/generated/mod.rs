@@ -1,6 +1,6 @@
-//! Plans that `abbe new --from-code` writes: what they describe, and what their fits find in readings of an independent machine.
+//! Plans that `abbe new --from-code` writes: their content, and their fits to readings of the independent simulator.
 //!
-//! Errors and set-ups are drawn here, and the plant makes the readings. The figures in the docs are those of
+//! The tests draw errors and set-ups, and the plant simulates the readings. The figures in the docs are those of
 //!
 //! ```text
 //! ABBE_STUDY=100 cargo test --profile checked --test main generated -- --nocapture --test-threads 1
@@ -23,9 +23,9 @@ use abbe::model::session::{Session, Test};
 use self::draw::draw;
 use super::topologies::{FIGURE_1_1, TABLE_1_1};
 use super::{abbe, text};
-use crate::plant::chain::{Chain, OutOfPlace};
+use crate::plant::chain::{Chain, ChainErrors};
 
-/// Codes that no textbook lists: rotary axes on both sides of any order, linear axes on and behind rotary ones, parallel axes, one rotary axis.
+/// Unusual codes: rotary axes on both sides in any order, linear axes on and behind rotary ones, parallel axes, one rotary axis.
 const MIXED: [&str; 5] = [
     "w B X b Y Z A t",
     "w C A X b Y Z B t",
@@ -34,7 +34,7 @@ const MIXED: [&str; 5] = [
     "w Y A b X Z W C t",
 ];
 
-/// The code with which the defect was found, and codes that lack linear axes.
+/// Further codes, some without some of the linear axes.
 const OTHERS: [&str; 7] = [
     "w b Z X Y C B t",
     "[wCbt]",
@@ -69,7 +69,7 @@ fn bar(test: &Test) -> &BallBar<f64> {
     }
 }
 
-/// Tests that share a set-up place its ball at one point, and know it equally well; the plant finds the bar as long as it is stated throughout.
+/// Asserts that tests with one set-up state one position and one uncertainty of its ball, and that the nominal length of the plant is the stated one.
 fn check_described_once(code: &str, plan: &Session) {
     assert!(plan.warnings.is_empty(), "{code}: {:?}", plan.warnings);
     for (index, test) in plan.tests.iter().enumerate() {
@@ -99,7 +99,7 @@ fn check_described_once(code: &str, plan: &Session) {
             for (axis, still) in still.iter_mut().enumerate() {
                 *still &= readings.positions[axis][row] == readings.positions[axis][0];
             }
-            let none = OutOfPlace::default();
+            let none = ChainErrors::default();
             let length = chain.reading_mm(&position, stated.workpiece_ball, stated.spindle_ball, &none);
             assert!(
                 (length - stated.bar).abs() < 1e-9,
@@ -107,7 +107,7 @@ fn check_described_once(code: &str, plan: &Session) {
                 test.name
             );
         }
-        // What stands still stands where the file says, and every such axis is in it.
+        // Every stationary axis is at the position that the file states.
         let start = plan.text.find(&format!("name = \"{}\"", test.name)).unwrap();
         let of_test = plan.text[start..].split("[[test]]").next().unwrap();
         for (axis, still) in still.into_iter().enumerate() {
@@ -163,20 +163,20 @@ fn one_mount_of_each_ball_serves_a_whole_machine() {
 }
 
 #[test]
-fn where_no_axis_lifts_a_ball_it_is_mounted_again_and_the_plan_says_so() {
+fn a_ball_that_no_axis_moves_is_mounted_again_with_a_comment() {
     let folder = tempfile::tempdir().unwrap();
     for (code, test, along) in [
         ("[wCbt]", "C150", "Z"),
         ("[wCbXYt]", "C150", "Z"),
         ("w C b Z A t", "A150", "X and Y"),
         ("w b Z B t", "B150", "Y"),
-        // A quill that the axis itself carries does not lift a ball along it.
+        // A linear axis that the rotary axis carries does not move a ball along it.
         ("w b X Y C Z t", "C150", "Z"),
     ] {
         let plan = generated(code, folder.path());
-        let said = format!("No linear axis can bring the balls there along {along}:");
+        let comment = format!("No linear axis can bring the balls there along {along}:");
         let start = plan.text.find(&format!("name = \"{test}\"")).unwrap();
-        assert!(plan.text[..start].contains(&said), "{code}\n{}", plan.text);
+        assert!(plan.text[..start].contains(&comment), "{code}\n{}", plan.text);
         let first = &plan.tests[0];
         let again = plan.tests.iter().find(|other| other.name == test).unwrap();
         assert!(
@@ -187,7 +187,7 @@ fn where_no_axis_lifts_a_ball_it_is_mounted_again_and_the_plan_says_so() {
 }
 
 #[test]
-fn a_generated_plan_is_simulated_as_the_plant_reads_it() {
+fn simulate_and_the_plant_agree_on_a_generated_plan() {
     let folder = tempfile::tempdir().unwrap();
     for (number, code) in codes().chain(OTHERS).enumerate() {
         let mut plan = generated(code, folder.path());
@@ -223,7 +223,7 @@ fn a_generated_plan_is_simulated_as_the_plant_reads_it() {
 }
 
 #[test]
-fn the_commands_run_one_after_the_other_on_a_generated_plan() {
+fn plan_simulate_and_fit_run_on_a_generated_plan() {
     let folder = tempfile::tempdir().unwrap();
     let at = |name: &str| folder.path().join(name);
     let code = "w b Z X Y C B t";
@@ -250,9 +250,9 @@ fn the_commands_run_one_after_the_other_on_a_generated_plan() {
     ];
     for arguments in steps {
         let ran = abbe(arguments);
-        let told = String::from_utf8_lossy(&ran.stderr).into_owned();
-        assert!(ran.status.success(), "{arguments:?}: {told}");
-        assert!(!told.contains("warning"), "{arguments:?}: {told}");
+        let stderr = String::from_utf8_lossy(&ran.stderr).into_owned();
+        assert!(ran.status.success(), "{arguments:?}: {stderr}");
+        assert!(!stderr.contains("warning"), "{arguments:?}: {stderr}");
     }
     let fitted: serde_json::Value = serde_json::from_str(&std::fs::read_to_string(json).unwrap()).unwrap();
     for parameter in fitted["parameters"].as_array().unwrap() {
@@ -271,7 +271,7 @@ fn the_commands_run_one_after_the_other_on_a_generated_plan() {
         );
         assert!((value - truth).abs() < 4.5 * u, "{id}: {value} ± {u}");
     }
-    // The data contain where the axes stand, and the ball has not moved.
+    // The data contain the positions of the axes, and the ball has not moved.
     let lifted = std::fs::read_to_string(run.join("C150.csv")).unwrap();
     let header: Vec<&str> = lifted.lines().next().unwrap().split(',').collect();
     let z = header.iter().position(|name| *name == "z_mm").unwrap();

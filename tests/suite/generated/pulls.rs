@@ -1,4 +1,4 @@
-//! Pulls of fitted errors over sessions whose truth is known.
+//! Pulls of fitted errors over simulated sessions.
 
 use abbe::identify::fit::{parameters, prepare};
 use abbe::model::session::Session;
@@ -9,12 +9,12 @@ use statrs::distribution::{ChiSquared, ContinuousCDF, Normal};
 use super::draw::draw;
 use super::{codes, generated};
 
-/// Sessions of each code where `ABBE_STUDY` says nothing else.
+/// Sessions per code without `ABBE_STUDY`.
 const FEW: usize = 3;
-/// Probability below which a mean or a spread of pulls is not attributed to chance: of some 400 figures one in 250 suites.
+/// Significance level for a mean or a standard deviation of pulls: of some 400 figures one exceeds it in 250 suites.
 const MIN_P: f64 = 1e-5;
 
-/// Pulls of every error over sessions: estimate less truth over stated standard uncertainty.
+/// Pulls of every error over sessions: estimate minus truth over stated standard uncertainty.
 fn pulls(code: &str, plan: &Session, seeds: std::ops::Range<u64>) -> Vec<(String, Vec<f64>)> {
     let of_session = |seed: u64| -> Vec<f64> {
         let drawn = draw(code, plan, seed, 0.3);

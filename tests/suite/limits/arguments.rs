@@ -1,4 +1,4 @@
-//! Plans and arguments.
+//! Limits of plans and of command-line arguments.
 
 use std::fs;
 
@@ -44,7 +44,7 @@ fn arguments_at_their_limits() {
         (
             "simulate",
             &["--error", "EX0C=1e300um"],
-            "1e300 is too large; 1e12 is the most",
+            "1e300 is too large; the maximum is 1e12",
         ),
     ] {
         let mut arguments = more.to_vec();
@@ -56,7 +56,7 @@ fn arguments_at_their_limits() {
     }
 }
 
-/// A sweep in steps that no machine can make, and one of more readings than there is memory.
+/// A sweep with steps that are too small for any machine, and a sweep with more readings than memory.
 #[test]
 fn steps_without_end() {
     for step in ["1e-300", "1e-6"] {
@@ -72,16 +72,16 @@ fn steps_without_end() {
             &["--no-effects"],
             &[
                 "session.toml:16",
-                "1000000 readings is the most",
-                "take a larger step",
+                "the limit is 1000000 readings",
+                "use a larger step",
             ],
         );
     }
 }
 
-/// A smallest number given is a smallest number simulated: the same readings as without.
+/// A denormal error gives the same readings as none.
 #[test]
-fn an_error_of_the_smallest_number() {
+fn a_denormal_error() {
     let folder = plan();
     let session = folder.path().join("session.toml");
     let simulated = |name: &str, more: &[&str]| {

@@ -1,4 +1,4 @@
-//! Maps of the volumetric error, and files of errors: what people write for them at its limits.
+//! Limits of maps of the volumetric error and of files of errors.
 
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -8,9 +8,9 @@ use tempfile::TempDir;
 
 use super::super::{abbe, ready, text};
 
-/// What `abbe volumetric --map` says about what it refuses; no map is left behind.
+/// The message of `abbe volumetric --map` for refused input. No map is written.
 #[track_caller]
-fn told(folder: &TempDir, functions: &Path, more: &[&str]) -> String {
+fn message_of(folder: &TempDir, functions: &Path, more: &[&str]) -> String {
     let (machine, map) = (ready("volumetric/machine.toml"), folder.path().join("map.csv"));
     let base = [
         "volumetric",
@@ -21,13 +21,13 @@ fn told(folder: &TempDir, functions: &Path, more: &[&str]) -> String {
         text(functions),
     ];
     let output = abbe(&[&base[..], more].concat());
-    let told = String::from_utf8(output.stderr).unwrap();
-    assert_eq!(output.status.code(), Some(1), "{told}");
+    let stderr = String::from_utf8(output.stderr).unwrap();
+    assert_eq!(output.status.code(), Some(1), "{stderr}");
     assert!(!map.exists());
-    told
+    stderr
 }
 
-/// What `abbe simulate --errors` comes to with a file, and the folder that it was asked to write.
+/// The output of `abbe simulate --errors` with a file, and its output folder.
 fn simulated(folder: &TempDir, errors: &Path) -> (Output, PathBuf) {
     let (plan, out) = (ready("hermle-c600u/chapter5.toml"), folder.path().join("out"));
     let output = abbe(&[
@@ -42,35 +42,39 @@ fn simulated(folder: &TempDir, errors: &Path) -> (Output, PathBuf) {
 }
 
 #[test]
-fn error_functions_beyond_all_numbers() {
+fn error_functions_beyond_the_largest_value() {
     let folder = tempfile::tempdir().unwrap();
     let file = folder.path().join("errors.toml");
     for (error, form, message) in [
         (
             "EXX",
             "polynomial = { um = [1e300] }",
-            "1e300, which is too large; 1e12 is the most",
+            "1e300, which is too large; the limit is 1e12",
         ),
         (
             "EXX",
             "table = { at_mm = [-1e308, 1e308], um = [0, 1] }",
-            "-1e308, which is too large; 1e12 is the most",
+            "-1e308, which is too large; the limit is 1e12",
         ),
         (
             "EXC",
             "harmonic = { order = 1e300, amplitude_um = 1 }",
-            "1e300, which is too large; 1e12 is the most",
+            "1e300, which is too large; the limit is 1e12",
         ),
-        ("EXX", "polynomial = { um = [nan] }", "`NaN` is no finite number"),
+        (
+            "EXX",
+            "polynomial = { um = [nan] }",
+            "`NaN` is not a finite number",
+        ),
         (
             "EXX",
             "polynomial = { scale_mm = 1e-300, um = [0, 1, 1] }",
-            "the errors move the tool by inf mm at C -180.000, A -115.000, Y -250.000, X -300.000, Z -250.000",
+            "the errors displace the tool by inf mm at C -180.000, A -115.000, Y -250.000, X -300.000, Z -250.000",
         ),
     ] {
         fs::write(&file, format!("[[function]]\nerror = \"{error}\"\n{form}\n")).unwrap();
-        let told = told(&folder, &file, &[]);
-        assert!(told.contains(message), "{told}");
+        let stderr = message_of(&folder, &file, &[]);
+        assert!(stderr.contains(message), "{stderr}");
     }
 }
 
@@ -89,16 +93,16 @@ fn arguments_of_a_map() {
         (["--axis", "A=inf"], "--axis A=inf: 1e12 is the most"),
         (["--axis", "A=nan"], "write where the axis stands"),
         (["--tool-mm", "1e300,0,0"], "three numbers of 1e12 at most"),
-        (["--places", "100"], "at least one and at most 1000000 places"),
+        (["--places", "100"], "a map needs 1 to 1000000 points"),
     ] {
-        let told = told(&folder, &ready, &more);
-        assert!(told.contains(message), "{told}");
+        let stderr = message_of(&folder, &ready, &more);
+        assert!(stderr.contains(message), "{stderr}");
     }
 }
 
-/// Files that the command line names are read with the limits of a session: whole or not at all, and never without end.
+/// Files that the command line names have the limits of a session: they are read completely or refused, and reading always ends.
 #[test]
-fn files_of_errors_that_are_none() {
+fn invalid_files_of_errors() {
     let folder = tempfile::tempdir().unwrap();
     let large = folder.path().join("large.toml");
     fs::write(&large, " ".repeat((8 << 20) + 1)).unwrap();
@@ -113,26 +117,26 @@ fn files_of_errors_that_are_none() {
         String::from_utf8(output.stderr).unwrap()
     };
     for (file, message) in [
-        (
-            large.as_path(),
-            "has more than 8388608 bytes, the most that is read",
-        ),
+        (large.as_path(), "has more than 8388608 bytes, which is the limit"),
         (latin.as_path(), "byte 11 is not UTF-8"),
         (folder.path(), "this is a folder"),
         (Path::new("/dev/zero"), "has more than 8388608 bytes"),
     ] {
-        for told in [refused(file), told(&folder, file, &[])] {
-            assert!(told.contains(message) && told.contains(text(file)), "{told}");
+        for stderr in [refused(file), message_of(&folder, file, &[])] {
+            assert!(
+                stderr.contains(message) && stderr.contains(text(file)),
+                "{stderr}"
+            );
         }
     }
-    let told = refused(&long);
+    let stderr = refused(&long);
     assert!(
-        told.contains("`EX0C`: a number with its unit of 300000 bytes; 100 is the most"),
-        "{told}"
+        stderr.contains("`EX0C`: the number with its unit has 300000 bytes; the maximum is 100"),
+        "{stderr}"
     );
 }
 
-/// An editor's byte order mark and line ends change nothing.
+/// A byte order mark and CRLF line ends have no effect.
 #[test]
 fn a_byte_order_mark_before_errors() {
     let folder = tempfile::tempdir().unwrap();
@@ -144,9 +148,9 @@ fn a_byte_order_mark_before_errors() {
         "{}",
         String::from_utf8_lossy(&output.stderr)
     );
-    let told = String::from_utf8(output.stdout).unwrap();
+    let stdout = String::from_utf8(output.stdout).unwrap();
     assert!(
-        told.contains("EX0C") && told.contains("3.0000") && told.contains("-2.0000"),
-        "{told}"
+        stdout.contains("EX0C") && stdout.contains("3.0000") && stdout.contains("-2.0000"),
+        "{stdout}"
     );
 }

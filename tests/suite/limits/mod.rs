@@ -1,13 +1,13 @@
-//! Numbers at their limits: each works, against a closed form, or is refused with its place and its reason.
+//! Numbers at their limits: each agrees with a closed form or is refused with its location and the reason.
 //!
-//! The session is the simplest there is: a bar between the turning table and a spindle ball that stands still. With the axis of C displaced by
-//! `(x, y)` a ball at radius R reads `L = √((x − R·sin C)² + (y + R·cos C)²)`.
+//! The session is the simplest one: a bar between the rotating table and a stationary spindle ball. With the axis of C displaced by `(x, y)` a
+//! ball at radius R reads `L = √((x − R·sin C)² + (y + R·cos C)²)`.
 
 mod arguments;
-mod little_to_see;
 mod map;
 mod noise_and_priors;
 mod numbers;
+mod uninformative_readings;
 
 use std::fs;
 use std::path::Path;
@@ -23,15 +23,15 @@ const MACHINE: &str = "chain = \"w C A b Y X Z t\"\n\n[axis.C]\n[axis.A]\n[axis.
 const X: f64 = 0.010;
 const Y: f64 = -0.020;
 
-/// A session that is changed one thing at a time.
+/// A session whose parts a test changes one at a time.
 struct Case {
     bar_mm: f64,
-    /// What the file says of the noise, if anything.
+    /// The line of the noise in the file, or empty.
     noise: &'static str,
     errors: &'static str,
-    /// More keys of the test.
+    /// Further keys of the test.
     more: &'static str,
-    /// Positions of C in degrees, once a run.
+    /// Positions of C in degrees, once per run.
     angles: Vec<f64>,
     runs: usize,
     /// Added to every reading, mm.
@@ -90,29 +90,29 @@ fn folder(session: &str, data: &str) -> TempDir {
     folder
 }
 
-/// What `abbe` says where it cannot go on.
+/// Asserts that `abbe` refuses with these parts in its message.
 #[track_caller]
 fn refused(folder: &Path, command: &str, more: &[&str], parts: &[&str]) {
     let session = folder.join("session.toml");
     let output = abbe(&[&[command, text(&session)], more].concat());
-    let told = String::from_utf8_lossy(&output.stderr).into_owned();
-    assert_eq!(output.status.code(), Some(1), "{told}");
+    let stderr = String::from_utf8_lossy(&output.stderr).into_owned();
+    assert_eq!(output.status.code(), Some(1), "{stderr}");
     assert!(output.stdout.is_empty(), "a result beside an error");
     for part in parts {
-        assert!(told.contains(part), "`{part}` is not in\n{told}");
+        assert!(stderr.contains(part), "`{part}` is not in\n{stderr}");
     }
 }
 
-/// The result of a fit that works.
+/// The result of a successful fit.
 #[track_caller]
 fn fitted(session: &str, data: &str) -> Value {
     let folder = folder(session, data);
     let (session, json) = (folder.path().join("session.toml"), folder.path().join("fit.json"));
     let output = abbe(&["fit", text(&session), "--json", text(&json)]);
-    let told = String::from_utf8_lossy(&output.stderr).into_owned();
-    assert!(output.status.success(), "{told}");
+    let stderr = String::from_utf8_lossy(&output.stderr).into_owned();
+    assert!(output.status.success(), "{stderr}");
     let mut result: Value = serde_json::from_str(&fs::read_to_string(json).unwrap()).unwrap();
-    result["told"] = told.into();
+    result["stderr"] = stderr.into();
     result
 }
 
@@ -128,7 +128,7 @@ fn found(result: &Value, id: &str) -> (f64, f64) {
     )
 }
 
-/// That the displacement of the axis comes back, µm.
+/// Asserts that the fit finds the displacement of the axis, within µm.
 #[track_caller]
 fn displaced(result: &Value, within_um: f64) {
     for (id, wanted_mm) in [("EX0C", X), ("EY0C", Y)] {

@@ -1,8 +1,8 @@
-//! What is known beforehand: nothing, everything, and what contradicts itself.
+//! Limits of noise and priors: none, exact, and contradictory ones.
 
 use super::{Case, displaced, fitted, found, session_refused, works};
 
-/// A noise of zero says that it is to be found; readings that repeat exactly show none, and what is left is the rounding of a double.
+/// A noise of zero means that it is estimated. Readings that repeat exactly have none, and only the rounding of a double remains.
 #[test]
 fn a_noise_of_zero() {
     for noise in ["noise_um = 0", ""] {
@@ -18,25 +18,25 @@ fn a_noise_of_zero() {
 }
 
 #[test]
-fn a_noise_that_is_no_noise() {
+fn an_invalid_noise() {
     for (noise, message) in [
         (
             "noise_um = 1e-300",
-            "`noise_um` is 1e-300 µm; 1e-6 µm is the least besides 0",
+            "`noise_um` is 1e-300 µm; the least value other than 0 is 1e-6 µm",
         ),
         (
             "noise_um = 5e-324",
-            "`noise_um` is 5e-324 µm; 1e-6 µm is the least besides 0",
+            "`noise_um` is 5e-324 µm; the least value other than 0 is 1e-6 µm",
         ),
         (
             "noise_um = 1e300",
-            "`noise_um` is 1e300, which is too large; 1e12 is the most",
+            "`noise_um` is 1e300, which is too large; the limit is 1e12",
         ),
         ("noise_um = inf", "`noise_um` is infinite"),
         ("noise_um = -0.1", "`noise_um` is -0.1; it cannot be negative"),
         (
             "resolution_um = 1e-300",
-            "`resolution_um` is 1e-300 µm; 1e-6 µm is the least besides 0",
+            "`resolution_um` is 1e-300 µm; the least value other than 0 is 1e-6 µm",
         ),
     ] {
         session_refused(
@@ -49,20 +49,20 @@ fn a_noise_that_is_no_noise() {
     }
 }
 
-/// What repeats scatter by, 0.3 µm alternately up and down by run and place, is held against what the session says.
+/// The scatter of repeats, 0.3 µm of alternating sign by run and position, is compared with the stated noise.
 #[test]
-fn a_noise_that_is_not_that_of_the_repeats() {
+fn a_stated_noise_that_differs_from_that_of_repeats() {
     let session = |noise| Case {
         noise,
         ..Case::default()
     };
-    // Two runs that differ by ±0.3·√2 µm scatter by 0.3 µm.
+    // Two runs that differ by ±0.3·√2 µm have a standard deviation of 0.3 µm.
     let data = |case: &Case| {
         let mut state = 7_u64;
         let mut data = String::from("run,c_deg,length_mm\n");
         for run in 1..=2 {
             for angle in &case.angles {
-                // Knuth's linear congruential generator; its upper bit is as good as a coin.
+                // Linear congruential generator of Knuth; its upper bit is random enough.
                 state = state
                     .wrapping_mul(6_364_136_223_846_793_005)
                     .wrapping_add(1_442_695_040_888_963_407);
@@ -72,7 +72,7 @@ fn a_noise_that_is_not_that_of_the_repeats() {
         }
         data
     };
-    for (noise, told) in [
+    for (noise, warned) in [
         ("noise_um = 3", true),
         ("noise_um = 0.03", true),
         ("noise_um = 0.3", false),
@@ -80,7 +80,7 @@ fn a_noise_that_is_not_that_of_the_repeats() {
     ] {
         let case = session(noise);
         let result = fitted(&case.session(), &data(&case));
-        // The Birge ratio says by how much readings scatter less than is stated as well; nothing is made smaller for it.
+        // The Birge ratio is below 1 if readings scatter less than stated; uncertainties are not reduced.
         if noise == "noise_um = 3" {
             let ratio = result["birge_ratio"].as_f64().unwrap();
             assert!((ratio - 0.1).abs() < 0.005, "{ratio}");
@@ -90,20 +90,24 @@ fn a_noise_that_is_not_that_of_the_repeats() {
         let is_it = |warning: &&serde_json::Value| {
             let warning = warning.as_str().unwrap();
             warning.starts_with("the session states a noise of")
-                && warning.contains("repeated readings scatter by 0.")
+                && warning.contains("the repeatability is 0.")
         };
-        assert_eq!(warnings.iter().any(|w| is_it(&w)), told, "{noise}: {warnings:?}");
         assert_eq!(
-            result["told"]
+            warnings.iter().any(|w| is_it(&w)),
+            warned,
+            "{noise}: {warnings:?}"
+        );
+        assert_eq!(
+            result["stderr"]
                 .as_str()
                 .unwrap()
                 .contains("the session states a noise of"),
-            told
+            warned
         );
     }
 }
 
-/// The least and the greatest that are taken are computed with as well as any other.
+/// The smallest and the largest accepted noise give correct results.
 #[test]
 fn noises_at_their_limits() {
     let least = works(&Case {
@@ -112,7 +116,7 @@ fn noises_at_their_limits() {
     });
     let (_, u) = found(&least, "EX0C");
     assert!((u / (1e-6 * (2.0_f64 / 72.0).sqrt()) - 1.0).abs() < 1e-3, "{u}");
-    // A kilometre of noise hides a millimetre of error: nothing is seen, and that is said.
+    // At a noise of a kilometre an error of a millimetre is not identifiable, and the result says so.
     let case = Case {
         noise: "noise_um = 1e9",
         ..Case::default()
@@ -130,7 +134,7 @@ fn priors_of_zero_and_of_infinity() {
         ..Case::default()
     });
     assert_eq!(known["parameters"].as_array().unwrap().len(), 2);
-    // Known not at all, the mean of 72 readings says how long the bar is.
+    // Without a prior the mean of 72 readings determines the bar length.
     let free = works(&Case {
         more: "bar_u_um = inf",
         longer_mm: 0.05,
@@ -142,7 +146,7 @@ fn priors_of_zero_and_of_infinity() {
 }
 
 #[test]
-fn priors_that_are_none() {
+fn invalid_priors() {
     for (more, message) in [
         (
             "bar_u_um = -1",
@@ -151,11 +155,11 @@ fn priors_that_are_none() {
         ("bar_u_um = nan", "`bar_u_um` is NaN"),
         (
             "bar_u_um = 1e-300",
-            "`bar_u_um` is 1e-300 µm; 1e-6 µm is the least besides 0",
+            "`bar_u_um` is 1e-300 µm; the least value other than 0 is 1e-6 µm",
         ),
         (
             "bar_u_um = 1e300",
-            "`bar_u_um` is 1e300, which is too large; 1e12 is the most",
+            "`bar_u_um` is 1e300, which is too large; the limit is 1e12",
         ),
     ] {
         session_refused(
@@ -168,7 +172,7 @@ fn priors_that_are_none() {
     }
 }
 
-/// A bar known to 0.1 µm that is 50 µm longer: the weighted mean of both statements, and uncertainties enlarged by what they disagree.
+/// A bar with u = 0.1 µm that is 50 µm longer: the weighted mean of both, and uncertainties enlarged by their disagreement.
 #[test]
 fn a_prior_that_the_readings_contradict() {
     let case = Case {
@@ -185,14 +189,14 @@ fn a_prior_that_the_readings_contradict() {
     assert!(result["birge_ratio"].as_f64().unwrap() > 10.0);
     assert_eq!(result["u_enlargement"], result["birge_ratio"]);
     assert!(
-        result["told"]
+        result["stderr"]
             .as_str()
             .unwrap()
             .contains("the residual exceeds the noise")
     );
 }
 
-/// One bar, described twice: it is said, and the tighter statement holds.
+/// Two statements on one bar: a warning, and the tighter statement holds.
 #[test]
 fn priors_that_contradict_each_other() {
     let case = Case {
@@ -206,10 +210,10 @@ fn priors_that_contradict_each_other() {
         .replace("bar_u_um = 1", "bar_u_um = 0.001");
     let result = fitted(&format!("{session}\n{second}"), &case.data());
     displaced(&result, 1e-3);
-    let told = result["told"].as_str().unwrap();
+    let stderr = result["stderr"].as_str().unwrap();
     assert!(
-        told.contains("tests \"C\" and \"D\" share the set-up \"B\" and describe it differently"),
-        "{told}"
+        stderr.contains("tests \"C\" and \"D\" share the set-up \"B\" and describe it differently"),
+        "{stderr}"
     );
     let (_, u) = found(&result, "bar[B]");
     assert!((u - 0.001).abs() < 1e-5, "{u}");

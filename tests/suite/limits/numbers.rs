@@ -1,4 +1,4 @@
-//! Lengths, angles and readings, as small and as large as a double can be.
+//! Lengths, angles and readings at the limits of double precision.
 
 use super::{Case, displaced, fitted, folder, found, refused, session_refused, works};
 
@@ -25,7 +25,7 @@ fn a_bar_of_no_length() {
         &[
             "session.toml:11",
             "reading 1",
-            "the two balls nominally lie in one place",
+            "the two balls nominally coincide",
             "5e-324 mm",
         ],
     );
@@ -40,9 +40,9 @@ fn a_million_turns() {
     });
 }
 
-/// At 10¹² degrees a double knows where it is to 10⁻⁴ degrees; beyond, an angle means nothing.
+/// At 10¹² degrees a double resolves 10⁻⁴ degrees; larger angles are meaningless.
 #[test]
-fn more_turns_than_a_number_can_count() {
+fn more_turns_than_double_precision_resolves() {
     let case = Case::default();
     let data = case.data().replacen("180.0", "1e13", 1);
     refused(
@@ -52,13 +52,13 @@ fn more_turns_than_a_number_can_count() {
         &[
             "C.csv:20",
             "`c_deg`",
-            "`1e13` is infinite or too large; 1e12 is the most",
+            "`1e13` is infinite or too large; the limit is 1e12",
         ],
     );
 }
 
 #[test]
-fn an_angle_of_the_smallest_number() {
+fn a_denormal_angle() {
     let case = Case::default();
     let result = fitted(&case.session(), &case.data().replace("1,0.0,", "1,5e-324,"));
     displaced(&result, 1e-3);
@@ -72,7 +72,7 @@ fn infinite_and_huge_readings() {
         let parts = [
             "C.csv:20",
             "`c_deg`",
-            "is infinite or too large; 1e12 is the most",
+            "is infinite or too large; the limit is 1e12",
         ];
         refused(folder(&case.session(), &data).path(), "fit", &[], &parts);
     }
@@ -85,22 +85,22 @@ fn huge_numbers_in_a_session() {
         (
             "bar_mm = 100.0",
             "bar_mm = 1e300",
-            "`bar_mm` is 1e300, which is too large; 1e12 is the most",
+            "`bar_mm` is 1e300, which is too large; the limit is 1e12",
         ),
         (
             "[0, 100.0, 0]",
             "[0, 1e300, 0]",
-            "is 1e300, which is too large; 1e12 is the most",
+            "is 1e300, which is too large; the limit is 1e12",
         ),
         (
             "[0, 100.0, 0]",
             "[0, \"1e200 * 1e10\", 0]",
-            "which is too large; 1e12 is the most",
+            "which is too large; the limit is 1e12",
         ),
         (
             "data = \"C.csv\"",
             "data = \"C.csv\"\nat = { x_mm = 1e300 }",
-            "`x_mm` is 1e300, which is too large; 1e12 is the most",
+            "`x_mm` is 1e300, which is too large; the limit is 1e12",
         ),
     ] {
         assert!(case.session().contains(from));
@@ -115,7 +115,7 @@ fn huge_numbers_in_a_session() {
 }
 
 #[test]
-fn readings_of_the_smallest_number() {
+fn denormal_readings() {
     let data = "run,c_deg,length_mm\n1,0,5e-324\n1,90,5e-324\n1,180,5e-324\n";
     refused(
         folder(&Case::default().session(), data).path(),

@@ -18,7 +18,7 @@ const NOISES: [Noise; 3] = [
         sigma_um: 0.3,
         coefficient: 0.8,
     },
-    Noise::Wild {
+    Noise::Outliers {
         sigma_um: 0.3,
         share: 0.01,
     },

@@ -1,4 +1,4 @@
-//! An effect laid over the tests: what it moves, and the basis functions that it moves it by.
+//! The basis columns of an effect for the tests of a session: the component it moves, and its basis functions.
 
 use std::collections::HashMap;
 use std::ops::Range;
@@ -10,35 +10,35 @@ use abbe_model::instrument::InternalUnit;
 use super::Columns;
 use crate::drivers;
 
-/// An effect laid over the tests.
+/// The basis columns of an effect in each test.
 #[derive(Clone, Debug)]
-pub struct Layout {
+pub struct EffectColumns {
     /// Number of columns.
     pub count: usize,
-    /// How many numbers of its shape are chosen to fit: each may gain what a column may.
+    /// Number of tuned shape numbers. Each counts as a degree of freedom of the gain.
     pub numbers: usize,
-    /// What it moves in each test: nothing in those in which it does not act.
-    pub(super) parts: Vec<Vec<Part>>,
+    /// The terms of each test. Empty for a test in which the effect does not act.
+    pub(super) terms: Vec<Vec<EffectTerm>>,
 }
 
-impl Layout {
-    /// Whether anything moves in a test.
+impl EffectColumns {
+    /// Whether the effect acts in a test.
     pub(super) fn acts_in(&self, test: usize) -> bool {
-        !self.parts[test].is_empty()
+        !self.terms[test].is_empty()
     }
 
-    /// The greatest absolute value of its basis functions.
+    /// The largest absolute value of its basis functions.
     pub fn greatest(&self) -> f64 {
-        let parts = self.parts.iter().flatten();
-        let factors = |part: &Part| {
-            part.factor
+        let terms = self.terms.iter().flatten();
+        let factors = |term: &EffectTerm| {
+            term.factor
                 .as_ref()
                 .map_or(1.0, |f| f.iter().fold(0.0_f64, |a, b| a.max(b.abs())))
         };
-        parts
-            .map(|part| {
-                factors(part)
-                    * part
+        terms
+            .map(|term| {
+                factors(term)
+                    * term
                         .basis
                         .iter()
                         .flat_map(|basis| basis.iter())
@@ -48,19 +48,19 @@ impl Layout {
     }
 }
 
-/// One thing that an effect moves in a test.
+/// One term of an effect in a test: a target, and the basis functions by which it moves.
 #[derive(Clone, Debug)]
-pub(super) struct Part {
-    pub moves: Moves,
-    /// By how much of the basis functions in each row; 1 where there is none.
+pub(super) struct EffectTerm {
+    pub target: TermTarget,
+    /// Factor of the basis functions in each row; 1 if absent.
     pub factor: Option<Arc<Vec<f64>>>,
-    /// Function by function, one value a row.
+    /// The basis functions, one value per row.
     pub basis: Arc<Vec<Vec<f64>>>,
 }
 
-/// What a part of a layout moves.
+/// The target of a term.
 #[derive(Clone, Copy, Debug)]
-pub(super) enum Moves {
+pub(super) enum TermTarget {
     /// A component, through its sensitivity.
     Slot(usize),
     /// One coordinate of the reading itself.
@@ -68,25 +68,25 @@ pub(super) enum Moves {
 }
 
 impl Columns<'_, '_> {
-    /// Lays an effect over the tests; `None` where the data lack what it follows.
-    pub fn layout(&self, effect: &Effect) -> Option<Layout> {
-        self.lay(effect, true)
+    /// Computes the basis columns of an effect. `None` if the data lack its driver.
+    pub fn effect_columns(&self, effect: &Effect) -> Option<EffectColumns> {
+        self.compute(effect, true)
     }
 
-    /// The same for an effect that is tried once: its basis functions are not kept.
-    pub fn layout_uncached(&self, effect: &Effect) -> Option<Layout> {
-        self.lay(effect, false)
+    /// Computes the basis columns of an effect that is evaluated once: its basis functions are not cached.
+    pub fn effect_columns_uncached(&self, effect: &Effect) -> Option<EffectColumns> {
+        self.compute(effect, false)
     }
 
-    fn lay(&self, effect: &Effect, keep: bool) -> Option<Layout> {
+    fn compute(&self, effect: &Effect, keep: bool) -> Option<EffectColumns> {
         let session = self.problem.session;
-        let mut parts = Vec::new();
+        let mut terms = Vec::new();
         for (number, test) in self.problem.tests.iter().enumerate() {
             let mut of_test = Vec::new();
             if effect.acts_in(&test.name) {
                 let readings = test.readings.as_ref()?;
                 let axis = drivers::component_axis(session, &effect.component);
-                let (follows, samples) = self.followed(number, &effect.driver, axis)?;
+                let (follows, samples) = self.driver_samples(number, &effect.driver, axis)?;
                 let make = || Arc::new(drivers::basis_columns(&effect.shape, &samples));
                 let basis = if keep {
                     cached(
@@ -98,26 +98,26 @@ impl Columns<'_, '_> {
                     make()
                 };
                 for (slot, factor) in drivers::component_slots(session, test, readings, &effect.component) {
-                    if self.place[number].contains_key(&slot) {
-                        of_test.push(Part {
-                            moves: Moves::Slot(slot),
+                    if self.slot_index[number].contains_key(&slot) {
+                        of_test.push(EffectTerm {
+                            target: TermTarget::Slot(slot),
                             factor: factor.map(Arc::new),
                             basis: basis.clone(),
                         });
                     }
                 }
             }
-            parts.push(of_test);
+            terms.push(of_test);
         }
-        Some(Layout {
+        Some(EffectColumns {
             count: effect.shape.coefficients(),
             numbers: effect.shape.numbers(),
-            parts,
+            terms,
         })
     }
 
-    /// What a driver does in a test, and the name that the stores have for it: the moment of gravity is another about each axis.
-    fn followed(
+    /// The samples of a driver in a test, and its key in the caches. The moment of gravity differs from axis to axis.
+    fn driver_samples(
         &self,
         test: usize,
         driver: &Driver,
@@ -135,17 +135,17 @@ impl Columns<'_, '_> {
         Some((name, samples))
     }
 
-    /// Lays a shape over one coordinate of the readings of one test, whatever component would cause it; `by_direction` turns its sign with the
-    /// direction of travel, `rows` confines it. `None` where the data lack what it follows.
-    pub fn reading_layout(
+    /// Places a shape on one coordinate of the readings of one test, without a component. `by_direction` changes its sign with
+    /// the direction of travel. `rows` confines it. `None` if the data lack its driver.
+    pub fn reading_columns(
         &self,
         effect: &Effect,
         test: usize,
         coordinate: usize,
         by_direction: bool,
         rows: Option<&Range<usize>>,
-    ) -> Option<Layout> {
-        let (_, samples) = self.followed(test, &effect.driver, None)?;
+    ) -> Option<EffectColumns> {
+        let (_, samples) = self.driver_samples(test, &effect.driver, None)?;
         let basis = Arc::new(drivers::basis_columns(&effect.shape, &samples));
         let factor = (by_direction || rows.is_some()).then(|| {
             let turned = |sample: &DriverSample<f64>| if by_direction { sample.direction } else { 1.0 };
@@ -153,29 +153,29 @@ impl Columns<'_, '_> {
             let factor = |(row, sample)| if inside(row) { turned(sample) } else { 0.0 };
             Arc::new(samples.iter().enumerate().map(factor).collect())
         });
-        let mut parts = vec![Vec::new(); self.problem.tests.len()];
-        parts[test].push(Part {
-            moves: Moves::Reading(coordinate),
+        let mut terms = vec![Vec::new(); self.problem.tests.len()];
+        terms[test].push(EffectTerm {
+            target: TermTarget::Reading(coordinate),
             factor,
             basis,
         });
-        Some(Layout {
+        Some(EffectColumns {
             count: effect.shape.coefficients(),
             numbers: 0,
-            parts,
+            terms,
         })
     }
 
-    /// A free curve over an axis in each test in which it moves, in the readings themselves, whatever component would cause it; none where the readings are
-    /// too few for that many intervals.
-    pub fn curves_of_tests(&self, driver: &Driver, intervals: usize) -> Vec<(Effect, Layout)> {
+    /// A nonparametric curve over an axis in the readings of each test in which the axis moves, without a component. Tests with
+    /// too few readings for that many intervals have none.
+    pub fn curves_of_tests(&self, driver: &Driver, intervals: usize) -> Vec<(Effect, EffectColumns)> {
         let Driver::Axis(name) = driver else {
             return Vec::new();
         };
         let Some(axis) = self.problem.session.machine.axis_index(name) else {
             return Vec::new();
         };
-        let mut layouts = Vec::new();
+        let mut column_sets = Vec::new();
         for (number, test) in self.problem.tests.iter().enumerate() {
             let Some(readings) = &test.readings else { continue };
             let column = &readings.positions[axis];
@@ -197,51 +197,51 @@ impl Columns<'_, '_> {
                 tests: vec![test.name.clone()],
             };
             for coordinate in 0..self.problem.coordinates() {
-                let layout = self.reading_layout(&effect, number, coordinate, false, None);
-                layouts.extend(layout.map(|layout| (effect.clone(), layout)));
+                let column_set = self.reading_columns(&effect, number, coordinate, false, None);
+                column_sets.extend(column_set.map(|column_set| (effect.clone(), column_set)));
             }
         }
-        layouts
+        column_sets
     }
 
-    /// The greatest coefficient that an effect may plausibly have, in internal units: 0.1 mm and 1 mrad on a machine tool, ten times as much on the
-    /// robots and long chains that trackers and sockets measure.
-    pub fn plausible(&self, effect: &Effect, layout: &Layout) -> f64 {
+    /// The largest plausible coefficient of an effect, in internal units: 0.1 mm and 1 mrad on a machine tool, ten times as much
+    /// on the robots and long chains that trackers and sockets measure.
+    pub fn plausible(&self, effect: &Effect, column_set: &EffectColumns) -> f64 {
         let machine_tool = self.problem.session.instrument.is_two_sided();
         let scale = if machine_tool { 1.0 } else { 10.0 };
         let most = match drivers::component_unit(self.problem.session, &effect.component) {
             Some(InternalUnit::Millimetre) => 0.1 * scale,
             Some(InternalUnit::Radian) => 1e-3 * scale,
             Some(InternalUnit::Ratio) => 0.1,
-            // The factor of a delay is the speed; a tenth of a second is long.
+            // The factor of a delay is the speed. A tenth of a second is a long delay.
             None => return 0.1,
         };
-        let greatest = layout.greatest();
+        let greatest = column_set.greatest();
         if greatest > 0.0 { most / greatest } else { 0.0 }
     }
 }
 
-/// Columns that are made together.
+/// Number of columns that are computed together.
 const CHUNK_COLUMNS: usize = 48;
 
-/// Consecutive layouts whose columns are made together: as many as fit into a chunk, and at least one.
-pub fn chunked(layouts: &[Layout]) -> Vec<Range<usize>> {
+/// Groups consecutive effects whose columns are computed together: as many as fit into a chunk, and at least one.
+pub fn chunked(column_sets: &[EffectColumns]) -> Vec<Range<usize>> {
     let mut chunks = Vec::new();
     let (mut start, mut width) = (0, 0);
-    for (index, layout) in layouts.iter().enumerate() {
-        if width > 0 && width + layout.count > CHUNK_COLUMNS {
+    for (index, column_set) in column_sets.iter().enumerate() {
+        if width > 0 && width + column_set.count > CHUNK_COLUMNS {
             chunks.push(start..index);
             (start, width) = (index, 0);
         }
-        width += layout.count;
+        width += column_set.count;
     }
-    if start < layouts.len() {
-        chunks.push(start..layouts.len());
+    if start < column_sets.len() {
+        chunks.push(start..column_sets.len());
     }
     chunks
 }
 
-/// What a store holds under a key, made and kept if it was not there.
+/// The cached value of a key. Computes and stores it if it is absent.
 fn cached<K: std::hash::Hash + Eq, V: Clone>(
     store: &Mutex<HashMap<K, V>>,
     key: K,
@@ -262,19 +262,19 @@ fn cached<K: std::hash::Hash + Eq, V: Clone>(
 mod tests {
     use super::*;
 
-    /// Chunks are full, and nothing is in two of them or in none: what is made together bounds the memory of a screening.
+    /// Chunks are full, and each effect is in exactly one. The chunk size bounds the memory of a screening.
     #[test]
-    fn chunks_are_as_full_as_they_can_be() {
-        let layouts = |counts: &[usize]| -> Vec<Layout> {
-            let of_count = |&count: &usize| Layout {
+    fn chunks_are_filled_in_order() {
+        let column_sets = |counts: &[usize]| -> Vec<EffectColumns> {
+            let of_count = |&count: &usize| EffectColumns {
                 count,
                 numbers: 0,
-                parts: Vec::new(),
+                terms: Vec::new(),
             };
             counts.iter().map(of_count).collect()
         };
         let ends = |counts: &[usize]| -> Vec<usize> {
-            let chunks = chunked(&layouts(counts));
+            let chunks = chunked(&column_sets(counts));
             let starts: Vec<usize> = chunks.iter().map(|chunk| chunk.start).collect();
             let ends: Vec<usize> = chunks.iter().map(|chunk| chunk.end).collect();
             assert!(
@@ -289,7 +289,7 @@ mod tests {
         assert_eq!(ends(&[2; 24]), [24]);
         assert_eq!(ends(&[2; 25]), [24, 25]);
         assert_eq!(ends(&[1, 47, 1, 46, 2]), [2, 4, 5]);
-        // A curve of many coefficients is one by itself.
+        // A curve with many coefficients is a chunk of its own.
         assert_eq!(ends(&[3, 200, 3, 3]), [1, 2, 4]);
     }
 }

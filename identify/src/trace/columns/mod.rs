@@ -1,9 +1,9 @@
-//! Columns of candidates: sensitivity × basis, whitened as the readings are.
+//! The columns of candidates: sensitivity × basis function, whitened as the readings are.
 //!
-//! The chain is evaluated once, for the sensitivities of every component; hundreds of candidates cost no further kinematics.
+//! The chain is evaluated once for the sensitivities of every component. Hundreds of candidates need no further kinematics.
 
 mod basis;
-mod plain;
+mod unwhitened;
 
 use std::collections::{BTreeSet, HashMap};
 use std::ops::Range;
@@ -16,32 +16,32 @@ use rayon::prelude::*;
 
 use crate::error::IdentifyError;
 use crate::problem::{Block, Problem};
-use basis::Moves;
-pub use basis::{Layout, chunked};
+use basis::TermTarget;
+pub use basis::{EffectColumns, chunked};
 
-/// Readings whose sensitivities are taken at once.
+/// Number of readings per evaluation of sensitivities.
 const ROWS_AT_ONCE: usize = 512;
 
-/// The whitened rows of a problem, by fold, and what is needed to lay any effect over them.
+/// The whitened rows of a problem in fold order, and the data to compute the columns of any effect.
 pub struct Columns<'p, 'a> {
     problem: &'p Problem<'a>,
-    /// By test.
+    /// The sensitivities of each test.
     sensitivities: Vec<Sensitivities>,
-    /// Place of each slot among the sensitivities, by test.
-    place: Vec<HashMap<usize, usize>>,
+    /// Index of each slot among the sensitivities, by test.
+    slot_index: Vec<HashMap<usize, usize>>,
     blocks: Vec<Block>,
     /// The scalar rows of each block that whitening keeps.
     kept: Vec<Vec<usize>>,
-    /// Where each whitened row goes, block after block, so that folds lie together.
+    /// Index of each whitened row, block after block, in fold order.
     target: Vec<usize>,
     /// The rows of each fold.
     pub fold_rows: Vec<Range<usize>>,
-    /// The tests whose readings each fold has.
+    /// The tests in each fold.
     fold_tests: Vec<BTreeSet<usize>>,
     rows: usize,
-    /// What each driver does, by test and name; none where the data have no such column.
+    /// The samples of each driver, by test and name. `None` if the data have no such column.
     samples: Mutex<HashMap<(usize, String), SharedSamples>>,
-    /// The basis functions of each shape over a driver, likewise.
+    /// The basis functions of each shape over a driver, by test and name.
     bases: Mutex<HashMap<(usize, String), SharedColumns>>,
 }
 
@@ -49,16 +49,16 @@ type SharedColumns = Arc<Vec<Vec<f64>>>;
 type SharedSamples = Option<Arc<Vec<DriverSample<f64>>>>;
 
 impl<'p, 'a> Columns<'p, 'a> {
-    /// At the unknowns' values of a fit.
+    /// Computes the sensitivities at the parameter values of a fit.
     pub fn new(problem: &'p Problem<'a>, beta: &[f64]) -> Columns<'p, 'a> {
         let sensitivities = sensitivities(problem, beta);
-        let place = sensitivities
+        let slot_index = sensitivities
             .iter()
             .map(|s| {
                 s.slots
                     .iter()
                     .enumerate()
-                    .map(|(place, slot)| (*slot, place))
+                    .map(|(index, slot)| (*slot, index))
                     .collect()
             })
             .collect();
@@ -86,7 +86,7 @@ impl<'p, 'a> Columns<'p, 'a> {
         Columns {
             problem,
             sensitivities,
-            place,
+            slot_index,
             blocks,
             kept,
             rows: target.len(),
@@ -103,29 +103,29 @@ impl<'p, 'a> Columns<'p, 'a> {
         self.rows
     }
 
-    /// The rows of layouts in one block, in mm, not whitened.
-    fn block_rows(&self, layouts: &[&Layout], block: &Block) -> Mat<f64> {
+    /// The unwhitened columns of effects in one block, mm.
+    fn block_rows(&self, column_sets: &[&EffectColumns], block: &Block) -> Mat<f64> {
         let coordinates = self.problem.coordinates();
-        let total: usize = layouts.iter().map(|layout| layout.count).sum();
+        let total: usize = column_sets.iter().map(|column_set| column_set.count).sum();
         let scalars = block.rows.len() * coordinates;
         let first = block.rows.start;
         let mut raw = Mat::<f64>::zeros(scalars, total);
         let sensitivities = &self.sensitivities[block.test];
         let mut column = 0;
-        for layout in layouts {
-            for part in &layout.parts[block.test] {
-                let derivative = match part.moves {
-                    Moves::Slot(slot) => {
-                        let whole = &sensitivities.derivatives[self.place[block.test][&slot]];
+        for column_set in column_sets {
+            for term in &column_set.terms[block.test] {
+                let derivative = match term.target {
+                    TermTarget::Slot(slot) => {
+                        let whole = &sensitivities.derivatives[self.slot_index[block.test][&slot]];
                         Some(&whole[first * coordinates..first * coordinates + scalars])
                     }
-                    Moves::Reading(_) => None,
+                    TermTarget::Reading(_) => None,
                 };
-                let factor = part.factor.as_ref().map(|factor| &factor[block.rows.clone()]);
-                for k in 0..layout.count {
-                    let basis = &part.basis[k][block.rows.clone()];
+                let factor = term.factor.as_ref().map(|factor| &factor[block.rows.clone()]);
+                for k in 0..column_set.count {
+                    let basis = &term.basis[k][block.rows.clone()];
                     let entries = raw.col_as_slice_mut(column + k);
-                    // One coordinate a reading and no factor is the common case, and the compiler makes vector instructions of it.
+                    // One coordinate per reading without a factor is the common case. The compiler vectorises it.
                     if let (1, Some(derivative), None) = (coordinates, derivative, factor) {
                         let terms = derivative.iter().zip(basis);
                         entries
@@ -137,8 +137,8 @@ impl<'p, 'a> Columns<'p, 'a> {
                     for (row, basis) in basis.iter().enumerate() {
                         let value = factor.map_or(*basis, |factor| basis * factor[row]);
                         let scalars = row * coordinates..(row + 1) * coordinates;
-                        match (derivative, part.moves) {
-                            (None, Moves::Reading(moved)) => entries[scalars.start + moved] += value,
+                        match (derivative, term.target) {
+                            (None, TermTarget::Reading(moved)) => entries[scalars.start + moved] += value,
                             (derivative, _) => {
                                 let derivative = derivative.map_or(&[][..], |whole| &whole[scalars.clone()]);
                                 let terms = entries[scalars].iter_mut().zip(derivative);
@@ -148,14 +148,14 @@ impl<'p, 'a> Columns<'p, 'a> {
                     }
                 }
             }
-            column += layout.count;
+            column += column_set.count;
         }
         raw
     }
 
-    /// The rows of each fold in which any of the layouts moves anything; none of a fold in which none does.
-    pub fn moved_rows(&self, layouts: &[Layout]) -> Vec<Range<usize>> {
-        let moved = |test: &usize| layouts.iter().any(|layout| layout.acts_in(*test));
+    /// For each fold the rows in which any of the effects acts. Empty if none acts in the fold.
+    pub fn moved_rows(&self, column_sets: &[EffectColumns]) -> Vec<Range<usize>> {
+        let moved = |test: &usize| column_sets.iter().any(|column_set| column_set.acts_in(*test));
         let folds = self.fold_rows.iter().zip(&self.fold_tests);
         folds
             .map(|(rows, tests)| {
@@ -168,13 +168,13 @@ impl<'p, 'a> Columns<'p, 'a> {
             .collect()
     }
 
-    /// The stretches of rows of some folds in which any of the layouts moves anything.
+    /// The stretches of rows of some folds in which any of the effects acts.
     pub fn moved_stretches(
         &self,
-        layouts: &[Layout],
+        column_sets: &[EffectColumns],
         folds: impl IntoIterator<Item = usize>,
     ) -> Vec<Range<usize>> {
-        let moved = self.moved_rows(layouts);
+        let moved = self.moved_rows(column_sets);
         let mut stretches: Vec<Range<usize>> = Vec::new();
         for rows in folds
             .into_iter()
@@ -189,17 +189,21 @@ impl<'p, 'a> Columns<'p, 'a> {
         stretches
     }
 
-    /// Fills columns, which are zero before, with the whitened rows of layouts, one after another.
-    pub fn fill(&self, layouts: &[&Layout], mut columns: MatMut<'_, f64>) {
-        let total: usize = layouts.iter().map(|layout| layout.count).sum();
+    /// Fills zero columns with the whitened columns of effects, one after another.
+    pub fn fill(&self, column_sets: &[&EffectColumns], mut columns: MatMut<'_, f64>) {
+        let total: usize = column_sets.iter().map(|column_set| column_set.count).sum();
         let mut start = 0;
         for (block, kept) in self.blocks.iter().zip(&self.kept) {
             let target = &self.target[start..start + kept.len()];
             start += kept.len();
-            if target.is_empty() || !layouts.iter().any(|layout| layout.acts_in(block.test)) {
+            if target.is_empty()
+                || !column_sets
+                    .iter()
+                    .any(|column_set| column_set.acts_in(block.test))
+            {
                 continue;
             }
-            let white = self.problem.whitened(self.block_rows(layouts, block), kept);
+            let white = self.problem.whitened(self.block_rows(column_sets, block), kept);
             let together = target.windows(2).all(|pair| pair[1] == pair[0] + 1);
             for (mut column, white) in columns.as_mut().col_iter_mut().zip(white.col_iter()).take(total) {
                 if together {
@@ -213,7 +217,7 @@ impl<'p, 'a> Columns<'p, 'a> {
         }
     }
 
-    /// Puts whitened rows of `[J | r]` at given values in the same order: rows × (unknowns + 1).
+    /// The whitened rows of `[J | r]` at given parameter values, in fold order: rows × (parameters + 1).
     ///
     /// # Errors
     /// If the model cannot be evaluated.
@@ -234,7 +238,7 @@ impl<'p, 'a> Columns<'p, 'a> {
         Ok(rows)
     }
 
-    /// Places columns that were whitened block by block in the order of the folds.
+    /// Sorts values that are whitened block by block into fold order.
     pub fn placed(&self, values: &[f64]) -> Vec<f64> {
         let mut placed = vec![0.0; self.rows];
         for (value, target) in values.iter().zip(&self.target) {
@@ -243,7 +247,7 @@ impl<'p, 'a> Columns<'p, 'a> {
         placed
     }
 
-    /// The test, row and coordinate of each whitened row, in the order of the folds.
+    /// The test, row and coordinate of each whitened row, in fold order.
     pub fn origin_of_rows(&self) -> Vec<(usize, usize, usize)> {
         let coordinates = self.problem.coordinates();
         let mut origins = vec![(0, 0, 0); self.rows];
@@ -259,7 +263,7 @@ impl<'p, 'a> Columns<'p, 'a> {
     }
 }
 
-/// The sensitivities of every test, in pieces that both short and long tests keep all cores busy with.
+/// The sensitivities of every test, computed in pieces that keep all cores busy with both short and long tests.
 fn sensitivities(problem: &Problem<'_>, beta: &[f64]) -> Vec<Sensitivities> {
     let values = problem.slot_values(beta);
     let pieces: Vec<(usize, Range<usize>)> = problem
@@ -268,7 +272,7 @@ fn sensitivities(problem: &Problem<'_>, beta: &[f64]) -> Vec<Sensitivities> {
         .enumerate()
         .flat_map(|(test, model)| {
             let rows = model.rows();
-            // A test without readings has a piece too: the sensitivities stand in the order of the tests.
+            // A test without readings has a piece too, because the sensitivities are in the order of the tests.
             (0..rows.div_ceil(ROWS_AT_ONCE).max(1))
                 .map(move |k| (test, k * ROWS_AT_ONCE..((k + 1) * ROWS_AT_ONCE).min(rows)))
         })
@@ -304,9 +308,9 @@ mod tests {
     use super::*;
     use crate::fit::prepare;
 
-    /// No file holds a test without readings, but a program may hand one over.
+    /// No file holds a test without readings, but a calling program may supply one.
     #[test]
-    fn sensitivities_stand_beside_their_tests_where_one_has_no_readings() {
+    fn sensitivities_match_their_tests_if_one_has_no_readings() {
         let file =
             Path::new(env!("CARGO_MANIFEST_DIR")).join("../sessions/hermle-c600u/measured/session.toml");
         let mut session = read::session(&file, &ReadOptions::default()).unwrap();

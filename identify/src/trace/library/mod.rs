@@ -1,4 +1,4 @@
-//! The library of effects: data in `library.toml`, laid out for a session here.
+//! The library of effects. Its data are in `library.toml`. This module lists its members for a session.
 
 mod sampling;
 mod shapes;
@@ -15,14 +15,14 @@ use shapes::shapes;
 
 const LIBRARY: &str = include_str!("library.toml");
 
-/// Intervals of the travel between the places where steps are looked for.
+/// Number of intervals of the travel between possible step positions.
 const STEP_POSITIONS: usize = 40;
 
-/// A family of effects, as it stands in the library.
+/// A family of effects in the library.
 #[derive(Clone, Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Family {
-    /// In words.
+    /// Description of the family.
     pub name: String,
     components: Components,
     driver: DriverChoice,
@@ -31,9 +31,9 @@ pub struct Family {
     degrees: Vec<usize>,
     #[serde(default)]
     tau_s: Vec<f64>,
-    /// What a member costs in the score.
+    /// Cost of a member in the score.
     pub simplicity: f64,
-    /// Whether it is tried only when nothing simpler is left to find and structure remains.
+    /// Whether it is searched only if no simpler candidate is significant and structure remains.
     #[serde(default)]
     pub last_resort: bool,
 }
@@ -89,56 +89,57 @@ struct Library {
     family: Vec<Family>,
 }
 
-/// An effect that is looked for.
+/// A candidate effect.
 #[derive(Clone, Debug)]
 pub struct Candidate {
     /// The effect.
     pub effect: Effect,
     /// Index of its family.
     pub family: usize,
-    /// What it costs in the score beside its coefficients, in natural-log units.
+    /// Cost in the score in addition to its degrees of freedom, in natural-logarithm units.
     pub cost: f64,
-    /// What the choice of its places takes from its evidence, where it is composed of several; 0 for an entry of the library.
-    pub price: f64,
-    /// Whether it is tried only when nothing simpler is left to find and structure remains.
+    /// Selection penalty: the reduction of the evidence for the selection of several positions. 0 for an effect of the library.
+    pub selection_penalty: f64,
+    /// Whether it is searched only if no simpler candidate is significant and structure remains.
     pub last_resort: bool,
-    /// Whether it holds the places that an effect may be composed of (`compose`) and is no effect itself.
+    /// Whether it is a dictionary of positions for `compose` and not an effect itself.
     pub dictionary: bool,
-    /// How far apart the entries of the library are in the number of the shape that is the first to be tuned, in the driver's unit; 0 without one.
+    /// Spacing of the library's members in the first tunable shape number, in the driver's unit; 0 if there is none.
     pub grid: f64,
 }
 
 impl Candidate {
-    /// A curve that no component's name stands for: what names are weighed against, and nothing that is looked for.
+    /// A curve without a component. It serves for comparison with effects and is not searched itself.
     pub fn test_curve(effect: Effect) -> Candidate {
         Candidate {
             effect,
             family: usize::MAX,
             cost: 0.0,
-            price: 0.0,
+            selection_penalty: 0.0,
             last_resort: false,
             dictionary: true,
             grid: 0.0,
         }
     }
 
-    /// How long it takes to say what it is: the simplest is the shortest.
-    pub fn length(&self) -> f64 {
-        self.cost + self.price
+    /// Description length. The simplest candidate has the shortest description.
+    pub fn description_length(&self) -> f64 {
+        self.cost + self.selection_penalty
     }
 }
 
 /// The families of the library.
 ///
 /// # Errors
-/// Only if the library that is compiled in cannot be read.
+/// Only if the compiled library cannot be read.
 pub fn families() -> Result<Vec<Family>, IdentifyError> {
     let library: Library = toml::from_str(LIBRARY)
         .map_err(|fault| IdentifyError::Request(format!("the library of effects cannot be read: {fault}")))?;
     Ok(library.family)
 }
 
-/// The library laid out for a session: every member that its axes, its instrument and its columns allow, less what the model has already.
+/// The candidates of a session: all members that its axes, instrument and columns permit, except effects that the model already
+/// has.
 ///
 /// # Errors
 /// See [`families`].
@@ -164,7 +165,7 @@ pub fn candidates(problem: &Problem<'_>) -> Result<Vec<Candidate>, IdentifyError
                         effect,
                         family: number,
                         cost,
-                        price: 0.0,
+                        selection_penalty: 0.0,
                         last_resort,
                         dictionary,
                         grid,
@@ -196,7 +197,7 @@ fn grid(problem: &Problem<'_>, sampling: &Sampling, effect: &Effect) -> f64 {
     };
     let span = axis.map_or(0.0, |axis| sampling.span(axis));
     match &effect.shape {
-        // Frequencies lie half a cycle over the travel apart.
+        // Adjacent frequencies differ by half a cycle over the travel.
         Shape::Periodic { period } => 0.5 * period * period / span,
         Shape::Steps { .. } => span / STEP_POSITIONS as f64,
         Shape::Local { width, .. } => *width,
@@ -204,7 +205,7 @@ fn grid(problem: &Problem<'_>, sampling: &Sampling, effect: &Effect) -> f64 {
     }
 }
 
-/// Whether a set-up quantity is free already, so that freeing it is no effect.
+/// Whether a set-up quantity is a free parameter already, so that it is no further effect.
 fn is_free_setup(problem: &Problem<'_>, effect: &Effect) -> bool {
     let Component::Instrument { thing, coordinate } = &effect.component else {
         return false;
@@ -216,11 +217,11 @@ fn is_free_setup(problem: &Problem<'_>, effect: &Effect) -> bool {
     else {
         return false;
     };
-    let unknowns = problem.session.instrument.unknowns();
-    let place = unknowns
+    let setup_parameters = problem.session.instrument.unknowns();
+    let index = setup_parameters
         .iter()
         .position(|u| u.thing == thing && u.coordinate == coordinate);
-    place.is_some_and(|place| test.priors[place] == abbe_model::session::Prior::Free)
+    index.is_some_and(|index| test.priors[index] == abbe_model::session::Prior::Free)
 }
 
 fn components(problem: &Problem<'_>, sampling: &Sampling, choice: Components) -> Vec<Component> {
@@ -239,10 +240,10 @@ fn components(problem: &Problem<'_>, sampling: &Sampling, choice: Components) ->
             .instrument
             .unknowns()
             .iter()
-            .filter(|unknown| names.contains(&unknown.thing))
-            .map(|unknown| Component::Instrument {
-                thing: unknown.thing.to_string(),
-                coordinate: unknown.coordinate.to_string(),
+            .filter(|parameter| names.contains(&parameter.thing))
+            .map(|parameter| Component::Instrument {
+                thing: parameter.thing.to_string(),
+                coordinate: parameter.coordinate.to_string(),
             })
             .collect()
     };
@@ -265,7 +266,8 @@ fn components(problem: &Problem<'_>, sampling: &Sampling, choice: Components) ->
                 let body = choice == Components::Body;
                 Freedom::ALL
                     .into_iter()
-                    // An axis is a line: it has no location along itself, and its zero is no error of the line. What it carries may well move there.
+                    // An axis is a line. It has no location error along itself, and its zero offset is no error of the line. The
+                    // body that it carries can move in these directions too.
                     .filter(move |f| {
                         if rotary {
                             body || *f != own && *f != along
@@ -308,7 +310,8 @@ fn drivers(
         DriverChoice::Own => own_of_kind(None),
         DriverChoice::OwnRotary => own_of_kind(Some(AxisKind::Rotary)),
         DriverChoice::OwnLinear => own_of_kind(Some(AxisKind::Linear)),
-        // Among independent poses every axis moves at once and any pair could be blamed; what a body gives there, the moment tells.
+        // With independent poses every axis moves at once, so that any pair of axes would be a candidate. There gravity covers
+        // compliance.
         DriverChoice::Other if sampling.is_poses() => Vec::new(),
         DriverChoice::Other => (0..machine.axes.len())
             .filter(|axis| sampling.moves[*axis] && Some(*axis) != own)
@@ -335,8 +338,8 @@ fn drivers(
     }
 }
 
-/// A translation is a simpler cause than a tilt that moves the point as much; the angle that an axis itself turns is no tilt, nor is the squareness of a
-/// linear axis, which slides askew and turns nothing.
+/// Additional cost of a tilt. A translation is a simpler cause than a tilt that displaces the point equally. The rotation about
+/// the axis itself is no tilt, and neither is the squareness of a linear axis.
 fn tilt_cost(problem: &Problem<'_>, component: &Component) -> f64 {
     match component {
         Component::Axis(name) if name.freedom.is_angle() => {

@@ -1,13 +1,13 @@
-//! How densely and how far a session samples its axes: what decides which shapes it could show.
+//! How densely and how far a session samples its axes. This determines which shapes are observable.
 
 use crate::problem::Problem;
 
-/// How the axes are sampled in a session.
+/// The sampling of the axes in a session.
 pub(super) struct Sampling {
     pub moves: Vec<bool>,
     pub low: Vec<f64>,
     pub high: Vec<f64>,
-    /// Typical step between readings where the axis moves; 0 for poses.
+    /// Median step between readings where the axis moves; 0 for poses.
     pub step: Vec<f64>,
     pub has_time: bool,
     pub duration_s: f64,
@@ -70,7 +70,7 @@ impl Sampling {
         sampling
     }
 
-    /// Whether rows are independent poses: no axis is swept.
+    /// Whether the rows are independent poses: no axis is swept.
     pub fn is_poses(&self) -> bool {
         self.step.iter().all(|step| *step == 0.0)
     }

@@ -1,4 +1,4 @@
-//! The shapes that a family of the library takes for a component and a driver, as far as the session samples them.
+//! The shapes of a family for a component and a driver, as far as the session samples them.
 
 use std::f64::consts::TAU;
 
@@ -10,19 +10,19 @@ use super::sampling::Sampling;
 use super::{Family, STEP_POSITIONS, ShapeChoice};
 use crate::problem::Problem;
 
-/// The highest harmonic that is looked for, however dense the sampling.
+/// Highest harmonic order of the library.
 const HIGHEST_ORDER: usize = 120;
-/// The highest harmonic for poses, which sample an axis at random: an independent search found nothing real above it.
+/// Highest harmonic order for poses, which sample an axis at random. An independent search found no significant order above it.
 const HIGHEST_ORDER_OF_POSES: usize = 40;
-/// Readings in a cycle of the shortest wave that is looked for; two would just carry it.
+/// Readings per cycle of the shortest wave in the library. The sampling theorem requires two.
 const READINGS_PER_CYCLE: f64 = 2.4;
-/// The most half cycles over the travel of a wave that is looked for.
+/// Maximum number of half cycles over the travel.
 const MAX_HALF_CYCLES: usize = 240;
 
-/// A shape, the tests it is confined to, and what it costs beyond its family.
+/// A shape, the tests to which it is confined, and its cost in addition to that of its family.
 type Member = (Shape, Vec<String>, f64);
 
-/// A shape in all tests that costs what its family does.
+/// A shape in all tests without additional cost.
 fn plain(shape: Shape) -> Member {
     (shape, Vec::new(), 0.0)
 }
@@ -47,8 +47,12 @@ pub(super) fn shapes(
         step: axis.map_or(0.0, |axis| sampling.step[axis]),
         poses: sampling.is_poses(),
     };
-    let only_if = |seen: bool, shape: Shape| {
-        if seen { vec![plain(shape)] } else { Vec::new() }
+    let only_if = |observable: bool, shape: Shape| {
+        if observable {
+            vec![plain(shape)]
+        } else {
+            Vec::new()
+        }
     };
     match family.shape {
         ShapeChoice::Constant => vec![plain(Shape::Constant)],
@@ -62,8 +66,8 @@ pub(super) fn shapes(
         ShapeChoice::Power => powers(&family.degrees, driver.default_scale(&problem.session.machine)),
         ShapeChoice::Periodic => over.periods(),
         ShapeChoice::Backlash => {
-            let seen = axis.is_some_and(|axis| sampling.both_directions[axis]);
-            only_if(seen && !over.poses, Shape::Backlash)
+            let observable = axis.is_some_and(|axis| sampling.both_directions[axis]);
+            only_if(observable && !over.poses, Shape::Backlash)
         }
         ShapeChoice::Lag => only_if(sampling.has_time && !over.poses, Shape::Lag),
         ShapeChoice::ReversalSpike => over.spikes(),
@@ -97,7 +101,7 @@ fn powers(degrees: &[usize], scale: f64) -> Vec<Member> {
         .collect()
 }
 
-/// What a shape is laid over: an axis as a session samples it, or another driver.
+/// The driver of the shapes: an axis as the session samples it, or another driver.
 struct FamilyScope<'s> {
     sampling: &'s Sampling,
     axis: Option<usize>,
@@ -110,7 +114,7 @@ struct FamilyScope<'s> {
 }
 
 impl FamilyScope<'_> {
-    /// The highest harmonic that the sampling carries.
+    /// The highest harmonic order that the sampling resolves.
     fn highest_order(&self) -> usize {
         if self.poses {
             HIGHEST_ORDER_OF_POSES
@@ -126,13 +130,13 @@ impl FamilyScope<'_> {
         self.rotary && self.span > 0.99 * TAU
     }
 
-    /// Frequencies half a cycle over the travel apart, from one cycle on.
+    /// Frequencies from one cycle on, half a cycle over the travel apart.
     fn periods(&self) -> Vec<Member> {
         if self.step <= 0.0 || self.poses {
             return Vec::new();
         }
         let most = ((2.0 * self.span / (READINGS_PER_CYCLE * self.step)) as usize).min(MAX_HALF_CYCLES);
-        // Over full turns whole cycles are harmonics.
+        // Over full turns, whole cycles are harmonics.
         let turns = self.span / TAU;
         let whole = self.rotary && (turns - turns.round()).abs() < 0.01;
         (2..=most)
@@ -145,11 +149,11 @@ impl FamilyScope<'_> {
     }
 
     fn spikes(&self) -> Vec<Member> {
-        // A run that begins where the one before it ended begins with a reversal.
-        let seen = self.axis.is_some_and(|axis| {
+        // A run that starts where the previous run ended starts with a reversal.
+        let observable = self.axis.is_some_and(|axis| {
             self.sampling.reverses_inside_runs[axis] || self.sampling.both_directions[axis]
         });
-        if !seen || self.poses {
+        if !observable || self.poses {
             return Vec::new();
         }
         let spike = |share: f64| Shape::ReversalSpike {
@@ -160,17 +164,17 @@ impl FamilyScope<'_> {
             .to_vec()
     }
 
-    /// A step at each place, and the dictionary of all places.
+    /// A single step at each position, and the dictionary of all positions.
     fn steps(&self) -> Vec<Member> {
         let Some(axis) = self.axis.filter(|_| !self.poses && self.step > 0.0) else {
             return Vec::new();
         };
         let low = self.sampling.low[axis];
-        let place = |k: usize| low + self.span * k as f64 / STEP_POSITIONS as f64;
-        let places: Vec<f64> = (1..STEP_POSITIONS).map(place).collect();
-        let singles = places.iter().map(|place| vec![*place]);
+        let position = |k: usize| low + self.span * k as f64 / STEP_POSITIONS as f64;
+        let positions: Vec<f64> = (1..STEP_POSITIONS).map(position).collect();
+        let singles = positions.iter().map(|position| vec![*position]);
         singles
-            .chain([places.clone()])
+            .chain([positions.clone()])
             .map(|at| plain(Shape::Steps { at }))
             .collect()
     }
@@ -207,7 +211,7 @@ impl FamilyScope<'_> {
         } else {
             self.sampling.high[axis]
         };
-        // At least one reading and a half an interval.
+        // At least 1.5 readings per interval.
         let carried = |intervals: usize| {
             self.poses && intervals <= 16
                 || self.step > 0.0 && 1.5 * self.step * intervals as f64 <= self.span
@@ -227,12 +231,12 @@ impl FamilyScope<'_> {
     }
 }
 
-/// High orders are many, and each by itself is unlikely: the cost of naming one grows as the logarithm of the order.
+/// There are many high orders, and each single one is unlikely. The cost therefore grows as the logarithm of the order.
 fn harmonic_cost(order: usize) -> f64 {
     (order as f64).ln()
 }
 
-/// The groups of tests that share a mount of a component's thing, where there is more than one group.
+/// The groups of tests that share one mount of a set-up component, each test alone, and each mount from a later test on.
 fn mounts(problem: &Problem<'_>, component: &Component) -> Vec<Vec<String>> {
     let Component::Instrument { thing, .. } = component else {
         return Vec::new();
@@ -242,8 +246,8 @@ fn mounts(problem: &Problem<'_>, component: &Component) -> Vec<Vec<String>> {
         .instrument
         .unknowns()
         .iter()
-        .find(|unknown| unknown.thing == thing)
-        .map_or(SharedBy::Session, |unknown| unknown.shared_by);
+        .find(|parameter| parameter.thing == thing)
+        .map_or(SharedBy::Session, |parameter| parameter.shared_by);
     let mut groups: Vec<(String, Vec<String>)> = Vec::new();
     for test in &problem.tests {
         let name = test.group(shared_by).to_string();
@@ -252,7 +256,7 @@ fn mounts(problem: &Problem<'_>, component: &Component) -> Vec<Vec<String>> {
             None => groups.push((name, vec![test.name.clone()])),
         }
     }
-    // A mount that tests share may have been disturbed between them: each test by itself as well.
+    // A mount that tests share may have been disturbed between them, so each test is a group too.
     let mut mounts: Vec<Vec<String>> = groups.into_iter().map(|(_, tests)| tests).collect();
     for test in &problem.tests {
         let alone = vec![test.name.clone()];
@@ -260,7 +264,7 @@ fn mounts(problem: &Problem<'_>, component: &Component) -> Vec<Vec<String>> {
             mounts.push(alone);
         }
     }
-    // And from a test on.
+    // A mount may have been disturbed once, so its later tests are a group too.
     for first in 1..problem.tests.len() {
         let mount = problem.tests[first].group(shared_by);
         let of_mount = |test: &&&abbe_model::session::Test| test.group(shared_by) == mount;

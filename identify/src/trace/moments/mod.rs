@@ -1,13 +1,13 @@
-//! Products of candidates with the model and the residual, fold by fold.
+//! Products of candidates with the model and the residual, for each fold.
 //!
-//! With these every question of the search is small algebra: the gain of any candidate over any model on any set of folds needs no second look
-//! at the readings. With `X` the model's columns, `y` the residual and `C` a candidate's columns over the folds of a training set,
-//!
+//! With these products, the search needs no further pass over the readings. The gain of any candidate added to any model on any set
+//! of folds is a small matrix expression. With `X` the model's columns, `y` the residual and `C` a candidate's columns over the
+//! training folds,
 //! ```text
 //! gain = gᵀ D⁻¹ g,   D = CᵀC − CᵀX (XᵀX)⁻¹ XᵀC,   g = Cᵀy − CᵀX (XᵀX)⁻¹ Xᵀy
 //! ```
 //!
-//! `X` begins with an orthonormal basis of what the fit has (priors included), so that the normal equations lose nothing.
+//! `X` begins with an orthonormal basis of the fitted model (priors included), so that the normal equations lose no precision.
 
 mod products;
 
@@ -16,13 +16,13 @@ use std::ops::Range;
 use faer::linalg::matmul::matmul;
 use faer::{Accum, Mat, MatRef, Par};
 
-use super::columns::{Columns, Layout};
-use products::{Block, laid, with_side};
+use super::columns::{Columns, EffectColumns};
+use products::{CandidateChunk, multiply, with_side};
 
 /// Products over one fold.
 #[derive(Clone, Debug)]
 pub struct FoldMoments {
-    /// Base with base: the orthonormal model columns, then those of materialised candidates.
+    /// Base with base: the orthonormal model columns, then those of the added candidates.
     pub base: Mat<f64>,
     /// Base with the residual.
     pub base_y: Vec<f64>,
@@ -32,12 +32,12 @@ pub struct FoldMoments {
     pub cross: Mat<f64>,
     /// Residual with candidates.
     pub cross_y: Vec<f64>,
-    /// Candidate with itself, one after another, each count × count.
+    /// Each candidate with itself, count × count.
     pub own: Vec<Mat<f64>>,
 }
 
 impl FoldMoments {
-    /// Over several folds together.
+    /// The sum over several folds.
     fn sum(folds: &[FoldMoments]) -> FoldMoments {
         let Some((first, rest)) = folds.split_first() else {
             return FoldMoments {
@@ -65,7 +65,8 @@ impl FoldMoments {
         sum
     }
 
-    /// Adds base columns by their products with the whole base (base × added), with the candidates (added × candidate columns) and with the residual.
+    /// Adds base columns by their products with the whole base (base × added), with the candidates (added × candidate columns)
+    /// and with the residual.
     fn extend_base(&mut self, gram: &Mat<f64>, cross: &Mat<f64>, with_y: impl Iterator<Item = f64>) {
         let base = gram.nrows();
         let old = base - gram.ncols();
@@ -89,26 +90,27 @@ pub struct Moments {
     pub whole: FoldMoments,
     /// Null draws with candidates: draws × all candidate columns.
     pub null_cross: Mat<f64>,
-    /// Base with null draws (readings part): base × draws.
+    /// Base with null draws (rows of readings): base × draws.
     pub null_base: Mat<f64>,
     /// First column of each candidate.
     pub first: Vec<usize>,
     /// Number of columns of each candidate.
     pub count: Vec<usize>,
-    /// How many numbers of its shape are chosen to fit.
+    /// Number of tuned shape numbers of each candidate.
     pub numbers: Vec<usize>,
-    blocks: Vec<Block>,
-    /// Base columns, rows × base, kept to extend.
+    chunks: Vec<CandidateChunk>,
+    /// Base columns, rows × base. They are kept because the base grows.
     base_columns: Mat<f64>,
     residual: Vec<f64>,
     null: Mat<f64>,
 }
 
-/// Rows and columns by which room is made.
+/// Increments of the reserved capacity.
 const BUFFER_ROWS: usize = 32;
 const BUFFER_COLUMNS: usize = 128;
 
-/// Enlarges a matrix, with room for more: candidates and effects come one after another, and what is large is not copied each time.
+/// Enlarges a matrix and reserves capacity. Candidates and effects are added one at a time, and large matrices are not copied
+/// each time.
 pub(super) fn grow(
     matrix: &mut Mat<f64>,
     rows: usize,
@@ -129,26 +131,27 @@ pub(super) fn transposed_product(a: MatRef<'_, f64>, b: MatRef<'_, f64>) -> Mat<
 }
 
 impl Moments {
-    /// From the orthonormal model columns (rows × rank), the residual and null draws (rows × draws). `go_on` is asked now and then; `None` where it says no.
+    /// From the orthonormal model columns (rows × rank), the residual and the null draws (rows × draws). Returns `None` if
+    /// `go_on` returns `false`.
     pub fn new(
         columns: &Columns<'_, '_>,
-        layouts: &[Layout],
+        column_sets: &[EffectColumns],
         model: Mat<f64>,
         residual: &[f64],
         null: Mat<f64>,
         go_on: &(dyn Fn() -> bool + Sync),
     ) -> Option<Moments> {
-        let mut first = Vec::with_capacity(layouts.len());
+        let mut first = Vec::with_capacity(column_sets.len());
         let mut total = 0;
-        for layout in layouts {
+        for column_set in column_sets {
             first.push(total);
-            total += layout.count;
+            total += column_set.count;
         }
-        let count: Vec<usize> = layouts.iter().map(|layout| layout.count).collect();
+        let count: Vec<usize> = column_sets.iter().map(|column_set| column_set.count).collect();
         let rank = model.ncols();
         let side = beside(&model, residual);
-        let all = 0..layouts.len();
-        let (blocks, products) = laid(columns, layouts, all, &[], (&side, &null), go_on)?;
+        let all = 0..column_sets.len();
+        let (chunks, products) = multiply(columns, column_sets, all, &[], (&side, &null), go_on)?;
         let folds = (columns.fold_rows.iter().zip(products.side).zip(products.own))
             .map(|((range, product), own)| {
                 let part = side.as_ref().subrows(range.start, range.len());
@@ -172,41 +175,44 @@ impl Moments {
             null_base,
             first,
             count,
-            numbers: layouts.iter().map(|layout| layout.numbers).collect(),
-            blocks,
+            numbers: column_sets.iter().map(|column_set| column_set.numbers).collect(),
+            chunks,
             base_columns: model,
             residual: residual.to_vec(),
             null,
         })
     }
 
-    /// Number of base columns so far.
+    /// Number of base columns.
     pub fn base(&self) -> usize {
         self.base_columns.ncols()
     }
 
-    /// Adds the columns of candidates to the base, each of unit length; returns their places there.
-    pub fn materialise(
+    /// Adds the columns of candidates to the base, each at unit length. Returns their ranges in the base.
+    pub fn add_to_base(
         &mut self,
         columns: &Columns<'_, '_>,
-        layouts: &[Layout],
+        column_sets: &[EffectColumns],
         candidates: &[usize],
     ) -> Vec<Range<usize>> {
-        let chosen: Vec<&Layout> = candidates.iter().map(|candidate| &layouts[*candidate]).collect();
-        let added: usize = chosen.iter().map(|layout| layout.count).sum();
+        let chosen: Vec<&EffectColumns> = candidates
+            .iter()
+            .map(|candidate| &column_sets[*candidate])
+            .collect();
+        let added: usize = chosen.iter().map(|column_set| column_set.count).sum();
         let (rows, old) = (columns.rows(), self.base());
         let mut places = Vec::new();
         let mut next = old;
-        for layout in &chosen {
-            places.push(next..next + layout.count);
-            next += layout.count;
+        for column_set in &chosen {
+            places.push(next..next + column_set.count);
+            next += column_set.count;
         }
         if added == 0 {
             return places;
         }
         let fresh = unit_columns(columns, &chosen);
         grow(&mut self.base_columns, rows, next, |i, j| fresh[(i, j - old)]);
-        let products = with_side(&self.blocks, columns, layouts, fresh.as_ref());
+        let products = with_side(&self.chunks, columns, column_sets, fresh.as_ref());
         let null_fresh = transposed_product(fresh.as_ref(), self.null.as_ref());
         let draws = self.null.ncols();
         grow(&mut self.null_base, next, draws, |i, d| null_fresh[(i - old, d)]);
@@ -223,17 +229,17 @@ impl Moments {
         places
     }
 
-    /// Adds the last of the candidates to those that are scored: those that are not yet.
-    pub fn append(&mut self, columns: &Columns<'_, '_>, layouts: &[Layout]) {
+    /// Computes the products of those effects in `column_sets` that are not yet candidates.
+    pub fn append(&mut self, columns: &Columns<'_, '_>, column_sets: &[EffectColumns]) {
         let rank = self.base();
         let side = beside(&self.base_columns, &self.residual);
-        let candidates = self.count.len()..layouts.len();
+        let candidates = self.count.len()..column_sets.len();
         let beside = (&side, &self.null);
-        let Some((fresh, products)) = laid(
+        let Some((fresh, products)) = multiply(
             columns,
-            layouts,
+            column_sets,
             candidates.clone(),
-            &self.blocks,
+            &self.chunks,
             beside,
             &|| true,
         ) else {
@@ -242,13 +248,13 @@ impl Moments {
         let draws = self.null.ncols();
         let total = self.null_cross.ncols();
         let mut added = 0;
-        for layout in &layouts[candidates] {
+        for column_set in &column_sets[candidates] {
             self.first.push(total + added);
-            self.count.push(layout.count);
-            self.numbers.push(layout.numbers);
-            added += layout.count;
+            self.count.push(column_set.count);
+            self.numbers.push(column_set.numbers);
+            added += column_set.count;
         }
-        self.blocks.extend(fresh);
+        self.chunks.extend(fresh);
         let of_null = products.null;
         for ((moments, product), own) in self.folds.iter_mut().zip(products.side).zip(products.own) {
             grow(&mut moments.cross, rank, total + added, |i, j| {
@@ -263,7 +269,7 @@ impl Moments {
         });
     }
 
-    /// Extends the products over all folds to what each fold has now: so many base columns and candidate columns.
+    /// Extends the products over all folds to the present number of base columns and candidate columns.
     fn accumulate_totals(&mut self, base: usize, total: usize) {
         let (folds, whole) = (&self.folds, &mut self.whole);
         grow(&mut whole.base, base, base, |i, j| {
@@ -285,22 +291,22 @@ impl Moments {
         }
     }
 
-    /// The base columns, rows × base, in the order of the folds.
+    /// The base columns, rows × base, in fold order.
     pub fn base_columns(&self) -> MatRef<'_, f64> {
         self.base_columns.as_ref()
     }
 
-    /// The residual, in the same order: rows × 1.
+    /// The residual in fold order: rows × 1.
     pub fn residual(&self) -> MatRef<'_, f64> {
         MatRef::from_column_major_slice(&self.residual, self.residual.len(), 1)
     }
 }
 
-/// The columns of layouts, each of unit length.
-fn unit_columns(columns: &Columns<'_, '_>, layouts: &[&Layout]) -> Mat<f64> {
-    let width = layouts.iter().map(|layout| layout.count).sum();
+/// The columns of effects, each at unit length.
+fn unit_columns(columns: &Columns<'_, '_>, column_sets: &[&EffectColumns]) -> Mat<f64> {
+    let width = column_sets.iter().map(|column_set| column_set.count).sum();
     let mut fresh = Mat::zeros(columns.rows(), width);
-    columns.fill(layouts, fresh.as_mut());
+    columns.fill(column_sets, fresh.as_mut());
     for j in 0..width {
         let norm = fresh.col(j).norm_l2();
         if norm > 0.0 {
@@ -312,7 +318,7 @@ fn unit_columns(columns: &Columns<'_, '_>, layouts: &[&Layout]) -> Mat<f64> {
     fresh
 }
 
-/// Model and residual side by side: one product with each chunk of candidates.
+/// Model and residual side by side, so that one product with each chunk of candidates is enough.
 fn beside(model: &Mat<f64>, residual: &[f64]) -> Mat<f64> {
     let rank = model.ncols();
     let mut side = Mat::zeros(residual.len(), rank + 1);

@@ -46,7 +46,7 @@ pub(super) fn result(
     found: &Found<'_>,
 ) -> EffectResult {
     let (after, search) = (findings.after, findings.search);
-    let taken = search.taken()[found.number];
+    let taken = search.selected()[found.number];
     let candidate = &search.candidates[taken.candidate];
     let number = found.number + findings.before.parameters.effects.len();
     let (curve_at_unit, curve_unit) = curve_units(after, &candidate.effect);

@@ -73,11 +73,11 @@ pub(super) fn report(findings: &TraceFindings<'_, '_>) -> Result<ReportedEffect,
     let mut gains = Vec::new();
     let mut moves = Vec::new();
     let variance = residual_variance(findings);
-    for (k, taken) in search.taken().iter().enumerate() {
+    for (k, taken) in search.selected().iter().enumerate() {
         let model = search.model_without(Some(k))?;
         let (aliases, of_effect) = alias::aliases(search, k, &model, variance);
         competing_effects.push(of_effect);
-        let named = model.joined(taken.candidate).0;
+        let named = model.with_candidate(taken.candidate).0;
         let effect_of = |alias: &Alias| search.candidates[alias.candidate].effect.clone();
         alias_effects.push(aliases.iter().map(effect_of).collect());
         let in_its_place = |alias: &Alias| moves_by(findings, k, &alias.model_coefficients, &named);
@@ -111,7 +111,7 @@ pub(super) fn report(findings: &TraceFindings<'_, '_>) -> Result<ReportedEffect,
         unique,
         noise_um: after.noise.sigma_mm * 1e3,
         noise_source: after.noise.source.word().to_string(),
-        noise_ar_coefficients: after.noise.memory.clone(),
+        noise_ar_coefficients: after.noise.ar_coefficients.clone(),
         readings: after.readings(),
         heldout_by: before.folds.kind.words().to_string(),
         before: before_result,
@@ -119,9 +119,9 @@ pub(super) fn report(findings: &TraceFindings<'_, '_>) -> Result<ReportedEffect,
         effects,
         remainder,
         residual_before: match findings.structure_before {
-            Some(structure) if structure.is_significant() => structure.words.clone(),
+            Some(structure) if structure.is_significant() => structure.description.clone(),
             // Detectors look at one test at a time; the search adds up what all tests show of one effect.
-            Some(_) if !search.taken().is_empty() => {
+            Some(_) if !search.selected().is_empty() => {
                 "structure that no single test shows beyond noise; the search over all tests finds it"
                     .to_string()
             }
@@ -272,7 +272,7 @@ fn cover(parameters: &mut [ParameterResult], problem: &Problem<'_>, fit: &Fit, m
     for (parameter, moved) in parameters.iter_mut().zip(moved) {
         let mut u = parameter.u.hypot(moved);
         if parameter.id.ends_with(".phase") {
-            u = u.min(fit::any_phase_deg());
+            u = u.min(fit::u_of_undetermined_phase_deg());
         }
         parameter.set_u(u);
     }
@@ -282,7 +282,7 @@ fn cover(parameters: &mut [ParameterResult], problem: &Problem<'_>, fit: &Fit, m
 /// How far the unknowns move if an alias stands in the place of the `k`-th effect, internal units: `in_place` and `named` are the coefficients of the model
 /// without that effect beside the alias and beside the effect. Its own do not move: the alias has none of them.
 fn moves_by(findings: &TraceFindings<'_, '_>, k: usize, in_place: &[f64], named: &[f64]) -> Vec<f64> {
-    let (search, to_unknowns) = (findings.search, &findings.start.to_unknowns);
+    let (search, to_unknowns) = (findings.search, &findings.start.to_parameters);
     let by: Vec<f64> = in_place.iter().zip(named).map(|(a, b)| a - b).collect();
     let (of_declared, of_found) = by.split_at(search.rank);
     // What was declared comes first among the unknowns, the found effects after it in their order.
@@ -296,7 +296,7 @@ fn moves_by(findings: &TraceFindings<'_, '_>, k: usize, in_place: &[f64], named:
         })
         .collect();
     let mut of_found = of_found.iter();
-    for (l, taken) in search.taken().iter().enumerate() {
+    for (l, taken) in search.selected().iter().enumerate() {
         // Base columns are unit-length copies of the candidate's own.
         for norm in search.norms(taken.candidate) {
             let by = if l == k { None } else { of_found.next() };
@@ -328,7 +328,7 @@ fn verdict(findings: &TraceFindings<'_, '_>, effects: &[EffectResult]) -> (Strin
     let remainder = Remainder {
         structured,
         p_value: after.p_value,
-        place: structured.then(|| after.words.clone()),
+        place: structured.then(|| after.description.clone()),
     };
     let before = findings
         .structure_before

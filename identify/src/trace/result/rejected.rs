@@ -13,11 +13,11 @@ pub(super) fn candidates(
     search: &Search<'_>,
     held_out: &HeldOut<'_>,
 ) -> Vec<RejectedCandidate> {
-    let rejected = search.unclaimed.iter().map(|unclaimed| {
-        let (heldout_decrease_um, u_heldout_decrease_um) = held_out.decrease_um(unclaimed.fall);
+    let rejected = search.rejected.iter().map(|rejected| {
+        let (heldout_decrease_um, u_heldout_decrease_um) = held_out.decrease_um(rejected.decrease);
         RejectedCandidate {
-            name: effect_name(machine, &search.candidates[unclaimed.taken.candidate].effect),
-            p_value: unclaimed.taken.p_value,
+            name: effect_name(machine, &search.candidates[rejected.selected.candidate].effect),
+            p_value: rejected.selected.p_value,
             heldout_decrease_um,
             u_heldout_decrease_um,
         }

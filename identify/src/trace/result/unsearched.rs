@@ -20,7 +20,7 @@ pub(in crate::trace) fn unsearched(problem: &Problem<'_>, fit: &Fit) -> TraceRes
         unique: true,
         noise_um: problem.noise.sigma_mm * 1e3,
         noise_source: problem.noise.source.word().to_string(),
-        noise_ar_coefficients: problem.noise.memory.clone(),
+        noise_ar_coefficients: problem.noise.ar_coefficients.clone(),
         readings: problem.readings(),
         heldout_by: problem.folds.kind.words().to_string(),
         before: declared.clone(),

@@ -1,5 +1,5 @@
-//! The held-out error: each fold, as it was read, under the model of the search that did not see it. Effects are claimed only where it falls by more than
-//! the standard error of the fall.
+//! The held-out error: each fold is predicted, unwhitened, by the model of the search that excludes it. Effects are accepted only
+//! if this error decreases by more than the standard error of the decrease.
 
 use faer::Mat;
 use rayon::prelude::*;
@@ -10,22 +10,22 @@ use crate::trace::moments::grow;
 use crate::trace::paired::{HeldOutDecrease, Units};
 use crate::trace::score::TrainedModel;
 
-/// Readings as they are, not whitened: what held-out errors are of. In units of the noise.
-pub struct Plain {
-    /// The base: rows × columns, extended as candidates are added.
+/// The unwhitened base and residual, divided by the noise standard deviation. Held-out errors refer to these.
+pub struct UnwhitenedModel {
+    /// The base: rows × columns. It grows as candidates are added.
     pub base: Mat<f64>,
     /// The residual.
     pub residual: Vec<f64>,
     /// The fold of each row.
     pub folds: Vec<usize>,
-    /// What held-out errors are paired over.
+    /// The independent units over which held-out errors are paired.
     pub units: Units,
     /// Standard deviation of a reading, mm.
     pub sigma_mm: f64,
 }
 
-impl Plain {
-    /// Adds base columns in mm, which the base has divided by these norms.
+impl UnwhitenedModel {
+    /// Adds base columns in mm. `norms` are the lengths by which the base divides them.
     pub(super) fn extend(&mut self, rows: &Mat<f64>, norms: &[f64]) {
         let old = self.base.ncols();
         let sigma_mm = self.sigma_mm;
@@ -40,11 +40,11 @@ impl Plain {
     }
 }
 
-/// What the searches have added and what that leaves on held-out readings.
+/// The selected effects of all searches and their held-out error.
 #[derive(Clone, Debug, Default)]
 pub struct HeldOutState {
-    /// The effects of every search.
-    tracks: Vec<SearchBranch>,
+    /// The branches of the search.
+    branches: Vec<SearchBranch>,
     /// [`Search::held_out`].
     held_out: Vec<f64>,
     /// Sums of squares of held-out residuals over the variance of the noise, by unit.
@@ -53,116 +53,125 @@ pub struct HeldOutState {
 
 impl HeldOutState {
     fn effects(&self) -> &[SelectedEffect] {
-        self.tracks.first().map_or(&[], |all| &all.taken)
+        self.branches.first().map_or(&[], |all| &all.selected)
     }
 }
 
-/// An effect that scores better than readings without structure, and that was not claimed.
+/// An effect that scores better than readings without structure but is not accepted.
 #[derive(Clone, Copy, Debug)]
 pub struct RejectedByHeldOut {
     /// The effect.
-    pub taken: SelectedEffect,
-    /// What it did to the held-out error.
-    pub fall: HeldOutDecrease,
+    pub selected: SelectedEffect,
+    /// The decrease of the held-out error that it causes.
+    pub decrease: HeldOutDecrease,
 }
 
 impl Search<'_> {
-    /// Sums of squares of held-out residuals over the variance of the noise, by unit: each fold under the model of the search that did not see it.
+    /// Sums of squares of held-out residuals over the noise variance, by unit. The model of the search that excludes a fold
+    /// predicts it.
     fn held_out_by_unit(&self) -> Result<Vec<f64>, IdentifyError> {
-        let models: Vec<TrainedModel<'_>> = self.tracks[ALL + 1..]
+        let models: Vec<TrainedModel<'_>> = self.branches[ALL + 1..]
             .par_iter()
-            .map(|track| self.lean_model_of(&track.chosen(), &track.folds))
+            .map(|branch| self.projection_of(&branch.chosen(), &branch.folds))
             .collect::<Result<_, _>>()?;
         let predicted = |model: &TrainedModel<'_>, row: usize| -> f64 {
             let along = model.base.iter().zip(&model.coefficients);
-            along.map(|(column, c)| self.plain.base[(row, *column)] * c).sum()
+            along
+                .map(|(column, c)| self.unwhitened.base[(row, *column)] * c)
+                .sum()
         };
-        let squares = self.plain.folds.iter().enumerate();
-        let squares =
-            squares.map(|(row, fold)| (self.plain.residual[row] - predicted(&models[*fold], row)).powi(2));
-        Ok(self.plain.units.sums(squares))
+        let squares = self.unwhitened.folds.iter().enumerate();
+        let squares = squares
+            .map(|(row, fold)| (self.unwhitened.residual[row] - predicted(&models[*fold], row)).powi(2));
+        Ok(self.unwhitened.units.sums(squares))
     }
 
-    /// Sum of squares of held-out residuals over the variance of the noise.
+    /// Sum of squares of held-out residuals over the noise variance.
     pub(super) fn held_out_now(&self) -> Result<f64, IdentifyError> {
         Ok(self.held_out_by_unit()?.iter().sum())
     }
 
-    /// Writes down the held-out error with as many effects as there are now.
+    /// Records the held-out error for the present number of effects.
     pub(in crate::trace) fn note_held_out(&mut self) -> Result<(), IdentifyError> {
         self.units_now = self.held_out_by_unit()?;
         let held_out = self.units_now.iter().sum();
-        let taken = self.taken().len();
-        self.held_out.truncate(taken);
-        self.held_out.resize(taken + 1, held_out);
+        let selected = self.selected().len();
+        self.held_out.truncate(selected);
+        self.held_out.resize(selected + 1, held_out);
         Ok(())
     }
 
-    /// What the searches have added now.
-    pub(super) fn standing(&self) -> HeldOutState {
+    /// The present state of the searches.
+    pub(super) fn state(&self) -> HeldOutState {
         HeldOutState {
-            tracks: self.tracks.clone(),
+            branches: self.branches.clone(),
             held_out: self.held_out.clone(),
             units: self.units_now.clone(),
         }
     }
 
-    /// Claims what the searches have added, if the held-out error says so: with more effects than are claimed it has to fall by more than the standard error of
-    /// the fall, with as many or fewer it must not rise by more than that. Returns whether all that was added is claimed.
-    pub(in crate::trace) fn claim(&mut self) -> bool {
-        let fall = self.fall_since_claimed();
-        let added = self.taken().len() > self.claimed.effects().len();
-        let claimed = if added {
-            fall.is_significant()
+    /// Accepts the selected effects if the held-out error permits it. With more effects than are accepted, it has to decrease by
+    /// more than the standard error. With as many or fewer, it must not increase by more than the standard error. Returns whether
+    /// all selected effects are accepted.
+    pub(in crate::trace) fn accept(&mut self) -> bool {
+        let decrease = self.decrease_since_accepted();
+        let added = self.selected().len() > self.accepted.effects().len();
+        let accepted = if added {
+            decrease.is_significant()
         } else {
-            !fall.is_increase() && self.lowers_heldout_error()
+            !decrease.is_increase() && self.lowers_heldout_error()
         };
-        if claimed {
-            self.claimed = self.standing();
-            let claimed: Vec<usize> = self.tracks[ALL].chosen();
-            self.unclaimed
-                .retain(|unclaimed| !claimed.contains(&unclaimed.taken.candidate));
+        if accepted {
+            self.accepted = self.state();
+            let accepted: Vec<usize> = self.branches[ALL].chosen();
+            self.rejected
+                .retain(|rejected| !accepted.contains(&rejected.selected.candidate));
         }
-        claimed
+        accepted
     }
 
-    /// How far the held-out error has fallen since effects were claimed last.
-    pub(in crate::trace) fn fall_since_claimed(&self) -> HeldOutDecrease {
-        self.plain.units.decrease(&self.claimed.units, &self.units_now)
+    /// The decrease of the held-out error since the last acceptance.
+    pub(in crate::trace) fn decrease_since_accepted(&self) -> HeldOutDecrease {
+        self.unwhitened
+            .units
+            .decrease(&self.accepted.units, &self.units_now)
     }
 
-    /// How far the held-out error is below that of the declared model.
-    pub(in crate::trace) fn fall_since_declared(&self) -> HeldOutDecrease {
-        self.plain.units.decrease(&self.declared_units, &self.units_now)
+    /// The decrease of the held-out error since the declared model.
+    pub(in crate::trace) fn decrease_since_declared(&self) -> HeldOutDecrease {
+        self.unwhitened
+            .units
+            .decrease(&self.declared_units, &self.units_now)
     }
 
-    /// Whether nothing was added, or the held-out error is below that of the declared model by more than the standard error of the fall.
+    /// Whether nothing is selected, or the held-out error is below that of the declared model by more than the standard error of
+    /// the decrease.
     fn lowers_heldout_error(&self) -> bool {
-        self.taken().is_empty() || self.fall_since_declared().is_significant()
+        self.selected().is_empty() || self.decrease_since_declared().is_significant()
     }
 
-    /// Withdraws what was added since effects were claimed last, and remembers it as not claimed.
-    pub(in crate::trace) fn withdraw_unclaimed(&mut self) {
-        let fall = self.fall_since_claimed();
-        let claimed: Vec<usize> = self
-            .claimed
+    /// Withdraws the effects added since the last acceptance, and records them as rejected.
+    pub(in crate::trace) fn withdraw_rejected(&mut self) {
+        let decrease = self.decrease_since_accepted();
+        let accepted: Vec<usize> = self
+            .accepted
             .effects()
             .iter()
-            .map(|taken| taken.candidate)
+            .map(|selected| selected.candidate)
             .collect();
-        for taken in self.tracks[ALL].taken.clone() {
+        for selected in self.branches[ALL].selected.clone() {
             let known = self
-                .unclaimed
+                .rejected
                 .iter()
-                .any(|u| u.taken.candidate == taken.candidate);
-            if !claimed.contains(&taken.candidate) && !known {
-                self.unclaimed.push(RejectedByHeldOut { taken, fall });
+                .any(|u| u.selected.candidate == selected.candidate);
+            if !accepted.contains(&selected.candidate) && !known {
+                self.rejected.push(RejectedByHeldOut { selected, decrease });
             }
         }
         self.restore();
     }
 
-    /// Goes back to what is claimed, where an interruption has left a round half done. From then on nothing interrupts.
+    /// Restores the accepted effects after an interruption within a round. The search is not interrupted again.
     pub(in crate::trace) fn roll_back(&mut self) {
         self.restore();
         self.interrupt = None;
@@ -170,29 +179,30 @@ impl Search<'_> {
 
     fn restore(&mut self) {
         let HeldOutState {
-            tracks,
+            branches,
             held_out,
             units,
-        } = self.claimed.clone();
-        self.tracks = tracks;
+        } = self.accepted.clone();
+        self.branches = branches;
         self.held_out = held_out;
         self.units_now = units;
     }
 
-    /// Withdraws all effects where together they do not lower the held-out error of the declared model by more than the standard error of the fall.
+    /// Withdraws all effects if together they do not lower the held-out error of the declared model by more than the standard
+    /// error of the decrease.
     pub(in crate::trace) fn withdraw_all_unless_better(&mut self) -> Result<(), IdentifyError> {
         if !self.lowers_heldout_error() {
-            self.claimed = HeldOutState::default();
-            self.claimed.tracks = self.tracks.clone();
-            self.claimed
-                .tracks
+            self.accepted = HeldOutState::default();
+            self.accepted.branches = self.branches.clone();
+            self.accepted
+                .branches
                 .iter_mut()
-                .for_each(|track| track.taken.clear());
-            self.claimed.held_out = self.held_out[..1].to_vec();
-            self.claimed.units = self.declared_units.clone();
-            self.withdraw_unclaimed();
+                .for_each(|branch| branch.selected.clear());
+            self.accepted.held_out = self.held_out[..1].to_vec();
+            self.accepted.units = self.declared_units.clone();
+            self.withdraw_rejected();
         }
-        self.claimed = self.standing();
+        self.accepted = self.state();
         Ok(())
     }
 }

@@ -1,8 +1,10 @@
-//! The search: project out what the model has, score every candidate, add the best, refit all together, let what has lost its place go, exchange
-//! what something else explains better, until the best that is left is no better than the best on readings without structure.
+//! The search. Each round projects out the present model, scores every candidate, adds the best and refits. It removes effects
+//! that are no longer significant, and exchanges effects for better candidates. The search ends when the best remaining candidate
+//! is no better than the best on readings without structure.
 //!
-//! It runs on all readings, and beside that once for each fold on the readings outside that fold alone ([`SearchBranch`]): each chooses for itself, and uses
-//! numbers and places only that it has tuned itself. So the error on held-out readings is that of a search that never saw them.
+//! One branch searches on all readings. One further branch for each fold searches on the readings outside that fold
+//! ([`SearchBranch`]). Each branch selects for itself, and uses only shape numbers and positions that it has tuned itself. The
+//! held-out error therefore belongs to a search without access to the held-out readings.
 
 mod heldout;
 mod models;
@@ -11,7 +13,7 @@ mod pool;
 use std::ops::Range;
 
 use super::alias::INDISTINGUISHABLE;
-use super::columns::{Columns, Layout};
+use super::columns::{Columns, EffectColumns};
 use super::compose::StepTable;
 use super::interrupt::Interrupt;
 use super::library::Candidate;
@@ -19,174 +21,178 @@ use super::moments::Moments;
 use super::score::{Gain, PriorMoments, TrainedModel};
 use crate::error::IdentifyError;
 use heldout::HeldOutState;
-pub use heldout::{Plain, RejectedByHeldOut};
+pub use heldout::{RejectedByHeldOut, UnwhitenedModel};
 
-/// When the search stops.
+/// The stopping rule of the search.
 #[derive(Clone, Copy, Debug)]
-pub struct Stop {
-    /// Probability that the search claims anything on readings without structure.
+pub struct StoppingRule {
+    /// Probability that the search accepts an effect on readings without structure.
     pub significance: f64,
-    /// The most effects.
-    pub most: usize,
-    /// Whether residual variance, not noise, is what gains are measured in: for poses, whose structure never ends.
+    /// Maximum number of effects.
+    pub max_effects: usize,
+    /// Whether gains are divided by the residual variance instead of the noise variance. This applies to poses, whose residual
+    /// always has structure.
     pub in_residual_variance: bool,
 }
 
-/// An effect that a search has added.
+/// An effect that a search has selected.
 #[derive(Clone, Copy, Debug)]
 pub struct SelectedEffect {
     /// Index of the candidate.
     pub candidate: usize,
-    /// Probability that the search finds as good on readings without structure.
+    /// Probability that the search finds at least as high a score on readings without structure.
     pub p_value: f64,
 }
 
-/// One of the searches: on all readings, or on all but one fold.
+/// One branch of the search: on all readings, or on all but one fold.
 #[derive(Clone, Debug)]
 pub struct SearchBranch {
-    /// The folds that it sees, ascending.
+    /// The training folds, ascending.
     pub folds: Vec<usize>,
-    /// What it has added.
-    pub taken: Vec<SelectedEffect>,
+    /// The selected effects.
+    pub selected: Vec<SelectedEffect>,
 }
 
 impl SearchBranch {
-    /// The candidates that it has added.
+    /// Indices of the selected candidates.
     pub fn chosen(&self) -> Vec<usize> {
-        self.taken.iter().map(|taken| taken.candidate).collect()
+        self.selected.iter().map(|selected| selected.candidate).collect()
     }
 }
 
-/// Place of the search on all readings among the tracks; that which leaves out fold `k` is at `k + 1`.
+/// Index of the branch on all readings. The branch that excludes fold `k` has index `k + 1`.
 pub(super) const ALL: usize = 0;
 
-/// Where the search stands.
+/// The state of the search.
 pub struct Search<'s> {
     /// The columns.
     pub columns: &'s Columns<'s, 's>,
-    /// What is looked for.
+    /// The candidates.
     pub candidates: Vec<Candidate>,
-    /// The candidates laid over the tests.
-    layouts: Vec<Layout>,
+    /// The basis columns of the candidates.
+    column_sets: Vec<EffectColumns>,
     /// All products.
     pub moments: Moments,
-    /// What is known beforehand.
+    /// The priors.
     prior: PriorMoments,
     /// Number of base columns that the fitted model has.
     pub rank: usize,
-    /// The search on all readings, then that of each fold.
-    pub tracks: Vec<SearchBranch>,
-    /// For each candidate the folds whose readings its numbers and places were tuned on; none for an entry of the library.
+    /// The branch on all readings, then one for each fold.
+    pub branches: Vec<SearchBranch>,
+    /// For each candidate the folds on which its shape numbers and positions were tuned. Empty for an effect of the library.
     tuned_on: Vec<Vec<usize>>,
-    /// Where the columns of every candidate that was ever added stand in the base.
-    materialised: Vec<(usize, Range<usize>)>,
-    /// Sum of squares of held-out residuals over the variance of the noise, before and after each addition.
+    /// For each candidate that was ever added, the range of its columns in the base.
+    added_to_base: Vec<(usize, Range<usize>)>,
+    /// Sum of squares of held-out residuals over the noise variance, for each number of effects.
     pub held_out: Vec<f64>,
-    /// The best score on readings without structure that is exceeded with the probability of the stop, by round.
+    /// For each round, the best score that readings without structure exceed with the probability of the significance level.
     pub thresholds: Vec<f64>,
-    /// Whether candidates of last resort are tried.
+    /// Whether candidates of last resort are searched.
     pub last_resort: bool,
-    /// Candidates of last resort whose products are not made yet.
-    pub reserve: Vec<(Candidate, Layout)>,
-    /// What held-out errors are of.
-    plain: Plain,
-    /// Sums of squares of held-out residuals over the variance of the noise, by unit: now, and under the declared model.
+    /// Candidates of last resort whose products are not computed yet.
+    pub reserve: Vec<(Candidate, EffectColumns)>,
+    /// The unwhitened base and residual for the held-out error.
+    unwhitened: UnwhitenedModel,
+    /// Sums of squares of held-out residuals over the noise variance, by unit: at present, and under the declared model.
     units_now: Vec<f64>,
     declared_units: Vec<f64>,
-    /// What is claimed: additions that lowered the held-out error by more than the standard error of the fall.
-    claimed: HeldOutState,
-    /// What scored better than readings without structure and was not claimed, in the order in which it was added.
-    pub unclaimed: Vec<RejectedByHeldOut>,
-    /// Entries of the library that would not stand out however large they plausibly were.
-    unseen: Vec<bool>,
-    /// Asked before each model that is trained; `None` where the search is not to be interrupted.
+    /// The accepted effects: additions that lowered the held-out error by more than the standard error of the decrease.
+    accepted: HeldOutState,
+    /// Effects that scored better than readings without structure but were not accepted, in order of addition.
+    pub rejected: Vec<RejectedByHeldOut>,
+    /// For each effect of the library whether it is undetectable at its largest plausible size.
+    undetectable: Vec<bool>,
+    /// Checked before each model is trained. `None` if the search must not be interrupted.
     pub interrupt: Option<Interrupt<'s>>,
-    pub(super) stop: Stop,
+    pub(super) stop: StoppingRule,
 }
 
-/// What a round came to.
+/// The outcome of a round.
 pub enum Round {
     /// An effect was added.
     Added {
-        /// Its candidate.
+        /// Index of the candidate.
         candidate: usize,
     },
-    /// No remaining candidate is significant; the best that there was, and its p-value.
+    /// No remaining candidate is significant.
     Done {
-        /// The p-value of the best that was not taken.
+        /// The p-value of the best candidate that was not added.
         p_value: f64,
     },
 }
 
 impl<'s> Search<'s> {
-    /// Before the first round.
+    /// The state before the first round.
     ///
     /// # Errors
     /// If products are not finite.
     pub fn new(
         columns: &'s Columns<'s, 's>,
         candidates: Vec<Candidate>,
-        layouts: Vec<Layout>,
+        column_sets: Vec<EffectColumns>,
         moments: Moments,
         prior: PriorMoments,
-        plain: Plain,
-        stop: Stop,
+        unwhitened: UnwhitenedModel,
+        stop: StoppingRule,
     ) -> Result<Search<'s>, IdentifyError> {
         let rank = moments.base();
         let folds = 0..columns.fold_rows.len();
         let without = |left_out: Option<usize>| SearchBranch {
             folds: folds.clone().filter(|fold| Some(*fold) != left_out).collect(),
-            taken: Vec::new(),
+            selected: Vec::new(),
         };
         let mut search = Search {
             columns,
             tuned_on: vec![Vec::new(); candidates.len()],
             candidates,
-            layouts,
+            column_sets,
             moments,
             prior,
             rank,
-            tracks: std::iter::once(None)
+            branches: std::iter::once(None)
                 .chain(folds.clone().map(Some))
                 .map(without)
                 .collect(),
-            materialised: Vec::new(),
+            added_to_base: Vec::new(),
             held_out: Vec::new(),
             thresholds: Vec::new(),
             last_resort: false,
             reserve: Vec::new(),
-            plain,
+            unwhitened,
             units_now: Vec::new(),
             declared_units: Vec::new(),
-            claimed: HeldOutState::default(),
-            unclaimed: Vec::new(),
-            unseen: Vec::new(),
+            accepted: HeldOutState::default(),
+            rejected: Vec::new(),
+            undetectable: Vec::new(),
             interrupt: None,
             stop,
         };
-        search.unseen = search.not_detectable()?;
+        search.undetectable = search.undetectable_candidates()?;
         search.note_held_out()?;
         search.declared_units = search.units_now.clone();
-        search.claimed = search.standing();
+        search.accepted = search.state();
         Ok(search)
     }
 
-    /// What the search on all readings has added.
-    pub fn taken(&self) -> &[SelectedEffect] {
-        &self.tracks[ALL].taken
+    /// The selected effects of the branch on all readings.
+    pub fn selected(&self) -> &[SelectedEffect] {
+        &self.branches[ALL].selected
     }
 
-    /// Whether folds are all that there are.
-    pub(super) fn identifies_all(&self, folds: &[usize]) -> bool {
-        folds.len() == self.tracks[ALL].folds.len()
+    /// Whether these folds are all folds.
+    pub(super) fn has_all_folds(&self, folds: &[usize]) -> bool {
+        folds.len() == self.branches[ALL].folds.len()
     }
 
-    /// Enough for every effect that may be added, and some that were attributed to one.
-    pub fn most_rounds(&self) -> usize {
-        self.stop.most.saturating_add(self.stop.most / 2).max(1)
+    /// A limit on rounds: enough for the maximum number of effects and some merges.
+    pub fn max_rounds(&self) -> usize {
+        self.stop
+            .max_effects
+            .saturating_add(self.stop.max_effects / 2)
+            .max(1)
     }
 
-    /// The best beside a model of what has been chosen, of what each would gain there.
+    /// The best candidate for addition to a model with the chosen candidates, and its score.
     pub(super) fn best_of(
         &self,
         model: &TrainedModel<'_>,
@@ -196,7 +202,7 @@ impl<'s> Search<'s> {
         let variance = self.variance(model);
         let mut best: Option<(usize, f64)> = None;
         for (candidate, gain) in gains.iter().enumerate() {
-            if chosen.contains(&candidate) || !self.is_open(candidate, &model.folds) {
+            if chosen.contains(&candidate) || !self.may_be_added(candidate, &model.folds) {
                 continue;
             }
             let score = self.score(candidate, gain, variance);
@@ -207,8 +213,8 @@ impl<'s> Search<'s> {
         best.filter(|(_, score)| score.is_finite())
     }
 
-    /// The simplest of the candidates that the readings cannot tell from the best one.
-    pub(super) fn named_first(
+    /// The candidate with the shortest description among those that are confounded with the best one.
+    pub(super) fn simplest_confounded(
         &self,
         model: &TrainedModel<'_>,
         gains: &[Gain],
@@ -219,12 +225,12 @@ impl<'s> Search<'s> {
         let least = self.evidence_for(best, &gains[best], variance) - INDISTINGUISHABLE;
         let mut first = best;
         for (candidate, gain) in gains.iter().enumerate() {
-            let passed_over = chosen.contains(&candidate) || !self.is_open(candidate, &model.folds);
+            let passed_over = chosen.contains(&candidate) || !self.may_be_added(candidate, &model.folds);
             if passed_over || gain.freedom == 0 || self.evidence_for(candidate, gain, variance) < least {
                 continue;
             }
-            let length = self.candidates[candidate].length();
-            let present = self.candidates[first].length();
+            let length = self.candidates[candidate].description_length();
+            let present = self.candidates[first].description_length();
             if length < present || (length == present && gain.gain > gains[first].gain * (1.0 + 1e-9)) {
                 first = candidate;
             }
@@ -232,31 +238,31 @@ impl<'s> Search<'s> {
         first
     }
 
-    /// One round.
+    /// Runs one round.
     pub fn round(&mut self) -> Result<Round, IdentifyError> {
         let Some((p_value, threshold)) = self.best_against_null()? else {
             return Ok(Round::Done { p_value: 1.0 });
         };
         self.thresholds.push(threshold);
-        if p_value > self.stop.significance || self.taken().len() >= self.stop.most {
+        if p_value > self.stop.significance || self.selected().len() >= self.stop.max_effects {
             return Ok(Round::Done { p_value });
         }
-        let Some(candidate) = self.pick(ALL, f64::NEG_INFINITY)? else {
+        let Some(candidate) = self.select(ALL, f64::NEG_INFINITY)? else {
             return Ok(Round::Done { p_value });
         };
-        let before = self.tracks.clone();
+        let before = self.branches.clone();
         self.add(ALL, SelectedEffect { candidate, p_value });
-        for track in 1..self.tracks.len() {
-            if let Some(candidate) = self.pick(track, threshold)? {
-                self.add(track, SelectedEffect { candidate, p_value });
+        for branch in 1..self.branches.len() {
+            if let Some(candidate) = self.select(branch, threshold)? {
+                self.add(branch, SelectedEffect { candidate, p_value });
             }
         }
         let held_out = self.held_out_now()?;
-        // For poses p-values say little; there an effect has to be significant on the readings that were held out.
+        // P-values are unreliable for poses. There an addition also has to lower the held-out error.
         if self.stop.in_residual_variance
             && held_out >= self.held_out.last().copied().unwrap_or(f64::INFINITY)
         {
-            self.tracks = before;
+            self.branches = before;
             return Ok(Round::Done { p_value });
         }
         self.remove_insignificant(threshold)?;
@@ -264,20 +270,20 @@ impl<'s> Search<'s> {
         Ok(Round::Added { candidate })
     }
 
-    /// The p-value of the best beside what has been taken, among the best of draws without structure, and the score that those exceed with the probability
-    /// of the stop.
+    /// The p-value of the best candidate with respect to the best scores of the null draws, and the score that these exceed with
+    /// the probability of the significance level.
     fn best_against_null(&self) -> Result<Option<(f64, f64)>, IdentifyError> {
-        let chosen = self.tracks[ALL].chosen();
+        let chosen = self.branches[ALL].chosen();
         let model = self.model_without(None)?;
         let Some((_, score)) = self.best_of(&model, &model.gains(), &chosen) else {
             return Ok(None);
         };
-        let composed = self.composed(&model);
+        let composed = self.step_tables(&model);
         let score = composed.iter().map(StepTable::score).fold(score, f64::max);
         let costs: Vec<f64> = (0..self.candidates.len())
             .map(|c| {
-                if self.is_open(c, &model.folds) {
-                    self.candidates[c].length()
+                if self.may_be_added(c, &model.folds) {
+                    self.candidates[c].description_length()
                 } else {
                     f64::INFINITY
                 }
@@ -292,45 +298,45 @@ impl<'s> Search<'s> {
         Ok(Some((p_value, threshold.copied().unwrap_or(0.0))))
     }
 
-    /// What a search would add, if it reaches a score: on all readings the simplest among those that are indistinguishable from the best; where a fold is left out, which has to
-    /// be predicted and not named, the best.
-    fn pick(&mut self, track: usize, least: f64) -> Result<Option<usize>, IdentifyError> {
-        let SearchBranch { folds, .. } = self.tracks[track].clone();
-        let chosen = self.tracks[track].chosen();
+    /// The candidate that a branch adds, if it reaches a score. On all readings it is the candidate with the shortest description
+    /// among those confounded with the best. With one fold left out, prediction matters and not the name, so it is the best.
+    fn select(&mut self, branch: usize, least: f64) -> Result<Option<usize>, IdentifyError> {
+        let SearchBranch { folds, .. } = self.branches[branch].clone();
+        let chosen = self.branches[branch].chosen();
         let known = self.refine(&chosen, &folds)?;
         let model = self.model_of(&chosen, &folds)?;
-        let gains = model.more_gains(known);
+        let gains = model.remaining_gains(known);
         let Some((best, score)) = self.best_of(&model, &gains, &chosen) else {
             return Ok(None);
         };
-        let first = || match track {
-            ALL => self.named_first(&model, &gains, best, &chosen),
+        let first = || match branch {
+            ALL => self.simplest_confounded(&model, &gains, best, &chosen),
             _ => best,
         };
         Ok((score >= least).then(first))
     }
 
-    fn add(&mut self, track: usize, taken: SelectedEffect) {
-        self.materialise(&[taken.candidate]);
-        self.tracks[track].taken.push(taken);
+    fn add(&mut self, branch: usize, selected: SelectedEffect) {
+        self.add_to_base(&[selected.candidate]);
+        self.branches[branch].selected.push(selected);
     }
 
-    /// Drops what the later effects have made superfluous.
+    /// Removes effects that later additions have made insignificant.
     fn remove_insignificant(&mut self, threshold: f64) -> Result<(), IdentifyError> {
-        let folds = self.tracks[ALL].folds.clone();
+        let folds = self.branches[ALL].folds.clone();
         loop {
-            let chosen = self.tracks[ALL].chosen();
+            let chosen = self.branches[ALL].chosen();
             let scored = (0..chosen.len().saturating_sub(1)).map(|k| {
                 let mut others = chosen.clone();
                 let candidate = others.remove(k);
-                let model = self.lean_model_of(&others, &folds)?;
+                let model = self.projection_of(&others, &folds)?;
                 let score = self.score(candidate, &model.gain(candidate), self.variance(&model));
                 Ok((k, score))
             });
             let scored: Vec<(usize, f64)> = scored.collect::<Result<_, IdentifyError>>()?;
             match scored.into_iter().min_by(|a, b| a.1.total_cmp(&b.1)) {
                 Some((k, score)) if score < threshold => {
-                    self.tracks[ALL].taken.remove(k);
+                    self.branches[ALL].selected.remove(k);
                 }
                 _ => return Ok(()),
             }

@@ -1,4 +1,5 @@
-//! The models that a search compares: what has been chosen, trained on the folds that it sees, and what a candidate is worth beside that.
+//! The models that a search compares: the chosen effects, trained on the folds of a branch, and the score of a candidate in
+//! addition to them.
 
 use std::ops::Range;
 
@@ -7,14 +8,14 @@ use abbe_model::effect::Effect;
 use super::{ALL, Search};
 use crate::error::IdentifyError;
 use crate::trace::chi_square_tail::ln_chi_square_tail;
-use crate::trace::columns::Layout;
+use crate::trace::columns::EffectColumns;
 use crate::trace::score::{Gain, TrainedModel};
-use crate::trace::tuning::Trial;
+use crate::trace::tuning::TunedEffect;
 
 impl Search<'_> {
-    /// Where a candidate's columns stand in the base; nowhere before it was ever added.
+    /// The range of a candidate's columns in the base. Empty if the candidate was never added.
     pub fn places(&self, candidate: usize) -> Range<usize> {
-        self.materialised
+        self.added_to_base
             .iter()
             .find(|(c, _)| *c == candidate)
             .map_or(0..0, |(_, places)| places.clone())
@@ -36,8 +37,8 @@ impl Search<'_> {
         TrainedModel::new(&self.moments, &self.prior, self.base_with(chosen), folds.to_vec())
     }
 
-    /// The same, to be asked for few candidates.
-    pub(in crate::trace) fn lean_model_of(
+    /// The model with some candidates, for the evaluation of few candidates.
+    pub(in crate::trace) fn projection_of(
         &self,
         chosen: &[usize],
         folds: &[usize],
@@ -46,31 +47,31 @@ impl Search<'_> {
         TrainedModel::projection(&self.moments, &self.prior, self.base_with(chosen), folds.to_vec())
     }
 
-    /// The model with what has been taken, less one of it, on all readings.
+    /// The model with the selected effects, without the `k`-th if one is given, on all readings.
     pub fn model_without(&self, left_out: Option<usize>) -> Result<TrainedModel<'_>, IdentifyError> {
-        let mut chosen = self.tracks[ALL].chosen();
+        let mut chosen = self.branches[ALL].chosen();
         if let Some(k) = left_out {
             chosen.remove(k);
         }
-        self.model_of(&chosen, &self.tracks[ALL].folds)
+        self.model_of(&chosen, &self.branches[ALL].folds)
     }
 
-    /// Puts the columns of candidates into the base, where they are not there yet.
-    pub(in crate::trace) fn materialise(&mut self, candidates: &[usize]) {
+    /// Adds the columns of candidates to the base, if they are not there yet.
+    pub(in crate::trace) fn add_to_base(&mut self, candidates: &[usize]) {
         let fresh: Vec<usize> = candidates
             .iter()
             .copied()
-            .filter(|c| !self.materialised.iter().any(|(present, _)| present == c))
+            .filter(|c| !self.added_to_base.iter().any(|(present, _)| present == c))
             .collect();
         if fresh.is_empty() {
             return;
         }
-        let places = self.moments.materialise(self.columns, &self.layouts, &fresh);
-        let chosen: Vec<&Layout> = fresh.iter().map(|c| &self.layouts[*c]).collect();
-        let rows = self.columns.plain_rows(&chosen);
+        let places = self.moments.add_to_base(self.columns, &self.column_sets, &fresh);
+        let chosen: Vec<&EffectColumns> = fresh.iter().map(|c| &self.column_sets[*c]).collect();
+        let rows = self.columns.unwhitened_rows(&chosen);
         let norms: Vec<f64> = fresh.iter().flat_map(|c| self.norms(*c)).collect();
-        self.plain.extend(&rows, &norms);
-        self.materialised.extend(fresh.into_iter().zip(places));
+        self.unwhitened.extend(&rows, &norms);
+        self.added_to_base.extend(fresh.into_iter().zip(places));
     }
 
     /// The lengths of a candidate's columns over all readings.
@@ -88,7 +89,7 @@ impl Search<'_> {
             .collect()
     }
 
-    /// The variance that gains are measured in.
+    /// The variance by which gains are divided.
     pub fn variance(&self, model: &TrainedModel<'_>) -> f64 {
         if !self.stop.in_residual_variance {
             return 1.0;
@@ -107,9 +108,9 @@ impl Search<'_> {
         (sum / freedom).max(f64::MIN_POSITIVE)
     }
 
-    /// The variance of the null draws, in the same sense.
+    /// The variance by which the gains of the null draws are divided.
     pub(super) fn null_variance(&self) -> Result<f64, IdentifyError> {
-        Ok(self.variance(&self.lean_model_of(&[], &self.tracks[ALL].folds)?))
+        Ok(self.variance(&self.projection_of(&[], &self.branches[ALL].folds)?))
     }
 
     /// `−ln P` of a gain.
@@ -120,24 +121,28 @@ impl Search<'_> {
         -ln_chi_square_tail(gain.gain / variance, gain.freedom)
     }
 
-    /// The evidence for a candidate: `−ln P` of its gain, less the price of its places.
+    /// The evidence for a candidate: `−ln P` of its gain, less its selection penalty.
     pub fn evidence_for(&self, candidate: usize, gain: &Gain, variance: f64) -> f64 {
-        self.evidence(gain, variance) - self.candidates[candidate].price
+        self.evidence(gain, variance) - self.candidates[candidate].selection_penalty
     }
 
-    /// The same, less the candidate's cost.
+    /// The evidence for a candidate, less its cost.
     pub fn score(&self, candidate: usize, gain: &Gain, variance: f64) -> f64 {
         self.evidence_for(candidate, gain, variance) - self.candidates[candidate].cost
     }
 
-    /// Any effect on trial beside a model; `None` where the data lack what it follows.
-    pub(in crate::trace) fn trial(&self, model: &TrainedModel<'_>, effect: &Effect) -> Option<Trial> {
-        let layout = self.columns.layout_uncached(effect)?;
-        Some(Trial::new(self.columns, &self.moments, &layout, model))
+    /// The products of any effect with a model. `None` if the data lack its driver.
+    pub(in crate::trace) fn tuned_effect(
+        &self,
+        model: &TrainedModel<'_>,
+        effect: &Effect,
+    ) -> Option<TunedEffect> {
+        let column_set = self.columns.effect_columns_uncached(effect)?;
+        Some(TunedEffect::new(self.columns, &self.moments, &column_set, model))
     }
 
-    /// What any effect would gain beside a model, on the folds that it is trained on; `None` where the data lack what it follows.
+    /// The gain of any effect added to a model, on the training folds of the model. `None` if the data lack its driver.
     pub fn gain_beside(&self, model: &TrainedModel<'_>, effect: &Effect) -> Option<f64> {
-        Some(self.trial(model, effect)?.gain(model))
+        Some(self.tuned_effect(model, effect)?.gain(model))
     }
 }

@@ -1,4 +1,4 @@
-//! A value of a TOML file, with its key and its place.
+//! A value of a TOML file, with its key and location.
 
 use std::ops::Range;
 
@@ -15,9 +15,9 @@ pub(crate) struct Value<'a> {
     pub source: &'a Source,
     /// The key it belongs to.
     pub key: String,
-    /// Where the key stands.
+    /// Location of the key.
     pub key_span: Range<usize>,
-    /// Where the value stands.
+    /// Location of the value.
     pub span: Range<usize>,
     pub(super) value: DeValue<'a>,
 }
@@ -28,8 +28,17 @@ impl<'a> Value<'a> {
         self.source.error(self.span.clone(), message, help)
     }
 
-    /// An error that says what the value is and what it should be.
-    pub fn unlike(&self, wanted: &str) -> ModelError {
+    /// An error about the file that the value names.
+    pub fn file_error(&self, message: String, help: &str) -> ModelError {
+        ModelError::FileAccess {
+            location: self.source.location(self.span.clone()),
+            message,
+            help: help.to_string(),
+        }
+    }
+
+    /// An error with the found value and the expected one.
+    pub fn unexpected(&self, expected: &str) -> ModelError {
         let found = match &self.value {
             DeValue::String(text) => format!("the text \"{text}\""),
             DeValue::Integer(_) | DeValue::Float(_) => "a number".to_string(),
@@ -38,32 +47,32 @@ impl<'a> Value<'a> {
             DeValue::Array(items) => format!("a list of {}", items.len()),
             DeValue::Table(_) => "a table".to_string(),
         };
-        self.error(format!("`{}` is {found}; {wanted} is expected", self.key), None)
+        self.error(format!("`{}` is {found}; {expected} is expected", self.key), None)
     }
 
-    /// A text.
+    /// The value as a text.
     pub fn text(&self) -> Result<String, ModelError> {
         match &self.value {
             DeValue::String(text) => match text.chars().find(|c| c.is_control() && *c != '\t') {
                 None => Ok(text.to_string()),
                 Some(control) => Err(self.error(
                     format!(
-                        "`{}` holds the control character U+{:04X}",
+                        "`{}` contains the control character U+{:04X}",
                         self.key, control as u32
                     ),
-                    Some("names are shown as they are: leave it out".into()),
+                    Some("remove it".into()),
                 )),
             },
-            _ => Err(self.unlike("a text in quotes")),
+            _ => Err(self.unexpected("a text in quotes")),
         }
     }
 
-    /// The text, where it is one.
+    /// The text, if the value is one.
     pub fn as_text(&self) -> Option<&str> {
         self.value.as_str()
     }
 
-    /// What is written there, as a text: a note may be a number or a date.
+    /// The value as a text of any type: a note may be a number or a date.
     pub fn note(&self) -> Result<String, ModelError> {
         match &self.value {
             DeValue::Integer(number) => Ok(number.as_str().to_string()),
@@ -76,7 +85,9 @@ impl<'a> Value<'a> {
                 None => Ok(text.trim().to_string()),
                 Some(_) => self.text(),
             },
-            DeValue::Array(_) | DeValue::Table(_) => Err(self.unlike("a text in quotes, a number or a date")),
+            DeValue::Array(_) | DeValue::Table(_) => {
+                Err(self.unexpected("a text in quotes, a number or a date"))
+            }
         }
     }
 
@@ -86,17 +97,19 @@ impl<'a> Value<'a> {
     }
 
     /// true or false.
-    pub fn truth(&self) -> Result<bool, ModelError> {
-        self.value.as_bool().ok_or_else(|| self.unlike("true or false"))
+    pub fn boolean(&self) -> Result<bool, ModelError> {
+        self.value
+            .as_bool()
+            .ok_or_else(|| self.unexpected("true or false"))
     }
 
-    /// A number within [`limits::LARGEST`], perhaps infinite, never NaN.
-    pub fn number_or_inf(&self, wanted: &str) -> Result<f64, ModelError> {
+    /// A number within [`limits::LARGEST`], possibly infinite, never NaN.
+    pub fn number_or_inf(&self, expected: &str) -> Result<f64, ModelError> {
         let number = match &self.value {
             DeValue::Integer(integer) => {
                 i64::from_str_radix(&integer.as_str().replace('_', ""), integer.radix())
                     .map(|integer| integer as f64)
-                    // What is too large for a whole number is a number all the same.
+                    // A value that is too large for an integer is still a number.
                     .or_else(|_| integer.as_str().replace('_', "").parse())
                     .ok()
             }
@@ -105,13 +118,13 @@ impl<'a> Value<'a> {
         };
         match number {
             Some(number) if f64::is_nan(number) => {
-                Err(self.error(format!("`{}` is NaN; {wanted} is expected", self.key), None))
+                Err(self.error(format!("`{}` is NaN; {expected} is expected", self.key), None))
             }
             Some(number) => match limits::too_large(number) {
                 Some(fault) => Err(self.error(format!("`{}` is {fault}", self.key), None)),
                 None => Ok(number),
             },
-            None => Err(self.unlike(wanted)),
+            None => Err(self.unexpected(expected)),
         }
     }
 
@@ -131,11 +144,14 @@ impl<'a> Value<'a> {
         if number > 0.0 {
             Ok(number)
         } else {
-            Err(self.error(format!("`{}` is {number}; it has to be above 0", self.key), None))
+            Err(self.error(
+                format!("`{}` is {number}; it must be greater than 0", self.key),
+                None,
+            ))
         }
     }
 
-    /// A whole number of at least `least` and at most `most`.
+    /// An integer of at least `least` and at most `most`.
     pub fn count(&self, least: usize, most: usize) -> Result<usize, ModelError> {
         let number = self.number()?;
         if number.fract() == 0.0 && number >= least as f64 && number <= most as f64 {
@@ -151,17 +167,17 @@ impl<'a> Value<'a> {
         }
     }
 
-    /// The items of a list, each under the list's key.
-    pub fn list(self, wanted: &str) -> Result<Vec<Value<'a>>, ModelError> {
+    /// The items of a list, each with the key of the list.
+    pub fn list(self, expected: &str) -> Result<Vec<Value<'a>>, ModelError> {
         if !self.value.is_array() {
-            return Err(self.unlike(wanted));
+            return Err(self.unexpected(expected));
         }
         let (source, key, span) = (self.source, self.key, self.span);
         let DeValue::Array(items) = self.value else {
             return Ok(Vec::new());
         };
         if items.len() > MAX_ITEMS {
-            let message = format!("`{key}` is a list of {}; {MAX_ITEMS} are the most", items.len());
+            let message = format!("`{key}` is a list of {}; the limit is {MAX_ITEMS}", items.len());
             return Err(source.error(span, message, None));
         }
         Ok(items
@@ -177,12 +193,12 @@ impl<'a> Value<'a> {
     }
 
     /// Exactly three items of a list.
-    pub fn three(self, wanted: &str) -> Result<[Value<'a>; 3], ModelError> {
+    pub fn three(self, expected: &str) -> Result<[Value<'a>; 3], ModelError> {
         let (source, key, span) = (self.source, self.key.clone(), self.span.clone());
-        let items = self.list(wanted)?;
+        let items = self.list(expected)?;
         let count = items.len();
         items.try_into().map_err(|_| {
-            let message = format!("`{key}` is a list of {count}; {wanted} is expected");
+            let message = format!("`{key}` is a list of {count}; {expected} is expected");
             source.error(span, message, None)
         })
     }
@@ -197,12 +213,12 @@ impl<'a> Value<'a> {
         Ok(vector)
     }
 
-    /// A table, called `name` in messages.
+    /// A table with `name` as its name in messages.
     pub fn table(self, name: String) -> Result<Table<'a>, ModelError> {
         if !self.value.is_table() {
-            return Err(self.unlike("a table"));
+            return Err(self.unexpected("a table"));
         }
-        // A header `[name]` is what a message about the table should point at.
+        // Messages about the table point at its header `[name]`.
         let span = if self.key_span.start < self.span.start {
             self.key_span.clone()
         } else {

@@ -1,7 +1,7 @@
-//! Where a session may read: beside itself, below, and where `--data` points.
+//! Access control: a session may read files beside itself, below, and in the data folder.
 //!
-//! A session that came by mail should not be able to name `../../secret.csv` and have it shown in a message or a report. What counts is where
-//! a file really lies, symbolic links and `..` resolved.
+//! A session from an untrusted source must not be able to name `../../secret.csv` and show its content in a message or a report. The
+//! check uses the real location of a file, with symbolic links and `..` resolved.
 
 use std::path::{Path, PathBuf};
 
@@ -9,7 +9,7 @@ use super::ReadOptions;
 use crate::error::ModelError;
 use crate::session::document::Value;
 
-/// The folder that the names in a session start from.
+/// The folder to which the names in a session are relative.
 pub(super) fn folder(session: &Path) -> &Path {
     match session.parent() {
         Some(folder) if !folder.as_os_str().is_empty() => folder,
@@ -17,7 +17,7 @@ pub(super) fn folder(session: &Path) -> &Path {
     }
 }
 
-/// An error unless the session may read the file that a value of it names.
+/// Returns an error unless the session may read the file.
 pub(super) fn check(
     session: &Path,
     options: &ReadOptions,
@@ -28,7 +28,7 @@ pub(super) fn check(
         return Ok(());
     }
     let folders = std::iter::once(folder(session)).chain(options.data_directory.as_deref());
-    // A place that cannot be resolved (a pipe in /proc) lies in no folder.
+    // A path that cannot be resolved (a pipe in /proc) lies in no folder.
     let real: Option<PathBuf> = found.canonicalize().ok();
     let inside = real.as_ref().is_some_and(|real| {
         folders
@@ -39,11 +39,12 @@ pub(super) fn check(
         return Ok(());
     }
     let message = format!(
-        "`{} = \"{}\"` leads out of the session's folder, to {}",
+        "`{} = \"{}\"` is outside the session's folder: {}",
         named.key,
         named.as_text().unwrap_or(""),
         real.as_deref().unwrap_or(found).display()
     );
-    let help = "a session reads beside itself, below, and where `--data DIR` points; copy the file there, or say `--allow-outside` if you trust the session";
-    Err(named.error(message, Some(help.into())))
+    let help = "a session may read files in its own folder, below it, and in the data folder; copy the file there, or allow files outside \
+                if you trust the session";
+    Err(named.file_error(message, help))
 }

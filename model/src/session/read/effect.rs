@@ -1,4 +1,4 @@
-//! `[[effect]]`: component × driver × shape.
+//! Reader of `[[effect]]`: component × driver × shape.
 
 use super::shape::{self, DriverUnit};
 use super::{Context, Declared, quantity};
@@ -17,7 +17,10 @@ pub(super) fn effect(
 ) -> Result<Effect, ModelError> {
     let mut table = item.table("[[effect]]".into())?;
     let component = component(context, &mut table)?;
-    let word_value = table.need("shape", "how the component follows the driver, as \"harmonic\"")?;
+    let word_value = table.require(
+        "shape",
+        "the dependence of the component on the driver, such as \"harmonic\"",
+    )?;
     let word = word_value.text()?;
     let driver = driver(context, &mut table, &component, &word)?;
     let unit = DriverUnit::of(context, &driver);
@@ -28,7 +31,7 @@ pub(super) fn effect(
         unit,
         driver.default_scale(context.machine),
     )?;
-    suits(context, &word_value, &shape, &driver)?;
+    check_compatible(context, &word_value, &shape, &driver)?;
     let tests = tests(&mut table, declared)?;
     shape
         .check()
@@ -43,7 +46,10 @@ pub(super) fn effect(
 }
 
 fn component(context: &Context<'_>, table: &mut Table<'_>) -> Result<Component, ModelError> {
-    let value = table.need("component", "what moves, as \"EZC\" or \"workpiece_ball.x\"")?;
+    let value = table.require(
+        "component",
+        "the component, such as \"EZC\" or \"workpiece_ball.x\"",
+    )?;
     let text = value.text()?;
     let instrument = || {
         let own = context.instrument.unknowns().iter();
@@ -82,15 +88,15 @@ fn component(context: &Context<'_>, table: &mut Table<'_>) -> Result<Component, 
         Some(Component::TriggerDelay) => Ok(Component::TriggerDelay),
         None => {
             let help = format!(
-                "errors of axes by ISO 230-1, as EZC or EX0C; of the instrument: {}; or trigger",
+                "errors of axes according to ISO 230-1, such as EZC or EX0C; parameters of the instrument: {}; or trigger",
                 instrument()
             );
-            Err(value.error(format!("\"{text}\" is no component"), Some(help)))
+            Err(value.error(format!("\"{text}\" is not a component"), Some(help)))
         }
     }
 }
 
-/// The driver; where it may be left out, an error motion follows its own axis and what drifts or warms up follows time.
+/// The driver. The default is the own axis for an error motion, and time for a drift or warm-up.
 fn driver(
     context: &Context<'_>,
     table: &mut Table<'_>,
@@ -127,7 +133,7 @@ fn driver(
                 _ => false,
             };
             if !rotary {
-                let help = "gravity drives the errors of rotary axes: a moment about their own line";
+                let help = "gravity acts on the errors of rotary axes, by a moment about the axis";
                 return Err(value.error(
                     format!("gravity exerts no moment about \"{component}\""),
                     Some(help.into()),
@@ -139,11 +145,19 @@ fn driver(
     }
 }
 
-/// Whether a shape can follow this driver.
-fn suits(context: &Context<'_>, word: &Value<'_>, shape: &Shape, driver: &Driver) -> Result<(), ModelError> {
+/// Checks that a shape and a driver are compatible.
+fn check_compatible(
+    context: &Context<'_>,
+    word: &Value<'_>,
+    shape: &Shape,
+    driver: &Driver,
+) -> Result<(), ModelError> {
     if (*driver == Driver::None) != (*shape == Shape::Constant) {
-        let message = format!("the shape \"{}\" cannot follow \"{driver}\"", shape.word());
-        let help = "a constant follows \"none\" (leave `driver` out); every other shape needs a driver";
+        let message = format!(
+            "the shape \"{}\" cannot have the driver \"{driver}\"",
+            shape.word()
+        );
+        let help = "a constant has the driver \"none\" (omit `driver`); every other shape needs a driver";
         return Err(word.error(message, Some(help.to_string())));
     }
     let axis = match driver {
@@ -154,22 +168,27 @@ fn suits(context: &Context<'_>, word: &Value<'_>, shape: &Shape, driver: &Driver
         _ => None,
     };
     let fault = |help: &str| {
-        let message = format!("the shape \"{}\" cannot follow \"{driver}\"", shape.word());
+        let message = format!(
+            "the shape \"{}\" cannot have the driver \"{driver}\"",
+            shape.word()
+        );
         Err(word.error(message, Some(help.to_string())))
     };
     match shape {
         Shape::Harmonic { .. } if axis != Some(AxisKind::Rotary) => {
-            fault("a harmonic follows a rotary axis; elsewhere say \"periodic\" with its period")
+            fault("a harmonic needs a rotary axis; for other drivers use \"periodic\" with its period")
         }
         Shape::Backlash | Shape::Lag | Shape::ReversalSpike { .. } if axis.is_none() => {
-            fault("it follows the movement of an axis")
+            fault("its driver must be an axis")
         }
-        Shape::Drift | Shape::Warmup { .. } if *driver != Driver::Time => fault("it follows \"time\""),
+        Shape::Drift | Shape::Warmup { .. } if *driver != Driver::Time => {
+            fault("its driver must be \"time\"")
+        }
         _ => Ok(()),
     }
 }
 
-/// The tests that an effect is confined to; a test that its data part by socket stands for all its parts.
+/// The tests in which an effect acts. A test that its data split by socket stands for all its parts.
 fn tests(table: &mut Table<'_>, declared: &[Declared]) -> Result<Vec<String>, ModelError> {
     let Some(value) = table.take("tests") else {
         return Ok(Vec::new());
@@ -182,7 +201,7 @@ fn tests(table: &mut Table<'_>, declared: &[Declared]) -> Result<Vec<String>, Mo
             None if declared.iter().any(|test| test.parts.contains(&name)) => tests.push(name),
             None => {
                 let names: Vec<&str> = declared.iter().map(|test| test.name.as_str()).collect();
-                let message = format!("no test is called \"{name}\"");
+                let message = format!("no test has the name \"{name}\"");
                 return Err(item.error(message, Some(known_names(&name, &names))));
             }
         }

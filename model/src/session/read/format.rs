@@ -1,10 +1,10 @@
-//! `[format]` and `[columns]`: how other people's files are written.
+//! Reader of `[format]` and `[columns]`: the layout of foreign files.
 
 use crate::error::ModelError;
 use crate::session::document::{Table, Value};
-use crate::session::table::{Format, Mapped, Theirs, encoding};
+use crate::session::table::{ColumnMapping, ForeignColumn, Format, encoding};
 
-/// `[format]`: separator, decimal, header, encoding, lines above the header; sheet of a spreadsheet; direction in a ball-bar file.
+/// Reads `[format]`: separator, decimal, header, encoding, lines above the header; sheet of a spreadsheet; direction in a ball-bar file.
 pub(super) fn format(mut table: Table<'_>) -> Result<Format, ModelError> {
     let mut format = Format::default();
     if let Some(value) = table.take("separator") {
@@ -15,14 +15,14 @@ pub(super) fn format(mut table: Table<'_>) -> Result<Format, ModelError> {
         format.decimal = one_of(value, b".,")?;
     }
     if let Some(value) = table.take("header") {
-        format.header = value.truth()?;
+        format.header = value.boolean()?;
     }
     if let Some(value) = table.take("sheet") {
         format.sheet = Some(value.text()?);
     }
     if let Some(value) = table.take("anticlockwise") {
-        // Files number directions, or say whether one is meant.
-        format.anticlockwise = Some(match value.truth() {
+        // Files number directions, or name one of them.
+        format.anticlockwise = Some(match value.boolean() {
             Ok(truth) => truth.to_string(),
             Err(_) if value.as_text().is_none() => value.count(0, 1_000_000)?.to_string(),
             Err(_) => value.text()?.trim().to_string(),
@@ -31,8 +31,8 @@ pub(super) fn format(mut table: Table<'_>) -> Result<Format, ModelError> {
     if let Some(value) = table.take("encoding") {
         let name = value.text()?;
         let Some(encoding) = encoding::of_name(&name) else {
-            let message = format!("`encoding` is \"{name}\", which no encoding is called");
-            let help = "common are \"utf-8\", \"latin1\", \"utf-16le\", \"utf-16be\"; others go by their name in the WHATWG Encoding Standard, as \"shift_jis\"";
+            let message = format!("`encoding` is \"{name}\", which is not a known encoding");
+            let help = "common are \"utf-8\", \"latin1\", \"utf-16le\", \"utf-16be\"; others have their name in the WHATWG Encoding Standard, such as \"shift_jis\"";
             return Err(value.error(message, Some(help.into())));
         };
         format.encoding = Some(encoding);
@@ -44,7 +44,7 @@ pub(super) fn format(mut table: Table<'_>) -> Result<Format, ModelError> {
         && let Some(value) = decimal
     {
         let message = "the decimal comma is also the separator (\",\" unless declared)";
-        let help = "declare what parts the columns, as `separator = \";\"`";
+        let help = "declare the separator of the columns, such as `separator = \";\"`";
         return Err(value.error(message, Some(help.into())));
     }
     table.finish()?;
@@ -60,23 +60,23 @@ fn one_of(value: &Value<'_>, known: &[u8]) -> Result<u8, ModelError> {
                 .iter()
                 .map(|byte| format!("{:?}", char::from(*byte).to_string()))
                 .collect();
-            Err(value.unlike(&format!("one of {}", names.join(" "))))
+            Err(value.unexpected(&format!("one of {}", names.join(" "))))
         }
     }
 }
 
-/// `[columns]`: ours = theirs, by name or number.
-pub(super) fn columns(mut table: Table<'_>) -> Result<Vec<Mapped>, ModelError> {
+/// Reads `[columns]`: own name = foreign name or number.
+pub(super) fn columns(mut table: Table<'_>) -> Result<Vec<ColumnMapping>, ModelError> {
     let mut columns = Vec::new();
     for entry in table.remaining_values()? {
-        let theirs = match entry.as_text() {
-            Some(text) => Theirs::Name(text.trim().to_string()),
-            None => Theirs::Number(entry.count(1, 1_000_000)?),
+        let foreign = match entry.as_text() {
+            Some(text) => ForeignColumn::Name(text.trim().to_string()),
+            None => ForeignColumn::Number(entry.count(1, 1_000_000)?),
         };
-        columns.push(Mapped {
-            ours: entry.key.clone(),
-            theirs,
-            place: entry.source.place(entry.key_span.start..entry.span.end),
+        columns.push(ColumnMapping {
+            own: entry.key.clone(),
+            foreign,
+            location: entry.source.location(entry.key_span.start..entry.span.end),
         });
     }
     Ok(columns)

@@ -1,4 +1,4 @@
-//! `machine.toml`, or the same tables inside a session.
+//! Reader of `machine.toml`, or of the same tables in a session.
 
 use std::path::Path;
 
@@ -26,9 +26,9 @@ pub(super) fn source(path: &Path) -> Result<Source, ModelError> {
 
 /// A machine from the tables `name`, `chain`, `[axis.…]`.
 pub(super) fn from_table(mut table: Table<'_>) -> Result<Machine, ModelError> {
-    let chain = table.need(
+    let chain = table.require(
         "chain",
-        "the axes from workpiece over bed to tool, as in \"w C A b Y X Z t\"",
+        "the axes from workpiece over bed to tool, such as \"w C A b Y X Z t\"",
     )?;
     let text = chain.text()?;
     let code = StructuralCode::parse(&text).map_err(|fault| chain.error(fault.to_string(), None))?;
@@ -41,7 +41,7 @@ pub(super) fn from_table(mut table: Table<'_>) -> Result<Machine, ModelError> {
         Some(value) => match value.text()?.as_str() {
             "exact" => Rotation::Exact,
             "small-angle" => Rotation::SmallAngle,
-            _ => return Err(value.unlike("\"exact\" or \"small-angle\"")),
+            _ => return Err(value.unexpected("\"exact\" or \"small-angle\"")),
         },
     };
     let gravity = match table.take("gravity") {
@@ -103,7 +103,7 @@ fn axis(name: &str, mut table: Table<'_>) -> Result<Axis, ModelError> {
             let kind = match value.text()?.as_str() {
                 "rotary" => AxisKind::Rotary,
                 "linear" => AxisKind::Linear,
-                _ => return Err(value.unlike("\"rotary\" or \"linear\"")),
+                _ => return Err(value.unexpected("\"rotary\" or \"linear\"")),
             };
             if of_letter.is_some_and(|letter| letter != kind) {
                 let message = format!(
@@ -111,14 +111,15 @@ fn axis(name: &str, mut table: Table<'_>) -> Result<Axis, ModelError> {
                     quantity::kind_word(of_letter.unwrap_or(kind)),
                     quantity::kind_word(kind)
                 );
-                let help = "A B C turn and X Y Z U V W slide; give another axis another name, such as `J1`";
+                let help =
+                    "A B C are rotary and X Y Z U V W linear; give another axis another name, such as `J1`";
                 return Err(value.error(message, Some(help.into())));
             }
             Some(kind)
         }
     };
     let Some(kind) = stated.or(of_letter) else {
-        let message = format!("axis `{name}` is no ISO 841 letter and has no `kind`");
+        let message = format!("axis `{name}` is not an ISO 841 letter and has no `kind`");
         return Err(table.error(
             message,
             Some("add `kind = \"rotary\"` or `kind = \"linear\"`".into()),
@@ -128,15 +129,18 @@ fn axis(name: &str, mut table: Table<'_>) -> Result<Axis, ModelError> {
         Some(value) => {
             let (source, span) = (value.source, value.span.clone());
             unit(value.vector()?).ok_or_else(|| {
-                let message = format!("`direction` of axis `{name}` has no length");
-                let help = "a direction of any length above 0, as [0, 0, 1]";
+                let message = format!("`direction` of axis `{name}` is zero");
+                let help = "a direction of any length above 0, such as [0, 0, 1]";
                 source.error(span, message, Some(help.into()))
             })?
         }
         None => Axis::direction_of_letter(name).ok_or_else(|| {
             table.error(
-                format!("axis `{name}` is no ISO 841 letter and has no `direction`"),
-                Some("add `direction`: along or about which line of R it moves, as [0, 0, 1]".into()),
+                format!("axis `{name}` is not an ISO 841 letter and has no `direction`"),
+                Some(
+                    "add `direction`: the direction in R along or about which it moves, such as [0, 0, 1]"
+                        .into(),
+                ),
             )
         })?,
     };
@@ -172,28 +176,28 @@ fn travel(name: &str, kind: AxisKind, table: &mut Table<'_>) -> Result<Option<[f
         } else {
             "travel_mm"
         };
-        let help = format!("it takes `{right}`");
+        let help = format!("use `{right}`");
         return Err(wrong.source.error(wrong.key_span.clone(), message, Some(help)));
     }
     let Some(value) = right else { return Ok(None) };
     let (source, span) = (value.source, value.span.clone());
     let key = value.key.clone();
-    let ends = value.list("a list of two numbers, least and greatest")?;
+    let ends = value.list("a list of two numbers, minimum and maximum")?;
     let numbers = ends
         .iter()
         .map(|end| end.number())
         .collect::<Result<Vec<_>, _>>()?;
     match numbers[..] {
-        [least, greatest] if least < greatest => Ok(Some([least, greatest].map(|end| kind.inside(end)))),
+        [least, greatest] if least < greatest => Ok(Some([least, greatest].map(|end| kind.to_internal(end)))),
         _ => Err(source.error(
             span,
-            format!("`{key}` of axis `{name}` is not two numbers, the least before the greatest"),
+            format!("`{key}` of axis `{name}` is not a list of two numbers, minimum and maximum"),
             None,
         )),
     }
 }
 
-/// The vector at length 1, unless it has none.
+/// The vector scaled to length 1; `None` for a zero vector.
 fn unit(vector: [f64; 3]) -> Option<[f64; 3]> {
     let largest = vector.iter().fold(0.0_f64, |largest, v| largest.max(v.abs()));
     if largest == 0.0 || !largest.is_finite() {

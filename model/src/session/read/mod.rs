@@ -1,4 +1,4 @@
-//! Machine and session files.
+//! Reader of machine and session files.
 
 mod data_folder;
 mod effect;
@@ -20,26 +20,26 @@ use super::document::{Source, Table, Value};
 use super::expression::Length;
 use super::limits;
 use super::stamp::FileStamp;
-use super::table::{Format, Mapped};
+use super::table::{ColumnMapping, Format};
 use super::{Session, Test};
 use crate::chain::Machine;
-use crate::error::{ModelError, Place};
+use crate::error::{Location, ModelError};
 use crate::instrument::InstrumentKind;
 use quantity::MICROMETRE;
 
-/// How a session is read.
+/// Options for reading a session.
 #[derive(Clone, Debug)]
 pub struct ReadOptions {
-    /// Where the data files lie when they do not lie beside the session file.
+    /// The folder of the data files, if they are not beside the session file.
     pub data_directory: Option<PathBuf>,
-    /// Whether the data files are read; without, a session is only its plan.
+    /// Whether the data files are read; otherwise the session is only a plan.
     pub read_data: bool,
-    /// Whether the session may read files that lie neither beside or below it nor in the data directory.
+    /// Whether the session may read files outside its own folder, the folders below and the data directory.
     pub allow_outside: bool,
 }
 
 impl Default for ReadOptions {
-    /// Data are read, from beside the session file and below.
+    /// Data are read, from the session's folder and below.
     fn default() -> Self {
         ReadOptions {
             data_directory: None,
@@ -49,7 +49,7 @@ impl Default for ReadOptions {
     }
 }
 
-/// What the readers of tests and effects need of the session around them.
+/// Context of the session for the readers of tests and effects.
 struct Context<'a> {
     /// The session file.
     file: &'a Path,
@@ -57,12 +57,12 @@ struct Context<'a> {
     instrument: InstrumentKind,
     constants: &'a [(String, f64)],
     format: Format,
-    columns: Option<Vec<Mapped>>,
+    columns: Option<Vec<ColumnMapping>>,
     options: &'a ReadOptions,
 }
 
 impl Context<'_> {
-    /// A length: a number, or an expression over the constants.
+    /// A length: a number, or an expression in the constants.
     fn length(&self, value: &Value<'_>) -> Result<(Length, f64), ModelError> {
         let Some(text) = value.as_text() else {
             let number = value.number_or_inf("a number or an expression in quotes")?;
@@ -73,7 +73,7 @@ impl Context<'_> {
         };
         let names: Vec<&str> = self.constants.iter().map(|(name, _)| name.as_str()).collect();
         let length = Length::parse(text, &names).map_err(|fault| {
-            let help = "a length is a number or an expression over [constants] with + - * / ^2 sqrt( )";
+            let help = "a length is a number or an expression in [constants] with + - * / ^2 sqrt( )";
             value.error(
                 format!("`{}` = \"{text}\": {fault}", value.key),
                 Some(help.into()),
@@ -84,12 +84,12 @@ impl Context<'_> {
             found.map_or(f64::NAN, |(_, value)| *value)
         });
         if let Some(fault) = limits::too_large(number) {
-            let message = format!("`{}` = \"{text}\" comes to {fault}", value.key);
+            let message = format!("`{}` = \"{text}\" evaluates to {fault}", value.key);
             return Err(value.error(message, None));
         }
         if !number.is_finite() {
             let message = format!(
-                "`{}` = \"{text}\" comes to {number} with these constants",
+                "`{}` = \"{text}\" evaluates to {number} with these constants",
                 value.key
             );
             return Err(value.error(
@@ -112,8 +112,8 @@ impl Context<'_> {
     }
 }
 
-/// The text of a TOML file of another form than these, read as they are: UTF-8 with or without byte order mark, of a limited size, unchanged while it
-/// is read. `what` says in messages what it is.
+/// Reads the text of another TOML file in the same way: UTF-8 with or without byte order mark, of a limited size, unchanged while it is
+/// read. `what` names its content in messages.
 ///
 /// # Errors
 /// If the file cannot be read or is not such a text, with its name and what to do.
@@ -121,14 +121,14 @@ pub fn text(path: &Path, what: &str) -> Result<String, ModelError> {
     Ok(Source::read(path, what)?.text)
 }
 
-/// Reads a session file, its machine and, if asked for, its data.
+/// Reads a session file, its machine and, if requested, its data.
 ///
 /// # Errors
-/// Whatever keeps the session from being used: file, line, what was found and expected, and what to do.
+/// Every fault that prevents the use of the session: file, line, what was found and expected, and what to do.
 pub fn session(path: &Path, options: &ReadOptions) -> Result<Session, ModelError> {
     let source = Source::read(path, "the session file")?;
     let mut root = source.parse()?;
-    let Bodies {
+    let SessionMachine {
         machine,
         source: machine_source,
     } = session_machine(path, options, &mut root)?;
@@ -156,7 +156,7 @@ pub fn session(path: &Path, options: &ReadOptions) -> Result<Session, ModelError
     };
     let mut warnings = Vec::new();
     let (tests, declared) = tests(&context, &mut root, &mut warnings)?;
-    warnings.extend(setups::unlike(&tests));
+    warnings.extend(setups::differing_set_ups(&tests));
     let effects = match root.take("effect") {
         Some(value) => value
             .list("tables [[effect]]")?
@@ -199,21 +199,25 @@ pub fn session(path: &Path, options: &ReadOptions) -> Result<Session, ModelError
     })
 }
 
-/// The machine of a session, and the file it stands in where that is one of its own.
-struct Bodies {
+/// The machine of a session, and its file if it has one of its own.
+struct SessionMachine {
     machine: Machine,
     source: Option<Source>,
 }
 
-/// The machine: a file beside the session, or the tables themselves.
-fn session_machine(path: &Path, options: &ReadOptions, root: &mut Table<'_>) -> Result<Bodies, ModelError> {
-    let value = root.need(
+/// Reads the machine: a file beside the session, or tables in the session.
+fn session_machine(
+    path: &Path,
+    options: &ReadOptions,
+    root: &mut Table<'_>,
+) -> Result<SessionMachine, ModelError> {
+    let value = root.require(
         "machine",
         "[machine] with `file = \"machine.toml\"`, or the machine's tables in it",
     )?;
     let mut table = value.table("[machine]".into())?;
     let Some(file) = table.take("file") else {
-        return Ok(Bodies {
+        return Ok(SessionMachine {
             machine: machine::from_table(table)?,
             source: None,
         });
@@ -222,7 +226,7 @@ fn session_machine(path: &Path, options: &ReadOptions, root: &mut Table<'_>) -> 
     let found = path.parent().unwrap_or(Path::new("")).join(&named);
     if !found.exists() {
         let message = format!(
-            "the machine file `{named}` is not there; looked for {}",
+            "the machine file `{named}` does not exist; looked for {}",
             found.display()
         );
         return Err(file.error(message, Some("its name is relative to the session file".into())));
@@ -230,7 +234,7 @@ fn session_machine(path: &Path, options: &ReadOptions, root: &mut Table<'_>) -> 
     data_folder::check(path, options, &file, &found)?;
     table.finish()?;
     let source = machine::source(&found)?;
-    Ok(Bodies {
+    Ok(SessionMachine {
         machine: machine::from_table(source.parse()?)?,
         source: Some(source),
     })
@@ -248,8 +252,8 @@ fn constants(root: &mut Table<'_>) -> Result<Vec<(String, f64)>, ModelError> {
             && letters.all(|c| c.is_alphanumeric() || c == '_')
             && name != "sqrt";
         if !valid {
-            let help = "a letter, then letters, digits and `_`; `sqrt` is taken";
-            let message = format!("a constant cannot be called `{name}`");
+            let help = "a name is a letter followed by letters, digits and `_`; `sqrt` is reserved";
+            let message = format!("a constant cannot have the name `{name}`");
             return Err(entry
                 .source
                 .error(entry.key_span.clone(), message, Some(help.into())));
@@ -259,7 +263,7 @@ fn constants(root: &mut Table<'_>) -> Result<Vec<(String, f64)>, ModelError> {
     Ok(constants)
 }
 
-/// `[about]`: notes that reports repeat.
+/// Reads `[about]`: notes that reports repeat.
 fn about(root: &mut Table<'_>) -> Result<Vec<(String, String)>, ModelError> {
     let Some(value) = root.take("about") else {
         return Ok(Vec::new());
@@ -270,8 +274,8 @@ fn about(root: &mut Table<'_>) -> Result<Vec<(String, String)>, ModelError> {
         .map(|note| {
             let control = note.key.chars().any(char::is_control);
             if control || note.key.trim().is_empty() {
-                let message = "a note of [about] has a name that cannot be shown";
-                let help = "as in `serial_number`, `operator`, `date`, `comment`";
+                let message = "a note of [about] has a name that cannot be displayed";
+                let help = "use names such as `serial_number`, `operator`, `date`, `comment`";
                 return Err(note
                     .source
                     .error(note.key_span.clone(), message, Some(help.into())));
@@ -281,7 +285,7 @@ fn about(root: &mut Table<'_>) -> Result<Vec<(String, String)>, ModelError> {
         .collect()
 }
 
-/// What `kind` of an instrument may be.
+/// The valid values of `kind` of an instrument.
 const KINDS: &str = "\"ballbar\", \"r-test\", \"probe\", \"tracker\" or \"socket\"";
 
 struct Instrument {
@@ -292,12 +296,12 @@ struct Instrument {
 
 impl Instrument {
     fn read(root: &mut Table<'_>) -> Result<Instrument, ModelError> {
-        let value = root.need("instrument", "[instrument] with `kind = \"ballbar\"`")?;
+        let value = root.require("instrument", "[instrument] with `kind = \"ballbar\"`")?;
         let mut table = value.table("[instrument]".into())?;
-        let value = table.need("kind", KINDS)?;
+        let value = table.require("kind", KINDS)?;
         let word = value.text()?;
         let Some(kind) = InstrumentKind::ALL.into_iter().find(|kind| kind.word() == word) else {
-            return Err(value.unlike(KINDS));
+            return Err(value.unexpected(KINDS));
         };
         let mut not_negative = |key: &'static str| -> Result<Option<f64>, ModelError> {
             let Some(value) = table.take(key) else {
@@ -324,13 +328,13 @@ impl Instrument {
     }
 }
 
-/// A `[[test]]` by name, with the tests that came of it: one for each socket, else itself.
+/// The name of a `[[test]]`, with the tests that it declares: one for each socket, else one.
 struct Declared {
     name: String,
     parts: Vec<String>,
 }
 
-/// The tests, and the names that effects may use for them.
+/// Reads the tests, and the names by which effects may refer to them.
 fn tests(
     context: &Context<'_>,
     root: &mut Table<'_>,
@@ -355,7 +359,7 @@ fn tests(
     }
     if tests.is_empty() {
         return Err(ModelError::Input {
-            place: Place::file(context.file),
+            location: Location::file(context.file),
             message: "a session without tests".into(),
             help: Some("add at least one [[test]]".into()),
         });

@@ -1,10 +1,10 @@
-//! Quantities by the unit in their name, and axes by theirs.
+//! Conversion of quantities by the unit in their name, and lookup of axes by name.
 
 use crate::axis::AxisKind;
 use crate::chain::Machine;
-use crate::session::spelling::meant;
+use crate::session::spelling::suggestion;
 
-/// µm in mm.
+/// A micrometre in mm.
 pub(crate) const MICROMETRE: f64 = 1e-3;
 /// An inch in mm (exact since 1959).
 const INCH: f64 = 25.4;
@@ -17,7 +17,7 @@ pub(crate) fn kind_word(kind: AxisKind) -> &'static str {
     }
 }
 
-/// The axis of this name; by another case of the letters where that leaves no doubt.
+/// The axis of this name; the case of letters is ignored if that is unambiguous.
 pub(crate) fn axis_index(machine: &Machine, name: &str) -> Option<usize> {
     if let Some(index) = machine.axis_index(name) {
         return Some(index);
@@ -27,16 +27,16 @@ pub(crate) fn axis_index(machine: &Machine, name: &str) -> Option<usize> {
     alike.next().filter(|_| alike.next().is_none())
 }
 
-/// That the machine has no such axis, with the one that may be meant.
+/// Message and help for an unknown axis, with the most similar name.
 pub(crate) fn no_axis(machine: &Machine, name: &str) -> (String, String) {
     let names: Vec<&str> = machine.axes.iter().map(|axis| axis.name.as_str()).collect();
     (
         format!("the machine \"{}\" has no axis `{name}`", machine.name),
-        format!("{}its axes are {}", meant(name, &names), names.join(", ")),
+        format!("{}its axes are {}", suggestion(name, &names), names.join(", ")),
     )
 }
 
-/// What an axis position called `x_mm`, `a_deg`, `J1_rad` is: the axis, and what a number is multiplied by.
+/// Interprets the name of an axis position, such as `x_mm`, `a_deg`, `J1_rad`: the axis and the conversion.
 pub(crate) fn axis_position(machine: &Machine, name: &str) -> Option<(usize, Unit)> {
     let (axis, unit) = name.rsplit_once('_')?;
     let axis = axis_index(machine, axis)?;
@@ -49,25 +49,25 @@ pub(crate) fn axis_position(machine: &Machine, name: &str) -> Option<(usize, Uni
     Some((axis, unit))
 }
 
-/// How a number in a file becomes one inside.
+/// Conversion of a number in a file to the internal unit.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) enum Unit {
-    /// Multiplied.
+    /// Multiplication by a factor.
     Times(f64),
-    /// From degrees.
+    /// Degrees to radians.
     Degrees,
 }
 
 impl Unit {
-    /// The number inside.
-    pub fn inside(self, value: f64) -> f64 {
+    /// The number in the internal unit.
+    pub fn to_internal(self, value: f64) -> f64 {
         match self {
             Unit::Times(factor) => value * factor,
             Unit::Degrees => value.to_radians(),
         }
     }
 
-    /// A length's unit: `mm`, `um`, `m`, `in`, `mil` (a thousandth of an inch).
+    /// A unit of length: `mm`, `um`, `m`, `in`, `mil` (a thousandth of an inch).
     pub fn of_length(unit: &str) -> Option<Unit> {
         match unit {
             "mm" => Some(Unit::Times(1.0)),

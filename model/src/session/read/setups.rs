@@ -1,4 +1,4 @@
-//! What tests share: things mounted once, and sockets at known distances.
+//! Set-ups shared by tests, and sockets at known distances.
 
 use super::quantity::MICROMETRE;
 use crate::error::ModelError;
@@ -6,12 +6,12 @@ use crate::instrument::{InstrumentKind, InstrumentUnknown, SharedBy, Station};
 use crate::session::document::Table;
 use crate::session::{Prior, SocketDistance, Test};
 
-/// Tests that share a mounted thing and describe it differently.
-pub(super) fn unlike(tests: &[Test]) -> Vec<String> {
+/// Warnings about tests that share a mounted object and describe it differently.
+pub(super) fn differing_set_ups(tests: &[Test]) -> Vec<String> {
     let mut warnings = Vec::new();
     for (index, test) in tests.iter().enumerate() {
         let unknowns = test.station.kind().unknowns();
-        for group in unlike_groups(unknowns) {
+        for group in mounted_groups(unknowns) {
             let Some(first) = tests[..index]
                 .iter()
                 .find(|other| other.group(group) == test.group(group))
@@ -28,8 +28,7 @@ pub(super) fn unlike(tests: &[Test]) -> Vec<String> {
             };
             if own(first) != own(test) {
                 warnings.push(format!(
-                    "tests \"{}\" and \"{}\" share the set-up \"{}\" and describe it differently; it is mounted once and \
-                     lies in one place",
+                    "tests \"{}\" and \"{}\" share the set-up \"{}\" and describe it differently; an object that is mounted once has one position",
                     first.name,
                     test.name,
                     test.group(group)
@@ -40,15 +39,15 @@ pub(super) fn unlike(tests: &[Test]) -> Vec<String> {
     warnings
 }
 
-/// What the unknowns of an instrument are shared by, of the things that a user mounts.
-fn unlike_groups(unknowns: &[InstrumentUnknown]) -> Vec<SharedBy> {
+/// The groups of an instrument's parameters that belong to objects that a user mounts.
+fn mounted_groups(unknowns: &[InstrumentUnknown]) -> Vec<SharedBy> {
     [SharedBy::Setup, SharedBy::SpindleSetup, SharedBy::BarSetup]
         .into_iter()
         .filter(|group| unknowns.iter().any(|unknown| unknown.shared_by == *group))
         .collect()
 }
 
-/// Where the thing that a group shares nominally lies.
+/// Nominal position of the object that a group shares.
 fn nominal(station: &Station<f64>, group: SharedBy) -> [f64; 3] {
     match (station, group) {
         (Station::BallBar(bar), SharedBy::Setup) => bar.workpiece_ball,
@@ -80,12 +79,12 @@ pub(super) fn socket_distances(
     let mut distances = Vec::new();
     for item in value.list("tables [[socket_distance]]")? {
         let mut table = item.table("[[socket_distance]]".into())?;
-        let between = table.need("between", "the two sockets, as [\"0\", \"1\"]")?;
+        let between = table.require("between", "the two sockets, such as [\"0\", \"1\"]")?;
         let (source, span) = (between.source, between.span.clone());
         let mut names = Vec::new();
         for name in between.list("a list of two sockets")? {
             let socket = name.text()?;
-            // Sockets that a column names are known once the data are read.
+            // Sockets named by a column are known after the data are read.
             if read
                 && !tests
                     .iter()
@@ -99,12 +98,12 @@ pub(super) fn socket_distances(
             names.push(socket);
         }
         let Ok(between) = <[String; 2]>::try_from(names) else {
-            return Err(source.error(span, "`between` takes two sockets", None));
+            return Err(source.error(span, "`between` needs two sockets", None));
         };
         if between[0] == between[1] {
-            return Err(source.error(span, "`between` takes two different sockets", None));
+            return Err(source.error(span, "`between` needs two different sockets", None));
         }
-        let distance_mm = table.need("mm", "the distance in mm")?.positive()?;
+        let distance_mm = table.require("mm", "the distance in mm")?.positive()?;
         let u_mm = match table.take("u_um") {
             Some(value) => {
                 let u = value.number()?;

@@ -1,7 +1,7 @@
-//! The shape of an effect and its numbers.
+//! Reader of the shape of an effect and its parameters.
 //!
-//! Numbers that belong to the driver carry its unit: `_mm` where it is a linear axis, `_deg` (or `_rad`) a rotary one, `_s` time,
-//! `_c` temperature, `_m` the gravity moment of a unit weight.
+//! Numbers in the unit of the driver have a suffix: `_mm` for a linear axis, `_deg` (or `_rad`) for a rotary one, `_s` for time, `_c` for
+//! temperature, `_m` for the gravity moment of a unit weight.
 
 use std::f64::consts::TAU;
 
@@ -12,10 +12,10 @@ use crate::error::ModelError;
 use crate::session::document::{Table, Value};
 use crate::session::spelling::known_names;
 
-/// Intervals of a curve that does not state them.
+/// Default number of intervals of a curve.
 const CURVE_INTERVALS: usize = 12;
 
-/// The words for shapes.
+/// The identifiers of shapes.
 const SHAPES: [&str; 13] = [
     "constant",
     "polynomial",
@@ -60,7 +60,7 @@ impl DriverUnit {
         }
     }
 
-    /// The suffix to recommend.
+    /// The recommended suffix.
     fn suffix(self) -> &'static str {
         match self {
             DriverUnit::Millimetre => "mm",
@@ -71,7 +71,7 @@ impl DriverUnit {
         }
     }
 
-    /// What a suffix means for this driver: `Some(true)` degrees, `Some(false)` the unit inside, `None` another driver's.
+    /// The meaning of a suffix for this driver: `Some(true)` degrees, `Some(false)` the internal unit, `None` the unit of another driver.
     fn degrees(self, suffix: &str) -> Option<bool> {
         match (self, suffix) {
             (DriverUnit::Angle, "deg") => Some(true),
@@ -120,7 +120,7 @@ const SCALE: Suffixed = [
     "scale_m",
 ];
 
-/// Takes the one of a key's forms that is there; whether it is in degrees.
+/// Takes the form of a key that is present; also returns whether it is in degrees.
 fn suffixed<'a>(
     table: &mut Table<'a>,
     keys: Suffixed,
@@ -133,11 +133,11 @@ fn suffixed<'a>(
         let Some(degrees) = unit.degrees(suffix) else {
             let id_stem = key.trim_end_matches(suffix);
             let message = format!("`{key}` for a driver in {}", unit.suffix());
-            let help = format!("it takes `{id_stem}{}`", unit.suffix());
+            let help = format!("use `{id_stem}{}`", unit.suffix());
             return Err(value.source.error(value.key_span.clone(), message, Some(help)));
         };
         if found.is_some() {
-            return Err(value.error(format!("`{key}` beside the same in another unit"), None));
+            return Err(value.error(format!("`{key}` is given twice, in two units"), None));
         }
         found = Some((value, degrees));
     }
@@ -156,7 +156,7 @@ fn optional(table: &mut Table<'_>, keys: Suffixed, unit: DriverUnit) -> Result<O
     }
 }
 
-fn needed(
+fn required(
     table: &mut Table<'_>,
     word: &Value<'_>,
     keys: Suffixed,
@@ -178,7 +178,7 @@ fn order<'a>(table: &mut Table<'a>, value: &Value<'_>, word: &str) -> Result<Val
     })
 }
 
-/// Reads the shape that `word` names from the other keys of its table; a polynomial that states no scale has `default_scale`.
+/// Reads the shape `word` from the other keys of its table; `default_scale` applies to a polynomial without a stated scale.
 pub(super) fn shape(
     table: &mut Table<'_>,
     value: &Value<'_>,
@@ -201,13 +201,13 @@ pub(super) fn shape(
             order: order(table, value, word)?.positive()?,
         }),
         "periodic" => Ok(Shape::Periodic {
-            period: needed(table, value, PERIOD, unit, word)?,
+            period: required(table, value, PERIOD, unit, word)?,
         }),
         "curve" => curve(table, value, word, unit),
         "backlash" => Ok(Shape::Backlash),
         "lag" => Ok(Shape::Lag),
         "reversal-spike" => Ok(Shape::ReversalSpike {
-            width: needed(table, value, WIDTH, unit, word)?,
+            width: required(table, value, WIDTH, unit, word)?,
         }),
         "drift" => Ok(Shape::Drift),
         "warmup" => {
@@ -232,10 +232,10 @@ pub(super) fn shape(
             Ok(Shape::Steps { at })
         }
         "local" => {
-            let centre = needed(table, value, CENTRE, unit, word)?;
-            let width = needed(table, value, WIDTH, unit, word)?;
+            let centre = required(table, value, CENTRE, unit, word)?;
+            let width = required(table, value, WIDTH, unit, word)?;
             let recurs = match table.take("recurs") {
-                Some(recurs) => recurs.truth()?,
+                Some(recurs) => recurs.boolean()?,
                 None => true,
             };
             Ok(Shape::Local {
@@ -245,13 +245,13 @@ pub(super) fn shape(
             })
         }
         other => {
-            let message = format!("\"{other}\" is no shape");
+            let message = format!("\"{other}\" is not a shape");
             Err(value.error(message, Some(known_names(other, &SHAPES))))
         }
     }
 }
 
-/// A curve runs over the full turn of a rotary axis and closes unless it says otherwise; elsewhere its ends are needed.
+/// Reads a curve. By default it covers the full revolution of a rotary axis and is closed; for other drivers its ends are required.
 fn curve(
     table: &mut Table<'_>,
     value: &Value<'_>,
@@ -260,20 +260,20 @@ fn curve(
 ) -> Result<Shape, ModelError> {
     let stated = table.take("closed");
     let mut closed = match &stated {
-        Some(closed) => closed.truth()?,
+        Some(closed) => closed.boolean()?,
         None => unit == DriverUnit::Angle,
     };
     let (from, to) = if unit == DriverUnit::Angle {
         let from = optional(table, FROM, unit)?;
         let to = optional(table, TO, unit)?;
-        // Ends of its own make it an open curve unless it says that it closes.
+        // A curve with stated ends is open unless it is declared closed.
         closed &= stated.is_some() || (from.is_none() && to.is_none());
         let from = from.unwrap_or(0.0);
         (from, to.unwrap_or(from + TAU))
     } else {
         (
-            needed(table, value, FROM, unit, word)?,
-            needed(table, value, TO, unit, word)?,
+            required(table, value, FROM, unit, word)?,
+            required(table, value, TO, unit, word)?,
         )
     };
     let intervals = match table.take("intervals") {

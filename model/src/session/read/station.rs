@@ -1,4 +1,4 @@
-//! The instrument as a test sets it up: nominal geometry, and what is known of it.
+//! Reader of the instrument of a test: nominal geometry and priors.
 
 use super::Context;
 use super::quantity::MICROMETRE;
@@ -23,8 +23,8 @@ pub(super) struct SetUp {
     pub socket: Option<String>,
 }
 
-/// Keys of a test that not every instrument has.
-const OWN: [(InstrumentKind, &[&str]); 5] = [
+/// Keys of a test that only some instruments have.
+const INSTRUMENT_KEYS: [(InstrumentKind, &[&str]); 5] = [
     (
         InstrumentKind::BallBar,
         &[
@@ -68,11 +68,13 @@ const OWN: [(InstrumentKind, &[&str]); 5] = [
     ),
 ];
 
-/// Takes the instrument's keys out of a test.
+/// Reads the instrument's keys of a test.
 pub(super) fn set_up(context: &Context<'_>, table: &mut Table<'_>) -> Result<SetUp, ModelError> {
-    let own = OWN.iter().find(|(kind, _)| *kind == context.instrument);
+    let own = INSTRUMENT_KEYS
+        .iter()
+        .find(|(kind, _)| *kind == context.instrument);
     let own = own.map_or(&[][..], |(_, keys)| keys);
-    for (kind, keys) in OWN {
+    for (kind, keys) in INSTRUMENT_KEYS {
         for key in keys.iter().filter(|key| !own.contains(key)) {
             if let Some(value) = table.take(key) {
                 let message = format!(
@@ -94,10 +96,10 @@ pub(super) fn set_up(context: &Context<'_>, table: &mut Table<'_>) -> Result<Set
 }
 
 fn ball_bar(context: &Context<'_>, table: &mut Table<'_>) -> Result<SetUp, ModelError> {
-    let bar = table.need("bar_mm", "the calibrated length of the bar")?;
+    let bar = table.require("bar_mm", "the calibrated length of the bar")?;
     let (bar_as_written, bar_mm) = context.length(&bar)?;
     if bar_mm <= 0.0 {
-        return Err(bar.error(format!("`bar_mm` is {bar_mm}; a bar has a length above 0"), None));
+        return Err(bar.error(format!("`bar_mm` is {bar_mm}; it must be greater than 0"), None));
     }
     let Balls {
         workpiece: (workpiece, workpiece_mm),
@@ -122,7 +124,7 @@ fn ball_bar(context: &Context<'_>, table: &mut Table<'_>) -> Result<SetUp, Model
     })
 }
 
-/// The point on the table and the one in the spindle, as written and in mm, and what is known of them.
+/// The points on the table and in the spindle, as written and in mm, and their priors.
 struct Balls {
     workpiece: ([Length; 3], [f64; 3]),
     spindle: ([Length; 3], [f64; 3]),
@@ -130,13 +132,13 @@ struct Balls {
 }
 
 fn balls(context: &Context<'_>, table: &mut Table<'_>) -> Result<Balls, ModelError> {
-    let workpiece = table.need(
+    let workpiece = table.require(
         "workpiece_ball_mm",
-        "the workpiece ball in the table frame, as [0, 100, 0]",
+        "the workpiece ball in the table frame, such as [0, 100, 0]",
     )?;
-    let spindle = table.need(
+    let spindle = table.require(
         "spindle_ball_mm",
-        "the spindle ball in the tool frame, as [0, 0, 0]",
+        "the spindle ball in the tool frame, such as [0, 0, 0]",
     )?;
     let (workpiece, spindle) = (context.point(workpiece)?, context.point(spindle)?);
     let mut priors = priors(table.take("workpiece_ball_u_um"), 3)?;
@@ -150,11 +152,11 @@ fn balls(context: &Context<'_>, table: &mut Table<'_>) -> Result<Balls, ModelErr
 
 fn r_test(context: &Context<'_>, table: &mut Table<'_>) -> Result<SetUp, ModelError> {
     const SETTINGS: &str = "\"E\" (sensors on the table) or \"Es\" (sensors in the spindle)";
-    let setting = table.need("setting", SETTINGS)?;
+    let setting = table.require("setting", SETTINGS)?;
     let setting = match setting.text()?.as_str() {
         "E" => Setting::Table,
         "Es" => Setting::Spindle,
-        _ => return Err(setting.unlike(SETTINGS)),
+        _ => return Err(setting.unexpected(SETTINGS)),
     };
     let Balls {
         workpiece: (workpiece, workpiece_mm),
@@ -181,14 +183,14 @@ fn r_test(context: &Context<'_>, table: &mut Table<'_>) -> Result<SetUp, ModelEr
     })
 }
 
-/// The directions along which three sensors count: ω, φ, θ, or the directions themselves; `None` where readings come in X, Y, Z.
+/// The measuring directions of three sensors: from ω, φ, θ, or stated; `None` if readings are in X, Y, Z.
 fn sensors(table: &mut Table<'_>) -> Result<Option<[[f64; 3]; 3]>, ModelError> {
     let (angles, directions) = (table.take("sensor_angles_deg"), table.take("sensor_directions"));
     match (angles, directions) {
         (Some(_), Some(directions)) => Err(directions.source.error(
             directions.key_span.clone(),
             "both `sensor_angles_deg` and `sensor_directions`",
-            Some("keep one of them: either says along which directions the sensors count".into()),
+            Some("keep one of them: either states the measuring directions of the sensors".into()),
         )),
         (None, None) => Ok(None),
         (Some(angles), None) => {
@@ -217,7 +219,8 @@ fn sensors(table: &mut Table<'_>) -> Result<Option<[[f64; 3]; 3]>, ModelError> {
                 let message = format!(
                     "the three `sensor_directions` lie almost in a plane (their triple product is {volume:.3}; 1 at right angles)"
                 );
-                let help = "sensors that read three coordinates point three ways; check the directions";
+                let help =
+                    "three coordinates need three independent measuring directions; check the directions";
                 return Err(source.error(span, message, Some(help.into())));
             }
             Ok(Some(rows))
@@ -225,11 +228,11 @@ fn sensors(table: &mut Table<'_>) -> Result<Option<[[f64; 3]; 3]>, ModelError> {
     }
 }
 
-/// Least triple product of three unit directions that still tell three coordinates: below it one of them is read with twenty times the noise.
+/// Least triple product of three measuring directions. Below it, one coordinate has twenty times the noise.
 const MIN_VOLUME: f64 = 0.05;
 
 fn tracker(context: &Context<'_>, table: &mut Table<'_>) -> Result<SetUp, ModelError> {
-    let target = table.need("target_mm", "the target in the tool frame")?;
+    let target = table.require("target_mm", "the target in the tool frame")?;
     let (target, target_mm) = context.point(target)?;
     let mut priors = vec![Prior::Free; 6];
     priors.extend(self::priors(table.take("target_u_um"), 3)?);
@@ -251,7 +254,7 @@ fn tracker(context: &Context<'_>, table: &mut Table<'_>) -> Result<SetUp, ModelE
 }
 
 fn socket(context: &Context<'_>, table: &mut Table<'_>) -> Result<SetUp, ModelError> {
-    let ball = table.need("ball_mm", "the ball in the tool frame")?;
+    let ball = table.require("ball_mm", "the ball in the tool frame")?;
     let (ball, ball_mm) = context.point(ball)?;
     let mut priors = vec![Prior::Free; 3];
     priors.extend(self::priors(table.take("ball_u_um"), 3)?);
@@ -274,15 +277,15 @@ fn socket(context: &Context<'_>, table: &mut Table<'_>) -> Result<SetUp, ModelEr
 }
 
 fn probe(context: &Context<'_>, table: &mut Table<'_>) -> Result<SetUp, ModelError> {
-    let artefact = table.need("artefact_mm", "a point of the cylinder's axis in the table frame")?;
+    let artefact = table.require("artefact_mm", "a point of the cylinder's axis in the table frame")?;
     let (artefact, artefact_mm) = context.point(artefact)?;
-    let radius = table.need("radius_mm", "the cylinder's radius, the stylus' included")?;
+    let radius = table.require("radius_mm", "the radius of the cylinder plus that of the stylus")?;
     let (radius_as_written, radius_mm) = context.length(&radius)?;
     if radius_mm <= 0.0 {
-        let message = format!("`radius_mm` is {radius_mm}; a cylinder has a radius above 0");
+        let message = format!("`radius_mm` is {radius_mm}; it must be greater than 0");
         return Err(radius.error(message, None));
     }
-    let stylus = table.need("stylus_mm", "the stylus' centre in the tool frame")?;
+    let stylus = table.require("stylus_mm", "the stylus' centre in the tool frame")?;
     let (stylus, stylus_mm) = context.point(stylus)?;
     let axis = match table.take("artefact_axis") {
         Some(value) => unit_vector(value)?,
@@ -318,7 +321,7 @@ fn probe(context: &Context<'_>, table: &mut Table<'_>) -> Result<SetUp, ModelErr
     })
 }
 
-/// A direction as three numbers, brought to unit length.
+/// A direction of three numbers, normalised to unit length.
 fn unit_vector(value: Value<'_>) -> Result<[f64; 3], ModelError> {
     let (source, span, key) = (value.source, value.span.clone(), value.key.clone());
     let items = value.three("a direction as three numbers")?;
@@ -328,7 +331,7 @@ fn unit_vector(value: Value<'_>) -> Result<[f64; 3], ModelError> {
     }
     let length = vector.iter().map(|x| x * x).sum::<f64>().sqrt();
     if length < 1e-9 {
-        return Err(source.error(span, format!("`{key}` has no length"), None));
+        return Err(source.error(span, format!("`{key}` is zero"), None));
     }
     Ok(vector.map(|x| x / length))
 }
@@ -346,7 +349,7 @@ fn angle_priors(value: Option<Value<'_>>) -> Result<Vec<Prior>, ModelError> {
         .collect())
 }
 
-/// `…_u_um`: a number for all coordinates or a list with one for each. Absent or 0 is known, `inf` is free.
+/// `…_u_um`: a number for all coordinates or a list with one for each. Absent or 0 is known, `inf` is no prior.
 fn priors(value: Option<Value<'_>>, count: usize) -> Result<Vec<Prior>, ModelError> {
     let Some(value) = value else {
         return Ok(vec![Prior::Known; count]);
@@ -355,7 +358,7 @@ fn priors(value: Option<Value<'_>>, count: usize) -> Result<Vec<Prior>, ModelErr
         return Ok(vec![prior(&value)?; count]);
     }
     if count == 1 {
-        return Err(value.unlike("a number"));
+        return Err(value.unexpected("a number"));
     }
     let items = value.three("a number or a list of three")?;
     items.iter().map(prior).collect()
@@ -365,11 +368,11 @@ fn prior(value: &Value<'_>) -> Result<Prior, ModelError> {
     let u = value.number_or_inf("a number or `inf`")?;
     if u < 0.0 {
         let message = format!("`{}` is {u}; an uncertainty cannot be negative", value.key);
-        let help = "0 says exactly known, `inf` says not known at all";
+        let help = "0 means exactly known, `inf` means unknown";
         return Err(value.error(message, Some(help.into())));
     }
     if let Some(fault) = limits::too_small_um(u) {
-        let help = "0 says exactly known";
+        let help = "0 means exactly known";
         return Err(value.error(format!("`{}` is {fault}", value.key), Some(help.into())));
     }
     Ok(if u == 0.0 {

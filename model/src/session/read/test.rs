@@ -1,4 +1,4 @@
-//! `[[test]]`: one test, or one for each socket that its data name.
+//! Reader of `[[test]]`: one test, or one for each socket in its data.
 
 use std::path::{Path, PathBuf};
 
@@ -12,17 +12,17 @@ use crate::session::expression::Length;
 use crate::session::motion::{self, Motion};
 use crate::session::readings::Readings;
 use crate::session::table::{self, Request};
-use crate::session::{Test, reach, runs};
+use crate::session::{Test, plausibility, runs};
 
-/// The name of a test, unlike every other.
+/// The name of a test, which must be unique.
 pub(super) fn name(table: &mut Table<'_>, declared: &[Declared]) -> Result<String, ModelError> {
-    let value = table.need("name", "a name that no other test has")?;
+    let value = table.require("name", "a name that no other test has")?;
     let name = value.text()?;
     if name.trim().is_empty() {
-        return Err(value.error("a test without a name", Some("give it one".into())));
+        return Err(value.error("a test without a name", Some("add a name".into())));
     }
     if declared.iter().any(|test| test.name == name) {
-        let message = format!("two tests are called \"{name}\"");
+        let message = format!("two tests have the name \"{name}\"");
         let help = "results name parameters by test: give each its own name";
         return Err(value.error(message, Some(help.into())));
     }
@@ -48,7 +48,7 @@ pub(super) fn tests(
         None => Ok(default.to_string()),
     };
     let setup = group("setup", name)?;
-    // The ball at a robot's flange stays there from socket to socket; a ball in a spindle is mounted for each test.
+    // The ball at a robot's flange stays mounted from socket to socket; a ball in a spindle is mounted for each test.
     let spindle_setup = match context.instrument {
         InstrumentKind::Socket => group("spindle_setup", "tool")?,
         _ => group("spindle_setup", name)?,
@@ -57,7 +57,7 @@ pub(super) fn tests(
         InstrumentKind::BallBar => group("bar_setup", name)?,
         _ => name.to_string(),
     };
-    let HeldOutState {
+    let HeldPositions {
         mut at,
         written: at_written,
         listed,
@@ -88,16 +88,16 @@ pub(super) fn tests(
     };
     let data = table.take("data");
     if data.is_none() && matches!(motion, None | Some(Motion::List)) {
-        let help = "add `data = \"….csv\"`, or how the axes are to move: `sweep = { … }` or `path = { … }`";
+        let help = "add `data = \"….csv\"`, or the motion of the axes: `sweep = { … }` or `path = { … }`";
         return Err(table.error(
-            format!("test \"{name}\" has neither data nor a movement"),
+            format!("test \"{name}\" has neither data nor a motion"),
             Some(help.into()),
         ));
     }
     let span = table.span.clone();
     let source = table.source;
     table.finish()?;
-    motion::stand(context.machine, &station, motion.as_ref(), &listed, &mut at);
+    motion::centre_circle(context.machine, &station, motion.as_ref(), &listed, &mut at);
 
     let mut test = Test {
         name: name.to_string(),
@@ -116,7 +116,7 @@ pub(super) fn tests(
     let here = |(message, help): (String, String)| source.error(span.clone(), message, Some(help));
     let Some(data) = data else {
         let planned = motion::checked_plan(context.machine, &test).map_err(here)?;
-        reach::check(context.machine, &test, &planned).map_err(here)?;
+        plausibility::check(context.machine, &test, &planned).map_err(here)?;
         return Ok(vec![test]);
     };
     if !context.options.read_data {
@@ -126,14 +126,14 @@ pub(super) fn tests(
     let request = Request {
         machine: context.machine,
         instrument: context.instrument,
-        bar_mm: reach::bar_mm(&test.station),
+        bar_mm: plausibility::bar_mm(&test.station),
         sensors: matches!(&test.station, Station::RTest(rtest) if rtest.sensors.is_some()),
         format,
-        // An empty table names no column: the file has our names.
+        // An empty table maps no column: the file has the default names.
         columns: columns.as_deref().filter(|columns| !columns.is_empty()),
         at: &test.at,
         at_listed: &listed,
-        moved: &motion::moved(test.motion.as_ref()),
+        moved: &motion::named_axes(test.motion.as_ref()),
         socket: test.socket.as_deref(),
     };
     let mut tests = Vec::new();
@@ -158,7 +158,7 @@ pub(super) fn tests(
         };
         if test.socket.is_some() {
             return Err(here((
-                format!("test \"{name}\" names a socket, and so does a column of its data"),
+                format!("test \"{name}\" names a socket, and a column of its data names sockets too"),
                 "keep one of them".into(),
             )));
         }
@@ -172,18 +172,18 @@ pub(super) fn tests(
     Ok(tests)
 }
 
-/// What measured readings say about the set-up that was declared.
+/// Checks of measured readings against the declared set-up.
 fn check_readings(
     context: &Context<'_>,
     test: &Test,
     readings: &Readings,
     warnings: &mut Vec<String>,
 ) -> Result<(), (String, String)> {
-    reach::check(context.machine, test, readings)?;
-    reach::check_lengths(test, readings)?;
+    plausibility::check(context.machine, test, readings)?;
+    plausibility::check_lengths(test, readings)?;
     let doubts = [
         motion::beyond_travel(context.machine, readings),
-        runs::unlike_stated(test.motion.as_ref(), readings),
+        runs::difference_from_stated(test.motion.as_ref(), readings),
     ];
     warnings.extend(
         doubts
@@ -194,48 +194,51 @@ fn check_readings(
     Ok(())
 }
 
-/// Where the axes of a test stand, axis by axis.
-struct HeldOutState {
+/// Positions at which a test holds its axes, by axis.
+struct HeldPositions {
     at: Vec<f64>,
     /// As written, for linear axes stated in mm.
     written: Vec<Option<Length>>,
-    /// Whether the test states it.
+    /// Whether the test states the position.
     listed: Vec<bool>,
 }
 
 /// `at = { x_mm = 0, … }`.
-fn at(context: &Context<'_>, table: &mut Table<'_>) -> Result<HeldOutState, ModelError> {
+fn at(context: &Context<'_>, table: &mut Table<'_>) -> Result<HeldPositions, ModelError> {
     let machine = context.machine;
     let axes = machine.axes.len();
-    let mut standing = HeldOutState {
+    let mut held = HeldPositions {
         at: vec![0.0; axes],
         written: vec![None; axes],
         listed: vec![false; axes],
     };
     let Some(value) = table.take("at") else {
-        return Ok(standing);
+        return Ok(held);
     };
     for entry in value.table("`at`".into())?.remaining_values()? {
         let Some((axis, unit)) = quantity::axis_position(machine, &entry.key) else {
             let known: Vec<String> = machine.axes.iter().map(|axis| axis.column("")).collect();
-            let message = format!("`at` knows no position `{}`", entry.key);
+            let message = format!("`at` has the unknown position `{}`", entry.key);
             let help = format!("known: {}", known.join(", "));
             return Err(entry.source.error(entry.key_span.clone(), message, Some(help)));
         };
-        if standing.listed[axis] {
-            let message = format!("`at` says twice where axis `{}` stands", machine.axes[axis].name);
+        if held.listed[axis] {
+            let message = format!(
+                "`at` gives the position of axis `{}` twice",
+                machine.axes[axis].name
+            );
             return Err(entry.source.error(entry.key_span.clone(), message, None));
         }
         let (written, number) = context.length(&entry)?;
-        standing.at[axis] = unit.inside(number);
+        held.at[axis] = unit.to_internal(number);
         let in_mm = machine.axes[axis].kind == AxisKind::Linear && unit == quantity::Unit::Times(1.0);
-        standing.written[axis] = in_mm.then_some(written);
-        standing.listed[axis] = true;
+        held.written[axis] = in_mm.then_some(written);
+        held.listed[axis] = true;
     }
-    Ok(standing)
+    Ok(held)
 }
 
-/// The data file: where `--data` points, else beside the session file.
+/// The data file: in the data directory if one is given, else beside the session file.
 fn data_file(context: &Context<'_>, data: &Value<'_>) -> Result<PathBuf, ModelError> {
     let named = data.text()?;
     let beside = context.file.parent().unwrap_or(Path::new("")).join(&named);
@@ -251,13 +254,13 @@ fn data_file(context: &Context<'_>, data: &Value<'_>) -> Result<PathBuf, ModelEr
     let (looked, help) = match &elsewhere {
         Some(elsewhere) => (
             format!("{} and {}", elsewhere.display(), beside.display()),
-            "check that `--data` names the folder that `data` starts from",
+            "check that the data folder is the one to which `data` is relative",
         ),
         None => (
             beside.display().to_string(),
-            "name the folder with `--data DIR` if the data do not lie beside the session file",
+            "state the data folder if the data are not beside the session file",
         ),
     };
-    let message = format!("the data file `{named}` is not there; looked for {looked}");
-    Err(data.error(message, Some(help.into())))
+    let message = format!("the data file `{named}` does not exist; looked for {looked}");
+    Err(data.file_error(message, help))
 }

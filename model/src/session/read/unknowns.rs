@@ -1,4 +1,4 @@
-//! `[unknowns]`: the errors to be identified.
+//! Reader of `[unknowns]`: the errors to be estimated.
 
 use super::quantity;
 use crate::axis::AxisKind;
@@ -9,7 +9,7 @@ use crate::instrument::InstrumentKind;
 use crate::pattern;
 use crate::session::document::{Table, Value};
 
-/// The errors to be identified: those stated, or what the instrument is there for.
+/// The errors to be estimated: those stated, or the defaults of the instrument.
 pub(super) fn unknowns(
     machine: &Machine,
     kind: InstrumentKind,
@@ -33,7 +33,7 @@ pub(super) fn unknowns(
         });
     };
     let mut unknowns: Vec<ErrorName> = Vec::new();
-    // What a pattern stands for may be among the others already: each error is estimated once.
+    // A pattern may include errors that are named already; each error is estimated once.
     let mut by_pattern: Vec<ErrorName> = Vec::new();
     for item in value.list("a list of error names")? {
         let text = item.text()?;
@@ -51,20 +51,20 @@ pub(super) fn unknowns(
             continue;
         }
         if unknowns.contains(&name) {
-            return Err(item.error(format!("`{name}` stands twice among the unknowns"), None));
+            return Err(item.error(format!("`{name}` occurs twice in `errors`"), None));
         }
         unknowns.push(name);
     }
     Ok(unknowns)
 }
 
-/// The errors that a pattern stands for.
+/// The errors that a pattern matches.
 fn matching(machine: &Machine, item: &Value<'_>, text: &str) -> Result<Vec<ErrorName>, ModelError> {
     let found = pattern::matching(machine, text);
     if found.is_empty() {
         let axes: Vec<&str> = machine.axes.iter().map(|axis| axis.name.as_str()).collect();
         let help = format!(
-            "`?` stands for one character, `*` for any number of them, as in \"E?0C\", the location errors of C, and \"E?0J*\"; the axes are {}",
+            "`?` matches one character and `*` any number of them: \"E?0C\" for the location errors of C, \"E?0J*\" for those of all joints; the axes are {}",
             axes.join(", ")
         );
         return Err(item.error(format!("\"{text}\" matches no error of the machine"), Some(help)));
@@ -77,7 +77,10 @@ fn error_name(machine: &Machine, item: &Value<'_>) -> Result<ErrorName, ModelErr
     let text = item.text()?;
     let Some(mut name) = ErrorName::parse(&text) else {
         let help = "ISO 230-1 names such as \"EY0A\" (location) and \"EYA\" (motion), or `e_y0a`, `θ_z0c`";
-        return Err(item.error(format!("\"{text}\" is no error's name"), Some(help.into())));
+        return Err(item.error(
+            format!("\"{text}\" is not the name of an error"),
+            Some(help.into()),
+        ));
     };
     match quantity::axis_index(machine, &name.axis) {
         Some(index) => name.axis.clone_from(&machine.axes[index].name),
@@ -89,8 +92,8 @@ fn error_name(machine: &Machine, item: &Value<'_>) -> Result<ErrorName, ModelErr
     Ok(name)
 }
 
-/// All location errors of all axes, but for what moves no reading: the rotation of a linear axis about its own direction. A robot's joints have six
-/// each, more than its readings identify; the fit names the combinations.
+/// All location errors of all axes, except the rotation of a linear axis about its own direction, which affects no reading. The joints of
+/// a robot have six each, more than its readings identify; the fit names the confounded combinations.
 fn all_location_errors(machine: &Machine) -> Vec<ErrorName> {
     let mut errors = pattern::errors(machine);
     errors.retain(|name| {
@@ -104,8 +107,8 @@ fn all_location_errors(machine: &Machine) -> Vec<ErrorName> {
     errors
 }
 
-/// The position and orientation errors of every rotary axis, in alphabetical order of the axes: its location errors without the two
-/// that its own movement hides.
+/// The position and orientation errors of every rotary axis, in alphabetical order of the axes. The two location errors in the axis' own
+/// degrees of freedom are excluded, because its own motion is confounded with them.
 fn default_unknowns(machine: &Machine) -> Vec<ErrorName> {
     let mut rotary: Vec<_> = machine
         .axes

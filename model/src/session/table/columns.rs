@@ -1,4 +1,4 @@
-//! Which column holds what.
+//! Assignment of the columns of a file to their roles.
 
 use std::path::Path;
 
@@ -6,32 +6,32 @@ use super::encoding::name_of;
 use super::required::required;
 use super::rows::Row;
 use super::{Request, number};
-use crate::error::{ModelError, Place};
+use crate::error::{Location, ModelError};
 use crate::instrument::InstrumentKind;
 use crate::session::read::quantity::{self, Unit};
-use crate::session::spelling::meant;
+use crate::session::spelling::suggestion;
 
-/// A line of `[columns]`: ours = theirs.
+/// A line of `[columns]`: own name = foreign name.
 #[derive(Clone, Debug)]
-pub(crate) struct Mapped {
-    /// Our name, which carries the unit.
-    pub ours: String,
-    /// Their name or number.
-    pub theirs: Theirs,
-    /// Where it is written.
-    pub place: Place,
+pub(crate) struct ColumnMapping {
+    /// Our name, which includes the unit.
+    pub own: String,
+    /// The foreign name or number.
+    pub foreign: ForeignColumn,
+    /// The location of the line.
+    pub location: Location,
 }
 
-/// How a foreign column is called.
+/// The identification of a foreign column.
 #[derive(Clone, Debug, PartialEq)]
-pub(crate) enum Theirs {
+pub(crate) enum ForeignColumn {
     /// By the header.
     Name(String),
     /// From 1.
     Number(usize),
 }
 
-/// What a column holds.
+/// The content of a column.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) enum Role {
     Time,
@@ -40,7 +40,7 @@ pub(super) enum Role {
     Axis(usize, Unit),
     Length(Unit),
     Deviation(Unit),
-    /// Against the probing direction: how far out a surface was met beyond the target.
+    /// Against the probing direction: the distance by which the surface lies beyond the target.
     Outward(Unit),
     Coordinate(usize, Unit),
     Socket,
@@ -50,14 +50,14 @@ pub(super) enum Role {
 #[derive(Clone, Debug)]
 pub(super) struct Column {
     pub role: Role,
-    /// Its place in a row, from 0.
+    /// Its index in a row, from 0.
     pub index: usize,
-    /// How messages call it.
+    /// Its name in messages.
     pub name: String,
 }
 
 impl Role {
-    /// Reads one of our names.
+    /// Parses one of our names.
     pub fn of(name: &str, request: &Request<'_>) -> Option<Role> {
         match name {
             "time_s" => return Some(Role::Time),
@@ -89,7 +89,7 @@ impl Role {
         }
     }
 
-    /// Whether two columns would tell the same.
+    /// Whether two columns contain the same quantity.
     fn same_as(self, other: Role) -> bool {
         match (self, other) {
             (Role::Axis(a, _), Role::Axis(b, _)) => a == b,
@@ -103,7 +103,7 @@ impl Role {
     }
 }
 
-/// What an R-test's columns are called before their unit: what the sensors count one by one, or the vector in the frame that carries them.
+/// The names of an R-test's columns before their unit: the values of the single sensors, or the vector in the frame that carries them.
 pub(crate) fn r_test_columns(sensors: bool) -> [&'static str; 3] {
     if sensors {
         ["du", "dv", "dw"]
@@ -112,18 +112,17 @@ pub(crate) fn r_test_columns(sensors: bool) -> [&'static str; 3] {
     }
 }
 
-/// What an R-test's columns need to be, where they are the other kind's.
+/// The required columns of an R-test, for data with columns of the other kind.
 pub(super) fn r_test_help(request: &Request<'_>) -> &'static str {
     if request.sensors {
-        "the test says how the sensors stand: it needs what they count, `du_um`, `dv_um` and `dw_um`; without `sensor_angles_deg` and \
-         `sensor_directions` it takes `dx_um`, `dy_um` and `dz_um`"
+        "the test states the sensor directions: it needs the sensor values `du_um`, `dv_um` and `dw_um`; without `sensor_angles_deg` and `sensor_directions` it needs `dx_um`, `dy_um` and `dz_um`"
     } else {
-        "an R-test needs `dx_um`, `dy_um` and `dz_um`; what single sensors count, `du_um`, `dv_um` and `dw_um`, needs \
+        "an R-test needs `dx_um`, `dy_um` and `dz_um`; the values of single sensors, `du_um`, `dv_um` and `dw_um`, need \
          `sensor_angles_deg` or `sensor_directions` in the test"
     }
 }
 
-/// Every name that a column may have in this test.
+/// Every valid column name of this test.
 pub(super) fn known(request: &Request<'_>) -> Vec<String> {
     let mut known: Vec<String> = ["time_s", "run"].map(str::to_string).to_vec();
     for axis in &request.machine.axes {
@@ -152,7 +151,7 @@ pub(super) fn listed(names: &[String]) -> String {
     text
 }
 
-/// The columns to be read: of the first row, which is the header where the file has one.
+/// The columns to be read, from the first row, which is the header if the file has one.
 pub(super) fn columns(
     request: &Request<'_>,
     file: &Path,
@@ -170,8 +169,11 @@ pub(super) fn columns(
             .find(|other| other.role.same_as(column.role))
         {
             return Err(ModelError::Input {
-                place: Place::line(file, line),
-                message: format!("columns `{}` and `{}` tell the same", other.name, column.name),
+                location: Location::line(file, line),
+                message: format!(
+                    "columns `{}` and `{}` have the same meaning",
+                    other.name, column.name
+                ),
                 help: Some("keep one of them; [columns] can name the one to read".into()),
             });
         }
@@ -194,9 +196,9 @@ fn own_columns(
 ) -> Result<Vec<Column>, ModelError> {
     let Some(header) = header else {
         return Err(ModelError::Input {
-            place: Place::file(file),
-            message: "a data file without a header, and no [columns] that say what its columns hold".into(),
-            help: Some("add [columns] with `ours = number`, counted from 1, as in `j1_rad = 1`".into()),
+            location: Location::file(file),
+            message: "a data file without a header and without [columns] that name its columns".into(),
+            help: Some("add [columns] with `name = number`, counted from 1, such as `j1_rad = 1`".into()),
         });
     };
     let known = known(request);
@@ -204,8 +206,8 @@ fn own_columns(
     for (index, name) in header.iter().enumerate() {
         let Some(role) = Role::of(name, request).or_else(|| Role::of(&name.to_lowercase(), request)) else {
             return Err(ModelError::Input {
-                place: Place::line(file, line),
-                message: format!("column {} is called `{name}`, which is not known", index + 1),
+                location: Location::line(file, line),
+                message: format!("column {} has the unknown name `{name}`", index + 1),
                 help: Some(unknown_column_help(request, name, header, &known)),
             });
         };
@@ -237,42 +239,45 @@ fn unknown_column_help(request: &Request<'_>, name: &str, header: &[String], kno
         return r_test_help(request).into();
     }
     format!(
-        "{}known here: {}; a file with other names is read through [columns], ours = theirs",
-        meant(name, known),
+        "{}known here: {}; a file with other names needs [columns], own name = foreign name",
+        suggestion(name, known),
         listed(known)
     )
 }
 
 /// What to do with a file whose first row names nothing.
-const NO_HEADER: &str = "a number where a name is expected: a file without a header declares `[format] header = false` and numbers its columns in \
-                         [columns], as in `length_mm = 3`; lines above the header are passed over with `skip_lines`";
+const NO_HEADER: &str = "a number was found where a name is expected: a file without a header declares `[format] header = false` and numbers its columns in [columns], such as `length_mm = 3`; lines above the header are skipped with `skip_lines`";
 
 fn mapped_columns(
     request: &Request<'_>,
     file: &Path,
-    mapped: &[Mapped],
+    mapped: &[ColumnMapping],
     header: Option<&Row>,
     first: &Row,
 ) -> Result<Vec<Column>, ModelError> {
     let mut columns: Vec<Column> = Vec::new();
     for entry in mapped {
         let fault = |message: String, help: String| ModelError::Input {
-            place: entry.place.clone(),
+            location: entry.location.clone(),
             message,
             help: Some(help),
         };
         let Some(role) =
-            Role::of(&entry.ours, request).or_else(|| Role::of(&entry.ours.to_lowercase(), request))
+            Role::of(&entry.own, request).or_else(|| Role::of(&entry.own.to_lowercase(), request))
         else {
             let known = known(request);
             return Err(fault(
-                format!("[columns] knows no column `{}`", entry.ours),
-                format!("{}ours are {}", meant(&entry.ours, &known), listed(&known)),
+                format!("[columns] has the unknown column `{}`", entry.own),
+                format!(
+                    "{}valid names are {}",
+                    suggestion(&entry.own, &known),
+                    listed(&known)
+                ),
             ));
         };
-        let index = match &entry.theirs {
-            Theirs::Number(number) => number_in(*number, file, first.cells.len()),
-            Theirs::Name(name) => name_in(name, request, file, header),
+        let index = match &entry.foreign {
+            ForeignColumn::Number(number) => number_in(*number, file, first.cells.len()),
+            ForeignColumn::Name(name) => name_in(name, request, file, header),
         }
         .map_err(|(message, help)| fault(message, help))?;
         if let Some(other) = columns.iter().position(|column| column.index == index) {
@@ -281,24 +286,24 @@ fn mapped_columns(
                     "[columns] reads column {} of {} twice: as `{}` and as `{}`",
                     index + 1,
                     file.display(),
-                    mapped[other].ours,
-                    entry.ours
+                    mapped[other].own,
+                    entry.own
                 ),
-                "a column holds one thing: name another column for one of them, or leave it out".into(),
+                "a column has one meaning: name another column for one of them, or remove one".into(),
             ));
         }
-        let name = match &entry.theirs {
-            Theirs::Name(name) => name.clone(),
-            Theirs::Number(_) => entry.ours.clone(),
+        let name = match &entry.foreign {
+            ForeignColumn::Name(name) => name.clone(),
+            ForeignColumn::Number(_) => entry.own.clone(),
         };
         columns.push(Column { role, index, name });
     }
     match header {
         Some(header) if are_readings(request, mapped, &columns, header) => Err(ModelError::Input {
-            place: Place::line(file, header.line),
-            message: "the first row holds numbers where a header is expected; it would not be read".into(),
+            location: Location::line(file, header.line),
+            message: "the first row contains numbers where a header is expected; it would not be read".into(),
             help: Some(
-                "a file without a header declares `[format] header = false`; lines above the header are passed over with `skip_lines`"
+                "a file without a header declares `[format] header = false`; lines above the header are skipped with `skip_lines`"
                     .into(),
             ),
         }),
@@ -306,8 +311,8 @@ fn mapped_columns(
     }
 }
 
-/// Whether what stands for a header is a row of readings: columns are called by number alone, and all of them hold numbers.
-fn are_readings(request: &Request<'_>, mapped: &[Mapped], columns: &[Column], header: &Row) -> bool {
+/// Whether the first row is a row of readings instead of a header: columns are given by number only, and all of them contain numbers.
+fn are_readings(request: &Request<'_>, mapped: &[ColumnMapping], columns: &[Column], header: &Row) -> bool {
     let mut of_numbers = columns
         .iter()
         .filter(|column| column.role != Role::Socket)
@@ -315,20 +320,23 @@ fn are_readings(request: &Request<'_>, mapped: &[Mapped], columns: &[Column], he
     of_numbers.peek().is_some()
         && mapped
             .iter()
-            .all(|entry| matches!(entry.theirs, Theirs::Number(_)))
+            .all(|entry| matches!(entry.foreign, ForeignColumn::Number(_)))
         && of_numbers.all(|column| number(&header.cells[column.index], &request.format).is_ok())
 }
 
-/// The place of a column by its number; a message and what to do where there is none.
+/// The index of a column from its number; otherwise a message and what to do.
 fn number_in(number: usize, file: &Path, width: usize) -> Result<usize, (String, String)> {
     if number > width {
-        let message = format!("column {number} of {}, which has {width}", file.display());
+        let message = format!(
+            "there is no column {number} in {}, which has {width}",
+            file.display()
+        );
         return Err((message, "columns are numbered from 1".into()));
     }
     Ok(number - 1)
 }
 
-/// The place of a column by its name in the header; a message and what to do where there is none, or more than one.
+/// The index of a column from its name in the header. If there is none or more than one: a message and what to do.
 fn name_in(
     name: &str,
     request: &Request<'_>,
@@ -338,7 +346,7 @@ fn name_in(
     let Some(row) = header else {
         return Err((
             format!("column `{name}` of a file declared to have no header"),
-            "give its number, counted from 1".into(),
+            "use its number, counted from 1".into(),
         ));
     };
     let header = &row.cells;
@@ -346,12 +354,12 @@ fn name_in(
     match found[..] {
         [index] => Ok(index),
         [] => {
-            let mut help = format!("{}it has {}", meant(name, header), listed(header));
+            let mut help = format!("{}it has {}", suggestion(name, header), listed(header));
             if header.iter().all(|cell| number(cell, &request.format).is_ok()) {
                 help = NO_HEADER.into();
             } else if let Some(encoding) = row.encoding {
                 help.push_str(&format!(
-                    "; the header was read as {}: if names look garbled, declare what it is written in, as `[format] encoding = \"utf-8\"`",
+                    "; the header was read as {}: if names look garbled, declare the encoding, such as `[format] encoding = \"utf-8\"`",
                     name_of(encoding)
                 ));
             }
@@ -361,13 +369,13 @@ fn name_in(
             let numbers: Vec<String> = found.iter().map(|index| (index + 1).to_string()).collect();
             Err((
                 format!(
-                    "{} has {} columns called `{name}`: {}",
+                    "{} has {} columns with the name `{name}`: {}",
                     file.display(),
                     found.len(),
                     numbers.join(", ")
                 ),
                 format!(
-                    "give the number of the one that is meant, counted from 1, as {}",
+                    "use the number of one of them, counted from 1, such as {}",
                     first + 1
                 ),
             ))

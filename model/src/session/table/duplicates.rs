@@ -1,8 +1,8 @@
-//! Rows that a file holds twice: copies by a slip of export or editing, not repeats of a measurement.
+//! Duplicate rows of a file: copies by a mistake of export or editing, not repeated measurements.
 //!
-//! A row is a copy where every cell is that of an earlier row: that of the time as well, where the file has one. Without a time column the run number is
-//! asked: where a state recurs within a run and every reading of it is the same to the last digit, whole rows were copied; where some of them differ, they are
-//! repeats, and equal ones are a matter of the resolution. A file with neither column does not tell, and is taken as it is.
+//! A row is a copy if every cell equals that of an earlier row, including the time if the file has one. Without a time column the run
+//! number decides. If a state recurs within a run and every reading of it is equal to the last digit, whole rows were copied. If some of
+//! them differ, they are repeats, and equal ones are due to the resolution. A file with neither column is taken as it is.
 
 use std::collections::HashMap;
 use std::hash::{DefaultHasher, Hash, Hasher};
@@ -10,39 +10,39 @@ use std::ops::Range;
 
 use crate::session::readings::Readings;
 
-/// Most lines that a message lists.
+/// Largest number of lines listed in a message.
 const MAX_LISTED: usize = 8;
 
-/// A number that two rows share only if all their cells are the same.
-pub(super) fn number_of(cells: &[String]) -> u64 {
+/// A hash of all cells of a row.
+pub(super) fn hash_of(cells: &[String]) -> u64 {
     let mut hasher = DefaultHasher::new();
     cells.hash(&mut hasher);
     hasher.finish()
 }
 
-/// The rows without copies; `None` where there are none. `cells` has a number for the cells of each row.
+/// The rows without copies; `None` if there are no copies. `cells` has the hash of the cells of each row.
 pub(super) fn kept(readings: &Readings, cells: &[u64]) -> Option<Vec<usize>> {
-    let closing = closing(readings);
-    if readings.time_s.is_empty() && (readings.run.is_empty() || has_repeats(readings, cells, &closing)) {
+    let closed_runs = closed_runs(readings);
+    if readings.time_s.is_empty() && (readings.run.is_empty() || has_repeats(readings, cells, &closed_runs)) {
         return None;
     }
     let mut first: HashMap<u64, usize> = HashMap::with_capacity(cells.len());
     let original: Vec<usize> = (0..cells.len())
         .map(|row| *first.entry(cells[row]).or_insert(row))
         .collect();
-    // Rows that come again in the opposite order are a way back, whose readings happen to be the same.
+    // Rows repeated in the opposite order are a return traversal with equal readings.
     let backward = |row: usize| original[row - 1] < row - 1 && original[row] < original[row - 1];
     if readings.time_s.is_empty() && (1..cells.len()).any(backward) {
         return None;
     }
     let kept: Vec<usize> = (0..cells.len())
-        .filter(|row| original[*row] == *row || closing.get(row) == Some(&original[*row]))
+        .filter(|row| original[*row] == *row || closed_runs.get(row) == Some(&original[*row]))
         .collect();
     (kept.len() < cells.len()).then_some(kept)
 }
 
-/// In words.
-pub(super) fn said(readings: &Readings, kept: &[usize]) -> String {
+/// The message.
+pub(super) fn message(readings: &Readings, kept: &[usize]) -> String {
     let mut kept = kept.iter().peekable();
     let copies: Vec<usize> = (0..readings.line.len())
         .filter(|row| kept.next_if_eq(&row).is_none())
@@ -62,17 +62,17 @@ pub(super) fn said(readings: &Readings, kept: &[usize]) -> String {
         ),
     };
     format!(
-        "{}: {count} {are} {copies_of} in every column (line {}); {they} left out, not taken as repeats",
+        "{}: {count} {are} {copies_of} in every column (line {}); {they} removed, not treated as repeats",
         readings.file.display(),
         lines.join(", ")
     )
 }
 
-/// Whether a state recurs within a run with another reading.
-fn has_repeats(readings: &Readings, cells: &[u64], closing: &HashMap<usize, usize>) -> bool {
+/// Whether a state recurs within a run with a different reading.
+fn has_repeats(readings: &Readings, cells: &[u64], closed_runs: &HashMap<usize, usize>) -> bool {
     let mut seen: HashMap<(i64, Vec<u64>), u64> = HashMap::new();
     (0..cells.len())
-        .filter(|row| !closing.contains_key(row))
+        .filter(|row| !closed_runs.contains_key(row))
         .any(|row| {
             let state = readings.positions.iter().map(|axis| axis[row].to_bits());
             let before = seen
@@ -82,8 +82,8 @@ fn has_repeats(readings: &Readings, cells: &[u64], closing: &HashMap<usize, usiz
         })
 }
 
-/// The last row of each run that ends where it began, with the row that it began with: it may read the same there. A time tells them apart.
-fn closing(readings: &Readings) -> HashMap<usize, usize> {
+/// The last row of each run that ends at its start, with its first row: both may have the same reading. A time column distinguishes them.
+fn closed_runs(readings: &Readings) -> HashMap<usize, usize> {
     if !readings.time_s.is_empty() {
         return HashMap::new();
     }

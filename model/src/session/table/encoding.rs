@@ -1,16 +1,16 @@
-//! The character encoding of a data file: stated, by its byte order mark, or as its bytes tell.
+//! Character encoding of a data file: stated, by its byte order mark, or detected from its bytes.
 //!
-//! Text that is not UTF-8 and has no mark is taken for Latin-1, as the WHATWG Encoding Standard defines it (windows-1252): numbers and the names of
-//! columns in western languages come out right. UTF-16 without a mark is recognised by the zero bytes of its ASCII letters.
+//! Text that is not UTF-8 and has no mark is read as Latin-1, as the WHATWG Encoding Standard defines it (windows-1252). Numbers and the
+//! column names of western languages are then correct. UTF-16 without a mark is recognised by the zero bytes of its ASCII letters.
 
 use std::borrow::Cow;
 
 use encoding_rs::{Encoding, UTF_8, UTF_16BE, UTF_16LE, WINDOWS_1252};
 
-/// An encoding by one of its names, in any case: `utf-8`, `latin1`, `utf-16le`, `shift_jis`, …; `None` where no encoding is called so.
+/// An encoding by one of its names, in any case: `utf-8`, `latin1`, `utf-16le`, `shift_jis`, …; `None` for an unknown name.
 pub(crate) fn of_name(name: &str) -> Option<&'static Encoding> {
     let name = name.trim();
-    // `Latin-1` is no label of the standard, `latin1` is.
+    // `Latin-1` is not a label of the standard, `latin1` is.
     let plain: String = name
         .to_lowercase()
         .chars()
@@ -25,7 +25,7 @@ pub(crate) fn of_name(name: &str) -> Option<&'static Encoding> {
     }
 }
 
-/// How messages call an encoding.
+/// The name of an encoding in messages.
 pub(super) fn name_of(encoding: &'static Encoding) -> &'static str {
     if encoding == WINDOWS_1252 {
         "Latin-1 (windows-1252)"
@@ -34,7 +34,7 @@ pub(super) fn name_of(encoding: &'static Encoding) -> &'static str {
     }
 }
 
-/// What the first bytes of a file say of its encoding, and how many of them are a byte order mark. A mark counts more than what is stated.
+/// The encoding by the first bytes of a file, and the length of its byte order mark. A mark overrides a stated encoding.
 pub(super) fn of_start(
     bytes: &[u8],
     stated: Option<&'static Encoding>,
@@ -53,7 +53,7 @@ pub(super) fn of_start(
     }
 }
 
-/// Bytes as text, with the encoding that they turned out to be in; or the encoding in which they are not valid.
+/// Decodes bytes to text and returns the encoding used. The error is the encoding in which the bytes are invalid.
 ///
 /// Without a stated encoding: UTF-8, else Latin-1, in which every byte is a character.
 pub(super) fn decode<'b>(

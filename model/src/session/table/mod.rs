@@ -1,7 +1,8 @@
-//! Tables of readings: CSV files of our own, other people's through `[format]` and `[columns]`, spreadsheets, and ball-bar files in XML.
+//! Reader of tables of readings: CSV files, foreign CSV files through `[format]` and `[columns]`, spreadsheets, and ball-bar files in
+//! XML.
 //!
-//! A header line, then a row a reading; `#` begins a comment line; empty lines, a byte order mark and CRLF do no harm. What is wrong
-//! is told with file, line and column.
+//! A header line, then one row per reading. A `#` starts a comment line. Empty lines, a byte order mark and CRLF are accepted. Errors
+//! have file, line and column.
 
 mod ballbar_xml;
 mod columns;
@@ -16,32 +17,32 @@ use std::path::Path;
 use encoding_rs::Encoding;
 
 pub(crate) use ballbar_xml::{is_xml, read as read_xml};
-pub(crate) use columns::{Mapped, Theirs, r_test_columns};
+pub(crate) use columns::{ColumnMapping, ForeignColumn, r_test_columns};
 
 use columns::{Column, Role};
 use rows::Rows;
 
 use crate::chain::Machine;
-use crate::error::{ModelError, Place};
+use crate::error::{Location, ModelError};
 use crate::instrument::InstrumentKind;
 use crate::session::limits;
 use crate::session::readings::Readings;
 use crate::session::stamp::FileStamp;
 
-/// How a file writes its rows.
+/// The layout of the rows of a file.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct Format {
-    /// Between cells.
+    /// The separator between cells.
     pub separator: u8,
     /// `.` or `,`.
     pub decimal: u8,
     /// Whether the first row names the columns.
     pub header: bool,
-    /// The sheet of a spreadsheet; the first that is not empty where absent.
+    /// The sheet of a spreadsheet; by default the first that is not empty.
     pub sheet: Option<String>,
-    /// How a ball-bar file in XML calls the direction from the first axis of the plane towards the second.
+    /// The word in a ball-bar file in XML for the direction from the first axis of the plane towards the second.
     pub anticlockwise: Option<String>,
-    /// The encoding of the text, where it is stated.
+    /// The stated encoding of the text.
     pub encoding: Option<&'static Encoding>,
     /// Lines (of a spreadsheet: rows) above the header.
     pub skip_lines: usize,
@@ -61,41 +62,41 @@ impl Default for Format {
     }
 }
 
-/// What a test wants from its data file.
+/// What a test requires of its data file.
 pub(crate) struct Request<'a> {
-    /// The machine whose axes the columns name.
+    /// The machine that has the axes of the columns.
     pub machine: &'a Machine,
-    /// What read.
+    /// The instrument.
     pub instrument: InstrumentKind,
-    /// Whether an R-test's sensors are read one by one rather than as X, Y, Z.
+    /// Whether the sensors of an R-test are read singly instead of as X, Y, Z.
     pub sensors: bool,
-    /// What a deviation is counted from, mm.
+    /// The reference length of deviations, mm.
     pub bar_mm: f64,
-    /// How the rows are written.
+    /// The layout of the rows.
     pub format: Format,
-    /// Foreign names, where declared.
-    pub columns: Option<&'a [Mapped]>,
-    /// Where axes stand that the data do not list, mm or rad.
+    /// Foreign names, if declared.
+    pub columns: Option<&'a [ColumnMapping]>,
+    /// Positions of axes that the data do not contain, mm or rad.
     pub at: &'a [f64],
     /// Which of them the test states.
     pub at_listed: &'a [bool],
-    /// Axes that move in the test as planned.
+    /// Axes that move in the planned test.
     pub moved: &'a [usize],
-    /// The socket of all poses, where the test states one.
+    /// The socket of all poses, if the test states one.
     pub socket: Option<&'a str>,
 }
 
-/// Most sockets that a file names.
+/// Largest number of sockets in a file.
 const MAX_SOCKETS: usize = 1000;
 
-/// Readings of one data file: one for each socket that it names, else one.
+/// Readings of one data file: one set per socket in the file, else one.
 pub(crate) type BySocket = Vec<(Option<String>, Readings)>;
 
-/// Reads a data file. Beside the readings: what a user should know of the file.
+/// Reads a data file. Returns the readings, and warnings about the file.
 ///
 /// # Errors
-/// Anything that is not a finite number where one is expected, with file, line and column; missing or unknown columns; time that
-/// runs backwards; fewer than two readings.
+/// Any cell that is not a finite number where one is expected, with file, line and column; missing or unknown columns; decreasing time;
+/// fewer than two readings.
 pub(crate) fn read(file: &Path, request: &Request<'_>) -> Result<(BySocket, Vec<String>), ModelError> {
     let (stamp, mut rows) = if sheet::is_spreadsheet(file) {
         let (stamp, rows) = sheet::rows(file, &request.format)?;
@@ -105,7 +106,7 @@ pub(crate) fn read(file: &Path, request: &Request<'_>) -> Result<(BySocket, Vec<
         (rows.stamp().clone(), Source::Text(rows))
     };
     let empty = |what: &str| ModelError::Input {
-        place: Place::file(file),
+        location: Location::file(file),
         message: format!("an empty data file: {what}"),
         help: Some("check that the measurement was exported".into()),
     };
@@ -115,7 +116,7 @@ pub(crate) fn read(file: &Path, request: &Request<'_>) -> Result<(BySocket, Vec<
     let width = first.cells.len();
     let header = request.format.header.then_some(&first);
     let columns = columns::columns(request, file, &first, header)?;
-    let mut filled = Filled::new(request, stamp, columns);
+    let mut filled = ReadingColumns::new(request, stamp, columns);
     if header.is_none() {
         filled.push(&first)?;
     }
@@ -129,15 +130,15 @@ pub(crate) fn read(file: &Path, request: &Request<'_>) -> Result<(BySocket, Vec<
     match filled.readings.line.len() {
         0 => Err(empty("a header without readings")),
         1 => Err(ModelError::Input {
-            place: Place::line(file, filled.readings.line[0]),
-            message: "one reading; nothing can be fitted to a single reading".into(),
-            help: Some("a test needs at least two readings, and as many as its unknowns in all".into()),
+            location: Location::line(file, filled.readings.line[0]),
+            message: "one reading, which is not enough for a fit".into(),
+            help: Some("a test needs at least two readings, and as many as it has parameters".into()),
         }),
         _ => Ok((filled.by_socket(), warning.into_iter().collect())),
     }
 }
 
-/// Rows of a text or of a sheet.
+/// Rows of a text or of a spreadsheet.
 enum Source {
     Text(Rows),
     Sheet(std::vec::IntoIter<rows::Row>),
@@ -162,27 +163,27 @@ fn wrong_width(file: &Path, row: &rows::Row, width: usize, format: &Format) -> M
         "complete the row or remove it"
     };
     ModelError::Input {
-        place: Place::line(file, row.line),
-        message: format!("a row of {} where the file has {width} columns", cells(found)),
+        location: Location::line(file, row.line),
+        message: format!("a row of {}, but the file has {width} columns", cells(found)),
         help: Some(help.into()),
     }
 }
 
-/// The columns as they fill.
-struct Filled<'a> {
+/// The columns while they are filled.
+struct ReadingColumns<'a> {
     request: &'a Request<'a>,
     columns: Vec<Column>,
     readings: Readings,
     /// The socket of each row, as an index into `sockets`.
     socket: Vec<usize>,
     sockets: Vec<String>,
-    /// A number for the cells of each row, all columns of the file included.
+    /// A hash of the cells of each row, over all columns of the file.
     cells: Vec<u64>,
 }
 
-impl<'a> Filled<'a> {
+impl<'a> ReadingColumns<'a> {
     fn new(request: &'a Request<'a>, stamp: FileStamp, columns: Vec<Column>) -> Self {
-        Filled {
+        ReadingColumns {
             request,
             columns,
             readings: Readings {
@@ -198,10 +199,10 @@ impl<'a> Filled<'a> {
         }
     }
 
-    /// Drops rows that are copies of earlier ones; says which.
+    /// Removes rows that are copies of earlier ones and returns a message that lists them.
     fn without_duplicates(&mut self) -> Option<String> {
         let kept = duplicates::kept(&self.readings, &self.cells)?;
-        let said = duplicates::said(&self.readings, &kept);
+        let said = duplicates::message(&self.readings, &kept);
         self.readings = self.readings.of_rows(&kept);
         if !self.socket.is_empty() {
             self.socket = kept.iter().map(|row| self.socket[*row]).collect();
@@ -218,14 +219,14 @@ impl<'a> Filled<'a> {
         for column in &self.columns {
             let cell = row.cells[column.index].as_str();
             if column.role == Role::Socket {
-                let place = Place::line(&readings.file, row.line);
-                self.socket.push(socket_index(&mut self.sockets, cell, place)?);
+                let location = Location::line(&readings.file, row.line);
+                self.socket.push(socket_index(&mut self.sockets, cell, location)?);
                 continue;
             }
             let fault = |message: String, help: &str| ModelError::Input {
-                place: Place {
+                location: Location {
                     span: row.span(column.index),
-                    ..Place::line(&readings.file, row.line)
+                    ..Location::line(&readings.file, row.line)
                 },
                 message: format!("column {} (`{}`): {message}", column.index + 1, column.name),
                 help: Some(help.to_string()),
@@ -237,8 +238,8 @@ impl<'a> Filled<'a> {
                         && value < before
                     {
                         return Err(fault(
-                            format!("time runs backwards: {value} s after {before} s on the row before"),
-                            "sort the rows by time, or leave the time column out of [columns] if it means nothing",
+                            format!("time decreases: {value} s after {before} s in the row before"),
+                            "sort the rows by time, or omit the time column from [columns] if it has no meaning",
                         ));
                     }
                     readings.time_s.push(value);
@@ -246,8 +247,8 @@ impl<'a> Filled<'a> {
                 Role::Run => {
                     if value.fract() != 0.0 || value.abs() > 1e9 {
                         return Err(fault(
-                            format!("`{cell}` numbers no run"),
-                            "runs are numbered by whole numbers, one for each traversal in one direction",
+                            format!("`{cell}` is not a run number"),
+                            "run numbers are integers, one for each traversal in one direction",
                         ));
                     }
                     readings.run.push(value as i64);
@@ -255,23 +256,23 @@ impl<'a> Filled<'a> {
                 Role::Temperature => readings.temperature_c.push(value),
                 Role::Axis(axis, unit) => {
                     if let Some(place) = readings.positions[axis].last_mut() {
-                        *place = unit.inside(value);
+                        *place = unit.to_internal(value);
                     }
                 }
-                Role::Length(unit) => observed[0] = unit.inside(value),
-                Role::Deviation(unit) => observed[0] = self.request.bar_mm + unit.inside(value),
-                Role::Outward(unit) => observed[0] = -unit.inside(value),
-                Role::Coordinate(i, unit) => observed[i] = unit.inside(value),
+                Role::Length(unit) => observed[0] = unit.to_internal(value),
+                Role::Deviation(unit) => observed[0] = self.request.bar_mm + unit.to_internal(value),
+                Role::Outward(unit) => observed[0] = -unit.to_internal(value),
+                Role::Coordinate(i, unit) => observed[i] = unit.to_internal(value),
                 Role::Socket => {}
             }
         }
-        self.cells.push(duplicates::number_of(&row.cells));
+        self.cells.push(duplicates::hash_of(&row.cells));
         readings.line.push(row.line);
         readings.observed.extend(&observed[..readings.coordinates]);
         Ok(())
     }
 
-    /// The readings, parted by socket where a column names it.
+    /// The readings, split by socket if a column names it.
     fn by_socket(self) -> BySocket {
         if self.sockets.is_empty() {
             return vec![(None, self.readings)];
@@ -290,13 +291,13 @@ impl<'a> Filled<'a> {
     }
 }
 
-/// The place of a socket among those that the file has named so far.
-fn socket_index(sockets: &mut Vec<String>, name: &str, place: Place) -> Result<usize, ModelError> {
+/// The index of a socket among those found so far in the file.
+fn socket_index(sockets: &mut Vec<String>, name: &str, location: Location) -> Result<usize, ModelError> {
     if let Some(known) = sockets.iter().position(|socket| socket == name) {
         return Ok(known);
     }
     let fault = |message: String, help: &str| ModelError::Input {
-        place,
+        location,
         message,
         help: Some(help.into()),
     };
@@ -304,31 +305,31 @@ fn socket_index(sockets: &mut Vec<String>, name: &str, place: Place) -> Result<u
         let message = format!("more than {MAX_SOCKETS} sockets in column `socket`");
         return Err(fault(
             message,
-            "a socket has many poses; is the column the socket's name?",
+            "a socket has many poses; does the column contain the socket's name?",
         ));
     }
     if let Some(control) = name.chars().find(|c| c.is_control()) {
         let message = format!(
-            "a socket's name holds the control character U+{:04X}",
+            "a socket's name contains the control character U+{:04X}",
             control as u32
         );
-        return Err(fault(message, "names are shown as they are: leave it out"));
+        return Err(fault(message, "remove it"));
     }
     sockets.push(name.to_string());
     Ok(sockets.len() - 1)
 }
 
-/// A finite number in a cell, or what is wrong with it and what to do.
+/// A finite number in a cell, or its fault and what to do.
 fn number(cell: &str, format: &Format) -> Result<f64, (String, &'static str)> {
-    const NUMBER: &str = "put a number there or remove the row";
+    const NUMBER: &str = "enter a number or remove the row";
     if cell.is_empty() {
         return Err(("an empty cell where a number is expected".into(), NUMBER));
     }
     let parsed = if format.decimal == b',' {
         if cell.contains('.') {
             return Err((
-                format!("`{cell}` has a decimal point where `decimal = \",\"` is declared"),
-                "declare what the file uses",
+                format!("`{cell}` has a decimal point, but `decimal = \",\"` is declared"),
+                "declare the decimal sign of the file",
             ));
         }
         cell.replace(',', ".").parse::<f64>()
@@ -340,7 +341,7 @@ fn number(cell: &str, format: &Format) -> Result<f64, (String, &'static str)> {
         Ok(value) if value.is_nan() => Err((format!("`{cell}` is not a number (NaN)"), NUMBER)),
         Ok(_) => {
             let fault = format!(
-                "`{cell}` is infinite or too large; {:e} is the most",
+                "`{cell}` is infinite or too large; the limit is {:e}",
                 limits::LARGEST
             );
             Err((fault, NUMBER))

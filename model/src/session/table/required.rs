@@ -1,13 +1,13 @@
-//! The columns that an instrument cannot do without.
+//! Columns that an instrument requires.
 
 use std::path::Path;
 
 use super::Request;
 use super::columns::{Column, Role, known, listed, r_test_columns, r_test_help};
-use crate::error::{ModelError, Place};
+use crate::error::{Location, ModelError};
 use crate::instrument::InstrumentKind;
 
-/// An error where one of them is not there.
+/// Returns an error if one of them is missing.
 pub(super) fn required(
     request: &Request<'_>,
     file: &Path,
@@ -22,7 +22,7 @@ pub(super) fn required(
     };
     let missing = |what: String, help: String| {
         Err(ModelError::Input {
-            place: Place::line(file, line),
+            location: Location::line(file, line),
             message: format!("no column {what}{}", found()),
             help: Some(help),
         })
@@ -31,7 +31,7 @@ pub(super) fn required(
         InstrumentKind::BallBar => {
             if !has(&|role| matches!(role, Role::Length(_) | Role::Deviation(_))) {
                 return missing(
-                    "with what the bar read".into(),
+                    "with the bar readings".into(),
                     "a ball bar needs `length_mm`, or `deviation_um` from `bar_mm`".into(),
                 );
             }
@@ -39,8 +39,8 @@ pub(super) fn required(
         InstrumentKind::Probe => {
             if !has(&|role| matches!(role, Role::Length(_) | Role::Outward(_))) {
                 return missing(
-                    "with what the probe read".into(),
-                    "a probe needs `distance_mm` to the surface, or `deviation_um`, by how much further out it was met"
+                    "with the probe readings".into(),
+                    "a probe needs `distance_mm` to the surface, or `deviation_um`, the deviation outwards"
                         .into(),
                 );
             }
@@ -66,7 +66,8 @@ pub(super) fn required(
             if request.socket.is_none() && !has(&|role| role == Role::Socket) {
                 return missing(
                     "`socket`".into(),
-                    "add the column, or `socket = \"…\"` to the test if all its poses are of one".into(),
+                    "add the column, or add `socket = \"…\"` to the test if all its poses have one socket"
+                        .into(),
                 );
             }
         }
@@ -87,7 +88,7 @@ pub(super) fn required(
             return missing(
                 format!("`{name}`"),
                 format!(
-                    "add the positions of axis `{}` to the data, or where it stands: `at = {{ {name} = 0 }}`",
+                    "add the positions of axis `{}` to the data, or state it: `at = {{ {name} = 0 }}`",
                     axis.name
                 ),
             );

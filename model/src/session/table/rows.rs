@@ -1,4 +1,4 @@
-//! Rows of cells from a file, in memory one line at a time.
+//! Rows of cells from a file, read one line at a time.
 
 use std::fs::File;
 use std::io::{BufRead, BufReader, Read};
@@ -8,12 +8,12 @@ use std::path::{Path, PathBuf};
 use encoding_rs::{Encoding, UTF_8, UTF_16BE, UTF_16LE};
 
 use super::{Format, encoding};
-use crate::error::{ModelError, Place};
+use crate::error::{Location, ModelError};
 use crate::session::stamp::FileStamp;
 
-/// Most bytes of one line.
+/// Largest length of one line, bytes.
 const LONGEST_LINE: u64 = 1 << 20;
-/// How long a file may be.
+/// Limits of the size of a file.
 #[derive(Clone, Copy)]
 struct Limits {
     bytes: u64,
@@ -26,26 +26,26 @@ const LIMITS: Limits = Limits {
     rows: 10_000_001,
 };
 
-/// What to do with a file that is too long.
-const SPLIT: &str = "leave out readings (every tenth will do), or split the file over several tests";
+/// The remedy for a file that is too long.
+const SPLIT: &str = "thin out the readings (every tenth is enough), or split the file into several tests";
 
 /// One row.
 #[derive(Clone, Debug)]
 pub(super) struct Row {
     /// Its line, from 1.
     pub line: usize,
-    /// Its cells, without the spaces around them.
+    /// Its cells, without surrounding spaces.
     pub cells: Vec<String>,
-    /// The bytes of the file that the line takes, without byte-order mark and line end.
+    /// The bytes of the line in the file, without byte order mark and line end.
     bytes: Range<usize>,
-    /// The line as it stands.
+    /// The text of the line.
     text: String,
-    /// What it is encoded in, where it is not plain ASCII.
+    /// The encoding, if the line is not plain ASCII.
     pub encoding: Option<&'static Encoding>,
 }
 
 impl Row {
-    /// A row that stands in no text: of a sheet.
+    /// A row of a spreadsheet, which has no text.
     pub fn of_cells(line: usize, cells: Vec<String>) -> Row {
         Row {
             line,
@@ -56,12 +56,12 @@ impl Row {
         }
     }
 
-    /// The bytes of the file that a cell takes, where no quotes hide them.
+    /// The bytes of a cell in the file, if it is not quoted.
     pub fn span(&self, cell: usize) -> Option<Range<usize>> {
         let cell = self.cells.get(cell).filter(|cell| !cell.is_empty())?;
         let mut found = self.text.match_indices(cell.as_str());
         let (at, _) = found.next()?;
-        // The same text twice in the line leaves in doubt which one is meant; another encoding may have moved the cell.
+        // If the same text occurs twice in the line, the cell is ambiguous; another encoding may have moved it.
         if found.next().is_some() || self.text.len() != self.bytes.len() {
             return Some(self.bytes.clone());
         }
@@ -70,13 +70,13 @@ impl Row {
     }
 }
 
-/// The rows of a file: no comments, no empty lines.
+/// The rows of a file, without comments and empty lines.
 pub(super) struct Rows {
     file: PathBuf,
     separator: u8,
-    /// As stated or as the byte order mark says; `None`: UTF-8, or Latin-1 from the first line that is not.
+    /// As stated or by the byte order mark. `None` means UTF-8, or Latin-1 from the first line that is not UTF-8.
     encoding: Option<&'static Encoding>,
-    /// Lines of the file that are still to be passed over.
+    /// Number of lines of the file still to be skipped.
     skip: usize,
     reader: BufReader<File>,
     stamp: FileStamp,
@@ -95,7 +95,7 @@ impl Rows {
 
     fn within(file: &Path, format: &Format, limits: Limits) -> Result<Rows, ModelError> {
         let fault = |message: String, help: &str| ModelError::Input {
-            place: Place::file(file),
+            location: Location::file(file),
             message,
             help: Some(help.into()),
         };
@@ -115,7 +115,7 @@ impl Rows {
         if found.len() > limits.bytes {
             return Err(fault(
                 format!(
-                    "a data file of {} bytes; {} is the most that is read",
+                    "a data file of {} bytes; the limit is {}",
                     found.len(),
                     limits.bytes
                 ),
@@ -137,7 +137,7 @@ impl Rows {
         })
     }
 
-    /// The file as it was when it was opened.
+    /// The state of the file when it was opened.
     pub fn stamp(&self) -> &FileStamp {
         &self.stamp
     }
@@ -167,7 +167,7 @@ impl Rows {
             self.rows += 1;
             if self.rows > self.limits.rows {
                 let most = self.limits.rows;
-                return Err(self.fault(format!("a row beyond {most}, the most that are read"), SPLIT));
+                return Err(self.fault(format!("more than {most} rows, which is the limit"), SPLIT));
             }
             return Ok(Some(Row {
                 line: self.line,
@@ -179,7 +179,7 @@ impl Rows {
         }
     }
 
-    /// Reads the next line into the buffer, without byte order mark and line end; the bytes of the file that it takes.
+    /// Reads the next line into the buffer, without byte order mark and line end; returns its bytes in the file.
     fn next_line(&mut self) -> Result<Option<Range<usize>>, ModelError> {
         let mut start = self.byte;
         self.buffer.clear();
@@ -193,7 +193,7 @@ impl Rows {
         if self.line == 1 {
             let (found, mark) = encoding::of_start(&self.buffer, self.encoding);
             self.encoding = found;
-            // Only now is it known where the line ends.
+            // The position of the line end is known only after decoding.
             if self.is_wide() {
                 self.until_line_end()?;
                 read = self.buffer.len();
@@ -202,15 +202,15 @@ impl Rows {
             self.buffer.drain(..mark);
         }
         self.byte += read;
-        // A pipe does not say how much there is to come.
+        // The length of a pipe is unknown in advance.
         if self.byte as u64 > self.limits.bytes {
             let most = self.limits.bytes;
-            return Err(self.fault(format!("more than {most} bytes, the most that are read"), SPLIT));
+            return Err(self.fault(format!("more than {most} bytes, which is the limit"), SPLIT));
         }
         if self.buffer.len() as u64 >= LONGEST_LINE && !self.ends_with(b'\n') {
             return Err(self.fault(
                 format!("a line of more than {LONGEST_LINE} bytes"),
-                "a data file has a line for each reading; is it one?",
+                "a data file has one line per reading; check that it is a data file",
             ));
         }
         for end in [b'\n', b'\r'] {
@@ -222,7 +222,7 @@ impl Rows {
         Ok(Some(start..start + self.buffer.len()))
     }
 
-    /// Reads on until the buffer ends with a line end, as the encoding writes it, or holds the longest line.
+    /// Reads until the buffer ends with a line end in the encoding of the file, or contains the longest line.
     fn until_line_end(&mut self) -> Result<(), ModelError> {
         while !self.ends_with(b'\n') && (self.buffer.len() as u64) < LONGEST_LINE {
             let room = LONGEST_LINE - self.buffer.len() as u64;
@@ -262,17 +262,17 @@ impl Rows {
     fn decoded(&mut self) -> Result<String, ModelError> {
         let (text, found) = encoding::decode(&self.buffer, self.encoding).map_err(|encoding| {
             let name = encoding::name_of(encoding);
-            let help = "declare what the file is written in, as `[format] encoding = \"latin1\"`";
+            let help = "declare the encoding of the file, such as `[format] encoding = \"latin1\"`";
             self.fault(format!("the line is not valid {name}"), help)
         })?;
         let text = text.into_owned();
         if text.contains('\r') {
             return Err(self.fault(
                 "a carriage return within a line".into(),
-                "save the file with lines that end in LF or CRLF",
+                "save the file with line ends LF or CRLF",
             ));
         }
-        // One line that is not UTF-8 tells of all that follow.
+        // One line that is not UTF-8 determines the encoding of all that follow.
         if found != UTF_8 {
             self.encoding = Some(found);
         }
@@ -282,8 +282,8 @@ impl Rows {
     fn quoted(&self, text: &str) -> Result<Vec<String>, ModelError> {
         if text.matches('"').count() % 2 == 1 {
             return Err(self.fault(
-                "a quote without its end".into(),
-                "a quoted cell begins and ends on its line",
+                "a quote is not closed".into(),
+                "a quoted cell must end on its line",
             ));
         }
         let mut record = csv::StringRecord::new();
@@ -296,15 +296,15 @@ impl Rows {
             Ok(true) => Ok(record.iter().map(str::to_string).collect()),
             Ok(false) => Ok(Vec::new()),
             Err(cause) => Err(self.fault(
-                format!("quotes that cannot be read: {cause}"),
-                "a quoted cell begins and ends on its line",
+                format!("invalid quotes: {cause}"),
+                "a quoted cell must end on its line",
             )),
         }
     }
 
     fn fault(&self, message: String, help: &str) -> ModelError {
         ModelError::Input {
-            place: Place::line(&self.file, self.line),
+            location: Location::line(&self.file, self.line),
             message,
             help: Some(help.to_string()),
         }

@@ -1,7 +1,7 @@
 //! Spreadsheets (XLSX, XLS, ODS) as rows of cells, read by calamine.
 //!
-//! The first row that is not empty is the header; a row whose first cell begins with `#` is a comment. What a cell shows is of no account: a
-//! number is read with all its digits, a formula by its last value.
+//! The first row that is not empty is the header; a row whose first cell begins with `#` is a comment. The display format of a cell is
+//! ignored: a number is read with all its digits, a formula by its last value.
 
 use std::fs::File;
 use std::io::{BufReader, Read};
@@ -13,7 +13,7 @@ use zip::ZipArchive;
 
 use super::Format;
 use super::rows::Row;
-use crate::error::{ModelError, Place};
+use crate::error::{Location, ModelError};
 use crate::session::stamp::FileStamp;
 
 /// Whether a file is a spreadsheet, by its name.
@@ -27,19 +27,19 @@ pub(super) fn is_spreadsheet(file: &Path) -> bool {
     )
 }
 
-/// Most bytes of a spreadsheet.
+/// Largest size of a spreadsheet, bytes.
 const MAX_BYTES: u64 = 64 << 20;
-/// Most bytes of what is packed in it, which is held in memory.
+/// Largest unpacked size, bytes; the content is held in memory.
 const MAX_UNPACKED: u64 = 256 << 20;
-/// Most columns that cells lie in.
+/// Largest number of columns.
 const MAX_COLUMNS: u32 = 1000;
-/// Most cells of the rectangle around all that is filled.
+/// Largest number of cells of the rectangle around all filled cells.
 const MAX_CELLS: usize = 20_000_000;
 
-/// The rows of a sheet, and the file as it was.
+/// The rows of a sheet, and the state of the file.
 pub(super) fn rows(file: &Path, format: &Format) -> Result<(FileStamp, Vec<Row>), ModelError> {
     let fault = |message: String, help: String| ModelError::Input {
-        place: Place::file(file),
+        location: Location::file(file),
         message,
         help: Some(help),
     };
@@ -51,25 +51,22 @@ pub(super) fn rows(file: &Path, format: &Format) -> Result<(FileStamp, Vec<Row>)
     };
     let found = std::fs::metadata(file).map_err(|cause| broken(cause.into()))?;
     if !found.is_file() {
-        return Err(broken(std::io::Error::other("it is no file").into()));
+        return Err(broken(std::io::Error::other("it is not a file").into()));
     }
     if found.len() > MAX_BYTES {
         return Err(fault(
-            format!(
-                "a spreadsheet of {} bytes; {MAX_BYTES} is the most that is read",
-                found.len()
-            ),
+            format!("a spreadsheet of {} bytes; the limit is {MAX_BYTES}", found.len()),
             "export it as CSV".into(),
         ));
     }
     if unpacks_beyond(file, MAX_UNPACKED) {
         return Err(fault(
-            format!("a spreadsheet that unpacks to more than {MAX_UNPACKED} bytes, the most that is read"),
+            format!("a spreadsheet that unpacks to more than {MAX_UNPACKED} bytes, which is the limit"),
             "export it as CSV".into(),
         ));
     }
     let stamp = FileStamp::of(file, &found);
-    let mut book = guarded(|| open_workbook_auto(file)).map_err(broken)?;
+    let mut book = catch_panic(|| open_workbook_auto(file)).map_err(broken)?;
     let names = book.sheet_names();
     let wanted: Vec<String> = match &format.sheet {
         Some(name) if names.contains(name) => vec![name.clone()],
@@ -83,33 +80,33 @@ pub(super) fn rows(file: &Path, format: &Format) -> Result<(FileStamp, Vec<Row>)
     };
     let mut filled: Vec<(String, Vec<Row>)> = Vec::new();
     for name in wanted {
-        let cells = guarded(|| cells(&mut book, &name)).map_err(broken)?;
+        let cells = catch_panic(|| cells(&mut book, &name)).map_err(broken)?;
         let rows = by_row(cells, format).map_err(|(message, help)| fault(message, help))?;
         if !rows.is_empty() {
             filled.push((name, rows));
         }
     }
     if let Some(what) = stamp.changed() {
-        return Err(fault(what, "wait until it is written, and try again".into()));
+        return Err(fault(what, "wait until it is written and try again".into()));
     }
     match filled.len() {
         0 | 1 => Ok((stamp, filled.pop().map(|(_, rows)| rows).unwrap_or_default())),
         _ => {
             let names: Vec<&str> = filled.iter().map(|(name, _)| name.as_str()).collect();
             Err(fault(
-                format!("several sheets hold cells: {}", names.join(", ")),
-                format!("say which one: `[format] sheet = \"{}\"`", names[0]),
+                format!("several sheets contain cells: {}", names.join(", ")),
+                format!("select one: `[format] sheet = \"{}\"`", names[0]),
             ))
         }
     }
 }
 
-/// Whether the parts of a ZIP file come to more than so many bytes: what they say of their size is not relied on.
+/// Whether the parts of a ZIP file unpack to more than this number of bytes. The sizes stated in the file are not trusted.
 fn unpacks_beyond(file: &Path, most: u64) -> bool {
     let archive = File::open(file)
         .ok()
         .and_then(|opened| ZipArchive::new(opened).ok());
-    // What is no ZIP file is not packed.
+    // A file that is not ZIP is not packed.
     let Some(mut archive) = archive else { return false };
     let mut left = most;
     for part in 0..archive.len() {
@@ -125,20 +122,20 @@ fn unpacks_beyond(file: &Path, most: u64) -> bool {
     false
 }
 
-/// What the library makes of a file. Where it panics over one that contradicts itself (a row number beyond 32 bits does it in builds that check
-/// arithmetic), that is an error as any other.
-fn guarded<T>(read: impl FnOnce() -> Result<T, calamine::Error>) -> Result<T, calamine::Error> {
-    let contradicts = || std::io::Error::other("its contents contradict each other").into();
+/// Calls the library. It may panic on a contradictory file (a row number beyond 32 bits, in builds with overflow checks); the panic
+/// becomes an ordinary error.
+fn catch_panic<T>(read: impl FnOnce() -> Result<T, calamine::Error>) -> Result<T, calamine::Error> {
+    let contradicts = || std::io::Error::other("its content is contradictory").into();
     catch_unwind(AssertUnwindSafe(read)).unwrap_or_else(|_| Err(contradicts()))
 }
 
 /// A cell with its row and column, from 0.
-type Placed = (u32, u32, Data);
+type PlacedCell = (u32, u32, Data);
 
-/// The cells of a sheet that hold something.
+/// The filled cells of a sheet.
 ///
-/// Where the file lists them one by one they are taken so: the rectangle around two cells at opposite corners would not fit into any memory.
-fn cells(book: &mut Sheets<BufReader<File>>, name: &str) -> Result<Vec<Placed>, calamine::Error> {
+/// Cells that the file lists one by one are read one by one: the rectangle around two cells in opposite corners would not fit in memory.
+fn cells(book: &mut Sheets<BufReader<File>>, name: &str) -> Result<Vec<PlacedCell>, calamine::Error> {
     let mut cells = Vec::new();
     match book {
         Sheets::Xlsx(book) => {
@@ -171,24 +168,24 @@ fn cells(book: &mut Sheets<BufReader<File>>, name: &str) -> Result<Vec<Placed>, 
     Ok(cells)
 }
 
-/// Cells as rows of one width, without comments and empty rows; a message and what to do where they lie too far apart.
-fn by_row(mut cells: Vec<Placed>, format: &Format) -> Result<Vec<Row>, (String, String)> {
+/// Cells as rows of equal width, without comments and empty rows. If they are too far apart: a message and what to do.
+fn by_row(mut cells: Vec<PlacedCell>, format: &Format) -> Result<Vec<Row>, (String, String)> {
     cells.retain(|(row, ..)| *row as usize >= format.skip_lines);
     let columns = || cells.iter().map(|(_, column, _)| *column);
     let (Some(left), Some(right)) = (columns().min(), columns().max()) else {
         return Ok(Vec::new());
     };
-    let help = "clear what lies beside the table, or export it as CSV";
+    let help = "remove the cells beside the table, or export it as CSV";
     if right - left >= MAX_COLUMNS {
         let message = format!(
-            "cells from column {} to column {}; {MAX_COLUMNS} columns are the most",
+            "cells from column {} to column {}; the limit is {MAX_COLUMNS} columns",
             left + 1,
             u64::from(right) + 1
         );
         return Err((message, help.into()));
     }
     let width = (right - left) as usize + 1;
-    // Of two cells that claim one place the later one holds.
+    // If two cells have the same position, the later one is used.
     cells.sort_by_key(|(row, column, _)| (*row, *column));
     let mut rows: Vec<Row> = Vec::new();
     for of_row in cells.chunk_by(|(row, ..), (next, ..)| row == next) {
@@ -197,7 +194,7 @@ fn by_row(mut cells: Vec<Placed>, format: &Format) -> Result<Vec<Row>, (String, 
             continue;
         }
         if (rows.len() + 1) * width > MAX_CELLS {
-            let message = format!("more than {MAX_CELLS} cells in the rectangle around all that are filled");
+            let message = format!("more than {MAX_CELLS} cells in the rectangle around all filled cells");
             return Err((message, help.into()));
         }
         let mut texts = vec![String::new(); width];
@@ -209,7 +206,7 @@ fn by_row(mut cells: Vec<Placed>, format: &Format) -> Result<Vec<Row>, (String, 
     Ok(rows)
 }
 
-/// A cell as it would stand in a CSV file of this format.
+/// The text of a cell in a CSV file of this format.
 fn text(cell: &Data, format: &Format) -> String {
     let number = |text: String| {
         if format.decimal == b',' {

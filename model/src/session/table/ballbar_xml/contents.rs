@@ -1,4 +1,4 @@
-//! What a ball-bar file in XML says: its runs, its plane, and the names of all else.
+//! Content of a ball-bar file in XML: its runs, its plane, and the names of all other elements.
 
 use std::collections::BTreeMap;
 use std::fs::File;
@@ -10,49 +10,49 @@ use quick_xml::Reader;
 use quick_xml::events::{BytesStart, Event};
 
 use super::super::encoding;
-use crate::error::{ModelError, Place};
+use crate::error::{Location, ModelError};
 use crate::session::stamp::FileStamp;
 
-/// Most bytes of a file.
+/// Largest file size, bytes.
 const MAX_BYTES: u64 = 64 << 20;
-/// Most elements within one another.
+/// Largest nesting depth of elements.
 const MAX_DEPTH: usize = 100;
-/// The element that holds the numbers of a run.
+/// The element that contains the numbers of a run.
 pub(super) const READINGS: &str = "READINGS";
 const DIRECTION: &str = "RUN_DIRECTION";
 
-/// A run as the file has it.
+/// A run in the file.
 pub(super) struct Run {
     pub line: usize,
     pub direction: Option<String>,
     pub text: String,
 }
 
-/// What a file says.
+/// The content of a file.
 #[derive(Default)]
 pub(super) struct Contents {
     pub runs: Vec<Run>,
     pub plane: Option<(String, usize)>,
-    /// How often each element occurs that means nothing here.
+    /// Number of occurrences of each element that is not interpreted.
     pub unread: BTreeMap<String, usize>,
 }
 
 /// An element that is open.
-struct Open {
+struct OpenElement {
     name: String,
     line: usize,
     text: String,
     direction: Option<String>,
-    /// Whether that stands in an element of its own, and so speaks for one run.
+    /// Whether the direction is in an element of its own and thus refers to one run.
     once: bool,
-    /// Runs in it whose direction is not known yet.
-    waiting: Vec<usize>,
+    /// Runs in the element whose direction is not known yet.
+    undirected_runs: Vec<usize>,
 }
 
-/// A file as it was, and its text.
+/// The state of a file and its text.
 fn decoded(file: &Path, stated: Option<&'static Encoding>) -> Result<(FileStamp, String), ModelError> {
     let fault = |message: String| ModelError::Input {
-        place: Place::file(file),
+        location: Location::file(file),
         message,
         help: Some("check `data` and the file".into()),
     };
@@ -66,7 +66,7 @@ fn decoded(file: &Path, stated: Option<&'static Encoding>) -> Result<(FileStamp,
         .map_err(unreadable)?;
     if bytes.len() as u64 > MAX_BYTES {
         return Err(fault(format!(
-            "more than {MAX_BYTES} bytes, the most that are read of a ball-bar file in XML"
+            "more than {MAX_BYTES} bytes, the limit of a ball-bar file in XML"
         )));
     }
     stamp.check(&opened)?;
@@ -80,7 +80,7 @@ fn decoded(file: &Path, stated: Option<&'static Encoding>) -> Result<(FileStamp,
 /// Reads a file.
 ///
 /// # Errors
-/// If it is no XML.
+/// If it is not XML.
 pub(super) fn parse(
     file: &Path,
     encoding: Option<&'static Encoding>,
@@ -88,7 +88,7 @@ pub(super) fn parse(
     let (stamp, text) = decoded(file, encoding)?;
     let mut reader = Reader::from_str(&text);
     let mut contents = Contents::default();
-    let mut open: Vec<Open> = Vec::new();
+    let mut open: Vec<OpenElement> = Vec::new();
     let (mut line, mut counted) = (1, 0);
     loop {
         let until = (reader.buffer_position() as usize).min(text.len());
@@ -98,10 +98,10 @@ pub(super) fn parse(
             .count();
         counted = until;
         let broken = |cause: String| ModelError::Input {
-            place: Place::line(file, line),
+            location: Location::line(file, line),
             message: format!("not valid XML: {cause}"),
             help: Some(
-                "a ball-bar file in XML is expected; other files are read by another name, as .csv or .xlsx"
+                "a ball-bar file in XML is expected; other files need another name, such as .csv or .xlsx"
                     .into(),
             ),
         };
@@ -113,7 +113,7 @@ pub(super) fn parse(
                 return Err(broken(format!("it ends within <{unclosed}>")));
             }
             Ok(Event::Start(_)) if open.len() == MAX_DEPTH => {
-                return Err(broken(format!("elements nested deeper than {MAX_DEPTH}")));
+                return Err(broken(format!("elements are nested deeper than {MAX_DEPTH}")));
             }
             Ok(Event::Start(start)) => open.push(opened(&start, line, &mut contents, &broken)?),
             Ok(Event::Empty(start)) => {
@@ -141,15 +141,15 @@ fn opened(
     line: usize,
     contents: &mut Contents,
     broken: &impl Fn(String) -> ModelError,
-) -> Result<Open, ModelError> {
+) -> Result<OpenElement, ModelError> {
     let name = start.local_name().as_ref().to_string();
-    let mut element = Open {
+    let mut element = OpenElement {
         name,
         line,
         text: String::new(),
         direction: None,
         once: false,
-        waiting: Vec::new(),
+        undirected_runs: Vec::new(),
     };
     for attribute in start.attributes() {
         let attribute = attribute.map_err(|cause| broken(cause.to_string()))?;
@@ -163,11 +163,11 @@ fn opened(
     Ok(element)
 }
 
-/// What an element says to the one about it.
-fn close(mut element: Open, open: &mut [Open], contents: &mut Contents) {
+/// Passes the content of a closed element to its parent.
+fn close(mut element: OpenElement, open: &mut [OpenElement], contents: &mut Contents) {
     let within = open.iter().any(|outer| outer.name == READINGS);
     if within {
-        // A reading may have an element of its own.
+        // A reading may have its own element.
         if let Some(outer) = open.last_mut() {
             outer.text.push(' ');
             outer.text.push_str(&element.text);
@@ -176,7 +176,7 @@ fn close(mut element: Open, open: &mut [Open], contents: &mut Contents) {
     }
     match element.name.as_str() {
         READINGS => {
-            element.waiting.push(contents.runs.len());
+            element.undirected_runs.push(contents.runs.len());
             contents.runs.push(Run {
                 line: element.line,
                 direction: None,
@@ -190,31 +190,31 @@ fn close(mut element: Open, open: &mut [Open], contents: &mut Contents) {
             if let Some(outer) = open.last_mut() {
                 outer.direction = element.direction.take();
                 outer.once = true;
-                settle(outer, contents);
+                assign_direction(outer, contents);
             }
             return;
         }
         "PLANE" => {}
         other => {
-            if element.waiting.is_empty() {
+            if element.undirected_runs.is_empty() {
                 *contents.unread.entry(other.to_string()).or_default() += 1;
             }
         }
     }
-    settle(&mut element, contents);
+    assign_direction(&mut element, contents);
     if let Some(outer) = open.last_mut() {
-        outer.waiting.append(&mut element.waiting);
-        settle(outer, contents);
+        outer.undirected_runs.append(&mut element.undirected_runs);
+        assign_direction(outer, contents);
     }
 }
 
-/// Gives the runs that wait in an element its direction, where it has one.
-fn settle(element: &mut Open, contents: &mut Contents) {
+/// Assigns the direction of an element, if it has one, to the runs that wait in it.
+fn assign_direction(element: &mut OpenElement, contents: &mut Contents) {
     let Some(direction) = &element.direction else {
         return;
     };
-    let settled = !element.waiting.is_empty();
-    for run in element.waiting.drain(..) {
+    let settled = !element.undirected_runs.is_empty();
+    for run in element.undirected_runs.drain(..) {
         contents.runs[run]
             .direction
             .get_or_insert_with(|| direction.clone());

@@ -1,4 +1,4 @@
-//! Which way a run of a ball-bar file goes round.
+//! Direction of rotation of the runs of a ball-bar file.
 
 use super::contents::Run;
 
@@ -11,17 +11,18 @@ const ANTICLOCKWISE: [&str; 6] = [
     "ANTI_CLOCKWISE",
     "COUNTER_CLOCKWISE",
 ];
-const KNOWN: &str = "words that speak for themselves are CW, CCW, CLOCKWISE, ANTICLOCKWISE, COUNTERCLOCKWISE; for others say \
-                     `[format] anticlockwise = \"…\"`, which word means from the first axis of the plane towards the second";
+const KNOWN: &str = "known words are CW, CCW, CLOCKWISE, ANTICLOCKWISE, COUNTERCLOCKWISE; for others use \
+                     `[format] anticlockwise = \"…\"`, the word for the direction from the first axis of the plane towards the second";
 
-/// For each run whether it goes from the first axis of the plane towards the second; a line, a message and what to do where that is not known.
+/// For each run, whether it goes from the first axis of the plane towards the second. If that is unknown: a line, a message and what to
+/// do.
 ///
-/// Words that speak for themselves do so whatever is stated, unless it is one of them that is stated. Of other words the stated one means
-/// forward, and one other backward. Capitals do not count; `1`, `true` and `yes` are one value, and so are `0`, `false` and `no`.
+/// Known words keep their meaning whatever is stated, except that a stated clockwise word reverses them. Of other words, the stated one
+/// means forward and one other backward. Case is ignored; `1`, `true` and `yes` are one value, and so are `0`, `false` and `no`.
 pub(super) fn of_runs(runs: &[Run], stated: Option<&str>) -> Result<Vec<bool>, (usize, String, String)> {
-    // A file may call the direction from the first axis to the second clockwise: seen from below it is.
-    let turned = stated.and_then(by_itself) == Some(false);
-    let stated = stated.map(plain);
+    // Seen from below, the direction from the first axis to the second is clockwise, and a file may call it so.
+    let turned = stated.and_then(known_meaning) == Some(false);
+    let stated = stated.map(normalised);
     let mut other: Option<String> = None;
     runs.iter()
         .map(|run| {
@@ -29,15 +30,15 @@ pub(super) fn of_runs(runs: &[Run], stated: Option<&str>) -> Result<Vec<bool>, (
             let Some(direction) = &run.direction else {
                 return fault("READINGS without a RUN_DIRECTION".into());
             };
-            if let Some(anticlockwise) = by_itself(direction) {
+            if let Some(anticlockwise) = known_meaning(direction) {
                 return Ok(anticlockwise != turned);
             }
-            let word = plain(direction);
+            let word = normalised(direction);
             match &stated {
                 Some(stated) if *stated == word => Ok(true),
                 Some(_) if other.get_or_insert_with(|| word.clone()) == &word => Ok(false),
                 Some(_) => fault(format!(
-                    "RUN_DIRECTION is `{direction}`: neither the word stated by `anticlockwise`, nor `{}`, which is the other one in this file",
+                    "RUN_DIRECTION is `{direction}`: neither the word stated by `anticlockwise`, nor `{}`, the other word in this file",
                     other.as_deref().unwrap_or("")
                 )),
                 None => fault(format!("RUN_DIRECTION is `{direction}`, which is not known")),
@@ -46,8 +47,8 @@ pub(super) fn of_runs(runs: &[Run], stated: Option<&str>) -> Result<Vec<bool>, (
         .collect()
 }
 
-/// What a word says by itself: whether it means anticlockwise.
-fn by_itself(word: &str) -> Option<bool> {
+/// The meaning of a known word: whether it is anticlockwise.
+fn known_meaning(word: &str) -> Option<bool> {
     let word = word.trim().to_uppercase().replace([' ', '-'], "_");
     if ANTICLOCKWISE.contains(&word.as_str()) {
         Some(true)
@@ -58,8 +59,8 @@ fn by_itself(word: &str) -> Option<bool> {
     }
 }
 
-/// A word without what does not count.
-fn plain(word: &str) -> String {
+/// The word in normalised form.
+fn normalised(word: &str) -> String {
     let word = word.trim().to_uppercase();
     match word.as_str() {
         "TRUE" | "YES" => "1".into(),

@@ -1,10 +1,10 @@
-//! Ball-bar files in XML (`.b5r` and others), as far as anything is publicly known of them.
+//! Reader of ball-bar files in XML (`.b5r` and others), within the limits of public knowledge.
 //!
-//! There is no public description of the format. What programs that read such files rely on is: an element `READINGS` for each run with
-//! numbers in it, a `RUN_DIRECTION` beside it or about it (element or attribute), and an element `PLANE` with `TEST_PLANE="XY"`. Neither the
-//! unit of the readings nor the angles at which they were taken is known, so nothing is assumed: `[columns]` states the unit, as
-//! `deviation_um = "READINGS"`, and the test's `path` states the circle, over which the readings of a run lie evenly from one end to the
-//! other. Everything else in the file is named in a warning, not interpreted.
+//! There is no public description of the format. Programs that read such files rely on three facts: an element `READINGS` with numbers
+//! for each run, a `RUN_DIRECTION` beside or around it (element or attribute), and an element `PLANE` with `TEST_PLANE="XY"`. The unit of
+//! the readings and the angles at which they were taken are unknown, so nothing is assumed. `[columns]` states the unit, as `deviation_um
+//! = "READINGS"`. The test's `path` states the circle, over which the readings of a run are evenly distributed from one end to the other.
+//! A warning names everything else in the file; it is not interpreted.
 
 mod contents;
 mod direction;
@@ -13,14 +13,14 @@ use std::path::Path;
 
 use contents::READINGS;
 
-use super::columns::{Role, Theirs};
+use super::columns::{ForeignColumn, Role};
 use super::{Request, number};
-use crate::error::{ModelError, Place};
+use crate::error::{Location, ModelError};
 use crate::session::motion::Motion;
 use crate::session::readings::Readings;
 use crate::session::{Test, plan};
 
-/// Whether a file is one of these, by its name.
+/// Whether a file is of this format, by its name.
 pub(crate) fn is_xml(file: &Path) -> bool {
     let extension = file
         .extension()
@@ -28,10 +28,10 @@ pub(crate) fn is_xml(file: &Path) -> bool {
     matches!(extension.as_deref(), Some("xml" | "b5r"))
 }
 
-/// Reads a file for a test. Beside the readings: what in the file was not read.
+/// Reads a file for a test. Returns the readings, and warnings about the elements that were not read.
 ///
 /// # Errors
-/// If it is no XML, holds no readings, or does not say what it takes to use them, with the line and what to do.
+/// If it is not XML, contains no readings, or lacks information for their use, with the line and what to do.
 pub(crate) fn read(
     file: &Path,
     request: &Request<'_>,
@@ -40,17 +40,17 @@ pub(crate) fn read(
     let role = value_role(file, request)?;
     let (stamp, contents) = contents::parse(file, request.format.encoding)?;
     let fault = |line: usize, message: String, help: String| ModelError::Input {
-        place: if line == 0 {
-            Place::file(file)
+        location: if line == 0 {
+            Location::file(file)
         } else {
-            Place::line(file, line)
+            Location::line(file, line)
         },
         message,
         help: Some(help),
     };
     if contents.runs.is_empty() {
         let help = "only ball-bar files with runs of READINGS are read; export the readings as CSV and map its columns";
-        return Err(fault(0, "no element READINGS in it".into(), help.into()));
+        return Err(fault(0, "it has no element READINGS".into(), help.into()));
     }
     let Some(Motion::Circle {
         first,
@@ -60,8 +60,8 @@ pub(crate) fn read(
         ..
     }) = &test.motion
     else {
-        let help = "say which circle it is: `path = { kind = \"circle\", plane = \"XY\", radius_mm = …, from_deg = …, to_deg = …, step_deg = 1 }`; \
-                    readings lie evenly from one end to the other";
+        let help = "state the circle: `path = { kind = \"circle\", plane = \"XY\", radius_mm = …, from_deg = …, to_deg = …, step_deg = 1 }`; \
+                    readings are evenly distributed from one end to the other";
         return Err(fault(
             0,
             "READINGS have no angles, and the test has no `path`".into(),
@@ -78,7 +78,7 @@ pub(crate) fn read(
             letters
         };
         if letters(stated) != letters(&plane) {
-            let message = format!("TEST_PLANE is `{stated}`, the test's `path` is in {plane}");
+            let message = format!("TEST_PLANE is `{stated}`, but the test's `path` is in {plane}");
             return Err(fault(
                 *line,
                 message,
@@ -107,7 +107,7 @@ pub(crate) fn read(
             return Err(fault(
                 run.line,
                 message,
-                "a run has one for each place on the circle".into(),
+                "a run has one for each point of the circle".into(),
             ));
         }
         let (start, end) = if forward { (*from, *to) } else { (*to, *from) };
@@ -126,8 +126,8 @@ pub(crate) fn read(
                 column.push(*at);
             }
             readings.observed.push(match role {
-                Role::Deviation(unit) => request.bar_mm + unit.inside(value),
-                Role::Length(unit) => unit.inside(value),
+                Role::Deviation(unit) => request.bar_mm + unit.to_internal(value),
+                Role::Length(unit) => unit.to_internal(value),
                 _ => value,
             });
             readings.line.push(run.line);
@@ -157,33 +157,33 @@ pub(crate) fn read(
     Ok((readings, warnings))
 }
 
-/// Which of our columns READINGS are, as `[columns]` states.
+/// The column of ours that READINGS contains, as `[columns]` states.
 fn value_role(file: &Path, request: &Request<'_>) -> Result<Role, ModelError> {
     let help = "state their unit: `[columns]` with `deviation_um = \"READINGS\"` (from `bar_mm`), or `length_mm = \"READINGS\"`";
     let mapped = request.columns.unwrap_or(&[]);
-    let fault = |place: Place, message: String| ModelError::Input {
-        place,
+    let fault = |location: Location, message: String| ModelError::Input {
+        location,
         message,
         help: Some(help.into()),
     };
     let Some(entry) = mapped
         .iter()
-        .find(|entry| entry.theirs == Theirs::Name(READINGS.into()))
+        .find(|entry| entry.foreign == ForeignColumn::Name(READINGS.into()))
     else {
         return Err(fault(
-            Place::file(file),
-            "the file does not say in which unit its READINGS are".into(),
+            Location::file(file),
+            "the file does not state the unit of its READINGS".into(),
         ));
     };
-    if let Some(other) = mapped.iter().find(|other| other.ours != entry.ours) {
-        let message = format!("a ball-bar file in XML has no column for `{}`", other.ours);
-        return Err(fault(other.place.clone(), message));
+    if let Some(other) = mapped.iter().find(|other| other.own != entry.own) {
+        let message = format!("a ball-bar file in XML has no column for `{}`", other.own);
+        return Err(fault(other.location.clone(), message));
     }
-    match Role::of(&entry.ours, request) {
+    match Role::of(&entry.own, request) {
         Some(role @ (Role::Deviation(_) | Role::Length(_))) => Ok(role),
         _ => Err(fault(
-            entry.place.clone(),
-            format!("READINGS cannot be `{}`", entry.ours),
+            entry.location.clone(),
+            format!("READINGS cannot be `{}`", entry.own),
         )),
     }
 }

@@ -1,8 +1,8 @@
-//! Limits, places and encodings.
+//! Tests of limits, locations and encodings.
 
 use super::*;
 
-/// Reads a file with small limits; the number of rows, or the message.
+/// Reads a file with small limits; returns the number of rows, or the message.
 fn read(text: &str, limits: Limits, meanwhile: impl Fn(&Path)) -> Result<usize, String> {
     let folder = tempfile::tempdir().unwrap();
     let file = folder.path().join("data.csv");
@@ -23,12 +23,12 @@ fn a_file_at_its_limits_is_read_and_one_beyond_them_is_refused() {
     assert_eq!(read("1,2\n3,4\n5,6\n", limits, still), Ok(3));
     let long = read("1,2\n3,4\n5,67\n", limits, still).unwrap_err();
     assert!(
-        long.ends_with("a data file of 13 bytes; 12 is the most that is read"),
+        long.ends_with("a data file of 13 bytes; the limit is 12"),
         "{long}"
     );
     let many = read("1\n2\n3\n4\n", limits, still).unwrap_err();
     assert!(
-        many.ends_with("data.csv:4: a row beyond 3, the most that are read"),
+        many.ends_with("data.csv:4: more than 3 rows, which is the limit"),
         "{many}"
     );
 }
@@ -46,7 +46,7 @@ fn a_cell_is_pointed_at_behind_a_byte_order_mark_and_beside_what_takes_other_byt
         spans("\u{feff}0,pq\r\nµµm,7\n".as_bytes()),
         [Some(5..7), Some(15..16)]
     );
-    // The whole line, since two bytes stand where four do in the text.
+    // The whole line, because the file has two bytes where the text has four.
     assert_eq!(spans(b"0,pq\r\n\xb5\xb5m,7\n"), [Some(2..4), Some(6..11)]);
 }
 
@@ -61,7 +61,7 @@ fn every_encoding_gives_the_same_cells() {
             .map(|row| (row.line, row.cells))
             .collect()
     };
-    // U+0A05 and U+010A have the byte of a line end in them.
+    // U+0A05 and U+010A contain the byte of a line end.
     let text = "Länge,b\u{a05}\u{10a}\r\n1,2\n\n3,4";
     let expected = cells(text.as_bytes(), &Format::default());
     assert_eq!(expected.len(), 3);
@@ -71,7 +71,7 @@ fn every_encoding_gives_the_same_cells() {
         let units: Vec<u16> = mark.encode_utf16().chain(text.encode_utf16()).collect();
         for of in [u16::to_le_bytes, u16::to_be_bytes] {
             let bytes: Vec<u8> = units.iter().copied().flat_map(of).collect();
-            // The first letter is not ASCII's neighbour of a zero byte in every file: the mark, or what is stated, tells.
+            // The first letter need not be ASCII with a zero byte: the mark or the stated encoding decides.
             let stated = Format {
                 encoding: encoding::of_name(if bytes[0] == 0 || bytes[0] == 0xfe {
                     "utf-16be"
@@ -87,7 +87,7 @@ fn every_encoding_gives_the_same_cells() {
         cells(b"L\xe4nge,b\r\n1,2\n", &Format::default())[0].1,
         ["Länge", "b"]
     );
-    // What stands above the table may hold anything.
+    // Lines above the table may contain anything.
     let skipping = Format {
         skip_lines: 2,
         ..Format::default()

@@ -1,32 +1,35 @@
-//! Rows as they are, not whitened, block after block: those whose readings count.
+//! Unwhitened rows of the readings that are not rejected as outliers, block after block.
 
 use faer::Mat;
 
-use super::{Columns, Layout};
+use super::{Columns, EffectColumns};
 use crate::error::IdentifyError;
 use crate::heldout::FoldKind;
 use crate::problem::Block;
 use crate::trace::paired::Units;
 
 impl Columns<'_, '_> {
-    /// The rows of layouts that count, in mm, not whitened, block after block.
-    pub fn plain_rows(&self, layouts: &[&Layout]) -> Mat<f64> {
-        let blocks = self.blocks.iter().map(|block| self.block_rows(layouts, block));
-        self.plain(blocks.collect())
+    /// The rows of effects for the accepted readings, in mm, unwhitened, block after block.
+    pub fn unwhitened_rows(&self, column_sets: &[&EffectColumns]) -> Mat<f64> {
+        let blocks = self
+            .blocks
+            .iter()
+            .map(|block| self.block_rows(column_sets, block));
+        self.unwhitened(blocks.collect())
     }
 
-    /// `[J | r]` at given values, likewise.
+    /// The unwhitened rows of `[J | r]` at given parameter values, block after block.
     ///
     /// # Errors
     /// If the model cannot be evaluated.
-    pub fn plain_model_rows(&self, beta: &[f64]) -> Result<Mat<f64>, IdentifyError> {
+    pub fn unwhitened_model_rows(&self, beta: &[f64]) -> Result<Mat<f64>, IdentifyError> {
         let values = self.problem.slot_values(beta);
         let blocks = self.blocks.iter().map(|block| self.problem.rows(&values, block));
-        Ok(self.plain(blocks.collect::<Result<_, _>>()?))
+        Ok(self.unwhitened(blocks.collect::<Result<_, _>>()?))
     }
 
-    /// The fold of each row of [`Columns::plain_rows`].
-    pub fn plain_folds(&self) -> Vec<usize> {
+    /// The fold of each row of [`Columns::unwhitened_rows`].
+    pub fn unwhitened_folds(&self) -> Vec<usize> {
         let coordinates = self.problem.coordinates();
         let fold = |block: &Block, i: usize| {
             self.problem.folds.of_row[block.test][block.rows.start + i / coordinates]
@@ -37,9 +40,9 @@ impl Columns<'_, '_> {
             .collect()
     }
 
-    /// The independent units that held-out errors are paired over: poses where folds are made of them, else folds (runs or blocks), each of which belongs to
-    /// one test. The rows are those of [`Columns::plain_rows`].
-    pub fn plain_units(&self) -> Units {
+    /// The independent units over which held-out errors are paired: the poses if folds consist of poses, otherwise the folds
+    /// (runs or blocks), each of which belongs to one test. The rows are those of [`Columns::unwhitened_rows`].
+    pub fn unwhitened_units(&self) -> Units {
         let coordinates = self.problem.coordinates();
         let rows = self.blocks.iter().flat_map(|block| {
             let reading = move |i: usize| (block.test, block.rows.start + i / coordinates);
@@ -52,7 +55,7 @@ impl Columns<'_, '_> {
         Units::of(rows.map(|(test, row)| (test, (fold(test, row), 0)))).divided()
     }
 
-    /// The scalar rows of a block whose readings count.
+    /// The scalar rows of a block whose readings are accepted.
     fn counting(&self, block: &Block) -> Vec<usize> {
         let coordinates = self.problem.coordinates();
         let rejected = &self.problem.rejected[block.test];
@@ -61,8 +64,8 @@ impl Columns<'_, '_> {
             .collect()
     }
 
-    /// The rows of all blocks that count, one block below another.
-    fn plain(&self, blocks: Vec<Mat<f64>>) -> Mat<f64> {
+    /// The accepted rows of all blocks, one block below another.
+    fn unwhitened(&self, blocks: Vec<Mat<f64>>) -> Mat<f64> {
         let counting: Vec<Vec<usize>> = self.blocks.iter().map(|block| self.counting(block)).collect();
         let mut rows = Mat::zeros(
             counting.iter().map(Vec::len).sum(),

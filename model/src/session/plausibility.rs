@@ -1,4 +1,4 @@
-//! Whether an instrument reaches where the session says that it is: a bar between its balls, a stylus before its artefact, a ball in its nest.
+//! Plausibility of the set-up: whether the bar spans its balls, the stylus is in front of its artefact, and the ball is in its nest.
 
 use super::Test;
 use super::readings::Readings;
@@ -6,10 +6,11 @@ use crate::axis::AxisKind;
 use crate::chain::{BodyErrors, Machine};
 use crate::instrument::Station;
 
-/// A ball bar's sensor moves a millimetre or two, those of an R-test a few; beyond this something else than an error of the machine is wrong, mm.
+/// The sensor range is one to two millimetres for a ball bar and a few for an R-test. A larger deviation is not an error of the machine,
+/// mm.
 const MAX_MM: f64 = 5.0;
 
-/// Balls that lie nearer to each other than this lie in one place, mm.
+/// Balls that are closer to each other than this coincide, mm.
 const MIN_MM: f64 = 1e-6;
 
 /// The calibrated length of a ball bar; 0 for other instruments.
@@ -20,25 +21,26 @@ pub(crate) fn bar_mm(station: &Station<f64>) -> f64 {
     }
 }
 
-/// That the instrument nominally reaches: the distance between the balls is the bar's length, the stylus stands before its artefact, the ball lies in
-/// its nest. Where a single slip in the positions of an axis (its sign, its unit) would account for it, the help names that slip.
+/// Checks that the instrument nominally fits: the distance between the balls is the length of the bar, the stylus is in front of its
+/// artefact, the ball is in its nest. If a single mistake in the positions of an axis (its sign, its unit) explains the deviation, the
+/// help names it.
 pub(crate) fn check(machine: &Machine, test: &Test, readings: &Readings) -> Result<(), (String, String)> {
-    let Err((message, help)) = reaches(machine, test, readings) else {
+    let Err((message, help)) = check_nominal(machine, test, readings) else {
         return Ok(());
     };
-    let help = match slips(machine, test, readings) {
+    let help = match mistakes(machine, test, readings) {
         found if found.is_empty() => help,
-        found => format!("it would reach if {}; {help}", found.join(", or if ")),
+        found => format!("it would fit if {}; {help}", found.join(", or if ")),
     };
     Err((message, help))
 }
 
-/// What a slip does to the positions of an axis, and how it is called.
-type Slip = (f64, &'static str);
+/// The factor by which a mistake changes the positions of an axis, and its description.
+type Mistake = (f64, &'static str);
 
 const SIGN: &str = "with the opposite sign (check its `direction` and its column)";
-/// Slips that are tried on linear axes. A sign error looks like a unit error: positions are off by a factor.
-const LINEAR: [Slip; 7] = [
+/// Mistakes that are tried on linear axes. Sign and unit errors both multiply the positions by a factor.
+const LINEAR: [Mistake; 7] = [
     (-1.0, SIGN),
     (1e3, "in m rather than mm"),
     (1e-3, "in µm rather than mm"),
@@ -47,25 +49,25 @@ const LINEAR: [Slip; 7] = [
     (1.0 / 25.4, "in mm rather than inches"),
     (1.0 / 0.0254, "in mm rather than mil"),
 ];
-/// Slips that are tried on rotary axes.
-const ROTARY: [Slip; 3] = [
+/// Mistakes that are tried on rotary axes.
+const ROTARY: [Mistake; 3] = [
     (-1.0, SIGN),
     (180.0 / std::f64::consts::PI, "in radians rather than degrees"),
     (std::f64::consts::PI / 180.0, "in degrees rather than radians"),
 ];
 
-/// Most readings that slips are tried on.
+/// Largest number of readings on which mistakes are tried.
 const MAX_TRIED: usize = 500;
 
-/// The slips, of one axis or of all axes of a kind, after whose correction the instrument reaches.
-fn slips(machine: &Machine, test: &Test, readings: &Readings) -> Vec<String> {
+/// The mistakes, of one axis or of all axes of a kind, whose correction makes the instrument fit.
+fn mistakes(machine: &Machine, test: &Test, readings: &Readings) -> Vec<String> {
     let rows: Vec<usize> = (0..readings.rows())
         .step_by(readings.rows().div_ceil(MAX_TRIED).max(1))
         .collect();
     let readings = readings.of_rows(&rows);
     let matters = |axis: usize| readings.positions[axis].iter().any(|q| *q != 0.0);
     let mut found: Vec<(f64, String)> = Vec::new();
-    for (kind, slips) in [(AxisKind::Linear, &LINEAR[..]), (AxisKind::Rotary, &ROTARY[..])] {
+    for (kind, mistakes) in [(AxisKind::Linear, &LINEAR[..]), (AxisKind::Rotary, &ROTARY[..])] {
         let axes: Vec<usize> = (0..machine.axes.len())
             .filter(|axis| machine.axes[*axis].kind == kind && matters(*axis))
             .collect();
@@ -76,34 +78,34 @@ fn slips(machine: &Machine, test: &Test, readings: &Readings) -> Vec<String> {
                 .iter()
                 .map(|axis| machine.axes[*axis].name.as_str())
                 .collect();
-            for (factor, words) in slips {
+            for (factor, words) in mistakes {
                 let mut corrected = readings.clone();
                 for axis in &group {
                     for position in &mut corrected.positions[*axis] {
                         *position *= factor;
                     }
                 }
-                if reaches(machine, test, &corrected).is_ok() {
-                    let said = format!("the positions of {} were taken {words}", names.join(" and "));
-                    found.push((misfit(machine, test, &corrected), said));
+                if check_nominal(machine, test, &corrected).is_ok() {
+                    let description = format!("the positions of {} were read {words}", names.join(" and "));
+                    found.push((misfit(machine, test, &corrected), description));
                 }
             }
         }
     }
-    // A scale that all but stops an axis lets a bar reach in many a set-up: only what fits as well as the best counts.
+    // A scale that nearly stops an axis makes many set-ups fit, so only corrections about as good as the best are kept.
     let best = found
         .iter()
         .map(|(misfit, _)| *misfit)
         .fold(f64::INFINITY, f64::min);
-    found.retain(|(misfit, _)| *misfit <= ALIKE * best + MISFIT_MM);
-    found.into_iter().map(|(_, said)| said).collect()
+    found.retain(|(misfit, _)| *misfit <= EQUIVALENT_FACTOR * best + EQUIVALENT_MM);
+    found.into_iter().map(|(_, description)| description).collect()
 }
 
-/// Slips whose misfits differ by less than this factor and this length, mm, fit alike.
-const ALIKE: f64 = 2.0;
-const MISFIT_MM: f64 = 0.05;
+/// Corrections are equivalent if their misfits differ by less than this factor and this length, mm.
+const EQUIVALENT_FACTOR: f64 = 2.0;
+const EQUIVALENT_MM: f64 = 0.05;
 
-/// How far the instrument nominally is from reaching, mm: rms over the readings.
+/// Nominal misfit of the instrument, mm: rms over the readings.
 fn misfit(machine: &Machine, test: &Test, readings: &Readings) -> f64 {
     let none = vec![BodyErrors::<f64>::NONE; machine.axes.len()];
     let mut state = Vec::new();
@@ -121,24 +123,24 @@ fn misfit(machine: &Machine, test: &Test, readings: &Readings) -> f64 {
     (sum / readings.rows().max(1) as f64).sqrt()
 }
 
-fn reaches(machine: &Machine, test: &Test, readings: &Readings) -> Result<(), (String, String)> {
+fn check_nominal(machine: &Machine, test: &Test, readings: &Readings) -> Result<(), (String, String)> {
     let bar = match &test.station {
         Station::BallBar(bar) => bar,
-        Station::Probe(_) => return check_touch(machine, test, readings),
+        Station::Probe(_) => return check_stylus(machine, test, readings),
         Station::RTest(_) => return check_nest(machine, test, readings),
         Station::Tracker(_) | Station::Socket(_) => return Ok(()),
     };
     let none = vec![BodyErrors::<f64>::NONE; machine.axes.len()];
     let mut state = Vec::new();
-    let mut off: Vec<f64> = Vec::with_capacity(readings.rows());
+    let mut deviations: Vec<f64> = Vec::with_capacity(readings.rows());
     for row in 0..readings.rows() {
         readings.state(machine, row, &mut state);
         let length = bar.read::<f64>(machine, &state, &none, |_| None);
-        // A length has no direction there, so that no error moves it one way or the other.
+        // A length of zero has no direction, so that no error changes it to first order.
         if length < MIN_MM {
             return Err((
                 format!(
-                    "test \"{}\", reading {}: the two balls nominally lie in one place, and the bar is {:e} mm long",
+                    "test \"{}\", reading {}: the two balls nominally coincide, but the bar is {:e} mm long",
                     test.name,
                     row + 1,
                     bar.bar
@@ -146,9 +148,9 @@ fn reaches(machine: &Machine, test: &Test, readings: &Readings) -> Result<(), (S
                 "check `bar_mm`, the two ball positions and the axis positions in `at` and the data".into(),
             ));
         }
-        off.push(length - bar.bar);
+        deviations.push(length - bar.bar);
     }
-    let nominal = bar.bar + median(&mut off);
+    let nominal = bar.bar + median(&mut deviations);
     if (nominal - bar.bar).abs() <= MAX_MM {
         return Ok(());
     }
@@ -158,16 +160,16 @@ fn reaches(machine: &Machine, test: &Test, readings: &Readings) -> Result<(), (S
              (median of {} positions)",
             test.name,
             bar.bar,
-            off.len()
+            deviations.len()
         ),
-        "degrees taken for radians (or radians for degrees) look like this; so do a ball position, an axis position \
+        "possible causes are degrees read as radians (or radians as degrees), and a ball position, an axis position \
          in `at` or an axis direction that is not as on the machine"
             .into(),
     ))
 }
 
-/// That the stylus stands before the artefact, and near it, wherever a reading is taken.
-fn check_touch(machine: &Machine, test: &Test, readings: &Readings) -> Result<(), (String, String)> {
+/// Checks that the stylus is in front of the artefact and near it at every reading.
+fn check_stylus(machine: &Machine, test: &Test, readings: &Readings) -> Result<(), (String, String)> {
     let none = vec![BodyErrors::<f64>::NONE; machine.axes.len()];
     let mut state = Vec::new();
     for row in 0..readings.rows() {
@@ -178,13 +180,13 @@ fn check_touch(machine: &Machine, test: &Test, readings: &Readings) -> Result<()
             continue;
         }
         let found = if distance.is_finite() {
-            format!("stands {distance:.3} mm before the artefact's nominal surface; {MAX_MM} mm is the most")
+            format!("is {distance:.3} mm from the artefact's nominal surface; the limit is {MAX_MM} mm")
         } else {
-            "looks past the artefact, or stands on its axis without a `direction`".into()
+            "misses the artefact, or is on its axis without a `direction`".into()
         };
         return Err((
             format!("test \"{}\", reading {}: the stylus {found}", test.name, row + 1),
-            "check `radius_mm` (the stylus' radius included), `artefact_mm`, `stylus_mm`, `direction` and the axis \
+            "check `radius_mm` (including the stylus radius), `artefact_mm`, `stylus_mm`, `direction` and the axis \
              positions in `at` and the data"
                 .into(),
         ));
@@ -192,7 +194,7 @@ fn check_touch(machine: &Machine, test: &Test, readings: &Readings) -> Result<()
     Ok(())
 }
 
-/// That the master ball nominally lies in the nest wherever a reading is taken.
+/// Checks that the master ball is nominally in the nest at every reading.
 fn check_nest(machine: &Machine, test: &Test, readings: &Readings) -> Result<(), (String, String)> {
     let none = vec![BodyErrors::<f64>::NONE; machine.axes.len()];
     let mut state = Vec::new();
@@ -203,12 +205,11 @@ fn check_nest(machine: &Machine, test: &Test, readings: &Readings) -> Result<(),
         if apart > MAX_MM {
             return Err((
                 format!(
-                    "test \"{}\", reading {}: the master ball nominally lies {apart:.3} mm from the centre of the sensors; {MAX_MM} mm is the most",
+                    "test \"{}\", reading {}: the master ball nominally lies {apart:.3} mm from the centre of the sensors; the limit is {MAX_MM} mm",
                     test.name,
                     row + 1
                 ),
-                "check `workpiece_ball_mm`, `spindle_ball_mm` and the axis positions in `at` and the data: the linear axes \
-                 have to follow the rotary one"
+                "check `workpiece_ball_mm`, `spindle_ball_mm` and the axis positions in `at` and the data: the linear axes must follow the rotary axis"
                     .into(),
             ));
         }
@@ -216,15 +217,15 @@ fn check_nest(machine: &Machine, test: &Test, readings: &Readings) -> Result<(),
     Ok(())
 }
 
-/// That the bar read about its own length, the sensors of an R-test within their range.
+/// Checks that the readings are near the length of the bar, or within the range of an R-test's sensors.
 pub(crate) fn check_lengths(test: &Test, readings: &Readings) -> Result<(), (String, String)> {
     let bar = match &test.station {
         Station::BallBar(bar) => bar,
         Station::RTest(_) => return check_sensors(test, readings),
         _ => return Ok(()),
     };
-    let mut off: Vec<f64> = readings.observed.iter().map(|length| length - bar.bar).collect();
-    let read = bar.bar + median(&mut off);
+    let mut deviations: Vec<f64> = readings.observed.iter().map(|length| length - bar.bar).collect();
+    let read = bar.bar + median(&mut deviations);
     if (read - bar.bar).abs() <= MAX_MM {
         return Ok(());
     }
@@ -233,7 +234,7 @@ pub(crate) fn check_lengths(test: &Test, readings: &Readings) -> Result<(), (Str
             "test \"{}\": a bar of {:.4} mm read {read:.3} mm (median of {} readings)",
             test.name,
             bar.bar,
-            off.len()
+            deviations.len()
         ),
         "is the column a deviation from `bar_mm` rather than a length, or in another unit than its name says?".into(),
     ))
@@ -247,11 +248,11 @@ fn check_sensors(test: &Test, readings: &Readings) -> Result<(), (String, String
     }
     Err((
         format!(
-            "test \"{}\": the sensors read {read:.3} mm (median of {} values); {MAX_MM} mm is the most",
+            "test \"{}\": the sensors read {read:.3} mm (median of {} values); the limit is {MAX_MM} mm",
             test.name,
             sizes.len()
         ),
-        "are the columns in another unit than their name says, or counted from another zero than the ball in the middle \
+        "are the columns in another unit than their name says, or relative to another zero than the ball in the middle \
          of the nest?"
             .into(),
     ))

@@ -1,8 +1,8 @@
-//! Readings that say little: too few, all the same, or the same of two unknowns.
+//! Uninformative readings: too few, all equal, or with collinear parameters.
 
 use super::{Case, fitted, found, works};
 
-/// The spindle ball, if nobody knows where it is, is the axis' own displacement.
+/// The position of a spindle ball without a prior is confounded with that of the axis.
 #[test]
 fn exactly_collinear_columns() {
     let case = Case {
@@ -22,21 +22,21 @@ fn exactly_collinear_columns() {
         .map(|u| u["why"].as_str().unwrap())
         .collect();
     for (error, ball) in [("EX0C", "spindle_ball.x[C]"), ("EY0C", "spindle_ball.y[C]")] {
-        let said = whys
+        let found = whys
             .iter()
             .any(|why| why.starts_with(&format!("{error} is confounded with {ball}")));
-        assert!(said, "{whys:?}");
+        assert!(found, "{whys:?}");
     }
     assert!(
         whys.contains(&"no reading of these tests changes with spindle_ball.z[C]"),
         "{whys:?}"
     );
-    // What they do together is seen all the same.
+    // Their combined effect is identifiable.
     assert!(result["rms_um"].as_f64().unwrap() < 1e-3);
 }
 
 #[test]
-fn more_unknowns_than_readings() {
+fn more_parameters_than_readings() {
     let case = Case {
         errors: "[\"EX0C\", \"EY0C\", \"EZ0C\", \"EA0C\", \"EB0C\", \"EC0C\"]",
         more: "bar_u_um = inf",
@@ -53,7 +53,7 @@ fn more_unknowns_than_readings() {
     assert!(!result["unobservable"].as_array().unwrap().is_empty());
 }
 
-/// A perfect circle about the nominal axis: nothing is displaced, and nothing scatters.
+/// A perfect circle about the nominal axis: no displacement and no scatter.
 #[test]
 fn all_readings_equal() {
     for noise in ["noise_um = 0.3", "noise_um = 0", ""] {

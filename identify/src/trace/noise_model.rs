@@ -1,0 +1,40 @@
+//! Estimates the noise model of a trace from repeats: standard deviation and autocorrelation.
+
+use crate::heldout::FoldKind;
+use crate::noise::{NoiseSource, PureError};
+use crate::problem::Problem;
+
+/// Sampling scatter of an estimated AR coefficient, and relative scatter of an estimated noise standard deviation.
+pub(super) const SCATTER: f64 = 0.02;
+
+/// Sets the noise standard deviation and autocorrelation from repeats, if there are enough. Returns whether this changed them by
+/// more than their sampling scatter.
+pub(super) fn estimate_noise_model(problem: &mut Problem<'_>, residuals: &[Vec<f64>]) -> bool {
+    if problem.folds.kind == FoldKind::Poses {
+        return false;
+    }
+    let kept = |test: usize, row: usize| !problem.rejected[test][row];
+    let pure = PureError::of(&problem.tests, residuals, kept).without_waves(&problem.tests, kept);
+    let Some(estimated) = pure.autocorrelation(&problem.tests, kept) else {
+        return false;
+    };
+    let mut noise = problem.noise.clone();
+    noise.ar_coefficients = estimated.coefficients;
+    noise.ar_sum_u = estimated.sum_u;
+    if let Some(sigma) = pure.sigma_mm() {
+        noise.sigma_mm = sigma * estimated.inflation;
+        noise.source = NoiseSource::Repeats;
+    }
+    let present = &problem.noise;
+    let same_coefficients = noise.ar_coefficients.len() == present.ar_coefficients.len()
+        && noise
+            .ar_coefficients
+            .iter()
+            .zip(&present.ar_coefficients)
+            .all(|(a, b)| (a - b).abs() < SCATTER);
+    if same_coefficients && (noise.sigma_mm / present.sigma_mm - 1.0).abs() < SCATTER {
+        return false;
+    }
+    problem.noise = noise;
+    true
+}
