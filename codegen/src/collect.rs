@@ -15,12 +15,12 @@ use crate::symbol::{Arena, Binary, Operand, Symbol, Unary};
 type Term = (bool, Tree);
 
 /// Writes polynomials of a ring as expressions in the inputs of a program.
-pub(crate) struct Layout<'r, 'a> {
+pub(crate) struct Collector<'r, 'a> {
     pub(crate) ring: &'r Ring<'a>,
     pub(crate) inputs: &'r [Input],
 }
 
-impl Layout<'_, '_> {
+impl Collector<'_, '_> {
     /// Arranges a polynomial: the terms without errors first, then error by error, then products of errors.
     pub(crate) fn group(&self, polynomial: &Polynomial) -> Tree {
         sum(self.group_terms(polynomial))

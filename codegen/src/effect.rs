@@ -17,7 +17,7 @@ use crate::variable::Variable;
 
 /// The driver of an effect, if it is not the position of an axis.
 #[derive(Clone, Debug, PartialEq)]
-pub enum Followed {
+pub enum DriverQuantity {
     /// Direction of the last movement of an axis: −1, 0 or 1.
     Direction(String),
     /// The rate of an axis, mm/s or rad/s.
@@ -32,30 +32,32 @@ pub enum Followed {
     Gravity(String),
 }
 
-impl Followed {
+impl DriverQuantity {
     pub(crate) fn unit(&self) -> &'static str {
         match self {
-            Followed::Direction(_) => "1",
-            Followed::Rate(_, AxisKind::Linear) => "mm/s",
-            Followed::Rate(_, AxisKind::Rotary) => "rad/s",
-            Followed::SinceReversal(_, AxisKind::Linear) => "mm",
-            Followed::SinceReversal(_, AxisKind::Rotary) => "rad",
-            Followed::Time => "s",
-            Followed::Temperature => "°C",
-            Followed::Gravity(_) => "m",
+            DriverQuantity::Direction(_) => "1",
+            DriverQuantity::Rate(_, AxisKind::Linear) => "mm/s",
+            DriverQuantity::Rate(_, AxisKind::Rotary) => "rad/s",
+            DriverQuantity::SinceReversal(_, AxisKind::Linear) => "mm",
+            DriverQuantity::SinceReversal(_, AxisKind::Rotary) => "rad",
+            DriverQuantity::Time => "s",
+            DriverQuantity::Temperature => "°C",
+            DriverQuantity::Gravity(_) => "m",
         }
     }
 
     pub(crate) fn meaning(&self) -> String {
         match self {
-            Followed::Direction(axis) => format!("direction of the last movement of axis {axis}: −1, 0 or 1"),
-            Followed::Rate(axis, _) => format!("rate of axis {axis}"),
-            Followed::SinceReversal(axis, _) => {
+            DriverQuantity::Direction(axis) => {
+                format!("direction of the last movement of axis {axis}: −1, 0 or 1")
+            }
+            DriverQuantity::Rate(axis, _) => format!("rate of axis {axis}"),
+            DriverQuantity::SinceReversal(axis, _) => {
                 format!("distance of axis {axis} since its last reversal")
             }
-            Followed::Time => "time since the first reading of the session".to_string(),
-            Followed::Temperature => "temperature above the mean of the session".to_string(),
-            Followed::Gravity(axis) => {
+            DriverQuantity::Time => "time since the first reading of the session".to_string(),
+            DriverQuantity::Temperature => "temperature above the mean of the session".to_string(),
+            DriverQuantity::Gravity(axis) => {
                 format!("moment of a unit weight about axis {axis}")
             }
         }
@@ -65,23 +67,23 @@ impl Followed {
     pub(crate) fn text(&self) -> String {
         let of = |letter: &str, axis: &str| format!("{letter}_{}", axis.to_lowercase());
         match self {
-            Followed::Direction(axis) => of("σ", axis),
-            Followed::Rate(axis, _) => of("v", axis),
-            Followed::SinceReversal(axis, _) => of("w", axis),
-            Followed::Time => "t".to_string(),
-            Followed::Temperature => "T".to_string(),
-            Followed::Gravity(axis) => of("g", axis),
+            DriverQuantity::Direction(axis) => of("σ", axis),
+            DriverQuantity::Rate(axis, _) => of("v", axis),
+            DriverQuantity::SinceReversal(axis, _) => of("w", axis),
+            DriverQuantity::Time => "t".to_string(),
+            DriverQuantity::Temperature => "T".to_string(),
+            DriverQuantity::Gravity(axis) => of("g", axis),
         }
     }
 
     pub(crate) fn identifier(&self) -> String {
         match self {
-            Followed::Direction(axis) => format!("direction_{axis}"),
-            Followed::Rate(axis, _) => format!("rate_{axis}"),
-            Followed::SinceReversal(axis, _) => format!("since_reversal_{axis}"),
-            Followed::Time => "time_s".to_string(),
-            Followed::Temperature => "temperature_c".to_string(),
-            Followed::Gravity(axis) => format!("gravity_{axis}"),
+            DriverQuantity::Direction(axis) => format!("direction_{axis}"),
+            DriverQuantity::Rate(axis, _) => format!("rate_{axis}"),
+            DriverQuantity::SinceReversal(axis, _) => format!("since_reversal_{axis}"),
+            DriverQuantity::Time => "time_s".to_string(),
+            DriverQuantity::Temperature => "temperature_c".to_string(),
+            DriverQuantity::Gravity(axis) => format!("gravity_{axis}"),
         }
     }
 }
@@ -225,13 +227,13 @@ fn kind_of(machine: &Machine, effect: &Effect, axis: &str) -> Result<bool, Codeg
 }
 
 /// Positions of the axes, and which axes the test holds fixed; those have no direction and no rate.
-pub(crate) struct Movement<'m, N> {
+pub(crate) struct AxisStates<'m, N> {
     pub(crate) machine: &'m Machine,
     pub(crate) state: &'m [AxisPosition<N>],
     pub(crate) held: &'m [bool],
 }
 
-impl<N: Nominal> Movement<'_, N> {
+impl<N: Nominal> AxisStates<'_, N> {
     /// The state of an effect's driver at a reading. Only the quantities that the shape uses are named.
     pub(crate) fn sample(
         &self,
@@ -246,11 +248,11 @@ impl<N: Nominal> Movement<'_, N> {
             since_reversal: zero,
             since_reversal_s: zero,
         };
-        let followed = |followed: Followed| nominal(Variable::Driver(followed));
+        let followed = |followed: DriverQuantity| nominal(Variable::Driver(followed));
         match &effect.driver {
             Driver::None => {}
-            Driver::Time => sample.value = followed(Followed::Time),
-            Driver::Temperature => sample.value = followed(Followed::Temperature),
+            Driver::Time => sample.value = followed(DriverQuantity::Time),
+            Driver::Temperature => sample.value = followed(DriverQuantity::Temperature),
             Driver::Gravity => {
                 let Component::Axis(ErrorName { axis, .. }) = &effect.component else {
                     return Err(CodegenError::EffectWithoutForm {
@@ -260,14 +262,14 @@ impl<N: Nominal> Movement<'_, N> {
                                 .to_string(),
                     });
                 };
-                sample.value = followed(Followed::Gravity(axis.clone()));
+                sample.value = followed(DriverQuantity::Gravity(axis.clone()));
             }
             Driver::Axis(name) => {
                 let index = self.machine.axis_index(name);
                 let index = index.ok_or_else(|| no_axis(self.machine, effect, name))?;
                 let direction = || match self.held[index] {
                     true => zero,
-                    false => followed(Followed::Direction(name.clone())),
+                    false => followed(DriverQuantity::Direction(name.clone())),
                 };
                 match effect.shape {
                     Shape::Backlash => sample.direction = direction(),
@@ -276,7 +278,8 @@ impl<N: Nominal> Movement<'_, N> {
                         sample.direction = direction();
                         if !self.held[index] {
                             let kind = self.machine.axes[index].kind;
-                            sample.since_reversal = followed(Followed::SinceReversal(name.clone(), kind));
+                            sample.since_reversal =
+                                followed(DriverQuantity::SinceReversal(name.clone(), kind));
                         }
                     }
                     _ => sample.value = self.state[index].value,
@@ -292,7 +295,10 @@ impl<N: Nominal> Movement<'_, N> {
             return N::constant(0.0);
         }
         let axis = &self.machine.axes[index];
-        nominal(Variable::Driver(Followed::Rate(axis.name.clone(), axis.kind)))
+        nominal(Variable::Driver(DriverQuantity::Rate(
+            axis.name.clone(),
+            axis.kind,
+        )))
     }
 
     /// The slots that an effect changes (machine errors first), with the factor of its basis function in each slot.

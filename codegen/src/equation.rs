@@ -12,7 +12,7 @@ use crate::collect::sum;
 use crate::effect::Coefficient;
 use crate::error::CodegenError;
 use crate::first_order::FirstOrder;
-use crate::forms::{self, Written};
+use crate::forms::{self, FormContext};
 use crate::normal_form::Ring;
 use crate::polynomial::Polynomial;
 use crate::print::terms_of;
@@ -20,7 +20,7 @@ use crate::program::{Input, Label, Naming, Program, Tree};
 use crate::run::Run;
 use crate::subject::{Source, Subject, ToolPoint};
 use crate::symbol::{Arena, NodeId, Operand, Symbol, Unary, VariableId, length};
-use crate::touch::{self, Touch};
+use crate::touch::{self, ProbeTerms};
 use crate::variable::{Symbols, Variable};
 use crate::vectors::{self, NamedVector};
 
@@ -82,28 +82,28 @@ pub enum Form {
         complete: bool,
     },
     /// The value without errors and a coefficient for each error, with the printed expression of each.
-    First(FirstOrder, FirstOrderLayout),
+    First(FirstOrder, PrintedFirstOrder),
 }
 
 /// The first-order form as printed.
 #[derive(Clone, Debug, PartialEq)]
-pub struct FirstOrderLayout {
+pub struct PrintedFirstOrder {
     /// The coordinates without errors; for a length, its square.
     pub nominal: Vec<Tree>,
     /// Sign of `L₀` and the offset added to it, if the reading without errors is not `L₀` itself.
-    pub beside_length: Option<(f64, Tree)>,
+    pub alternative_length: Option<(f64, Tree)>,
     /// The coefficients, parameter by parameter, coordinate by coordinate.
     pub coefficients: Vec<Vec<Tree>>,
     /// For a constant multiple of an earlier column: numerator and denominator of the factor.
     pub factors: Vec<Option<(Tree, Tree)>>,
 }
 
-impl FirstOrderLayout {
+impl PrintedFirstOrder {
     /// Replaces the root by the name `length`.
-    pub(crate) fn with_named_length(&self, length: &Tree) -> FirstOrderLayout {
+    pub(crate) fn with_named_length(&self, length: &Tree) -> PrintedFirstOrder {
         let root = Tree::Unary(Unary::Sqrt, Box::new(self.nominal[0].clone()));
         let named = |trees: &Vec<Tree>| trees.iter().map(|tree| tree.replaced(&root, length)).collect();
-        FirstOrderLayout {
+        PrintedFirstOrder {
             coefficients: self.coefficients.iter().map(named).collect(),
             ..self.clone()
         }
@@ -111,7 +111,7 @@ impl FirstOrderLayout {
 
     /// The reading without errors, from the length `L₀`.
     pub(crate) fn without_errors(&self, length: Tree) -> Tree {
-        match &self.beside_length {
+        match &self.alternative_length {
             None => length,
             Some((sign, offset)) => {
                 let mut terms = vec![(*sign < 0.0, length)];
@@ -144,13 +144,13 @@ pub struct Equation {
     /// The intermediate vectors.
     pub vectors: Vec<NamedVector>,
     /// The errors and instrument parameters that are determined by effects alone, as functions of their drivers.
-    pub followers: Vec<(Variable, Operand)>,
+    pub driven_errors: Vec<(Variable, Operand)>,
     /// The stated length of the bar, for a ball bar.
     pub stated_length: Option<Operand>,
     /// The length error of the bar and the gain error of its sensor, if included.
     pub(crate) bar_unknowns: [Option<Operand>; 2],
     /// The quantities between the vectors of a probe and its reading, for a probe.
-    pub touch: Option<Touch>,
+    pub touch: Option<ProbeTerms>,
     /// Basis functions that are kept as they are and never expanded.
     pub(crate) whole: Vec<Operand>,
     /// Errors and instrument parameters that the form does not contain.
@@ -179,7 +179,7 @@ impl Equation {
         machine.rotation = options.rotation.unwrap_or(machine.rotation);
         let arena = Arena::new();
         let parameters = parameters(&arena, &machine, source, errors, options)?;
-        let (kind, exact, vectors, outputs, form, stated_length, followers, bar_unknowns, touch, whole) = {
+        let (kind, exact, vectors, outputs, form, stated_length, driven_errors, bar_unknowns, touch, whole) = {
             let run = Run::<Symbol<'_>>::new(
                 &machine,
                 source,
@@ -200,13 +200,13 @@ impl Equation {
             let on_the_way = vectors.clone();
             let inputs = inputs(&arena, &machine, &parameters);
             let symbol = |place: usize| arena.variable(parameters[place].clone());
-            let followers = run.followers(&symbol).into_iter();
-            let followers = followers
+            let driven_errors = run.driven_errors(&symbol).into_iter();
+            let driven_errors = driven_errors
                 .map(|(variable, value)| (variable, value.operand()))
                 .collect();
             let bar_unknowns = run.bar_unknowns().map(|unknown| unknown.map(Symbol::operand));
             let whole = curves(&run, &parameters);
-            let written = Written {
+            let written = FormContext {
                 arena: &arena,
                 inputs: &inputs,
                 parameters: &parameters,
@@ -221,15 +221,15 @@ impl Equation {
                 Subject::Station(Station::BallBar(bar)) => Some(bar.bar.operand()),
                 _ => None,
             };
-            let touch = run.sight().map(|sight| match vectors.as_slice() {
+            let touch = run.probe_geometry().map(|geometry| match vectors.as_slice() {
                 [.., stylus, step] if options.order == Order::Bilinear => {
                     let groups: Vec<Symbol<'_>> = [stylus, step]
                         .iter()
                         .flat_map(|vector| vector.components.map(|component| arena.symbol(component)))
                         .collect();
-                    Touch::of(&touch::with_groups(&sight, &groups), &on_the_way)
+                    ProbeTerms::of(&touch::with_groups(&geometry, &groups), &on_the_way)
                 }
-                _ => Touch::of(&sight, &on_the_way),
+                _ => ProbeTerms::of(&geometry, &on_the_way),
             });
             (
                 kind,
@@ -238,7 +238,7 @@ impl Equation {
                 outputs,
                 form,
                 stated,
-                followers,
+                driven_errors,
                 bar_unknowns,
                 touch,
                 whole,
@@ -254,7 +254,7 @@ impl Equation {
             outputs,
             form,
             vectors,
-            followers,
+            driven_errors,
             stated_length,
             bar_unknowns,
             touch,
@@ -353,7 +353,7 @@ impl Equation {
             }
         }
         let mut labels = vectors::labels(&vectors);
-        labels.extend(self.follower_labels());
+        labels.extend(self.driven_labels());
         if let (Some(touch), false) = (&self.touch, self.options.order == Order::First) {
             labels.extend(touch.labels());
         }
@@ -364,12 +364,12 @@ impl Equation {
     }
 
     /// The names of errors that effects determine.
-    pub(crate) fn follower_labels(&self) -> impl Iterator<Item = (NodeId, Label)> {
+    pub(crate) fn driven_labels(&self) -> impl Iterator<Item = (NodeId, Label)> {
         let label = |(variable, value): &(Variable, Operand)| match value {
             Operand::Node(id) => Some((*id, Label::Quantity(variable.clone()))),
             Operand::Constant(_) => None,
         };
-        self.followers.iter().filter_map(label)
+        self.driven_errors.iter().filter_map(label)
     }
 
     /// The operands of the parameters.
@@ -434,7 +434,7 @@ fn inputs(arena: &Arena, machine: &Machine, parameters: &[Variable]) -> Vec<Inpu
                 AxisKind::Rotary => {
                     inputs.push(Input::Sine(position.clone()));
                     inputs.push(Input::Cosine(position.clone()));
-                    if arena.is_own_symbol(&position) {
+                    if arena.is_used_directly(&position) {
                         inputs.push(Input::Plain(position));
                     }
                 }

@@ -8,26 +8,26 @@ use crate::variable::Variable;
 
 /// The value of a variable: nominal, or an error by which derivatives are taken.
 #[derive(Clone, Copy, Debug)]
-pub enum Value<S: Scalar> {
+pub enum VariableValue<S: Scalar> {
     /// Never differentiated.
     Nominal(S::Nominal),
     /// An error.
     Error(S),
 }
 
-impl<S: Scalar> Value<S> {
+impl<S: Scalar> VariableValue<S> {
     /// The value as a scalar, nominal or not.
     pub fn scalar(self) -> S {
         match self {
-            Value::Nominal(value) => S::nominal(value),
-            Value::Error(value) => value,
+            VariableValue::Nominal(value) => S::nominal(value),
+            VariableValue::Error(value) => value,
         }
     }
 
     fn unary(self, op: Unary) -> Option<Self> {
         Some(match self {
-            Value::Nominal(a) => Value::Nominal(op.of(a)),
-            Value::Error(a) => Value::Error(match op {
+            VariableValue::Nominal(a) => VariableValue::Nominal(op.of(a)),
+            VariableValue::Error(a) => VariableValue::Error(match op {
                 Unary::Neg => -a,
                 Unary::Sin => Scalar::sin_cos(a).0,
                 Unary::Cos => Scalar::sin_cos(a).1,
@@ -39,10 +39,10 @@ impl<S: Scalar> Value<S> {
 
     fn binary(self, op: Binary, other: Self) -> Self {
         match (self, other) {
-            (Value::Nominal(a), Value::Nominal(b)) => Value::Nominal(op.of(a, b)),
+            (VariableValue::Nominal(a), VariableValue::Nominal(b)) => VariableValue::Nominal(op.of(a, b)),
             (a, b) => {
                 let (a, b) = (a.scalar(), b.scalar());
-                Value::Error(match op {
+                VariableValue::Error(match op {
                     Binary::Add => a + b,
                     Binary::Sub => a - b,
                     Binary::Mul => a * b,
@@ -60,11 +60,11 @@ impl<S: Scalar> Value<S> {
 pub fn evaluate<S: Scalar>(
     arena: &Arena,
     outputs: &[Operand],
-    variable: impl Fn(&Variable) -> Value<S>,
+    variable: impl Fn(&Variable) -> VariableValue<S>,
 ) -> Result<Vec<S>, CodegenError> {
-    let mut values: Vec<Option<Value<S>>> = vec![None; arena.node_count()];
-    let constant = |value: f64| Value::<S>::Nominal(S::Nominal::constant(value));
-    let normal_form_of = |values: &[Option<Value<S>>], operand: Operand| match operand {
+    let mut values: Vec<Option<VariableValue<S>>> = vec![None; arena.node_count()];
+    let constant = |value: f64| VariableValue::<S>::Nominal(S::Nominal::constant(value));
+    let normal_form_of = |values: &[Option<VariableValue<S>>], operand: Operand| match operand {
         Operand::Constant(value) => constant(value.value()),
         Operand::Node(id) => values[id.index()].unwrap_or_else(|| constant(f64::NAN)),
     };
@@ -93,5 +93,5 @@ pub fn evaluate_f64(
     outputs: &[Operand],
     variable: impl Fn(&Variable) -> f64,
 ) -> Result<Vec<f64>, CodegenError> {
-    evaluate(arena, outputs, |v| Value::Nominal(variable(v)))
+    evaluate(arena, outputs, |v| VariableValue::Nominal(variable(v)))
 }

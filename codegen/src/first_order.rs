@@ -20,7 +20,7 @@ pub struct FirstOrder {
     /// The sensitivities, one for each parameter.
     pub sensitivities: Vec<Sensitivity>,
     /// The reading without errors, if it is not `L₀` itself.
-    pub beside_length: Option<AlternativeLength>,
+    pub alternative_length: Option<AlternativeLength>,
 }
 
 /// `±L₀ + offset`: the reading of a probe without errors.
@@ -102,7 +102,7 @@ impl FirstOrder {
         let mut form = FirstOrder {
             nominal: vec![square],
             sensitivities,
-            beside_length: None,
+            alternative_length: None,
         };
         form.mark(ring);
         Ok(form)
@@ -119,7 +119,7 @@ impl FirstOrder {
         let none = Operand::constant(0.0);
         let mut form = FirstOrder::of_length(ring, stylus, none, [Some(radius), None], parameters)?;
         let radius = ring.normal_form(radius)?;
-        form.beside_length = Some(AlternativeLength {
+        form.alternative_length = Some(AlternativeLength {
             sign: 1.0,
             offset: -&without_errors(ring, &radius),
         });
@@ -172,7 +172,7 @@ impl FirstOrder {
         let mut form = FirstOrder {
             sensitivities: parameters.iter().map(sensitivity).collect(),
             nominal: vec![square],
-            beside_length: Some(AlternativeLength {
+            alternative_length: Some(AlternativeLength {
                 sign: -1.0,
                 offset: -&b,
             }),
@@ -206,7 +206,7 @@ impl FirstOrder {
         let mut form = FirstOrder {
             nominal: forms.iter().map(|form| without_errors(ring, form)).collect(),
             sensitivities,
-            beside_length: None,
+            alternative_length: None,
         };
         form.mark(ring);
         Ok(form)

@@ -3,8 +3,8 @@
 use abbe_model::instrument::Station;
 use abbe_model::scalar::Nominal;
 
-use crate::collect::{Layout, product, sum};
-use crate::equation::{FirstOrderLayout, Form};
+use crate::collect::{Collector, product, sum};
+use crate::equation::{Form, PrintedFirstOrder};
 use crate::error::CodegenError;
 use crate::first_order::{Column, FirstOrder};
 use crate::normal_form::Ring;
@@ -16,10 +16,10 @@ use crate::symbol::{Arena, Binary, Operand, Symbol, Unary};
 use crate::variable::Variable;
 use crate::vectors::NamedVector;
 
-type Formed = (Vec<Operand>, Form);
+type FormResult = (Vec<Operand>, Form);
 
 /// The context in which a form is written.
-pub(crate) struct Written<'a, 'w> {
+pub(crate) struct FormContext<'a, 'w> {
     pub(crate) arena: &'a Arena,
     /// The inputs of its programs.
     pub(crate) inputs: &'w [Input],
@@ -33,9 +33,9 @@ pub(crate) fn bilinear<'a>(
     run: &Run<'_, Symbol<'a>>,
     exact: &[Operand],
     vectors: &mut Vec<NamedVector>,
-    written: &Written<'a, '_>,
-) -> Result<Formed, CodegenError> {
-    let &Written { arena, inputs, .. } = written;
+    written: &FormContext<'a, '_>,
+) -> Result<FormResult, CodegenError> {
+    let &FormContext { arena, inputs, .. } = written;
     let mut ring = Ring::truncated(arena, 2)?;
     ring.keep(written.whole);
     let read_over = read_over(run, vectors);
@@ -57,7 +57,7 @@ pub(crate) fn bilinear<'a>(
             wanted.iter().map(|group| whole.normal_form(*group)).collect();
         forms.is_ok_and(|forms| forms == groups)
     };
-    let layout = Layout { ring: &ring, inputs };
+    let layout = Collector { ring: &ring, inputs };
     let trees: Vec<Tree> = groups.iter().map(|group| layout.group(group)).collect();
     let operands = operands(arena, inputs);
     let symbols: Vec<Symbol<'a>> = trees.iter().map(|tree| tree.symbol(arena, &operands)).collect();
@@ -82,9 +82,9 @@ pub(crate) fn first<'a>(
     run: &Run<'_, Symbol<'a>>,
     exact: &[Operand],
     vectors: &mut Vec<NamedVector>,
-    written: &Written<'a, '_>,
-) -> Result<Formed, CodegenError> {
-    let &Written {
+    written: &FormContext<'a, '_>,
+) -> Result<FormResult, CodegenError> {
+    let &FormContext {
         arena,
         inputs,
         parameters,
@@ -106,7 +106,9 @@ pub(crate) fn first<'a>(
         }
         ([stylus, step], Subject::Station(Station::Probe(probe))) => {
             let nominal = probe.radius.operand();
-            let radius = run.sight().map_or(nominal, |sight| sight.radius.operand());
+            let radius = run
+                .probe_geometry()
+                .map_or(nominal, |geometry| geometry.radius.operand());
             match probe.direction {
                 Some(_) => FirstOrder::of_stated_way(
                     &mut ring,
@@ -119,12 +121,12 @@ pub(crate) fn first<'a>(
         }
         _ => FirstOrder::of_coordinates(&mut ring, exact, parameters)?,
     };
-    let layout = Layout { ring: &ring, inputs };
+    let layout = Collector { ring: &ring, inputs };
     let lay_out = |polynomials: &[Polynomial]| polynomials.iter().map(|p| layout.group(p)).collect();
-    let laid_out = FirstOrderLayout {
+    let laid_out = PrintedFirstOrder {
         nominal: lay_out(&form.nominal),
-        beside_length: form
-            .beside_length
+        alternative_length: form
+            .alternative_length
             .as_ref()
             .map(|beside| (beside.sign, layout.group(&beside.offset))),
         coefficients: form

@@ -49,10 +49,10 @@ pub mod touch;
 pub mod variable;
 pub mod vectors;
 
-pub use effect::{Coefficient, Followed};
+pub use effect::{Coefficient, DriverQuantity};
 pub use equation::{Equation, Form, Kind, Options, Order};
 pub use error::CodegenError;
-pub use evaluate::Value;
+pub use evaluate::VariableValue;
 pub use normal_form::Ring;
 pub use polynomial::Polynomial;
 pub use print::Language;

@@ -4,7 +4,7 @@ use abbe_model::chain::{AxisPosition, BodyErrors, Machine};
 use abbe_model::instrument::{Station, ballbar};
 use abbe_model::scalar::{Nominal, Scalar};
 
-use crate::effect::Movement;
+use crate::effect::AxisStates;
 use crate::error::CodegenError;
 use crate::subject::{Source, Subject};
 use crate::touch;
@@ -18,11 +18,11 @@ pub(crate) struct Run<'m, S: Scalar> {
     pub(crate) errors: Vec<BodyErrors<S>>,
     unknowns: Vec<(usize, S)>,
     /// The contributions to each slot, machine errors before instrument parameters: indices of parameters, and their factors.
-    slots: Vec<Vec<Share<S::Nominal>>>,
+    slots: Vec<Vec<Contribution<S::Nominal>>>,
 }
 
 /// A parameter in a slot: its index, and its basis function if it is a coefficient of an effect.
-type Share<N> = (usize, Option<N>);
+type Contribution<N> = (usize, Option<N>);
 
 impl<'m, S: Scalar> Run<'m, S> {
     /// `nominal` gives lengths and positions of moving axes, `small` the parameters by index.
@@ -49,7 +49,7 @@ impl<'m, S: Scalar> Run<'m, S> {
             state.push(AxisPosition::new(axis.kind, position));
         }
         let unknowns = subject.unknowns();
-        let movement = Movement {
+        let movement = AxisStates {
             machine,
             state: &state,
             held: &held,
@@ -123,9 +123,9 @@ impl<'m, S: Scalar> Run<'m, S> {
     }
 
     /// The errors and instrument parameters that effects determine, and their values.
-    pub(crate) fn followers(&self, small: &impl Fn(usize) -> S) -> Vec<(Variable, S)> {
+    pub(crate) fn driven_errors(&self, small: &impl Fn(usize) -> S) -> Vec<(Variable, S)> {
         let first = self.machine.error_slots();
-        let mut followers = Vec::new();
+        let mut driven_errors = Vec::new();
         for (slot, shares) in self.slots.iter().enumerate() {
             let effects_alone = !shares.is_empty() && shares.iter().all(|(_, basis)| basis.is_some());
             if let (true, Some(value)) = (effects_alone, in_slot(shares, small)) {
@@ -133,10 +133,10 @@ impl<'m, S: Scalar> Run<'m, S> {
                     None => Variable::Error(self.machine.error_name(slot)),
                     Some(place) => Variable::Unknown(self.subject.unknowns()[place]),
                 };
-                followers.push((variable, value));
+                driven_errors.push((variable, value));
             }
         }
-        followers
+        driven_errors
     }
 
     /// The instrument parameter in a slot, if included.
@@ -164,8 +164,8 @@ impl<'m, S: Scalar> Run<'m, S> {
     /// Computes the reading from its coordinate groups: the bar, or the stylus and step of a probe. `None` if the reading is the groups
     /// themselves.
     pub(crate) fn reading_of_groups(&self, groups: &[S]) -> Option<S> {
-        match (self.sight(), &self.subject) {
-            (Some(sight), _) => Some(touch::with_groups(&sight, groups).distance()),
+        match (self.probe_geometry(), &self.subject) {
+            (Some(geometry), _) => Some(touch::with_groups(&geometry, groups).distance()),
             (None, Subject::Station(Station::BallBar(_))) => {
                 let [x, y, z] = [groups[0], groups[1], groups[2]];
                 Some(self.length_reading((x * x + y * y + z * z).sqrt()))
@@ -193,8 +193,8 @@ impl<'m, S: Scalar> Run<'m, S> {
 }
 
 /// The sum of the contributions to a slot.
-fn in_slot<S: Scalar>(shares: &[Share<S::Nominal>], small: &impl Fn(usize) -> S) -> Option<S> {
-    let value = |(place, basis): &Share<S::Nominal>| match basis {
+fn in_slot<S: Scalar>(shares: &[Contribution<S::Nominal>], small: &impl Fn(usize) -> S) -> Option<S> {
+    let value = |(place, basis): &Contribution<S::Nominal>| match basis {
         Some(basis) => small(*place) * *basis,
         None => small(*place),
     };

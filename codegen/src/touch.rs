@@ -21,7 +21,7 @@ use crate::vectors::NamedVector;
 
 /// The named quantities between the vectors of a probe and its reading.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Touch {
+pub struct ProbeTerms {
     /// `a`, `b`, `c`.
     pub quadratic: [Operand; 3],
     /// `r`: the radius of the artefact including the stylus radius and its errors.
@@ -37,13 +37,13 @@ pub(crate) const STEP_LENGTH: Label = Label::Scalar("l_n");
 /// The coefficients of the quadratic equation.
 pub(crate) const QUADRATIC: [Label; 3] = [Label::Scalar("a"), Label::Scalar("b"), Label::Scalar("c")];
 
-impl Touch {
+impl ProbeTerms {
     /// From stylus and step in the frame of the artefact, and the intermediate vectors.
-    pub(crate) fn of(sight: &ProbeGeometry<Symbol<'_>>, vectors: &[NamedVector]) -> Self {
-        Touch {
-            quadratic: sight.quadratic().map(Symbol::operand),
-            radius: sight.radius.operand(),
-            step_length: sight.step_length.map(Symbol::operand),
+    pub(crate) fn of(geometry: &ProbeGeometry<Symbol<'_>>, vectors: &[NamedVector]) -> Self {
+        ProbeTerms {
+            quadratic: geometry.quadratic().map(Symbol::operand),
+            radius: geometry.radius.operand(),
+            step_length: geometry.step_length.map(Symbol::operand),
             step: vectors.iter().find(|vector| vector.letter == "n").cloned(),
         }
     }
@@ -61,10 +61,10 @@ impl Touch {
 
 impl<S: Scalar> Run<'_, S> {
     /// The geometry of a probe's reading; `None` for any other subject.
-    pub(crate) fn sight(&self) -> Option<ProbeGeometry<S>> {
+    pub(crate) fn probe_geometry(&self) -> Option<ProbeGeometry<S>> {
         match &self.subject {
             Subject::Station(Station::Probe(probe)) => {
-                Some(probe.sight(self.machine, &self.state, &self.errors, |slot| self.unknown(slot)))
+                Some(probe.geometry(self.machine, &self.state, &self.errors, |slot| self.unknown(slot)))
             }
             _ => None,
         }
@@ -72,10 +72,10 @@ impl<S: Scalar> Run<'_, S> {
 }
 
 /// Replaces the six coordinates of stylus and step.
-pub(crate) fn with_groups<S: Scalar>(sight: &ProbeGeometry<S>, groups: &[S]) -> ProbeGeometry<S> {
+pub(crate) fn with_groups<S: Scalar>(geometry: &ProbeGeometry<S>, groups: &[S]) -> ProbeGeometry<S> {
     ProbeGeometry {
         stylus: Point(std::array::from_fn(|i| groups[i])),
         step: Point(std::array::from_fn(|i| groups[i + 3])),
-        ..*sight
+        ..*geometry
     }
 }

@@ -4,7 +4,7 @@ use abbe_model::axis::AxisKind;
 use abbe_model::component::{ErrorKind, ErrorName};
 use abbe_model::instrument::{InstrumentUnknown, InternalUnit};
 
-use crate::effect::{Coefficient, Followed};
+use crate::effect::{Coefficient, DriverQuantity};
 
 /// A variable of an expression.
 #[derive(Clone, Debug, PartialEq)]
@@ -23,7 +23,7 @@ pub enum Variable {
     /// A parameter of the instrument, mm, rad or a ratio.
     Unknown(InstrumentUnknown),
     /// The driver of an effect, if it is not the position of an axis.
-    Driver(Followed),
+    Driver(DriverQuantity),
     /// A coefficient of an effect.
     Coefficient(Coefficient),
 }

@@ -46,7 +46,7 @@ impl NamedVector {
 }
 
 /// The name of a ball or point.
-struct Body {
+struct PointName {
     letter: &'static str,
     meaning: &'static str,
 }
@@ -59,11 +59,11 @@ pub(crate) fn of_subject<'a>(
     errors: &[BodyErrors<Symbol<'a>>],
     unknown: &impl Fn(usize) -> Option<Symbol<'a>>,
 ) -> Vec<NamedVector> {
-    let workpiece = Body {
+    let workpiece = PointName {
         letter: "p",
         meaning: "workpiece ball",
     };
-    let tool = |meaning| Body { letter: "q", meaning };
+    let tool = |meaning| PointName { letter: "q", meaning };
     match subject {
         Subject::Station(Station::BallBar(bar)) => {
             let p = displaced(bar.workpiece_ball, 0, unknown);
@@ -93,7 +93,7 @@ pub(crate) fn of_subject<'a>(
             let mut vectors = on_tool_side(tool("stylus"), machine, state, errors, stylus);
             let stylus = machine.tool_point(state, errors, stylus);
             let (step, _) = probe.step_at(machine, state);
-            let ahead = Body {
+            let ahead = PointName {
                 letter: "r",
                 meaning: "a step ahead",
             };
@@ -104,15 +104,15 @@ pub(crate) fn of_subject<'a>(
             vectors.push(named("n", step, meaning));
             vectors.extend(into_the_table(tool("stylus"), machine, state, errors, stylus));
             vectors.extend(into_the_table(ahead, machine, state, errors, stylus.plus(step)));
-            let sight = probe.sight(machine, state, errors, unknown);
+            let geometry = probe.geometry(machine, state, errors, unknown);
             vectors.push(named(
                 "v",
-                sight.stylus,
+                geometry.stylus,
                 "position of the stylus perpendicular to the artefact's axis",
             ));
             vectors.push(named(
                 "u",
-                sight.step,
+                geometry.step,
                 "the step perpendicular to the artefact's axis",
             ));
             vectors
@@ -125,7 +125,7 @@ pub(crate) fn of_subject<'a>(
             }
             Setting::Spindle => {
                 let p = displaced(rtest.workpiece_ball, 0, unknown);
-                let ball = Body {
+                let ball = PointName {
                     letter: "p",
                     meaning: "master ball",
                 };
@@ -151,7 +151,7 @@ fn named(letter: &'static str, vector: Point<Symbol<'_>>, meaning: &str) -> Name
 
 /// Transforms a point of R to the table frame, axis by axis.
 fn into_the_table<'a>(
-    body: Body,
+    body: PointName,
     machine: &Machine,
     state: &[AxisPosition<Symbol<'a>>],
     errors: &[BodyErrors<Symbol<'a>>],
@@ -178,7 +178,7 @@ fn into_the_table<'a>(
 }
 
 fn on_workpiece_side<'a>(
-    body: Body,
+    body: PointName,
     machine: &Machine,
     state: &[AxisPosition<Symbol<'a>>],
     errors: &[BodyErrors<Symbol<'a>>],
@@ -192,7 +192,7 @@ fn on_workpiece_side<'a>(
 }
 
 fn on_tool_side<'a>(
-    body: Body,
+    body: PointName,
     machine: &Machine,
     state: &[AxisPosition<Symbol<'a>>],
     errors: &[BodyErrors<Symbol<'a>>],
@@ -207,7 +207,7 @@ fn on_tool_side<'a>(
 
 /// The point after each step; `steps` gives the axis of the step and the axis in whose frame the point then is.
 fn along<'a>(
-    body: Body,
+    body: PointName,
     machine: &Machine,
     state: &[AxisPosition<Symbol<'a>>],
     errors: &[BodyErrors<Symbol<'a>>],

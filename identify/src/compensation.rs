@@ -180,8 +180,8 @@ pub fn of_fit(problem: &Problem<'_>, fit: &Fit) -> Compensation {
         for unconnected in &observed.unconnected {
             result.left_out.push(format!(
                 "{error} from {:.3} to {:.3} {}: not connected to the longest range of motion of the axis",
-                kind.outside(unconnected.start),
-                kind.outside(unconnected.end),
+                kind.to_display(unconnected.start),
+                kind.to_display(unconnected.end),
                 kind.unit()
             ));
         }

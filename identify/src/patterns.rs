@@ -35,7 +35,7 @@ pub struct Pattern {
     pub mean_um: f64,
     /// Standard deviation about the mean, µm.
     pub standard_deviation_um: f64,
-    /// Reading by reading, a reading's coordinates together, µm.
+    /// Reading by reading, µm; the coordinates of a reading are consecutive.
     #[serde(skip)]
     pub deviations_um: Vec<f64>,
 }

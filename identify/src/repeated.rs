@@ -96,7 +96,7 @@ pub struct RepeatedParameter {
     pub values: Vec<f64>,
 }
 
-/// Scatter of the sessions against what their fits say.
+/// Scatter of the sessions against the uncertainties of their fits.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 pub enum Scatter {
@@ -115,9 +115,9 @@ pub struct DeviatingSession {
     pub session: String,
     /// The parameter.
     pub id: String,
-    /// Value of the session less the mean over the other sessions, in `unit`.
+    /// Value of the session less the mean of the other sessions, in `unit`.
     pub deviation: f64,
-    /// Standard uncertainty of this deviation by the fits, in `unit`.
+    /// Standard uncertainty of this deviation from the fits, in `unit`.
     pub u: f64,
     /// Unit of `deviation` and `u`.
     pub unit: String,

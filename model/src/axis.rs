@@ -31,7 +31,7 @@ impl AxisKind {
     }
 
     /// Converts a position from mm or degrees to mm or radians.
-    pub fn inside(self, position: f64) -> f64 {
+    pub fn to_internal(self, position: f64) -> f64 {
         match self {
             AxisKind::Linear => position,
             AxisKind::Rotary => position.to_radians(),
@@ -39,7 +39,7 @@ impl AxisKind {
     }
 
     /// Converts a position from mm or radians to mm or degrees.
-    pub fn outside(self, position: f64) -> f64 {
+    pub fn to_display(self, position: f64) -> f64 {
         match self {
             AxisKind::Linear => position,
             AxisKind::Rotary => position.to_degrees(),

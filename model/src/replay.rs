@@ -19,16 +19,16 @@ const READINGS: usize = 128;
 /// A quantity of a block: one number per reading. The alignment keeps vectors within cache lines.
 #[derive(Clone)]
 #[repr(align(64))]
-struct Block([f64; READINGS]);
+struct BlockValues([f64; READINGS]);
 
 /// Index of a block in the register file.
 type Register = usize;
 
 /// An operation over a block with up to four operands; unused operands repeat the first.
 #[derive(Clone, Copy, Debug)]
-struct Step<Q> {
+struct Instruction<Q> {
     operation: Operation,
-    of: [Q; 4],
+    operands: [Q; 4],
 }
 
 #[derive(Clone, Copy, Debug)]
@@ -36,14 +36,14 @@ enum Operation {
     Unary(Unary),
     Binary(Binary),
     /// `a·b` and `c`.
-    ProductAnd(Joined),
+    MultiplyAdd(Combination),
     /// `a·b` and `c·d`.
-    Products(Joined),
+    SumOfProducts(Combination),
 }
 
 /// Combination of two terms.
 #[derive(Clone, Copy, Debug)]
-enum Joined {
+enum Combination {
     Sum,
     Difference,
     /// The second less the first.
@@ -64,14 +64,14 @@ enum Uniform<V> {
 pub struct Replay<V> {
     uniform: Vec<Uniform<V>>,
     /// The uniform quantities that operations or outputs use; they have the first registers.
-    spread: Vec<usize>,
+    broadcast: Vec<usize>,
     /// The variables given for each reading, in the registers that follow.
     columns: Vec<V>,
     /// The operations, each with its result register.
-    steps: Vec<(Step<Register>, Register)>,
+    instructions: Vec<(Instruction<Register>, Register)>,
     registers: usize,
     /// The outputs that no operation computes, because they are uniform or given: output index and register.
-    standing: Vec<(usize, Register)>,
+    not_computed: Vec<(usize, Register)>,
     /// The computed outputs in the order of their operations: operation index and output index. Each is delivered immediately, so that
     /// its register can be reused.
     computed: Vec<(usize, usize)>,
@@ -81,7 +81,7 @@ impl<V: Clone + PartialEq> Replay<V> {
     /// Prepares the evaluation of `outputs` of an arena; `varies` tells whether a variable differs between readings.
     pub fn new(arena: &Arena<V>, outputs: &[Operand], varies: impl Fn(&V) -> bool) -> Self {
         let nodes = arena.reachable(outputs);
-        let mut recorder = Recorder {
+        let mut compiler = Compiler {
             arena,
             uniform: Vec::new(),
             uniform_of: HashMap::new(),
@@ -92,20 +92,20 @@ impl<V: Clone + PartialEq> Replay<V> {
             let node = arena.node(*id);
             let varying = match node {
                 Node::Variable(variable) => varies(&arena.variable_at(variable)),
-                _ => operands(node).any(|operand| recorder.varies(operand)),
+                _ => operands(node).any(|operand| compiler.varies(operand)),
             };
             if varying {
-                recorder.varying.insert(*id);
+                compiler.varying.insert(*id);
             }
             for operand in operands(node) {
-                let takes_up = matches!(node, Node::Binary(Binary::Add | Binary::Sub, ..));
-                recorder.uses.entry(operand).or_default().push(takes_up);
+                let can_fuse = matches!(node, Node::Binary(Binary::Add | Binary::Sub, ..));
+                compiler.uses.entry(operand).or_default().push(can_fuse);
             }
         }
         for output in outputs {
-            recorder.uses.entry(*output).or_default().push(false);
+            compiler.uses.entry(*output).or_default().push(false);
         }
-        recorder.replay(&nodes, outputs)
+        compiler.replay(&nodes, outputs)
     }
 
     /// Evaluates the calculation for a number of readings. `given` returns the uniform variables, `column` the varying ones, one value
@@ -127,16 +127,16 @@ impl<V: Clone + PartialEq> Replay<V> {
             };
             uniform.push(value);
         }
-        let spread = self.spread.iter().map(|place| uniform[*place]);
+        let broadcast = self.broadcast.iter().map(|index| uniform[*index]);
         // One more than the registers: an operation writes there and then swaps with the register that it replaces.
-        let mut store = vec![Block([0.0; READINGS]); self.registers + 1];
+        let mut store = vec![BlockValues([0.0; READINGS]); self.registers + 1];
         store
             .iter_mut()
-            .zip(spread)
+            .zip(broadcast)
             .for_each(|(block, value)| block.0.fill(value));
-        let mut file: Vec<&mut Block> = store.iter_mut().collect();
+        let mut file: Vec<&mut BlockValues> = store.iter_mut().collect();
         let columns: Vec<&[f64]> = self.columns.iter().map(column).collect();
-        pulp::Arch::new().dispatch(Blocks {
+        pulp::Arch::new().dispatch(Evaluation {
             replay: self,
             rows,
             columns: &columns,
@@ -147,34 +147,34 @@ impl<V: Clone + PartialEq> Replay<V> {
 }
 
 /// An evaluation over all blocks, compiled for each vector instruction set that the processor may have.
-struct Blocks<'r, 'f, V, P> {
+struct Evaluation<'r, 'f, V, P> {
     replay: &'r Replay<V>,
     rows: usize,
     columns: &'r [&'r [f64]],
-    file: &'r mut Vec<&'f mut Block>,
+    file: &'r mut Vec<&'f mut BlockValues>,
     put: P,
 }
 
-impl<V, P: FnMut(usize, usize, &[f64])> NullaryFnOnce for Blocks<'_, '_, V, P> {
+impl<V, P: FnMut(usize, usize, &[f64])> NullaryFnOnce for Evaluation<'_, '_, V, P> {
     type Output = ();
 
     #[inline(always)]
     fn call(mut self) {
-        let first = self.replay.spread.len();
-        let Some(mut made) = self.file.pop() else { return };
+        let first = self.replay.broadcast.len();
+        let Some(mut result) = self.file.pop() else { return };
         for start in (0..self.rows).step_by(READINGS) {
             let end = (start + READINGS).min(self.rows);
-            for (place, column) in self.columns.iter().enumerate() {
+            for (index, column) in self.columns.iter().enumerate() {
                 // Values beyond the last reading are computed too and discarded.
-                self.file[first + place].0[..end - start].copy_from_slice(&column[start..end]);
+                self.file[first + index].0[..end - start].copy_from_slice(&column[start..end]);
             }
-            for (output, register) in &self.replay.standing {
+            for (output, register) in &self.replay.not_computed {
                 (self.put)(*output, start, &self.file[*register].0[..end - start]);
             }
             let mut computed = self.replay.computed.iter().peekable();
-            for (number, (step, to)) in self.replay.steps.iter().enumerate() {
-                step.of_block(self.file, made);
-                std::mem::swap(&mut self.file[*to], &mut made);
+            for (number, (instruction, to)) in self.replay.instructions.iter().enumerate() {
+                instruction.evaluate(self.file, result);
+                std::mem::swap(&mut self.file[*to], &mut result);
                 while let Some((_, output)) = computed.next_if(|(of, _)| *of == number) {
                     (self.put)(*output, start, &self.file[*to].0[..end - start]);
                 }
@@ -183,38 +183,38 @@ impl<V, P: FnMut(usize, usize, &[f64])> NullaryFnOnce for Blocks<'_, '_, V, P> {
     }
 }
 
-impl Step<Register> {
+impl Instruction<Register> {
     #[inline(always)]
-    fn of_block(&self, file: &[&mut Block], made: &mut Block) {
-        let [a, b, c, d] = self.of;
+    fn evaluate(&self, file: &[&mut BlockValues], result: &mut BlockValues) {
+        let [a, b, c, d] = self.operands;
         let (a, b, c, d) = (&file[a].0, &file[b].0, &file[c].0, &file[d].0);
         match self.operation {
-            Operation::Unary(Unary::Neg) => each(made, |i| -a[i]),
-            Operation::Unary(Unary::Sqrt) => each(made, |i| a[i].sqrt()),
-            Operation::Unary(op) => each(made, |i| op.of(a[i])),
-            Operation::Binary(Binary::Add) => each(made, |i| a[i] + b[i]),
-            Operation::Binary(Binary::Sub) => each(made, |i| a[i] - b[i]),
-            Operation::Binary(Binary::Mul) => each(made, |i| a[i] * b[i]),
-            Operation::Binary(Binary::Div) => each(made, |i| a[i] / b[i]),
-            Operation::ProductAnd(Joined::Sum) => each(made, |i| a[i] * b[i] + c[i]),
-            Operation::ProductAnd(Joined::Difference) => each(made, |i| a[i] * b[i] - c[i]),
-            Operation::ProductAnd(Joined::Reverse) => each(made, |i| c[i] - a[i] * b[i]),
-            Operation::Products(Joined::Sum) => each(made, |i| a[i] * b[i] + c[i] * d[i]),
-            Operation::Products(Joined::Difference) => each(made, |i| a[i] * b[i] - c[i] * d[i]),
-            Operation::Products(Joined::Reverse) => each(made, |i| c[i] * d[i] - a[i] * b[i]),
+            Operation::Unary(Unary::Neg) => each(result, |i| -a[i]),
+            Operation::Unary(Unary::Sqrt) => each(result, |i| a[i].sqrt()),
+            Operation::Unary(op) => each(result, |i| op.of(a[i])),
+            Operation::Binary(Binary::Add) => each(result, |i| a[i] + b[i]),
+            Operation::Binary(Binary::Sub) => each(result, |i| a[i] - b[i]),
+            Operation::Binary(Binary::Mul) => each(result, |i| a[i] * b[i]),
+            Operation::Binary(Binary::Div) => each(result, |i| a[i] / b[i]),
+            Operation::MultiplyAdd(Combination::Sum) => each(result, |i| a[i] * b[i] + c[i]),
+            Operation::MultiplyAdd(Combination::Difference) => each(result, |i| a[i] * b[i] - c[i]),
+            Operation::MultiplyAdd(Combination::Reverse) => each(result, |i| c[i] - a[i] * b[i]),
+            Operation::SumOfProducts(Combination::Sum) => each(result, |i| a[i] * b[i] + c[i] * d[i]),
+            Operation::SumOfProducts(Combination::Difference) => each(result, |i| a[i] * b[i] - c[i] * d[i]),
+            Operation::SumOfProducts(Combination::Reverse) => each(result, |i| c[i] * d[i] - a[i] * b[i]),
         }
     }
 }
 
 #[inline(always)]
-fn each(made: &mut Block, value: impl Fn(usize) -> f64) {
+fn each(result: &mut BlockValues, value: impl Fn(usize) -> f64) {
     for i in 0..READINGS {
-        made.0[i] = value(i);
+        result.0[i] = value(i);
     }
 }
 
 /// State of the nodes while an evaluation is prepared.
-struct Recorder<'a, V> {
+struct Compiler<'a, V> {
     arena: &'a Arena<V>,
     uniform: Vec<Uniform<V>>,
     uniform_of: HashMap<Operand, usize>,
@@ -223,15 +223,15 @@ struct Recorder<'a, V> {
     varying: HashSet<NodeId>,
 }
 
-impl<V: Clone + PartialEq> Recorder<'_, V> {
+impl<V: Clone + PartialEq> Compiler<'_, V> {
     fn varies(&self, operand: Operand) -> bool {
         matches!(operand, Operand::Node(id) if self.varying.contains(&id))
     }
 
     /// The index of a uniform operand among the uniform quantities.
     fn uniform(&mut self, operand: Operand) -> usize {
-        if let Some(place) = self.uniform_of.get(&operand) {
-            return *place;
+        if let Some(index) = self.uniform_of.get(&operand) {
+            return *index;
         }
         let quantity = match operand {
             Operand::Constant(constant) => Uniform::Constant(constant.value()),
@@ -257,53 +257,53 @@ impl<V: Clone + PartialEq> Recorder<'_, V> {
     }
 
     /// The operation of a node; `None` for a variable, and for a product that is fused with another operation.
-    fn step(&self, id: NodeId) -> Option<Step<Operand>> {
+    fn instruction(&self, id: NodeId) -> Option<Instruction<Operand>> {
         if self.product(Operand::Node(id)).is_some() {
             return None;
         }
-        let (operation, of) = match self.arena.node(id) {
+        let (operation, operands) = match self.arena.node(id) {
             Node::Variable(_) => return None,
             Node::Unary(op, a) => (Operation::Unary(op), [a; 4]),
             Node::Binary(op @ (Binary::Add | Binary::Sub), a, b) => {
-                let (joined, reverse) = match op {
-                    Binary::Add => (Joined::Sum, Joined::Sum),
-                    _ => (Joined::Difference, Joined::Reverse),
+                let (combination, reverse) = match op {
+                    Binary::Add => (Combination::Sum, Combination::Sum),
+                    _ => (Combination::Difference, Combination::Reverse),
                 };
                 match (self.product(a), self.product(b)) {
-                    (Some([x, y]), Some([z, w])) => (Operation::Products(joined), [x, y, z, w]),
-                    (Some([x, y]), None) => (Operation::ProductAnd(joined), [x, y, b, x]),
-                    (None, Some([x, y])) => (Operation::ProductAnd(reverse), [x, y, a, x]),
+                    (Some([x, y]), Some([z, w])) => (Operation::SumOfProducts(combination), [x, y, z, w]),
+                    (Some([x, y]), None) => (Operation::MultiplyAdd(combination), [x, y, b, x]),
+                    (None, Some([x, y])) => (Operation::MultiplyAdd(reverse), [x, y, a, x]),
                     (None, None) => (Operation::Binary(op), [a, b, a, a]),
                 }
             }
             Node::Binary(op, a, b) => (Operation::Binary(op), [a, b, a, a]),
         };
-        Some(Step { operation, of })
+        Some(Instruction { operation, operands })
     }
 
     fn replay(mut self, nodes: &[NodeId], outputs: &[Operand]) -> Replay<V> {
-        let mut steps: Vec<(NodeId, Step<Operand>)> = Vec::new();
+        let mut instructions: Vec<(NodeId, Instruction<Operand>)> = Vec::new();
         let mut columns: Vec<V> = Vec::new();
         let mut column_nodes: Vec<Operand> = Vec::new();
         for id in nodes.iter().filter(|id| self.varying.contains(id)) {
             if let Node::Variable(variable) = self.arena.node(*id) {
                 columns.push(self.arena.variable_at(variable));
                 column_nodes.push(Operand::Node(*id));
-            } else if let Some(step) = self.step(*id) {
-                steps.push((*id, step));
+            } else if let Some(instruction) = self.instruction(*id) {
+                instructions.push((*id, instruction));
             }
         }
-        let mut spread = Vec::new();
+        let mut broadcast = Vec::new();
         let mut register_of: HashMap<Operand, Register> = HashMap::new();
-        for operand in steps
+        for operand in instructions
             .iter()
-            .flat_map(|(_, step)| step.of)
+            .flat_map(|(_, instruction)| instruction.operands)
             .chain(outputs.iter().copied())
         {
             if !self.varies(operand) && !register_of.contains_key(&operand) {
-                register_of.insert(operand, spread.len());
-                let place = self.uniform(operand);
-                spread.push(place);
+                register_of.insert(operand, broadcast.len());
+                let index = self.uniform(operand);
+                broadcast.push(index);
             }
         }
         for operand in column_nodes {
@@ -313,15 +313,15 @@ impl<V: Clone + PartialEq> Recorder<'_, V> {
         let kept = register_of.len();
         let mut registers = kept;
         let mut last_read: HashMap<Operand, usize> = HashMap::new();
-        for (number, (_, step)) in steps.iter().enumerate() {
-            last_read.extend(step.of.map(|operand| (operand, number)));
+        for (number, (_, instruction)) in instructions.iter().enumerate() {
+            last_read.extend(instruction.operands.map(|operand| (operand, number)));
         }
         let mut free: Vec<Register> = Vec::new();
-        let mut placed = Vec::with_capacity(steps.len());
+        let mut allocated = Vec::with_capacity(instructions.len());
         let mut computed = Vec::new();
-        for (number, (id, step)) in steps.into_iter().enumerate() {
-            let of = step.of.map(|operand| register_of[&operand]);
-            for (operand, register) in step.of.iter().zip(of) {
+        for (number, (id, instruction)) in instructions.into_iter().enumerate() {
+            let operands = instruction.operands.map(|operand| register_of[&operand]);
+            for (operand, register) in instruction.operands.iter().zip(operands) {
                 if register >= kept && last_read[operand] == number && !free.contains(&register) {
                     free.push(register);
                 }
@@ -331,21 +331,21 @@ impl<V: Clone + PartialEq> Recorder<'_, V> {
                 registers - 1
             });
             register_of.insert(Operand::Node(id), to);
-            let made = (outputs.iter().enumerate()).filter(|(_, output)| **output == Operand::Node(id));
-            computed.extend(made.map(|(output, _)| (number, output)));
+            let result = (outputs.iter().enumerate()).filter(|(_, output)| **output == Operand::Node(id));
+            computed.extend(result.map(|(output, _)| (number, output)));
             if !last_read.contains_key(&Operand::Node(id)) {
                 free.push(to);
             }
-            let operation = step.operation;
-            placed.push((Step { operation, of }, to));
+            let operation = instruction.operation;
+            allocated.push((Instruction { operation, operands }, to));
         }
         Replay {
             uniform: self.uniform,
-            spread,
+            broadcast,
             columns,
-            steps: placed,
+            instructions: allocated,
             registers,
-            standing: (outputs.iter().enumerate())
+            not_computed: (outputs.iter().enumerate())
                 .filter_map(|(number, output)| {
                     Some((number, *register_of.get(output)?)).filter(|(_, r)| *r < kept)
                 })

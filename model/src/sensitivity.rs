@@ -78,16 +78,16 @@ enum Quantity {
 
 /// Key of a recording: its slots, whether they vary, and the slots of the derivatives.
 #[derive(Clone, Debug, PartialEq, Eq, Hash)]
-struct CarriedComponent {
+struct RecordingKey {
     slots: Vec<(usize, bool)>,
     derivatives: Vec<usize>,
 }
 
 /// Position of an axis in every row.
 #[derive(Clone, Debug)]
-enum DriverCourse {
+enum AxisColumn {
     /// Equal in all rows.
-    Still(AxisPosition<f64>),
+    Fixed(AxisPosition<f64>),
     /// Positions, and for a rotary axis their sines and cosines, computed once.
     Moving {
         position: Vec<f64>,
@@ -96,17 +96,17 @@ enum DriverCourse {
     },
 }
 
-impl DriverCourse {
-    fn new(kind: AxisKind, positions: &[f64]) -> DriverCourse {
+impl AxisColumn {
+    fn new(kind: AxisKind, positions: &[f64]) -> AxisColumn {
         let first = positions.first().copied().unwrap_or(0.0);
         if positions.iter().all(|position| *position == first) {
-            return DriverCourse::Still(AxisPosition::new(kind, first));
+            return AxisColumn::Fixed(AxisPosition::new(kind, first));
         }
         let (sine, cosine) = match kind {
             AxisKind::Rotary => positions.iter().map(|position| position.sin_cos()).unzip(),
             AxisKind::Linear => (Vec::new(), Vec::new()),
         };
-        DriverCourse::Moving {
+        AxisColumn::Moving {
             position: positions.to_vec(),
             sine,
             cosine,
@@ -115,8 +115,8 @@ impl DriverCourse {
 
     fn at(&self, row: usize) -> AxisPosition<f64> {
         match self {
-            DriverCourse::Still(position) => *position,
-            DriverCourse::Moving {
+            AxisColumn::Fixed(position) => *position,
+            AxisColumn::Moving {
                 position,
                 sine,
                 cosine,
@@ -139,9 +139,9 @@ impl DriverCourse {
 pub struct TestModel<'a> {
     machine: &'a Machine,
     station: Station<f64>,
-    courses: Vec<DriverCourse>,
+    axis_columns: Vec<AxisColumn>,
     rows: usize,
-    recorded: Arc<Mutex<HashMap<CarriedComponent, Arc<Replay<Quantity>>>>>,
+    recorded: Arc<Mutex<HashMap<RecordingKey, Arc<Replay<Quantity>>>>>,
 }
 
 impl<'a> TestModel<'a> {
@@ -151,8 +151,8 @@ impl<'a> TestModel<'a> {
         TestModel {
             machine,
             station,
-            courses: axes
-                .map(|(axis, positions)| DriverCourse::new(axis.kind, positions))
+            axis_columns: axes
+                .map(|(axis, positions)| AxisColumn::new(axis.kind, positions))
                 .collect(),
             rows: readings.rows(),
             recorded: Arc::default(),
@@ -194,47 +194,50 @@ impl<'a> TestModel<'a> {
 
     /// Positions of the axes in a row.
     pub fn state(&self, row: usize) -> Vec<AxisPosition<f64>> {
-        self.courses.iter().map(|course| course.at(row)).collect()
+        self.axis_columns
+            .iter()
+            .map(|axis_column| axis_column.at(row))
+            .collect()
     }
 
     /// The recorded chain: the coordinates of the reading, then for each of them its derivatives by the requested slots.
     fn recording(&self, values: &SlotValues, derivatives: &[usize]) -> Arc<Replay<Quantity>> {
-        let mut carries: Vec<bool> = values.constant.iter().map(|value| *value != 0.0).collect();
-        derivatives.iter().for_each(|slot| carries[*slot] = true);
+        let mut included: Vec<bool> = values.constant.iter().map(|value| *value != 0.0).collect();
+        derivatives.iter().for_each(|slot| included[*slot] = true);
         let slots = (0..self.slots())
-            .filter(|slot| carries[*slot] || values.varies(*slot))
+            .filter(|slot| included[*slot] || values.varies(*slot))
             .map(|slot| (slot, values.varies(slot)))
             .collect();
-        let carried = CarriedComponent {
+        let key = RecordingKey {
             slots,
             derivatives: derivatives.to_vec(),
         };
         // After a panic in another thread every recording is either complete or absent.
         let mut recorded = self.recorded.lock().unwrap_or_else(PoisonError::into_inner);
-        match recorded.get(&carried) {
+        match recorded.get(&key) {
             Some(replay) => replay.clone(),
             None => {
-                let replay = Arc::new(self.record(&carried));
-                recorded.insert(carried, replay.clone());
+                let replay = Arc::new(self.record(&key));
+                recorded.insert(key, replay.clone());
                 replay
             }
         }
     }
 
-    fn record(&self, carried: &CarriedComponent) -> Replay<Quantity> {
+    fn record(&self, key: &RecordingKey) -> Replay<Quantity> {
         let arena = Arena::new();
         let constant = Symbol::constant;
         let state: Vec<AxisPosition<Symbol<'_, Quantity>>> =
-            (self.machine.axes.iter().zip(&self.courses).enumerate())
-                .map(|(index, (axis, course))| match course {
-                    DriverCourse::Still(position) => AxisPosition {
+            (self.machine.axes.iter().zip(&self.axis_columns).enumerate())
+                .map(|(index, (axis, axis_column))| match axis_column {
+                    AxisColumn::Fixed(position) => AxisPosition {
                         value: constant(position.value),
                         turn: SinCos {
                             sin: constant(position.turn.sin),
                             cos: constant(position.turn.cos),
                         },
                     },
-                    DriverCourse::Moving { .. } => AxisPosition {
+                    AxisColumn::Moving { .. } => AxisPosition {
                         value: arena.variable(Quantity::Position(index)),
                         turn: match axis.kind {
                             AxisKind::Rotary => SinCos {
@@ -249,7 +252,7 @@ impl<'a> TestModel<'a> {
                     },
                 })
                 .collect();
-        let slots: HashMap<usize, Symbol<'_, Quantity>> = (carried.slots.iter())
+        let slots: HashMap<usize, Symbol<'_, Quantity>> = (key.slots.iter())
             .map(|&(slot, varies)| (slot, arena.variable(Quantity::Slot { slot, varies })))
             .collect();
         let bodies = self
@@ -265,11 +268,7 @@ impl<'a> TestModel<'a> {
             .iter()
             .map(|value| value.operand())
             .collect();
-        let by: Vec<Operand> = carried
-            .derivatives
-            .iter()
-            .map(|slot| slots[slot].operand())
-            .collect();
+        let by: Vec<Operand> = key.derivatives.iter().map(|slot| slots[slot].operand()).collect();
         let gradients = coordinates
             .iter()
             .flat_map(|coordinate| arena.gradient(*coordinate, &by));
@@ -294,13 +293,13 @@ impl<'a> TestModel<'a> {
         let varying: HashMap<usize, Vec<f64>> = (values.varying.iter())
             .map(|(slot, _)| (*slot, values.column(*slot, rows.clone())))
             .collect();
-        let course = |axis: usize| match &self.courses[axis] {
-            DriverCourse::Moving {
+        let axis_column = |axis: usize| match &self.axis_columns[axis] {
+            AxisColumn::Moving {
                 position,
                 sine,
                 cosine,
             } => [position, sine, cosine].map(|column| column.as_slice()),
-            DriverCourse::Still(_) => [&[][..]; 3],
+            AxisColumn::Fixed(_) => [&[][..]; 3],
         };
         recording.run(
             rows.len(),
@@ -309,9 +308,9 @@ impl<'a> TestModel<'a> {
                 Quantity::Position(_) | Quantity::Sine(_) | Quantity::Cosine(_) => f64::NAN,
             },
             |quantity| match quantity {
-                Quantity::Position(axis) => &course(*axis)[0][rows.clone()],
-                Quantity::Sine(axis) => &course(*axis)[1][rows.clone()],
-                Quantity::Cosine(axis) => &course(*axis)[2][rows.clone()],
+                Quantity::Position(axis) => &axis_column(*axis)[0][rows.clone()],
+                Quantity::Sine(axis) => &axis_column(*axis)[1][rows.clone()],
+                Quantity::Cosine(axis) => &axis_column(*axis)[2][rows.clone()],
                 Quantity::Slot { slot, .. } => &varying[slot],
             },
             put,
@@ -323,7 +322,7 @@ impl<'a> TestModel<'a> {
         let coordinates = self.coordinates();
         let mut readings = vec![0.0; self.rows * coordinates];
         self.sweep(values, &[], 0..self.rows, |coordinate, start, column| {
-            place(&mut readings, coordinates, coordinate, start, column);
+            scatter(&mut readings, coordinates, coordinate, start, column);
         });
         readings
     }
@@ -342,20 +341,20 @@ impl<'a> TestModel<'a> {
                 None => (output, &mut result.readings_mm),
                 Some(by) => (by / slots.len(), &mut result.derivatives[by % slots.len()]),
             };
-            place(into, coordinates, coordinate, start, column);
+            scatter(into, coordinates, coordinate, start, column);
         });
         result
     }
 }
 
 /// Writes one coordinate of consecutive readings; `into` is readings × coordinates.
-fn place(into: &mut [f64], coordinates: usize, coordinate: usize, start: usize, column: &[f64]) {
+fn scatter(into: &mut [f64], coordinates: usize, coordinate: usize, start: usize, column: &[f64]) {
     if coordinates == 1 {
         into[start..start + column.len()].copy_from_slice(column);
         return;
     }
-    let places = into[start * coordinates + coordinate..]
+    let targets = into[start * coordinates + coordinate..]
         .iter_mut()
         .step_by(coordinates);
-    places.zip(column).for_each(|(place, value)| *place = *value);
+    targets.zip(column).for_each(|(target, value)| *target = *value);
 }

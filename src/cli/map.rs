@@ -188,14 +188,14 @@ fn csv(machine: &Machine, places: &[VolumetricPoint]) -> Result<Vec<u8>, Failure
     let row = |place: &VolumetricPoint| {
         let at = machine.axes.iter().zip(&place.positions);
         let mut cells: Vec<String> = at
-            .map(|(axis, q)| format!("{:.6}", axis.kind.outside(*q)))
+            .map(|(axis, q)| format!("{:.6}", axis.kind.to_display(*q)))
             .collect();
         cells.extend(place.nominal_mm.iter().map(|p| format!("{p:.6}")));
         cells.extend(place.error_mm.iter().map(|e| format!("{:.6}", e * 1e3)));
         cells.push(format!("{:.6}", norm(place.error_mm)));
         if let Some(compensated) = &place.compensated {
             let at = machine.axes.iter().zip(&compensated.positions);
-            cells.extend(at.map(|(axis, q)| format!("{:.9}", axis.kind.outside(*q))));
+            cells.extend(at.map(|(axis, q)| format!("{:.9}", axis.kind.to_display(*q))));
             cells.push(format!("{:.9}", norm(compensated.error_mm)));
         }
         cells

@@ -129,7 +129,7 @@ fn another_radius_is_proposed_to_separate_an_axial_motion_from_a_tilt() {
     let separation = &effect["separation"];
     // Both tilts are equivalent: the first by name is proposed.
     assert_eq!(separation["from"]["component"], "EAC");
-    assert_eq!(separation["from"]["order"], 2.0);
+    assert_eq!(separation["from"]["order"], 2);
     // The ball of the session is at 100 mm.
     let test = effect["separated_by"].as_str().unwrap();
     let radius = test

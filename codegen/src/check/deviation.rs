@@ -2,7 +2,7 @@
 
 use abbe_model::frames::Rotation;
 
-use crate::check::points::{Draws, Point};
+use crate::check::points::{CheckPoint, PseudoRandom};
 use crate::check::worst;
 use crate::equation::{Equation, Order};
 use crate::error::CodegenError;
@@ -40,7 +40,7 @@ impl Equation {
         let count = self.parameters.len();
         // The contribution of an effect reaches the stated size where it is largest.
         let mut reach = vec![f64::MIN_POSITIVE; count];
-        let mut draws = Draws::new(6);
+        let mut draws = PseudoRandom::new(6);
         for _ in 0..60 {
             let point = drawn_between(range, count, &mut draws);
             let at = |variable: Variable| point.nominal(&variable);
@@ -56,7 +56,7 @@ impl Equation {
         }
         let mut deviations = Vec::new();
         for (shift_um, tilt_deg) in [(10.0, 0.01), (100.0, 0.1_f64)] {
-            let mut draws = Draws::new(5);
+            let mut draws = PseudoRandom::new(5);
             let mut largest = 0.0_f64;
             for _ in 0..60 {
                 let point = drawn_between(range, count, &mut draws);
@@ -100,12 +100,12 @@ impl Equation {
 }
 
 /// A random point without errors within the range; one coordinate in four is at an end of its range.
-fn drawn_between(range: &[(Variable, [f64; 2])], count: usize, draws: &mut Draws) -> Point {
+fn drawn_between(range: &[(Variable, [f64; 2])], count: usize, draws: &mut PseudoRandom) -> CheckPoint {
     let nominal = range.iter().map(|(variable, [low, high])| {
         let along = draws.between(-1.0 / 6.0, 7.0 / 6.0).clamp(0.0, 1.0);
         (variable.clone(), low + (high - low) * along)
     });
-    Point {
+    CheckPoint {
         nominal: nominal.collect(),
         small: vec![0.0; count],
     }

@@ -6,7 +6,7 @@ mod reference;
 
 pub use deviation::Deviation;
 
-use crate::check::points::{Draws, Point};
+use crate::check::points::{CheckPoint, PseudoRandom};
 use crate::equation::Equation;
 use crate::error::CodegenError;
 use crate::program::Program;
@@ -48,7 +48,7 @@ impl Equation {
     /// # Errors
     /// If they disagree; the program must then not be written.
     pub(crate) fn confirm(&self, source: &impl Source, programs: &[&Program]) -> Result<Check, CodegenError> {
-        let mut draws = Draws::new(4);
+        let mut draws = PseudoRandom::new(4);
         let mut check = Check::default();
         let count = self.parameters.len();
         let mut value_scale = f64::MIN_POSITIVE;
@@ -61,7 +61,7 @@ impl Equation {
             let nominal = self.draw_anywhere(source, &mut draws);
             let size = |variable: &Variable| SIZES[usize::from(variable.is_angle())];
             let small = self.parameters.iter().map(|p| draws.between(-size(p), size(p)));
-            let point = Point {
+            let point = CheckPoint {
                 small: small.collect(),
                 nominal,
             };

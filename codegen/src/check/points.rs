@@ -3,18 +3,18 @@
 use abbe_model::axis::AxisKind;
 use abbe_model::effect::{Driver, Effect, Shape};
 
-use crate::effect::Followed;
+use crate::effect::DriverQuantity;
 use crate::equation::Equation;
 use crate::program::{Input, Program};
 use crate::subject::Source;
 use crate::variable::Variable;
 
 /// Deterministic pseudo-random numbers (SplitMix64).
-pub(crate) struct Draws(u64);
+pub(crate) struct PseudoRandom(u64);
 
-impl Draws {
+impl PseudoRandom {
     pub(crate) fn new(seed: u64) -> Self {
-        Draws(seed)
+        PseudoRandom(seed)
     }
 
     pub(crate) fn bits(&mut self) -> u64 {
@@ -35,12 +35,12 @@ impl Draws {
 const UNSTATED_MM: f64 = 100.0;
 
 /// Values of the lengths, the positions and the parameters.
-pub(crate) struct Point {
+pub(crate) struct CheckPoint {
     pub(crate) nominal: Vec<(Variable, f64)>,
     pub(crate) small: Vec<f64>,
 }
 
-impl Point {
+impl CheckPoint {
     pub(crate) fn nominal(&self, variable: &Variable) -> f64 {
         let found = self.nominal.iter().find(|(known, _)| known == variable);
         found.map_or(f64::NAN, |(_, value)| *value)
@@ -62,16 +62,16 @@ impl Point {
 
 impl Equation {
     /// Intervals of a driver in which effects with a local shape are not zero.
-    fn places_of_effects(&self, driver: &Variable) -> Vec<[f64; 2]> {
+    fn intervals_of_effects(&self, driver: &Variable) -> Vec<[f64; 2]> {
         let follows = |effect: &Effect| match (driver, &effect.driver) {
             (Variable::Position { axis, .. }, Driver::Axis(name)) => axis == name,
-            (Variable::Driver(Followed::SinceReversal(axis, _)), Driver::Axis(name)) => axis == name,
-            (Variable::Driver(Followed::Time), Driver::Time) => true,
-            (Variable::Driver(Followed::Temperature), Driver::Temperature) => true,
-            (Variable::Driver(Followed::Gravity(_)), Driver::Gravity) => true,
+            (Variable::Driver(DriverQuantity::SinceReversal(axis, _)), Driver::Axis(name)) => axis == name,
+            (Variable::Driver(DriverQuantity::Time), Driver::Time) => true,
+            (Variable::Driver(DriverQuantity::Temperature), Driver::Temperature) => true,
+            (Variable::Driver(DriverQuantity::Gravity(_)), Driver::Gravity) => true,
             _ => false,
         };
-        let turn_back = matches!(driver, Variable::Driver(Followed::SinceReversal(..)));
+        let turn_back = matches!(driver, Variable::Driver(DriverQuantity::SinceReversal(..)));
         let around = |low: f64, high: f64, margin: f64| Some([low - margin, high + margin]);
         let place = |effect: &Effect| match &effect.shape {
             Shape::ReversalSpike { width } if turn_back => Some([0.0, 3.0 * width]),
@@ -93,15 +93,19 @@ impl Equation {
             .collect()
     }
 
-    /// Draws the nominal variables over their whole range: lengths near their stated values, positions over all possible values.
-    pub(crate) fn draw_anywhere(&self, source: &impl Source, draws: &mut Draws) -> Vec<(Variable, f64)> {
+    /// PseudoRandom the nominal variables over their whole range: lengths near their stated values, positions over all possible values.
+    pub(crate) fn draw_anywhere(
+        &self,
+        source: &impl Source,
+        draws: &mut PseudoRandom,
+    ) -> Vec<(Variable, f64)> {
         let draw = |variable: Variable| {
             let value = match &variable {
                 Variable::Length(name) => match source.length_mm(name) {
                     Some(value) => value * (1.0 + draws.between(-0.01, 0.01)),
                     None => UNSTATED_MM * (1.0 + draws.between(-0.5, 0.5)),
                 },
-                Variable::Driver(Followed::Direction(_)) => {
+                Variable::Driver(DriverQuantity::Direction(_)) => {
                     if draws.bits() & 1 == 0 {
                         -1.0
                     } else {
@@ -109,7 +113,7 @@ impl Equation {
                     }
                 }
                 moving => {
-                    let places = self.places_of_effects(moving);
+                    let places = self.intervals_of_effects(moving);
                     // Half of the points lie where local effects are not zero.
                     let anywhere = places.is_empty() || draws.bits() & 1 == 0;
                     let [low, high] = if anywhere {
@@ -152,13 +156,13 @@ impl Equation {
 fn whole_range(moving: &Variable) -> [f64; 2] {
     if let Variable::Driver(followed) = moving {
         match followed {
-            Followed::Direction(_) | Followed::Gravity(_) => [-1.0, 1.0],
-            Followed::Rate(_, AxisKind::Linear) => [-50.0, 50.0],
-            Followed::Rate(_, AxisKind::Rotary) => [-1.0, 1.0],
-            Followed::SinceReversal(_, AxisKind::Linear) => [0.0, 100.0],
-            Followed::SinceReversal(_, AxisKind::Rotary) => [0.0, std::f64::consts::PI],
-            Followed::Time => [0.0, 3600.0],
-            Followed::Temperature => [-5.0, 5.0],
+            DriverQuantity::Direction(_) | DriverQuantity::Gravity(_) => [-1.0, 1.0],
+            DriverQuantity::Rate(_, AxisKind::Linear) => [-50.0, 50.0],
+            DriverQuantity::Rate(_, AxisKind::Rotary) => [-1.0, 1.0],
+            DriverQuantity::SinceReversal(_, AxisKind::Linear) => [0.0, 100.0],
+            DriverQuantity::SinceReversal(_, AxisKind::Rotary) => [0.0, std::f64::consts::PI],
+            DriverQuantity::Time => [0.0, 3600.0],
+            DriverQuantity::Temperature => [-5.0, 5.0],
         }
     } else if moving.is_angle() {
         [-std::f64::consts::PI, std::f64::consts::PI]

@@ -3,7 +3,7 @@
 use abbe_model::instrument::Station;
 use num_dual::{Derivative, Dual64, DualNum, DualSVec64, HyperDual64};
 
-use crate::check::points::Point;
+use crate::check::points::CheckPoint;
 use crate::equation::{Equation, Order};
 use crate::error::CodegenError;
 use crate::run::Run;
@@ -22,7 +22,7 @@ impl Equation {
     fn run<S>(
         &self,
         source: &impl Source,
-        point: &Point,
+        point: &CheckPoint,
         small: impl Fn(usize) -> S,
     ) -> Result<(Vec<S>, Vec<S>), CodegenError>
     where
@@ -37,9 +37,9 @@ impl Equation {
                 p.minus(q).0.to_vec()
             }
             Subject::Station(Station::Probe(_)) => {
-                let sight = run.sight().into_iter();
-                sight
-                    .flat_map(|sight| [sight.stylus.0, sight.step.0].concat())
+                let geometry = run.probe_geometry().into_iter();
+                geometry
+                    .flat_map(|geometry| [geometry.stylus.0, geometry.step.0].concat())
                     .collect()
             }
             _ => run.read(),
@@ -51,7 +51,7 @@ impl Equation {
     pub(crate) fn expected(
         &self,
         source: &impl Source,
-        point: &Point,
+        point: &CheckPoint,
     ) -> Result<ValueAndGradient, CodegenError> {
         match self.options.order {
             Order::Exact => self.by_duals(source, point, &point.small),
@@ -72,7 +72,7 @@ impl Equation {
     fn by_duals(
         &self,
         source: &impl Source,
-        point: &Point,
+        point: &CheckPoint,
         at: &[f64],
     ) -> Result<ValueAndGradient, CodegenError> {
         let values = self.run(source, point, |i| at[i])?.0;
@@ -103,7 +103,7 @@ impl Equation {
     fn expected_bilinear(
         &self,
         source: &impl Source,
-        point: &Point,
+        point: &CheckPoint,
     ) -> Result<ValueAndGradient, CodegenError> {
         let count = self.parameters.len();
         let mut base = Vec::new();
@@ -154,7 +154,7 @@ impl Equation {
     fn reading_of_groups(
         &self,
         source: &impl Source,
-        point: &Point,
+        point: &CheckPoint,
         groups: &[Dual64],
         small: &impl Fn(usize) -> Dual64,
     ) -> Result<Vec<Dual64>, CodegenError> {

@@ -3,7 +3,7 @@
 use std::collections::HashMap;
 
 use crate::collect::{product, sum};
-use crate::equation::{Equation, FirstOrderLayout, Form, Kind, Order};
+use crate::equation::{Equation, Form, Kind, Order, PrintedFirstOrder};
 use crate::first_order::{Column, FirstOrder};
 use crate::print::{exact, notes, touch};
 use crate::program::{Input, Label, Naming, Program, Step, Tree};
@@ -25,7 +25,7 @@ pub(crate) enum LeftSide {
 
 /// One printed equation.
 #[derive(Clone, Debug)]
-pub(crate) struct Row {
+pub(crate) struct EquationLine {
     pub(crate) left: LeftSide,
     /// `≈` instead of `=`.
     pub(crate) approximate: bool,
@@ -38,7 +38,7 @@ pub(crate) struct Row {
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) enum NoteKind {
     /// Identically zero: the parameter is not observable.
-    NotSeen,
+    NotObservable,
     /// A constant multiple of another parameter's coefficient.
     MultipleOf(Variable),
 }
@@ -47,7 +47,7 @@ pub(crate) enum NoteKind {
 #[derive(Clone, Debug)]
 pub(crate) struct Section {
     pub(crate) heading: String,
-    pub(crate) rows: Vec<Row>,
+    pub(crate) rows: Vec<EquationLine>,
 }
 
 /// The complete content.
@@ -101,8 +101,8 @@ fn uses(sections: &[Section], place: usize) -> bool {
     rows.into_iter().any(|row| row.right.holds(place))
 }
 
-pub(crate) fn row(left: LeftSide, right: Tree) -> Row {
-    Row {
+pub(crate) fn row(left: LeftSide, right: Tree) -> EquationLine {
+    EquationLine {
         left,
         approximate: false,
         right,
@@ -110,7 +110,7 @@ pub(crate) fn row(left: LeftSide, right: Tree) -> Row {
     }
 }
 
-pub(crate) fn what_is_read(equation: &Equation) -> &'static str {
+pub(crate) fn quantity_heading(equation: &Equation) -> &'static str {
     match equation.kind {
         Kind::Length => "length of the bar",
         Kind::Distance => "distance read",
@@ -151,12 +151,12 @@ fn groups(equation: &Equation, trees: &[Tree], complete: bool) -> (Program, Vec<
         return touch::groups(equation, touch, trees, complete);
     }
     if equation.kind != Kind::Length {
-        let rows = trees.iter().enumerate().map(|(place, tree)| Row {
+        let rows = trees.iter().enumerate().map(|(place, tree)| EquationLine {
             approximate: !complete,
             ..row(LeftSide::Output(place), tree.clone())
         });
         let section = Section {
-            heading: what_is_read(equation).to_string(),
+            heading: quantity_heading(equation).to_string(),
             rows: rows.collect(),
         };
         return (naming(equation, Vec::new()), vec![section]);
@@ -175,8 +175,8 @@ fn groups(equation: &Equation, trees: &[Tree], complete: bool) -> (Program, Vec<
             rows: rows.collect(),
         },
         Section {
-            heading: what_is_read(equation).to_string(),
-            rows: vec![Row {
+            heading: quantity_heading(equation).to_string(),
+            rows: vec![EquationLine {
                 approximate: !complete,
                 ..row(LeftSide::Output(0), length)
             }],
@@ -187,7 +187,7 @@ fn groups(equation: &Equation, trees: &[Tree], complete: bool) -> (Program, Vec<
 
 /// `d − δ_bar + δ_gain·(d − bar)`, with the parameters that are included.
 pub(crate) fn with_bar_unknowns(equation: &Equation, program: &Program, distance: Tree) -> Tree {
-    let tree = |operand: Operand| as_it_stands(equation, program, operand);
+    let tree = |operand: Operand| named_or_expanded(equation, program, operand);
     let [bar, gain] = equation.bar_unknowns;
     let mut terms = vec![(false, distance.clone())];
     if let Some(bar) = bar {
@@ -201,8 +201,8 @@ pub(crate) fn with_bar_unknowns(equation: &Equation, program: &Program, distance
 }
 
 /// An operand by the name that effects give it, or as its own expression.
-pub(crate) fn as_it_stands(equation: &Equation, program: &Program, operand: Operand) -> Tree {
-    let follower = equation.followers.iter().find(|(_, value)| *value == operand);
+pub(crate) fn named_or_expanded(equation: &Equation, program: &Program, operand: Operand) -> Tree {
+    let follower = equation.driven_errors.iter().find(|(_, value)| *value == operand);
     let named = follower.and_then(|(variable, _)| {
         let label = Label::Quantity(variable.clone());
         program.steps.iter().position(|step| step.label == label)
@@ -222,7 +222,7 @@ const S: Label = Label::Scalar("S");
 fn first_order(
     equation: &Equation,
     first: &FirstOrder,
-    layout: &FirstOrderLayout,
+    layout: &PrintedFirstOrder,
 ) -> (Program, Vec<Section>) {
     let is_length = matches!(equation.kind, Kind::Length | Kind::Distance);
     let program = naming(equation, if is_length { vec![L_0, S] } else { Vec::new() });
@@ -240,7 +240,7 @@ fn first_order(
         let mut all = terms_of(&layout.without_errors(l_0.clone()));
         all.push((false, slope));
         all.extend(terms(equation, first, layout, 0, false));
-        sum_rows.push(Row {
+        sum_rows.push(EquationLine {
             approximate: true,
             ..row(LeftSide::Output(0), sum(all))
         });
@@ -251,7 +251,7 @@ fn first_order(
                 all.push((false, nominal.clone()));
             }
             all.extend(terms(equation, first, layout, place, false));
-            sum_rows.push(Row {
+            sum_rows.push(EquationLine {
                 approximate: true,
                 ..row(LeftSide::Output(place), sum(all))
             });
@@ -261,7 +261,7 @@ fn first_order(
     for (sensitivity, coefficients) in first.sensitivities.iter().zip(&layout.coefficients) {
         let remark = match &sensitivity.column {
             Column::Distinct => None,
-            Column::Zero => Some(NoteKind::NotSeen),
+            Column::Zero => Some(NoteKind::NotObservable),
             Column::Multiple { of, .. } => Some(NoteKind::MultipleOf(of.clone())),
         };
         let zero = |tree: &Tree| *tree == Tree::Number(0.0);
@@ -276,7 +276,7 @@ fn first_order(
             } else {
                 coefficient.clone()
             };
-            table.push(Row {
+            table.push(EquationLine {
                 remark: remark.clone(),
                 ..row(LeftSide::Slope(place, sensitivity.parameter.clone()), right)
             });
@@ -284,7 +284,7 @@ fn first_order(
     }
     let sections = vec![
         Section {
-            heading: format!("{}, {}", what_is_read(equation), order_words(Order::First)),
+            heading: format!("{}, {}", quantity_heading(equation), order_words(Order::First)),
             rows: sum_rows,
         },
         Section {
@@ -324,7 +324,7 @@ fn order_words(order: Order) -> &'static str {
 fn terms(
     equation: &Equation,
     first: &FirstOrder,
-    layout: &FirstOrderLayout,
+    layout: &PrintedFirstOrder,
     coordinate: usize,
     over_length: bool,
 ) -> Vec<(bool, Tree)> {

@@ -5,18 +5,20 @@
 //! ```
 
 use crate::equation::{Equation, Kind};
-use crate::print::article::{LeftSide, Row, Section, norm_of_steps, row, what_is_read, with_bar_unknowns};
+use crate::print::article::{
+    EquationLine, LeftSide, Section, norm_of_steps, quantity_heading, row, with_bar_unknowns,
+};
 use crate::program::{Label, Naming, Program, Step, Tree};
 use crate::symbol::{Binary, Operand, Symbol};
-use crate::touch::{self, Touch};
+use crate::touch::{self, ProbeTerms};
 use crate::vectors::{self, NamedVector};
 
 /// The program and the sections: the intermediate vectors of the outputs, and the adjoint vectors.
 pub(crate) fn sections(equation: &Equation) -> (Program, Vec<Section>) {
     let forth = &equation.vectors;
     let mut labels = vectors::labels(forth);
-    labels.extend(equation.follower_labels());
-    labels.extend(equation.touch.iter().flat_map(Touch::labels));
+    labels.extend(equation.driven_labels());
+    labels.extend(equation.touch.iter().flat_map(ProbeTerms::labels));
     let mut back: Vec<NamedVector> = Vec::new();
     let mut slopes: Vec<Operand> = Vec::new();
     if let (Kind::Length, true, Some(Operand::Node(distance))) =
@@ -54,7 +56,7 @@ pub(crate) fn sections(equation: &Equation) -> (Program, Vec<Section>) {
     let mut asked: Vec<Operand> = equation.outputs.clone();
     asked.extend(forth.iter().chain(&back).flat_map(|vector| vector.components));
     asked.extend(&slopes);
-    asked.extend(equation.followers.iter().map(|(_, value)| *value));
+    asked.extend(equation.driven_errors.iter().map(|(_, value)| *value));
     let mut program = Program::of(
         &equation.arena,
         equation.inputs(),
@@ -63,14 +65,14 @@ pub(crate) fn sections(equation: &Equation) -> (Program, Vec<Section>) {
         Naming::Labelled,
     );
     let (outputs, rest) = program.outputs.split_at(equation.outputs.len());
-    let (rest, followers) = rest.split_at(rest.len() - equation.followers.len());
+    let (rest, driven_errors) = rest.split_at(rest.len() - equation.driven_errors.len());
     let (vectors, slopes) = rest.split_at(rest.len() - slopes.len());
-    let followers = equation.followers.iter().zip(followers);
-    let followers = followers.map(|((variable, _), tree)| {
+    let driven_errors = equation.driven_errors.iter().zip(driven_errors);
+    let driven_errors = driven_errors.map(|((variable, _), tree)| {
         let label = Label::Quantity(variable.clone());
         row(LeftSide::Named(label.clone()), value_of(&program, &label, tree))
     });
-    let followers: Vec<Row> = followers.collect();
+    let driven_errors: Vec<EquationLine> = driven_errors.collect();
     let mut vectors = forth
         .iter()
         .chain(&back)
@@ -83,16 +85,16 @@ pub(crate) fn sections(equation: &Equation) -> (Program, Vec<Section>) {
             }
         });
     let mut sections: Vec<Section> = vectors.by_ref().take(forth.len()).collect();
-    if !followers.is_empty() {
+    if !driven_errors.is_empty() {
         let follow = Section {
             heading: "errors as functions of drivers".to_string(),
-            rows: followers,
+            rows: driven_errors,
         };
         sections.insert(0, follow);
     }
     let outputs = outputs.iter().enumerate();
     let mut read = Section {
-        heading: what_is_read(equation).to_string(),
+        heading: quantity_heading(equation).to_string(),
         rows: outputs
             .map(|(place, tree)| row(LeftSide::Output(place), tree.clone()))
             .collect(),
@@ -103,11 +105,11 @@ pub(crate) fn sections(equation: &Equation) -> (Program, Vec<Section>) {
             let own = program.steps.iter().find(|step| step.label == label)?;
             Some(row(LeftSide::Named(label), own.value.clone()))
         });
-        read.rows.splice(0..0, between.collect::<Vec<Row>>());
+        read.rows.splice(0..0, between.collect::<Vec<EquationLine>>());
     }
     let back: Vec<Section> = vectors.collect();
     let slopes = equation.parameters.iter().zip(slopes);
-    let slopes: Vec<Row> = slopes
+    let slopes: Vec<EquationLine> = slopes
         .map(|(parameter, tree)| row(LeftSide::Slope(0, parameter.clone()), tree.clone()))
         .collect();
     if let (Kind::Length, Some(bar)) = (equation.kind, forth.last()) {
@@ -149,7 +151,7 @@ pub(crate) fn sections(equation: &Equation) -> (Program, Vec<Section>) {
 }
 
 /// A coordinate of a named vector. An input, a constant or another name is written as such.
-fn component(program: &Program, vector: &NamedVector, trees: &[Tree], coordinate: usize) -> Row {
+fn component(program: &Program, vector: &NamedVector, trees: &[Tree], coordinate: usize) -> EquationLine {
     let label = vector.label(coordinate);
     let right = value_of(program, &label, &trees[coordinate]);
     row(LeftSide::Named(label), as_quotient(right))

@@ -4,7 +4,7 @@ use std::f64::consts::{PI, TAU};
 use std::fmt::Write;
 
 use crate::equation::{Equation, Kind};
-use crate::print::article::{Article, LeftSide, NoteKind, Row, terms_of};
+use crate::print::article::{Article, EquationLine, LeftSide, NoteKind, terms_of};
 use crate::print::dialect::{self, Dialect};
 use crate::print::notes;
 use crate::program::{Input, Label, Program};
@@ -228,7 +228,7 @@ pub(crate) fn print(equation: &Equation) -> String {
             let _ = writeln!(
                 page,
                 "{}{end}",
-                write_row(equation, &article.program, row, symbols)
+                write_line(equation, &article.program, row, symbols)
             );
         }
         page.push_str("\\end{align}\n");
@@ -259,7 +259,7 @@ pub(crate) fn print(equation: &Equation) -> String {
     page
 }
 
-fn write_row(equation: &Equation, program: &Program, row: &Row, symbols: Symbols) -> String {
+fn write_line(equation: &Equation, program: &Program, row: &EquationLine, symbols: Symbols) -> String {
     let spelling = Latex { program, symbols };
     let left = match &row.left {
         LeftSide::Named(name) => label(name, symbols),
@@ -275,7 +275,7 @@ fn write_row(equation: &Equation, program: &Program, row: &Row, symbols: Symbols
     let lines = dialect::lines(&terms_of(&row.right), &spelling, WIDTH, visible);
     let remark = match &row.remark {
         None => String::new(),
-        Some(NoteKind::NotSeen) => " \\quad\\text{(not observable)}".to_string(),
+        Some(NoteKind::NotObservable) => " \\quad\\text{(not observable)}".to_string(),
         Some(NoteKind::MultipleOf(other)) => {
             format!(" \\quad\\text{{(multiple of ${}$)}}", variable(other, symbols))
         }

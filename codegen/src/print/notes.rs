@@ -2,7 +2,7 @@
 
 use abbe_model::frames::Rotation;
 
-use crate::effect::Followed;
+use crate::effect::DriverQuantity;
 use crate::equation::{Equation, Form, Kind, Order};
 use crate::first_order::Column;
 use crate::variable::Variable;
@@ -112,7 +112,7 @@ fn range(equation: &Equation) -> String {
                 two_places(*low),
                 two_places(*high)
             )),
-            Variable::Driver(Followed::Direction(_)) => None,
+            Variable::Driver(DriverQuantity::Direction(_)) => None,
             Variable::Driver(followed) => Some(format!(
                 "{} {low} {unit} to {high} {unit}",
                 followed.text(),

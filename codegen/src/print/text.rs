@@ -145,7 +145,7 @@ pub(crate) fn print(equation: &Equation) -> String {
             );
             match &row.remark {
                 None => page.push('\n'),
-                Some(NoteKind::NotSeen) => page.push_str("   (not observable)\n"),
+                Some(NoteKind::NotObservable) => page.push_str("   (not observable)\n"),
                 Some(NoteKind::MultipleOf(other)) => {
                     let _ = writeln!(
                         page,

@@ -3,11 +3,11 @@
 use crate::collect::sum;
 use crate::equation::Equation;
 use crate::print::article::{
-    LeftSide, Row, Section, as_it_stands, binary, naming, row, terms_of, what_is_read,
+    EquationLine, LeftSide, Section, binary, named_or_expanded, naming, quantity_heading, row, terms_of,
 };
 use crate::program::{Label, Program, Tree};
 use crate::symbol::{Binary, Unary};
-use crate::touch::{self, Touch};
+use crate::touch::{self, ProbeTerms};
 use crate::vectors::NamedVector;
 
 /// Index of the first coordinate of the step in R among the names: after two vectors, `a`, `b`, `c` and `l_n`.
@@ -16,7 +16,7 @@ const STEP: usize = 10;
 /// The groups of stylus and step, and the distance in terms of them.
 pub(crate) fn groups(
     equation: &Equation,
-    touch: &Touch,
+    touch: &ProbeTerms,
     trees: &[Tree],
     complete: bool,
 ) -> (Program, Vec<Section>) {
@@ -32,7 +32,7 @@ pub(crate) fn groups(
     let program = naming(equation, labels);
     let step_trees: Vec<Tree> = way.map_or_else(Vec::new, |step| {
         step.components
-            .map(|part| as_it_stands(equation, &program, part))
+            .map(|part| named_or_expanded(equation, &program, part))
             .to_vec()
     });
     let dot = |a: usize, b: usize| {
@@ -52,12 +52,12 @@ pub(crate) fn groups(
                 .collect(),
         });
     }
-    let radius = as_it_stands(equation, &program, touch.radius);
+    let radius = named_or_expanded(equation, &program, touch.radius);
     let radius = (true, binary(Binary::Mul, radius.clone(), radius));
     let mut beyond = terms_of(&dot(0, 0));
     beyond.push(radius);
     let quadratic = [dot(3, 3), dot(0, 3), sum(beyond)];
-    let mut rows: Vec<Row> = touch::QUADRATIC
+    let mut rows: Vec<EquationLine> = touch::QUADRATIC
         .into_iter()
         .zip(quadratic)
         .map(|(label, tree)| row(LeftSide::Named(label), tree))
@@ -80,12 +80,12 @@ pub(crate) fn groups(
             },
         );
     }
-    rows.push(Row {
+    rows.push(EquationLine {
         approximate: !complete,
         ..row(LeftSide::Output(0), distance_of_steps(6, way.is_some()))
     });
     sections.push(Section {
-        heading: what_is_read(equation).to_string(),
+        heading: quantity_heading(equation).to_string(),
         rows,
     });
     (program, sections)

@@ -4,7 +4,7 @@ use std::f64::consts::{PI, TAU};
 use std::fmt::Write;
 
 use crate::equation::{Equation, Kind};
-use crate::print::article::{Article, LeftSide, NoteKind, Row, terms_of};
+use crate::print::article::{Article, EquationLine, LeftSide, NoteKind, terms_of};
 use crate::print::dialect::{self, Dialect};
 use crate::print::latex::{capital, of_sin_cos};
 use crate::print::notes;
@@ -162,7 +162,7 @@ pub(crate) fn print(equation: &Equation) -> String {
         let rows: Vec<String> = section
             .rows
             .iter()
-            .map(|row| write_row(equation, &article.program, row, symbols))
+            .map(|row| write_line(equation, &article.program, row, symbols))
             .collect();
         let heading = escape(&capital(&section.heading));
         let _ = writeln!(page, "\n{heading}:\n$\n{}\n$", rows.join(" \\\n"));
@@ -185,7 +185,7 @@ pub(crate) fn print(equation: &Equation) -> String {
     page
 }
 
-fn write_row(equation: &Equation, program: &Program, row: &Row, symbols: Symbols) -> String {
+fn write_line(equation: &Equation, program: &Program, row: &EquationLine, symbols: Symbols) -> String {
     let spelling = Typst { program, symbols };
     let left = match &row.left {
         LeftSide::Named(name) => label(name, symbols),
@@ -201,7 +201,7 @@ fn write_row(equation: &Equation, program: &Program, row: &Row, symbols: Symbols
     let lines = dialect::lines(&terms_of(&row.right), &spelling, WIDTH, visible);
     let remark = match &row.remark {
         None => String::new(),
-        Some(NoteKind::NotSeen) => " quad #[(not observable)]".to_string(),
+        Some(NoteKind::NotObservable) => " quad #[(not observable)]".to_string(),
         Some(NoteKind::MultipleOf(other)) => {
             format!(" quad #[(multiple of ${}$)]", variable(other, symbols))
         }

@@ -3,7 +3,9 @@
 use std::f64::consts::{PI, TAU};
 
 use abbe_codegen::evaluate::evaluate_f64;
-use abbe_codegen::{CodegenError, Equation, Followed, Language, Options, Order, Source, Subject, Variable};
+use abbe_codegen::{
+    CodegenError, DriverQuantity, Equation, Language, Options, Order, Source, Subject, Variable,
+};
 use abbe_model::chain::Machine;
 use abbe_model::component::ErrorName;
 use abbe_model::effect::{Component, Driver, Effect, Shape};
@@ -56,10 +58,12 @@ fn bases(driver: &str, shape: Shape, at: At) -> Vec<f64> {
     let options = with(vec![effect("EYX", driver, shape)]);
     let equation = Equation::of(&machine, &Ball, &[], &options).expect("an equation");
     let variable = |variable: &Variable| match variable {
-        Variable::Position { .. } | Variable::Driver(Followed::Time | Followed::Temperature) => at.q,
-        Variable::Driver(Followed::Direction(_)) => at.direction,
-        Variable::Driver(Followed::Rate(..)) => at.rate,
-        Variable::Driver(Followed::SinceReversal(..)) => at.way,
+        Variable::Position { .. } | Variable::Driver(DriverQuantity::Time | DriverQuantity::Temperature) => {
+            at.q
+        }
+        Variable::Driver(DriverQuantity::Direction(_)) => at.direction,
+        Variable::Driver(DriverQuantity::Rate(..)) => at.rate,
+        Variable::Driver(DriverQuantity::SinceReversal(..)) => at.way,
         Variable::Coefficient(coefficient) => coefficient.number as f64,
         other => panic!("{other:?} has no place here"),
     };

@@ -108,13 +108,13 @@ fn options(order: Order) -> Options {
 }
 
 /// Positions of the axes in the machine's order, and errors in the equation's order.
-struct Point {
+struct State {
     lengths: Vec<(String, f64)>,
     positions: Vec<f64>,
     small: Vec<f64>,
 }
 
-impl Point {
+impl State {
     fn length(&self, name: &str) -> f64 {
         self.lengths
             .iter()
@@ -161,7 +161,7 @@ fn six(error: [f64; 6]) -> Matrix4<f64> {
 }
 
 /// Distance from the stylus to the intersection of the probing line with the cylinder, mm.
-fn geometry(touch: Touch, parameters: &[Variable], point: &Point) -> f64 {
+fn geometry(touch: Touch, parameters: &[Variable], point: &State) -> f64 {
     let machine = touch.machine();
     let error = |axis: &str, kind: ErrorKind| -> [f64; 6] {
         let mut six = [0.0; 6];
@@ -256,7 +256,7 @@ fn geometry(touch: Touch, parameters: &[Variable], point: &Point) -> f64 {
     inside
 }
 
-fn point(touch: Touch, parameters: &[Variable], size: [f64; 2], random: &mut impl rand::Rng) -> Point {
+fn point(touch: Touch, parameters: &[Variable], size: [f64; 2], random: &mut impl rand::Rng) -> State {
     let lengths: Vec<(String, f64)> = LENGTHS
         .iter()
         .map(|(name, value)| (name.to_string(), value * random.random_range(0.9..1.1)))
@@ -281,7 +281,7 @@ fn point(touch: Touch, parameters: &[Variable], size: [f64; 2], random: &mut imp
         draw(-size, size)
     });
     let small: Vec<f64> = small.collect();
-    Point {
+    State {
         lengths,
         positions,
         small,

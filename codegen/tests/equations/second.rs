@@ -1,7 +1,7 @@
 //! Tests of second derivatives against central differences of the dual-number gradient at large random errors.
 
 use abbe_codegen::evaluate::evaluate;
-use abbe_codegen::{Equation, Options, Source, Subject, Value, Variable};
+use abbe_codegen::{Equation, Options, Source, Subject, Variable, VariableValue};
 use abbe_model::chain::{AxisPosition, Machine};
 use abbe_model::component::ErrorName;
 use abbe_model::frames::Rotation;
@@ -41,14 +41,14 @@ impl Source for AnySocket {
 }
 
 /// Values of all variables.
-struct Point {
+struct State {
     lengths: Vec<(String, f64)>,
     positions: Vec<(String, f64)>,
     small: Vec<f64>,
 }
 
-fn draw(equation: &Equation, random: &mut impl rand::Rng) -> Point {
-    let mut point = Point {
+fn draw(equation: &Equation, random: &mut impl rand::Rng) -> State {
+    let mut point = State {
         lengths: Vec::new(),
         positions: Vec::new(),
         small: Vec::new(),
@@ -86,7 +86,7 @@ fn named(values: &[(String, f64)], name: &str) -> f64 {
 }
 
 /// The gradient by dual numbers through the model's chain: output, parameter.
-fn gradient(source: &impl Source, machine: &Machine, errors: &[ErrorName], at: &Point) -> Vec<Vec<f64>> {
+fn gradient(source: &impl Source, machine: &Machine, errors: &[ErrorName], at: &State) -> Vec<Vec<f64>> {
     let length = |name: &str| named(&at.lengths, name);
     let subject = source.subject(&length);
     let state: Vec<_> = machine
@@ -137,7 +137,7 @@ fn agrees(what: &str, source: &impl Source, machine: &Machine, errors: &[ErrorNa
     for _ in 0..5 {
         let mut point = draw(&equation, &mut random);
         let value = |variable: &Variable| {
-            Value::<f64>::Nominal(match variable {
+            VariableValue::<f64>::Nominal(match variable {
                 Variable::Length(name) => named(&point.lengths, name),
                 Variable::Position { axis, .. } => named(&point.positions, axis),
                 small => {

@@ -223,7 +223,7 @@ fn eq_3_21_with_the_printed_d_and_with_the_right_one() {
         // Without errors, at C = 0 and H = Z_CA, the distance must equal the length of the bar; only the correct D satisfies this.
         let nominal = evaluate::<Symbol<'_>>(arena, &[chain.operand()], |variable| {
             let zero = arena.symbol(Operand::constant(0.0));
-            abbe_codegen::Value::Nominal(match variable {
+            abbe_codegen::VariableValue::Nominal(match variable {
                 Variable::Error(_) | Variable::Unknown(_) => zero,
                 Variable::Position { axis, .. } if axis == "C" => zero,
                 Variable::Length(name) if name == "H" => length(arena, "Z_CA"),

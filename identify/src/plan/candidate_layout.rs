@@ -261,7 +261,7 @@ impl Choice<'_> {
                 if outward.is_some_and(|outward| dot(wanted, outward) < -MIN_RADIUS_MM) {
                     return None;
                 }
-                let at = placing::standing(machine, &station, self.at, wanted)?;
+                let at = placing::positions_for_bar(machine, &station, self.at, wanted)?;
                 let motion = Motion::Sweep {
                     axis: self.axis,
                     from: self.sweep.from,

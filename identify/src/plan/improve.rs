@@ -82,7 +82,7 @@ pub struct NamedUncertainty {
     pub unit: String,
 }
 
-/// A candidate test that comes close.
+/// One of the best candidate tests.
 #[derive(Clone, Debug, Serialize, JsonSchema)]
 pub struct AlternativeTest {
     /// Description of the test.

@@ -108,7 +108,7 @@ impl MachineWithErrors<'_> {
     fn position_text(&self, positions: &[f64]) -> String {
         let axes = self.machine.axes.iter().zip(positions);
         let each: Vec<String> = axes
-            .map(|(axis, q)| format!("{} {:.3}", axis.name, axis.kind.outside(*q)))
+            .map(|(axis, q)| format!("{} {:.3}", axis.name, axis.kind.to_display(*q)))
             .collect();
         each.join(", ")
     }

@@ -232,7 +232,7 @@ impl<V: Clone + PartialEq> Arena<V> {
     }
 
     /// Whether the variable itself is used, not only its sine or cosine.
-    pub fn is_own_symbol(&self, variable: &V) -> bool {
+    pub fn is_used_directly(&self, variable: &V) -> bool {
         let nodes = self.nodes.borrow();
         let variables = self.variables.borrow();
         let itself = |operand: Operand| {

@@ -294,7 +294,7 @@ pub fn displaced<S: Scalar>(
 }
 
 /// The small motion given by the first six parameters, if one of them is included.
-fn moved<S: Scalar>(unknown: &impl Fn(usize) -> Option<S>) -> Option<SmallMotion<S>> {
+fn pose_error<S: Scalar>(unknown: &impl Fn(usize) -> Option<S>) -> Option<SmallMotion<S>> {
     let carried = (0..6).any(|i| unknown(i).is_some());
     carried.then(|| {
         let six = std::array::from_fn(|i| unknown(i).unwrap_or_else(|| S::constant(0.0)));

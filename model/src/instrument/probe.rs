@@ -11,7 +11,7 @@
 //! This is the nearer of the two intersections of the line with the surface. The distance is positive if the surface lies ahead. A form
 //! deviation of `w` outwards reduces the distance by `w`. The "measured radius less the target" of the literature is `−d`.
 
-use super::{InstrumentUnknown, SharedBy, displaced, moved};
+use super::{InstrumentUnknown, SharedBy, displaced, pose_error};
 use crate::chain::{AxisPosition, BodyErrors, Machine};
 use crate::frames::Point;
 use crate::scalar::{Nominal, Scalar};
@@ -102,7 +102,7 @@ impl<N: Nominal> Probe<N> {
         let along = machine
             .workpiece_point(state, &none, Point::nominal(tip))
             .minus(foot);
-        let inward = across(foot.minus(stylus), along);
+        let inward = perpendicular(foot.minus(stylus), along);
         (inward, Some(inward.norm()))
     }
 
@@ -119,7 +119,7 @@ impl<N: Nominal> Probe<N> {
     }
 
     /// Stylus and probing direction in the frame of the artefact.
-    pub fn sight<S: Scalar<Nominal = N>>(
+    pub fn geometry<S: Scalar<Nominal = N>>(
         &self,
         machine: &Machine,
         state: &[AxisPosition<N>],
@@ -132,7 +132,7 @@ impl<N: Nominal> Probe<N> {
         let stylus = machine.table_point(state, errors, stylus);
         let mut from_artefact = stylus.minus(Point::nominal(self.artefact));
         let mut direction = ahead.minus(stylus);
-        if let Some(pose) = moved(&unknown) {
+        if let Some(pose) = pose_error(&unknown) {
             from_artefact = pose.pull(from_artefact);
             direction = pose.rotate_back(direction);
         }
@@ -144,8 +144,8 @@ impl<N: Nominal> Probe<N> {
             }
         }
         ProbeGeometry {
-            stylus: across(from_artefact, axis),
-            step: across(direction, axis),
+            stylus: perpendicular(from_artefact, axis),
+            step: perpendicular(direction, axis),
             radius,
             step_length,
         }
@@ -159,7 +159,7 @@ impl<N: Nominal> Probe<N> {
         errors: &[BodyErrors<S>],
         unknown: impl Fn(usize) -> Option<S>,
     ) -> S {
-        self.sight(machine, state, errors, unknown).distance()
+        self.geometry(machine, state, errors, unknown).distance()
     }
 }
 
@@ -169,7 +169,7 @@ fn dot<S: Scalar>(a: Point<S>, b: Point<S>) -> S {
 }
 
 /// The component of `v` perpendicular to the unit vector `along`.
-fn across<S: Scalar>(v: Point<S>, along: Point<S>) -> Point<S> {
+fn perpendicular<S: Scalar>(v: Point<S>, along: Point<S>) -> Point<S> {
     let part = dot(v, along);
     v.minus(Point(along.0.map(|x| x * part)))
 }

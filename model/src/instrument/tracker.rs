@@ -3,7 +3,7 @@
 //! `m = B · E · P`: `P` is the target in R through the chain, `E` a small motion (the pose parameters) and `B` a fixed rigid motion. `B`
 //! keeps the estimated angles small for any orientation of the tracker.
 
-use super::{InstrumentUnknown, SharedBy, displaced, moved};
+use super::{InstrumentUnknown, SharedBy, displaced, pose_error};
 use crate::chain::{AxisPosition, BodyErrors, Machine};
 use crate::frames::Point;
 use crate::scalar::{Nominal, Scalar};
@@ -53,7 +53,7 @@ impl<N: Nominal> Tracker<N> {
         unknown: impl Fn(usize) -> Option<S>,
     ) -> Point<S> {
         let mut point = self.target_point(machine, state, errors, &unknown);
-        if let Some(pose) = moved(&unknown) {
+        if let Some(pose) = pose_error(&unknown) {
             point = pose.push(point);
         }
         let [x, y, z] = point.0;

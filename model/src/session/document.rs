@@ -171,13 +171,13 @@ impl<'a> Table<'a> {
         Some(self.entries.remove(index))
     }
 
-    /// The value of a required key; `wanted` names the expected value.
-    pub fn need(&mut self, key: &'static str, wanted: &str) -> Result<Value<'a>, ModelError> {
+    /// The value of a required key; `expected` names the expected value.
+    pub fn require(&mut self, key: &'static str, expected: &str) -> Result<Value<'a>, ModelError> {
         match self.take(key) {
             Some(value) => Ok(value),
             None => Err(self.error(
-                format!("{} has no `{key}`", self.called()),
-                Some(format!("add `{key}`: {wanted}")),
+                format!("{} has no `{key}`", self.display_name()),
+                Some(format!("add `{key}`: {expected}")),
             )),
         }
     }
@@ -187,7 +187,7 @@ impl<'a> Table<'a> {
         if self.entries.len() > MAX_ITEMS {
             let message = format!(
                 "{} has {} entries; the limit is {MAX_ITEMS}",
-                self.called(),
+                self.display_name(),
                 self.entries.len()
             );
             return Err(self.error(message, None));
@@ -203,7 +203,7 @@ impl<'a> Table<'a> {
                 let mut known: Vec<&str> = self.asked.clone();
                 known.sort_unstable();
                 known.dedup();
-                let message = format!("{} has the unknown key `{}`", self.called(), entry.key);
+                let message = format!("{} has the unknown key `{}`", self.display_name(), entry.key);
                 Err(self.source.error(
                     entry.key_span.clone(),
                     message,
@@ -214,7 +214,7 @@ impl<'a> Table<'a> {
     }
 
     /// The name of the table in messages.
-    pub fn called(&self) -> &str {
+    pub fn display_name(&self) -> &str {
         if self.name.is_empty() {
             "the file"
         } else {

@@ -8,7 +8,7 @@ pub mod limits;
 pub mod motion;
 pub mod placing;
 mod plan;
-mod reach;
+mod plausibility;
 pub mod read;
 pub mod readings;
 pub mod rewrite;

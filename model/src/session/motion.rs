@@ -185,20 +185,20 @@ pub(crate) fn beyond_travel(machine: &Machine, readings: &Readings) -> Option<St
             let beyond = positions
                 .iter()
                 .find(|&&q| q < least - slack || q > greatest + slack)?;
-            let outside = |q: f64| axis.kind.outside(q);
+            let displayed = |q: f64| axis.kind.to_display(q);
             Some(format!(
                 "axis `{}` goes to {:.3} {unit}; its travel is {} to {} {unit}",
                 axis.name,
-                outside(*beyond),
-                outside(least),
-                outside(greatest),
+                displayed(*beyond),
+                displayed(least),
+                displayed(greatest),
                 unit = axis.kind.unit(),
             ))
         })
 }
 
 /// The axes that a motion names.
-pub(crate) fn moved(motion: Option<&Motion>) -> Vec<usize> {
+pub(crate) fn named_axes(motion: Option<&Motion>) -> Vec<usize> {
     match motion {
         Some(Motion::Sweep { axis, .. } | Motion::Follow { axis, .. }) => vec![*axis],
         Some(Motion::Circle { first, second, .. }) => vec![*first, *second],
@@ -207,7 +207,7 @@ pub(crate) fn moved(motion: Option<&Motion>) -> Vec<usize> {
 }
 
 /// Sets linear axes that a circle does not move, and that the test does not state, so that the centre of the circle lies in its plane.
-pub(crate) fn stand(
+pub(crate) fn centre_circle(
     machine: &Machine,
     station: &Station<f64>,
     motion: Option<&Motion>,
@@ -222,13 +222,13 @@ pub(crate) fn stand(
             centre,
             ..
         }),
-    ) = (plan::pair(station), motion)
+    ) = (plan::bar_between_points(station), motion)
     {
         let open: Vec<usize> = plan::linear_axes(machine)
             .into_iter()
             .filter(|axis| !listed[*axis] || axis == first || axis == second)
             .collect();
-        let placed = plan::placed(machine, &pair, at, &open, *centre);
+        let placed = plan::solve_linear_axes(machine, &pair, at, &open, *centre);
         for axis in open {
             if axis != *first && axis != *second {
                 at[axis] = placed.0[axis];

@@ -5,7 +5,7 @@ use crate::chain::{BodyErrors, Machine};
 use crate::instrument::ballbar::BallBar;
 
 /// Largest accepted position error of the balls, mm.
-const MISSED_MM: f64 = 1e-6;
+const POSITION_TOLERANCE_MM: f64 = 1e-6;
 
 /// The two balls in R, nominal: workpiece ball, spindle ball; mm.
 pub fn balls(machine: &Machine, bar: &BallBar<f64>, at: &[f64]) -> ([f64; 3], [f64; 3]) {
@@ -15,11 +15,16 @@ pub fn balls(machine: &Machine, bar: &BallBar<f64>, at: &[f64]) -> ([f64; 3], [f
     (workpiece.0, spindle.0)
 }
 
-/// The positions of all axes at which the linear axes place the spindle ball at `wanted` from the workpiece ball (mm, in R), with the
+/// The positions of all axes at which the linear axes place the spindle ball at `requested` from the workpiece ball (mm, in R), with the
 /// rotary axes `at` their positions. `None` if that is impossible.
-pub fn standing(machine: &Machine, bar: &BallBar<f64>, at: &[f64], wanted: [f64; 3]) -> Option<Vec<f64>> {
-    let (state, missed) = plan::placed(machine, bar, at, &plan::linear_axes(machine), wanted);
-    (missed <= MISSED_MM).then_some(state)
+pub fn positions_for_bar(
+    machine: &Machine,
+    bar: &BallBar<f64>,
+    at: &[f64],
+    requested: [f64; 3],
+) -> Option<Vec<f64>> {
+    let (state, missed) = plan::solve_linear_axes(machine, bar, at, &plan::linear_axes(machine), requested);
+    (missed <= POSITION_TOLERANCE_MM).then_some(state)
 }
 
 /// A point of an axis and its direction in R, carried by the axes between it and the bed.

@@ -17,7 +17,7 @@ const BETWEEN_RUNS_S: f64 = 3.0;
 /// the rounding of the solver, so that an axis that need not move does not.
 const STEPS_PER_MM: f64 = 1e10;
 /// Largest accepted deviation of the balls from the requested path, mm.
-const MISSED_MM: f64 = 1e-6;
+const POSITION_TOLERANCE_MM: f64 = 1e-6;
 
 /// A message and what to do.
 type Fault = (String, String);
@@ -53,7 +53,7 @@ pub(super) fn states(machine: &Machine, test: &Test, motion: &Motion) -> Result<
             runs,
             both_directions,
         } => {
-            let bar = pair(&test.station).unwrap_or(BallBar {
+            let bar = bar_between_points(&test.station).unwrap_or(BallBar {
                 workpiece_ball: [0.0; 3],
                 spindle_ball: [0.0; 3],
                 bar: 0.0,
@@ -75,26 +75,26 @@ pub(super) fn states(machine: &Machine, test: &Test, motion: &Motion) -> Result<
             both_directions,
             offset,
         } => {
-            let Some(mut bar) = pair(&test.station) else {
+            let Some(mut bar) = bar_between_points(&test.station) else {
                 return Err((
                     format!("test \"{}\" has no point of the table to follow", test.name),
                     "a path of kind \"follow\" needs a ball bar, an R-test or a probe".into(),
                 ));
             };
             if *offset == FollowOffset::None {
-                bar.workpiece_ball = under_the_tool(machine, &bar, &test.at);
+                bar.workpiece_ball = table_point_at_tool(machine, &bar, &test.at);
             }
             let linear = linear_axes(machine);
             let along = steps(*from, *to, *step);
             traversals(machine, &along, *speed, *runs, *both_directions, |q| {
                 let mut at = test.at.clone();
                 at[*axis] = q;
-                let wanted = offset_vector(machine, &bar, &at, *axis, *offset)?;
-                let (mut state, missed) = placed(machine, &bar, &at, &linear, wanted);
+                let requested = offset_vector(machine, &bar, &at, *axis, *offset)?;
+                let (mut state, missed) = solve_linear_axes(machine, &bar, &at, &linear, requested);
                 for axis in &linear {
                     state[*axis] = (state[*axis] * STEPS_PER_MM).round() / STEPS_PER_MM + 0.0;
                 }
-                if missed > MISSED_MM {
+                if missed > POSITION_TOLERANCE_MM {
                     return Err((
                         format!(
                             "test \"{}\": the linear axes cannot keep the balls on the path; the deviation is {missed:.3} mm",
@@ -111,7 +111,7 @@ pub(super) fn states(machine: &Machine, test: &Test, motion: &Motion) -> Result<
 }
 
 /// The instrument's points of table and tool, as the ends of a bar.
-pub(super) fn pair(station: &Station<f64>) -> Option<BallBar<f64>> {
+pub(super) fn bar_between_points(station: &Station<f64>) -> Option<BallBar<f64>> {
     if let Station::BallBar(bar) = station {
         return Some(bar.clone());
     }
@@ -123,7 +123,7 @@ pub(super) fn pair(station: &Station<f64>) -> Option<BallBar<f64>> {
 }
 
 /// The point of the table frame at the tool point.
-fn under_the_tool(machine: &Machine, bar: &BallBar<f64>, at: &[f64]) -> [f64; 3] {
+fn table_point_at_tool(machine: &Machine, bar: &BallBar<f64>, at: &[f64]) -> [f64; 3] {
     let state = positions(machine, at);
     let none = vec![BodyErrors::<f64>::NONE; machine.axes.len()];
     let tool = machine.tool_point::<f64>(&state, &none, Point(bar.spindle_ball));
@@ -197,7 +197,7 @@ pub(super) fn on_circle(
     else {
         return None;
     };
-    let bar = pair(&test.station)?;
+    let bar = bar_between_points(&test.station)?;
     let circle = Circle::new(machine, &bar, &test.at, [*first, *second], *centre);
     Some(circle.map(|circle| angles.iter().map(|angle| circle.state(*radius, *angle)).collect()))
 }
@@ -229,7 +229,7 @@ impl Circle {
                 "a circle needs two linear axes at right angles".into(),
             ));
         }
-        let (state, _) = placed(machine, bar, at, &axes, centre);
+        let (state, _) = solve_linear_axes(machine, bar, at, &axes, centre);
         Ok(Circle {
             at: state.clone(),
             axes,
@@ -254,18 +254,18 @@ pub(super) fn linear_axes(machine: &Machine) -> Vec<usize> {
         .collect()
 }
 
-/// Moves the `open` axes so that the spindle ball is nominally at `wanted` from the workpiece ball, in the least-squares sense. Returns
+/// Moves the `open` axes so that the spindle ball is nominally at `requested` from the workpiece ball, in the least-squares sense. Returns
 /// the positions of all axes, and the remaining distance, mm. The difference of the balls is affine in the linear axes, so this is one
 /// linear solve.
-pub(super) fn placed(
+pub(super) fn solve_linear_axes(
     machine: &Machine,
     bar: &BallBar<f64>,
     at: &[f64],
     open: &[usize],
-    wanted: [f64; 3],
+    requested: [f64; 3],
 ) -> (Vec<f64>, f64) {
     let apart = spindle_from_workpiece(machine, bar, at);
-    let rest = DVector::from_iterator(3, (0..3).map(|i| wanted[i] - apart[i]));
+    let rest = DVector::from_iterator(3, (0..3).map(|i| requested[i] - apart[i]));
     let moves: Vec<[f64; 3]> = open
         .iter()
         .map(|&axis| relative_move(machine, bar, at, axis))

@@ -39,7 +39,7 @@ pub fn with_noise(original: &str, file: &Path, noise_um: f64) -> Result<String, 
     let (noise, kind) = (table.take("noise_um"), table.take("kind"));
     let text = match (noise, kind) {
         (Some(noise), _) => replaced(&source.text, noise.span, &noise_um.to_string()),
-        (None, Some(kind)) => behind(&source.text, &kind, &format!("noise_um = {noise_um}")),
+        (None, Some(kind)) => insert_after(&source.text, &kind, &format!("noise_um = {noise_um}")),
         (None, None) => source.text.clone(),
     };
     Ok(text)
@@ -50,7 +50,7 @@ pub fn with_noise(original: &str, file: &Path, noise_um: f64) -> Result<String, 
 ///
 /// # Errors
 /// If the text is not a session, or if one of the two folders does not exist.
-pub fn moved(
+pub fn relocated(
     original: &str,
     file: &Path,
     folder: &Path,
@@ -162,7 +162,7 @@ fn replaced(text: &str, span: Range<usize>, new: &str) -> String {
 }
 
 /// Inserts a new key after a value: on its own line, or after a comma in an inline table.
-fn behind(text: &str, value: &Value<'_>, new: &str) -> String {
+fn insert_after(text: &str, value: &Value<'_>, new: &str) -> String {
     let end = value.span.end;
     let line_end = end + text[end..].find('\n').unwrap_or(text.len() - end);
     let rest = text[end..line_end].trim_start();
@@ -208,14 +208,14 @@ mod tests {
                        [[test]]\nname = \"B\"\ndata = \"b.csv\"\n\n[[test]]\nname = \"C\"\ndata = \"/c.csv\"\n";
         let file = at("ours/session.toml");
         let elsewhere = at("ours/elsewhere");
-        let moved = |folder: &str| moved(session, &file, &at(folder), Some(&elsewhere)).unwrap();
+        let relocated_to = |folder: &str| relocated(session, &file, &at(folder), Some(&elsewhere)).unwrap();
         let there = session
             .replace("../machine.toml", "../../machine.toml")
             .replace("data/a.csv", "../../ours/data/a.csv");
-        assert_eq!(moved("theirs/next"), there);
-        assert_eq!(moved("ours"), session);
+        assert_eq!(relocated_to("theirs/next"), there);
+        assert_eq!(relocated_to("ours"), session);
         assert_eq!(
-            moved("ours/data"),
+            relocated_to("ours/data"),
             session.replace("../", "../../").replace("data/a", "a")
         );
     }

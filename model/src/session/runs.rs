@@ -7,11 +7,11 @@ use super::readings::Readings;
 use crate::words::counted;
 
 /// A run is a forward and backward run if its net advance is less than this fraction of its path length.
-const ONE_WAY: f64 = 0.5;
+const MIN_ADVANCE: f64 = 0.5;
 
 /// A description of the difference between the runs of the data and those of the stated motion, if any. Data without a `run` column are
 /// not compared.
-pub(crate) fn unlike_stated(motion: Option<&Motion>, readings: &Readings) -> Option<String> {
+pub(crate) fn difference_from_stated(motion: Option<&Motion>, readings: &Readings) -> Option<String> {
     let (Motion::Sweep {
         runs,
         both_directions,
@@ -35,8 +35,8 @@ pub(crate) fn unlike_stated(motion: Option<&Motion>, readings: &Readings) -> Opt
     }
     let (mut forward, mut backward, mut turning) = (0, 0, Vec::new());
     for run in readings.runs() {
-        let (net, whole) = way(motion?, readings, &run);
-        if whole > 0.0 && net.abs() < ONE_WAY * whole {
+        let (net, whole) = advance_and_length(motion?, readings, &run);
+        if whole > 0.0 && net.abs() < MIN_ADVANCE * whole {
             turning.push(readings.run[run.start].to_string());
         } else if net > 0.0 {
             forward += 1;
@@ -67,7 +67,7 @@ pub(crate) fn unlike_stated(motion: Option<&Motion>, readings: &Readings) -> Opt
 }
 
 /// Net advance of a run in the direction of the motion, and its total path length: along an axis, or around a circle by the swept area.
-fn way(motion: &Motion, readings: &Readings, run: &Range<usize>) -> (f64, f64) {
+fn advance_and_length(motion: &Motion, readings: &Readings, run: &Range<usize>) -> (f64, f64) {
     let sum = |steps: &mut dyn Iterator<Item = f64>| {
         steps.fold((0.0, 0.0), |(net, whole), step| (net + step, whole + step.abs()))
     };

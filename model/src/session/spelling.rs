@@ -9,19 +9,19 @@ pub(crate) fn known_names(found: &str, known: &[&str]) -> String {
     } else {
         format!("known: {}", known.join(", "))
     };
-    match nearest(found, known) {
+    match most_similar(found, known) {
         Some(near) => format!("did you mean `{near}`? ({all})"),
         None => all,
     }
 }
 
 /// The start of a help text: a suggestion of the most similar known name, or nothing.
-pub(crate) fn meant(found: &str, known: &[impl AsRef<str>]) -> String {
-    nearest(found, known).map_or(String::new(), |near| format!("did you mean `{near}`? "))
+pub(crate) fn suggestion(found: &str, known: &[impl AsRef<str>]) -> String {
+    most_similar(found, known).map_or(String::new(), |near| format!("did you mean `{near}`? "))
 }
 
 /// The most similar known name, if any is similar.
-fn nearest<'k>(found: &str, known: &'k [impl AsRef<str>]) -> Option<&'k str> {
+fn most_similar<'k>(found: &str, known: &'k [impl AsRef<str>]) -> Option<&'k str> {
     // No name is longer; the limit bounds the cost for very long keys.
     let lower: String = found.chars().take(64).collect::<String>().to_lowercase();
     known
@@ -59,15 +59,15 @@ mod tests {
             ("noise", "noise_um"),
             ("y", "x"),
         ] {
-            assert_eq!(nearest(found, &KEYS), Some(near), "{found}");
+            assert_eq!(most_similar(found, &KEYS), Some(near), "{found}");
         }
         // Short names allow one edit, longer ones one more per four letters.
-        assert_eq!(nearest("zz", &KEYS), None);
-        assert_eq!(nearest("nosieum", &KEYS), Some("noise_um"));
-        assert_eq!(nearest("noise_abc", &KEYS), Some("noise_um"));
-        assert_eq!(nearest("no1234um", &KEYS), None);
-        assert_eq!(nearest(&"s".repeat(100_000), &KEYS), None);
-        assert_eq!(nearest("sweep", &[""; 0]), None);
+        assert_eq!(most_similar("zz", &KEYS), None);
+        assert_eq!(most_similar("nosieum", &KEYS), Some("noise_um"));
+        assert_eq!(most_similar("noise_abc", &KEYS), Some("noise_um"));
+        assert_eq!(most_similar("no1234um", &KEYS), None);
+        assert_eq!(most_similar(&"s".repeat(100_000), &KEYS), None);
+        assert_eq!(most_similar("sweep", &[""; 0]), None);
     }
 
     #[test]
@@ -78,7 +78,7 @@ mod tests {
         );
         assert_eq!(known_names("at", &["sweep", "path"]), "known: sweep, path");
         assert_eq!(known_names("at", &[]), "no key is allowed here");
-        assert_eq!(meant("swep", &["sweep"]), "did you mean `sweep`? ");
-        assert_eq!(meant("at", &["sweep"]), "");
+        assert_eq!(suggestion("swep", &["sweep"]), "did you mean `sweep`? ");
+        assert_eq!(suggestion("at", &["sweep"]), "");
     }
 }

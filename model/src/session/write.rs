@@ -63,7 +63,7 @@ pub fn readings_text(machine: &Machine, station: &Station<f64>, readings: &Readi
             cells.push(run.to_string());
         }
         for (axis, column) in machine.axes.iter().zip(&readings.positions) {
-            cells.push(decimal(axis.kind.outside(column[row])));
+            cells.push(decimal(axis.kind.to_display(column[row])));
         }
         if let Some(temperature) = readings.temperature_c.get(row) {
             cells.push(decimal(*temperature));
@@ -275,7 +275,7 @@ pub fn with_data(original: &str, file: &Path, data: &[(String, String)]) -> Resu
     if let Some(tests) = source.parse()?.take("test") {
         for item in tests.list("tables [[test]]")? {
             let mut table = item.table("[[test]]".into())?;
-            let name = table.need("name", "a name")?;
+            let name = table.require("name", "a name")?;
             let text = name.text()?;
             let Some((_, data)) = data.iter().find(|(test, _)| *test == text) else {
                 continue;

@@ -38,7 +38,7 @@ impl<'a> Value<'a> {
     }
 
     /// An error with the found value and the expected one.
-    pub fn unlike(&self, wanted: &str) -> ModelError {
+    pub fn unexpected(&self, expected: &str) -> ModelError {
         let found = match &self.value {
             DeValue::String(text) => format!("the text \"{text}\""),
             DeValue::Integer(_) | DeValue::Float(_) => "a number".to_string(),
@@ -47,7 +47,7 @@ impl<'a> Value<'a> {
             DeValue::Array(items) => format!("a list of {}", items.len()),
             DeValue::Table(_) => "a table".to_string(),
         };
-        self.error(format!("`{}` is {found}; {wanted} is expected", self.key), None)
+        self.error(format!("`{}` is {found}; {expected} is expected", self.key), None)
     }
 
     /// The value as a text.
@@ -63,7 +63,7 @@ impl<'a> Value<'a> {
                     Some("remove it".into()),
                 )),
             },
-            _ => Err(self.unlike("a text in quotes")),
+            _ => Err(self.unexpected("a text in quotes")),
         }
     }
 
@@ -85,7 +85,9 @@ impl<'a> Value<'a> {
                 None => Ok(text.trim().to_string()),
                 Some(_) => self.text(),
             },
-            DeValue::Array(_) | DeValue::Table(_) => Err(self.unlike("a text in quotes, a number or a date")),
+            DeValue::Array(_) | DeValue::Table(_) => {
+                Err(self.unexpected("a text in quotes, a number or a date"))
+            }
         }
     }
 
@@ -95,12 +97,14 @@ impl<'a> Value<'a> {
     }
 
     /// true or false.
-    pub fn truth(&self) -> Result<bool, ModelError> {
-        self.value.as_bool().ok_or_else(|| self.unlike("true or false"))
+    pub fn boolean(&self) -> Result<bool, ModelError> {
+        self.value
+            .as_bool()
+            .ok_or_else(|| self.unexpected("true or false"))
     }
 
     /// A number within [`limits::LARGEST`], possibly infinite, never NaN.
-    pub fn number_or_inf(&self, wanted: &str) -> Result<f64, ModelError> {
+    pub fn number_or_inf(&self, expected: &str) -> Result<f64, ModelError> {
         let number = match &self.value {
             DeValue::Integer(integer) => {
                 i64::from_str_radix(&integer.as_str().replace('_', ""), integer.radix())
@@ -114,13 +118,13 @@ impl<'a> Value<'a> {
         };
         match number {
             Some(number) if f64::is_nan(number) => {
-                Err(self.error(format!("`{}` is NaN; {wanted} is expected", self.key), None))
+                Err(self.error(format!("`{}` is NaN; {expected} is expected", self.key), None))
             }
             Some(number) => match limits::too_large(number) {
                 Some(fault) => Err(self.error(format!("`{}` is {fault}", self.key), None)),
                 None => Ok(number),
             },
-            None => Err(self.unlike(wanted)),
+            None => Err(self.unexpected(expected)),
         }
     }
 
@@ -164,9 +168,9 @@ impl<'a> Value<'a> {
     }
 
     /// The items of a list, each with the key of the list.
-    pub fn list(self, wanted: &str) -> Result<Vec<Value<'a>>, ModelError> {
+    pub fn list(self, expected: &str) -> Result<Vec<Value<'a>>, ModelError> {
         if !self.value.is_array() {
-            return Err(self.unlike(wanted));
+            return Err(self.unexpected(expected));
         }
         let (source, key, span) = (self.source, self.key, self.span);
         let DeValue::Array(items) = self.value else {
@@ -189,12 +193,12 @@ impl<'a> Value<'a> {
     }
 
     /// Exactly three items of a list.
-    pub fn three(self, wanted: &str) -> Result<[Value<'a>; 3], ModelError> {
+    pub fn three(self, expected: &str) -> Result<[Value<'a>; 3], ModelError> {
         let (source, key, span) = (self.source, self.key.clone(), self.span.clone());
-        let items = self.list(wanted)?;
+        let items = self.list(expected)?;
         let count = items.len();
         items.try_into().map_err(|_| {
-            let message = format!("`{key}` is a list of {count}; {wanted} is expected");
+            let message = format!("`{key}` is a list of {count}; {expected} is expected");
             source.error(span, message, None)
         })
     }
@@ -212,7 +216,7 @@ impl<'a> Value<'a> {
     /// A table with `name` as its name in messages.
     pub fn table(self, name: String) -> Result<Table<'a>, ModelError> {
         if !self.value.is_table() {
-            return Err(self.unlike("a table"));
+            return Err(self.unexpected("a table"));
         }
         // Messages about the table point at its header `[name]`.
         let span = if self.key_span.start < self.span.start {

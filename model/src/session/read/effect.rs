@@ -17,7 +17,7 @@ pub(super) fn effect(
 ) -> Result<Effect, ModelError> {
     let mut table = item.table("[[effect]]".into())?;
     let component = component(context, &mut table)?;
-    let word_value = table.need(
+    let word_value = table.require(
         "shape",
         "the dependence of the component on the driver, such as \"harmonic\"",
     )?;
@@ -31,7 +31,7 @@ pub(super) fn effect(
         unit,
         driver.default_scale(context.machine),
     )?;
-    suits(context, &word_value, &shape, &driver)?;
+    check_compatible(context, &word_value, &shape, &driver)?;
     let tests = tests(&mut table, declared)?;
     shape
         .check()
@@ -46,7 +46,7 @@ pub(super) fn effect(
 }
 
 fn component(context: &Context<'_>, table: &mut Table<'_>) -> Result<Component, ModelError> {
-    let value = table.need(
+    let value = table.require(
         "component",
         "the component, such as \"EZC\" or \"workpiece_ball.x\"",
     )?;
@@ -146,7 +146,12 @@ fn driver(
 }
 
 /// Checks that a shape and a driver are compatible.
-fn suits(context: &Context<'_>, word: &Value<'_>, shape: &Shape, driver: &Driver) -> Result<(), ModelError> {
+fn check_compatible(
+    context: &Context<'_>,
+    word: &Value<'_>,
+    shape: &Shape,
+    driver: &Driver,
+) -> Result<(), ModelError> {
     if (*driver == Driver::None) != (*shape == Shape::Constant) {
         let message = format!(
             "the shape \"{}\" cannot have the driver \"{driver}\"",

@@ -2,7 +2,7 @@
 
 use crate::error::ModelError;
 use crate::session::document::{Table, Value};
-use crate::session::table::{Format, Mapped, Theirs, encoding};
+use crate::session::table::{ColumnMapping, ForeignColumn, Format, encoding};
 
 /// Reads `[format]`: separator, decimal, header, encoding, lines above the header; sheet of a spreadsheet; direction in a ball-bar file.
 pub(super) fn format(mut table: Table<'_>) -> Result<Format, ModelError> {
@@ -15,14 +15,14 @@ pub(super) fn format(mut table: Table<'_>) -> Result<Format, ModelError> {
         format.decimal = one_of(value, b".,")?;
     }
     if let Some(value) = table.take("header") {
-        format.header = value.truth()?;
+        format.header = value.boolean()?;
     }
     if let Some(value) = table.take("sheet") {
         format.sheet = Some(value.text()?);
     }
     if let Some(value) = table.take("anticlockwise") {
         // Files number directions, or name one of them.
-        format.anticlockwise = Some(match value.truth() {
+        format.anticlockwise = Some(match value.boolean() {
             Ok(truth) => truth.to_string(),
             Err(_) if value.as_text().is_none() => value.count(0, 1_000_000)?.to_string(),
             Err(_) => value.text()?.trim().to_string(),
@@ -60,22 +60,22 @@ fn one_of(value: &Value<'_>, known: &[u8]) -> Result<u8, ModelError> {
                 .iter()
                 .map(|byte| format!("{:?}", char::from(*byte).to_string()))
                 .collect();
-            Err(value.unlike(&format!("one of {}", names.join(" "))))
+            Err(value.unexpected(&format!("one of {}", names.join(" "))))
         }
     }
 }
 
 /// Reads `[columns]`: own name = foreign name or number.
-pub(super) fn columns(mut table: Table<'_>) -> Result<Vec<Mapped>, ModelError> {
+pub(super) fn columns(mut table: Table<'_>) -> Result<Vec<ColumnMapping>, ModelError> {
     let mut columns = Vec::new();
     for entry in table.remaining_values()? {
-        let theirs = match entry.as_text() {
-            Some(text) => Theirs::Name(text.trim().to_string()),
-            None => Theirs::Number(entry.count(1, 1_000_000)?),
+        let foreign = match entry.as_text() {
+            Some(text) => ForeignColumn::Name(text.trim().to_string()),
+            None => ForeignColumn::Number(entry.count(1, 1_000_000)?),
         };
-        columns.push(Mapped {
-            ours: entry.key.clone(),
-            theirs,
+        columns.push(ColumnMapping {
+            own: entry.key.clone(),
+            foreign,
             location: entry.source.location(entry.key_span.start..entry.span.end),
         });
     }

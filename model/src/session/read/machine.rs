@@ -26,7 +26,7 @@ pub(super) fn source(path: &Path) -> Result<Source, ModelError> {
 
 /// A machine from the tables `name`, `chain`, `[axis.…]`.
 pub(super) fn from_table(mut table: Table<'_>) -> Result<Machine, ModelError> {
-    let chain = table.need(
+    let chain = table.require(
         "chain",
         "the axes from workpiece over bed to tool, such as \"w C A b Y X Z t\"",
     )?;
@@ -41,7 +41,7 @@ pub(super) fn from_table(mut table: Table<'_>) -> Result<Machine, ModelError> {
         Some(value) => match value.text()?.as_str() {
             "exact" => Rotation::Exact,
             "small-angle" => Rotation::SmallAngle,
-            _ => return Err(value.unlike("\"exact\" or \"small-angle\"")),
+            _ => return Err(value.unexpected("\"exact\" or \"small-angle\"")),
         },
     };
     let gravity = match table.take("gravity") {
@@ -103,7 +103,7 @@ fn axis(name: &str, mut table: Table<'_>) -> Result<Axis, ModelError> {
             let kind = match value.text()?.as_str() {
                 "rotary" => AxisKind::Rotary,
                 "linear" => AxisKind::Linear,
-                _ => return Err(value.unlike("\"rotary\" or \"linear\"")),
+                _ => return Err(value.unexpected("\"rotary\" or \"linear\"")),
             };
             if of_letter.is_some_and(|letter| letter != kind) {
                 let message = format!(
@@ -188,7 +188,7 @@ fn travel(name: &str, kind: AxisKind, table: &mut Table<'_>) -> Result<Option<[f
         .map(|end| end.number())
         .collect::<Result<Vec<_>, _>>()?;
     match numbers[..] {
-        [least, greatest] if least < greatest => Ok(Some([least, greatest].map(|end| kind.inside(end)))),
+        [least, greatest] if least < greatest => Ok(Some([least, greatest].map(|end| kind.to_internal(end)))),
         _ => Err(source.error(
             span,
             format!("`{key}` of axis `{name}` is not a list of two numbers, minimum and maximum"),

@@ -20,7 +20,7 @@ use super::document::{Source, Table, Value};
 use super::expression::Length;
 use super::limits;
 use super::stamp::FileStamp;
-use super::table::{Format, Mapped};
+use super::table::{ColumnMapping, Format};
 use super::{Session, Test};
 use crate::chain::Machine;
 use crate::error::{Location, ModelError};
@@ -57,7 +57,7 @@ struct Context<'a> {
     instrument: InstrumentKind,
     constants: &'a [(String, f64)],
     format: Format,
-    columns: Option<Vec<Mapped>>,
+    columns: Option<Vec<ColumnMapping>>,
     options: &'a ReadOptions,
 }
 
@@ -128,7 +128,7 @@ pub fn text(path: &Path, what: &str) -> Result<String, ModelError> {
 pub fn session(path: &Path, options: &ReadOptions) -> Result<Session, ModelError> {
     let source = Source::read(path, "the session file")?;
     let mut root = source.parse()?;
-    let Bodies {
+    let SessionMachine {
         machine,
         source: machine_source,
     } = session_machine(path, options, &mut root)?;
@@ -156,7 +156,7 @@ pub fn session(path: &Path, options: &ReadOptions) -> Result<Session, ModelError
     };
     let mut warnings = Vec::new();
     let (tests, declared) = tests(&context, &mut root, &mut warnings)?;
-    warnings.extend(setups::unlike(&tests));
+    warnings.extend(setups::differing_set_ups(&tests));
     let effects = match root.take("effect") {
         Some(value) => value
             .list("tables [[effect]]")?
@@ -200,20 +200,24 @@ pub fn session(path: &Path, options: &ReadOptions) -> Result<Session, ModelError
 }
 
 /// The machine of a session, and its file if it has one of its own.
-struct Bodies {
+struct SessionMachine {
     machine: Machine,
     source: Option<Source>,
 }
 
 /// Reads the machine: a file beside the session, or tables in the session.
-fn session_machine(path: &Path, options: &ReadOptions, root: &mut Table<'_>) -> Result<Bodies, ModelError> {
-    let value = root.need(
+fn session_machine(
+    path: &Path,
+    options: &ReadOptions,
+    root: &mut Table<'_>,
+) -> Result<SessionMachine, ModelError> {
+    let value = root.require(
         "machine",
         "[machine] with `file = \"machine.toml\"`, or the machine's tables in it",
     )?;
     let mut table = value.table("[machine]".into())?;
     let Some(file) = table.take("file") else {
-        return Ok(Bodies {
+        return Ok(SessionMachine {
             machine: machine::from_table(table)?,
             source: None,
         });
@@ -230,7 +234,7 @@ fn session_machine(path: &Path, options: &ReadOptions, root: &mut Table<'_>) -> 
     data_folder::check(path, options, &file, &found)?;
     table.finish()?;
     let source = machine::source(&found)?;
-    Ok(Bodies {
+    Ok(SessionMachine {
         machine: machine::from_table(source.parse()?)?,
         source: Some(source),
     })
@@ -292,12 +296,12 @@ struct Instrument {
 
 impl Instrument {
     fn read(root: &mut Table<'_>) -> Result<Instrument, ModelError> {
-        let value = root.need("instrument", "[instrument] with `kind = \"ballbar\"`")?;
+        let value = root.require("instrument", "[instrument] with `kind = \"ballbar\"`")?;
         let mut table = value.table("[instrument]".into())?;
-        let value = table.need("kind", KINDS)?;
+        let value = table.require("kind", KINDS)?;
         let word = value.text()?;
         let Some(kind) = InstrumentKind::ALL.into_iter().find(|kind| kind.word() == word) else {
-            return Err(value.unlike(KINDS));
+            return Err(value.unexpected(KINDS));
         };
         let mut not_negative = |key: &'static str| -> Result<Option<f64>, ModelError> {
             let Some(value) = table.take(key) else {

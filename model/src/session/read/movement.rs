@@ -10,7 +10,7 @@ use crate::session::motion::{FollowOffset, MAX_READINGS, Motion, programmed_over
 /// Default feed of a linear axis or a circle, mm/s: 1000 mm/min.
 const DEFAULT_FEED_MM_S: f64 = 1000.0 / 60.0;
 /// Default speed of a rotary axis, rad/s: 120 °/min.
-const DEFAULT_TURN_RAD_S: f64 = 2.0 / 180.0 * std::f64::consts::PI;
+const DEFAULT_ROTARY_SPEED_RAD_S: f64 = 2.0 / 180.0 * std::f64::consts::PI;
 
 /// Reads `sweep = { axis, from_…, to_…, step_…, feed_…, runs, both_directions }`.
 pub(super) fn sweep(
@@ -20,15 +20,15 @@ pub(super) fn sweep(
 ) -> Result<Motion, ModelError> {
     let mut table = value.table("`sweep`".into())?;
     let (axis, kind) = moved_axis(context, &mut table)?;
-    let way = Abscissa::read(&mut table, kind, true)?;
+    let range = StepRange::read(&mut table, kind, true)?;
     let speed = speed(context, &mut table, axis, station)?;
-    let (runs, both_directions) = repeats(&mut table, way.steps())?;
+    let (runs, both_directions) = runs_and_directions(&mut table, range.steps())?;
     table.finish()?;
     Ok(Motion::Sweep {
         axis,
-        from: way.from,
-        to: way.to,
-        step: way.step,
+        from: range.from,
+        to: range.to,
+        step: range.step,
         speed,
         runs,
         both_directions,
@@ -42,7 +42,7 @@ pub(super) fn path(
     station: &Station<f64>,
 ) -> Result<Motion, ModelError> {
     let mut table = value.table("`path`".into())?;
-    let kind = table.need("kind", "\"circle\", \"follow\" or \"list\"")?;
+    let kind = table.require("kind", "\"circle\", \"follow\" or \"list\"")?;
     match kind.text()?.as_str() {
         "list" => {
             table.finish()?;
@@ -50,16 +50,16 @@ pub(super) fn path(
         }
         "circle" => circle(context, table),
         "follow" => follow(context, table, station),
-        _ => Err(kind.unlike("\"circle\", \"follow\" or \"list\"")),
+        _ => Err(kind.unexpected("\"circle\", \"follow\" or \"list\"")),
     }
 }
 
 fn circle(context: &Context<'_>, mut table: Table<'_>) -> Result<Motion, ModelError> {
-    let plane = table.need("plane", "the two linear axes, such as \"XY\"")?;
+    let plane = table.require("plane", "the two linear axes, such as \"XY\"")?;
     let text = plane.text()?;
     let letters: Vec<String> = text.chars().map(String::from).collect();
     let [first, second] = &letters[..] else {
-        return Err(plane.unlike("two linear axes, such as \"XY\","));
+        return Err(plane.unexpected("two linear axes, such as \"XY\","));
     };
     let linear = |name: &str| -> Result<usize, ModelError> {
         let Some(index) = quantity::axis_index(context.machine, name) else {
@@ -78,7 +78,7 @@ fn circle(context: &Context<'_>, mut table: Table<'_>) -> Result<Motion, ModelEr
     if first == second {
         return Err(plane.error(format!("`plane` = \"{text}\" names one axis twice"), None));
     }
-    let radius_value = table.need("radius_mm", "the radius of the circle")?;
+    let radius_value = table.require("radius_mm", "the radius of the circle")?;
     let (_, radius) = context.length(&radius_value)?;
     if radius <= 0.0 {
         return Err(radius_value.error(
@@ -90,21 +90,21 @@ fn circle(context: &Context<'_>, mut table: Table<'_>) -> Result<Motion, ModelEr
         Some(value) => context.point(value)?.1,
         None => [0.0; 3],
     };
-    let way = Abscissa::read(&mut table, AxisKind::Rotary, false)?;
+    let range = StepRange::read(&mut table, AxisKind::Rotary, false)?;
     let speed = match table.take("feed_mm_min") {
         Some(value) => value.positive()? / 60.0,
         None => DEFAULT_FEED_MM_S,
     };
-    let (runs, both_directions) = repeats(&mut table, way.steps())?;
+    let (runs, both_directions) = runs_and_directions(&mut table, range.steps())?;
     table.finish()?;
     Ok(Motion::Circle {
         first,
         second,
         radius,
         centre,
-        from: way.from,
-        to: way.to,
-        step: way.step,
+        from: range.from,
+        to: range.to,
+        step: range.step,
         speed,
         runs,
         both_directions,
@@ -128,12 +128,12 @@ fn follow(context: &Context<'_>, mut table: Table<'_>, station: &Station<f64>) -
     }
     let offset = match station {
         Station::BallBar(_) => {
-            let offset = table.need("offset", "\"radial\", \"tangential\" or \"axial\"")?;
+            let offset = table.require("offset", "\"radial\", \"tangential\" or \"axial\"")?;
             match offset.text()?.as_str() {
                 "radial" => FollowOffset::Radial,
                 "tangential" => FollowOffset::Tangential,
                 "axial" => FollowOffset::Axial,
-                _ => return Err(offset.unlike("\"radial\", \"tangential\" or \"axial\"")),
+                _ => return Err(offset.unexpected("\"radial\", \"tangential\" or \"axial\"")),
             }
         }
         Station::RTest(_) => {
@@ -149,18 +149,18 @@ fn follow(context: &Context<'_>, mut table: Table<'_>, station: &Station<f64>) -
         // The points have no fixed distance.
         _ => FollowOffset::None,
     };
-    let way = Abscissa::read(&mut table, kind, false)?;
+    let range = StepRange::read(&mut table, kind, false)?;
     let speed = match table.take("programmed_feed_mm_min") {
         Some(feed) => programmed_speed(context, &mut table, axis, station, &feed)?,
         None => speed(context, &mut table, axis, station)?,
     };
-    let (runs, both_directions) = repeats(&mut table, way.steps())?;
+    let (runs, both_directions) = runs_and_directions(&mut table, range.steps())?;
     table.finish()?;
     Ok(Motion::Follow {
         axis,
-        from: way.from,
-        to: way.to,
-        step: way.step,
+        from: range.from,
+        to: range.to,
+        step: range.step,
         speed,
         runs,
         both_directions,
@@ -169,7 +169,7 @@ fn follow(context: &Context<'_>, mut table: Table<'_>, station: &Station<f64>) -
 }
 
 fn moved_axis(context: &Context<'_>, table: &mut Table<'_>) -> Result<(usize, AxisKind), ModelError> {
-    let value = table.need("axis", "the axis that moves")?;
+    let value = table.require("axis", "the axis that moves")?;
     let name = value.text()?;
     let Some(axis) = quantity::axis_index(context.machine, &name) else {
         let (message, help) = quantity::no_axis(context.machine, &name);
@@ -179,22 +179,25 @@ fn moved_axis(context: &Context<'_>, table: &mut Table<'_>) -> Result<(usize, Ax
 }
 
 /// Start, end and step of a motion, in the internal unit.
-struct Abscissa {
+struct StepRange {
     from: f64,
     to: f64,
     step: f64,
 }
 
-impl Abscissa {
+impl StepRange {
     /// Reads `from_…`, `to_…` and `step_…`; the default of optional ends is a full revolution.
-    fn read(table: &mut Table<'_>, kind: AxisKind, ends_needed: bool) -> Result<Abscissa, ModelError> {
+    fn read(table: &mut Table<'_>, kind: AxisKind, ends_needed: bool) -> Result<StepRange, ModelError> {
         let from = end(table, kind, ["from_mm", "from_deg"])?;
         let to = end(table, kind, ["to_mm", "to_deg"])?;
         let step = end(table, kind, ["step_mm", "step_deg"])?;
         let unit = kind.unit();
         let missing = |key: &str| {
             let help = format!("add `{key}_{unit}`");
-            table.error(format!("{} has no `{key}_{unit}`", table.called()), Some(help))
+            table.error(
+                format!("{} has no `{key}_{unit}`", table.display_name()),
+                Some(help),
+            )
         };
         let turn = kind == AxisKind::Rotary && !ends_needed;
         let from = match from {
@@ -218,17 +221,20 @@ impl Abscissa {
             return Err(stepped.error(message, None));
         }
         if from == to {
-            return Err(table.error(format!("{} has equal start and end", table.called()), None));
+            return Err(table.error(format!("{} has equal start and end", table.display_name()), None));
         }
-        let way = Abscissa { from, to, step };
-        if way.steps() > MAX_READINGS as f64 {
-            let message = format!("{:.2e} steps; the limit is {MAX_READINGS} readings", way.steps());
+        let range = StepRange { from, to, step };
+        if range.steps() > MAX_READINGS as f64 {
+            let message = format!(
+                "{:.2e} steps; the limit is {MAX_READINGS} readings",
+                range.steps()
+            );
             return Err(stepped.error(message, Some("use a larger step".into())));
         }
-        if way.steps() < 1.0 {
+        if range.steps() < 1.0 {
             return Err(stepped.error(format!("`{}` is larger than the whole motion", stepped.key), None));
         }
-        Ok(way)
+        Ok(range)
     }
 
     fn steps(&self) -> f64 {
@@ -251,7 +257,7 @@ fn end<'a>(
         return Err(wrong.source.error(wrong.key_span.clone(), message, None));
     }
     match right {
-        Some(value) => Ok(Some((kind.inside(value.number()?), value))),
+        Some(value) => Ok(Some((kind.to_internal(value.number()?), value))),
         None => Ok(None),
     }
 }
@@ -271,7 +277,7 @@ fn speed(
         (AxisKind::Linear, None, None) => Ok(DEFAULT_FEED_MM_S),
         (AxisKind::Linear, None, Some(deg)) => Err(deg.error("`feed_deg_min` for a linear axis", None)),
         (AxisKind::Rotary, None, Some(deg)) => Ok(deg.positive()?.to_radians() / 60.0),
-        (AxisKind::Rotary, None, None) => Ok(DEFAULT_TURN_RAD_S),
+        (AxisKind::Rotary, None, None) => Ok(DEFAULT_ROTARY_SPEED_RAD_S),
         (AxisKind::Rotary, Some(feed), None) => {
             let feed_mm_s = feed.positive()? / 60.0;
             Ok(feed_mm_s / radius_on_axis(context, axis, station, &feed)?)
@@ -331,9 +337,9 @@ fn radius_about(axis: &crate::axis::Axis, point: [f64; 3]) -> f64 {
 }
 
 /// Reads `runs` and `both_directions`; the default is one run in both directions.
-fn repeats(table: &mut Table<'_>, steps: f64) -> Result<(usize, bool), ModelError> {
+fn runs_and_directions(table: &mut Table<'_>, steps: f64) -> Result<(usize, bool), ModelError> {
     let both_directions = match table.take("both_directions") {
-        Some(value) => value.truth()?,
+        Some(value) => value.boolean()?,
         None => true,
     };
     let runs = match table.take("runs") {

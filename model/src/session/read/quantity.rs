@@ -2,7 +2,7 @@
 
 use crate::axis::AxisKind;
 use crate::chain::Machine;
-use crate::session::spelling::meant;
+use crate::session::spelling::suggestion;
 
 /// A micrometre in mm.
 pub(crate) const MICROMETRE: f64 = 1e-3;
@@ -32,7 +32,7 @@ pub(crate) fn no_axis(machine: &Machine, name: &str) -> (String, String) {
     let names: Vec<&str> = machine.axes.iter().map(|axis| axis.name.as_str()).collect();
     (
         format!("the machine \"{}\" has no axis `{name}`", machine.name),
-        format!("{}its axes are {}", meant(name, &names), names.join(", ")),
+        format!("{}its axes are {}", suggestion(name, &names), names.join(", ")),
     )
 }
 
@@ -60,7 +60,7 @@ pub(crate) enum Unit {
 
 impl Unit {
     /// The number in the internal unit.
-    pub fn inside(self, value: f64) -> f64 {
+    pub fn to_internal(self, value: f64) -> f64 {
         match self {
             Unit::Times(factor) => value * factor,
             Unit::Degrees => value.to_radians(),

@@ -7,11 +7,11 @@ use crate::session::document::Table;
 use crate::session::{Prior, SocketDistance, Test};
 
 /// Warnings about tests that share a mounted object and describe it differently.
-pub(super) fn unlike(tests: &[Test]) -> Vec<String> {
+pub(super) fn differing_set_ups(tests: &[Test]) -> Vec<String> {
     let mut warnings = Vec::new();
     for (index, test) in tests.iter().enumerate() {
         let unknowns = test.station.kind().unknowns();
-        for group in unlike_groups(unknowns) {
+        for group in mounted_groups(unknowns) {
             let Some(first) = tests[..index]
                 .iter()
                 .find(|other| other.group(group) == test.group(group))
@@ -40,7 +40,7 @@ pub(super) fn unlike(tests: &[Test]) -> Vec<String> {
 }
 
 /// The groups of an instrument's parameters that belong to objects that a user mounts.
-fn unlike_groups(unknowns: &[InstrumentUnknown]) -> Vec<SharedBy> {
+fn mounted_groups(unknowns: &[InstrumentUnknown]) -> Vec<SharedBy> {
     [SharedBy::Setup, SharedBy::SpindleSetup, SharedBy::BarSetup]
         .into_iter()
         .filter(|group| unknowns.iter().any(|unknown| unknown.shared_by == *group))
@@ -79,7 +79,7 @@ pub(super) fn socket_distances(
     let mut distances = Vec::new();
     for item in value.list("tables [[socket_distance]]")? {
         let mut table = item.table("[[socket_distance]]".into())?;
-        let between = table.need("between", "the two sockets, such as [\"0\", \"1\"]")?;
+        let between = table.require("between", "the two sockets, such as [\"0\", \"1\"]")?;
         let (source, span) = (between.source, between.span.clone());
         let mut names = Vec::new();
         for name in between.list("a list of two sockets")? {
@@ -103,7 +103,7 @@ pub(super) fn socket_distances(
         if between[0] == between[1] {
             return Err(source.error(span, "`between` needs two different sockets", None));
         }
-        let distance_mm = table.need("mm", "the distance in mm")?.positive()?;
+        let distance_mm = table.require("mm", "the distance in mm")?.positive()?;
         let u_mm = match table.take("u_um") {
             Some(value) => {
                 let u = value.number()?;

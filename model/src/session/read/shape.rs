@@ -156,7 +156,7 @@ fn optional(table: &mut Table<'_>, keys: Suffixed, unit: DriverUnit) -> Result<O
     }
 }
 
-fn needed(
+fn required(
     table: &mut Table<'_>,
     word: &Value<'_>,
     keys: Suffixed,
@@ -201,13 +201,13 @@ pub(super) fn shape(
             order: order(table, value, word)?.positive()?,
         }),
         "periodic" => Ok(Shape::Periodic {
-            period: needed(table, value, PERIOD, unit, word)?,
+            period: required(table, value, PERIOD, unit, word)?,
         }),
         "curve" => curve(table, value, word, unit),
         "backlash" => Ok(Shape::Backlash),
         "lag" => Ok(Shape::Lag),
         "reversal-spike" => Ok(Shape::ReversalSpike {
-            width: needed(table, value, WIDTH, unit, word)?,
+            width: required(table, value, WIDTH, unit, word)?,
         }),
         "drift" => Ok(Shape::Drift),
         "warmup" => {
@@ -232,10 +232,10 @@ pub(super) fn shape(
             Ok(Shape::Steps { at })
         }
         "local" => {
-            let centre = needed(table, value, CENTRE, unit, word)?;
-            let width = needed(table, value, WIDTH, unit, word)?;
+            let centre = required(table, value, CENTRE, unit, word)?;
+            let width = required(table, value, WIDTH, unit, word)?;
             let recurs = match table.take("recurs") {
-                Some(recurs) => recurs.truth()?,
+                Some(recurs) => recurs.boolean()?,
                 None => true,
             };
             Ok(Shape::Local {
@@ -260,7 +260,7 @@ fn curve(
 ) -> Result<Shape, ModelError> {
     let stated = table.take("closed");
     let mut closed = match &stated {
-        Some(closed) => closed.truth()?,
+        Some(closed) => closed.boolean()?,
         None => unit == DriverUnit::Angle,
     };
     let (from, to) = if unit == DriverUnit::Angle {
@@ -272,8 +272,8 @@ fn curve(
         (from, to.unwrap_or(from + TAU))
     } else {
         (
-            needed(table, value, FROM, unit, word)?,
-            needed(table, value, TO, unit, word)?,
+            required(table, value, FROM, unit, word)?,
+            required(table, value, TO, unit, word)?,
         )
     };
     let intervals = match table.take("intervals") {

@@ -24,7 +24,7 @@ pub(super) struct SetUp {
 }
 
 /// Keys of a test that only some instruments have.
-const OWN: [(InstrumentKind, &[&str]); 5] = [
+const INSTRUMENT_KEYS: [(InstrumentKind, &[&str]); 5] = [
     (
         InstrumentKind::BallBar,
         &[
@@ -70,9 +70,11 @@ const OWN: [(InstrumentKind, &[&str]); 5] = [
 
 /// Reads the instrument's keys of a test.
 pub(super) fn set_up(context: &Context<'_>, table: &mut Table<'_>) -> Result<SetUp, ModelError> {
-    let own = OWN.iter().find(|(kind, _)| *kind == context.instrument);
+    let own = INSTRUMENT_KEYS
+        .iter()
+        .find(|(kind, _)| *kind == context.instrument);
     let own = own.map_or(&[][..], |(_, keys)| keys);
-    for (kind, keys) in OWN {
+    for (kind, keys) in INSTRUMENT_KEYS {
         for key in keys.iter().filter(|key| !own.contains(key)) {
             if let Some(value) = table.take(key) {
                 let message = format!(
@@ -94,7 +96,7 @@ pub(super) fn set_up(context: &Context<'_>, table: &mut Table<'_>) -> Result<Set
 }
 
 fn ball_bar(context: &Context<'_>, table: &mut Table<'_>) -> Result<SetUp, ModelError> {
-    let bar = table.need("bar_mm", "the calibrated length of the bar")?;
+    let bar = table.require("bar_mm", "the calibrated length of the bar")?;
     let (bar_as_written, bar_mm) = context.length(&bar)?;
     if bar_mm <= 0.0 {
         return Err(bar.error(format!("`bar_mm` is {bar_mm}; it must be greater than 0"), None));
@@ -130,11 +132,11 @@ struct Balls {
 }
 
 fn balls(context: &Context<'_>, table: &mut Table<'_>) -> Result<Balls, ModelError> {
-    let workpiece = table.need(
+    let workpiece = table.require(
         "workpiece_ball_mm",
         "the workpiece ball in the table frame, such as [0, 100, 0]",
     )?;
-    let spindle = table.need(
+    let spindle = table.require(
         "spindle_ball_mm",
         "the spindle ball in the tool frame, such as [0, 0, 0]",
     )?;
@@ -150,11 +152,11 @@ fn balls(context: &Context<'_>, table: &mut Table<'_>) -> Result<Balls, ModelErr
 
 fn r_test(context: &Context<'_>, table: &mut Table<'_>) -> Result<SetUp, ModelError> {
     const SETTINGS: &str = "\"E\" (sensors on the table) or \"Es\" (sensors in the spindle)";
-    let setting = table.need("setting", SETTINGS)?;
+    let setting = table.require("setting", SETTINGS)?;
     let setting = match setting.text()?.as_str() {
         "E" => Setting::Table,
         "Es" => Setting::Spindle,
-        _ => return Err(setting.unlike(SETTINGS)),
+        _ => return Err(setting.unexpected(SETTINGS)),
     };
     let Balls {
         workpiece: (workpiece, workpiece_mm),
@@ -230,7 +232,7 @@ fn sensors(table: &mut Table<'_>) -> Result<Option<[[f64; 3]; 3]>, ModelError> {
 const MIN_VOLUME: f64 = 0.05;
 
 fn tracker(context: &Context<'_>, table: &mut Table<'_>) -> Result<SetUp, ModelError> {
-    let target = table.need("target_mm", "the target in the tool frame")?;
+    let target = table.require("target_mm", "the target in the tool frame")?;
     let (target, target_mm) = context.point(target)?;
     let mut priors = vec![Prior::Free; 6];
     priors.extend(self::priors(table.take("target_u_um"), 3)?);
@@ -252,7 +254,7 @@ fn tracker(context: &Context<'_>, table: &mut Table<'_>) -> Result<SetUp, ModelE
 }
 
 fn socket(context: &Context<'_>, table: &mut Table<'_>) -> Result<SetUp, ModelError> {
-    let ball = table.need("ball_mm", "the ball in the tool frame")?;
+    let ball = table.require("ball_mm", "the ball in the tool frame")?;
     let (ball, ball_mm) = context.point(ball)?;
     let mut priors = vec![Prior::Free; 3];
     priors.extend(self::priors(table.take("ball_u_um"), 3)?);
@@ -275,15 +277,15 @@ fn socket(context: &Context<'_>, table: &mut Table<'_>) -> Result<SetUp, ModelEr
 }
 
 fn probe(context: &Context<'_>, table: &mut Table<'_>) -> Result<SetUp, ModelError> {
-    let artefact = table.need("artefact_mm", "a point of the cylinder's axis in the table frame")?;
+    let artefact = table.require("artefact_mm", "a point of the cylinder's axis in the table frame")?;
     let (artefact, artefact_mm) = context.point(artefact)?;
-    let radius = table.need("radius_mm", "the radius of the cylinder plus that of the stylus")?;
+    let radius = table.require("radius_mm", "the radius of the cylinder plus that of the stylus")?;
     let (radius_as_written, radius_mm) = context.length(&radius)?;
     if radius_mm <= 0.0 {
         let message = format!("`radius_mm` is {radius_mm}; it must be greater than 0");
         return Err(radius.error(message, None));
     }
-    let stylus = table.need("stylus_mm", "the stylus' centre in the tool frame")?;
+    let stylus = table.require("stylus_mm", "the stylus' centre in the tool frame")?;
     let (stylus, stylus_mm) = context.point(stylus)?;
     let axis = match table.take("artefact_axis") {
         Some(value) => unit_vector(value)?,
@@ -356,7 +358,7 @@ fn priors(value: Option<Value<'_>>, count: usize) -> Result<Vec<Prior>, ModelErr
         return Ok(vec![prior(&value)?; count]);
     }
     if count == 1 {
-        return Err(value.unlike("a number"));
+        return Err(value.unexpected("a number"));
     }
     let items = value.three("a number or a list of three")?;
     items.iter().map(prior).collect()

@@ -12,11 +12,11 @@ use crate::session::expression::Length;
 use crate::session::motion::{self, Motion};
 use crate::session::readings::Readings;
 use crate::session::table::{self, Request};
-use crate::session::{Test, reach, runs};
+use crate::session::{Test, plausibility, runs};
 
 /// The name of a test, which must be unique.
 pub(super) fn name(table: &mut Table<'_>, declared: &[Declared]) -> Result<String, ModelError> {
-    let value = table.need("name", "a name that no other test has")?;
+    let value = table.require("name", "a name that no other test has")?;
     let name = value.text()?;
     if name.trim().is_empty() {
         return Err(value.error("a test without a name", Some("add a name".into())));
@@ -57,7 +57,7 @@ pub(super) fn tests(
         InstrumentKind::BallBar => group("bar_setup", name)?,
         _ => name.to_string(),
     };
-    let HeldOutState {
+    let HeldPositions {
         mut at,
         written: at_written,
         listed,
@@ -97,7 +97,7 @@ pub(super) fn tests(
     let span = table.span.clone();
     let source = table.source;
     table.finish()?;
-    motion::stand(context.machine, &station, motion.as_ref(), &listed, &mut at);
+    motion::centre_circle(context.machine, &station, motion.as_ref(), &listed, &mut at);
 
     let mut test = Test {
         name: name.to_string(),
@@ -116,7 +116,7 @@ pub(super) fn tests(
     let here = |(message, help): (String, String)| source.error(span.clone(), message, Some(help));
     let Some(data) = data else {
         let planned = motion::checked_plan(context.machine, &test).map_err(here)?;
-        reach::check(context.machine, &test, &planned).map_err(here)?;
+        plausibility::check(context.machine, &test, &planned).map_err(here)?;
         return Ok(vec![test]);
     };
     if !context.options.read_data {
@@ -126,14 +126,14 @@ pub(super) fn tests(
     let request = Request {
         machine: context.machine,
         instrument: context.instrument,
-        bar_mm: reach::bar_mm(&test.station),
+        bar_mm: plausibility::bar_mm(&test.station),
         sensors: matches!(&test.station, Station::RTest(rtest) if rtest.sensors.is_some()),
         format,
         // An empty table maps no column: the file has the default names.
         columns: columns.as_deref().filter(|columns| !columns.is_empty()),
         at: &test.at,
         at_listed: &listed,
-        moved: &motion::moved(test.motion.as_ref()),
+        moved: &motion::named_axes(test.motion.as_ref()),
         socket: test.socket.as_deref(),
     };
     let mut tests = Vec::new();
@@ -179,11 +179,11 @@ fn check_readings(
     readings: &Readings,
     warnings: &mut Vec<String>,
 ) -> Result<(), (String, String)> {
-    reach::check(context.machine, test, readings)?;
-    reach::check_lengths(test, readings)?;
+    plausibility::check(context.machine, test, readings)?;
+    plausibility::check_lengths(test, readings)?;
     let doubts = [
         motion::beyond_travel(context.machine, readings),
-        runs::unlike_stated(test.motion.as_ref(), readings),
+        runs::difference_from_stated(test.motion.as_ref(), readings),
     ];
     warnings.extend(
         doubts
@@ -195,7 +195,7 @@ fn check_readings(
 }
 
 /// Positions at which a test holds its axes, by axis.
-struct HeldOutState {
+struct HeldPositions {
     at: Vec<f64>,
     /// As written, for linear axes stated in mm.
     written: Vec<Option<Length>>,
@@ -204,16 +204,16 @@ struct HeldOutState {
 }
 
 /// `at = { x_mm = 0, … }`.
-fn at(context: &Context<'_>, table: &mut Table<'_>) -> Result<HeldOutState, ModelError> {
+fn at(context: &Context<'_>, table: &mut Table<'_>) -> Result<HeldPositions, ModelError> {
     let machine = context.machine;
     let axes = machine.axes.len();
-    let mut standing = HeldOutState {
+    let mut held = HeldPositions {
         at: vec![0.0; axes],
         written: vec![None; axes],
         listed: vec![false; axes],
     };
     let Some(value) = table.take("at") else {
-        return Ok(standing);
+        return Ok(held);
     };
     for entry in value.table("`at`".into())?.remaining_values()? {
         let Some((axis, unit)) = quantity::axis_position(machine, &entry.key) else {
@@ -222,7 +222,7 @@ fn at(context: &Context<'_>, table: &mut Table<'_>) -> Result<HeldOutState, Mode
             let help = format!("known: {}", known.join(", "));
             return Err(entry.source.error(entry.key_span.clone(), message, Some(help)));
         };
-        if standing.listed[axis] {
+        if held.listed[axis] {
             let message = format!(
                 "`at` gives the position of axis `{}` twice",
                 machine.axes[axis].name
@@ -230,12 +230,12 @@ fn at(context: &Context<'_>, table: &mut Table<'_>) -> Result<HeldOutState, Mode
             return Err(entry.source.error(entry.key_span.clone(), message, None));
         }
         let (written, number) = context.length(&entry)?;
-        standing.at[axis] = unit.inside(number);
+        held.at[axis] = unit.to_internal(number);
         let in_mm = machine.axes[axis].kind == AxisKind::Linear && unit == quantity::Unit::Times(1.0);
-        standing.written[axis] = in_mm.then_some(written);
-        standing.listed[axis] = true;
+        held.written[axis] = in_mm.then_some(written);
+        held.listed[axis] = true;
     }
-    Ok(standing)
+    Ok(held)
 }
 
 /// The data file: in the data directory if one is given, else beside the session file.

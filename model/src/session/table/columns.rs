@@ -9,22 +9,22 @@ use super::{Request, number};
 use crate::error::{Location, ModelError};
 use crate::instrument::InstrumentKind;
 use crate::session::read::quantity::{self, Unit};
-use crate::session::spelling::meant;
+use crate::session::spelling::suggestion;
 
 /// A line of `[columns]`: own name = foreign name.
 #[derive(Clone, Debug)]
-pub(crate) struct Mapped {
+pub(crate) struct ColumnMapping {
     /// Our name, which includes the unit.
-    pub ours: String,
+    pub own: String,
     /// The foreign name or number.
-    pub theirs: Theirs,
+    pub foreign: ForeignColumn,
     /// The location of the line.
     pub location: Location,
 }
 
 /// The identification of a foreign column.
 #[derive(Clone, Debug, PartialEq)]
-pub(crate) enum Theirs {
+pub(crate) enum ForeignColumn {
     /// By the header.
     Name(String),
     /// From 1.
@@ -240,7 +240,7 @@ fn unknown_column_help(request: &Request<'_>, name: &str, header: &[String], kno
     }
     format!(
         "{}known here: {}; a file with other names needs [columns], own name = foreign name",
-        meant(name, known),
+        suggestion(name, known),
         listed(known)
     )
 }
@@ -251,7 +251,7 @@ const NO_HEADER: &str = "a number was found where a name is expected: a file wit
 fn mapped_columns(
     request: &Request<'_>,
     file: &Path,
-    mapped: &[Mapped],
+    mapped: &[ColumnMapping],
     header: Option<&Row>,
     first: &Row,
 ) -> Result<Vec<Column>, ModelError> {
@@ -263,17 +263,21 @@ fn mapped_columns(
             help: Some(help),
         };
         let Some(role) =
-            Role::of(&entry.ours, request).or_else(|| Role::of(&entry.ours.to_lowercase(), request))
+            Role::of(&entry.own, request).or_else(|| Role::of(&entry.own.to_lowercase(), request))
         else {
             let known = known(request);
             return Err(fault(
-                format!("[columns] has the unknown column `{}`", entry.ours),
-                format!("{}ours are {}", meant(&entry.ours, &known), listed(&known)),
+                format!("[columns] has the unknown column `{}`", entry.own),
+                format!(
+                    "{}valid names are {}",
+                    suggestion(&entry.own, &known),
+                    listed(&known)
+                ),
             ));
         };
-        let index = match &entry.theirs {
-            Theirs::Number(number) => number_in(*number, file, first.cells.len()),
-            Theirs::Name(name) => name_in(name, request, file, header),
+        let index = match &entry.foreign {
+            ForeignColumn::Number(number) => number_in(*number, file, first.cells.len()),
+            ForeignColumn::Name(name) => name_in(name, request, file, header),
         }
         .map_err(|(message, help)| fault(message, help))?;
         if let Some(other) = columns.iter().position(|column| column.index == index) {
@@ -282,15 +286,15 @@ fn mapped_columns(
                     "[columns] reads column {} of {} twice: as `{}` and as `{}`",
                     index + 1,
                     file.display(),
-                    mapped[other].ours,
-                    entry.ours
+                    mapped[other].own,
+                    entry.own
                 ),
                 "a column has one meaning: name another column for one of them, or remove one".into(),
             ));
         }
-        let name = match &entry.theirs {
-            Theirs::Name(name) => name.clone(),
-            Theirs::Number(_) => entry.ours.clone(),
+        let name = match &entry.foreign {
+            ForeignColumn::Name(name) => name.clone(),
+            ForeignColumn::Number(_) => entry.own.clone(),
         };
         columns.push(Column { role, index, name });
     }
@@ -308,7 +312,7 @@ fn mapped_columns(
 }
 
 /// Whether the first row is a row of readings instead of a header: columns are given by number only, and all of them contain numbers.
-fn are_readings(request: &Request<'_>, mapped: &[Mapped], columns: &[Column], header: &Row) -> bool {
+fn are_readings(request: &Request<'_>, mapped: &[ColumnMapping], columns: &[Column], header: &Row) -> bool {
     let mut of_numbers = columns
         .iter()
         .filter(|column| column.role != Role::Socket)
@@ -316,7 +320,7 @@ fn are_readings(request: &Request<'_>, mapped: &[Mapped], columns: &[Column], he
     of_numbers.peek().is_some()
         && mapped
             .iter()
-            .all(|entry| matches!(entry.theirs, Theirs::Number(_)))
+            .all(|entry| matches!(entry.foreign, ForeignColumn::Number(_)))
         && of_numbers.all(|column| number(&header.cells[column.index], &request.format).is_ok())
 }
 
@@ -350,7 +354,7 @@ fn name_in(
     match found[..] {
         [index] => Ok(index),
         [] => {
-            let mut help = format!("{}it has {}", meant(name, header), listed(header));
+            let mut help = format!("{}it has {}", suggestion(name, header), listed(header));
             if header.iter().all(|cell| number(cell, &request.format).is_ok()) {
                 help = NO_HEADER.into();
             } else if let Some(encoding) = row.encoding {

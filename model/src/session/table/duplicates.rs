@@ -14,7 +14,7 @@ use crate::session::readings::Readings;
 const MAX_LISTED: usize = 8;
 
 /// A hash of all cells of a row.
-pub(super) fn number_of(cells: &[String]) -> u64 {
+pub(super) fn hash_of(cells: &[String]) -> u64 {
     let mut hasher = DefaultHasher::new();
     cells.hash(&mut hasher);
     hasher.finish()
@@ -22,8 +22,8 @@ pub(super) fn number_of(cells: &[String]) -> u64 {
 
 /// The rows without copies; `None` if there are no copies. `cells` has the hash of the cells of each row.
 pub(super) fn kept(readings: &Readings, cells: &[u64]) -> Option<Vec<usize>> {
-    let closing = closing(readings);
-    if readings.time_s.is_empty() && (readings.run.is_empty() || has_repeats(readings, cells, &closing)) {
+    let closed_runs = closed_runs(readings);
+    if readings.time_s.is_empty() && (readings.run.is_empty() || has_repeats(readings, cells, &closed_runs)) {
         return None;
     }
     let mut first: HashMap<u64, usize> = HashMap::with_capacity(cells.len());
@@ -36,13 +36,13 @@ pub(super) fn kept(readings: &Readings, cells: &[u64]) -> Option<Vec<usize>> {
         return None;
     }
     let kept: Vec<usize> = (0..cells.len())
-        .filter(|row| original[*row] == *row || closing.get(row) == Some(&original[*row]))
+        .filter(|row| original[*row] == *row || closed_runs.get(row) == Some(&original[*row]))
         .collect();
     (kept.len() < cells.len()).then_some(kept)
 }
 
 /// The message.
-pub(super) fn said(readings: &Readings, kept: &[usize]) -> String {
+pub(super) fn message(readings: &Readings, kept: &[usize]) -> String {
     let mut kept = kept.iter().peekable();
     let copies: Vec<usize> = (0..readings.line.len())
         .filter(|row| kept.next_if_eq(&row).is_none())
@@ -69,10 +69,10 @@ pub(super) fn said(readings: &Readings, kept: &[usize]) -> String {
 }
 
 /// Whether a state recurs within a run with a different reading.
-fn has_repeats(readings: &Readings, cells: &[u64], closing: &HashMap<usize, usize>) -> bool {
+fn has_repeats(readings: &Readings, cells: &[u64], closed_runs: &HashMap<usize, usize>) -> bool {
     let mut seen: HashMap<(i64, Vec<u64>), u64> = HashMap::new();
     (0..cells.len())
-        .filter(|row| !closing.contains_key(row))
+        .filter(|row| !closed_runs.contains_key(row))
         .any(|row| {
             let state = readings.positions.iter().map(|axis| axis[row].to_bits());
             let before = seen
@@ -83,7 +83,7 @@ fn has_repeats(readings: &Readings, cells: &[u64], closing: &HashMap<usize, usiz
 }
 
 /// The last row of each run that ends at its start, with its first row: both may have the same reading. A time column distinguishes them.
-fn closing(readings: &Readings) -> HashMap<usize, usize> {
+fn closed_runs(readings: &Readings) -> HashMap<usize, usize> {
     if !readings.time_s.is_empty() {
         return HashMap::new();
     }

@@ -17,7 +17,7 @@ use std::path::Path;
 use encoding_rs::Encoding;
 
 pub(crate) use ballbar_xml::{is_xml, read as read_xml};
-pub(crate) use columns::{Mapped, Theirs, r_test_columns};
+pub(crate) use columns::{ColumnMapping, ForeignColumn, r_test_columns};
 
 use columns::{Column, Role};
 use rows::Rows;
@@ -75,7 +75,7 @@ pub(crate) struct Request<'a> {
     /// The layout of the rows.
     pub format: Format,
     /// Foreign names, if declared.
-    pub columns: Option<&'a [Mapped]>,
+    pub columns: Option<&'a [ColumnMapping]>,
     /// Positions of axes that the data do not contain, mm or rad.
     pub at: &'a [f64],
     /// Which of them the test states.
@@ -116,7 +116,7 @@ pub(crate) fn read(file: &Path, request: &Request<'_>) -> Result<(BySocket, Vec<
     let width = first.cells.len();
     let header = request.format.header.then_some(&first);
     let columns = columns::columns(request, file, &first, header)?;
-    let mut filled = Filled::new(request, stamp, columns);
+    let mut filled = ReadingColumns::new(request, stamp, columns);
     if header.is_none() {
         filled.push(&first)?;
     }
@@ -170,7 +170,7 @@ fn wrong_width(file: &Path, row: &rows::Row, width: usize, format: &Format) -> M
 }
 
 /// The columns while they are filled.
-struct Filled<'a> {
+struct ReadingColumns<'a> {
     request: &'a Request<'a>,
     columns: Vec<Column>,
     readings: Readings,
@@ -181,9 +181,9 @@ struct Filled<'a> {
     cells: Vec<u64>,
 }
 
-impl<'a> Filled<'a> {
+impl<'a> ReadingColumns<'a> {
     fn new(request: &'a Request<'a>, stamp: FileStamp, columns: Vec<Column>) -> Self {
-        Filled {
+        ReadingColumns {
             request,
             columns,
             readings: Readings {
@@ -202,7 +202,7 @@ impl<'a> Filled<'a> {
     /// Removes rows that are copies of earlier ones and returns a message that lists them.
     fn without_duplicates(&mut self) -> Option<String> {
         let kept = duplicates::kept(&self.readings, &self.cells)?;
-        let said = duplicates::said(&self.readings, &kept);
+        let said = duplicates::message(&self.readings, &kept);
         self.readings = self.readings.of_rows(&kept);
         if !self.socket.is_empty() {
             self.socket = kept.iter().map(|row| self.socket[*row]).collect();
@@ -256,17 +256,17 @@ impl<'a> Filled<'a> {
                 Role::Temperature => readings.temperature_c.push(value),
                 Role::Axis(axis, unit) => {
                     if let Some(place) = readings.positions[axis].last_mut() {
-                        *place = unit.inside(value);
+                        *place = unit.to_internal(value);
                     }
                 }
-                Role::Length(unit) => observed[0] = unit.inside(value),
-                Role::Deviation(unit) => observed[0] = self.request.bar_mm + unit.inside(value),
-                Role::Outward(unit) => observed[0] = -unit.inside(value),
-                Role::Coordinate(i, unit) => observed[i] = unit.inside(value),
+                Role::Length(unit) => observed[0] = unit.to_internal(value),
+                Role::Deviation(unit) => observed[0] = self.request.bar_mm + unit.to_internal(value),
+                Role::Outward(unit) => observed[0] = -unit.to_internal(value),
+                Role::Coordinate(i, unit) => observed[i] = unit.to_internal(value),
                 Role::Socket => {}
             }
         }
-        self.cells.push(duplicates::number_of(&row.cells));
+        self.cells.push(duplicates::hash_of(&row.cells));
         readings.line.push(row.line);
         readings.observed.extend(&observed[..readings.coordinates]);
         Ok(())

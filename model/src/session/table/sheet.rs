@@ -66,7 +66,7 @@ pub(super) fn rows(file: &Path, format: &Format) -> Result<(FileStamp, Vec<Row>)
         ));
     }
     let stamp = FileStamp::of(file, &found);
-    let mut book = guarded(|| open_workbook_auto(file)).map_err(broken)?;
+    let mut book = catch_panic(|| open_workbook_auto(file)).map_err(broken)?;
     let names = book.sheet_names();
     let wanted: Vec<String> = match &format.sheet {
         Some(name) if names.contains(name) => vec![name.clone()],
@@ -80,7 +80,7 @@ pub(super) fn rows(file: &Path, format: &Format) -> Result<(FileStamp, Vec<Row>)
     };
     let mut filled: Vec<(String, Vec<Row>)> = Vec::new();
     for name in wanted {
-        let cells = guarded(|| cells(&mut book, &name)).map_err(broken)?;
+        let cells = catch_panic(|| cells(&mut book, &name)).map_err(broken)?;
         let rows = by_row(cells, format).map_err(|(message, help)| fault(message, help))?;
         if !rows.is_empty() {
             filled.push((name, rows));
@@ -124,18 +124,18 @@ fn unpacks_beyond(file: &Path, most: u64) -> bool {
 
 /// Calls the library. It may panic on a contradictory file (a row number beyond 32 bits, in builds with overflow checks); the panic
 /// becomes an ordinary error.
-fn guarded<T>(read: impl FnOnce() -> Result<T, calamine::Error>) -> Result<T, calamine::Error> {
+fn catch_panic<T>(read: impl FnOnce() -> Result<T, calamine::Error>) -> Result<T, calamine::Error> {
     let contradicts = || std::io::Error::other("its content is contradictory").into();
     catch_unwind(AssertUnwindSafe(read)).unwrap_or_else(|_| Err(contradicts()))
 }
 
 /// A cell with its row and column, from 0.
-type Placed = (u32, u32, Data);
+type PlacedCell = (u32, u32, Data);
 
 /// The filled cells of a sheet.
 ///
 /// Cells that the file lists one by one are read one by one: the rectangle around two cells in opposite corners would not fit in memory.
-fn cells(book: &mut Sheets<BufReader<File>>, name: &str) -> Result<Vec<Placed>, calamine::Error> {
+fn cells(book: &mut Sheets<BufReader<File>>, name: &str) -> Result<Vec<PlacedCell>, calamine::Error> {
     let mut cells = Vec::new();
     match book {
         Sheets::Xlsx(book) => {
@@ -169,7 +169,7 @@ fn cells(book: &mut Sheets<BufReader<File>>, name: &str) -> Result<Vec<Placed>, 
 }
 
 /// Cells as rows of equal width, without comments and empty rows. If they are too far apart: a message and what to do.
-fn by_row(mut cells: Vec<Placed>, format: &Format) -> Result<Vec<Row>, (String, String)> {
+fn by_row(mut cells: Vec<PlacedCell>, format: &Format) -> Result<Vec<Row>, (String, String)> {
     cells.retain(|(row, ..)| *row as usize >= format.skip_lines);
     let columns = || cells.iter().map(|(_, column, _)| *column);
     let (Some(left), Some(right)) = (columns().min(), columns().max()) else {

@@ -38,7 +38,7 @@ pub(super) struct Contents {
 }
 
 /// An element that is open.
-struct Open {
+struct OpenElement {
     name: String,
     line: usize,
     text: String,
@@ -46,7 +46,7 @@ struct Open {
     /// Whether the direction is in an element of its own and thus refers to one run.
     once: bool,
     /// Runs in the element whose direction is not known yet.
-    waiting: Vec<usize>,
+    undirected_runs: Vec<usize>,
 }
 
 /// The state of a file and its text.
@@ -88,7 +88,7 @@ pub(super) fn parse(
     let (stamp, text) = decoded(file, encoding)?;
     let mut reader = Reader::from_str(&text);
     let mut contents = Contents::default();
-    let mut open: Vec<Open> = Vec::new();
+    let mut open: Vec<OpenElement> = Vec::new();
     let (mut line, mut counted) = (1, 0);
     loop {
         let until = (reader.buffer_position() as usize).min(text.len());
@@ -141,15 +141,15 @@ fn opened(
     line: usize,
     contents: &mut Contents,
     broken: &impl Fn(String) -> ModelError,
-) -> Result<Open, ModelError> {
+) -> Result<OpenElement, ModelError> {
     let name = start.local_name().as_ref().to_string();
-    let mut element = Open {
+    let mut element = OpenElement {
         name,
         line,
         text: String::new(),
         direction: None,
         once: false,
-        waiting: Vec::new(),
+        undirected_runs: Vec::new(),
     };
     for attribute in start.attributes() {
         let attribute = attribute.map_err(|cause| broken(cause.to_string()))?;
@@ -164,7 +164,7 @@ fn opened(
 }
 
 /// Passes the content of a closed element to its parent.
-fn close(mut element: Open, open: &mut [Open], contents: &mut Contents) {
+fn close(mut element: OpenElement, open: &mut [OpenElement], contents: &mut Contents) {
     let within = open.iter().any(|outer| outer.name == READINGS);
     if within {
         // A reading may have its own element.
@@ -176,7 +176,7 @@ fn close(mut element: Open, open: &mut [Open], contents: &mut Contents) {
     }
     match element.name.as_str() {
         READINGS => {
-            element.waiting.push(contents.runs.len());
+            element.undirected_runs.push(contents.runs.len());
             contents.runs.push(Run {
                 line: element.line,
                 direction: None,
@@ -190,31 +190,31 @@ fn close(mut element: Open, open: &mut [Open], contents: &mut Contents) {
             if let Some(outer) = open.last_mut() {
                 outer.direction = element.direction.take();
                 outer.once = true;
-                settle(outer, contents);
+                assign_direction(outer, contents);
             }
             return;
         }
         "PLANE" => {}
         other => {
-            if element.waiting.is_empty() {
+            if element.undirected_runs.is_empty() {
                 *contents.unread.entry(other.to_string()).or_default() += 1;
             }
         }
     }
-    settle(&mut element, contents);
+    assign_direction(&mut element, contents);
     if let Some(outer) = open.last_mut() {
-        outer.waiting.append(&mut element.waiting);
-        settle(outer, contents);
+        outer.undirected_runs.append(&mut element.undirected_runs);
+        assign_direction(outer, contents);
     }
 }
 
 /// Assigns the direction of an element, if it has one, to the runs that wait in it.
-fn settle(element: &mut Open, contents: &mut Contents) {
+fn assign_direction(element: &mut OpenElement, contents: &mut Contents) {
     let Some(direction) = &element.direction else {
         return;
     };
-    let settled = !element.waiting.is_empty();
-    for run in element.waiting.drain(..) {
+    let settled = !element.undirected_runs.is_empty();
+    for run in element.undirected_runs.drain(..) {
         contents.runs[run]
             .direction
             .get_or_insert_with(|| direction.clone());

@@ -21,8 +21,8 @@ const KNOWN: &str = "known words are CW, CCW, CLOCKWISE, ANTICLOCKWISE, COUNTERC
 /// means forward and one other backward. Case is ignored; `1`, `true` and `yes` are one value, and so are `0`, `false` and `no`.
 pub(super) fn of_runs(runs: &[Run], stated: Option<&str>) -> Result<Vec<bool>, (usize, String, String)> {
     // Seen from below, the direction from the first axis to the second is clockwise, and a file may call it so.
-    let turned = stated.and_then(by_itself) == Some(false);
-    let stated = stated.map(plain);
+    let turned = stated.and_then(known_meaning) == Some(false);
+    let stated = stated.map(normalised);
     let mut other: Option<String> = None;
     runs.iter()
         .map(|run| {
@@ -30,10 +30,10 @@ pub(super) fn of_runs(runs: &[Run], stated: Option<&str>) -> Result<Vec<bool>, (
             let Some(direction) = &run.direction else {
                 return fault("READINGS without a RUN_DIRECTION".into());
             };
-            if let Some(anticlockwise) = by_itself(direction) {
+            if let Some(anticlockwise) = known_meaning(direction) {
                 return Ok(anticlockwise != turned);
             }
-            let word = plain(direction);
+            let word = normalised(direction);
             match &stated {
                 Some(stated) if *stated == word => Ok(true),
                 Some(_) if other.get_or_insert_with(|| word.clone()) == &word => Ok(false),
@@ -48,7 +48,7 @@ pub(super) fn of_runs(runs: &[Run], stated: Option<&str>) -> Result<Vec<bool>, (
 }
 
 /// The meaning of a known word: whether it is anticlockwise.
-fn by_itself(word: &str) -> Option<bool> {
+fn known_meaning(word: &str) -> Option<bool> {
     let word = word.trim().to_uppercase().replace([' ', '-'], "_");
     if ANTICLOCKWISE.contains(&word.as_str()) {
         Some(true)
@@ -60,7 +60,7 @@ fn by_itself(word: &str) -> Option<bool> {
 }
 
 /// The word in normalised form.
-fn plain(word: &str) -> String {
+fn normalised(word: &str) -> String {
     let word = word.trim().to_uppercase();
     match word.as_str() {
         "TRUE" | "YES" => "1".into(),

@@ -13,7 +13,7 @@ use std::path::Path;
 
 use contents::READINGS;
 
-use super::columns::{Role, Theirs};
+use super::columns::{ForeignColumn, Role};
 use super::{Request, number};
 use crate::error::{Location, ModelError};
 use crate::session::motion::Motion;
@@ -126,8 +126,8 @@ pub(crate) fn read(
                 column.push(*at);
             }
             readings.observed.push(match role {
-                Role::Deviation(unit) => request.bar_mm + unit.inside(value),
-                Role::Length(unit) => unit.inside(value),
+                Role::Deviation(unit) => request.bar_mm + unit.to_internal(value),
+                Role::Length(unit) => unit.to_internal(value),
                 _ => value,
             });
             readings.line.push(run.line);
@@ -168,22 +168,22 @@ fn value_role(file: &Path, request: &Request<'_>) -> Result<Role, ModelError> {
     };
     let Some(entry) = mapped
         .iter()
-        .find(|entry| entry.theirs == Theirs::Name(READINGS.into()))
+        .find(|entry| entry.foreign == ForeignColumn::Name(READINGS.into()))
     else {
         return Err(fault(
             Location::file(file),
             "the file does not state the unit of its READINGS".into(),
         ));
     };
-    if let Some(other) = mapped.iter().find(|other| other.ours != entry.ours) {
-        let message = format!("a ball-bar file in XML has no column for `{}`", other.ours);
+    if let Some(other) = mapped.iter().find(|other| other.own != entry.own) {
+        let message = format!("a ball-bar file in XML has no column for `{}`", other.own);
         return Err(fault(other.location.clone(), message));
     }
-    match Role::of(&entry.ours, request) {
+    match Role::of(&entry.own, request) {
         Some(role @ (Role::Deviation(_) | Role::Length(_))) => Ok(role),
         _ => Err(fault(
             entry.location.clone(),
-            format!("READINGS cannot be `{}`", entry.ours),
+            format!("READINGS cannot be `{}`", entry.own),
         )),
     }
 }

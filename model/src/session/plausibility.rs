@@ -25,10 +25,10 @@ pub(crate) fn bar_mm(station: &Station<f64>) -> f64 {
 /// artefact, the ball is in its nest. If a single mistake in the positions of an axis (its sign, its unit) explains the deviation, the
 /// help names it.
 pub(crate) fn check(machine: &Machine, test: &Test, readings: &Readings) -> Result<(), (String, String)> {
-    let Err((message, help)) = reaches(machine, test, readings) else {
+    let Err((message, help)) = check_nominal(machine, test, readings) else {
         return Ok(());
     };
-    let help = match slips(machine, test, readings) {
+    let help = match mistakes(machine, test, readings) {
         found if found.is_empty() => help,
         found => format!("it would fit if {}; {help}", found.join(", or if ")),
     };
@@ -36,11 +36,11 @@ pub(crate) fn check(machine: &Machine, test: &Test, readings: &Readings) -> Resu
 }
 
 /// The factor by which a mistake changes the positions of an axis, and its description.
-type Slip = (f64, &'static str);
+type Mistake = (f64, &'static str);
 
 const SIGN: &str = "with the opposite sign (check its `direction` and its column)";
 /// Mistakes that are tried on linear axes. Sign and unit errors both multiply the positions by a factor.
-const LINEAR: [Slip; 7] = [
+const LINEAR: [Mistake; 7] = [
     (-1.0, SIGN),
     (1e3, "in m rather than mm"),
     (1e-3, "in µm rather than mm"),
@@ -50,7 +50,7 @@ const LINEAR: [Slip; 7] = [
     (1.0 / 0.0254, "in mm rather than mil"),
 ];
 /// Mistakes that are tried on rotary axes.
-const ROTARY: [Slip; 3] = [
+const ROTARY: [Mistake; 3] = [
     (-1.0, SIGN),
     (180.0 / std::f64::consts::PI, "in radians rather than degrees"),
     (std::f64::consts::PI / 180.0, "in degrees rather than radians"),
@@ -60,14 +60,14 @@ const ROTARY: [Slip; 3] = [
 const MAX_TRIED: usize = 500;
 
 /// The mistakes, of one axis or of all axes of a kind, whose correction makes the instrument fit.
-fn slips(machine: &Machine, test: &Test, readings: &Readings) -> Vec<String> {
+fn mistakes(machine: &Machine, test: &Test, readings: &Readings) -> Vec<String> {
     let rows: Vec<usize> = (0..readings.rows())
         .step_by(readings.rows().div_ceil(MAX_TRIED).max(1))
         .collect();
     let readings = readings.of_rows(&rows);
     let matters = |axis: usize| readings.positions[axis].iter().any(|q| *q != 0.0);
     let mut found: Vec<(f64, String)> = Vec::new();
-    for (kind, slips) in [(AxisKind::Linear, &LINEAR[..]), (AxisKind::Rotary, &ROTARY[..])] {
+    for (kind, mistakes) in [(AxisKind::Linear, &LINEAR[..]), (AxisKind::Rotary, &ROTARY[..])] {
         let axes: Vec<usize> = (0..machine.axes.len())
             .filter(|axis| machine.axes[*axis].kind == kind && matters(*axis))
             .collect();
@@ -78,16 +78,16 @@ fn slips(machine: &Machine, test: &Test, readings: &Readings) -> Vec<String> {
                 .iter()
                 .map(|axis| machine.axes[*axis].name.as_str())
                 .collect();
-            for (factor, words) in slips {
+            for (factor, words) in mistakes {
                 let mut corrected = readings.clone();
                 for axis in &group {
                     for position in &mut corrected.positions[*axis] {
                         *position *= factor;
                     }
                 }
-                if reaches(machine, test, &corrected).is_ok() {
-                    let said = format!("the positions of {} were read {words}", names.join(" and "));
-                    found.push((misfit(machine, test, &corrected), said));
+                if check_nominal(machine, test, &corrected).is_ok() {
+                    let description = format!("the positions of {} were read {words}", names.join(" and "));
+                    found.push((misfit(machine, test, &corrected), description));
                 }
             }
         }
@@ -97,13 +97,13 @@ fn slips(machine: &Machine, test: &Test, readings: &Readings) -> Vec<String> {
         .iter()
         .map(|(misfit, _)| *misfit)
         .fold(f64::INFINITY, f64::min);
-    found.retain(|(misfit, _)| *misfit <= ALIKE * best + MISFIT_MM);
-    found.into_iter().map(|(_, said)| said).collect()
+    found.retain(|(misfit, _)| *misfit <= EQUIVALENT_FACTOR * best + EQUIVALENT_MM);
+    found.into_iter().map(|(_, description)| description).collect()
 }
 
 /// Corrections are equivalent if their misfits differ by less than this factor and this length, mm.
-const ALIKE: f64 = 2.0;
-const MISFIT_MM: f64 = 0.05;
+const EQUIVALENT_FACTOR: f64 = 2.0;
+const EQUIVALENT_MM: f64 = 0.05;
 
 /// Nominal misfit of the instrument, mm: rms over the readings.
 fn misfit(machine: &Machine, test: &Test, readings: &Readings) -> f64 {
@@ -123,16 +123,16 @@ fn misfit(machine: &Machine, test: &Test, readings: &Readings) -> f64 {
     (sum / readings.rows().max(1) as f64).sqrt()
 }
 
-fn reaches(machine: &Machine, test: &Test, readings: &Readings) -> Result<(), (String, String)> {
+fn check_nominal(machine: &Machine, test: &Test, readings: &Readings) -> Result<(), (String, String)> {
     let bar = match &test.station {
         Station::BallBar(bar) => bar,
-        Station::Probe(_) => return check_touch(machine, test, readings),
+        Station::Probe(_) => return check_stylus(machine, test, readings),
         Station::RTest(_) => return check_nest(machine, test, readings),
         Station::Tracker(_) | Station::Socket(_) => return Ok(()),
     };
     let none = vec![BodyErrors::<f64>::NONE; machine.axes.len()];
     let mut state = Vec::new();
-    let mut off: Vec<f64> = Vec::with_capacity(readings.rows());
+    let mut deviations: Vec<f64> = Vec::with_capacity(readings.rows());
     for row in 0..readings.rows() {
         readings.state(machine, row, &mut state);
         let length = bar.read::<f64>(machine, &state, &none, |_| None);
@@ -148,9 +148,9 @@ fn reaches(machine: &Machine, test: &Test, readings: &Readings) -> Result<(), (S
                 "check `bar_mm`, the two ball positions and the axis positions in `at` and the data".into(),
             ));
         }
-        off.push(length - bar.bar);
+        deviations.push(length - bar.bar);
     }
-    let nominal = bar.bar + median(&mut off);
+    let nominal = bar.bar + median(&mut deviations);
     if (nominal - bar.bar).abs() <= MAX_MM {
         return Ok(());
     }
@@ -160,7 +160,7 @@ fn reaches(machine: &Machine, test: &Test, readings: &Readings) -> Result<(), (S
              (median of {} positions)",
             test.name,
             bar.bar,
-            off.len()
+            deviations.len()
         ),
         "possible causes are degrees read as radians (or radians as degrees), and a ball position, an axis position \
          in `at` or an axis direction that is not as on the machine"
@@ -169,7 +169,7 @@ fn reaches(machine: &Machine, test: &Test, readings: &Readings) -> Result<(), (S
 }
 
 /// Checks that the stylus is in front of the artefact and near it at every reading.
-fn check_touch(machine: &Machine, test: &Test, readings: &Readings) -> Result<(), (String, String)> {
+fn check_stylus(machine: &Machine, test: &Test, readings: &Readings) -> Result<(), (String, String)> {
     let none = vec![BodyErrors::<f64>::NONE; machine.axes.len()];
     let mut state = Vec::new();
     for row in 0..readings.rows() {
@@ -224,8 +224,8 @@ pub(crate) fn check_lengths(test: &Test, readings: &Readings) -> Result<(), (Str
         Station::RTest(_) => return check_sensors(test, readings),
         _ => return Ok(()),
     };
-    let mut off: Vec<f64> = readings.observed.iter().map(|length| length - bar.bar).collect();
-    let read = bar.bar + median(&mut off);
+    let mut deviations: Vec<f64> = readings.observed.iter().map(|length| length - bar.bar).collect();
+    let read = bar.bar + median(&mut deviations);
     if (read - bar.bar).abs() <= MAX_MM {
         return Ok(());
     }
@@ -234,7 +234,7 @@ pub(crate) fn check_lengths(test: &Test, readings: &Readings) -> Result<(), (Str
             "test \"{}\": a bar of {:.4} mm read {read:.3} mm (median of {} readings)",
             test.name,
             bar.bar,
-            off.len()
+            deviations.len()
         ),
         "is the column a deviation from `bar_mm` rather than a length, or in another unit than its name says?".into(),
     ))
