@@ -1,4 +1,4 @@
-//! `abbe equation` and `abbe volumetric`.
+//! `abbe equation` and `abbe volumetric`: closed-form equations.
 
 use std::path::PathBuf;
 
@@ -16,6 +16,23 @@ use clap::{Args, ValueEnum};
 use super::failure::Failure;
 use super::message::{Kind, tell};
 use super::output::{self, Outputs};
+
+/// Examples of `abbe equation`.
+pub const HELP: &str = "Examples:
+  abbe equation sessions/hermle-c600u/chapter5.toml --test A150 --as latex
+  abbe equation sessions/hermle-c600u/chapter5.toml --test C150 --order first --errors EX0C,EY0C,bar
+  abbe equation sessions/hermle-c600u/chapter5.toml --test A150 --as python --gradient --out a150.py";
+
+/// Examples of `abbe volumetric`.
+pub const VOLUMETRIC_HELP: &str = "Examples:
+  abbe volumetric sessions/hermle-c600u/machine.toml --order first --errors EX0C,EY0C,EXX
+  abbe volumetric sessions/hermle-c600u/machine.toml --errors EX0C,EB0A --rotation small-angle \\
+      --as c --symbols iso --gradient --out error.c
+  abbe volumetric sessions/volumetric/machine.toml --map map.csv \\
+      --functions sessions/volumetric/errors.toml --compensate
+  abbe volumetric sessions/volumetric/machine.toml --map map2.csv \\
+      --functions sessions/volumetric/errors.toml --places 3 --axis A=30 --axis X:5 --tool-mm 0,0,-120 \\
+      --json map.json";
 
 /// The language of an equation.
 #[derive(Clone, Copy, ValueEnum)]
@@ -65,27 +82,40 @@ enum SymbolsWord {
 /// The form of an equation.
 #[derive(Args)]
 struct FormArguments {
-    /// The language.
+    /// The language of the equation.
+    ///
+    /// Example: --as latex
     #[arg(long = "as", value_enum, default_value = "text")]
     language: OutputForm,
-    /// How far it goes in the errors: all terms, products of two, or a coefficient for each.
+    /// Order in the errors: all terms, products of two errors, or one sensitivity coefficient per error.
+    ///
+    /// Example: --order first
     #[arg(long, value_enum, default_value = "exact")]
     order: OrderWord,
-    /// How error angles rotate; the machine's own way if not given.
+    /// Rotation by error angles [default: as the machine file states].
+    ///
+    /// Example: --rotation small-angle
     #[arg(long, value_enum)]
     rotation: Option<RotationWord>,
-    /// What to keep, by name and separated by commas; what is not named is zero. Errors as EX0C or e_x0c or by a pattern as E?0C, of a session also unknowns of the
-    /// instrument, as bar or workpiece_ball.x, and effects that it declares, as EZC~C:h2. Without it a session's unknown errors and declared
-    /// effects, of a machine all errors.
+    /// Parameters in the equation, separated by commas; all others are zero. Errors (EX0C, e_x0c) or patterns of errors (E?0C); for a session also
+    /// parameters of the instrument (bar, workpiece_ball.x) and declared effects (EZC~C:h2) [default: for a session its errors and declared effects,
+    /// for a machine all errors].
+    ///
+    /// Example: --errors EX0C,EY0C,E?0A
     #[arg(long, value_delimiter = ',', value_name = "NAMES")]
     errors: Vec<String>,
-    /// Which names errors go by in print: e_y0a, or EY0A of ISO 230-1.
+    /// Symbols of the errors: e_y0a (literature) or EY0A (ISO 230-1).
+    ///
+    /// Example: --symbols iso
     #[arg(long, value_enum, default_value = "literature")]
     symbols: SymbolsWord,
-    /// Add the derivatives by everything that is kept: to code of any form, in text, LaTeX and Typst to the exact length of a bar.
+    /// Add the derivatives with respect to all parameters in the equation: in code for every order; in text, LaTeX and Typst for the exact length of
+    /// a bar.
     #[arg(long)]
     gradient: bool,
-    /// Write to a file, whole or not at all.
+    /// Write the equation to a file instead of standard output.
+    ///
+    /// Example: --out equation.tex
     #[arg(long, value_name = "FILE")]
     out: Option<PathBuf>,
 }
@@ -95,7 +125,9 @@ struct FormArguments {
 pub struct EquationArguments {
     #[command(flatten)]
     session: super::SessionArguments,
-    /// The test, by its name in the session. Its readings, if there are any, only say which axes move and how far.
+    /// Name of the test in the session. Its readings, if there are any, state only which axes move and how far.
+    ///
+    /// Example: --test A150
     #[arg(long, value_name = "NAME")]
     test: String,
     #[command(flatten)]
@@ -113,17 +145,17 @@ pub struct VolumetricArguments {
     map: super::map::MapArguments,
 }
 
-/// What an equation is written in.
+/// The parameters of an equation.
 #[derive(Default)]
 struct Kept {
     errors: Vec<ErrorName>,
-    /// Places in the instrument's list of unknowns.
+    /// Indices in the list of parameters of the instrument.
     unknowns: Vec<usize>,
     effects: Vec<Effect>,
 }
 
 impl Kept {
-    /// Reads names of errors, also as patterns, of the instrument's unknowns and of effects.
+    /// Reads names and patterns of errors, parameters of the instrument and effects.
     fn parse(
         names: &[String],
         machine: &Machine,
@@ -159,18 +191,18 @@ impl Kept {
                     let unknown = |u: &InstrumentParameter| Variable::Instrument(*u).name();
                     kept.unknowns.push(place.ok_or_else(|| {
                         let has = match known {
-                            [] => "an error vector has none of an instrument".to_string(),
+                            [] => "an error vector has no parameters of an instrument".to_string(),
                             known => format!(
-                                "this one has {}",
+                                "this instrument has {}",
                                 known.iter().map(unknown).collect::<Vec<_>>().join(", ")
                             ),
                         };
-                        Failure::Other(format!("`{name}` is an unknown of another instrument; {has}"))
+                        Failure::Other(format!("`{name}` is a parameter of another instrument; {has}"))
                     })?);
                 }
                 Some(Component::TriggerDelay) | None => {
                     return Err(Failure::Other(format!(
-                        "`{name}` is no error that an equation can keep; errors go by ISO 230-1 names, as EX0C or EZC, or by those of the literature, as e_x0c"
+                        "`{name}` is no parameter of an equation; errors have names of ISO 230-1, as EX0C or EZC, or of the literature, as e_x0c"
                     )));
                 }
             }
@@ -179,7 +211,7 @@ impl Kept {
     }
 }
 
-/// The declared effects of a name such as `EZC~C:h2`; those that differ in their numbers alone share one.
+/// The declared effects with a name such as `EZC~C:h2`. Effects that differ only in the numbers of their shapes share a name.
 fn named(name: &str, effects: &[Effect]) -> Result<Vec<Effect>, Failure> {
     let found: Vec<Effect> = effects
         .iter()
@@ -189,7 +221,7 @@ fn named(name: &str, effects: &[Effect]) -> Result<Vec<Effect>, Failure> {
     if found.is_empty() {
         let declared: Vec<String> = effects.iter().map(Effect::id).collect();
         let has = match declared.as_slice() {
-            [] => "no effect that is declared acts here".to_string(),
+            [] => "no declared effect acts here".to_string(),
             declared => format!("declared here: {}", declared.join(", ")),
         };
         return Err(Failure::Other(format!("no effect is called `{name}`; {has}")));
@@ -231,7 +263,7 @@ impl FormArguments {
     }
 }
 
-/// The session with its readings; without them where they cannot be read, which is said.
+/// The session with its readings, or without them and with a note if they cannot be read.
 fn read(arguments: &super::SessionArguments) -> Result<Session, Failure> {
     let fault = match read::session(&arguments.session, &arguments.options()) {
         Ok(session) => return Ok(session),
@@ -246,7 +278,7 @@ fn read(arguments: &super::SessionArguments) -> Result<Session, Failure> {
             tell(Kind::Note, &fault.to_string());
             tell(
                 Kind::Note,
-                "the equation does without readings; of a test without a planned movement every axis that it does not hold is taken to move",
+                "the equation is made without readings: in a test without a planned movement every axis moves that the test does not hold",
             );
             Ok(session)
         }

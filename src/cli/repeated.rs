@@ -1,4 +1,4 @@
-//! `abbe fit SESSION --repeat …`.
+//! `abbe fit SESSION --repeat …`: Type A evaluation over repeated sessions beside the Type B evaluation of each fit.
 
 use std::path::{Path, PathBuf};
 
@@ -9,7 +9,7 @@ use super::failure::Failure;
 use super::output::{self, Outputs};
 use super::{CommonArguments, SessionArguments, fit, read_session, table};
 
-/// Fits every session by itself and compares them.
+/// Fits each session separately and compares the fits.
 pub fn run(
     first: &SessionArguments,
     repeat: &[PathBuf],
@@ -25,7 +25,7 @@ pub fn run(
         let twice = all[..place].iter().any(|earlier| output::is_same(earlier, path));
         if twice {
             return Err(Failure::Other(format!(
-                "{} is named twice: a session is no repeat of itself",
+                "{} is named twice; name each repeated session once",
                 path.display()
             )));
         }
@@ -60,7 +60,7 @@ pub fn run(
 
 fn print(result: &Repeated) {
     say!(
-        "{} of one plan, each fitted by itself\n",
+        "{} of one plan, each fitted separately\n",
         counted(result.sessions.len(), "session")
     );
     let rows: Vec<Vec<String>> = result
@@ -79,13 +79,13 @@ fn print(result: &Repeated) {
                 u_type_a,
                 s,
                 u_type_b,
-                parameter.unit.clone(),
+                table::unit(&parameter.unit),
                 number(parameter.ratio, 2),
                 number(parameter.p_value, 3),
                 match parameter.scatter {
                     Scatter::AsStated => "",
-                    Scatter::More => "scatters more than the fits say",
-                    Scatter::Less => "scatters less than the fits say",
+                    Scatter::More => "scatters more than u states",
+                    Scatter::Less => "scatters less than u states",
                 }
                 .to_string(),
             ]
@@ -106,32 +106,33 @@ fn print(result: &Repeated) {
         &rows,
     );
     say!(
-        "\nA: over the sessions, of their mean and of one; B: of one session by its fit; p: of such an s/u by chance"
+        "\nType A: from the scatter of the sessions, s/√n of their mean, s of one session. Type B: standard uncertainty u of one fit.\n\
+         p: probability of such a ratio s/u by chance."
     );
     if result.deviating.is_empty() {
         if result.sessions.len() > 2 {
-            say!("No session is off the others by more than the fits explain");
+            say!("No session deviates significantly from the others.");
         }
         return;
     }
-    say!("\nOff the mean of the others:");
+    say!("\nSignificant deviations of a session from the mean of the others:");
     let rows: Vec<Vec<String>> = result
         .deviating
         .iter()
-        .map(|off| {
-            let (by, u) = table::value_and_u(off.deviation, off.u);
+        .map(|deviation| {
+            let (difference, u) = table::value_and_u(deviation.deviation, deviation.u);
             vec![
-                off.session.clone(),
-                off.id.clone(),
-                by,
+                deviation.session.clone(),
+                deviation.id.clone(),
+                difference,
                 u,
-                off.unit.clone(),
-                format!("{:.1}", (off.deviation / off.u).abs()),
+                table::unit(&deviation.unit),
+                format!("{:.1}", (deviation.deviation / deviation.u).abs()),
             ]
         })
         .collect();
     table::print(
-        &["session", "parameter", "by", "u (k=1)", "unit", "times u"],
+        &["session", "parameter", "deviation", "u", "unit", "deviation/u"],
         &rows,
     );
 }

@@ -78,7 +78,7 @@ fn an_interrupted_trace_exits_with_130_and_every_output_says_so() {
         text(&report),
     ]);
     assert_eq!(status.code(), Some(INTERRUPTED), "{stderr}");
-    assert!(result.starts_with("Verdict: incomplete\n"), "{result}");
+    assert!(result.starts_with("Verdict: incomplete, 1 effect\n"), "{result}");
     assert!(stderr.contains("interrupted after 1 effect\n"), "{stderr}");
     let read = |path: &Path| std::fs::read_to_string(path).unwrap();
     let result: serde_json::Value = serde_json::from_str(&read(&json)).unwrap();

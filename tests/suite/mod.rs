@@ -12,6 +12,7 @@ mod equation_command;
 mod equation_effects;
 mod faults;
 mod field_files;
+mod first_screen;
 mod generated;
 mod geometric;
 mod help;
