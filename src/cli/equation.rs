@@ -7,7 +7,7 @@ use abbe::model::chain::Machine;
 use abbe::model::component::ErrorName;
 use abbe::model::effect::{Component, Effect};
 use abbe::model::frames::Rotation;
-use abbe::model::instrument::InstrumentUnknown;
+use abbe::model::instrument::InstrumentParameter;
 use abbe::model::pattern;
 use abbe::model::session::Session;
 use abbe::model::session::read::{self, ReadOptions};
@@ -159,7 +159,7 @@ impl Kept {
     fn parse(
         names: &[String],
         machine: &Machine,
-        known: &[InstrumentUnknown],
+        known: &[InstrumentParameter],
         effects: &[Effect],
     ) -> Result<Kept, Failure> {
         let mut kept = Kept::default();
@@ -188,7 +188,7 @@ impl Kept {
                     let place = known
                         .iter()
                         .position(|u| u.thing == thing && u.coordinate == coordinate);
-                    let unknown = |u: &InstrumentUnknown| Variable::Unknown(*u).name();
+                    let unknown = |u: &InstrumentParameter| Variable::Instrument(*u).name();
                     kept.unknowns.push(place.ok_or_else(|| {
                         let has = match known {
                             [] => "an error vector has no parameters of an instrument".to_string(),

@@ -137,7 +137,7 @@ fn print(result: &SelfCalibration) {
                 let interval = |Interval { low, high }: Interval| {
                     let (low, _) = table::value_and_u(low, quantity.u_um);
                     let (high, _) = table::value_and_u(high, quantity.u_um);
-                    format!("{low} … {high}")
+                    format!("{low} to {high}")
                 };
                 vec![
                     quantity.id.clone(),
@@ -148,7 +148,7 @@ fn print(result: &SelfCalibration) {
                 ]
             })
             .collect();
-        table::print(&["quantity", "mean", "u (k=1)", "shortest", "symmetric"], &rows);
+        table::print(&["quantity", "mean", "u", "shortest", "symmetric"], &rows);
     }
 }
 

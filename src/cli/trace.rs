@@ -6,7 +6,7 @@ use std::path::PathBuf;
 use std::sync::Mutex;
 use std::time::Duration;
 
-use abbe::identify::plan::candidate_tests::TestVariations;
+use abbe::identify::plan::test_variations::TestVariations;
 use abbe::identify::results::EffectName;
 use abbe::identify::trace::separating_tests::separate_aliases;
 use abbe::identify::trace::{Progress, TraceOptions, library};

@@ -8,10 +8,10 @@ use schemars::JsonSchema;
 use serde::Serialize;
 
 use super::candidate_information::PreparedCandidates;
-use super::candidate_tests::TestVariations;
 use super::criterion::{Goal, figure, reported, targets};
 use super::information::{Root, SharedParameters};
 use super::ranking::smallest_first;
+use super::test_variations::TestVariations;
 use crate::error::IdentifyError;
 use crate::problem::Problem;
 
@@ -40,9 +40,10 @@ pub struct Improvement {
     pub uncertainties_before: Vec<NamedUncertainty>,
     /// The proposed tests, in the order in which they are added.
     pub steps: Vec<ProposedTest>,
-    /// The exchanges of proposed tests, in words.
+    /// The exchanges of proposed tests, one sentence each.
     pub exchanged: Vec<String>,
-    /// The best candidate tests by themselves, in the order of the criterion, or of its gain per minute. Of tests with equal readings, one.
+    /// The best single candidate tests, in the order of the criterion or of its gain per minute. Of tests with equal readings,
+    /// one is listed.
     pub alternatives: Vec<AlternativeTest>,
 }
 
@@ -51,7 +52,7 @@ pub struct Improvement {
 pub struct ProposedTest {
     /// Description of the test.
     pub test: String,
-    /// Value of the criterion with it; infinite (`null` in JSON) where an error is not identifiable.
+    /// Value of the criterion with this test and those before it; infinite (`null` in JSON) where an error is not identifiable.
     #[schemars(with = "Option<f64>")]
     pub after: f64,
     /// Duration of the test, min.

@@ -11,7 +11,7 @@ use crate::problem::Problem;
 use crate::rank::Rank;
 use crate::results::Interval;
 
-/// The range by which a sweep can be reduced.
+/// How far a sweep can shrink.
 #[derive(Clone, Debug, Serialize, JsonSchema)]
 pub struct Shrinkage {
     /// The test.
@@ -22,7 +22,7 @@ pub struct Shrinkage {
     pub range: Interval,
     /// Unit of the ranges: `deg`, `mm`.
     pub unit: String,
-    /// The least range at which no uncertainty has doubled, in `unit`; `null` where the test can be left out.
+    /// The smallest range at which no uncertainty has doubled, in `unit`; `null` if the test can be left out.
     pub minimum_range: Option<Interval>,
     /// The error whose uncertainty doubles first.
     pub first_to_double: Option<String>,
@@ -70,7 +70,7 @@ pub fn shrinkages(problem: &Problem<'_>) -> Result<Vec<Shrinkage>, IdentifyError
                 whole.absorb(Mat::from_fn(kept.len(), white.ncols(), |i, j| white[(kept[i], j)]).as_ref());
             }
             let rank = Rank::decide(whole.parts().0.as_ref(), &linear.size, &linear.preference)?;
-            let covariance = fit::covariance(&whole, &rank.seen)?;
+            let covariance = fit::parameter_covariance(&whole, &rank.identifiable_basis)?;
             let ratios = of_interest.iter().map(|&j| {
                 let ratio = (covariance[(j, j)] / linear.covariance[(j, j)]).sqrt();
                 (
@@ -110,10 +110,13 @@ pub fn shrinkages(problem: &Problem<'_>) -> Result<Vec<Shrinkage>, IdentifyError
                 }
             }
             let (middle, half) = (0.5 * (low + high), 0.5 * enough * (high - low));
-            shrinkage.minimum_range = Some(Interval {
-                low: (middle - half) * display_per_internal,
-                high: (middle + half) * display_per_internal,
-            });
+            shrinkage.minimum_range = Some(
+                [
+                    (middle - half) * display_per_internal,
+                    (middle + half) * display_per_internal,
+                ]
+                .into(),
+            );
             shrinkage.first_to_double = Some(problem.parameters.list[parameter].id.clone());
         }
         found.push(shrinkage);

@@ -95,7 +95,7 @@ fn print_drawn(drawn: &FitMonteCarlo, estimates: &Estimates<'_>, all: bool) {
                 value,
                 gum_u,
                 u,
-                format!("{low} … {high}"),
+                format!("{low} to {high}"),
                 table::unit(&parameter.unit),
                 source.to_string(),
             ]

@@ -170,15 +170,38 @@ fn indices(analysis: &PlanAnalysis) {
         indices.identifiable_count,
         counted(indices.error_count, "error")
     );
-    say!(
-        "  condition number {}; O1 {}  O2 {}  O3 {}  O4 {}  O5 {}",
-        three_digits(indices.condition_number),
-        three_digits(indices.o1),
-        three_digits(indices.o2),
-        three_digits(indices.o3),
-        three_digits(indices.o4),
-        three_digits(indices.o5)
-    );
+    let row = |name: &str, value: f64, meaning: &str| {
+        vec![name.to_string(), three_digits(value), meaning.to_string()]
+    };
+    let rows = [
+        row(
+            "condition number",
+            indices.condition_number,
+            "largest over smallest singular value",
+        ),
+        row(
+            "O1",
+            indices.o1,
+            "geometric mean of the singular values, per root of the readings: volume of the confidence region",
+        ),
+        row("O2", indices.o2, "smallest over largest singular value: evenness"),
+        row(
+            "O3",
+            indices.o3,
+            "smallest singular value: worst determined direction",
+        ),
+        row(
+            "O4",
+            indices.o4,
+            "square of the smallest over the largest singular value: noise amplification",
+        ),
+        row(
+            "O5",
+            indices.o5,
+            "reciprocal of the sum of reciprocal singular values: mean uncertainty",
+        ),
+    ];
+    table::print_aligned(&["index", "value", "meaning"], &rows, &[0, 2]);
     say!(
         "  efficiency D {}  A {}  E {}  G {}",
         three_digits(indices.d_efficiency),

@@ -1,10 +1,10 @@
 //! `abbe plan --improve`, `--separate`, `--range`.
 
 use abbe::identify::IdentifyError;
-use abbe::identify::plan::candidate_tests::TestVariations;
 use abbe::identify::plan::criterion::Goal;
 use abbe::identify::plan::improve::{ImproveOptions, Improvement, improve};
 use abbe::identify::plan::range::Shrinkage;
+use abbe::identify::plan::test_variations::TestVariations;
 use abbe::identify::problem::Problem;
 use abbe::identify::results::Interval;
 use abbe::identify::trace::library;
@@ -261,10 +261,10 @@ fn add(problem: &mut Problem<'_>, id: &str) -> Result<(), IdentifyError> {
 
 /// Prints the proposed tests.
 pub fn print(found: &Improvement) {
+    let criterion = found.criterion.replace("um or arcsec", "µm or ″");
     say!(
-        "{}; {} of the plan: {}",
+        "{}. With the plan: {criterion} {}",
         counted(found.candidate_tests, "candidate test"),
-        found.criterion,
         three_digits(found.before)
     );
     if found.steps.is_empty() {
@@ -274,8 +274,7 @@ pub fn print(found: &Improvement) {
     for (number, step) in found.steps.iter().enumerate() {
         say!("\n{}. {}", number + 1, step.test);
         say!(
-            "   {} → {}, {:.1} min{}",
-            found.criterion,
+            "   {criterion} {}, {:.1} min{}",
             three_digits(step.after),
             step.duration_min,
             if step.new_setup {
@@ -314,7 +313,7 @@ pub fn print(found: &Improvement) {
         .collect();
     table::print(&header.iter().map(String::as_str).collect::<Vec<_>>(), &rows);
     for exchange in &found.exchanged {
-        say!("replaced: {exchange}");
+        say!("replaced by a further search: {exchange}");
     }
     say!("\nBest single tests:");
     for other in &found.alternatives {
@@ -338,7 +337,9 @@ pub const RANGES: [&str; 5] = ["test", "axis", "planned", "smallest", "doubles f
 /// The smallest range of each sweep, one row per sweep.
 pub fn range_rows(ranges: &[Shrinkage]) -> Vec<Vec<String>> {
     let row = |range: &Shrinkage| {
-        let span = |Interval { low, high }: Interval| format!("{low:.0} to {high:.0} {}", range.unit);
+        let span = |Interval { low, high }: Interval| {
+            table::quantity(&format!("{low:.0} to {high:.0}"), &range.unit)
+        };
         vec![
             range.test.clone(),
             range.axis.clone(),
