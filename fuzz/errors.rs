@@ -1,4 +1,4 @@
-//! What is fuzzed in `abbe-identify`: its readers of errors as people give them, through files as the command reads them.
+//! Fuzz functions for the readers of `abbe-identify`: files of error functions and of error values, read as the command reads them.
 //!
 //! `identify/tests/corpus.rs` replays the corpus with these functions on every test run.
 
@@ -14,10 +14,10 @@ use abbe_model::session::read;
 
 const MACHINE: &str = "chain = \"w C A b Y X Z t\"\n[axis.C]\n[axis.A]\n[axis.X]\n[axis.Y]\n[axis.Z]\n";
 
-/// The input as a file of this thread's own: in memory where the system has such a place.
+/// Writes the input to a file of this thread, in memory if the system has `/dev/shm`.
 fn as_file<T>(input: &[u8], work: impl FnOnce(&PathBuf, &Machine) -> T) -> T {
     thread_local! {
-        static PLACE: (tempfile::TempDir, Machine) = {
+        static FOLDER_AND_MACHINE: (tempfile::TempDir, Machine) = {
             let memory = std::path::Path::new("/dev/shm");
             let made = if memory.is_dir() { tempfile::tempdir_in(memory) } else { tempfile::tempdir() };
             let made = made.expect("a temporary folder");
@@ -27,18 +27,18 @@ fn as_file<T>(input: &[u8], work: impl FnOnce(&PathBuf, &Machine) -> T) -> T {
             (made, machine)
         };
     }
-    PLACE.with(|(folder, machine)| {
+    FOLDER_AND_MACHINE.with(|(folder, machine)| {
         let file = folder.path().join("errors.toml");
         fs::write(&file, input).expect("a file in a temporary folder");
         work(&file, machine)
     })
 }
 
-/// The file of `volumetric --functions`: what is read moves the tool by a number of millimetres anywhere, or a map says that it does not.
+/// The file of `volumetric --functions`: accepted functions give a finite volumetric error everywhere, or the map returns an error.
 pub fn functions(input: &[u8]) {
     as_file(input, |file, machine| match functions::read(file, machine) {
         Ok(functions) => {
-            let erring = MachineWithErrors {
+            let machine_with_errors = MachineWithErrors {
                 machine,
                 functions: &functions,
                 tool_mm: [0.0, 0.0, -120.0],
@@ -48,7 +48,7 @@ pub fn functions(input: &[u8]) {
                 AxisKind::Rotary => vec![-1.5, 0.0, 3.0],
             };
             let grid: Vec<Vec<f64>> = machine.axes.iter().map(|axis| along(axis.kind)).collect();
-            match volumetric::map(&erring, &grid, false) {
+            match volumetric::map(&machine_with_errors, &grid, false) {
                 Ok((places, summary)) => {
                     assert!(summary.error.rms_um <= summary.error.largest_um * (1.0 + 1e-12));
                     assert!(places.iter().flat_map(|place| place.error_mm).all(f64::is_finite));
@@ -60,9 +60,9 @@ pub fn functions(input: &[u8]) {
     });
 }
 
-/// The file of `simulate --errors`, and each line of it as an argument of `--error`.
+/// The file of `simulate --errors`, and each of its lines as an argument of `--error`.
 pub fn values(input: &[u8]) {
-    fn sound(given: &Given) {
+    fn check_value(given: &Given) {
         assert!(given.value.abs() <= LARGEST);
         for unit in ["um", "arcsec", "ms", "um/h", "um/m", "arcsec/K"] {
             if let Ok(value) = given.in_unit(unit) {
@@ -71,7 +71,7 @@ pub fn values(input: &[u8]) {
         }
     }
     as_file(input, |file, _| match quantity::read(file) {
-        Ok(values) => values.iter().for_each(sound),
+        Ok(values) => values.iter().for_each(check_value),
         Err(fault) => assert!(!fault.to_string().is_empty()),
     });
     let Ok(text) = std::str::from_utf8(input) else {
@@ -79,7 +79,7 @@ pub fn values(input: &[u8]) {
     };
     for line in text.lines() {
         match Given::parse(line) {
-            Ok(given) => sound(&given),
+            Ok(given) => check_value(&given),
             Err(fault) => assert!(!fault.to_string().is_empty()),
         }
     }

@@ -1,6 +1,6 @@
-//! What is fuzzed: every reader of `abbe-model`, through files as the command reads them.
+//! Fuzz functions for every reader of `abbe-model`: files, read as the command reads them.
 //!
-//! An input is good or bad; either way the reader returns, a message points at bytes that are there, and what was read is finite.
+//! For any input the reader returns, a message refers to existing bytes, and accepted values are finite.
 //! `model/tests/corpus.rs` replays the corpus with these functions on every test run.
 
 use std::fs;
@@ -9,7 +9,7 @@ use std::path::Path;
 
 use abbe_model::ModelError;
 use abbe_model::session::read::{self, ReadOptions};
-use abbe_model::session::{Session, motion, rewrite, write};
+use abbe_model::session::{Session, planned, rewrite, write};
 
 const MACHINE: &str = "chain = \"w C A b Y X Z t\"\n[axis.C]\n[axis.A]\n[axis.X]\n[axis.Y]\n[axis.Z]\n";
 
@@ -28,7 +28,7 @@ spindle_ball_mm = [0, 0, 0]
 COLUMNS
 "#;
 
-/// The folder that this thread's files lie in: in memory where the system has such a place.
+/// Runs `work` with the folder of this thread, in memory if the system has `/dev/shm`.
 fn within<T>(work: impl FnOnce(&Path) -> T) -> T {
     thread_local! {
         static FOLDER: tempfile::TempDir = {
@@ -46,8 +46,8 @@ fn put(folder: &Path, name: &str, contents: &[u8]) {
     fs::write(folder.join(name), contents).expect("a file in a temporary folder");
 }
 
-/// A message says where, and bytes that it points at are characters of the file: the command shows them.
-fn told(fault: &ModelError) {
+/// Asserts that a message is not empty and that its span is a range of characters of the file, which the command prints.
+fn check_message(fault: &ModelError) {
     assert!(!fault.to_string().is_empty());
     let Some(location) = fault.location() else { return };
     let Some(span) = &location.span else { return };
@@ -62,12 +62,12 @@ fn told(fault: &ModelError) {
     }
 }
 
-/// A session is read; of a good one, numbers are finite and a plan of moderate length comes to states.
+/// Reads the session of the folder. The numbers of an accepted session are finite.
 fn session_in(folder: &Path) -> Option<Session> {
     let session = match read::session(&folder.join("session.toml"), &ReadOptions::default()) {
         Ok(session) => session,
         Err(fault) => {
-            told(&fault);
+            check_message(&fault);
             return None;
         }
     };
@@ -77,7 +77,7 @@ fn session_in(folder: &Path) -> Option<Session> {
         assert_eq!(readings.observed.len(), readings.rows() * readings.coordinates);
         assert!(readings.observed.iter().all(|value| value.is_finite()));
         assert!(readings.positions.iter().flatten().all(|value| value.is_finite()));
-        // Runs cover the rows, each once.
+        // Each row belongs to exactly one run.
         assert_eq!(
             readings.runs().iter().map(|run| run.len()).sum::<usize>(),
             readings.rows()
@@ -98,7 +98,7 @@ pub fn machine(input: &[u8]) {
                     .flat_map(|axis| axis.direction)
                     .all(f64::is_finite)
             ),
-            Err(fault) => told(&fault),
+            Err(fault) => check_message(&fault),
         }
     });
 }
@@ -113,9 +113,9 @@ pub fn session(input: &[u8]) {
         );
         put(folder, "session.toml", input);
         let Some(session) = session_in(folder) else { return };
-        let text = std::str::from_utf8(input).expect("what was read is UTF-8");
+        let text = std::str::from_utf8(input).expect("an accepted session is UTF-8");
         let file = Path::new("session.toml");
-        // What is written from a good session is a session.
+        // The rewritten form of a valid session is a valid session.
         let again = rewrite::with_machine_file(text, file, "machine.toml").expect("it was read");
         let again = rewrite::with_noise(&again, file, 0.5).expect("it was read");
         let again = write::with_effects(&again, &session.effects, &session.machine);
@@ -123,9 +123,9 @@ pub fn session(input: &[u8]) {
         let short = text.matches("runs").count() == 0 && text.len() < 4000;
         let steps = session.tests.iter().filter(|test| test.motion.is_some()).count();
         if short && steps == 1 {
-            // A plan that the machine cannot carry out says so.
-            if let Err(fault) = motion::planned_session(&session) {
-                told(&fault);
+            // A plan that the machine cannot execute gives an error.
+            if let Err(fault) = planned::planned_session(&session) {
+                check_message(&fault);
             }
         }
     });
@@ -143,12 +143,12 @@ fn table_of(data: &str, format: &str, columns: &str, input: &[u8]) {
     });
 }
 
-/// A CSV file of our own.
+/// A CSV file with the names of Abbe.
 pub fn table(input: &[u8]) {
     table_of("data.csv", "", "", input);
 }
 
-/// A CSV file of somebody else: the first byte chooses the format, the rest is the file.
+/// A foreign CSV file: the first byte selects the format, the rest is the file.
 pub fn foreign(input: &[u8]) {
     let Some((choice, rest)) = input.split_first() else {
         return;
@@ -173,7 +173,7 @@ pub fn xml(input: &[u8]) {
     table_of("data.b5r", "", columns, input);
 }
 
-/// A spreadsheet: a whole file where the input begins as a ZIP file does, else the XML of its sheet.
+/// A spreadsheet: a complete file if the input begins like a ZIP file, otherwise the XML of its sheet.
 pub fn sheet(input: &[u8]) {
     if input.starts_with(b"PK") {
         table_of("data.xlsx", "", "", input);
@@ -182,7 +182,7 @@ pub fn sheet(input: &[u8]) {
     }
 }
 
-/// The smallest workbook around the XML of a sheet.
+/// The smallest workbook that contains the XML of a sheet.
 fn book(sheet: &[u8]) -> zip::result::ZipResult<Vec<u8>> {
     const PARTS: [(&str, &str); 5] = [
         (

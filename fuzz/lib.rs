@@ -1,4 +1,4 @@
-//! What the targets call: the readers of `abbe-model` and those of `abbe-identify`.
+//! The functions of the fuzz targets: readers of `abbe-model` and of `abbe-identify`.
 
 pub mod errors;
 mod harness;

@@ -1,8 +1,8 @@
-//! Every input that the corpus keeps, given to a target once more: without nightly, in the tests of the crate whose readers are fuzzed.
+//! Replays the corpus through a target without nightly, in the tests of the crate whose readers are fuzzed.
 
 use std::path::Path;
 
-/// Gives a target every input of its corpus; the name of the file is printed before it is read, so that a failure says which.
+/// Passes every input of its corpus to a target. The name of each file is printed first, so that a failure shows it.
 #[track_caller]
 pub fn replay(target: &str, read: fn(&[u8])) {
     let folder = Path::new(env!("CARGO_MANIFEST_DIR"))

@@ -1,9 +1,9 @@
-"""Mutants of `model` and `identify`, many in one build.
+"""Tests mutants of `model` and `identify`, many in one build.
 
-cargo-mutants builds the workspace anew for each mutant; that takes longer than the tests. Here its list of mutants is taken, a systematic sample is
-written into a copy of the workspace, each behind a question (`if crate::mutant(17) { changed body } else { body }`), the copy is built once, and each
-mutant is tried by setting ABBE_MUTANT. Tests run in stages, the cheapest first and examples of the documentation last, until one fails. Mutants are tried
-in an order that is drawn, so that those tried until it is stopped are a sample too; what has been tried before is not tried again.
+cargo-mutants builds the workspace for each mutant, which takes longer than the tests. This script takes its list of mutants and writes a systematic
+sample into a copy of the workspace, each behind a condition (`if crate::mutant(17) { changed body } else { body }`). It builds the copy once and selects
+each mutant by ABBE_MUTANT. Tests run in stages until one fails, the cheapest first and examples of the documentation last. The order of the mutants is
+random, so that an interrupted run is a random sample too. Mutants with a result in the output file are not tested again.
 
     git worktree add ../mutants
     python tests/mutants.py --sample abbe-identify=86 --sample abbe-model=45 --copy ../mutants --out mutants.jsonl
@@ -21,21 +21,21 @@ import sys
 import time
 
 SWITCH = """
-/// Whether the mutant of this number is asked for.
+/// Whether the mutant of this number is selected.
 #[doc(hidden)]
 pub fn mutant(number: usize) -> bool {
-    static ASKED: std::sync::OnceLock<usize> = std::sync::OnceLock::new();
-    *ASKED.get_or_init(|| std::env::var("ABBE_MUTANT").ok().and_then(|text| text.parse().ok()).unwrap_or(0)) == number
+    static SELECTED: std::sync::OnceLock<usize> = std::sync::OnceLock::new();
+    *SELECTED.get_or_init(|| std::env::var("ABBE_MUTANT").ok().and_then(|text| text.parse().ok()).unwrap_or(0)) == number
 }
 """
 
-# What asks about the workspace, the compiler's products or the operating system, not about what the two crates compute.
-LEFT_OUT = ("supply_chain", "kill::", "another_build", "report_browser", "repeatability", "codes::")
+# Tests of the workspace, of compiler products or of the operating system, not of the computations of the two crates.
+EXCLUDED_TESTS = ("supply_chain", "kill::", "another_build", "report_browser", "repeatability", "codes::")
 PROFILE = ["--profile", "checked"]
 
 
 def offset(text, place):
-    """Of a line and a column, both from one, the place in a text."""
+    """Offset in a text of a line and a column, both counted from one."""
     start = 0
     for _ in range(place["line"] - 1):
         start = text.index("\n", start) + 1
@@ -43,7 +43,7 @@ def offset(text, place):
 
 
 def body_of(text, function):
-    """Where the block of a function begins and ends."""
+    """Begin and end of the block of a function."""
     begin, end = offset(text, function["span"]["start"]), offset(text, function["span"]["end"])
     name = function["function_name"].split("::")[-1].split("<")[0]
     head = re.compile(r"\bfn\s+" + re.escape(name) + r"\b").search(text, begin, end)
@@ -51,13 +51,13 @@ def body_of(text, function):
 
 
 def changed(text, mutant, begin, end):
-    """The block of a function as the mutant has it."""
+    """The block of a function in the mutant."""
     first, last = offset(text, mutant["span"]["start"]), offset(text, mutant["span"]["end"])
     return text[begin:first] + mutant["replacement"] + text[last:end]
 
 
 def write(copy, originals, mutants):
-    """All mutants into the copy, those of one function within one another."""
+    """Writes all mutants into the copy; those of one function are nested."""
     for file, text in originals.items():
         functions = {}
         for mutant in (m for m in mutants if m["file"] == file):
@@ -73,7 +73,7 @@ def write(copy, originals, mutants):
 
 
 def at_fault(copy, span, mutants):
-    """The numbers of the mutants that an error of the compiler points into; all of a function where it points between them."""
+    """Numbers of the mutants that a compiler error points into; all mutants of the function if it points between them."""
     text = (copy / span["file_name"]).read_bytes()
     place = span["byte_start"]
     inside = [
@@ -81,7 +81,7 @@ def at_fault(copy, span, mutants):
         and (b := text.find(b"/*<%d*/" % m["number"])) >= 0 and b <= place < text.find(b"/*%d>*/" % m["number"])
     ]
     if inside:
-        # Of mutants within one another the innermost text is the one written last.
+        # Of nested mutants the innermost text is the one written last.
         return [max(inside, key=lambda number: text.find(b"/*<%d*/" % number))]
     before = [(text.rfind(b"/*<%d*/" % m["number"], 0, place + 200), m) for m in mutants if m["file"] == span["file_name"]]
     function = max(before, key=lambda entry: entry[0])[1]["function"]
@@ -94,8 +94,8 @@ def spans_of(message):
             yield span
 
 
-def leave_out_what_does_not_build(copy, originals, mutants, packages):
-    """Writes the mutants and checks, again and again, until what is left builds; gives it and what was left out."""
+def exclude_mutants_that_do_not_build(copy, originals, mutants, packages):
+    """Writes the mutants and checks repeatedly until the remaining ones build; returns these and the excluded ones."""
     out = []
     while True:
         write(copy, originals, mutants)
@@ -116,12 +116,12 @@ def leave_out_what_does_not_build(copy, originals, mutants, packages):
         mutants = [m for m in mutants if m["number"] not in faults]
 
 
-# Packages whose tests know of a package, its own first.
+# Folders whose tests cover a package, its own first.
 TESTED_BY = {"abbe-model": ("model", "codegen", "identify", "."), "abbe-identify": ("identify", ".")}
 
 
 def binaries(copy):
-    """The test programs, each with the folder that its tests run in."""
+    """The test programs, each with the working folder of its tests."""
     run = subprocess.run(["cargo", "test", "--workspace", "--no-run", "--message-format=json", *PROFILE], cwd=copy, stdout=subprocess.PIPE, text=True, check=True)
     found = []
     for line in run.stdout.splitlines():
@@ -132,7 +132,7 @@ def binaries(copy):
 
 
 def run_tests(program, folder, names, number, limit):
-    """0 passed, 1 failed, 2 out of time; and what it printed."""
+    """Status (0 passed, 1 failed, 2 timeout) and output."""
     environment = dict(os.environ, ABBE_MUTANT=str(number), RUSTC_BOOTSTRAP="1", CI="true", INSTA_UPDATE="no", CARGO_MANIFEST_DIR=folder)
     command = [program, "-Z", "unstable-options", "--fail-fast", "--report-time", "--exact", *names]
     process = subprocess.Popen(command, cwd=folder, env=environment, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True, start_new_session=True)
@@ -146,18 +146,18 @@ def run_tests(program, folder, names, number, limit):
 
 
 def examples_fail(copy, package, number):
-    """Whether an example of the documentation does."""
+    """Whether an example of the documentation fails."""
     command = ["cargo", "test", "--doc", "-p", package, *PROFILE]
     run = subprocess.run(command, cwd=copy, env=dict(os.environ, ABBE_MUTANT=str(number)), capture_output=True)
     return run.returncode != 0
 
 
 def timed_tests(programs, slowest_s):
-    """Of all tests, run once: (seconds, program, folder, name), the cheapest first. Tests slower than a bound are left out."""
+    """Runs all tests once; returns (seconds, program, folder, name), the cheapest first, without tests slower than `slowest_s`."""
     timed = []
     for program, folder in programs:
         listed = subprocess.run([program, "--list"], cwd=folder, capture_output=True, text=True, check=True).stdout
-        names = [line[:-6] for line in listed.splitlines() if line.endswith(": test") and not any(part in line for part in LEFT_OUT)]
+        names = [line[:-6] for line in listed.splitlines() if line.endswith(": test") and not any(part in line for part in EXCLUDED_TESTS)]
         if not names:
             continue
         status, printed = run_tests(program, folder, names, 0, 7200)
@@ -166,12 +166,12 @@ def timed_tests(programs, slowest_s):
         seconds = dict(re.findall(r"^test (\S+)(?: - should panic)? \.\.\. ok <([\d.]+)s>", printed, re.M))
         timed += [(float(seconds[name]), program, folder, name) for name in names if name in seconds]
     for seconds, _, _, name in (test for test in timed if test[0] > slowest_s):
-        print(f"left out: {name}, {seconds:.0f} s", flush=True)
+        print(f"excluded as too slow: {name}, {seconds:.0f} s", flush=True)
     return sorted(test for test in timed if test[0] <= slowest_s)
 
 
 def stages_of(timed, folders):
-    """Of the tests in these folders, in their order: stages of growing cost, as (program, folder, names, seconds)."""
+    """Stages of growing cost of the tests in these folders, in their order: (program, folder, names, seconds)."""
     timed = [test for test in timed if test[2] in folders]
     programs = sorted({test[1:3] for test in timed}, key=lambda program: folders.index(program[1]))
     stages, bound = [], 0.5
@@ -187,7 +187,7 @@ def stages_of(timed, folders):
 
 
 def listed(copy, asked, only):
-    """A sample of cargo-mutants' list of a package, as `abbe-model=45+11` asks for: one in 45 from the eleventh, counted from zero."""
+    """A sample of the list of cargo-mutants for a package: `abbe-model=45+11` is one in 45 from the eleventh, counted from zero."""
     package, every, first = re.fullmatch(r"([\w-]+)=(\d+)(?:\+(\d+))?", asked).groups()
     run = subprocess.run(["cargo", "mutants", "--list", "--json", "-p", package], cwd=copy, capture_output=True, text=True, check=True)
     found = [m for m in json.loads(run.stdout) if m["function"] and (not only or re.search(only, m["name"]))]
@@ -197,10 +197,10 @@ def listed(copy, asked, only):
 def main():
     ask = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     ask.add_argument("--sample", required=True, action="append", metavar="PACKAGE=N[+FIRST]", help="one mutant of N of a package; may be repeated")
-    ask.add_argument("--only", help="only mutants whose names this expression finds")
-    ask.add_argument("--slowest", type=float, default=32.0, help="tests that take longer are left out, s")
-    ask.add_argument("--copy", type=pathlib.Path, required=True, help="a copy of the workspace, which is written over")
-    ask.add_argument("--out", type=pathlib.Path, required=True, help="results, a line of JSON each")
+    ask.add_argument("--only", help="only mutants whose names match this regular expression")
+    ask.add_argument("--slowest", type=float, default=32.0, help="tests that take longer are excluded, s")
+    ask.add_argument("--copy", type=pathlib.Path, required=True, help="a copy of the workspace, which is overwritten")
+    ask.add_argument("--out", type=pathlib.Path, required=True, help="results, one line of JSON per mutant")
     given = ask.parse_args()
     copy = given.copy.resolve()
 
@@ -216,7 +216,7 @@ def main():
             if str(library.relative_to(copy)) in originals:
                 sys.exit("a mutant in lib.rs")
             library.write_text(text + SWITCH)
-        kept, unviable = leave_out_what_does_not_build(copy, originals, list(sample), packages)
+        kept, unviable = exclude_mutants_that_do_not_build(copy, originals, list(sample), packages)
         print(f"{len(sample)} mutants, {len(unviable)} do not build", flush=True)
         random.Random(1).shuffle(kept)
         timed = timed_tests(binaries(copy), given.slowest)

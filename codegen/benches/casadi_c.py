@@ -1,4 +1,4 @@
-"""The printed C against CasADi's: value and eight derivatives of the chapter 5 test, one reading at a time.
+"""Benchmark of the printed C against that of CasADi: value and eight derivatives of the chapter 5 test, one reading at a time.
 
     pip install casadi
     python codegen/benches/casadi_c.py
@@ -19,7 +19,7 @@ FLAGS = ["-O3", "-march=native", "-fno-math-errno"]
 
 
 def length(lengths, axes, errors):
-    """The point pushed through the chain, small-angle errors, arguments as in emitted.c."""
+    """Transforms the point through the chain with small-angle errors; arguments as in emitted.c."""
     d, r, h, z_ca = ca.vertsplit(lengths)
     sc, cc, sa, ca_ = ca.vertsplit(axes)
     ey, ez, ty, tz, fx, fy, gx, gy = ca.vertsplit(errors)

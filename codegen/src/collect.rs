@@ -114,11 +114,11 @@ impl Collector<'_, '_> {
     }
 
     fn atom(&self, atom: Atom) -> Tree {
-        let place = |input: Input| self.inputs.iter().position(|known| *known == input);
+        let index = |input: Input| self.inputs.iter().position(|known| *known == input);
         match atom {
             Atom::Variable(id) => {
                 let variable = self.ring.variable(id).clone();
-                place(Input::Plain(variable)).map_or(Tree::Number(f64::NAN), Tree::Input)
+                index(Input::Plain(variable)).map_or(Tree::Number(f64::NAN), Tree::Input)
             }
             Atom::Sin(id) | Atom::Cos(id) => {
                 let variable = self.ring.variable(id).clone();
@@ -126,8 +126,8 @@ impl Collector<'_, '_> {
                     Atom::Sin(_) => (Input::Sine(variable), Unary::Sin),
                     _ => (Input::Cosine(variable), Unary::Cos),
                 };
-                match place(turn) {
-                    Some(place) => Tree::Input(place),
+                match index(turn) {
+                    Some(index) => Tree::Input(index),
                     None => Tree::Unary(function, Box::new(self.atom(Atom::Variable(id)))),
                 }
             }
@@ -209,7 +209,7 @@ impl Tree {
     pub(crate) fn symbol<'a>(&self, arena: &'a Arena, inputs: &[Operand]) -> Symbol<'a> {
         match self {
             Tree::Number(value) => arena.symbol(Operand::constant(*value)),
-            Tree::Input(place) | Tree::Step(place) => arena.symbol(inputs[*place]),
+            Tree::Input(index) | Tree::Step(index) => arena.symbol(inputs[*index]),
             Tree::Unary(function, a) => {
                 let a = a.symbol(arena, inputs);
                 match function {

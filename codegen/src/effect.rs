@@ -9,7 +9,7 @@ use abbe_model::axis::AxisKind;
 use abbe_model::chain::{AxisPosition, Machine};
 use abbe_model::component::ErrorName;
 use abbe_model::effect::{Component, Driver, DriverSample, Effect, Shape};
-use abbe_model::instrument::{InstrumentUnknown, InternalUnit};
+use abbe_model::instrument::{InstrumentParameter, InternalUnit};
 use abbe_model::scalar::Nominal;
 
 use crate::error::CodegenError;
@@ -96,7 +96,7 @@ pub struct Coefficient {
     /// The effect.
     pub effect: Arc<Effect>,
     /// Index among the coefficients of the effect.
-    pub place: usize,
+    pub index: usize,
     /// The unit of the component; `None` for a delay.
     pub component: Option<InternalUnit>,
     /// Whether component and driver are both lengths or both angles.
@@ -111,7 +111,7 @@ impl Coefficient {
     pub(crate) fn of_effects(
         effects: &[Effect],
         machine: &Machine,
-        unknowns: &[InstrumentUnknown],
+        unknowns: &[InstrumentParameter],
     ) -> Result<Vec<Coefficient>, CodegenError> {
         let mut coefficients = Vec::new();
         for (earlier, effect) in effects.iter().enumerate() {
@@ -134,11 +134,11 @@ impl Coefficient {
                 _ => false,
             };
             let shared = Arc::new(effect.clone());
-            for place in 0..count {
+            for index in 0..count {
                 coefficients.push(Coefficient {
                     number: coefficients.len() + 1,
                     effect: Arc::clone(&shared),
-                    place,
+                    index,
                     component,
                     same_kind,
                 });
@@ -150,7 +150,7 @@ impl Coefficient {
     /// The identifier as in the results of a fit: `EZC~C:h2.cos`.
     pub fn id(&self) -> String {
         let names = self.effect.shape.coefficient_names();
-        match names.get(self.place).map(String::as_str) {
+        match names.get(self.index).map(String::as_str) {
             None | Some("") => self.effect.id(),
             Some(name) => format!("{}.{name}", self.effect.id()),
         }
@@ -189,7 +189,7 @@ const MAX_COEFFICIENTS: usize = 40;
 fn unit_of_component(
     effect: &Effect,
     machine: &Machine,
-    unknowns: &[InstrumentUnknown],
+    unknowns: &[InstrumentParameter],
 ) -> Result<Option<InternalUnit>, CodegenError> {
     match &effect.component {
         Component::Axis(name) => match machine.axis_index(&name.axis) {
@@ -199,12 +199,12 @@ fn unit_of_component(
         },
         Component::Instrument { thing, coordinate } => {
             let own =
-                |unknown: &&InstrumentUnknown| unknown.thing == thing && unknown.coordinate == coordinate;
+                |unknown: &&InstrumentParameter| unknown.thing == thing && unknown.coordinate == coordinate;
             let found = unknowns.iter().find(own);
             found
                 .map(|unknown| Some(unknown.unit))
-                .ok_or_else(|| CodegenError::NoSuchUnknown {
-                    unknown: format!("`{}` of the effect `{}`", effect.component, effect.id()),
+                .ok_or_else(|| CodegenError::NoSuchParameter {
+                    parameter: format!("`{}` of the effect `{}`", effect.component, effect.id()),
                 })
         }
         Component::TriggerDelay => Ok(None),
@@ -305,7 +305,7 @@ impl<N: Nominal> AxisStates<'_, N> {
     pub(crate) fn slots(
         &self,
         effect: &Effect,
-        unknowns: &[InstrumentUnknown],
+        unknowns: &[InstrumentParameter],
         nominal: &impl Fn(Variable) -> N,
     ) -> Vec<(usize, Option<N>)> {
         match &effect.component {
@@ -314,10 +314,11 @@ impl<N: Nominal> AxisStates<'_, N> {
                 slot.map(|slot| (slot, None)).into_iter().collect()
             }
             Component::Instrument { thing, coordinate } => {
-                let own =
-                    |unknown: &InstrumentUnknown| unknown.thing == thing && unknown.coordinate == coordinate;
-                let place = unknowns.iter().position(own);
-                let slot = place.map(|place| (self.machine.error_slots() + place, None));
+                let own = |unknown: &InstrumentParameter| {
+                    unknown.thing == thing && unknown.coordinate == coordinate
+                };
+                let position = unknowns.iter().position(own);
+                let slot = position.map(|position| (self.machine.error_slots() + position, None));
                 slot.into_iter().collect()
             }
             Component::TriggerDelay => {

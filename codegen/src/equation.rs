@@ -76,7 +76,7 @@ pub enum Form {
         /// The normal forms.
         polynomials: Vec<Polynomial>,
         /// The expressions as printed.
-        layout: Vec<Tree>,
+        printed: Vec<Tree>,
         /// Whether the truncation omitted nothing because the chain has no further terms. This is decided for up to twelve parameters.
         /// For more, the full normal form is not built and the value is false.
         complete: bool,
@@ -143,12 +143,12 @@ pub struct Equation {
     pub form: Form,
     /// The intermediate vectors.
     pub vectors: Vec<NamedVector>,
-    /// The errors and instrument parameters that are determined by effects alone, as functions of their drivers.
+    /// The driven errors: errors and instrument parameters that are determined by effects alone, as functions of their drivers.
     pub driven_errors: Vec<(Variable, Operand)>,
     /// The stated length of the bar, for a ball bar.
     pub stated_length: Option<Operand>,
     /// The length error of the bar and the gain error of its sensor, if included.
-    pub(crate) bar_unknowns: [Option<Operand>; 2],
+    pub(crate) bar_parameters: [Option<Operand>; 2],
     /// The quantities between the vectors of a probe and its reading, for a probe.
     pub touch: Option<ProbeTerms>,
     /// Basis functions that are kept as they are and never expanded.
@@ -179,13 +179,13 @@ impl Equation {
         machine.rotation = options.rotation.unwrap_or(machine.rotation);
         let arena = Arena::new();
         let parameters = parameters(&arena, &machine, source, errors, options)?;
-        let (kind, exact, vectors, outputs, form, stated_length, driven_errors, bar_unknowns, touch, whole) = {
+        let (kind, exact, vectors, outputs, form, stated_length, driven_errors, bar_parameters, touch, whole) = {
             let run = Run::<Symbol<'_>>::new(
                 &machine,
                 source,
                 &parameters,
                 &|variable| arena.variable(variable),
-                &|place| arena.variable(parameters[place].clone()),
+                &|index| arena.variable(parameters[index].clone()),
             )?;
             let kind = match run.subject {
                 Subject::Station(Station::BallBar(_)) => Kind::Length,
@@ -199,12 +199,12 @@ impl Equation {
             });
             let on_the_way = vectors.clone();
             let inputs = inputs(&arena, &machine, &parameters);
-            let symbol = |place: usize| arena.variable(parameters[place].clone());
+            let symbol = |index: usize| arena.variable(parameters[index].clone());
             let driven_errors = run.driven_errors(&symbol).into_iter();
             let driven_errors = driven_errors
                 .map(|(variable, value)| (variable, value.operand()))
                 .collect();
-            let bar_unknowns = run.bar_unknowns().map(|unknown| unknown.map(Symbol::operand));
+            let bar_parameters = run.bar_parameters().map(|unknown| unknown.map(Symbol::operand));
             let whole = curves(&run, &parameters);
             let written = FormContext {
                 arena: &arena,
@@ -239,7 +239,7 @@ impl Equation {
                 form,
                 stated,
                 driven_errors,
-                bar_unknowns,
+                bar_parameters,
                 touch,
                 whole,
             )
@@ -256,7 +256,7 @@ impl Equation {
             vectors,
             driven_errors,
             stated_length,
-            bar_unknowns,
+            bar_parameters,
             touch,
             whole,
             absent: Vec::new(),
@@ -284,7 +284,7 @@ impl Equation {
             |parameter: &Variable| below.iter().any(|id| self.arena.variable_at(*id) == *parameter);
         let (doubtful, mut absent): (Vec<Variable>, Vec<Variable>) = unseen.into_iter().partition(in_graph);
         if !doubtful.is_empty() {
-            let wanted = match (self.kind, self.vectors.as_slice()) {
+            let requested = match (self.kind, self.vectors.as_slice()) {
                 (Kind::Length, [.., bar]) => bar.components.to_vec(),
                 (Kind::Distance, [.., stylus, step]) => {
                     let radius = self.touch.iter().map(|touch| touch.radius);
@@ -295,7 +295,7 @@ impl Equation {
             };
             let mut ring = Ring::exact(&self.arena);
             ring.keep(&self.whole);
-            let forms = wanted
+            let forms = requested
                 .iter()
                 .map(|w| ring.normal_form(*w))
                 .collect::<Result<Vec<_>, _>>()?;
@@ -363,7 +363,7 @@ impl Equation {
         Program::of(&self.arena, self.inputs(), &outputs, &labels, Naming::Shared)
     }
 
-    /// The names of errors that effects determine.
+    /// The names of the driven errors, which effects determine.
     pub(crate) fn driven_labels(&self) -> impl Iterator<Item = (NodeId, Label)> {
         let label = |(variable, value): &(Variable, Operand)| match value {
             Operand::Node(id) => Some((*id, Label::Quantity(variable.clone()))),
@@ -382,9 +382,9 @@ impl Equation {
 /// The basis functions of curves; expanded interval by interval they have hundreds of terms.
 fn curves(run: &Run<'_, Symbol<'_>>, parameters: &[Variable]) -> Vec<Operand> {
     let of_curve = |parameter: &Variable| matches!(parameter, Variable::Coefficient(c) if matches!(c.effect.shape, Shape::Curve { .. }));
-    let places = (0..parameters.len()).filter(|place| of_curve(&parameters[*place]));
+    let places = (0..parameters.len()).filter(|index| of_curve(&parameters[*index]));
     places
-        .flat_map(|place| run.bases(place))
+        .flat_map(|index| run.bases(index))
         .map(Symbol::operand)
         .collect()
 }
@@ -399,17 +399,17 @@ fn parameters(
 ) -> Result<Vec<Variable>, CodegenError> {
     let known = source.subject(&|name: &str| length(arena, name)).unknowns();
     let mut parameters: Vec<Variable> = errors.iter().cloned().map(Variable::Error).collect();
-    for place in &options.unknowns {
-        let unknown = known.get(*place).ok_or_else(|| CodegenError::NoSuchUnknown {
-            unknown: format!("number {place}"),
+    for index in &options.unknowns {
+        let unknown = known.get(*index).ok_or_else(|| CodegenError::NoSuchParameter {
+            parameter: format!("number {index}"),
         })?;
-        parameters.push(Variable::Unknown(*unknown));
+        parameters.push(Variable::Instrument(*unknown));
     }
     let coefficients = Coefficient::of_effects(&options.effects, machine, known)?;
     parameters.extend(coefficients.into_iter().map(Variable::Coefficient));
     // Naming them here fixes their order wherever terms are sorted.
-    for (place, parameter) in parameters.iter().enumerate() {
-        if parameters[..place].contains(parameter) {
+    for (index, parameter) in parameters.iter().enumerate() {
+        if parameters[..index].contains(parameter) {
             return Err(CodegenError::Twice {
                 name: parameter.name(),
             });

@@ -23,10 +23,10 @@ pub enum CodegenError {
         machine: String,
     },
     /// A parameter that the instrument does not have.
-    #[error("the instrument has no parameter {unknown}")]
-    NoSuchUnknown {
+    #[error("the instrument has no parameter {parameter}")]
+    NoSuchParameter {
         /// The parameter.
-        unknown: String,
+        parameter: String,
     },
     /// An error or parameter that is requested more than once.
     #[error("`{name}` is named twice; name it once")]

@@ -56,7 +56,7 @@ impl<S: Scalar> VariableValue<S> {
 /// Evaluates `outputs`; every node is computed once.
 ///
 /// # Errors
-/// If the expression takes an exponential, a sign, a step or a rounding of an error; the chain never does.
+/// If the expression takes an exponential, a sign, a step or a rounding of an error. The chain contains no such expression.
 pub fn evaluate<S: Scalar>(
     arena: &Arena,
     outputs: &[Operand],
@@ -70,7 +70,7 @@ pub fn evaluate<S: Scalar>(
     };
     for id in arena.reachable(outputs) {
         let value = match arena.node(id) {
-            Node::Variable(place) => variable(&arena.variable_at(place)),
+            Node::Variable(index) => variable(&arena.variable_at(index)),
             Node::Unary(op, a) => normal_form_of(&values, a)
                 .unary(op)
                 .ok_or(CodegenError::FunctionOfError { function: op })?,

@@ -216,8 +216,8 @@ impl FirstOrder {
     fn mark(&mut self, ring: &Ring<'_>) {
         // A constant L₀ is a constant factor like any other.
         let fixed = self.nominal.len() == 1 && !self.nominal[0].contains(|atom| ring.moves(atom));
-        for place in 0..self.sensitivities.len() {
-            let (earlier, rest) = self.sensitivities.split_at_mut(place);
+        for index in 0..self.sensitivities.len() {
+            let (earlier, rest) = self.sensitivities.split_at_mut(index);
             let this = &mut rest[0];
             if this.coefficients.iter().all(Polynomial::is_zero) {
                 this.column = Column::Zero;

@@ -39,11 +39,11 @@ pub(crate) fn bilinear<'a>(
     let mut ring = Ring::truncated(arena, 2)?;
     ring.keep(written.whole);
     let read_over = read_over(run, vectors);
-    let wanted: Vec<Operand> = match read_over.as_slice() {
+    let requested: Vec<Operand> = match read_over.as_slice() {
         [] => exact.to_vec(),
         vectors => vectors.iter().flat_map(|vector| vector.components).collect(),
     };
-    let groups = wanted
+    let groups = requested
         .iter()
         .map(|group| ring.normal_form(*group))
         .collect::<Result<Vec<Polynomial>, _>>()?;
@@ -54,11 +54,11 @@ pub(crate) fn bilinear<'a>(
         let mut whole = Ring::exact(arena);
         whole.keep(written.whole);
         let forms: Result<Vec<Polynomial>, _> =
-            wanted.iter().map(|group| whole.normal_form(*group)).collect();
+            requested.iter().map(|group| whole.normal_form(*group)).collect();
         forms.is_ok_and(|forms| forms == groups)
     };
-    let layout = Collector { ring: &ring, inputs };
-    let trees: Vec<Tree> = groups.iter().map(|group| layout.group(group)).collect();
+    let collector = Collector { ring: &ring, inputs };
+    let trees: Vec<Tree> = groups.iter().map(|group| collector.group(group)).collect();
     let operands = operands(arena, inputs);
     let symbols: Vec<Symbol<'a>> = trees.iter().map(|tree| tree.symbol(arena, &operands)).collect();
     *vectors = read_over;
@@ -71,7 +71,7 @@ pub(crate) fn bilinear<'a>(
     };
     let form = Form::Groups {
         polynomials: groups,
-        layout: trees,
+        printed: trees,
         complete,
     };
     Ok((outputs, form))
@@ -95,7 +95,7 @@ pub(crate) fn first<'a>(
     let read_over = read_over(run, vectors);
     let form = match (read_over.as_slice(), &run.subject) {
         ([bar], Subject::Station(Station::BallBar(station))) => {
-            let unknowns = run.bar_unknowns().map(|unknown| unknown.map(Symbol::operand));
+            let unknowns = run.bar_parameters().map(|unknown| unknown.map(Symbol::operand));
             FirstOrder::of_length(
                 &mut ring,
                 bar.components,
@@ -121,41 +121,41 @@ pub(crate) fn first<'a>(
         }
         _ => FirstOrder::of_coordinates(&mut ring, exact, parameters)?,
     };
-    let layout = Collector { ring: &ring, inputs };
-    let lay_out = |polynomials: &[Polynomial]| polynomials.iter().map(|p| layout.group(p)).collect();
+    let collector = Collector { ring: &ring, inputs };
+    let collect = |polynomials: &[Polynomial]| polynomials.iter().map(|p| collector.group(p)).collect();
     let laid_out = PrintedFirstOrder {
-        nominal: lay_out(&form.nominal),
+        nominal: collect(&form.nominal),
         alternative_length: form
             .alternative_length
             .as_ref()
-            .map(|beside| (beside.sign, layout.group(&beside.offset))),
+            .map(|length| (length.sign, collector.group(&length.offset))),
         coefficients: form
             .sensitivities
             .iter()
-            .map(|s| lay_out(&s.coefficients))
+            .map(|s| collect(&s.coefficients))
             .collect(),
         factors: form
             .sensitivities
             .iter()
             .map(|s| match &s.column {
-                Column::Multiple { factor: (a, b), .. } => Some((layout.group(a), layout.group(b))),
+                Column::Multiple { factor: (a, b), .. } => Some((collector.group(a), collector.group(b))),
                 Column::Distinct | Column::Zero => None,
             })
             .collect(),
     };
     vectors.clear();
     let operands = operands(arena, inputs);
-    let place = |parameter: &Variable| {
-        let wanted = Input::Plain(parameter.clone());
-        inputs.iter().position(|input| *input == wanted)
+    let index = |parameter: &Variable| {
+        let requested = Input::Plain(parameter.clone());
+        inputs.iter().position(|input| *input == requested)
     };
     let terms = |coordinate: usize, over_length: bool| {
         let mut terms = Vec::new();
         for (sensitivity, coefficients) in form.sensitivities.iter().zip(&laid_out.coefficients) {
             let coefficient = &coefficients[coordinate];
             let seen = *coefficient != Tree::Number(0.0) && sensitivity.over_length == over_length;
-            if let (true, Some(place)) = (seen, place(&sensitivity.parameter)) {
-                terms.push((false, product(vec![coefficient.clone(), Tree::Input(place)])));
+            if let (true, Some(index)) = (seen, index(&sensitivity.parameter)) {
+                terms.push((false, product(vec![coefficient.clone(), Tree::Input(index)])));
             }
         }
         sum(terms)

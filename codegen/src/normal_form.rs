@@ -84,8 +84,8 @@ impl<'a> Ring<'a> {
 
     /// The atom of a variable, if the arena contains it.
     pub fn atom_of(&self, variable: &Variable) -> Option<Atom> {
-        let place = self.variables.iter().position(|known| known == variable)?;
-        Some(Atom::Variable(VariableId(place as u32)))
+        let index = self.variables.iter().position(|known| known == variable)?;
+        Some(Atom::Variable(VariableId(index as u32)))
     }
 
     /// Whether two expressions are equal, decided by their normal forms. Functions that the normal form does not expand, such as an
@@ -103,18 +103,18 @@ impl<'a> Ring<'a> {
     /// If it is not a polynomial: a quotient of expressions, a root of errors, or a function of errors other than the sine or cosine of
     /// one.
     pub fn normal_form(&mut self, operand: Operand) -> Result<Polynomial, CodegenError> {
-        let mut wanted = BTreeSet::new();
+        let mut requested = BTreeSet::new();
         let mut pending = vec![operand];
         while let Some(next) = pending.pop() {
             if let Operand::Node(id) = next
                 && !self.known.contains_key(&id)
-                && wanted.insert(id)
+                && requested.insert(id)
                 && !self.is_function(id)
             {
                 pending.extend(operands(self.arena.node(id)));
             }
         }
-        for id in wanted {
+        for id in requested {
             let form = self.of_node(id)?;
             self.known.insert(id, form);
         }
@@ -246,12 +246,12 @@ impl<'a> Ring<'a> {
         if radicand.is_zero() {
             return radicand;
         }
-        let place = self.roots.iter().position(|known| *known == radicand);
-        let place = place.unwrap_or_else(|| {
+        let index = self.roots.iter().position(|known| *known == radicand);
+        let index = index.unwrap_or_else(|| {
             self.roots.push(radicand);
             self.roots.len() - 1
         });
-        Polynomial::atom(Atom::Root(place))
+        Polynomial::atom(Atom::Root(index))
     }
 
     /// The product in normal form, truncated at the ring's order.
@@ -263,15 +263,15 @@ impl<'a> Ring<'a> {
         let mut pending: Vec<(Monomial, BigRational)> = a.product(b, beyond).0.into_iter().collect();
         let mut product = Polynomial::default();
         while let Some((mut monomial, coefficient)) = pending.pop() {
-            let Some(place) = squared(&monomial) else {
+            let Some(index) = squared(&monomial) else {
                 product.insert(monomial, coefficient);
                 continue;
             };
-            let (atom, power) = monomial.0[place];
+            let (atom, power) = monomial.0[index];
             if power == 2 {
-                monomial.0.remove(place);
+                monomial.0.remove(index);
             } else {
-                monomial.0[place].1 = power - 2;
+                monomial.0[index].1 = power - 2;
             }
             let square = match atom {
                 Atom::Root(root) => self.roots[root].clone(),

@@ -58,8 +58,8 @@ impl Monomial {
     pub fn divided_by(&self, other: &Monomial) -> Option<Monomial> {
         let mut quotient = self.clone();
         for (atom, power) in &other.0 {
-            let place = quotient.0.iter().position(|(own, n)| own == atom && n >= power)?;
-            quotient.0[place].1 -= power;
+            let index = quotient.0.iter().position(|(own, n)| own == atom && n >= power)?;
+            quotient.0[index].1 -= power;
         }
         quotient.0.retain(|(_, power)| *power > 0);
         Some(quotient)
@@ -155,10 +155,10 @@ impl Polynomial {
         self.0.is_empty()
     }
 
-    /// Whether some term contains an atom for which `wanted` holds.
-    pub fn contains(&self, wanted: impl Fn(Atom) -> bool) -> bool {
+    /// Whether some term contains an atom for which `condition` holds.
+    pub fn contains(&self, condition: impl Fn(Atom) -> bool) -> bool {
         let mut atoms = self.0.keys().flat_map(|monomial| monomial.0.iter());
-        atoms.any(|(atom, _)| wanted(*atom))
+        atoms.any(|(atom, _)| condition(*atom))
     }
 
     /// Groups the terms by their atoms for which `by` holds: each such monomial with its coefficient.

@@ -24,7 +24,7 @@ impl Tree {
     /// Whether it contains an input.
     pub(crate) fn holds(&self, input: usize) -> bool {
         match self {
-            Tree::Input(place) => *place == input,
+            Tree::Input(index) => *index == input,
             Tree::Number(_) | Tree::Step(_) => false,
             Tree::Unary(_, a) => a.holds(input),
             Tree::Binary(_, a, b) => a.holds(input) || b.holds(input),
@@ -56,8 +56,8 @@ impl Tree {
     fn value(&self, inputs: &[f64], steps: &[f64]) -> f64 {
         match self {
             Tree::Number(value) => *value,
-            Tree::Input(place) => inputs[*place],
-            Tree::Step(place) => steps[*place],
+            Tree::Input(index) => inputs[*index],
+            Tree::Step(index) => steps[*index],
             Tree::Unary(function, a) => function.of(a.value(inputs, steps)),
             Tree::Binary(op, a, b) => op.of(a.value(inputs, steps), b.value(inputs, steps)),
         }

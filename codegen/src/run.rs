@@ -38,9 +38,9 @@ impl<'m, S: Scalar> Run<'m, S> {
         let mut held = Vec::with_capacity(machine.axes.len());
         let mut state = Vec::with_capacity(machine.axes.len());
         for axis in &machine.axes {
-            let stands = source.held(&axis.name, &length);
-            held.push(stands.is_some());
-            let position = stands.unwrap_or_else(|| {
+            let held_position = source.held(&axis.name, &length);
+            held.push(held_position.is_some());
+            let position = held_position.unwrap_or_else(|| {
                 nominal(Variable::Position {
                     axis: axis.name.clone(),
                     kind: axis.kind,
@@ -56,7 +56,7 @@ impl<'m, S: Scalar> Run<'m, S> {
         };
         let mut slots = vec![Vec::new(); machine.error_slots() + unknowns.len()];
         let mut basis = Vec::new();
-        for (place, parameter) in parameters.iter().enumerate() {
+        for (index, parameter) in parameters.iter().enumerate() {
             match parameter {
                 Variable::Error(name) => {
                     let slot = machine.error_slot(name).ok_or_else(|| CodegenError::NoSuchAxis {
@@ -64,26 +64,26 @@ impl<'m, S: Scalar> Run<'m, S> {
                         axis: name.axis.clone(),
                         machine: machine.code(),
                     })?;
-                    slots[slot].push((place, None));
+                    slots[slot].push((index, None));
                 }
-                Variable::Unknown(unknown) => {
+                Variable::Instrument(unknown) => {
                     let slot = unknowns.iter().position(|known| known == unknown);
-                    let slot = slot.ok_or_else(|| CodegenError::NoSuchUnknown {
-                        unknown: parameter.meaning(),
+                    let slot = slot.ok_or_else(|| CodegenError::NoSuchParameter {
+                        parameter: parameter.meaning(),
                     })?;
-                    slots[machine.error_slots() + slot].push((place, None));
+                    slots[machine.error_slots() + slot].push((index, None));
                 }
                 Variable::Coefficient(coefficient) => {
                     let effect = &coefficient.effect;
                     // The coefficients of one effect are consecutive.
-                    if coefficient.place == 0 {
+                    if coefficient.index == 0 {
                         basis.clear();
                         effect.shape.basis(&movement.sample(effect, nominal)?, &mut basis);
                     }
                     for (slot, factor) in movement.slots(effect, unknowns, nominal) {
-                        let own = basis[coefficient.place];
+                        let own = basis[coefficient.index];
                         let share = factor.map_or(own, |factor| own * factor);
-                        slots[slot].push((place, Some(share)));
+                        slots[slot].push((index, Some(share)));
                     }
                 }
                 Variable::Length(_) | Variable::Position { .. } | Variable::Driver(_) => {}
@@ -115,10 +115,10 @@ impl<'m, S: Scalar> Run<'m, S> {
     }
 
     /// The factor of an effect's coefficient in each slot that it changes.
-    pub(crate) fn bases(&self, place: usize) -> impl Iterator<Item = S::Nominal> {
+    pub(crate) fn bases(&self, index: usize) -> impl Iterator<Item = S::Nominal> {
         let shares = self.slots.iter().flatten();
         shares
-            .filter(move |(parameter, _)| *parameter == place)
+            .filter(move |(parameter, _)| *parameter == index)
             .filter_map(|(_, basis)| *basis)
     }
 
@@ -131,7 +131,7 @@ impl<'m, S: Scalar> Run<'m, S> {
             if let (true, Some(value)) = (effects_alone, in_slot(shares, small)) {
                 let variable = match slot.checked_sub(first) {
                     None => Variable::Error(self.machine.error_name(slot)),
-                    Some(place) => Variable::Unknown(self.subject.unknowns()[place]),
+                    Some(index) => Variable::Instrument(self.subject.unknowns()[index]),
                 };
                 driven_errors.push((variable, value));
             }
@@ -146,7 +146,7 @@ impl<'m, S: Scalar> Run<'m, S> {
     }
 
     /// The length error of the bar and the gain error of its sensor, if a bar is read and they are included.
-    pub(crate) fn bar_unknowns(&self) -> [Option<S>; 2] {
+    pub(crate) fn bar_parameters(&self) -> [Option<S>; 2] {
         match self.subject {
             Subject::Station(Station::BallBar(_)) => {
                 [ballbar::BAR, ballbar::GAIN].map(|slot| self.unknown(slot))
@@ -180,7 +180,7 @@ impl<'m, S: Scalar> Run<'m, S> {
         let Subject::Station(Station::BallBar(bar)) = &self.subject else {
             return distance;
         };
-        let [error, gain] = self.bar_unknowns();
+        let [error, gain] = self.bar_parameters();
         let length = match error {
             Some(error) => distance - error,
             None => distance,
@@ -194,9 +194,9 @@ impl<'m, S: Scalar> Run<'m, S> {
 
 /// The sum of the contributions to a slot.
 fn in_slot<S: Scalar>(shares: &[Contribution<S::Nominal>], small: &impl Fn(usize) -> S) -> Option<S> {
-    let value = |(place, basis): &Contribution<S::Nominal>| match basis {
-        Some(basis) => small(*place) * *basis,
-        None => small(*place),
+    let value = |(index, basis): &Contribution<S::Nominal>| match basis {
+        Some(basis) => small(*index) * *basis,
+        None => small(*index),
     };
     shares.iter().map(value).reduce(|sum, value| sum + value)
 }

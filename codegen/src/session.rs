@@ -2,7 +2,8 @@
 
 use abbe_model::error::ModelError;
 use abbe_model::scalar::Nominal;
-use abbe_model::session::motion::{self, Motion};
+use abbe_model::session::motion::Motion;
+use abbe_model::session::planned;
 use abbe_model::session::{Session, Test};
 
 use crate::subject::{Source, Subject};
@@ -36,7 +37,7 @@ impl<'s> SessionTest<'s> {
                 held.collect()
             }
             (None, Some(_)) => {
-                let planned = motion::planned(&session.machine, test)?;
+                let planned = planned::planned(&session.machine, test)?;
                 planned.positions.iter().map(range).collect()
             }
         };
@@ -60,12 +61,12 @@ impl Source for SessionTest<'_> {
             return None;
         }
         let written = self.test.at_written.get(index).and_then(Option::as_ref);
-        let stands = if least.is_finite() {
+        let held_position = if least.is_finite() {
             least
         } else {
             self.test.at[index]
         };
-        Some(written.map_or_else(|| N::constant(stands), |written| written.evaluate(length)))
+        Some(written.map_or_else(|| N::constant(held_position), |written| written.evaluate(length)))
     }
 
     fn length_mm(&self, name: &str) -> Option<f64> {

@@ -2,7 +2,7 @@
 
 use abbe_model::chain::{AxisPosition, BodyErrors, Machine};
 use abbe_model::frames::Point;
-use abbe_model::instrument::{InstrumentUnknown, Station};
+use abbe_model::instrument::{InstrumentParameter, Station};
 use abbe_model::scalar::{Nominal, Scalar};
 
 /// The nominal geometry of an equation over any nominal type: symbols give the equation, numbers its check. Implemented by a test of a
@@ -57,7 +57,7 @@ pub enum Subject<N> {
 
 impl<N: Nominal> Subject<N> {
     /// The parameters of the instrument.
-    pub fn unknowns(&self) -> &'static [InstrumentUnknown] {
+    pub fn unknowns(&self) -> &'static [InstrumentParameter] {
         match self {
             Subject::Station(station) => station.kind().unknowns(),
             Subject::Volumetric { .. } => &[],

@@ -2,7 +2,7 @@
 
 use abbe_model::axis::AxisKind;
 use abbe_model::component::{ErrorKind, ErrorName};
-use abbe_model::instrument::{InstrumentUnknown, InternalUnit};
+use abbe_model::instrument::{InstrumentParameter, InternalUnit};
 
 use crate::effect::{Coefficient, DriverQuantity};
 
@@ -21,7 +21,7 @@ pub enum Variable {
     /// An error of the machine, mm or rad.
     Error(ErrorName),
     /// A parameter of the instrument, mm, rad or a ratio.
-    Unknown(InstrumentUnknown),
+    Instrument(InstrumentParameter),
     /// The driver of an effect, if it is not the position of an axis.
     Driver(DriverQuantity),
     /// A coefficient of an effect.
@@ -43,7 +43,7 @@ impl Variable {
     pub fn is_small(&self) -> bool {
         matches!(
             self,
-            Variable::Error(_) | Variable::Unknown(_) | Variable::Coefficient(_)
+            Variable::Error(_) | Variable::Instrument(_) | Variable::Coefficient(_)
         )
     }
 
@@ -59,14 +59,14 @@ impl Variable {
             Variable::Coefficient(coefficient) => coefficient.component == Some(InternalUnit::Radian),
             Variable::Position { kind, .. } => *kind == AxisKind::Rotary,
             Variable::Error(name) => name.freedom.is_angle(),
-            Variable::Unknown(unknown) => unknown.unit == InternalUnit::Radian,
+            Variable::Instrument(unknown) => unknown.unit == InternalUnit::Radian,
         }
     }
 
     /// The unit of its values.
     pub fn unit(&self) -> &'static str {
         match self {
-            Variable::Unknown(unknown) if unknown.unit == InternalUnit::Ratio => "1",
+            Variable::Instrument(unknown) if unknown.unit == InternalUnit::Ratio => "1",
             Variable::Driver(followed) => followed.unit(),
             Variable::Coefficient(coefficient) => coefficient.unit(),
             _ if self.is_angle() => "rad",
@@ -92,7 +92,7 @@ impl Variable {
                 };
                 format!("{what} ({name})")
             }
-            Variable::Unknown(unknown) => {
+            Variable::Instrument(unknown) => {
                 let thing = unknown.thing.replace('_', " ");
                 match unknown.coordinate {
                     "" => format!("error of the {thing}"),
@@ -110,8 +110,8 @@ impl Variable {
             Variable::Length(name) => name.clone(),
             Variable::Position { axis, .. } => axis.clone(),
             Variable::Error(name) => name.to_string(),
-            Variable::Unknown(unknown) if unknown.coordinate.is_empty() => unknown.thing.to_string(),
-            Variable::Unknown(unknown) => format!("{}.{}", unknown.thing, unknown.coordinate),
+            Variable::Instrument(unknown) if unknown.coordinate.is_empty() => unknown.thing.to_string(),
+            Variable::Instrument(unknown) => format!("{}.{}", unknown.thing, unknown.coordinate),
             Variable::Driver(followed) => followed.meaning(),
             Variable::Coefficient(coefficient) => coefficient.id(),
         }
@@ -129,7 +129,7 @@ impl Variable {
                 Symbols::Literature => name.literature(),
                 Symbols::Iso => name.to_string(),
             },
-            Variable::Unknown(unknown) => match unknown.coordinate {
+            Variable::Instrument(unknown) => match unknown.coordinate {
                 "" => format!("δ_{}", unknown.thing),
                 coordinate => format!("δ_{}_{coordinate}", unknown.thing),
             },
@@ -159,7 +159,7 @@ impl Variable {
                 AxisKind::Linear => format!("pos_{}", axis.to_lowercase()),
                 AxisKind::Rotary => format!("angle_{}", axis.to_lowercase()),
             },
-            Variable::Unknown(_) => self.text(symbols).replace('δ', "delta"),
+            Variable::Instrument(_) => self.text(symbols).replace('δ', "delta"),
             Variable::Driver(followed) => followed.identifier(),
             _ => self.text(symbols).replace('θ', "theta"),
         };

@@ -219,7 +219,7 @@ fn along<'a>(
     let mut point = point;
     for (index, outside) in steps {
         let axis = &machine.axes[index];
-        let (frame, place) = match outside {
+        let (frame, frame_words) = match outside {
             Some(outside) => {
                 let name = machine.axes[outside].name.clone();
                 (name.clone(), format!("the frame of axis {name}"))
@@ -251,13 +251,13 @@ fn along<'a>(
                     _ => format!(", from the origin of {}", axis.name),
                 };
                 let meaning = format!(
-                    "{} in {place}{from}, {} without its errors",
+                    "{} in {frame_words}{from}, {} without its errors",
                     body.meaning, axis.name
                 );
                 vector(turned, true, meaning);
             }
         }
-        vector(pushed, false, format!("{} in {place}", body.meaning));
+        vector(pushed, false, format!("{} in {frame_words}", body.meaning));
         point = pushed;
     }
     vectors

@@ -7,9 +7,9 @@ use std::hint::black_box;
 use std::path::Path;
 use std::time::Duration;
 
-use abbe_identify::plan::candidate_tests::TestVariations;
 use abbe_identify::plan::criterion::Goal;
 use abbe_identify::plan::improve::{ImproveOptions, improve};
+use abbe_identify::plan::test_variations::TestVariations;
 use abbe_identify::plan::{PlanOptions, analyse, prepared, states};
 use abbe_model::session::Session;
 use abbe_model::session::read::{ReadOptions, session as read};

@@ -74,11 +74,11 @@ fn adapt_diagonal(matrix: &mut Mat<f64>, parameters: &[ParameterResult]) {
 pub(crate) fn null_space(problem: &Problem<'_>, rank: &Rank) -> NullSpace {
     let list = &problem.parameters.list;
     let involved: Vec<usize> = (0..list.len())
-        .filter(|j| rank.unseen.iter().any(|row| row[*j] != 0.0))
+        .filter(|j| rank.null_combinations.iter().any(|row| row[*j] != 0.0))
         .collect();
     let displayed = |row: &[f64], j: usize| row[j] * list[j].size * list[j].unit.display_per_internal;
     let vectors = rank
-        .unseen
+        .null_combinations
         .iter()
         .zip(&rank.pivots)
         .map(|(row, pivot)| {

@@ -340,8 +340,8 @@ impl EffectTerms<'_> {
                 )
             }
             several => {
-                let steps_listed: Vec<String> = several.iter().map(|place| self.at_value(*place)).collect();
-                format!("steps at {}", steps_listed.join(", "))
+                let values: Vec<String> = several.iter().map(|step| self.at_value(*step)).collect();
+                format!("steps at {}", values.join(", "))
             }
         }
     }

@@ -207,7 +207,7 @@ fn estimated_noise(problem: &Problem<'_>, fit: &Fit, floor: f64) -> Noise {
         return Noise::white(sigma.max(floor).max(MIN_NOISE_MM), NoiseSource::Repeats);
     }
     let count = (problem.readings() * problem.coordinates()) as f64;
-    let freedom = (count - fit.rank.seen.ncols() as f64).max(1.0);
+    let freedom = (count - fit.rank.identifiable_basis.ncols() as f64).max(1.0);
     let sigma = rms_mm(problem, &fit.residuals) * (count / freedom).sqrt();
     Noise::white(sigma.max(floor).max(MIN_NOISE_MM), NoiseSource::Residual)
 }
@@ -234,14 +234,14 @@ pub fn fit(problem: &Problem<'_>, start: Option<&[f64]>) -> Result<Fit, Identify
     )?;
     let restricted = IdentifiableDirections {
         problem,
-        basis: &rank.seen,
+        basis: &rank.identifiable_basis,
         last: RefCell::new((nominal, triangles)),
     };
     let mut end = None;
-    if rank.seen.ncols() > 0 {
-        let scale = Scaling::Physical(vec![1.0; rank.seen.ncols()]);
+    if rank.identifiable_basis.ncols() > 0 {
+        let scale = Scaling::Physical(vec![1.0; rank.identifiable_basis.ncols()]);
         let from = start.map_or_else(
-            || vec![0.0; rank.seen.ncols()],
+            || vec![0.0; rank.identifiable_basis.ncols()],
             |beta| rank.coordinates(beta, &size),
         );
         end = Some(restricted.beta(&minimise(&restricted, &from, &scale)?.x));
@@ -262,14 +262,14 @@ fn finish(
     rank: Rank,
 ) -> Result<Fit, IdentifyError> {
     let whole = whole(problem, &beta, &triangles);
-    let covariance = self::covariance(&whole, &rank.seen)?;
+    let covariance = self::covariance(&whole, &rank.identifiable_basis)?;
     let residuals = problem.residuals(&beta);
-    let held_out = held_out(problem, &beta, &triangles, &whole, &rank.seen)?;
+    let held_out = held_out(problem, &beta, &triangles, &whole, &rank.identifiable_basis)?;
     let zero = vec![0.0; beta.len()];
     let chi_square: f64 = whole.sum_of_squares_after(&zero);
     // Each prior counts as an observation in χ².
     let degrees_of_freedom = (problem.readings() * problem.coordinates() + problem.prior_rows())
-        .saturating_sub(rank.seen.ncols())
+        .saturating_sub(rank.identifiable_basis.ncols())
         .max(1);
     let free = degrees_of_freedom as f64;
     Ok(Fit {
@@ -352,7 +352,7 @@ pub fn report(problem: &Problem<'_>, fit: &Fit) -> FitResult {
         rms_3d_um: in_3d(rms),
         heldout_rms_3d_um: in_3d(held),
         heldout_by: problem.folds.kind.words().to_string(),
-        rank: fit.rank.seen.ncols(),
+        rank: fit.rank.identifiable_basis.ncols(),
         parameter_count: fit.beta.len(),
         chi_square: fit.chi_square,
         degrees_of_freedom: fit.degrees_of_freedom,
@@ -503,7 +503,7 @@ pub(crate) fn u_of_undetermined_phase_deg() -> f64 {
 /// The null-space combinations, in display units and in words.
 pub fn unobservable(problem: &Problem<'_>, rank: &Rank) -> Vec<Unobservable> {
     let list = &problem.parameters.list;
-    rank.unseen
+    rank.null_combinations
         .iter()
         .zip(&rank.pivots)
         .map(|(row, pivot)| {

@@ -18,7 +18,7 @@ use rayon::prelude::*;
 
 use crate::drivers::Origin;
 use crate::error::IdentifyError;
-use crate::heldout::Folds;
+use crate::heldout::folds::Folds;
 use crate::noise::Noise;
 use crate::parameters::{Parameters, TestParameters};
 use crate::triangle::{BLOCK_ROWS, Triangle};
@@ -48,7 +48,7 @@ pub struct Problem<'a> {
 
 /// Consecutive rows of one run of one test.
 #[derive(Clone, Debug)]
-pub struct Block {
+pub struct RowBlock {
     /// Index of the test.
     pub test: usize,
     /// Its rows.
@@ -143,7 +143,7 @@ impl<'a> Problem<'a> {
     }
 
     /// The blocks of rows, in order.
-    pub fn blocks(&self) -> Vec<Block> {
+    pub fn blocks(&self) -> Vec<RowBlock> {
         let mut blocks = Vec::new();
         for (test, plan) in self.tests.iter().enumerate() {
             let Some(readings) = &plan.readings else { continue };
@@ -162,7 +162,7 @@ impl<'a> Problem<'a> {
                 let mut start = run.start;
                 while start < run.end {
                     let end = (start + most).min(run.end);
-                    blocks.push(Block {
+                    blocks.push(RowBlock {
                         test,
                         rows: start..end,
                     });
@@ -182,7 +182,7 @@ impl<'a> Problem<'a> {
     ///
     /// # Errors
     /// If the model yields a number that is not finite.
-    pub fn rows(&self, values: &[SlotValues], block: &Block) -> Result<Mat<f64>, IdentifyError> {
+    pub fn rows(&self, values: &[SlotValues], block: &RowBlock) -> Result<Mat<f64>, IdentifyError> {
         let own = &self.test_parameters[block.test].parameters;
         let own_rows = self.own_rows(&values[block.test], block)?;
         let mut rows = Mat::zeros(own_rows.nrows(), self.parameters.list.len() + 1);
@@ -203,7 +203,7 @@ impl<'a> Problem<'a> {
     ///
     /// # Errors
     /// If the model yields a number that is not finite.
-    pub fn own_rows(&self, values: &SlotValues, block: &Block) -> Result<Mat<f64>, IdentifyError> {
+    pub fn own_rows(&self, values: &SlotValues, block: &RowBlock) -> Result<Mat<f64>, IdentifyError> {
         let coordinates = self.coordinates();
         let own = &self.test_parameters[block.test];
         let scalars = block.rows.start * coordinates..block.rows.end * coordinates;
@@ -266,7 +266,7 @@ impl<'a> Problem<'a> {
 
     /// The scalar rows of a block that remain after whitening. A row is dropped if its reading, or one within the filter's order before
     /// it, is an outlier.
-    pub fn kept_rows(&self, block: &Block) -> Vec<usize> {
+    pub fn kept_rows(&self, block: &RowBlock) -> Vec<usize> {
         let coordinates = self.coordinates();
         let rejected = &self.rejected[block.test];
         if !rejected[block.rows.clone()].contains(&true) {
@@ -283,14 +283,14 @@ impl<'a> Problem<'a> {
 
     /// Whitens rows along a run, `(x_t − Σ a_k x_{t−k})/σ_innovation`, and drops outliers. Returns the remaining rows and the fold of
     /// each.
-    pub fn whiten(&self, rows: &Mat<f64>, block: &Block) -> (Mat<f64>, Vec<usize>) {
+    pub fn whiten(&self, rows: &Mat<f64>, block: &RowBlock) -> (Mat<f64>, Vec<usize>) {
         let kept = self.kept_rows(block);
         let folds = self.folds_of(&kept, block).collect();
         (self.whitened(rows.clone(), &kept), folds)
     }
 
     /// The fold of each of the given scalar rows of a block.
-    pub fn folds_of(&self, rows: &[usize], block: &Block) -> impl Iterator<Item = usize> {
+    pub fn folds_of(&self, rows: &[usize], block: &RowBlock) -> impl Iterator<Item = usize> {
         let fold_of = &self.folds.of_row[block.test][block.rows.clone()];
         let coordinates = self.coordinates();
         rows.iter().map(move |i| fold_of[i / coordinates])
@@ -299,20 +299,20 @@ impl<'a> Problem<'a> {
     /// The rows of [`Problem::whiten`] for known remaining rows.
     pub fn whitened(&self, mut rows: Mat<f64>, kept: &[usize]) -> Mat<f64> {
         let coordinates = self.coordinates();
-        let memory = &self.noise.ar_coefficients;
+        let ar_coefficients = &self.noise.ar_coefficients;
         let innovation = 1.0 / self.noise.innovation_mm();
         let marginal = 1.0 / self.noise.sigma_mm;
-        if memory.is_empty() && kept.len() == rows.nrows() {
+        if ar_coefficients.is_empty() && kept.len() == rows.nrows() {
             rows *= faer::Scale(innovation);
             return rows;
         }
         let mut white = Mat::zeros(kept.len(), rows.ncols());
         for (mut white, column) in white.col_iter_mut().zip(rows.col_iter()) {
             for (k, &i) in kept.iter().enumerate() {
-                white[k] = if i / coordinates < memory.len() {
+                white[k] = if i / coordinates < ar_coefficients.len() {
                     column[i] * marginal
                 } else {
-                    let lags = memory.iter().enumerate();
+                    let lags = ar_coefficients.iter().enumerate();
                     let past: f64 = lags.map(|(lag, a)| a * column[i - (lag + 1) * coordinates]).sum();
                     (column[i] - past) * innovation
                 };
@@ -352,7 +352,7 @@ impl<'a> Problem<'a> {
     fn factors_of_blocks(
         &self,
         values: &[SlotValues],
-        blocks: &[Block],
+        blocks: &[RowBlock],
     ) -> Result<FactorsByTestAndFold, IdentifyError> {
         let mut factors = FactorsByTestAndFold::new();
         for block in blocks {

@@ -19,7 +19,7 @@ use crate::error::IdentifyError;
 use crate::fit::{Fit, Quantity, covariance, in_directions, quantities, values_at};
 use crate::least_squares::{LeastSquares, Scaling, minimise};
 use crate::monte_carlo::{self, Distribution, Draws, Function, MonteCarlo};
-use crate::problem::{Block, Problem};
+use crate::problem::{Problem, RowBlock};
 use crate::results::{DrawnParameter, FitMonteCarlo, FitResult, Verdict, phases_follow_amplitudes};
 use crate::triangle::{BLOCK_ROWS, Triangle};
 
@@ -32,7 +32,7 @@ const MIN_DECREASE: f64 = 1e-4;
 struct Refit<'p, 'a> {
     problem: &'p Problem<'a>,
     fit: &'p Fit,
-    blocks: Vec<Block>,
+    blocks: Vec<RowBlock>,
     /// Index among the inputs of each test's first reading.
     starts: Vec<usize>,
     /// Index among the inputs of each parameter with a Gaussian prior.
@@ -74,8 +74,8 @@ impl<'p, 'a> Refit<'p, 'a> {
         let size: Vec<f64> = problem.parameters.list.iter().map(|p| p.size).collect();
         let mut whole = problem.prior_triangle(&fit.beta);
         fit.triangles.iter().for_each(|triangle| whole.merge(triangle));
-        let seen = fit.rank.seen.ncols();
-        let reduced = in_directions(&whole, &fit.rank.seen);
+        let rank = fit.rank.identifiable_basis.ncols();
+        let reduced = in_directions(&whole, &fit.rank.identifiable_basis);
         Ok(Refit {
             problem,
             fit,
@@ -85,15 +85,15 @@ impl<'p, 'a> Refit<'p, 'a> {
             distances,
             quantities: quantities(problem, &fit.rank),
             end: fit.rank.coordinates(&fit.beta, &size),
-            inverse: covariance(&reduced, &Mat::identity(seen, seen))?,
+            inverse: covariance(&reduced, &Mat::identity(rank, rank))?,
             u,
         })
     }
 
     fn beta(&self, z: &[f64]) -> Vec<f64> {
-        let seen = &self.fit.rank.seen;
-        (0..seen.nrows())
-            .map(|j| (0..z.len()).map(|k| seen[(j, k)] * z[k]).sum())
+        let basis = &self.fit.rank.identifiable_basis;
+        (0..basis.nrows())
+            .map(|j| (0..z.len()).map(|k| basis[(j, k)] * z[k]).sum())
             .collect()
     }
 
@@ -203,9 +203,9 @@ impl SimulatedFit<'_, '_, '_> {
         let known = Mat::from_fn(count, count + 1, |i, j| if j == count { c[i] } else { r[(i, j)] });
         add(&all, &known);
         self.rows(&beta, |own, rows| add(own, &rows))?;
-        let seen = &self.refit.fit.rank.seen;
-        Ok((0..seen.ncols())
-            .map(|k| (0..count).map(|j| seen[(j, k)] * whole[j]).sum())
+        let basis = &self.refit.fit.rank.identifiable_basis;
+        Ok((0..basis.ncols())
+            .map(|k| (0..count).map(|j| basis[(j, k)] * whole[j]).sum())
             .collect())
     }
 }
@@ -226,7 +226,7 @@ impl LeastSquares for SimulatedFit<'_, '_, '_> {
             }
             whole.merge(&narrow.over_columns(own, beta.len()));
         })?;
-        Ok(in_directions(&whole, &self.refit.fit.rank.seen))
+        Ok(in_directions(&whole, &self.refit.fit.rank.identifiable_basis))
     }
 
     fn sum_of_squares(&self, z: &[f64]) -> f64 {
@@ -267,7 +267,7 @@ pub fn add_monte_carlo(
     draws: &MonteCarlo,
     result: &mut FitResult,
 ) -> Result<(), IdentifyError> {
-    if fit.rank.seen.ncols() == 0 {
+    if fit.rank.identifiable_basis.ncols() == 0 {
         return Err(IdentifyError::Request(
             "no parameter is identifiable from these readings, so there is nothing to propagate".into(),
         ));

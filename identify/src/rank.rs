@@ -23,10 +23,10 @@ pub struct Rank {
     /// Singular values in descending order, standard deviations per physical size.
     pub singular_values: Vec<f64>,
     /// A basis of the identifiable space: parameters × rank, in internal units (mm, rad). Each column is one physical size long.
-    pub seen: Mat<f64>,
+    pub identifiable_basis: Mat<f64>,
     /// Null-space combinations in scaled parameters, in reduced row echelon form. Each row is one combination, with 1 at its pivot and 0
     /// at the pivots of the other rows.
-    pub unseen: Vec<Vec<f64>>,
+    pub null_combinations: Vec<Vec<f64>>,
     /// The pivot of each row, in the order of preference.
     pub pivots: Vec<usize>,
     /// Orthonormal basis of the null space, in scaled parameters: parameters × (parameters − rank).
@@ -44,8 +44,8 @@ impl Rank {
         if n == 0 {
             return Ok(Rank {
                 singular_values: Vec::new(),
-                seen: Mat::zeros(0, 0),
-                unseen: Vec::new(),
+                identifiable_basis: Mat::zeros(0, 0),
+                null_combinations: Vec::new(),
                 pivots: Vec::new(),
                 null_space: Mat::zeros(0, 0),
             });
@@ -60,17 +60,18 @@ impl Rank {
             .count();
         let v = svd.V();
         let null_space = Mat::from_fn(n, n - rank, |j, k| v[(j, rank + k)]);
-        let (unseen, pivots) = combinations(null_space.as_ref(), scaled.as_ref(), preference, MIN_PIVOT);
+        let (null_combinations, pivots) =
+            combinations(null_space.as_ref(), scaled.as_ref(), preference, MIN_PIVOT);
         // At full rank the basis is that of the parameters themselves.
-        let seen = if rank == n {
+        let identifiable_basis = if rank == n {
             Mat::from_fn(n, n, |i, j| if i == j { size[i] } else { 0.0 })
         } else {
             Mat::from_fn(n, rank, |i, k| v[(i, k)] * size[i])
         };
         Ok(Rank {
             singular_values,
-            seen,
-            unseen,
+            identifiable_basis,
+            null_combinations,
             pivots,
             null_space,
         })
@@ -79,11 +80,11 @@ impl Rank {
     /// Coordinates of parameters in the identifiable basis, by least squares; null-space parts are dropped. `size` as in [`Rank::decide`].
     /// Internal units.
     pub fn coordinates(&self, beta: &[f64], size: &[f64]) -> Vec<f64> {
-        // The columns of `seen` over `size` are orthonormal.
-        (0..self.seen.ncols())
+        // The columns of the basis over `size` are orthonormal.
+        (0..self.identifiable_basis.ncols())
             .map(|k| {
                 (0..beta.len())
-                    .map(|j| self.seen[(j, k)] / size[j] * (beta[j] / size[j]))
+                    .map(|j| self.identifiable_basis[(j, k)] / size[j] * (beta[j] / size[j]))
                     .sum()
             })
             .collect()
@@ -91,7 +92,7 @@ impl Rank {
 
     /// Whether a parameter takes part in no null-space combination.
     pub fn is_identifiable(&self, parameter: usize) -> bool {
-        self.unseen.iter().all(|row| row[parameter] == 0.0)
+        self.null_combinations.iter().all(|row| row[parameter] == 0.0)
     }
 }
 
@@ -310,7 +311,7 @@ mod tests {
             let mut preference: Vec<usize> = (0..N).collect();
             preference.sort_by_key(|j| order[*j]);
             let rank = Rank::decide(r.as_ref(), &[1.0; N], &preference).unwrap();
-            let rows: Vec<Vec<f64>> = (rank.unseen.iter())
+            let rows: Vec<Vec<f64>> = (rank.null_combinations.iter())
                 .map(|row| {
                     let mut by_name = vec![0.0; N];
                     order

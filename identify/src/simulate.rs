@@ -8,7 +8,7 @@ use abbe_model::effect::Shape;
 use abbe_model::instrument::InstrumentKind;
 use abbe_model::sensitivity::TestModel;
 use abbe_model::session::readings::Readings;
-use abbe_model::session::{Prior, Session, Test, motion};
+use abbe_model::session::{Prior, Session, Test, planned};
 use rand_distr::{Distribution, StandardNormal};
 use rand_pcg::Pcg64;
 
@@ -81,7 +81,7 @@ pub fn simulate(session: &Session, simulation: &Simulation) -> Result<Simulated,
             "a socket session has no readings to draw: its poses are its data".into(),
         ));
     }
-    let planned = motion::planned_session(session)?;
+    let planned = planned::planned_session(session)?;
     let mut given = Vec::with_capacity(simulation.given.len());
     let mut open = with_free_setups(session, planned);
     for value in &simulation.given {
@@ -248,7 +248,7 @@ fn assign(
         let Some(amplitude) = amplitude else {
             if phase.is_some() {
                 return Err(IdentifyError::Request(format!(
-                    "`{id}.phase` has a value, but not `{id}.amplitude`"
+                    "`{id}.phase` has a value, but `{id}.amplitude` has none"
                 )));
             }
             continue;

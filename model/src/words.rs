@@ -22,7 +22,7 @@ pub fn counted(count: impl TryInto<u64> + std::fmt::Display + Copy, thing: &str)
         None => (thing, ""),
     };
     let plural = match noun.strip_suffix('y') {
-        Some(id_stem) if !id_stem.ends_with(['a', 'e', 'o']) => format!("{id_stem}ies"),
+        Some(stem) if !stem.ends_with(['a', 'e', 'o']) => format!("{stem}ies"),
         _ => format!("{noun}s"),
     };
     format!("{count} {plural}{rest}")

@@ -22,7 +22,7 @@ fn data() -> PathBuf {
 }
 
 /// A folder or file that a test requires; if it is missing, the test reports that it is skipped.
-fn at_hand(test: &str, path: PathBuf) -> Option<PathBuf> {
+fn available(test: &str, path: PathBuf) -> Option<PathBuf> {
     if path.exists() {
         return Some(path);
     }
@@ -45,7 +45,7 @@ fn ready(name: &str) -> Session {
 
 #[test]
 fn the_samples_of_an_independent_simulator_read() {
-    let Some(samples) = at_hand("samples", data().join("../sample")) else {
+    let Some(samples) = available("samples", data().join("../sample")) else {
         return;
     };
     let rows = |name: &str| -> (Session, Vec<usize>) {
@@ -87,7 +87,7 @@ fn the_samples_of_an_independent_simulator_read() {
 
 #[test]
 fn the_ur10_session_reads() {
-    if at_hand("UR10", data().join("landgraf_ur10")).is_none() {
+    if available("UR10", data().join("landgraf_ur10")).is_none() {
         return;
     }
     let session = ready("ur10/session.toml");
@@ -102,7 +102,7 @@ fn the_ur10_session_reads() {
 
 #[test]
 fn the_kuka_session_reads_and_its_sockets_nearly_close() {
-    if at_hand("KUKA", data().join("mukca")).is_none() {
+    if available("KUKA", data().join("mukca")).is_none() {
         return;
     }
     let session = ready("kuka-iiwa14/session.toml");

@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 
 use abbe_model::chain::BodyErrors;
 use abbe_model::effect::{Component, Driver, Effect, Shape};
-use abbe_model::session::motion;
+use abbe_model::session::planned;
 use abbe_model::session::read::{self, ReadOptions};
 use abbe_model::session::readings::Readings;
 use abbe_model::session::{Session, Test, write};
@@ -57,7 +57,7 @@ fn the_three_methods_are_plans_in_which_the_bar_fits() {
         for (test, readings) in session
             .tests
             .iter()
-            .zip(motion::planned_session(&session).unwrap())
+            .zip(planned::planned_session(&session).unwrap())
         {
             for length in nominal(&session, test, &readings) {
                 let bar = if test.name.ends_with("150") {
@@ -72,9 +72,9 @@ fn the_three_methods_are_plans_in_which_the_bar_fits() {
 }
 
 #[test]
-fn runs_go_there_and_back_and_time_runs_on() {
+fn runs_alternate_direction_and_time_increases() {
     let session = plan("hermle-c600u/chapter5.toml");
-    let readings = motion::planned(&session.machine, &session.tests[0]).unwrap();
+    let readings = planned::planned(&session.machine, &session.tests[0]).unwrap();
     assert_eq!(readings.rows(), 4 * 361);
     assert_eq!(readings.runs().len(), 4);
     assert_eq!(readings.run.last(), Some(&4));
@@ -86,16 +86,16 @@ fn runs_go_there_and_back_and_time_runs_on() {
     // 500 mm/min at 100 mm: 5 rad/min.
     let turn = 90.0_f64.to_radians();
     assert!((readings.time_s[360] - turn / 5.0 * 60.0).abs() < 1e-9);
-    let all = motion::planned_session(&session).unwrap();
+    let all = planned::planned_session(&session).unwrap();
     assert!(all[1].time_s[0] > *all[0].time_s.last().unwrap());
 }
 
 #[test]
-fn a_circle_goes_round_the_workpiece_ball_wherever_it_stands() {
+fn a_circle_is_centred_on_the_workpiece_ball_anywhere() {
     let test = "bar_mm = 100\nworkpiece_ball_mm = [10, 20, 30]\n\
                 path = { kind = \"circle\", plane = \"XY\", radius_mm = 100, step_deg = 0.5, feed_mm_min = 1000 }";
     let session = one_test(test).unwrap();
-    let readings = motion::planned(&session.machine, &session.tests[0]).unwrap();
+    let readings = planned::planned(&session.machine, &session.tests[0]).unwrap();
     assert_eq!(readings.rows(), 2 * 721);
     for length in nominal(&session, &session.tests[0], &readings) {
         assert!((length - 100.0).abs() < 1e-10, "{length}");
@@ -113,7 +113,7 @@ fn linear_axes_follow_a_rotary_one_at_the_length_of_the_bar() {
                  offset = \"{offset}\", from_deg = 0, to_deg = 90, step_deg = 1 }}"
             );
             let session = one_test(&test).unwrap();
-            let readings = motion::planned(&session.machine, &session.tests[0]).unwrap();
+            let readings = planned::planned(&session.machine, &session.tests[0]).unwrap();
             for length in nominal(&session, &session.tests[0], &readings) {
                 assert!((length - 100.0).abs() < 1e-9, "{axis} {offset}: {length}");
             }
@@ -133,7 +133,7 @@ fn a_plan_beyond_the_travel_is_refused() {
 }
 
 #[test]
-fn effects_written_read_back_the_same() {
+fn written_effects_read_back_equal() {
     let effect = |component: &str, driver: &str, shape: Shape| Effect {
         component: Component::parse(component).unwrap(),
         driver: Driver::parse(driver),
@@ -255,7 +255,7 @@ fn a_plan_becomes_a_measured_session() {
     let original = fs::read_to_string(ready("hermle-c600u/chapter5.toml")).unwrap();
     let folder = tempfile::tempdir().unwrap();
     let mut data = Vec::new();
-    let plans = motion::planned_session(&session).unwrap();
+    let plans = planned::planned_session(&session).unwrap();
     let mut measured = Vec::new();
     for (test, mut readings) in session.tests.iter().zip(plans) {
         readings.observed = nominal(&session, test, &readings);
@@ -323,7 +323,7 @@ fn sockets_named_by_a_column_become_tests() {
 }
 
 #[test]
-fn runs_that_the_data_lack_are_said() {
+fn missing_runs_are_reported() {
     let sweep = "sweep = { axis = \"C\", from_deg = 0, to_deg = 270, step_deg = 90, runs = 2, both_directions = true }";
     let circle = "path = { kind = \"circle\", plane = \"XY\", radius_mm = 100, step_deg = 90, runs = 2, both_directions = true }";
     for (movement, columns) in [(sweep, "c_deg"), (circle, "x_mm,y_mm")] {
@@ -356,10 +356,10 @@ fn runs_that_the_data_lack_are_said() {
             read::session(&path, &ReadOptions::default()).unwrap().warnings
         };
         let forward_only = movement.replace("both_directions = true", "both_directions = false");
-        let said = |runs: &[bool]| warnings_of(movement, runs, true);
+        let reported = |runs: &[bool]| warnings_of(movement, runs, true);
         let one_way = |runs: &[bool]| warnings_of(&forward_only, runs, true);
         let unseparated = || warnings_of(movement, &[true, false], false);
-        assert!(said(&[true, false, true, false]).is_empty(), "{movement}");
+        assert!(reported(&[true, false, true, false]).is_empty(), "{movement}");
         // One direction is stated, but the other one was run as well, or instead.
         for (runs, found) in [
             (&[true, true, false][..], "2 runs forward and 1 backward"),
@@ -385,7 +385,7 @@ fn runs_that_the_data_lack_are_said() {
             (&[true, true, true, true][..], "4 runs forward and 0 backward"),
             (&[false][..], "0 runs forward and 1 backward"),
         ] {
-            let warnings = said(runs);
+            let warnings = reported(runs);
             assert_eq!(warnings.len(), 1, "{warnings:?}");
             assert!(warnings[0].starts_with("test \"T\": "), "{warnings:?}");
             assert!(warnings[0].contains(found), "{warnings:?}");

@@ -7,7 +7,7 @@ use abbe::model::chain::Machine;
 use abbe::model::component::ErrorName;
 use abbe::model::effect::{Component, Effect};
 use abbe::model::frames::Rotation;
-use abbe::model::instrument::InstrumentUnknown;
+use abbe::model::instrument::InstrumentParameter;
 use abbe::model::pattern;
 use abbe::model::session::Session;
 use abbe::model::session::read::{self, ReadOptions};
@@ -20,8 +20,10 @@ use super::output::{self, Outputs};
 /// Examples of `abbe equation`.
 pub const HELP: &str = "Examples:
   abbe equation sessions/hermle-c600u/chapter5.toml --test A150 --as latex
-  abbe equation sessions/hermle-c600u/chapter5.toml --test C150 --order first --errors EX0C,EY0C,bar
-  abbe equation sessions/hermle-c600u/chapter5.toml --test A150 --as python --gradient --out a150.py";
+  abbe equation sessions/hermle-c600u/chapter5.toml --test C150 --order first \\
+      --errors EX0C,EY0C,bar
+  abbe equation sessions/hermle-c600u/chapter5.toml --test A150 --as python \\
+      --gradient --out a150.py";
 
 /// Examples of `abbe volumetric`.
 pub const VOLUMETRIC_HELP: &str = "Examples:
@@ -31,8 +33,8 @@ pub const VOLUMETRIC_HELP: &str = "Examples:
   abbe volumetric sessions/volumetric/machine.toml --map map.csv \\
       --functions sessions/volumetric/errors.toml --compensate
   abbe volumetric sessions/volumetric/machine.toml --map map2.csv \\
-      --functions sessions/volumetric/errors.toml --places 3 --axis A=30 --axis X:5 --tool-mm 0,0,-120 \\
-      --json map.json";
+      --functions sessions/volumetric/errors.toml --places 3 --axis A=30 --axis X:5 \\
+      --tool-mm 0,0,-120 --json map.json";
 
 /// The language of an equation.
 #[derive(Clone, Copy, ValueEnum)]
@@ -159,7 +161,7 @@ impl Kept {
     fn parse(
         names: &[String],
         machine: &Machine,
-        known: &[InstrumentUnknown],
+        known: &[InstrumentParameter],
         effects: &[Effect],
     ) -> Result<Kept, Failure> {
         let mut kept = Kept::default();
@@ -188,7 +190,7 @@ impl Kept {
                     let place = known
                         .iter()
                         .position(|u| u.thing == thing && u.coordinate == coordinate);
-                    let unknown = |u: &InstrumentUnknown| Variable::Unknown(*u).name();
+                    let unknown = |u: &InstrumentParameter| Variable::Instrument(*u).name();
                     kept.unknowns.push(place.ok_or_else(|| {
                         let has = match known {
                             [] => "an error vector has no parameters of an instrument".to_string(),

@@ -7,7 +7,7 @@ use super::machine::Machine;
 use super::noise::Noise;
 use super::oracle::Oracle;
 use super::plan::Plan;
-use super::recipe::{Draw, Row, Truth};
+use super::recipe::{Row, SimulatedSession, Truth};
 use serde_json::Value;
 use std::path::PathBuf;
 
@@ -116,14 +116,14 @@ fn axial_third_order() -> Injected {
 }
 
 /// Readings without true values.
-fn measured(rows: Vec<Row>) -> Draw {
+fn measured(rows: Vec<Row>) -> SimulatedSession {
     let truth = Truth {
         unknowns: Vec::new(),
         effects: Vec::new(),
         noise: Noise::White { sigma_um: 0.3 },
         outlier_rows: Vec::new(),
     };
-    Draw {
+    SimulatedSession {
         files: Vec::new(),
         rows,
         truth,

@@ -90,7 +90,7 @@ pub enum Component {
     SpindleBall(Cartesian),
     /// True minus stated bar length.
     Bar,
-    /// The sensor's gain.
+    /// The gain error of the sensor.
     Sensor,
     /// The delay of the sensor reading.
     Trigger,

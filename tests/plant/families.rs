@@ -38,7 +38,7 @@ pub enum Family {
     Squareness,
     /// A ball that moves between two tests of one set-up.
     Remount,
-    /// The sensor's gain.
+    /// The gain error of the sensor.
     SensorGain,
     /// The delay of the sensor reading.
     TriggerDelay,

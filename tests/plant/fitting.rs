@@ -2,7 +2,7 @@
 
 use super::effect::Injected;
 use super::oracle::{Oracle, WEAK_U};
-use super::recipe::{Draw, Row};
+use super::recipe::{Row, SimulatedSession};
 use super::whitening::whiten;
 use nalgebra::{DMatrix, DVector};
 
@@ -32,14 +32,14 @@ const ROUNDS: usize = 3;
 
 impl Oracle {
     /// Fits all readings except the outliers, with these effects in the model.
-    pub fn fit(&self, draw: &Draw, effects: &[Injected]) -> Fit {
+    pub fn fit(&self, draw: &SimulatedSession, effects: &[Injected]) -> Fit {
         let rows: Vec<Row> = draw.rows.iter().copied().filter(|row| !row.outlier).collect();
         self.fit_rows(&rows, effects)
     }
 
     /// Root mean square of the held-out residual, µm. Each fold holds out the traversals of one number in every test and fits all
     /// others. Outliers are excluded.
-    pub fn heldout_rms_um(&self, draw: &Draw, effects: &[Injected]) -> f64 {
+    pub fn heldout_rms_um(&self, draw: &SimulatedSession, effects: &[Injected]) -> f64 {
         let run_of = |row: &Row| self.plan.instants[row.instant].run;
         let runs = draw.rows.iter().map(run_of).max().unwrap_or(0);
         let (mut sum, mut count) = (0.0, 0_u32);

@@ -8,12 +8,12 @@ use std::f64::consts::FRAC_PI_2;
 /// A kind of session on the Hermle C600U.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum Kind {
-    /// Chapter 5 of seed 000: A100, A150, C100, C150, one workpiece ball.
+    /// Chapter 5 of the thesis: A100, A150, C100, C150, one workpiece ball.
     Rotary,
-    /// Chapter 4 of seed 000: the ball for the A tests at +Y, remounted at +X for the C tests. (In the thesis the first is mounted on
+    /// Chapter 4 of the thesis: the ball for the A tests at +Y, remounted at +X for the C tests. (There the first is mounted on
     /// the A table; here it is mounted on the C table, which is at zero.)
     Chapter4,
-    /// Chapter 6 of seed 000: A tests at X = ±550 mm, C tests at two heights, four mounts.
+    /// Chapter 6 of the thesis: A tests at X = ±550 mm, C tests at two heights, four mounts.
     Chapter6,
     /// Four tests of C with the table tilted to A = −20°, 0°, 30°, 60°: the influence of A on C.
     TiltedTable,

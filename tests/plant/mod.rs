@@ -1,7 +1,7 @@
 //! The plant: an independent simulator for tests, which shares no code with `abbe-model`.
 //!
 //! Motions are exact rigid motions with unit quaternions, errors are displaced bodies, and no formula is of first order. A [`Recipe`]
-//! makes a [`Draw`]: the files that Abbe reads, which declare no effect, and the true values. An [`Oracle`] knows the effect and gives
+//! makes a [`SimulatedSession`]: the files that Abbe reads, which declare no effect, and the true values. An [`Oracle`] knows the effect and gives
 //! bounds for the results.
 //!
 //! ```text
@@ -38,11 +38,11 @@ pub use component::{AxisName, Cartesian, Component, Freedom};
 pub use effect::{Decay, Driver, Injected, Profile, Shape};
 pub use families::Family;
 pub use kind::Kind;
-pub use naming::{Named, from_name, named};
+pub use naming::{EffectLabel, from_name, named};
 pub use noise::Noise;
 pub use oracle::{Alias, Oracle};
 pub use plan::Plan;
-pub use recipe::{Draw, Recipe, Truth};
+pub use recipe::{Recipe, SimulatedSession, Truth};
 
 mod check_effects;
 mod check_frames;

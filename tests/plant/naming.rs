@@ -5,7 +5,7 @@ use super::effect::{Driver, Injected, Shape};
 
 /// The name of an effect in a result: `{"component": "EZC", "driver": "C", "shape": "harmonic", "order": 3}`.
 #[derive(Clone, Debug, PartialEq, Eq, Hash)]
-pub struct Named {
+pub struct EffectLabel {
     /// `EZC`, `EX0C`, `workpiece_ball.x`, `bar`, `gain`, `trigger`.
     pub component: String,
     /// An axis, `time`, `temperature`, `gravity`, or `none` for a constant.
@@ -18,7 +18,7 @@ pub struct Named {
 }
 
 /// The name of an injected effect.
-pub fn named(effect: &Injected) -> Named {
+pub fn named(effect: &Injected) -> EffectLabel {
     let driver = match effect.driver {
         Driver::Axis(axis) => format!("{axis:?}"),
         Driver::Time => "time".to_string(),
@@ -40,7 +40,7 @@ pub fn named(effect: &Injected) -> Named {
         Shape::Warmup { .. } => ("warmup", None),
         Shape::Modulated { .. } | Shape::Chirp { .. } | Shape::Plateaus { .. } => ("outside", None),
     };
-    Named {
+    EffectLabel {
         component: effect.component.to_string(),
         driver,
         shape: shape.to_string(),
@@ -50,7 +50,7 @@ pub fn named(effect: &Injected) -> Named {
 
 /// The effect of a name, at unit amplitude and zero phase. Numbers that a name does not state (period, centre and width, decay,
 /// positions of steps, time constant) come from `like` if that has the same shape. `None` if the plant has no such effect.
-pub fn from_name(name: &Named, like: &Injected) -> Option<Injected> {
+pub fn from_name(name: &EffectLabel, like: &Injected) -> Option<Injected> {
     let component = Component::parse(&name.component)?;
     let driver = match name.driver.as_str() {
         "time" => Driver::Time,

@@ -7,7 +7,7 @@ use super::component::{AxisName, Cartesian, Component, Freedom, unit_size};
 use super::effect::{Injected, Shape};
 use super::families;
 use super::machine::Displacement;
-use super::naming::{Named, named};
+use super::naming::{EffectLabel, named};
 use super::noise::Noise;
 use super::plan::Plan;
 use super::recipe::Recipe;
@@ -31,7 +31,7 @@ const MIN_SIGNATURE: f64 = 1e-6;
 /// The oracle of one kind of session.
 #[derive(Clone, Debug)]
 pub struct Oracle {
-    /// The session's plan.
+    /// The plan of the session.
     pub plan: Plan,
     /// The noise, assumed known.
     pub noise: Noise,
@@ -99,7 +99,7 @@ impl Oracle {
         DMatrix::from_columns(&columns)
     }
 
-    /// Whitened columns after projection off the parameters, and their lengths before it.
+    /// Whitened columns after removal of their projection on the parameters, and their lengths before.
     fn projected(&self, effect: &Injected) -> (DMatrix<f64>, Vec<f64>) {
         let whitened = whiten(&self.plan, self.noise, &rows_of(&self.plan), self.columns(effect));
         let lengths = whitened.column_iter().map(|column| column.norm()).collect();
@@ -280,7 +280,7 @@ const PAIR_SHARE: f64 = 0.5;
 #[derive(Clone, Debug, PartialEq)]
 pub struct Alias {
     /// Its name in results.
-    pub name: Named,
+    pub name: EffectLabel,
     /// The effect of the plant, at unit amplitude.
     pub effect: Injected,
     /// The share of the true effect that it explains, as a cosine.

@@ -72,12 +72,12 @@ impl Recipe {
     }
 
     /// Draws parameters and noise and simulates the readings.
-    pub fn draw(&self) -> Draw {
+    pub fn draw(&self) -> SimulatedSession {
         self.draw_on(&self.plan())
     }
 
     /// The same for a plan from [`Recipe::plan`].
-    pub fn draw_on(&self, plan: &Plan) -> Draw {
+    pub fn draw_on(&self, plan: &Plan) -> SimulatedSession {
         let mut random = Pcg64Mcg::seed_from_u64(self.seed);
         let values: Vec<f64> = plan
             .unknowns
@@ -136,7 +136,7 @@ impl Recipe {
             .iter()
             .any(|effect| effect.driver == Driver::Temperature);
         let files = files::session_files(plan, &rows, self.temperature_column || follows_temperature);
-        Draw { files, rows, truth }
+        SimulatedSession { files, rows, truth }
     }
 }
 
@@ -215,7 +215,7 @@ impl Truth {
 
 /// A simulated measured session with its true values.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Draw {
+pub struct SimulatedSession {
     /// Names and texts of `session.toml`, `machine.toml` and the data files.
     pub files: Vec<(String, String)>,
     /// The readings, in the order of the data files.
@@ -224,7 +224,7 @@ pub struct Draw {
     pub truth: Truth,
 }
 
-impl Draw {
+impl SimulatedSession {
     /// Writes the folder of the session, without the true values.
     ///
     /// # Errors

@@ -3,12 +3,12 @@
 use abbe::identify::results::{EffectName, EffectResult, ModelResult};
 
 use super::rates::Pulls;
-use super::sessions::{Outcome, oracle};
-use crate::plant::{Injected, Named, Shape, from_name, named};
+use super::sessions::{TracedSession, oracle};
+use crate::plant::{EffectLabel, Injected, Shape, from_name, named};
 
 /// The name of a found effect, in the notation of the plant.
-pub fn name_in_plant(name: &EffectName) -> Named {
-    Named {
+pub fn name_in_plant(name: &EffectName) -> EffectLabel {
+    EffectLabel {
         component: name.component.clone(),
         driver: name.driver.clone(),
         shape: name.shape.clone(),
@@ -29,8 +29,9 @@ pub fn is(name: &EffectName, truth: &Injected) -> bool {
     }
 }
 
-/// The found effect that is the truth or has it among its aliases. A period that divides a turn, within the resolution of a turn, is that harmonic.
-pub fn found<'r>(outcome: &'r Outcome, truth: &Injected) -> Option<&'r EffectResult> {
+/// The found effect that is the truth or has it among its aliases. A period that divides a turn, within the resolution of a turn, is that
+/// harmonic.
+pub fn found<'r>(outcome: &'r TracedSession, truth: &Injected) -> Option<&'r EffectResult> {
     let oracle = oracle(outcome.kind, outcome.noise);
     let is_truth = |name: &EffectName| {
         is(name, truth)
@@ -48,16 +49,21 @@ pub fn found<'r>(outcome: &'r Outcome, truth: &Injected) -> Option<&'r EffectRes
 
 /// The surplus members of an alias set, the named effect included: effects of the plant that neither belong to the alias class of the
 /// truth nor lie within `sigma` standard deviations of it.
-pub fn surplus_aliases(outcome: &Outcome, effect: &EffectResult, truth: &Injected, sigma: f64) -> Vec<Named> {
+pub fn surplus_aliases(
+    outcome: &TracedSession,
+    effect: &EffectResult,
+    truth: &Injected,
+    sigma: f64,
+) -> Vec<EffectLabel> {
     let oracle = oracle(outcome.kind, outcome.noise);
-    let mut surplus_aliases: Vec<Named> = std::iter::once(&effect.name)
+    let mut surplus_aliases: Vec<EffectLabel> = std::iter::once(&effect.name)
         .chain(&effect.aliases)
         .filter(|name| !is(name, truth))
         .filter_map(|name| {
             let remounted = matches!(truth.shape, Shape::Remount { .. }) && !name.tests.is_empty();
             let name = match remounted {
                 // A ball that moves between tests is a constant of those tests in the result and a step in time in the plant.
-                true => Named {
+                true => EffectLabel {
                     component: name.component.clone(),
                     ..named(truth)
                 },
@@ -90,7 +96,7 @@ fn with_any_time_constant(effect: &Injected) -> Vec<Injected> {
 }
 
 /// Pulls of the errors of the machine: (value − truth) / u.
-pub fn pulls(outcome: &Outcome, model: &ModelResult) -> Pulls {
+pub fn pulls(outcome: &TracedSession, model: &ModelResult) -> Pulls {
     let pulls = outcome.draw.truth.piges().filter_map(|(id, value, _)| {
         let parameter = model.parameters.iter().find(|parameter| parameter.id == id)?;
         Some((parameter.value - value) / parameter.u)
@@ -110,7 +116,7 @@ pub fn short(name: &EffectName) -> String {
 }
 
 /// A summary of one session for the terminal.
-pub fn summary(outcome: &Outcome, mark: &str) -> String {
+pub fn summary(outcome: &TracedSession, mark: &str) -> String {
     let oracle = oracle(outcome.kind, outcome.noise);
     let noise = match outcome.noise {
         crate::plant::Noise::White { .. } => "white",

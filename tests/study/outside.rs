@@ -2,7 +2,7 @@
 
 use super::judging::summary;
 use super::rates::Rate;
-use super::sessions::{Outcome, at_multiple, case, oracle, random, run, sessions, skipped, verbose};
+use super::sessions::{TracedSession, at_multiple, case, oracle, random, run, sessions, skipped, verbose};
 use crate::plant::families::outside_library;
 use crate::plant::{Injected, Kind, Noise};
 
@@ -14,7 +14,7 @@ fn outside_case(number: usize) -> (Kind, Noise, Vec<Injected>) {
 }
 
 /// Whether a result states that the library does not explain the structure.
-fn is_honest(outcome: &Outcome) -> bool {
+fn is_honest(outcome: &TracedSession) -> bool {
     let result = &outcome.result;
     let curve = result.effects.iter().any(|effect| effect.name.shape == "curve");
     curve || result.verdict == "unexplained"

@@ -2,7 +2,7 @@
 
 use super::judging::{found, summary};
 use super::rates::Rate;
-use super::sessions::{Outcome, at_multiple, case, oracle, random, run, sessions, skipped, verbose};
+use super::sessions::{TracedSession, at_multiple, case, oracle, random, run, sessions, skipped, verbose};
 use crate::plant::{Injected, Kind, Noise};
 
 fn pair(number: usize) -> (Kind, Noise, Vec<Injected>) {
@@ -13,7 +13,7 @@ fn pair(number: usize) -> (Kind, Noise, Vec<Injected>) {
     (kind, noise, pair.to_vec())
 }
 
-fn hits(outcome: &Outcome) -> usize {
+fn hits(outcome: &TracedSession) -> usize {
     let truths = &outcome.draw.truth.effects;
     truths
         .iter()

@@ -11,7 +11,7 @@ use rand::SeedableRng;
 use rand_pcg::Pcg64Mcg;
 use rayon::prelude::*;
 
-use crate::plant::{Draw, Injected, Kind, Noise, Oracle, Recipe};
+use crate::plant::{Injected, Kind, Noise, Oracle, Recipe, SimulatedSession};
 
 /// The kinds of noise of a study.
 pub const NOISES: [Noise; 3] = [
@@ -89,7 +89,7 @@ pub fn at_multiple(oracle: &Oracle, effect: &Injected, factor: f64) -> Injected 
 }
 
 /// A simulated session and the result of trace.
-pub struct Outcome {
+pub struct TracedSession {
     /// Its number in the study.
     pub number: usize,
     /// Its kind.
@@ -97,7 +97,7 @@ pub struct Outcome {
     /// Its noise.
     pub noise: Noise,
     /// The readings, with the true values.
-    pub draw: Draw,
+    pub draw: SimulatedSession,
     /// The result of trace.
     pub result: TraceResult,
     /// Duration of trace, s.
@@ -109,7 +109,7 @@ pub struct Outcome {
 pub fn run(
     numbers: std::ops::Range<usize>,
     make: impl Fn(usize) -> (Kind, Noise, Vec<Injected>) + Sync,
-) -> Vec<Outcome> {
+) -> Vec<TracedSession> {
     let only = number("ABBE_STUDY_ONLY");
     let first = number("ABBE_STUDY_FIRST").unwrap_or(0);
     numbers
@@ -126,7 +126,7 @@ pub fn run(
             .noise(noise);
             let draw = recipe.draw_on(&oracle.plan);
             let (result, seconds) = traced(&draw, number);
-            Outcome {
+            TracedSession {
                 number,
                 kind,
                 noise,
@@ -139,7 +139,7 @@ pub fn run(
 }
 
 /// Runs trace on the files of a simulated session.
-fn traced(draw: &Draw, session_number: usize) -> (TraceResult, f64) {
+fn traced(draw: &SimulatedSession, session_number: usize) -> (TraceResult, f64) {
     let folder = tempfile::tempdir().unwrap();
     draw.write(folder.path()).unwrap();
     if number("ABBE_STUDY_KEEP") == Some(session_number) {

@@ -2,10 +2,10 @@
 
 use super::judging::{found, is, pulls, summary, surplus_aliases};
 use super::rates::{Pulls, Rate};
-use super::sessions::{Outcome, at_multiple, case, oracle, random, run, sessions, skipped, verbose};
+use super::sessions::{TracedSession, at_multiple, case, oracle, random, run, sessions, skipped, verbose};
 use crate::plant::named;
 
-fn study(factor: f64) -> Vec<Outcome> {
+fn study(factor: f64) -> Vec<TracedSession> {
     run(0..sessions(), |number| {
         let (kind, noise) = case(number);
         let oracle = oracle(kind, noise);
@@ -15,7 +15,8 @@ fn study(factor: f64) -> Vec<Outcome> {
     })
 }
 
-/// An alias lies within 2 σ of the named effect with noise. One that is more than 4 σ behind without noise does so in one session of fourteen.
+/// An alias lies within 2 σ of the named effect with noise. One that is more than 4 σ behind without noise does so in one session of
+/// fourteen.
 const FAR_SIGMA: f64 = 4.0;
 
 #[derive(Default)]
@@ -33,7 +34,7 @@ struct Tally {
     seconds: f64,
 }
 
-fn tally(outcomes: &[Outcome]) -> Tally {
+fn tally(outcomes: &[TracedSession]) -> Tally {
     let mut tally = Tally::default();
     for outcome in outcomes {
         let truth = &outcome.draw.truth.effects[0];

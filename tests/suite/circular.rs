@@ -12,7 +12,8 @@ const RADIUS_MM: f64 = 100.0;
 const FEED_MM_S: f64 = 20.0;
 const STEP: f64 = PI / 360.0;
 
-/// A reading of a circle: path angle, path direction, direction of each axis, path angle since the reversal of each axis, and the end of that reversal.
+/// A reading of a circle: path angle, path direction, direction of each axis, path angle since the reversal of each axis, and the end of
+/// that reversal.
 struct At {
     angle: f64,
     path: f64,

@@ -1,5 +1,5 @@
-//! The rule of a claim: an effect exceeds the null distribution *and* lowers the held-out error by more than the standard error of the fall. It
-//! holds for any run column.
+//! The rule of a claim: an effect exceeds the null distribution *and* lowers the held-out error by more than the standard error of the
+//! fall. It holds for any run column.
 
 use abbe::identify::results::{EffectName, TraceResult};
 use abbe::identify::trace::{TraceOptions, trace};
@@ -61,8 +61,8 @@ fn an_effect_that_does_not_lower_the_held_out_error_is_not_claimed() {
     assert_consistent(&result, &result.residual_before);
 }
 
-/// White noise of 0.20 µm without an effect. At a significance level at which candidates exceed the null distribution, the held-out error must
-/// reject them.
+/// White noise of 0.20 µm without an effect. At a significance level at which candidates exceed the null distribution, the held-out error
+/// must reject them.
 #[test]
 fn noise_beyond_the_null_distribution_fails_the_held_out_rule() {
     let mut rejected = 0;

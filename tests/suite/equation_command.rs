@@ -277,7 +277,8 @@ fn a_file_is_written_whole_or_not_at_all() {
     assert_eq!(fs::read_dir(folder.path()).unwrap().count(), 1);
 }
 
-/// By hand: a stylus at (x, y) is √(x² + y²) from the axis; a shift of the cylinder along X reduces the reading by its component along the probing direction.
+/// By hand: a stylus at (x, y) is √(x² + y²) from the axis; a shift of the cylinder along X reduces the reading by its component along
+/// the probing direction.
 #[test]
 fn the_reading_of_a_probe_in_every_language() {
     let session = ready("self-calibration/session.toml");
@@ -362,7 +363,7 @@ fn invalid_requests_are_refused_with_the_reason() {
     refused(&["volumetric", text(&plan)], &["chapter5.toml:1", "no `chain`"]);
     refused(
         &["volumetric", text(&machine), "--errors", "bar"],
-        &["`bar`", "an error vector has none"],
+        &["`bar`", "an error vector has no parameters"],
     );
     let folder = tempfile::tempdir().unwrap();
     let broken = folder.path().join("machine.toml");
@@ -380,7 +381,8 @@ fn invalid_requests_are_refused_with_the_reason() {
     }
 }
 
-/// A Python with NumPy: that of `ABBE_PYTHON`, otherwise that of the system. Without one the test prints that it is skipped; in CI it fails.
+/// A Python with NumPy: that of `ABBE_PYTHON`, otherwise that of the system. Without one the test prints that it is skipped; in CI it
+/// fails.
 pub(super) fn python(test: &str) -> Option<String> {
     let own = std::env::var("ABBE_PYTHON").unwrap_or_default();
     let runs = |name: &String| {

@@ -78,8 +78,8 @@ fn declared_effects_appear_where_they_act() {
     );
 }
 
-/// Python runs the printed code. The ball of the C test moves in Z by e = k₁ cos 2C + k₂ sin 2C on a radius of 100 mm, and the bar expands by
-/// k₃ (1 − exp(−t/900)), so the reading is √(R² + e²) minus the expansion.
+/// Python runs the printed code. The ball of the C test moves in Z by e = k₁ cos 2C + k₂ sin 2C on a radius of 100 mm, and the bar
+/// expands by k₃ (1 − exp(−t/900)), so the reading is √(R² + e²) minus the expansion.
 #[test]
 fn printed_effects_run_unchanged() {
     let Some(python) = python("printed_effects_run_unchanged") else {

@@ -259,7 +259,7 @@ fn ball_bar_xml_gives_the_same_fit() {
     );
     says(
         &good.replace("TEST_PLANE=\"XY\"", "TEST_PLANE=\"YZ\""),
-        "TEST_PLANE is `YZ`, the test's `path` is in XY",
+        "TEST_PLANE is `YZ`, but the test's `path` is in XY",
     );
     says(
         &good.replace("<READINGS>", "<READINGS>dropout "),
@@ -290,8 +290,8 @@ fn ball_bar_xml_gives_the_same_fit() {
     );
 }
 
-/// The direction of a run in files: CCW and CW have their meaning whatever the session states for other words; numbers and booleans are the stated
-/// value or the opposite. A session that states forward runs only is warned of backward runs.
+/// The direction of a run in files: CCW and CW have their meaning whatever the session states for other words; numbers and booleans are
+/// the stated value or the opposite. A session that states forward runs only is warned of backward runs.
 #[test]
 fn the_direction_of_a_run_is_read_from_words_numbers_and_booleans() {
     let folder = tempfile::tempdir().unwrap();
@@ -421,7 +421,8 @@ fn notes_and_ball_bar_figures_are_in_the_report() {
     }
 }
 
-/// A report suggests `--improve` only if the command accepts it: it is refused for other instruments than a ball bar and without a rotary axis.
+/// A report suggests `--improve` only if the command accepts it: it is refused for other instruments than a ball bar and without a rotary
+/// axis.
 #[test]
 fn a_report_suggests_no_command_that_is_refused() {
     let folder = tempfile::tempdir().unwrap();

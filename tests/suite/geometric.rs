@@ -6,7 +6,8 @@ use abbe::identify::geometric::{Estimator, Method, compare};
 use abbe::identify::noise::{Noise, NoiseSource};
 use abbe::identify::problem::Problem;
 use abbe::model::instrument::Station;
-use abbe::model::session::motion::{self, Motion};
+use abbe::model::session::motion::Motion;
+use abbe::model::session::planned;
 use abbe::model::session::read::{self, ReadOptions};
 use abbe::model::session::{Prior, Session};
 use nalgebra::{Point3, Rotation3, Translation3, Vector3};
@@ -81,7 +82,7 @@ fn measured(plan: &Session, errors: &Errors, moved: [f64; 3], noise: Option<(f64
     let [a, c, x, y, z] = ["A", "C", "X", "Y", "Z"].map(place);
     let mut random = Pcg64::seed_from_u64(noise.map_or(0, |(_, seed)| seed));
     for test in &mut session.tests {
-        let mut readings = motion::planned(&machine, test).unwrap();
+        let mut readings = planned::planned(&machine, test).unwrap();
         let Station::BallBar(bar) = &test.station else {
             unreachable!()
         };
@@ -142,20 +143,20 @@ fn by(session: &Session, method: Method) -> [f64; 8] {
 fn centre(session: &Session, test: &str) -> [f64; 2] {
     let problem = problem(session);
     let place = problem.tests.iter().position(|known| known.name == test).unwrap();
-    let layout =
+    let geometry =
         abbe::identify::geometric::CircleGeometry::of(&session.machine, &problem.models[place]).unwrap();
     let observed = &problem.tests[place].readings.as_ref().unwrap().observed;
     let left_out = vec![false; observed.len()];
-    layout
+    geometry
         .centre(observed, &left_out)
         .unwrap()
         .offset_mm
         .map(|mm| mm * 1e3)
 }
 
-/// A ball that is displaced by `t` along its path is plotted `t²/R` off the true circle; over an arc of 90° the centre shifts by at most 1.75 times as
-/// much. The axes pass within 50 µm of the ball (0.044 µm), within 64 µm at the second positions of Chapter 6 (0.07 µm). An angle is the difference of
-/// two centres over its lever.
+/// A ball that is displaced by `t` along its path is plotted `t²/R` off the true circle; over an arc of 90° the centre shifts by at most
+/// 1.75 times as much. The axes pass within 50 µm of the ball (0.044 µm), within 64 µm at the second positions of Chapter 6 (0.07 µm). An
+/// angle is the difference of two centres over its lever.
 #[test]
 fn each_method_recovers_its_table_of_the_thesis_within_its_bias() {
     for (chapter, method, values) in TABLES {
@@ -186,8 +187,8 @@ fn each_method_recovers_its_table_of_the_thesis_within_its_bias() {
     }
 }
 
-/// If its plane is off the origin, the circle method adds the lever times the angle to a position: the conversion between local and reference position
-/// errors.
+/// If its plane is off the origin, the circle method adds the lever times the angle to a position: the conversion between local and
+/// reference position errors.
 #[test]
 fn local_position_errors_are_reference_errors_plus_lever_times_angle() {
     let (_, _, values) = TABLES[2];
@@ -243,7 +244,8 @@ fn the_cone_has_the_axes_of_chapter_4_and_chapter_5_exchanges_them() {
     );
 }
 
-/// Eq. 4.1: a pivot that is 0.4 mm further along its path starts at `δ = atan(0.4/100)`. With its true position stated, the angle is correct.
+/// Eq. 4.1: a pivot that is 0.4 mm further along its path starts at `δ = atan(0.4/100)`. With its true position stated, the angle is
+/// correct.
 #[test]
 fn stating_the_true_ball_position_corrects_the_start_angle() {
     let errors = table([35.3, -33.4, 0.0, 0.0, 1.3, -52.9, 0.0, 0.0]);
@@ -273,9 +275,9 @@ fn stating_the_true_ball_position_corrects_the_start_angle() {
     assert!((uncorrected[0] - expected[0]).abs() > 0.05);
 }
 
-/// Section 4.2: the distortion is below 0.2 µm for eccentricities below 100 µm. A ball displaced by `t` along its path reads `t²/2R` long and is plotted
-/// `t²/R` off the circle: 0.10 µm at 100 µm and R = 100 mm, 0.2 µm at 141 µm. A full turn does not shift the centre; an arc of 90° shifts it by 0.17 µm
-/// at 100 µm and by 0.2 µm at 107 µm.
+/// Section 4.2: the distortion is below 0.2 µm for eccentricities below 100 µm. A ball displaced by `t` along its path reads `t²/2R` long
+/// and is plotted `t²/R` off the circle: 0.10 µm at 100 µm and R = 100 mm, 0.2 µm at 141 µm. A full turn does not shift the centre; an
+/// arc of 90° shifts it by 0.17 µm at 100 µm and by 0.2 µm at 107 µm.
 #[test]
 fn the_distortion_by_eccentricity_is_below_a_fifth_of_a_micrometre_up_to_141_micrometres() {
     let radius = 100.0;
@@ -418,7 +420,8 @@ fn one_command_shows_method_and_full_fit_on_the_same_readings() {
     assert!(String::from_utf8_lossy(&refused.stderr).contains("two tests in planes apart"));
 }
 
-/// Chapter 7 (Figs. 7.1, 7.2): the method of Chapter 5 with rotary axes that carry the spindle. The true values are in the comments of the sessions.
+/// Chapter 7 (Figs. 7.1, 7.2): the method of Chapter 5 with rotary axes that carry the spindle. The true values are in the comments of
+/// the sessions.
 #[test]
 fn tilting_heads_are_identified_by_method_and_full_fit() {
     let cases = [
@@ -464,7 +467,8 @@ fn tilting_heads_are_identified_by_method_and_full_fit() {
             assert!(row.bias.unwrap().abs() < 0.02, "{name}: {row:?}");
         }
     }
-    // For a table and a head only the offset of A from C along Y is identifiable: with both errors as parameters neither method gives a value.
+    // For a table and a head only the offset of A from C along Y is identifiable: with both errors as parameters neither method gives a
+    // value.
     let path = ready("table-and-head/measured/session.toml");
     let mut session = read::session(&path, &ReadOptions::default()).unwrap();
     session

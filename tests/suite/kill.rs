@@ -1,7 +1,7 @@
 //! Killed at any time, `abbe` leaves the old file or the complete new one.
 //!
-//! `ABBE_KILLS` is the number of kills (24 by default). Half of them occur at a random time of the run, half within a few milliseconds after the
-//! first output file appears.
+//! `ABBE_KILLS` is the number of kills (24 by default). Half of them occur at a random time of the run, half within a few milliseconds
+//! after the first output file appears.
 #![cfg(unix)]
 
 use std::collections::BTreeMap;
@@ -13,7 +13,7 @@ use std::time::{Duration, Instant};
 use rand::{RngExt, SeedableRng};
 use rand_pcg::Pcg64Mcg;
 
-use super::faults::Place;
+use super::faults::TestFolder;
 
 /// The commands, with the files and folders that each writes.
 const COMMANDS: [(&str, &[&str]); 3] = [
@@ -52,8 +52,8 @@ fn files(folder: &Path) -> Files {
 }
 
 /// The folder before the command.
-fn prepared(outputs: &[&str]) -> Place {
-    let place = Place::new();
+fn prepared(outputs: &[&str]) -> TestFolder {
+    let place = TestFolder::new();
     for name in outputs {
         if name.starts_with("run/") {
             fs::create_dir_all(place.at("run")).unwrap();
@@ -63,7 +63,7 @@ fn prepared(outputs: &[&str]) -> Place {
     place
 }
 
-fn start(place: &Place, command: &str) -> Child {
+fn start(place: &TestFolder, command: &str) -> Child {
     Command::new(env!("CARGO_BIN_EXE_abbe"))
         .args(command.split(' '))
         .current_dir(place.0.path())

@@ -4,13 +4,13 @@
 
 use abbe::model::session::read::{self, ReadOptions};
 
-use crate::plant::{AxisName, Component, Draw, Driver, Freedom, Injected, Kind, Recipe, Shape};
+use crate::plant::{AxisName, Component, Driver, Freedom, Injected, Kind, Recipe, Shape, SimulatedSession};
 
 const FOLDER: &str = "hermle-c600u/measured";
 
 const ABOUT: &str = "\
-# A simulated session as somebody might have measured it: the method of chapter 5 with bars of 100 and 150 mm, two runs in both
-# directions, noise of 0.3 um. The machine does something that this file does not declare; `abbe trace` says what.
+# A simulated measured session: the method of Jiang (2014), Chapter 5, with bars of 100 and 150 mm, two runs in both directions, noise of
+# 0.3 um. The machine has an effect that this file does not declare; `abbe trace` finds it.
 
 ";
 
@@ -29,7 +29,7 @@ fn axial_motion() -> Injected {
 }
 
 /// The session with its true values.
-fn draw() -> Draw {
+fn draw() -> SimulatedSession {
     let mut draw = Recipe::new(Kind::Rotary, 5)
         .with(axial_motion())
         .readings(2400)

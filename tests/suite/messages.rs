@@ -4,11 +4,11 @@ use std::fs;
 use std::path::Path;
 use std::process::{Command, Output};
 
-use super::faults::Place;
+use super::faults::TestFolder;
 
 const PROGRAM: &str = env!("CARGO_BIN_EXE_abbe");
 
-fn run(place: &Place, arguments: &[&str], environment: &[(&str, &str)]) -> Output {
+fn run(place: &TestFolder, arguments: &[&str], environment: &[(&str, &str)]) -> Output {
     Command::new(PROGRAM)
         .args(arguments)
         .current_dir(place.0.path())
@@ -22,8 +22,8 @@ fn run(place: &Place, arguments: &[&str], environment: &[(&str, &str)]) -> Outpu
 }
 
 /// Sessions that are refused at a line, refused as a whole, or accepted with a warning.
-fn place() -> Place {
-    let place = Place::new();
+fn test_folder() -> TestFolder {
+    let place = TestFolder::new();
     let session = fs::read_to_string(place.at("session.toml")).unwrap();
     place.put("key.toml", &session.replace("noise_um", "noise_umm"));
     place.put("loud.toml", &session.replace("noise_um = 0.3", "noise_um = 0.03"));
@@ -54,7 +54,7 @@ fn plain(text: &str) -> String {
 
 #[test]
 fn messages_have_one_form() {
-    let place = place();
+    let place = test_folder();
     for (arguments, starts) in MESSAGES {
         let output = run(&place, arguments, &[]);
         let stderr = String::from_utf8(output.stderr).unwrap();
@@ -79,7 +79,7 @@ fn messages_have_one_form() {
 
 #[test]
 fn colour_is_for_terminals_and_no_color_is_respected() {
-    let place = place();
+    let place = test_folder();
     for (arguments, starts) in MESSAGES {
         let piped = String::from_utf8(run(&place, arguments, &[]).stderr).unwrap();
         assert!(!piped.contains('\u{1b}'), "{arguments:?}: {piped}");
@@ -103,7 +103,7 @@ fn a_terminal_has_colour() {
         println!("a_terminal_has_colour: skipped, there is no /usr/bin/script");
         return;
     }
-    let place = place();
+    let place = test_folder();
     let on_terminal = |environment: &[(&str, &str)]| {
         let output = Command::new("/usr/bin/script")
             .args(["-qec", &format!("{PROGRAM} fit key.toml"), "/dev/null"])
@@ -129,7 +129,7 @@ fn a_terminal_has_colour() {
 
 #[test]
 fn one_test_and_two_tests() {
-    let place = Place::new();
+    let place = TestFolder::new();
     let simulate = |out: &str, session: &str| {
         let output = run(&place, &["simulate", session, "--out", out], &[]);
         let stderr = String::from_utf8_lossy(&output.stderr).into_owned();

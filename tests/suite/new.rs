@@ -150,7 +150,7 @@ fn any_structural_code_gives_a_plan_that_runs() {
         }
     }
     for (code, message) in [
-        ("[wCAYXZt]", "it holds 0 beds"),
+        ("[wCAYXZt]", "it contains 0 beds"),
         (
             "w b J1 J2 t",
             "axis `J1` of `w b J1 J2 t` is no letter of ISO 841",

@@ -99,8 +99,8 @@ fn trace_and_fit_agree_for_poses() {
     }
 }
 
-/// One run in each direction has no repeats. An effect of 5 µm remains in the residual of the declared model. The residual of the found model is the
-/// simulated noise of 0.3 µm.
+/// One run in each direction has no repeats. An effect of 5 µm remains in the residual of the declared model. The residual of the found
+/// model is the simulated noise of 0.3 µm.
 #[test]
 fn trace_and_fit_agree_for_runs_without_repeats() {
     let out = tempfile::tempdir().unwrap();

@@ -1,8 +1,9 @@
 //! The next test: improvement over the published methods, and separation of two effects.
 
-use abbe::identify::plan::candidate_tests::{TestVariations, candidate_tests};
+use abbe::identify::plan::candidate_tests::candidate_tests;
 use abbe::identify::plan::criterion::Goal;
 use abbe::identify::plan::improve::{ImproveOptions, improve};
+use abbe::identify::plan::test_variations::TestVariations;
 use abbe::identify::plan::{PlanOptions, analyse, separation, states};
 use abbe::model::effect::{Component, Driver, Effect, Shape};
 use abbe::model::instrument::Station;
@@ -150,8 +151,8 @@ fn a_second_radius_separates_tilt_and_axial_motion() {
     );
 }
 
-/// A curve is the sensitivity along a test; the result also states the largest of all tests. A length changes a reading by at most its own size, an
-/// angle of 1″ by 5 nm per millimetre of lever.
+/// A curve is the sensitivity along a test; the result also states the largest of all tests. A length changes a reading by at most its
+/// own size, an angle of 1″ by 5 nm per millimetre of lever.
 #[test]
 fn curves_reach_the_largest_sensitivity() {
     let options = PlanOptions {

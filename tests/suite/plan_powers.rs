@@ -43,8 +43,8 @@ fn judged(plan: &Session) -> Vec<EffectDetectability> {
     effects(&problem).unwrap().effects
 }
 
-/// The detectable amplitude, µm, of an effect whose response at each position is `signal`: numerical least squares with the bar length as the second
-/// parameter.
+/// The detectable amplitude, µm, of an effect whose response at each position is `signal`: numerical least squares with the bar length as
+/// the second parameter.
 fn closed_form(positions: impl Iterator<Item = f64>, signal: impl Fn(f64) -> [f64; 2]) -> f64 {
     let weight = 1.0 / NOISE_UM.powi(2);
     let (mut own, mut cross, mut bar) = (0.0, 0.0, 1.0 / BAR_U_UM.powi(2));

@@ -41,7 +41,7 @@ fn rank(height: f64, spindles: &[(&str, [f64; 3])]) -> (usize, Vec<String>) {
         .enumerate()
         .filter(|(j, _)| !linear.rank.is_identifiable(*j))
         .map(|(_, id)| id.clone());
-    (linear.rank.seen.ncols(), not_identifiable.collect())
+    (linear.rank.identifiable_basis.ncols(), not_identifiable.collect())
 }
 
 #[test]
@@ -61,8 +61,8 @@ fn the_eight_errors_have_rank_six_seven_and_eight() {
     assert_eq!(rank(50.0, &five), (8, Vec::new()));
 }
 
-/// PDGEs of C of orders 1 to 3 in one test at one radius and one height, with free set-ups and radial, tangential and axial readings: rank, number of
-/// parameters, and the coefficients that are identifiable individually.
+/// PDGEs of C of orders 1 to 3 in one test at one radius and one height, with free set-ups and radial, tangential and axial readings:
+/// rank, number of parameters, and the coefficients that are identifiable individually.
 fn individually_identifiable(orders: std::ops::RangeInclusive<usize>) -> (usize, usize, Vec<String>) {
     let mut text = head("\"EX0C\", \"EY0C\", \"EA0C\", \"EB0C\"");
     for offset in ["radial", "tangential", "axial"] {
@@ -86,7 +86,7 @@ fn individually_identifiable(orders: std::ops::RangeInclusive<usize>) -> (usize,
         .filter(|(j, _)| linear.rank.is_identifiable(*j))
         .map(|(_, id)| id.clone())
         .collect();
-    (linear.rank.seen.ncols(), ids.len(), identifiable)
+    (linear.rank.identifiable_basis.ncols(), ids.len(), identifiable)
 }
 
 #[test]

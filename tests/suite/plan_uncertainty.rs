@@ -108,7 +108,7 @@ fn squares(code: &str, first_seed: usize, complete_fit: bool) -> Vec<(String, f6
         let found = if complete_fit {
             fit(&problem, None).unwrap().beta
         } else {
-            linear_step(&problem, &linear.rank.seen)
+            linear_step(&problem, &linear.rank.identifiable_basis)
         };
         let truth = |id: &str| {
             let named = drawn.truth.iter().find(|(name, _, _)| name == id);
@@ -156,7 +156,8 @@ fn check(code: &str, sums: &[(String, f64)]) {
             "{code} {id}: χ² {sum:.0} over {FITS}"
         );
     }
-    // With one axis in the head and one in the table only the relative location of the two lines is identifiable: two pairs of errors are confounded.
+    // With one axis in the head and one in the table only the relative location of the two lines is identifiable: two pairs of errors are
+    // confounded.
     let divided = code.starts_with("[wC") && !code.starts_with("[wCA") && !code.starts_with("[wCB");
     assert_eq!(errors, if divided { 4 } else { 8 }, "{code}");
 }
@@ -179,7 +180,7 @@ fn with_axes_in_head_and_table_two_pairs_are_confounded() {
         let (ids, linear) = linearised(&plan(code));
         let pairs: Vec<Vec<&str>> = linear
             .rank
-            .unseen
+            .null_combinations
             .iter()
             .map(|row| {
                 (0..ids.len())

@@ -119,7 +119,8 @@ fn the_same_bytes_for_any_number_of_threads() {
 const R: f64 = 50.0;
 const U_MM: f64 = 0.8;
 
-/// A short bar whose spindle ball has u = 0.8 mm along the axis of C: the estimated error of the bar length depends on the square of that offset.
+/// A short bar whose spindle ball has u = 0.8 mm along the axis of C: the estimated error of the bar length depends on the square of that
+/// offset.
 fn bent() -> Session {
     session(&format!(
         "[machine]\nfile = \"machine.toml\"\n[instrument]\nkind = \"ballbar\"\nnoise_um = 0.3\n[unknowns]\nerrors = [\"EX0C\", \"EY0C\"]\n\

@@ -1,7 +1,7 @@
 //! The same input, seed and binary give the same bytes for any number of threads.
 //!
-//! Every command runs twice with the same files, once with one thread and once with two, each in a folder of its own. Standard output and all files
-//! of the folder are compared byte by byte. Each run is a process, so hash tables have different seeds.
+//! Every command runs twice with the same files, once with one thread and once with two, each in a folder of its own. Standard output and
+//! all files of the folder are compared byte by byte. Each run is a process, so hash tables have different seeds.
 
 use std::collections::BTreeMap;
 use std::fs;

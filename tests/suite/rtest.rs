@@ -11,7 +11,7 @@ use abbe::model::frames::{Point, Rotation};
 use abbe::model::instrument::rtest::{Orientation, RTest, Setting};
 use abbe::model::instrument::{InstrumentKind, Station};
 use abbe::model::sensitivity::{SlotValues, TestModel};
-use abbe::model::session::motion;
+use abbe::model::session::planned;
 use abbe::model::session::read::{self, ReadOptions};
 use abbe::model::session::readings::Readings;
 use nalgebra::{Matrix3, Vector3};
@@ -239,7 +239,7 @@ fn radial_and_tangential_are_equations_10_and_11() {
 fn a_programmed_feed_takes_the_time_of_the_diagonal() {
     let session = read::session(&ready("r-test/plan.toml"), &ReadOptions::default()).unwrap();
     let bk2 = session.tests.iter().find(|test| test.name == "BK2").unwrap();
-    let planned = motion::planned(&session.machine, bk2).unwrap();
+    let planned = planned::planned(&session.machine, bk2).unwrap();
     let first = planned.runs()[0].clone();
     let taken_s = planned.time_s[first.end - 1] - planned.time_s[first.start];
     let diagonal = (std::f64::consts::TAU * 100.0).hypot(360.0);
@@ -256,7 +256,7 @@ fn linear_axes_that_follow_keep_the_ball_in_the_nest() {
         let session = read::session(&ready(file), &ReadOptions::default()).unwrap();
         assert_eq!(session.tests.len(), tests);
         for test in &session.tests {
-            let planned = motion::planned(&session.machine, test).unwrap();
+            let planned = planned::planned(&session.machine, test).unwrap();
             let moving = session
                 .machine
                 .axes

@@ -2,8 +2,8 @@
 
 use super::{abbe, ready, text};
 
-/// First order by hand for the nest on a C table: an error δ of the table in X displaces its point, so the tool lies at −δ from it, in the frame of a
-/// table rotated by C.
+/// First order by hand for the nest on a C table: an error δ of the table in X displaces its point, so the tool lies at −δ from it, in
+/// the frame of a table rotated by C.
 #[test]
 fn the_equation_of_bk2_agrees_with_a_rotating_table() {
     let output = abbe(&[

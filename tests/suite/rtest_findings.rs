@@ -1,5 +1,5 @@
-//! The effects that Yamaji, Hamabata & Ihara (HPC 2014, Section 7) found with an R-test, found by trace in readings of the plant. The session files
-//! declare no effect; only the assertions use the true effects.
+//! The effects that Yamaji, Hamabata & Ihara (HPC 2014, Section 7) found with an R-test, found by trace in readings of the plant. The
+//! session files declare no effect; only the assertions use the true effects.
 
 use std::f64::consts::FRAC_PI_2;
 
@@ -247,7 +247,8 @@ fn a_ball_bar_on_x_and_y_alone_shows_the_same_steps() {
     assert!(away < 0.6, "{away}");
 }
 
-/// Figs. 17 and 18: an ellipse at 45° from the squareness of Y and Z, and waves from the straightness of Y, with the sensors on either body.
+/// Figs. 17 and 18: an ellipse at 45° from the squareness of Y and Z, and waves from the straightness of Y, with the sensors on either
+/// body.
 #[test]
 fn squareness_and_cyclic_straightness_of_y_are_found_in_bk1() {
     let squareness = Component::Location(Freedom::A, AxisName::Z);

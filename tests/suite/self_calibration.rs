@@ -145,8 +145,8 @@ fn the_printed_sign_of_test_3_does_not_reproduce_table_5() {
     assert!(worst > 2.5, "{worst}");
 }
 
-/// Table 6 prints 3.68 and 3.10 µm. The algebraic circle of draws about readings of zero reproduces them: there the radius of the circle is due to
-/// noise alone. About a circle with the radius of that of Table 4 the same fit gives 2.93 and 3.10 µm.
+/// Table 6 prints 3.68 and 3.10 µm. The algebraic circle of draws about readings of zero reproduces them: there the radius of the circle
+/// is due to noise alone. About a circle with the radius of that of Table 4 the same fit gives 2.93 and 3.10 µm.
 #[test]
 fn table_6_is_the_circle_through_draws_about_zero() {
     let mut session = unmoved(8, 45.0);
@@ -197,7 +197,7 @@ fn touched(session: &mut Session, case: &Touched) {
     let machine = session.machine.clone();
     let [c, x, y] = ["C", "X", "Y"].map(|name| machine.axis_index(name).unwrap());
     for test in &mut session.tests {
-        let mut readings = abbe::model::session::motion::planned(&machine, test).unwrap();
+        let mut readings = abbe::model::session::planned::planned(&machine, test).unwrap();
         for row in 0..readings.rows() {
             let (commanded_x, commanded_y) = (readings.positions[x][row], readings.positions[y][row]);
             // The table rotates clockwise by C.

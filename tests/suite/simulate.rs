@@ -150,7 +150,7 @@ fn the_text_of_the_plan_is_kept_except_for_data_and_noise() {
     );
     let text = fs::read_to_string(out.join("session.toml")).unwrap();
     for part in [
-        "# test radius: pivot from the axis (Table 3.1)",
+        "# test radius: distance of the pivot from the axis (Table 3.1)",
         "noise_um = 0.5\n",
         "[[effect]] # an axial motion",
         "data = \"C-150.csv\"",

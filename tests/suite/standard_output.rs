@@ -3,10 +3,10 @@
 use std::fs;
 
 use super::abbe;
-use super::faults::Place;
+use super::faults::TestFolder;
 use super::text;
 
-/// Commands that print a table and write JSON, for the files of [`place`].
+/// Commands that print a table and write JSON, for the files of [`test_folder`].
 const COMMANDS: &[&str] = &[
     "fit session.toml",
     "fit session.toml --repeat again/session.toml",
@@ -22,8 +22,8 @@ const COMMANDS: &[&str] = &[
 ];
 
 /// A folder with a small session, a repeat of it, a machine to map, and two ready sessions of other methods.
-fn place() -> Place {
-    let place = Place::new();
+fn test_folder() -> TestFolder {
+    let place = TestFolder::new();
     place.put("machine.toml", "chain = \"w X b Y Z t\"\n[axis.X]\ntravel_mm = [0, 9]\n[axis.Y]\ntravel_mm = [0, 9]\n[axis.Z]\ntravel_mm = [0, 9]\n");
     place.put(
         "functions.toml",
@@ -48,7 +48,7 @@ fn place() -> Place {
 
 /// Standard output and standard error of a command that succeeds.
 #[track_caller]
-fn run(place: &Place, line: &str) -> (String, String) {
+fn run(place: &TestFolder, line: &str) -> (String, String) {
     let output = place.shell(&format!("abbe {line}"));
     let stderr = String::from_utf8(output.stderr).unwrap();
     assert!(output.status.success(), "{line}: {stderr}");
@@ -62,7 +62,7 @@ fn warnings(stderr: &str) -> Vec<&str> {
 
 #[test]
 fn json_goes_to_standard_output_and_nothing_else_does() {
-    let place = place();
+    let place = test_folder();
     let before = place.names();
     for command in COMMANDS {
         let (piped, piped_stderr) = run(&place, &format!("{command} --json -"));
@@ -96,7 +96,7 @@ fn json_goes_to_standard_output_and_nothing_else_does() {
 
 #[test]
 fn quiet_suppresses_tables_and_not_warnings() {
-    let place = place();
+    let place = test_folder();
     // The true noise is ten times the stated one.
     let wrong = fs::read_to_string(place.at("session.toml"))
         .unwrap()
@@ -133,7 +133,7 @@ fn quiet_suppresses_tables_and_not_warnings() {
 
 #[test]
 fn other_outputs_go_to_standard_output_too() {
-    let place = place();
+    let place = test_folder();
     for (command, first) in [
         ("fit session.toml --csv -", "# Errors by their names"),
         ("fit session.toml --report -", "<!DOCTYPE html>"),
@@ -160,7 +160,7 @@ fn other_outputs_go_to_standard_output_too() {
 
 #[test]
 fn standard_output_takes_one_output_and_no_folder() {
-    let place = place();
+    let place = test_folder();
     let session = place.at("session.toml");
     let compensation = ["--compensation", "-", "--control", "linuxcnc"];
     for (arguments, words) in [

@@ -1,4 +1,5 @@
-//! Dependencies: licences, sources and duplicates conform to `deny.toml`, and docs/development/dependencies.md names each direct dependency.
+//! Dependencies: licences, sources and duplicates conform to `deny.toml`, and docs/development/dependencies.md names each direct
+//! dependency.
 //!
 //! `cargo deny` reads the same file if it is installed. These tests use cargo only and need neither a database nor a network.
 

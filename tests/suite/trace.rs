@@ -110,8 +110,8 @@ fn lost_motion_is_found_with_its_amplitude() {
     assert!((lost.value - 4.0).abs() < 4.0 * lost.u, "{lost:?}");
 }
 
-/// At one radius EZC of order n is confounded with a tilt of order n − 1. A second radius separates them: to first order the response to EZC does
-/// not depend on the radius, and that to the tilt is proportional to it.
+/// At one radius EZC of order n is confounded with a tilt of order n − 1. A second radius separates them: to first order the response to
+/// EZC does not depend on the radius, and that to the tilt is proportional to it.
 #[test]
 fn another_radius_is_proposed_to_separate_an_axial_motion_from_a_tilt() {
     let name = "another_radius_is_proposed_to_separate_an_axial_motion_from_a_tilt";
@@ -143,8 +143,8 @@ fn another_radius_is_proposed_to_separate_an_axial_motion_from_a_tilt() {
     assert!(separation["after_sigma"].as_f64().unwrap() > 10.0, "{separation}");
 }
 
-/// A tilt of A under the moment of a ball at y = R cos C on the table raises the ball by a · y² = a R² (1 + cos 2C) / 2, as EZC of second order does
-/// at that phase. Gravity needs one coefficient, the harmonic two, and the two are confounded.
+/// A tilt of A under the moment of a ball at y = R cos C on the table raises the ball by a · y² = a R² (1 + cos 2C) / 2, as EZC of second
+/// order does at that phase. Gravity needs one coefficient, the harmonic two, and the two are confounded.
 #[test]
 fn a_harmonic_is_listed_as_alias_of_a_compliance() {
     let folder = tempfile::tempdir().unwrap();

@@ -2,7 +2,8 @@
 
 use abbe::identify::fit::fit;
 use abbe::identify::noise::Noise;
-use abbe::identify::plan::candidate_tests::{TestVariations, candidate_tests};
+use abbe::identify::plan::candidate_tests::candidate_tests;
+use abbe::identify::plan::test_variations::TestVariations;
 use abbe::identify::problem::Problem;
 use abbe::identify::quantity::Given;
 use abbe::identify::results::EffectName;

@@ -135,7 +135,7 @@ fn a_pattern_selects_the_errors_that_it_matches() {
     ] {
         assert_eq!(names(&asked(errors).unwrap()), expected, "{errors}");
     }
-    assert!(asked("\"EX0C\", \"EX0C\"").unwrap_err().contains("stands twice"));
+    assert!(asked("\"EX0C\", \"EX0C\"").unwrap_err().contains("occurs twice"));
     for nothing in ["E?0B", "?0C", "EX0?C", "E?1C"] {
         let fault = asked(&format!("\"EX0C\",\n  \"{nothing}\"")).unwrap_err();
         for part in [

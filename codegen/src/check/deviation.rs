@@ -45,8 +45,8 @@ impl Equation {
             let point = drawn_between(range, count, &mut draws);
             let at = |variable: Variable| point.nominal(&variable);
             let run = Run::<f64>::new(&exact, source, &self.parameters, &at, &|_| 0.0)?;
-            for (place, reach) in reach.iter_mut().enumerate() {
-                *reach = run.bases(place).fold(*reach, |most, basis| most.max(basis.abs()));
+            for (index, reach) in reach.iter_mut().enumerate() {
+                *reach = run.bases(index).fold(*reach, |most, basis| most.max(basis.abs()));
             }
         }
         for reach in &mut reach {
@@ -67,8 +67,8 @@ impl Equation {
                 let first = inputs.len() - count;
                 for pattern in 0..(1u64 << count.min(8)) {
                     let pattern = if count <= 8 { pattern } else { draws.bits() };
-                    for (place, parameter) in self.parameters.iter().enumerate() {
-                        let sign = if pattern >> (place % 64) & 1 == 0 {
+                    for (index, parameter) in self.parameters.iter().enumerate() {
+                        let sign = if pattern >> (index % 64) & 1 == 0 {
                             1.0
                         } else {
                             -1.0
@@ -78,9 +78,9 @@ impl Equation {
                         } else {
                             shift_um * 1e-3
                         };
-                        inputs[first + place] = sign * size / reach[place];
+                        inputs[first + index] = sign * size / reach[index];
                     }
-                    run.seed(&|place| inputs[first + place]);
+                    run.seed(&|index| inputs[first + index]);
                     let found = program.run(&inputs);
                     // Skip points at which the probe misses the artefact.
                     let expected = run.read();

@@ -90,10 +90,10 @@ impl Equation {
                     difference = difference.max(worst(*found, *expected));
                 }
                 // A program without derivatives has no derivatives to compare.
-                for (place, (found, expected)) in
+                for (index, (found, expected)) in
                     found_slopes.iter().zip(gradient.iter().flatten()).enumerate()
                 {
-                    let k = place % count;
+                    let k = index % count;
                     differences[k] = differences[k].max(worst(*found, *expected));
                 }
             }

@@ -48,8 +48,8 @@ impl CheckPoint {
 
     pub(crate) fn inputs(&self, program: &Program, parameters: &[Variable]) -> Vec<f64> {
         let value = |variable: &Variable| {
-            let place = parameters.iter().position(|parameter| parameter == variable);
-            place.map_or_else(|| self.nominal(variable), |place| self.small[place])
+            let index = parameters.iter().position(|parameter| parameter == variable);
+            index.map_or_else(|| self.nominal(variable), |index| self.small[index])
         };
         let input = |input: &Input| match input {
             Input::Plain(variable) => value(variable),
@@ -73,7 +73,7 @@ impl Equation {
         };
         let turn_back = matches!(driver, Variable::Driver(DriverQuantity::SinceReversal(..)));
         let around = |low: f64, high: f64, margin: f64| Some([low - margin, high + margin]);
-        let place = |effect: &Effect| match &effect.shape {
+        let interval = |effect: &Effect| match &effect.shape {
             Shape::ReversalSpike { width } if turn_back => Some([0.0, 3.0 * width]),
             _ if turn_back => None,
             Shape::Local { centre, width, .. } => around(*centre, *centre, 1.2 * width),
@@ -89,7 +89,7 @@ impl Equation {
         let effects = self.options.effects.iter();
         effects
             .filter(|effect| follows(effect))
-            .filter_map(place)
+            .filter_map(interval)
             .collect()
     }
 
@@ -143,7 +143,7 @@ impl Equation {
                     stated.unwrap_or_else(|| whole_range(&variable))
                 }
                 Variable::Driver(_) => whole_range(&variable),
-                Variable::Error(_) | Variable::Unknown(_) | Variable::Coefficient(_) => [0.0; 2],
+                Variable::Error(_) | Variable::Instrument(_) | Variable::Coefficient(_) => [0.0; 2],
             };
             (variable, ends)
         };

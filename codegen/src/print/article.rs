@@ -63,19 +63,21 @@ impl Article {
     pub(crate) fn new(equation: &Equation) -> Self {
         let (program, sections) = match &equation.form {
             Form::Exact => exact::sections(equation),
-            Form::Groups { layout, complete, .. } => groups(equation, layout, *complete),
-            Form::First(first, layout) => first_order(equation, first, layout),
+            Form::Groups {
+                printed, complete, ..
+            } => groups(equation, printed, *complete),
+            Form::First(first, printed) => first_order(equation, first, printed),
         };
-        let told = |place: usize, input: &Input| match input {
+        let is_listed = |index: usize, input: &Input| match input {
             // Omit a length or position that the form does not contain.
             Input::Plain(variable) if variable.is_small() => true,
-            Input::Plain(_) => uses(&sections, place),
-            Input::Sine(_) => uses(&sections, place) || uses(&sections, place + 1),
+            Input::Plain(_) => uses(&sections, index),
+            Input::Sine(_) => uses(&sections, index) || uses(&sections, index + 1),
             Input::Cosine(_) => false,
         };
         let inputs = program.inputs.iter().enumerate();
         let symbols = inputs
-            .filter(|(place, input)| told(*place, input))
+            .filter(|(index, input)| is_listed(*index, input))
             .map(|(_, input)| match input {
                 Input::Plain(variable) => {
                     (input.clone(), notes::meaning(equation, variable), variable.unit())
@@ -96,9 +98,9 @@ impl Article {
 }
 
 /// Whether any of the equations uses an input.
-fn uses(sections: &[Section], place: usize) -> bool {
+fn uses(sections: &[Section], index: usize) -> bool {
     let rows = sections.iter().flat_map(|section| &section.rows);
-    rows.into_iter().any(|row| row.right.holds(place))
+    rows.into_iter().any(|row| row.right.holds(index))
 }
 
 pub(crate) fn row(left: LeftSide, right: Tree) -> EquationLine {
@@ -138,7 +140,7 @@ pub(crate) fn binary(op: Binary, a: Tree, b: Tree) -> Tree {
 
 /// `√(x² + y² + z²)` of three steps.
 pub(crate) fn norm_of_steps(start: usize) -> Tree {
-    let square = |place| (false, binary(Binary::Mul, Tree::Step(place), Tree::Step(place)));
+    let square = |index| (false, binary(Binary::Mul, Tree::Step(index), Tree::Step(index)));
     Tree::Unary(
         Unary::Sqrt,
         Box::new(sum((start..start + 3).map(square).collect())),
@@ -151,9 +153,9 @@ fn groups(equation: &Equation, trees: &[Tree], complete: bool) -> (Program, Vec<
         return touch::groups(equation, touch, trees, complete);
     }
     if equation.kind != Kind::Length {
-        let rows = trees.iter().enumerate().map(|(place, tree)| EquationLine {
+        let rows = trees.iter().enumerate().map(|(index, tree)| EquationLine {
             approximate: !complete,
-            ..row(LeftSide::Output(place), tree.clone())
+            ..row(LeftSide::Output(index), tree.clone())
         });
         let section = Section {
             heading: quantity_heading(equation).to_string(),
@@ -168,7 +170,7 @@ fn groups(equation: &Equation, trees: &[Tree], complete: bool) -> (Program, Vec<
         .into_iter()
         .zip(trees)
         .map(|(label, tree)| row(LeftSide::Named(label), tree.clone()));
-    let length = with_bar_unknowns(equation, &program, norm_of_steps(0));
+    let length = with_bar_parameters(equation, &program, norm_of_steps(0));
     let sections = vec![
         Section {
             heading: bar.meaning.clone(),
@@ -186,9 +188,9 @@ fn groups(equation: &Equation, trees: &[Tree], complete: bool) -> (Program, Vec<
 }
 
 /// `d − δ_bar + δ_gain·(d − bar)`, with the parameters that are included.
-pub(crate) fn with_bar_unknowns(equation: &Equation, program: &Program, distance: Tree) -> Tree {
+pub(crate) fn with_bar_parameters(equation: &Equation, program: &Program, distance: Tree) -> Tree {
     let tree = |operand: Operand| named_or_expanded(equation, program, operand);
-    let [bar, gain] = equation.bar_unknowns;
+    let [bar, gain] = equation.bar_parameters;
     let mut terms = vec![(false, distance.clone())];
     if let Some(bar) = bar {
         terms.push((true, tree(bar)));
@@ -200,7 +202,7 @@ pub(crate) fn with_bar_unknowns(equation: &Equation, program: &Program, distance
     sum(terms)
 }
 
-/// An operand by the name that effects give it, or as its own expression.
+/// An operand under the name of a driven error, or as its own expression.
 pub(crate) fn named_or_expanded(equation: &Equation, program: &Program, operand: Operand) -> Tree {
     let follower = equation.driven_errors.iter().find(|(_, value)| *value == operand);
     let named = follower.and_then(|(variable, _)| {
@@ -222,43 +224,43 @@ const S: Label = Label::Scalar("S");
 fn first_order(
     equation: &Equation,
     first: &FirstOrder,
-    layout: &PrintedFirstOrder,
+    printed: &PrintedFirstOrder,
 ) -> (Program, Vec<Section>) {
     let is_length = matches!(equation.kind, Kind::Length | Kind::Distance);
     let program = naming(equation, if is_length { vec![L_0, S] } else { Vec::new() });
     let (l_0, s) = (Tree::Step(0), Tree::Step(1));
-    let named = (equation.kind == Kind::Distance).then(|| layout.with_named_length(&l_0));
-    let layout = named.as_ref().unwrap_or(layout);
+    let named = (equation.kind == Kind::Distance).then(|| printed.with_named_length(&l_0));
+    let printed = named.as_ref().unwrap_or(printed);
     let mut sum_rows = Vec::new();
     if is_length {
-        sum_rows.push(row(LeftSide::Square(L_0), layout.nominal[0].clone()));
+        sum_rows.push(row(LeftSide::Square(L_0), printed.nominal[0].clone()));
         sum_rows.push(row(
             LeftSide::Named(S),
-            sum(terms(equation, first, layout, 0, true)),
+            sum(terms(equation, first, printed, 0, true)),
         ));
         let slope = binary(Binary::Div, s, l_0.clone());
-        let mut all = terms_of(&layout.without_errors(l_0.clone()));
+        let mut all = terms_of(&printed.without_errors(l_0.clone()));
         all.push((false, slope));
-        all.extend(terms(equation, first, layout, 0, false));
+        all.extend(terms(equation, first, printed, 0, false));
         sum_rows.push(EquationLine {
             approximate: true,
             ..row(LeftSide::Output(0), sum(all))
         });
     } else {
-        for (place, nominal) in layout.nominal.iter().enumerate() {
+        for (index, nominal) in printed.nominal.iter().enumerate() {
             let mut all = Vec::new();
             if *nominal != Tree::Number(0.0) {
                 all.push((false, nominal.clone()));
             }
-            all.extend(terms(equation, first, layout, place, false));
+            all.extend(terms(equation, first, printed, index, false));
             sum_rows.push(EquationLine {
                 approximate: true,
-                ..row(LeftSide::Output(place), sum(all))
+                ..row(LeftSide::Output(index), sum(all))
             });
         }
     }
     let mut table = Vec::new();
-    for (sensitivity, coefficients) in first.sensitivities.iter().zip(&layout.coefficients) {
+    for (sensitivity, coefficients) in first.sensitivities.iter().zip(&printed.coefficients) {
         let remark = match &sensitivity.column {
             Column::Distinct => None,
             Column::Zero => Some(NoteKind::NotObservable),
@@ -266,9 +268,9 @@ fn first_order(
         };
         let zero = |tree: &Tree| *tree == Tree::Number(0.0);
         let all_zero = coefficients.iter().all(zero);
-        for (place, coefficient) in coefficients.iter().enumerate() {
+        for (index, coefficient) in coefficients.iter().enumerate() {
             // Zero coordinates of a vector are omitted; of an identically zero column, one coordinate remains.
-            if zero(coefficient) && !is_length && !(all_zero && place == 0) {
+            if zero(coefficient) && !is_length && !(all_zero && index == 0) {
                 continue;
             }
             let right = if sensitivity.over_length && !zero(coefficient) {
@@ -278,7 +280,7 @@ fn first_order(
             };
             table.push(EquationLine {
                 remark: remark.clone(),
-                ..row(LeftSide::Slope(place, sensitivity.parameter.clone()), right)
+                ..row(LeftSide::Slope(index, sensitivity.parameter.clone()), right)
             });
         }
     }
@@ -324,35 +326,39 @@ fn order_words(order: Order) -> &'static str {
 fn terms(
     equation: &Equation,
     first: &FirstOrder,
-    layout: &PrintedFirstOrder,
+    printed: &PrintedFirstOrder,
     coordinate: usize,
     over_length: bool,
 ) -> Vec<(bool, Tree)> {
     let inputs = equation.inputs();
     let input = |parameter: &Variable| {
-        let wanted = Input::Plain(parameter.clone());
-        inputs.iter().position(|input| *input == wanted).map(Tree::Input)
+        let requested = Input::Plain(parameter.clone());
+        inputs
+            .iter()
+            .position(|input| *input == requested)
+            .map(Tree::Input)
     };
     let mut terms = Vec::new();
-    for (place, sensitivity) in first.sensitivities.iter().enumerate() {
-        let coefficient = &layout.coefficients[place][coordinate];
+    for (index, sensitivity) in first.sensitivities.iter().enumerate() {
+        let coefficient = &printed.coefficients[index][coordinate];
         // A multiple stays a separate term if only one of the two columns is divided by L₀, or if its factor is a fraction, which is not
         // shorter.
-        let stands = match &sensitivity.column {
+        let is_separate = match &sensitivity.column {
             Column::Distinct => true,
             Column::Zero => false,
             Column::Multiple { of, .. } => {
                 let mut bases = first.sensitivities.iter();
-                is_fraction(&layout.factors[place])
+                is_fraction(&printed.factors[index])
                     || bases.any(|base| base.parameter == *of && base.over_length != sensitivity.over_length)
             }
         };
-        let shown = stands && sensitivity.over_length == over_length && *coefficient != Tree::Number(0.0);
+        let shown =
+            is_separate && sensitivity.over_length == over_length && *coefficient != Tree::Number(0.0);
         let (true, Some(own)) = (shown, input(&sensitivity.parameter)) else {
             continue;
         };
         let mut errors = vec![(false, own)];
-        for (other, factor) in first.sensitivities.iter().zip(&layout.factors) {
+        for (other, factor) in first.sensitivities.iter().zip(&printed.factors) {
             let Column::Multiple { of, .. } = &other.column else {
                 continue;
             };

@@ -13,11 +13,11 @@ impl Dialect for C<'_, '_> {
     fn number(&self, value: f64) -> String {
         format!("{value:?}")
     }
-    fn input(&self, place: usize) -> String {
-        self.0.inputs[place].clone()
+    fn input(&self, index: usize) -> String {
+        self.0.inputs[index].clone()
     }
-    fn step(&self, place: usize) -> String {
-        self.0.steps[place].clone()
+    fn step(&self, index: usize) -> String {
+        self.0.steps[index].clone()
     }
     fn product(&self, a: &str, b: &str) -> String {
         format!("{a} * {b}")
@@ -88,11 +88,11 @@ fn kernel(file: &mut String, code: &Code<'_>, gradient: bool) {
     }
     let results = code.results(&dialect);
     let (values, derivatives) = results.split_at(code.outputs());
-    for (place, value) in values.iter().enumerate() {
-        let _ = writeln!(file, "    value[{place}] = {value};");
+    for (index, value) in values.iter().enumerate() {
+        let _ = writeln!(file, "    value[{index}] = {value};");
     }
-    for (place, slope) in derivatives.iter().enumerate() {
-        let _ = writeln!(file, "    gradient[{place}] = {slope};");
+    for (index, slope) in derivatives.iter().enumerate() {
+        let _ = writeln!(file, "    gradient[{index}] = {slope};");
     }
     file.push_str("}\n\n");
 
@@ -106,34 +106,34 @@ fn kernel(file: &mut String, code: &Code<'_>, gradient: bool) {
     );
     let _ = writeln!(file, "/* {what} of n readings. */\n{many};\n\n{many}\n{{");
     // Each column is a pointer of its own, so that the compiler knows that no two overlap.
-    for (number, place) in code.groups[1].clone().enumerate() {
-        if code.uses(place) {
+    for (number, index) in code.groups[1].clone().enumerate() {
+        if code.uses(index) {
             let _ = writeln!(
                 file,
                 "    const double *restrict column_{} = axes + {number} * n;",
-                code.inputs[place]
+                code.inputs[index]
             );
         }
     }
-    for place in 0..code.outputs() {
-        let _ = writeln!(file, "    double *restrict value_{place} = value + {place} * n;");
+    for index in 0..code.outputs() {
+        let _ = writeln!(file, "    double *restrict value_{index} = value + {index} * n;");
     }
-    for place in 0..derivatives.len() {
+    for index in 0..derivatives.len() {
         let _ = writeln!(
             file,
-            "    double *restrict gradient_{place} = gradient + {place} * n;"
+            "    double *restrict gradient_{index} = gradient + {index} * n;"
         );
     }
-    if !code.groups[1].clone().any(|place| code.uses(place)) {
+    if !code.groups[1].clone().any(|index| code.uses(index)) {
         file.push_str("    (void)axes;\n");
     }
     declare(file, code, "    ", &[0, 2]);
     // gcc tests only a limited number of columns for overlap; the pragma asserts that there is none.
     file.push_str("#if defined(__GNUC__) && !defined(__clang__)\n#pragma GCC ivdep\n#endif\n");
     file.push_str("    for (size_t i = 0; i < n; ++i) {\n");
-    for place in code.groups[1].clone() {
-        if code.uses(place) {
-            let input = &code.inputs[place];
+    for index in code.groups[1].clone() {
+        if code.uses(index) {
+            let input = &code.inputs[index];
             let _ = writeln!(file, "        const double {input} = column_{input}[i];");
         }
     }
@@ -142,11 +142,11 @@ fn kernel(file: &mut String, code: &Code<'_>, gradient: bool) {
     }) {
         let _ = writeln!(file, "{line}");
     }
-    for (place, value) in values.iter().enumerate() {
-        let _ = writeln!(file, "        value_{place}[i] = {value};");
+    for (index, value) in values.iter().enumerate() {
+        let _ = writeln!(file, "        value_{index}[i] = {value};");
     }
-    for (place, slope) in derivatives.iter().enumerate() {
-        let _ = writeln!(file, "        gradient_{place}[i] = {slope};");
+    for (index, slope) in derivatives.iter().enumerate() {
+        let _ = writeln!(file, "        gradient_{index}[i] = {slope};");
     }
     file.push_str("    }\n}\n\n");
 }
@@ -155,10 +155,10 @@ fn kernel(file: &mut String, code: &Code<'_>, gradient: bool) {
 fn declare(file: &mut String, code: &Code<'_>, indent: &str, groups: &[usize]) {
     for group in groups {
         let mut used = false;
-        for (number, place) in code.groups[*group].clone().enumerate() {
-            if code.uses(place) {
+        for (number, index) in code.groups[*group].clone().enumerate() {
+            if code.uses(index) {
                 used = true;
-                let name = &code.inputs[place];
+                let name = &code.inputs[index];
                 let _ = writeln!(
                     file,
                     "{indent}const double {name} = {}[{number}];",

@@ -147,11 +147,11 @@ impl<'e> Code<'e> {
     pub(crate) fn new(equation: &'e Equation, gradient: bool) -> Self {
         let program = equation.program(gradient);
         let mut taken: HashSet<String> = RESERVED_WORDS.iter().map(|word| (*word).to_string()).collect();
-        let mut name = |wanted: String| {
-            let mut free = wanted.clone();
+        let mut name = |requested: String| {
+            let mut free = requested.clone();
             let mut number = 2;
             while !taken.insert(free.clone()) {
-                free = format!("{wanted}_{number}");
+                free = format!("{requested}_{number}");
                 number += 1;
             }
             free
@@ -177,7 +177,8 @@ impl<'e> Code<'e> {
             .iter()
             .map(|step| name(step_name(&step.label, symbols)))
             .collect();
-        let count = |wanted: &dyn Fn(&Input) -> bool| program.inputs.iter().filter(|i| wanted(i)).count();
+        let count =
+            |requested: &dyn Fn(&Input) -> bool| program.inputs.iter().filter(|i| requested(i)).count();
         let lengths = count(&|input| matches!(input, Input::Plain(Variable::Length(_))));
         let small = count(&|input| matches!(input, Input::Plain(variable) if variable.is_small()));
         let all = program.inputs.len();
@@ -211,9 +212,9 @@ impl<'e> Code<'e> {
     }
 
     /// Whether the program uses an input.
-    pub(crate) fn uses(&self, place: usize) -> bool {
+    pub(crate) fn uses(&self, index: usize) -> bool {
         let steps = self.program.steps.iter().map(|step| &step.value);
-        steps.chain(&self.program.outputs).any(|tree| tree.holds(place))
+        steps.chain(&self.program.outputs).any(|tree| tree.holds(index))
     }
 
     /// The steps as text; `assign` writes an assignment in the language.
@@ -239,8 +240,8 @@ impl<'e> Code<'e> {
         lines.push(String::new());
         lines.push("Arguments in order:".to_string());
         for (group, places) in GROUPS.iter().zip(&self.groups) {
-            for (number, place) in places.clone().enumerate() {
-                let input = &self.program.inputs[place];
+            for (number, index) in places.clone().enumerate() {
+                let input = &self.program.inputs[index];
                 let (unit, meaning) = match input {
                     Input::Plain(variable) => (variable.unit(), notes::meaning(equation, variable)),
                     Input::Sine(variable) => ("1", format!("sine of the {}", variable.meaning())),
@@ -249,7 +250,7 @@ impl<'e> Code<'e> {
                 let argument = at(group, number);
                 lines.push(format!(
                     "  {argument:<12} {:<12} {unit:<4} {meaning}",
-                    self.inputs[place]
+                    self.inputs[index]
                 ));
             }
         }

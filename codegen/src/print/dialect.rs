@@ -8,9 +8,9 @@ pub trait Dialect {
     /// A number that is not negative.
     fn number(&self, value: f64) -> String;
     /// The name of an input.
-    fn input(&self, place: usize) -> String;
+    fn input(&self, index: usize) -> String;
     /// The name of a step.
-    fn step(&self, place: usize) -> String;
+    fn step(&self, index: usize) -> String;
     /// A product of two factors that already have the necessary parentheses.
     fn product(&self, a: &str, b: &str) -> String;
     /// A quotient.
@@ -73,8 +73,8 @@ pub fn lines(
     visible: impl Fn(&str) -> usize,
 ) -> Vec<String> {
     let mut whole = String::new();
-    for (place, (minus, tree)) in terms.iter().enumerate() {
-        let sign = match (place, minus) {
+    for (index, (minus, tree)) in terms.iter().enumerate() {
+        let sign = match (index, minus) {
             (0, false) => String::new(),
             (0, true) => dialect.minus().to_string(),
             (_, false) => " + ".to_string(),
@@ -150,8 +150,8 @@ fn bound(tree: &Tree, dialect: &impl Dialect) -> (String, Binding) {
             Binding::Sum,
         ),
         Tree::Number(value) => (dialect.number(*value), Binding::Atom),
-        Tree::Input(place) => (dialect.input(*place), Binding::Atom),
-        Tree::Step(place) => (dialect.step(*place), Binding::Atom),
+        Tree::Input(index) => (dialect.input(*index), Binding::Atom),
+        Tree::Step(index) => (dialect.step(*index), Binding::Atom),
         Tree::Unary(Unary::Neg, a) => (
             format!("{}{}", dialect.minus(), at_least(a, Binding::Product)),
             Binding::Sum,

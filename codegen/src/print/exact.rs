@@ -6,7 +6,7 @@
 
 use crate::equation::{Equation, Kind};
 use crate::print::article::{
-    EquationLine, LeftSide, Section, norm_of_steps, quantity_heading, row, with_bar_unknowns,
+    EquationLine, LeftSide, Section, norm_of_steps, quantity_heading, row, with_bar_parameters,
 };
 use crate::program::{Label, Naming, Program, Step, Tree};
 use crate::symbol::{Binary, Operand, Symbol};
@@ -15,11 +15,11 @@ use crate::vectors::{self, NamedVector};
 
 /// The program and the sections: the intermediate vectors of the outputs, and the adjoint vectors.
 pub(crate) fn sections(equation: &Equation) -> (Program, Vec<Section>) {
-    let forth = &equation.vectors;
-    let mut labels = vectors::labels(forth);
+    let forward = &equation.vectors;
+    let mut labels = vectors::labels(forward);
     labels.extend(equation.driven_labels());
     labels.extend(equation.touch.iter().flat_map(ProbeTerms::labels));
-    let mut back: Vec<NamedVector> = Vec::new();
+    let mut adjoint: Vec<NamedVector> = Vec::new();
     let mut slopes: Vec<Operand> = Vec::new();
     if let (Kind::Length, true, Some(Operand::Node(distance))) =
         (equation.kind, equation.options.gradient, distance(equation))
@@ -33,7 +33,7 @@ pub(crate) fn sections(equation: &Equation) -> (Program, Vec<Section>) {
         let parameters = equation.parameter_operands();
         let adjoints = equation.arena.adjoints(equation.outputs[0], &parameters);
         let unit = adjoints.of(Operand::Node(distance)) == Operand::constant(1.0);
-        for mut vector in vectors::adjoint_vectors(forth, &adjoints) {
+        for mut vector in vectors::adjoint_vectors(forward, &adjoints) {
             if vector.frame.is_empty() && !unit {
                 vector.meaning =
                     "derivatives by the bar vector: its unit vector times the gain of the sensor".to_string();
@@ -45,7 +45,7 @@ pub(crate) fn sections(equation: &Equation) -> (Program, Vec<Section>) {
                 for (node, label) in vectors::labels(std::slice::from_ref(&vector)) {
                     labels.entry(node).or_insert(label);
                 }
-                back.push(vector);
+                adjoint.push(vector);
             }
         }
         slopes = parameters
@@ -53,14 +53,19 @@ pub(crate) fn sections(equation: &Equation) -> (Program, Vec<Section>) {
             .map(|parameter| adjoints.of(*parameter))
             .collect();
     }
-    let mut asked: Vec<Operand> = equation.outputs.clone();
-    asked.extend(forth.iter().chain(&back).flat_map(|vector| vector.components));
-    asked.extend(&slopes);
-    asked.extend(equation.driven_errors.iter().map(|(_, value)| *value));
+    let mut requested: Vec<Operand> = equation.outputs.clone();
+    requested.extend(
+        forward
+            .iter()
+            .chain(&adjoint)
+            .flat_map(|vector| vector.components),
+    );
+    requested.extend(&slopes);
+    requested.extend(equation.driven_errors.iter().map(|(_, value)| *value));
     let mut program = Program::of(
         &equation.arena,
         equation.inputs(),
-        &asked,
+        &requested,
         &labels,
         Naming::Labelled,
     );
@@ -73,9 +78,9 @@ pub(crate) fn sections(equation: &Equation) -> (Program, Vec<Section>) {
         row(LeftSide::Named(label.clone()), value_of(&program, &label, tree))
     });
     let driven_errors: Vec<EquationLine> = driven_errors.collect();
-    let mut vectors = forth
+    let mut vectors = forward
         .iter()
-        .chain(&back)
+        .chain(&adjoint)
         .zip(vectors.chunks(3))
         .map(|(vector, trees)| {
             let rows = (0..3).map(|coordinate| component(&program, vector, trees, coordinate));
@@ -84,7 +89,7 @@ pub(crate) fn sections(equation: &Equation) -> (Program, Vec<Section>) {
                 rows: rows.collect(),
             }
         });
-    let mut sections: Vec<Section> = vectors.by_ref().take(forth.len()).collect();
+    let mut sections: Vec<Section> = vectors.by_ref().take(forward.len()).collect();
     if !driven_errors.is_empty() {
         let follow = Section {
             heading: "errors as functions of drivers".to_string(),
@@ -96,7 +101,7 @@ pub(crate) fn sections(equation: &Equation) -> (Program, Vec<Section>) {
     let mut read = Section {
         heading: quantity_heading(equation).to_string(),
         rows: outputs
-            .map(|(place, tree)| row(LeftSide::Output(place), tree.clone()))
+            .map(|(index, tree)| row(LeftSide::Output(index), tree.clone()))
             .collect(),
     };
     if equation.kind == Kind::Distance {
@@ -107,12 +112,12 @@ pub(crate) fn sections(equation: &Equation) -> (Program, Vec<Section>) {
         });
         read.rows.splice(0..0, between.collect::<Vec<EquationLine>>());
     }
-    let back: Vec<Section> = vectors.collect();
+    let adjoint: Vec<Section> = vectors.collect();
     let slopes = equation.parameters.iter().zip(slopes);
     let slopes: Vec<EquationLine> = slopes
         .map(|(parameter, tree)| row(LeftSide::Slope(0, parameter.clone()), tree.clone()))
         .collect();
-    if let (Kind::Length, Some(bar)) = (equation.kind, forth.last()) {
+    if let (Kind::Length, Some(bar)) = (equation.kind, forward.last()) {
         // The norm of the bar in terms of its own coordinates, even if some of them are aliases.
         let start = program.steps.len();
         let aliases = (0..3).map(|coordinate| Step {
@@ -126,21 +131,21 @@ pub(crate) fn sections(equation: &Equation) -> (Program, Vec<Section>) {
             .iter()
             .position(|step| step.label == Label::Scalar("d"));
         read.rows = match named {
-            Some(place) => vec![
+            Some(index) => vec![
                 row(LeftSide::Named(Label::Scalar("d")), norm),
                 row(
                     LeftSide::Output(0),
-                    with_bar_unknowns(equation, &program, Tree::Step(place)),
+                    with_bar_parameters(equation, &program, Tree::Step(index)),
                 ),
             ],
             None => vec![row(
                 LeftSide::Output(0),
-                with_bar_unknowns(equation, &program, norm),
+                with_bar_parameters(equation, &program, norm),
             )],
         };
     }
     sections.push(read);
-    sections.extend(back);
+    sections.extend(adjoint);
     if !slopes.is_empty() {
         sections.push(Section {
             heading: "derivatives".to_string(),
@@ -158,9 +163,9 @@ fn component(program: &Program, vector: &NamedVector, trees: &[Tree], coordinate
 }
 
 /// The expression of a name: that of its own step or, without one, the given expression.
-fn value_of(program: &Program, label: &Label, stands: &Tree) -> Tree {
+fn value_of(program: &Program, label: &Label, own_expression: &Tree) -> Tree {
     let own = program.steps.iter().find(|step| step.label == *label);
-    own.map_or_else(|| stands.clone(), |step| step.value.clone())
+    own.map_or_else(|| own_expression.clone(), |step| step.value.clone())
 }
 
 /// `x/y` for `(1/y)·x`; code uses the second form to share the reciprocal.

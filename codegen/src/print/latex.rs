@@ -39,11 +39,11 @@ impl Dialect for Latex<'_> {
             None => scientific,
         }
     }
-    fn input(&self, place: usize) -> String {
-        input(&self.program.inputs[place], self.symbols)
+    fn input(&self, index: usize) -> String {
+        input(&self.program.inputs[index], self.symbols)
     }
-    fn step(&self, place: usize) -> String {
-        label(&self.program.steps[place].label, self.symbols)
+    fn step(&self, index: usize) -> String {
+        label(&self.program.steps[index].label, self.symbols)
     }
     fn product(&self, a: &str, b: &str) -> String {
         // Between digits a space would be read as a thousands separator.
@@ -153,8 +153,8 @@ fn label(name: &Label, symbols: Symbols) -> String {
     }
 }
 
-fn output(kind: Kind, place: usize) -> String {
-    let coordinate = ["x", "y", "z"][place];
+fn output(kind: Kind, index: usize) -> String {
+    let coordinate = ["x", "y", "z"][index];
     match kind {
         Kind::Length => "L".to_string(),
         Kind::Distance => "d".to_string(),
@@ -223,8 +223,8 @@ pub(crate) fn print(equation: &Equation) -> String {
         let heading = escape(&capital(&section.heading));
         let _ = writeln!(page, "{heading}:\n\\begin{{align}}");
         let last = section.rows.len().saturating_sub(1);
-        for (place, row) in section.rows.iter().enumerate() {
-            let end = if place == last { "" } else { " \\\\" };
+        for (index, row) in section.rows.iter().enumerate() {
+            let end = if index == last { "" } else { " \\\\" };
             let _ = writeln!(
                 page,
                 "{}{end}",
@@ -264,10 +264,10 @@ fn write_line(equation: &Equation, program: &Program, row: &EquationLine, symbol
     let left = match &row.left {
         LeftSide::Named(name) => label(name, symbols),
         LeftSide::Square(name) => format!("{}^2", label(name, symbols)),
-        LeftSide::Output(place) => output(equation.kind, *place),
-        LeftSide::Slope(place, parameter) => format!(
+        LeftSide::Output(index) => output(equation.kind, *index),
+        LeftSide::Slope(index, parameter) => format!(
             "\\frac{{\\partial {}}}{{\\partial {}}}",
-            output(equation.kind, *place),
+            output(equation.kind, *index),
             variable(parameter, symbols)
         ),
     };

@@ -13,11 +13,11 @@ impl Dialect for Matlab<'_, '_> {
     fn number(&self, value: f64) -> String {
         format!("{value:?}")
     }
-    fn input(&self, place: usize) -> String {
-        self.0.inputs[place].clone()
+    fn input(&self, index: usize) -> String {
+        self.0.inputs[index].clone()
     }
-    fn step(&self, place: usize) -> String {
-        self.0.steps[place].clone()
+    fn step(&self, index: usize) -> String {
+        self.0.steps[index].clone()
     }
     fn product(&self, a: &str, b: &str) -> String {
         format!("{a} .* {b}")
@@ -67,13 +67,13 @@ pub(crate) fn print(equation: &Equation) -> String {
         );
     }
     for (group, places) in GROUPS.iter().zip(&code.groups) {
-        for (number, place) in places.clone().enumerate() {
-            if code.uses(place) {
+        for (number, index) in places.clone().enumerate() {
+            if code.uses(index) {
                 let column = if *group == "axes" { ", :" } else { "" };
                 let _ = writeln!(
                     file,
                     "  {} = {group}({}{column});",
-                    code.inputs[place],
+                    code.inputs[index],
                     number + 1
                 );
             }

@@ -13,11 +13,11 @@ impl Dialect for Python<'_, '_> {
     fn number(&self, value: f64) -> String {
         format!("{value:?}")
     }
-    fn input(&self, place: usize) -> String {
-        self.0.inputs[place].clone()
+    fn input(&self, index: usize) -> String {
+        self.0.inputs[index].clone()
     }
-    fn step(&self, place: usize) -> String {
-        self.0.steps[place].clone()
+    fn step(&self, index: usize) -> String {
+        self.0.steps[index].clone()
     }
     fn product(&self, a: &str, b: &str) -> String {
         format!("{a} * {b}")
@@ -77,9 +77,9 @@ fn function(file: &mut String, code: &Code<'_>, gradient: bool) {
         code.function()
     );
     for (group, places) in GROUPS.iter().zip(&code.groups) {
-        for (number, place) in places.clone().enumerate() {
-            if code.uses(place) {
-                let _ = writeln!(file, "    {} = {group}[{number}]", code.inputs[place]);
+        for (number, index) in places.clone().enumerate() {
+            if code.uses(index) {
+                let _ = writeln!(file, "    {} = {group}[{number}]", code.inputs[index]);
             }
         }
     }

@@ -13,11 +13,11 @@ impl Dialect for Rust<'_, '_> {
     fn number(&self, value: f64) -> String {
         format!("{value:?}")
     }
-    fn input(&self, place: usize) -> String {
-        self.0.inputs[place].clone()
+    fn input(&self, index: usize) -> String {
+        self.0.inputs[index].clone()
     }
-    fn step(&self, place: usize) -> String {
-        self.0.steps[place].clone()
+    fn step(&self, index: usize) -> String {
+        self.0.steps[index].clone()
     }
     fn product(&self, a: &str, b: &str) -> String {
         format!("{a} * {b}")
@@ -112,9 +112,9 @@ fn single(file: &mut String, code: &Code<'_>, gradient: bool) {
     for (group, places) in crate::print::code::GROUPS.iter().zip(&code.groups) {
         let names: Vec<String> = places
             .clone()
-            .map(|place| {
-                if code.uses(place) {
-                    code.inputs[place].clone()
+            .map(|index| {
+                if code.uses(index) {
+                    code.inputs[index].clone()
                 } else {
                     "_".to_string()
                 }
@@ -192,8 +192,8 @@ fn columns(file: &mut String, code: &Code<'_>, gradient: bool) {
          for (block, column) in x.iter_mut().zip(axes) {{\n            block.copy_from_slice(&column[at..at + LANES]);\n        }}\n        \
          for lane in 0..LANES {{\n"
     );
-    let row = |place: &dyn Fn(usize) -> String, count: usize| {
-        let inputs: Vec<String> = (0..count).map(place).collect();
+    let row = |index: &dyn Fn(usize) -> String, count: usize| {
+        let inputs: Vec<String> = (0..count).map(index).collect();
         inputs.join(", ")
     };
     let axes = code.groups[1].len();
@@ -276,8 +276,8 @@ fn elementary(file: &mut String, code: &Code<'_>) {
         return;
     }
     file.push_str("/// Functions that `core` lacks. In a crate without `std` replace them by those of `libm`; nothing else needs `std`.\nmod elementary {\n");
-    for (place, (name, body)) in used.iter().enumerate() {
-        let gap = if place == 0 { "" } else { "\n" };
+    for (index, (name, body)) in used.iter().enumerate() {
+        let gap = if index == 0 { "" } else { "\n" };
         let _ = write!(
             file,
             "{gap}    #[inline(always)]\n    pub fn {name}(x: f64) -> f64 {{\n        {body}\n    }}\n"

@@ -28,11 +28,11 @@ impl Dialect for Text<'_> {
             value => format!("{}", dialect::for_readers(value)),
         }
     }
-    fn input(&self, place: usize) -> String {
-        input(&self.program.inputs[place], self.symbols)
+    fn input(&self, index: usize) -> String {
+        input(&self.program.inputs[index], self.symbols)
     }
-    fn step(&self, place: usize) -> String {
-        label(&self.program.steps[place].label, self.symbols)
+    fn step(&self, index: usize) -> String {
+        label(&self.program.steps[index].label, self.symbols)
     }
     fn product(&self, a: &str, b: &str) -> String {
         format!("{a}·{b}")
@@ -101,12 +101,12 @@ fn label(label: &Label, symbols: Symbols) -> String {
     }
 }
 
-fn output(kind: Kind, place: usize) -> String {
+fn output(kind: Kind, index: usize) -> String {
     match kind {
         Kind::Length => "L".to_string(),
         Kind::Distance => "d".to_string(),
-        Kind::Coordinates => format!("m.{}", ["x", "y", "z"][place]),
-        Kind::Volumetric => format!("Δ.{}", ["x", "y", "z"][place]),
+        Kind::Coordinates => format!("m.{}", ["x", "y", "z"][index]),
+        Kind::Volumetric => format!("Δ.{}", ["x", "y", "z"][index]),
     }
 }
 
@@ -124,9 +124,9 @@ pub(crate) fn print(equation: &Equation) -> String {
         let left = |left: &LeftSide| match left {
             LeftSide::Named(name) => label(name, symbols),
             LeftSide::Square(name) => format!("{}²", label(name, symbols)),
-            LeftSide::Output(place) => output(equation.kind, *place),
-            LeftSide::Slope(place, parameter) => {
-                format!("∂{}/∂{}", output(equation.kind, *place), parameter.text(symbols))
+            LeftSide::Output(index) => output(equation.kind, *index),
+            LeftSide::Slope(index, parameter) => {
+                format!("∂{}/∂{}", output(equation.kind, *index), parameter.text(symbols))
             }
         };
         let lefts: Vec<String> = section.rows.iter().map(|row| left(&row.left)).collect();

@@ -93,7 +93,7 @@ pub(crate) fn groups(
 
 /// `−l_n·(b + √(b² − a·c))/a`, where the steps from `start` are `a`, `b`, `c` and `l_n` in this order.
 fn distance_of_steps(start: usize, with_length: bool) -> Tree {
-    let [a, b, c, length] = [0, 1, 2, 3].map(|place| Tree::Step(start + place));
+    let [a, b, c, length] = [0, 1, 2, 3].map(|index| Tree::Step(start + index));
     let product_of = |x: &Tree, y: &Tree| binary(Binary::Mul, x.clone(), y.clone());
     let under = binary(Binary::Sub, product_of(&b, &b), product_of(&a, &c));
     let way = binary(Binary::Add, b, Tree::Unary(Unary::Sqrt, Box::new(under)));

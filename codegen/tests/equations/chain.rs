@@ -76,7 +76,7 @@ fn the_symbolic_chain_evaluates_to_the_chain_over_numbers() {
                     .iter()
                     .position(|e| e == name)
                     .map_or(f64::NAN, |i| values[i]),
-                Variable::Unknown(_) | Variable::Driver(_) | Variable::Coefficient(_) => f64::NAN,
+                Variable::Instrument(_) | Variable::Driver(_) | Variable::Coefficient(_) => f64::NAN,
             });
             let found = found.expect("plain numbers")[0];
             assert!((found - expected).abs() <= 1e-12 * expected, "{found} {expected}");

@@ -169,8 +169,8 @@ fn curves_by_truncated_powers() {
         closed: false,
     };
     // Beyond its ends a curve is constant.
-    for (q, place) in [(10.0, 0.0), (22.5, 1.25), (37.0, 2.7), (59.9, 4.99), (-20.0, 0.0)] {
-        let expected: Vec<f64> = (0..8).map(|j| cardinal(place - j as f64 + 3.0)).collect();
+    for (q, position) in [(10.0, 0.0), (22.5, 1.25), (37.0, 2.7), (59.9, 4.99), (-20.0, 0.0)] {
+        let expected: Vec<f64> = (0..8).map(|j| cardinal(position - j as f64 + 3.0)).collect();
         near(&bases("X", open(), here(q)), &expected);
     }
     for at in [60.0, 80.0] {
@@ -186,10 +186,10 @@ fn curves_by_truncated_powers() {
         closed: true,
     };
     for q in [0.0_f64, 13.0, 59.0, 73.0, -47.0] {
-        let place = (q / 10.0).rem_euclid(6.0);
+        let position = (q / 10.0).rem_euclid(6.0);
         let turns = |j: i32| (-1..=1).map(move |turn| f64::from(j + 6 * turn));
         let expected: Vec<f64> = (0..6)
-            .map(|j| turns(j).map(|j| cardinal(place - j + 3.0)).sum())
+            .map(|j| turns(j).map(|j| cardinal(position - j + 3.0)).sum())
             .collect();
         near(&bases("X", closed(), here(q)), &expected);
     }
@@ -275,11 +275,11 @@ fn every_form_is_confirmed_with_every_shape() {
                 match equation.print(language) {
                     Ok(text) => assert!(!(text.contains("NaN") || curved && for_readers), "{text}"),
                     Err(refused) => {
-                        let told = refused.to_string();
-                        assert!(curved && for_readers, "{told}");
+                        let message = refused.to_string();
+                        assert!(curved && for_readers, "{message}");
                         assert!(
-                            told.contains("`EYC~C:curve`") && told.contains("rust, c, python"),
-                            "{told}"
+                            message.contains("`EYC~C:curve`") && message.contains("rust, c, python"),
+                            "{message}"
                         );
                     }
                 }
@@ -289,7 +289,7 @@ fn every_form_is_confirmed_with_every_shape() {
 }
 
 #[test]
-fn an_equation_names_what_effects_make_up_and_what_they_follow() {
+fn an_equation_names_driven_errors_and_their_drivers() {
     let machine = Machine::from_code("w C b X t").expect("a code");
     let effects = vec![
         effect("EZC", "C", Shape::Harmonic { order: 2.0 }),
@@ -316,7 +316,7 @@ fn an_equation_names_what_effects_make_up_and_what_they_follow() {
 
 /// A first-order harmonic in X and Y of C is confounded with the eccentricity of the ball: the same column twice.
 #[test]
-fn an_effect_that_is_a_location_error_is_marked() {
+fn an_effect_confounded_with_a_location_error_is_marked() {
     let machine = Machine::from_code("w C b X t").expect("a code");
     let options = Options {
         order: Order::First,
@@ -329,7 +329,7 @@ fn an_effect_that_is_a_location_error_is_marked() {
 }
 
 #[test]
-fn what_cannot_be_written_is_refused_by_name() {
+fn effects_without_a_closed_form_are_refused_by_name() {
     let machine = Machine::from_code("w C b X t").expect("a code");
     let refused = |effect: Effect| {
         let equation = Equation::of(&machine, &Bar, &[], &with(vec![effect]));
@@ -341,15 +341,18 @@ fn what_cannot_be_written_is_refused_by_name() {
         intervals: 200,
         closed: true,
     };
-    let told = refused(effect("EZC", "C", long));
+    let message = refused(effect("EZC", "C", long));
     assert!(
-        told.contains("EZC~C:curve") && told.contains("200") && told.contains("fewer intervals"),
-        "{told}"
+        message.contains("EZC~C:curve") && message.contains("200") && message.contains("fewer intervals"),
+        "{message}"
     );
-    let told = refused(effect("EZA", "A", Shape::Backlash));
-    assert!(told.contains("EZA~A:backlash") && told.contains("`A`"), "{told}");
-    let told = refused(effect("tracker.x", "time", Shape::Drift));
-    assert!(told.contains("tracker.x~time:drift"), "{told}");
+    let message = refused(effect("EZA", "A", Shape::Backlash));
+    assert!(
+        message.contains("EZA~A:backlash") && message.contains("`A`"),
+        "{message}"
+    );
+    let message = refused(effect("tracker.x", "time", Shape::Drift));
+    assert!(message.contains("tracker.x~time:drift"), "{message}");
     let twice = effect("EZC", "C", Shape::Backlash);
     let equation = Equation::of(&machine, &Bar, &[], &with(vec![twice.clone(), twice]));
     assert!(matches!(equation, Err(CodegenError::Twice { .. })));

@@ -151,7 +151,7 @@ fn main() {{
 
 /// The benchmark code is the printer's output. `ABBE_WRITE_BENCHES=1` writes it again.
 #[test]
-fn the_benches_run_what_is_printed() {
+fn the_benchmark_code_is_the_printed_code() {
     let options = Options {
         gradient: true,
         ..Options::default()

@@ -137,8 +137,8 @@ impl State {
                 Input::Plain(Variable::Length(name)) => groups[0].push(self.length(name)),
                 Input::Plain(variable @ Variable::Position { .. }) => groups[1].push(position(variable)),
                 Input::Plain(variable) => {
-                    let place = parameters.iter().position(|known| known == variable);
-                    groups[2].push(self.small[place.expect("a parameter")]);
+                    let index = parameters.iter().position(|known| known == variable);
+                    groups[2].push(self.small[index.expect("a parameter")]);
                 }
             }
         }
@@ -178,7 +178,7 @@ fn geometry(touch: Touch, parameters: &[Variable], point: &State) -> f64 {
     let unknown = |thing: &str, coordinate: &str| {
         let pairs = parameters.iter().zip(&point.small);
         let found = pairs.filter_map(|(parameter, value)| match parameter {
-            Variable::Unknown(u) if u.thing == thing && u.coordinate == coordinate => Some(*value),
+            Variable::Instrument(u) if u.thing == thing && u.coordinate == coordinate => Some(*value),
             _ => None,
         });
         found.sum::<f64>()
@@ -208,30 +208,30 @@ fn geometry(touch: Touch, parameters: &[Variable], point: &State) -> f64 {
         let outwards = machine.workpiece_side..machine.axes.len();
         outwards.fold(Matrix4::identity(), |t, index| t * matrix(index, with_errors))
     };
-    let place = |t: Matrix4<f64>, p: Vector3<f64>| (t * Vector4::new(p.x, p.y, p.z, 1.0)).xyz();
+    let transformed = |t: Matrix4<f64>, p: Vector3<f64>| (t * Vector4::new(p.x, p.y, p.z, 1.0)).xyz();
     let vector = |names: [&str; 3]| Vector3::from(names.map(|name| point.length(name)));
     let (artefact, stylus) = (vector(["A_x", "A_y", "A_z"]), vector(["S_x", "S_y", "S_z"]));
     let axis = Vector3::from(touch.axis());
     let direction = if touch.stated {
         Vector3::from(STATED)
     } else {
-        let foot = place(table(false), artefact);
-        let along = place(table(false), artefact + axis) - foot;
-        let inward = foot - place(tool(false), stylus);
+        let foot = transformed(table(false), artefact);
+        let along = transformed(table(false), artefact + axis) - foot;
+        let inward = foot - transformed(tool(false), stylus);
         (inward - along * inward.dot(&along)).normalize()
     };
     let off = Vector3::from(["x", "y", "z"].map(|k| unknown("stylus", k)));
-    let start = place(tool(true), stylus + off);
+    let start = transformed(tool(true), stylus + off);
     let pose = six(["x", "y", "z", "a", "b", "c"].map(|k| unknown("artefact", k)));
     let to_artefact = (table(true) * shift(artefact) * pose)
         .try_inverse()
         .expect("a motion");
     let radius = point.length("R") + unknown("radius", "") + unknown("form", "");
     let beyond = |t: f64| {
-        let p = place(to_artefact, start + direction * t);
+        let p = transformed(to_artefact, start + direction * t);
         (p - axis * p.dot(&axis)).norm() - radius
     };
-    // The distance from the axis is convex along the line: ternary search for its minimum, then bisection for the crossing before it.
+    // The distance from the axis is convex along the line. Ternary search finds its minimum, bisection the crossing before it.
     let (mut low, mut high) = (-2000.0, 2000.0);
     for _ in 0..200 {
         let third = (high - low) / 3.0;
@@ -294,7 +294,7 @@ fn equation(touch: Touch, order: Order) -> Equation {
 }
 
 #[test]
-fn the_exact_form_is_where_the_line_enters_the_cylinder() {
+fn the_exact_form_is_the_intersection_of_line_and_cylinder() {
     let mut random = rand_pcg::Pcg64::seed_from_u64(21);
     for stated in [false, true] {
         let touch = Touch { stated };
@@ -330,20 +330,20 @@ fn the_first_order_is_the_slope_of_the_geometry() {
             let arguments = point.arguments(&equation.machine, &program.inputs, &equation.parameters);
             let found = program.run(&arguments.concat());
             assert!((found[0] - geometry(touch, &equation.parameters, &point)).abs() < 1e-8);
-            for (place, parameter) in equation.parameters.iter().enumerate() {
+            for (index, parameter) in equation.parameters.iter().enumerate() {
                 let step = if parameter.is_angle() { 1e-5 } else { 1e-3 };
                 let mut at = |value: f64| {
-                    point.small[place] = value;
+                    point.small[index] = value;
                     geometry(touch, &equation.parameters, &point)
                 };
                 let slope = (at(step) - at(-step)) / (2.0 * step);
                 at(0.0);
                 let scale = slope.abs().max(1.0);
                 assert!(
-                    (found[1 + place] - slope).abs() < 1e-5 * scale,
+                    (found[1 + index] - slope).abs() < 1e-5 * scale,
                     "{}: {} {slope}",
                     parameter.name(),
-                    found[1 + place]
+                    found[1 + index]
                 );
             }
         }
@@ -352,7 +352,7 @@ fn the_first_order_is_the_slope_of_the_geometry() {
 
 /// The distance is exact to second order in `v` and `u`: a tenth of the errors gives a thousandth of the deviation.
 #[test]
-fn the_bilinear_form_is_off_by_the_third_order() {
+fn the_bilinear_form_deviates_by_third_order() {
     let touch = Touch { stated: false };
     let equation = equation(touch, Order::Bilinear);
     let program = equation.program(false);
@@ -410,7 +410,7 @@ pub fn printed(
             let point = point(touch, &equation.parameters, [5.0, 0.05], random);
             let arguments = point.arguments(&equation.machine, &program.inputs, &equation.parameters);
             let found = program.run(&arguments.concat());
-            // Near the edge of the artefact rounding errors are unbounded.
+            // Near the edge of the artefact rounding errors grow without bound.
             if found.iter().all(|value| value.is_finite() && value.abs() < 300.0) {
                 cases.push(Case {
                     arguments,

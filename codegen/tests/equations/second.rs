@@ -66,7 +66,8 @@ fn draw(equation: &Equation, random: &mut impl rand::Rng) -> State {
                     .positions
                     .push((axis.clone(), random.random_range(-size..size)));
             }
-            Variable::Error(_) | Variable::Unknown(_) | Variable::Driver(_) | Variable::Coefficient(_) => {}
+            Variable::Error(_) | Variable::Instrument(_) | Variable::Driver(_) | Variable::Coefficient(_) => {
+            }
         }
     }
     point.small = equation
@@ -100,7 +101,7 @@ fn gradient(source: &impl Source, machine: &Machine, errors: &[ErrorName], at: &
             )
         })
         .collect();
-    let place = |slot: usize| {
+    let index = |slot: usize| {
         errors
             .iter()
             .position(|name| machine.error_slot(name) == Some(slot))
@@ -115,8 +116,8 @@ fn gradient(source: &impl Source, machine: &Machine, errors: &[ErrorName], at: &
             Pack::new(at.small[i], Derivative::some(seed))
         };
         let bodies = machine.body_errors(
-            |slot| place(slot).is_some(),
-            |slot| place(slot).map_or_else(|| Pack::from(0.0), seeded),
+            |slot| index(slot).is_some(),
+            |slot| index(slot).map_or_else(|| Pack::from(0.0), seeded),
         );
         let read = subject.read(machine, &state, &bodies, |_| None);
         gradient.resize(read.len(), Vec::new());
@@ -141,8 +142,8 @@ fn agrees(what: &str, source: &impl Source, machine: &Machine, errors: &[ErrorNa
                 Variable::Length(name) => named(&point.lengths, name),
                 Variable::Position { axis, .. } => named(&point.positions, axis),
                 small => {
-                    let place = equation.parameters.iter().position(|known| known == small);
-                    place.map_or(f64::NAN, |place| point.small[place])
+                    let index = equation.parameters.iter().position(|known| known == small);
+                    index.map_or(f64::NAN, |index| point.small[index])
                 }
             })
         };

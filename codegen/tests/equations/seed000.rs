@@ -224,7 +224,7 @@ fn eq_3_21_with_the_printed_d_and_with_the_right_one() {
         let nominal = evaluate::<Symbol<'_>>(arena, &[chain.operand()], |variable| {
             let zero = arena.symbol(Operand::constant(0.0));
             abbe_codegen::VariableValue::Nominal(match variable {
-                Variable::Error(_) | Variable::Unknown(_) => zero,
+                Variable::Error(_) | Variable::Instrument(_) => zero,
                 Variable::Position { axis, .. } if axis == "C" => zero,
                 Variable::Length(name) if name == "H" => length(arena, "Z_CA"),
                 other => arena.variable(other.clone()),
@@ -239,7 +239,7 @@ fn eq_3_21_with_the_printed_d_and_with_the_right_one() {
 }
 
 #[test]
-fn the_length_holds_no_error_beyond_the_eight() {
+fn the_length_contains_only_the_eight_errors() {
     let equation = chapter5(false);
     let mut ring = Ring::exact(&equation.arena);
     let form = ring.normal_form(square(&equation).operand());
@@ -375,7 +375,7 @@ fn the_first_order_term_for_term() {
 
 /// Truncation errors against figures from an independent calculation: 10 µm and 0.01°, then ten times those.
 #[test]
-fn what_truncation_costs() {
+fn truncation_errors_match_independent_figures() {
     use abbe_codegen::Order;
     let worst = |order, rotation, extended| {
         let options = Options {

@@ -180,7 +180,7 @@ fn by_rigid_bodies<'a>(arena: &'a Arena, machine: &Machine) -> Vector<'a> {
 }
 
 #[test]
-fn every_arrangement_with_its_nominal_turns() {
+fn every_arrangement_with_its_nominal_rotations() {
     let codes = arrangements();
     assert_eq!(codes.len(), 24);
     for code in codes {

@@ -58,7 +58,7 @@ fn every_test_of_the_self_calibration() {
 
 /// A distance derived from the length of the bar remains an expression in the equation.
 #[test]
-fn lengths_that_follow_from_the_bar_stay_expressions() {
+fn lengths_derived_from_the_bar_stay_expressions() {
     let path = file("hermle-c600u/chapter5.toml");
     let session = read::session(&path, &read::ReadOptions::default()).expect("a session");
     let test = session

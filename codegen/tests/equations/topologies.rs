@@ -27,9 +27,9 @@ pub const CODES: [&str; 10] = [
 /// A machine of this code with rotary axes away from R's origin and one axis that counts against R.
 pub fn machine(code: &str) -> Machine {
     let mut machine = Machine::from_code(code).expect("a code of the table");
-    for (place, axis) in machine.axes.iter_mut().enumerate() {
+    for (index, axis) in machine.axes.iter_mut().enumerate() {
         if axis.kind == AxisKind::Rotary {
-            axis.origin_mm = [12.5, -30.0 + place as f64, 41.25];
+            axis.origin_mm = [12.5, -30.0 + index as f64, 41.25];
         }
     }
     machine.axes[1].direction = machine.axes[1].direction.map(|d| -d);
@@ -128,7 +128,7 @@ fn case(what: What, machine: &Machine, errors: &[ErrorName], random: &mut impl r
             random.random_range(-size..size)
         })
         .collect();
-    let place = |slot: usize| {
+    let index = |slot: usize| {
         errors
             .iter()
             .position(|name| machine.error_slot(name) == Some(slot))
@@ -144,8 +144,8 @@ fn case(what: What, machine: &Machine, errors: &[ErrorName], random: &mut impl r
             Pack::new(small[i], Derivative::some(seed))
         };
         let bodies = machine.body_errors(
-            |slot| place(slot).is_some(),
-            |slot| place(slot).map_or_else(|| Pack::from_re(0.0), seeded),
+            |slot| index(slot).is_some(),
+            |slot| index(slot).map_or_else(|| Pack::from_re(0.0), seeded),
         );
         let read: Vec<Pack> = match what {
             What::Bar => {

@@ -55,10 +55,12 @@ fn compare_feeds(results: &mut [CircularTest]) {
             };
             let others: Vec<&str> = results.iter().filter(differs).map(|other| other.test.as_str()).collect();
             Some(if others.is_empty() {
-                "one feed: backlash is confounded with the part of a lag that changes sign with the direction; a test at another feed separates them".into()
+                "one feed: backlash is confounded with the part of a lag that changes sign with the direction; a test at another feed \
+                 separates them".into()
             } else {
                 format!(
-                    "backlash is confounded with lag in this test alone: compare with {} at another feed; backlash is independent of the feed, lag is proportional to it",
+                    "backlash is confounded with lag in this test alone: compare with {} at another feed; backlash is independent of the feed, lag is \
+                     proportional to it",
                     others.join(", ")
                 )
             })

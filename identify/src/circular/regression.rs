@@ -18,7 +18,7 @@ pub(super) struct Regression {
 }
 
 impl Regression {
-    /// Solves; `None` where the columns are confounded.
+    /// Solves; `None` if the columns are collinear.
     pub fn solve(columns: &[Vec<f64>], y: &[f64]) -> Option<Regression> {
         let n = columns.len();
         if y.len() <= n {

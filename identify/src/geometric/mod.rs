@@ -23,7 +23,7 @@ pub use compare::{CentreResult, Comparison, ComparisonRow, compare};
 
 use crate::error::IdentifyError;
 use crate::parameters::Role;
-use crate::problem::{Block, Problem};
+use crate::problem::{Problem, RowBlock};
 use abbe_model::session::Prior;
 use abbe_model::words::counted;
 
@@ -268,7 +268,7 @@ fn sensitivities(
                     problem.tests[*test].name
                 ))
             })?;
-        let block = Block {
+        let block = RowBlock {
             test: *test,
             rows: 0..problem.models[*test].rows(),
         };

@@ -65,7 +65,7 @@ impl PureError {
         let observed: [f64; MAX_ORDER + 1] = std::array::from_fn(|lag| covariance[lag] / pairs[lag] as f64);
         // Two repeats hold the same deviation twice, so half of the pairs are independent.
         let insignificant = 3.0 / (0.5 * pairs[0] as f64).sqrt();
-        let (coefficients, variance) = without_detrending(&observed, order, insignificant, &lengths);
+        let (coefficients, variance) = correct_for_detrending(&observed, order, insignificant, &lengths);
         // Bartlett's standard error of the lag-1 correlation, propagated through the correction.
         let neighbours = observed[1] / observed[0];
         let u =
@@ -74,7 +74,7 @@ impl PureError {
         shifted[1..]
             .iter_mut()
             .for_each(|value| *value += u * observed[0]);
-        let (of_shifted, _) = without_detrending(&shifted, order, insignificant, &lengths);
+        let (of_shifted, _) = correct_for_detrending(&shifted, order, insignificant, &lengths);
         let total = |coefficients: &[f64]| coefficients.iter().sum::<f64>();
         let sum_u = (total(&of_shifted) - total(&coefficients)).abs();
         Some(Autocorrelation {
@@ -86,7 +86,7 @@ impl PureError {
 }
 
 /// Coefficients and variance of the noise whose detrended deviations have these autocovariances.
-fn without_detrending(
+fn correct_for_detrending(
     observed: &[f64; MAX_ORDER + 1],
     order: usize,
     insignificant: f64,
@@ -297,7 +297,7 @@ mod tests {
             let lengths = BTreeMap::from([(100, 100)]);
             let (_, shown) = detrended(&a, &lengths);
             let observed = shown.map(|value| value * sigma * sigma);
-            let (found, variance) = without_detrending(&observed, MAX_ORDER, 0.05, &lengths);
+            let (found, variance) = correct_for_detrending(&observed, MAX_ORDER, 0.05, &lengths);
             assert_eq!(found.len(), a.len(), "{found:?}");
             for (found, wanted) in found.iter().zip(&a) {
                 assert!((found - wanted).abs() < 0.02, "{found} instead of {wanted}");

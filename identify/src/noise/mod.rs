@@ -10,15 +10,15 @@
 //! sum of squares is therefore divided by that trace, not by the number of deviations.
 
 mod autocorrelation;
+mod stated;
 mod trends;
 mod waves;
 
 use abbe_model::session::Test;
 use abbe_model::session::readings::Readings;
-use statrs::distribution::{ChiSquared, ContinuousCDF};
 
-use crate::problem::Problem;
 pub use autocorrelation::Autocorrelation;
+pub use stated::stated_against_repeats;
 use trends::Trends;
 
 /// The noise of one scalar reading.
@@ -161,7 +161,7 @@ fn deviations(
 ) -> (f64, f64) {
     let coordinates = readings.coordinates;
     let trends = Trends::of(readings, &kept);
-    let level = trends.removed_from(residual, coordinates);
+    let level = trends.detrend(residual, coordinates);
     let keys = RepeatKeys::of(readings);
     let mut order: Vec<usize> = (0..readings.rows()).filter(|row| kept(*row)).collect();
     order.sort_by(|a, b| keys.of_row(*a).cmp(keys.of_row(*b)));
@@ -225,35 +225,6 @@ impl RepeatKeys {
     }
 }
 
-/// Ratio beyond which stated noise and noise of repeats disagree.
-const DISAGREEMENT_RATIO: f64 = 2.0;
-/// Significance level of this disagreement.
-const DISAGREEMENT_P: f64 = 0.001;
-
-/// A warning if repeated readings scatter by more than twice or less than half of the stated noise, significantly. `residuals` are those
-/// of any model, mm, test by test.
-pub fn stated_against_repeats(problem: &Problem<'_>, residuals: &[Vec<f64>]) -> Option<String> {
-    let stated_mm = problem.session.noise_mm.filter(|sigma| *sigma > 0.0)?;
-    let pure = PureError::of(&problem.tests, residuals, |test, row| {
-        !problem.rejected[test][row]
-    });
-    let sigma_mm = pure.sigma_mm()?;
-    let resolution_mm = problem.session.resolution_mm.unwrap_or(0.0) / 12.0_f64.sqrt();
-    let ratio = sigma_mm.max(resolution_mm) / stated_mm;
-    let freedom = pure.freedom as f64;
-    let below = ChiSquared::new(freedom).ok()?.cdf(freedom * ratio * ratio);
-    let by_chance = below.min(1.0 - below) > DISAGREEMENT_P / 2.0;
-    (!by_chance && !(1.0 / DISAGREEMENT_RATIO..=DISAGREEMENT_RATIO).contains(&ratio)).then(|| {
-        format!(
-            "the session states a noise of {} µm, and the repeatability is {:.3} µm ({} degrees of freedom): the uncertainties of a fit follow from \
-             the stated noise; correct `noise_um`, or omit it",
-            stated_mm * 1e3,
-            sigma_mm * 1e3,
-            pure.freedom
-        )
-    })
-}
-
 /// The direction of travel of every axis, one number per row.
 fn directions(readings: &Readings) -> Vec<i64> {
     let mut code = vec![0_i64; readings.rows()];
@@ -276,15 +247,15 @@ mod tests {
     /// With the impulse response ψ of `x_t = Σ a_k x_{t−k} + e_t`, the variance of x is that of e times `Σ ψ²`.
     #[test]
     fn innovation_follows_from_the_impulse_response() {
-        for memory in [vec![], vec![0.8], vec![1.1, -0.4], vec![0.5, 0.2, -0.3]] {
+        for ar_coefficients in [vec![], vec![0.8], vec![1.1, -0.4], vec![0.5, 0.2, -0.3]] {
             let mut response = vec![1.0];
             for t in 1..2000 {
-                let terms = memory.iter().enumerate().filter(|(k, _)| *k < t);
+                let terms = ar_coefficients.iter().enumerate().filter(|(k, _)| *k < t);
                 response.push(terms.map(|(k, a)| a * response[t - 1 - k]).sum::<f64>());
             }
             let power: f64 = response.iter().map(|r| r * r).sum();
             let noise = Noise {
-                ar_coefficients: memory,
+                ar_coefficients: ar_coefficients,
                 ..Noise::white(2.0, NoiseSource::Stated)
             };
             let innovation = noise.innovation_mm();

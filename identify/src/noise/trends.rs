@@ -93,7 +93,7 @@ impl Trends {
     }
 
     /// Residuals without the trend of each run and coordinate.
-    pub fn removed_from(&self, residual: &[f64], coordinates: usize) -> Vec<f64> {
+    pub fn detrend(&self, residual: &[f64], coordinates: usize) -> Vec<f64> {
         let mut level = residual.to_vec();
         for rows in &self.rows {
             for coordinate in 0..coordinates {

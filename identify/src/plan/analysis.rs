@@ -127,7 +127,7 @@ pub fn analyse_problem(problem: &Problem<'_>, travel_mm: f64) -> Result<PlanAnal
     Ok(PlanAnalysis {
         noise_um: problem.noise.sigma_mm * 1e3,
         readings: problem.readings(),
-        rank: linear.rank.seen.ncols(),
+        rank: linear.rank.identifiable_basis.ncols(),
         parameter_count: list.len(),
         setup_count: setups.len(),
         moving_min: tests.iter().map(|test| test.moving_min).sum(),

@@ -3,7 +3,7 @@
 use abbe_model::instrument::Station;
 use abbe_model::session::Session;
 
-use super::candidate_tests::TestVariations;
+use super::test_variations::TestVariations;
 
 /// Distance below which a ball position counts as one that is already mounted, mm.
 const SAME_POSITION_MM: f64 = 0.5;

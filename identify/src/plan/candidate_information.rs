@@ -2,10 +2,11 @@
 
 use rayon::prelude::*;
 
-use super::candidate_tests::{CandidateTest, TestVariations};
+use super::candidate_tests::CandidateTest;
 use super::information::{Root, SharedParameters, sum};
 use super::linear::{Linearisation, merged};
 use super::ranking::smallest_first;
+use super::test_variations::TestVariations;
 use crate::error::IdentifyError;
 use crate::parameters::{Parameter, Role};
 use crate::problem::Problem;

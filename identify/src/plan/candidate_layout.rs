@@ -8,8 +8,8 @@ use abbe_model::session::motion::{FollowOffset, Motion};
 use abbe_model::session::{Prior, Session, Test, placing};
 
 use super::ball_positions::{BallPosition, axis_positions, ball_positions, dot, norm};
-use super::candidate_tests::TestVariations;
 use super::sweep::{Sweep, sweep_of};
+use super::test_variations::TestVariations;
 
 /// Least radius about the swept axis, mm. At smaller radii the bar hardly moves.
 const MIN_RADIUS_MM: f64 = 10.0;

@@ -106,7 +106,7 @@ fn format_short(value: f64) -> String {
 /// Null-space combinations: they leave every reading unchanged, and no prior determines them.
 pub fn unidentifiable(problem: &Problem<'_>, rank: &Rank) -> Vec<Unobservable> {
     let list = &problem.parameters.list;
-    rank.unseen
+    rank.null_combinations
         .iter()
         .zip(&rank.pivots)
         .map(|(row, pivot)| {

@@ -8,10 +8,10 @@ use schemars::JsonSchema;
 use serde::Serialize;
 
 use super::candidate_information::PreparedCandidates;
-use super::candidate_tests::TestVariations;
 use super::criterion::{Goal, figure, reported, targets};
 use super::information::{Root, SharedParameters};
 use super::ranking::smallest_first;
+use super::test_variations::TestVariations;
 use crate::error::IdentifyError;
 use crate::problem::Problem;
 
@@ -29,7 +29,7 @@ pub struct ImproveOptions {
 /// The proposed tests.
 #[derive(Clone, Debug, Serialize, JsonSchema)]
 pub struct Improvement {
-    /// The criterion and of unit of its values: `worst standard uncertainty, um or arcsec`, or `separation, standard deviations`.
+    /// The criterion and the unit of its values: `worst standard uncertainty, um or arcsec`, or `separation, standard deviations`.
     pub criterion: String,
     /// Number of candidate tests that were evaluated.
     pub candidate_tests: usize,
@@ -40,9 +40,10 @@ pub struct Improvement {
     pub uncertainties_before: Vec<NamedUncertainty>,
     /// The proposed tests, in the order in which they are added.
     pub steps: Vec<ProposedTest>,
-    /// The exchanges of proposed tests, a sentence.
+    /// The exchanges of proposed tests, one sentence each.
     pub exchanged: Vec<String>,
-    /// The best candidate tests by tests, in order of the criterion, or of its gain per minute. Of tests with equal readings, one is listed.
+    /// The best single candidate tests, in the order of the criterion or of its gain per minute. Of tests with equal readings,
+    /// one is listed.
     pub alternatives: Vec<AlternativeTest>,
 }
 

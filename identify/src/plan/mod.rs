@@ -5,7 +5,7 @@
 //!
 //! - [`analyse`]: uncertainties, budgets, identifiability, indices, and the contribution of each test;
 //! - [`effects`]: detectability and bias of undeclared effects;
-//! - [`candidate_tests`], [`candidate_information`], [`information`], [`criterion`], [`mod@improve`], [`separate`]: the next
+//! - [`test_variations`], [`candidate_tests`], [`candidate_information`], [`information`], [`criterion`], [`mod@improve`], [`separate`]: the next
 //!   test; [`mod@range`]: how far a sweep can shrink;
 //! - [`states`], [`linear`], [`sensitivity`], [`budget`], [`identifiability`], [`indices`]: the parts of the analysis;
 //! - [`results`]: the results, as they are written to JSON.
@@ -32,6 +32,7 @@ pub mod sensitivity;
 pub mod separate;
 pub mod states;
 mod sweep;
+pub mod test_variations;
 
 pub use analysis::{BAR_TRAVEL_MM, PlanOptions, analyse, analyse_problem, prepared};
 pub use separate::{SeparatingTest, SeparationAnalysis, separating_tests, separation};

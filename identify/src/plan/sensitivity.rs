@@ -6,7 +6,7 @@ use rayon::prelude::*;
 
 use super::results::{Curve, Sensitivity};
 use crate::error::IdentifyError;
-use crate::problem::{Block, Problem};
+use crate::problem::{Problem, RowBlock};
 
 /// Maximum number of points of a curve.
 const CURVE_POINTS: usize = 60;
@@ -84,7 +84,7 @@ pub fn sensitivities(
 
 fn of_block(
     problem: &Problem<'_>,
-    block: &Block,
+    block: &RowBlock,
     rows: &Mat<f64>,
     parameters: usize,
     covariance: &Mat<f64>,

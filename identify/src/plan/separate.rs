@@ -11,11 +11,11 @@ use schemars::JsonSchema;
 use serde::Serialize;
 
 use super::candidate_information::PreparedCandidates;
-use super::candidate_tests::TestVariations;
 use super::criterion;
 use super::information::{Root, SharedParameters};
 use super::ranking::{rounded, smallest_first};
 use super::states;
+use super::test_variations::TestVariations;
 use crate::error::IdentifyError;
 use crate::parameters::Role;
 use crate::problem::Problem;

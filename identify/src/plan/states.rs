@@ -2,7 +2,7 @@
 
 use abbe_model::sensitivity::{SlotValues, TestModel};
 use abbe_model::session::readings::Readings;
-use abbe_model::session::{Session, Test, motion};
+use abbe_model::session::{Session, Test, motion, planned};
 
 use crate::error::IdentifyError;
 use crate::heldout::{FoldKind, Folds};
@@ -41,7 +41,7 @@ pub fn complete(session: &Session, planned_only: bool) -> Result<Session, Identi
 /// # Errors
 /// If the movement leaves the travel or there is none.
 pub fn planned(session: &Session, test: &Test) -> Result<Readings, IdentifyError> {
-    let mut readings = motion::planned(&session.machine, test)?;
+    let mut readings = planned::planned(&session.machine, test)?;
     readings.coordinates = test.station.kind().coordinates();
     let model = TestModel::new(&session.machine, test.station.clone(), &readings);
     readings.observed = model.readings_mm(&SlotValues::zero(model.slots()));

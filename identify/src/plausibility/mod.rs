@@ -83,7 +83,7 @@ pub(crate) fn checked(problem: &Problem<'_>, fit: Result<Fit, IdentifyError>) ->
     let found = match fit {
         // Noise that is stated may well be larger than anything that the tests show.
         Ok(fit)
-            if fit.rank.seen.ncols() > 0
+            if fit.rank.identifiable_basis.ncols() > 0
                 || problem.parameters.list.is_empty()
                 || problem.noise.source == NoiseSource::Stated =>
         {

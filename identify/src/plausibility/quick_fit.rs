@@ -46,14 +46,16 @@ pub(super) fn trial(session: &Session, noise: &Noise) -> Option<Trial> {
             Some(rank) => rank,
             none => none.insert(Rank::decide(whole.parts().0.as_ref(), &size, &preference).ok()?),
         };
-        let (r, c, _) = in_directions(&whole, &rank.seen).parts();
+        let (r, c, _) = in_directions(&whole, &rank.identifiable_basis).parts();
         let mut step = vec![0.0; c.len()];
         for i in (0..c.len()).rev() {
             let beyond: f64 = (i + 1..c.len()).map(|j| r[(i, j)] * step[j]).sum();
             step[i] = (c[i] - beyond) / r[(i, i)];
         }
         for (j, value) in beta.iter_mut().enumerate() {
-            *value += (0..step.len()).map(|k| rank.seen[(j, k)] * step[k]).sum::<f64>();
+            *value += (0..step.len())
+                .map(|k| rank.identifiable_basis[(j, k)] * step[k])
+                .sum::<f64>();
         }
         if beta.iter().any(|value| !value.is_finite()) {
             return None;
@@ -75,7 +77,9 @@ pub(super) fn trial(session: &Session, noise: &Noise) -> Option<Trial> {
         .count();
     chi_square.is_finite().then(|| Trial {
         chi_square,
-        freedom: readings.saturating_sub(free.min(rank.seen.ncols())).max(1) as f64,
+        freedom: readings
+            .saturating_sub(free.min(rank.identifiable_basis.ncols()))
+            .max(1) as f64,
         rms_mm: rms_mm(&problem, &problem.residuals(&beta)),
         cost: determined + priors,
     })

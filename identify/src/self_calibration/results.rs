@@ -194,7 +194,7 @@ impl Calibration {
                 .map(|condition| condition.words.clone())
                 .collect(),
             parameter_count: self.solution.parameters,
-            rank: self.solution.rank.seen.ncols(),
+            rank: self.solution.rank.identifiable_basis.ncols(),
             functions: Function::ALL
                 .map(|function| self.function(function, &axis))
                 .to_vec(),
@@ -323,7 +323,7 @@ impl Calibration {
         };
         self.solution
             .rank
-            .unseen
+            .null_combinations
             .iter()
             .map(|row| {
                 let terms = row.iter().enumerate().filter(|(_, value)| **value != 0.0);

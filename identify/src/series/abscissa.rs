@@ -20,7 +20,7 @@ pub struct Abscissa {
     pub name: String,
     /// Whether it is an angle.
     pub is_angle: bool,
-    /// The axis, where it is one.
+    /// The axis, if the abscissa is an axis.
     pub axis: Option<usize>,
     /// Row by row: degrees, or mm.
     pub values: Vec<f64>,

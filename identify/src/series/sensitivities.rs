@@ -10,7 +10,7 @@ use super::abscissa::Abscissa;
 use crate::error::IdentifyError;
 use crate::parameters::Parameter;
 use crate::plan::linear::is_of_interest;
-use crate::problem::{Block, Problem};
+use crate::problem::{Problem, RowBlock};
 
 /// Maximum number of points along a run.
 const MAX_POINTS: usize = 181;
@@ -64,7 +64,7 @@ pub fn sensitivities(problem: &Problem<'_>, beta: &[f64]) -> Result<Vec<TestSens
         }
         let mut way = Abscissa::of(&problem.session.machine, readings);
         way.values = picked.iter().map(|i| way.values[run.start + i]).collect();
-        let block = Block {
+        let block = RowBlock {
             test: number,
             rows: run,
         };

@@ -10,11 +10,9 @@ use std::collections::HashSet;
 
 use abbe_model::effect::Shape;
 
-use super::score::{Gain, TrainedModel};
+use super::score::{Gain, INDISTINGUISHABLE, TrainedModel};
 use super::search::{ALL, Search};
 
-/// Difference in `−ln P` below which two candidates are confounded. It corresponds to 2 σ for one column.
-pub(super) const INDISTINGUISHABLE: f64 = 2.0;
 /// Least cosine between the signature of the found effect and the column space of an alias, which then reproduces at least half
 /// of the squared signature. The evidence alone does not suffice: a candidate may explain as much of a different structure.
 const MIN_COSINE: f64 = std::f64::consts::FRAC_1_SQRT_2;

@@ -7,8 +7,8 @@ use super::result::effect_name;
 use super::{Progress, TraceOutcome};
 use crate::error::IdentifyError;
 use crate::parameters::Role;
-use crate::plan::candidate_tests::TestVariations;
 use crate::plan::separate::{AlternativeSeparation, SeparatingTest, separating_tests};
+use crate::plan::test_variations::TestVariations;
 use crate::results::{AlternativeResult, EffectResult, SeparatingTestResult, SeparationResult};
 
 /// Maximum number of aliases that are compared with an effect, the nearest first. Each alias adds columns.

@@ -29,7 +29,7 @@ impl Start {
     /// Computes the start from a fit, whose triangular factors contain the readings.
     pub fn of(problem: &Problem<'_>, columns: &Columns<'_, '_>, fit: &Fit) -> Result<Start, IdentifyError> {
         let parameters = fit.beta.len();
-        let basis = &fit.rank.seen;
+        let basis = &fit.rank.identifiable_basis;
         let rank = basis.ncols();
         let rows = columns.model_rows(&fit.beta)?;
         let residual = (0..rows.nrows()).map(|i| rows[(i, parameters)]).collect();

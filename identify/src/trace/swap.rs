@@ -12,11 +12,10 @@ use std::collections::HashSet;
 
 use abbe_model::effect::Shape;
 
-use super::alias::INDISTINGUISHABLE;
 use super::compose;
 use super::library::Candidate;
 use super::refine;
-use super::score::TrainedModel;
+use super::score::{INDISTINGUISHABLE, TrainedModel};
 use super::search::{ALL, Search, SearchBranch, SelectedEffect};
 use crate::error::IdentifyError;
 

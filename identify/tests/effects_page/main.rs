@@ -17,7 +17,7 @@ use std::path::{Path, PathBuf};
 
 use abbe_model::effect::{Driver, Effect, Shape};
 use abbe_model::session::Session;
-use abbe_model::session::motion::planned_session;
+use abbe_model::session::planned::planned_session;
 use abbe_model::session::read::{self, ReadOptions};
 use changes::{At, Changes, Share, changes};
 use page::{Section, effect, sections};

@@ -101,9 +101,9 @@ fn b_splines<N: Nominal>(q: N, ends: [f64; 2], intervals: usize, closed: bool, b
     } else {
         along.at_least(0.0).at_most(1.0)
     };
-    let place = along * constant(intervals as f64);
-    let interval = place.floor().at_most((intervals - 1) as f64);
-    let four = pieces(place - interval);
+    let position = along * constant(intervals as f64);
+    let interval = position.floor().at_most((intervals - 1) as f64);
+    let four = pieces(position - interval);
     let mut add = |interval: usize, value: &dyn Fn(N) -> N| {
         for (k, piece) in four.into_iter().enumerate() {
             let index = if closed {

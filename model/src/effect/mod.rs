@@ -23,7 +23,7 @@ pub enum Component {
     Axis(ErrorName),
     /// One of the instrument's parameters: `workpiece_ball.x`, `bar`.
     Instrument {
-        /// The object, as in [`crate::instrument::InstrumentUnknown::thing`].
+        /// The object, as in [`crate::instrument::InstrumentParameter::thing`].
         thing: String,
         /// Its coordinate, or empty.
         coordinate: String,

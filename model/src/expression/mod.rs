@@ -165,16 +165,16 @@ impl<V: Clone + PartialEq> Arena<V> {
 
     /// The symbol of a variable; the same variable is always the same symbol.
     pub fn variable(&self, variable: V) -> Symbol<'_, V> {
-        let place = self
+        let index = self
             .variables
             .borrow()
             .iter()
             .position(|known| *known == variable);
-        let place = place.unwrap_or_else(|| {
+        let index = index.unwrap_or_else(|| {
             self.variables.borrow_mut().push(variable);
             self.variables.borrow().len() - 1
         });
-        self.symbol(self.intern(Node::Variable(VariableId(place as u32))))
+        self.symbol(self.intern(Node::Variable(VariableId(index as u32))))
     }
 
     /// The symbol of an operand of this arena.
@@ -236,8 +236,8 @@ impl<V: Clone + PartialEq> Arena<V> {
         let nodes = self.nodes.borrow();
         let variables = self.variables.borrow();
         let itself = |operand: Operand| {
-            matches!(operand, Operand::Node(id) if matches!(nodes[id.0 as usize], Node::Variable(place)
-                if variables[place.0 as usize] == *variable))
+            matches!(operand, Operand::Node(id) if matches!(nodes[id.0 as usize], Node::Variable(index)
+                if variables[index.0 as usize] == *variable))
         };
         let plain = |node: &Node| {
             !matches!(node, Node::Unary(Unary::Sin | Unary::Cos, _)) && operands(*node).any(itself)

@@ -3,26 +3,26 @@
 //! The reading refers to the stated length of the bar: a bar that is `δ` longer than stated reads `L − δ`. A sensor with the gain error
 //! `k` adds `k·(L − L_bar)`.
 
-use super::{InstrumentUnknown, InternalUnit, SharedBy, displaced};
+use super::{InstrumentParameter, InternalUnit, SharedBy, displaced};
 use crate::chain::{AxisPosition, BodyErrors, Machine};
 use crate::frames::Point;
 use crate::scalar::Scalar;
 
 /// Both balls, the length of the bar, the gain of the sensor.
-pub const UNKNOWNS: [InstrumentUnknown; 8] = [
-    InstrumentUnknown::length("workpiece_ball", "x", SharedBy::Setup),
-    InstrumentUnknown::length("workpiece_ball", "y", SharedBy::Setup),
-    InstrumentUnknown::length("workpiece_ball", "z", SharedBy::Setup),
-    InstrumentUnknown::length("spindle_ball", "x", SharedBy::SpindleSetup),
-    InstrumentUnknown::length("spindle_ball", "y", SharedBy::SpindleSetup),
-    InstrumentUnknown::length("spindle_ball", "z", SharedBy::SpindleSetup),
-    InstrumentUnknown::length("bar", "", SharedBy::BarSetup),
-    InstrumentUnknown::new("gain", "", InternalUnit::Ratio, SharedBy::Session),
+pub const PARAMETERS: [InstrumentParameter; 8] = [
+    InstrumentParameter::length("workpiece_ball", "x", SharedBy::Setup),
+    InstrumentParameter::length("workpiece_ball", "y", SharedBy::Setup),
+    InstrumentParameter::length("workpiece_ball", "z", SharedBy::Setup),
+    InstrumentParameter::length("spindle_ball", "x", SharedBy::SpindleSetup),
+    InstrumentParameter::length("spindle_ball", "y", SharedBy::SpindleSetup),
+    InstrumentParameter::length("spindle_ball", "z", SharedBy::SpindleSetup),
+    InstrumentParameter::length("bar", "", SharedBy::BarSetup),
+    InstrumentParameter::new("gain", "", InternalUnit::Ratio, SharedBy::Session),
 ];
 
-/// Index of the length of the bar in [`UNKNOWNS`].
+/// Index of the length of the bar in [`PARAMETERS`].
 pub const BAR: usize = 6;
-/// Index of the gain of the sensor in [`UNKNOWNS`].
+/// Index of the gain of the sensor in [`PARAMETERS`].
 pub const GAIN: usize = 7;
 
 /// A ball bar as set up for one test, lengths in mm.

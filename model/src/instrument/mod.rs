@@ -93,13 +93,13 @@ impl InstrumentKind {
     }
 
     /// The instrument's parameters in the order of its slots.
-    pub fn unknowns(self) -> &'static [InstrumentUnknown] {
+    pub fn unknowns(self) -> &'static [InstrumentParameter] {
         match self {
-            InstrumentKind::BallBar => &ballbar::UNKNOWNS,
-            InstrumentKind::Tracker => &tracker::UNKNOWNS,
-            InstrumentKind::Socket => &socket::UNKNOWNS,
-            InstrumentKind::Probe => &probe::UNKNOWNS,
-            InstrumentKind::RTest => &rtest::UNKNOWNS,
+            InstrumentKind::BallBar => &ballbar::PARAMETERS,
+            InstrumentKind::Tracker => &tracker::PARAMETERS,
+            InstrumentKind::Socket => &socket::PARAMETERS,
+            InstrumentKind::Probe => &probe::PARAMETERS,
+            InstrumentKind::RTest => &rtest::PARAMETERS,
         }
     }
 }
@@ -124,7 +124,7 @@ pub enum SharedBy {
 
 /// One parameter of an instrument.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct InstrumentUnknown {
+pub struct InstrumentParameter {
     /// The object: `workpiece_ball`, `spindle_ball`, `bar`, `tracker`, `target`, `socket`, `ball`, `artefact`, `radius`, `form`,
     /// `stylus`, `sensor`, `gain`.
     pub thing: &'static str,
@@ -136,14 +136,14 @@ pub struct InstrumentUnknown {
     pub shared_by: SharedBy,
 }
 
-impl InstrumentUnknown {
+impl InstrumentParameter {
     const fn new(
         thing: &'static str,
         coordinate: &'static str,
         unit: InternalUnit,
         shared_by: SharedBy,
-    ) -> InstrumentUnknown {
-        InstrumentUnknown {
+    ) -> InstrumentParameter {
+        InstrumentParameter {
             thing,
             coordinate,
             unit,
@@ -151,12 +151,20 @@ impl InstrumentUnknown {
         }
     }
 
-    const fn length(thing: &'static str, coordinate: &'static str, shared_by: SharedBy) -> InstrumentUnknown {
-        InstrumentUnknown::new(thing, coordinate, InternalUnit::Millimetre, shared_by)
+    const fn length(
+        thing: &'static str,
+        coordinate: &'static str,
+        shared_by: SharedBy,
+    ) -> InstrumentParameter {
+        InstrumentParameter::new(thing, coordinate, InternalUnit::Millimetre, shared_by)
     }
 
-    const fn angle(thing: &'static str, coordinate: &'static str, shared_by: SharedBy) -> InstrumentUnknown {
-        InstrumentUnknown::new(thing, coordinate, InternalUnit::Radian, shared_by)
+    const fn angle(
+        thing: &'static str,
+        coordinate: &'static str,
+        shared_by: SharedBy,
+    ) -> InstrumentParameter {
+        InstrumentParameter::new(thing, coordinate, InternalUnit::Radian, shared_by)
     }
 }
 

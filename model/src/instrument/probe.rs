@@ -11,31 +11,31 @@
 //! This is the nearer of the two intersections of the line with the surface. The distance is positive if the surface lies ahead. A form
 //! deviation of `w` outwards reduces the distance by `w`. The "measured radius less the target" of the literature is `−d`.
 
-use super::{InstrumentUnknown, SharedBy, displaced, pose_error};
+use super::{InstrumentParameter, SharedBy, displaced, pose_error};
 use crate::chain::{AxisPosition, BodyErrors, Machine};
 use crate::frames::Point;
 use crate::scalar::{Nominal, Scalar};
 
 /// The pose of the artefact on the table, its radius, its form deviation; the stylus in the tool frame.
-pub const UNKNOWNS: [InstrumentUnknown; 11] = [
-    InstrumentUnknown::length("artefact", "x", SharedBy::Setup),
-    InstrumentUnknown::length("artefact", "y", SharedBy::Setup),
-    InstrumentUnknown::length("artefact", "z", SharedBy::Setup),
-    InstrumentUnknown::angle("artefact", "a", SharedBy::Setup),
-    InstrumentUnknown::angle("artefact", "b", SharedBy::Setup),
-    InstrumentUnknown::angle("artefact", "c", SharedBy::Setup),
-    InstrumentUnknown::length("radius", "", SharedBy::Setup),
-    InstrumentUnknown::length("form", "", SharedBy::Setup),
-    InstrumentUnknown::length("stylus", "x", SharedBy::SpindleSetup),
-    InstrumentUnknown::length("stylus", "y", SharedBy::SpindleSetup),
-    InstrumentUnknown::length("stylus", "z", SharedBy::SpindleSetup),
+pub const PARAMETERS: [InstrumentParameter; 11] = [
+    InstrumentParameter::length("artefact", "x", SharedBy::Setup),
+    InstrumentParameter::length("artefact", "y", SharedBy::Setup),
+    InstrumentParameter::length("artefact", "z", SharedBy::Setup),
+    InstrumentParameter::angle("artefact", "a", SharedBy::Setup),
+    InstrumentParameter::angle("artefact", "b", SharedBy::Setup),
+    InstrumentParameter::angle("artefact", "c", SharedBy::Setup),
+    InstrumentParameter::length("radius", "", SharedBy::Setup),
+    InstrumentParameter::length("form", "", SharedBy::Setup),
+    InstrumentParameter::length("stylus", "x", SharedBy::SpindleSetup),
+    InstrumentParameter::length("stylus", "y", SharedBy::SpindleSetup),
+    InstrumentParameter::length("stylus", "z", SharedBy::SpindleSetup),
 ];
 
-/// Index of the radius of the artefact in [`UNKNOWNS`].
+/// Index of the radius of the artefact in [`PARAMETERS`].
 pub const RADIUS: usize = 6;
-/// Index of the form deviation in [`UNKNOWNS`].
+/// Index of the form deviation in [`PARAMETERS`].
 pub const FORM: usize = 7;
-/// Index of the first stylus coordinate in [`UNKNOWNS`].
+/// Index of the first stylus coordinate in [`PARAMETERS`].
 pub const STYLUS: usize = 8;
 
 /// A probe and a cylindrical artefact as set up for one test, lengths in mm.
@@ -138,8 +138,8 @@ impl<N: Nominal> Probe<N> {
         }
         let axis = Point::nominal(self.axis);
         let mut radius = S::nominal(self.radius);
-        for place in [RADIUS, FORM] {
-            if let Some(larger) = unknown(place) {
+        for index in [RADIUS, FORM] {
+            if let Some(larger) = unknown(index) {
                 radius = radius + larger;
             }
         }

@@ -12,25 +12,25 @@
 //! of linear axis motion error of machine tools using an R-test device (HPC 2014), Section 4: sensor outputs become machine coordinates
 //! by `R = R_φ·R_θ·R_ω` (Eqs. 1–3). The matrices above Eq. 1 are printed in a different order from the expanded equations and the text.
 
-use super::{InstrumentUnknown, SharedBy, displaced};
+use super::{InstrumentParameter, SharedBy, displaced};
 use crate::chain::{AxisPosition, BodyErrors, Machine};
 use crate::frames::{Coordinate, Point, Rotation, SinCos, turn_about};
 use crate::scalar::{Nominal, Scalar};
 
 /// Both points, then ω₁, φ₁ and θ₁ of the nest.
-pub const UNKNOWNS: [InstrumentUnknown; 9] = [
-    InstrumentUnknown::length("workpiece_ball", "x", SharedBy::Setup),
-    InstrumentUnknown::length("workpiece_ball", "y", SharedBy::Setup),
-    InstrumentUnknown::length("workpiece_ball", "z", SharedBy::Setup),
-    InstrumentUnknown::length("spindle_ball", "x", SharedBy::SpindleSetup),
-    InstrumentUnknown::length("spindle_ball", "y", SharedBy::SpindleSetup),
-    InstrumentUnknown::length("spindle_ball", "z", SharedBy::SpindleSetup),
-    InstrumentUnknown::angle("sensor", "omega", SharedBy::Sensors),
-    InstrumentUnknown::angle("sensor", "phi", SharedBy::Sensors),
-    InstrumentUnknown::angle("sensor", "theta", SharedBy::Sensors),
+pub const PARAMETERS: [InstrumentParameter; 9] = [
+    InstrumentParameter::length("workpiece_ball", "x", SharedBy::Setup),
+    InstrumentParameter::length("workpiece_ball", "y", SharedBy::Setup),
+    InstrumentParameter::length("workpiece_ball", "z", SharedBy::Setup),
+    InstrumentParameter::length("spindle_ball", "x", SharedBy::SpindleSetup),
+    InstrumentParameter::length("spindle_ball", "y", SharedBy::SpindleSetup),
+    InstrumentParameter::length("spindle_ball", "z", SharedBy::SpindleSetup),
+    InstrumentParameter::angle("sensor", "omega", SharedBy::Sensors),
+    InstrumentParameter::angle("sensor", "phi", SharedBy::Sensors),
+    InstrumentParameter::angle("sensor", "theta", SharedBy::Sensors),
 ];
 
-/// Index of ω₁ in [`UNKNOWNS`].
+/// Index of ω₁ in [`PARAMETERS`].
 pub const SENSOR: usize = 6;
 
 /// The body that carries the sensors.
@@ -67,7 +67,7 @@ pub struct RTest<N> {
 /// use abbe_model::frames::{Point, Rotation};
 /// use abbe_model::instrument::rtest::Orientation;
 ///
-/// // Eq. (4) of the paper: what sensor u counts is cos(−35.264°) of X and sin(−35.264°) of Z.
+/// // Eq. (4) of the paper: sensor u measures cos(−35.264°)·X + sin(−35.264°)·Z.
 /// let angles: [f64; 3] = [135.0_f64, -35.264, 0.0].map(f64::to_radians);
 /// let machine = Orientation::new(angles, Rotation::Exact).to_machine(Point([1.0, 0.0, 0.0])).0;
 /// assert!((machine[0] - 0.81650).abs() < 1e-5 && machine[1] == 0.0 && (machine[2] + 0.57735).abs() < 1e-5);
@@ -147,7 +147,7 @@ impl<N: Nominal> RTest<N> {
         unknown: impl Fn(usize) -> Option<S>,
     ) -> Point<S> {
         let mut vector = self.difference(machine, state, errors, &unknown);
-        let carried = (SENSOR..SENSOR + 3).any(|place| unknown(place).is_some());
+        let carried = (SENSOR..SENSOR + 3).any(|index| unknown(index).is_some());
         if carried {
             let angles = std::array::from_fn(|i| unknown(SENSOR + i).unwrap_or_else(|| S::constant(0.0)));
             vector = Orientation::new(angles, machine.rotation).to_sensors(vector);
@@ -166,7 +166,7 @@ mod tests {
 
     /// Each sensor angle transforms the reading by the transpose of its own matrix above, and by nothing else.
     #[test]
-    fn sensors_that_stand_askew_turn_the_reading() {
+    fn sensor_orientation_errors_rotate_the_reading() {
         let machine = Machine {
             name: "none".into(),
             axes: Vec::new(),
@@ -187,7 +187,7 @@ mod tests {
             ..vectors.clone()
         };
         let (sin, cos) = 0.4_f64.sin_cos();
-        for (place, turned) in [
+        for (index, turned) in [
             [x, cos * y - sin * z, sin * y + cos * z],
             [cos * x + sin * z, y, -sin * x + cos * z],
             [cos * x - sin * y, sin * x + cos * y, z],
@@ -195,10 +195,10 @@ mod tests {
         .into_iter()
         .enumerate()
         {
-            let askew = |unknown: usize| (unknown == SENSOR + place).then_some(0.4);
+            let askew = |unknown: usize| (unknown == SENSOR + index).then_some(0.4);
             let near = |found: [f64; 3], expected: [f64; 3]| {
                 let far = (0..3).any(|i| (found[i] - expected[i]).abs() > 1e-15);
-                assert!(!far, "angle {place}: {found:?}, not {expected:?}");
+                assert!(!far, "angle {index}: {found:?}, not {expected:?}");
             };
             near(vectors.read(&machine, &[], &[], askew).0, turned);
             let counted = directions.map(|direction| (0..3).map(|i| direction[i] * turned[i]).sum());

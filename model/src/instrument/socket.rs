@@ -2,19 +2,19 @@
 //!
 //! The reading is the closure `P_s − s`, the ball in R less the socket in R; the observed value is zero.
 
-use super::{InstrumentUnknown, SharedBy, displaced};
+use super::{InstrumentParameter, SharedBy, displaced};
 use crate::chain::{AxisPosition, BodyErrors, Machine};
 use crate::frames::Point;
 use crate::scalar::Scalar;
 
 /// The socket in R, then the ball in the tool frame.
-pub const UNKNOWNS: [InstrumentUnknown; 6] = [
-    InstrumentUnknown::length("socket", "x", SharedBy::Socket),
-    InstrumentUnknown::length("socket", "y", SharedBy::Socket),
-    InstrumentUnknown::length("socket", "z", SharedBy::Socket),
-    InstrumentUnknown::length("ball", "x", SharedBy::SpindleSetup),
-    InstrumentUnknown::length("ball", "y", SharedBy::SpindleSetup),
-    InstrumentUnknown::length("ball", "z", SharedBy::SpindleSetup),
+pub const PARAMETERS: [InstrumentParameter; 6] = [
+    InstrumentParameter::length("socket", "x", SharedBy::Socket),
+    InstrumentParameter::length("socket", "y", SharedBy::Socket),
+    InstrumentParameter::length("socket", "z", SharedBy::Socket),
+    InstrumentParameter::length("ball", "x", SharedBy::SpindleSetup),
+    InstrumentParameter::length("ball", "y", SharedBy::SpindleSetup),
+    InstrumentParameter::length("ball", "z", SharedBy::SpindleSetup),
 ];
 
 /// A ball and its socket, mm.

@@ -3,22 +3,22 @@
 //! `m = B · E · P`: `P` is the target in R through the chain, `E` a small motion (the pose parameters) and `B` a fixed rigid motion. `B`
 //! keeps the estimated angles small for any orientation of the tracker.
 
-use super::{InstrumentUnknown, SharedBy, displaced, pose_error};
+use super::{InstrumentParameter, SharedBy, displaced, pose_error};
 use crate::chain::{AxisPosition, BodyErrors, Machine};
 use crate::frames::Point;
 use crate::scalar::{Nominal, Scalar};
 
 /// The pose, then the target in the tool frame.
-pub const UNKNOWNS: [InstrumentUnknown; 9] = [
-    InstrumentUnknown::length("tracker", "x", SharedBy::Setup),
-    InstrumentUnknown::length("tracker", "y", SharedBy::Setup),
-    InstrumentUnknown::length("tracker", "z", SharedBy::Setup),
-    InstrumentUnknown::angle("tracker", "a", SharedBy::Setup),
-    InstrumentUnknown::angle("tracker", "b", SharedBy::Setup),
-    InstrumentUnknown::angle("tracker", "c", SharedBy::Setup),
-    InstrumentUnknown::length("target", "x", SharedBy::SpindleSetup),
-    InstrumentUnknown::length("target", "y", SharedBy::SpindleSetup),
-    InstrumentUnknown::length("target", "z", SharedBy::SpindleSetup),
+pub const PARAMETERS: [InstrumentParameter; 9] = [
+    InstrumentParameter::length("tracker", "x", SharedBy::Setup),
+    InstrumentParameter::length("tracker", "y", SharedBy::Setup),
+    InstrumentParameter::length("tracker", "z", SharedBy::Setup),
+    InstrumentParameter::angle("tracker", "a", SharedBy::Setup),
+    InstrumentParameter::angle("tracker", "b", SharedBy::Setup),
+    InstrumentParameter::angle("tracker", "c", SharedBy::Setup),
+    InstrumentParameter::length("target", "x", SharedBy::SpindleSetup),
+    InstrumentParameter::length("target", "y", SharedBy::SpindleSetup),
+    InstrumentParameter::length("target", "z", SharedBy::SpindleSetup),
 ];
 
 /// A tracker as set up for one test, lengths in mm.

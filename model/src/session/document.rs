@@ -139,7 +139,7 @@ pub(crate) struct Table<'a> {
     /// Its location.
     pub span: Range<usize>,
     entries: Vec<Value<'a>>,
-    asked: Vec<&'static str>,
+    known_keys: Vec<&'static str>,
 }
 
 impl<'a> Table<'a> {
@@ -160,13 +160,13 @@ impl<'a> Table<'a> {
             name,
             span,
             entries,
-            asked: Vec::new(),
+            known_keys: Vec::new(),
         }
     }
 
     /// The value of a key, if present.
     pub fn take(&mut self, key: &'static str) -> Option<Value<'a>> {
-        self.asked.push(key);
+        self.known_keys.push(key);
         let index = self.entries.iter().position(|entry| entry.key == key)?;
         Some(self.entries.remove(index))
     }
@@ -200,7 +200,7 @@ impl<'a> Table<'a> {
         match self.entries.first() {
             None => Ok(()),
             Some(entry) => {
-                let mut known: Vec<&str> = self.asked.clone();
+                let mut known: Vec<&str> = self.known_keys.clone();
                 known.sort_unstable();
                 known.dedup();
                 let message = format!("{} has the unknown key `{}`", self.display_name(), entry.key);

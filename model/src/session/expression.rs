@@ -110,8 +110,8 @@ impl Reader<'_> {
         self.characters.get(self.position).copied()
     }
 
-    fn accept(&mut self, wanted: char) -> bool {
-        let found = self.peek() == Some(wanted);
+    fn accept(&mut self, expected: char) -> bool {
+        let found = self.peek() == Some(expected);
         self.position += usize::from(found);
         found
     }

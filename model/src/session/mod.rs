@@ -7,7 +7,7 @@ pub mod expression;
 pub mod limits;
 pub mod motion;
 pub mod placing;
-mod plan;
+pub mod planned;
 mod plausibility;
 pub mod read;
 pub mod readings;
@@ -17,6 +17,7 @@ pub mod schema;
 mod spelling;
 pub mod stamp;
 mod table;
+mod trajectory;
 pub mod write;
 
 use std::path::PathBuf;

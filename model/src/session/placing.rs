@@ -1,6 +1,6 @@
 //! Axis positions that place the balls as requested, for proposals of candidate tests.
 
-use super::plan;
+use super::trajectory;
 use crate::chain::{BodyErrors, Machine};
 use crate::instrument::ballbar::BallBar;
 
@@ -9,7 +9,7 @@ const POSITION_TOLERANCE_MM: f64 = 1e-6;
 
 /// The two balls in R, nominal: workpiece ball, spindle ball; mm.
 pub fn balls(machine: &Machine, bar: &BallBar<f64>, at: &[f64]) -> ([f64; 3], [f64; 3]) {
-    let state = plan::positions(machine, at);
+    let state = trajectory::positions(machine, at);
     let none = vec![BodyErrors::<f64>::NONE; machine.axes.len()];
     let (workpiece, spindle) = bar.balls::<f64>(machine, &state, &none, &|_| None);
     (workpiece.0, spindle.0)
@@ -23,11 +23,12 @@ pub fn positions_for_bar(
     at: &[f64],
     requested: [f64; 3],
 ) -> Option<Vec<f64>> {
-    let (state, missed) = plan::solve_linear_axes(machine, bar, at, &plan::linear_axes(machine), requested);
+    let (state, missed) =
+        trajectory::solve_linear_axes(machine, bar, at, &trajectory::linear_axes(machine), requested);
     (missed <= POSITION_TOLERANCE_MM).then_some(state)
 }
 
 /// A point of an axis and its direction in R, carried by the axes between it and the bed.
 pub fn axis_line(machine: &Machine, at: &[f64], axis: usize) -> ([f64; 3], [f64; 3]) {
-    plan::axis_line(machine, &plan::positions(machine, at), axis)
+    trajectory::axis_line(machine, &trajectory::positions(machine, at), axis)
 }

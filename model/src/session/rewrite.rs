@@ -181,7 +181,7 @@ mod tests {
         "[machine]\nfile = \"../machine.toml\" # ours\n\n[instrument]\nkind = \"ballbar\"   # Renishaw\n";
 
     #[test]
-    fn what_is_not_meant_stays() {
+    fn other_text_is_unchanged() {
         let file = Path::new("session.toml");
         let text = with_machine_file(SESSION, file, "machine.toml").unwrap();
         assert_eq!(text, SESSION.replace("../machine.toml", "machine.toml"));
@@ -197,7 +197,7 @@ mod tests {
     }
 
     #[test]
-    fn names_of_files_follow_the_session_to_another_folder() {
+    fn file_names_are_adapted_to_another_folder() {
         let root = tempfile::tempdir().unwrap();
         let at = |name: &str| root.path().join(name);
         for folder in ["ours/data", "ours/elsewhere", "theirs/next"] {

@@ -46,7 +46,7 @@ mod tests {
     const KEYS: [&str; 6] = ["bar_mm", "bar_u_um", "c_deg", "x", "noise_um", "sweep"];
 
     #[test]
-    fn a_slip_is_told_from_another_name() {
+    fn misspelt_names_are_distinguished_from_other_names() {
         // An extra, missing, wrong or transposed letter, or another case, is one edit each.
         for (found, near) in [
             ("barr_mm", "bar_mm"),

@@ -5,29 +5,31 @@ use std::path::Path;
 
 use abbe_model::session::read::{self, ReadOptions};
 
-use super::{DATA, MACHINE, SESSION, holds, session, told, with_data, with_machine, with_session};
+use super::{
+    DATA, MACHINE, SESSION, assert_contains, error_text, session, with_data, with_machine, with_session,
+};
 
 #[test]
-fn files_that_are_none() {
+fn missing_and_invalid_files() {
     let folder = tempfile::tempdir().unwrap();
-    let read = |path: &Path| told(read::session(path, &ReadOptions::default()));
-    holds(&read(folder.path()), &["this is a folder"]);
-    holds(
+    let read = |path: &Path| error_text(read::session(path, &ReadOptions::default()));
+    assert_contains(&read(folder.path()), &["this is a folder"]);
+    assert_contains(
         &read(&folder.path().join("no.toml")),
         &["the session file cannot be read"],
     );
     let latin = folder.path().join("latin.toml");
     fs::write(&latin, b"name = \"\xe4\"").unwrap();
-    holds(&read(&latin), &["byte 9 is not UTF-8"]);
+    assert_contains(&read(&latin), &["byte 9 is not UTF-8"]);
 }
 
 #[test]
-fn text_that_is_no_toml() {
-    holds(
+fn invalid_toml() {
+    assert_contains(
         &with_session("kind = ", "kind "),
         &["session.toml:5", "not valid TOML"],
     );
-    holds(
+    assert_contains(
         &with_session("100.0", "\"a\" 1"),
         &["session.toml:11", "not valid TOML"],
     );
@@ -35,14 +37,14 @@ fn text_that_is_no_toml() {
 
 #[test]
 fn unknown_keys() {
-    holds(
+    assert_contains(
         &with_session("bar_mm", "bar_length = 1\nbar_mm"),
         &[
             "session.toml:11",
             "test \"C100\" has the unknown key `bar_length`",
         ],
     );
-    holds(
+    assert_contains(
         &with_session("noise_um", "nois_um"),
         &[
             "session.toml:6",
@@ -50,15 +52,15 @@ fn unknown_keys() {
             "did you mean `noise_um`?",
         ],
     );
-    holds(
+    assert_contains(
         &with_session("[instrument]", "[instruments]"),
         &["has no `instrument`"],
     );
-    holds(
+    assert_contains(
         &with_session("[machine]", "extra = 1\n[machine]"),
         &["session.toml:1", "the file has the unknown key `extra`"],
     );
-    holds(
+    assert_contains(
         &with_machine("direction = [1, 0, 0]", "directon = [1, 0, 0]"),
         &[
             "machine.toml:8",
@@ -69,24 +71,24 @@ fn unknown_keys() {
 }
 
 #[test]
-fn numbers_that_are_none() {
-    holds(
+fn invalid_numbers() {
+    assert_contains(
         &with_data(&DATA.replace("100.0010", "NaN")),
         &["C100.csv:3", "column 4", "NaN"],
     );
-    holds(
+    assert_contains(
         &with_data(&DATA.replace("100.0010", "inf")),
         &["C100.csv:3", "column 4", "infinite"],
     );
-    holds(
+    assert_contains(
         &with_session("100.0", "nan"),
         &["session.toml:11", "`bar_mm` is NaN"],
     );
-    holds(
+    assert_contains(
         &with_machine("[1, 0, 0]", "[nan, 0, 0]"),
         &["machine.toml:8", "`direction` is NaN"],
     );
-    holds(
+    assert_contains(
         &with_machine("[1, 0, 0]", "[0, 0, 0]"),
         &["machine.toml:8", "is zero"],
     );
@@ -116,8 +118,8 @@ fn torn_and_garbled_files_are_refused_or_read_and_never_panic() {
         }
     }
     let nested = format!("x = {}", "[".repeat(100_000));
-    holds(
-        &told(session(MACHINE, &nested, None)),
+    assert_contains(
+        &error_text(session(MACHINE, &nested, None)),
         &["session.toml:1", "not valid TOML"],
     );
 }

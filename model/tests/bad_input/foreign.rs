@@ -5,7 +5,7 @@ use std::fs;
 use abbe_model::session::Session;
 use abbe_model::session::read::{self, ReadOptions};
 
-use super::{DATA, MACHINE, SESSION, holds, session, told};
+use super::{DATA, MACHINE, SESSION, assert_contains, error_text, session};
 
 /// Reads the session with these lines before its test, and a data file of these bytes.
 fn with_bytes(lines: &str, data: &[u8]) -> Result<Session, abbe_model::ModelError> {
@@ -55,30 +55,30 @@ fn latin_1_and_utf_16_are_read_as_utf_8_is() {
         assert_eq!(read.tests[0].readings.as_ref().unwrap().line, [2, 3, 4]);
     }
     // A header in another encoding than the stated one.
-    let fault = told(with_bytes(&format!("{COLUMNS}encoding = \"utf-8\""), &latin));
-    holds(
+    let fault = error_text(with_bytes(&format!("{COLUMNS}encoding = \"utf-8\""), &latin));
+    assert_contains(
         &fault,
         &["C100.csv:1", "not valid UTF-8", "encoding = \"latin1\""],
     );
-    let fault = told(with_bytes(
+    let fault = error_text(with_bytes(
         &format!("{COLUMNS}encoding = \"latin1\""),
         FOREIGN.as_bytes(),
     ));
-    holds(&fault, &["no column `Länge`", "read as Latin-1", "encoding = "]);
-    let fault = told(with_bytes(&format!("{COLUMNS}encoding = \"latin-one\""), &latin));
-    holds(
+    assert_contains(&fault, &["no column `Länge`", "read as Latin-1", "encoding = "]);
+    let fault = error_text(with_bytes(&format!("{COLUMNS}encoding = \"latin-one\""), &latin));
+    assert_contains(
         &fault,
         &["session.toml", "which is not a known encoding", "latin1"],
     );
 }
 
 #[test]
-fn lines_above_the_header_are_passed_over() {
+fn lines_above_the_header_are_skipped() {
     let above = format!("Gerät \"7\nSerie;1;2;3;4\n\n{DATA}");
     let read = with_bytes("[format]\nskip_lines = 3\n", above.as_bytes()).unwrap();
     let readings = read.tests[0].readings.as_ref().unwrap();
     assert_eq!((readings.rows(), readings.line[0]), (4, 5));
-    holds(&told(with_bytes("", above.as_bytes())), &["C100.csv:1"]);
+    assert_contains(&error_text(with_bytes("", above.as_bytes())), &["C100.csv:1"]);
 }
 
 #[test]
@@ -98,8 +98,8 @@ fn inches_and_mil() {
 fn a_file_without_a_header_keeps_its_first_reading() {
     let rows = "0,1,0,99.9990\n1,1,90,100.0010\n2,1,180,100.0000\n";
     let columns = "[columns]\ntime_s = 1\nrun = 2\nc_deg = 3\nlength_mm = 4\n";
-    let fault = told(with_bytes(columns, rows.as_bytes()));
-    holds(
+    let fault = error_text(with_bytes(columns, rows.as_bytes()));
+    assert_contains(
         &fault,
         &[
             "C100.csv:1",
@@ -111,19 +111,19 @@ fn a_file_without_a_header_keeps_its_first_reading() {
     assert_eq!(observed(&read), [99.9990, 100.0010, 100.0]);
     // A remark in the row does not make it a header.
     let remarks = rows.replace('\n', ",good\n");
-    holds(
-        &told(with_bytes(columns, remarks.as_bytes())),
+    assert_contains(
+        &error_text(with_bytes(columns, remarks.as_bytes())),
         &["numbers where a header is expected"],
     );
-    holds(
-        &told(with_bytes(
+    assert_contains(
+        &error_text(with_bytes(
             &columns.replace("= 4", "= \"reading\""),
             rows.as_bytes(),
         )),
         &["no column `reading`", "header = false"],
     );
-    holds(
-        &told(with_bytes("", rows.as_bytes())),
+    assert_contains(
+        &error_text(with_bytes("", rows.as_bytes())),
         &["C100.csv:1", "header = false"],
     );
     // Names that look like numbers are names if [columns] says so.
@@ -136,11 +136,11 @@ fn a_file_without_a_header_keeps_its_first_reading() {
 }
 
 #[test]
-fn a_column_is_one_column() {
+fn a_foreign_column_maps_to_one_column() {
     let twice = "angle,reading,reading\n0,99.9,100.0\n90,99.9,100.0\n";
     let columns = "[columns]\nc_deg = \"angle\"\nlength_mm = \"reading\"\n";
-    let fault = told(with_bytes(columns, twice.as_bytes()));
-    holds(
+    let fault = error_text(with_bytes(columns, twice.as_bytes()));
+    assert_contains(
         &fault,
         &[
             "session.toml",
@@ -157,11 +157,11 @@ fn a_column_is_one_column() {
         "run = 1\ntime_s = \"t\"",
         "time_s = 1\nrun = 1",
     ] {
-        let fault = told(with_bytes(
+        let fault = error_text(with_bytes(
             &format!("[columns]\n{both}\nc_deg = \"angle\"\nlength_mm = \"reading\"\n"),
             one.as_bytes(),
         ));
-        holds(
+        assert_contains(
             &fault,
             &["session.toml", "column 1 of", "twice", "`run`", "`time_s`"],
         );
@@ -169,7 +169,7 @@ fn a_column_is_one_column() {
 }
 
 #[test]
-fn an_empty_table_of_columns_is_none() {
+fn an_empty_table_of_columns_is_ignored() {
     assert_eq!(
         observed(&with_bytes("[columns]\n", DATA.as_bytes()).unwrap()).len(),
         4
@@ -187,7 +187,7 @@ fn an_empty_table_of_columns_is_none() {
 }
 
 #[test]
-fn copies_of_rows_are_named_and_are_no_repeats() {
+fn duplicate_rows_are_reported_and_are_not_repeats() {
     let copied = |data: &str| {
         let read = session(MACHINE, SESSION, Some(data)).unwrap();
         (read.tests[0].readings.as_ref().unwrap().rows(), read.warnings)
@@ -200,7 +200,7 @@ fn copies_of_rows_are_named_and_are_no_repeats() {
     let (rows, warnings) = copied(&lines.join("\n"));
     assert_eq!(rows, 4);
     assert_eq!(warnings.len(), 1);
-    holds(
+    assert_contains(
         &warnings[0],
         &[
             "test \"C100\"",
@@ -223,7 +223,7 @@ fn copies_of_rows_are_named_and_are_no_repeats() {
     let body = timeless.split_once('\n').unwrap().1.to_string();
     let (rows, warnings) = copied(&(timeless.clone() + &body));
     assert_eq!((rows, warnings.len()), (16, 1), "{warnings:?}");
-    holds(&warnings[0], &["16 rows", "…"]);
+    assert_contains(&warnings[0], &["16 rows", "…"]);
     // Repeats at fixed axes, some equal by rounding, are kept; so is a closed path that ends as it began.
     let dwell = "run,c_deg,length_mm\n1,0,100.000\n1,0,100.000\n1,0,100.001\n1,90,100.000\n1,90,100.000\n";
     assert_eq!(copied(dwell), (5, Vec::new()));
@@ -251,16 +251,16 @@ fn notes_of_the_measurement_are_kept_in_order() {
     ];
     let expected = expected.map(|(name, note)| (name.to_string(), note.to_string()));
     assert_eq!(read.about, expected);
-    let fault = told(with_bytes("[about]\noperator = [1]\n", DATA.as_bytes()));
-    holds(&fault, &["session.toml:9", "`operator` is a list of 1; a text"]);
-    holds(
-        &told(with_bytes("about = 3\n[x]\n", DATA.as_bytes())),
+    let fault = error_text(with_bytes("[about]\noperator = [1]\n", DATA.as_bytes()));
+    assert_contains(&fault, &["session.toml:9", "`operator` is a list of 1; a text"]);
+    assert_contains(
+        &error_text(with_bytes("about = 3\n[x]\n", DATA.as_bytes())),
         &["session.toml"],
     );
 }
 
 #[test]
-fn the_sign_of_an_axis_is_suggested_as_its_unit_is() {
+fn sign_and_unit_mistakes_of_an_axis_are_suggested() {
     // X moves the ball away from the axis of C; with the opposite sign the bar fits.
     let with = |column: &str, value: &dyn Fn(f64) -> f64| {
         let mut data = format!("run,{column},x_mm,y_mm,length_mm\n");
@@ -274,13 +274,13 @@ fn the_sign_of_an_axis_is_suggested_as_its_unit_is() {
         data
     };
     session(MACHINE, SESSION, Some(&with("c_deg", &|angle| angle))).unwrap();
-    let fault = told(session(MACHINE, SESSION, Some(&with("c_deg", &|angle| -angle))));
-    holds(
+    let fault = error_text(session(MACHINE, SESSION, Some(&with("c_deg", &|angle| -angle))));
+    assert_contains(
         &fault,
         &["cannot reach", "positions of C were read with the opposite sign"],
     );
-    let fault = told(session(MACHINE, SESSION, Some(&with("c_deg", &f64::to_radians))));
-    holds(
+    let fault = error_text(session(MACHINE, SESSION, Some(&with("c_deg", &f64::to_radians))));
+    assert_contains(
         &fault,
         &[
             "cannot reach",
@@ -288,8 +288,8 @@ fn the_sign_of_an_axis_is_suggested_as_its_unit_is() {
         ],
     );
     let inches = with("c_deg", &|angle| angle).replace("x_mm,y_mm", "x_in,y_in");
-    let fault = told(session(MACHINE, SESSION, Some(&inches)));
-    holds(
+    let fault = error_text(session(MACHINE, SESSION, Some(&inches)));
+    assert_contains(
         &fault,
         &["positions of Y and X were read in mm rather than inches"],
     );

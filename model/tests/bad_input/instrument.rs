@@ -1,17 +1,19 @@
 //! Tests of instrument set-ups.
 
-use super::{DATA, MACHINE, SESSION, holds, session, told, with_data, with_session, without_tests};
+use super::{
+    DATA, MACHINE, SESSION, assert_contains, error_text, session, with_data, with_session, without_tests,
+};
 
 #[test]
-fn instruments_that_there_are_not() {
-    holds(
+fn unknown_instruments() {
+    assert_contains(
         &with_session("\"ballbar\"", "\"bar\""),
         &[
             "session.toml:5",
             "\"ballbar\", \"r-test\", \"probe\", \"tracker\" or \"socket\" is expected",
         ],
     );
-    holds(
+    assert_contains(
         &with_session("\"ballbar\"", "\"tracker\""),
         &["`bar_mm` belongs to a ballbar"],
     );
@@ -19,22 +21,22 @@ fn instruments_that_there_are_not() {
 
 #[test]
 fn uncertainties_below_zero() {
-    holds(
+    assert_contains(
         &with_session("bar_mm", "bar_u_um = -1\nbar_mm"),
         &["session.toml:11", "`bar_u_um` is -1", "cannot be negative"],
     );
-    holds(
+    assert_contains(
         &with_session("noise_um = 0.3", "noise_um = -0.3"),
         &["session.toml:6", "cannot be negative"],
     );
 }
 
 #[test]
-fn a_bar_that_cannot_reach() {
+fn a_bar_that_does_not_fit() {
     let radians = DATA.replace("c_deg", "a_deg");
     let offset = SESSION.replace("[0, 100, 0]", "[0, 100, 60]");
-    holds(
-        &told(session(MACHINE, &offset, Some(DATA))),
+    assert_contains(
+        &error_text(session(MACHINE, &offset, Some(DATA))),
         &[
             "session.toml:8",
             "a bar of 100.0000 mm cannot reach",
@@ -48,8 +50,11 @@ fn a_bar_that_cannot_reach() {
         .replace("a_deg", "a_rad")
         .replace(",90,", ",2,")
         .replace(",270,", ",5,");
-    holds(&told(session(MACHINE, &both, Some(&data))), &["cannot reach"]);
-    holds(
+    assert_contains(
+        &error_text(session(MACHINE, &both, Some(&data))),
+        &["cannot reach"],
+    );
+    assert_contains(
         &with_data(
             &DATA
                 .replace("length_mm", "deviation_um")
@@ -61,7 +66,7 @@ fn a_bar_that_cannot_reach() {
 }
 
 #[test]
-fn probes_that_cannot_touch() {
+fn probes_that_miss_the_artefact() {
     const TEST: &str = r#"[[test]]
 name = "1a"
 data = "C100.csv"
@@ -85,7 +90,7 @@ at = { x_mm = 45, y_mm = 0, z_mm = 0, a_deg = 0 }
         (
             "stylus_mm = [0, 0, 0]",
             "stylus_mm = [0, 0, 0]\ndirection = [0, 1, 0]\nartefact_axis = [0, 1, 0]",
-            "looks past",
+            "misses the artefact",
         ),
         (
             "stylus_mm = [0, 0, 0]",
@@ -99,16 +104,16 @@ at = { x_mm = 45, y_mm = 0, z_mm = 0, a_deg = 0 }
             "`bar_mm` belongs to a ballbar",
         ),
     ] {
-        let told = told(read(from, to));
-        assert!(told.contains(expected), "{to}: {told}");
+        let error_text = error_text(read(from, to));
+        assert!(error_text.contains(expected), "{to}: {error_text}");
     }
     let named = session(MACHINE, &probe, Some("c_deg,length_mm\n0,1\n90,2\n"));
-    assert!(told(named).contains("unknown name `length_mm`"));
+    assert!(error_text(named).contains("unknown name `length_mm`"));
 }
 
 /// An invalid R-test: the change in a valid one, and the message.
 #[test]
-fn sensors_that_cannot_read() {
+fn invalid_sensors() {
     const TEST: &str = r#"[[test]]
 name = "BK2"
 data = "C100.csv"
@@ -174,7 +179,12 @@ at = { y_mm = 0, z_mm = 50, a_deg = 0 }
         (
             angles,
             "sensor_directions = [[1, 0, 0], [0, 1, 0], [1, 1, 0.01]]",
-            &["session.toml:14", "almost in a plane", "0.007", "three ways"],
+            &[
+                "session.toml:14",
+                "almost in a plane",
+                "0.007",
+                "three independent measuring directions",
+            ],
         ),
         (
             angles,
@@ -222,7 +232,7 @@ at = { y_mm = 0, z_mm = 50, a_deg = 0 }
             ],
         ),
     ] {
-        holds(&told(read(from, to, ("", ""))), expected);
+        assert_contains(&error_text(read(from, to, ("", ""))), expected);
     }
     for (from, to, expected) in [
         (
@@ -238,14 +248,14 @@ at = { y_mm = 0, z_mm = 50, a_deg = 0 }
             &["session.toml:8", "the sensors read", "another unit"],
         ),
     ] {
-        holds(&told(read("", "", (from, to))), expected);
+        assert_contains(&error_text(read("", "", (from, to))), expected);
     }
     let on_axis = good.replace("[100, 0, 50]", "[0, 0, 50]").replace(
         angles,
         "path = { kind = \"follow\", axis = \"C\", step_deg = 10, programmed_feed_mm_min = 10 }",
     );
-    holds(
-        &told(session(MACHINE, &on_axis, Some(DATA))),
+    assert_contains(
+        &error_text(session(MACHINE, &on_axis, Some(DATA))),
         &[
             "session.toml:14",
             "`programmed_feed_mm_min` of a ball that lies on its axis of rotation",

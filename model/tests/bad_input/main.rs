@@ -64,7 +64,7 @@ fn without_tests() -> &'static str {
 }
 
 /// The error as `file:line: message | help`, the file without its folder.
-fn told(result: Result<Session, ModelError>) -> String {
+fn error_text(result: Result<Session, ModelError>) -> String {
     let fault = result.expect_err("this input is bad");
     let location = fault.location().expect("a location in a file").clone();
     let name = location.file.file_name().unwrap().to_string_lossy().into_owned();
@@ -77,28 +77,28 @@ fn told(result: Result<Session, ModelError>) -> String {
 }
 
 #[track_caller]
-fn holds(told: &str, parts: &[&str]) {
+fn assert_contains(error_text: &str, parts: &[&str]) {
     for part in parts {
-        assert!(told.contains(part), "`{part}` is not in\n{told}");
+        assert!(error_text.contains(part), "`{part}` is not in\n{error_text}");
     }
 }
 
 fn with_session(from: &str, to: &str) -> String {
     assert!(SESSION.contains(from), "{from}");
-    told(session(MACHINE, &SESSION.replacen(from, to, 1), Some(DATA)))
+    error_text(session(MACHINE, &SESSION.replacen(from, to, 1), Some(DATA)))
 }
 
 fn with_data(data: &str) -> String {
-    told(session(MACHINE, SESSION, Some(data)))
+    error_text(session(MACHINE, SESSION, Some(data)))
 }
 
 fn with_machine(from: &str, to: &str) -> String {
     assert!(MACHINE.contains(from), "{from}");
-    told(session(&MACHINE.replacen(from, to, 1), SESSION, Some(DATA)))
+    error_text(session(&MACHINE.replacen(from, to, 1), SESSION, Some(DATA)))
 }
 
 #[test]
-fn the_good_one_reads() {
+fn the_valid_session_reads() {
     let read = session(MACHINE, SESSION, Some(DATA)).unwrap();
     assert_eq!(read.tests[0].readings.as_ref().unwrap().rows(), 4);
 }

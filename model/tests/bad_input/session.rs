@@ -1,10 +1,10 @@
 //! Tests of sessions: their files, tests, estimated errors, effects and expressions.
 
-use super::{DATA, MACHINE, SESSION, holds, session, told, with_session, without_tests};
+use super::{DATA, MACHINE, SESSION, assert_contains, error_text, session, with_session, without_tests};
 
 #[test]
 fn missing_machine_file() {
-    holds(
+    assert_contains(
         &with_session("\"machine.toml\"", "\"engine.toml\""),
         &["session.toml:2", "the machine file `engine.toml` does not exist"],
     );
@@ -12,8 +12,8 @@ fn missing_machine_file() {
 
 #[test]
 fn missing_data_file() {
-    holds(
-        &told(session(MACHINE, SESSION, None)),
+    assert_contains(
+        &error_text(session(MACHINE, SESSION, None)),
         &[
             "session.toml:10",
             "the data file `C100.csv` does not exist",
@@ -24,82 +24,82 @@ fn missing_data_file() {
 }
 
 #[test]
-fn test_names_twice_and_tests_absent() {
+fn duplicate_test_names_and_missing_tests() {
     let twice = SESSION.to_string() + &SESSION[without_tests().len()..];
-    holds(
-        &told(session(MACHINE, &twice, Some(DATA))),
+    assert_contains(
+        &error_text(session(MACHINE, &twice, Some(DATA))),
         &["session.toml:15", "two tests have the name \"C100\""],
     );
-    holds(
-        &told(session(MACHINE, without_tests(), None)),
+    assert_contains(
+        &error_text(session(MACHINE, without_tests(), None)),
         &["a session without tests"],
     );
 }
 
 #[test]
-fn tests_that_do_not_say_how_they_move() {
-    holds(
+fn tests_without_a_motion() {
+    assert_contains(
         &with_session("data = \"C100.csv\"\n", ""),
         &["session.toml:8", "neither data nor a motion"],
     );
     let both = SESSION.to_string()
         + "sweep = { axis = \"C\", from_deg = 0, to_deg = 10, step_deg = 1 }\npath = { kind = \"list\" }\n";
-    holds(
-        &told(session(MACHINE, &both, Some(DATA))),
+    assert_contains(
+        &error_text(session(MACHINE, &both, Some(DATA))),
         &["both `sweep` and `path`"],
     );
 }
 
 #[test]
-fn unknowns_that_the_machine_cannot_have() {
+fn errors_of_missing_axes() {
     let unknown = |name: &str| {
         with_session(
             "[[test]]",
             &format!("[unknowns]\nerrors = [\"{name}\"]\n\n[[test]]"),
         )
     };
-    holds(&unknown("EX0B"), &["session.toml:9", "has no axis `B`"]);
-    holds(&unknown("error"), &["\"error\" is not the name of an error"]);
+    assert_contains(&unknown("EX0B"), &["session.toml:9", "has no axis `B`"]);
+    assert_contains(&unknown("error"), &["\"error\" is not the name of an error"]);
 }
 
 #[test]
-fn effects_that_the_machine_cannot_have() {
+fn effects_on_missing_components() {
     let effect = |text: &str| {
-        told(session(
+        error_text(session(
             MACHINE,
             &format!("{SESSION}\n[[effect]]\n{text}\n"),
             Some(DATA),
         ))
     };
-    holds(
+    assert_contains(
         &effect("component = \"EZB\"\ndriver = \"C\"\nshape = \"harmonic\"\norder = 2"),
         &["session.toml:16", "the machine \"Small\" has no axis `B`"],
     );
-    holds(
+    assert_contains(
         &effect("component = \"EZC\"\ndriver = \"B\"\nshape = \"harmonic\"\norder = 2"),
         &["session.toml:17", "no axis `B`"],
     );
-    holds(
+    assert_contains(
         &effect("component = \"EZC\"\nshape = \"harmonics\"\norder = 2"),
         &["\"harmonics\" is not a shape", "did you mean `harmonic`?"],
     );
-    holds(
+    assert_contains(
         &effect("component = \"EZC\"\nshape = \"harmonic\""),
         &["needs `order`"],
     );
-    holds(
+    assert_contains(
         &effect("component = \"EXX\"\nshape = \"harmonic\"\norder = 1"),
         &["cannot have the driver \"X\"", "rotary"],
     );
-    holds(
+    assert_contains(
         &effect("component = \"EXX\"\nshape = \"periodic\"\nperiod_deg = 10"),
         &["session.toml:18", "`period_deg` for a driver in mm", "period_mm"],
     );
-    holds(
+    assert_contains(
         &effect("component = \"target.x\"\ndriver = \"time\"\nshape = \"drift\""),
         &["a ballbar does not have"],
     );
-    holds(
+    assert_contains(
         &effect("component = \"EZC\"\nshape = \"harmonic\"\norder = 2\ntests = [\"C10\"]"),
         &["no test has the name \"C10\"", "did you mean `C100`?"],
     );
@@ -107,21 +107,21 @@ fn effects_that_the_machine_cannot_have() {
 
 #[test]
 fn expressions_over_unknown_constants() {
-    holds(
+    assert_contains(
         &with_session("[0, 100, 0]", "[0, \"R\", 0]"),
         &["session.toml:12", "no constant `R`", "no [constants]"],
     );
     let constants = SESSION.replace("[[test]]", "[constants]\nR = 100\nH = 75\n\n[[test]]");
-    holds(
-        &told(session(
+    assert_contains(
+        &error_text(session(
             MACHINE,
             &constants.replace("[0, 100, 0]", "[0, \"r\", 0]"),
             Some(DATA),
         )),
         &["no constant `r`", "R, H"],
     );
-    holds(
-        &told(session(
+    assert_contains(
+        &error_text(session(
             MACHINE,
             &constants.replace("[0, 100, 0]", "[0, \"sqrt(H - R)\", 0]"),
             Some(DATA),
@@ -129,8 +129,8 @@ fn expressions_over_unknown_constants() {
         &["evaluates to NaN"],
     );
     let deep = format!("[0, \"{}R{}\", 0]", "(".repeat(60), ")".repeat(60));
-    holds(
-        &told(session(
+    assert_contains(
+        &error_text(session(
             MACHINE,
             &constants.replace("[0, 100, 0]", &deep),
             Some(DATA),
@@ -142,8 +142,8 @@ fn expressions_over_unknown_constants() {
         squares = format!("({squares})^2");
     }
     let wide = format!("[0, \"{squares}\", 0]");
-    holds(
-        &told(session(
+    assert_contains(
+        &error_text(session(
             MACHINE,
             &constants.replace("[0, 100, 0]", &wide),
             Some(DATA),

@@ -154,8 +154,8 @@ fn derivatives_agree_with_central_differences_on_every_topology() {
 }
 
 /// The largest difference between the recorded chain and the chain over dual numbers, relative to the largest value or derivative. Errors
-/// are 10 mm and 0.1 rad, some of them vary between rows, and the rows exceed one block.
-fn worst_beside_duals(machine: &Machine, station: Station<f64>, random: &mut impl Rng) -> f64 {
+/// are 10 mm and 0.1 rad; some of them vary between rows. The test has more rows than one block.
+fn worst_against_duals(machine: &Machine, station: Station<f64>, random: &mut impl Rng) -> f64 {
     let rows = 131;
     let mut readings = states(machine, rows, random);
     // An axis that does not move is a constant of the recording.
@@ -174,9 +174,9 @@ fn worst_beside_duals(machine: &Machine, station: Station<f64>, random: &mut imp
             _ => values.constant[slot] = uniform(random, size(slot)),
         }
     }
-    let asked: Vec<usize> = (0..model.slots()).filter(|slot| slot % 7 != 3).collect();
+    let requested: Vec<usize> = (0..model.slots()).filter(|slot| slot % 7 != 3).collect();
     let range = 3..rows;
-    let found = model.sensitivities(&values, &asked, range.clone());
+    let found = model.sensitivities(&values, &requested, range.clone());
     let mut worst = 0.0_f64;
     for row in range.clone() {
         let state = model.state(row);
@@ -184,7 +184,7 @@ fn worst_beside_duals(machine: &Machine, station: Station<f64>, random: &mut imp
             let varying = values.varying.iter().find(|(varied, _)| *varied == slot);
             values.constant[slot] + varying.map_or(0.0, |(_, column)| column[row])
         };
-        for (place, seed) in asked.iter().enumerate() {
+        for (place, seed) in requested.iter().enumerate() {
             let dual = |slot: usize| Dual64::new(value(slot), if slot == *seed { 1.0 } else { 0.0 });
             let bodies = machine.body_errors(|_| true, dual);
             let reading = station.read(machine, &state, &bodies, |unknown| {
@@ -212,8 +212,8 @@ fn the_recorded_chain_is_the_chain_over_dual_numbers_at_large_errors() {
             let (table, tool) = (point(), point());
             for station in every_station(table, tool) {
                 let kind = station.kind();
-                let worst = worst_beside_duals(&machine, station, &mut random);
-                // Under 10 mm and 0.1 rad the normal of a cylinder can change strongly: the cause is cancellation, not another formula.
+                let worst = worst_against_duals(&machine, station, &mut random);
+                // Errors of 10 mm and 0.1 rad can turn the normal of a cylinder far. The larger tolerance allows for cancellation.
                 let most = if kind == InstrumentKind::Probe {
                     1e-9
                 } else {

@@ -91,7 +91,7 @@ proptest! {
     }
 
     #[test]
-    fn an_axis_that_is_elsewhere_errs_along_itself(drawn in machines(), table in point(), tool in point(), late in 1e-7..1e-6_f64) {
+    fn an_axis_offset_equals_error_motions_along_the_axis(drawn in machines(), table in point(), tool in point(), late in 1e-7..1e-6_f64) {
         // Error motions in the proportions of `slots_along` equal an offset of the position, to first order.
         let drawn = drawn.with(Rotation::Exact);
         let nothing = vec![0.0; drawn.errors.len()];
@@ -158,7 +158,7 @@ proptest! {
     }
 
     #[test]
-    fn errors_move_bodies_and_do_not_bend_them(drawn in machines(), one in point(), other in point()) {
+    fn errors_preserve_distances_within_a_body(drawn in machines(), one in point(), other in point()) {
         let drawn = drawn.with(Rotation::Exact);
         let (at_one, at_other) = (both(&drawn, 1.0, one, one), both(&drawn, 1.0, other, other));
         for side in [0, 1] {
@@ -182,7 +182,7 @@ proptest! {
     }
 
     #[test]
-    fn a_mirrored_machine_errs_as_the_mirror_shows(
+    fn the_errors_of_a_mirrored_machine_are_mirrored(
         drawn in machines(),
         table in point(),
         tool in point(),
@@ -207,7 +207,7 @@ proptest! {
     }
 
     #[test]
-    fn an_axis_that_does_not_move_and_does_not_err_is_not_there(drawn in machines(), table in point()) {
+    fn an_axis_without_motion_and_errors_has_no_effect(drawn in machines(), table in point()) {
         let (state, bodies) = (drawn.state(), drawn.bodies(0.0));
         let mut at_zero = drawn.clone();
         at_zero.positions.fill(0.0);

@@ -86,7 +86,7 @@ proptest! {
     }
 
     #[test]
-    fn limits_hold_on_either_side(value in -3.0..3.0_f64, limit in -3.0..3.0_f64) {
+    fn limits_apply_on_both_sides(value in -3.0..3.0_f64, limit in -3.0..3.0_f64) {
         prop_assert_eq!(Nominal::at_most(value, limit), value.min(limit));
         prop_assert_eq!(Nominal::at_least(value, limit), value.max(limit));
         // Symbols have no order, so their minimum and maximum consist of steps.

@@ -132,7 +132,7 @@ proptest! {
     }
 
     #[test]
-    fn what_is_not_effective_moves_nothing(test in tests()) {
+    fn ineffective_slots_do_not_change_readings(test in tests()) {
         let model = test.model();
         let effective = model.effective_slots();
         let slots: Vec<usize> = (0..model.slots()).filter(|slot| !effective.contains(slot)).collect();
@@ -146,7 +146,7 @@ proptest! {
         let slot = slot.index(model.slots());
         let mut with = test.values.clone();
         with.varying.push((slot, vec![0.0; model.rows()]));
-        // An exact zero is omitted from the chain; if included, it multiplies and adds zeros.
+        // An exact zero is omitted from the chain. If it is included, it only adds zeros and multiplies by zero.
         let mut without = test.values.clone();
         without.constant[slot] = 0.0;
         with.constant[slot] = 0.0;
@@ -156,7 +156,7 @@ proptest! {
     }
 
     #[test]
-    fn what_varies_row_by_row_is_a_constant_in_each(test in tests(), slot in any::<prop::sample::Index>()) {
+    fn varying_slots_equal_constant_slots_row_by_row(test in tests(), slot in any::<prop::sample::Index>()) {
         let model = test.model();
         let slot = slot.index(model.slots());
         let mut varying = test.values.clone();

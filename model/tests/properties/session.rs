@@ -120,7 +120,7 @@ proptest! {
     #![proptest_config(cases(64))]
 
     #[test]
-    fn a_session_written_reads_back_the_same(
+    fn a_written_session_reads_back_equal(
         drawn in machines(),
         effects in effects(),
         rows in vec(vec(-1.0..1.0, 10), 4..12),

@@ -58,7 +58,7 @@ proptest! {
     #![proptest_config(cases(256))]
 
     #[test]
-    fn a_shape_has_a_finite_basis_function_a_coefficient(
+    fn a_shape_has_one_finite_basis_function_per_coefficient(
         shape in prop_oneof![shapes(AxisKind::Linear), shapes(AxisKind::Rotary)],
         value in -1e3..1e3,
         rate in -1e3..1e3,
@@ -96,7 +96,7 @@ proptest! {
 
     /// A periodic shape has the same value one period further on.
     #[test]
-    fn what_recurs_recurs(shape in shapes(AxisKind::Rotary), value in -3.0..3.0, turns in -3_i32..=3) {
+    fn periodic_shapes_are_periodic(shape in shapes(AxisKind::Rotary), value in -3.0..3.0, turns in -3_i32..=3) {
         let period = match &shape {
             Shape::Harmonic { order } => std::f64::consts::TAU / order,
             Shape::Periodic { period } => *period,

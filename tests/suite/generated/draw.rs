@@ -1,6 +1,6 @@
 //! Draws errors and set-ups and simulates the readings with the plant.
 
-use abbe::model::session::motion::planned_session;
+use abbe::model::session::planned::planned_session;
 use abbe::model::session::{Prior, Session, Test};
 use rand::SeedableRng;
 use rand_distr::{Distribution, StandardNormal};
@@ -14,7 +14,7 @@ const ERRORS: f64 = 20.0;
 const ARCSEC: f64 = std::f64::consts::PI / (180.0 * 3600.0);
 
 /// The drawn values of a session, by the names of results, in µm and arcsec.
-pub struct Draw {
+pub struct DrawnSession {
     pub values: Vec<(String, f64)>,
     pub measured: Session,
 }
@@ -51,7 +51,7 @@ fn out_of_place(plan: &Session, test: &Test, values: &[(String, f64)]) -> ChainE
 }
 
 /// Draws errors and set-ups and simulates readings with white noise of `noise_um`, rounded to the resolution unless the noise is zero.
-pub fn draw(code: &str, plan: &Session, seed: u64, noise_um: f64) -> Draw {
+pub fn draw(code: &str, plan: &Session, seed: u64, noise_um: f64) -> DrawnSession {
     let mut random = Pcg64::seed_from_u64(seed);
     let mut normal = || -> f64 { StandardNormal.sample(&mut random) };
     let mut values: Vec<(String, f64)> = Vec::new();
@@ -94,5 +94,5 @@ pub fn draw(code: &str, plan: &Session, seed: u64, noise_um: f64) -> Draw {
         }
         test.readings = Some(readings);
     }
-    Draw { values, measured }
+    DrawnSession { values, measured }
 }

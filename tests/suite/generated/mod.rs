@@ -16,7 +16,7 @@ use abbe::identify::quantity::Given;
 use abbe::identify::simulate::{Simulation, simulate};
 use abbe::model::instrument::Station;
 use abbe::model::instrument::ballbar::BallBar;
-use abbe::model::session::motion::planned_session;
+use abbe::model::session::planned::planned_session;
 use abbe::model::session::read::{self, ReadOptions};
 use abbe::model::session::{Session, Test};
 
@@ -69,7 +69,8 @@ fn bar(test: &Test) -> &BallBar<f64> {
     }
 }
 
-/// Asserts that tests with one set-up state one position and one uncertainty of its ball, and that the nominal length of the plant is the stated one.
+/// Asserts that tests with one set-up state one position and one uncertainty of its ball, and that the nominal length of the plant is the
+/// stated one.
 fn check_described_once(code: &str, plan: &Session) {
     assert!(plan.warnings.is_empty(), "{code}: {:?}", plan.warnings);
     for (index, test) in plan.tests.iter().enumerate() {

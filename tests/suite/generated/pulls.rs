@@ -2,7 +2,7 @@
 
 use abbe::identify::fit::{parameters, prepare};
 use abbe::model::session::Session;
-use abbe::model::session::motion::planned_session;
+use abbe::model::session::planned::planned_session;
 use rayon::prelude::*;
 use statrs::distribution::{ChiSquared, ContinuousCDF, Normal};
 

@@ -1,7 +1,7 @@
 //! Numbers at their limits: each agrees with a closed form or is refused with its location and the reason.
 //!
-//! The session is the simplest one: a bar between the rotating table and a stationary spindle ball. With the axis of C displaced by `(x, y)` a
-//! ball at radius R reads `L = √((x − R·sin C)² + (y + R·cos C)²)`.
+//! The session is the simplest one: a bar between the rotating table and a stationary spindle ball. With the axis of C displaced by `(x,
+//! y)` a ball at radius R reads `L = √((x − R·sin C)² + (y + R·cos C)²)`.
 
 mod arguments;
 mod map;

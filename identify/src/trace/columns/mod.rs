@@ -15,7 +15,7 @@ use faer::{Mat, MatMut};
 use rayon::prelude::*;
 
 use crate::error::IdentifyError;
-use crate::problem::{Block, Problem};
+use crate::problem::{Problem, RowBlock};
 use basis::TermTarget;
 pub use basis::{EffectColumns, chunked};
 
@@ -29,7 +29,7 @@ pub struct Columns<'p, 'a> {
     sensitivities: Vec<Sensitivities>,
     /// Index of each slot among the sensitivities, by test.
     slot_index: Vec<HashMap<usize, usize>>,
-    blocks: Vec<Block>,
+    blocks: Vec<RowBlock>,
     /// The scalar rows of each block that whitening keeps.
     kept: Vec<Vec<usize>>,
     /// Index of each whitened row, block after block, in fold order.
@@ -104,7 +104,7 @@ impl<'p, 'a> Columns<'p, 'a> {
     }
 
     /// The unwhitened columns of effects in one block, mm.
-    fn block_rows(&self, column_sets: &[&EffectColumns], block: &Block) -> Mat<f64> {
+    fn block_rows(&self, column_sets: &[&EffectColumns], block: &RowBlock) -> Mat<f64> {
         let coordinates = self.problem.coordinates();
         let total: usize = column_sets.iter().map(|column_set| column_set.count).sum();
         let scalars = block.rows.len() * coordinates;

@@ -5,7 +5,7 @@ use faer::Mat;
 use super::{Columns, EffectColumns};
 use crate::error::IdentifyError;
 use crate::heldout::FoldKind;
-use crate::problem::Block;
+use crate::problem::RowBlock;
 use crate::trace::paired::Units;
 
 impl Columns<'_, '_> {
@@ -31,7 +31,7 @@ impl Columns<'_, '_> {
     /// The fold of each row of [`Columns::unwhitened_rows`].
     pub fn unwhitened_folds(&self) -> Vec<usize> {
         let coordinates = self.problem.coordinates();
-        let fold = |block: &Block, i: usize| {
+        let fold = |block: &RowBlock, i: usize| {
             self.problem.folds.of_row[block.test][block.rows.start + i / coordinates]
         };
         self.blocks
@@ -56,7 +56,7 @@ impl Columns<'_, '_> {
     }
 
     /// The scalar rows of a block whose readings are accepted.
-    fn counting(&self, block: &Block) -> Vec<usize> {
+    fn counting(&self, block: &RowBlock) -> Vec<usize> {
         let coordinates = self.problem.coordinates();
         let rejected = &self.problem.rejected[block.test];
         (0..block.rows.len() * coordinates)

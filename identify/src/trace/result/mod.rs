@@ -222,7 +222,7 @@ pub(super) fn model_result(problem: &Problem<'_>, fit: &Fit, held_out_mm: f64) -
         rms_3d_um: in_3d(rms),
         heldout_rms_3d_um: in_3d(held),
         noise_um: problem.noise.sigma_mm * 1e3,
-        rank: fit.rank.seen.ncols(),
+        rank: fit.rank.identifiable_basis.ncols(),
         parameter_count: fit.beta.len(),
         chi_square: fit.chi_square,
         degrees_of_freedom: fit.degrees_of_freedom,

@@ -12,13 +12,12 @@ mod pool;
 
 use std::ops::Range;
 
-use super::alias::INDISTINGUISHABLE;
 use super::columns::{Columns, EffectColumns};
 use super::compose::StepTable;
 use super::interrupt::Interrupt;
 use super::library::Candidate;
 use super::moments::Moments;
-use super::score::{Gain, PriorMoments, TrainedModel};
+use super::score::{Gain, INDISTINGUISHABLE, PriorMoments, TrainedModel};
 use crate::error::IdentifyError;
 use heldout::HeldOutState;
 pub use heldout::{RejectedByHeldOut, UnwhitenedModel};

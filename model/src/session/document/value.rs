@@ -207,8 +207,8 @@ impl<'a> Value<'a> {
     pub fn vector(self) -> Result<[f64; 3], ModelError> {
         let items = self.three("a list of three numbers")?;
         let mut vector = [0.0; 3];
-        for (place, item) in vector.iter_mut().zip(&items) {
-            *place = item.number()?;
+        for (component, item) in vector.iter_mut().zip(&items) {
+            *component = item.number()?;
         }
         Ok(vector)
     }

@@ -2,7 +2,7 @@
 
 use super::quantity::MICROMETRE;
 use crate::error::ModelError;
-use crate::instrument::{InstrumentKind, InstrumentUnknown, SharedBy, Station};
+use crate::instrument::{InstrumentKind, InstrumentParameter, SharedBy, Station};
 use crate::session::document::Table;
 use crate::session::{Prior, SocketDistance, Test};
 
@@ -40,7 +40,7 @@ pub(super) fn differing_set_ups(tests: &[Test]) -> Vec<String> {
 }
 
 /// The groups of an instrument's parameters that belong to objects that a user mounts.
-fn mounted_groups(unknowns: &[InstrumentUnknown]) -> Vec<SharedBy> {
+fn mounted_groups(unknowns: &[InstrumentParameter]) -> Vec<SharedBy> {
     [SharedBy::Setup, SharedBy::SpindleSetup, SharedBy::BarSetup]
         .into_iter()
         .filter(|group| unknowns.iter().any(|unknown| unknown.shared_by == *group))

@@ -131,9 +131,9 @@ fn suffixed<'a>(
         let Some(value) = table.take(key) else { continue };
         let suffix = key.rsplit('_').next().unwrap_or("");
         let Some(degrees) = unit.degrees(suffix) else {
-            let id_stem = key.trim_end_matches(suffix);
+            let stem = key.trim_end_matches(suffix);
             let message = format!("`{key}` for a driver in {}", unit.suffix());
-            let help = format!("use `{id_stem}{}`", unit.suffix());
+            let help = format!("use `{stem}{}`", unit.suffix());
             return Err(value.source.error(value.key_span.clone(), message, Some(help)));
         };
         if found.is_some() {
@@ -164,10 +164,10 @@ fn required(
     shape: &str,
 ) -> Result<f64, ModelError> {
     let suffix = unit.suffix();
-    let id_stem = keys[0].trim_end_matches("mm");
+    let stem = keys[0].trim_end_matches("mm");
     optional(table, keys, unit)?.ok_or_else(|| {
-        let message = format!("the shape \"{shape}\" needs `{id_stem}{suffix}`");
-        word.error(message, Some(format!("add `{id_stem}{suffix} = …`")))
+        let message = format!("the shape \"{shape}\" needs `{stem}{suffix}`");
+        word.error(message, Some(format!("add `{stem}{suffix} = …`")))
     })
 }
 

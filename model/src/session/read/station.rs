@@ -107,7 +107,7 @@ fn ball_bar(context: &Context<'_>, table: &mut Table<'_>) -> Result<SetUp, Model
         mut priors,
     } = balls(context, table)?;
     priors.extend(self::priors(table.take("bar_u_um"), 1)?);
-    priors.push(Prior::Known); // the sensor's gain
+    priors.push(Prior::Known); // gain of the sensor
     Ok(SetUp {
         station: Station::BallBar(BallBar {
             workpiece_ball: workpiece_mm,
@@ -298,7 +298,7 @@ fn probe(context: &Context<'_>, table: &mut Table<'_>) -> Result<SetUp, ModelErr
     let mut priors = priors(table.take("artefact_u_um"), 3)?;
     priors.extend(angle_priors(table.take("artefact_u_arcsec"))?);
     priors.extend(self::priors(table.take("radius_u_um"), 1)?);
-    priors.push(Prior::Known); // the form
+    priors.push(Prior::Known); // form deviation
     priors.extend(self::priors(table.take("stylus_u_um"), 3)?);
     let written = |vector: [f64; 3]| vector.map(Length::Number);
     Ok(SetUp {

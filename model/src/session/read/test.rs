@@ -10,6 +10,7 @@ use crate::instrument::{InstrumentKind, Station};
 use crate::session::document::{Table, Value};
 use crate::session::expression::Length;
 use crate::session::motion::{self, Motion};
+use crate::session::planned;
 use crate::session::readings::Readings;
 use crate::session::table::{self, Request};
 use crate::session::{Test, plausibility, runs};
@@ -97,7 +98,7 @@ pub(super) fn tests(
     let span = table.span.clone();
     let source = table.source;
     table.finish()?;
-    motion::centre_circle(context.machine, &station, motion.as_ref(), &listed, &mut at);
+    planned::centre_circle(context.machine, &station, motion.as_ref(), &listed, &mut at);
 
     let mut test = Test {
         name: name.to_string(),
@@ -115,7 +116,7 @@ pub(super) fn tests(
     };
     let here = |(message, help): (String, String)| source.error(span.clone(), message, Some(help));
     let Some(data) = data else {
-        let planned = motion::checked_plan(context.machine, &test).map_err(here)?;
+        let planned = planned::checked_plan(context.machine, &test).map_err(here)?;
         plausibility::check(context.machine, &test, &planned).map_err(here)?;
         return Ok(vec![test]);
     };
@@ -182,7 +183,7 @@ fn check_readings(
     plausibility::check(context.machine, test, readings)?;
     plausibility::check_lengths(test, readings)?;
     let doubts = [
-        motion::beyond_travel(context.machine, readings),
+        planned::beyond_travel(context.machine, readings),
         runs::difference_from_stated(test.motion.as_ref(), readings),
     ];
     warnings.extend(

@@ -3,7 +3,6 @@
 use std::path::Path;
 
 use super::encoding::name_of;
-use super::required::required;
 use super::rows::Row;
 use super::{Request, number};
 use crate::error::{Location, ModelError};
@@ -178,13 +177,6 @@ pub(super) fn columns(
             });
         }
     }
-    required(
-        request,
-        file,
-        line,
-        &columns,
-        header.map(|row| row.cells.as_slice()),
-    )?;
     Ok(columns)
 }
 

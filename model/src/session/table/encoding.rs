@@ -95,7 +95,7 @@ mod tests {
     }
 
     #[test]
-    fn the_start_tells_the_encoding() {
+    fn the_first_bytes_determine_the_encoding() {
         let of = |bytes: &[u8]| {
             let (encoding, mark) = of_start(bytes, None);
             (encoding.map(Encoding::name), mark)
@@ -109,7 +109,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_not_utf_8_is_latin_1_unless_it_is_stated_to_be_something_else() {
+    fn text_that_is_not_utf_8_is_latin_1_unless_another_encoding_is_stated() {
         let (text, encoding) = decode(b"L\xe4nge", None).unwrap();
         assert_eq!((text.as_ref(), encoding.name()), ("Länge", "windows-1252"));
         let (text, encoding) = decode("Länge".as_bytes(), None).unwrap();

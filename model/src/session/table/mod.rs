@@ -116,6 +116,13 @@ pub(crate) fn read(file: &Path, request: &Request<'_>) -> Result<(BySocket, Vec<
     let width = first.cells.len();
     let header = request.format.header.then_some(&first);
     let columns = columns::columns(request, file, &first, header)?;
+    required::required(
+        request,
+        file,
+        first.line,
+        &columns,
+        header.map(|row| row.cells.as_slice()),
+    )?;
     let mut filled = ReadingColumns::new(request, stamp, columns);
     if header.is_none() {
         filled.push(&first)?;
@@ -202,12 +209,12 @@ impl<'a> ReadingColumns<'a> {
     /// Removes rows that are copies of earlier ones and returns a message that lists them.
     fn without_duplicates(&mut self) -> Option<String> {
         let kept = duplicates::kept(&self.readings, &self.cells)?;
-        let said = duplicates::message(&self.readings, &kept);
+        let message = duplicates::message(&self.readings, &kept);
         self.readings = self.readings.of_rows(&kept);
         if !self.socket.is_empty() {
             self.socket = kept.iter().map(|row| self.socket[*row]).collect();
         }
-        Some(said)
+        Some(message)
     }
 
     fn push(&mut self, row: &rows::Row) -> Result<(), ModelError> {
@@ -255,8 +262,8 @@ impl<'a> ReadingColumns<'a> {
                 }
                 Role::Temperature => readings.temperature_c.push(value),
                 Role::Axis(axis, unit) => {
-                    if let Some(place) = readings.positions[axis].last_mut() {
-                        *place = unit.to_internal(value);
+                    if let Some(last) = readings.positions[axis].last_mut() {
+                        *last = unit.to_internal(value);
                     }
                 }
                 Role::Length(unit) => observed[0] = unit.to_internal(value),

@@ -15,7 +15,7 @@ pub(super) fn required(
     columns: &[Column],
     header: Option<&[String]>,
 ) -> Result<(), ModelError> {
-    let has = |wanted: &dyn Fn(Role) -> bool| columns.iter().any(|column| wanted(column.role));
+    let has = |accepted: &dyn Fn(Role) -> bool| columns.iter().any(|column| accepted(column.role));
     let found = || match header {
         Some(header) => format!("; found: {}", listed(header)),
         None => String::new(),

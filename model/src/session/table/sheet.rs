@@ -68,7 +68,7 @@ pub(super) fn rows(file: &Path, format: &Format) -> Result<(FileStamp, Vec<Row>)
     let stamp = FileStamp::of(file, &found);
     let mut book = catch_panic(|| open_workbook_auto(file)).map_err(broken)?;
     let names = book.sheet_names();
-    let wanted: Vec<String> = match &format.sheet {
+    let sheets_to_read: Vec<String> = match &format.sheet {
         Some(name) if names.contains(name) => vec![name.clone()],
         Some(name) => {
             return Err(fault(
@@ -79,7 +79,7 @@ pub(super) fn rows(file: &Path, format: &Format) -> Result<(FileStamp, Vec<Row>)
         None => names.clone(),
     };
     let mut filled: Vec<(String, Vec<Row>)> = Vec::new();
-    for name in wanted {
+    for name in sheets_to_read {
         let cells = catch_panic(|| cells(&mut book, &name)).map_err(broken)?;
         let rows = by_row(cells, format).map_err(|(message, help)| fault(message, help))?;
         if !rows.is_empty() {

@@ -14,8 +14,8 @@ const ANTICLOCKWISE: [&str; 6] = [
 const KNOWN: &str = "known words are CW, CCW, CLOCKWISE, ANTICLOCKWISE, COUNTERCLOCKWISE; for others use \
                      `[format] anticlockwise = \"…\"`, the word for the direction from the first axis of the plane towards the second";
 
-/// For each run, whether it goes from the first axis of the plane towards the second. If that is unknown: a line, a message and what to
-/// do.
+/// Whether each run goes from the first axis of the plane towards the second. If that is unknown, the error is a line, a message and what
+/// to do.
 ///
 /// Known words keep their meaning whatever is stated, except that a stated clockwise word reverses them. Of other words, the stated one
 /// means forward and one other backward. Case is ignored; `1`, `true` and `yes` are one value, and so are `0`, `false` and `no`.
@@ -86,7 +86,7 @@ mod tests {
     }
 
     #[test]
-    fn words_that_speak_for_themselves_do_so_whatever_is_stated() {
+    fn known_words_keep_their_meaning_whatever_is_stated() {
         for stated in [
             None,
             Some("0"),

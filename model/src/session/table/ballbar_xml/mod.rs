@@ -18,7 +18,7 @@ use super::{Request, number};
 use crate::error::{Location, ModelError};
 use crate::session::motion::Motion;
 use crate::session::readings::Readings;
-use crate::session::{Test, plan};
+use crate::session::{Test, trajectory};
 
 /// Whether a file is of this format, by its name.
 pub(crate) fn is_xml(file: &Path) -> bool {
@@ -114,7 +114,7 @@ pub(crate) fn read(
         let angles: Vec<f64> = (0..count)
             .map(|k| start + (end - start) * k as f64 / (count - 1) as f64)
             .collect();
-        let Some(states) = plan::on_circle(request.machine, test, &angles) else {
+        let Some(states) = trajectory::on_circle(request.machine, test, &angles) else {
             continue;
         };
         let states = states.map_err(|(message, help)| fault(0, message, help))?;

@@ -34,7 +34,7 @@ fn a_file_at_its_limits_is_read_and_one_beyond_them_is_refused() {
 }
 
 #[test]
-fn a_cell_is_pointed_at_behind_a_byte_order_mark_and_beside_what_takes_other_bytes() {
+fn cell_spans_are_correct_after_a_byte_order_mark_and_non_ascii_text() {
     let folder = tempfile::tempdir().unwrap();
     let file = folder.path().join("data.csv");
     let spans = |bytes: &[u8]| {
@@ -136,7 +136,7 @@ fn a_file_that_changes_while_it_is_read_is_refused() {
 
 #[cfg(unix)]
 #[test]
-fn a_file_that_vanishes_while_it_is_read_is_read_to_its_end() {
+fn a_file_that_is_deleted_while_it_is_read_is_read_to_its_end() {
     let gone = |file: &Path| std::fs::remove_file(file).unwrap();
     assert_eq!(read("1,2\n3,4\n", LIMITS, gone), Ok(2));
 }
