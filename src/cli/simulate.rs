@@ -24,7 +24,8 @@ Examples:
   abbe simulate sessions/hermle-c600u/chapter5.toml --out run1 --error EY0A=35.3um \\
       --error EB0A=-1.29arcsec
   abbe simulate sessions/hermle-c600u/chapter5.toml --out run2 --draw-setups --seed 7
-  abbe simulate sessions/hermle-c600u/chapter5.toml --out run3 --draw-setups --seed 8 --noise-um 0.5
+  abbe simulate sessions/hermle-c600u/chapter5.toml --out run3 --draw-setups --seed 8 \\
+      --noise-um 0.5
 
 A file for --errors has one value per line, `EY0A = \"35.3 um\"`. Names with other characters than letters and digits are quoted.";
 

@@ -27,7 +27,8 @@ pub const HELP: &str = "Examples:
   abbe trace sessions/hermle-c600u/measured/session.toml --all
   abbe trace sessions/hermle-c600u/measured/session.toml --json trace.json --csv trace.csv
   abbe trace sessions/hermle-c600u/measured/session.toml --report trace.html --write next.toml
-  abbe trace sessions/hermle-c600u/measured/session.toml --only EZC --exclude ~time --max-effects 2
+  abbe trace sessions/hermle-c600u/measured/session.toml --only EZC \\
+      --exclude ~time --max-effects 2
   abbe trace sessions/hermle-c600u/measured/session.toml --list
 
 The first screen answers in this order: verdict and uniqueness; residual before and after, also on held-out readings; \
