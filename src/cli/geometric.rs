@@ -6,7 +6,7 @@ use abbe::model::words::counted;
 
 use super::failure::Failure;
 use super::report::ReportArguments;
-use super::{CommonArguments, fit, output, table};
+use super::{CommonArguments, fit, json, table};
 
 /// Runs a geometric method and the full fit on the same readings.
 pub fn run(
@@ -22,7 +22,7 @@ pub fn run(
     }
     fit::print_warnings(&result.warnings);
     if let Some(path) = &common.json {
-        output::write_json(path, &result)?;
+        json::write_of_session(path, session, common.seed, &result)?;
     }
     if report.asked() {
         let (problem, _) = abbe::identify::fit::prepare(session, common.seed)?;

@@ -7,7 +7,7 @@ use abbe::model::words::counted;
 use clap::Args;
 
 use super::failure::Failure;
-use super::{CommonArguments, fit, output, screen, table};
+use super::{CommonArguments, fit, json, screen, table};
 
 /// Monte Carlo propagation of a self-calibration or of the full fit.
 #[derive(Args)]
@@ -78,7 +78,7 @@ pub fn run(
     }
     fit::print_warnings(&result.warnings);
     if let Some(path) = &common.json {
-        output::write_json(path, &result)?;
+        json::write_of_session(path, session, common.seed, &result)?;
     }
     Ok(())
 }
