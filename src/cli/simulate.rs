@@ -12,7 +12,7 @@ use schemars::JsonSchema;
 use serde::Serialize;
 
 use super::failure::Failure;
-use super::{CommonArguments, SessionArguments, fit, folder, json, output, read_session, table};
+use super::{CommonArguments, SessionArguments, folder, json, message, output, read_session, table};
 
 /// Examples of `abbe simulate`, and the names of values.
 pub const HELP: &str = "Names of values are those of results, with a unit: errors (EY0A of ISO 230-1, e_y0a of the literature), set-up \
@@ -234,7 +234,7 @@ fn report(
     if tables {
         print(session, &report, arguments.common.seed);
     }
-    fit::print_warnings(&report.warnings);
+    message::print_warnings(&report.warnings);
     if let Some(path) = &arguments.common.json {
         json::write_of_session(path, session, arguments.common.seed, &report)?;
     }
