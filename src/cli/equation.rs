@@ -20,8 +20,10 @@ use super::output::{self, Outputs};
 /// Examples of `abbe equation`.
 pub const HELP: &str = "Examples:
   abbe equation sessions/hermle-c600u/chapter5.toml --test A150 --as latex
-  abbe equation sessions/hermle-c600u/chapter5.toml --test C150 --order first --errors EX0C,EY0C,bar
-  abbe equation sessions/hermle-c600u/chapter5.toml --test A150 --as python --gradient --out a150.py";
+  abbe equation sessions/hermle-c600u/chapter5.toml --test C150 --order first \\
+      --errors EX0C,EY0C,bar
+  abbe equation sessions/hermle-c600u/chapter5.toml --test A150 --as python \\
+      --gradient --out a150.py";
 
 /// Examples of `abbe volumetric`.
 pub const VOLUMETRIC_HELP: &str = "Examples:
@@ -31,8 +33,8 @@ pub const VOLUMETRIC_HELP: &str = "Examples:
   abbe volumetric sessions/volumetric/machine.toml --map map.csv \\
       --functions sessions/volumetric/errors.toml --compensate
   abbe volumetric sessions/volumetric/machine.toml --map map2.csv \\
-      --functions sessions/volumetric/errors.toml --places 3 --axis A=30 --axis X:5 --tool-mm 0,0,-120 \\
-      --json map.json";
+      --functions sessions/volumetric/errors.toml --places 3 --axis A=30 --axis X:5 \\
+      --tool-mm 0,0,-120 --json map.json";
 
 /// The language of an equation.
 #[derive(Clone, Copy, ValueEnum)]

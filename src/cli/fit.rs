@@ -7,14 +7,12 @@ use std::path::PathBuf;
 use clap::{Args, ValueEnum};
 
 use super::failure::Failure;
-use super::message::{Kind, tell};
+use super::message::print_warnings;
 use super::report::ReportArguments;
 use super::{
     CommonArguments, SessionArguments, compensation, csv, directions, geometric, json, read_session,
     repeated, residuals, self_calibration,
 };
-
-pub use screen::noise;
 
 /// Examples of `abbe fit`.
 pub const HELP: &str = "Examples:
@@ -180,11 +178,4 @@ pub fn run(arguments: &FitArguments) -> Result<(), Failure> {
             .write(&document, &method, &session, arguments.common.seed)?;
     }
     arguments.compensation.run(&problem, &fit, tables)
-}
-
-/// Writes warnings to standard error.
-pub fn print_warnings(warnings: &[String]) {
-    for warning in warnings {
-        tell(Kind::Warning, warning);
-    }
 }

@@ -8,7 +8,7 @@ use abbe::model::words::counted;
 use super::failure::Failure;
 use super::json::{self, Origin};
 use super::output::{self, Outputs};
-use super::{CommonArguments, SessionArguments, fit, read_session, table};
+use super::{CommonArguments, SessionArguments, message, read_session, table};
 
 /// Fits each session separately and compares the fits.
 pub fn run(
@@ -46,7 +46,7 @@ pub fn run(
             .iter()
             .map(|warning| format!("{}: {warning}", path.display()))
             .collect();
-        fit::print_warnings(&named);
+        message::print_warnings(&named);
         sessions.push(repeated::Session::new(
             &path.display().to_string(),
             &problem,

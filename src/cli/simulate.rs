@@ -12,7 +12,7 @@ use schemars::JsonSchema;
 use serde::Serialize;
 
 use super::failure::Failure;
-use super::{CommonArguments, SessionArguments, fit, folder, json, output, read_session, table};
+use super::{CommonArguments, SessionArguments, folder, json, message, output, read_session, table};
 
 /// Examples of `abbe simulate`, and the names of values.
 pub const HELP: &str = "Names of values are those of results, with a unit: errors (EY0A of ISO 230-1, e_y0a of the literature), set-up \
@@ -24,7 +24,8 @@ Examples:
   abbe simulate sessions/hermle-c600u/chapter5.toml --out run1 --error EY0A=35.3um \\
       --error EB0A=-1.29arcsec
   abbe simulate sessions/hermle-c600u/chapter5.toml --out run2 --draw-setups --seed 7
-  abbe simulate sessions/hermle-c600u/chapter5.toml --out run3 --draw-setups --seed 8 --noise-um 0.5
+  abbe simulate sessions/hermle-c600u/chapter5.toml --out run3 --draw-setups --seed 8 \\
+      --noise-um 0.5
 
 A file for --errors has one value per line, `EY0A = \"35.3 um\"`. Names with other characters than letters and digits are quoted.";
 
@@ -233,7 +234,7 @@ fn report(
     if tables {
         print(session, &report, arguments.common.seed);
     }
-    fit::print_warnings(&report.warnings);
+    message::print_warnings(&report.warnings);
     if let Some(path) = &arguments.common.json {
         json::write_of_session(path, session, arguments.common.seed, &report)?;
     }

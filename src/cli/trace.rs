@@ -7,7 +7,6 @@ use std::sync::Mutex;
 use std::time::Duration;
 
 use abbe::identify::plan::test_variations::TestVariations;
-use abbe::identify::results::EffectName;
 use abbe::identify::trace::separating_tests::separate_aliases;
 use abbe::identify::trace::{Progress, TraceOptions, library};
 use abbe::model::session::{rewrite, write};
@@ -20,7 +19,7 @@ use super::interrupt::Interrupts;
 use super::message::{Kind, tell};
 use super::report::ReportArguments;
 use super::{
-    CommonArguments, SessionArguments, compensation, csv, fit, json, output, read_session, residuals,
+    CommonArguments, SessionArguments, compensation, csv, json, message, output, read_session, residuals,
 };
 
 /// Examples of `abbe trace`.
@@ -29,7 +28,8 @@ pub const HELP: &str = "Examples:
   abbe trace sessions/hermle-c600u/measured/session.toml --all
   abbe trace sessions/hermle-c600u/measured/session.toml --json trace.json --csv trace.csv
   abbe trace sessions/hermle-c600u/measured/session.toml --report trace.html --write next.toml
-  abbe trace sessions/hermle-c600u/measured/session.toml --only EZC --exclude ~time --max-effects 2
+  abbe trace sessions/hermle-c600u/measured/session.toml --only EZC \\
+      --exclude ~time --max-effects 2
   abbe trace sessions/hermle-c600u/measured/session.toml --list
 
 The first screen answers in this order: verdict and uniqueness; residual before and after, also on held-out readings; \
@@ -146,7 +146,7 @@ pub fn run(arguments: &TraceArguments) -> Result<(), Failure> {
     if tables {
         screen::print(&trace, &arguments.session, arguments.all);
     }
-    fit::print_warnings(&trace.result.warnings);
+    message::print_warnings(&trace.result.warnings);
     if let Some(path) = &arguments.common.json {
         json::write_of_session(path, &session, arguments.common.seed, &trace.result)?;
     }
@@ -223,20 +223,4 @@ fn list(session: &abbe::model::session::Session, options: &TraceOptions) -> Resu
         }
     }
     Ok(())
-}
-
-/// An effect by component, driver and shape.
-pub fn name(effect: &EffectName) -> String {
-    let order = effect
-        .order
-        .map_or(String::new(), |order| format!(" order {order}"));
-    let tests = if effect.tests.is_empty() {
-        String::new()
-    } else {
-        format!(" in {}", effect.tests.join(", "))
-    };
-    format!(
-        "{} over {}: {}{order}{tests}",
-        effect.component, effect.driver, effect.shape
-    )
 }

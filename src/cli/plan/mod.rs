@@ -16,7 +16,7 @@ use abbe::model::session::{Prior, Session};
 use clap::Args;
 
 use super::failure::Failure;
-use super::fit::print_warnings;
+use super::message::print_warnings;
 use super::report::ReportArguments;
 use super::{CommonArguments, SessionArguments, json, read_session};
 
