@@ -89,6 +89,9 @@ RENAMED = [
     (r"^\.session$", ".written_session"),
 ]
 
+# Phrases of the old version whose words for a number became digits.
+REPHRASED = [("grows by half", "increases by 50 %")]
+
 NUMBER = re.compile(r"(?<![A-Za-z_])[-−+]?\d+(?:\.\d+)?(?:[eE][-+]?\d+)?")
 
 
@@ -129,6 +132,8 @@ def renamed(old):
             path = f"{pair.group(1)}.{named[key]}"
         for pattern, by in RENAMED:
             path = re.sub(pattern, by, path)
+        for phrase, by in REPHRASED:
+            value = value.replace(phrase, by)
         found[path] = value
     return found
 

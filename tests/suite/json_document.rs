@@ -121,7 +121,7 @@ fn uncertainties_covariance_and_chi_square_agree() {
     assert_eq!(meaning("bar[A100]"), "A100: bar length");
 }
 
-/// The socket measurements of a robot leave directions unidentifiable. Each row of the null space is a combination of `unobservable`.
+/// A bar of unknown length leaves directions unidentifiable. Each row of the null space is a combination of `unobservable`.
 #[test]
 fn the_null_space_has_the_rows_of_the_unobservable_combinations() {
     let plan = std::fs::read_to_string(ready("hermle-c600u/chapter5.toml")).unwrap();
@@ -150,6 +150,7 @@ fn the_null_space_has_the_rows_of_the_unobservable_combinations() {
     let fit = document(&["fit", text(&run.join("session.toml"))]);
     let (space, unobservable) = (&fit["null_space"], array(&fit["unobservable"]));
     let rows = array(&space["vectors"]);
+    assert!(!rows.is_empty());
     assert_eq!(rows.len(), unobservable.len());
     assert_eq!(
         number(&fit["rank"]) + rows.len() as f64,
