@@ -335,7 +335,12 @@ pub fn run_volumetric(arguments: &VolumetricArguments, quiet: bool) -> Result<()
     let read = std::iter::once(&arguments.machine).chain(arguments.map.functions());
     outputs.refuse_overwrite(read.map(PathBuf::as_path))?;
     if arguments.map.wanted() {
-        return super::map::run(&machine, &arguments.map, outputs.tables(quiet));
+        return super::map::run(
+            &arguments.machine,
+            &machine,
+            &arguments.map,
+            outputs.tables(quiet),
+        );
     }
     let form = &arguments.form;
     let mut parameters = EquationParameters::parse(&form.errors, &machine, &[], &[])?;

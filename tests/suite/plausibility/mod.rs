@@ -219,7 +219,7 @@ fn a_conflict_is_told_everywhere() {
     assert_eq!(read["conflicts"][0]["kind"], "setup-parameter", "{read:#}");
     assert!(read["suggestions"][0]["words"].is_string(), "{read:#}");
     let page = std::fs::read_to_string(html).unwrap();
-    assert!(page.contains("The readings contradict the session"));
+    assert!(page.contains("Conflict between readings and session"));
 }
 
 /// What is reported of a correct session is as it was.

@@ -11,7 +11,6 @@ use super::library;
 use super::remainder::Structure;
 use super::search::Search;
 use super::start::Start;
-use crate::covariance;
 use crate::error::IdentifyError;
 use crate::fit::{self, Fit};
 use crate::heldout::{mislabelled_runs, rms_mm};
@@ -85,7 +84,7 @@ pub(super) fn report(findings: &TraceFindings<'_, '_>) -> Result<ReportedEffect,
         gains.push(model.gain(taken.candidate).gain);
     }
     cover(&mut after_result.parameters, after, after_fit, &moves);
-    after_result.covariance = covariance::of_parameters(after, after_fit, &after_result.parameters);
+    after_result.covariance = fit::covariance_of_parameters(after, after_fit, &after_result.parameters);
     let families = library::families()?;
     let effects: Vec<EffectResult> = (0..moves.len())
         .map(|k| {
@@ -133,7 +132,7 @@ pub(super) fn report(findings: &TraceFindings<'_, '_>) -> Result<ReportedEffect,
         candidates: findings.candidates,
         candidates_detectable: findings.candidates_seen,
         unobservable: fit::unobservable(after, &after_fit.rank),
-        null_space: covariance::null_space(after, &after_fit.rank),
+        null_space: fit::null_space(after, &after_fit.rank),
         outliers: fit::outliers(after, after_fit),
         plausibility: Plausibility::default(),
         warnings,
@@ -227,7 +226,7 @@ pub(super) fn model_result(problem: &Problem<'_>, fit: &Fit, held_out_mm: f64) -
         chi_square: fit.chi_square,
         degrees_of_freedom: fit.degrees_of_freedom,
         identifiable: fit::ids(&parameters),
-        covariance: covariance::of_parameters(problem, fit, &parameters),
+        covariance: fit::covariance_of_parameters(problem, fit, &parameters),
         parameters,
     }
 }
