@@ -217,7 +217,7 @@ fn a_conflict_is_told_everywhere() {
     );
     let read: serde_json::Value = serde_json::from_str(&std::fs::read_to_string(json).unwrap()).unwrap();
     assert_eq!(read["conflicts"][0]["kind"], "setup-parameter", "{read:#}");
-    assert!(read["suggestions"][0]["words"].is_string(), "{read:#}");
+    assert!(read["suggestions"][0]["description"].is_string(), "{read:#}");
     let page = std::fs::read_to_string(html).unwrap();
     assert!(page.contains("Conflict between readings and session"));
 }
