@@ -204,11 +204,29 @@ fn estimated_noise(problem: &Problem<'_>, fit: &Fit, floor: f64) -> Noise {
     Noise::white(sigma.max(floor).max(MIN_NOISE_MM), NoiseSource::Residual)
 }
 
-/// Fits a problem, from the nominal machine or from an earlier fit's unknowns.
+/// Fits a problem, from the nominal machine or from earlier estimates.
 ///
 /// # Errors
 /// If there is nothing to fit, the model cannot be evaluated, or the iterations do not end.
 pub fn fit(problem: &Problem<'_>, start: Option<&[f64]>) -> Result<Fit, IdentifyError> {
+    finish(problem, minimum(problem, start)?)
+}
+
+/// Where the sum of squares of readings and priors is least.
+pub(crate) struct Minimum {
+    /// The estimates, in internal units (mm, rad).
+    pub beta: Vec<f64>,
+    /// The triangles of the folds at `beta`.
+    pub triangles: Vec<Triangle>,
+    /// The rank at the nominal machine.
+    pub rank: Rank,
+}
+
+/// Minimises the sum of squares in the identifiable directions, from the nominal machine or from earlier estimates.
+///
+/// # Errors
+/// If the model cannot be evaluated, or the iterations do not end.
+pub(crate) fn minimum(problem: &Problem<'_>, start: Option<&[f64]>) -> Result<Minimum, IdentifyError> {
     let unknowns = problem.parameters.list.len();
     let size: Vec<f64> = problem
         .parameters
@@ -243,16 +261,20 @@ pub fn fit(problem: &Problem<'_>, start: Option<&[f64]>) -> Result<Fit, Identify
     // The iterations end within a step of the last linearisation that is too small for the model to bend.
     let step: Vec<f64> = beta.iter().zip(&last).map(|(end, last)| end - last).collect();
     let triangles = triangles.iter().map(|triangle| triangle.after(&step)).collect();
-    finish(problem, beta, triangles, rank)
+    Ok(Minimum {
+        beta,
+        triangles,
+        rank,
+    })
 }
 
 /// Everything that follows from the solution.
-fn finish(
-    problem: &Problem<'_>,
-    beta: Vec<f64>,
-    triangles: Vec<Triangle>,
-    rank: Rank,
-) -> Result<Fit, IdentifyError> {
+fn finish(problem: &Problem<'_>, minimum: Minimum) -> Result<Fit, IdentifyError> {
+    let Minimum {
+        beta,
+        triangles,
+        rank,
+    } = minimum;
     let whole = whole(problem, &beta, &triangles);
     let covariance = covariance(&whole, &rank.seen)?;
     let residuals = problem.residuals(&beta);
