@@ -38,7 +38,7 @@ pub const VOLUMETRIC_HELP: &str = "Examples:
 
 /// The language of an equation.
 #[derive(Clone, Copy, ValueEnum)]
-enum OutputForm {
+enum LanguageArgument {
     Text,
     Latex,
     Typst,
@@ -48,35 +48,35 @@ enum OutputForm {
     Matlab,
 }
 
-impl OutputForm {
+impl LanguageArgument {
     fn language(self) -> Language {
         match self {
-            OutputForm::Text => Language::Text,
-            OutputForm::Latex => Language::Latex,
-            OutputForm::Typst => Language::Typst,
-            OutputForm::Rust => Language::Rust,
-            OutputForm::C => Language::C,
-            OutputForm::Python => Language::Python,
-            OutputForm::Matlab => Language::Matlab,
+            LanguageArgument::Text => Language::Text,
+            LanguageArgument::Latex => Language::Latex,
+            LanguageArgument::Typst => Language::Typst,
+            LanguageArgument::Rust => Language::Rust,
+            LanguageArgument::C => Language::C,
+            LanguageArgument::Python => Language::Python,
+            LanguageArgument::Matlab => Language::Matlab,
         }
     }
 }
 
 #[derive(Clone, Copy, ValueEnum)]
-enum OrderWord {
+enum OrderArgument {
     Exact,
     Bilinear,
     First,
 }
 
 #[derive(Clone, Copy, ValueEnum)]
-enum RotationWord {
+enum RotationArgument {
     Exact,
     SmallAngle,
 }
 
 #[derive(Clone, Copy, ValueEnum)]
-enum SymbolsWord {
+enum SymbolsArgument {
     Literature,
     Iso,
 }
@@ -88,17 +88,17 @@ struct FormArguments {
     ///
     /// Example: --as latex
     #[arg(long = "as", value_enum, default_value = "text")]
-    language: OutputForm,
+    language: LanguageArgument,
     /// Order in the errors: all terms, products of two errors, or one sensitivity coefficient per error.
     ///
     /// Example: --order first
     #[arg(long, value_enum, default_value = "exact")]
-    order: OrderWord,
+    order: OrderArgument,
     /// Rotation by error angles [default: as the machine file states].
     ///
     /// Example: --rotation small-angle
     #[arg(long, value_enum)]
-    rotation: Option<RotationWord>,
+    rotation: Option<RotationArgument>,
     /// Parameters in the equation, separated by commas; all others are zero. Errors (EX0C, e_x0c) or patterns of errors (E?0C); for a session also
     /// parameters of the instrument (bar, workpiece_ball.x) and declared effects (EZC~C:h2) [default: for a session its errors and declared effects,
     /// for a machine all errors].
@@ -110,7 +110,7 @@ struct FormArguments {
     ///
     /// Example: --symbols iso
     #[arg(long, value_enum, default_value = "literature")]
-    symbols: SymbolsWord,
+    symbols: SymbolsArgument,
     /// Add the derivatives with respect to all parameters in the equation: in code for every order; in text, LaTeX and Typst for the exact length of
     /// a bar.
     #[arg(long)]
@@ -149,22 +149,22 @@ pub struct VolumetricArguments {
 
 /// The parameters of an equation.
 #[derive(Default)]
-struct Kept {
+struct EquationParameters {
     errors: Vec<ErrorName>,
     /// Indices in the list of parameters of the instrument.
-    unknowns: Vec<usize>,
+    instrument: Vec<usize>,
     effects: Vec<Effect>,
 }
 
-impl Kept {
+impl EquationParameters {
     /// Reads names and patterns of errors, parameters of the instrument and effects.
     fn parse(
         names: &[String],
         machine: &Machine,
-        known: &[InstrumentParameter],
+        of_instrument: &[InstrumentParameter],
         effects: &[Effect],
-    ) -> Result<Kept, Failure> {
-        let mut kept = Kept::default();
+    ) -> Result<EquationParameters, Failure> {
+        let mut parameters = EquationParameters::default();
         for name in names {
             if pattern::is_pattern(name) {
                 let found = pattern::matching(machine, name);
@@ -174,29 +174,29 @@ impl Kept {
                     )));
                 }
                 for error in found {
-                    if !kept.errors.contains(&error) {
-                        kept.errors.push(error);
+                    if !parameters.errors.contains(&error) {
+                        parameters.errors.push(error);
                     }
                 }
                 continue;
             }
             if name.contains('~') {
-                kept.effects.extend(named(name, effects)?);
+                parameters.effects.extend(named(name, effects)?);
                 continue;
             }
             match Component::parse(name) {
-                Some(Component::Axis(error)) => kept.errors.push(error),
+                Some(Component::Axis(error)) => parameters.errors.push(error),
                 Some(Component::Instrument { thing, coordinate }) => {
-                    let place = known
+                    let place = of_instrument
                         .iter()
                         .position(|u| u.thing == thing && u.coordinate == coordinate);
-                    let unknown = |u: &InstrumentParameter| Variable::Instrument(*u).name();
-                    kept.unknowns.push(place.ok_or_else(|| {
-                        let has = match known {
+                    let name_of = |u: &InstrumentParameter| Variable::Instrument(*u).name();
+                    parameters.instrument.push(place.ok_or_else(|| {
+                        let has = match of_instrument {
                             [] => "an error vector has no parameters of an instrument".to_string(),
-                            known => format!(
+                            some => format!(
                                 "this instrument has {}",
-                                known.iter().map(unknown).collect::<Vec<_>>().join(", ")
+                                some.iter().map(name_of).collect::<Vec<_>>().join(", ")
                             ),
                         };
                         Failure::Other(format!("`{name}` is a parameter of another instrument; {has}"))
@@ -209,7 +209,7 @@ impl Kept {
                 }
             }
         }
-        Ok(kept)
+        Ok(parameters)
     }
 }
 
@@ -232,24 +232,24 @@ fn named(name: &str, effects: &[Effect]) -> Result<Vec<Effect>, Failure> {
 }
 
 impl FormArguments {
-    fn options(&self, kept: &Kept) -> Options {
+    fn options(&self, parameters: &EquationParameters) -> Options {
         Options {
             order: match self.order {
-                OrderWord::Exact => Order::Exact,
-                OrderWord::Bilinear => Order::Bilinear,
-                OrderWord::First => Order::First,
+                OrderArgument::Exact => Order::Exact,
+                OrderArgument::Bilinear => Order::Bilinear,
+                OrderArgument::First => Order::First,
             },
             rotation: self.rotation.map(|rotation| match rotation {
-                RotationWord::Exact => Rotation::Exact,
-                RotationWord::SmallAngle => Rotation::SmallAngle,
+                RotationArgument::Exact => Rotation::Exact,
+                RotationArgument::SmallAngle => Rotation::SmallAngle,
             }),
             symbols: match self.symbols {
-                SymbolsWord::Literature => Symbols::Literature,
-                SymbolsWord::Iso => Symbols::Iso,
+                SymbolsArgument::Literature => Symbols::Literature,
+                SymbolsArgument::Iso => Symbols::Iso,
             },
             gradient: self.gradient,
-            unknowns: kept.unknowns.clone(),
-            effects: kept.effects.clone(),
+            unknowns: parameters.instrument.clone(),
+            effects: parameters.effects.clone(),
         }
     }
 
@@ -309,17 +309,22 @@ pub fn run(arguments: &EquationArguments) -> Result<(), Failure> {
         .filter(|effect| effect.acts_in(&test.name))
         .cloned()
         .collect();
-    let mut kept = Kept::parse(
+    let mut parameters = EquationParameters::parse(
         &form.errors,
         &session.machine,
         session.instrument.unknowns(),
         &effects,
     )?;
     if form.errors.is_empty() {
-        kept.errors.clone_from(&session.unknowns);
-        kept.effects = effects;
+        parameters.errors.clone_from(&session.unknowns);
+        parameters.effects = effects;
     }
-    let equation = Equation::of(&session.machine, &source, &kept.errors, &form.options(&kept))?;
+    let equation = Equation::of(
+        &session.machine,
+        &source,
+        &parameters.errors,
+        &form.options(&parameters),
+    )?;
     form.write(&equation)
 }
 
@@ -338,10 +343,10 @@ pub fn run_volumetric(arguments: &VolumetricArguments, quiet: bool) -> Result<()
         );
     }
     let form = &arguments.form;
-    let mut kept = Kept::parse(&form.errors, &machine, &[], &[])?;
+    let mut parameters = EquationParameters::parse(&form.errors, &machine, &[], &[])?;
     if form.errors.is_empty() {
-        kept.errors = pattern::errors(&machine);
+        parameters.errors = pattern::errors(&machine);
     }
-    let equation = Equation::volumetric(&machine, &kept.errors, &form.options(&kept))?;
+    let equation = Equation::volumetric(&machine, &parameters.errors, &form.options(&parameters))?;
     form.write(&equation)
 }

@@ -79,14 +79,18 @@ pub fn document(trace: &TraceOutcome<'_>) -> Result<Document, IdentifyError> {
         &mut document,
         problem,
         &result.after.parameters,
-        Some(&result.before.parameters),
+        (!result.effects.is_empty()).then_some(result.before.parameters.as_slice()),
     );
     document.section("Values", html! { (section) (changes(problem, result)) });
     let section = residuals::section(
         &mut document,
         &session,
         &spectra,
-        ["declared model", "with the found effects"],
+        if result.effects.is_empty() {
+            ["declared model"; 2]
+        } else {
+            ["declared model", "with the found effects"]
+        },
     );
     document.section(
         "Residuals",

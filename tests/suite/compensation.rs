@@ -181,7 +181,7 @@ fn tables_correct_by_the_negative_identified_curve() {
     let out = folder.join("beckhoff");
     let printed = tables(&session, &out, "beckhoff");
     assert!(
-        printed.contains("EYY: what depends on the direction; the mean of both"),
+        printed.contains("EYY: the difference between the directions; the table contains the mean of both"),
         "{printed}"
     );
     let file = std::fs::read_to_string(out.join("volcomp.csv")).unwrap();
