@@ -6,7 +6,7 @@
 //! matrix no larger than the number of the fold's rows (Woodbury). If the other folds barely determine a direction, their triangular
 //! factors are merged and solved again.
 
-mod folds;
+pub(crate) mod folds;
 
 use faer::Mat;
 use rayon::prelude::*;

@@ -18,7 +18,7 @@ use rayon::prelude::*;
 
 use crate::drivers::Origin;
 use crate::error::IdentifyError;
-use crate::heldout::Folds;
+use crate::heldout::folds::Folds;
 use crate::noise::Noise;
 use crate::parameters::{Parameters, TestParameters};
 use crate::triangle::{BLOCK_ROWS, Triangle};

@@ -248,7 +248,7 @@ fn assign(
         let Some(amplitude) = amplitude else {
             if phase.is_some() {
                 return Err(IdentifyError::Request(format!(
-                    "`{id}.phase` has a value, but not `{id}.amplitude`"
+                    "`{id}.phase` has a value, but `{id}.amplitude` has none"
                 )));
             }
             continue;

@@ -14,8 +14,8 @@ use super::format::{integer, noise_sentence, unit, value_and_u};
 use super::plots::SessionPlots;
 use super::summary::{self, Quality};
 use super::{curves, effects, plausibility, readings, residuals, values};
-use crate::cli::trace::name;
 use crate::cli::uniqueness;
+use crate::present::effect::name;
 
 /// Method of a trace.
 pub fn method(result: &TraceResult) -> Markup {

@@ -13,7 +13,7 @@
 
 use abbe_model::chain::Machine;
 
-use super::fault::Fault;
+use super::fault::{Fault, columns, variance_and_correlation};
 use super::path::{MovingAxes, Path};
 use super::regression::Regression;
 use super::results::{CircularTest, Diagnosis};
@@ -148,12 +148,6 @@ fn add_faults(rows: &PathRows, faults: &mut Vec<Fault>, regression: &mut Regress
     }
 }
 
-pub(super) fn columns(rows: &PathRows, faults: &[Fault]) -> Vec<Vec<f64>> {
-    let mut columns = rows.setup();
-    columns.extend(faults.iter().flat_map(|fault| fault.columns.iter().cloned()));
-    columns
-}
-
 fn solve(rows: &PathRows, faults: &[Fault]) -> Option<Regression> {
     Regression::solve(&columns(rows, faults), &rows.y)
 }
@@ -216,23 +210,6 @@ fn standard(path: &Path, rows: &PathRows, names: &[String; 2], radius_mm: f64) -
         }
     }
     faults
-}
-
-/// Variance of the residual, and the correlation of neighbouring residuals.
-pub(super) fn variance_and_correlation(rows: &PathRows, regression: &Regression) -> (f64, f64) {
-    let residual = &regression.residual;
-    let sum = regression.sum_of_squares();
-    let neighbours: f64 = (1..residual.len())
-        .filter(|i| rows.follows[*i])
-        .map(|i| residual[i] * residual[i - 1])
-        .sum();
-    let freedom = residual.len().saturating_sub(regression.beta.len()).max(1);
-    let correlation = if sum > 0.0 {
-        (neighbours / sum).clamp(0.0, 0.99)
-    } else {
-        0.0
-    };
-    (sum / freedom as f64, correlation)
 }
 
 /// The standard deviation for the uncertainties, mm.

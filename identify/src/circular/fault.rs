@@ -1,5 +1,7 @@
 //! A fault as columns of a regression, and the values that follow from its coefficients.
 
+use super::regression::Regression;
+use super::terms::PathRows;
 use crate::results::ParameterResult;
 
 /// A value of a fault: its name, a weight per column, and the conversion from internal units (mm) to its unit.
@@ -49,4 +51,28 @@ impl Fault {
         });
         self
     }
+}
+
+/// The columns of the regression: set-up first, then fault by fault.
+pub(super) fn columns(rows: &PathRows, faults: &[Fault]) -> Vec<Vec<f64>> {
+    let mut columns = rows.setup();
+    columns.extend(faults.iter().flat_map(|fault| fault.columns.iter().cloned()));
+    columns
+}
+
+/// Variance of the residual, and the correlation of neighbouring residuals.
+pub(super) fn variance_and_correlation(rows: &PathRows, regression: &Regression) -> (f64, f64) {
+    let residual = &regression.residual;
+    let sum = regression.sum_of_squares();
+    let neighbours: f64 = (1..residual.len())
+        .filter(|i| rows.follows[*i])
+        .map(|i| residual[i] * residual[i - 1])
+        .sum();
+    let freedom = residual.len().saturating_sub(regression.beta.len()).max(1);
+    let correlation = if sum > 0.0 {
+        (neighbours / sum).clamp(0.0, 0.99)
+    } else {
+        0.0
+    };
+    (sum / freedom as f64, correlation)
 }

@@ -5,8 +5,7 @@
 
 use statrs::distribution::{ChiSquared, ContinuousCDF};
 
-use super::diagnosis::{columns, variance_and_correlation};
-use super::fault::Fault;
+use super::fault::{Fault, columns, variance_and_correlation};
 use super::path::Path;
 use super::regression::{Orthonormal, Regression};
 use super::terms::PathRows;

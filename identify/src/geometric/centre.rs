@@ -86,7 +86,7 @@ impl CircleGeometry {
             let [u, v] = across.map(|k| from[k]);
             let radius = u.hypot(v);
             if radius < 1.0 {
-                return Err("the moving ball lies on the axis direction through the other ball, so its angle is undefined".into());
+                return Err("the moving ball lies on the line through the other ball along the axis, so its angle is undefined".into());
             }
             angle.push([v / radius, u / radius]);
         }

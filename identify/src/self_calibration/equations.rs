@@ -329,13 +329,13 @@ fn turning_axis(session: &Session, tests: &[&Test]) -> Result<usize, String> {
             .map(|axis| machine.axes[*axis].name.as_str())
             .collect();
         return Err(match names.len() {
-            0 => "no rotary axis axis_varies in these tests".into(),
+            0 => "no rotary axis turns in these tests".into(),
             _ => format!("axes {} turn; the method is for one", names.join(" and ")),
         });
     };
     if axis >= machine.workpiece_side {
         return Err(format!(
-            "axis `{}` axis_varies the tool; the method is for an axis that axis_varies the table",
+            "axis `{}` turns the tool; the method is for an axis that turns the table",
             machine.axes[axis].name
         ));
     }

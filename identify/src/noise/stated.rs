@@ -1,0 +1,35 @@
+//! Comparison of the stated noise with the noise of repeats.
+
+use statrs::distribution::{ChiSquared, ContinuousCDF};
+
+use super::PureError;
+use crate::problem::Problem;
+
+/// Ratio beyond which stated noise and noise of repeats disagree.
+const DISAGREEMENT_RATIO: f64 = 2.0;
+/// Significance level of this disagreement.
+const DISAGREEMENT_P: f64 = 0.001;
+
+/// A warning if repeated readings scatter by more than twice or less than half of the stated noise, significantly. `residuals` are those
+/// of any model, mm, test by test.
+pub fn stated_against_repeats(problem: &Problem<'_>, residuals: &[Vec<f64>]) -> Option<String> {
+    let stated_mm = problem.session.noise_mm.filter(|sigma| *sigma > 0.0)?;
+    let pure = PureError::of(&problem.tests, residuals, |test, row| {
+        !problem.rejected[test][row]
+    });
+    let sigma_mm = pure.sigma_mm()?;
+    let resolution_mm = problem.session.resolution_mm.unwrap_or(0.0) / 12.0_f64.sqrt();
+    let ratio = sigma_mm.max(resolution_mm) / stated_mm;
+    let freedom = pure.freedom as f64;
+    let below = ChiSquared::new(freedom).ok()?.cdf(freedom * ratio * ratio);
+    let by_chance = below.min(1.0 - below) > DISAGREEMENT_P / 2.0;
+    (!by_chance && !(1.0 / DISAGREEMENT_RATIO..=DISAGREEMENT_RATIO).contains(&ratio)).then(|| {
+        format!(
+            "the session states a noise of {} µm, and the repeatability is {:.3} µm ({} degrees of freedom): the uncertainties of a fit follow from \
+             the stated noise; correct `noise_um`, or omit it",
+            stated_mm * 1e3,
+            sigma_mm * 1e3,
+            pure.freedom
+        )
+    })
+}
