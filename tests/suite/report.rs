@@ -113,16 +113,12 @@ fn methods_and_next_tests_have_reports() {
     let at = |name: &str| folder.path().join(name);
     let written = |arguments: &[&str], name: &str| {
         let (page, json, plots) = (at(&format!("{name}.html")), at(&format!("{name}.json")), at(name));
-        let faces = [
-            "-q",
-            "--report",
-            text(&page),
-            "--json",
-            text(&json),
-            "--plots",
-            text(&plots),
+        let outputs = [
+            ["--report", text(&page)],
+            ["--json", text(&json)],
+            ["--plots", text(&plots)],
         ];
-        let output = abbe(&[arguments, &faces].concat());
+        let output = abbe(&[arguments, &["-q"], &outputs.concat()].concat());
         assert!(
             output.status.success(),
             "{}",
