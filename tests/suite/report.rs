@@ -17,7 +17,6 @@ fn session(path: &Path) -> Session {
 
 /// `∂L/∂error` to first order, derived independently of the chain: ball at (0, R, 0), spindle ball at (−D, 0, 0), so that for a rotation of A
 /// `L₀ = √(R² + D²)`, with `ca = cos A`, `sa = sin A` (Jiang (2014), Eqs. 3.20 and 3.21, to first order).
-///
 /// Jiang (2014): Xiaogeng Jiang, *Characterising Geometric Errors in Rotary Axes of 5-axis Machine Tools*, PhD thesis, University of Birmingham, 2014.
 #[test]
 fn sensitivities_agree_with_the_closed_form() {
