@@ -1,7 +1,7 @@
 //! Named points of a chain: the ball in the frame of each axis, and the bar between the balls.
 //!
-//! The chain records nothing about them. Equal expressions are one node, so transforming the point again, step by step, finds the nodes
-//! of the reading.
+//! The chain records nothing about them. Equal expressions are one node, so transforming the point again, step by step,
+//! finds the nodes of the reading.
 
 use std::collections::HashMap;
 
@@ -20,8 +20,9 @@ use crate::symbol::{NodeId, Operand, Symbol};
 /// A vector with a name, such as the workpiece ball in the frame of axis A.
 #[derive(Clone, Debug, PartialEq)]
 pub struct NamedVector {
-    /// `p` for a point on the workpiece side, `q` on the tool side, `b` for the bar, `u` for its unit vector. For a probe: `n`, `r`, `v`
-    /// and `u` for its step in R, the point one step ahead, the stylus and the step in the frame of the artefact.
+    /// `p` for a point on the workpiece side, `q` on the tool side, `b` for the bar, `u` for its unit vector. For a
+    /// probe: `n`, `r`, `v` and `u` for its step in R, the point one step ahead, the stylus and the step in the frame
+    /// of the artefact.
     pub letter: &'static str,
     /// The frame of its coordinates: an axis, or `R`; empty if it needs none.
     pub frame: String,

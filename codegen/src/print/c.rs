@@ -77,7 +77,8 @@ fn single(code: &Code<'_>) -> String {
     text + "}\n"
 }
 
-/// The function for columns of readings. Each column is a pointer of its own, so that the compiler knows that no two overlap.
+/// The function for columns of readings. Each column is a pointer of its own, so that the compiler knows that no two
+/// overlap.
 fn columns(code: &Code<'_>) -> String {
     let signature = format!(
         "void {}_columns(size_t n, const double *restrict lengths, const double *restrict axes, \

@@ -179,7 +179,8 @@ impl<'e> Code<'e> {
         (values, slopes)
     }
 
-    /// The lines of the header, without comment signs. Indices of arguments start at `first` and are enclosed in `brackets`.
+    /// The lines of the header, without comment signs. Indices of arguments start at `first` and are enclosed in
+    /// `brackets`.
     pub(crate) fn header(&self, first: usize, brackets: [char; 2]) -> Vec<String> {
         let at =
             |group: &str, number: usize| format!("{group}{}{}{}", brackets[0], number + first, brackets[1]);

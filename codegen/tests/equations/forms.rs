@@ -87,7 +87,8 @@ fn derivatives_of_the_chapter_5_test() {
     snapshot("chapter5_text_derivatives", &text);
 }
 
-/// Value and gradient of the chapter 5 test take at most 70 operations, counted by running the printed Rust over a counting scalar.
+/// Value and gradient of the chapter 5 test take at most 70 operations, counted by running the printed Rust over a
+/// counting scalar.
 #[test]
 fn operations_counted_by_running_the_printed_code() {
     let rustc = std::env::var("RUSTC").unwrap_or_else(|_| "rustc".to_string());
