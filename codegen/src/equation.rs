@@ -216,7 +216,10 @@ impl Equation {
 
 /// The basis functions of curves; expanded interval by interval they have hundreds of terms.
 fn curves(run: &Run<'_, Symbol<'_>>, parameters: &[Variable]) -> Vec<Operand> {
-    let of_curve = |parameter: &Variable| matches!(parameter, Variable::Coefficient(c) if matches!(c.effect.shape, Shape::Curve { .. }));
+    let of_curve = |parameter: &Variable| match parameter {
+        Variable::Coefficient(coefficient) => matches!(coefficient.effect.shape, Shape::Curve { .. }),
+        _ => false,
+    };
     let places = (0..parameters.len()).filter(|index| of_curve(&parameters[*index]));
     places
         .flat_map(|index| run.bases(index))

@@ -2,7 +2,8 @@
 //! length:
 //!
 //! ```text
-//! u = b/L, carried back through the chain frame by frame;   ∂L/∂e = a product with the vectors of the frame that e is an error of
+//! u = b/L, transformed back through the chain frame by frame
+//! ∂L/∂e = a product with the vectors of the frame that e is an error of
 //! ```
 
 use crate::equation::Equation;
