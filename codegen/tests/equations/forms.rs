@@ -48,7 +48,7 @@ fn code_of_the_chapter_5_test() {
         ..Options::default()
     };
     let equation = chapter5(&options);
-    for word in ["rust", "c", "python", "matlab"] {
+    for word in ["rust", "c", "python", "matlab", "julia"] {
         snapshot(&format!("chapter5_{word}"), &printed(&equation, word));
     }
 }
