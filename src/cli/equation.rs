@@ -22,8 +22,10 @@ use super::output::{self, Outputs};
 /// Examples of `abbe equation`.
 pub const HELP: &str = "Examples:
   abbe equation sessions/hermle-c600u/chapter5.toml --test A150 --as latex
-  abbe equation sessions/hermle-c600u/chapter5.toml --test C150 --order first --errors EX0C,EY0C,bar
-  abbe equation sessions/hermle-c600u/chapter5.toml --test A150 --as python --gradient --out a150.py";
+  abbe equation sessions/hermle-c600u/chapter5.toml --test C150 --order first \\
+      --errors EX0C,EY0C,bar
+  abbe equation sessions/hermle-c600u/chapter5.toml --test A150 --as python \\
+      --gradient --out a150.py";
 
 /// Examples of `abbe volumetric`.
 pub const VOLUMETRIC_HELP: &str = "Examples:
@@ -33,8 +35,8 @@ pub const VOLUMETRIC_HELP: &str = "Examples:
   abbe volumetric sessions/volumetric/machine.toml --map map.csv \\
       --functions sessions/volumetric/errors.toml --compensate
   abbe volumetric sessions/volumetric/machine.toml --map map2.csv \\
-      --functions sessions/volumetric/errors.toml --places 3 --axis A=30 --axis X:5 --tool-mm 0,0,-120 \\
-      --json map.json";
+      --functions sessions/volumetric/errors.toml --places 3 --axis A=30 --axis X:5 \\
+      --tool-mm 0,0,-120 --json map.json";
 
 /// The words of the output languages, as the registry lists them.
 fn languages() -> impl TypedValueParser<Value = &'static OutputLanguage> {
@@ -42,20 +44,20 @@ fn languages() -> impl TypedValueParser<Value = &'static OutputLanguage> {
 }
 
 #[derive(Clone, Copy, ValueEnum)]
-enum OrderWord {
+enum OrderArgument {
     Exact,
     Bilinear,
     First,
 }
 
 #[derive(Clone, Copy, ValueEnum)]
-enum RotationWord {
+enum RotationArgument {
     Exact,
     SmallAngle,
 }
 
 #[derive(Clone, Copy, ValueEnum)]
-enum SymbolsWord {
+enum SymbolsArgument {
     Literature,
     Iso,
 }
@@ -72,12 +74,12 @@ struct FormArguments {
     ///
     /// Example: --order first
     #[arg(long, value_enum, default_value = "exact")]
-    order: OrderWord,
+    order: OrderArgument,
     /// Rotation by error angles [default: as the machine file states].
     ///
     /// Example: --rotation small-angle
     #[arg(long, value_enum)]
-    rotation: Option<RotationWord>,
+    rotation: Option<RotationArgument>,
     /// Parameters in the equation, separated by commas; all others are zero. Errors (EX0C, e_x0c) or patterns of errors (E?0C); for a session also
     /// parameters of the instrument (bar, workpiece_ball.x) and declared effects (EZC~C:h2) [default: for a session its errors and declared effects,
     /// for a machine all errors].
@@ -89,7 +91,7 @@ struct FormArguments {
     ///
     /// Example: --symbols iso
     #[arg(long, value_enum, default_value = "literature")]
-    symbols: SymbolsWord,
+    symbols: SymbolsArgument,
     /// Add the derivatives with respect to all parameters in the equation: in code for every order; in text, LaTeX and Typst for the exact length of
     /// a bar.
     #[arg(long)]
@@ -128,22 +130,22 @@ pub struct VolumetricArguments {
 
 /// The parameters of an equation.
 #[derive(Default)]
-struct Kept {
+struct EquationParameters {
     errors: Vec<ErrorName>,
     /// Indices in the list of parameters of the instrument.
-    unknowns: Vec<usize>,
+    instrument: Vec<usize>,
     effects: Vec<Effect>,
 }
 
-impl Kept {
+impl EquationParameters {
     /// Reads names and patterns of errors, parameters of the instrument and effects.
     fn parse(
         names: &[String],
         machine: &Machine,
-        known: &[InstrumentParameter],
+        of_instrument: &[InstrumentParameter],
         effects: &[Effect],
-    ) -> Result<Kept, Failure> {
-        let mut kept = Kept::default();
+    ) -> Result<EquationParameters, Failure> {
+        let mut parameters = EquationParameters::default();
         for name in names {
             if pattern::is_pattern(name) {
                 let found = pattern::matching(machine, name);
@@ -153,29 +155,29 @@ impl Kept {
                     )));
                 }
                 for error in found {
-                    if !kept.errors.contains(&error) {
-                        kept.errors.push(error);
+                    if !parameters.errors.contains(&error) {
+                        parameters.errors.push(error);
                     }
                 }
                 continue;
             }
             if name.contains('~') {
-                kept.effects.extend(named(name, effects)?);
+                parameters.effects.extend(named(name, effects)?);
                 continue;
             }
             match Component::parse(name) {
-                Some(Component::Axis(error)) => kept.errors.push(error),
+                Some(Component::Axis(error)) => parameters.errors.push(error),
                 Some(Component::Instrument { thing, coordinate }) => {
-                    let place = known
+                    let place = of_instrument
                         .iter()
                         .position(|u| u.thing == thing && u.coordinate == coordinate);
-                    let unknown = |u: &InstrumentParameter| Variable::Instrument(*u).name();
-                    kept.unknowns.push(place.ok_or_else(|| {
-                        let has = match known {
+                    let name_of = |u: &InstrumentParameter| Variable::Instrument(*u).name();
+                    parameters.instrument.push(place.ok_or_else(|| {
+                        let has = match of_instrument {
                             [] => "an error vector has no parameters of an instrument".to_string(),
-                            known => format!(
+                            some => format!(
                                 "this instrument has {}",
-                                known.iter().map(unknown).collect::<Vec<_>>().join(", ")
+                                some.iter().map(name_of).collect::<Vec<_>>().join(", ")
                             ),
                         };
                         Failure::Other(format!("`{name}` is a parameter of another instrument; {has}"))
@@ -188,7 +190,7 @@ impl Kept {
                 }
             }
         }
-        Ok(kept)
+        Ok(parameters)
     }
 }
 
@@ -211,24 +213,24 @@ fn named(name: &str, effects: &[Effect]) -> Result<Vec<Effect>, Failure> {
 }
 
 impl FormArguments {
-    fn options(&self, kept: &Kept) -> Options {
+    fn options(&self, parameters: &EquationParameters) -> Options {
         Options {
             order: match self.order {
-                OrderWord::Exact => Order::Exact,
-                OrderWord::Bilinear => Order::Bilinear,
-                OrderWord::First => Order::First,
+                OrderArgument::Exact => Order::Exact,
+                OrderArgument::Bilinear => Order::Bilinear,
+                OrderArgument::First => Order::First,
             },
             rotation: self.rotation.map(|rotation| match rotation {
-                RotationWord::Exact => Rotation::Exact,
-                RotationWord::SmallAngle => Rotation::SmallAngle,
+                RotationArgument::Exact => Rotation::Exact,
+                RotationArgument::SmallAngle => Rotation::SmallAngle,
             }),
             symbols: match self.symbols {
-                SymbolsWord::Literature => Symbols::Literature,
-                SymbolsWord::Iso => Symbols::Iso,
+                SymbolsArgument::Literature => Symbols::Literature,
+                SymbolsArgument::Iso => Symbols::Iso,
             },
             gradient: self.gradient,
-            unknowns: kept.unknowns.clone(),
-            effects: kept.effects.clone(),
+            unknowns: parameters.instrument.clone(),
+            effects: parameters.effects.clone(),
         }
     }
 
@@ -288,17 +290,22 @@ pub fn run(arguments: &EquationArguments) -> Result<(), Failure> {
         .filter(|effect| effect.acts_in(&test.name))
         .cloned()
         .collect();
-    let mut kept = Kept::parse(
+    let mut parameters = EquationParameters::parse(
         &form.errors,
         &session.machine,
         session.instrument.unknowns(),
         &effects,
     )?;
     if form.errors.is_empty() {
-        kept.errors.clone_from(&session.unknowns);
-        kept.effects = effects;
+        parameters.errors.clone_from(&session.unknowns);
+        parameters.effects = effects;
     }
-    let equation = Equation::of(&session.machine, &source, &kept.errors, &form.options(&kept))?;
+    let equation = Equation::of(
+        &session.machine,
+        &source,
+        &parameters.errors,
+        &form.options(&parameters),
+    )?;
     form.write(&equation, &source)
 }
 
@@ -309,13 +316,18 @@ pub fn run_volumetric(arguments: &VolumetricArguments, quiet: bool) -> Result<()
     let read = std::iter::once(&arguments.machine).chain(arguments.map.functions());
     outputs.refuse_overwrite(read.map(PathBuf::as_path))?;
     if arguments.map.wanted() {
-        return super::map::run(&machine, &arguments.map, outputs.tables(quiet));
+        return super::map::run(
+            &arguments.machine,
+            &machine,
+            &arguments.map,
+            outputs.tables(quiet),
+        );
     }
     let form = &arguments.form;
-    let mut kept = Kept::parse(&form.errors, &machine, &[], &[])?;
+    let mut parameters = EquationParameters::parse(&form.errors, &machine, &[], &[])?;
     if form.errors.is_empty() {
-        kept.errors = pattern::errors(&machine);
+        parameters.errors = pattern::errors(&machine);
     }
-    let equation = Equation::volumetric(&machine, &kept.errors, &form.options(&kept))?;
+    let equation = Equation::volumetric(&machine, &parameters.errors, &form.options(&parameters))?;
     form.write(&equation, &ToolPoint)
 }

@@ -7,14 +7,12 @@ use std::path::PathBuf;
 use clap::{Args, ValueEnum};
 
 use super::failure::Failure;
-use super::message::{Kind, tell};
+use super::message::print_warnings;
 use super::report::ReportArguments;
 use super::{
-    CommonArguments, SessionArguments, compensation, csv, directions, geometric, output, read_session,
-    repeated, self_calibration,
+    CommonArguments, SessionArguments, compensation, csv, directions, geometric, json, read_session,
+    repeated, residuals, self_calibration,
 };
-
-pub use screen::noise;
 
 /// Examples of `abbe fit`.
 pub const HELP: &str = "Examples:
@@ -25,7 +23,7 @@ pub const HELP: &str = "Examples:
   abbe fit run2/session.toml --repeat run3/session.toml
   abbe fit run1/session.toml --method cone
   abbe fit run1/session.toml --monte-carlo 10000 --coverage 0.99
-  abbe fit sessions/r-test/measured/session.toml --views views.csv
+  abbe fit sessions/r-test/measured/session.toml --views views.csv --residuals residuals.csv
   abbe fit sessions/self-calibration/measured/session.toml --method self-calibration \\
       --monte-carlo 100000
 
@@ -70,6 +68,12 @@ pub struct FitArguments {
     /// Example: --views views.csv
     #[arg(long, value_name = "FILE.csv")]
     views: Option<PathBuf>,
+    /// Write reading and residual of every reading as CSV: test, run, line, axis positions, reading, residual in µm, residual over the noise standard
+    /// deviation, and whether the reading counts or is an outlier (full fit only).
+    ///
+    /// Example: --residuals residuals.csv
+    #[arg(long, value_name = "FILE.csv")]
+    residuals: Option<PathBuf>,
     #[command(flatten)]
     draws: self_calibration::DrawArguments,
     /// Compare with further sessions of the same plan: standard uncertainty from the scatter of the fits (Type A) beside that of each fit (Type B).
@@ -79,7 +83,7 @@ pub struct FitArguments {
         long,
         value_name = "SESSION",
         num_args = 1..,
-        conflicts_with_all = ["monte_carlo", "csv", "views", "report", "plots", "compensation"]
+        conflicts_with_all = ["monte_carlo", "csv", "views", "residuals", "report", "plots", "compensation"]
     )]
     repeat: Vec<PathBuf>,
     /// Write the result as CSV, one row per value (full fit only).
@@ -98,6 +102,7 @@ pub fn run(arguments: &FitArguments) -> Result<(), Failure> {
     let others = [
         arguments.csv.as_ref(),
         arguments.views.as_ref(),
+        arguments.residuals.as_ref(),
         arguments.report.file(),
     ];
     let outputs = arguments.common.outputs(&others)?;
@@ -113,6 +118,10 @@ pub fn run(arguments: &FitArguments) -> Result<(), Failure> {
     let session = read_session(&arguments.session, &outputs)?;
     if arguments.views.is_some() && arguments.method != Method::Full {
         let message = "`--views` writes residuals of the full fit: leave out `--method`";
+        return Err(Failure::CommandLine(message.into()));
+    }
+    if arguments.residuals.is_some() && arguments.method != Method::Full {
+        let message = "`--residuals` writes residuals of the full fit: leave out `--method`";
         return Err(Failure::CommandLine(message.into()));
     }
     if arguments.method != Method::Full && (arguments.csv.is_some() || arguments.compensation.wanted()) {
@@ -144,6 +153,9 @@ pub fn run(arguments: &FitArguments) -> Result<(), Failure> {
     if let Some(path) = &arguments.views {
         directions::write(&problem, &fit, path)?;
     }
+    if let Some(path) = &arguments.residuals {
+        residuals::write(&problem, &fit, path)?;
+    }
     let mut result = abbe::identify::fit::report(&problem, &fit);
     if let Some(draws) = &draws {
         abbe::identify::propagation::add_monte_carlo(&problem, &fit, draws, &mut result)?;
@@ -153,7 +165,7 @@ pub fn run(arguments: &FitArguments) -> Result<(), Failure> {
     }
     print_warnings(&result.warnings);
     if let Some(path) = &arguments.common.json {
-        output::write_json(path, &result)?;
+        json::write_of_session(path, &session, arguments.common.seed, &result)?;
     }
     if let Some(path) = &arguments.csv {
         csv::write_fit(path, &result)?;
@@ -166,11 +178,4 @@ pub fn run(arguments: &FitArguments) -> Result<(), Failure> {
             .write(&document, &method, &session, arguments.common.seed)?;
     }
     arguments.compensation.run(&problem, &fit, tables)
-}
-
-/// Writes warnings to standard error.
-pub fn print_warnings(warnings: &[String]) {
-    for warning in warnings {
-        tell(Kind::Warning, warning);
-    }
 }

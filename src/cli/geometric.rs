@@ -1,12 +1,13 @@
 //! `abbe fit --method circle|cone|two-plane`: a geometric method compared with the full fit.
 
-use abbe::identify::geometric::{self, Comparison, ComparisonRow, Method};
+use abbe::identify::geometric::{self, Comparison, Method};
 use abbe::model::session::Session;
 use abbe::model::words::counted;
 
 use super::failure::Failure;
 use super::report::ReportArguments;
-use super::{CommonArguments, fit, output, table};
+use super::{CommonArguments, json, message, screen, table};
+use crate::present::method::{error_header, error_rows};
 
 /// Runs a geometric method and the full fit on the same readings.
 pub fn run(
@@ -20,9 +21,9 @@ pub fn run(
     if tables {
         print(&result);
     }
-    fit::print_warnings(&result.warnings);
+    message::print_warnings(&result.warnings);
     if let Some(path) = &common.json {
-        output::write_json(path, &result)?;
+        json::write_of_session(path, session, common.seed, &result)?;
     }
     if report.asked() {
         let (problem, _) = abbe::identify::fit::prepare(session, common.seed)?;
@@ -37,7 +38,7 @@ fn print(result: &Comparison) {
     say!(
         "{}, {}",
         counted(result.readings, "reading"),
-        fit::noise(result.noise_um, &result.noise_source)
+        screen::noise(result.noise_um, &result.noise_source)
     );
     say!("\nOffset of each axis at the fixed ball from its nominal position:");
     let rows: Vec<Vec<String>> = result
@@ -83,37 +84,4 @@ fn print(result: &Comparison) {
         table::micrometres(result.method_rms_um),
         table::micrometres(result.rms_um)
     );
-}
-
-/// Header of [`error_rows`].
-pub fn error_header(result: &Comparison) -> [&str; 8] {
-    let method = result.method.as_str();
-    ["error", method, "u", "bias", "full fit", "u", "bias", "unit"]
-}
-
-/// The errors by the method and by the full fit, one row per error.
-pub fn error_rows(result: &Comparison) -> Vec<Vec<String>> {
-    let pair = |value: Option<f64>, u: Option<f64>| match (value, u) {
-        (Some(value), Some(u)) => table::value_and_u(value, u),
-        _ => ("–".to_string(), "–".to_string()),
-    };
-    // A bias that rounds to zero has no sign.
-    let rounded = |bias: f64| (bias * 1e4).round() / 1e4 + 0.0;
-    let bias = |bias: Option<f64>| bias.map_or("–".to_string(), |bias| format!("{:.4}", rounded(bias)));
-    let row = |row: &ComparisonRow| {
-        let (value, u) = pair(row.value, row.u);
-        let (full, full_u) = pair(row.full_value, row.full_u);
-        let [of_method, of_full] = [bias(row.bias), bias(row.full_bias)];
-        vec![
-            row.id.clone(),
-            value,
-            u,
-            of_method,
-            full,
-            full_u,
-            of_full,
-            table::unit(&row.unit),
-        ]
-    };
-    result.errors.iter().map(row).collect()
 }

@@ -67,3 +67,10 @@ pub fn visible(text: &str) -> String {
     }
     shown
 }
+
+/// Writes warnings to standard error.
+pub fn print_warnings(warnings: &[String]) {
+    for warning in warnings {
+        tell(Kind::Warning, warning);
+    }
+}

@@ -6,8 +6,9 @@ use abbe::identify::repeated::{self, Repeated, Scatter};
 use abbe::model::words::counted;
 
 use super::failure::Failure;
+use super::json::{self, Origin};
 use super::output::{self, Outputs};
-use super::{CommonArguments, SessionArguments, fit, read_session, table};
+use super::{CommonArguments, SessionArguments, message, read_session, table};
 
 /// Fits each session separately and compares the fits.
 pub fn run(
@@ -21,6 +22,7 @@ pub fn run(
         .map(PathBuf::as_path)
         .collect();
     let mut sessions = Vec::with_capacity(all.len());
+    let mut origin = Origin::default();
     for (place, path) in all.iter().enumerate() {
         let twice = all[..place].iter().any(|earlier| output::is_same(earlier, path));
         if twice {
@@ -34,6 +36,9 @@ pub fn run(
             ..first.clone()
         };
         let session = read_session(&arguments, outputs)?;
+        if common.json.is_some() {
+            origin.add(Origin::of_session(&session)?);
+        }
         let (problem, fit) = abbe::identify::fit::prepare(&session, common.seed)?;
         let report = abbe::identify::fit::report(&problem, &fit);
         let named: Vec<String> = report
@@ -41,7 +46,7 @@ pub fn run(
             .iter()
             .map(|warning| format!("{}: {warning}", path.display()))
             .collect();
-        fit::print_warnings(&named);
+        message::print_warnings(&named);
         sessions.push(repeated::Session::new(
             &path.display().to_string(),
             &problem,
@@ -53,7 +58,7 @@ pub fn run(
         print(&result);
     }
     if let Some(path) = &common.json {
-        output::write_json(path, &result)?;
+        json::write(path, origin, Some(common.seed), &result)?;
     }
     Ok(())
 }

@@ -280,3 +280,12 @@ pub fn command(verb: &str, session: &SessionArguments, options: &str) -> String 
     }
     words.join(" ")
 }
+
+/// The noise and its source in words. A residual is not called noise.
+pub fn noise(noise_um: f64, source: &str) -> String {
+    let figure = table::micrometres(noise_um);
+    match source {
+        "residual" => format!("residual of the declared model {figure} (no noise stated, no repeats)"),
+        other => format!("noise {figure} ({other})"),
+    }
+}

@@ -7,7 +7,7 @@ use abbe::model::words::counted;
 use clap::Args;
 
 use super::failure::Failure;
-use super::{CommonArguments, fit, output, screen, table};
+use super::{CommonArguments, json, message, screen, table};
 
 /// Monte Carlo propagation of a self-calibration or of the full fit.
 #[derive(Args)]
@@ -76,9 +76,9 @@ pub fn run(
     if tables {
         print(&result);
     }
-    fit::print_warnings(&result.warnings);
+    message::print_warnings(&result.warnings);
     if let Some(path) = &common.json {
-        output::write_json(path, &result)?;
+        json::write_of_session(path, session, common.seed, &result)?;
     }
     Ok(())
 }
@@ -87,7 +87,7 @@ fn print(result: &SelfCalibration) {
     say!(
         "{}, {}, residual {}",
         counted(result.readings, "reading"),
-        fit::noise(result.noise_um, &result.noise_source),
+        screen::noise(result.noise_um, &result.noise_source),
         table::micrometres(result.rms_um)
     );
     say!(

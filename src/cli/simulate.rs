@@ -12,7 +12,7 @@ use schemars::JsonSchema;
 use serde::Serialize;
 
 use super::failure::Failure;
-use super::{CommonArguments, SessionArguments, fit, folder, output, read_session, table};
+use super::{CommonArguments, SessionArguments, folder, json, message, output, read_session, table};
 
 /// Examples of `abbe simulate`, and the names of values.
 pub const HELP: &str = "Names of values are those of results, with a unit: errors (EY0A of ISO 230-1, e_y0a of the literature), set-up \
@@ -24,7 +24,8 @@ Examples:
   abbe simulate sessions/hermle-c600u/chapter5.toml --out run1 --error EY0A=35.3um \\
       --error EB0A=-1.29arcsec
   abbe simulate sessions/hermle-c600u/chapter5.toml --out run2 --draw-setups --seed 7
-  abbe simulate sessions/hermle-c600u/chapter5.toml --out run3 --draw-setups --seed 8 --noise-um 0.5
+  abbe simulate sessions/hermle-c600u/chapter5.toml --out run3 --draw-setups --seed 8 \\
+      --noise-um 0.5
 
 A file for --errors has one value per line, `EY0A = \"35.3 um\"`. Names with other characters than letters and digits are quoted.";
 
@@ -180,23 +181,31 @@ fn data_name(test: &str, taken: &[(String, String)]) -> String {
     name
 }
 
-/// What `abbe simulate` reports as JSON.
+/// The simulated session and the true values of its parameters.
 #[derive(Serialize, JsonSchema)]
-pub struct Report {
-    session: String,
+pub struct SimulationResult {
+    /// The session file that was written.
+    written_session: String,
+    /// Number of simulated readings.
     readings: usize,
+    /// Standard deviation of the simulated noise, µm.
     noise_um: f64,
+    /// Resolution of the readings, µm; `null` for none.
     resolution_um: Option<f64>,
-    seed: u64,
-    truth: Vec<Value>,
+    /// The parameters that are not zero.
+    truth: Vec<TrueValue>,
+    /// Warnings in words.
     warnings: Vec<String>,
 }
 
-/// A value that was put into the model.
+/// The true value of a parameter.
 #[derive(Serialize, JsonSchema)]
-struct Value {
+struct TrueValue {
+    /// Identifier: `EY0A`, `bar[A100]`, `EZC~C:h2.cos`.
     id: String,
+    /// The value, in `unit`.
     value: f64,
+    /// `um`, `arcsec`, …
     unit: String,
 }
 
@@ -206,16 +215,15 @@ fn report(
     arguments: &SimulateArguments,
     tables: bool,
 ) -> Result<(), Failure> {
-    let report = Report {
-        session: arguments.out.join("session.toml").display().to_string(),
+    let report = SimulationResult {
+        written_session: arguments.out.join("session.toml").display().to_string(),
         readings: simulated.readings.iter().map(|readings| readings.rows()).sum(),
         noise_um: simulated.noise_mm * 1e3,
         resolution_um: session.resolution_mm.map(|step| step * 1e3),
-        seed: arguments.common.seed,
         truth: simulated
             .truth
             .iter()
-            .map(|(id, value, unit)| Value {
+            .map(|(id, value, unit)| TrueValue {
                 id: id.clone(),
                 value: *value,
                 unit: unit.clone(),
@@ -224,23 +232,23 @@ fn report(
         warnings: simulated.warnings.clone(),
     };
     if tables {
-        print(session, &report);
+        print(session, &report, arguments.common.seed);
     }
-    fit::print_warnings(&report.warnings);
+    message::print_warnings(&report.warnings);
     if let Some(path) = &arguments.common.json {
-        output::write_json(path, &report)?;
+        json::write_of_session(path, session, arguments.common.seed, &report)?;
     }
     Ok(())
 }
 
-fn print(session: &Session, report: &Report) {
+fn print(session: &Session, report: &SimulationResult, seed: u64) {
     say!(
         "{}: {} of {}, noise {}, seed {}",
-        report.session,
+        report.written_session,
         counted(report.readings, "reading"),
         counted(session.tests.len(), "test"),
         table::micrometres(report.noise_um),
-        report.seed
+        seed
     );
     let rows: Vec<Vec<String>> = report
         .truth

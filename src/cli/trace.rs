@@ -7,7 +7,6 @@ use std::sync::Mutex;
 use std::time::Duration;
 
 use abbe::identify::plan::test_variations::TestVariations;
-use abbe::identify::results::EffectName;
 use abbe::identify::trace::separating_tests::separate_aliases;
 use abbe::identify::trace::{Progress, TraceOptions, library};
 use abbe::model::session::{rewrite, write};
@@ -19,7 +18,9 @@ use super::failure::Failure;
 use super::interrupt::Interrupts;
 use super::message::{Kind, tell};
 use super::report::ReportArguments;
-use super::{CommonArguments, SessionArguments, compensation, csv, fit, output, read_session};
+use super::{
+    CommonArguments, SessionArguments, compensation, csv, json, message, output, read_session, residuals,
+};
 
 /// Examples of `abbe trace`.
 pub const HELP: &str = "Examples:
@@ -27,7 +28,8 @@ pub const HELP: &str = "Examples:
   abbe trace sessions/hermle-c600u/measured/session.toml --all
   abbe trace sessions/hermle-c600u/measured/session.toml --json trace.json --csv trace.csv
   abbe trace sessions/hermle-c600u/measured/session.toml --report trace.html --write next.toml
-  abbe trace sessions/hermle-c600u/measured/session.toml --only EZC --exclude ~time --max-effects 2
+  abbe trace sessions/hermle-c600u/measured/session.toml --only EZC \\
+      --exclude ~time --max-effects 2
   abbe trace sessions/hermle-c600u/measured/session.toml --list
 
 The first screen answers in this order: verdict and uniqueness; residual before and after, also on held-out readings; \
@@ -64,7 +66,7 @@ pub struct TraceArguments {
     #[arg(long, value_name = "TEXT")]
     exclude: Vec<String>,
     /// List the candidates of the library with their detectability in this session, and stop.
-    #[arg(long, conflicts_with_all = ["json", "csv", "write", "report", "plots", "compensation", "max_effects"])]
+    #[arg(long, conflicts_with_all = ["json", "csv", "residuals", "write", "report", "plots", "compensation", "max_effects"])]
     list: bool,
     /// Write the session with the found effects declared.
     ///
@@ -76,6 +78,12 @@ pub struct TraceArguments {
     /// Example: --csv trace.csv
     #[arg(long, value_name = "FILE")]
     csv: Option<PathBuf>,
+    /// Write reading and residual of every reading as CSV, for the model with the found effects: test, run, line, axis positions, reading, residual in µm,
+    /// residual over the noise standard deviation, and whether the reading counts or is an outlier.
+    ///
+    /// Example: --residuals residuals.csv
+    #[arg(long, value_name = "FILE.csv")]
+    residuals: Option<PathBuf>,
     #[command(flatten)]
     compensation: compensation::CompensationArguments,
 }
@@ -87,6 +95,7 @@ pub fn run(arguments: &TraceArguments) -> Result<(), Failure> {
     let others = [
         arguments.csv.as_ref(),
         arguments.write.as_ref(),
+        arguments.residuals.as_ref(),
         arguments.report.file(),
     ];
     let outputs = arguments.common.outputs(&others)?;
@@ -137,9 +146,9 @@ pub fn run(arguments: &TraceArguments) -> Result<(), Failure> {
     if tables {
         screen::print(&trace, &arguments.session, arguments.all);
     }
-    fit::print_warnings(&trace.result.warnings);
+    message::print_warnings(&trace.result.warnings);
     if let Some(path) = &arguments.common.json {
-        output::write_json(path, &trace.result)?;
+        json::write_of_session(path, &session, arguments.common.seed, &trace.result)?;
     }
     if let Some(path) = &arguments.write {
         let data = arguments.session.data.as_deref();
@@ -161,6 +170,9 @@ pub fn run(arguments: &TraceArguments) -> Result<(), Failure> {
     }
     if let Some(path) = &arguments.csv {
         csv::write_trace(path, &trace.result)?;
+    }
+    if let Some(path) = &arguments.residuals {
+        residuals::write(&trace.after, &trace.after_fit, path)?;
     }
     if arguments.report.asked() {
         let document = crate::report::trace::document(&trace)?;
@@ -211,20 +223,4 @@ fn list(session: &abbe::model::session::Session, options: &TraceOptions) -> Resu
         }
     }
     Ok(())
-}
-
-/// An effect by component, driver and shape.
-pub fn name(effect: &EffectName) -> String {
-    let order = effect
-        .order
-        .map_or(String::new(), |order| format!(" order {order}"));
-    let tests = if effect.tests.is_empty() {
-        String::new()
-    } else {
-        format!(" in {}", effect.tests.join(", "))
-    };
-    format!(
-        "{} over {}: {}{order}{tests}",
-        effect.component, effect.driver, effect.shape
-    )
 }

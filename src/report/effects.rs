@@ -13,8 +13,8 @@ use super::plot::lines::{ACROSS, Lines, Mark, Series, UP, span};
 use super::plot::scale::{Scale, coordinate, polyline};
 use super::plot::{Plot, shortened};
 use crate::cli::table::shape_number;
-use crate::cli::trace::name;
 use crate::cli::uniqueness;
+use crate::present::effect::name;
 
 /// Maximum number of effects that are shown unfolded.
 const MAX_OPEN: usize = 4;

@@ -8,7 +8,8 @@ use base64::Engine;
 use base64::engine::general_purpose::STANDARD;
 use serde_json::{Value, json};
 
-use super::plots::{Column, SessionPlots, axes_of};
+use super::abscissae::axes_of;
+use super::plots::{Column, SessionPlots};
 
 /// Maximum number of sliders.
 pub const MAX_SLIDERS: usize = 40;

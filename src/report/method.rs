@@ -9,7 +9,7 @@ use super::format::{noise_sentence, typeset, um, unit, units, value_and_u};
 use super::plot::Plot;
 use super::plot::bars::{Row, Value, values};
 use super::readings;
-use crate::cli::geometric::{error_header, error_rows};
+use crate::present::method::{error_header, error_rows};
 
 /// Method of the comparison.
 pub fn method(result: &Comparison) -> Markup {

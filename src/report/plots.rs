@@ -2,10 +2,10 @@
 
 use abbe::identify::problem::Problem;
 use abbe::identify::series::{SessionSeries, TestSeries, is_round, lengths};
-use abbe::model::axis::AxisKind;
 use maud::html;
 use serde_json::json;
 
+use super::abscissae::{PlotAxis, axes_of};
 use super::decimate;
 use super::plot::lines::{ACROSS, Lines, Mark, Series, UP, span};
 use super::plot::polar::{DIVISIONS, PolarSize, Traversal, division_um};
@@ -199,8 +199,22 @@ impl<'d> SessionPlots<'d> {
             .then(|| self.polar(number, Column::Deviation, "trace", title, None))
     }
 
+    /// Whether the second model changes any residual. Otherwise the plots show one residual.
+    pub fn has_change(&self) -> bool {
+        self.series.tests.iter().any(|test| Self::change_um(test) > 0.0)
+    }
+
+    /// The residuals that the plots show.
+    fn residual_columns(&self) -> &'static [Column] {
+        if self.has_change() {
+            &[Column::Before, Column::After]
+        } else {
+            &[Column::After]
+        }
+    }
+
     /// Polar plots of the residuals of a test, at one magnification.
-    pub fn polar_residuals(&self, number: usize, models: [&str; 2]) -> Option<[Plot; 2]> {
+    pub fn polar_residuals(&self, number: usize, models: [&str; 2]) -> Option<Vec<Plot>> {
         let test = &self.series.tests[number];
         if !self.is_polar() || !test.way.is_angle {
             return None;
@@ -208,11 +222,18 @@ impl<'d> SessionPlots<'d> {
         let maximum = |values: &[f64]| values.iter().map(|v| v.abs()).fold(0.0, f64::max);
         let um =
             super::plot::scale::round_up(maximum(&test.before_um).max(maximum(&test.after_um)) / DIVISIONS);
-        Some([Column::Before, Column::After].map(|column| {
-            let model = models[usize::from(column == Column::After)];
+        let plot = |column: &Column| {
+            let model = models[usize::from(*column == Column::After)];
             let name = format!("residual-{}", column.name());
-            self.polar(number, column, &name, format!("{}: {model}", test.name), Some(um))
-        }))
+            self.polar(
+                number,
+                *column,
+                &name,
+                format!("{}: {model}", test.name),
+                Some(um),
+            )
+        };
+        Some(self.residual_columns().iter().map(plot).collect())
     }
 
     /// Deviation of a test against its abscissa. For separate poses: against each axis.
@@ -222,7 +243,7 @@ impl<'d> SessionPlots<'d> {
 
     /// Residuals of a test before and after, against the same abscissae.
     pub fn residuals(&self, number: usize) -> Vec<Plot> {
-        self.against(number, &[Column::Before, Column::After])
+        self.against(number, self.residual_columns())
     }
 
     fn against(&self, number: usize, columns: &[Column]) -> Vec<Plot> {
@@ -295,6 +316,7 @@ impl<'d> SessionPlots<'d> {
                 .filter(|(_, there)| *there)
                 .map(|(class, _)| (class, class.to_string()))
                 .collect(),
+            (false, _) if columns.len() == 1 => Vec::new(),
             (false, true) => vec![("before dots", "before".into()), ("after dots", "after".into())],
             (false, false) => vec![("before", "before".into()), ("after", "after".into())],
         };
@@ -320,7 +342,12 @@ impl<'d> SessionPlots<'d> {
             caption: if is_deviation {
                 "Observed minus nominal reading.".to_string()
             } else {
-                "Before: red, dashed or large. After: blue.".to_string()
+                let text = if columns.len() == 1 {
+                    ""
+                } else {
+                    "Before: red, dashed or large. After: blue."
+                };
+                text.to_string()
             },
             x: (x, format!("{}, {}", axis.name, axis.unit)),
             y: (y, format!("{quantity}, µm")),
@@ -350,47 +377,4 @@ pub fn class_of(forward: Option<bool>) -> &'static str {
         Some(false) => "backward",
         None => "plain",
     }
-}
-
-/// Abscissa of a plot of readings.
-pub struct PlotAxis {
-    /// Name.
-    pub name: String,
-    /// Unit.
-    pub unit: &'static str,
-    /// Whether it is an angle.
-    pub is_angle: bool,
-}
-
-/// Abscissae of a test with their values: the angle or position of its traversal, or for separate poses each axis that moves.
-pub fn axes_of(problem: &Problem<'_>, test: &TestSeries, number: usize) -> Vec<(PlotAxis, Vec<f64>)> {
-    let is_traversal = test.stretches.iter().all(|stretch| stretch.forward.is_some());
-    let readings = problem.tests[number].readings.as_ref();
-    let (Some(readings), false) = (readings, is_traversal || test.way.moving.is_empty()) else {
-        let unit = if test.way.is_angle {
-            "°"
-        } else if test.way.axis.is_some() {
-            "mm"
-        } else {
-            "number"
-        };
-        let axis = PlotAxis {
-            name: test.way.name.clone(),
-            unit,
-            is_angle: test.way.is_angle,
-        };
-        return vec![(axis, test.way.values.clone())];
-    };
-    let of = |axis: &usize| {
-        let is_angle = problem.session.machine.axes[*axis].kind == AxisKind::Rotary;
-        let display = if is_angle { 1.0_f64.to_degrees() } else { 1.0 };
-        let values = readings.positions[*axis].iter().map(|q| q * display).collect();
-        let axis = PlotAxis {
-            name: problem.session.machine.axes[*axis].name.clone(),
-            unit: if is_angle { "°" } else { "mm" },
-            is_angle,
-        };
-        (axis, values)
-    };
-    test.way.moving.iter().map(of).collect()
 }

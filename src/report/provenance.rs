@@ -3,6 +3,7 @@
 use std::path::PathBuf;
 
 use abbe::model::session::Session;
+use abbe::model::session::stamp::FileStamp;
 use sha2::{Digest, Sha256};
 
 /// An input file.
@@ -36,13 +37,7 @@ impl Provenance {
         let inputs = session
             .files
             .iter()
-            .map(|stamp| {
-                let unchanged = || stamp.changed().map_or(Ok(()), Err);
-                unchanged()?;
-                let input = input(stamp.file.clone()).map_err(|cause| cause.to_string())?;
-                unchanged()?;
-                Ok(input)
-            })
+            .map(stamped)
             .zip(&session.files)
             .map(|(input, stamp)| input.map_err(|cause| (stamp.file.clone(), cause)))
             .collect::<Result<_, _>>()?;
@@ -58,7 +53,23 @@ impl Provenance {
     }
 }
 
-fn input(path: PathBuf) -> std::io::Result<Input> {
+/// A file of a session with its checksum.
+///
+/// # Errors
+/// If the file has changed since the session was read: the change, or why it cannot be read.
+pub fn stamped(stamp: &FileStamp) -> Result<Input, String> {
+    let unchanged = || stamp.changed().map_or(Ok(()), Err);
+    unchanged()?;
+    let input = input(stamp.file.clone()).map_err(|cause| cause.to_string())?;
+    unchanged()?;
+    Ok(input)
+}
+
+/// A file with its checksum.
+///
+/// # Errors
+/// If it cannot be read.
+pub fn input(path: PathBuf) -> std::io::Result<Input> {
     let contents = std::fs::read(&path)?;
     Ok(Input {
         path: path.display().to_string(),

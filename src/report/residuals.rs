@@ -107,6 +107,7 @@ fn straight(session: &SessionPlots<'_>, number: usize, spectra: &[Spectrum], max
 /// Readings and RMS residuals of every test.
 fn test_table(session: &SessionPlots<'_>, models: [&str; 2]) -> Markup {
     let coordinates = session.series.coordinates;
+    let has_change = session.has_change();
     let rows: Vec<Vec<String>> = session
         .series
         .tests
@@ -115,18 +116,19 @@ fn test_table(session: &SessionPlots<'_>, models: [&str; 2]) -> Markup {
         .map(|(number, test)| {
             let [before, after] = session.rms_um(number);
             let readings = integer(test.after_um.len() / coordinates);
-            vec![test.name.clone(), readings, um(before), um(after)]
+            let mut row = vec![test.name.clone(), readings, um(after)];
+            if has_change {
+                row.insert(2, um(before));
+            }
+            row
         })
         .collect();
-    let table = table(
-        &[
-            "test",
-            "readings",
-            &format!("rms, {}", models[0]),
-            &format!("rms, {}", models[1]),
-        ],
-        &rows,
-    );
+    let rms = models.map(|model| format!("rms, {model}"));
+    let mut header = vec!["test", "readings", &rms[1]];
+    if has_change {
+        header.insert(2, &rms[0]);
+    }
+    let table = table(&header, &rows);
     if rows.len() > MAX_ROWS {
         folded(
             &format!("RMS residual of {}", counted(rows.len(), "test")),

@@ -14,8 +14,8 @@ use super::format::{integer, noise_sentence, unit, value_and_u};
 use super::plots::SessionPlots;
 use super::summary::{self, Quality};
 use super::{curves, effects, plausibility, readings, residuals, values};
-use crate::cli::trace::name;
 use crate::cli::uniqueness;
+use crate::present::effect::name;
 
 /// Method of a trace.
 pub fn method(result: &TraceResult) -> Markup {
@@ -79,14 +79,18 @@ pub fn document(trace: &TraceOutcome<'_>) -> Result<Document, IdentifyError> {
         &mut document,
         problem,
         &result.after.parameters,
-        Some(&result.before.parameters),
+        (!result.effects.is_empty()).then_some(result.before.parameters.as_slice()),
     );
     document.section("Values", html! { (section) (changes(problem, result)) });
     let section = residuals::section(
         &mut document,
         &session,
         &spectra,
-        ["declared model", "with the found effects"],
+        if result.effects.is_empty() {
+            ["declared model"; 2]
+        } else {
+            ["declared model", "with the found effects"]
+        },
     );
     document.section(
         "Residuals",

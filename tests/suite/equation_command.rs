@@ -366,7 +366,7 @@ fn invalid_requests_are_refused_with_the_reason() {
     refused(&["volumetric", text(&plan)], &["chapter5.toml:1", "no `chain`"]);
     refused(
         &["volumetric", text(&machine), "--errors", "bar"],
-        &["`bar`", "an error vector has none"],
+        &["`bar`", "an error vector has no parameters"],
     );
     let folder = tempfile::tempdir().unwrap();
     let broken = folder.path().join("machine.toml");

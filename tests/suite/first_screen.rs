@@ -155,10 +155,7 @@ fn a_plan_ends_in_its_worst_error_and_what_limits_it() {
             let setup = parts.iter().filter(|part| part["source"] != "noise");
             let share = |part: &&Value| part["share"].as_f64().unwrap();
             let largest = setup.max_by(|a, b| share(a).total_cmp(&share(b))).unwrap();
-            let named = format!(
-                "The set-up limits it, first {} (",
-                largest["source"].as_str().unwrap()
-            );
+            let named = format!("The set-up limits it: {} ", largest["source"].as_str().unwrap());
             assert!(verdict.contains(&named), "{named}");
         }
     }

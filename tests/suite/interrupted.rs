@@ -115,7 +115,7 @@ fn a_second_interruption_ends_the_program_at_once() {
     let mut result = BufReader::new(child.stdout.take().unwrap());
     let mut verdict = String::new();
     result.read_line(&mut verdict).unwrap();
-    assert_eq!(verdict, "Verdict: incomplete\n");
+    assert_eq!(verdict, "Verdict: incomplete, 1 effect\n");
     interrupt(&child);
     let began = Instant::now();
     while child.try_wait().unwrap().is_none() {

@@ -17,6 +17,8 @@ mod generated;
 mod geometric;
 mod help;
 mod interrupted;
+mod json_document;
+mod json_page;
 mod kept;
 mod kill;
 mod limits;

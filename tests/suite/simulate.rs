@@ -226,7 +226,7 @@ fn invalid_simulations_are_refused_and_nothing_is_written() {
         ),
         (
             &["--effect", "EZC~C:h2.phase=1deg"],
-            "without `EZC~C:h2.amplitude`",
+            "`EZC~C:h2.phase` has a value, but `EZC~C:h2.amplitude` has none",
         ),
         (&["--noise-um", "-1"], "a standard deviation in µm is expected"),
     ] {

@@ -120,6 +120,24 @@ pub fn in_directions(triangle: &Triangle, basis: &Mat<f64>) -> Triangle {
 /// # Errors
 /// If there are no parameters, the model cannot be evaluated, or the iterations do not converge.
 pub fn fit(problem: &Problem<'_>, start: Option<&[f64]>) -> Result<Fit, IdentifyError> {
+    finish(problem, minimum(problem, start)?)
+}
+
+/// The minimum of the sum of squares of readings and priors.
+pub(crate) struct Minimum {
+    /// Estimates of all parameters, in internal units (mm, rad).
+    pub beta: Vec<f64>,
+    /// The triangular factors of the folds at `beta`.
+    pub triangles: Vec<Triangle>,
+    /// The rank at the nominal machine.
+    pub rank: Rank,
+}
+
+/// Minimises the sum of squares in the identifiable directions, from the nominal machine or from given parameters.
+///
+/// # Errors
+/// If the model cannot be evaluated, or the iterations do not converge.
+pub(crate) fn minimum(problem: &Problem<'_>, start: Option<&[f64]>) -> Result<Minimum, IdentifyError> {
     let parameter_count = problem.parameters.list.len();
     let size: Vec<f64> = problem
         .parameters
@@ -154,16 +172,20 @@ pub fn fit(problem: &Problem<'_>, start: Option<&[f64]>) -> Result<Fit, Identify
     // After the last linearisation the parameters move by a step at which nonlinearity is negligible.
     let step: Vec<f64> = beta.iter().zip(&last).map(|(end, last)| end - last).collect();
     let triangles = triangles.iter().map(|triangle| triangle.after(&step)).collect();
-    finish(problem, beta, triangles, rank)
+    Ok(Minimum {
+        beta,
+        triangles,
+        rank,
+    })
 }
 
 /// Computes covariance, residuals, cross-validation and χ² at the solution.
-fn finish(
-    problem: &Problem<'_>,
-    beta: Vec<f64>,
-    triangles: Vec<Triangle>,
-    rank: Rank,
-) -> Result<Fit, IdentifyError> {
+fn finish(problem: &Problem<'_>, minimum: Minimum) -> Result<Fit, IdentifyError> {
+    let Minimum {
+        beta,
+        triangles,
+        rank,
+    } = minimum;
     let whole = whole(problem, &beta, &triangles);
     let covariance = parameter_covariance(&whole, &rank.identifiable_basis)?;
     let residuals = problem.residuals(&beta);

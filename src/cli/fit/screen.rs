@@ -44,7 +44,7 @@ fn quality(result: &FitResult) {
     say!(
         "{}, {}; residual {} rms, held out {} rms (leaving out {})",
         counted(result.readings, "reading"),
-        noise(result.noise_um, &result.noise_source),
+        screen::noise(result.noise_um, &result.noise_source),
         table::micrometres(result.rms_um),
         table::micrometres(result.heldout_rms_um),
         result.heldout_by
@@ -60,15 +60,6 @@ fn quality(result: &FitResult) {
         "{}",
         screen::rank(result.identifiable.len(), result.parameter_count, result.rank)
     );
-}
-
-/// The noise and its source in words. A residual is not called noise.
-pub fn noise(noise_um: f64, source: &str) -> String {
-    let figure = table::micrometres(noise_um);
-    match source {
-        "residual" => format!("residual of the declared model {figure} (no noise stated, no repeats)"),
-        other => format!("noise {figure} ({other})"),
-    }
 }
 
 /// Both propagations side by side, with the quoted interval.

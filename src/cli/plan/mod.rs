@@ -3,7 +3,7 @@
 mod details;
 mod digits;
 pub mod improve;
-mod patterns;
+pub mod patterns;
 mod screen;
 pub mod verdict;
 
@@ -16,9 +16,9 @@ use abbe::model::session::{Prior, Session};
 use clap::Args;
 
 use super::failure::Failure;
-use super::fit::print_warnings;
+use super::message::print_warnings;
 use super::report::ReportArguments;
-use super::{CommonArguments, SessionArguments, output, read_session};
+use super::{CommonArguments, SessionArguments, json, read_session};
 
 /// `abbe plan SESSION`
 #[derive(Args)]
@@ -92,9 +92,7 @@ pub fn run(arguments: &PlanArguments) -> Result<(), Failure> {
     let tables = outputs.tables(arguments.common.quiet);
     let mut session = read_session(&arguments.session, &outputs)?;
     if arguments.patterns.asked() {
-        return arguments
-            .patterns
-            .run(&session, arguments.common.json.as_deref(), tables);
+        return arguments.patterns.run(&session, &arguments.common, tables);
     }
     if let Some(u_um) = arguments.setup_um {
         set_priors(&mut session, positive("--setup-um", u_um)?);
@@ -130,7 +128,7 @@ pub fn run(arguments: &PlanArguments) -> Result<(), Failure> {
     }
     print_warnings(&analysis.warnings);
     if let Some(path) = &arguments.common.json {
-        output::write_json(path, &analysis)?;
+        json::write_of_session(path, &session, arguments.common.seed, &analysis)?;
     }
     if arguments.report.asked() {
         let (complete, noise) = plan::prepared(&session, &options)?;
@@ -144,11 +142,13 @@ pub fn run(arguments: &PlanArguments) -> Result<(), Failure> {
     Ok(())
 }
 
-/// The result of `--improve`, `--separate` and `--range`.
+/// Proposed tests, and ranges that suffice.
 #[derive(serde::Serialize, schemars::JsonSchema)]
 pub struct NextTest {
+    /// The tests that `--improve` or `--separate` proposes.
     #[serde(skip_serializing_if = "Option::is_none")]
     improvement: Option<plan::improve::Improvement>,
+    /// The sweeps that `--range` examines.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     ranges: Vec<plan::range::Shrinkage>,
 }
@@ -180,7 +180,7 @@ fn next_test(
     }
     let found = NextTest { improvement, ranges };
     if let Some(path) = &arguments.common.json {
-        output::write_json(path, &found)?;
+        json::write_of_session(path, session, arguments.common.seed, &found)?;
     }
     if arguments.report.asked() {
         let document =

@@ -1,14 +1,14 @@
 //! `abbe plan SESSION --patterns FILE.csv`: the change of the readings by each error alone.
 
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
-use abbe::identify::patterns::{Patterns, patterns, usual_sizes};
+use abbe::identify::patterns::{Pattern, Patterns, patterns, usual_sizes};
 use abbe::identify::quantity::Given;
 use abbe::model::session::Session;
 use clap::Args;
 
 use crate::cli::failure::Failure;
-use crate::cli::{output, table};
+use crate::cli::{CommonArguments, json, output, table};
 
 /// Trace patterns: the change of the readings by each error alone.
 #[derive(Args)]
@@ -46,7 +46,7 @@ impl PatternArguments {
     }
 
     /// Writes the patterns and prints their sizes.
-    pub fn run(&self, session: &Session, json: Option<&Path>, tables: bool) -> Result<(), Failure> {
+    pub fn run(&self, session: &Session, common: &CommonArguments, tables: bool) -> Result<(), Failure> {
         let given: Vec<Given> = self
             .errors
             .iter()
@@ -64,11 +64,21 @@ impl PatternArguments {
         if tables {
             print(&found);
         }
-        if let Some(path) = json {
-            output::write_json(path, &found.patterns)?;
+        if let Some(path) = &common.json {
+            let result = PatternSizes {
+                patterns: found.patterns,
+            };
+            json::write_of_session(path, session, common.seed, &result)?;
         }
         Ok(())
     }
+}
+
+/// Change of the readings of each test by each error alone.
+#[derive(serde::Serialize, schemars::JsonSchema)]
+pub struct PatternSizes {
+    /// Test by test, error by error.
+    patterns: Vec<Pattern>,
 }
 
 /// Prints the sizes of the patterns.

@@ -4,9 +4,9 @@ use abbe::identify::results::{EffectResult, ModelResult, TraceResult};
 use abbe::identify::trace::TraceOutcome;
 use abbe::model::words::counted;
 
-use super::name;
 use crate::cli::screen::{self, Estimates, Step, command};
-use crate::cli::{SessionArguments, fit, plausibility, table, uniqueness};
+use crate::cli::{SessionArguments, plausibility, table, uniqueness};
+use crate::present::effect::name;
 
 /// Prints the result of a trace of a session. With `all`, no list is folded.
 pub fn print(trace: &TraceOutcome<'_>, session: &SessionArguments, all: bool) {
@@ -60,7 +60,7 @@ fn verdict(result: &TraceResult) {
 /// The noise and its source in words. A residual is not called noise.
 fn noise(result: &TraceResult) -> String {
     if result.noise_source != "residual" || result.effects.is_empty() {
-        return fit::noise(result.noise_um, &result.noise_source);
+        return screen::noise(result.noise_um, &result.noise_source);
     }
     format!(
         "residual of the declared model {}, with the effects {} (no noise stated, no repeats)",
