@@ -6,11 +6,11 @@ use abbe::codegen::{Equation, Language, Options, Order, SessionTest, Symbols, Va
 use abbe::model::chain::Machine;
 use abbe::model::component::ErrorName;
 use abbe::model::effect::{Component, Effect};
+use abbe::model::files::{self, ReadOptions};
 use abbe::model::frames::Rotation;
 use abbe::model::instrument::InstrumentParameter;
 use abbe::model::pattern;
 use abbe::model::session::Session;
-use abbe::model::session::read::{self, ReadOptions};
 use clap::{Args, ValueEnum};
 
 use super::failure::Failure;
@@ -233,7 +233,7 @@ impl FormArguments {
 
 /// The session with its readings; without them where they cannot be read, which is said.
 fn read(arguments: &super::SessionArguments) -> Result<Session, Failure> {
-    let fault = match read::session(&arguments.session, &arguments.options()) {
+    let fault = match files::session(&arguments.session, &arguments.options()) {
         Ok(session) => return Ok(session),
         Err(fault) => fault,
     };
@@ -241,7 +241,7 @@ fn read(arguments: &super::SessionArguments) -> Result<Session, Failure> {
         read_data: false,
         ..arguments.options()
     };
-    match read::session(&arguments.session, &plan_only) {
+    match files::session(&arguments.session, &plan_only) {
         Ok(session) => {
             tell(Kind::Note, &fault.to_string());
             tell(
@@ -291,7 +291,7 @@ pub fn run(arguments: &EquationArguments) -> Result<(), Failure> {
 
 /// Runs `abbe volumetric`.
 pub fn run_volumetric(arguments: &VolumetricArguments, quiet: bool) -> Result<(), Failure> {
-    let machine = read::machine(&arguments.machine)?;
+    let machine = files::machine(&arguments.machine)?;
     let outputs = Outputs::new(arguments.form.out.iter().chain(arguments.map.outputs()))?;
     let read = std::iter::once(&arguments.machine).chain(arguments.map.functions());
     outputs.refuse_overwrite(read.map(PathBuf::as_path))?;

@@ -34,8 +34,8 @@ pub mod uniqueness;
 use std::path::PathBuf;
 use std::process::ExitCode;
 
+use abbe::model::files::{self, ReadOptions};
 use abbe::model::session::Session;
-use abbe::model::session::read::{self, ReadOptions};
 use clap::{Args, CommandFactory, Parser, Subcommand};
 
 use failure::Failure;
@@ -195,7 +195,7 @@ pub fn run() -> ExitCode {
 
 /// Reads the session that the arguments name, which no output may replace.
 fn read_session(arguments: &SessionArguments, outputs: &Outputs) -> Result<Session, Failure> {
-    let session = read::session(&arguments.session, &arguments.options())?;
+    let session = files::session(&arguments.session, &arguments.options())?;
     outputs.refuse_overwrite_of_session(&session)?;
     Ok(session)
 }

@@ -5,7 +5,7 @@ use abbe::identify::plan::results::PlanAnalysis;
 use abbe::identify::results::{FitResult, TraceResult};
 use abbe::identify::self_calibration::SelfCalibration;
 use abbe::identify::volumetric::Summary;
-use abbe::model::session::schema;
+use abbe::model::files::schema;
 use clap::{Args, ValueEnum};
 use schemars::JsonSchema;
 use schemars::generate::SchemaSettings;

@@ -4,8 +4,10 @@ use std::path::PathBuf;
 
 use abbe::identify::quantity::{self, Given};
 use abbe::identify::simulate::{Simulated, Simulation, simulate};
+use abbe::model::files::table::csv;
+use abbe::model::files::toml::{rewrite, write};
+use abbe::model::session::Session;
 use abbe::model::session::limits::{LARGEST, MIN_UM};
-use abbe::model::session::{Session, read, rewrite, write};
 use abbe::model::words::counted;
 use clap::Args;
 use schemars::JsonSchema;
@@ -105,7 +107,7 @@ pub fn run(arguments: &SimulateArguments) -> Result<(), Failure> {
     folder::write(&arguments.out, &files, arguments.force, |made| {
         // What is left behind has to be a session.
         let path = made.join("session.toml");
-        read::session(&path, &read::ReadOptions::default())?;
+        abbe::model::files::session(&path, &abbe::model::files::ReadOptions::default())?;
         Ok(())
     })?;
     report(
@@ -127,7 +129,7 @@ fn files(
     let mut data: Vec<(String, String)> = Vec::new();
     for (test, readings) in session.tests.iter().zip(&simulated.readings) {
         let name = data_name(&test.name, &data);
-        let text = write::readings_text(&session.machine, &test.station, readings);
+        let text = csv::text(&session.machine, &test.station, readings);
         data.push((test.name.clone(), name.clone()));
         files.push((name, text));
     }

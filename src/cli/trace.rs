@@ -7,7 +7,7 @@ use abbe::identify::plan::test_variations::TestVariations;
 use abbe::identify::results::{EffectName, ModelResult, TraceResult};
 use abbe::identify::trace::separating_tests::separate_aliases;
 use abbe::identify::trace::{Progress, TraceOptions, library};
-use abbe::model::session::{rewrite, write};
+use abbe::model::files::toml::{rewrite, write};
 use abbe::model::words::counted;
 use clap::Args;
 use indicatif::{ProgressBar, ProgressStyle};

@@ -6,8 +6,8 @@ use std::process::Command;
 
 use abbe::codegen::{Equation, Language, Options, Order, SessionTest, Symbols};
 use abbe::model::component::ErrorName;
+use abbe::model::files::{self, ReadOptions};
 use abbe::model::frames::Rotation;
-use abbe::model::session::read::{self, ReadOptions};
 
 use super::{abbe, ready, text};
 
@@ -42,7 +42,7 @@ pub(super) fn refused(arguments: &[&str], parts: &[&str]) {
 
 /// The equation of the test A150 from the library.
 fn of_library(language: Language, errors: &[&str], options: &Options) -> String {
-    let session = read::session(&plan(), &ReadOptions::default()).unwrap();
+    let session = files::session(&plan(), &ReadOptions::default()).unwrap();
     let test = session.tests.iter().find(|test| test.name == "A150").unwrap();
     let source = SessionTest::new(&session, test).unwrap();
     let named: Vec<ErrorName> = errors

@@ -13,12 +13,12 @@ use abbe::identify::results::FitResult;
 use abbe::model::axis::AxisKind;
 use abbe::model::component::{ErrorKind, ErrorName, Freedom};
 use abbe::model::effect::{Component, Driver, Effect, Shape};
+use abbe::model::files::{self, ReadOptions};
 use abbe::model::instrument::Station;
 use abbe::model::instrument::ballbar::BallBar;
 use abbe::model::instrument::rtest::{RTest, Setting};
 use abbe::model::sensitivity::{SlotValues, TestModel};
 use abbe::model::session::expression::Length;
-use abbe::model::session::read::{self, ReadOptions};
 use abbe::model::session::readings::Readings;
 use abbe::model::session::{Prior, Session, Test};
 use machines::{Drawn, cases, is_angle, machines, mirror_sign, point};
@@ -106,7 +106,7 @@ fn session(drawn: &Drawn, balls: &[([f64; 3], [f64; 3])], bar: bool, seed: u64) 
             .collect(),
         tests,
         // File names exist only in a session that was read from a file.
-        ..read::session(&ready, &ReadOptions::default()).unwrap()
+        ..files::session(&ready, &ReadOptions::default()).unwrap()
     }
 }
 

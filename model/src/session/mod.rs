@@ -1,34 +1,26 @@
 //! Sessions: a machine, a plan of tests, and the readings of the tests that were run.
 //!
-//! [`read::session`] reads a session file. The result is validated and in mm, rad and s.
+//! [`files`](crate::files) reads and writes sessions. A session is validated and in mm, rad and s.
 
-mod document;
 pub mod expression;
 pub mod limits;
 pub mod motion;
 pub mod placing;
 pub mod planned;
-mod plausibility;
-pub mod read;
+pub(crate) mod plausibility;
 pub mod readings;
-pub mod rewrite;
-mod runs;
-pub mod schema;
-mod spelling;
-pub mod stamp;
-mod table;
-mod trajectory;
-pub mod write;
+pub(crate) mod runs;
+pub(crate) mod trajectory;
 
 use std::path::PathBuf;
 
 use crate::chain::Machine;
 use crate::component::ErrorName;
 use crate::effect::Effect;
+use crate::files::stamp::FileStamp;
 use crate::instrument::rtest::Setting;
 use crate::instrument::{InstrumentKind, SharedBy, Station};
 use readings::Readings;
-use stamp::FileStamp;
 
 /// A validated session. Lengths in mm, angles in rad.
 #[derive(Clone, Debug)]

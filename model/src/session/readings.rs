@@ -5,7 +5,7 @@ use std::path::PathBuf;
 use crate::axis::AxisKind;
 use crate::chain::{AxisPosition, Machine};
 use crate::effect::DriverSample;
-use crate::session::stamp::FileStamp;
+use crate::files::stamp::FileStamp;
 
 /// The readings of one test, one row per reading, in mm, rad, s, °C.
 #[derive(Clone, Debug, Default)]

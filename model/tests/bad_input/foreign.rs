@@ -2,8 +2,8 @@
 
 use std::fs;
 
+use abbe_model::files::{self, ReadOptions};
 use abbe_model::session::Session;
-use abbe_model::session::read::{self, ReadOptions};
 
 use super::{DATA, MACHINE, SESSION, assert_contains, error_text, session};
 
@@ -14,7 +14,7 @@ fn with_bytes(lines: &str, data: &[u8]) -> Result<Session, abbe_model::ModelErro
     fs::write(folder.path().join("C100.csv"), data).unwrap();
     let text = SESSION.replace("[[test]]", &format!("{lines}\n[[test]]"));
     fs::write(folder.path().join("session.toml"), text).unwrap();
-    read::session(&folder.path().join("session.toml"), &ReadOptions::default())
+    files::session(&folder.path().join("session.toml"), &ReadOptions::default())
 }
 
 fn observed(read: &Session) -> &[f64] {

@@ -4,8 +4,8 @@ use std::fs;
 use std::path::Path;
 
 use abbe_model::ModelError;
+use abbe_model::files::{self, ReadOptions};
 use abbe_model::session::Session;
-use abbe_model::session::read::{self, ReadOptions};
 
 use super::{
     DATA, MACHINE, SESSION, assert_contains, error_text, session, with_data, with_machine, with_session,
@@ -50,7 +50,7 @@ impl Sandbox {
     fn read(&self, from: &str, to: &str, options: &ReadOptions) -> Result<Session, ModelError> {
         assert!(SESSION.contains(from));
         fs::write(self.at("inner/session.toml"), SESSION.replace(from, to)).unwrap();
-        read::session(&self.at("inner/session.toml"), options)
+        files::session(&self.at("inner/session.toml"), options)
     }
 
     fn data(&self, name: &str) -> Result<Session, ModelError> {
@@ -248,7 +248,7 @@ fn with_bytes(bytes: &[u8]) -> String {
     fs::write(at("machine.toml"), MACHINE).unwrap();
     fs::write(at("session.toml"), SESSION).unwrap();
     fs::write(at("C100.csv"), bytes).unwrap();
-    error_text(read::session(&at("session.toml"), &ReadOptions::default()))
+    error_text(files::session(&at("session.toml"), &ReadOptions::default()))
 }
 
 fn utf16(text: &str) -> Vec<u8> {
@@ -278,7 +278,7 @@ fn sparse(name: &str, bytes: u64) -> String {
     fs::write(at("session.toml"), SESSION.replace("C100.csv", name) + columns).unwrap();
     let file = fs::File::create(at(name)).unwrap();
     file.set_len(bytes).unwrap();
-    let read = |file: &Path| read::session(file, &ReadOptions::default());
+    let read = |file: &Path| files::session(file, &ReadOptions::default());
     error_text(read(&at(if name.ends_with(".toml") {
         name
     } else {
@@ -311,7 +311,7 @@ fn a_spreadsheet_that_unpacks_without_end() {
     writer.finish().unwrap();
     assert!(fs::metadata(at("C.xlsx")).unwrap().len() < 1 << 20);
     assert_contains(
-        &error_text(read::session(&at("session.toml"), &ReadOptions::default())),
+        &error_text(files::session(&at("session.toml"), &ReadOptions::default())),
         &[
             "C.xlsx:0",
             "unpacks to more than 268435456 bytes",
@@ -340,7 +340,7 @@ fn with_xml(text: &str) -> String {
     let columns = "columns = { deviation_um = \"READINGS\" }\n";
     fs::write(at("session.toml"), SESSION.replace("C100.csv", "C.b5r") + columns).unwrap();
     fs::write(at("C.b5r"), text).unwrap();
-    error_text(read::session(&at("session.toml"), &ReadOptions::default()))
+    error_text(files::session(&at("session.toml"), &ReadOptions::default()))
 }
 
 refused! {
@@ -415,6 +415,6 @@ fn folders_and_files_of_any_name_are_read() {
             SESSION.replace("C100.csv", "C 100.csv"),
         )
         .unwrap();
-        assert!(read::session(&inner.join("my session.toml"), &ReadOptions::default()).is_ok());
+        assert!(files::session(&inner.join("my session.toml"), &ReadOptions::default()).is_ok());
     }
 }

@@ -14,10 +14,10 @@ use std::path::Path;
 use abbe::identify::plan::{PlanOptions, analyse};
 use abbe::identify::quantity::Given;
 use abbe::identify::simulate::{Simulation, simulate};
+use abbe::model::files::{self, ReadOptions};
 use abbe::model::instrument::Station;
 use abbe::model::instrument::ballbar::BallBar;
 use abbe::model::session::planned::planned_session;
-use abbe::model::session::read::{self, ReadOptions};
 use abbe::model::session::{Session, Test};
 
 use self::draw::draw;
@@ -58,7 +58,7 @@ fn generated(code: &str, folder: &Path) -> Session {
         "{code}: {}",
         String::from_utf8_lossy(&run.stderr)
     );
-    read::session(&made.join("plan.toml"), &ReadOptions::default())
+    files::session(&made.join("plan.toml"), &ReadOptions::default())
         .unwrap_or_else(|fault| panic!("{code}: {fault}"))
 }
 

@@ -2,7 +2,7 @@
 
 use crate::axis::AxisKind;
 use crate::chain::Machine;
-use crate::session::spelling::suggestion;
+use crate::files::spelling::suggestion;
 
 /// A micrometre in mm.
 pub(crate) const MICROMETRE: f64 = 1e-3;

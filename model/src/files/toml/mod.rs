@@ -1,31 +1,33 @@
 //! Reader of machine and session files.
 
 mod data_folder;
+pub(crate) mod document;
 mod effect;
 mod format;
 mod machine;
 mod movement;
-pub(crate) mod quantity;
+pub mod rewrite;
 mod setups;
 mod shape;
 mod station;
 mod test;
 mod unknowns;
+pub mod write;
 
 use std::path::{Path, PathBuf};
 
 pub use machine::machine;
 
-use super::document::{Source, Table, Value};
-use super::expression::Length;
-use super::limits;
+use super::quantity::{self, MICROMETRE};
 use super::stamp::FileStamp;
 use super::table::{ColumnMapping, Format};
-use super::{Session, Test};
 use crate::chain::Machine;
 use crate::error::{Location, ModelError};
 use crate::instrument::InstrumentKind;
-use quantity::MICROMETRE;
+use crate::session::expression::Length;
+use crate::session::limits;
+use crate::session::{Session, Test};
+use document::{Source, Table, Value};
 
 /// Options for reading a session.
 #[derive(Clone, Debug)]

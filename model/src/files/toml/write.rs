@@ -1,122 +1,19 @@
-//! Writer for tables of readings, and for sessions with additional effects or data.
+//! Writer of additional effects and data files into the text of a session.
 
 use std::fmt::Write as _;
-use std::io::Write as _;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
 use super::document::Source;
-use super::readings::Readings;
-use super::table::r_test_columns;
 use crate::chain::Machine;
 use crate::effect::{Driver, Effect, Shape};
 use crate::error::ModelError;
-use crate::instrument::Station;
-
-/// Writes readings as a CSV file with our column names, atomically.
-///
-/// Numbers have up to twelve decimals of mm, degree or s, so that the rounding is far below any resolution.
-///
-/// # Errors
-/// If the file cannot be written; the previous file then remains.
-pub fn readings(
-    path: &Path,
-    machine: &Machine,
-    station: &Station<f64>,
-    readings: &Readings,
-) -> Result<(), ModelError> {
-    whole_file(path, &readings_text(machine, station, readings))
-}
-
-/// The text of [`readings`].
-pub fn readings_text(machine: &Machine, station: &Station<f64>, readings: &Readings) -> String {
-    let mut header = Vec::new();
-    if !readings.time_s.is_empty() {
-        header.push("time_s".to_string());
-    }
-    if !readings.run.is_empty() {
-        header.push("run".into());
-    }
-    for axis in &machine.axes {
-        header.push(axis.column(""));
-    }
-    if !readings.temperature_c.is_empty() {
-        header.push("temperature_c".into());
-    }
-    match station {
-        Station::BallBar(_) => header.push("length_mm".into()),
-        Station::Tracker(_) => header.extend(["px_mm", "py_mm", "pz_mm"].map(String::from)),
-        // A pose of a socket consists of axis positions only.
-        Station::Socket(_) => {}
-        Station::Probe(_) => header.push("distance_mm".into()),
-        Station::RTest(rtest) => {
-            header.extend(r_test_columns(rtest.sensors.is_some()).map(|name| format!("{name}_mm")));
-        }
-    }
-    let mut text = header.join(",");
-    text.push('\n');
-    for row in 0..readings.rows() {
-        let mut cells = Vec::with_capacity(header.len());
-        if let Some(time) = readings.time_s.get(row) {
-            cells.push(decimal(*time));
-        }
-        if let Some(run) = readings.run.get(row) {
-            cells.push(run.to_string());
-        }
-        for (axis, column) in machine.axes.iter().zip(&readings.positions) {
-            cells.push(decimal(axis.kind.to_display(column[row])));
-        }
-        if let Some(temperature) = readings.temperature_c.get(row) {
-            cells.push(decimal(*temperature));
-        }
-        if !matches!(station, Station::Socket(_)) {
-            let start = row * readings.coordinates;
-            for k in start..start + readings.coordinates {
-                cells.push(readings.observed.get(k).map_or(String::new(), |mm| decimal(*mm)));
-            }
-        }
-        text.push_str(&cells.join(","));
-        text.push('\n');
-    }
-    text
-}
-
-/// A number with the necessary decimals, at most twelve.
-fn decimal(value: f64) -> String {
-    let text = format!("{value:.12}");
-    let text = text.trim_end_matches('0').trim_end_matches('.');
-    if text == "-0" { "0".into() } else { text.into() }
-}
-
-/// Writes a file atomically: a temporary file in the same folder is renamed.
-///
-/// # Errors
-/// If it cannot be written; the previous file then remains.
-pub fn whole_file(path: &Path, text: &str) -> Result<(), ModelError> {
-    let fault = |cause: std::io::Error| ModelError::Output {
-        file: path.to_path_buf(),
-        cause: cause.to_string(),
-    };
-    let mut name = path.file_name().unwrap_or_default().to_os_string();
-    name.push(format!(".{}.part", std::process::id()));
-    let part: PathBuf = path.with_file_name(name);
-    let written = std::fs::File::create(&part).and_then(|mut file| {
-        file.write_all(text.as_bytes())?;
-        file.sync_all()
-    });
-    let renamed = written.and_then(|()| std::fs::rename(&part, path));
-    renamed.map_err(|cause| {
-        // Remove the incomplete file; a failure to remove it is not reported.
-        let _ = std::fs::remove_file(&part);
-        fault(cause)
-    })
-}
 
 /// A session's text with additional effects at its end; the existing text and its comments are unchanged.
 ///
 /// ```
 /// use abbe_model::chain::Machine;
 /// use abbe_model::effect::{Component, Driver, Effect, Shape};
-/// use abbe_model::session::write;
+/// use abbe_model::files::toml::write;
 ///
 /// let machine = Machine::from_code("wCAbYXZt")?;
 /// let effect = Effect {

@@ -6,28 +6,29 @@
 
 mod ballbar_xml;
 mod columns;
+pub mod csv;
 mod duplicates;
 pub(crate) mod encoding;
 mod required;
 mod rows;
-mod sheet;
+mod spreadsheet;
 
 use std::path::Path;
 
 use encoding_rs::Encoding;
 
 pub(crate) use ballbar_xml::{is_xml, read as read_xml};
-pub(crate) use columns::{ColumnMapping, ForeignColumn, r_test_columns};
+pub(crate) use columns::{ColumnMapping, ForeignColumn};
 
 use columns::{Column, Role};
 use rows::Rows;
 
 use crate::chain::Machine;
 use crate::error::{Location, ModelError};
+use crate::files::stamp::FileStamp;
 use crate::instrument::InstrumentKind;
 use crate::session::limits;
 use crate::session::readings::Readings;
-use crate::session::stamp::FileStamp;
 
 /// The layout of the rows of a file.
 #[derive(Clone, Debug, PartialEq)]
@@ -98,8 +99,8 @@ pub(crate) type BySocket = Vec<(Option<String>, Readings)>;
 /// Any cell that is not a finite number where one is expected, with file, line and column; missing or unknown columns; decreasing time;
 /// fewer than two readings.
 pub(crate) fn read(file: &Path, request: &Request<'_>) -> Result<(BySocket, Vec<String>), ModelError> {
-    let (stamp, mut rows) = if sheet::is_spreadsheet(file) {
-        let (stamp, rows) = sheet::rows(file, &request.format)?;
+    let (stamp, mut rows) = if spreadsheet::is_spreadsheet(file) {
+        let (stamp, rows) = spreadsheet::rows(file, &request.format)?;
         (stamp, Source::Sheet(rows.into_iter()))
     } else {
         let rows = Rows::open(file, &request.format)?;

@@ -5,9 +5,9 @@ use crate::axis::AxisKind;
 use crate::chain::Machine;
 use crate::component::{ErrorKind, ErrorName, Freedom};
 use crate::error::ModelError;
+use crate::files::toml::document::{Table, Value};
 use crate::instrument::InstrumentKind;
 use crate::pattern;
-use crate::session::document::{Table, Value};
 
 /// The errors to be estimated: those stated, or the defaults of the instrument.
 pub(super) fn unknowns(

@@ -2,8 +2,8 @@
 
 use super::quantity::MICROMETRE;
 use crate::error::ModelError;
+use crate::files::toml::document::Table;
 use crate::instrument::{InstrumentKind, InstrumentParameter, SharedBy, Station};
-use crate::session::document::Table;
 use crate::session::{Prior, SocketDistance, Test};
 
 /// Warnings about tests that share a mounted object and describe it differently.

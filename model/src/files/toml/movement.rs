@@ -3,8 +3,8 @@
 use super::{Context, quantity};
 use crate::axis::AxisKind;
 use crate::error::ModelError;
+use crate::files::toml::document::{Table, Value};
 use crate::instrument::Station;
-use crate::session::document::{Table, Value};
 use crate::session::motion::{FollowOffset, MAX_READINGS, Motion, programmed_over_path_feed};
 
 /// Default feed of a linear axis or a circle, mm/s: 1000 mm/min.

@@ -10,9 +10,9 @@ use std::path::{Path, PathBuf};
 
 use toml::de::DeTable;
 
-use super::spelling::known_names;
-use super::stamp::FileStamp;
 use crate::error::{Location, ModelError};
+use crate::files::spelling::known_names;
+use crate::files::stamp::FileStamp;
 pub(crate) use value::Value;
 
 /// Largest size of a machine or session file, bytes.

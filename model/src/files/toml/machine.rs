@@ -7,9 +7,9 @@ use crate::axis::{Axis, AxisKind};
 use crate::chain::Machine;
 use crate::code::StructuralCode;
 use crate::error::ModelError;
+use crate::files::spelling::known_names;
+use crate::files::toml::document::{Source, Table};
 use crate::frames::Rotation;
-use crate::session::document::{Source, Table};
-use crate::session::spelling::known_names;
 
 /// Reads a machine file.
 ///

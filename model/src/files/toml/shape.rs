@@ -9,8 +9,8 @@ use super::Context;
 use crate::axis::AxisKind;
 use crate::effect::{Driver, Shape};
 use crate::error::ModelError;
-use crate::session::document::{Table, Value};
-use crate::session::spelling::known_names;
+use crate::files::spelling::known_names;
+use crate::files::toml::document::{Table, Value};
 
 /// Default number of intervals of a curve.
 const CURVE_INTERVALS: usize = 12;

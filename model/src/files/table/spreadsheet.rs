@@ -14,7 +14,7 @@ use zip::ZipArchive;
 use super::Format;
 use super::rows::Row;
 use crate::error::{Location, ModelError};
-use crate::session::stamp::FileStamp;
+use crate::files::stamp::FileStamp;
 
 /// Whether a file is a spreadsheet, by its name.
 pub(super) fn is_spreadsheet(file: &Path) -> bool {

@@ -11,7 +11,7 @@ use quick_xml::events::{BytesStart, Event};
 
 use super::super::encoding;
 use crate::error::{Location, ModelError};
-use crate::session::stamp::FileStamp;
+use crate::files::stamp::FileStamp;
 
 /// Largest file size, bytes.
 const MAX_BYTES: u64 = 64 << 20;

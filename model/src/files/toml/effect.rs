@@ -6,8 +6,8 @@ use crate::axis::AxisKind;
 use crate::component::ErrorKind;
 use crate::effect::{Component, Driver, Effect, Shape};
 use crate::error::ModelError;
-use crate::session::document::{Table, Value};
-use crate::session::spelling::known_names;
+use crate::files::spelling::known_names;
+use crate::files::toml::document::{Table, Value};
 
 /// Reads one `[[effect]]`.
 pub(super) fn effect(

@@ -6,13 +6,13 @@ use super::station::{self, SetUp};
 use super::{Context, Declared, data_folder, format, movement, quantity};
 use crate::axis::AxisKind;
 use crate::error::ModelError;
+use crate::files::table::{self, Request};
+use crate::files::toml::document::{Table, Value};
 use crate::instrument::{InstrumentKind, Station};
-use crate::session::document::{Table, Value};
 use crate::session::expression::Length;
 use crate::session::motion::{self, Motion};
 use crate::session::planned;
 use crate::session::readings::Readings;
-use crate::session::table::{self, Request};
 use crate::session::{Test, plausibility, runs};
 
 /// The name of a test, which must be unique.

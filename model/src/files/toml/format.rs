@@ -1,8 +1,8 @@
 //! Reader of `[format]` and `[columns]`: the layout of foreign files.
 
 use crate::error::ModelError;
-use crate::session::document::{Table, Value};
-use crate::session::table::{ColumnMapping, ForeignColumn, Format, encoding};
+use crate::files::table::{ColumnMapping, ForeignColumn, Format, encoding};
+use crate::files::toml::document::{Table, Value};
 
 /// Reads `[format]`: separator, decimal, header, encoding, lines above the header; sheet of a spreadsheet; direction in a ball-bar file.
 pub(super) fn format(mut table: Table<'_>) -> Result<Format, ModelError> {

@@ -126,7 +126,7 @@ fn relative_path(folder: &Path, file: &Path) -> Result<String, ModelError> {
 /// The text without the tables of these names: `[name]`, `[[name]]` and their content.
 ///
 /// ```
-/// use abbe_model::session::rewrite::without_tables;
+/// use abbe_model::files::toml::rewrite::without_tables;
 ///
 /// let text = "[columns]\nJ1_rad = \"j1\"\n\n[[test]]\nname = \"A\"\n\n[[effect]]\nshape = \"lag\"\n";
 /// assert_eq!(without_tables(text, &["columns", "effect"]), "[[test]]\nname = \"A\"\n\n");

@@ -7,7 +7,7 @@ use std::path::{Path, PathBuf};
 
 use super::ReadOptions;
 use crate::error::ModelError;
-use crate::session::document::Value;
+use crate::files::toml::document::Value;
 
 /// The folder to which the names in a session are relative.
 pub(super) fn folder(session: &Path) -> &Path {

@@ -9,7 +9,7 @@ use encoding_rs::{Encoding, UTF_8, UTF_16BE, UTF_16LE};
 
 use super::{Format, encoding};
 use crate::error::{Location, ModelError};
-use crate::session::stamp::FileStamp;
+use crate::files::stamp::FileStamp;
 
 /// Largest length of one line, bytes.
 const LONGEST_LINE: u64 = 1 << 20;

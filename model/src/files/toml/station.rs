@@ -3,6 +3,7 @@
 use super::Context;
 use super::quantity::MICROMETRE;
 use crate::error::ModelError;
+use crate::files::toml::document::{Table, Value};
 use crate::frames::{Point, Rotation};
 use crate::instrument::ballbar::BallBar;
 use crate::instrument::probe::Probe;
@@ -11,7 +12,6 @@ use crate::instrument::socket::Socket;
 use crate::instrument::tracker::Tracker;
 use crate::instrument::{InstrumentKind, Station};
 use crate::session::Prior;
-use crate::session::document::{Table, Value};
 use crate::session::expression::Length;
 use crate::session::limits;
 

@@ -6,9 +6,9 @@ use super::encoding::name_of;
 use super::rows::Row;
 use super::{Request, number};
 use crate::error::{Location, ModelError};
+use crate::files::quantity::{self, Unit};
+use crate::files::spelling::suggestion;
 use crate::instrument::InstrumentKind;
-use crate::session::read::quantity::{self, Unit};
-use crate::session::spelling::suggestion;
 
 /// A line of `[columns]`: own name = foreign name.
 #[derive(Clone, Debug)]
