@@ -77,7 +77,7 @@ fn the_samples_of_an_independent_simulator_read() {
     let a = clean.machine.axis_index("A").unwrap();
     assert!((readings.positions[a][0] + 20.0_f64.to_radians()).abs() < 1e-15);
     assert_eq!(readings.observed[0], 99.9610);
-    assert_eq!(readings.line[0], 2);
+    assert_eq!(readings.line(0), Some(2));
 
     rows("rotary-axial-h3");
     let (circle, _) = rows("circle-backlash-y");

@@ -318,7 +318,7 @@ fn sockets_named_by_a_column_become_tests() {
     assert_eq!(session.effects[0].tests, ["T/a", "T/b"]);
     let readings = session.tests[0].readings.as_ref().unwrap();
     assert_eq!(readings.positions[0], [0.0, 0.001]);
-    assert_eq!(readings.line, [2, 4]);
+    assert_eq!(readings.origin.as_ref().unwrap().line, [2, 4]);
     assert_eq!(readings.observed, [0.0; 6]);
     assert_eq!(session.machine.axes[0].direction, [0.0, 0.0, 1.0]);
     assert_eq!(session.tests[0].spindle_setup, session.tests[1].spindle_setup);

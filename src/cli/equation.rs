@@ -6,7 +6,7 @@ use abbe::codegen::{Equation, Language, Options, Order, SessionTest, Symbols, Va
 use abbe::model::chain::Machine;
 use abbe::model::component::ErrorName;
 use abbe::model::effect::{Component, Effect};
-use abbe::model::files::{self, ReadOptions};
+use abbe::model::files::{self, ReadOptions, SourceMap};
 use abbe::model::frames::Rotation;
 use abbe::model::instrument::InstrumentParameter;
 use abbe::model::pattern;
@@ -232,23 +232,23 @@ impl FormArguments {
 }
 
 /// The session with its readings; without them where they cannot be read, which is said.
-fn read(arguments: &super::SessionArguments) -> Result<Session, Failure> {
-    let fault = match files::session(&arguments.session, &arguments.options()) {
-        Ok(session) => return Ok(session),
+fn read(arguments: &super::SessionArguments) -> Result<(Session, SourceMap), Failure> {
+    let fault = match files::session_with_sources(&arguments.session, &arguments.options()) {
+        Ok(found) => return Ok(found),
         Err(fault) => fault,
     };
     let plan_only = ReadOptions {
         read_data: false,
         ..arguments.options()
     };
-    match files::session(&arguments.session, &plan_only) {
-        Ok(session) => {
+    match files::session_with_sources(&arguments.session, &plan_only) {
+        Ok(found) => {
             tell(Kind::Note, &fault.to_string());
             tell(
                 Kind::Note,
                 "the equation does without readings; of a test without a planned movement every axis that it does not hold is taken to move",
             );
-            Ok(session)
+            Ok(found)
         }
         Err(_) => Err(fault.into()),
     }
@@ -257,8 +257,8 @@ fn read(arguments: &super::SessionArguments) -> Result<Session, Failure> {
 /// Runs `abbe equation`.
 pub fn run(arguments: &EquationArguments) -> Result<(), Failure> {
     let outputs = Outputs::new(&arguments.form.out)?;
-    let session = read(&arguments.session)?;
-    outputs.refuse_overwrite_of_session(&session)?;
+    let (session, sources) = read(&arguments.session)?;
+    outputs.refuse_overwrite_of_sources(&sources)?;
     let Some(test) = session.tests.iter().find(|test| test.name == arguments.test) else {
         let names: Vec<&str> = session.tests.iter().map(|test| test.name.as_str()).collect();
         let names = names.join(", ");

@@ -90,7 +90,7 @@ pub fn run(arguments: &FitArguments) -> Result<(), Failure> {
         }
         return repeated::run(&arguments.session, &arguments.repeat, &arguments.common, &outputs);
     }
-    let session = read_session(&arguments.session, &outputs)?;
+    let (session, sources) = read_session(&arguments.session, &outputs)?;
     if arguments.views.is_some() && arguments.method != Method::Full {
         let message = "`--views` shows what the full fit leaves as residual: leave `--method` out";
         return Err(Failure::CommandLine(message.into()));
@@ -117,7 +117,13 @@ pub fn run(arguments: &FitArguments) -> Result<(), Failure> {
     };
     if let Some(method) = geometric {
         arguments.draws.refuse()?;
-        return geometric::run(&session, method, &arguments.common, &arguments.faces, tables);
+        return geometric::run(
+            (&session, &sources),
+            method,
+            &arguments.common,
+            &arguments.faces,
+            tables,
+        );
     }
     let draws = arguments.draws.draws(arguments.common.seed)?;
     let (problem, fit) = abbe::identify::fit::prepare(&session, arguments.common.seed)?;
@@ -143,7 +149,7 @@ pub fn run(arguments: &FitArguments) -> Result<(), Failure> {
         let method = crate::report::fit::method(&result);
         arguments
             .faces
-            .write(&document, &method, &session, arguments.common.seed)?;
+            .write(&document, &method, (&session, &sources), arguments.common.seed)?;
     }
     arguments.compensation.run(&problem, &fit, tables)
 }

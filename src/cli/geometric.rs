@@ -1,6 +1,7 @@
 //! `abbe fit --method circle|cone|two-plane`: a geometric method beside the full fit.
 
 use abbe::identify::geometric::{self, Comparison, ComparisonRow, Method};
+use abbe::model::files::SourceMap;
 use abbe::model::session::Session;
 use abbe::model::words::counted;
 
@@ -10,7 +11,7 @@ use super::{CommonArguments, fit, output, table};
 
 /// Runs a geometric method and the full fit on the same readings.
 pub fn run(
-    session: &Session,
+    (session, sources): (&Session, &SourceMap),
     method: Method,
     common: &CommonArguments,
     faces: &ReportArguments,
@@ -28,7 +29,7 @@ pub fn run(
         let (problem, _) = abbe::identify::fit::prepare(session, common.seed)?;
         let document = crate::report::method::document(&problem, &result);
         let method = crate::report::method::method(&result);
-        faces.write(&document, &method, session, common.seed)?;
+        faces.write(&document, &method, (session, sources), common.seed)?;
     }
     Ok(())
 }

@@ -34,7 +34,7 @@ pub mod uniqueness;
 use std::path::PathBuf;
 use std::process::ExitCode;
 
-use abbe::model::files::{self, ReadOptions};
+use abbe::model::files::{self, ReadOptions, SourceMap};
 use abbe::model::session::Session;
 use clap::{Args, CommandFactory, Parser, Subcommand};
 
@@ -193,9 +193,9 @@ pub fn run() -> ExitCode {
     }
 }
 
-/// Reads the session that the arguments name, which no output may replace.
-fn read_session(arguments: &SessionArguments, outputs: &Outputs) -> Result<Session, Failure> {
-    let session = files::session(&arguments.session, &arguments.options())?;
-    outputs.refuse_overwrite_of_session(&session)?;
-    Ok(session)
+/// Reads the session that the arguments name, with its sources, which no output may replace.
+fn read_session(arguments: &SessionArguments, outputs: &Outputs) -> Result<(Session, SourceMap), Failure> {
+    let (session, sources) = files::session_with_sources(&arguments.session, &arguments.options())?;
+    outputs.refuse_overwrite_of_sources(&sources)?;
+    Ok((session, sources))
 }

@@ -33,7 +33,7 @@ pub fn run(
             session: path.to_path_buf(),
             ..first.clone()
         };
-        let session = read_session(&arguments, outputs)?;
+        let (session, _) = read_session(&arguments, outputs)?;
         let (problem, fit) = abbe::identify::fit::prepare(&session, common.seed)?;
         let report = abbe::identify::fit::report(&problem, &fit);
         let named: Vec<String> = report

@@ -63,7 +63,7 @@ pub fn run(arguments: &TraceArguments) -> Result<(), Failure> {
     ];
     let outputs = arguments.common.outputs(&others)?;
     let tables = outputs.tables(arguments.common.quiet);
-    let session = read_session(&arguments.session, &outputs)?;
+    let (session, sources) = read_session(&arguments.session, &outputs)?;
     let options = TraceOptions {
         seed: arguments.common.seed,
         max_effects: arguments.max_effects,
@@ -115,14 +115,14 @@ pub fn run(arguments: &TraceArguments) -> Result<(), Failure> {
     }
     if let Some(path) = &arguments.write {
         let data = arguments.session.data.as_deref();
-        let text = rewrite::relocated(&session.text, &session.file, output::folder_of(path), data)?;
+        let text = rewrite::relocated(&sources.text, &sources.file, output::folder_of(path), data)?;
         let mut next = write::with_effects(&text, &trace.effects, &session.machine);
         if trace.result.interrupted {
             let interruption = trace.result.interruption();
             next = format!("# The trace was {interruption}: effects may be missing.\n{next}");
         }
         output::write_whole(path, next.as_bytes())?;
-        let [own, there] = [&session.file, path].map(|file| output::folder_of(file).canonicalize().ok());
+        let [own, there] = [&sources.file, path].map(|file| output::folder_of(file).canonicalize().ok());
         if own != there {
             let note = format!(
                 "{} names its machine and data where they are; commands read it with --allow-outside",
@@ -139,7 +139,7 @@ pub fn run(arguments: &TraceArguments) -> Result<(), Failure> {
         let method = crate::report::trace::method(&trace.result);
         arguments
             .faces
-            .write(&document, &method, &session, arguments.common.seed)?;
+            .write(&document, &method, (&session, &sources), arguments.common.seed)?;
     }
     if trace.result.interrupted {
         if arguments.compensation.wanted() {

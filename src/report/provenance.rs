@@ -2,6 +2,7 @@
 
 use std::path::PathBuf;
 
+use abbe::model::files::SourceMap;
 use abbe::model::session::Session;
 use sha2::{Digest, Sha256};
 
@@ -28,12 +29,15 @@ pub struct Provenance {
 }
 
 impl Provenance {
-    /// Of a session that was read.
+    /// Of a session that was read, with its sources.
     ///
     /// # Errors
     /// If a file is not what was read a moment ago, so that a checksum would be that of something else: its path, and why.
-    pub fn of(session: &Session, seed: u64) -> Result<Provenance, (PathBuf, String)> {
-        let inputs = session
+    pub fn of(
+        (session, sources): (&Session, &SourceMap),
+        seed: u64,
+    ) -> Result<Provenance, (PathBuf, String)> {
+        let inputs = sources
             .files
             .iter()
             .map(|stamp| {
@@ -43,7 +47,7 @@ impl Provenance {
                 same()?;
                 Ok(found)
             })
-            .zip(&session.files)
+            .zip(&sources.files)
             .map(|(found, stamp)| found.map_err(|fault| (stamp.file.clone(), fault)))
             .collect::<Result<_, _>>()?;
         Ok(Provenance {

@@ -68,7 +68,6 @@ fn session(drawn: &Drawn, balls: &[([f64; 3], [f64; 3])], bar: bool, seed: u64) 
         };
         let mut readings = Readings {
             run: (0..rows).map(|row| (row / ROWS_A_RUN) as i64 + 1).collect(),
-            line: (1..=rows).collect(),
             positions: machine
                 .axes
                 .iter()
@@ -105,7 +104,6 @@ fn session(drawn: &Drawn, balls: &[([f64; 3], [f64; 3])], bar: bool, seed: u64) 
             .map(|slot| machine.error_name(slot))
             .collect(),
         tests,
-        // File names exist only in a session that was read from a file.
         ..files::session(&ready, &ReadOptions::default()).unwrap()
     }
 }

@@ -2,6 +2,9 @@
 //!
 //! [`files`](crate::files) reads and writes sessions. A session is validated and in mm, rad and s.
 
+pub mod build;
+pub(crate) mod check;
+pub mod defaults;
 pub mod expression;
 pub mod limits;
 pub mod motion;
@@ -9,15 +12,13 @@ pub mod placing;
 pub mod planned;
 pub(crate) mod plausibility;
 pub mod readings;
-pub(crate) mod runs;
+mod runs;
+pub(crate) mod setups;
 pub(crate) mod trajectory;
-
-use std::path::PathBuf;
 
 use crate::chain::Machine;
 use crate::component::ErrorName;
 use crate::effect::Effect;
-use crate::files::stamp::FileStamp;
 use crate::instrument::rtest::Setting;
 use crate::instrument::{InstrumentKind, SharedBy, Station};
 use readings::Readings;
@@ -25,14 +26,6 @@ use readings::Readings;
 /// A validated session. Lengths in mm, angles in rad.
 #[derive(Clone, Debug)]
 pub struct Session {
-    /// The session file.
-    pub file: PathBuf,
-    /// The text of the session file.
-    pub text: String,
-    /// The text of the machine file, if the session names one.
-    pub machine_text: Option<String>,
-    /// All files that were read: the session, its machine, its data.
-    pub files: Vec<FileStamp>,
     /// The machine.
     pub machine: Machine,
     /// Named lengths in the order of the file, mm.

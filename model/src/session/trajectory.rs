@@ -174,7 +174,6 @@ fn traversals(
             readings
                 .time_s
                 .push(start_s + (along[here] - along[origin]).abs() / speed);
-            readings.line.push(readings.line.len() + 1);
         }
         start_s = readings.time_s.last().copied().unwrap_or(0.0) + BETWEEN_RUNS_S;
     }

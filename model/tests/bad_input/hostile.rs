@@ -4,7 +4,7 @@ use std::fs;
 use std::path::Path;
 
 use abbe_model::ModelError;
-use abbe_model::files::{self, ReadOptions};
+use abbe_model::files::{self, ReadOptions, SourceMap};
 use abbe_model::session::Session;
 
 use super::{
@@ -55,6 +55,13 @@ impl Sandbox {
 
     fn data(&self, name: &str) -> Result<Session, ModelError> {
         self.read("\"C100.csv\"", &format!("\"{name}\""), &ReadOptions::default())
+    }
+
+    /// With a data file of this name, the session and its sources.
+    fn with_sources(&self, name: &str) -> Result<(Session, SourceMap), ModelError> {
+        let text = SESSION.replace("\"C100.csv\"", &format!("\"{name}\""));
+        fs::write(self.at("inner/session.toml"), text).unwrap();
+        files::session_with_sources(&self.at("inner/session.toml"), &ReadOptions::default())
     }
 
     fn machine(&self, name: &str) -> Result<Session, ModelError> {
@@ -362,32 +369,32 @@ fn a_pipe_is_read_as_a_stream() {
         let pipe = pipe.clone();
         move || fs::write(pipe, DATA).unwrap()
     });
-    let session = sandbox.data("pipe.csv").unwrap();
+    let (session, sources) = sandbox.with_sources("pipe.csv").unwrap();
     writer.join().unwrap();
     assert_eq!(session.tests[0].readings.as_ref().unwrap().rows(), 4);
-    let stamp = session.files.iter().find(|stamp| stamp.file == pipe).unwrap();
+    let stamp = sources.files.iter().find(|stamp| stamp.file == pipe).unwrap();
     assert!(stamp.changed().unwrap().contains("can be read only once"));
 }
 
 #[test]
 fn changed_files_are_detected() {
     let sandbox = Sandbox::new();
-    let session = sandbox.data("C100.csv").unwrap();
-    let names: Vec<_> = session
+    let (_, sources) = sandbox.with_sources("C100.csv").unwrap();
+    let names: Vec<_> = sources
         .files
         .iter()
         .map(|stamp| stamp.file.file_name().unwrap().to_str().unwrap())
         .collect();
     assert_eq!(names, ["session.toml", "machine.toml", "C100.csv"]);
-    assert!(session.files.iter().all(|stamp| stamp.changed().is_none()));
+    assert!(sources.files.iter().all(|stamp| stamp.changed().is_none()));
     fs::write(sandbox.at("inner/C100.csv"), format!("{DATA}4,1,300,100\n")).unwrap();
     assert_eq!(
-        session.files[2].changed().unwrap(),
+        sources.files[2].changed().unwrap(),
         "it has changed since it was read"
     );
     fs::remove_file(sandbox.at("inner/C100.csv")).unwrap();
     assert!(
-        session.files[2]
+        sources.files[2]
             .changed()
             .unwrap()
             .starts_with("it no longer exists")

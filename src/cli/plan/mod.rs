@@ -7,6 +7,7 @@ mod tables;
 
 use abbe::identify::plan::clearance::Clearance;
 use abbe::identify::plan::{self, PlanOptions};
+use abbe::model::files::SourceMap;
 use abbe::model::instrument::Station;
 use abbe::model::instrument::rtest::Setting;
 use abbe::model::session::limits::{LARGEST, MIN_UM};
@@ -71,7 +72,7 @@ pub fn run(arguments: &PlanArguments) -> Result<(), Failure> {
         .common
         .outputs(&[arguments.patterns.file(), arguments.faces.file()])?;
     let tables = outputs.tables(arguments.common.quiet);
-    let mut session = read_session(&arguments.session, &outputs)?;
+    let (mut session, sources) = read_session(&arguments.session, &outputs)?;
     if arguments.patterns.asked() {
         return arguments
             .patterns
@@ -97,7 +98,7 @@ pub fn run(arguments: &PlanArguments) -> Result<(), Failure> {
         reach_mm: arguments.improve.reach_mm()?,
     };
     if arguments.improve.asked() || arguments.range {
-        return next_test(arguments, &session, &options, tables);
+        return next_test(arguments, (&session, &sources), &options, tables);
     }
     let mut analysis = plan::analyse(&session, &options)?;
     if let Some(sizes) = &arguments.clearance_mm {
@@ -117,7 +118,7 @@ pub fn run(arguments: &PlanArguments) -> Result<(), Failure> {
         let method = crate::report::plan::method(&analysis);
         arguments
             .faces
-            .write(&document, &method, &session, arguments.common.seed)?;
+            .write(&document, &method, (&session, &sources), arguments.common.seed)?;
     }
     Ok(())
 }
@@ -133,7 +134,7 @@ pub struct NextTest {
 
 fn next_test(
     arguments: &PlanArguments,
-    session: &Session,
+    (session, sources): (&Session, &SourceMap),
     options: &PlanOptions,
     tables: bool,
 ) -> Result<(), Failure> {
@@ -166,7 +167,7 @@ fn next_test(
         let method = crate::report::next_test::method();
         arguments
             .faces
-            .write(&document, &method, session, arguments.common.seed)?;
+            .write(&document, &method, (session, sources), arguments.common.seed)?;
     }
     Ok(())
 }

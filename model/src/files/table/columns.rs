@@ -3,32 +3,13 @@
 use std::path::Path;
 
 use super::encoding::name_of;
-use super::rows::Row;
-use super::{Request, number};
+use super::number::number;
+use super::request::{ColumnMapping, ForeignColumn, Request};
+use super::row::Row;
 use crate::error::{Location, ModelError};
 use crate::files::quantity::{self, Unit};
 use crate::files::spelling::suggestion;
 use crate::instrument::InstrumentKind;
-
-/// A line of `[columns]`: own name = foreign name.
-#[derive(Clone, Debug)]
-pub(crate) struct ColumnMapping {
-    /// Our name, which includes the unit.
-    pub own: String,
-    /// The foreign name or number.
-    pub foreign: ForeignColumn,
-    /// The location of the line.
-    pub location: Location,
-}
-
-/// The identification of a foreign column.
-#[derive(Clone, Debug, PartialEq)]
-pub(crate) enum ForeignColumn {
-    /// By the header.
-    Name(String),
-    /// From 1.
-    Number(usize),
-}
 
 /// The content of a column.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -62,7 +43,7 @@ impl Role {
             "time_s" => return Some(Role::Time),
             "run" => return Some(Role::Run),
             "temperature_c" => return Some(Role::Temperature),
-            "socket" if request.instrument == InstrumentKind::Socket => return Some(Role::Socket),
+            "socket" if request.instrument() == InstrumentKind::Socket => return Some(Role::Socket),
             _ => {}
         }
         if let Some((axis, unit)) = quantity::axis_position(request.machine, name) {
@@ -70,7 +51,7 @@ impl Role {
         }
         let (what, unit) = name.rsplit_once('_')?;
         let unit = Unit::of_length(unit)?;
-        match (request.instrument, what) {
+        match (request.instrument(), what) {
             (InstrumentKind::BallBar, "length") => Some(Role::Length(unit)),
             (InstrumentKind::BallBar, "deviation") => Some(Role::Deviation(unit)),
             (InstrumentKind::Probe, "distance") => Some(Role::Length(unit)),
@@ -79,7 +60,7 @@ impl Role {
             (InstrumentKind::Tracker, "py") => Some(Role::Coordinate(1, unit)),
             (InstrumentKind::Tracker, "pz") => Some(Role::Coordinate(2, unit)),
             (InstrumentKind::RTest, name) => {
-                let place = r_test_columns(request.sensors)
+                let place = r_test_columns(request.sensors())
                     .iter()
                     .position(|own| *own == name)?;
                 Some(Role::Coordinate(place, unit))
@@ -113,7 +94,7 @@ pub(crate) fn r_test_columns(sensors: bool) -> [&'static str; 3] {
 
 /// The required columns of an R-test, for data with columns of the other kind.
 pub(super) fn r_test_help(request: &Request<'_>) -> &'static str {
-    if request.sensors {
+    if request.sensors() {
         "the test states the sensor directions: it needs the sensor values `du_um`, `dv_um` and `dw_um`; without `sensor_angles_deg` and `sensor_directions` it needs `dx_um`, `dy_um` and `dz_um`"
     } else {
         "an R-test needs `dx_um`, `dy_um` and `dz_um`; the values of single sensors, `du_um`, `dv_um` and `dw_um`, need \
@@ -129,12 +110,12 @@ pub(super) fn known(request: &Request<'_>) -> Vec<String> {
         known.push(format!("{}_{unit}", axis.name.to_lowercase()));
     }
     known.push("temperature_c".into());
-    let own: &[&str] = match request.instrument {
+    let own: &[&str] = match request.instrument() {
         InstrumentKind::BallBar => &["length_mm", "deviation_um"],
         InstrumentKind::Tracker => &["px_mm", "py_mm", "pz_mm"],
         InstrumentKind::Socket => &["socket"],
         InstrumentKind::Probe => &["distance_mm", "deviation_um"],
-        InstrumentKind::RTest if request.sensors => &["du_um", "dv_um", "dw_um"],
+        InstrumentKind::RTest if request.sensors() => &["du_um", "dv_um", "dw_um"],
         InstrumentKind::RTest => &["dx_um", "dy_um", "dz_um"],
     };
     known.extend(own.iter().map(|name| name.to_string()));
@@ -160,7 +141,7 @@ pub(super) fn columns(
     let line = first.line;
     let columns = match request.columns {
         Some(mapped) => mapped_columns(request, file, mapped, header, first)?,
-        None => own_columns(request, file, line, header.map(|row| row.cells.as_slice()))?,
+        None => own_columns(request, file, header)?,
     };
     for (index, column) in columns.iter().enumerate() {
         if let Some(other) = columns[..index]
@@ -180,13 +161,8 @@ pub(super) fn columns(
     Ok(columns)
 }
 
-fn own_columns(
-    request: &Request<'_>,
-    file: &Path,
-    line: usize,
-    header: Option<&[String]>,
-) -> Result<Vec<Column>, ModelError> {
-    let Some(header) = header else {
+fn own_columns(request: &Request<'_>, file: &Path, header: Option<&Row>) -> Result<Vec<Column>, ModelError> {
+    let Some(row) = header else {
         return Err(ModelError::Input {
             location: Location::file(file),
             message: "a data file without a header and without [columns] that name its columns".into(),
@@ -194,12 +170,17 @@ fn own_columns(
         });
     };
     let known = known(request);
+    let header = &row.cells;
     let mut columns = Vec::new();
     for (index, name) in header.iter().enumerate() {
         let Some(role) = Role::of(name, request).or_else(|| Role::of(&name.to_lowercase(), request)) else {
             return Err(ModelError::Input {
-                location: Location::line(file, line),
-                message: format!("column {} has the unknown name `{name}`", index + 1),
+                location: Location::line(file, row.line),
+                message: if row.keyed {
+                    format!("unknown key `{name}`")
+                } else {
+                    format!("column {} has the unknown name `{name}`", index + 1)
+                },
                 help: Some(unknown_column_help(request, name, header, &known)),
             });
         };
@@ -227,7 +208,8 @@ fn unknown_column_help(request: &Request<'_>, name: &str, header: &[String], kno
         return NO_HEADER.into();
     }
     let id_stem = name.rsplit_once('_').map_or(name, |(id_stem, _)| id_stem);
-    if request.instrument == InstrumentKind::RTest && r_test_columns(!request.sensors).contains(&id_stem) {
+    if request.instrument() == InstrumentKind::RTest && r_test_columns(!request.sensors()).contains(&id_stem)
+    {
         return r_test_help(request).into();
     }
     format!(

@@ -7,6 +7,7 @@
 use std::collections::HashMap;
 use std::hash::{DefaultHasher, Hash, Hasher};
 use std::ops::Range;
+use std::path::Path;
 
 use crate::session::readings::Readings;
 
@@ -41,12 +42,12 @@ pub(super) fn kept(readings: &Readings, cells: &[u64]) -> Option<Vec<usize>> {
     (kept.len() < cells.len()).then_some(kept)
 }
 
-/// The message.
-pub(super) fn message(readings: &Readings, kept: &[usize]) -> String {
+/// The message; `line` has the line of each row.
+pub(super) fn message(file: &Path, line: &[usize], kept: &[usize]) -> String {
     let mut kept = kept.iter().peekable();
-    let copies: Vec<usize> = (0..readings.line.len())
+    let copies: Vec<usize> = (0..line.len())
         .filter(|row| kept.next_if_eq(&row).is_none())
-        .map(|row| readings.line[row])
+        .map(|row| line[row])
         .collect();
     let mut lines: Vec<String> = copies.iter().take(MAX_LISTED).map(usize::to_string).collect();
     if copies.len() > MAX_LISTED {
@@ -63,7 +64,7 @@ pub(super) fn message(readings: &Readings, kept: &[usize]) -> String {
     };
     format!(
         "{}: {count} {are} {copies_of} in every column (line {}); {they} removed, not treated as repeats",
-        readings.file.display(),
+        file.display(),
         lines.join(", ")
     )
 }

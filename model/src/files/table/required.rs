@@ -2,10 +2,11 @@
 
 use std::path::Path;
 
-use super::Request;
 use super::columns::{Column, Role, known, listed, r_test_columns, r_test_help};
+use super::request::Request;
 use crate::error::{Location, ModelError};
 use crate::instrument::InstrumentKind;
+use crate::session::check::{self, MissingPosition};
 
 /// Returns an error if one of them is missing.
 pub(super) fn required(
@@ -27,7 +28,7 @@ pub(super) fn required(
             help: Some(help),
         })
     };
-    match request.instrument {
+    match request.instrument() {
         InstrumentKind::BallBar => {
             if !has(&|role| matches!(role, Role::Length(_) | Role::Deviation(_))) {
                 return missing(
@@ -56,14 +57,14 @@ pub(super) fn required(
             }
         }
         InstrumentKind::RTest => {
-            for (index, name) in r_test_columns(request.sensors).into_iter().enumerate() {
+            for (index, name) in r_test_columns(request.sensors()).into_iter().enumerate() {
                 if !has(&|role| matches!(role, Role::Coordinate(i, _) if i == index)) {
                     return missing(format!("`{name}_um`"), r_test_help(request).into());
                 }
             }
         }
         InstrumentKind::Socket => {
-            if request.socket.is_none() && !has(&|role| role == Role::Socket) {
+            if request.test.socket.is_none() && !has(&|role| role == Role::Socket) {
                 return missing(
                     "`socket`".into(),
                     "add the column, or add `socket = \"…\"` to the test if all its poses have one socket"
@@ -72,33 +73,37 @@ pub(super) fn required(
             }
         }
     }
-    for (index, axis) in request.machine.axes.iter().enumerate() {
-        let stated = request.at_listed.get(index).copied().unwrap_or(false);
-        if stated || has(&|role| matches!(role, Role::Axis(i, _) if i == index)) {
-            continue;
-        }
-        let name = axis.column("");
-        if request.moved.contains(&index) {
-            return missing(
+    let missed = check::missing_position(
+        request.machine,
+        request.instrument(),
+        |axis| request.at_listed.get(axis).copied().unwrap_or(false),
+        |axis| has(&|role| matches!(role, Role::Axis(i, _) if i == axis)),
+        &request.moved(),
+    );
+    match missed {
+        None => Ok(()),
+        Some(MissingPosition::Moved(index)) => {
+            let axis = &request.machine.axes[index];
+            let name = axis.column("");
+            missing(
                 format!("`{name}`, though axis `{}` moves in this test", axis.name),
                 "add its positions to the data".into(),
-            );
+            )
         }
-        if request.instrument != InstrumentKind::BallBar {
-            return missing(
+        Some(MissingPosition::NotStated(index)) => {
+            let axis = &request.machine.axes[index];
+            let name = axis.column("");
+            missing(
                 format!("`{name}`"),
                 format!(
                     "add the positions of axis `{}` to the data, or state it: `at = {{ {name} = 0 }}`",
                     axis.name
                 ),
-            );
+            )
         }
-    }
-    if !has(&|role| matches!(role, Role::Axis(..))) {
-        return missing(
+        Some(MissingPosition::All) => missing(
             "with the position of an axis".into(),
             format!("known here: {}", listed(&known(request))),
-        );
+        ),
     }
-    Ok(())
 }

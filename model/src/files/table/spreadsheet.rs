@@ -11,20 +11,37 @@ use std::path::Path;
 use calamine::{Data, Reader, Sheets, XlsxError, open_workbook_auto};
 use zip::ZipArchive;
 
-use super::Format;
-use super::rows::Row;
+use super::format::{Content, DataFormat, Rows, Table, has_extension};
+use super::request::{Format, Request};
+use super::row::Row;
 use crate::error::{Location, ModelError};
 use crate::files::stamp::FileStamp;
 
-/// Whether a file is a spreadsheet, by its name.
-pub(super) fn is_spreadsheet(file: &Path) -> bool {
-    let extension = file
-        .extension()
-        .map(|extension| extension.to_string_lossy().to_lowercase());
-    matches!(
-        extension.as_deref(),
-        Some("xlsx" | "xlsm" | "xlsb" | "xls" | "ods")
-    )
+/// The format, recognised by the extension of the file.
+pub(super) struct Spreadsheet;
+
+impl DataFormat for Spreadsheet {
+    fn reads(&self, file: &Path) -> bool {
+        has_extension(file, &["xlsx", "xlsm", "xlsb", "xls", "ods"])
+    }
+
+    fn open(&self, file: &Path, request: &Request<'_>) -> Result<Content, ModelError> {
+        let (stamp, rows) = rows(file, &request.format)?;
+        Ok(Content::Table(Table {
+            stamp,
+            has_header: request.format.header,
+            rows: Box::new(SheetRows(rows.into_iter())),
+        }))
+    }
+}
+
+/// The rows of a sheet that was read as a whole.
+struct SheetRows(std::vec::IntoIter<Row>);
+
+impl Rows for SheetRows {
+    fn next_row(&mut self) -> Result<Option<Row>, ModelError> {
+        Ok(self.0.next())
+    }
 }
 
 /// Largest size of a spreadsheet, bytes.
@@ -37,7 +54,7 @@ const MAX_COLUMNS: u32 = 1000;
 const MAX_CELLS: usize = 20_000_000;
 
 /// The rows of a sheet, and the state of the file.
-pub(super) fn rows(file: &Path, format: &Format) -> Result<(FileStamp, Vec<Row>), ModelError> {
+fn rows(file: &Path, format: &Format) -> Result<(FileStamp, Vec<Row>), ModelError> {
     let fault = |message: String, help: String| ModelError::Input {
         location: Location::file(file),
         message,

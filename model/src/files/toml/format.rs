@@ -1,7 +1,8 @@
 //! Reader of `[format]` and `[columns]`: the layout of foreign files.
 
 use crate::error::ModelError;
-use crate::files::table::{ColumnMapping, ForeignColumn, Format, encoding};
+use crate::files::table::encoding;
+use crate::files::table::request::{ColumnMapping, ForeignColumn, Format};
 use crate::files::toml::document::{Table, Value};
 
 /// Reads `[format]`: separator, decimal, header, encoding, lines above the header; sheet of a spreadsheet; direction in a ball-bar file.

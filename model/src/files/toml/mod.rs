@@ -7,8 +7,8 @@ mod format;
 mod machine;
 mod movement;
 pub mod rewrite;
-mod setups;
 mod shape;
+mod sockets;
 mod station;
 mod test;
 mod unknowns;
@@ -19,14 +19,15 @@ use std::path::{Path, PathBuf};
 pub use machine::machine;
 
 use super::quantity::{self, MICROMETRE};
+use super::source_map::SourceMap;
 use super::stamp::FileStamp;
-use super::table::{ColumnMapping, Format};
+use super::table::request::{ColumnMapping, Format};
 use crate::chain::Machine;
 use crate::error::{Location, ModelError};
 use crate::instrument::InstrumentKind;
 use crate::session::expression::Length;
 use crate::session::limits;
-use crate::session::{Session, Test};
+use crate::session::{Session, Test, setups};
 use document::{Source, Table, Value};
 
 /// Options for reading a session.
@@ -128,6 +129,14 @@ pub fn text(path: &Path, what: &str) -> Result<String, ModelError> {
 /// # Errors
 /// Every fault that prevents the use of the session: file, line, what was found and expected, and what to do.
 pub fn session(path: &Path, options: &ReadOptions) -> Result<Session, ModelError> {
+    session_with_sources(path, options).map(|(session, _)| session)
+}
+
+/// As [`session`], with the files and texts from which the session was read.
+///
+/// # Errors
+/// As [`session`].
+pub fn session_with_sources(path: &Path, options: &ReadOptions) -> Result<(Session, SourceMap), ModelError> {
     let source = Source::read(path, "the session file")?;
     let mut root = source.parse()?;
     let SessionMachine {
@@ -156,9 +165,11 @@ pub fn session(path: &Path, options: &ReadOptions) -> Result<Session, ModelError
         columns,
         options,
     };
-    let mut warnings = Vec::new();
-    let (tests, declared) = tests(&context, &mut root, &mut warnings)?;
-    warnings.extend(setups::differing_set_ups(&tests));
+    let mut found = Found::default();
+    let (tests, declared) = tests(&context, &mut root, &mut found)?;
+    for (index, test) in tests.iter().enumerate() {
+        found.warnings.extend(setups::differing(&tests[..index], test));
+    }
     let effects = match root.take("effect") {
         Some(value) => value
             .list("tables [[effect]]")?
@@ -167,26 +178,25 @@ pub fn session(path: &Path, options: &ReadOptions) -> Result<Session, ModelError
             .collect::<Result<Vec<_>, _>>()?,
         None => Vec::new(),
     };
-    let socket_distances = setups::socket_distances(instrument.kind, &tests, &mut root, options.read_data)?;
+    let socket_distances = sockets::socket_distances(instrument.kind, &tests, &mut root, options.read_data)?;
     root.finish()?;
     let mut files: Vec<FileStamp> = Vec::new();
-    let of_tests = tests
-        .iter()
-        .filter_map(|test| test.readings.as_ref()?.stamp.as_ref());
     let own = source
         .stamp
         .iter()
         .chain(machine_source.iter().filter_map(|source| source.stamp.as_ref()));
-    for stamp in own.chain(of_tests) {
+    for stamp in own.chain(&found.stamps) {
         if !files.contains(stamp) {
             files.push(stamp.clone());
         }
     }
-    Ok(Session {
+    let sources = SourceMap {
         file: path.to_path_buf(),
         text: source.text.clone(),
         machine_text: machine_source.map(|source| source.text),
         files,
+    };
+    let session = Session {
         constants,
         instrument: instrument.kind,
         noise_mm: instrument.noise_mm,
@@ -195,10 +205,20 @@ pub fn session(path: &Path, options: &ReadOptions) -> Result<Session, ModelError
         effects,
         tests,
         socket_distances,
-        warnings,
+        warnings: found.warnings,
         about,
         machine,
-    })
+    };
+    Ok((session, sources))
+}
+
+/// What was found while the tests were read, beside the tests.
+#[derive(Default)]
+struct Found {
+    /// Warnings about usable tests.
+    warnings: Vec<String>,
+    /// The data files.
+    stamps: Vec<FileStamp>,
 }
 
 /// The machine of a session, and its file if it has one of its own.
@@ -340,7 +360,7 @@ struct Declared {
 fn tests(
     context: &Context<'_>,
     root: &mut Table<'_>,
-    warnings: &mut Vec<String>,
+    found: &mut Found,
 ) -> Result<(Vec<Test>, Vec<Declared>), ModelError> {
     let items = match root.take("test") {
         Some(value) => value.list("tables [[test]]")?,
@@ -352,7 +372,7 @@ fn tests(
         let called = format!("test {}", declared.len() + 1);
         let mut table = item.table(called)?;
         let name = test::name(&mut table, &declared)?;
-        let parts = test::tests(context, &name, table, warnings)?;
+        let parts = test::tests(context, &name, table, found)?;
         declared.push(Declared {
             name,
             parts: parts.iter().map(|test| test.name.clone()).collect(),

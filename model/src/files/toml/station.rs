@@ -98,8 +98,8 @@ pub(super) fn set_up(context: &Context<'_>, table: &mut Table<'_>) -> Result<Set
 fn ball_bar(context: &Context<'_>, table: &mut Table<'_>) -> Result<SetUp, ModelError> {
     let bar = table.require("bar_mm", "the calibrated length of the bar")?;
     let (bar_as_written, bar_mm) = context.length(&bar)?;
-    if bar_mm <= 0.0 {
-        return Err(bar.error(format!("`bar_mm` is {bar_mm}; it must be greater than 0"), None));
+    if let Some(fault) = limits::not_positive("bar_mm", bar_mm) {
+        return Err(bar.error(fault, None));
     }
     let Balls {
         workpiece: (workpiece, workpiece_mm),
@@ -281,9 +281,8 @@ fn probe(context: &Context<'_>, table: &mut Table<'_>) -> Result<SetUp, ModelErr
     let (artefact, artefact_mm) = context.point(artefact)?;
     let radius = table.require("radius_mm", "the radius of the cylinder plus that of the stylus")?;
     let (radius_as_written, radius_mm) = context.length(&radius)?;
-    if radius_mm <= 0.0 {
-        let message = format!("`radius_mm` is {radius_mm}; it must be greater than 0");
-        return Err(radius.error(message, None));
+    if let Some(fault) = limits::not_positive("radius_mm", radius_mm) {
+        return Err(radius.error(fault, None));
     }
     let stylus = table.require("stylus_mm", "the stylus' centre in the tool frame")?;
     let (stylus, stylus_mm) = context.point(stylus)?;

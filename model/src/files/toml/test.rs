@@ -3,30 +3,23 @@
 use std::path::{Path, PathBuf};
 
 use super::station::{self, SetUp};
-use super::{Context, Declared, data_folder, format, movement, quantity};
+use super::{Context, Declared, Found, data_folder, format, movement, quantity};
 use crate::axis::AxisKind;
 use crate::error::ModelError;
-use crate::files::table::{self, Request};
+use crate::files::table::{self, request::Request};
 use crate::files::toml::document::{Table, Value};
-use crate::instrument::{InstrumentKind, Station};
+use crate::instrument::InstrumentKind;
 use crate::session::expression::Length;
-use crate::session::motion::{self, Motion};
+use crate::session::motion::Motion;
 use crate::session::planned;
-use crate::session::readings::Readings;
-use crate::session::{Test, plausibility, runs};
+use crate::session::{Test, check, defaults};
 
 /// The name of a test, which must be unique.
 pub(super) fn name(table: &mut Table<'_>, declared: &[Declared]) -> Result<String, ModelError> {
     let value = table.require("name", "a name that no other test has")?;
     let name = value.text()?;
-    if name.trim().is_empty() {
-        return Err(value.error("a test without a name", Some("add a name".into())));
-    }
-    if declared.iter().any(|test| test.name == name) {
-        let message = format!("two tests have the name \"{name}\"");
-        let help = "results name parameters by test: give each its own name";
-        return Err(value.error(message, Some(help.into())));
-    }
+    check::name(&name, declared.iter().map(|test| test.name.as_str()))
+        .map_err(|(message, help)| value.error(message, Some(help)))?;
     table.name = format!("test \"{name}\"");
     Ok(name)
 }
@@ -36,7 +29,7 @@ pub(super) fn tests(
     context: &Context<'_>,
     name: &str,
     mut table: Table<'_>,
-    warnings: &mut Vec<String>,
+    found: &mut Found,
 ) -> Result<Vec<Test>, ModelError> {
     let SetUp {
         station,
@@ -49,11 +42,7 @@ pub(super) fn tests(
         None => Ok(default.to_string()),
     };
     let setup = group("setup", name)?;
-    // The ball at a robot's flange stays mounted from socket to socket; a ball in a spindle is mounted for each test.
-    let spindle_setup = match context.instrument {
-        InstrumentKind::Socket => group("spindle_setup", "tool")?,
-        _ => group("spindle_setup", name)?,
-    };
+    let spindle_setup = group("spindle_setup", defaults::spindle_setup(context.instrument, name))?;
     let bar_setup = match context.instrument {
         InstrumentKind::BallBar => group("bar_setup", name)?,
         _ => name.to_string(),
@@ -116,8 +105,7 @@ pub(super) fn tests(
     };
     let here = |(message, help): (String, String)| source.error(span.clone(), message, Some(help));
     let Some(data) = data else {
-        let planned = planned::checked_plan(context.machine, &test).map_err(here)?;
-        plausibility::check(context.machine, &test, &planned).map_err(here)?;
+        check::plan(context.machine, &test).map_err(here)?;
         return Ok(vec![test]);
     };
     if !context.options.read_data {
@@ -126,33 +114,19 @@ pub(super) fn tests(
     let file = data_file(context, &data)?;
     let request = Request {
         machine: context.machine,
-        instrument: context.instrument,
-        bar_mm: plausibility::bar_mm(&test.station),
-        sensors: matches!(&test.station, Station::RTest(rtest) if rtest.sensors.is_some()),
+        test: &test,
+        at_listed: &listed,
         format,
         // An empty table maps no column: the file has the default names.
         columns: columns.as_deref().filter(|columns| !columns.is_empty()),
-        at: &test.at,
-        at_listed: &listed,
-        moved: &motion::named_axes(test.motion.as_ref()),
-        socket: test.socket.as_deref(),
     };
+    let data = table::read(&file, &request)?;
+    found.warnings.extend(data.warnings);
+    found.stamps.push(data.stamp);
     let mut tests = Vec::new();
-    if table::is_xml(&file) {
-        let (readings, unread) = table::read_xml(&file, &request, &test)?;
-        warnings.extend(unread);
-        check_readings(context, &test, &readings, warnings).map_err(here)?;
-        test.readings = Some(readings);
-        return Ok(vec![test]);
-    }
-    let (by_socket, doubts) = table::read(&file, &request)?;
-    warnings.extend(
-        doubts
-            .into_iter()
-            .map(|doubt| format!("test \"{name}\": {doubt}")),
-    );
-    for (socket, readings) in by_socket {
-        check_readings(context, &test, &readings, warnings).map_err(here)?;
+    for (socket, readings) in data.by_socket {
+        let doubts = check::readings(context.machine, &test, &readings).map_err(here)?;
+        found.warnings.extend(doubts);
         let Some(socket) = socket else {
             test.readings = Some(readings);
             return Ok(vec![test]);
@@ -171,28 +145,6 @@ pub(super) fn tests(
         });
     }
     Ok(tests)
-}
-
-/// Checks of measured readings against the declared set-up.
-fn check_readings(
-    context: &Context<'_>,
-    test: &Test,
-    readings: &Readings,
-    warnings: &mut Vec<String>,
-) -> Result<(), (String, String)> {
-    plausibility::check(context.machine, test, readings)?;
-    plausibility::check_lengths(test, readings)?;
-    let doubts = [
-        planned::beyond_travel(context.machine, readings),
-        runs::difference_from_stated(test.motion.as_ref(), readings),
-    ];
-    warnings.extend(
-        doubts
-            .into_iter()
-            .flatten()
-            .map(|doubt| format!("test \"{}\": {doubt}; the data are used as they are", test.name)),
-    );
-    Ok(())
 }
 
 /// Positions at which a test holds its axes, by axis.

@@ -1,13 +1,13 @@
 //! Reader of `[unknowns]`: the errors to be estimated.
 
 use super::quantity;
-use crate::axis::AxisKind;
 use crate::chain::Machine;
-use crate::component::{ErrorKind, ErrorName, Freedom};
+use crate::component::ErrorName;
 use crate::error::ModelError;
 use crate::files::toml::document::{Table, Value};
 use crate::instrument::InstrumentKind;
 use crate::pattern;
+use crate::session::defaults;
 
 /// The errors to be estimated: those stated, or the defaults of the instrument.
 pub(super) fn unknowns(
@@ -25,12 +25,7 @@ pub(super) fn unknowns(
         }
     };
     let Some(value) = stated else {
-        return Ok(match kind {
-            InstrumentKind::BallBar | InstrumentKind::Probe | InstrumentKind::RTest => {
-                default_unknowns(machine)
-            }
-            InstrumentKind::Tracker | InstrumentKind::Socket => all_location_errors(machine),
-        });
+        return Ok(defaults::unknowns(machine, kind));
     };
     let mut unknowns: Vec<ErrorName> = Vec::new();
     // A pattern may include errors that are named already; each error is estimated once.
@@ -90,44 +85,4 @@ fn error_name(machine: &Machine, item: &Value<'_>) -> Result<ErrorName, ModelErr
         }
     }
     Ok(name)
-}
-
-/// All location errors of all axes, except the rotation of a linear axis about its own direction, which affects no reading. The joints of
-/// a robot have six each, more than its readings identify; the fit names the confounded combinations.
-fn all_location_errors(machine: &Machine) -> Vec<ErrorName> {
-    let mut errors = pattern::errors(machine);
-    errors.retain(|name| {
-        let of_linear = machine
-            .axes
-            .iter()
-            .find(|axis| axis.name == name.axis && axis.kind == AxisKind::Linear);
-        let own = of_linear.is_some_and(|axis| name.freedom.index() == axis.own_freedom().index() + 3);
-        name.kind == ErrorKind::Location && !own
-    });
-    errors
-}
-
-/// The position and orientation errors of every rotary axis, in alphabetical order of the axes. The two location errors in the axis' own
-/// degrees of freedom are excluded, because its own motion is confounded with them.
-fn default_unknowns(machine: &Machine) -> Vec<ErrorName> {
-    let mut rotary: Vec<_> = machine
-        .axes
-        .iter()
-        .filter(|axis| axis.kind == AxisKind::Rotary)
-        .collect();
-    rotary.sort_by(|a, b| a.name.cmp(&b.name));
-    rotary
-        .into_iter()
-        .flat_map(|axis| {
-            let own = axis.own_freedom().index() % 3;
-            Freedom::ALL
-                .into_iter()
-                .filter(move |freedom| freedom.index() % 3 != own)
-                .map(|freedom| ErrorName {
-                    kind: ErrorKind::Location,
-                    freedom,
-                    axis: axis.name.clone(),
-                })
-        })
-        .collect()
 }

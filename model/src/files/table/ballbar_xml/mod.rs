@@ -13,30 +13,34 @@ use std::path::Path;
 
 use contents::READINGS;
 
-use super::columns::{ForeignColumn, Role};
-use super::{Request, number};
+use super::columns::Role;
+use super::format::{Content, DataFormat, WholeReadings, has_extension};
+use super::number::number;
+use super::request::{ForeignColumn, Request};
 use crate::error::{Location, ModelError};
 use crate::session::motion::Motion;
-use crate::session::readings::Readings;
-use crate::session::{Test, trajectory};
+use crate::session::readings::{Origin, Readings};
+use crate::session::trajectory;
 
-/// Whether a file is of this format, by its name.
-pub(crate) fn is_xml(file: &Path) -> bool {
-    let extension = file
-        .extension()
-        .map(|extension| extension.to_string_lossy().to_lowercase());
-    matches!(extension.as_deref(), Some("xml" | "b5r"))
+/// The format, recognised by the extension of the file.
+pub(super) struct BallBarXml;
+
+impl DataFormat for BallBarXml {
+    fn reads(&self, file: &Path) -> bool {
+        has_extension(file, &["xml", "b5r"])
+    }
+
+    fn open(&self, file: &Path, request: &Request<'_>) -> Result<Content, ModelError> {
+        Ok(Content::Readings(Box::new(read(file, request)?)))
+    }
 }
 
-/// Reads a file for a test. Returns the readings, and warnings about the elements that were not read.
+/// Reads a file for a test, with warnings about the elements that were not read.
 ///
 /// # Errors
 /// If it is not XML, contains no readings, or lacks information for their use, with the line and what to do.
-pub(crate) fn read(
-    file: &Path,
-    request: &Request<'_>,
-    test: &Test,
-) -> Result<(Readings, Vec<String>), ModelError> {
+fn read(file: &Path, request: &Request<'_>) -> Result<WholeReadings, ModelError> {
+    let test = request.test;
     let role = value_role(file, request)?;
     let (stamp, contents) = contents::parse(file, request.format.encoding)?;
     let fault = |line: usize, message: String, help: String| ModelError::Input {
@@ -87,12 +91,11 @@ pub(crate) fn read(
         }
     }
     let mut readings = Readings {
-        file: file.to_path_buf(),
-        stamp: Some(stamp),
         positions: vec![Vec::new(); request.machine.axes.len()],
         coordinates: 1,
         ..Readings::default()
     };
+    let mut line = Vec::new();
     let directions = direction::of_runs(&contents.runs, request.format.anticlockwise.as_deref())
         .map_err(|(line, message, help)| fault(line, message, help))?;
     for (index, (run, forward)) in contents.runs.iter().zip(directions).enumerate() {
@@ -126,11 +129,11 @@ pub(crate) fn read(
                 column.push(*at);
             }
             readings.observed.push(match role {
-                Role::Deviation(unit) => request.bar_mm + unit.to_internal(value),
+                Role::Deviation(unit) => request.bar_mm() + unit.to_internal(value),
                 Role::Length(unit) => unit.to_internal(value),
                 _ => value,
             });
-            readings.line.push(run.line);
+            line.push(run.line);
             readings.run.push(index as i64 + 1);
         }
     }
@@ -154,7 +157,15 @@ pub(crate) fn read(
             names.join(", ")
         ));
     }
-    Ok((readings, warnings))
+    readings.origin = Some(Origin {
+        file: file.to_path_buf(),
+        line,
+    });
+    Ok(WholeReadings {
+        stamp,
+        readings,
+        warnings,
+    })
 }
 
 /// The column of ours that READINGS contains, as `[columns]` states.

@@ -1,4 +1,4 @@
-//! Rows of cells from a file, read one line at a time.
+//! Lines of a text file, read one at a time within the limits of a data file.
 
 use std::fs::File;
 use std::io::{BufRead, BufReader, Read};
@@ -7,7 +7,8 @@ use std::path::{Path, PathBuf};
 
 use encoding_rs::{Encoding, UTF_8, UTF_16BE, UTF_16LE};
 
-use super::{Format, encoding};
+use super::encoding;
+use super::request::Format;
 use crate::error::{Location, ModelError};
 use crate::files::stamp::FileStamp;
 
@@ -15,12 +16,12 @@ use crate::files::stamp::FileStamp;
 const LONGEST_LINE: u64 = 1 << 20;
 /// Limits of the size of a file.
 #[derive(Clone, Copy)]
-struct Limits {
-    bytes: u64,
-    rows: usize,
+pub(super) struct Limits {
+    pub bytes: u64,
+    pub rows: usize,
 }
 
-const LIMITS: Limits = Limits {
+pub(super) const LIMITS: Limits = Limits {
     bytes: 2 << 30,
     // A header and ten million readings.
     rows: 10_000_001,
@@ -29,51 +30,21 @@ const LIMITS: Limits = Limits {
 /// The remedy for a file that is too long.
 const SPLIT: &str = "thin out the readings (every tenth is enough), or split the file into several tests";
 
-/// One row.
-#[derive(Clone, Debug)]
-pub(super) struct Row {
-    /// Its line, from 1.
-    pub line: usize,
-    /// Its cells, without surrounding spaces.
-    pub cells: Vec<String>,
-    /// The bytes of the line in the file, without byte order mark and line end.
-    bytes: Range<usize>,
-    /// The text of the line.
-    text: String,
+/// One line.
+pub(super) struct Line {
+    /// Its number, from 1.
+    pub number: usize,
+    /// Its text, without line end.
+    pub text: String,
+    /// Its bytes in the file, without byte order mark and line end.
+    pub bytes: Range<usize>,
     /// The encoding, if the line is not plain ASCII.
     pub encoding: Option<&'static Encoding>,
 }
 
-impl Row {
-    /// A row of a spreadsheet, which has no text.
-    pub fn of_cells(line: usize, cells: Vec<String>) -> Row {
-        Row {
-            line,
-            cells,
-            bytes: 0..0,
-            text: String::new(),
-            encoding: None,
-        }
-    }
-
-    /// The bytes of a cell in the file, if it is not quoted.
-    pub fn span(&self, cell: usize) -> Option<Range<usize>> {
-        let cell = self.cells.get(cell).filter(|cell| !cell.is_empty())?;
-        let mut found = self.text.match_indices(cell.as_str());
-        let (at, _) = found.next()?;
-        // If the same text occurs twice in the line, the cell is ambiguous; another encoding may have moved it.
-        if found.next().is_some() || self.text.len() != self.bytes.len() {
-            return Some(self.bytes.clone());
-        }
-        let start = self.bytes.start + at;
-        Some(start..start + cell.len())
-    }
-}
-
-/// The rows of a file, without comments and empty lines.
-pub(super) struct Rows {
+/// The lines of a file below those that are skipped.
+pub(super) struct Lines {
     file: PathBuf,
-    separator: u8,
     /// As stated or by the byte order mark. `None` means UTF-8, or Latin-1 from the first line that is not UTF-8.
     encoding: Option<&'static Encoding>,
     /// Number of lines of the file still to be skipped.
@@ -87,13 +58,14 @@ pub(super) struct Rows {
     buffer: Vec<u8>,
 }
 
-impl Rows {
+impl Lines {
     /// Opens a file.
-    pub fn open(file: &Path, format: &Format) -> Result<Rows, ModelError> {
+    pub fn open(file: &Path, format: &Format) -> Result<Lines, ModelError> {
         Self::within(file, format, LIMITS)
     }
 
-    fn within(file: &Path, format: &Format, limits: Limits) -> Result<Rows, ModelError> {
+    /// Opens a file with other limits.
+    pub fn within(file: &Path, format: &Format, limits: Limits) -> Result<Lines, ModelError> {
         let fault = |message: String, help: &str| ModelError::Input {
             location: Location::file(file),
             message,
@@ -122,9 +94,8 @@ impl Rows {
                 SPLIT,
             ));
         }
-        Ok(Rows {
+        Ok(Lines {
             file: file.to_path_buf(),
-            separator: format.separator,
             encoding: format.encoding,
             skip: format.skip_lines,
             stamp: FileStamp::of(file, &found),
@@ -142,10 +113,10 @@ impl Rows {
         &self.stamp
     }
 
-    /// The next row, or `None` at the end.
-    pub fn next_row(&mut self) -> Result<Option<Row>, ModelError> {
+    /// The next line, or `None` at the end.
+    pub fn next_line(&mut self) -> Result<Option<Line>, ModelError> {
         loop {
-            let Some(bytes) = self.next_line()? else {
+            let Some(bytes) = self.read_line()? else {
                 return Ok(None);
             };
             if self.skip > 0 {
@@ -153,25 +124,8 @@ impl Rows {
                 continue;
             }
             let text = self.decoded()?;
-            let content = text.trim();
-            if content.is_empty() || content.starts_with('#') {
-                continue;
-            }
-            let cells = if text.contains('"') {
-                self.quoted(&text)?
-            } else {
-                text.split(char::from(self.separator))
-                    .map(|cell| cell.trim().to_string())
-                    .collect()
-            };
-            self.rows += 1;
-            if self.rows > self.limits.rows {
-                let most = self.limits.rows;
-                return Err(self.fault(format!("more than {most} rows, which is the limit"), SPLIT));
-            }
-            return Ok(Some(Row {
-                line: self.line,
-                cells,
+            return Ok(Some(Line {
+                number: self.line,
                 bytes,
                 encoding: (!text.is_ascii()).then_some(self.encoding.unwrap_or(UTF_8)),
                 text,
@@ -179,8 +133,18 @@ impl Rows {
         }
     }
 
+    /// Counts the line that was read last as a row, within the largest number of rows.
+    pub fn count_row(&mut self) -> Result<(), ModelError> {
+        self.rows += 1;
+        if self.rows > self.limits.rows {
+            let most = self.limits.rows;
+            return Err(self.fault(format!("more than {most} rows, which is the limit"), SPLIT));
+        }
+        Ok(())
+    }
+
     /// Reads the next line into the buffer, without byte order mark and line end; returns its bytes in the file.
-    fn next_line(&mut self) -> Result<Option<Range<usize>>, ModelError> {
+    fn read_line(&mut self) -> Result<Option<Range<usize>>, ModelError> {
         let mut start = self.byte;
         self.buffer.clear();
         self.until_line_end()?;
@@ -279,30 +243,8 @@ impl Rows {
         Ok(text)
     }
 
-    fn quoted(&self, text: &str) -> Result<Vec<String>, ModelError> {
-        if text.matches('"').count() % 2 == 1 {
-            return Err(self.fault(
-                "a quote is not closed".into(),
-                "a quoted cell must end on its line",
-            ));
-        }
-        let mut record = csv::StringRecord::new();
-        let mut reader = csv::ReaderBuilder::new()
-            .has_headers(false)
-            .delimiter(self.separator)
-            .trim(csv::Trim::All)
-            .from_reader(text.as_bytes());
-        match reader.read_record(&mut record) {
-            Ok(true) => Ok(record.iter().map(str::to_string).collect()),
-            Ok(false) => Ok(Vec::new()),
-            Err(cause) => Err(self.fault(
-                format!("invalid quotes: {cause}"),
-                "a quoted cell must end on its line",
-            )),
-        }
-    }
-
-    fn fault(&self, message: String, help: &str) -> ModelError {
+    /// An error in the line that was read last.
+    pub fn fault(&self, message: String, help: &str) -> ModelError {
         ModelError::Input {
             location: Location::line(&self.file, self.line),
             message,
@@ -310,6 +252,3 @@ impl Rows {
         }
     }
 }
-
-#[cfg(test)]
-mod tests;

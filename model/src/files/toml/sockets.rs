@@ -1,63 +1,10 @@
-//! Set-ups shared by tests, and sockets at known distances.
+//! Reader of `[[socket_distance]]`: sockets at known distances.
 
 use super::quantity::MICROMETRE;
 use crate::error::ModelError;
 use crate::files::toml::document::Table;
-use crate::instrument::{InstrumentKind, InstrumentParameter, SharedBy, Station};
-use crate::session::{Prior, SocketDistance, Test};
-
-/// Warnings about tests that share a mounted object and describe it differently.
-pub(super) fn differing_set_ups(tests: &[Test]) -> Vec<String> {
-    let mut warnings = Vec::new();
-    for (index, test) in tests.iter().enumerate() {
-        let unknowns = test.station.kind().unknowns();
-        for group in mounted_groups(unknowns) {
-            let Some(first) = tests[..index]
-                .iter()
-                .find(|other| other.group(group) == test.group(group))
-            else {
-                continue;
-            };
-            let own = |test: &Test| -> (Vec<Prior>, [f64; 3]) {
-                let priors = unknowns.iter().zip(&test.priors);
-                let priors = priors.filter(|(unknown, _)| unknown.shared_by == group);
-                (
-                    priors.map(|(_, prior)| *prior).collect(),
-                    nominal(&test.station, group),
-                )
-            };
-            if own(first) != own(test) {
-                warnings.push(format!(
-                    "tests \"{}\" and \"{}\" share the set-up \"{}\" and describe it differently; an object that is mounted once has one position",
-                    first.name,
-                    test.name,
-                    test.group(group)
-                ));
-            }
-        }
-    }
-    warnings
-}
-
-/// The groups of an instrument's parameters that belong to objects that a user mounts.
-fn mounted_groups(unknowns: &[InstrumentParameter]) -> Vec<SharedBy> {
-    [SharedBy::Setup, SharedBy::SpindleSetup, SharedBy::BarSetup]
-        .into_iter()
-        .filter(|group| unknowns.iter().any(|unknown| unknown.shared_by == *group))
-        .collect()
-}
-
-/// Nominal position of the object that a group shares.
-fn nominal(station: &Station<f64>, group: SharedBy) -> [f64; 3] {
-    match (station, group) {
-        (Station::BallBar(bar), SharedBy::Setup) => bar.workpiece_ball,
-        (Station::BallBar(bar), SharedBy::BarSetup) => [bar.bar, 0.0, 0.0],
-        (Station::Tracker(_), SharedBy::Setup) => [0.0; 3],
-        (Station::Probe(probe), SharedBy::Setup) => probe.artefact,
-        (Station::RTest(rtest), SharedBy::Setup) => rtest.workpiece_ball,
-        (station, _) => station.tool_point_mm(),
-    }
-}
+use crate::instrument::InstrumentKind;
+use crate::session::{SocketDistance, Test};
 
 /// `[[socket_distance]] between = ["0", "1"], mm = 50.0, u_um = 100`; without `u_um` the distance is exact.
 pub(super) fn socket_distances(

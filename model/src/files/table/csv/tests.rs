@@ -1,13 +1,21 @@
 //! Tests of limits, locations and encodings.
 
+use super::super::encoding;
+use super::super::lines::{LIMITS, Limits};
+use super::super::request::Format;
 use super::*;
+
+fn opened(file: &Path, format: &Format, limits: Limits) -> Result<CsvRows, ModelError> {
+    let lines = Lines::within(file, format, limits)?;
+    Ok(CsvRows::new(lines, format.separator))
+}
 
 /// Reads a file with small limits; returns the number of rows, or the message.
 fn read(text: &str, limits: Limits, meanwhile: impl Fn(&Path)) -> Result<usize, String> {
     let folder = tempfile::tempdir().unwrap();
     let file = folder.path().join("data.csv");
     std::fs::write(&file, text).unwrap();
-    let mut rows = Rows::within(&file, &Format::default(), limits).map_err(|fault| fault.to_string())?;
+    let mut rows = opened(&file, &Format::default(), limits).map_err(|fault| fault.to_string())?;
     meanwhile(&file);
     let mut count = 0;
     while rows.next_row().map_err(|fault| fault.to_string())?.is_some() {
@@ -39,7 +47,7 @@ fn cell_spans_are_correct_after_a_byte_order_mark_and_non_ascii_text() {
     let file = folder.path().join("data.csv");
     let spans = |bytes: &[u8]| {
         std::fs::write(&file, bytes).unwrap();
-        let mut rows = Rows::within(&file, &Format::default(), LIMITS).unwrap();
+        let mut rows = opened(&file, &Format::default(), LIMITS).unwrap();
         [(); 2].map(|()| rows.next_row().unwrap().unwrap().span(1))
     };
     assert_eq!(
@@ -56,7 +64,7 @@ fn every_encoding_gives_the_same_cells() {
     let file = folder.path().join("data.csv");
     let cells = |bytes: &[u8], format: &Format| -> Vec<(usize, Vec<String>)> {
         std::fs::write(&file, bytes).unwrap();
-        let mut rows = Rows::open(&file, format).unwrap();
+        let mut rows = opened(&file, format, LIMITS).unwrap();
         std::iter::from_fn(|| rows.next_row().unwrap())
             .map(|row| (row.line, row.cells))
             .collect()
@@ -105,7 +113,7 @@ fn a_line_that_is_not_in_the_stated_encoding_is_named() {
         encoding: encoding::of_name("utf-8"),
         ..Format::default()
     };
-    let mut rows = Rows::open(&file, &format).unwrap();
+    let mut rows = opened(&file, &format, LIMITS).unwrap();
     rows.next_row().unwrap();
     let fault = rows.next_row().unwrap_err();
     assert!(
