@@ -239,7 +239,7 @@ fn a_measured_session_has_equations_too() {
     let stderr = String::from_utf8(output.stderr).unwrap();
     assert!(output.status.success(), "{stderr}");
     assert!(
-        stderr.contains("A100.csv") && stderr.contains("does without readings"),
+        stderr.contains("A100.csv") && stderr.contains("made without readings"),
         "{stderr}"
     );
     let found = String::from_utf8(output.stdout).unwrap();
@@ -342,7 +342,10 @@ fn invalid_requests_are_refused_with_the_reason() {
         &["equation", text(&plan), "--test", "A200"],
         &["no test `A200`", "A100, A150, C100, C150"],
     );
-    refused_with(&["--errors", "EQ0C"], &["`EQ0C` is no error", "EX0C"]);
+    refused_with(
+        &["--errors", "EQ0C"],
+        &["`EQ0C` is no parameter of an equation", "EX0C"],
+    );
     refused_with(
         &["--errors", "EX0B"],
         &["`EX0B` is an error of axis `B`", "does not have"],
@@ -360,7 +363,7 @@ fn invalid_requests_are_refused_with_the_reason() {
     refused(&["volumetric", text(&plan)], &["chapter5.toml:1", "no `chain`"]);
     refused(
         &["volumetric", text(&machine), "--errors", "bar"],
-        &["`bar`", "an error vector has none"],
+        &["`bar`", "an error vector has no parameters"],
     );
     let folder = tempfile::tempdir().unwrap();
     let broken = folder.path().join("machine.toml");
