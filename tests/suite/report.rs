@@ -4,15 +4,15 @@ use std::path::Path;
 
 use abbe::identify::plan::states;
 use abbe::identify::series::{Cause, sensitivities, views};
+use abbe::model::files::{self, ReadOptions};
 use abbe::model::session::Session;
-use abbe::model::session::read::{self, ReadOptions};
 
 use super::data::data;
 use super::{abbe, ready, text};
 use crate::plant::{Kind, Recipe};
 
 fn session(path: &Path) -> Session {
-    read::session(path, &ReadOptions::default()).unwrap()
+    files::session(path, &ReadOptions::default()).unwrap()
 }
 
 /// `∂L/∂error` to first order, derived independently of the chain: ball at (0, R, 0), spindle ball at (−D, 0, 0), so that for a rotation of A
@@ -95,7 +95,7 @@ fn the_sensitivity_of_poses_to_a_shift_is_one() {
         data_directory: series.parent().map(Path::to_path_buf),
         ..ReadOptions::default()
     };
-    let session = read::session(&ready("ur10/session.toml"), &options).unwrap();
+    let session = files::session(&ready("ur10/session.toml"), &options).unwrap();
     let (problem, fit) = abbe::identify::fit::prepare(&session, 1).unwrap();
     let found = sensitivities::over_poses(&problem, &vec![0.0; fit.beta.len()]).unwrap();
     let shifts: Vec<_> = found.iter().filter(|error| error.unit == "um").collect();
