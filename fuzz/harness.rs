@@ -8,8 +8,9 @@ use std::io::Write;
 use std::path::Path;
 
 use abbe_model::ModelError;
-use abbe_model::session::read::{self, ReadOptions};
-use abbe_model::session::{Session, planned, rewrite, write};
+use abbe_model::files::toml::{rewrite, write};
+use abbe_model::files::{self, ReadOptions};
+use abbe_model::session::{Session, planned};
 
 const MACHINE: &str = "chain = \"w C A b Y X Z t\"\n[axis.C]\n[axis.A]\n[axis.X]\n[axis.Y]\n[axis.Z]\n";
 
@@ -64,7 +65,7 @@ fn check_message(fault: &ModelError) {
 
 /// Reads the session of the folder. The numbers of an accepted session are finite.
 fn session_in(folder: &Path) -> Option<Session> {
-    let session = match read::session(&folder.join("session.toml"), &ReadOptions::default()) {
+    let session = match files::session(&folder.join("session.toml"), &ReadOptions::default()) {
         Ok(session) => session,
         Err(fault) => {
             check_message(&fault);
@@ -90,7 +91,7 @@ fn session_in(folder: &Path) -> Option<Session> {
 pub fn machine(input: &[u8]) {
     within(|folder| {
         put(folder, "other.toml", input);
-        match read::machine(&folder.join("other.toml")) {
+        match files::machine(&folder.join("other.toml")) {
             Ok(machine) => assert!(
                 machine
                     .axes

@@ -12,10 +12,10 @@
 //! use abbe::identify::patterns::patterns;
 //! use abbe::identify::quantity::Given;
 //! use abbe::model::component::ErrorName;
-//! use abbe::model::session::read::{self, ReadOptions};
+//! use abbe::model::files::{self, ReadOptions};
 //!
 //! let plan = Path::new(env!("CARGO_MANIFEST_DIR")).join("sessions/hermle-c600u/chapter5.toml");
-//! let session = read::session(&plan, &ReadOptions::default())?;
+//! let session = files::session(&plan, &ReadOptions::default())?;
 //! let test = session.tests.iter().position(|test| test.name == "C150").unwrap();
 //!
 //! let source = SessionTest::new(&session, &session.tests[test])?;

@@ -19,10 +19,10 @@
 //!
 //! use abbe_codegen::{Equation, Options, Order, SessionTest, check, language};
 //! use abbe_model::component::ErrorName;
-//! use abbe_model::session::read::{self, ReadOptions};
+//! use abbe_model::files::{self, ReadOptions};
 //!
 //! let plan = Path::new(env!("CARGO_MANIFEST_DIR")).join("../sessions/hermle-c600u/chapter5.toml");
-//! let session = read::session(&plan, &ReadOptions::default())?;
+//! let session = files::session(&plan, &ReadOptions::default())?;
 //! let test = session.tests.iter().find(|test| test.name == "C150").unwrap();
 //! let errors = [ErrorName::parse("EX0C").unwrap()];
 //! let options = Options { order: Order::First, ..Options::default() };

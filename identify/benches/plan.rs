@@ -11,8 +11,8 @@ use abbe_identify::plan::criterion::Goal;
 use abbe_identify::plan::improve::{ImproveOptions, improve};
 use abbe_identify::plan::test_variations::TestVariations;
 use abbe_identify::plan::{PlanOptions, analyse, prepared, states};
+use abbe_model::files::{ReadOptions, session as read};
 use abbe_model::session::Session;
-use abbe_model::session::read::{ReadOptions, session as read};
 use criterion::{Criterion, criterion_group, criterion_main};
 
 fn sessions() -> std::path::PathBuf {

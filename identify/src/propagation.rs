@@ -405,7 +405,7 @@ pub fn tolerance(u: f64) -> f64 {
 mod tests {
     use std::path::Path;
 
-    use abbe_model::session::read::{self, ReadOptions};
+    use abbe_model::files::{self, ReadOptions};
 
     use super::*;
     use crate::fit::prepare;
@@ -416,7 +416,7 @@ mod tests {
     fn sum_of_squares_and_gradient_of_a_simulated_session_agree() {
         let file =
             Path::new(env!("CARGO_MANIFEST_DIR")).join("../sessions/hermle-c600u/measured/session.toml");
-        let session = read::session(&file, &ReadOptions::default()).unwrap();
+        let session = files::session(&file, &ReadOptions::default()).unwrap();
         let (problem, fit) = prepare(&session, 1).unwrap();
         let refit = Refit::new(&problem, &fit).unwrap();
         // Deviations of one standard uncertainty with alternating signs.

@@ -2,8 +2,8 @@
 
 use std::path::Path;
 
+use abbe_model::files;
 use abbe_model::session::limits::LARGEST;
-use abbe_model::session::read;
 
 use crate::error::IdentifyError;
 use crate::unit::{ARCSEC, Unit};
@@ -149,7 +149,7 @@ fn factor(from: &str, to: &str) -> Option<f64> {
 /// If the file cannot be read, is not TOML, or a value is not text with a number and a unit. The message names the file and the entry.
 pub fn read(path: &Path) -> Result<Vec<Given>, IdentifyError> {
     let fault = |message: String| IdentifyError::Request(format!("{}: {message}", path.display()));
-    let text = read::text(path, "the file of values")?;
+    let text = files::text(path, "the file of values")?;
     let table = toml::de::DeTable::parse(&text).map_err(|cause| fault(cause.to_string()))?;
     let mut entries: Vec<_> = table.into_inner().into_iter().collect();
     entries.sort_by_key(|(key, _)| key.span().start);

@@ -84,6 +84,14 @@ pub enum ModelError {
         /// What to do.
         help: String,
     },
+    /// An invalid part of a session that is built in memory.
+    #[error("{message}")]
+    Session {
+        /// What was found and what was expected.
+        message: String,
+        /// What to do.
+        help: String,
+    },
     /// A plan that the machine cannot carry out.
     #[error("{message}")]
     Plan {
@@ -115,7 +123,9 @@ impl ModelError {
     pub fn help(&self) -> Option<&str> {
         match self {
             ModelError::Input { help, .. } => help.as_deref(),
-            ModelError::FileAccess { help, .. } | ModelError::Plan { help, .. } => Some(help),
+            ModelError::FileAccess { help, .. }
+            | ModelError::Plan { help, .. }
+            | ModelError::Session { help, .. } => Some(help),
             _ => None,
         }
     }

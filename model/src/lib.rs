@@ -45,10 +45,10 @@
 //! ```
 //! use std::path::Path;
 //!
-//! use abbe_model::session::read::{self, ReadOptions};
+//! use abbe_model::files::{self, ReadOptions};
 //!
 //! let file = Path::new(env!("CARGO_MANIFEST_DIR")).join("../sessions/hermle-c600u/measured/session.toml");
-//! let session = read::session(&file, &ReadOptions::default())?;
+//! let session = files::session(&file, &ReadOptions::default())?;
 //! assert_eq!(session.machine.code(), "w C A b Y X Z t");
 //! let names: Vec<&str> = session.tests.iter().map(|test| test.name.as_str()).collect();
 //! assert_eq!(names, ["A100", "A150", "C100", "C150"]);
@@ -64,6 +64,7 @@ pub mod component;
 pub mod effect;
 pub mod error;
 pub mod expression;
+pub mod files;
 pub mod frames;
 pub mod instrument;
 pub mod pattern;

@@ -3,9 +3,9 @@
 use std::path::{Path, PathBuf};
 
 use abbe_model::chain::BodyErrors;
+use abbe_model::files::{self, ReadOptions};
 use abbe_model::frames::Point;
 use abbe_model::instrument::Station;
-use abbe_model::session::read::{self, ReadOptions};
 use abbe_model::session::{Prior, Session};
 use nalgebra::{DMatrix, DVector};
 
@@ -40,7 +40,7 @@ fn ready(name: &str) -> Session {
         data_directory: Some(data()),
         ..ReadOptions::default()
     };
-    read::session(&workspace().join("sessions").join(name), &options).unwrap()
+    files::session(&workspace().join("sessions").join(name), &options).unwrap()
 }
 
 #[test]
@@ -50,7 +50,7 @@ fn the_samples_of_an_independent_simulator_read() {
     };
     let rows = |name: &str| -> (Session, Vec<usize>) {
         let session =
-            read::session(&samples.join(name).join("session.toml"), &ReadOptions::default()).unwrap();
+            files::session(&samples.join(name).join("session.toml"), &ReadOptions::default()).unwrap();
         let rows = session
             .tests
             .iter()
@@ -77,7 +77,7 @@ fn the_samples_of_an_independent_simulator_read() {
     let a = clean.machine.axis_index("A").unwrap();
     assert!((readings.positions[a][0] + 20.0_f64.to_radians()).abs() < 1e-15);
     assert_eq!(readings.observed[0], 99.9610);
-    assert_eq!(readings.line[0], 2);
+    assert_eq!(readings.line(0), Some(2));
 
     rows("rotary-axial-h3");
     let (circle, _) = rows("circle-backlash-y");

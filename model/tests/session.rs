@@ -5,10 +5,12 @@ use std::path::{Path, PathBuf};
 
 use abbe_model::chain::BodyErrors;
 use abbe_model::effect::{Component, Driver, Effect, Shape};
+use abbe_model::files::table::csv;
+use abbe_model::files::{self, ReadOptions};
+use abbe_model::files::{toml::write, whole};
 use abbe_model::session::planned;
-use abbe_model::session::read::{self, ReadOptions};
 use abbe_model::session::readings::Readings;
-use abbe_model::session::{Session, Test, write};
+use abbe_model::session::{Session, Test};
 
 fn ready(name: &str) -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR"))
@@ -17,7 +19,7 @@ fn ready(name: &str) -> PathBuf {
 }
 
 fn plan(name: &str) -> Session {
-    read::session(&ready(name), &ReadOptions::default()).unwrap()
+    files::session(&ready(name), &ReadOptions::default()).unwrap()
 }
 
 /// The nominal reading of each row, mm.
@@ -44,7 +46,7 @@ fn one_test(test: &str) -> Result<Session, abbe_model::ModelError> {
     );
     let path = folder.path().join("session.toml");
     fs::write(&path, text).unwrap();
-    read::session(&path, &ReadOptions::default())
+    files::session(&path, &ReadOptions::default())
 }
 
 #[test]
@@ -241,8 +243,8 @@ fn written_effects_read_back_equal() {
     )
     .unwrap();
     let written = folder.path().join("session.toml");
-    write::whole_file(&written, &text).unwrap();
-    let read = read::session(&written, &ReadOptions::default()).unwrap();
+    whole::write(&written, &text).unwrap();
+    let read = files::session(&written, &ReadOptions::default()).unwrap();
     assert_eq!(read.effects.len(), effects.len());
     for (read, effect) in read.effects.iter().zip(&effects) {
         assert_eq!(read, effect);
@@ -260,7 +262,7 @@ fn a_plan_becomes_a_measured_session() {
     for (test, mut readings) in session.tests.iter().zip(plans) {
         readings.observed = nominal(&session, test, &readings);
         let name = format!("{}.csv", test.name);
-        write::readings(
+        csv::write(
             &folder.path().join(&name),
             &session.machine,
             &test.station,
@@ -281,7 +283,7 @@ fn a_plan_becomes_a_measured_session() {
         folder.path().join("machine.toml"),
     )
     .unwrap();
-    let read = read::session(&written, &ReadOptions::default()).unwrap();
+    let read = files::session(&written, &ReadOptions::default()).unwrap();
     for (test, before) in read.tests.iter().zip(&measured) {
         let after = test.readings.as_ref().unwrap();
         assert_eq!(after.run, before.run);
@@ -310,13 +312,13 @@ fn sockets_named_by_a_column_become_tests() {
         "socket,J1_rad\na,0\nb,0.5\na,0.001\n",
     )
     .unwrap();
-    let session = read::session(&path, &ReadOptions::default()).unwrap();
+    let session = files::session(&path, &ReadOptions::default()).unwrap();
     let names: Vec<&str> = session.tests.iter().map(|test| test.name.as_str()).collect();
     assert_eq!(names, ["T/a", "T/b"]);
     assert_eq!(session.effects[0].tests, ["T/a", "T/b"]);
     let readings = session.tests[0].readings.as_ref().unwrap();
     assert_eq!(readings.positions[0], [0.0, 0.001]);
-    assert_eq!(readings.line, [2, 4]);
+    assert_eq!(readings.origin.as_ref().unwrap().line, [2, 4]);
     assert_eq!(readings.observed, [0.0; 6]);
     assert_eq!(session.machine.axes[0].direction, [0.0, 0.0, 1.0]);
     assert_eq!(session.tests[0].spindle_setup, session.tests[1].spindle_setup);
@@ -353,7 +355,7 @@ fn missing_runs_are_reported() {
             );
             let path = folder.path().join("session.toml");
             fs::write(&path, text).unwrap();
-            read::session(&path, &ReadOptions::default()).unwrap().warnings
+            files::session(&path, &ReadOptions::default()).unwrap().warnings
         };
         let forward_only = movement.replace("both_directions = true", "both_directions = false");
         let reported = |runs: &[bool]| warnings_of(movement, runs, true);

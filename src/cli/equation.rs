@@ -7,11 +7,11 @@ use abbe::codegen::{Equation, Options, Order, SessionTest, Source, Symbols, Tool
 use abbe::model::chain::Machine;
 use abbe::model::component::ErrorName;
 use abbe::model::effect::{Component, Effect};
+use abbe::model::files::{self, ReadOptions, SourceMap};
 use abbe::model::frames::Rotation;
 use abbe::model::instrument::InstrumentParameter;
 use abbe::model::pattern;
 use abbe::model::session::Session;
-use abbe::model::session::read::{self, ReadOptions};
 use clap::builder::{PossibleValuesParser, TypedValueParser};
 use clap::{Args, ValueEnum};
 
@@ -247,23 +247,23 @@ impl FormArguments {
 }
 
 /// The session with its readings, or without them and with a note if they cannot be read.
-fn read(arguments: &super::SessionArguments) -> Result<Session, Failure> {
-    let fault = match read::session(&arguments.session, &arguments.options()) {
-        Ok(session) => return Ok(session),
+fn read(arguments: &super::SessionArguments) -> Result<(Session, SourceMap), Failure> {
+    let fault = match files::session_with_sources(&arguments.session, &arguments.options()) {
+        Ok(found) => return Ok(found),
         Err(fault) => fault,
     };
     let plan_only = ReadOptions {
         read_data: false,
         ..arguments.options()
     };
-    match read::session(&arguments.session, &plan_only) {
-        Ok(session) => {
+    match files::session_with_sources(&arguments.session, &plan_only) {
+        Ok(found) => {
             tell(Kind::Note, &fault.to_string());
             tell(
                 Kind::Note,
                 "the equation is made without readings: in a test without a planned movement every axis moves that the test does not hold",
             );
-            Ok(session)
+            Ok(found)
         }
         Err(_) => Err(fault.into()),
     }
@@ -272,8 +272,8 @@ fn read(arguments: &super::SessionArguments) -> Result<Session, Failure> {
 /// Runs `abbe equation`.
 pub fn run(arguments: &EquationArguments) -> Result<(), Failure> {
     let outputs = Outputs::new(&arguments.form.out)?;
-    let session = read(&arguments.session)?;
-    outputs.refuse_overwrite_of_session(&session)?;
+    let (session, sources) = read(&arguments.session)?;
+    outputs.refuse_overwrite_of_sources(&sources)?;
     let Some(test) = session.tests.iter().find(|test| test.name == arguments.test) else {
         let names: Vec<&str> = session.tests.iter().map(|test| test.name.as_str()).collect();
         let names = names.join(", ");
@@ -311,7 +311,7 @@ pub fn run(arguments: &EquationArguments) -> Result<(), Failure> {
 
 /// Runs `abbe volumetric`.
 pub fn run_volumetric(arguments: &VolumetricArguments, quiet: bool) -> Result<(), Failure> {
-    let machine = read::machine(&arguments.machine)?;
+    let machine = files::machine(&arguments.machine)?;
     let outputs = Outputs::new(arguments.form.out.iter().chain(arguments.map.outputs()))?;
     let read = std::iter::once(&arguments.machine).chain(arguments.map.functions());
     outputs.refuse_overwrite(read.map(PathBuf::as_path))?;

@@ -115,7 +115,7 @@ pub fn run(arguments: &FitArguments) -> Result<(), Failure> {
         }
         return repeated::run(&arguments.session, &arguments.repeat, &arguments.common, &outputs);
     }
-    let session = read_session(&arguments.session, &outputs)?;
+    let (session, sources) = read_session(&arguments.session, &outputs)?;
     if arguments.views.is_some() && arguments.method != Method::Full {
         let message = "`--views` writes residuals of the full fit: leave out `--method`";
         return Err(Failure::CommandLine(message.into()));
@@ -136,7 +136,7 @@ pub fn run(arguments: &FitArguments) -> Result<(), Failure> {
         ));
     }
     if arguments.method == Method::SelfCalibration {
-        return self_calibration::run(&session, &arguments.draws, &arguments.common, tables);
+        return self_calibration::run((&session, &sources), &arguments.draws, &arguments.common, tables);
     }
     let geometric = match arguments.method {
         Method::Full | Method::SelfCalibration => None,
@@ -146,7 +146,13 @@ pub fn run(arguments: &FitArguments) -> Result<(), Failure> {
     };
     if let Some(method) = geometric {
         arguments.draws.refuse()?;
-        return geometric::run(&session, method, &arguments.common, &arguments.report, tables);
+        return geometric::run(
+            (&session, &sources),
+            method,
+            &arguments.common,
+            &arguments.report,
+            tables,
+        );
     }
     let draws = arguments.draws.draws(arguments.common.seed)?;
     let (problem, fit) = abbe::identify::fit::prepare(&session, arguments.common.seed)?;
@@ -165,7 +171,7 @@ pub fn run(arguments: &FitArguments) -> Result<(), Failure> {
     }
     print_warnings(&result.warnings);
     if let Some(path) = &arguments.common.json {
-        json::write_of_session(path, &session, arguments.common.seed, &result)?;
+        json::write_of_session(path, &sources, arguments.common.seed, &result)?;
     }
     if let Some(path) = &arguments.csv {
         csv::write_fit(path, &result)?;
@@ -175,7 +181,7 @@ pub fn run(arguments: &FitArguments) -> Result<(), Failure> {
         let method = crate::report::fit::method(&result);
         arguments
             .report
-            .write(&document, &method, &session, arguments.common.seed)?;
+            .write(&document, &method, (&session, &sources), arguments.common.seed)?;
     }
     arguments.compensation.run(&problem, &fit, tables)
 }

@@ -1,6 +1,7 @@
 //! `abbe fit --method circle|cone|two-plane`: a geometric method compared with the full fit.
 
 use abbe::identify::geometric::{self, Comparison, Method};
+use abbe::model::files::SourceMap;
 use abbe::model::session::Session;
 use abbe::model::words::counted;
 
@@ -11,7 +12,7 @@ use crate::present::method::{error_header, error_rows};
 
 /// Runs a geometric method and the full fit on the same readings.
 pub fn run(
-    session: &Session,
+    (session, sources): (&Session, &SourceMap),
     method: Method,
     common: &CommonArguments,
     report: &ReportArguments,
@@ -23,13 +24,13 @@ pub fn run(
     }
     message::print_warnings(&result.warnings);
     if let Some(path) = &common.json {
-        json::write_of_session(path, session, common.seed, &result)?;
+        json::write_of_session(path, sources, common.seed, &result)?;
     }
     if report.asked() {
         let (problem, _) = abbe::identify::fit::prepare(session, common.seed)?;
         let document = crate::report::method::document(&problem, &result);
         let method = crate::report::method::method(&result);
-        report.write(&document, &method, session, common.seed)?;
+        report.write(&document, &method, (session, sources), common.seed)?;
     }
     Ok(())
 }

@@ -3,7 +3,7 @@
 use std::any::TypeId;
 use std::path::Path;
 
-use abbe::model::session::Session;
+use abbe::model::files::SourceMap;
 use clap::{Arg, ArgAction, ArgMatches, CommandFactory};
 use schemars::JsonSchema;
 use serde::Serialize;
@@ -57,9 +57,9 @@ impl Origin {
     ///
     /// # Errors
     /// If a file has changed since it was read.
-    pub fn of_session(session: &Session) -> Result<Origin, Failure> {
-        let mut inputs = Vec::with_capacity(session.files.len());
-        for stamp in &session.files {
+    pub fn of_session(sources: &SourceMap) -> Result<Origin, Failure> {
+        let mut inputs = Vec::with_capacity(sources.files.len());
+        for stamp in &sources.files {
             inputs.push(if stamp.is_regular() {
                 provenance::stamped(stamp)
                     .map_err(|fault| unreadable(&stamp.file, &fault))?
@@ -71,7 +71,7 @@ impl Origin {
                 }
             });
         }
-        let file = session.file.display().to_string();
+        let file = sources.file.display().to_string();
         let own = inputs.iter().find(|input| input.file == file);
         Ok(Origin {
             session: Some(SessionFile {
@@ -175,11 +175,11 @@ pub fn write<T: Serialize>(
 /// See [`Origin::of_session`] and [`write()`].
 pub fn write_of_session<T: Serialize>(
     path: &Path,
-    session: &Session,
+    sources: &SourceMap,
     seed: u64,
     result: &T,
 ) -> Result<(), Failure> {
-    write(path, Origin::of_session(session)?, Some(seed), result)
+    write(path, Origin::of_session(sources)?, Some(seed), result)
 }
 
 /// The name of the command, and the options on the command line of this process.

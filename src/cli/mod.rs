@@ -37,8 +37,8 @@ pub mod uniqueness;
 use std::path::PathBuf;
 use std::process::ExitCode;
 
+use abbe::model::files::{self, ReadOptions, SourceMap};
 use abbe::model::session::Session;
-use abbe::model::session::read::{self, ReadOptions};
 use clap::{Args, CommandFactory, Parser, Subcommand};
 
 use failure::Failure;
@@ -196,11 +196,11 @@ pub fn run() -> ExitCode {
     }
 }
 
-/// Reads the session. No output may replace one of its files.
-fn read_session(arguments: &SessionArguments, outputs: &Outputs) -> Result<Session, Failure> {
-    let session = read::session(&arguments.session, &arguments.options())?;
-    outputs.refuse_overwrite_of_session(&session)?;
-    Ok(session)
+/// Reads the session, with its sources. No output may replace one of its files.
+fn read_session(arguments: &SessionArguments, outputs: &Outputs) -> Result<(Session, SourceMap), Failure> {
+    let (session, sources) = files::session_with_sources(&arguments.session, &arguments.options())?;
+    outputs.refuse_overwrite_of_sources(&sources)?;
+    Ok((session, sources))
 }
 
 #[cfg(test)]

@@ -4,7 +4,7 @@ use std::fs::OpenOptions;
 use std::io::Write;
 use std::path::{Path, PathBuf};
 
-use abbe::model::session::Session;
+use abbe::model::files::SourceMap;
 
 use super::failure::Failure;
 use super::message::{Kind, tell};
@@ -134,8 +134,8 @@ impl Outputs {
 
     /// # Errors
     /// If one of them would replace the session, its machine or its data.
-    pub fn refuse_overwrite_of_session(&self, session: &Session) -> Result<(), Failure> {
-        self.refuse_overwrite(session.files.iter().map(|stamp| stamp.file.as_path()))
+    pub fn refuse_overwrite_of_sources(&self, sources: &SourceMap) -> Result<(), Failure> {
+        self.refuse_overwrite(sources.files.iter().map(|stamp| stamp.file.as_path()))
     }
 
     /// # Errors

@@ -35,9 +35,9 @@ pub fn run(
             session: path.to_path_buf(),
             ..first.clone()
         };
-        let session = read_session(&arguments, outputs)?;
+        let (session, sources) = read_session(&arguments, outputs)?;
         if common.json.is_some() {
-            origin.add(Origin::of_session(&session)?);
+            origin.add(Origin::of_session(&sources)?);
         }
         let (problem, fit) = abbe::identify::fit::prepare(&session, common.seed)?;
         let report = abbe::identify::fit::report(&problem, &fit);

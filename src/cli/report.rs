@@ -2,6 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
+use abbe::model::files::SourceMap;
 use abbe::model::session::Session;
 use clap::Args;
 use maud::Markup;
@@ -60,11 +61,11 @@ impl ReportArguments {
         &self,
         document: &Document,
         method: &Markup,
-        session: &Session,
+        read: (&Session, &SourceMap),
         seed: u64,
     ) -> Result<(), Failure> {
         if let Some(path) = &self.report {
-            let provenance = Provenance::of(session, seed).map_err(|(path, error)| {
+            let provenance = Provenance::of(read, seed).map_err(|(path, error)| {
                 Failure::Other(format!(
                     "{}: cannot be read again for its checksum in the report: {error}",
                     path.display()

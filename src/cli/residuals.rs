@@ -34,7 +34,7 @@ pub fn write(problem: &Problem<'_>, fit: &Fit, path: &Path) -> Result<(), Failur
             let mut cells = vec![
                 test.name.clone(),
                 readings.run.get(row).map_or(String::new(), i64::to_string),
-                readings.line.get(row).map_or(String::new(), usize::to_string),
+                readings.line(row).map_or(String::new(), |line| line.to_string()),
             ];
             let at = machine.axes.iter().zip(&readings.positions);
             cells.extend(at.map(|(axis, column)| format!("{:.6}", axis.kind.to_display(column[row]))));

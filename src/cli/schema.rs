@@ -6,7 +6,7 @@ use abbe::identify::repeated::Repeated;
 use abbe::identify::results::{FitResult, TraceResult};
 use abbe::identify::self_calibration::SelfCalibration;
 use abbe::identify::volumetric::Summary;
-use abbe::model::session::schema;
+use abbe::model::files::schema;
 use clap::{Args, ValueEnum};
 use schemars::generate::SchemaSettings;
 use schemars::{JsonSchema, Schema};

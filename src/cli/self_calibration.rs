@@ -2,6 +2,7 @@
 
 use abbe::identify::results::Interval;
 use abbe::identify::self_calibration::{self, FunctionResult, MonteCarlo, SelfCalibration};
+use abbe::model::files::SourceMap;
 use abbe::model::session::Session;
 use abbe::model::words::counted;
 use clap::Args;
@@ -65,7 +66,7 @@ impl DrawArguments {
 
 /// Runs `abbe fit --method self-calibration`.
 pub fn run(
-    session: &Session,
+    (session, sources): (&Session, &SourceMap),
     draws: &DrawArguments,
     common: &CommonArguments,
     tables: bool,
@@ -78,7 +79,7 @@ pub fn run(
     }
     message::print_warnings(&result.warnings);
     if let Some(path) = &common.json {
-        json::write_of_session(path, session, common.seed, &result)?;
+        json::write_of_session(path, sources, common.seed, &result)?;
     }
     Ok(())
 }

@@ -4,8 +4,11 @@ use std::path::PathBuf;
 
 use abbe::identify::quantity::{self, Given};
 use abbe::identify::simulate::{Simulated, Simulation, simulate};
+use abbe::model::files::table::csv;
+use abbe::model::files::toml::{rewrite, write};
+use abbe::model::files::{self, SourceMap};
+use abbe::model::session::Session;
 use abbe::model::session::limits::{LARGEST, MIN_UM};
-use abbe::model::session::{Session, read, rewrite, write};
 use abbe::model::words::counted;
 use clap::Args;
 use schemars::JsonSchema;
@@ -75,7 +78,7 @@ pub struct SimulateArguments {
 /// Runs `abbe simulate`.
 pub fn run(arguments: &SimulateArguments) -> Result<(), Failure> {
     let outputs = arguments.common.outputs(&[])?;
-    let session = read_session(&arguments.session, &outputs)?;
+    let (session, sources) = read_session(&arguments.session, &outputs)?;
     let mut given = match &arguments.file {
         Some(file) => {
             outputs.refuse_overwrite([file.as_path()])?;
@@ -104,23 +107,23 @@ pub fn run(arguments: &SimulateArguments) -> Result<(), Failure> {
         seed: arguments.common.seed,
     };
     let simulated = simulate(&session, &simulation)?;
-    let files = files(&session, &simulated, arguments)?;
-    if output::is_same(output::folder_of(&session.file), &arguments.out) {
+    let files = files((&session, &sources), &simulated, arguments)?;
+    if output::is_same(output::folder_of(&sources.file), &arguments.out) {
         return Err(Failure::Other(format!(
             "{}: this folder contains the plan itself; write the readings to another folder",
             arguments.out.display()
         )));
     }
     output::Outputs::in_folder(&arguments.out, files.iter().map(|(name, _)| name))
-        .refuse_overwrite_of_session(&session)?;
+        .refuse_overwrite_of_sources(&sources)?;
     folder::write(&arguments.out, &files, arguments.force, |made| {
         // The written files are read back as a session.
         let path = made.join("session.toml");
-        read::session(&path, &read::ReadOptions::default())?;
+        files::session(&path, &files::ReadOptions::default())?;
         Ok(())
     })?;
     report(
-        &session,
+        (&session, &sources),
         &simulated,
         arguments,
         outputs.tables(arguments.common.quiet),
@@ -129,23 +132,23 @@ pub fn run(arguments: &SimulateArguments) -> Result<(), Failure> {
 
 /// The files; `session.toml` is the last, so that the others exist when it does.
 fn files(
-    session: &Session,
+    (session, sources): (&Session, &SourceMap),
     simulated: &Simulated,
     arguments: &SimulateArguments,
 ) -> Result<Vec<folder::NewFile>, Failure> {
-    let file = session.file.as_path();
+    let file = sources.file.as_path();
     let mut files = Vec::new();
     let mut data: Vec<(String, String)> = Vec::new();
     for (test, readings) in session.tests.iter().zip(&simulated.readings) {
         let name = data_name(&test.name, &data);
-        let text = write::readings_text(&session.machine, &test.station, readings);
+        let text = csv::text(&session.machine, &test.station, readings);
         data.push((test.name.clone(), name.clone()));
         files.push((name, text));
     }
-    if let Some(machine) = &session.machine_text {
+    if let Some(machine) = &sources.machine_text {
         files.push(("machine.toml".into(), machine.clone()));
     }
-    let mut text = write::with_data(&session.text, file, &data)?;
+    let mut text = write::with_data(&sources.text, file, &data)?;
     text = rewrite::with_machine_file(&text, file, "machine.toml")?;
     if let Some(noise_um) = arguments.noise_um {
         text = rewrite::with_noise(&text, file, noise_um)?;
@@ -210,7 +213,7 @@ struct TrueValue {
 }
 
 fn report(
-    session: &Session,
+    (session, sources): (&Session, &SourceMap),
     simulated: &Simulated,
     arguments: &SimulateArguments,
     tables: bool,
@@ -236,7 +239,7 @@ fn report(
     }
     message::print_warnings(&report.warnings);
     if let Some(path) = &arguments.common.json {
-        json::write_of_session(path, session, arguments.common.seed, &report)?;
+        json::write_of_session(path, sources, arguments.common.seed, &report)?;
     }
     Ok(())
 }

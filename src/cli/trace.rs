@@ -9,7 +9,7 @@ use std::time::Duration;
 use abbe::identify::plan::test_variations::TestVariations;
 use abbe::identify::trace::separating_tests::separate_aliases;
 use abbe::identify::trace::{Progress, TraceOptions, library};
-use abbe::model::session::{rewrite, write};
+use abbe::model::files::toml::{rewrite, write};
 use abbe::model::words::counted;
 use clap::Args;
 use indicatif::{ProgressBar, ProgressStyle};
@@ -100,7 +100,7 @@ pub fn run(arguments: &TraceArguments) -> Result<(), Failure> {
     ];
     let outputs = arguments.common.outputs(&others)?;
     let tables = outputs.tables(arguments.common.quiet);
-    let session = read_session(&arguments.session, &outputs)?;
+    let (session, sources) = read_session(&arguments.session, &outputs)?;
     let options = TraceOptions {
         seed: arguments.common.seed,
         max_effects: arguments.max_effects,
@@ -148,18 +148,18 @@ pub fn run(arguments: &TraceArguments) -> Result<(), Failure> {
     }
     message::print_warnings(&trace.result.warnings);
     if let Some(path) = &arguments.common.json {
-        json::write_of_session(path, &session, arguments.common.seed, &trace.result)?;
+        json::write_of_session(path, &sources, arguments.common.seed, &trace.result)?;
     }
     if let Some(path) = &arguments.write {
         let data = arguments.session.data.as_deref();
-        let text = rewrite::relocated(&session.text, &session.file, output::folder_of(path), data)?;
+        let text = rewrite::relocated(&sources.text, &sources.file, output::folder_of(path), data)?;
         let mut next = write::with_effects(&text, &trace.effects, &session.machine);
         if trace.result.interrupted {
             let interruption = trace.result.interruption();
             next = format!("# The trace was {interruption}: effects may be missing.\n{next}");
         }
         output::write_whole(path, next.as_bytes())?;
-        let [own, there] = [&session.file, path].map(|file| output::folder_of(file).canonicalize().ok());
+        let [own, there] = [&sources.file, path].map(|file| output::folder_of(file).canonicalize().ok());
         if own != there {
             let note = format!(
                 "{} refers to its machine and data in another folder; commands read it with --allow-outside",
@@ -179,7 +179,7 @@ pub fn run(arguments: &TraceArguments) -> Result<(), Failure> {
         let method = crate::report::trace::method(&trace.result);
         arguments
             .report
-            .write(&document, &method, &session, arguments.common.seed)?;
+            .write(&document, &method, (&session, &sources), arguments.common.seed)?;
     }
     if trace.result.interrupted {
         if arguments.compensation.wanted() {

@@ -86,8 +86,8 @@ pub fn data(session: &SessionPlots<'_>) -> Value {
                         })
                         .collect();
                     let lines: Option<Value> = readings
-                        .filter(|r| !r.line.is_empty())
-                        .map(|r| quantised(rows.iter().map(|row| r.line[*row] as f64)));
+                        .and_then(|r| r.origin.as_ref())
+                        .map(|origin| quantised(rows.iter().map(|row| origin.line[*row] as f64)));
                     json!({
                         "run": ordinal, "number": stretch.run, "forward": stretch.forward, "n": rows.len(), "abscissa": abscissae, "line": lines,
                         "deviation": scalars(&test.deviation_um), "before": scalars(&test.before_um), "after": scalars(&test.after_um),
@@ -134,7 +134,7 @@ pub fn csv(session: &SessionPlots<'_>) -> String {
                 text.push(',');
                 text.push_str(&value.unwrap_or_default());
             };
-            number(&mut text, readings.line.get(row).map(ToString::to_string));
+            number(&mut text, readings.line(row).map(|line| line.to_string()));
             number(&mut text, readings.run.get(row).map(ToString::to_string));
             number(&mut text, readings.time_s.get(row).map(|t| format!("{t:.3}")));
             for (axis, column) in machine.axes.iter().zip(&readings.positions) {

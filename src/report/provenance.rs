@@ -2,8 +2,9 @@
 
 use std::path::PathBuf;
 
+use abbe::model::files::SourceMap;
+use abbe::model::files::stamp::FileStamp;
 use abbe::model::session::Session;
-use abbe::model::session::stamp::FileStamp;
 use sha2::{Digest, Sha256};
 
 /// An input file.
@@ -29,16 +30,19 @@ pub struct Provenance {
 }
 
 impl Provenance {
-    /// Provenance of a session.
+    /// Provenance of a session with its sources.
     ///
     /// # Errors
     /// If a file changed after it was read, or cannot be read. The error holds the path and the cause.
-    pub fn of(session: &Session, seed: u64) -> Result<Provenance, (PathBuf, String)> {
-        let inputs = session
+    pub fn of(
+        (session, sources): (&Session, &SourceMap),
+        seed: u64,
+    ) -> Result<Provenance, (PathBuf, String)> {
+        let inputs = sources
             .files
             .iter()
             .map(stamped)
-            .zip(&session.files)
+            .zip(&sources.files)
             .map(|(input, stamp)| input.map_err(|cause| (stamp.file.clone(), cause)))
             .collect::<Result<_, _>>()?;
         Ok(Provenance {

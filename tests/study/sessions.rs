@@ -6,7 +6,7 @@ use std::time::Instant;
 
 use abbe::identify::results::TraceResult;
 use abbe::identify::trace::{TraceOptions, trace};
-use abbe::model::session::read::{ReadOptions, session};
+use abbe::model::files::{ReadOptions, session};
 use rand::SeedableRng;
 use rand_pcg::Pcg64Mcg;
 use rayon::prelude::*;

@@ -3,8 +3,8 @@
 
 use abbe::identify::results::{EffectName, TraceResult};
 use abbe::identify::trace::{TraceOptions, trace};
+use abbe::model::files::{self, ReadOptions};
 use abbe::model::session::Session;
-use abbe::model::session::read::{self, ReadOptions};
 use rand::SeedableRng;
 use rand::seq::SliceRandom;
 use rand_pcg::Pcg64Mcg;
@@ -14,7 +14,7 @@ use crate::plant::{AxisName, Component, Driver, Freedom, Injected, Kind, Noise, 
 fn session_of(recipe: &Recipe) -> Session {
     let folder = tempfile::tempdir().unwrap();
     recipe.draw().write(folder.path()).unwrap();
-    read::session(&folder.path().join("session.toml"), &ReadOptions::default()).unwrap()
+    files::session(&folder.path().join("session.toml"), &ReadOptions::default()).unwrap()
 }
 
 fn traced(session: &Session, significance: f64) -> TraceResult {

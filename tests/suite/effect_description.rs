@@ -9,8 +9,8 @@ use abbe::identify::trace::library;
 use abbe::model::chain::Machine;
 use abbe::model::component::{ErrorKind, Freedom};
 use abbe::model::effect::{Component, Driver, Effect, Shape};
+use abbe::model::files::{ReadOptions, session as read};
 use abbe::model::session::Session;
-use abbe::model::session::read::{ReadOptions, session as read};
 
 use super::plan_help::{noise_um, ready};
 

@@ -7,8 +7,8 @@ use std::process::Command;
 use abbe::codegen::print::{LANGUAGES, OutputLanguage};
 use abbe::codegen::{Equation, Options, Order, SessionTest, Symbols, check};
 use abbe::model::component::ErrorName;
+use abbe::model::files::{self, ReadOptions};
 use abbe::model::frames::Rotation;
-use abbe::model::session::read::{self, ReadOptions};
 
 use super::{abbe, ready, text};
 
@@ -43,7 +43,7 @@ pub(super) fn refused(arguments: &[&str], parts: &[&str]) {
 
 /// The equation of the test A150 from the library.
 fn of_library(language: &OutputLanguage, errors: &[&str], options: &Options) -> String {
-    let session = read::session(&plan(), &ReadOptions::default()).unwrap();
+    let session = files::session(&plan(), &ReadOptions::default()).unwrap();
     let test = session.tests.iter().find(|test| test.name == "A150").unwrap();
     let source = SessionTest::new(&session, test).unwrap();
     let named: Vec<ErrorName> = errors

@@ -5,10 +5,10 @@ use abbe::identify::fit::prepare;
 use abbe::identify::geometric::{Estimator, Method, compare};
 use abbe::identify::noise::{Noise, NoiseSource};
 use abbe::identify::problem::Problem;
+use abbe::model::files::{self, ReadOptions};
 use abbe::model::instrument::Station;
 use abbe::model::session::motion::Motion;
 use abbe::model::session::planned;
-use abbe::model::session::read::{self, ReadOptions};
 use abbe::model::session::{Prior, Session};
 use nalgebra::{Point3, Rotation3, Translation3, Vector3};
 use rand::SeedableRng;
@@ -60,7 +60,7 @@ const TABLES: [(&str, Method, [f64; 8]); 3] = [
 const IDS: [&str; 8] = ["EY0A", "EZ0A", "EB0A", "EC0A", "EX0C", "EY0C", "EA0C", "EB0C"];
 
 fn plan(chapter: &str) -> Session {
-    let mut session = read::session(
+    let mut session = files::session(
         &ready(&format!("hermle-c600u/{chapter}.toml")),
         &ReadOptions::default(),
     )
@@ -453,7 +453,7 @@ fn tilting_heads_are_identified_by_method_and_full_fit() {
     ];
     for (name, truth) in cases {
         let path = ready(&format!("{name}/measured/session.toml"));
-        let session = read::session(&path, &ReadOptions::default()).unwrap();
+        let session = files::session(&path, &ReadOptions::default()).unwrap();
         let comparison = compare(&session, Method::Cone, 1).unwrap();
         assert_eq!(comparison.errors.len(), truth.len());
         for (id, value) in truth {
@@ -470,7 +470,7 @@ fn tilting_heads_are_identified_by_method_and_full_fit() {
     // For a table and a head only the offset of A from C along Y is identifiable: with both errors as parameters neither method gives a
     // value.
     let path = ready("table-and-head/measured/session.toml");
-    let mut session = read::session(&path, &ReadOptions::default()).unwrap();
+    let mut session = files::session(&path, &ReadOptions::default()).unwrap();
     session
         .unknowns
         .push(abbe::model::component::ErrorName::parse("EY0A").unwrap());

@@ -10,8 +10,8 @@ use std::time::{Duration, Instant};
 
 use abbe::identify::results::TraceResult;
 use abbe::identify::trace::{Progress, TraceOptions, TraceOutcome, trace};
+use abbe::model::files::{self, ReadOptions};
 use abbe::model::session::Session;
-use abbe::model::session::read::{self, ReadOptions};
 
 use super::{ready, text};
 
@@ -176,7 +176,7 @@ fn ids(trace: &TraceOutcome<'_>) -> Vec<String> {
 #[test]
 fn a_trace_can_be_interrupted_anywhere() {
     let file = ready("hermle-c600u/measured/session.toml");
-    let session = read::session(&file, &ReadOptions::default()).unwrap();
+    let session = files::session(&file, &ReadOptions::default()).unwrap();
     let (whole, asked) = traced(&session, usize::MAX);
     assert!(!whole.result.interrupted && asked > 20, "{asked}");
     assert_eq!(ids(&whole), ["EZC~C:h2"]);

@@ -2,7 +2,7 @@
 //!
 //! `ABBE_WRITE_SESSIONS=1 cargo test --profile checked measured` writes it again.
 
-use abbe::model::session::read::{self, ReadOptions};
+use abbe::model::files::{self, ReadOptions};
 
 use crate::plant::{AxisName, Component, Driver, Freedom, Injected, Kind, Recipe, Shape, SimulatedSession};
 
@@ -66,7 +66,7 @@ fn the_bundled_session_is_that_of_the_plant() {
 
 #[test]
 fn the_bundled_session_is_valid_and_declares_no_effect() {
-    let session = read::session(
+    let session = files::session(
         &super::ready(FOLDER).join("session.toml"),
         &ReadOptions::default(),
     )

@@ -1,7 +1,7 @@
 //! `abbe new`: every template is a readable session.
 
 use abbe::identify::volumetric::functions;
-use abbe::model::session::read::{self, ReadOptions};
+use abbe::model::files::{self, ReadOptions};
 
 use super::{abbe, text};
 
@@ -35,7 +35,7 @@ fn every_template_is_copied_and_reads() {
             let path = entry.unwrap().path();
             let file = path.file_name().unwrap().to_str().unwrap().to_string();
             if file == "errors.toml" {
-                let machine = read::machine(&made.join("machine.toml")).unwrap();
+                let machine = files::machine(&made.join("machine.toml")).unwrap();
                 assert!(!functions::read(&path, &machine).unwrap().is_empty());
                 sessions += 1;
             } else if file.ends_with(".toml") && file != "machine.toml" {
@@ -43,7 +43,7 @@ fn every_template_is_copied_and_reads() {
                     read_data: !["kuka-iiwa14", "ur10"].contains(&name),
                     ..ReadOptions::default()
                 };
-                read::session(&path, &options).unwrap();
+                files::session(&path, &options).unwrap();
                 sessions += 1;
             }
         }
@@ -108,7 +108,7 @@ fn any_structural_code_gives_a_plan_that_runs() {
             "{code}: {}",
             String::from_utf8_lossy(&run.stderr)
         );
-        let machine = read::machine(&made.join("machine.toml")).unwrap();
+        let machine = files::machine(&made.join("machine.toml")).unwrap();
         assert_eq!(
             machine.code().replace(' ', ""),
             code.replace(' ', "").trim_matches(['[', ']'])

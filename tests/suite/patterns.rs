@@ -1,7 +1,7 @@
 //! The trace patterns of single errors (thesis, Figs. 3.7 and 3.8) against the first order of its Eqs. 3.20 and 3.21.
 
 use abbe::identify::patterns::{patterns, usual_sizes};
-use abbe::model::session::read::{self, ReadOptions};
+use abbe::model::files::{self, ReadOptions};
 
 use super::{abbe, ready, text};
 
@@ -25,7 +25,7 @@ fn numerator(error: &str, a: f64, d: f64) -> f64 {
 #[test]
 fn the_patterns_of_the_a_axis_are_those_of_the_thesis() {
     let path = ready("hermle-c600u/chapter5.toml");
-    let session = read::session(&path, &ReadOptions::default()).unwrap();
+    let session = files::session(&path, &ReadOptions::default()).unwrap();
     let found = patterns(&session, &usual_sizes(&session)).unwrap();
     let mut compared = 0;
     for pattern in found.patterns.iter().filter(|p| p.test.starts_with('A')) {

@@ -3,8 +3,8 @@
 use abbe::identify::noise::{Noise, NoiseSource};
 use abbe::identify::plan::linear::Linearisation;
 use abbe::identify::plan::states;
+use abbe::model::files::{ReadOptions, session as read};
 use abbe::model::session::Session;
-use abbe::model::session::read::{ReadOptions, session as read};
 
 /// The `[machine]` table of a structural code with the axis directions of ISO 841 and, if stated, the travel of rotary axes.
 pub fn machine(code: &str, travel_deg: Option<[i32; 2]>) -> String {

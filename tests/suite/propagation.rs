@@ -6,8 +6,8 @@ use abbe::identify::propagation::add_monte_carlo;
 use abbe::identify::quantity::Given;
 use abbe::identify::results::{DrawnParameter, FitMonteCarlo, Verdict};
 use abbe::identify::simulate::{Simulation, simulate};
+use abbe::model::files::{self, ReadOptions};
 use abbe::model::session::Session;
-use abbe::model::session::read::{self, ReadOptions};
 
 use super::{abbe, ready, text};
 
@@ -21,7 +21,7 @@ fn session(contents: &str) -> Session {
     .unwrap();
     let path = folder.path().join("session.toml");
     std::fs::write(&path, contents).unwrap();
-    let mut session = read::session(&path, &ReadOptions::default()).unwrap();
+    let mut session = files::session(&path, &ReadOptions::default()).unwrap();
     session.resolution_mm = None;
     session
 }

@@ -13,12 +13,12 @@ use abbe::identify::results::FitResult;
 use abbe::model::axis::AxisKind;
 use abbe::model::component::{ErrorKind, ErrorName, Freedom};
 use abbe::model::effect::{Component, Driver, Effect, Shape};
+use abbe::model::files::{self, ReadOptions};
 use abbe::model::instrument::Station;
 use abbe::model::instrument::ballbar::BallBar;
 use abbe::model::instrument::rtest::{RTest, Setting};
 use abbe::model::sensitivity::{SlotValues, TestModel};
 use abbe::model::session::expression::Length;
-use abbe::model::session::read::{self, ReadOptions};
 use abbe::model::session::readings::Readings;
 use abbe::model::session::{Prior, Session, Test};
 use machines::{Drawn, cases, is_angle, machines, mirror_sign, point};
@@ -68,7 +68,6 @@ fn session(drawn: &Drawn, balls: &[([f64; 3], [f64; 3])], bar: bool, seed: u64) 
         };
         let mut readings = Readings {
             run: (0..rows).map(|row| (row / ROWS_A_RUN) as i64 + 1).collect(),
-            line: (1..=rows).collect(),
             positions: machine
                 .axes
                 .iter()
@@ -105,8 +104,7 @@ fn session(drawn: &Drawn, balls: &[([f64; 3], [f64; 3])], bar: bool, seed: u64) 
             .map(|slot| machine.error_name(slot))
             .collect(),
         tests,
-        // File names exist only in a session that was read from a file.
-        ..read::session(&ready, &ReadOptions::default()).unwrap()
+        ..files::session(&ready, &ReadOptions::default()).unwrap()
     }
 }
 

@@ -4,8 +4,8 @@ use abbe::identify::fit::{Fit, prepare};
 use abbe::identify::problem::Problem;
 use abbe::identify::quantity::Given;
 use abbe::identify::simulate::{Simulation, simulate};
+use abbe::model::files::{self, ReadOptions};
 use abbe::model::session::motion::Motion;
-use abbe::model::session::read::{self, ReadOptions};
 use abbe::model::session::{Prior, Session};
 use rayon::prelude::*;
 
@@ -23,7 +23,7 @@ pub const THESIS: [&str; 8] = [
 const ISO: [&str; 8] = ["EY0A", "EZ0A", "EX0C", "EY0C", "EB0A", "EC0A", "EA0C", "EB0C"];
 
 fn plan(chapter: &str) -> Session {
-    let mut session = read::session(
+    let mut session = files::session(
         &super::ready(&format!("hermle-c600u/{chapter}.toml")),
         &ReadOptions::default(),
     )

@@ -4,8 +4,8 @@ use abbe::identify::fit::prepare;
 use abbe::identify::quantity::Given;
 use abbe::identify::repeated::{Repeated, Scatter, Session as Fitted, compare};
 use abbe::identify::simulate::{Simulation, simulate};
+use abbe::model::files::{self, ReadOptions};
 use abbe::model::session::Session;
-use abbe::model::session::read::{self, ReadOptions};
 use rayon::prelude::*;
 
 use super::recovery::THESIS;
@@ -25,7 +25,7 @@ fn plan() -> Session {
     .unwrap();
     let path = folder.path().join("session.toml");
     std::fs::write(&path, coarse).unwrap();
-    let mut session = read::session(&path, &ReadOptions::default()).unwrap();
+    let mut session = files::session(&path, &ReadOptions::default()).unwrap();
     session.resolution_mm = None;
     session
 }

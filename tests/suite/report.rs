@@ -4,20 +4,19 @@ use std::path::Path;
 
 use abbe::identify::plan::states;
 use abbe::identify::series::{Cause, sensitivities, views};
+use abbe::model::files::{self, ReadOptions};
 use abbe::model::session::Session;
-use abbe::model::session::read::{self, ReadOptions};
 
 use super::data::data;
 use super::{abbe, ready, text};
 use crate::plant::{Kind, Recipe};
 
 fn session(path: &Path) -> Session {
-    read::session(path, &ReadOptions::default()).unwrap()
+    files::session(path, &ReadOptions::default()).unwrap()
 }
 
 /// `∂L/∂error` to first order, derived independently of the chain: ball at (0, R, 0), spindle ball at (−D, 0, 0), so that for a rotation of A
 /// `L₀ = √(R² + D²)`, with `ca = cos A`, `sa = sin A` (Jiang (2014), Eqs. 3.20 and 3.21, to first order).
-///
 /// Jiang (2014): Xiaogeng Jiang, *Characterising Geometric Errors in Rotary Axes of 5-axis Machine Tools*, PhD thesis, University of Birmingham, 2014.
 #[test]
 fn sensitivities_agree_with_the_closed_form() {
@@ -96,7 +95,7 @@ fn the_sensitivity_of_poses_to_a_shift_is_one() {
         data_directory: series.parent().map(Path::to_path_buf),
         ..ReadOptions::default()
     };
-    let session = read::session(&ready("ur10/session.toml"), &options).unwrap();
+    let session = files::session(&ready("ur10/session.toml"), &options).unwrap();
     let (problem, fit) = abbe::identify::fit::prepare(&session, 1).unwrap();
     let found = sensitivities::over_poses(&problem, &vec![0.0; fit.beta.len()]).unwrap();
     let shifts: Vec<_> = found.iter().filter(|error| error.unit == "um").collect();
@@ -113,16 +112,12 @@ fn methods_and_next_tests_have_reports() {
     let at = |name: &str| folder.path().join(name);
     let written = |arguments: &[&str], name: &str| {
         let (page, json, plots) = (at(&format!("{name}.html")), at(&format!("{name}.json")), at(name));
-        let faces = [
-            "-q",
-            "--report",
-            text(&page),
-            "--json",
-            text(&json),
-            "--plots",
-            text(&plots),
+        let outputs = [
+            ["--report", text(&page)],
+            ["--json", text(&json)],
+            ["--plots", text(&plots)],
         ];
-        let output = abbe(&[arguments, &faces].concat());
+        let output = abbe(&[arguments, &["-q"], &outputs.concat()].concat());
         assert!(
             output.status.success(),
             "{}",
@@ -357,11 +352,11 @@ fn a_report_of_6000_readings_is_under_3_mb() {
     let draw = Recipe::new(Kind::Rotary, 5).readings(6000).draw();
     draw.write(folder.path()).unwrap();
     let path = folder.path().join("session.toml");
-    let rows: usize = session(&path)
-        .tests
+    let tests = session(&path).tests;
+    let rows: usize = tests
         .iter()
-        .filter_map(|test| test.readings.as_ref())
-        .map(|readings| readings.rows())
+        .flat_map(|test| &test.readings)
+        .map(|r| r.rows())
         .sum();
     assert!(rows >= 5_900, "{rows} readings");
     let report = folder.path().join("fit.html");

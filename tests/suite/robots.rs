@@ -2,8 +2,8 @@
 
 use abbe::identify::fit::{prepare, report};
 use abbe::identify::results::FitResult;
+use abbe::model::files::{self, ReadOptions};
 use abbe::model::session::Session;
-use abbe::model::session::read::{self, ReadOptions};
 
 use super::data::data;
 use super::ready;
@@ -17,7 +17,7 @@ pub fn session_on_public_data(test: &str, name: &str, path: &str) -> Option<Sess
         data_directory: Some(folder),
         ..ReadOptions::default()
     };
-    Some(read::session(&ready(name), &options).unwrap())
+    Some(files::session(&ready(name), &options).unwrap())
 }
 
 fn fitted(session: &Session) -> FitResult {

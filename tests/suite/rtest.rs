@@ -7,12 +7,12 @@ use abbe::identify::fit::prepare;
 use abbe::model::axis::AxisKind;
 use abbe::model::chain::Machine;
 use abbe::model::component::ErrorName;
+use abbe::model::files::{self, ReadOptions};
 use abbe::model::frames::{Point, Rotation};
 use abbe::model::instrument::rtest::{Orientation, RTest, Setting};
 use abbe::model::instrument::{InstrumentKind, Station};
 use abbe::model::sensitivity::{SlotValues, TestModel};
 use abbe::model::session::planned;
-use abbe::model::session::read::{self, ReadOptions};
 use abbe::model::session::readings::Readings;
 use nalgebra::{Matrix3, Vector3};
 use rand::SeedableRng;
@@ -208,7 +208,7 @@ fn radial_and_tangential_are_equations_10_and_11() {
         super::rtest_findings::bk2_without_effects(on)
             .write(folder.path())
             .unwrap();
-        let session = read::session(&folder.path().join("session.toml"), &ReadOptions::default()).unwrap();
+        let session = files::session(&folder.path().join("session.toml"), &ReadOptions::default()).unwrap();
         let (problem, fit) = prepare(&session, 1).unwrap();
         let all = views(&problem, &fit).unwrap();
         let readings = session.tests[0].readings.as_ref().unwrap();
@@ -237,7 +237,7 @@ fn radial_and_tangential_are_equations_10_and_11() {
 /// Eq. (12): if a control counts a degree as a millimetre, the length of one turn is the diagonal of 2πR mm and 360°.
 #[test]
 fn a_programmed_feed_takes_the_time_of_the_diagonal() {
-    let session = read::session(&ready("r-test/plan.toml"), &ReadOptions::default()).unwrap();
+    let session = files::session(&ready("r-test/plan.toml"), &ReadOptions::default()).unwrap();
     let bk2 = session.tests.iter().find(|test| test.name == "BK2").unwrap();
     let planned = planned::planned(&session.machine, bk2).unwrap();
     let first = planned.runs()[0].clone();
@@ -253,7 +253,7 @@ fn a_programmed_feed_takes_the_time_of_the_diagonal() {
 #[test]
 fn linear_axes_that_follow_keep_the_ball_in_the_nest() {
     for (file, tests) in [("r-test/plan.toml", 3), ("r-test/machine-b.toml", 3)] {
-        let session = read::session(&ready(file), &ReadOptions::default()).unwrap();
+        let session = files::session(&ready(file), &ReadOptions::default()).unwrap();
         assert_eq!(session.tests.len(), tests);
         for test in &session.tests {
             let planned = planned::planned(&session.machine, test).unwrap();

@@ -4,7 +4,7 @@
 use std::f64::consts::FRAC_PI_2;
 
 use abbe::identify::trace::{TraceOptions, TraceOutcome, trace};
-use abbe::model::session::read::{self, ReadOptions};
+use abbe::model::files::{self, ReadOptions};
 
 use crate::plant::machine::Stated;
 use crate::plant::rtest::{Nest, NestOn, Session};
@@ -130,7 +130,7 @@ fn pitch_compensation() -> Vec<Injected> {
 fn traced<T>(session: &Session, examine: impl FnOnce(&TraceOutcome<'_>) -> T) -> T {
     let folder = tempfile::tempdir().unwrap();
     session.write(folder.path()).unwrap();
-    let session = read::session(&folder.path().join("session.toml"), &ReadOptions::default()).unwrap();
+    let session = files::session(&folder.path().join("session.toml"), &ReadOptions::default()).unwrap();
     let outcome = trace(&session, &TraceOptions::default(), &|_| true).unwrap();
     let result = &outcome.result;
     println!(
@@ -239,7 +239,7 @@ fn a_ball_bar_on_x_and_y_alone_shows_the_same_steps() {
     let recipe = Recipe::new(Kind::LinearCircles, 11).with(pitch_compensation()[0].clone());
     let folder = tempfile::tempdir().unwrap();
     recipe.draw().write(folder.path()).unwrap();
-    let session = read::session(&folder.path().join("session.toml"), &ReadOptions::default()).unwrap();
+    let session = files::session(&folder.path().join("session.toml"), &ReadOptions::default()).unwrap();
     let outcome = trace(&session, &TraceOptions::default(), &|_| true).unwrap();
     let stairs = staircase(&outcome, "EXX").expect("steps of X");
     let away = furthest(&stairs, &pairs(&X_STEPS_MM, &X_HEIGHTS_UM));

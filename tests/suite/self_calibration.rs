@@ -6,11 +6,11 @@ use abbe::identify::self_calibration::{
 };
 use abbe::identify::simulate::{Simulation, simulate};
 use abbe::model::component::ErrorName;
+use abbe::model::files::{self, ReadOptions};
 use abbe::model::instrument::Station;
 use abbe::model::instrument::probe::Probe;
 use abbe::model::sensitivity::{SlotValues, TestModel};
 use abbe::model::session::Session;
-use abbe::model::session::read::{self, ReadOptions};
 use abbe::model::session::readings::Readings;
 use rand::{RngExt, SeedableRng};
 use rand_distr::{Distribution, StandardNormal};
@@ -52,7 +52,7 @@ fn plan(count: usize, second_deg: f64) -> Session {
     .unwrap();
     let path = folder.path().join("session.toml");
     std::fs::write(&path, edited).unwrap();
-    read::session(&path, &ReadOptions::default()).unwrap()
+    files::session(&path, &ReadOptions::default()).unwrap()
 }
 
 /// The plan with readings of the nominal machine.
@@ -443,7 +443,7 @@ fn noise_that_is_not_stated_follows_from_repeated_cycles() {
 #[test]
 fn a_session_of_another_kind_is_refused_with_a_remedy() {
     let refused = |session: &Session| Equations::of(session).unwrap_err().to_string();
-    let bar = read::session(
+    let bar = files::session(
         &ready("hermle-c600u/measured/session.toml"),
         &ReadOptions::default(),
     )

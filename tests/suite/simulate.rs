@@ -3,8 +3,8 @@
 use std::fs;
 use std::path::{Path, PathBuf};
 
+use abbe::model::files::{self, ReadOptions};
 use abbe::model::session::Session;
-use abbe::model::session::read::{self, ReadOptions};
 
 use super::{abbe, ready, text};
 use crate::plant;
@@ -33,7 +33,7 @@ fn refused(plan: &Path, out: &Path, more: &[&str]) -> String {
 }
 
 fn session(folder: &Path) -> Session {
-    read::session(&folder.join("session.toml"), &ReadOptions::default()).unwrap()
+    files::session(&folder.join("session.toml"), &ReadOptions::default()).unwrap()
 }
 
 /// Writes a plan of one coarse C test with a declared effect, and its machine.

@@ -3,8 +3,8 @@
 
 use abbe::identify::results::{EffectName, TraceResult};
 use abbe::identify::trace::{TraceOptions, trace};
+use abbe::model::files::{self, ReadOptions};
 use abbe::model::session::Session;
-use abbe::model::session::read::{self, ReadOptions};
 
 use super::data::data;
 use super::robots::session_on_public_data;
@@ -17,7 +17,7 @@ fn traced(session: &Session, options: &TraceOptions) -> TraceResult {
 /// A session of the samples beside the public data.
 fn sample(test: &str, name: &str) -> Option<Session> {
     let folder = data(test, ".")?.join("../sample").join(name);
-    Some(read::session(&folder.join("session.toml"), &ReadOptions::default()).unwrap())
+    Some(files::session(&folder.join("session.toml"), &ReadOptions::default()).unwrap())
 }
 
 fn is(effect: &EffectName, component: &str, shape: &str, order: Option<usize>) -> bool {
@@ -162,7 +162,7 @@ fn a_harmonic_is_listed_as_alias_of_a_compliance() {
         "{}",
         String::from_utf8_lossy(&outcome.stderr)
     );
-    let session = read::session(&run.join("session.toml"), &ReadOptions::default()).unwrap();
+    let session = files::session(&run.join("session.toml"), &ReadOptions::default()).unwrap();
     let result = traced(&session, &TraceOptions::default());
     assert_eq!(result.effects.len(), 1);
     let gravity = |effect: &EffectName| effect.driver == "gravity";

@@ -11,8 +11,8 @@ use abbe::identify::simulate::{Simulation, simulate};
 use abbe::identify::trace::separating_tests::separate_aliases;
 use abbe::identify::trace::{TraceOptions, trace};
 use abbe::model::effect::{Component, Driver, Effect, Shape};
+use abbe::model::files::{self, ReadOptions};
 use abbe::model::session::Session;
-use abbe::model::session::read::{self, ReadOptions};
 
 use super::{abbe, ready, text};
 
@@ -28,7 +28,7 @@ fn of_c(component: &str, shape: Shape) -> Effect {
 /// The session of chapter 5 with readings of a machine with some effects, of which it declares the first `declared`.
 fn measured(effects: Vec<Effect>, values: &[&str], declared: usize) -> Session {
     let plan = ready("hermle-c600u/chapter5.toml");
-    let mut session = read::session(&plan, &ReadOptions::default()).unwrap();
+    let mut session = files::session(&plan, &ReadOptions::default()).unwrap();
     session.effects = effects;
     let simulation = Simulation {
         given: values.iter().map(|text| Given::parse(text).unwrap()).collect(),
@@ -200,7 +200,7 @@ fn left_by(session: &Session, noise: &Noise, alternative: &Effect) -> f64 {
 #[test]
 fn each_explanation_states_its_separation_by_a_further_test() {
     let file = ready("hermle-c600u/measured/session.toml");
-    let session = read::session(&file, &ReadOptions::default()).unwrap();
+    let session = files::session(&file, &ReadOptions::default()).unwrap();
     let mut trace = trace(&session, &TraceOptions::default(), &|_| true).unwrap();
     let menu = TestVariations {
         thin: 1,
@@ -265,7 +265,7 @@ fn each_explanation_states_its_separation_by_a_further_test() {
 #[test]
 fn an_effect_without_an_alias_is_unique() {
     let file = ready("hermle-c600u/measured/session.toml");
-    let session = read::session(&file, &ReadOptions::default()).unwrap();
+    let session = files::session(&file, &ReadOptions::default()).unwrap();
     let options = TraceOptions {
         only: vec!["EZC~C:h".to_string()],
         ..TraceOptions::default()

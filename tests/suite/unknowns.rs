@@ -3,8 +3,8 @@
 use std::fs;
 use std::path::Path;
 
+use abbe::model::files::{self, ReadOptions};
 use abbe::model::session::Session;
-use abbe::model::session::read::{self, ReadOptions};
 
 use super::{abbe, ready, text, workspace};
 
@@ -32,7 +32,7 @@ fn read(
         read_data: false,
         ..ReadOptions::default()
     };
-    read::session(&folder.join("session.toml"), &options).map_err(|fault| fault.to_string())
+    files::session(&folder.join("session.toml"), &options).map_err(|fault| fault.to_string())
 }
 
 fn names(session: &Session) -> Vec<String> {
@@ -107,7 +107,7 @@ fn the_bundled_robots_list_their_errors_by_a_pattern() {
         read_data: false,
         ..ReadOptions::default()
     };
-    let session = read::session(&ready("ur10/session.toml"), &options).unwrap();
+    let session = files::session(&ready("ur10/session.toml"), &options).unwrap();
     assert_eq!(names(&session), six_each(&ur10));
     for file in ["ur10/session.toml", "kuka-iiwa14/session.toml"] {
         let text = fs::read_to_string(ready(file)).unwrap();

@@ -11,7 +11,7 @@ use super::topologies::{self, uniform};
 use super::{abbe, ready, text};
 
 fn machine() -> Machine {
-    abbe::model::session::read::machine(&ready("volumetric/machine.toml")).unwrap()
+    abbe::model::files::machine(&ready("volumetric/machine.toml")).unwrap()
 }
 
 fn errors(machine: &Machine) -> Vec<ErrorFunction> {

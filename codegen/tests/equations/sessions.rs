@@ -4,7 +4,7 @@ use std::path::PathBuf;
 
 use abbe_codegen::print::LANGUAGES;
 use abbe_codegen::{Equation, Kind, Options, Order, SessionTest, check};
-use abbe_model::session::read;
+use abbe_model::files;
 
 use crate::support::printed;
 
@@ -18,7 +18,7 @@ fn file(name: &str) -> PathBuf {
 fn every_test_of_the_bundled_plans() {
     for chapter in ["chapter4", "chapter5", "chapter6"] {
         let path = file(&format!("hermle-c600u/{chapter}.toml"));
-        let session = read::session(&path, &read::ReadOptions::default()).expect("a session");
+        let session = files::session(&path, &files::ReadOptions::default()).expect("a session");
         for test in &session.tests {
             let source = SessionTest::new(&session, test).expect("a plan");
             for order in [Order::Exact, Order::Bilinear, Order::First] {
@@ -41,7 +41,7 @@ fn every_test_of_the_bundled_plans() {
 #[test]
 fn every_test_of_the_self_calibration() {
     let path = file("self-calibration/session.toml");
-    let session = read::session(&path, &read::ReadOptions::default()).expect("a session");
+    let session = files::session(&path, &files::ReadOptions::default()).expect("a session");
     for test in &session.tests {
         let source = SessionTest::new(&session, test).expect("a plan");
         for order in [Order::Exact, Order::Bilinear, Order::First] {
@@ -65,7 +65,7 @@ fn every_test_of_the_self_calibration() {
 #[test]
 fn lengths_derived_from_the_bar_stay_expressions() {
     let path = file("hermle-c600u/chapter5.toml");
-    let session = read::session(&path, &read::ReadOptions::default()).expect("a session");
+    let session = files::session(&path, &files::ReadOptions::default()).expect("a session");
     let test = session
         .tests
         .iter()

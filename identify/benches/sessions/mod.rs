@@ -5,8 +5,8 @@ use std::path::Path;
 
 use abbe_identify::quantity::Given;
 use abbe_identify::simulate::{Simulation, simulate};
+use abbe_model::files::{ReadOptions, session as read};
 use abbe_model::session::Session;
-use abbe_model::session::read::{ReadOptions, session as read};
 
 /// The session of chapter 5 with about 3,616 readings and no undeclared effect.
 pub fn chapter_5() -> Session {

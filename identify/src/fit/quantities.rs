@@ -71,7 +71,7 @@ mod tests {
     use std::path::Path;
 
     use abbe_model::effect::{Component, Driver, Effect};
-    use abbe_model::session::read::{self, ReadOptions};
+    use abbe_model::files::{self, ReadOptions};
 
     use super::*;
     use crate::fit::{fit, prepare};
@@ -81,7 +81,7 @@ mod tests {
     fn amplitude_and_phase_of_a_harmonic_follow_from_its_coefficients() {
         let file =
             Path::new(env!("CARGO_MANIFEST_DIR")).join("../sessions/hermle-c600u/measured/session.toml");
-        let session = read::session(&file, &ReadOptions::default()).unwrap();
+        let session = files::session(&file, &ReadOptions::default()).unwrap();
         let (mut problem, _) = prepare(&session, 1).unwrap();
         problem
             .add_effect(&Effect {

@@ -165,12 +165,13 @@ pub fn outliers(problem: &Problem<'_>, fit: &Fit) -> Vec<Outlier> {
     let mut list = Vec::new();
     for (number, test) in problem.tests.iter().enumerate() {
         let Some(readings) = &test.readings else { continue };
+        let origin = readings.origin.as_ref();
         for row in (0..readings.rows()).filter(|row| problem.rejected[number][*row]) {
             let residual = &fit.residuals[number][row * coordinates..(row + 1) * coordinates];
             list.push(Outlier {
                 test: test.name.clone(),
-                file: readings.file.display().to_string(),
-                line: readings.line.get(row).copied().unwrap_or(0),
+                file: origin.map_or(String::new(), |origin| origin.file.display().to_string()),
+                line: readings.line(row).unwrap_or(0),
                 residual_um: residual.iter().map(|v| v * v).sum::<f64>().sqrt() * 1e3,
             });
         }

@@ -161,7 +161,7 @@ pub fn mislabelled_runs(tests: &[&Test]) -> Vec<String> {
 mod tests {
     use std::path::Path;
 
-    use abbe_model::session::read::{self, ReadOptions};
+    use abbe_model::files::{self, ReadOptions};
 
     use super::*;
 
@@ -169,7 +169,7 @@ mod tests {
     fn numbered(number: impl Fn(usize, i64) -> i64) -> Session {
         let file =
             Path::new(env!("CARGO_MANIFEST_DIR")).join("../sessions/hermle-c600u/measured/session.toml");
-        let mut session = read::session(&file, &ReadOptions::default()).unwrap();
+        let mut session = files::session(&file, &ReadOptions::default()).unwrap();
         for readings in session.tests.iter_mut().filter_map(|test| test.readings.as_mut()) {
             for (row, run) in readings.run.iter_mut().enumerate() {
                 *run = number(row, *run);

@@ -5,7 +5,8 @@ use std::path::Path;
 use abbe_model::axis::AxisKind;
 use abbe_model::chain::{ERRORS_PER_AXIS, Machine};
 use abbe_model::component::{ErrorKind, ErrorName};
-use abbe_model::session::{limits, read};
+use abbe_model::files;
+use abbe_model::session::limits;
 use serde::Deserialize;
 use std::collections::BTreeMap;
 
@@ -159,7 +160,7 @@ struct HarmonicEntry {
 /// The message names the file and the entry.
 pub fn read(path: &Path, machine: &Machine) -> Result<Vec<ErrorFunction>, IdentifyError> {
     let fault = |message: String| IdentifyError::Request(format!("{}: {message}", path.display()));
-    let text = read::text(path, "the file of error functions")?;
+    let text = files::text(path, "the file of error functions")?;
     parse(&text, machine).map_err(fault)
 }
 

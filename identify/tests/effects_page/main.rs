@@ -16,9 +16,9 @@ mod poses;
 use std::path::{Path, PathBuf};
 
 use abbe_model::effect::{Driver, Effect, Shape};
+use abbe_model::files::{self, ReadOptions};
 use abbe_model::session::Session;
 use abbe_model::session::planned::planned_session;
-use abbe_model::session::read::{self, ReadOptions};
 use changes::{At, Changes, Share, changes};
 use page::{Section, effect, sections};
 
@@ -54,7 +54,7 @@ fn session(toml: &str) -> Session {
         allow_outside: true,
         ..ReadOptions::default()
     };
-    let mut session = read::session(&path, &options).unwrap();
+    let mut session = files::session(&path, &options).unwrap();
     let planned = planned_session(&session).unwrap();
     for (test, mut readings) in session.tests.iter_mut().zip(planned) {
         readings.temperature_c = readings

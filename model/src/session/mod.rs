@@ -1,26 +1,20 @@
 //! Sessions: a machine, a plan of tests, and the readings of the tests that were run.
 //!
-//! [`read::session`] reads a session file. The result is validated and in mm, rad and s.
+//! [`files`](crate::files) reads and writes sessions. A session is validated and in mm, rad and s.
 
-mod document;
+pub mod build;
+pub(crate) mod check;
+pub mod defaults;
 pub mod expression;
 pub mod limits;
 pub mod motion;
 pub mod placing;
 pub mod planned;
-mod plausibility;
-pub mod read;
+pub(crate) mod plausibility;
 pub mod readings;
-pub mod rewrite;
 mod runs;
-pub mod schema;
-mod spelling;
-pub mod stamp;
-mod table;
-mod trajectory;
-pub mod write;
-
-use std::path::PathBuf;
+pub(crate) mod setups;
+pub(crate) mod trajectory;
 
 use crate::chain::Machine;
 use crate::component::ErrorName;
@@ -28,19 +22,10 @@ use crate::effect::Effect;
 use crate::instrument::rtest::Setting;
 use crate::instrument::{InstrumentKind, SharedBy, Station};
 use readings::Readings;
-use stamp::FileStamp;
 
 /// A validated session. Lengths in mm, angles in rad.
 #[derive(Clone, Debug)]
 pub struct Session {
-    /// The session file.
-    pub file: PathBuf,
-    /// The text of the session file.
-    pub text: String,
-    /// The text of the machine file, if the session names one.
-    pub machine_text: Option<String>,
-    /// All files that were read: the session, its machine, its data.
-    pub files: Vec<FileStamp>,
     /// The machine.
     pub machine: Machine,
     /// Named lengths in the order of the file, mm.

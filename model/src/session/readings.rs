@@ -5,17 +5,21 @@ use std::path::PathBuf;
 use crate::axis::AxisKind;
 use crate::chain::{AxisPosition, Machine};
 use crate::effect::DriverSample;
-use crate::session::stamp::FileStamp;
+
+/// The file of readings, for messages about single readings.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Origin {
+    /// The file.
+    pub file: PathBuf,
+    /// Line of each row in the file, from 1.
+    pub line: Vec<usize>,
+}
 
 /// The readings of one test, one row per reading, in mm, rad, s, °C.
 #[derive(Clone, Debug, Default)]
 pub struct Readings {
-    /// The file from which they were read.
-    pub file: PathBuf,
-    /// The state of that file when it was read; `None` for readings that come from no file.
-    pub stamp: Option<FileStamp>,
-    /// Line of each row in that file, from 1.
-    pub line: Vec<usize>,
+    /// Where they come from; `None` for readings that come from no file.
+    pub origin: Option<Origin>,
     /// The traversal of each row, as numbered in the file; empty without such a column.
     pub run: Vec<i64>,
     /// Time of each row, s; empty without such a column.
@@ -36,6 +40,11 @@ impl Readings {
         self.positions.first().map_or(0, Vec::len)
     }
 
+    /// Line of a row in the file of the readings, from 1; `None` for readings that come from no file.
+    pub fn line(&self, row: usize) -> Option<usize> {
+        self.origin.as_ref()?.line.get(row).copied()
+    }
+
     /// A selection of rows, in the given order.
     pub fn of_rows(&self, rows: &[usize]) -> Readings {
         fn of<T: Copy>(column: &[T], rows: &[usize]) -> Vec<T> {
@@ -45,9 +54,10 @@ impl Readings {
             rows.iter().map(|&row| column[row]).collect()
         }
         Readings {
-            file: self.file.clone(),
-            stamp: self.stamp.clone(),
-            line: of(&self.line, rows),
+            origin: self.origin.as_ref().map(|origin| Origin {
+                file: origin.file.clone(),
+                line: of(&origin.line, rows),
+            }),
             run: of(&self.run, rows),
             time_s: of(&self.time_s, rows),
             temperature_c: of(&self.temperature_c, rows),

@@ -174,7 +174,6 @@ fn traversals(
             readings
                 .time_s
                 .push(start_s + (along[here] - along[origin]).abs() / speed);
-            readings.line.push(readings.line.len() + 1);
         }
         start_s = readings.time_s.last().copied().unwrap_or(0.0) + BETWEEN_RUNS_S;
     }
@@ -182,7 +181,7 @@ fn traversals(
 }
 
 /// Positions of the axes at these angles of a test's circle; `None` for another motion.
-pub(super) fn on_circle(
+pub(crate) fn on_circle(
     machine: &Machine,
     test: &Test,
     angles: &[f64],
@@ -248,7 +247,7 @@ impl Circle {
 }
 
 /// The linear axes of a machine, by index.
-pub(super) fn linear_axes(machine: &Machine) -> Vec<usize> {
+pub(crate) fn linear_axes(machine: &Machine) -> Vec<usize> {
     (0..machine.axes.len())
         .filter(|&index| machine.axes[index].kind == AxisKind::Linear)
         .collect()
@@ -312,7 +311,7 @@ fn relative_move(machine: &Machine, bar: &BallBar<f64>, at: &[f64], axis: usize)
     })
 }
 
-pub(super) fn positions(machine: &Machine, at: &[f64]) -> Vec<AxisPosition<f64>> {
+pub(crate) fn positions(machine: &Machine, at: &[f64]) -> Vec<AxisPosition<f64>> {
     machine
         .axes
         .iter()

@@ -3,7 +3,7 @@
 use std::fs;
 use std::path::Path;
 
-use abbe_model::session::read::{self, ReadOptions};
+use abbe_model::files::{self, ReadOptions};
 
 use super::{
     DATA, MACHINE, SESSION, assert_contains, error_text, session, with_data, with_machine, with_session,
@@ -12,7 +12,7 @@ use super::{
 #[test]
 fn missing_and_invalid_files() {
     let folder = tempfile::tempdir().unwrap();
-    let read = |path: &Path| error_text(read::session(path, &ReadOptions::default()));
+    let read = |path: &Path| error_text(files::session(path, &ReadOptions::default()));
     assert_contains(&read(folder.path()), &["this is a folder"]);
     assert_contains(
         &read(&folder.path().join("no.toml")),

@@ -2,8 +2,8 @@
 
 use std::fs;
 
+use abbe_model::files::{self, ReadOptions};
 use abbe_model::session::Session;
-use abbe_model::session::read::{self, ReadOptions};
 
 use super::{DATA, MACHINE, SESSION, assert_contains, error_text, session};
 
@@ -14,7 +14,7 @@ fn with_bytes(lines: &str, data: &[u8]) -> Result<Session, abbe_model::ModelErro
     fs::write(folder.path().join("C100.csv"), data).unwrap();
     let text = SESSION.replace("[[test]]", &format!("{lines}\n[[test]]"));
     fs::write(folder.path().join("session.toml"), text).unwrap();
-    read::session(&folder.path().join("session.toml"), &ReadOptions::default())
+    files::session(&folder.path().join("session.toml"), &ReadOptions::default())
 }
 
 fn observed(read: &Session) -> &[f64] {
@@ -52,7 +52,17 @@ fn latin_1_and_utf_16_are_read_as_utf_8_is() {
             "{more} {:?}",
             &bytes[..8]
         );
-        assert_eq!(read.tests[0].readings.as_ref().unwrap().line, [2, 3, 4]);
+        assert_eq!(
+            read.tests[0]
+                .readings
+                .as_ref()
+                .unwrap()
+                .origin
+                .as_ref()
+                .unwrap()
+                .line,
+            [2, 3, 4]
+        );
     }
     // A header in another encoding than the stated one.
     let fault = error_text(with_bytes(&format!("{COLUMNS}encoding = \"utf-8\""), &latin));
@@ -77,7 +87,7 @@ fn lines_above_the_header_are_skipped() {
     let above = format!("Gerät \"7\nSerie;1;2;3;4\n\n{DATA}");
     let read = with_bytes("[format]\nskip_lines = 3\n", above.as_bytes()).unwrap();
     let readings = read.tests[0].readings.as_ref().unwrap();
-    assert_eq!((readings.rows(), readings.line[0]), (4, 5));
+    assert_eq!((readings.rows(), readings.line(0)), (4, Some(5)));
     assert_contains(&error_text(with_bytes("", above.as_bytes())), &["C100.csv:1"]);
 }
 

@@ -4,8 +4,8 @@ use std::fs;
 use std::path::Path;
 
 use abbe_model::ModelError;
+use abbe_model::files::{self, ReadOptions, SourceMap};
 use abbe_model::session::Session;
-use abbe_model::session::read::{self, ReadOptions};
 
 use super::{
     DATA, MACHINE, SESSION, assert_contains, error_text, session, with_data, with_machine, with_session,
@@ -50,11 +50,18 @@ impl Sandbox {
     fn read(&self, from: &str, to: &str, options: &ReadOptions) -> Result<Session, ModelError> {
         assert!(SESSION.contains(from));
         fs::write(self.at("inner/session.toml"), SESSION.replace(from, to)).unwrap();
-        read::session(&self.at("inner/session.toml"), options)
+        files::session(&self.at("inner/session.toml"), options)
     }
 
     fn data(&self, name: &str) -> Result<Session, ModelError> {
         self.read("\"C100.csv\"", &format!("\"{name}\""), &ReadOptions::default())
+    }
+
+    /// With a data file of this name, the session and its sources.
+    fn with_sources(&self, name: &str) -> Result<(Session, SourceMap), ModelError> {
+        let text = SESSION.replace("\"C100.csv\"", &format!("\"{name}\""));
+        fs::write(self.at("inner/session.toml"), text).unwrap();
+        files::session_with_sources(&self.at("inner/session.toml"), &ReadOptions::default())
     }
 
     fn machine(&self, name: &str) -> Result<Session, ModelError> {
@@ -248,7 +255,7 @@ fn with_bytes(bytes: &[u8]) -> String {
     fs::write(at("machine.toml"), MACHINE).unwrap();
     fs::write(at("session.toml"), SESSION).unwrap();
     fs::write(at("C100.csv"), bytes).unwrap();
-    error_text(read::session(&at("session.toml"), &ReadOptions::default()))
+    error_text(files::session(&at("session.toml"), &ReadOptions::default()))
 }
 
 fn utf16(text: &str) -> Vec<u8> {
@@ -278,7 +285,7 @@ fn sparse(name: &str, bytes: u64) -> String {
     fs::write(at("session.toml"), SESSION.replace("C100.csv", name) + columns).unwrap();
     let file = fs::File::create(at(name)).unwrap();
     file.set_len(bytes).unwrap();
-    let read = |file: &Path| read::session(file, &ReadOptions::default());
+    let read = |file: &Path| files::session(file, &ReadOptions::default());
     error_text(read(&at(if name.ends_with(".toml") {
         name
     } else {
@@ -311,7 +318,7 @@ fn a_spreadsheet_that_unpacks_without_end() {
     writer.finish().unwrap();
     assert!(fs::metadata(at("C.xlsx")).unwrap().len() < 1 << 20);
     assert_contains(
-        &error_text(read::session(&at("session.toml"), &ReadOptions::default())),
+        &error_text(files::session(&at("session.toml"), &ReadOptions::default())),
         &[
             "C.xlsx:0",
             "unpacks to more than 268435456 bytes",
@@ -340,7 +347,7 @@ fn with_xml(text: &str) -> String {
     let columns = "columns = { deviation_um = \"READINGS\" }\n";
     fs::write(at("session.toml"), SESSION.replace("C100.csv", "C.b5r") + columns).unwrap();
     fs::write(at("C.b5r"), text).unwrap();
-    error_text(read::session(&at("session.toml"), &ReadOptions::default()))
+    error_text(files::session(&at("session.toml"), &ReadOptions::default()))
 }
 
 refused! {
@@ -362,32 +369,32 @@ fn a_pipe_is_read_as_a_stream() {
         let pipe = pipe.clone();
         move || fs::write(pipe, DATA).unwrap()
     });
-    let session = sandbox.data("pipe.csv").unwrap();
+    let (session, sources) = sandbox.with_sources("pipe.csv").unwrap();
     writer.join().unwrap();
     assert_eq!(session.tests[0].readings.as_ref().unwrap().rows(), 4);
-    let stamp = session.files.iter().find(|stamp| stamp.file == pipe).unwrap();
+    let stamp = sources.files.iter().find(|stamp| stamp.file == pipe).unwrap();
     assert!(stamp.changed().unwrap().contains("can be read only once"));
 }
 
 #[test]
 fn changed_files_are_detected() {
     let sandbox = Sandbox::new();
-    let session = sandbox.data("C100.csv").unwrap();
-    let names: Vec<_> = session
+    let (_, sources) = sandbox.with_sources("C100.csv").unwrap();
+    let names: Vec<_> = sources
         .files
         .iter()
         .map(|stamp| stamp.file.file_name().unwrap().to_str().unwrap())
         .collect();
     assert_eq!(names, ["session.toml", "machine.toml", "C100.csv"]);
-    assert!(session.files.iter().all(|stamp| stamp.changed().is_none()));
+    assert!(sources.files.iter().all(|stamp| stamp.changed().is_none()));
     fs::write(sandbox.at("inner/C100.csv"), format!("{DATA}4,1,300,100\n")).unwrap();
     assert_eq!(
-        session.files[2].changed().unwrap(),
+        sources.files[2].changed().unwrap(),
         "it has changed since it was read"
     );
     fs::remove_file(sandbox.at("inner/C100.csv")).unwrap();
     assert!(
-        session.files[2]
+        sources.files[2]
             .changed()
             .unwrap()
             .starts_with("it no longer exists")
@@ -415,6 +422,6 @@ fn folders_and_files_of_any_name_are_read() {
             SESSION.replace("C100.csv", "C 100.csv"),
         )
         .unwrap();
-        assert!(read::session(&inner.join("my session.toml"), &ReadOptions::default()).is_ok());
+        assert!(files::session(&inner.join("my session.toml"), &ReadOptions::default()).is_ok());
     }
 }

@@ -11,8 +11,8 @@ mod table;
 use std::fs;
 
 use abbe_model::ModelError;
+use abbe_model::files::{self, ReadOptions};
 use abbe_model::session::Session;
-use abbe_model::session::read::{self, ReadOptions};
 
 const MACHINE: &str = r#"name = "Small"
 chain = "w C A b Y X Z t"
@@ -55,7 +55,7 @@ fn session(machine: &str, session: &str, data: Option<&str>) -> Result<Session, 
     if let Some(data) = data {
         write("C100.csv", data);
     }
-    read::session(&folder.path().join("session.toml"), &ReadOptions::default())
+    files::session(&folder.path().join("session.toml"), &ReadOptions::default())
 }
 
 /// The session before its tests.

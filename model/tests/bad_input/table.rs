@@ -159,7 +159,7 @@ fn rows_and_lines_are_counted_through_comments_and_crlf() {
     let data = format!("\u{feff}# from the bar\r\n\r\n{}", DATA.replace('\n', "\r\n"));
     let read = session(MACHINE, SESSION, Some(&data)).unwrap();
     let readings = read.tests[0].readings.as_ref().unwrap();
-    assert_eq!(readings.line, [4, 5, 6, 7]);
+    assert_eq!(readings.origin.as_ref().unwrap().line, [4, 5, 6, 7]);
     assert_contains(&with_data(&data.replace("100.0000", "x")), &["C100.csv:6"]);
     assert_contains(
         &with_data(&DATA.replace(",1,90,", ",90,")),

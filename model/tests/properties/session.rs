@@ -9,12 +9,13 @@ use abbe_model::axis::AxisKind;
 use abbe_model::chain::Machine;
 use abbe_model::component::{ErrorKind, ErrorName, Freedom};
 use abbe_model::effect::{Component, Driver, Effect, Shape};
+use abbe_model::files::{self, ReadOptions};
+use abbe_model::files::{table::csv, toml::write};
 use abbe_model::frames::Rotation;
 use abbe_model::instrument::Station;
 use abbe_model::instrument::tracker::Tracker;
-use abbe_model::session::read::{self, ReadOptions};
+use abbe_model::session::Session;
 use abbe_model::session::readings::Readings;
-use abbe_model::session::{Session, write};
 use proptest::collection::vec;
 use proptest::prelude::*;
 
@@ -49,7 +50,7 @@ fn text(machine: &Machine) -> String {
 }
 
 fn read(folder: &Path) -> Result<Session, ModelError> {
-    read::session(&folder.join("session.toml"), &ReadOptions::default())
+    files::session(&folder.join("session.toml"), &ReadOptions::default())
 }
 
 /// Readings with times, runs, and the random positions and coordinates.
@@ -137,7 +138,7 @@ proptest! {
             origin: [0.0; 3],
         });
         let data = folder.path().join("T.csv");
-        write::readings(&data, &machine, &station, &readings).unwrap();
+        csv::write(&data, &machine, &station, &readings).unwrap();
 
         let back = read(folder.path()).map_err(|fault| TestCaseError::fail(format!("{fault}\n{session}")))?;
         prop_assert_eq!(back.machine.code(), machine.code());
@@ -166,10 +167,10 @@ proptest! {
 
         // Written again, the result is equal to the byte.
         let first = fs::read(&data).unwrap();
-        write::readings(&data, &back.machine, &back.tests[0].station, found).unwrap();
+        csv::write(&data, &back.machine, &back.tests[0].station, found).unwrap();
         let again = read(folder.path()).unwrap();
         let found = again.tests[0].readings.as_ref().unwrap();
-        write::readings(&data, &again.machine, &again.tests[0].station, found).unwrap();
+        csv::write(&data, &again.machine, &again.tests[0].station, found).unwrap();
         prop_assert_eq!(first, fs::read(&data).unwrap());
     }
 

@@ -9,6 +9,7 @@ pub mod verdict;
 
 use abbe::identify::plan::clearance::Clearance;
 use abbe::identify::plan::{self, PlanOptions};
+use abbe::model::files::SourceMap;
 use abbe::model::instrument::Station;
 use abbe::model::instrument::rtest::Setting;
 use abbe::model::session::limits::{LARGEST, MIN_UM};
@@ -90,9 +91,11 @@ pub fn run(arguments: &PlanArguments) -> Result<(), Failure> {
         .common
         .outputs(&[arguments.patterns.file(), arguments.report.file()])?;
     let tables = outputs.tables(arguments.common.quiet);
-    let mut session = read_session(&arguments.session, &outputs)?;
+    let (mut session, sources) = read_session(&arguments.session, &outputs)?;
     if arguments.patterns.asked() {
-        return arguments.patterns.run(&session, &arguments.common, tables);
+        return arguments
+            .patterns
+            .run((&session, &sources), &arguments.common, tables);
     }
     if let Some(u_um) = arguments.setup_um {
         set_priors(&mut session, positive("--setup-um", u_um)?);
@@ -114,7 +117,7 @@ pub fn run(arguments: &PlanArguments) -> Result<(), Failure> {
         reach_mm: arguments.improve.reach_mm()?,
     };
     if arguments.improve.asked() || arguments.range {
-        return next_test(arguments, &session, &options, tables);
+        return next_test(arguments, (&session, &sources), &options, tables);
     }
     let mut analysis = plan::analyse(&session, &options)?;
     if let Some(sizes) = &arguments.clearance_mm {
@@ -128,7 +131,7 @@ pub fn run(arguments: &PlanArguments) -> Result<(), Failure> {
     }
     print_warnings(&analysis.warnings);
     if let Some(path) = &arguments.common.json {
-        json::write_of_session(path, &session, arguments.common.seed, &analysis)?;
+        json::write_of_session(path, &sources, arguments.common.seed, &analysis)?;
     }
     if arguments.report.asked() {
         let (complete, noise) = plan::prepared(&session, &options)?;
@@ -137,7 +140,7 @@ pub fn run(arguments: &PlanArguments) -> Result<(), Failure> {
         let method = crate::report::plan::method(&analysis);
         arguments
             .report
-            .write(&document, &method, &session, arguments.common.seed)?;
+            .write(&document, &method, (&session, &sources), arguments.common.seed)?;
     }
     Ok(())
 }
@@ -155,7 +158,7 @@ pub struct NextTest {
 
 fn next_test(
     arguments: &PlanArguments,
-    session: &Session,
+    (session, sources): (&Session, &SourceMap),
     options: &PlanOptions,
     tables: bool,
 ) -> Result<(), Failure> {
@@ -180,7 +183,7 @@ fn next_test(
     }
     let found = NextTest { improvement, ranges };
     if let Some(path) = &arguments.common.json {
-        json::write_of_session(path, session, arguments.common.seed, &found)?;
+        json::write_of_session(path, sources, arguments.common.seed, &found)?;
     }
     if arguments.report.asked() {
         let document =
@@ -188,7 +191,7 @@ fn next_test(
         let method = crate::report::next_test::method();
         arguments
             .report
-            .write(&document, &method, session, arguments.common.seed)?;
+            .write(&document, &method, (session, sources), arguments.common.seed)?;
     }
     Ok(())
 }

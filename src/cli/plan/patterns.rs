@@ -4,6 +4,7 @@ use std::path::PathBuf;
 
 use abbe::identify::patterns::{Pattern, Patterns, patterns, usual_sizes};
 use abbe::identify::quantity::Given;
+use abbe::model::files::SourceMap;
 use abbe::model::session::Session;
 use clap::Args;
 
@@ -46,7 +47,12 @@ impl PatternArguments {
     }
 
     /// Writes the patterns and prints their sizes.
-    pub fn run(&self, session: &Session, common: &CommonArguments, tables: bool) -> Result<(), Failure> {
+    pub fn run(
+        &self,
+        (session, sources): (&Session, &SourceMap),
+        common: &CommonArguments,
+        tables: bool,
+    ) -> Result<(), Failure> {
         let given: Vec<Given> = self
             .errors
             .iter()
@@ -68,7 +74,7 @@ impl PatternArguments {
             let result = PatternSizes {
                 patterns: found.patterns,
             };
-            json::write_of_session(path, session, common.seed, &result)?;
+            json::write_of_session(path, sources, common.seed, &result)?;
         }
         Ok(())
     }

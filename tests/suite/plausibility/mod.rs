@@ -6,7 +6,7 @@ mod sessions;
 use abbe::identify::fit::{prepare, report};
 use abbe::identify::plausibility::{Plausibility, Pulls, Suggestion, SuggestionKind, examine, warnings};
 use abbe::identify::trace::{TraceOptions, trace};
-use abbe::model::session::read::{self, ReadOptions};
+use abbe::model::files::{self, ReadOptions};
 
 use crate::plant::Noise;
 use sessions::{MISTAKES, Mistake, STEPS_DEG, session};
@@ -203,7 +203,7 @@ fn trace_stops_at_the_readings_of_another_session() {
         let text = std::fs::read_to_string(&path).unwrap();
         std::fs::write(&path, text.replace("a_deg,c_deg", "a_rad,c_rad")).unwrap();
     }
-    let session = read::session(&folder.path().join("session.toml"), &ReadOptions::default()).unwrap();
+    let session = files::session(&folder.path().join("session.toml"), &ReadOptions::default()).unwrap();
     let found = trace(&session, &TraceOptions::default(), &|_| true)
         .unwrap()
         .result;

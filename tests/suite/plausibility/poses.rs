@@ -5,8 +5,8 @@ use abbe::identify::fit::{prepare, report};
 use abbe::identify::plausibility::{ConflictKind, SuggestionKind};
 use abbe::identify::results::FitResult;
 use abbe::identify::trace::{TraceOptions, trace};
+use abbe::model::files::{self, ReadOptions};
 use abbe::model::session::Session;
-use abbe::model::session::read::{self, ReadOptions};
 
 use super::super::data::data;
 use super::super::ready;
@@ -30,7 +30,7 @@ fn ur10(test: &str, change: impl Fn(String) -> String) -> Option<Session> {
     let text = change(text.replace(path, "poses.csv"));
     std::fs::write(at("session.toml"), text).unwrap();
     std::fs::copy(ready("ur10/machine.toml"), at("machine.toml")).unwrap();
-    Some(read::session(&at("session.toml"), &ReadOptions::default()).unwrap())
+    Some(files::session(&at("session.toml"), &ReadOptions::default()).unwrap())
 }
 
 fn fitted(session: &Session) -> Result<FitResult, IdentifyError> {

@@ -2,8 +2,8 @@
 
 use std::path::Path;
 
+use abbe::model::files::{self, ReadOptions};
 use abbe::model::session::Session;
-use abbe::model::session::read::{self, ReadOptions};
 use rand::SeedableRng;
 use rand_pcg::Pcg64Mcg;
 
@@ -156,5 +156,5 @@ fn mistaken(text: &str, mistake: Mistake, wrong_bar_mm: f64) -> String {
 pub fn session(step_deg: f64, mistake: Mistake, noise: Noise, seed: u64) -> Session {
     let folder = tempfile::tempdir().unwrap();
     write(folder.path(), step_deg, mistake, noise, seed);
-    read::session(&folder.path().join("session.toml"), &ReadOptions::default()).unwrap()
+    files::session(&folder.path().join("session.toml"), &ReadOptions::default()).unwrap()
 }

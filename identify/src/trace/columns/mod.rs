@@ -303,7 +303,7 @@ fn sensitivities(problem: &Problem<'_>, beta: &[f64]) -> Vec<Sensitivities> {
 mod tests {
     use std::path::Path;
 
-    use abbe_model::session::read::{self, ReadOptions};
+    use abbe_model::files::{self, ReadOptions};
 
     use super::*;
     use crate::fit::prepare;
@@ -313,7 +313,7 @@ mod tests {
     fn sensitivities_match_their_tests_if_one_has_no_readings() {
         let file =
             Path::new(env!("CARGO_MANIFEST_DIR")).join("../sessions/hermle-c600u/measured/session.toml");
-        let mut session = read::session(&file, &ReadOptions::default()).unwrap();
+        let mut session = files::session(&file, &ReadOptions::default()).unwrap();
         let without = session.tests[1].readings.as_ref().unwrap().of_rows(&[]);
         session.tests[1].readings = Some(without);
         let (problem, fit) = prepare(&session, 1).unwrap();

@@ -203,7 +203,7 @@ mod tests {
     use std::path::Path;
 
     use abbe_model::effect::Component;
-    use abbe_model::session::read::{self, ReadOptions};
+    use abbe_model::files::{self, ReadOptions};
 
     use super::*;
     use crate::fit::{fit, prepare};
@@ -212,7 +212,7 @@ mod tests {
     fn the_band_of_a_curve_is_enlarged_as_every_uncertainty_is_and_covers_what_aliases_move() {
         let file =
             Path::new(env!("CARGO_MANIFEST_DIR")).join("../sessions/hermle-c600u/measured/session.toml");
-        let session = read::session(&file, &ReadOptions::default()).unwrap();
+        let session = files::session(&file, &ReadOptions::default()).unwrap();
         let (mut problem, _) = prepare(&session, 1).unwrap();
         let turn = 360_f64.to_radians();
         problem

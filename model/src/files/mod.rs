@@ -1,0 +1,17 @@
+//! Files of machines, sessions and readings: reading into the domain of [`session`](crate::session), and writing it.
+//!
+//! - [`toml`]: machine and session files; [`table`]: data files, one module per data format;
+//! - [`SourceMap`]: the files and texts of a session that was read;
+//! - [`schema`]: JSON Schema of machine and session files; [`stamp`]: state of the files that were read; [`whole`]: files written as a whole.
+
+mod quantity;
+pub mod schema;
+pub mod source_map;
+mod spelling;
+pub mod stamp;
+pub mod table;
+pub mod toml;
+pub mod whole;
+
+pub use self::source_map::SourceMap;
+pub use self::toml::{ReadOptions, machine, session, session_with_sources, text};

@@ -1,0 +1,20 @@
+//! Where a session comes from: its files, and their texts.
+
+use std::path::PathBuf;
+
+use super::stamp::FileStamp;
+
+/// The sources of a session that was read from files. A program that writes a changed session edits its text, so that comments and
+/// everything else remain, and it refers to the files for provenance. The lines of single readings are in
+/// [`Readings::origin`](crate::session::readings::Readings::origin).
+#[derive(Clone, Debug)]
+pub struct SourceMap {
+    /// The session file.
+    pub file: PathBuf,
+    /// The text of the session file.
+    pub text: String,
+    /// The text of the machine file, if the session names one.
+    pub machine_text: Option<String>,
+    /// All files that were read, each once: the session, its machine, its data.
+    pub files: Vec<FileStamp>,
+}

@@ -1,0 +1,358 @@
+//! Assignment of the columns of a file to their roles.
+
+use std::path::Path;
+
+use super::encoding::name_of;
+use super::number::number;
+use super::request::{ColumnMapping, ForeignColumn, Request};
+use super::row::Row;
+use crate::error::{Location, ModelError};
+use crate::files::quantity::{self, Unit};
+use crate::files::spelling::suggestion;
+use crate::instrument::InstrumentKind;
+
+/// The content of a column.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) enum Role {
+    Time,
+    Run,
+    Temperature,
+    Axis(usize, Unit),
+    Length(Unit),
+    Deviation(Unit),
+    /// Against the probing direction: the distance by which the surface lies beyond the target.
+    Outward(Unit),
+    Coordinate(usize, Unit),
+    Socket,
+}
+
+/// A column that is read.
+#[derive(Clone, Debug)]
+pub(super) struct Column {
+    pub role: Role,
+    /// Its index in a row, from 0.
+    pub index: usize,
+    /// Its name in messages.
+    pub name: String,
+}
+
+impl Role {
+    /// Parses one of our names.
+    pub fn of(name: &str, request: &Request<'_>) -> Option<Role> {
+        match name {
+            "time_s" => return Some(Role::Time),
+            "run" => return Some(Role::Run),
+            "temperature_c" => return Some(Role::Temperature),
+            "socket" if request.instrument() == InstrumentKind::Socket => return Some(Role::Socket),
+            _ => {}
+        }
+        if let Some((axis, unit)) = quantity::axis_position(request.machine, name) {
+            return Some(Role::Axis(axis, unit));
+        }
+        let (what, unit) = name.rsplit_once('_')?;
+        let unit = Unit::of_length(unit)?;
+        match (request.instrument(), what) {
+            (InstrumentKind::BallBar, "length") => Some(Role::Length(unit)),
+            (InstrumentKind::BallBar, "deviation") => Some(Role::Deviation(unit)),
+            (InstrumentKind::Probe, "distance") => Some(Role::Length(unit)),
+            (InstrumentKind::Probe, "deviation") => Some(Role::Outward(unit)),
+            (InstrumentKind::Tracker, "px") => Some(Role::Coordinate(0, unit)),
+            (InstrumentKind::Tracker, "py") => Some(Role::Coordinate(1, unit)),
+            (InstrumentKind::Tracker, "pz") => Some(Role::Coordinate(2, unit)),
+            (InstrumentKind::RTest, name) => {
+                let place = r_test_columns(request.sensors())
+                    .iter()
+                    .position(|own| *own == name)?;
+                Some(Role::Coordinate(place, unit))
+            }
+            _ => None,
+        }
+    }
+
+    /// Whether two columns contain the same quantity.
+    fn same_as(self, other: Role) -> bool {
+        match (self, other) {
+            (Role::Axis(a, _), Role::Axis(b, _)) => a == b,
+            (Role::Coordinate(a, _), Role::Coordinate(b, _)) => a == b,
+            (
+                Role::Length(_) | Role::Deviation(_) | Role::Outward(_),
+                Role::Length(_) | Role::Deviation(_) | Role::Outward(_),
+            ) => true,
+            _ => self == other,
+        }
+    }
+}
+
+/// The names of an R-test's columns before their unit: the values of the single sensors, or the vector in the frame that carries them.
+pub(crate) fn r_test_columns(sensors: bool) -> [&'static str; 3] {
+    if sensors {
+        ["du", "dv", "dw"]
+    } else {
+        ["dx", "dy", "dz"]
+    }
+}
+
+/// The required columns of an R-test, for data with columns of the other kind.
+pub(super) fn r_test_help(request: &Request<'_>) -> &'static str {
+    if request.sensors() {
+        "the test states the sensor directions: it needs the sensor values `du_um`, `dv_um` and `dw_um`; without `sensor_angles_deg` and `sensor_directions` it needs `dx_um`, `dy_um` and `dz_um`"
+    } else {
+        "an R-test needs `dx_um`, `dy_um` and `dz_um`; the values of single sensors, `du_um`, `dv_um` and `dw_um`, need \
+         `sensor_angles_deg` or `sensor_directions` in the test"
+    }
+}
+
+/// Every valid column name of this test.
+pub(super) fn known(request: &Request<'_>) -> Vec<String> {
+    let mut known: Vec<String> = ["time_s", "run"].map(str::to_string).to_vec();
+    for axis in &request.machine.axes {
+        let unit = axis.kind.unit();
+        known.push(format!("{}_{unit}", axis.name.to_lowercase()));
+    }
+    known.push("temperature_c".into());
+    let own: &[&str] = match request.instrument() {
+        InstrumentKind::BallBar => &["length_mm", "deviation_um"],
+        InstrumentKind::Tracker => &["px_mm", "py_mm", "pz_mm"],
+        InstrumentKind::Socket => &["socket"],
+        InstrumentKind::Probe => &["distance_mm", "deviation_um"],
+        InstrumentKind::RTest if request.sensors() => &["du_um", "dv_um", "dw_um"],
+        InstrumentKind::RTest => &["dx_um", "dy_um", "dz_um"],
+    };
+    known.extend(own.iter().map(|name| name.to_string()));
+    known
+}
+
+pub(super) fn listed(names: &[String]) -> String {
+    const MAX: usize = 40;
+    let mut text = names.iter().take(MAX).cloned().collect::<Vec<_>>().join(", ");
+    if names.len() > MAX {
+        text.push_str(", …");
+    }
+    text
+}
+
+/// The columns to be read, from the first row, which is the header if the file has one.
+pub(super) fn columns(
+    request: &Request<'_>,
+    file: &Path,
+    first: &Row,
+    header: Option<&Row>,
+) -> Result<Vec<Column>, ModelError> {
+    let line = first.line;
+    let columns = match request.columns {
+        Some(mapped) => mapped_columns(request, file, mapped, header, first)?,
+        None => own_columns(request, file, header)?,
+    };
+    for (index, column) in columns.iter().enumerate() {
+        if let Some(other) = columns[..index]
+            .iter()
+            .find(|other| other.role.same_as(column.role))
+        {
+            return Err(ModelError::Input {
+                location: Location::line(file, line),
+                message: format!(
+                    "columns `{}` and `{}` have the same meaning",
+                    other.name, column.name
+                ),
+                help: Some("keep one of them; [columns] can name the one to read".into()),
+            });
+        }
+    }
+    Ok(columns)
+}
+
+fn own_columns(request: &Request<'_>, file: &Path, header: Option<&Row>) -> Result<Vec<Column>, ModelError> {
+    let Some(row) = header else {
+        return Err(ModelError::Input {
+            location: Location::file(file),
+            message: "a data file without a header and without [columns] that name its columns".into(),
+            help: Some("add [columns] with `name = number`, counted from 1, such as `j1_rad = 1`".into()),
+        });
+    };
+    let known = known(request);
+    let header = &row.cells;
+    let mut columns = Vec::new();
+    for (index, name) in header.iter().enumerate() {
+        let Some(role) = Role::of(name, request).or_else(|| Role::of(&name.to_lowercase(), request)) else {
+            return Err(ModelError::Input {
+                location: Location::line(file, row.line),
+                message: if row.keyed {
+                    format!("unknown key `{name}`")
+                } else {
+                    format!("column {} has the unknown name `{name}`", index + 1)
+                },
+                help: Some(unknown_column_help(request, name, header, &known)),
+            });
+        };
+        columns.push(Column {
+            role,
+            index,
+            name: name.clone(),
+        });
+    }
+    Ok(columns)
+}
+
+fn unknown_column_help(request: &Request<'_>, name: &str, header: &[String], known: &[String]) -> String {
+    let separators = [(';', "\";\""), ('\t', "\"\\t\""), (',', "\",\"")];
+    if header.len() == 1
+        && let Some((_, other)) = separators
+            .iter()
+            .find(|(other, _)| *other as u8 != request.format.separator && name.contains(*other))
+    {
+        return format!(
+            "the columns seem to be separated by {other}: declare `[format] separator = {other}`"
+        );
+    }
+    if name.parse::<f64>().is_ok() {
+        return NO_HEADER.into();
+    }
+    let id_stem = name.rsplit_once('_').map_or(name, |(id_stem, _)| id_stem);
+    if request.instrument() == InstrumentKind::RTest && r_test_columns(!request.sensors()).contains(&id_stem)
+    {
+        return r_test_help(request).into();
+    }
+    format!(
+        "{}known here: {}; a file with other names needs [columns], own name = foreign name",
+        suggestion(name, known),
+        listed(known)
+    )
+}
+
+/// What to do with a file whose first row names nothing.
+const NO_HEADER: &str = "a number was found where a name is expected: a file without a header declares `[format] header = false` and numbers its columns in [columns], such as `length_mm = 3`; lines above the header are skipped with `skip_lines`";
+
+fn mapped_columns(
+    request: &Request<'_>,
+    file: &Path,
+    mapped: &[ColumnMapping],
+    header: Option<&Row>,
+    first: &Row,
+) -> Result<Vec<Column>, ModelError> {
+    let mut columns: Vec<Column> = Vec::new();
+    for entry in mapped {
+        let fault = |message: String, help: String| ModelError::Input {
+            location: entry.location.clone(),
+            message,
+            help: Some(help),
+        };
+        let Some(role) =
+            Role::of(&entry.own, request).or_else(|| Role::of(&entry.own.to_lowercase(), request))
+        else {
+            let known = known(request);
+            return Err(fault(
+                format!("[columns] has the unknown column `{}`", entry.own),
+                format!(
+                    "{}valid names are {}",
+                    suggestion(&entry.own, &known),
+                    listed(&known)
+                ),
+            ));
+        };
+        let index = match &entry.foreign {
+            ForeignColumn::Number(number) => number_in(*number, file, first.cells.len()),
+            ForeignColumn::Name(name) => name_in(name, request, file, header),
+        }
+        .map_err(|(message, help)| fault(message, help))?;
+        if let Some(other) = columns.iter().position(|column| column.index == index) {
+            return Err(fault(
+                format!(
+                    "[columns] reads column {} of {} twice: as `{}` and as `{}`",
+                    index + 1,
+                    file.display(),
+                    mapped[other].own,
+                    entry.own
+                ),
+                "a column has one meaning: name another column for one of them, or remove one".into(),
+            ));
+        }
+        let name = match &entry.foreign {
+            ForeignColumn::Name(name) => name.clone(),
+            ForeignColumn::Number(_) => entry.own.clone(),
+        };
+        columns.push(Column { role, index, name });
+    }
+    match header {
+        Some(header) if are_readings(request, mapped, &columns, header) => Err(ModelError::Input {
+            location: Location::line(file, header.line),
+            message: "the first row contains numbers where a header is expected; it would not be read".into(),
+            help: Some(
+                "a file without a header declares `[format] header = false`; lines above the header are skipped with `skip_lines`"
+                    .into(),
+            ),
+        }),
+        _ => Ok(columns),
+    }
+}
+
+/// Whether the first row is a row of readings instead of a header: columns are given by number only, and all of them contain numbers.
+fn are_readings(request: &Request<'_>, mapped: &[ColumnMapping], columns: &[Column], header: &Row) -> bool {
+    let mut of_numbers = columns
+        .iter()
+        .filter(|column| column.role != Role::Socket)
+        .peekable();
+    of_numbers.peek().is_some()
+        && mapped
+            .iter()
+            .all(|entry| matches!(entry.foreign, ForeignColumn::Number(_)))
+        && of_numbers.all(|column| number(&header.cells[column.index], &request.format).is_ok())
+}
+
+/// The index of a column from its number; otherwise a message and what to do.
+fn number_in(number: usize, file: &Path, width: usize) -> Result<usize, (String, String)> {
+    if number > width {
+        let message = format!(
+            "there is no column {number} in {}, which has {width}",
+            file.display()
+        );
+        return Err((message, "columns are numbered from 1".into()));
+    }
+    Ok(number - 1)
+}
+
+/// The index of a column from its name in the header. If there is none or more than one: a message and what to do.
+fn name_in(
+    name: &str,
+    request: &Request<'_>,
+    file: &Path,
+    header: Option<&Row>,
+) -> Result<usize, (String, String)> {
+    let Some(row) = header else {
+        return Err((
+            format!("column `{name}` of a file declared to have no header"),
+            "use its number, counted from 1".into(),
+        ));
+    };
+    let header = &row.cells;
+    let found: Vec<usize> = (0..header.len()).filter(|index| header[*index] == name).collect();
+    match found[..] {
+        [index] => Ok(index),
+        [] => {
+            let mut help = format!("{}it has {}", suggestion(name, header), listed(header));
+            if header.iter().all(|cell| number(cell, &request.format).is_ok()) {
+                help = NO_HEADER.into();
+            } else if let Some(encoding) = row.encoding {
+                help.push_str(&format!(
+                    "; the header was read as {}: if names look garbled, declare the encoding, such as `[format] encoding = \"utf-8\"`",
+                    name_of(encoding)
+                ));
+            }
+            Err((format!("{} has no column `{name}`", file.display()), help))
+        }
+        [first, ..] => {
+            let numbers: Vec<String> = found.iter().map(|index| (index + 1).to_string()).collect();
+            Err((
+                format!(
+                    "{} has {} columns with the name `{name}`: {}",
+                    file.display(),
+                    found.len(),
+                    numbers.join(", ")
+                ),
+                format!(
+                    "use the number of one of them, counted from 1, such as {}",
+                    first + 1
+                ),
+            ))
+        }
+    }
+}

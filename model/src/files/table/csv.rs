@@ -1,0 +1,170 @@
+//! CSV: rows of cells in a text, with a separator between cells. Read with any layout, written with our column names.
+//!
+//! A header line, then one row per reading. A `#` starts a comment line. Empty lines, a byte order mark and CRLF are accepted.
+
+use std::path::Path;
+
+use super::columns::r_test_columns;
+use super::format::{Content, DataFormat, Rows, Table};
+use super::lines::Lines;
+use super::request::Request;
+use super::row::Row;
+use crate::chain::Machine;
+use crate::error::ModelError;
+use crate::files::whole;
+use crate::instrument::Station;
+use crate::session::readings::Readings;
+
+/// The format. It reads every file that is of no other format.
+pub(super) struct Csv;
+
+impl DataFormat for Csv {
+    fn reads(&self, _: &Path) -> bool {
+        true
+    }
+
+    fn open(&self, file: &Path, request: &Request<'_>) -> Result<Content, ModelError> {
+        let lines = Lines::open(file, &request.format)?;
+        Ok(Content::Table(Table {
+            stamp: lines.stamp().clone(),
+            has_header: request.format.header,
+            rows: Box::new(CsvRows::new(lines, request.format.separator)),
+        }))
+    }
+}
+
+/// The rows of a text, without comments and empty lines.
+struct CsvRows {
+    lines: Lines,
+    separator: u8,
+}
+
+impl CsvRows {
+    fn new(lines: Lines, separator: u8) -> CsvRows {
+        CsvRows { lines, separator }
+    }
+
+    /// The cells of a line with quotes.
+    fn quoted(&self, text: &str) -> Result<Vec<String>, ModelError> {
+        if text.matches('"').count() % 2 == 1 {
+            return Err(self.lines.fault(
+                "a quote is not closed".into(),
+                "a quoted cell must end on its line",
+            ));
+        }
+        let mut record = csv::StringRecord::new();
+        let mut reader = csv::ReaderBuilder::new()
+            .has_headers(false)
+            .delimiter(self.separator)
+            .trim(csv::Trim::All)
+            .from_reader(text.as_bytes());
+        match reader.read_record(&mut record) {
+            Ok(true) => Ok(record.iter().map(str::to_string).collect()),
+            Ok(false) => Ok(Vec::new()),
+            Err(cause) => Err(self.lines.fault(
+                format!("invalid quotes: {cause}"),
+                "a quoted cell must end on its line",
+            )),
+        }
+    }
+}
+
+impl Rows for CsvRows {
+    fn next_row(&mut self) -> Result<Option<Row>, ModelError> {
+        while let Some(line) = self.lines.next_line()? {
+            let content = line.text.trim();
+            if content.is_empty() || content.starts_with('#') {
+                continue;
+            }
+            let cells = if line.text.contains('"') {
+                self.quoted(&line.text)?
+            } else {
+                line.text
+                    .split(char::from(self.separator))
+                    .map(|cell| cell.trim().to_string())
+                    .collect()
+            };
+            self.lines.count_row()?;
+            return Ok(Some(Row::of_line(line, cells)));
+        }
+        Ok(None)
+    }
+}
+
+/// Writes readings as a CSV file with our column names, atomically.
+///
+/// Numbers have up to twelve decimals of mm, degree or s, so that the rounding is far below any resolution.
+///
+/// # Errors
+/// If the file cannot be written; the previous file then remains.
+pub fn write(
+    path: &Path,
+    machine: &Machine,
+    station: &Station<f64>,
+    readings: &Readings,
+) -> Result<(), ModelError> {
+    whole::write(path, &text(machine, station, readings))
+}
+
+/// The text of [`write`].
+pub fn text(machine: &Machine, station: &Station<f64>, readings: &Readings) -> String {
+    let mut header = Vec::new();
+    if !readings.time_s.is_empty() {
+        header.push("time_s".to_string());
+    }
+    if !readings.run.is_empty() {
+        header.push("run".into());
+    }
+    for axis in &machine.axes {
+        header.push(axis.column(""));
+    }
+    if !readings.temperature_c.is_empty() {
+        header.push("temperature_c".into());
+    }
+    match station {
+        Station::BallBar(_) => header.push("length_mm".into()),
+        Station::Tracker(_) => header.extend(["px_mm", "py_mm", "pz_mm"].map(String::from)),
+        // A pose of a socket consists of axis positions only.
+        Station::Socket(_) => {}
+        Station::Probe(_) => header.push("distance_mm".into()),
+        Station::RTest(rtest) => {
+            header.extend(r_test_columns(rtest.sensors.is_some()).map(|name| format!("{name}_mm")));
+        }
+    }
+    let mut text = header.join(",");
+    text.push('\n');
+    for row in 0..readings.rows() {
+        let mut cells = Vec::with_capacity(header.len());
+        if let Some(time) = readings.time_s.get(row) {
+            cells.push(decimal(*time));
+        }
+        if let Some(run) = readings.run.get(row) {
+            cells.push(run.to_string());
+        }
+        for (axis, column) in machine.axes.iter().zip(&readings.positions) {
+            cells.push(decimal(axis.kind.to_display(column[row])));
+        }
+        if let Some(temperature) = readings.temperature_c.get(row) {
+            cells.push(decimal(*temperature));
+        }
+        if !matches!(station, Station::Socket(_)) {
+            let start = row * readings.coordinates;
+            for k in start..start + readings.coordinates {
+                cells.push(readings.observed.get(k).map_or(String::new(), |mm| decimal(*mm)));
+            }
+        }
+        text.push_str(&cells.join(","));
+        text.push('\n');
+    }
+    text
+}
+
+/// A number with the necessary decimals, at most twelve.
+fn decimal(value: f64) -> String {
+    let text = format!("{value:.12}");
+    let text = text.trim_end_matches('0').trim_end_matches('.');
+    if text == "-0" { "0".into() } else { text.into() }
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,65 @@
+//! Data files: tables of readings in any format, and foreign files through `[format]` and `[columns]`.
+//!
+//! - [`format`]: what a data format is; [`formats`]: the registry; one module per format: [`csv`], [`spreadsheet`], [`ballbar_xml`];
+//! - [`request`]: what a test requires of its file; [`columns`], [`required`]: roles of columns; [`fill`]: readings from rows;
+//! - [`lines`], [`encoding`], [`row`], [`number`]: lines of a text, rows and cells.
+
+mod ballbar_xml;
+mod columns;
+pub mod csv;
+mod duplicates;
+pub(crate) mod encoding;
+mod fill;
+mod format;
+mod formats;
+mod lines;
+mod number;
+pub(crate) mod request;
+mod required;
+mod row;
+mod spreadsheet;
+
+use std::path::Path;
+
+use fill::BySocket;
+use format::Content;
+use request::Request;
+
+use crate::error::ModelError;
+use crate::files::stamp::FileStamp;
+
+/// The content of a data file.
+pub(crate) struct Data {
+    /// The state of the file when it was read.
+    pub stamp: FileStamp,
+    /// Its readings: one set per socket in the file, else one.
+    pub by_socket: BySocket,
+    /// Warnings about the file.
+    pub warnings: Vec<String>,
+}
+
+/// Reads a data file.
+///
+/// # Errors
+/// Every fault that prevents the use of the file, with its line and what to do.
+pub(crate) fn read(file: &Path, request: &Request<'_>) -> Result<Data, ModelError> {
+    match formats::of(file).open(file, request)? {
+        Content::Table(mut table) => {
+            let (by_socket, warnings) = fill::read(file, table.rows.as_mut(), table.has_header, request)?;
+            let name = &request.test.name;
+            let warnings = warnings
+                .into_iter()
+                .map(|warning| format!("test \"{name}\": {warning}"));
+            Ok(Data {
+                stamp: table.stamp,
+                by_socket,
+                warnings: warnings.collect(),
+            })
+        }
+        Content::Readings(whole) => Ok(Data {
+            stamp: whole.stamp,
+            by_socket: vec![(None, whole.readings)],
+            warnings: whole.warnings,
+        }),
+    }
+}

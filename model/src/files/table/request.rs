@@ -1,0 +1,97 @@
+//! What a test requires of its data file, and what the session states of the layout of the file.
+
+use encoding_rs::Encoding;
+
+use crate::chain::Machine;
+use crate::error::Location;
+use crate::instrument::{InstrumentKind, Station};
+use crate::session::{Test, motion, plausibility};
+
+/// The layout of the rows of a file.
+#[derive(Clone, Debug, PartialEq)]
+pub(crate) struct Format {
+    /// The separator between cells.
+    pub separator: u8,
+    /// `.` or `,`.
+    pub decimal: u8,
+    /// Whether the first row names the columns.
+    pub header: bool,
+    /// The sheet of a spreadsheet; by default the first that is not empty.
+    pub sheet: Option<String>,
+    /// The word in a ball-bar file in XML for the direction from the first axis of the plane towards the second.
+    pub anticlockwise: Option<String>,
+    /// The stated encoding of the text.
+    pub encoding: Option<&'static Encoding>,
+    /// Lines (of a spreadsheet: rows) above the header.
+    pub skip_lines: usize,
+}
+
+impl Default for Format {
+    fn default() -> Self {
+        Format {
+            separator: b',',
+            decimal: b'.',
+            header: true,
+            sheet: None,
+            anticlockwise: None,
+            encoding: None,
+            skip_lines: 0,
+        }
+    }
+}
+
+/// A line of `[columns]`: own name = foreign name.
+#[derive(Clone, Debug)]
+pub(crate) struct ColumnMapping {
+    /// Our name, which includes the unit.
+    pub own: String,
+    /// The foreign name or number.
+    pub foreign: ForeignColumn,
+    /// The location of the line.
+    pub location: Location,
+}
+
+/// The identification of a foreign column.
+#[derive(Clone, Debug, PartialEq)]
+pub(crate) enum ForeignColumn {
+    /// By the header.
+    Name(String),
+    /// From 1.
+    Number(usize),
+}
+
+/// What a test requires of its data file.
+pub(crate) struct Request<'a> {
+    /// The machine that has the axes of the columns.
+    pub machine: &'a Machine,
+    /// The test, without its readings.
+    pub test: &'a Test,
+    /// Which positions in [`Test::at`] the session states.
+    pub at_listed: &'a [bool],
+    /// The layout of the rows.
+    pub format: Format,
+    /// Foreign names, if declared.
+    pub columns: Option<&'a [ColumnMapping]>,
+}
+
+impl Request<'_> {
+    /// The instrument.
+    pub fn instrument(&self) -> InstrumentKind {
+        self.test.station.kind()
+    }
+
+    /// Whether the sensors of an R-test are read singly instead of as X, Y, Z.
+    pub fn sensors(&self) -> bool {
+        matches!(&self.test.station, Station::RTest(rtest) if rtest.sensors.is_some())
+    }
+
+    /// The reference length of deviations, mm.
+    pub fn bar_mm(&self) -> f64 {
+        plausibility::bar_mm(&self.test.station)
+    }
+
+    /// Axes that move in the planned test.
+    pub fn moved(&self) -> Vec<usize> {
+        motion::named_axes(self.test.motion.as_ref())
+    }
+}

@@ -1,0 +1,390 @@
+//! Reader of machine and session files.
+
+mod data_folder;
+pub(crate) mod document;
+mod effect;
+mod format;
+mod machine;
+mod movement;
+pub mod rewrite;
+mod shape;
+mod sockets;
+mod station;
+mod test;
+mod unknowns;
+pub mod write;
+
+use std::path::{Path, PathBuf};
+
+pub use machine::machine;
+
+use super::quantity::{self, MICROMETRE};
+use super::source_map::SourceMap;
+use super::stamp::FileStamp;
+use super::table::request::{ColumnMapping, Format};
+use crate::chain::Machine;
+use crate::error::{Location, ModelError};
+use crate::instrument::InstrumentKind;
+use crate::session::expression::Length;
+use crate::session::limits;
+use crate::session::{Session, Test, setups};
+use document::{Source, Table, Value};
+
+/// Options for reading a session.
+#[derive(Clone, Debug)]
+pub struct ReadOptions {
+    /// The folder of the data files, if they are not beside the session file.
+    pub data_directory: Option<PathBuf>,
+    /// Whether the data files are read; otherwise the session is only a plan.
+    pub read_data: bool,
+    /// Whether the session may read files outside its own folder, the folders below and the data directory.
+    pub allow_outside: bool,
+}
+
+impl Default for ReadOptions {
+    /// Data are read, from the session's folder and below.
+    fn default() -> Self {
+        ReadOptions {
+            data_directory: None,
+            read_data: true,
+            allow_outside: false,
+        }
+    }
+}
+
+/// Context of the session for the readers of tests and effects.
+struct Context<'a> {
+    /// The session file.
+    file: &'a Path,
+    machine: &'a Machine,
+    instrument: InstrumentKind,
+    constants: &'a [(String, f64)],
+    format: Format,
+    columns: Option<Vec<ColumnMapping>>,
+    options: &'a ReadOptions,
+}
+
+impl Context<'_> {
+    /// A length: a number, or an expression in the constants.
+    fn length(&self, value: &Value<'_>) -> Result<(Length, f64), ModelError> {
+        let Some(text) = value.as_text() else {
+            let number = value.number_or_inf("a number or an expression in quotes")?;
+            if !number.is_finite() {
+                return Err(value.error(format!("`{}` is infinite; a length is expected", value.key), None));
+            }
+            return Ok((Length::Number(number), number));
+        };
+        let names: Vec<&str> = self.constants.iter().map(|(name, _)| name.as_str()).collect();
+        let length = Length::parse(text, &names).map_err(|fault| {
+            let help = "a length is a number or an expression in [constants] with + - * / ^2 sqrt( )";
+            value.error(
+                format!("`{}` = \"{text}\": {fault}", value.key),
+                Some(help.into()),
+            )
+        })?;
+        let number = length.evaluate(&|name: &str| {
+            let found = self.constants.iter().find(|(known, _)| known == name);
+            found.map_or(f64::NAN, |(_, value)| *value)
+        });
+        if let Some(fault) = limits::too_large(number) {
+            let message = format!("`{}` = \"{text}\" evaluates to {fault}", value.key);
+            return Err(value.error(message, None));
+        }
+        if !number.is_finite() {
+            let message = format!(
+                "`{}` = \"{text}\" evaluates to {number} with these constants",
+                value.key
+            );
+            return Err(value.error(
+                message,
+                Some("a root of a negative number, or a division by zero?".into()),
+            ));
+        }
+        Ok((length, number))
+    }
+
+    /// Three lengths.
+    fn point(&self, value: Value<'_>) -> Result<([Length; 3], [f64; 3]), ModelError> {
+        let items = value.three("a list of three lengths")?;
+        let mut lengths = [const { Length::Number(0.0) }; 3];
+        let mut numbers = [0.0; 3];
+        for (i, item) in items.iter().enumerate() {
+            (lengths[i], numbers[i]) = self.length(item)?;
+        }
+        Ok((lengths, numbers))
+    }
+}
+
+/// Reads the text of another TOML file in the same way: UTF-8 with or without byte order mark, of a limited size, unchanged while it is
+/// read. `what` names its content in messages.
+///
+/// # Errors
+/// If the file cannot be read or is not such a text, with its name and what to do.
+pub fn text(path: &Path, what: &str) -> Result<String, ModelError> {
+    Ok(Source::read(path, what)?.text)
+}
+
+/// Reads a session file, its machine and, if requested, its data.
+///
+/// # Errors
+/// Every fault that prevents the use of the session: file, line, what was found and expected, and what to do.
+pub fn session(path: &Path, options: &ReadOptions) -> Result<Session, ModelError> {
+    session_with_sources(path, options).map(|(session, _)| session)
+}
+
+/// As [`session`], with the files and texts from which the session was read.
+///
+/// # Errors
+/// As [`session`].
+pub fn session_with_sources(path: &Path, options: &ReadOptions) -> Result<(Session, SourceMap), ModelError> {
+    let source = Source::read(path, "the session file")?;
+    let mut root = source.parse()?;
+    let SessionMachine {
+        machine,
+        source: machine_source,
+    } = session_machine(path, options, &mut root)?;
+    let constants = constants(&mut root)?;
+    let instrument = Instrument::read(&mut root)?;
+    let about = about(&mut root)?;
+    let unknowns = unknowns::unknowns(&machine, instrument.kind, &mut root)?;
+
+    let format = match root.take("format") {
+        Some(value) => format::format(value.table("[format]".into())?)?,
+        None => Format::default(),
+    };
+    let columns = match root.take("columns") {
+        Some(value) => Some(format::columns(value.table("[columns]".into())?)?),
+        None => None,
+    };
+    let context = Context {
+        file: path,
+        machine: &machine,
+        instrument: instrument.kind,
+        constants: &constants,
+        format,
+        columns,
+        options,
+    };
+    let mut found = Found::default();
+    let (tests, declared) = tests(&context, &mut root, &mut found)?;
+    for (index, test) in tests.iter().enumerate() {
+        found.warnings.extend(setups::differing(&tests[..index], test));
+    }
+    let effects = match root.take("effect") {
+        Some(value) => value
+            .list("tables [[effect]]")?
+            .into_iter()
+            .map(|item| effect::effect(&context, &declared, item))
+            .collect::<Result<Vec<_>, _>>()?,
+        None => Vec::new(),
+    };
+    let socket_distances = sockets::socket_distances(instrument.kind, &tests, &mut root, options.read_data)?;
+    root.finish()?;
+    let mut files: Vec<FileStamp> = Vec::new();
+    let own = source
+        .stamp
+        .iter()
+        .chain(machine_source.iter().filter_map(|source| source.stamp.as_ref()));
+    for stamp in own.chain(&found.stamps) {
+        if !files.contains(stamp) {
+            files.push(stamp.clone());
+        }
+    }
+    let sources = SourceMap {
+        file: path.to_path_buf(),
+        text: source.text.clone(),
+        machine_text: machine_source.map(|source| source.text),
+        files,
+    };
+    let session = Session {
+        constants,
+        instrument: instrument.kind,
+        noise_mm: instrument.noise_mm,
+        resolution_mm: instrument.resolution_mm,
+        unknowns,
+        effects,
+        tests,
+        socket_distances,
+        warnings: found.warnings,
+        about,
+        machine,
+    };
+    Ok((session, sources))
+}
+
+/// What was found while the tests were read, beside the tests.
+#[derive(Default)]
+struct Found {
+    /// Warnings about usable tests.
+    warnings: Vec<String>,
+    /// The data files.
+    stamps: Vec<FileStamp>,
+}
+
+/// The machine of a session, and its file if it has one of its own.
+struct SessionMachine {
+    machine: Machine,
+    source: Option<Source>,
+}
+
+/// Reads the machine: a file beside the session, or tables in the session.
+fn session_machine(
+    path: &Path,
+    options: &ReadOptions,
+    root: &mut Table<'_>,
+) -> Result<SessionMachine, ModelError> {
+    let value = root.require(
+        "machine",
+        "[machine] with `file = \"machine.toml\"`, or the machine's tables in it",
+    )?;
+    let mut table = value.table("[machine]".into())?;
+    let Some(file) = table.take("file") else {
+        return Ok(SessionMachine {
+            machine: machine::from_table(table)?,
+            source: None,
+        });
+    };
+    let named = file.text()?;
+    let found = path.parent().unwrap_or(Path::new("")).join(&named);
+    if !found.exists() {
+        let message = format!(
+            "the machine file `{named}` does not exist; looked for {}",
+            found.display()
+        );
+        return Err(file.error(message, Some("its name is relative to the session file".into())));
+    }
+    data_folder::check(path, options, &file, &found)?;
+    table.finish()?;
+    let source = machine::source(&found)?;
+    Ok(SessionMachine {
+        machine: machine::from_table(source.parse()?)?,
+        source: Some(source),
+    })
+}
+
+fn constants(root: &mut Table<'_>) -> Result<Vec<(String, f64)>, ModelError> {
+    let Some(value) = root.take("constants") else {
+        return Ok(Vec::new());
+    };
+    let mut constants = Vec::new();
+    for entry in value.table("[constants]".into())?.remaining_values()? {
+        let name = entry.key.clone();
+        let mut letters = name.chars();
+        let valid = letters.next().is_some_and(|c| c.is_alphabetic() || c == '_')
+            && letters.all(|c| c.is_alphanumeric() || c == '_')
+            && name != "sqrt";
+        if !valid {
+            let help = "a name is a letter followed by letters, digits and `_`; `sqrt` is reserved";
+            let message = format!("a constant cannot have the name `{name}`");
+            return Err(entry
+                .source
+                .error(entry.key_span.clone(), message, Some(help.into())));
+        }
+        constants.push((name, entry.number()?));
+    }
+    Ok(constants)
+}
+
+/// Reads `[about]`: notes that reports repeat.
+fn about(root: &mut Table<'_>) -> Result<Vec<(String, String)>, ModelError> {
+    let Some(value) = root.take("about") else {
+        return Ok(Vec::new());
+    };
+    let notes = value.table("[about]".into())?.remaining_values()?;
+    notes
+        .into_iter()
+        .map(|note| {
+            let control = note.key.chars().any(char::is_control);
+            if control || note.key.trim().is_empty() {
+                let message = "a note of [about] has a name that cannot be displayed";
+                let help = "use names such as `serial_number`, `operator`, `date`, `comment`";
+                return Err(note
+                    .source
+                    .error(note.key_span.clone(), message, Some(help.into())));
+            }
+            Ok((note.key.clone(), note.note()?))
+        })
+        .collect()
+}
+
+/// The valid values of `kind` of an instrument.
+const KINDS: &str = "\"ballbar\", \"r-test\", \"probe\", \"tracker\" or \"socket\"";
+
+struct Instrument {
+    kind: InstrumentKind,
+    noise_mm: Option<f64>,
+    resolution_mm: Option<f64>,
+}
+
+impl Instrument {
+    fn read(root: &mut Table<'_>) -> Result<Instrument, ModelError> {
+        let value = root.require("instrument", "[instrument] with `kind = \"ballbar\"`")?;
+        let mut table = value.table("[instrument]".into())?;
+        let value = table.require("kind", KINDS)?;
+        let word = value.text()?;
+        let Some(kind) = InstrumentKind::ALL.into_iter().find(|kind| kind.word() == word) else {
+            return Err(value.unexpected(KINDS));
+        };
+        let mut not_negative = |key: &'static str| -> Result<Option<f64>, ModelError> {
+            let Some(value) = table.take(key) else {
+                return Ok(None);
+            };
+            let number = value.number()?;
+            if number < 0.0 {
+                let message = format!("`{key}` is {number}; it cannot be negative");
+                return Err(value.error(message, None));
+            }
+            if let Some(fault) = limits::too_small_um(number) {
+                return Err(value.error(format!("`{key}` is {fault}"), None));
+            }
+            Ok(Some(number * MICROMETRE))
+        };
+        let noise_mm = not_negative("noise_um")?;
+        let resolution_mm = not_negative("resolution_um")?.filter(|step| *step > 0.0);
+        table.finish()?;
+        Ok(Instrument {
+            kind,
+            noise_mm,
+            resolution_mm,
+        })
+    }
+}
+
+/// The name of a `[[test]]`, with the tests that it declares: one for each socket, else one.
+struct Declared {
+    name: String,
+    parts: Vec<String>,
+}
+
+/// Reads the tests, and the names by which effects may refer to them.
+fn tests(
+    context: &Context<'_>,
+    root: &mut Table<'_>,
+    found: &mut Found,
+) -> Result<(Vec<Test>, Vec<Declared>), ModelError> {
+    let items = match root.take("test") {
+        Some(value) => value.list("tables [[test]]")?,
+        None => Vec::new(),
+    };
+    let mut tests: Vec<Test> = Vec::new();
+    let mut declared: Vec<Declared> = Vec::new();
+    for item in items {
+        let called = format!("test {}", declared.len() + 1);
+        let mut table = item.table(called)?;
+        let name = test::name(&mut table, &declared)?;
+        let parts = test::tests(context, &name, table, found)?;
+        declared.push(Declared {
+            name,
+            parts: parts.iter().map(|test| test.name.clone()).collect(),
+        });
+        tests.extend(parts);
+    }
+    if tests.is_empty() {
+        return Err(ModelError::Input {
+            location: Location::file(context.file),
+            message: "a session without tests".into(),
+            help: Some("add at least one [[test]]".into()),
+        });
+    }
+    Ok((tests, declared))
+}

@@ -1,0 +1,420 @@
+//! Sessions built in memory, with the checks and defaults that a session file has.
+//!
+//! A ball bar on a five-axis machine. The workpiece ball lies at radius 100 mm on the table, the spindle ball 75 mm above its centre, so
+//! that the bar has 125 mm. The axis of C is 10 µm away from its nominal position along X:
+//!
+//! ```
+//! use abbe_model::chain::Machine;
+//! use abbe_model::component::ErrorName;
+//! use abbe_model::instrument::ballbar::BallBar;
+//! use abbe_model::instrument::{InstrumentKind, Station};
+//! use abbe_model::session::Session;
+//! use abbe_model::session::build::{Columns, NewTest};
+//!
+//! let machine = Machine::from_code("[wCAbYXZt]")?;
+//! let mut session = Session::new(machine, InstrumentKind::BallBar);
+//! session.noise_mm = Some(0.3e-3);
+//! session.unknowns = ["EX0C", "EY0C"].iter().filter_map(|name| ErrorName::parse(name)).collect();
+//!
+//! let c_rad: Vec<f64> = (0..360).map(|degree| f64::from(degree).to_radians()).collect();
+//! let read = |c: &f64| ((0.01 - 100.0 * c.sin()).powi(2) + (100.0 * c.cos()).powi(2) + 75.0_f64.powi(2)).sqrt();
+//! let columns = Columns {
+//!     observed: c_rad.iter().map(read).collect(),
+//!     axes: vec![("C".into(), c_rad)],
+//!     ..Columns::default()
+//! };
+//! let bar = BallBar { workpiece_ball: [0.0, 100.0, 0.0], spindle_ball: [0.0; 3], bar: 125.0 };
+//! session.add_test(NewTest::new("C100", Station::BallBar(bar.clone())).at("Z", 75.0).readings(columns.clone()))?;
+//! assert_eq!(session.tests[0].readings.as_ref().map(|readings| readings.rows()), Some(360));
+//!
+//! // Without the position of Z, the bar does not reach from ball to ball.
+//! let fault = session.add_test(NewTest::new("again", Station::BallBar(bar)).readings(columns)).unwrap_err();
+//! assert!(fault.to_string().contains("a bar of 125.0000 mm cannot reach between its balls"));
+//! # Ok::<(), abbe_model::ModelError>(())
+//! ```
+
+use super::check::{self, Fault, MIN_READINGS, MissingPosition};
+use super::expression::Length;
+use super::motion::{self, Motion};
+use super::readings::Readings;
+use super::{Prior, Session, Test, defaults, limits, planned, setups};
+use crate::chain::Machine;
+use crate::error::ModelError;
+use crate::instrument::{InstrumentKind, Station};
+
+impl Session {
+    /// A session without tests. The errors to be estimated are the defaults of the instrument; the noise is estimated.
+    pub fn new(machine: Machine, instrument: InstrumentKind) -> Session {
+        Session {
+            unknowns: defaults::unknowns(&machine, instrument),
+            machine,
+            constants: Vec::new(),
+            instrument,
+            noise_mm: None,
+            resolution_mm: None,
+            effects: Vec::new(),
+            tests: Vec::new(),
+            socket_distances: Vec::new(),
+            warnings: Vec::new(),
+            about: Vec::new(),
+        }
+    }
+
+    /// Adds a test, with the checks of a `[[test]]` of a session file. Warnings about a usable test are added to
+    /// [`Session::warnings`]. After an error the session is unchanged.
+    ///
+    /// # Errors
+    /// [`ModelError::Session`] if the test cannot be used: its name is taken, a number is out of range, its motion or its readings do not
+    /// fit its set-up.
+    pub fn add_test(&mut self, test: NewTest) -> Result<(), ModelError> {
+        let added = test.checked(self);
+        let (test, warnings) = added.map_err(|(message, help)| ModelError::Session { message, help })?;
+        self.warnings.extend(warnings);
+        self.tests.push(test);
+        Ok(())
+    }
+}
+
+/// A test to be added to a session. What is not stated has the default of a session file.
+#[derive(Clone, Debug)]
+pub struct NewTest {
+    name: String,
+    station: Station<f64>,
+    priors: Vec<(&'static str, Prior)>,
+    setup: Option<String>,
+    spindle_setup: Option<String>,
+    bar_setup: Option<String>,
+    socket: Option<String>,
+    motion: Option<Motion>,
+    at: Vec<(String, f64)>,
+    columns: Option<Columns>,
+}
+
+/// Readings as columns, all of the same length but for those that are empty.
+#[derive(Clone, Debug, Default)]
+pub struct Columns {
+    /// Positions of axes by their name, mm or rad. Other axes stay where the test holds them.
+    pub axes: Vec<(String, Vec<f64>)>,
+    /// The number of the traversal in one direction, or empty.
+    pub run: Vec<i64>,
+    /// Time, s, or empty.
+    pub time_s: Vec<f64>,
+    /// Temperature, °C, or empty.
+    pub temperature_c: Vec<f64>,
+    /// The observed values, mm, row by row: one length each (of a ball bar: from ball to ball), or three coordinates.
+    pub observed: Vec<f64>,
+}
+
+impl NewTest {
+    /// A test of this name with the nominal set-up of its instrument, mm.
+    pub fn new(name: &str, station: Station<f64>) -> NewTest {
+        NewTest {
+            name: name.to_string(),
+            station,
+            priors: Vec::new(),
+            setup: None,
+            spindle_setup: None,
+            bar_setup: None,
+            socket: None,
+            motion: None,
+            at: Vec::new(),
+            columns: None,
+        }
+    }
+
+    /// The prior of every parameter of an object of the instrument, such as `workpiece_ball` or `bar`
+    /// ([`InstrumentParameter::thing`](crate::instrument::InstrumentParameter::thing)).
+    pub fn prior(mut self, thing: &'static str, prior: Prior) -> Self {
+        self.priors.push((thing, prior));
+        self
+    }
+
+    /// The name shared by tests with the same mounted workpiece ball.
+    pub fn setup(mut self, name: &str) -> Self {
+        self.setup = Some(name.to_string());
+        self
+    }
+
+    /// The name shared by tests with the same mounted spindle ball.
+    pub fn spindle_setup(mut self, name: &str) -> Self {
+        self.spindle_setup = Some(name.to_string());
+        self
+    }
+
+    /// The name shared by tests with the same assembled bar.
+    pub fn bar_setup(mut self, name: &str) -> Self {
+        self.bar_setup = Some(name.to_string());
+        self
+    }
+
+    /// The socket of all readings.
+    pub fn socket(mut self, name: &str) -> Self {
+        self.socket = Some(name.to_string());
+        self
+    }
+
+    /// The position at which the test holds an axis, mm or rad.
+    pub fn at(mut self, axis: &str, position: f64) -> Self {
+        self.at.push((axis.to_string(), position));
+        self
+    }
+
+    /// The planned motion.
+    pub fn motion(mut self, motion: Motion) -> Self {
+        self.motion = Some(motion);
+        self
+    }
+
+    /// The measured readings.
+    pub fn readings(mut self, columns: Columns) -> Self {
+        self.columns = Some(columns);
+        self
+    }
+
+    /// The test, and warnings.
+    fn checked(self, session: &Session) -> Result<(Test, Vec<String>), Fault> {
+        let machine = &session.machine;
+        check::name(&self.name, session.tests.iter().map(|test| test.name.as_str()))?;
+        let kind = self.station.kind();
+        let named = |message: String| format!("test \"{}\": {message}", self.name);
+        if kind != session.instrument {
+            return Err((
+                named(format!(
+                    "its instrument is a {}, that of the session a {}",
+                    kind.word(),
+                    session.instrument.word()
+                )),
+                "a session has tests of one instrument".into(),
+            ));
+        }
+        check_station(&self.station).map_err(|(message, help)| (named(message), help))?;
+        let priors = self
+            .all_priors()
+            .map_err(|(message, help)| (named(message), help))?;
+        let mut at = vec![0.0; machine.axes.len()];
+        let mut listed = vec![false; machine.axes.len()];
+        for (name, position) in &self.at {
+            let axis = axis_index(machine, name).map_err(|(message, help)| (named(message), help))?;
+            number(&format!("the position of {name}"), *position)
+                .map_err(|(message, help)| (named(message), help))?;
+            at[axis] = *position;
+            listed[axis] = true;
+        }
+        if self.columns.is_none() && matches!(self.motion, None | Some(Motion::List)) {
+            return Err((
+                named("neither readings nor a motion".into()),
+                "add its readings, or the motion of the axes".into(),
+            ));
+        }
+        planned::centre_circle(machine, &self.station, self.motion.as_ref(), &listed, &mut at);
+        let readings = match &self.columns {
+            Some(columns) => Some(
+                columns
+                    .readings(machine, kind, self.motion.as_ref(), &at, &listed)
+                    .map_err(|(message, help)| (named(message), help))?,
+            ),
+            None => None,
+        };
+        let group = |stated: &Option<String>, default: &str| stated.clone().unwrap_or(default.to_string());
+        let mut test = Test {
+            geometry: self.station.map(|length| Length::Number(*length)),
+            priors,
+            setup: group(&self.setup, &self.name),
+            spindle_setup: group(&self.spindle_setup, defaults::spindle_setup(kind, &self.name)),
+            bar_setup: group(&self.bar_setup, &self.name),
+            socket: self.socket,
+            motion: self.motion,
+            at_written: vec![None; at.len()],
+            at,
+            readings: None,
+            station: self.station,
+            name: self.name,
+        };
+        let mut warnings = match &readings {
+            Some(readings) => check::readings(machine, &test, readings)?,
+            None => {
+                check::plan(machine, &test)?;
+                Vec::new()
+            }
+        };
+        warnings.extend(setups::differing(&session.tests, &test));
+        test.readings = readings;
+        Ok((test, warnings))
+    }
+
+    /// The priors of the instrument's parameters, in their order.
+    fn all_priors(&self) -> Result<Vec<Prior>, Fault> {
+        let kind = self.station.kind();
+        let mut priors = defaults::priors(kind);
+        for (thing, prior) in &self.priors {
+            if let Prior::Gaussian(u) = prior
+                && !(*u > 0.0 && u.is_finite())
+            {
+                return Err((
+                    format!("the standard uncertainty of `{thing}` is {u}"),
+                    "it is greater than 0; `Prior::Known` means exactly known, `Prior::Free` unknown".into(),
+                ));
+            }
+            let mut found = false;
+            for (parameter, own) in kind.unknowns().iter().zip(&mut priors) {
+                if parameter.thing == *thing {
+                    *own = *prior;
+                    found = true;
+                }
+            }
+            if !found {
+                let mut things: Vec<&str> = kind.unknowns().iter().map(|parameter| parameter.thing).collect();
+                things.dedup();
+                return Err((
+                    format!("a {} has no `{thing}`", kind.word()),
+                    format!("it has {}", things.join(", ")),
+                ));
+            }
+        }
+        Ok(priors)
+    }
+}
+
+impl Columns {
+    /// The readings of a test.
+    fn readings(
+        &self,
+        machine: &Machine,
+        kind: InstrumentKind,
+        motion: Option<&Motion>,
+        at: &[f64],
+        listed: &[bool],
+    ) -> Result<Readings, Fault> {
+        let coordinates = kind.coordinates();
+        // A socket has no reading of its own: the ball is where it is.
+        let by_axis = self.axes.first().map_or(0, |(_, column)| column.len());
+        let rows = match kind {
+            InstrumentKind::Socket => by_axis,
+            _ => self.observed.len() / coordinates,
+        };
+        if rows < MIN_READINGS {
+            return Err((
+                format!("{rows} readings, which is not enough for a fit"),
+                "a test needs at least two readings, and as many as it has parameters".into(),
+            ));
+        }
+        let mut positions: Vec<Vec<f64>> = at.iter().map(|&position| vec![position; rows]).collect();
+        let mut read = vec![false; at.len()];
+        for (name, column) in &self.axes {
+            let axis = axis_index(machine, name)?;
+            if read[axis] {
+                return Err((format!("two columns of axis {name}"), "keep one of them".into()));
+            }
+            column_of(&format!("positions of {name}"), column, rows)?;
+            positions[axis].clone_from(column);
+            read[axis] = true;
+        }
+        match check::missing_position(
+            machine,
+            kind,
+            |axis| listed[axis],
+            |axis| read[axis],
+            &motion::named_axes(motion),
+        ) {
+            None => {}
+            Some(MissingPosition::All) => {
+                return Err(("no positions of an axis".into(), "add them to the columns".into()));
+            }
+            Some(MissingPosition::Moved(axis) | MissingPosition::NotStated(axis)) => {
+                return Err((
+                    format!("no positions of axis {}", machine.axes[axis].name),
+                    "add them to the columns, or state the position at which the test holds the axis".into(),
+                ));
+            }
+        }
+        let observed = match kind {
+            InstrumentKind::Socket => vec![0.0; rows * coordinates],
+            _ => {
+                column_of("observed values", &self.observed, rows * coordinates)?;
+                self.observed.clone()
+            }
+        };
+        for (what, column) in [("times", &self.time_s), ("temperatures", &self.temperature_c)] {
+            if !column.is_empty() {
+                column_of(what, column, rows)?;
+            }
+        }
+        if !self.run.is_empty() && self.run.len() != rows {
+            return Err(wrong_count("run numbers", self.run.len(), rows));
+        }
+        for pair in self.time_s.windows(2) {
+            if let Some(fault) = check::decreasing_time(pair[0], pair[1]) {
+                return Err((fault, "sort the readings by time, or omit the times".into()));
+            }
+        }
+        Ok(Readings {
+            origin: None,
+            run: self.run.clone(),
+            time_s: self.time_s.clone(),
+            temperature_c: self.temperature_c.clone(),
+            positions,
+            coordinates,
+            observed,
+        })
+    }
+}
+
+/// The axis of this name.
+fn axis_index(machine: &Machine, name: &str) -> Result<usize, Fault> {
+    machine.axis_index(name).ok_or_else(|| {
+        let names: Vec<&str> = machine.axes.iter().map(|axis| axis.name.as_str()).collect();
+        (
+            format!("the machine \"{}\" has no axis `{name}`", machine.name),
+            format!("its axes are {}", names.join(", ")),
+        )
+    })
+}
+
+/// Checks the nominal set-up: finite numbers, and lengths above zero.
+fn check_station(station: &Station<f64>) -> Result<(), Fault> {
+    let numbers = std::cell::RefCell::new(Vec::new());
+    station.map(|value| numbers.borrow_mut().push(*value));
+    for value in numbers.into_inner() {
+        number("a coordinate of the set-up", value)?;
+    }
+    let fault = match station {
+        Station::BallBar(bar) => limits::not_positive("bar", bar.bar),
+        Station::Probe(probe) => limits::not_positive("radius", probe.radius),
+        Station::RTest(_) | Station::Tracker(_) | Station::Socket(_) => None,
+    };
+    match fault {
+        None => Ok(()),
+        Some(fault) => Err((fault, "state the calibrated length, mm".into())),
+    }
+}
+
+/// Checks a column.
+fn column_of(what: &str, column: &[f64], rows: usize) -> Result<(), Fault> {
+    if column.len() != rows {
+        return Err(wrong_count(what, column.len(), rows));
+    }
+    for (row, value) in column.iter().enumerate() {
+        number(what, *value).map_err(|(message, help)| (format!("{message} (item {})", row + 1), help))?;
+    }
+    Ok(())
+}
+
+fn wrong_count(what: &str, found: usize, expected: usize) -> Fault {
+    (
+        format!("{what}: {found} where {expected} are expected"),
+        "all columns have one item for each reading".into(),
+    )
+}
+
+/// Checks that a number is finite and within [`limits::LARGEST`].
+fn number(what: &str, value: f64) -> Result<(), Fault> {
+    let fault = if value.is_finite() {
+        limits::too_large(value)
+    } else {
+        Some(value.to_string())
+    };
+    match fault {
+        None => Ok(()),
+        Some(fault) => Err((format!("{what} is {fault}"), "a finite number is expected".into())),
+    }
+}

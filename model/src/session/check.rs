@@ -1,0 +1,85 @@
+//! Checks of a test and its readings, for sessions from files and sessions built in memory.
+//!
+//! A fault is a message and what to do. It has no place: the reader of a file adds the file and line.
+
+use super::readings::Readings;
+use super::{Test, planned, plausibility, runs};
+use crate::chain::Machine;
+use crate::instrument::InstrumentKind;
+
+/// A message and what to do.
+pub(crate) type Fault = (String, String);
+
+/// Least number of readings of a test.
+pub(crate) const MIN_READINGS: usize = 2;
+
+/// Checks the name of a test against those of the others.
+pub(crate) fn name<'t>(name: &str, mut others: impl Iterator<Item = &'t str>) -> Result<(), Fault> {
+    if name.trim().is_empty() {
+        return Err(("a test without a name".into(), "add a name".into()));
+    }
+    if others.any(|other| other == name) {
+        return Err((
+            format!("two tests have the name \"{name}\""),
+            "results name parameters by test: give each its own name".into(),
+        ));
+    }
+    Ok(())
+}
+
+/// Checks the plan of a test without readings.
+pub(crate) fn plan(machine: &Machine, test: &Test) -> Result<(), Fault> {
+    let planned = planned::checked_plan(machine, test)?;
+    plausibility::check(machine, test, &planned)
+}
+
+/// Checks measured readings against the declared set-up. Returns warnings.
+pub(crate) fn readings(machine: &Machine, test: &Test, readings: &Readings) -> Result<Vec<String>, Fault> {
+    plausibility::check(machine, test, readings)?;
+    plausibility::check_lengths(test, readings)?;
+    let doubts = [
+        planned::beyond_travel(machine, readings),
+        runs::difference_from_stated(test.motion.as_ref(), readings),
+    ];
+    let doubts = doubts.into_iter().flatten();
+    Ok(doubts
+        .map(|doubt| format!("test \"{}\": {doubt}; the data are used as they are", test.name))
+        .collect())
+}
+
+/// The fault of a time after another, if it decreases.
+pub(crate) fn decreasing_time(before_s: f64, time_s: f64) -> Option<String> {
+    (time_s < before_s).then(|| format!("time decreases: {time_s} s after {before_s} s in the row before"))
+}
+
+/// A position that the readings of a test lack.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum MissingPosition {
+    /// Of an axis that moves in the test, by index.
+    Moved(usize),
+    /// Of an axis that the test does not state, by index.
+    NotStated(usize),
+    /// Of every axis.
+    All,
+}
+
+/// The first position that readings lack, if any. `stated` are axes whose position the test states, `read` those with a column of
+/// positions, `moved` those that move in its plan. A ball bar needs no more than the axes that move; others need every axis.
+pub(crate) fn missing_position(
+    machine: &Machine,
+    instrument: InstrumentKind,
+    stated: impl Fn(usize) -> bool,
+    read: impl Fn(usize) -> bool,
+    moved: &[usize],
+) -> Option<MissingPosition> {
+    let axes = 0..machine.axes.len();
+    for axis in axes.clone().filter(|&axis| !stated(axis) && !read(axis)) {
+        if moved.contains(&axis) {
+            return Some(MissingPosition::Moved(axis));
+        }
+        if instrument != InstrumentKind::BallBar {
+            return Some(MissingPosition::NotStated(axis));
+        }
+    }
+    (!axes.clone().any(read)).then_some(MissingPosition::All)
+}

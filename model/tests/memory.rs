@@ -1,0 +1,176 @@
+//! Sessions built in memory against the same sessions read from files, and the errors of unusable ones.
+
+use std::fs;
+
+use abbe_model::ModelError;
+use abbe_model::chain::Machine;
+use abbe_model::files::{self, ReadOptions};
+use abbe_model::instrument::ballbar::BallBar;
+use abbe_model::instrument::tracker::Tracker;
+use abbe_model::instrument::{InstrumentKind, Station};
+use abbe_model::session::build::{Columns, NewTest};
+use abbe_model::session::motion::Motion;
+use abbe_model::session::{Prior, Session};
+
+const SESSION: &str = r#"
+[machine]
+chain = "w C A b Y X Z t"
+[instrument]
+kind = "ballbar"
+[[test]]
+name = "C100"
+data = "C100.csv"
+bar_mm = 125.0
+bar_u_um = 0.5
+workpiece_ball_mm = [0, 100, 0]
+workpiece_ball_u_um = 2
+spindle_ball_mm = [0, 0, 0]
+setup = "P1"
+at = { z_mm = 75 }
+sweep = { axis = "C", from_deg = 0, to_deg = 180, step_deg = 90, feed_deg_min = 120 }
+"#;
+
+fn ball_bar() -> Station<f64> {
+    Station::BallBar(BallBar {
+        workpiece_ball: [0.0, 100.0, 0.0],
+        spindle_ball: [0.0; 3],
+        bar: 125.0,
+    })
+}
+
+fn empty() -> Session {
+    Session::new(
+        Machine::from_code("w C A b Y X Z t").unwrap(),
+        InstrumentKind::BallBar,
+    )
+}
+
+fn columns() -> Columns {
+    Columns {
+        axes: vec![("C".into(), [0.0_f64, 90.0, 180.0].map(f64::to_radians).to_vec())],
+        run: vec![1; 3],
+        time_s: vec![0.0, 1.0, 2.0],
+        observed: vec![125.001, 125.0, 124.999],
+        ..Columns::default()
+    }
+}
+
+fn test() -> NewTest {
+    NewTest::new("C100", ball_bar())
+        .prior("bar", Prior::Gaussian(0.5e-3))
+        .prior("workpiece_ball", Prior::Gaussian(2e-3))
+        .setup("P1")
+        .at("Z", 75.0)
+        .readings(columns())
+}
+
+#[test]
+fn a_session_in_memory_is_that_of_its_file() {
+    let folder = tempfile::tempdir().unwrap();
+    let data = "time_s,run,c_deg,length_mm\n0,1,0,125.001\n1,1,90,125.0\n2,1,180,124.999\n";
+    fs::write(folder.path().join("C100.csv"), data).unwrap();
+    fs::write(folder.path().join("session.toml"), SESSION).unwrap();
+    let read = files::session(&folder.path().join("session.toml"), &ReadOptions::default()).unwrap();
+    let mut built = empty();
+    let sweep = read.tests[0].motion.clone().unwrap();
+    assert!(matches!(sweep, Motion::Sweep { .. }));
+    built.add_test(test().motion(sweep)).unwrap();
+    assert_eq!(built.unknowns, read.unknowns);
+    assert_eq!(built.warnings, read.warnings);
+    let (own, other) = (&built.tests[0], &read.tests[0]);
+    assert_eq!(own.name, other.name);
+    assert_eq!(own.station, other.station);
+    assert_eq!(own.priors, other.priors);
+    assert_eq!(
+        [&own.setup, &own.spindle_setup, &own.bar_setup],
+        [&other.setup, &other.spindle_setup, &other.bar_setup]
+    );
+    assert_eq!(own.at, other.at);
+    let [own, other] = [own, other].map(|test| test.readings.as_ref().unwrap());
+    assert_eq!(own.positions, other.positions);
+    assert_eq!(own.observed, other.observed);
+    assert_eq!((&own.run, &own.time_s), (&other.run, &other.time_s));
+    assert_eq!((own.line(1), other.line(1)), (None, Some(3)));
+}
+
+#[test]
+fn an_unusable_test_is_refused_and_the_session_unchanged() {
+    let mut session = empty();
+    session.add_test(test()).unwrap();
+    let with = |change: &dyn Fn(&mut Columns)| {
+        let mut columns = columns();
+        change(&mut columns);
+        NewTest::new("other", ball_bar()).at("Z", 75.0).readings(columns)
+    };
+    let tracker = Station::Tracker(Tracker {
+        target: [0.0; 3],
+        rotation: [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]],
+        origin: [0.0; 3],
+    });
+    let no_bar = Station::BallBar(BallBar {
+        workpiece_ball: [0.0, 100.0, 0.0],
+        spindle_ball: [0.0; 3],
+        bar: 0.0,
+    });
+    for (bad, expected) in [
+        (test(), "two tests have the name \"C100\""),
+        (NewTest::new(" ", ball_bar()), "a test without a name"),
+        (
+            NewTest::new("T", tracker),
+            "its instrument is a tracker, that of the session a ballbar",
+        ),
+        (NewTest::new("T", no_bar), "`bar` is 0; it must be greater than 0"),
+        (NewTest::new("T", ball_bar()), "neither readings nor a motion"),
+        (
+            NewTest::new("T", ball_bar()).prior("mirror", Prior::Free),
+            "a ballbar has no `mirror`",
+        ),
+        (
+            NewTest::new("T", ball_bar()).prior("bar", Prior::Gaussian(-1.0)),
+            "the standard uncertainty of `bar` is -1",
+        ),
+        (with(&|columns| columns.axes[0].0 = "Q".into()), "has no axis `Q`"),
+        (with(&|columns| columns.axes.clear()), "no positions of an axis"),
+        (
+            with(&|columns| columns.axes[0].1.truncate(2)),
+            "positions of C: 2 where 3 are expected",
+        ),
+        (
+            with(&|columns| columns.observed[1] = f64::NAN),
+            "observed values is NaN (item 2)",
+        ),
+        (with(&|columns| columns.observed[1] = 1e13), "too large"),
+        (
+            with(&|columns| columns.observed.truncate(1)),
+            "not enough for a fit",
+        ),
+        (
+            with(&|columns| columns.run.truncate(1)),
+            "run numbers: 1 where 3 are expected",
+        ),
+        (
+            with(&|columns| columns.time_s[2] = 0.5),
+            "time decreases: 0.5 s after 1 s",
+        ),
+        (
+            with(&|columns| columns.observed = vec![0.001; 3]),
+            "a bar of 125.0000 mm read 0.001 mm",
+        ),
+        (test_at("C", 0.0), "cannot reach between its balls"),
+    ] {
+        let fault = session.add_test(bad).unwrap_err();
+        assert!(
+            fault.to_string().contains(expected),
+            "`{expected}` is not in\n{fault}"
+        );
+        assert!(matches!(fault, ModelError::Session { .. }) && fault.help().is_some());
+        assert!(fault.location().is_none());
+        assert_eq!(session.tests.len(), 1);
+    }
+}
+
+fn test_at(axis: &str, position: f64) -> NewTest {
+    NewTest::new("low", ball_bar())
+        .at(axis, position)
+        .readings(columns())
+}
