@@ -9,7 +9,7 @@
 use crate::equation::Equation;
 use crate::form::Kind;
 use crate::print::article::groups::{norm_of_steps, with_bar_parameters};
-use crate::print::article::line::{EquationLine, LeftSide, Section, quantity_heading, row};
+use crate::print::article::line::{EquationLine, LeftSide, Section, quantity_heading, row, section};
 use crate::program::{Label, Naming, Program, Step};
 use crate::symbol::{Binary, Operand, Symbol};
 use crate::touch::{self, ProbeTerms};
@@ -87,26 +87,15 @@ pub(crate) fn sections(equation: &Equation) -> (Program, Vec<Section>) {
         .zip(vectors.chunks(3))
         .map(|(vector, trees)| {
             let rows = (0..3).map(|coordinate| component(&program, vector, trees, coordinate));
-            Section {
-                heading: vector.meaning.clone(),
-                rows: rows.collect(),
-            }
+            section(&vector.meaning, rows)
         });
     let mut sections: Vec<Section> = vectors.by_ref().take(forward.len()).collect();
     if !driven_errors.is_empty() {
-        let follow = Section {
-            heading: "errors as functions of drivers".to_string(),
-            rows: driven_errors,
-        };
-        sections.insert(0, follow);
+        sections.insert(0, section("errors as functions of drivers", driven_errors));
     }
     let outputs = outputs.iter().enumerate();
-    let mut read = Section {
-        heading: quantity_heading(equation).to_string(),
-        rows: outputs
-            .map(|(index, tree)| row(LeftSide::Output(index), tree.clone()))
-            .collect(),
-    };
+    let rows = outputs.map(|(index, tree)| row(LeftSide::Output(index), tree.clone()));
+    let mut read = section(quantity_heading(equation), rows);
     if equation.kind == Kind::Distance {
         let between = touch::QUADRATIC.into_iter().chain([touch::STEP_LENGTH]);
         let between = between.filter_map(|label| {
@@ -150,10 +139,7 @@ pub(crate) fn sections(equation: &Equation) -> (Program, Vec<Section>) {
     sections.push(read);
     sections.extend(adjoint);
     if !slopes.is_empty() {
-        sections.push(Section {
-            heading: "derivatives".to_string(),
-            rows: slopes,
-        });
+        sections.push(section("derivatives", slopes));
     }
     (program, sections)
 }

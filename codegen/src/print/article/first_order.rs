@@ -3,7 +3,9 @@
 use crate::equation::Equation;
 use crate::first_order::{Column, FirstOrder};
 use crate::form::{Kind, PrintedFirstOrder};
-use crate::print::article::line::{EquationLine, LeftSide, NoteKind, Section, naming, quantity_heading, row};
+use crate::print::article::line::{
+    EquationLine, LeftSide, NoteKind, Section, naming, quantity_heading, row, section, truncated,
+};
 use crate::program::{Input, Label, Program};
 use crate::symbol::{Binary, Unary};
 use crate::tree::{Term, Tree, binary, negative, product, sum, terms_of};
@@ -34,10 +36,7 @@ pub(crate) fn sections(
         let mut all = terms_of(&printed.without_errors(l_0.clone()));
         all.push((false, slope));
         all.extend(terms(equation, first, printed, 0, false));
-        sum_rows.push(EquationLine {
-            approximate: true,
-            ..row(LeftSide::Output(0), sum(all))
-        });
+        sum_rows.push(truncated(LeftSide::Output(0), sum(all), false));
     } else {
         for (index, nominal) in printed.nominal.iter().enumerate() {
             let mut all = Vec::new();
@@ -45,10 +44,7 @@ pub(crate) fn sections(
                 all.push((false, nominal.clone()));
             }
             all.extend(terms(equation, first, printed, index, false));
-            sum_rows.push(EquationLine {
-                approximate: true,
-                ..row(LeftSide::Output(index), sum(all))
-            });
+            sum_rows.push(truncated(LeftSide::Output(index), sum(all), false));
         }
     }
     let mut table = Vec::new();
@@ -76,15 +72,10 @@ pub(crate) fn sections(
             });
         }
     }
+    let heading = format!("{}, first order", quantity_heading(equation));
     let sections = vec![
-        Section {
-            heading: format!("{}, first order", quantity_heading(equation)),
-            rows: sum_rows,
-        },
-        Section {
-            heading: "coefficients by parameter".to_string(),
-            rows: table,
-        },
+        section(&heading, sum_rows),
+        section("coefficients by parameter", table),
     ];
     (program, sections)
 }

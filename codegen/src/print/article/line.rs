@@ -56,6 +56,22 @@ pub(crate) fn row(left: LeftSide, right: Tree) -> EquationLine {
     }
 }
 
+/// A line that omits terms unless it is complete.
+pub(crate) fn truncated(left: LeftSide, right: Tree, complete: bool) -> EquationLine {
+    EquationLine {
+        approximate: !complete,
+        ..row(left, right)
+    }
+}
+
+/// Equations under a heading.
+pub(crate) fn section(heading: &str, rows: impl IntoIterator<Item = EquationLine>) -> Section {
+    Section {
+        heading: heading.to_string(),
+        rows: rows.into_iter().collect(),
+    }
+}
+
 /// The heading of the section of the reading.
 pub(crate) fn quantity_heading(equation: &Equation) -> &'static str {
     match equation.kind {

@@ -2,7 +2,9 @@
 
 use crate::equation::Equation;
 use crate::print::article::groups::named_or_expanded;
-use crate::print::article::line::{EquationLine, LeftSide, Section, naming, quantity_heading, row};
+use crate::print::article::line::{
+    EquationLine, LeftSide, Section, naming, quantity_heading, row, section, truncated,
+};
 use crate::program::{Label, Program};
 use crate::symbol::{Binary, Unary};
 use crate::touch::{self, ProbeTerms};
@@ -44,12 +46,8 @@ pub(crate) fn sections(
     let mut sections: Vec<Section> = Vec::new();
     for (vector, trees) in vectors.iter().zip(trees.chunks(3)) {
         let rows = coordinates(vector).into_iter().zip(trees);
-        sections.push(Section {
-            heading: vector.meaning.clone(),
-            rows: rows
-                .map(|(label, tree)| row(LeftSide::Named(label), tree.clone()))
-                .collect(),
-        });
+        let rows = rows.map(|(label, tree)| row(LeftSide::Named(label), tree.clone()));
+        sections.push(section(&vector.meaning, rows));
     }
     let radius = named_or_expanded(equation, &program, touch.radius);
     let radius = (true, binary(Binary::Mul, radius.clone(), radius));
@@ -69,24 +67,12 @@ pub(crate) fn sections(
         let length = Tree::Unary(Unary::Sqrt, Box::new(sum(squares.collect())));
         rows.push(row(LeftSide::Named(touch::STEP_LENGTH), length));
         let named = coordinates(step).into_iter().zip(step_trees);
-        sections.insert(
-            0,
-            Section {
-                heading: step.meaning.clone(),
-                rows: named
-                    .map(|(label, tree)| row(LeftSide::Named(label), tree))
-                    .collect(),
-            },
-        );
+        let named = named.map(|(label, tree)| row(LeftSide::Named(label), tree));
+        sections.insert(0, section(&step.meaning, named));
     }
-    rows.push(EquationLine {
-        approximate: !complete,
-        ..row(LeftSide::Output(0), distance_of_steps(6, way.is_some()))
-    });
-    sections.push(Section {
-        heading: quantity_heading(equation).to_string(),
-        rows,
-    });
+    let distance = distance_of_steps(6, way.is_some());
+    rows.push(truncated(LeftSide::Output(0), distance, complete));
+    sections.push(section(quantity_heading(equation), rows));
     (program, sections)
 }
 
