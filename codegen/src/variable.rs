@@ -4,7 +4,8 @@ use abbe_model::axis::AxisKind;
 use abbe_model::component::{ErrorKind, ErrorName};
 use abbe_model::instrument::{InstrumentParameter, InternalUnit};
 
-use crate::effect::{Coefficient, DriverQuantity};
+use crate::coefficient::Coefficient;
+use crate::driver_quantity::DriverQuantity;
 
 /// A variable of an expression.
 #[derive(Clone, Debug, PartialEq)]

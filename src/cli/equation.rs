@@ -2,7 +2,8 @@
 
 use std::path::PathBuf;
 
-use abbe::codegen::{Equation, Language, Options, Order, SessionTest, Symbols, Variable};
+use abbe::codegen::print::{LANGUAGES, OutputLanguage, language};
+use abbe::codegen::{Equation, Options, Order, SessionTest, Source, Symbols, ToolPoint, Variable, check};
 use abbe::model::chain::Machine;
 use abbe::model::component::ErrorName;
 use abbe::model::effect::{Component, Effect};
@@ -11,6 +12,7 @@ use abbe::model::frames::Rotation;
 use abbe::model::instrument::InstrumentParameter;
 use abbe::model::pattern;
 use abbe::model::session::Session;
+use clap::builder::{PossibleValuesParser, TypedValueParser};
 use clap::{Args, ValueEnum};
 
 use super::failure::Failure;
@@ -36,30 +38,9 @@ pub const VOLUMETRIC_HELP: &str = "Examples:
       --functions sessions/volumetric/errors.toml --places 3 --axis A=30 --axis X:5 \\
       --tool-mm 0,0,-120 --json map.json";
 
-/// The language of an equation.
-#[derive(Clone, Copy, ValueEnum)]
-enum LanguageArgument {
-    Text,
-    Latex,
-    Typst,
-    Rust,
-    C,
-    Python,
-    Matlab,
-}
-
-impl LanguageArgument {
-    fn language(self) -> Language {
-        match self {
-            LanguageArgument::Text => Language::Text,
-            LanguageArgument::Latex => Language::Latex,
-            LanguageArgument::Typst => Language::Typst,
-            LanguageArgument::Rust => Language::Rust,
-            LanguageArgument::C => Language::C,
-            LanguageArgument::Python => Language::Python,
-            LanguageArgument::Matlab => Language::Matlab,
-        }
-    }
+/// The words of the output languages, as the registry lists them.
+fn languages() -> impl TypedValueParser<Value = &'static OutputLanguage> {
+    PossibleValuesParser::new(LANGUAGES.iter().map(|language| language.word)).try_map(|word| language(&word))
 }
 
 #[derive(Clone, Copy, ValueEnum)]
@@ -87,8 +68,8 @@ struct FormArguments {
     /// The language of the equation.
     ///
     /// Example: --as latex
-    #[arg(long = "as", value_enum, default_value = "text")]
-    language: LanguageArgument,
+    #[arg(long = "as", value_parser = languages(), default_value = "text")]
+    language: &'static OutputLanguage,
     /// Order in the errors: all terms, products of two errors, or one sensitivity coefficient per error.
     ///
     /// Example: --order first
@@ -253,8 +234,8 @@ impl FormArguments {
         }
     }
 
-    fn write(&self, equation: &Equation) -> Result<(), Failure> {
-        let text = equation.print(self.language.language())?;
+    fn write(&self, equation: &Equation, source: &impl Source) -> Result<(), Failure> {
+        let text = self.language.print(&check(equation, source)?)?;
         match &self.out {
             Some(path) => output::write_whole(path, text.as_bytes()),
             None => {
@@ -325,7 +306,7 @@ pub fn run(arguments: &EquationArguments) -> Result<(), Failure> {
         &parameters.errors,
         &form.options(&parameters),
     )?;
-    form.write(&equation)
+    form.write(&equation, &source)
 }
 
 /// Runs `abbe volumetric`.
@@ -348,5 +329,5 @@ pub fn run_volumetric(arguments: &VolumetricArguments, quiet: bool) -> Result<()
         parameters.errors = pattern::errors(&machine);
     }
     let equation = Equation::volumetric(&machine, &parameters.errors, &form.options(&parameters))?;
-    form.write(&equation)
+    form.write(&equation, &ToolPoint)
 }

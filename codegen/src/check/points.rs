@@ -3,7 +3,7 @@
 use abbe_model::axis::AxisKind;
 use abbe_model::effect::{Driver, Effect, Shape};
 
-use crate::effect::DriverQuantity;
+use crate::driver_quantity::DriverQuantity;
 use crate::equation::Equation;
 use crate::program::{Input, Program};
 use crate::subject::Source;
@@ -60,96 +60,94 @@ impl CheckPoint {
     }
 }
 
-impl Equation {
-    /// Intervals of a driver in which effects with a local shape are not zero.
-    fn intervals_of_effects(&self, driver: &Variable) -> Vec<[f64; 2]> {
-        let follows = |effect: &Effect| match (driver, &effect.driver) {
-            (Variable::Position { axis, .. }, Driver::Axis(name)) => axis == name,
-            (Variable::Driver(DriverQuantity::SinceReversal(axis, _)), Driver::Axis(name)) => axis == name,
-            (Variable::Driver(DriverQuantity::Time), Driver::Time) => true,
-            (Variable::Driver(DriverQuantity::Temperature), Driver::Temperature) => true,
-            (Variable::Driver(DriverQuantity::Gravity(_)), Driver::Gravity) => true,
-            _ => false,
-        };
-        let turn_back = matches!(driver, Variable::Driver(DriverQuantity::SinceReversal(..)));
-        let around = |low: f64, high: f64, margin: f64| Some([low - margin, high + margin]);
-        let interval = |effect: &Effect| match &effect.shape {
-            Shape::ReversalSpike { width } if turn_back => Some([0.0, 3.0 * width]),
-            _ if turn_back => None,
-            Shape::Local { centre, width, .. } => around(*centre, *centre, 1.2 * width),
-            Shape::Curve { from, to, .. } => around(*from, *to, 0.1 * (to - from)),
-            Shape::Warmup { tau_s } => Some([0.0, 3.0 * tau_s]),
-            Shape::Steps { at } => {
-                let low = at.iter().copied().fold(f64::INFINITY, f64::min);
-                let high = at.iter().copied().fold(f64::NEG_INFINITY, f64::max);
-                around(low, high, (0.2 * (high - low)).max(1e-3))
+/// Intervals of a driver in which effects with a local shape are not zero.
+fn intervals_of_effects(equation: &Equation, driver: &Variable) -> Vec<[f64; 2]> {
+    let follows = |effect: &Effect| match (driver, &effect.driver) {
+        (Variable::Position { axis, .. }, Driver::Axis(name)) => axis == name,
+        (Variable::Driver(DriverQuantity::SinceReversal(axis, _)), Driver::Axis(name)) => axis == name,
+        (Variable::Driver(DriverQuantity::Time), Driver::Time) => true,
+        (Variable::Driver(DriverQuantity::Temperature), Driver::Temperature) => true,
+        (Variable::Driver(DriverQuantity::Gravity(_)), Driver::Gravity) => true,
+        _ => false,
+    };
+    let turn_back = matches!(driver, Variable::Driver(DriverQuantity::SinceReversal(..)));
+    let around = |low: f64, high: f64, margin: f64| Some([low - margin, high + margin]);
+    let interval = |effect: &Effect| match &effect.shape {
+        Shape::ReversalSpike { width } if turn_back => Some([0.0, 3.0 * width]),
+        _ if turn_back => None,
+        Shape::Local { centre, width, .. } => around(*centre, *centre, 1.2 * width),
+        Shape::Curve { from, to, .. } => around(*from, *to, 0.1 * (to - from)),
+        Shape::Warmup { tau_s } => Some([0.0, 3.0 * tau_s]),
+        Shape::Steps { at } => {
+            let low = at.iter().copied().fold(f64::INFINITY, f64::min);
+            let high = at.iter().copied().fold(f64::NEG_INFINITY, f64::max);
+            around(low, high, (0.2 * (high - low)).max(1e-3))
+        }
+        _ => None,
+    };
+    let effects = equation.options.effects.iter();
+    effects
+        .filter(|effect| follows(effect))
+        .filter_map(interval)
+        .collect()
+}
+
+/// Draws the nominal variables over their whole range: lengths near their stated values, positions over all possible values.
+pub(crate) fn draw_anywhere(
+    equation: &Equation,
+    source: &impl Source,
+    draws: &mut PseudoRandom,
+) -> Vec<(Variable, f64)> {
+    let draw = |variable: Variable| {
+        let value = match &variable {
+            Variable::Length(name) => match source.length_mm(name) {
+                Some(value) => value * (1.0 + draws.between(-0.01, 0.01)),
+                None => UNSTATED_MM * (1.0 + draws.between(-0.5, 0.5)),
+            },
+            Variable::Driver(DriverQuantity::Direction(_)) => {
+                if draws.bits() & 1 == 0 {
+                    -1.0
+                } else {
+                    1.0
+                }
             }
-            _ => None,
+            moving => {
+                let places = intervals_of_effects(equation, moving);
+                // Half of the points lie where local effects are not zero.
+                let anywhere = places.is_empty() || draws.bits() & 1 == 0;
+                let [low, high] = if anywhere {
+                    whole_range(moving)
+                } else {
+                    places[(draws.bits() % places.len() as u64) as usize]
+                };
+                draws.between(low, high)
+            }
         };
-        let effects = self.options.effects.iter();
-        effects
-            .filter(|effect| follows(effect))
-            .filter_map(interval)
-            .collect()
-    }
+        (variable, value)
+    };
+    let nominal = equation.arena.variables().into_iter().filter(|v| !v.is_small());
+    nominal.map(draw).collect()
+}
 
-    /// PseudoRandom the nominal variables over their whole range: lengths near their stated values, positions over all possible values.
-    pub(crate) fn draw_anywhere(
-        &self,
-        source: &impl Source,
-        draws: &mut PseudoRandom,
-    ) -> Vec<(Variable, f64)> {
-        let draw = |variable: Variable| {
-            let value = match &variable {
-                Variable::Length(name) => match source.length_mm(name) {
-                    Some(value) => value * (1.0 + draws.between(-0.01, 0.01)),
-                    None => UNSTATED_MM * (1.0 + draws.between(-0.5, 0.5)),
-                },
-                Variable::Driver(DriverQuantity::Direction(_)) => {
-                    if draws.bits() & 1 == 0 {
-                        -1.0
-                    } else {
-                        1.0
-                    }
-                }
-                moving => {
-                    let places = self.intervals_of_effects(moving);
-                    // Half of the points lie where local effects are not zero.
-                    let anywhere = places.is_empty() || draws.bits() & 1 == 0;
-                    let [low, high] = if anywhere {
-                        whole_range(moving)
-                    } else {
-                        places[(draws.bits() % places.len() as u64) as usize]
-                    };
-                    draws.between(low, high)
-                }
-            };
-            (variable, value)
+/// Ranges of the nominal variables in the session: lengths as stated; axis positions between the ends of their motion, as stated by
+/// the source or else by the machine; mm or rad.
+pub(crate) fn range(equation: &Equation, source: &impl Source) -> Vec<(Variable, [f64; 2])> {
+    let range = |variable: Variable| {
+        let ends = match &variable {
+            Variable::Length(name) => [source.length_mm(name).unwrap_or(UNSTATED_MM); 2],
+            Variable::Position { axis, .. } => {
+                let index = equation.machine.axis_index(axis);
+                let travel = index.and_then(|index| equation.machine.axes[index].travel);
+                let stated = source.range(axis).or(travel);
+                stated.unwrap_or_else(|| whole_range(&variable))
+            }
+            Variable::Driver(_) => whole_range(&variable),
+            Variable::Error(_) | Variable::Instrument(_) | Variable::Coefficient(_) => [0.0; 2],
         };
-        let nominal = self.arena.variables().into_iter().filter(|v| !v.is_small());
-        nominal.map(draw).collect()
-    }
-
-    /// Ranges of the nominal variables in the session: lengths as stated; axis positions between the ends of their motion, as stated by
-    /// the source or else by the machine; mm or rad.
-    pub(crate) fn range(&self, source: &impl Source) -> Vec<(Variable, [f64; 2])> {
-        let range = |variable: Variable| {
-            let ends = match &variable {
-                Variable::Length(name) => [source.length_mm(name).unwrap_or(UNSTATED_MM); 2],
-                Variable::Position { axis, .. } => {
-                    let index = self.machine.axis_index(axis);
-                    let travel = index.and_then(|index| self.machine.axes[index].travel);
-                    let stated = source.range(axis).or(travel);
-                    stated.unwrap_or_else(|| whole_range(&variable))
-                }
-                Variable::Driver(_) => whole_range(&variable),
-                Variable::Error(_) | Variable::Instrument(_) | Variable::Coefficient(_) => [0.0; 2],
-            };
-            (variable, ends)
-        };
-        let nominal = self.arena.variables().into_iter().filter(|v| !v.is_small());
-        nominal.map(range).collect()
-    }
+        (variable, ends)
+    };
+    let nominal = equation.arena.variables().into_iter().filter(|v| !v.is_small());
+    nominal.map(range).collect()
 }
 
 /// Range of a position or another driver whose range is not stated, in its unit.
@@ -168,5 +166,15 @@ fn whole_range(moving: &Variable) -> [f64; 2] {
         [-std::f64::consts::PI, std::f64::consts::PI]
     } else {
         [-200.0, 200.0]
+    }
+}
+
+/// The absolute difference; infinite if either value is not a number.
+pub(crate) fn worst(found: f64, expected: f64) -> f64 {
+    let difference = (found - expected).abs();
+    if difference.is_nan() {
+        f64::INFINITY
+    } else {
+        difference
     }
 }

@@ -182,7 +182,7 @@ fn a_ball_that_no_axis_moves_is_mounted_again_with_a_comment() {
         ("w b X Y C Z t", "C150", "Z"),
     ] {
         let plan = generated(code, folder.path());
-        let comment = format!("No linear axis can bring the balls there along {along}:");
+        let comment = format!("No linear axis can move the balls there along {along}:");
         let written = fs::read_to_string(plan_file(code, folder.path())).unwrap();
         let start = written.find(&format!("name = \"{test}\"")).unwrap();
         assert!(written[..start].contains(&comment), "{code}\n{written}");
@@ -236,7 +236,7 @@ fn plan_simulate_and_fit_run_on_a_generated_plan() {
     let folder = tempfile::tempdir().unwrap();
     let at = |name: &str| folder.path().join(name);
     let code = "w b Z X Y C B t";
-    let plan = generated(code, folder.path());
+    generated(code, folder.path());
     let file = plan_file(code, folder.path());
     let (run, json) = (at("run"), at("fit.json"));
     let measured = run.join("session.toml");
