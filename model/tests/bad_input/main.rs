@@ -4,6 +4,7 @@ mod document;
 mod foreign;
 mod hostile;
 mod instrument;
+mod json_lines;
 mod machine;
 mod session;
 mod table;

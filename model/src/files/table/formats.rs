@@ -5,12 +5,14 @@ use std::path::Path;
 use super::ballbar_xml::BallBarXml;
 use super::csv::Csv;
 use super::format::DataFormat;
+use super::json_lines::JsonLines;
 use super::spreadsheet::Spreadsheet;
 
 /// Every format but CSV, which reads what no other format does.
 const FORMATS: &[&dyn DataFormat] = &[
     &Spreadsheet, // XLSX, XLSM, XLSB, XLS, ODS
     &BallBarXml,  // B5R, XML
+    &JsonLines,   // JSONL, NDJSON
 ];
 
 /// The format of a file.

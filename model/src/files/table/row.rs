@@ -48,6 +48,11 @@ impl Row {
         }
     }
 
+    /// The row, with cells that are found by a key.
+    pub fn with_keys(self) -> Row {
+        Row { keyed: true, ..self }
+    }
+
     /// The place of a cell in messages; `name` is that of its column.
     pub fn place(&self, cell: usize, name: &str) -> String {
         if self.keyed {
