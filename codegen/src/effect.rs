@@ -7,86 +7,14 @@ use std::sync::Arc;
 
 use abbe_model::axis::AxisKind;
 use abbe_model::chain::{AxisPosition, Machine};
-use abbe_model::component::ErrorName;
-use abbe_model::effect::{Component, Driver, DriverSample, Effect, Shape};
+use abbe_model::driver::{Driver, DriverQuantity, DriverSample, SymbolInput};
+use abbe_model::effect::shape::Per;
+use abbe_model::effect::{Component, Effect};
 use abbe_model::instrument::{InstrumentParameter, InternalUnit};
 use abbe_model::scalar::Nominal;
 
 use crate::error::CodegenError;
 use crate::variable::Variable;
-
-/// The driver of an effect, if it is not the position of an axis.
-#[derive(Clone, Debug, PartialEq)]
-pub enum DriverQuantity {
-    /// Direction of the last movement of an axis: −1, 0 or 1.
-    Direction(String),
-    /// The rate of an axis, mm/s or rad/s.
-    Rate(String, AxisKind),
-    /// Distance that an axis has travelled since its last reversal, mm or rad.
-    SinceReversal(String, AxisKind),
-    /// Time since the session's first reading, s.
-    Time,
-    /// Temperature above the session's mean, °C.
-    Temperature,
-    /// Moment about an axis of a unit weight at the instrument's point, m.
-    Gravity(String),
-}
-
-impl DriverQuantity {
-    pub(crate) fn unit(&self) -> &'static str {
-        match self {
-            DriverQuantity::Direction(_) => "1",
-            DriverQuantity::Rate(_, AxisKind::Linear) => "mm/s",
-            DriverQuantity::Rate(_, AxisKind::Rotary) => "rad/s",
-            DriverQuantity::SinceReversal(_, AxisKind::Linear) => "mm",
-            DriverQuantity::SinceReversal(_, AxisKind::Rotary) => "rad",
-            DriverQuantity::Time => "s",
-            DriverQuantity::Temperature => "°C",
-            DriverQuantity::Gravity(_) => "m",
-        }
-    }
-
-    pub(crate) fn meaning(&self) -> String {
-        match self {
-            DriverQuantity::Direction(axis) => {
-                format!("direction of the last movement of axis {axis}: −1, 0 or 1")
-            }
-            DriverQuantity::Rate(axis, _) => format!("rate of axis {axis}"),
-            DriverQuantity::SinceReversal(axis, _) => {
-                format!("distance of axis {axis} since its last reversal")
-            }
-            DriverQuantity::Time => "time since the first reading of the session".to_string(),
-            DriverQuantity::Temperature => "temperature above the mean of the session".to_string(),
-            DriverQuantity::Gravity(axis) => {
-                format!("moment of a unit weight about axis {axis}")
-            }
-        }
-    }
-
-    /// The name in plain text; typeset output takes the letter and the subscript from it.
-    pub(crate) fn text(&self) -> String {
-        let of = |letter: &str, axis: &str| format!("{letter}_{}", axis.to_lowercase());
-        match self {
-            DriverQuantity::Direction(axis) => of("σ", axis),
-            DriverQuantity::Rate(axis, _) => of("v", axis),
-            DriverQuantity::SinceReversal(axis, _) => of("w", axis),
-            DriverQuantity::Time => "t".to_string(),
-            DriverQuantity::Temperature => "T".to_string(),
-            DriverQuantity::Gravity(axis) => of("g", axis),
-        }
-    }
-
-    pub(crate) fn identifier(&self) -> String {
-        match self {
-            DriverQuantity::Direction(axis) => format!("direction_{axis}"),
-            DriverQuantity::Rate(axis, _) => format!("rate_{axis}"),
-            DriverQuantity::SinceReversal(axis, _) => format!("since_reversal_{axis}"),
-            DriverQuantity::Time => "time_s".to_string(),
-            DriverQuantity::Temperature => "temperature_c".to_string(),
-            DriverQuantity::Gravity(axis) => format!("gravity_{axis}"),
-        }
-    }
-}
 
 /// A coefficient of an effect.
 #[derive(Clone, Debug, PartialEq)]
@@ -168,14 +96,14 @@ impl Coefficient {
         let Some(component) = self.component else {
             return "s";
         };
-        match (&self.effect.shape, component) {
-            (Shape::Lag, _) if self.same_kind => "s",
-            (Shape::Lag, InternalUnit::Millimetre) => "mm·s/rad",
-            (Shape::Lag, InternalUnit::Radian) => "rad·s/mm",
-            (Shape::Lag, InternalUnit::Ratio) => "1/rate",
-            (Shape::Drift, InternalUnit::Millimetre) => "mm/h",
-            (Shape::Drift, InternalUnit::Radian) => "rad/h",
-            (Shape::Drift, InternalUnit::Ratio) => "1/h",
+        match (self.effect.shape.per(self.index), component) {
+            (Per::Rate, _) if self.same_kind => "s",
+            (Per::Rate, InternalUnit::Millimetre) => "mm·s/rad",
+            (Per::Rate, InternalUnit::Radian) => "rad·s/mm",
+            (Per::Rate, InternalUnit::Ratio) => "1/rate",
+            (Per::Hour, InternalUnit::Millimetre) => "mm/h",
+            (Per::Hour, InternalUnit::Radian) => "rad/h",
+            (Per::Hour, InternalUnit::Ratio) => "1/h",
             (_, InternalUnit::Millimetre) => "mm",
             (_, InternalUnit::Radian) => "rad",
             (_, InternalUnit::Ratio) => "1",
@@ -191,23 +119,15 @@ fn unit_of_component(
     machine: &Machine,
     unknowns: &[InstrumentParameter],
 ) -> Result<Option<InternalUnit>, CodegenError> {
+    let unit = effect.component.unit(unknowns);
     match &effect.component {
-        Component::Axis(name) => match machine.axis_index(&name.axis) {
-            Some(_) if name.freedom.is_angle() => Ok(Some(InternalUnit::Radian)),
-            Some(_) => Ok(Some(InternalUnit::Millimetre)),
-            None => Err(no_axis(machine, effect, &name.axis)),
-        },
-        Component::Instrument { thing, coordinate } => {
-            let own =
-                |unknown: &&InstrumentParameter| unknown.thing == thing && unknown.coordinate == coordinate;
-            let found = unknowns.iter().find(own);
-            found
-                .map(|unknown| Some(unknown.unit))
-                .ok_or_else(|| CodegenError::NoSuchParameter {
-                    parameter: format!("`{}` of the effect `{}`", effect.component, effect.id()),
-                })
+        Component::Axis(name) if machine.axis_index(&name.axis).is_none() => {
+            Err(no_axis(machine, effect, &name.axis))
         }
-        Component::TriggerDelay => Ok(None),
+        Component::Instrument { .. } if unit.is_none() => Err(CodegenError::NoSuchParameter {
+            parameter: format!("`{}` of the effect `{}`", effect.component, effect.id()),
+        }),
+        Component::Axis(_) | Component::Instrument { .. } | Component::TriggerDelay => Ok(unit),
     }
 }
 
@@ -240,65 +160,26 @@ impl<N: Nominal> AxisStates<'_, N> {
         effect: &Effect,
         nominal: &impl Fn(Variable) -> N,
     ) -> Result<DriverSample<N>, CodegenError> {
-        let zero = N::constant(0.0);
-        let mut sample = DriverSample {
-            value: zero,
-            direction: N::constant(1.0),
-            rate: zero,
-            since_reversal: zero,
-            since_reversal_s: zero,
+        let input = SymbolInput {
+            machine: self.machine,
+            state: self.state,
+            held: self.held,
+            component_axis: effect.component.axis(self.machine),
+            uses: effect.shape.uses(),
         };
-        let followed = |followed: DriverQuantity| nominal(Variable::Driver(followed));
-        match &effect.driver {
-            Driver::None => {}
-            Driver::Time => sample.value = followed(DriverQuantity::Time),
-            Driver::Temperature => sample.value = followed(DriverQuantity::Temperature),
-            Driver::Gravity => {
-                let Component::Axis(ErrorName { axis, .. }) = &effect.component else {
-                    return Err(CodegenError::EffectWithoutForm {
-                        effect: effect.id(),
-                        why:
-                            "gravity needs an axis about which it exerts a moment, and the component has none"
-                                .to_string(),
-                    });
-                };
-                sample.value = followed(DriverQuantity::Gravity(axis.clone()));
-            }
-            Driver::Axis(name) => {
-                let index = self.machine.axis_index(name);
-                let index = index.ok_or_else(|| no_axis(self.machine, effect, name))?;
-                let direction = || match self.held[index] {
-                    true => zero,
-                    false => followed(DriverQuantity::Direction(name.clone())),
-                };
-                match effect.shape {
-                    Shape::Backlash => sample.direction = direction(),
-                    Shape::Lag => sample.rate = self.rate(index, nominal),
-                    Shape::ReversalSpike { .. } => {
-                        sample.direction = direction();
-                        if !self.held[index] {
-                            let kind = self.machine.axes[index].kind;
-                            sample.since_reversal =
-                                followed(DriverQuantity::SinceReversal(name.clone(), kind));
-                        }
-                    }
-                    _ => sample.value = self.state[index].value,
-                }
-            }
-        }
-        Ok(sample)
-    }
-
-    /// The rate of an axis.
-    fn rate(&self, index: usize, nominal: &impl Fn(Variable) -> N) -> N {
-        if self.held[index] {
-            return N::constant(0.0);
-        }
-        let axis = &self.machine.axes[index];
-        nominal(Variable::Driver(DriverQuantity::Rate(
-            axis.name.clone(),
-            axis.kind,
-        )))
+        let named = |quantity: DriverQuantity| nominal(Variable::Driver(quantity));
+        effect
+            .driver
+            .symbols(&input, &named)
+            .ok_or_else(|| match &effect.driver {
+                Driver::Axis(name) => no_axis(self.machine, effect, name),
+                driver => CodegenError::EffectWithoutForm {
+                    effect: effect.id(),
+                    why: format!(
+                        "{driver} needs an axis about which it exerts a moment, and the component has none"
+                    ),
+                },
+            })
     }
 
     /// The slots that an effect changes (machine errors first), with the factor of its basis function in each slot.
@@ -308,28 +189,11 @@ impl<N: Nominal> AxisStates<'_, N> {
         unknowns: &[InstrumentParameter],
         nominal: &impl Fn(Variable) -> N,
     ) -> Vec<(usize, Option<N>)> {
-        match &effect.component {
-            Component::Axis(name) => {
-                let slot = self.machine.error_slot(name);
-                slot.map(|slot| (slot, None)).into_iter().collect()
-            }
-            Component::Instrument { thing, coordinate } => {
-                let own = |unknown: &InstrumentParameter| {
-                    unknown.thing == thing && unknown.coordinate == coordinate
-                };
-                let position = unknowns.iter().position(own);
-                let slot = position.map(|position| (self.machine.error_slots() + position, None));
-                slot.into_iter().collect()
-            }
-            Component::TriggerDelay => {
-                let moving = (0..self.machine.axes.len()).filter(|index| !self.held[*index]);
-                let slots = moving.flat_map(|index| {
-                    let rate = self.rate(index, nominal);
-                    let shares = self.machine.slots_along(index);
-                    shares.map(move |(slot, along)| (slot, Some(rate * N::constant(along))))
-                });
-                slots.collect()
-            }
-        }
+        let rate = |axis: usize| {
+            let moves = !self.held[axis];
+            moves.then(|| nominal(Variable::Driver(DriverQuantity::rate(&self.machine.axes[axis]))))
+        };
+        let times = |rate: &N, along: f64| *rate * N::constant(along);
+        effect.component.slots(self.machine, unknowns, rate, times)
     }
 }

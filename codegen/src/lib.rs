@@ -49,7 +49,7 @@ pub mod touch;
 pub mod variable;
 pub mod vectors;
 
-pub use effect::{Coefficient, DriverQuantity};
+pub use effect::Coefficient;
 pub use equation::{Equation, Form, Kind, Options, Order};
 pub use error::CodegenError;
 pub use evaluate::VariableValue;

@@ -7,7 +7,7 @@
 use std::cell::RefCell;
 use std::collections::BTreeMap;
 
-use abbe_model::effect::{Effect, Shape};
+use abbe_model::effect::Effect;
 use abbe_model::session::Session;
 use abbe_model::session::limits::MIN_UM;
 use faer::Mat;
@@ -393,7 +393,7 @@ pub(crate) fn quantities(problem: &Problem<'_>, rank: &Rank) -> Vec<Quantity> {
         } = list[j].role
         {
             let effect = &problem.parameters.effects[effect];
-            let pair = matches!(effect.shape, Shape::Harmonic { .. } | Shape::Periodic { .. });
+            let pair = effect.shape.is_wave();
             if pair && rank.is_identifiable(j) && rank.is_identifiable(j + 1) {
                 quantities.push(Quantity::Harmonic(j));
                 j += 2;
@@ -557,7 +557,9 @@ pub fn outliers(problem: &Problem<'_>, fit: &Fit) -> Vec<Outlier> {
 mod tests {
     use std::path::Path;
 
-    use abbe_model::effect::{Component, Driver};
+    use abbe_model::driver::Driver;
+    use abbe_model::effect::shape::Harmonic;
+    use abbe_model::effect::{Component, Shape};
     use abbe_model::session::read::{self, ReadOptions};
 
     use super::*;
@@ -573,7 +575,7 @@ mod tests {
             .add_effect(&Effect {
                 component: Component::parse("EZC").unwrap(),
                 driver: Driver::parse("C"),
-                shape: Shape::Harmonic { order: 3.0 },
+                shape: Shape::Harmonic(Harmonic { order: 3.0 }),
                 tests: Vec::new(),
             })
             .unwrap();

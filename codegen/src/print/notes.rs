@@ -1,8 +1,8 @@
 //! Sentences about an equation, common to all printers.
 
+use abbe_model::driver::DriverPart;
 use abbe_model::frames::Rotation;
 
-use crate::effect::DriverQuantity;
 use crate::equation::{Equation, Form, Kind, Order};
 use crate::first_order::Column;
 use crate::variable::Variable;
@@ -112,13 +112,13 @@ fn range(equation: &Equation) -> String {
                 two_places(*low),
                 two_places(*high)
             )),
-            Variable::Driver(DriverQuantity::Direction(_)) => None,
+            Variable::Driver(quantity) if quantity.part == DriverPart::Direction => None,
             Variable::Driver(followed) => Some(format!(
                 "{} {low} {unit} to {high} {unit}",
-                followed.text(),
+                followed.text,
                 low = two_places(*low),
                 high = two_places(*high),
-                unit = followed.unit()
+                unit = followed.unit
             )),
             Variable::Length(name) if equation.kind == Kind::Volumetric => {
                 Some(format!("{name} {} mm", two_places(*low)))

@@ -4,7 +4,7 @@ use std::path::PathBuf;
 
 use crate::axis::AxisKind;
 use crate::chain::{AxisPosition, Machine};
-use crate::effect::DriverSample;
+use crate::driver::DriverSample;
 use crate::session::stamp::FileStamp;
 
 /// The readings of one test, one row per reading, in mm, rad, s, °C.
