@@ -8,7 +8,7 @@
 //! ```
 //! use std::path::Path;
 //!
-//! use abbe::codegen::{Equation, Language, Options, Order, SessionTest};
+//! use abbe::codegen::{Equation, Options, Order, SessionTest, check, language};
 //! use abbe::identify::patterns::patterns;
 //! use abbe::identify::quantity::Given;
 //! use abbe::model::component::ErrorName;
@@ -21,7 +21,8 @@
 //! let source = SessionTest::new(&session, &session.tests[test])?;
 //! let options = Options { order: Order::First, ..Options::default() };
 //! let equation = Equation::of(&session.machine, &source, &[ErrorName::parse("EX0C").unwrap()], &options)?;
-//! assert!(equation.print(Language::Text)?.contains("∂L/∂e_x0c = −R·s_c/L_0"));
+//! let text = language("text")?.print(&check(&equation, &source)?)?;
+//! assert!(text.contains("∂L/∂e_x0c = −R·s_c/L_0"));
 //!
 //! let found = patterns(&session, &[Given::parse("EX0C=10um")?])?;
 //! let c = session.machine.axis_index("C").unwrap();

@@ -1,6 +1,7 @@
 //! The command `abbe`.
 
 mod cli;
+mod present;
 mod report;
 
 use std::process::ExitCode;

@@ -6,7 +6,7 @@
 use std::hint::black_box;
 use std::path::Path;
 
-use abbe_codegen::{Equation, Language, Options};
+use abbe_codegen::{Equation, Options, ToolPoint, check, language};
 use abbe_model::component::ErrorName;
 use abbe_model::session::read::machine;
 use criterion::{Criterion, Throughput, criterion_group, criterion_main};
@@ -114,7 +114,8 @@ fn equations(criterion: &mut Criterion) {
     group.bench_function("error vector with eight derivatives, as C", |bencher| {
         bencher.iter(|| {
             let equation = Equation::volumetric(black_box(&machine), &errors, &options).expect("an equation");
-            black_box(equation.print(Language::C).expect("C"))
+            let checked = check(&equation, &ToolPoint).expect("agreement");
+            black_box(language("c").expect("C").print(&checked).expect("code"))
         });
     });
     group.finish();

@@ -2,17 +2,14 @@
 
 use std::collections::HashMap;
 
-use abbe_model::scalar::Nominal;
 use num_rational::BigRational;
 use num_traits::{One, Signed, ToPrimitive};
 
 use crate::normal_form::Ring;
 use crate::polynomial::{Atom, Monomial, Polynomial};
-use crate::program::{Input, Naming, Program, Tree};
-use crate::symbol::{Arena, Binary, Operand, Symbol, Unary};
-
-/// A term with its sign; true means minus.
-type Term = (bool, Tree);
+use crate::program::{Input, Naming, Program};
+use crate::symbol::{Binary, Operand, Unary};
+use crate::tree::{Term, Tree, binary, product, sum};
 
 /// Writes polynomials of a ring as expressions in the inputs of a program.
 pub(crate) struct Collector<'r, 'a> {
@@ -152,32 +149,6 @@ fn is_sin_cos(atom: Atom) -> bool {
     matches!(atom, Atom::Sin(_) | Atom::Cos(_) | Atom::Function(_))
 }
 
-fn binary(op: Binary, a: Tree, b: Tree) -> Tree {
-    Tree::Binary(op, Box::new(a), Box::new(b))
-}
-
-fn negative(tree: Tree) -> Tree {
-    Tree::Unary(Unary::Neg, Box::new(tree))
-}
-
-/// `a·b·c`; 1 for no factors.
-pub(crate) fn product(factors: Vec<Tree>) -> Tree {
-    let product = factors.into_iter().reduce(|a, b| binary(Binary::Mul, a, b));
-    product.unwrap_or(Tree::Number(1.0))
-}
-
-/// `a + b − c`; 0 for no terms.
-pub(crate) fn sum(terms: Vec<Term>) -> Tree {
-    let mut terms = terms.into_iter();
-    let Some((minus, first)) = terms.next() else {
-        return Tree::Number(0.0);
-    };
-    let first = if minus { negative(first) } else { first };
-    terms.fold(first, |sum, (minus, term)| {
-        binary(if minus { Binary::Sub } else { Binary::Add }, sum, term)
-    })
-}
-
 /// The largest common factor of all terms.
 fn common(polynomial: &Polynomial) -> Monomial {
     let mut monomials = polynomial.terms().map(|(monomial, _)| monomial.clone());
@@ -201,38 +172,5 @@ fn as_factor(terms: Vec<Term>) -> (bool, Option<Tree>) {
     match sum(terms) {
         Tree::Number(1.0) => (minus, None),
         factor => (minus, Some(factor)),
-    }
-}
-
-impl Tree {
-    /// Builds the expression in an arena; `inputs` are the operands of the program's inputs.
-    pub(crate) fn symbol<'a>(&self, arena: &'a Arena, inputs: &[Operand]) -> Symbol<'a> {
-        match self {
-            Tree::Number(value) => arena.symbol(Operand::constant(*value)),
-            Tree::Input(index) | Tree::Step(index) => arena.symbol(inputs[*index]),
-            Tree::Unary(function, a) => {
-                let a = a.symbol(arena, inputs);
-                match function {
-                    Unary::Neg => -a,
-                    Unary::Sqrt => a.sqrt(),
-                    Unary::Sin => a.sin_cos().0,
-                    Unary::Cos => a.sin_cos().1,
-                    Unary::Exp => a.exp(),
-                    Unary::Signum => a.signum(),
-                    Unary::Step => a.step(),
-                    Unary::Floor => a.floor(),
-                    Unary::Round => a.round(),
-                }
-            }
-            Tree::Binary(op, a, b) => {
-                let (a, b) = (a.symbol(arena, inputs), b.symbol(arena, inputs));
-                match op {
-                    Binary::Add => a + b,
-                    Binary::Sub => a - b,
-                    Binary::Mul => a * b,
-                    Binary::Div => a / b,
-                }
-            }
-        }
     }
 }

@@ -3,126 +3,22 @@
 use abbe_model::axis::AxisKind;
 use abbe_model::chain::Machine;
 use abbe_model::component::ErrorName;
-use abbe_model::effect::{Effect, Shape};
-use abbe_model::frames::Rotation;
+use abbe_model::effect::Shape;
 use abbe_model::instrument::Station;
 
-use crate::check::{Check, Deviation};
-use crate::collect::sum;
-use crate::effect::Coefficient;
+use crate::coefficient::Coefficient;
 use crate::error::CodegenError;
-use crate::first_order::FirstOrder;
-use crate::forms::{self, FormContext};
-use crate::normal_form::Ring;
-use crate::polynomial::Polynomial;
-use crate::print::terms_of;
-use crate::program::{Input, Label, Naming, Program, Tree};
-use crate::run::Run;
+use crate::form::{Form, Kind, Options, Order};
+use crate::program::{Input, Label, Naming, Program};
+use crate::run::{self, Run};
 use crate::subject::{Source, Subject, ToolPoint};
-use crate::symbol::{Arena, NodeId, Operand, Symbol, Unary, VariableId, length};
-use crate::touch::{self, ProbeTerms};
-use crate::variable::{Symbols, Variable};
+use crate::symbol::{Arena, NodeId, Operand, Symbol, length};
+use crate::touch::ProbeTerms;
+use crate::truncation::{self, FormContext};
+use crate::variable::Variable;
 use crate::vectors::{self, NamedVector};
 
-/// Truncation order of an equation in the errors.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub enum Order {
-    /// No truncation.
-    #[default]
-    Exact,
-    /// Coordinates up to products of two errors (and squares, for exact rotations); a length is the norm of these coordinates.
-    Bilinear,
-    /// The value without errors and a coefficient for each error.
-    First,
-}
-
-/// The form of an equation.
-#[derive(Clone, Debug, Default, PartialEq)]
-pub struct Options {
-    /// Truncation order in the errors.
-    pub order: Order,
-    /// Rotation convention of the error angles; `None` for that of the machine.
-    pub rotation: Option<Rotation>,
-    /// Naming convention of the errors.
-    pub symbols: Symbols,
-    /// Whether the derivatives by every error are included.
-    pub gradient: bool,
-    /// Parameters of the instrument that are included, by index in its list.
-    pub unknowns: Vec<usize>,
-    /// Effects that are included, with all their coefficients.
-    pub effects: Vec<Effect>,
-}
-
-/// The quantity that an equation describes.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Kind {
-    /// The length of a ball bar.
-    Length,
-    /// The distance from a probe to the surface of its artefact.
-    Distance,
-    /// Three coordinates measured by an instrument.
-    Coordinates,
-    /// The error vector of the tool in the table frame.
-    Volumetric,
-}
-
-/// The content of an equation, by the requested order.
-#[derive(Clone, Debug, PartialEq)]
-pub enum Form {
-    /// The named vectors, and the outputs in terms of them.
-    Exact,
-    /// The coordinate groups, grouped by error: the bar vector for a length, otherwise the coordinates themselves.
-    Groups {
-        /// The normal forms.
-        polynomials: Vec<Polynomial>,
-        /// The expressions as printed.
-        printed: Vec<Tree>,
-        /// Whether the truncation omitted nothing because the chain has no further terms. This is decided for up to twelve parameters.
-        /// For more, the full normal form is not built and the value is false.
-        complete: bool,
-    },
-    /// The value without errors and a coefficient for each error, with the printed expression of each.
-    First(FirstOrder, PrintedFirstOrder),
-}
-
-/// The first-order form as printed.
-#[derive(Clone, Debug, PartialEq)]
-pub struct PrintedFirstOrder {
-    /// The coordinates without errors; for a length, its square.
-    pub nominal: Vec<Tree>,
-    /// Sign of `L₀` and the offset added to it, if the reading without errors is not `L₀` itself.
-    pub alternative_length: Option<(f64, Tree)>,
-    /// The coefficients, parameter by parameter, coordinate by coordinate.
-    pub coefficients: Vec<Vec<Tree>>,
-    /// For a constant multiple of an earlier column: numerator and denominator of the factor.
-    pub factors: Vec<Option<(Tree, Tree)>>,
-}
-
-impl PrintedFirstOrder {
-    /// Replaces the root by the name `length`.
-    pub(crate) fn with_named_length(&self, length: &Tree) -> PrintedFirstOrder {
-        let root = Tree::Unary(Unary::Sqrt, Box::new(self.nominal[0].clone()));
-        let named = |trees: &Vec<Tree>| trees.iter().map(|tree| tree.replaced(&root, length)).collect();
-        PrintedFirstOrder {
-            coefficients: self.coefficients.iter().map(named).collect(),
-            ..self.clone()
-        }
-    }
-
-    /// The reading without errors, from the length `L₀`.
-    pub(crate) fn without_errors(&self, length: Tree) -> Tree {
-        match &self.alternative_length {
-            None => length,
-            Some((sign, offset)) => {
-                let mut terms = vec![(*sign < 0.0, length)];
-                terms.extend(terms_of(offset));
-                sum(terms)
-            }
-        }
-    }
-}
-
-/// The closed form of one reading of one machine, checked against the chain over dual numbers.
+/// The closed form of one reading of one machine, as data; [`mod@crate::check`] compares it with the chain before it is printed.
 #[derive(Debug)]
 pub struct Equation {
     /// The machine, with the rotation convention of the equation.
@@ -153,22 +49,13 @@ pub struct Equation {
     pub touch: Option<ProbeTerms>,
     /// Basis functions that are kept as they are and never expanded.
     pub(crate) whole: Vec<Operand>,
-    /// Errors and instrument parameters that the form does not contain.
-    pub absent: Vec<Variable>,
-    /// Agreement with the chain.
-    pub check: Check,
-    /// Ranges of the lengths and of the positions of moving axes in the session, mm or rad.
-    pub range: Vec<(Variable, [f64; 2])>,
-    /// Deviations of a truncated or small-angle form from the exact chain over that range.
-    pub deviations: Vec<Deviation>,
 }
 
 impl Equation {
     /// Derives the equation of a reading in the named errors; other errors are exactly zero.
     ///
     /// # Errors
-    /// If the machine lacks the axis of an error, if the instrument lacks a parameter, if the form has no closed polynomial, or if the
-    /// check against dual numbers fails.
+    /// If the machine lacks the axis of an error, if the instrument lacks a parameter, or if the form has no closed polynomial.
     pub fn of(
         machine: &Machine,
         source: &impl Source,
@@ -179,72 +66,59 @@ impl Equation {
         machine.rotation = options.rotation.unwrap_or(machine.rotation);
         let arena = Arena::new();
         let parameters = parameters(&arena, &machine, source, errors, options)?;
-        let (kind, exact, vectors, outputs, form, stated_length, driven_errors, bar_parameters, touch, whole) = {
-            let run = Run::<Symbol<'_>>::new(
-                &machine,
-                source,
-                &parameters,
-                &|variable| arena.variable(variable),
-                &|index| arena.variable(parameters[index].clone()),
-            )?;
-            let kind = match run.subject {
-                Subject::Station(Station::BallBar(_)) => Kind::Length,
-                Subject::Station(Station::Probe(_)) => Kind::Distance,
-                Subject::Station(_) => Kind::Coordinates,
-                Subject::Volumetric { .. } => Kind::Volumetric,
-            };
-            let exact: Vec<Operand> = run.read().into_iter().map(Symbol::operand).collect();
-            let mut vectors = vectors::of_subject(&run.subject, &machine, &run.state, &run.errors, &|slot| {
-                run.unknown(slot)
-            });
-            let on_the_way = vectors.clone();
-            let inputs = inputs(&arena, &machine, &parameters);
-            let symbol = |index: usize| arena.variable(parameters[index].clone());
-            let driven_errors = run.driven_errors(&symbol).into_iter();
-            let driven_errors = driven_errors
-                .map(|(variable, value)| (variable, value.operand()))
-                .collect();
-            let bar_parameters = run.bar_parameters().map(|unknown| unknown.map(Symbol::operand));
-            let whole = curves(&run, &parameters);
-            let written = FormContext {
-                arena: &arena,
-                inputs: &inputs,
-                parameters: &parameters,
-                whole: &whole,
-            };
-            let (outputs, form) = match options.order {
-                Order::Exact => (exact.clone(), Form::Exact),
-                Order::Bilinear => forms::bilinear(&run, &exact, &mut vectors, &written)?,
-                Order::First => forms::first(&run, &exact, &mut vectors, &written)?,
-            };
-            let stated = match &run.subject {
-                Subject::Station(Station::BallBar(bar)) => Some(bar.bar.operand()),
-                _ => None,
-            };
-            let touch = run.probe_geometry().map(|geometry| match vectors.as_slice() {
-                [.., stylus, step] if options.order == Order::Bilinear => {
-                    let groups: Vec<Symbol<'_>> = [stylus, step]
-                        .iter()
-                        .flat_map(|vector| vector.components.map(|component| arena.symbol(component)))
-                        .collect();
-                    ProbeTerms::of(&touch::with_groups(&geometry, &groups), &on_the_way)
-                }
-                _ => ProbeTerms::of(&geometry, &on_the_way),
-            });
-            (
-                kind,
-                exact,
-                vectors,
-                outputs,
-                form,
-                stated,
-                driven_errors,
-                bar_parameters,
-                touch,
-                whole,
-            )
+        let run = Run::<Symbol<'_>>::new(
+            &machine,
+            source,
+            &parameters,
+            &|variable| arena.variable(variable),
+            &|index| arena.variable(parameters[index].clone()),
+        )?;
+        let kind = match run.subject {
+            Subject::Station(Station::BallBar(_)) => Kind::Length,
+            Subject::Station(Station::Probe(_)) => Kind::Distance,
+            Subject::Station(_) => Kind::Coordinates,
+            Subject::Volumetric { .. } => Kind::Volumetric,
         };
-        let mut equation = Equation {
+        let exact: Vec<Operand> = run.read().into_iter().map(Symbol::operand).collect();
+        let mut vectors = vectors::of_subject(&run.subject, &machine, &run.state, &run.errors, &|slot| {
+            run.unknown(slot)
+        });
+        let on_the_way = vectors.clone();
+        let inputs = inputs(&arena, &machine, &parameters);
+        let symbol = |index: usize| arena.variable(parameters[index].clone());
+        let driven_errors = run.driven_errors(&symbol).into_iter();
+        let driven_errors = driven_errors
+            .map(|(variable, value)| (variable, value.operand()))
+            .collect();
+        let bar_parameters = run.bar_parameters().map(|unknown| unknown.map(Symbol::operand));
+        let whole = curves(&run, &parameters);
+        let written = FormContext {
+            arena: &arena,
+            inputs: &inputs,
+            parameters: &parameters,
+            whole: &whole,
+        };
+        let (outputs, form) = match options.order {
+            Order::Exact => (exact.clone(), Form::Exact),
+            Order::Bilinear => truncation::bilinear(&run, &exact, &mut vectors, &written)?,
+            Order::First => truncation::first(&run, &exact, &mut vectors, &written)?,
+        };
+        let stated_length = match &run.subject {
+            Subject::Station(Station::BallBar(bar)) => Some(bar.bar.operand()),
+            _ => None,
+        };
+        let touch = run.probe_geometry().map(|geometry| match vectors.as_slice() {
+            [.., stylus, step] if options.order == Order::Bilinear => {
+                let groups: Vec<Symbol<'_>> = [stylus, step]
+                    .iter()
+                    .flat_map(|vector| vector.components.map(|component| arena.symbol(component)))
+                    .collect();
+                ProbeTerms::of(&run::with_groups(&geometry, &groups), &on_the_way)
+            }
+            _ => ProbeTerms::of(&geometry, &on_the_way),
+        });
+        drop(run);
+        Ok(Equation {
             machine,
             options: options.clone(),
             kind,
@@ -259,49 +133,7 @@ impl Equation {
             bar_parameters,
             touch,
             whole,
-            absent: Vec::new(),
-            check: Check::default(),
-            range: Vec::new(),
-            deviations: Vec::new(),
-        };
-        let value = equation.program(false);
-        equation.check = equation.confirm(source, &[&value, &equation.program(true)])?;
-        equation.absent = equation.absent_parameters()?;
-        equation.range = equation.range(source);
-        equation.deviations = equation.deviations(source, &equation.range, &value)?;
-        Ok(equation)
-    }
-
-    /// The parameters that the outputs do not contain. A derivative that is not zero at some point proves that its parameter is
-    /// contained; otherwise the normal form decides.
-    fn absent_parameters(&self) -> Result<Vec<Variable>, CodegenError> {
-        let rounding = 1e-9;
-        let derivatives = self.parameters.iter().zip(&self.check.largest_derivatives);
-        let unseen = derivatives.filter(|(_, largest)| **largest < rounding);
-        let unseen: Vec<Variable> = unseen.map(|(parameter, _)| parameter.clone()).collect();
-        let below: Vec<VariableId> = self.arena.variables_of(&self.outputs);
-        let in_graph =
-            |parameter: &Variable| below.iter().any(|id| self.arena.variable_at(*id) == *parameter);
-        let (doubtful, mut absent): (Vec<Variable>, Vec<Variable>) = unseen.into_iter().partition(in_graph);
-        if !doubtful.is_empty() {
-            let requested = match (self.kind, self.vectors.as_slice()) {
-                (Kind::Length, [.., bar]) => bar.components.to_vec(),
-                (Kind::Distance, [.., stylus, step]) => {
-                    let radius = self.touch.iter().map(|touch| touch.radius);
-                    let vectors = stylus.components.into_iter().chain(step.components);
-                    vectors.chain(radius).collect()
-                }
-                _ => self.outputs.clone(),
-            };
-            let mut ring = Ring::exact(&self.arena);
-            ring.keep(&self.whole);
-            let forms = requested
-                .iter()
-                .map(|w| ring.normal_form(*w))
-                .collect::<Result<Vec<_>, _>>()?;
-            absent.extend(ring.absent(&forms, &doubtful).into_iter().cloned());
-        }
-        Ok(absent)
+        })
     }
 
     /// Derives the error vector of the tool in the table frame, over the whole workspace.

@@ -1,6 +1,7 @@
 //! The error type of this crate.
 
-use crate::symbol::Unary;
+use abbe_model::chain::Machine;
+use abbe_model::expression::Unary;
 
 /// Reasons why an equation cannot be written.
 #[derive(Debug, thiserror::Error)]
@@ -36,19 +37,31 @@ pub enum CodegenError {
     },
     /// Derivatives that are not printed in mathematical notation.
     #[error(
-        "the derivatives of {what} are written as code only: as rust, c, python or matlab; at zero errors they equal the first-order coefficients"
+        "the derivatives of {what} are written as code only: as {languages}; at zero errors they equal the first-order coefficients"
     )]
     GradientForReaders {
         /// The quantity that is differentiated.
         what: &'static str,
+        /// The languages that carry them.
+        languages: String,
     },
     /// A curve, which has hundreds of terms, in mathematical notation.
     #[error(
-        "the curve `{effect}` is written as code only: as rust, c, python or matlab; to omit it, name the errors to keep"
+        "the curve `{effect}` is written as code only: as {languages}; to omit it, name the errors to keep"
     )]
     CurveForReaders {
         /// The effect.
         effect: String,
+        /// The languages that carry it.
+        languages: String,
+    },
+    /// A word that names no language.
+    #[error("no output language is called `{word}`; the languages are {known}")]
+    NoSuchLanguage {
+        /// The word.
+        word: String,
+        /// The known words.
+        known: String,
     },
     /// A stated probing direction whose angle with the artefact's axis changes as the axes move.
     #[error(
@@ -102,4 +115,15 @@ pub enum CodegenError {
         /// Largest relative difference of a derivative.
         gradient: f64,
     },
+}
+
+impl CodegenError {
+    /// The error named `error` belongs to an axis that the machine does not have.
+    pub(crate) fn no_axis(machine: &Machine, error: String, axis: &str) -> Self {
+        CodegenError::NoSuchAxis {
+            error,
+            axis: axis.to_string(),
+            machine: machine.code(),
+        }
+    }
 }

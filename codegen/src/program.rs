@@ -3,66 +3,8 @@
 use std::collections::HashMap;
 
 use crate::symbol::{Arena, Binary, Node, NodeId, Operand, Unary, operands};
+use crate::tree::Tree;
 use crate::variable::Variable;
-
-/// An expression to be printed on one line.
-#[derive(Clone, Debug, PartialEq)]
-pub enum Tree {
-    /// A number.
-    Number(f64),
-    /// An input, by its index in [`Program::inputs`].
-    Input(usize),
-    /// An earlier step, by its index in [`Program::steps`].
-    Step(usize),
-    /// A function of one operand.
-    Unary(Unary, Box<Tree>),
-    /// An operation on two operands.
-    Binary(Binary, Box<Tree>, Box<Tree>),
-}
-
-impl Tree {
-    /// Whether it contains an input.
-    pub(crate) fn holds(&self, input: usize) -> bool {
-        match self {
-            Tree::Input(index) => *index == input,
-            Tree::Number(_) | Tree::Step(_) => false,
-            Tree::Unary(_, a) => a.holds(input),
-            Tree::Binary(_, a, b) => a.holds(input) || b.holds(input),
-        }
-    }
-
-    /// Number of names and numbers in it.
-    pub(crate) fn leaves(&self) -> usize {
-        match self {
-            Tree::Number(_) | Tree::Input(_) | Tree::Step(_) => 1,
-            Tree::Unary(_, a) => a.leaves(),
-            Tree::Binary(_, a, b) => a.leaves() + b.leaves(),
-        }
-    }
-
-    /// Replaces every occurrence of an expression by another one.
-    pub(crate) fn replaced(&self, what: &Tree, by: &Tree) -> Tree {
-        if self == what {
-            return by.clone();
-        }
-        let inner = |tree: &Tree| Box::new(tree.replaced(what, by));
-        match self {
-            Tree::Number(_) | Tree::Input(_) | Tree::Step(_) => self.clone(),
-            Tree::Unary(function, a) => Tree::Unary(*function, inner(a)),
-            Tree::Binary(op, a, b) => Tree::Binary(*op, inner(a), inner(b)),
-        }
-    }
-
-    fn value(&self, inputs: &[f64], steps: &[f64]) -> f64 {
-        match self {
-            Tree::Number(value) => *value,
-            Tree::Input(index) => inputs[*index],
-            Tree::Step(index) => steps[*index],
-            Tree::Unary(function, a) => function.of(a.value(inputs, steps)),
-            Tree::Binary(op, a, b) => op.of(a.value(inputs, steps), b.value(inputs, steps)),
-        }
-    }
-}
 
 /// An argument of a program: a variable, or the sine or cosine of an axis position, which is computed once per data set.
 #[derive(Clone, Debug, PartialEq)]

@@ -1,13 +1,14 @@
 //! Evaluation of the chain, over symbols for the equation and over numbers for its check.
 
 use abbe_model::chain::{AxisPosition, BodyErrors, Machine};
+use abbe_model::frames::Point;
+use abbe_model::instrument::probe::ProbeGeometry;
 use abbe_model::instrument::{Station, ballbar};
 use abbe_model::scalar::{Nominal, Scalar};
 
 use crate::effect::AxisStates;
 use crate::error::CodegenError;
 use crate::subject::{Source, Subject};
-use crate::touch;
 use crate::variable::Variable;
 
 /// All quantities from which a reading is computed.
@@ -59,11 +60,9 @@ impl<'m, S: Scalar> Run<'m, S> {
         for (index, parameter) in parameters.iter().enumerate() {
             match parameter {
                 Variable::Error(name) => {
-                    let slot = machine.error_slot(name).ok_or_else(|| CodegenError::NoSuchAxis {
-                        error: name.to_string(),
-                        axis: name.axis.clone(),
-                        machine: machine.code(),
-                    })?;
+                    let slot = machine.error_slot(name);
+                    let slot =
+                        slot.ok_or_else(|| CodegenError::no_axis(machine, name.to_string(), &name.axis))?;
                     slots[slot].push((index, None));
                 }
                 Variable::Instrument(unknown) => {
@@ -155,6 +154,16 @@ impl<'m, S: Scalar> Run<'m, S> {
         }
     }
 
+    /// The geometry of a probe's reading; `None` for any other subject.
+    pub(crate) fn probe_geometry(&self) -> Option<ProbeGeometry<S>> {
+        match &self.subject {
+            Subject::Station(Station::Probe(probe)) => {
+                Some(probe.geometry(self.machine, &self.state, &self.errors, |slot| self.unknown(slot)))
+            }
+            _ => None,
+        }
+    }
+
     /// The coordinates of the reading.
     pub(crate) fn read(&self) -> Vec<S> {
         self.subject
@@ -165,7 +174,7 @@ impl<'m, S: Scalar> Run<'m, S> {
     /// themselves.
     pub(crate) fn reading_of_groups(&self, groups: &[S]) -> Option<S> {
         match (self.probe_geometry(), &self.subject) {
-            (Some(geometry), _) => Some(touch::with_groups(&geometry, groups).distance()),
+            (Some(geometry), _) => Some(with_groups(&geometry, groups).distance()),
             (None, Subject::Station(Station::BallBar(_))) => {
                 let [x, y, z] = [groups[0], groups[1], groups[2]];
                 Some(self.length_reading((x * x + y * y + z * z).sqrt()))
@@ -199,4 +208,13 @@ fn in_slot<S: Scalar>(shares: &[Contribution<S::Nominal>], small: &impl Fn(usize
         None => small(*index),
     };
     shares.iter().map(value).reduce(|sum, value| sum + value)
+}
+
+/// Replaces the six coordinates of stylus and step.
+pub(crate) fn with_groups<S: Scalar>(geometry: &ProbeGeometry<S>, groups: &[S]) -> ProbeGeometry<S> {
+    ProbeGeometry {
+        stylus: Point(std::array::from_fn(|i| groups[i])),
+        step: Point(std::array::from_fn(|i| groups[i + 3])),
+        ..*geometry
+    }
 }

@@ -8,14 +8,9 @@
 //! `l_n` is the length of the step in R; it is 1 for a stated direction. The sign of the root selects the nearer of the two intersections
 //! for every artefact that is hit, so that no case distinction is necessary.
 
-use abbe_model::frames::Point;
-use abbe_model::instrument::Station;
 use abbe_model::instrument::probe::ProbeGeometry;
-use abbe_model::scalar::Scalar;
 
 use crate::program::Label;
-use crate::run::Run;
-use crate::subject::Subject;
 use crate::symbol::{NodeId, Operand, Symbol};
 use crate::vectors::NamedVector;
 
@@ -56,26 +51,5 @@ impl ProbeTerms {
             Operand::Node(id) => Some((id, label)),
             Operand::Constant(_) => None,
         })
-    }
-}
-
-impl<S: Scalar> Run<'_, S> {
-    /// The geometry of a probe's reading; `None` for any other subject.
-    pub(crate) fn probe_geometry(&self) -> Option<ProbeGeometry<S>> {
-        match &self.subject {
-            Subject::Station(Station::Probe(probe)) => {
-                Some(probe.geometry(self.machine, &self.state, &self.errors, |slot| self.unknown(slot)))
-            }
-            _ => None,
-        }
-    }
-}
-
-/// Replaces the six coordinates of stylus and step.
-pub(crate) fn with_groups<S: Scalar>(geometry: &ProbeGeometry<S>, groups: &[S]) -> ProbeGeometry<S> {
-    ProbeGeometry {
-        stylus: Point(std::array::from_fn(|i| groups[i])),
-        step: Point(std::array::from_fn(|i| groups[i + 3])),
-        ..*geometry
     }
 }

@@ -5,7 +5,7 @@ use abbe_model::component::{ErrorKind, ErrorName};
 use abbe_model::driver::DriverQuantity;
 use abbe_model::instrument::{InstrumentParameter, InternalUnit};
 
-use crate::effect::Coefficient;
+use crate::coefficient::Coefficient;
 
 /// A variable of an expression.
 #[derive(Clone, Debug, PartialEq)]

@@ -44,7 +44,6 @@
 pub mod circle;
 pub mod circular;
 pub mod compensation;
-mod covariance;
 pub mod directions;
 pub mod error;
 pub mod fit;

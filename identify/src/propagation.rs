@@ -14,9 +14,9 @@ use statrs::distribution::{Continuous, ContinuousCDF, Normal};
 use abbe_model::session::Prior;
 use abbe_model::words::counted;
 
-use crate::covariance;
 use crate::error::IdentifyError;
-use crate::fit::{Fit, Quantity, covariance, in_directions, quantities, values_at};
+use crate::fit;
+use crate::fit::{Fit, Quantity, in_directions, parameter_covariance, quantities, values_at};
 use crate::least_squares::{LeastSquares, Scaling, minimise};
 use crate::monte_carlo::{self, Distribution, Draws, Function, MonteCarlo};
 use crate::problem::{Problem, RowBlock};
@@ -85,7 +85,7 @@ impl<'p, 'a> Refit<'p, 'a> {
             distances,
             quantities: quantities(problem, &fit.rank),
             end: fit.rank.coordinates(&fit.beta, &size),
-            inverse: covariance(&reduced, &Mat::identity(rank, rank))?,
+            inverse: parameter_covariance(&reduced, &Mat::identity(rank, rank))?,
             u,
         })
     }
@@ -313,7 +313,7 @@ pub fn add_monte_carlo(
         }
     }
     phases_follow_amplitudes(&mut result.parameters);
-    result.covariance = covariance::of_parameters(problem, fit, &result.parameters);
+    result.covariance = fit::covariance_of_parameters(problem, fit, &result.parameters);
     if unconverged > 0 {
         result.warnings.push(format!(
             "{unconverged} of {} could not be fitted and are excluded",

@@ -34,7 +34,7 @@ pub struct Outlier {
     pub residual_um: f64,
 }
 
-/// What a fit reports.
+/// Estimates of the parameters of a session, with their uncertainties.
 #[derive(Clone, Debug, PartialEq, Serialize, JsonSchema)]
 pub struct FitResult {
     /// Standard deviation of one scalar reading, µm.

@@ -1,10 +1,10 @@
-//! `abbe fit --compensation`: identified errors in the forms that controls read, as far as those are publicly documented.
+//! `abbe fit --compensation`: estimated errors as compensation tables of controls, as far as their formats are publicly documented.
 //!
 //! - **LinuxCNC** `COMP_FILE` of type 0 (INI Configuration, `[JOINT_n]`): nominal, actual forward, actual reverse; the control adds nominal less actual.
-//!   It reads three numbers of a line and nothing behind them (`usrmotLoadComp` in `usrmotintf.cc`): the uncertainty stands there.
+//!   It reads three numbers per line and ignores the rest (`usrmotLoadComp` in `usrmotintf.cc`). The uncertainty follows them.
 //! - **Heidenhain** `.COM` (Technical Manual MANUALplus 620, 6.10.3): columns AXISPOS, BACKLASH, and one for each axis; points of the error curve
-//!   (Technical Manual TNC 406/306, 4-21), positive where the travel is too long (TNC 407, 1.6.3). How the file is framed is not publicly documented.
-//! - **Beckhoff** TF5280 (and ISG kernel) ISG CSV format: the errors themselves by the names of ISO 230, in mm and rad over mm and degrees.
+//!   (Technical Manual TNC 406/306, 4-21), positive where the travel is too long (TNC 407, 1.6.3). The frame of the file is not publicly documented.
+//! - **Beckhoff** TF5280 (and ISG kernel) ISG CSV format: the errors by their names of ISO 230, in mm and rad over mm and degrees.
 
 use std::fmt::Write;
 use std::path::PathBuf;
@@ -14,7 +14,6 @@ use abbe::identify::fit::Fit;
 use abbe::identify::problem::Problem;
 use abbe::model::axis::AxisKind;
 use abbe::model::chain::Machine;
-use abbe::model::component::Freedom;
 use clap::{Args, ValueEnum};
 
 use super::failure::Failure;
@@ -22,11 +21,14 @@ use super::folder::{self, NewFile};
 use super::message::{Kind, tell};
 
 mod uncertainty;
+mod words;
 
-/// Most points of a table: LinuxCNC takes 256 triplets a joint, Heidenhain 256 points a table.
+pub use words::words;
+
+/// Maximum number of points of a table: LinuxCNC reads 256 triplets per joint, Heidenhain 256 points per table.
 const MAX_POINTS: usize = 256;
 
-/// Whose table.
+/// The control of a table.
 #[derive(Clone, Copy, PartialEq, Eq, ValueEnum)]
 pub enum Control {
     /// LinuxCNC, COMP_FILE of type 0.
@@ -37,41 +39,47 @@ pub enum Control {
     Beckhoff,
 }
 
-/// What commands that identify take.
+/// Arguments of commands that estimate errors.
 #[derive(Args)]
 pub struct CompensationArguments {
-    /// Write compensation tables of the error motions that were identified into a new folder.
+    /// Write compensation tables of the estimated error motions into a new folder.
+    ///
+    /// Example: --compensation tables --control linuxcnc
     #[arg(long, value_name = "DIR", requires = "control")]
     compensation: Option<PathBuf>,
-    /// For which control.
+    /// The control that reads the tables.
+    ///
+    /// Example: --compensation tables --control beckhoff
     #[arg(long, value_enum, requires = "compensation")]
     control: Option<Control>,
-    /// Points of a table, over the positions through which the axis moved.
+    /// Number of points of a table, over the travel of the axis in the readings.
+    ///
+    /// Example: --compensation tables --control heidenhain --points 73
     #[arg(long, value_name = "N", default_value_t = 37, requires = "compensation")]
     points: usize,
 }
 
 impl CompensationArguments {
-    /// Whether tables are asked for.
+    /// Whether tables are requested.
     pub fn wanted(&self) -> bool {
         self.compensation.is_some()
     }
 
-    /// Refuses before the work what could not be written after it.
+    /// Refuses tables that cannot be written, before the work.
     pub fn check(&self) -> Result<(), Failure> {
         let Some(folder) = &self.compensation else {
             return Ok(());
         };
         if !(2..=MAX_POINTS).contains(&self.points) {
             return Err(Failure::Other(format!(
-                "--points {}: from 2 to {MAX_POINTS}, which is the most that LinuxCNC and Heidenhain take",
+                "`--points {}`: a number from 2 to {MAX_POINTS} is expected, the maximum of LinuxCNC and Heidenhain",
                 self.points
             )));
         }
         folder::check(folder, None).map(|_| ())
     }
 
-    /// Writes the tables if they were asked for.
+    /// Writes the tables if they are requested.
     pub fn run(&self, problem: &Problem<'_>, fit: &Fit, tables: bool) -> Result<(), Failure> {
         let (Some(folder), Some(control)) = (&self.compensation, self.control) else {
             return Ok(());
@@ -88,7 +96,7 @@ impl CompensationArguments {
     }
 }
 
-/// Writes tables of what was identified into a folder, and says what is not in them.
+/// Writes tables of the estimated errors into a folder and lists the errors that they do not contain.
 fn write(
     machine: &Machine,
     compensation: &Compensation,
@@ -112,7 +120,7 @@ fn write(
             .map(|line| format!("\n  {line}"))
             .collect::<String>();
         return Err(Failure::Other(format!(
-            "nothing to compensate in this form: declare error motions as [[effect]], as `abbe trace --write` does, and fit again{all}"
+            "no error can be compensated in this format: declare error motions as [[effect]], as `abbe trace --write` does, and fit again{all}"
         )));
     }
     let mut files = files;
@@ -131,12 +139,12 @@ fn write(
     match control {
         Control::Linuxcnc => {
             say!(
-                "  in [JOINT_n] of the INI file: COMP_FILE = the file, COMP_FILE_TYPE = 0; BACKLASH is then not used"
+                "  in [JOINT_n] of the INI file: COMP_FILE = the file, COMP_FILE_TYPE = 0; the control then ignores BACKLASH"
             );
         }
         Control::Heidenhain => {
             say!(
-                "  columns of a .COM table; how the file is framed is not publicly documented: enter or import them in the table editor"
+                "  columns of a .COM table; the frame of the file is not publicly documented: enter or import the columns in the table editor"
             );
             say!(
                 "  values are points of the error curve, positive where the travel is too long; check the sign on one axis first"
@@ -144,21 +152,21 @@ fn write(
         }
         Control::Beckhoff => {
             say!(
-                "  file_format[0] ISG_CSV; values are errors (actual less nominal), the control takes them off; `negate` turns the sign"
+                "  file_format[0] ISG_CSV; values are errors (actual less nominal), which the control subtracts; `negate` reverses the sign"
             );
         }
     }
     say!(
-        "  standard uncertainty (k = 1) of every point: {}",
+        "  standard uncertainty (k = 1) of each point: {}",
         uncertainty::FILE
     );
     for line in &left_out {
-        say!("  left out: {line}");
+        say!("  not in the tables: {line}");
     }
     Ok(())
 }
 
-/// Positions that all of these curves cover, equidistant, internal units.
+/// Equidistant positions that all of these curves cover, internal units.
 fn positions<'c>(
     curves: impl IntoIterator<Item = &'c ErrorCurve>,
     points: usize,
@@ -167,27 +175,27 @@ fn positions<'c>(
     let (from, to) = ranges.fold((f64::NEG_INFINITY, f64::INFINITY), |(from, to), range| {
         (from.max(range.start), to.min(range.end))
     });
-    // Curves that have no position in common have no table.
+    // Curves without a common position have no table.
     let points = if from < to { points } else { 0 };
     (0..points).map(move |k| from + (to - from) * k as f64 / (points - 1) as f64)
 }
 
-/// A position or an angle as files have it: mm or degrees.
-fn outside(kind: AxisKind, value: f64) -> f64 {
+/// A position in the unit of files: mm or degrees.
+fn in_file_unit(kind: AxisKind, value: f64) -> f64 {
     match kind {
         AxisKind::Linear => value,
         AxisKind::Rotary => value.to_degrees(),
     }
 }
 
-/// The axis that moves in the freedom of an error, and what an error of 1 in R is as a position of that axis: the tool against the workpiece,
-/// rotary axes at zero.
+/// The axis that moves in the freedom of an error, and the change of its position that equals an error of 1 in R (tool against workpiece, rotary
+/// axes at zero).
 fn as_position(machine: &Machine, curve: &ErrorCurve) -> Option<(usize, f64)> {
     let side = |axis: usize| if axis < machine.workpiece_side { -1.0 } else { 1.0 };
     let freedom = curve.error.freedom;
     let moves =
         |axis: usize| machine.axes[axis].own_freedom() == freedom && machine.axes[axis].principal().is_some();
-    // Its own axis before another that moves alike.
+    // The axis of the error before another axis with the same freedom.
     let axis = std::iter::once(curve.axis)
         .chain((0..machine.axes.len()).filter(|_| !freedom.is_angle()))
         .find(|axis| moves(*axis))?;
@@ -205,7 +213,7 @@ fn linuxcnc(
     for curve in &compensation.curves {
         let Some((axis, factor)) = as_position(machine, curve).filter(|(axis, _)| *axis == curve.axis) else {
             left_out.push(format!(
-                "{}: COMP_FILE corrects the positioning of a joint only",
+                "{}: COMP_FILE compensates the positioning of a joint only",
                 curve.error
             ));
             continue;
@@ -213,15 +221,15 @@ fn linuxcnc(
         let kind = machine.axes[axis].kind;
         let mut text = String::new();
         for q in positions([curve], points) {
-            let actual = |direction: f64| outside(kind, q + factor * curve.at(q, direction));
+            let actual = |direction: f64| in_file_unit(kind, q + factor * curve.at(q, direction));
             let u = curve.u_at(q, 1.0).max(curve.u_at(q, -1.0));
             let _ = writeln!(
                 text,
                 "{:.6} {:.6} {:.6} # u {:.6}",
-                outside(kind, q),
+                in_file_unit(kind, q),
                 actual(1.0),
                 actual(-1.0),
-                outside(kind, u)
+                in_file_unit(kind, u)
             );
         }
         files.push((format!("{}.comp", machine.axes[axis].name), text));
@@ -242,7 +250,7 @@ fn heidenhain(
             match as_position(machine, curve) {
                 Some((column, factor)) => columns.push((curve, column, factor)),
                 None => left_out.push(format!(
-                    "{}: a column of a .COM table corrects the position of an axis",
+                    "{}: a column of a .COM table compensates the position of an axis",
                     curve.error
                 )),
             }
@@ -267,9 +275,9 @@ fn heidenhain(
         }
         text.push('\n');
         for q in positions(columns.iter().map(|(curve, ..)| *curve), points) {
-            let _ = write!(text, "{:>12.5}", outside(kind, q));
+            let _ = write!(text, "{:>12.5}", in_file_unit(kind, q));
             if let Some((curve, _, factor)) = backlash {
-                let _ = write!(text, " {:>12.6}", outside(kind, factor * curve.at(q, -1.0)));
+                let _ = write!(text, " {:>12.6}", in_file_unit(kind, factor * curve.at(q, -1.0)));
             }
             for (curve, column, factor) in &columns {
                 let value = if *column == axis {
@@ -280,7 +288,7 @@ fn heidenhain(
                 let _ = write!(
                     text,
                     " {:>12.6}",
-                    outside(machine.axes[*column].kind, factor * value)
+                    in_file_unit(machine.axes[*column].kind, factor * value)
                 );
             }
             text.push('\n');
@@ -298,23 +306,23 @@ fn beckhoff(
 ) -> Vec<NewFile> {
     let letter = |name: &str| matches!(name, "X" | "Y" | "Z" | "A" | "B" | "C");
     let mut blocks = Vec::new();
-    let known: Vec<_> = compensation
+    let named: Vec<_> = compensation
         .locations
         .iter()
         .filter(|(name, _)| {
-            let known = letter(&name.axis);
-            if !known {
-                left_out.push(format!("{name}: the format knows axes X, Y, Z, A, B, C"));
+            let is_known = letter(&name.axis);
+            if !is_known {
+                left_out.push(format!("{name}: the format has axes X, Y, Z, A, B, C only"));
             }
-            known
+            is_known
         })
         .collect();
-    if !known.is_empty() {
-        let names: Vec<String> = known
+    if !named.is_empty() {
+        let names: Vec<String> = named
             .iter()
             .map(|(name, _)| format!("{name}")[1..].to_string())
             .collect();
-        let values: Vec<String> = known.iter().map(|(_, value)| format!("{value:.9}")).collect();
+        let values: Vec<String> = named.iter().map(|(_, value)| format!("{value:.9}")).collect();
         blocks.push(format!(
             "// Position errors, mm and rad\n{}\n",
             table(&[names, values])
@@ -331,7 +339,7 @@ fn beckhoff(
         }
         if !letter(&axis.name) {
             left_out.push(format!(
-                "error motions of {}: the format knows axes X, Y, Z, A, B, C",
+                "error motions of {}: the format has axes X, Y, Z, A, B, C only",
                 axis.name
             ));
             continue;
@@ -345,7 +353,7 @@ fn beckhoff(
                 .collect::<Vec<_>>(),
         ];
         for q in positions(curves.iter().copied(), points) {
-            let position = format!("{:.5}", outside(axis.kind, q));
+            let position = format!("{:.5}", in_file_unit(axis.kind, q));
             rows.push(
                 std::iter::once(position)
                     .chain(curves.iter().map(|curve| format!("{:.9}", curve.mean_at(q))))
@@ -365,7 +373,7 @@ fn beckhoff(
     vec![("volcomp.csv".to_string(), blocks.join("#\n"))]
 }
 
-/// Location errors, for forms that have no place for them.
+/// Location errors, for formats without location errors.
 fn locations(compensation: &Compensation) -> impl Iterator<Item = String> + '_ {
     let locations = compensation.locations.iter();
     locations.map(|(name, _)| {
@@ -373,44 +381,19 @@ fn locations(compensation: &Compensation) -> impl Iterator<Item = String> + '_ {
     })
 }
 
-/// A curve of which a table has the mean of both directions only.
+/// A curve whose table contains only the mean of both directions.
 fn without_direction(curve: &ErrorCurve) -> String {
     format!(
-        "{}: what depends on the direction; the mean of both is in the table",
+        "{}: the difference between the directions; the table contains the mean of both",
         curve.error
     )
 }
 
-/// Cells aligned by spaces, as in the manual's examples.
+/// Cells aligned by spaces, as in the examples of the manual.
 fn table(rows: &[Vec<String>]) -> String {
     let lines = rows.iter().map(|row| {
         let cells: Vec<String> = row.iter().map(|cell| format!("{cell:<14}")).collect();
         cells.join(" ").trim_end().to_string()
     });
     lines.collect::<Vec<_>>().join("\n")
-}
-
-/// What an error is, in the words of ISO 230-1.
-pub fn words(name: &abbe::model::component::ErrorName) -> String {
-    use abbe::model::component::ErrorKind;
-    let letter = name.freedom.letter();
-    let direction = if name.freedom.is_angle() {
-        let about = Freedom::ALL[name.freedom.index() % 3].letter();
-        format!("{letter} (about {about})")
-    } else {
-        letter.to_string()
-    };
-    match (name.kind, name.freedom.is_angle()) {
-        (ErrorKind::Location, false) => {
-            format!("error of the position of {} in direction {direction}", name.axis)
-        }
-        (ErrorKind::Location, true) => format!(
-            "error of the orientation of {} in direction {direction}",
-            name.axis
-        ),
-        (ErrorKind::Motion, false) => format!("error motion of {} in direction {direction}", name.axis),
-        (ErrorKind::Motion, true) => {
-            format!("angular error motion of {} in direction {direction}", name.axis)
-        }
-    }
 }

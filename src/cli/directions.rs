@@ -1,4 +1,4 @@
-//! `abbe fit --views`: readings and residuals of an R-test by direction, as a CSV file.
+//! `abbe fit --views`: readings and residuals of an R-test by direction, as CSV.
 
 use std::path::Path;
 
@@ -9,8 +9,8 @@ use abbe::identify::problem::Problem;
 use super::failure::Failure;
 use super::output;
 
-/// Names of the columns of one view.
-const VIEW: [&str; 9] = [
+/// Columns of one direction frame.
+const DIRECTIONS: [&str; 9] = [
     "dx",
     "dy",
     "dz",
@@ -27,8 +27,8 @@ pub fn write(problem: &Problem<'_>, fit: &Fit, path: &Path) -> Result<(), Failur
     let machine = &problem.session.machine;
     let mut header = vec!["test".to_string(), "run".to_string()];
     header.extend(machine.axes.iter().map(|axis| axis.column("")));
-    header.extend(VIEW.map(|name| format!("{name}_um")));
-    header.extend(VIEW.map(|name| format!("residual_{name}_um")));
+    header.extend(DIRECTIONS.map(|name| format!("{name}_um")));
+    header.extend(DIRECTIONS.map(|name| format!("residual_{name}_um")));
     let mut rows = Vec::new();
     for (test, viewed) in problem.tests.iter().zip(views(problem, fit)?) {
         let Some(readings) = &test.readings else { continue };
@@ -45,7 +45,7 @@ pub fn write(problem: &Problem<'_>, fit: &Fit, path: &Path) -> Result<(), Failur
     output::write_whole(path, &output::csv(&header, rows)?)
 }
 
-/// The cells of one view; those about the axis that turns are empty where none or several do.
+/// The cells of one direction frame. Radial, tangential and axial cells are empty unless exactly one rotary axis moves.
 fn micrometres(view: &DirectionFrame) -> Vec<String> {
     let along = view.sensors.iter().chain(&view.wise).map(Some);
     let about = (0..3).map(|k| view.turning.as_ref().map(|turning| &turning[k]));

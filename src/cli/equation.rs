@@ -1,8 +1,9 @@
-//! `abbe equation` and `abbe volumetric`.
+//! `abbe equation` and `abbe volumetric`: closed-form equations.
 
 use std::path::PathBuf;
 
-use abbe::codegen::{Equation, Language, Options, Order, SessionTest, Symbols, Variable};
+use abbe::codegen::print::{LANGUAGES, OutputLanguage, language};
+use abbe::codegen::{Equation, Options, Order, SessionTest, Source, Symbols, ToolPoint, Variable, check};
 use abbe::model::chain::Machine;
 use abbe::model::component::ErrorName;
 use abbe::model::effect::{Component, Effect};
@@ -11,53 +12,52 @@ use abbe::model::instrument::InstrumentParameter;
 use abbe::model::pattern;
 use abbe::model::session::Session;
 use abbe::model::session::read::{self, ReadOptions};
+use clap::builder::{PossibleValuesParser, TypedValueParser};
 use clap::{Args, ValueEnum};
 
 use super::failure::Failure;
 use super::message::{Kind, tell};
 use super::output::{self, Outputs};
 
-/// The language of an equation.
-#[derive(Clone, Copy, ValueEnum)]
-enum OutputForm {
-    Text,
-    Latex,
-    Typst,
-    Rust,
-    C,
-    Python,
-    Matlab,
-}
+/// Examples of `abbe equation`.
+pub const HELP: &str = "Examples:
+  abbe equation sessions/hermle-c600u/chapter5.toml --test A150 --as latex
+  abbe equation sessions/hermle-c600u/chapter5.toml --test C150 --order first \\
+      --errors EX0C,EY0C,bar
+  abbe equation sessions/hermle-c600u/chapter5.toml --test A150 --as python \\
+      --gradient --out a150.py";
 
-impl OutputForm {
-    fn language(self) -> Language {
-        match self {
-            OutputForm::Text => Language::Text,
-            OutputForm::Latex => Language::Latex,
-            OutputForm::Typst => Language::Typst,
-            OutputForm::Rust => Language::Rust,
-            OutputForm::C => Language::C,
-            OutputForm::Python => Language::Python,
-            OutputForm::Matlab => Language::Matlab,
-        }
-    }
+/// Examples of `abbe volumetric`.
+pub const VOLUMETRIC_HELP: &str = "Examples:
+  abbe volumetric sessions/hermle-c600u/machine.toml --order first --errors EX0C,EY0C,EXX
+  abbe volumetric sessions/hermle-c600u/machine.toml --errors EX0C,EB0A --rotation small-angle \\
+      --as c --symbols iso --gradient --out error.c
+  abbe volumetric sessions/volumetric/machine.toml --map map.csv \\
+      --functions sessions/volumetric/errors.toml --compensate
+  abbe volumetric sessions/volumetric/machine.toml --map map2.csv \\
+      --functions sessions/volumetric/errors.toml --places 3 --axis A=30 --axis X:5 \\
+      --tool-mm 0,0,-120 --json map.json";
+
+/// The words of the output languages, as the registry lists them.
+fn languages() -> impl TypedValueParser<Value = &'static OutputLanguage> {
+    PossibleValuesParser::new(LANGUAGES.iter().map(|language| language.word)).try_map(|word| language(&word))
 }
 
 #[derive(Clone, Copy, ValueEnum)]
-enum OrderWord {
+enum OrderArgument {
     Exact,
     Bilinear,
     First,
 }
 
 #[derive(Clone, Copy, ValueEnum)]
-enum RotationWord {
+enum RotationArgument {
     Exact,
     SmallAngle,
 }
 
 #[derive(Clone, Copy, ValueEnum)]
-enum SymbolsWord {
+enum SymbolsArgument {
     Literature,
     Iso,
 }
@@ -65,27 +65,40 @@ enum SymbolsWord {
 /// The form of an equation.
 #[derive(Args)]
 struct FormArguments {
-    /// The language.
-    #[arg(long = "as", value_enum, default_value = "text")]
-    language: OutputForm,
-    /// How far it goes in the errors: all terms, products of two, or a coefficient for each.
+    /// The language of the equation.
+    ///
+    /// Example: --as latex
+    #[arg(long = "as", value_parser = languages(), default_value = "text")]
+    language: &'static OutputLanguage,
+    /// Order in the errors: all terms, products of two errors, or one sensitivity coefficient per error.
+    ///
+    /// Example: --order first
     #[arg(long, value_enum, default_value = "exact")]
-    order: OrderWord,
-    /// How error angles rotate; the machine's own way if not given.
+    order: OrderArgument,
+    /// Rotation by error angles [default: as the machine file states].
+    ///
+    /// Example: --rotation small-angle
     #[arg(long, value_enum)]
-    rotation: Option<RotationWord>,
-    /// What to keep, by name and separated by commas; what is not named is zero. Errors as EX0C or e_x0c or by a pattern as E?0C, of a session also unknowns of the
-    /// instrument, as bar or workpiece_ball.x, and effects that it declares, as EZC~C:h2. Without it a session's unknown errors and declared
-    /// effects, of a machine all errors.
+    rotation: Option<RotationArgument>,
+    /// Parameters in the equation, separated by commas; all others are zero. Errors (EX0C, e_x0c) or patterns of errors (E?0C); for a session also
+    /// parameters of the instrument (bar, workpiece_ball.x) and declared effects (EZC~C:h2) [default: for a session its errors and declared effects,
+    /// for a machine all errors].
+    ///
+    /// Example: --errors EX0C,EY0C,E?0A
     #[arg(long, value_delimiter = ',', value_name = "NAMES")]
     errors: Vec<String>,
-    /// Which names errors go by in print: e_y0a, or EY0A of ISO 230-1.
+    /// Symbols of the errors: e_y0a (literature) or EY0A (ISO 230-1).
+    ///
+    /// Example: --symbols iso
     #[arg(long, value_enum, default_value = "literature")]
-    symbols: SymbolsWord,
-    /// Add the derivatives by everything that is kept: to code of any form, in text, LaTeX and Typst to the exact length of a bar.
+    symbols: SymbolsArgument,
+    /// Add the derivatives with respect to all parameters in the equation: in code for every order; in text, LaTeX and Typst for the exact length of
+    /// a bar.
     #[arg(long)]
     gradient: bool,
-    /// Write to a file, whole or not at all.
+    /// Write the equation to a file instead of standard output.
+    ///
+    /// Example: --out equation.tex
     #[arg(long, value_name = "FILE")]
     out: Option<PathBuf>,
 }
@@ -95,7 +108,9 @@ struct FormArguments {
 pub struct EquationArguments {
     #[command(flatten)]
     session: super::SessionArguments,
-    /// The test, by its name in the session. Its readings, if there are any, only say which axes move and how far.
+    /// Name of the test in the session. Its readings, if there are any, state only which axes move and how far.
+    ///
+    /// Example: --test A150
     #[arg(long, value_name = "NAME")]
     test: String,
     #[command(flatten)]
@@ -113,24 +128,24 @@ pub struct VolumetricArguments {
     map: super::map::MapArguments,
 }
 
-/// What an equation is written in.
+/// The parameters of an equation.
 #[derive(Default)]
-struct Kept {
+struct EquationParameters {
     errors: Vec<ErrorName>,
-    /// Places in the instrument's list of unknowns.
-    unknowns: Vec<usize>,
+    /// Indices in the list of parameters of the instrument.
+    instrument: Vec<usize>,
     effects: Vec<Effect>,
 }
 
-impl Kept {
-    /// Reads names of errors, also as patterns, of the instrument's unknowns and of effects.
+impl EquationParameters {
+    /// Reads names and patterns of errors, parameters of the instrument and effects.
     fn parse(
         names: &[String],
         machine: &Machine,
-        known: &[InstrumentParameter],
+        of_instrument: &[InstrumentParameter],
         effects: &[Effect],
-    ) -> Result<Kept, Failure> {
-        let mut kept = Kept::default();
+    ) -> Result<EquationParameters, Failure> {
+        let mut parameters = EquationParameters::default();
         for name in names {
             if pattern::is_pattern(name) {
                 let found = pattern::matching(machine, name);
@@ -140,46 +155,46 @@ impl Kept {
                     )));
                 }
                 for error in found {
-                    if !kept.errors.contains(&error) {
-                        kept.errors.push(error);
+                    if !parameters.errors.contains(&error) {
+                        parameters.errors.push(error);
                     }
                 }
                 continue;
             }
             if name.contains('~') {
-                kept.effects.extend(named(name, effects)?);
+                parameters.effects.extend(named(name, effects)?);
                 continue;
             }
             match Component::parse(name) {
-                Some(Component::Axis(error)) => kept.errors.push(error),
+                Some(Component::Axis(error)) => parameters.errors.push(error),
                 Some(Component::Instrument { thing, coordinate }) => {
-                    let place = known
+                    let place = of_instrument
                         .iter()
                         .position(|u| u.thing == thing && u.coordinate == coordinate);
-                    let unknown = |u: &InstrumentParameter| Variable::Instrument(*u).name();
-                    kept.unknowns.push(place.ok_or_else(|| {
-                        let has = match known {
-                            [] => "an error vector has none of an instrument".to_string(),
-                            known => format!(
-                                "this one has {}",
-                                known.iter().map(unknown).collect::<Vec<_>>().join(", ")
+                    let name_of = |u: &InstrumentParameter| Variable::Instrument(*u).name();
+                    parameters.instrument.push(place.ok_or_else(|| {
+                        let has = match of_instrument {
+                            [] => "an error vector has no parameters of an instrument".to_string(),
+                            some => format!(
+                                "this instrument has {}",
+                                some.iter().map(name_of).collect::<Vec<_>>().join(", ")
                             ),
                         };
-                        Failure::Other(format!("`{name}` is an unknown of another instrument; {has}"))
+                        Failure::Other(format!("`{name}` is a parameter of another instrument; {has}"))
                     })?);
                 }
                 Some(Component::TriggerDelay) | None => {
                     return Err(Failure::Other(format!(
-                        "`{name}` is no error that an equation can keep; errors go by ISO 230-1 names, as EX0C or EZC, or by those of the literature, as e_x0c"
+                        "`{name}` is no parameter of an equation; errors have names of ISO 230-1, as EX0C or EZC, or of the literature, as e_x0c"
                     )));
                 }
             }
         }
-        Ok(kept)
+        Ok(parameters)
     }
 }
 
-/// The declared effects of a name such as `EZC~C:h2`; those that differ in their numbers alone share one.
+/// The declared effects with a name such as `EZC~C:h2`. Effects that differ only in the numbers of their shapes share a name.
 fn named(name: &str, effects: &[Effect]) -> Result<Vec<Effect>, Failure> {
     let found: Vec<Effect> = effects
         .iter()
@@ -189,7 +204,7 @@ fn named(name: &str, effects: &[Effect]) -> Result<Vec<Effect>, Failure> {
     if found.is_empty() {
         let declared: Vec<String> = effects.iter().map(Effect::id).collect();
         let has = match declared.as_slice() {
-            [] => "no effect that is declared acts here".to_string(),
+            [] => "no declared effect acts here".to_string(),
             declared => format!("declared here: {}", declared.join(", ")),
         };
         return Err(Failure::Other(format!("no effect is called `{name}`; {has}")));
@@ -198,29 +213,29 @@ fn named(name: &str, effects: &[Effect]) -> Result<Vec<Effect>, Failure> {
 }
 
 impl FormArguments {
-    fn options(&self, kept: &Kept) -> Options {
+    fn options(&self, parameters: &EquationParameters) -> Options {
         Options {
             order: match self.order {
-                OrderWord::Exact => Order::Exact,
-                OrderWord::Bilinear => Order::Bilinear,
-                OrderWord::First => Order::First,
+                OrderArgument::Exact => Order::Exact,
+                OrderArgument::Bilinear => Order::Bilinear,
+                OrderArgument::First => Order::First,
             },
             rotation: self.rotation.map(|rotation| match rotation {
-                RotationWord::Exact => Rotation::Exact,
-                RotationWord::SmallAngle => Rotation::SmallAngle,
+                RotationArgument::Exact => Rotation::Exact,
+                RotationArgument::SmallAngle => Rotation::SmallAngle,
             }),
             symbols: match self.symbols {
-                SymbolsWord::Literature => Symbols::Literature,
-                SymbolsWord::Iso => Symbols::Iso,
+                SymbolsArgument::Literature => Symbols::Literature,
+                SymbolsArgument::Iso => Symbols::Iso,
             },
             gradient: self.gradient,
-            unknowns: kept.unknowns.clone(),
-            effects: kept.effects.clone(),
+            unknowns: parameters.instrument.clone(),
+            effects: parameters.effects.clone(),
         }
     }
 
-    fn write(&self, equation: &Equation) -> Result<(), Failure> {
-        let text = equation.print(self.language.language())?;
+    fn write(&self, equation: &Equation, source: &impl Source) -> Result<(), Failure> {
+        let text = self.language.print(&check(equation, source)?)?;
         match &self.out {
             Some(path) => output::write_whole(path, text.as_bytes()),
             None => {
@@ -231,7 +246,7 @@ impl FormArguments {
     }
 }
 
-/// The session with its readings; without them where they cannot be read, which is said.
+/// The session with its readings, or without them and with a note if they cannot be read.
 fn read(arguments: &super::SessionArguments) -> Result<Session, Failure> {
     let fault = match read::session(&arguments.session, &arguments.options()) {
         Ok(session) => return Ok(session),
@@ -246,7 +261,7 @@ fn read(arguments: &super::SessionArguments) -> Result<Session, Failure> {
             tell(Kind::Note, &fault.to_string());
             tell(
                 Kind::Note,
-                "the equation does without readings; of a test without a planned movement every axis that it does not hold is taken to move",
+                "the equation is made without readings: in a test without a planned movement every axis moves that the test does not hold",
             );
             Ok(session)
         }
@@ -275,18 +290,23 @@ pub fn run(arguments: &EquationArguments) -> Result<(), Failure> {
         .filter(|effect| effect.acts_in(&test.name))
         .cloned()
         .collect();
-    let mut kept = Kept::parse(
+    let mut parameters = EquationParameters::parse(
         &form.errors,
         &session.machine,
         session.instrument.unknowns(),
         &effects,
     )?;
     if form.errors.is_empty() {
-        kept.errors.clone_from(&session.unknowns);
-        kept.effects = effects;
+        parameters.errors.clone_from(&session.unknowns);
+        parameters.effects = effects;
     }
-    let equation = Equation::of(&session.machine, &source, &kept.errors, &form.options(&kept))?;
-    form.write(&equation)
+    let equation = Equation::of(
+        &session.machine,
+        &source,
+        &parameters.errors,
+        &form.options(&parameters),
+    )?;
+    form.write(&equation, &source)
 }
 
 /// Runs `abbe volumetric`.
@@ -296,13 +316,18 @@ pub fn run_volumetric(arguments: &VolumetricArguments, quiet: bool) -> Result<()
     let read = std::iter::once(&arguments.machine).chain(arguments.map.functions());
     outputs.refuse_overwrite(read.map(PathBuf::as_path))?;
     if arguments.map.wanted() {
-        return super::map::run(&machine, &arguments.map, outputs.tables(quiet));
+        return super::map::run(
+            &arguments.machine,
+            &machine,
+            &arguments.map,
+            outputs.tables(quiet),
+        );
     }
     let form = &arguments.form;
-    let mut kept = Kept::parse(&form.errors, &machine, &[], &[])?;
+    let mut parameters = EquationParameters::parse(&form.errors, &machine, &[], &[])?;
     if form.errors.is_empty() {
-        kept.errors = pattern::errors(&machine);
+        parameters.errors = pattern::errors(&machine);
     }
-    let equation = Equation::volumetric(&machine, &kept.errors, &form.options(&kept))?;
-    form.write(&equation)
+    let equation = Equation::volumetric(&machine, &parameters.errors, &form.options(&parameters))?;
+    form.write(&equation, &ToolPoint)
 }

@@ -1,20 +1,20 @@
-//! Errors as a user sees them: what, where, what to do; the line of the file shown where one is meant.
+//! Errors on standard error: what was found and where, what to do, and an excerpt of the file.
 
 use abbe::identify::IdentifyError;
 use abbe::model::ModelError;
 
 use super::message::{Kind, lines, tell, visible};
 
-/// Why a command could not do its work.
+/// Why a command failed.
 #[derive(Debug, thiserror::Error)]
 pub enum Failure {
-    /// Input.
+    /// Input that cannot be used.
     #[error(transparent)]
     Model(#[from] ModelError),
-    /// Identification.
+    /// The identification failed.
     #[error(transparent)]
     Identify(IdentifyError),
-    /// An equation.
+    /// The equation cannot be made.
     #[error(transparent)]
     Codegen(#[from] abbe::codegen::CodegenError),
     /// A file that cannot be written.
@@ -25,18 +25,18 @@ pub enum Failure {
         /// Why.
         source: std::io::Error,
     },
-    /// Options that do not go together.
+    /// Options that contradict each other.
     #[error("{0}")]
     CommandLine(String),
-    /// The user interrupted the work; what there was by then has been written.
+    /// The user interrupted the work. The results found until then have been written.
     #[error("{0}")]
     Interrupted(String),
-    /// Anything else.
+    /// Any other error.
     #[error("{0}")]
     Other(String),
 }
 
-/// Exit status of a program that was interrupted, as shells give it.
+/// Exit status of an interrupted program, as in shells.
 pub const INTERRUPTED: u8 = 130;
 
 impl From<IdentifyError> for Failure {
@@ -87,7 +87,7 @@ impl Failure {
             let mut excerpt = Vec::new();
             if report.write((name, Source::from(source)), &mut excerpt).is_ok() {
                 tell(Kind::Error, &error.to_string());
-                // Its first line is its own `Error:`.
+                // The first line of the excerpt is another `Error:`.
                 let first = excerpt.iter().position(|byte| *byte == b'\n').unwrap_or(0);
                 lines(excerpt.get(first + 1..).unwrap_or_default());
                 self.help();
@@ -98,7 +98,7 @@ impl Failure {
         self.help();
     }
 
-    /// What to do, where the error knows.
+    /// Writes what to do, if the error states it.
     fn help(&self) {
         match self {
             Failure::Model(ModelError::Input { help: Some(help), .. }) => tell(Kind::Help, help),

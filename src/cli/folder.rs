@@ -1,21 +1,21 @@
-//! Folders of files that appear whole or not at all.
+//! Folders of files, written completely or not at all.
 
 use std::path::Path;
 
 use super::failure::Failure;
 
-/// A file to be written: its name in the folder, its contents.
+/// A file to write: its name in the folder and its contents.
 pub type NewFile = (String, String);
 
-/// Writes files into a folder. They are made in a temporary folder beside it, `look` sees them there, and only then do they move to their place:
-/// a new folder in one step, into one that is there file by file, the last one last.
+/// Writes files into a folder. They are first written into a temporary folder beside it, where `check_files` reads them. Then they are moved: a new
+/// folder in one step; into an existing folder one file after the other, in their order.
 ///
-/// A folder that is there and not empty is refused unless `force` says that files of these names may be replaced; other files in it stay.
+/// A folder that is not empty is refused, unless `force` allows to replace files with these names. Other files stay.
 pub fn write(
     folder: &Path,
     files: &[(String, impl AsRef<[u8]>)],
     force: bool,
-    look: impl FnOnce(&Path) -> Result<(), Failure>,
+    check_files: impl FnOnce(&Path) -> Result<(), Failure>,
 ) -> Result<(), Failure> {
     let fault = |source| fault(folder, source);
     let present = check(folder, Some(force))?;
@@ -24,7 +24,7 @@ pub fn write(
         _ => Path::new("."),
     };
     std::fs::create_dir_all(parent).map_err(fault)?;
-    // What is written here is renamed into its place, so it has to lie on the same file system.
+    // The temporary folder is on the same file system, so that renaming works.
     let made = tempfile::Builder::new()
         .prefix(".abbe-")
         .tempdir_in(parent)
@@ -32,7 +32,7 @@ pub fn write(
     let whole = made.path().join("whole");
     std::fs::create_dir(&whole).map_err(fault)?;
     for (name, contents) in files {
-        // The place that is meant, not the one where it is made.
+        // An error names the final path, not the temporary one.
         super::output::write_whole(&whole.join(name), contents.as_ref()).map_err(
             |failure| match failure {
                 Failure::Write { source, .. } => self::fault(&folder.join(name), source),
@@ -40,7 +40,7 @@ pub fn write(
             },
         )?;
     }
-    look(&whole)?;
+    check_files(&whole)?;
     if present {
         for (name, _) in files {
             std::fs::rename(whole.join(name), folder.join(name)).map_err(fault)?;
@@ -58,11 +58,14 @@ fn fault(folder: &Path, source: std::io::Error) -> Failure {
     }
 }
 
-/// Whether the folder is there; an error where nothing may be written into it. `force` is what the user said, where the command has a `--force`.
+/// Whether the folder exists. `force` is the option of the user, if the command has one.
+///
+/// # Errors
+/// If nothing may be written into the folder.
 pub fn check(folder: &Path, force: Option<bool>) -> Result<bool, Failure> {
     if folder.as_os_str() == "-" {
         return Err(Failure::CommandLine(
-            "`-` is standard output, which cannot take a folder of files; name a folder".into(),
+            "`-` is standard output, which cannot contain a folder; name a folder".into(),
         ));
     }
     if folder.is_file() {
@@ -79,11 +82,11 @@ pub fn check(folder: &Path, force: Option<bool>) -> Result<bool, Failure> {
             .is_some();
     if occupied && force != Some(true) {
         let or = match force {
-            Some(_) => ", or say --force to replace the files in it that are of the same names",
+            Some(_) => ", or use --force to replace files with the same names",
             None => "",
         };
         return Err(Failure::Other(format!(
-            "{}: the folder is there and not empty; name another{or}",
+            "{}: the folder exists and is not empty; name another{or}",
             folder.display()
         )));
     }

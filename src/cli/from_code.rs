@@ -1,4 +1,4 @@
-//! `abbe new --from-code`: a machine and a plan for any structural code, each line explained.
+//! `abbe new --from-code`: a machine and a plan for any structural code, with a comment on each line.
 
 mod mounts;
 mod plan;
@@ -39,7 +39,7 @@ pub fn files(code: &str) -> Result<Vec<NewFile>, Failure> {
         let (Some(kind), Some(direction)) = (AxisKind::of_letter(name), Axis::direction_of_letter(name))
         else {
             return Err(Failure::Other(format!(
-                "axis `{name}` of `{code}` is no letter of ISO 841 (X Y Z U V W slide, A B C turn): what it does is not known; \
+                "axis `{name}` of `{code}` is no letter of ISO 841 (X Y Z U V W are linear, A B C rotary), so its kind is not known; \
                  `abbe new DIR --template ur10` shows a machine whose axes state their kind and direction"
             )));
         };
@@ -52,7 +52,7 @@ pub fn files(code: &str) -> Result<Vec<NewFile>, Failure> {
     }
     if bodies.is_empty() {
         return Err(Failure::Other(format!(
-            "`{code}` has no axis; nothing can be tested"
+            "`{code}` has no axis; a code such as [wCXbYZAt] is expected"
         )));
     }
     Ok(vec![
@@ -63,13 +63,13 @@ pub fn files(code: &str) -> Result<Vec<NewFile>, Failure> {
 
 fn machine(code: &StructuralCode, bodies: &[Body]) -> String {
     let mut text = format!(
-        "# What results call the machine.\n\
+        "# Name of the machine in results.\n\
          name = \"Machine {spaced}\"\n\
-         # The axes from the workpiece (w) over the bed (b) to the tool (t). What stands before b carries the workpiece.\n\
+         # The axes from the workpiece (w) over the bed (b) to the tool (t). Axes before b carry the workpiece.\n\
          chain = \"{spaced}\"\n\
-         # How the angles of an error turn: exact is Rx·Ry·Rz; \"small-angle\" is I + [θ]×, as the literature prints it.\n\
+         # Rotation by the angles of an error: \"exact\" is Rx·Ry·Rz, \"small-angle\" is I + [θ]×, the form of the literature.\n\
          rotation = \"exact\"\n\
-         # Down, in the frame R of the bed. Matters only to effects that gravity drives.\n\
+         # Direction of gravity in the frame R of the bed. Only effects with the driver gravity use it.\n\
          gravity = [0, 0, -1]\n",
         spaced = code.spaced()
     );
@@ -82,40 +82,40 @@ fn machine(code: &StructuralCode, bodies: &[Body]) -> String {
             AxisKind::Linear => {
                 let _ = writeln!(
                     text,
-                    "# Where the body that carries the {carries} physically goes when {name} is commanded to increase."
+                    "# Physical direction of motion of the body that carries the {carries} for an increasing command of {name}."
                 );
                 if body.on_table {
                     let _ = writeln!(
                         text,
-                        "# A table by ISO 841 slides against its letter: if yours does, turn the sign."
+                        "# By ISO 841 a table moves against the direction of its letter. Reverse the sign for such a table."
                     );
                 }
                 let _ = writeln!(text, "direction = {vector}");
                 let _ = writeln!(
                     text,
-                    "# Least and greatest position, mm: set it to the machine's.\ntravel_mm = [-300, 300]"
+                    "# Smallest and largest position, mm. Enter the travel of the machine.\ntravel_mm = [-300, 300]"
                 );
             }
             AxisKind::Rotary => {
                 let _ = writeln!(
                     text,
-                    "# About which direction of R the body that carries the {carries} physically turns when {name} increases (right hand)."
+                    "# Physical axis of rotation of the body that carries the {carries} for an increasing command of {name} (right-hand rule)."
                 );
                 if body.on_table {
                     let _ = writeln!(
                         text,
-                        "# A table by ISO 841 turns against its letter: if yours does, turn the sign."
+                        "# By ISO 841 a table turns against the direction of its letter. Reverse the sign for such a table."
                     );
                 }
                 let _ = writeln!(text, "direction = {vector}");
                 let _ = writeln!(
                     text,
-                    "# A point of its line in R, mm. Best: R where the rotary axes meet; else how far this one misses that point."
+                    "# A point on the axis of rotation in R, mm. Choose the origin of R where the rotary axes meet, and enter the offset of others."
                 );
                 let _ = writeln!(text, "origin_mm = [0, 0, 0]");
                 let _ = writeln!(
                     text,
-                    "# Least and greatest position, degrees: set it to the machine's.\ntravel_deg = {}",
+                    "# Smallest and largest position, degrees. Enter the travel of the machine.\ntravel_deg = {}",
                     if body.along == 2 {
                         "[-360, 360]"
                     } else {

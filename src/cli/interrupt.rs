@@ -1,4 +1,4 @@
-//! Ctrl-C: the first one ends a search, whose results are kept; a second one, or one where there is nothing to keep, ends the program.
+//! Ctrl-C: the first interrupt ends a search and keeps its results. A second one, or one without results, ends the program.
 
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -8,16 +8,16 @@ use indicatif::ProgressBar;
 use super::failure::INTERRUPTED;
 use super::message::{Kind, tell};
 
-/// What interruptions there were, and what one does now.
+/// The state of interrupts.
 #[derive(Clone)]
 pub struct Interrupts {
     came: Arc<AtomicBool>,
-    /// Whether the next one ends the program: there are no results yet, or they are being written.
+    /// Whether the next interrupt ends the program, because there are no results yet or they are being written.
     at_once: Arc<AtomicBool>,
 }
 
 impl Interrupts {
-    /// Handles Ctrl-C from now on; messages go above a progress bar. Until [`Interrupts::keep_results`] it ends the program.
+    /// Handles Ctrl-C from now on, with messages above the progress bar. An interrupt before [`Interrupts::keep_results`] ends the program.
     pub fn handled(bar: ProgressBar) -> Interrupts {
         let interrupts = Interrupts {
             came: Arc::new(AtomicBool::new(false)),
@@ -25,7 +25,10 @@ impl Interrupts {
         };
         let handler = interrupts.clone();
         if ctrlc::set_handler(move || handler.handle(&bar)).is_err() {
-            tell(Kind::Warning, "Ctrl-C will end the program without a result");
+            tell(
+                Kind::Warning,
+                "Ctrl-C cannot be handled; it ends the program without a result",
+            );
         }
         interrupts
     }
@@ -37,21 +40,21 @@ impl Interrupts {
             std::process::exit(i32::from(INTERRUPTED));
         }
         bar.suspend(|| {
-            eprintln!("interrupted: the effects found until now are being fitted; Ctrl-C again ends at once")
+            eprintln!("interrupted: the effects found so far are being fitted; Ctrl-C again ends the program")
         });
     }
 
-    /// Whether there was one.
+    /// Whether an interrupt occurred.
     pub fn came(&self) -> bool {
         self.came.load(Ordering::Relaxed)
     }
 
-    /// From now on the first one is left to whoever asks whether it came.
+    /// From now on the first interrupt only sets the state that [`Interrupts::came`] returns.
     pub fn keep_results(&self) {
         self.at_once.store(false, Ordering::Relaxed);
     }
 
-    /// From now on each one ends the program.
+    /// From now on each interrupt ends the program.
     pub fn end_at_once(&self) {
         self.at_once.store(true, Ordering::Relaxed);
     }

@@ -1,6 +1,6 @@
 //! `abbe volumetric --map`: the volumetric error over a grid, and its compensation.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use abbe::identify::volumetric::{self, MachineWithErrors, Summary, VolumetricPoint, functions};
 use abbe::model::axis::AxisKind;
@@ -10,6 +10,7 @@ use abbe::model::words::counted;
 use clap::Args;
 
 use super::failure::Failure;
+use super::json::{self, Origin};
 use super::{output, table};
 
 /// A map of the volumetric error.
@@ -72,7 +73,12 @@ impl MapArguments {
 }
 
 /// Runs `abbe volumetric --map`.
-pub fn run(machine: &Machine, arguments: &MapArguments, tables: bool) -> Result<(), Failure> {
+pub fn run(
+    machine_file: &Path,
+    machine: &Machine,
+    arguments: &MapArguments,
+    tables: bool,
+) -> Result<(), Failure> {
     let (Some(path), Some(file)) = (&arguments.map, &arguments.functions) else {
         return Err(Failure::Other("--map and --functions go together".into()));
     };
@@ -97,8 +103,8 @@ pub fn run(machine: &Machine, arguments: &MapArguments, tables: bool) -> Result<
     if tables {
         print(&summary, functions.len(), &path.display().to_string());
     }
-    if let Some(json) = &arguments.json {
-        output::write_json(json, &summary)?;
+    if let Some(path) = &arguments.json {
+        json::write(path, Origin::of_files(&[machine_file, file])?, None, &summary)?;
     }
     Ok(())
 }

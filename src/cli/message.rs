@@ -1,19 +1,19 @@
-//! Messages on standard error in one form, `error:`, `warning:`, `note:`, `help:`, in colour on a terminal.
+//! Messages on standard error with a coloured prefix: `error:`, `warning:`, `note:`, `help:`.
 //!
-//! Pipes and files get no colour, nor does a terminal where `NO_COLOR` is set; `CLICOLOR_FORCE` asks for it elsewhere.
+//! Pipes, files and terminals with `NO_COLOR` get no colour. `CLICOLOR_FORCE` enables colour everywhere.
 
 use std::io::Write;
 
 use clap::builder::styling::{AnsiColor, Style};
 
-/// What a message is.
+/// The kind of a message.
 #[derive(Clone, Copy)]
 pub enum Kind {
-    /// The work cannot be done.
+    /// The command fails.
     Error,
-    /// The work is done; the result may not be what it seems.
+    /// The command succeeds, but the result may be misleading.
     Warning,
-    /// What else is useful to know.
+    /// Further information.
     Note,
     /// What to do about an error.
     Help,
@@ -29,7 +29,7 @@ impl Kind {
         }
     }
 
-    /// The same colours as the messages of the command line's parser.
+    /// The colours of the messages of clap.
     fn style(self) -> Style {
         let colour = match self {
             Kind::Error => AnsiColor::Red,
@@ -41,19 +41,19 @@ impl Kind {
     }
 }
 
-/// Writes a message. If standard error cannot be written to, there is nobody to tell.
+/// Writes a message. An error of standard error itself is ignored.
 pub fn tell(kind: Kind, text: &str) {
     let style = kind.style();
     let word = kind.word();
     let _ = writeln!(anstream::stderr(), "{style}{word}:{style:#} {}", visible(text));
 }
 
-/// Writes lines as they are; colours in them are taken out where none are wanted.
+/// Writes lines unchanged, without their colours where colours are disabled.
 pub fn lines(text: &[u8]) {
     let _ = anstream::stderr().write_all(text);
 }
 
-/// The text without what would steer a terminal: of a control character `?` is shown, one for each of its bytes, so that places stay.
+/// The text without control characters. Each byte of a control character becomes `?`, so that byte positions stay.
 pub fn visible(text: &str) -> String {
     let mut shown = String::with_capacity(text.len());
     for c in text.chars() {
@@ -66,4 +66,11 @@ pub fn visible(text: &str) -> String {
         }
     }
     shown
+}
+
+/// Writes warnings to standard error.
+pub fn print_warnings(warnings: &[String]) {
+    for warning in warnings {
+        tell(Kind::Warning, warning);
+    }
 }

@@ -1,6 +1,6 @@
-//! Arguments, progress, tables: what stands between a user and the library. No mathematics.
+//! The command line: arguments, progress, tables, files. It calls the library and contains no mathematics.
 
-/// Writes a line of the result to standard output. A reader that has seen enough (a closed pipe) ends the program, quietly.
+/// Writes a line of the result to standard output. A closed pipe ends the program without a message.
 macro_rules! say {
     ($($text:tt)*) => { $crate::cli::output::line(format_args!($($text)*)) };
 }
@@ -16,6 +16,7 @@ mod folder;
 mod from_code;
 pub mod geometric;
 mod interrupt;
+pub mod json;
 mod map;
 mod message;
 mod new;
@@ -24,7 +25,9 @@ pub mod plan;
 mod plausibility;
 mod repeated;
 mod report;
+mod residuals;
 mod schema;
+mod screen;
 mod self_calibration;
 mod simulate;
 pub mod table;
@@ -41,18 +44,18 @@ use clap::{Args, CommandFactory, Parser, Subcommand};
 use failure::Failure;
 use output::Outputs;
 
-/// Geometric errors of machine tools and other serial chains: what tests can see, how large errors are, and what a model still lacks.
+/// Identify geometric errors of machine tools, robots and other serial chains: identifiability, estimates with uncertainties, unmodelled effects.
 #[derive(Parser)]
 #[command(name = "abbe", version, max_term_width = 110, after_help = EXAMPLES)]
 struct Arguments {
     #[command(subcommand)]
     command: Command,
-    /// Print no tables and no progress; warnings and errors stay.
+    /// Suppress tables and progress output; warnings and errors stay.
     #[arg(short, long, global = true)]
     quiet: bool,
 }
 
-const EXAMPLES: &str = "Example, from nothing to a found effect:
+const EXAMPLES: &str = "Example, from a template to a found effect:
   abbe new my --template hermle-c600u
   abbe plan my/chapter5.toml
   abbe simulate my/chapter5.toml --out my/run1 --error EY0A=35.3um --error EB0A=-1.29arcsec
@@ -60,12 +63,13 @@ const EXAMPLES: &str = "Example, from nothing to a found effect:
   abbe trace my/run1/session.toml --only EZC --only EAC
   abbe equation my/chapter5.toml --test C150 --order first
 
-`abbe new` lists the templates; `abbe new mine --from-code \"[wCAbYXZt]\"` lays out a machine of your own. `abbe COMMAND --help` has examples of each.
+`abbe new` lists the templates. `abbe new mine --from-code \"[wCAbYXZt]\"` creates any other machine. `abbe COMMAND --help` has \
+examples of each command.
 
 Output:
-  Results go to standard output; progress, warnings and errors go to standard error. A FILE of
-  `-` is standard output: `--json -` writes JSON there and nothing else. `--quiet` suppresses
-  tables and progress, not warnings.
+  Results go to standard output. Progress, warnings and errors go to standard error. FILE `-` is
+  standard output: `--json -` writes JSON there and nothing else. `--quiet` suppresses tables and
+  progress, not warnings. `--all` lists everything that the first screen of a result folds.
 
 Exit status:
   0    done, whatever the verdict
@@ -76,65 +80,60 @@ Exit status:
 const COMPLETIONS: &str = "Example:
   abbe completions bash
 
-Put what it prints where the shell looks for it: ~/.local/share/bash-completion/completions/abbe (bash), a folder of $fpath as _abbe (zsh),
+Save the output where the shell finds it: ~/.local/share/bash-completion/completions/abbe (bash), a folder of $fpath as _abbe (zsh),
 ~/.config/fish/completions/abbe.fish (fish).";
 
 #[derive(Subcommand)]
 enum Command {
-    /// Print the closed form of a test's reading.
-    #[command(
-        after_help = "Example:\n  abbe equation sessions/hermle-c600u/chapter5.toml --test A150 --as latex"
-    )]
+    /// Print the closed-form equation of the readings of a test.
+    #[command(after_help = equation::HELP)]
     Equation(equation::EquationArguments),
-    /// Print the error vector of the tool in the workpiece frame, or map it over the workspace.
-    #[command(
-        after_help = "Examples:\n  abbe volumetric sessions/hermle-c600u/machine.toml --order first --errors EX0C,EY0C,EXX\n  \
-                      abbe volumetric sessions/volumetric/machine.toml --map map.csv \\\n      --functions sessions/volumetric/errors.toml --compensate"
-    )]
+    /// Print the equation of the volumetric error, or map and compensate it over the workspace.
+    #[command(after_help = equation::VOLUMETRIC_HELP)]
     Volumetric(equation::VolumetricArguments),
-    /// Identify errors from readings, with uncertainties.
+    /// Estimate errors from readings, with uncertainties.
     #[command(after_help = fit::HELP)]
     Fit(fit::FitArguments),
-    /// What can these tests see, before anybody measures?
-    #[command(after_help = plan::EXAMPLES)]
+    /// Analyse identifiability and predicted uncertainty of planned tests.
+    #[command(after_help = plan::HELP)]
     Plan(Box<plan::PlanArguments>),
-    /// Start from a ready session.
+    /// Create a machine and a session, from a template or a structural code.
     #[command(after_help = new::HELP)]
     New(new::NewArguments),
-    /// Write a script that completes the command line in a shell.
+    /// Generate the shell completion script.
     #[command(after_help = COMPLETIONS)]
     Completions {
-        /// For which shell.
+        /// The shell.
         shell: clap_complete::Shell,
     },
-    /// Describe a file or a result as JSON Schema.
+    /// Print the JSON Schema of a file or a result.
     #[command(after_help = schema::HELP)]
     Schema(schema::SchemaArguments),
-    /// Simulate readings from a plan with given errors.
+    /// Simulate readings of planned tests with given errors.
     #[command(after_help = simulate::HELP)]
     Simulate(Box<simulate::SimulateArguments>),
     /// Find the unmodelled effect behind the residual.
-    #[command(
-        after_help = "Example:\n  abbe trace sessions/hermle-c600u/measured/session.toml --json trace.json --csv trace.csv"
-    )]
+    #[command(after_help = trace::HELP)]
     Trace(trace::TraceArguments),
 }
 
-/// What every command that reads a session takes.
+/// Arguments of every command that reads a session.
 #[derive(Args, Clone)]
 pub struct SessionArguments {
     /// The session file.
     session: PathBuf,
-    /// Where the data files lie when they do not lie beside the session file.
+    /// Folder of the data files, if they do not lie beside the session file.
+    ///
+    /// Example: --data measurements
     #[arg(long, value_name = "DIR")]
     data: Option<PathBuf>,
-    /// Let the session read files that lie neither beside or below it nor where `--data` points.
+    /// Allow the session to read files outside its own folder and the folder of --data.
     #[arg(long)]
     allow_outside: bool,
 }
 
 impl SessionArguments {
-    /// How the session is to be read.
+    /// Options of the reader.
     fn options(&self) -> ReadOptions {
         ReadOptions {
             data_directory: self.data.clone(),
@@ -144,28 +143,32 @@ impl SessionArguments {
     }
 }
 
-/// What every command takes.
+/// Arguments of every command with a result.
 #[derive(Args, Clone)]
 pub struct CommonArguments {
     /// Write the result as JSON; `-` writes it, and nothing else, to standard output.
+    ///
+    /// Example: --json result.json
     #[arg(long, value_name = "FILE")]
     json: Option<PathBuf>,
-    /// Print no tables and no progress; warnings and errors stay.
+    /// Suppress tables and progress output; warnings and errors stay.
     #[arg(short, long, global = true)]
     quiet: bool,
-    /// Seed of everything that is drawn: folds, null draws, simulated noise.
+    /// Seed of the random numbers: folds, null distribution, simulated noise, Monte Carlo.
+    ///
+    /// Example: --seed 7
     #[arg(long, value_name = "N", default_value_t = 1)]
     seed: u64,
 }
 
 impl CommonArguments {
-    /// The JSON and the other files that were asked for. Refuses before the work what could not be written after it.
+    /// The requested output files. A file that cannot be written is refused before the work.
     fn outputs(&self, others: &[Option<&PathBuf>]) -> Result<Outputs, Failure> {
         Outputs::new(others.iter().copied().flatten().chain(&self.json))
     }
 }
 
-/// Runs the command line; the exit status.
+/// Runs the command line and returns the exit status.
 pub fn run() -> ExitCode {
     let Arguments { command, quiet } = Arguments::parse();
     let outcome = match command {
@@ -193,9 +196,83 @@ pub fn run() -> ExitCode {
     }
 }
 
-/// Reads the session that the arguments name, which no output may replace.
+/// Reads the session. No output may replace one of its files.
 fn read_session(arguments: &SessionArguments, outputs: &Outputs) -> Result<Session, Failure> {
     let session = read::session(&arguments.session, &arguments.options())?;
     outputs.refuse_overwrite_of_session(&session)?;
     Ok(session)
+}
+
+#[cfg(test)]
+mod tests {
+    use clap::{Arg, Command, CommandFactory};
+
+    use super::Arguments;
+
+    /// The help texts of an option and of its command in full.
+    fn help(command: &Command, option: &Arg) -> String {
+        let long = option.get_long_help().or(option.get_help());
+        let texts = [long, command.get_after_help(), command.get_after_long_help()];
+        let texts = texts.into_iter().flatten();
+        texts.map(ToString::to_string).collect::<Vec<_>>().join("\n")
+    }
+
+    /// The options of all commands that take a value, each with its command.
+    fn options_with_values(command: &Command) -> Vec<(&Command, &Arg)> {
+        command
+            .get_subcommands()
+            .flat_map(|command| command.get_arguments().map(move |option| (command, option)))
+            .filter(|(_, option)| !option.is_positional() && option.get_action().takes_values())
+            .collect()
+    }
+
+    #[test]
+    fn every_option_with_a_value_has_an_example() {
+        let command = Arguments::command();
+        let options = options_with_values(&command);
+        assert!(options.len() > 60, "{} options", options.len());
+        let without: Vec<String> = options
+            .into_iter()
+            .filter_map(|(command, option)| {
+                let name = format!("--{} ", option.get_long()?);
+                (!help(command, option).contains(&name)).then(|| format!("{} {name}", command.get_name()))
+            })
+            .collect();
+        assert!(without.is_empty(), "no example of {}", without.join(", "));
+    }
+
+    /// The examples in the help of options are command lines that the parser accepts.
+    #[test]
+    fn examples_of_options_are_accepted() {
+        let command = Arguments::command();
+        for (command, option) in options_with_values(&command) {
+            let text = option
+                .get_long_help()
+                .map(ToString::to_string)
+                .unwrap_or_default();
+            for example in text.lines().filter_map(|line| line.strip_prefix("Example: ")) {
+                let required: &[&str] = match command.get_name() {
+                    "equation" => &["SESSION", "--test", "T"],
+                    "simulate" => &["SESSION", "--out", "DIR"],
+                    "volumetric" => &["MACHINE"],
+                    "new" => &["DIR"],
+                    _ => &["SESSION"],
+                };
+                let is_given = |name: &str| example.split(' ').any(|word| word == name);
+                let required = match required {
+                    [positional, name, _] if is_given(name) => std::slice::from_ref(positional),
+                    all => all,
+                };
+                let words = ["abbe", command.get_name()].into_iter();
+                let words = words.chain(required.iter().copied()).chain(example.split(' '));
+                let parsed = Arguments::command().try_get_matches_from(words);
+                assert!(
+                    parsed.is_ok(),
+                    "{}: {example}: {}",
+                    command.get_name(),
+                    parsed.unwrap_err()
+                );
+            }
+        }
+    }
 }

@@ -1,4 +1,4 @@
-//! `abbe new`: ready sessions to start from, or a machine laid out from its structural code.
+//! `abbe new`: create a machine and a session from a template or from a structural code.
 
 use std::path::PathBuf;
 
@@ -13,38 +13,42 @@ pub const HELP: &str = "Examples:
   abbe new mymachine --template hermle-c600u
   abbe new mine --from-code \"[wCXbYZAt]\"
 
-The first lists the templates. The last lays out machine.toml and plan.toml with every line explained; `abbe plan mine/plan.toml` runs at once.";
+The first lists the templates. The last creates machine.toml and plan.toml with a comment on each line; `abbe plan mine/plan.toml` analyses them.";
 
 /// `abbe new [DIR --template NAME | DIR --from-code CODE]`
 #[derive(Args)]
 #[command(group = clap::ArgGroup::new("start").args(["template", "from_code"]))]
 pub struct NewArguments {
-    /// The folder to make; without it, the templates are listed.
+    /// The new folder. Without it, the templates are listed.
     #[arg(requires = "start")]
     folder: Option<PathBuf>,
-    /// Which session to start from.
+    /// Copy this template.
+    ///
+    /// Example: --template hermle-c600u
     #[arg(long, value_name = "NAME", requires = "folder")]
     template: Option<String>,
-    /// Lay out a machine with this structural code, from workpiece over bed to tool, and a plan for it.
+    /// Create a machine with this structural code, from workpiece over bed to tool, and a plan for it.
+    ///
+    /// Example: --from-code [wCXbYZAt]
     #[arg(long, value_name = "CODE", requires = "folder")]
     from_code: Option<String>,
-    /// Say which templates there are.
+    /// List the templates.
     #[arg(long)]
     list: bool,
-    /// Replace files in a folder that is there.
+    /// Replace files in an existing folder.
     #[arg(long)]
     force: bool,
 }
 
-/// A session that the program carries with it.
+/// A session in the program.
 struct Template {
     name: &'static str,
     about: &'static str,
-    /// Name in the folder, contents.
+    /// File name and contents.
     files: &'static [(&'static str, &'static str)],
 }
 
-/// Files of a folder of `sessions/`, as they are there.
+/// Files of a folder of `sessions/`.
 macro_rules! files {
     ($folder:literal: $($file:literal),+ $(,)?) => {
         &[$(($file, include_str!(concat!("../../sessions/", $folder, "/", $file)))),+]
@@ -59,14 +63,14 @@ const TEMPLATES: &[Template] = &[
     },
     Template {
         name: "hermle-c600u-measured",
-        about: "the same machine measured, simulated readings with an effect to trace",
+        about: "the same machine with simulated readings and an effect to trace",
         files: files!(
             "hermle-c600u/measured": "machine.toml", "A100.csv", "A150.csv", "C100.csv", "C150.csv", "session.toml"
         ),
     },
     Template {
         name: "kuka-iiwa14",
-        about: "seven-axis robot whose ball sits in sockets (public data set, to be fetched)",
+        about: "seven-axis robot with its ball in sockets (public data set, to be downloaded)",
         files: files!("kuka-iiwa14": "machine.toml", "session.toml"),
     },
     Template {
@@ -200,7 +204,7 @@ const TEMPLATES: &[Template] = &[
     },
     Template {
         name: "ur10",
-        about: "six-axis robot before a laser tracker (public data set, to be fetched)",
+        about: "six-axis robot measured by a laser tracker (public data set, to be downloaded)",
         files: files!("ur10": "machine.toml", "session.toml"),
     },
 ];
@@ -226,7 +230,7 @@ pub fn run(arguments: &NewArguments, quiet: bool) -> Result<(), Failure> {
     Ok(())
 }
 
-/// The menu: each template in a line.
+/// Lists the templates, one per line.
 fn list() {
     let width = TEMPLATES
         .iter()
@@ -246,7 +250,7 @@ fn names() -> String {
 fn template(name: &str) -> Result<Vec<folder::NewFile>, Failure> {
     let Some(template) = TEMPLATES.iter().find(|template| template.name == name) else {
         return Err(Failure::Other(format!(
-            "there is no template `{name}`; there are {}",
+            "no template `{name}`; the templates are {}",
             names()
         )));
     };

@@ -214,11 +214,3 @@ pub fn csv(header: &[String], rows: impl IntoIterator<Item = Vec<String>>) -> Re
     }
     writer.into_inner().map_err(|error| fault(error.to_string()))
 }
-
-/// Writes a result as JSON.
-pub fn write_json<T: serde::Serialize>(path: &Path, result: &T) -> Result<(), Failure> {
-    let mut text = serde_json::to_string_pretty(result)
-        .map_err(|error| Failure::Other(format!("the result cannot be written as JSON: {error}")))?;
-    text.push('\n');
-    write_whole(path, text.as_bytes())
-}

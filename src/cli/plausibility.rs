@@ -1,10 +1,10 @@
-//! Conflicts between readings and session, in front of the results.
+//! Conflicts between the readings and the session, printed before the results.
 
 use abbe::identify::plausibility::{ConflictKind, Plausibility};
 
 use super::table;
 
-/// Conflicts, and what may be wrong; nothing where there are none.
+/// Prints the conflicts and their possible causes, if there are any.
 pub fn print(plausibility: &Plausibility) {
     if plausibility.conflicts.is_empty() {
         return;
@@ -20,7 +20,7 @@ pub fn print(plausibility: &Plausibility) {
                 conflict.subject.clone(),
                 format!("{:.1}", conflict.value),
                 format!("{}", conflict.stated),
-                conflict.unit.clone(),
+                table::unit(&conflict.unit),
                 format!("{pull:.1}"),
             ])
         })
@@ -32,7 +32,7 @@ pub fn print(plausibility: &Plausibility) {
         );
     }
     match plausibility.suggestions.as_slice() {
-        [] => say!("No single mistake that is tried explains this."),
+        [] => say!("No single mistake among those tried explains this."),
         [one] => say!(
             "Explained if {} (residual {}).",
             one.words,

@@ -1,4 +1,4 @@
-//! `abbe fit SESSION --repeat …`.
+//! `abbe fit SESSION --repeat …`: Type A evaluation over repeated sessions beside the Type B evaluation of each fit.
 
 use std::path::{Path, PathBuf};
 
@@ -6,10 +6,11 @@ use abbe::identify::repeated::{self, Repeated, Scatter};
 use abbe::model::words::counted;
 
 use super::failure::Failure;
+use super::json::{self, Origin};
 use super::output::{self, Outputs};
-use super::{CommonArguments, SessionArguments, fit, read_session, table};
+use super::{CommonArguments, SessionArguments, message, read_session, table};
 
-/// Fits every session by itself and compares them.
+/// Fits each session separately and compares the fits.
 pub fn run(
     first: &SessionArguments,
     repeat: &[PathBuf],
@@ -21,11 +22,12 @@ pub fn run(
         .map(PathBuf::as_path)
         .collect();
     let mut sessions = Vec::with_capacity(all.len());
+    let mut origin = Origin::default();
     for (place, path) in all.iter().enumerate() {
         let twice = all[..place].iter().any(|earlier| output::is_same(earlier, path));
         if twice {
             return Err(Failure::Other(format!(
-                "{} is named twice: a session is no repeat of itself",
+                "{} is named twice; name each repeated session once",
                 path.display()
             )));
         }
@@ -34,6 +36,9 @@ pub fn run(
             ..first.clone()
         };
         let session = read_session(&arguments, outputs)?;
+        if common.json.is_some() {
+            origin.add(Origin::of_session(&session)?);
+        }
         let (problem, fit) = abbe::identify::fit::prepare(&session, common.seed)?;
         let report = abbe::identify::fit::report(&problem, &fit);
         let named: Vec<String> = report
@@ -41,7 +46,7 @@ pub fn run(
             .iter()
             .map(|warning| format!("{}: {warning}", path.display()))
             .collect();
-        fit::print_warnings(&named);
+        message::print_warnings(&named);
         sessions.push(repeated::Session::new(
             &path.display().to_string(),
             &problem,
@@ -53,14 +58,14 @@ pub fn run(
         print(&result);
     }
     if let Some(path) = &common.json {
-        output::write_json(path, &result)?;
+        json::write(path, origin, Some(common.seed), &result)?;
     }
     Ok(())
 }
 
 fn print(result: &Repeated) {
     say!(
-        "{} of one plan, each fitted by itself\n",
+        "{} of one plan, each fitted separately\n",
         counted(result.sessions.len(), "session")
     );
     let rows: Vec<Vec<String>> = result
@@ -79,13 +84,13 @@ fn print(result: &Repeated) {
                 u_type_a,
                 s,
                 u_type_b,
-                parameter.unit.clone(),
+                table::unit(&parameter.unit),
                 number(parameter.ratio, 2),
                 number(parameter.p_value, 3),
                 match parameter.scatter {
                     Scatter::AsStated => "",
-                    Scatter::More => "scatters more than the fits say",
-                    Scatter::Less => "scatters less than the fits say",
+                    Scatter::More => "scatters more than u states",
+                    Scatter::Less => "scatters less than u states",
                 }
                 .to_string(),
             ]
@@ -106,32 +111,33 @@ fn print(result: &Repeated) {
         &rows,
     );
     say!(
-        "\nA: over the sessions, of their mean and of one; B: of one session by its fit; p: of such an s/u by chance"
+        "\nType A: from the scatter of the sessions, s/√n of their mean, s of one session. Type B: standard uncertainty u of one fit.\n\
+         p: probability of such a ratio s/u by chance."
     );
     if result.deviating.is_empty() {
         if result.sessions.len() > 2 {
-            say!("No session is off the others by more than the fits explain");
+            say!("No session deviates significantly from the others.");
         }
         return;
     }
-    say!("\nOff the mean of the others:");
+    say!("\nSignificant deviations of a session from the mean of the others:");
     let rows: Vec<Vec<String>> = result
         .deviating
         .iter()
-        .map(|off| {
-            let (by, u) = table::value_and_u(off.deviation, off.u);
+        .map(|deviation| {
+            let (difference, u) = table::value_and_u(deviation.deviation, deviation.u);
             vec![
-                off.session.clone(),
-                off.id.clone(),
-                by,
+                deviation.session.clone(),
+                deviation.id.clone(),
+                difference,
                 u,
-                off.unit.clone(),
-                format!("{:.1}", (off.deviation / off.u).abs()),
+                table::unit(&deviation.unit),
+                format!("{:.1}", (deviation.deviation / deviation.u).abs()),
             ]
         })
         .collect();
     table::print(
-        &["session", "parameter", "by", "u (k=1)", "unit", "times u"],
+        &["session", "parameter", "deviation", "u", "unit", "deviation/u"],
         &rows,
     );
 }

@@ -12,37 +12,40 @@ use crate::report::document::Document;
 use crate::report::page;
 use crate::report::provenance::Provenance;
 
-/// Where a report goes.
+/// The files of a report.
 #[derive(Args, Clone)]
 pub struct ReportArguments {
-    /// Write a report for people: one HTML file that needs nothing else.
+    /// Write a report with tables and plots as one self-contained HTML file.
+    ///
+    /// Example: --report report.html
     #[arg(long, value_name = "FILE.html")]
     report: Option<PathBuf>,
-    /// Write every plot of the report by itself, as SVG, and as PNG if the program is built with the feature `png`, into a folder that is new or
-    /// empty.
+    /// Write each plot of the report into a new or empty folder, as SVG, and as PNG if the program is built with the feature `png`.
+    ///
+    /// Example: --plots plots
     #[arg(long, value_name = "DIR")]
     plots: Option<PathBuf>,
-    /// Require PNG beside each SVG of `--plots`: an error if the program is built without it.
+    /// Require PNG beside each SVG of --plots; an error if the program is built without the feature `png`.
     #[arg(long, requires = "plots")]
     png: bool,
 }
 
 impl ReportArguments {
-    /// Whether anything is to be written.
+    /// Whether a report or plots are requested.
     pub fn asked(&self) -> bool {
         self.report.is_some() || self.plots.is_some()
     }
 
-    /// The report's file.
+    /// The file of the report.
     pub fn file(&self) -> Option<&PathBuf> {
         self.report.as_ref()
     }
 
-    /// Refuses before the work is done plots that could not be written after it.
+    /// Refuses plots that cannot be written, before the work.
     pub fn check(&self) -> Result<(), Failure> {
         if self.png && !cfg!(feature = "png") {
             return Err(Failure::CommandLine(
-                "`--png`: this program is built without PNG; build it with `cargo build --release --features png`, or leave `--png` out for SVG"
+                "`--png`: this program is built without PNG; build it with `cargo build --release --features png`, or leave out `--png` for SVG"
                     .into(),
             ));
         }
@@ -52,7 +55,7 @@ impl ReportArguments {
         Ok(())
     }
 
-    /// Writes what was asked for.
+    /// Writes the requested files.
     pub fn write(
         &self,
         document: &Document,

@@ -2,16 +2,18 @@
 
 use abbe::identify::geometric::Comparison;
 use abbe::identify::plan::results::PlanAnalysis;
+use abbe::identify::repeated::Repeated;
 use abbe::identify::results::{FitResult, TraceResult};
 use abbe::identify::self_calibration::SelfCalibration;
 use abbe::identify::volumetric::Summary;
 use abbe::model::session::schema;
 use clap::{Args, ValueEnum};
-use schemars::JsonSchema;
 use schemars::generate::SchemaSettings;
+use schemars::{JsonSchema, Schema};
 use serde_json::{Value, json};
 
 use super::failure::Failure;
+use super::json::Document;
 use super::{plan, simulate};
 
 /// Examples of `abbe schema`.
@@ -31,6 +33,8 @@ enum Subject {
     Machine,
     /// `abbe fit --json`
     Fit,
+    /// `abbe fit --repeat --json`
+    Repeat,
     /// `abbe fit --method circle|cone|two-plane --json`
     Geometric,
     /// `abbe fit --method self-calibration --json`
@@ -41,6 +45,8 @@ enum Subject {
     Plan,
     /// `abbe plan --improve|--separate|--range --json`
     NextTest,
+    /// `abbe plan --patterns --json`
+    Patterns,
     /// `abbe simulate --json`
     Simulate,
     /// `abbe volumetric --map --json`
@@ -61,12 +67,14 @@ pub fn run(arguments: &SchemaArguments) -> Result<(), Failure> {
         Subject::Session => session()?,
         Subject::Machine => parsed(schema::MACHINE)?,
         Subject::Fit => of::<FitResult>(),
+        Subject::Repeat => of::<Repeated>(),
         Subject::Geometric => of::<Comparison>(),
         Subject::SelfCalibration => of::<SelfCalibration>(),
         Subject::Trace => of::<TraceResult>(),
         Subject::Plan => of::<PlanAnalysis>(),
         Subject::NextTest => of::<plan::NextTest>(),
-        Subject::Simulate => of::<simulate::Report>(),
+        Subject::Patterns => of::<plan::patterns::PatternSizes>(),
+        Subject::Simulate => of::<simulate::SimulationResult>(),
         Subject::Map => of::<Summary>(),
     };
     let text = serde_json::to_string_pretty(&schema)
@@ -96,13 +104,15 @@ fn parsed(text: &str) -> Result<Value, Failure> {
         .map_err(|error| Failure::Other(format!("a schema of this program is no JSON: {error}")))
 }
 
-/// The schema of a result as it is written.
-fn of<T: JsonSchema>() -> Value {
-    let mut schema = SchemaSettings::draft2020_12()
-        .for_serialize()
-        .into_generator()
-        .into_root_schema_for::<T>()
-        .to_value();
+/// The schema of a command's document.
+fn of<T: JsonSchema + 'static>() -> Value {
+    let root = |of: Schema| of.to_value();
+    let generator = || SchemaSettings::draft2020_12().for_serialize().into_generator();
+    let mut schema = root(generator().into_root_schema_for::<Document<'static, T>>());
+    let result = root(generator().into_root_schema_for::<T>());
+    for key in ["title", "description"] {
+        schema[key] = result[key].clone();
+    }
     close(&mut schema);
     schema
 }

@@ -1,4 +1,4 @@
-//! `abbe fit --method self-calibration`.
+//! `abbe fit --method self-calibration`: rotary axis, linear axes and artefact separately.
 
 use abbe::identify::results::Interval;
 use abbe::identify::self_calibration::{self, FunctionResult, MonteCarlo, SelfCalibration};
@@ -7,47 +7,51 @@ use abbe::model::words::counted;
 use clap::Args;
 
 use super::failure::Failure;
-use super::{CommonArguments, fit, output, table};
+use super::{CommonArguments, json, message, screen, table};
 
-/// Monte Carlo of a self-calibration or of the full fit.
+/// Monte Carlo propagation of a self-calibration or of the full fit.
 #[derive(Args)]
 pub struct DrawArguments {
-    /// Propagate distributions by so many runs (JCGM 101): of the full fit, of a self-calibration.
+    /// Propagate distributions by Monte Carlo with this number of runs (JCGM 101), for the full fit and for a self-calibration.
+    ///
+    /// Example: --monte-carlo 100000
     #[arg(long, value_name = "RUNS")]
     monte_carlo: Option<u64>,
-    /// Probability that a coverage interval is to hold.
+    /// Coverage probability of the intervals of --monte-carlo.
+    ///
+    /// Example: --monte-carlo 10000 --coverage 0.99
     #[arg(long, value_name = "P", requires = "monte_carlo", default_value_t = 0.95)]
     coverage: f64,
 }
 
-/// Fewest runs of which 95 % intervals mean anything (JCGM 101, 7.2.2 asks for 200 of them at the ends: 10⁴).
+/// Minimum number of runs for 95 % intervals (JCGM 101, 7.2.2: 10⁴, so that 200 runs lie beyond each end).
 const MIN_RUNS: u64 = 10_000;
 
 impl DrawArguments {
-    /// That nothing is to be drawn.
+    /// Refuses Monte Carlo with another method.
     pub fn refuse(&self) -> Result<(), Failure> {
         match self.monte_carlo {
             None => Ok(()),
             Some(_) => Err(Failure::CommandLine(
-                "--monte-carlo goes with the full fit and with `--method self-calibration`; leave out `--method`, or --monte-carlo"
+                "`--monte-carlo` works with the full fit and with `--method self-calibration`: leave out `--method` or `--monte-carlo`"
                     .into(),
             )),
         }
     }
 
-    /// What is to be drawn, if anything is.
+    /// The requested Monte Carlo propagation.
     pub fn draws(&self, seed: u64) -> Result<Option<MonteCarlo>, Failure> {
         let Some(runs) = self.monte_carlo else {
             return Ok(None);
         };
         if runs < MIN_RUNS {
             return Err(Failure::Other(format!(
-                "--monte-carlo {runs}: {MIN_RUNS} runs are the fewest whose intervals mean anything"
+                "`--monte-carlo {runs}`: at least {MIN_RUNS} runs are needed for the coverage intervals"
             )));
         }
         if !(self.coverage > 0.5 && self.coverage < 0.9999) {
             return Err(Failure::Other(format!(
-                "--coverage {}: a probability between 0.5 and 0.9999",
+                "`--coverage {}`: a probability between 0.5 and 0.9999 is expected",
                 self.coverage
             )));
         }
@@ -72,9 +76,9 @@ pub fn run(
     if tables {
         print(&result);
     }
-    fit::print_warnings(&result.warnings);
+    message::print_warnings(&result.warnings);
     if let Some(path) = &common.json {
-        output::write_json(path, &result)?;
+        json::write_of_session(path, session, common.seed, &result)?;
     }
     Ok(())
 }
@@ -83,44 +87,44 @@ fn print(result: &SelfCalibration) {
     say!(
         "{}, {}, residual {}",
         counted(result.readings, "reading"),
-        fit::noise(result.noise_um, &result.noise_source),
+        screen::noise(result.noise_um, &result.noise_source),
         table::micrometres(result.rms_um)
     );
     say!(
-        "{} of four functions, rank {} before boundary conditions",
+        "{} of four functions, numerical rank {} without boundary conditions",
         counted(result.value_count, "value"),
         result.rank_without_conditions
     );
     say!(
-        "{} under {}, rank {}",
-        counted(result.parameter_count, "unknown"),
+        "{} under {}, numerical rank {}",
+        counted(result.parameter_count, "parameter"),
         counted(result.conditions.len(), "condition"),
         result.rank
     );
     for condition in &result.conditions {
         say!("  {condition}");
     }
-    say!("\nµm, with standard uncertainty:");
+    say!("\nFunctions, µm, value ± standard uncertainty:");
     print_functions(&result.functions);
     if let Some(radius) = &result.radius {
         say!("");
-        fit::print_parameters(std::slice::from_ref(radius));
+        screen::print_parameters(&[radius]);
     }
     if !result.parameters.is_empty() {
         say!(
             "\nPosition of axis {}, by the least-squares circle of its displacements:",
             result.axis
         );
-        fit::print_parameters(&result.parameters);
-        say!("\nThe same from the angles of the turn:");
-        fit::print_parameters(&result.parameters_by_turn);
+        screen::print_parameters(&result.parameters.iter().collect::<Vec<_>>());
+        say!("\nThe same, from the angles of rotation:");
+        screen::print_parameters(&result.parameters_by_turn.iter().collect::<Vec<_>>());
         say!("\nError motions of axis {}, µm:", result.axis);
         print_functions(&result.error_motions);
     }
-    fit::print_unobservable(&result.unobservable);
+    screen::print_missing(&result.unobservable, &[], true);
     if let Some(drawn) = &result.monte_carlo {
         say!(
-            "\nMonte Carlo, {}, seed {}; intervals of {} % in µm:",
+            "\nMonte Carlo, {}, seed {}; coverage intervals of {} %, µm:",
             counted(drawn.runs, "run"),
             drawn.seed,
             drawn.coverage_probability * 100.0
@@ -133,7 +137,7 @@ fn print(result: &SelfCalibration) {
                 let interval = |Interval { low, high }: Interval| {
                     let (low, _) = table::value_and_u(low, quantity.u_um);
                     let (high, _) = table::value_and_u(high, quantity.u_um);
-                    format!("{low} … {high}")
+                    format!("{low} to {high}")
                 };
                 vec![
                     quantity.id.clone(),
@@ -144,11 +148,11 @@ fn print(result: &SelfCalibration) {
                 ]
             })
             .collect();
-        table::print(&["quantity", "mean", "u (k=1)", "shortest", "symmetric"], &rows);
+        table::print(&["quantity", "mean", "u", "shortest", "symmetric"], &rows);
     }
 }
 
-/// Functions side by side, one line an angle.
+/// Functions side by side, one line per angle.
 fn print_functions(functions: &[FunctionResult]) {
     let mut angles: Vec<f64> = Vec::new();
     for point in functions.iter().flat_map(|function| &function.points) {
@@ -157,7 +161,7 @@ fn print_functions(functions: &[FunctionResult]) {
         }
     }
     angles.sort_by(f64::total_cmp);
-    let mut header = vec!["at"];
+    let mut header = vec!["angle"];
     header.extend(functions.iter().map(|function| function.id.as_str()));
     let cell = |function: &FunctionResult, angle: f64| {
         let point = function.points.iter().find(|point| point.at_deg == angle);

@@ -1,4 +1,4 @@
-//! `abbe simulate`.
+//! `abbe simulate`: simulate readings of planned tests.
 
 use std::path::PathBuf;
 
@@ -12,49 +12,60 @@ use schemars::JsonSchema;
 use serde::Serialize;
 
 use super::failure::Failure;
-use super::{CommonArguments, SessionArguments, fit, folder, output, read_session, table};
+use super::{CommonArguments, SessionArguments, folder, json, message, output, read_session, table};
 
-/// Examples and the names that values go by.
-pub const HELP: &str = "Values go by the names that results use, with their unit: errors by ISO 230-1 or the literature (EY0A, e_y0a), set-up \
-quantities (`bar[A100]`, `workpiece_ball.x[P1]`), coefficients of the [[effect]]s that the session declares \
-(--effect \"EZC~C:h2.amplitude=1.5um\"). A harmonic takes amplitude and phase of \
-amplitude · cos(order · angle + phase). What is not given is zero.
+/// Examples of `abbe simulate`, and the names of values.
+pub const HELP: &str = "Names of values are those of results, with a unit: errors (EY0A of ISO 230-1, e_y0a of the literature), set-up \
+parameters (`bar[A100]`, `workpiece_ball.x[P1]`), coefficients of the [[effect]] tables of the session \
+(--effect \"EZC~C:h2.amplitude=1.5um\"). A harmonic is amplitude · cos(order · angle + phase). Values that are not \
+given are zero.
 
 Examples:
   abbe simulate sessions/hermle-c600u/chapter5.toml --out run1 --error EY0A=35.3um \\
       --error EB0A=-1.29arcsec
   abbe simulate sessions/hermle-c600u/chapter5.toml --out run2 --draw-setups --seed 7
-  abbe simulate sessions/hermle-c600u/chapter5.toml --out run3 --draw-setups --seed 8
+  abbe simulate sessions/hermle-c600u/chapter5.toml --out run3 --draw-setups --seed 8 \\
+      --noise-um 0.5
 
-errors.toml holds one value a line, `EY0A = \"35.3 um\"`; names with other than letters and digits stand in quotes.";
+A file for --errors has one value per line, `EY0A = \"35.3 um\"`. Names with other characters than letters and digits are quoted.";
 
 /// `abbe simulate SESSION --out DIR`
 #[derive(Args)]
 pub struct SimulateArguments {
     #[command(flatten)]
     session: SessionArguments,
-    /// The folder to write the measured session to.
+    /// New folder for the session with readings.
+    ///
+    /// Example: --out run1
     #[arg(long, value_name = "DIR")]
     out: PathBuf,
-    /// The value of an error or a set-up quantity; may be repeated.
+    /// Value of an error or a set-up parameter; may be repeated.
+    ///
+    /// Example: --error EY0A=35.3um --error bar[A100]=0.4um
     #[arg(long = "error", value_name = "NAME=VALUE", allow_hyphen_values = true)]
     errors: Vec<String>,
-    /// The value of a coefficient of a declared effect; may be repeated.
+    /// Value of a coefficient of a declared effect; may be repeated.
+    ///
+    /// Example: --effect EZC~C:h2.amplitude=1.5um --effect EZC~C:h2.phase=60deg
     #[arg(long = "effect", value_name = "NAME=VALUE", allow_hyphen_values = true)]
     effects: Vec<String>,
-    /// A TOML file of such values.
+    /// TOML file with such values.
+    ///
+    /// Example: --errors errors.toml
     #[arg(long = "errors", value_name = "FILE")]
     file: Option<PathBuf>,
-    /// Standard deviation of the noise, µm; the session's own if not given.
+    /// Standard deviation of the noise, µm [default: the noise of the session].
+    ///
+    /// Example: --noise-um 0.5
     #[arg(long, value_name = "X", allow_negative_numbers = true)]
     noise_um: Option<f64>,
-    /// Draw set-up quantities from what the session says is known of them.
+    /// Draw the set-up parameters from their priors.
     #[arg(long)]
     draw_setups: bool,
-    /// Leave the declared effects out of the session that is written, as if nobody knew of them.
+    /// Omit the declared effects from the session that is written.
     #[arg(long)]
     hide_effects: bool,
-    /// Replace files in a folder that is there.
+    /// Replace files in an existing folder.
     #[arg(long)]
     force: bool,
     #[command(flatten)]
@@ -74,7 +85,7 @@ pub fn run(arguments: &SimulateArguments) -> Result<(), Failure> {
     };
     for text in arguments.errors.iter().chain(&arguments.effects) {
         let value = Given::parse(text)?;
-        // The command line has the last word.
+        // A value on the command line replaces that of the file.
         given.retain(|other| other.id != value.id);
         given.push(value);
     }
@@ -83,7 +94,7 @@ pub fn run(arguments: &SimulateArguments) -> Result<(), Failure> {
         && !(MIN_UM..=LARGEST).contains(&noise)
     {
         return Err(Failure::Other(format!(
-            "--noise-um {noise}: a standard deviation in µm is a number that is not negative: 0, or {MIN_UM:e} to {LARGEST:e}"
+            "`--noise-um {noise}`: a standard deviation in µm is expected: 0, or {MIN_UM:e} to {LARGEST:e}"
         )));
     }
     let simulation = Simulation {
@@ -96,14 +107,14 @@ pub fn run(arguments: &SimulateArguments) -> Result<(), Failure> {
     let files = files(&session, &simulated, arguments)?;
     if output::is_same(output::folder_of(&session.file), &arguments.out) {
         return Err(Failure::Other(format!(
-            "{}: the plan itself lies there; write its readings to another folder",
+            "{}: this folder contains the plan itself; write the readings to another folder",
             arguments.out.display()
         )));
     }
     output::Outputs::in_folder(&arguments.out, files.iter().map(|(name, _)| name))
         .refuse_overwrite_of_session(&session)?;
     folder::write(&arguments.out, &files, arguments.force, |made| {
-        // What is left behind has to be a session.
+        // The written files are read back as a session.
         let path = made.join("session.toml");
         read::session(&path, &read::ReadOptions::default())?;
         Ok(())
@@ -116,7 +127,7 @@ pub fn run(arguments: &SimulateArguments) -> Result<(), Failure> {
     )
 }
 
-/// `session.toml` last: where it is, the rest is.
+/// The files; `session.toml` is the last, so that the others exist when it does.
 fn files(
     session: &Session,
     simulated: &Simulated,
@@ -139,7 +150,7 @@ fn files(
     if let Some(noise_um) = arguments.noise_um {
         text = rewrite::with_noise(&text, file, noise_um)?;
     }
-    // The tables written here have our columns, whatever those of the original had.
+    // The data files have the standard columns, whatever the columns of the original.
     text = rewrite::without_tables(&text, &["format", "columns"]);
     if arguments.hide_effects {
         text = rewrite::without_tables(&text, &["effect"]);
@@ -148,7 +159,7 @@ fn files(
     Ok(files)
 }
 
-/// A file name for a test that no system stumbles over and no other test has.
+/// A portable file name for the data of a test, different from those of other tests.
 fn data_name(test: &str, taken: &[(String, String)]) -> String {
     let plain: String = test
         .chars()
@@ -170,23 +181,31 @@ fn data_name(test: &str, taken: &[(String, String)]) -> String {
     name
 }
 
-/// What `abbe simulate` reports as JSON.
+/// The simulated session and the true values of its parameters.
 #[derive(Serialize, JsonSchema)]
-pub struct Report {
-    session: String,
+pub struct SimulationResult {
+    /// The session file that was written.
+    written_session: String,
+    /// Number of simulated readings.
     readings: usize,
+    /// Standard deviation of the simulated noise, µm.
     noise_um: f64,
+    /// Resolution of the readings, µm; `null` for none.
     resolution_um: Option<f64>,
-    seed: u64,
-    truth: Vec<Value>,
+    /// The parameters that are not zero.
+    truth: Vec<TrueValue>,
+    /// Warnings in words.
     warnings: Vec<String>,
 }
 
-/// A value that was put into the model.
+/// The true value of a parameter.
 #[derive(Serialize, JsonSchema)]
-struct Value {
+struct TrueValue {
+    /// Identifier: `EY0A`, `bar[A100]`, `EZC~C:h2.cos`.
     id: String,
+    /// The value, in `unit`.
     value: f64,
+    /// `um`, `arcsec`, …
     unit: String,
 }
 
@@ -196,16 +215,15 @@ fn report(
     arguments: &SimulateArguments,
     tables: bool,
 ) -> Result<(), Failure> {
-    let report = Report {
-        session: arguments.out.join("session.toml").display().to_string(),
+    let report = SimulationResult {
+        written_session: arguments.out.join("session.toml").display().to_string(),
         readings: simulated.readings.iter().map(|readings| readings.rows()).sum(),
         noise_um: simulated.noise_mm * 1e3,
         resolution_um: session.resolution_mm.map(|step| step * 1e3),
-        seed: arguments.common.seed,
         truth: simulated
             .truth
             .iter()
-            .map(|(id, value, unit)| Value {
+            .map(|(id, value, unit)| TrueValue {
                 id: id.clone(),
                 value: *value,
                 unit: unit.clone(),
@@ -214,23 +232,23 @@ fn report(
         warnings: simulated.warnings.clone(),
     };
     if tables {
-        print(session, &report);
+        print(session, &report, arguments.common.seed);
     }
-    fit::print_warnings(&report.warnings);
+    message::print_warnings(&report.warnings);
     if let Some(path) = &arguments.common.json {
-        output::write_json(path, &report)?;
+        json::write_of_session(path, session, arguments.common.seed, &report)?;
     }
     Ok(())
 }
 
-fn print(session: &Session, report: &Report) {
+fn print(session: &Session, report: &SimulationResult, seed: u64) {
     say!(
         "{}: {} of {}, noise {}, seed {}",
-        report.session,
+        report.written_session,
         counted(report.readings, "reading"),
         counted(session.tests.len(), "test"),
         table::micrometres(report.noise_um),
-        report.seed
+        seed
     );
     let rows: Vec<Vec<String>> = report
         .truth
@@ -239,14 +257,14 @@ fn print(session: &Session, report: &Report) {
             vec![
                 value.id.clone(),
                 format!("{:.4}", value.value),
-                value.unit.clone(),
+                table::unit(&value.unit),
             ]
         })
         .collect();
     if rows.is_empty() {
-        say!("no error: the nominal machine");
+        say!("No error is given: the readings are those of the nominal machine.");
     } else {
         say!("");
-        table::print(&["given", "value", "unit"], &rows);
+        table::print(&["parameter", "value", "unit"], &rows);
     }
 }

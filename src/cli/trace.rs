@@ -1,10 +1,12 @@
-//! `abbe trace`.
+//! `abbe trace`: find the unmodelled effect behind the residual.
 
+mod screen;
+
+use std::path::PathBuf;
 use std::sync::Mutex;
 use std::time::Duration;
 
 use abbe::identify::plan::test_variations::TestVariations;
-use abbe::identify::results::{EffectName, ModelResult, TraceResult};
 use abbe::identify::trace::separating_tests::separate_aliases;
 use abbe::identify::trace::{Progress, TraceOptions, library};
 use abbe::model::session::{rewrite, write};
@@ -17,9 +19,24 @@ use super::interrupt::Interrupts;
 use super::message::{Kind, tell};
 use super::report::ReportArguments;
 use super::{
-    CommonArguments, SessionArguments, compensation, csv, fit, output, plausibility, read_session, table,
-    uniqueness,
+    CommonArguments, SessionArguments, compensation, csv, json, message, output, read_session, residuals,
 };
+
+/// Examples of `abbe trace`.
+pub const HELP: &str = "Examples:
+  abbe trace sessions/hermle-c600u/measured/session.toml
+  abbe trace sessions/hermle-c600u/measured/session.toml --all
+  abbe trace sessions/hermle-c600u/measured/session.toml --json trace.json --csv trace.csv
+  abbe trace sessions/hermle-c600u/measured/session.toml --report trace.html --write next.toml
+  abbe trace sessions/hermle-c600u/measured/session.toml --only EZC \\
+      --exclude ~time --max-effects 2
+  abbe trace sessions/hermle-c600u/measured/session.toml --list
+
+The first screen answers in this order: verdict and uniqueness; residual before and after, also on held-out readings; \
+the effects with their aliases; the estimates with standard uncertainty; what to measure next. It folds aliases beyond \
+three and set-up parameters. --all lists them.
+
+An effect is component~driver:shape. EZC~C:h2 is an axial motion (EZC) over the angle of C, harmonic of order 2.";
 
 /// `abbe trace SESSION`
 #[derive(Args)]
@@ -29,37 +46,57 @@ pub struct TraceArguments {
     #[command(flatten)]
     common: CommonArguments,
     #[command(flatten)]
-    faces: ReportArguments,
+    report: ReportArguments,
+    /// List everything that the first screen folds: all aliases, set-up parameters, null-space directions, outliers, rejected candidates.
+    #[arg(long)]
+    all: bool,
     /// Maximum number of effects (default: until the held-out error stops improving).
+    ///
+    /// Example: --max-effects 2
     #[arg(long, value_name = "N")]
     max_effects: Option<usize>,
-    /// Look only for effects whose identifier contains this (`EZC`, `~time`, `:h2`); may be repeated.
+    /// Search only effects whose identifier contains this text; may be repeated.
+    ///
+    /// Example: --only EZC --only ~time --only :h2
     #[arg(long, value_name = "TEXT")]
     only: Vec<String>,
-    /// Do not look for effects whose identifier contains this; may be repeated.
+    /// Do not search effects whose identifier contains this text; may be repeated.
+    ///
+    /// Example: --exclude :spline --exclude ~time
     #[arg(long, value_name = "TEXT")]
     exclude: Vec<String>,
-    /// List the library for this session, with what its readings can see, and stop.
-    #[arg(long, conflicts_with_all = ["json", "csv", "write", "report", "plots", "compensation", "max_effects"])]
+    /// List the candidates of the library with their detectability in this session, and stop.
+    #[arg(long, conflicts_with_all = ["json", "csv", "residuals", "write", "report", "plots", "compensation", "max_effects"])]
     list: bool,
-    /// Write the session that declares the found effects.
+    /// Write the session with the found effects declared.
+    ///
+    /// Example: --write next.toml
     #[arg(long, value_name = "FILE")]
-    write: Option<std::path::PathBuf>,
-    /// Write the result as CSV, one row a figure.
+    write: Option<PathBuf>,
+    /// Write the result as CSV, one row per value.
+    ///
+    /// Example: --csv trace.csv
     #[arg(long, value_name = "FILE")]
-    csv: Option<std::path::PathBuf>,
+    csv: Option<PathBuf>,
+    /// Write reading and residual of every reading as CSV, for the model with the found effects: test, run, line, axis positions, reading, residual in µm,
+    /// residual over the noise standard deviation, and whether the reading counts or is an outlier.
+    ///
+    /// Example: --residuals residuals.csv
+    #[arg(long, value_name = "FILE.csv")]
+    residuals: Option<PathBuf>,
     #[command(flatten)]
     compensation: compensation::CompensationArguments,
 }
 
 /// Runs `abbe trace`.
 pub fn run(arguments: &TraceArguments) -> Result<(), Failure> {
-    arguments.faces.check()?;
+    arguments.report.check()?;
     arguments.compensation.check()?;
     let others = [
         arguments.csv.as_ref(),
         arguments.write.as_ref(),
-        arguments.faces.file(),
+        arguments.residuals.as_ref(),
+        arguments.report.file(),
     ];
     let outputs = arguments.common.outputs(&others)?;
     let tables = outputs.tables(arguments.common.quiet);
@@ -79,7 +116,7 @@ pub fn run(arguments: &TraceArguments) -> Result<(), Failure> {
     let shown = Mutex::new(());
     let report = |progress: Progress| {
         if matches!(progress, Progress::Working) {
-            // Asked often, from many threads: nothing to show.
+            // Called often and from many threads; it shows nothing.
             interrupts.keep_results();
             return !interrupts.came();
         }
@@ -102,16 +139,16 @@ pub fn run(arguments: &TraceArguments) -> Result<(), Failure> {
         !interrupts.came()
     };
     let mut trace = abbe::identify::trace::trace(&session, &options, &report)?;
-    bar.set_message("weighing further tests");
+    bar.set_message("comparing candidate tests");
     separate_aliases(&mut trace, &TestVariations::short(), &report)?;
     interrupts.end_at_once();
     bar.finish_and_clear();
     if tables {
-        print(&trace.result);
+        screen::print(&trace, &arguments.session, arguments.all);
     }
-    fit::print_warnings(&trace.result.warnings);
+    message::print_warnings(&trace.result.warnings);
     if let Some(path) = &arguments.common.json {
-        output::write_json(path, &trace.result)?;
+        json::write_of_session(path, &session, arguments.common.seed, &trace.result)?;
     }
     if let Some(path) = &arguments.write {
         let data = arguments.session.data.as_deref();
@@ -125,7 +162,7 @@ pub fn run(arguments: &TraceArguments) -> Result<(), Failure> {
         let [own, there] = [&session.file, path].map(|file| output::folder_of(file).canonicalize().ok());
         if own != there {
             let note = format!(
-                "{} names its machine and data where they are; commands read it with --allow-outside",
+                "{} refers to its machine and data in another folder; commands read it with --allow-outside",
                 path.display()
             );
             tell(Kind::Note, &note);
@@ -134,11 +171,14 @@ pub fn run(arguments: &TraceArguments) -> Result<(), Failure> {
     if let Some(path) = &arguments.csv {
         csv::write_trace(path, &trace.result)?;
     }
-    if arguments.faces.asked() {
+    if let Some(path) = &arguments.residuals {
+        residuals::write(&trace.after, &trace.after_fit, path)?;
+    }
+    if arguments.report.asked() {
         let document = crate::report::trace::document(&trace)?;
         let method = crate::report::trace::method(&trace.result);
         arguments
-            .faces
+            .report
             .write(&document, &method, &session, arguments.common.seed)?;
     }
     if trace.result.interrupted {
@@ -169,132 +209,18 @@ fn list(session: &abbe::model::session::Session, options: &TraceOptions) -> Resu
         let of_family: Vec<_> = entries.iter().filter(|entry| entry.family == number).collect();
         let seen = of_family.iter().filter(|entry| entry.observable).count();
         let candidates = counted(of_family.len(), "candidate");
-        say!("{}: {candidates}, {seen} seen", family.name);
+        say!("{}: {candidates}, {seen} detectable", family.name);
         for entry in of_family {
             say!(
                 "  {} {}",
-                if entry.observable { "seen    " } else { "not seen" },
+                if entry.observable {
+                    "detectable    "
+                } else {
+                    "not detectable"
+                },
                 entry.id
             );
         }
     }
     Ok(())
-}
-
-/// What uncertainties follow from, in words: the residual of a model is not called noise.
-fn noise(result: &TraceResult) -> String {
-    if result.noise_source != "residual" || result.effects.is_empty() {
-        return fit::noise(result.noise_um, &result.noise_source);
-    }
-    format!(
-        "residual of the declared model {}, with the effects {} (no noise stated, no repeats)",
-        table::micrometres(result.before.noise_um),
-        table::micrometres(result.after.noise_um)
-    )
-}
-
-fn print(result: &TraceResult) {
-    plausibility::print(&result.plausibility);
-    say!("Verdict: {}", result.verdict);
-    if let Some(headline) = uniqueness::headline(result) {
-        say!("{headline}");
-    }
-    say!(
-        "{}, {}; {} of {} can be seen",
-        counted(result.readings, "reading"),
-        noise(result),
-        result.candidates_detectable,
-        counted(result.candidates, "candidate")
-    );
-    say!("The declared model leaves: {}", result.residual_before);
-    say!("");
-    let row = |name: &str, model: &ModelResult| {
-        let mut cells = vec![
-            name.to_string(),
-            format!("{:.3}", model.rms_um),
-            format!("{:.3}", model.heldout_rms_um),
-        ];
-        if let (Some(rms), Some(held)) = (model.rms_3d_um, model.heldout_rms_3d_um) {
-            cells.extend([format!("{rms:.1}"), format!("{held:.1}")]);
-        }
-        cells
-    };
-    let mut header = vec!["residual, µm", "rms", "held out"];
-    if result.before.rms_3d_um.is_some() {
-        header.extend(["3-vector", "held out"]);
-    }
-    table::print(
-        &header,
-        &[row("before", &result.before), row("after", &result.after)],
-    );
-    say!("held out: leaving out {}", result.heldout_by);
-    for (number, effect) in result.effects.iter().enumerate() {
-        say!("\n{}. {}  ({})", number + 1, name(&effect.name), effect.family);
-        say!("   {}", effect.name.meaning);
-        for number in &effect.shape_parameters {
-            say!("   {}", table::shape_number(number));
-        }
-        for p in &effect.parameters {
-            let (value, u) = table::value_and_u(p.value, p.u);
-            say!("   {}  {value} ± {u} {}", p.id, p.unit);
-        }
-        say!(
-            "   explains {} rms; p ≤ {:.3}",
-            table::micrometres(effect.rms_gain_um),
-            effect.p_value
-        );
-        say!(
-            "   {}",
-            uniqueness::standing(effect, result.candidates_detectable)
-        );
-        for alias in &effect.aliases {
-            say!("     or {}  ({})", alias.meaning, name(alias));
-        }
-        for sentence in uniqueness::tests(effect, name) {
-            say!("   {sentence}");
-        }
-    }
-    for rejected in &result.rejected_candidates {
-        say!(
-            "\nNot claimed: {} (p ≤ {:.3}); the held-out rms falls by {:.4} µm, with a standard error of {:.4} µm",
-            name(&rejected.name),
-            rejected.p_value,
-            rejected.heldout_decrease_um,
-            rejected.u_heldout_decrease_um
-        );
-    }
-    if result.remainder.structured {
-        say!(
-            "\nStructure remains (p ≤ {:.3}): {}",
-            result.remainder.p_value,
-            result.remainder.place.as_deref().unwrap_or("")
-        );
-    }
-    if !result.after.parameters.is_empty() {
-        say!("");
-        fit::print_parameters(&result.after.parameters);
-    }
-    if !result.changed_parameters.is_empty() {
-        say!("\nMoved by more than their uncertainty when the effects were added (the bias before):");
-        for moved in &result.changed_parameters {
-            let (by, u) = table::value_and_u(moved.change, moved.u);
-            say!("  {}  by {by} {} (u {u})", moved.id, moved.unit);
-        }
-    }
-}
-
-/// An effect in words.
-pub fn name(effect: &EffectName) -> String {
-    let order = effect
-        .order
-        .map_or(String::new(), |order| format!(" order {order}"));
-    let tests = if effect.tests.is_empty() {
-        String::new()
-    } else {
-        format!(" in {}", effect.tests.join(", "))
-    };
-    format!(
-        "{} over {}: {}{order}{tests}",
-        effect.component, effect.driver, effect.shape
-    )
 }

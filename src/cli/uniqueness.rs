@@ -1,13 +1,13 @@
-//! Whether the effects that a trace found are the only explanation, and which tests would single them out, in words for terminal and report.
+//! Uniqueness of the effects of a trace, and the tests that separate them from their aliases, in words for terminal and report.
 
 use abbe::identify::results::{EffectName, EffectResult, SeparatingTestResult, TraceResult};
 
-/// Explanations that the headline names.
+/// Explanations named in the headline.
 const MAX_NAMED: usize = 3;
-/// Effects that the headline goes through one by one.
+/// Effects described one by one in the headline.
 const MAX_LISTED: usize = 4;
 
-/// What stands below the verdict; `None` without an effect.
+/// The uniqueness of all effects in one line; `None` without an effect.
 pub fn headline(result: &TraceResult) -> Option<String> {
     let screened = result.candidates_detectable;
     match result.effects.as_slice() {
@@ -50,7 +50,7 @@ pub fn standing(effect: &EffectResult, screened: usize) -> String {
     }
 }
 
-/// The first explanations, and how many more there are. A part of the machine that is the same as before is not named again.
+/// The first explanations and the number of the others. A part of the machine is named once where it repeats.
 fn in_short(effect: &EffectResult) -> String {
     let others = effect.aliases.iter().map(|alias| alias.meaning.as_str());
     let mut part = "";
@@ -75,45 +75,53 @@ fn in_short(effect: &EffectResult) -> String {
     named.join(", or ")
 }
 
-/// For each proposed test a sentence that says which of the aliases it separates.
+/// One sentence per proposed test, with the aliases that it separates; then the aliases that no proposed test separates.
 pub fn tests(effect: &EffectResult, name: impl Fn(&EffectName) -> String) -> Vec<String> {
-    let sentence = |(k, test): (usize, &SeparatingTestResult)| {
-        let first = if k == 0 { "" } else { "after that, " };
-        let all = if test.separated_count == test.alternative_count {
-            "all "
-        } else {
-            ""
-        };
-        let of_them = match (k, test.alternative_count) {
-            (0, 1) => "the other".to_string(),
-            (0, of) if test.separated_count == of => format!("{of} others"),
-            (0, of) => format!("{} of {of} others", test.separated_count),
-            (_, 1) => "the one that is left".to_string(),
-            (_, of) if test.separated_count == of => format!("{of} that are left"),
-            (_, of) => format!("{} of {of} that are left", test.separated_count),
-        };
-        let all = if test.alternative_count == 1 { "" } else { all };
-        let separated = || test.alternatives.iter().filter(|one| one.separated);
-        let after = separated()
-            .map(|one| one.after_sigma)
-            .fold(f64::INFINITY, f64::min);
-        let before = separated().map(|one| one.before_sigma).fold(0.0, f64::max);
-        format!(
-            "{first}{} separates it from {all}{of_them}, in {:.0} min: by {after:.1} standard deviations or more, {before:.1} or less without it",
-            test.test, test.duration_min
-        )
-    };
-    let mut sentences: Vec<String> = effect.separating_tests.iter().enumerate().map(sentence).collect();
+    let mut sentences: Vec<String> = (effect.separating_tests.iter().enumerate())
+        .map(|(k, test)| sentence(test, k > 0))
+        .collect();
     if let Some(last) = effect.separating_tests.last() {
-        let left: Vec<String> = (last.alternatives.iter())
-            .filter(|one| !one.separated)
-            .map(|one| name(&one.name))
+        let remaining: Vec<String> = (last.alternatives.iter())
+            .filter(|alternative| !alternative.separated)
+            .map(|alternative| name(&alternative.name))
             .collect();
-        if !left.is_empty() {
-            sentences.push(format!("no proposed test separates it from {}", left.join("; ")));
+        if !remaining.is_empty() {
+            sentences.push(format!(
+                "no proposed test separates it from {}",
+                remaining.join("; ")
+            ));
         }
     } else if !effect.unique {
-        sentences.push("no test is proposed that separates it from the others".to_string());
+        sentences.push("no test is proposed that separates it from its aliases".to_string());
     }
     sentences
+}
+
+/// A proposed test and the aliases that it separates; a `further` one, those that the tests before it leave.
+fn sentence(test: &SeparatingTestResult, further: bool) -> String {
+    let (then, remaining) = if further {
+        ("then ", "remaining ")
+    } else {
+        ("", "")
+    };
+    let aliases = match (test.separated_count, test.alternative_count) {
+        (_, 1) => format!("the {remaining}alias"),
+        (separates, of) if separates == of => format!("all {of} {remaining}aliases"),
+        (separates, of) => format!("{separates} of {of} {remaining}aliases"),
+    };
+    let separated = || {
+        test.alternatives
+            .iter()
+            .filter(|alternative| alternative.separated)
+    };
+    let after = separated()
+        .map(|alternative| alternative.after_sigma)
+        .fold(f64::INFINITY, f64::min);
+    let before = separated()
+        .map(|alternative| alternative.before_sigma)
+        .fold(0.0, f64::max);
+    format!(
+        "{then}{} separates it from {aliases} in {:.0} min: by at least {after:.1} standard deviations, without the test by at most {before:.1}",
+        test.test, test.duration_min
+    )
 }

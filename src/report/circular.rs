@@ -1,40 +1,40 @@
-//! Ball-bar figures of ISO 230-4 and the classical diagnosis.
+//! Ball-bar figures by ISO 230-4, and the diagnosis of machine faults.
 //!
-//! The edition of 2022 speaks of circular and radial *errors* where that of 2005 had *deviations*; the symbols are those of 2005. Hysteresis was left out
-//! after the edition of 1996.
+//! ISO 230-4:2022 uses the terms circular and radial *error*. The edition of 2005 used *deviation*, and the symbols are from there. The hysteresis is
+//! from the edition of 1996.
 
 use abbe::identify::circular::CircularTest;
 use maud::{Markup, html};
 
 use super::document::{list, table};
-use super::readings::{typeset, um};
+use super::format::{typeset, um};
 use crate::cli::circular::{FAULTS, fault_rows, heading};
 
-/// A part for each test.
+/// Figures and diagnosis of each test.
 pub fn section(tests: &[CircularTest]) -> Markup {
     html! {
         p {
-            "ISO 230-4:2022 by name, symbols of the edition of 2005 in brackets; µm. Figures are of the readings as they are: nothing that the fit identifies is taken off. \
-             Centre and range are those of the least-squares circle."
+            "Terms of ISO 230-4:2022, symbols of the edition of 2005 in brackets; all figures in µm. The figures describe the readings without any correction \
+             by the fit. Centre and radius are those of the least-squares circle."
         }
         @for test in tests {
             h3 { (heading(test)) }
             (table(
-                &["direction", "runs", "circular error (G)", "radial error, greatest (F max)", "radial error, least (F min)"],
+                &["direction", "runs", "circular error (G)", "maximum radial error (F max)", "minimum radial error (F min)"],
                 &typeset(crate::cli::circular::direction_rows(test)),
             ))
             @let both = both(test);
             @if !both.is_empty() { (table(&["both directions", "µm"], &typeset(both))) }
             @if !test.diagnosis.is_empty() {
                 (table(&FAULTS, &typeset(test.diagnosis.iter().flat_map(fault_rows).collect())))
-                @if let Some(rms) = test.diagnosis_rms_um { p { "The faults leave " (um(rms)) " rms." } }
+                @if let Some(rms) = test.diagnosis_rms_um { p { "Residual after the diagnosis: " (um(rms)) " rms." } }
             }
             @if !test.not_identifiable.is_empty() { (list(test.not_identifiable.iter().cloned())) }
         }
     }
 }
 
-/// The figures of both directions together.
+/// Figures of both directions together.
 fn both(test: &CircularTest) -> Vec<Vec<String>> {
     [
         (

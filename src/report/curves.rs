@@ -1,53 +1,56 @@
-//! Plots of what stands behind the readings: orders, lengths, and what one error at a time does.
+//! Plots of derived quantities: histogram and time series of the residual, spectra, and sensitivities to single errors.
 
 use abbe::identify::IdentifyError;
 use abbe::identify::heldout::FoldKind;
 use abbe::identify::problem::Problem;
 use abbe::identify::series::lengths;
-use abbe::identify::series::sensitivities::{self, Sensitivity, TestSensitivities};
+use abbe::identify::series::sensitivities::{self as sensitivity, Sensitivity, TestSensitivities};
 use abbe::identify::series::spectrum::Spectrum;
 use abbe::model::effect::shape::Harmonic;
 use abbe::model::effect::{Effect, Shape};
+use abbe::model::words::counted;
 use maud::{Markup, html};
 
 use super::decimate;
 use super::document::Document;
+use super::format::{unit, units};
 use super::plot::bars::{Fill, bars};
 use super::plot::lines::{ACROSS, Lines, Mark, Series, UP, span};
-use super::plot::polar::{Round, Trace, drawing};
-use super::plot::scale::{Scale, place, polyline, text};
-use super::plot::{Plot, cut};
-use super::plots::{Drawn, MAX_TESTS};
-use super::readings::unit;
+use super::plot::polar::{PolarSize, Traversal, drawing};
+use super::plot::scale::{Scale, coordinate, polyline, text};
+use super::plot::{Plot, shortened};
+use super::plots::{MAX_TESTS, SessionPlots};
 
-/// Strips of a plot over time.
-const TIME_STRIPS: usize = 240;
-/// Strips of a test at least.
-const MIN_STRIPS: usize = 12;
+/// Intervals of a plot over time.
+const TIME_INTERVALS: usize = 240;
+/// Minimum number of intervals of a test.
+const MIN_INTERVALS: usize = 12;
+/// Labels to the right of this coordinate are aligned to the right.
+const LABEL_LIMIT: f64 = ACROSS[1] - 144.0;
 
-/// How many readings have how long a residual.
-pub fn histogram(drawn: &Drawn<'_>, words: [&str; 2]) -> Plot {
+/// Histogram of the absolute residual before and after.
+pub fn histogram(session: &SessionPlots<'_>, models: [&str; 2]) -> Plot {
     const CLASSES: usize = 60;
     let all = |after: bool| -> Vec<f64> {
-        drawn
-            .views
+        session
+            .series
             .tests
             .iter()
             .flat_map(|test| {
                 let values = if after { &test.after_um } else { &test.before_um };
-                lengths(values, drawn.views.coordinates)
+                lengths(values, session.series.coordinates)
             })
             .map(f64::abs)
             .collect()
     };
     let [before, after] = [all(false), all(true)];
-    let most = before.iter().chain(&after).copied().fold(0.0, f64::max);
+    let maximum = before.iter().chain(&after).copied().fold(0.0, f64::max);
     let counted = |values: &[f64]| -> Vec<(f64, f64)> {
         let mut counts = vec![0.0; CLASSES];
         for value in values {
-            counts[((value / most * CLASSES as f64) as usize).min(CLASSES - 1)] += 1.0;
+            counts[((value / maximum * CLASSES as f64) as usize).min(CLASSES - 1)] += 1.0;
         }
-        let width = most / CLASSES as f64;
+        let width = maximum / CLASSES as f64;
         let steps = counts
             .into_iter()
             .enumerate()
@@ -58,83 +61,86 @@ pub fn histogram(drawn: &Drawn<'_>, words: [&str; 2]) -> Plot {
     let highest = before.iter().chain(&after).map(|p| p.1).fold(0.0, f64::max);
     Lines {
         name: "residual-lengths".to_string(),
-        title: "How many readings have how large a residual".to_string(),
-        caption: "All tests together.".to_string(),
-        x: (Scale::over(0.0, most, ACROSS, 7), "residual, µm".to_string()),
+        title: "Distribution of the residual".to_string(),
+        caption: "Absolute residual of all tests.".to_string(),
+        x: (Scale::over(0.0, maximum, ACROSS, 7), "residual, µm".to_string()),
         y: (Scale::rounded(0.0, highest, UP, 5), "readings".to_string()),
         series: vec![
             Series {
                 class: "before",
-                live: None,
+                source: None,
                 mark: Mark::Line,
                 points: before,
             },
             Series {
                 class: "after",
-                live: None,
+                source: None,
                 mark: Mark::Line,
                 points: after,
             },
         ],
-        legend: vec![("before", words[0].to_string()), ("after", words[1].to_string())],
+        legend: vec![
+            ("before", models[0].to_string()),
+            ("after", models[1].to_string()),
+        ],
         over: html! {},
     }
     .plot()
 }
 
-/// Residuals of the whole session over time, or in the order of the readings where there is no time.
-pub fn over_time(drawn: &Drawn<'_>) -> Plot {
-    let timed = drawn
+/// Residuals of the session over time. Without time: in the order of the readings.
+pub fn over_time(session: &SessionPlots<'_>) -> Plot {
+    let has_time = session
         .problem
         .tests
         .iter()
         .all(|test| test.readings.as_ref().is_some_and(|r| !r.time_s.is_empty()));
-    // Time, before and after of each test, and the classes by which the page switches it off.
+    // Time, residual before and residual after of each test. The script of the page hides a test by its class.
     let mut tests: Vec<[Vec<f64>; 3]> = Vec::new();
-    let mut past = 0;
-    for (test, view) in drawn.problem.tests.iter().zip(&drawn.views.tests) {
+    let mut preceding = 0;
+    for (test, view) in session.problem.tests.iter().zip(&session.series.tests) {
         let Some(readings) = &test.readings else { continue };
-        let time = if timed {
-            let minutes = |t: &f64| (t - drawn.problem.origin.time_s) / 60.0;
+        let time = if has_time {
+            let minutes = |t: &f64| (t - session.problem.origin.time_s) / 60.0;
             readings.time_s.iter().map(minutes).collect()
         } else {
-            (past..past + readings.rows())
+            (preceding..preceding + readings.rows())
                 .map(|row| row as f64 + 1.0)
                 .collect()
         };
-        past += readings.rows();
-        let of = |values: &[f64]| lengths(values, drawn.views.coordinates);
+        preceding += readings.rows();
+        let of = |values: &[f64]| lengths(values, session.series.coordinates);
         tests.push([time, of(&view.before_um), of(&view.after_um)]);
     }
     let classes: Vec<[String; 2]> = (0..tests.len())
         .map(|test| ["before", "after"].map(|when| format!("{when} of-test-{test}")))
         .collect();
-    let strips = (TIME_STRIPS / tests.len().max(1)).max(MIN_STRIPS);
+    let intervals = (TIME_INTERVALS / tests.len().max(1)).max(MIN_INTERVALS);
     let of = |time: &[f64], values: &[f64]| -> Vec<(f64, f64)> {
-        let strips = decimate::strips(time, values, strips);
-        strips
+        let extremes = decimate::interval_extremes(time, values, intervals);
+        extremes
             .into_iter()
-            .flat_map(|(at, low, high)| [(at, low), (at, high)])
+            .flat_map(|(centre, minimum, maximum)| [(centre, minimum), (centre, maximum)])
             .collect()
     };
     let all = |column: usize| tests.iter().flat_map(move |test| test[column].iter().copied());
     let [low, high] = span(all(0));
-    let [least, most] = span(all(1).chain(all(2)));
-    let (what, unit) = if timed {
+    let [minimum, maximum] = span(all(1).chain(all(2)));
+    let (abscissa, unit) = if has_time {
         ("time", "min")
     } else {
         ("reading", "in the order of the files")
     };
     Lines {
         name: "residual-over-time".to_string(),
-        title: format!("Residual against {what}"),
+        title: format!("Residual against {abscissa}"),
         caption:
-            "All tests one after another: drift, and what comes and goes. Before (red) and after (blue). The switches of the traces take tests out here too."
+            "All tests, minimum to maximum of each interval. Before: red. After: blue. The test switches of the traces apply here too."
                 .to_string(),
-        x: (Scale::over(low, high, ACROSS, 7), format!("{what}, {unit}")),
+        x: (Scale::over(low, high, ACROSS, 7), format!("{abscissa}, {unit}")),
         y: (
-            Scale::rounded(least.min(0.0), most.max(0.0), UP, 6),
-            if drawn.views.coordinates == 3 {
+            Scale::rounded(minimum.min(0.0), maximum.max(0.0), UP, 6),
+            if session.series.coordinates == 3 {
                 "length of the residual, µm".to_string()
             } else {
                 "residual, µm".to_string()
@@ -146,7 +152,7 @@ pub fn over_time(drawn: &Drawn<'_>) -> Plot {
                 let of = &of;
                 tests.iter().zip(&classes).map(move |(test, class)| Series {
                     class: &class[when],
-                    live: None,
+                    source: None,
                     mark: Mark::Bars,
                     points: of(&test[0], &test[1 + when]),
                 })
@@ -158,15 +164,15 @@ pub fn over_time(drawn: &Drawn<'_>) -> Plot {
     .plot()
 }
 
-/// A residual by order; `highest` is the greatest amplitude of all that are drawn beside it.
-pub fn spectrum_plot(spectrum: &Spectrum, highest: f64, effects: &[Effect]) -> Plot {
+/// Amplitude spectrum of the residual of a test. `maximum` is the largest amplitude of all spectra, so that they share one scale.
+pub fn spectrum_plot(spectrum: &Spectrum, maximum: f64, effects: &[Effect]) -> Plot {
     let orders = spectrum.before_um.len() as f64;
     let x = Scale {
         step: 5.0,
         ..Scale::over(0.0, orders + 1.0, ACROSS, 8)
     };
-    // A fifth of the height stays free for the names of found orders.
-    let y = Scale::over(0.0, (highest * 1.25).max(1e-6), UP, 5);
+    // The upper fifth is left free for the names of found effects.
+    let y = Scale::over(0.0, (maximum * 1.25).max(1e-6), UP, 5);
     let stems = |values: &[f64], shift: f64| -> Vec<(f64, f64)> {
         values
             .iter()
@@ -186,13 +192,13 @@ pub fn spectrum_plot(spectrum: &Spectrum, highest: f64, effects: &[Effect]) -> P
     found.sort_by(|a, b| a.0.total_cmp(&b.0));
     let over = html! {
         @for (number, (order, id)) in found.iter().enumerate() {
-            @let (at, down) = (x.at(*order), UP[1] + 12.0 + 12.0 * (number % 3) as f64);
-            @let id_stem = spectrum.before_um.iter().zip(&spectrum.after_um).nth((order.round() as usize).saturating_sub(1));
-            @let top = y.at(id_stem.map_or(0.0, |(before, after)| before.max(*after)));
-            path class="found-line" d=(polyline([(at, (top - 3.0).max(down + 2.0)), (at, down + 2.0)])) {}
-            path class="found" d=(format!("M{} {}l-4 8h8z", place(at), UP[0])) {}
-            text class=(if at > 400.0 { "small right" } else { "small" }) x=(place(if at > 400.0 { at - 4.0 } else { at + 4.0 })) y=(place(down)) {
-                title { (id) } (cut(id, 24))
+            @let (at, baseline) = (x.at(*order), UP[1] + 12.0 + 12.0 * (number % 3) as f64);
+            @let stem = spectrum.before_um.iter().zip(&spectrum.after_um).nth((order.round() as usize).saturating_sub(1));
+            @let top = y.at(stem.map_or(0.0, |(before, after)| before.max(*after)));
+            path class="found-line" d=(polyline([(at, (top - 3.0).max(baseline + 2.0)), (at, baseline + 2.0)])) {}
+            path class="found" d=(format!("M{} {}l-4 8h8z", coordinate(at), UP[0])) {}
+            text class=(if at > LABEL_LIMIT { "small right" } else { "small" }) x=(coordinate(if at > LABEL_LIMIT { at - 4.0 } else { at + 4.0 })) y=(coordinate(baseline)) {
+                title { (id) } (shortened(id, 24))
             }
         }
     };
@@ -202,20 +208,20 @@ pub fn spectrum_plot(spectrum: &Spectrum, highest: f64, effects: &[Effect]) -> P
     }
     Lines {
         name: format!("spectrum-{}-{}", spectrum.of, spectrum.over),
-        title: format!("{}: residual by order over {}", spectrum.of, spectrum.over),
-        caption: "Amplitude of the wave that each order explains by itself.".to_string(),
-        x: (x, format!("order, cycles a turn of {}", spectrum.over)),
+        title: format!("{}: spectrum of the residual over {}", spectrum.of, spectrum.over),
+        caption: "Amplitude of a sine and cosine of each order, fitted separately.".to_string(),
+        x: (x, format!("order, cycles per turn of {}", spectrum.over)),
         y: (y, "amplitude, µm".to_string()),
         series: vec![
             Series {
                 class: "before",
-                live: None,
+                source: None,
                 mark: Mark::Stems,
                 points: stems(&spectrum.before_um, -0.16),
             },
             Series {
                 class: "after",
-                live: None,
+                source: None,
                 mark: Mark::Stems,
                 points: stems(&spectrum.after_um, 0.16),
             },
@@ -226,30 +232,32 @@ pub fn spectrum_plot(spectrum: &Spectrum, highest: f64, effects: &[Effect]) -> P
     .plot()
 }
 
-/// What one error at a time does to each test: 10 µm and 0.01° (Table 3.1 of the thesis), 5 µm per division (its Figs. 3.7, 3.8); coordinates of a vector
-/// as curves, and among poses by how much.
+/// Effect of single errors on each test: 10 µm and 0.01° (Table 3.1 of Jiang (2014)) at 5 µm per division (Figs. 3.7 and 3.8 there). Instruments with three
+/// coordinates have curves of each coordinate. Separate poses have one RMS sensitivity per error.
+///
+/// Jiang (2014): Xiaogeng Jiang, *Characterising Geometric Errors in Rotary Axes of 5-axis Machine Tools*, PhD thesis, University of Birmingham, 2014.
 ///
 /// # Errors
 /// If the model cannot be evaluated.
-pub fn patterns(
+pub fn sensitivities(
     document: &mut Document,
     problem: &Problem<'_>,
     beta: &[f64],
 ) -> Result<Markup, IdentifyError> {
     const DIVISION_UM: f64 = 5.0;
     if problem.folds.kind == FoldKind::Poses {
-        let plots = over_poses(&sensitivities::over_poses(problem, beta)?);
+        let plots = pose_sensitivities(&sensitivity::over_poses(problem, beta)?);
         return Ok(document.show(plots));
     }
     let mut plots = Vec::new();
-    let found = sensitivities::sensitivities(problem, beta)?;
+    let found = sensitivity::sensitivities(problem, beta)?;
     for test in found.iter().take(MAX_TESTS * problem.coordinates()) {
         if test.columns.is_empty() {
             continue;
         }
         if test.way.is_angle && test.coordinate.is_none() {
             for chunk in test.columns.chunks(12) {
-                plots.push(small_circles(test, chunk, DIVISION_UM));
+                plots.push(polar_sensitivities(test, chunk, DIVISION_UM));
             }
         }
         for chunk in test.columns.chunks(8) {
@@ -259,30 +267,30 @@ pub fn patterns(
     Ok(document.show(plots))
 }
 
-/// How far each error moves the readings of poses, unit by unit, the greatest first.
-fn over_poses(found: &[Sensitivity]) -> Vec<Plot> {
+/// RMS sensitivity of the readings of separate poses to each error, by unit, in descending order.
+fn pose_sensitivities(found: &[Sensitivity]) -> Vec<Plot> {
     const MAX: usize = 40;
-    let mut units: Vec<&str> = found.iter().map(|error| error.unit.as_str()).collect();
-    units.sort_unstable();
-    units.dedup();
-    units
+    units(found.iter().map(|error| error.unit.as_str()))
         .into_iter()
         .map(|name| {
             let own = found.iter().filter(|error| error.unit == name);
             let mut rows: Vec<(String, f64, Fill)> =
                 own.map(|error| (error.id.clone(), error.values[0], Fill::Named)).collect();
             rows.sort_by(|a, b| b.1.total_cmp(&a.1));
-            let left = rows.len().saturating_sub(MAX);
+            let omitted = rows.len().saturating_sub(MAX);
             rows.truncate(MAX);
-            let caption = match left {
-                0 => "Root mean square over all poses of the length by which a unit moves a reading.".to_string(),
-                left => format!("Root mean square over all poses of the length by which a unit moves a reading; {left} that move it less are left out."),
+            let caption = match omitted {
+                0 => "RMS over all poses of the displacement of a reading per unit of the error.".to_string(),
+                omitted => format!(
+                    "RMS over all poses of the displacement of a reading per unit of the error. {} with smaller sensitivity omitted.",
+                    counted(omitted, "error")
+                ),
             };
             bars(
                 format!("sensitivity-{}", name.replace('/', "-per-")),
                 format!("Sensitivity to errors in {}", unit(name)),
                 caption,
-                &format!("µm for one {}", unit(name)),
+                &format!("µm per {}", unit(name)),
                 &rows,
                 &[],
             )
@@ -290,7 +298,7 @@ fn over_poses(found: &[Sensitivity]) -> Vec<Plot> {
         .collect()
 }
 
-/// By how much an error of this unit is drawn, and in words.
+/// Size of an error in a plot, in this unit and as text.
 fn amount(unit_name: &str) -> Option<(f64, &'static str)> {
     match unit_name {
         "um" => Some((10.0, "10 µm")),
@@ -299,43 +307,43 @@ fn amount(unit_name: &str) -> Option<(f64, &'static str)> {
     }
 }
 
-fn small_circles(test: &TestSensitivities, columns: &[Sensitivity], um: f64) -> Plot {
-    let round = Round::SMALL;
-    let across = 3;
+fn polar_sensitivities(test: &TestSensitivities, columns: &[Sensitivity], um: f64) -> Plot {
+    let size = PolarSize::SMALL;
+    let per_row = 3;
     let drawn: Vec<_> = columns
         .iter()
         .filter_map(|c| Some((c, amount(&c.unit)?)))
         .collect();
-    let rows = drawn.len().div_ceil(across).max(1);
-    let high = round.side + 22.0;
+    let rows = drawn.len().div_ceil(per_row).max(1);
+    let row_height = size.side + 22.0;
     let inner = html! {
-        @for (number, (column, (size, words))) in drawn.iter().enumerate() {
-            @let x = (number % across) as f64 * round.side;
-            @let y = (number / across) as f64 * high;
+        @for (number, (column, (amount, label))) in drawn.iter().enumerate() {
+            @let x = (number % per_row) as f64 * size.side;
+            @let y = (number / per_row) as f64 * row_height;
             g transform=(format!("translate({x} {y})")) {
-                @let points = test.way.values.iter().zip(&column.values).map(|(angle, value)| (*angle, value * size)).collect();
-                (drawing(round, um, &[Trace { class: "forward", number: None, points }]))
-                text class="middle" x=(round.side / 2.0) y=(round.side + 8.0) { (cut(&column.id, 18)) " = " (words) }
+                @let points = test.way.values.iter().zip(&column.values).map(|(angle, value)| (*angle, value * amount)).collect();
+                (drawing(size, um, &[Traversal { class: "forward", index: None, points }]))
+                text class="middle" x=(size.side / 2.0) y=(size.side + 8.0) { (shortened(&column.id, 18)) " = " (label) }
             }
         }
     };
-    Plot::still(
+    Plot::new(
         format!("patterns-{}", test.test),
-        format!("{}: the trace of one error at a time", test.test),
+        format!("{}: deviation caused by single errors", test.test),
         format!(
-            "{} µm per division; first order. What no reading of the test changes with is left out.",
+            "{} µm per division, first order. Errors without influence on the test are omitted.",
             text(um, um)
         ),
-        [round.side * across as f64, high * rows as f64 + 6.0],
+        [super::plot::WIDTH, row_height * rows as f64 + 6.0],
         inner,
     )
 }
 
 fn curves(test: &TestSensitivities, columns: &[Sensitivity]) -> Plot {
     const CLASSES: [&str; 8] = ["c0", "c1", "c2", "c3", "c4", "c5", "c6", "c7"];
-    let ways = span(test.way.values.iter().copied());
+    let range = span(test.way.values.iter().copied());
     let values = span(columns.iter().flat_map(|c| c.values.iter().copied()));
-    let x = Scale::over(ways[0], ways[1], ACROSS, 9);
+    let x = Scale::over(range[0], range[1], ACROSS, 9);
     let x = if test.way.is_angle { x.in_degrees() } else { x };
     let points = |column: &Sensitivity| {
         test.way
@@ -345,7 +353,7 @@ fn curves(test: &TestSensitivities, columns: &[Sensitivity]) -> Plot {
             .zip(column.values.iter().copied())
             .collect()
     };
-    let (name, what) = match test.coordinate {
+    let (name, title) = match test.coordinate {
         Some(coordinate) => (
             format!("{}-{coordinate}", test.test),
             format!("{}: sensitivity of {coordinate}", test.test),
@@ -354,8 +362,8 @@ fn curves(test: &TestSensitivities, columns: &[Sensitivity]) -> Plot {
     };
     Lines {
         name: format!("sensitivity-{name}"),
-        title: what,
-        caption: "µm of reading per unit of each error, along the first run.".to_string(),
+        title,
+        caption: "Change of the reading per unit of each error, along the first run.".to_string(),
         x: (
             x,
             format!(
@@ -373,7 +381,7 @@ fn curves(test: &TestSensitivities, columns: &[Sensitivity]) -> Plot {
             .zip(CLASSES)
             .map(|(column, class)| Series {
                 class,
-                live: None,
+                source: None,
                 mark: Mark::Line,
                 points: points(column),
             })
@@ -381,7 +389,7 @@ fn curves(test: &TestSensitivities, columns: &[Sensitivity]) -> Plot {
         legend: columns
             .iter()
             .zip(CLASSES)
-            .map(|(c, class)| (class, format!("{}, per {}", cut(&c.id, 20), unit(&c.unit))))
+            .map(|(c, class)| (class, format!("{}, per {}", shortened(&c.id, 20), unit(&c.unit))))
             .collect(),
         over: html! {},
     }

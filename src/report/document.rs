@@ -1,27 +1,55 @@
-//! A report while it grows: sections in order, and every plot that is in one of them.
+//! Contents of a report: title, summary, sections and plots.
 
 use maud::{Markup, html};
 use serde_json::Value;
 
 use super::plot::Plot;
 
-/// A report.
+/// A word column with a longer cell than this wraps.
+const MAX_UNWRAPPED: usize = 26;
+
+/// The contents of a report, independent of the page around it.
 #[derive(Default)]
 pub struct Document {
-    /// What it is about.
+    /// Title.
     pub title: String,
-    /// The outcome in one word, where there is one.
+    /// Verdict in one word. Empty if the command has none.
     pub word: String,
-    /// The outcome in a sentence.
+    /// Verdict in one or two sentences.
     pub verdict: String,
-    /// Sections: anchor, heading, contents.
+    /// Key figures of the summary.
+    pub figures: Vec<KeyFigure>,
+    /// Warnings, shown below the key figures.
+    pub warnings: Vec<String>,
+    /// Sections in order: anchor, heading, contents.
     pub sections: Vec<(String, String, Markup)>,
-    /// The plots that are in them.
+    /// All plots of the sections.
     pub plots: Vec<Plot>,
-    /// What the page moves; null for a page that stands still.
+    /// Data of the interactive plots. Null if the page has none.
     pub data: Value,
-    /// All readings, as CSV.
-    pub table: String,
+    /// All readings as CSV.
+    pub csv: String,
+}
+
+/// A key figure of the summary.
+pub struct KeyFigure {
+    /// What the figure is.
+    pub label: &'static str,
+    /// The figure with its unit.
+    pub value: String,
+    /// What the figure is compared with.
+    pub note: String,
+}
+
+impl KeyFigure {
+    /// A key figure.
+    pub fn new(label: &'static str, value: impl Into<String>, note: impl Into<String>) -> KeyFigure {
+        KeyFigure {
+            label,
+            value: value.into(),
+            note: note.into(),
+        }
+    }
 }
 
 impl Document {
@@ -31,23 +59,53 @@ impl Document {
         self.sections.push((anchor, heading.to_string(), contents));
     }
 
-    /// Takes plots up and lays them beside one another.
+    /// Adds plots to the document and returns their figures. Plots of one width stand in columns; plots of several widths share rows.
     pub fn show(&mut self, plots: impl IntoIterator<Item = Plot>) -> Markup {
         let plots: Vec<Plot> = plots.into_iter().collect();
+        let widths: Vec<f64> = plots.iter().map(|plot| plot.size[0]).collect();
+        let is_mixed = widths.windows(2).any(|pair| pair[0] != pair[1]);
+        let layout = if is_mixed {
+            "figures row"
+        } else {
+            "figures columns"
+        };
+        let width = widths.first().copied().unwrap_or_default();
         let markup = html! {
-            div class="figures" { @for plot in &plots { (plot.figure()) } }
+            @if !plots.is_empty() {
+                div class=(layout) style=(format!("--width:{width}")) { @for plot in &plots { (plot.figure()) } }
+            }
         };
         for plot in plots {
-            self.take(plot);
+            self.add(plot);
         }
         markup
     }
 
-    /// Takes a plot up under a name that no other has.
-    fn take(&mut self, mut plot: Plot) {
+    /// Adds plots to the document and returns their figures in two groups, one beside the other on a wide page.
+    pub fn show_beside(
+        &mut self,
+        left: impl IntoIterator<Item = Plot>,
+        right: impl IntoIterator<Item = Plot>,
+    ) -> Markup {
+        let [left, right] = [
+            left.into_iter().collect(),
+            right.into_iter().collect::<Vec<Plot>>(),
+        ];
+        let markup = html! {
+            div class="beside" {
+                div class="figures row" { @for plot in &left { (plot.figure()) } }
+                div class="figures stack" { @for plot in &right { (plot.figure()) } }
+            }
+        };
+        left.into_iter().chain(right).for_each(|plot| self.add(plot));
+        markup
+    }
+
+    /// Adds a plot under a unique name.
+    fn add(&mut self, mut plot: Plot) {
         let wanted = plot.name.clone();
         let mut number = 2;
-        // File systems that do not tell A from a are the commonest.
+        // Names differ by more than case, because many file systems ignore case.
         while self
             .plots
             .iter()
@@ -60,14 +118,10 @@ impl Document {
     }
 }
 
-/// A table: header, rows; columns of words to the left, of numbers to the right.
+/// A table. Columns of words are aligned to the left, columns of numbers to the right.
 pub fn table(header: &[&str], rows: &[Vec<String>]) -> Markup {
-    let is_word = |cell: &String| cell.starts_with(char::is_alphabetic);
     let class: Vec<Option<&str>> = (0..header.len())
-        .map(|column| {
-            let words = rows.iter().any(|row| row.get(column).is_some_and(is_word));
-            words.then_some("word-column")
-        })
+        .map(|column| column_class(rows, column))
         .collect();
     html! {
         div class="scroll" {
@@ -79,7 +133,25 @@ pub fn table(header: &[&str], rows: &[Vec<String>]) -> Markup {
     }
 }
 
-/// Words in which what stands between backquotes is to be typed.
+/// CSS class of a column: that of words if more cells start with a letter than with anything else.
+fn column_class(rows: &[Vec<String>], column: usize) -> Option<&'static str> {
+    let cells = || {
+        rows.iter()
+            .filter_map(|row| row.get(column))
+            .filter(|cell| !cell.is_empty())
+    };
+    let words = cells()
+        .filter(|cell| cell.starts_with(char::is_alphabetic))
+        .count();
+    let is_long = cells().any(|cell| cell.chars().count() > MAX_UNWRAPPED && cell.contains(' '));
+    match (2 * words > cells().count(), is_long) {
+        (true, true) => Some("word-column long"),
+        (true, false) => Some("word-column"),
+        (false, _) => None,
+    }
+}
+
+/// Text in which backquotes mark code.
 pub fn prose(text: &str) -> Markup {
     html! {
         @for (number, part) in text.split('`').enumerate() {
@@ -88,7 +160,20 @@ pub fn prose(text: &str) -> Markup {
     }
 }
 
-/// Sentences, one a line.
+/// A list of sentences.
 pub fn list(items: impl IntoIterator<Item = String>) -> Markup {
     html! { ul { @for item in items { li { (prose(&item)) } } } }
+}
+
+/// Contents that the reader unfolds.
+pub fn folded(summary: &str, contents: &Markup) -> Markup {
+    html! { details { summary { (summary) } (contents) } }
+}
+
+/// Text with a capital first letter.
+pub fn capitalised(text: &str) -> String {
+    let mut letters = text.chars();
+    letters.next().map_or(String::new(), |first| {
+        first.to_uppercase().chain(letters).collect()
+    })
 }

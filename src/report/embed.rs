@@ -1,4 +1,4 @@
-//! The data that the page brings along: what is drawn as whole numbers of two bytes with a scale, all readings as compressed CSV.
+//! Data inside the page: the drawn readings as scaled 16-bit integers, and all readings as compressed CSV.
 
 use std::fmt::Write as _;
 use std::io::Write as _;
@@ -8,12 +8,13 @@ use base64::Engine;
 use base64::engine::general_purpose::STANDARD;
 use serde_json::{Value, json};
 
-use super::plots::{Column, Drawn, axes_of};
+use super::abscissae::axes_of;
+use super::plots::{Column, SessionPlots};
 
-/// The most errors and effects that get a slider.
+/// Maximum number of sliders.
 pub const MAX_SLIDERS: usize = 40;
 
-/// Numbers in two bytes each: `offset + scale · k`, `k` from −32767 to 32767.
+/// Encodes numbers as 16-bit integers: `value = offset + scale · k`, `k` from −32767 to 32767.
 fn quantised(values: impl Iterator<Item = f64> + Clone) -> Value {
     let (low, high) = values
         .clone()
@@ -37,14 +38,14 @@ fn quantised(values: impl Iterator<Item = f64> + Clone) -> Value {
     json!({"o": offset, "s": scale, "d": STANDARD.encode(bytes)})
 }
 
-/// The shares that get a slider, the largest first: their places.
-pub fn slider_parameters(drawn: &Drawn<'_>) -> Vec<usize> {
-    let mut chosen: Vec<(f64, usize)> = (0..drawn.views.shares.len())
+/// Indices of the shares with a slider, in descending order of their sum of squares.
+pub fn sliders(session: &SessionPlots<'_>) -> Vec<usize> {
+    let mut chosen: Vec<(f64, usize)> = (0..session.series.shares.len())
         .filter(|k| {
-            let cause = drawn.views.shares[*k].cause;
-            cause != Cause::Setup || drawn.views.coordinates == 1
+            let cause = session.series.shares[*k].cause;
+            cause != Cause::Setup || session.series.coordinates == 1
         })
-        .map(|k| (drawn.views.weight_of(k), k))
+        .map(|k| (session.series.weight_of(k), k))
         .filter(|(weight, _)| *weight > 0.0)
         .collect();
     chosen.sort_by(|a, b| b.0.total_cmp(&a.0));
@@ -52,22 +53,22 @@ pub fn slider_parameters(drawn: &Drawn<'_>) -> Vec<usize> {
     chosen.into_iter().map(|(_, k)| k).collect()
 }
 
-/// What the page moves and shows under the pointer.
-pub fn data(drawn: &Drawn<'_>) -> Value {
-    let coordinates = drawn.views.coordinates;
-    let slider_parameters = slider_parameters(drawn);
-    let tests: Vec<Value> = drawn
+/// Data of the interactive plots.
+pub fn data(session: &SessionPlots<'_>) -> Value {
+    let coordinates = session.series.coordinates;
+    let sliders = sliders(session);
+    let tests: Vec<Value> = session
         .tests()
         .map(|(number, test)| {
-            let readings = drawn.problem.tests[number].readings.as_ref();
-            let axes = axes_of(drawn.problem, test, number);
+            let readings = session.problem.tests[number].readings.as_ref();
+            let axes = axes_of(session.problem, test, number);
             let mut ordinals: Vec<i64> = Vec::new();
-            let stretches: Vec<Value> = test
+            let traversals: Vec<Value> = test
                 .stretches
                 .iter()
                 .enumerate()
                 .map(|(k, stretch)| {
-                    let rows = &drawn.rows[number][k];
+                    let rows = &session.rows[number][k];
                     let ordinal = ordinals.iter().position(|run| *run == stretch.run).unwrap_or_else(|| {
                         ordinals.push(stretch.run);
                         ordinals.len() - 1
@@ -77,7 +78,7 @@ pub fn data(drawn: &Drawn<'_>) -> Value {
                         let all = rows.iter().flat_map(|row| row * coordinates..(row + 1) * coordinates);
                         quantised(all.map(|i| values[i]))
                     };
-                    let along: serde_json::Map<String, Value> = axes
+                    let abscissae: serde_json::Map<String, Value> = axes
                         .iter()
                         .map(|(axis, values)| {
                             let key = if stretch.forward.is_some() { "x" } else { &axis.name };
@@ -88,22 +89,22 @@ pub fn data(drawn: &Drawn<'_>) -> Value {
                         .filter(|r| !r.line.is_empty())
                         .map(|r| quantised(rows.iter().map(|row| r.line[*row] as f64)));
                     json!({
-                        "run": ordinal, "number": stretch.run, "forward": stretch.forward, "n": rows.len(), "along": along, "line": lines,
+                        "run": ordinal, "number": stretch.run, "forward": stretch.forward, "n": rows.len(), "abscissa": abscissae, "line": lines,
                         "deviation": scalars(&test.deviation_um), "before": scalars(&test.before_um), "after": scalars(&test.after_um),
-                        "shares": slider_parameters.iter().map(|s| scalars(&test.shares_um[*s])).collect::<Vec<_>>(),
+                        "shares": sliders.iter().map(|s| scalars(&test.shares_um[*s])).collect::<Vec<_>>(),
                     })
                 })
                 .collect();
             let units: Vec<&str> = axes.iter().map(|(axis, _)| axis.unit).collect();
-            json!({"name": test.name, "over": test.way.name, "units": units, "stretches": stretches})
+            json!({"name": test.name, "over": test.way.name, "units": units, "traversals": traversals})
         })
         .collect();
     json!({"coordinates": coordinates, "tests": tests})
 }
 
 /// All readings as CSV.
-pub fn table(drawn: &Drawn<'_>) -> String {
-    let machine = &drawn.problem.session.machine;
+pub fn csv(session: &SessionPlots<'_>) -> String {
+    let machine = &session.problem.session.machine;
     let mut text = String::from("test,file_line,run,time_s");
     for axis in &machine.axes {
         let unit = if axis.kind == abbe::model::axis::AxisKind::Rotary {
@@ -113,7 +114,7 @@ pub fn table(drawn: &Drawn<'_>) -> String {
         };
         text.push_str(&format!(",{}_{unit}", axis.name));
     }
-    let coordinates = drawn.views.coordinates;
+    let coordinates = session.series.coordinates;
     let names: &[&str] = if coordinates == 3 {
         &["_x", "_y", "_z"]
     } else {
@@ -125,7 +126,7 @@ pub fn table(drawn: &Drawn<'_>) -> String {
         }
     }
     text.push('\n');
-    for (test, view) in drawn.problem.tests.iter().zip(&drawn.views.tests) {
+    for (test, series) in session.problem.tests.iter().zip(&session.series.tests) {
         let Some(readings) = &test.readings else { continue };
         for row in 0..readings.rows() {
             text.push_str(&quoted(&test.name));
@@ -143,11 +144,11 @@ pub fn table(drawn: &Drawn<'_>) -> String {
                 } else {
                     column[row]
                 };
-                // Writing to a string cannot fail.
+                // `write!` to a string always succeeds.
                 let _ = write!(text, ",{value:.5}");
             }
             for column in [Column::Deviation, Column::Before, Column::After] {
-                for value in &column.of(view)[row * coordinates..(row + 1) * coordinates] {
+                for value in &column.of(series)[row * coordinates..(row + 1) * coordinates] {
                     let _ = write!(text, ",{value:.3}");
                 }
             }
@@ -167,8 +168,8 @@ fn quoted(field: &str) -> String {
     }
 }
 
-/// A text, deflated with the header of zlib (what browsers call `deflate`), in base64.
-pub fn packed(text: &str) -> String {
+/// Compresses text in zlib format (`deflate` in browsers) and encodes it in base64.
+pub fn compressed(text: &str) -> String {
     let mut encoder = flate2::write::ZlibEncoder::new(Vec::new(), flate2::Compression::best());
     let whole = encoder.write_all(text.as_bytes()).and_then(|()| encoder.finish());
     whole.map(|bytes| STANDARD.encode(bytes)).unwrap_or_default()
@@ -179,11 +180,11 @@ mod tests {
     use super::*;
 
     #[test]
-    fn two_bytes_hold_a_number_to_a_part_in_65534() {
+    fn sixteen_bits_resolve_one_part_in_65534() {
         let values = [-17.25, 3.5, 48.125, 0.0];
-        let packed = quantised(values.into_iter());
-        let bytes = STANDARD.decode(packed["d"].as_str().unwrap()).unwrap();
-        let number = |key: &str| packed[key].as_f64().unwrap();
+        let encoded = quantised(values.into_iter());
+        let bytes = STANDARD.decode(encoded["d"].as_str().unwrap()).unwrap();
+        let number = |key: &str| encoded[key].as_f64().unwrap();
         for (value, pair) in values.iter().zip(bytes.chunks(2)) {
             let found = number("o") + number("s") * f64::from(i16::from_le_bytes([pair[0], pair[1]]));
             assert!(
@@ -194,10 +195,10 @@ mod tests {
     }
 
     #[test]
-    fn packed_text_comes_back() {
+    fn compressed_text_is_recovered() {
         use std::io::Read as _;
         let text = "test,µm\n\"a,b\",1.25\n".repeat(40);
-        let bytes = STANDARD.decode(packed(&text)).unwrap();
+        let bytes = STANDARD.decode(compressed(&text)).unwrap();
         let mut found = String::new();
         flate2::read::ZlibDecoder::new(bytes.as_slice())
             .read_to_string(&mut found)

@@ -1,26 +1,27 @@
-//! The report of `abbe fit`.
+//! Report of `abbe fit`.
 
 use abbe::identify::IdentifyError;
 use abbe::identify::fit::Fit;
 use abbe::identify::plan::candidate_tests;
 use abbe::identify::problem::Problem;
-use abbe::identify::results::{FitResult, ModelResult};
+use abbe::identify::results::FitResult;
 use abbe::identify::series::{spectrum, views};
 use abbe::model::words::counted;
 use maud::{Markup, html};
 
-use super::document::{Document, prose};
-use super::plausibility;
-use super::plots::Drawn;
-use super::readings::{self, sentence_of_noise, um};
-use super::{circular, curves};
+use super::document::{Document, KeyFigure, prose};
+use super::format::{noise_sentence, um};
+use super::plots::SessionPlots;
+use super::summary::{self, Quality};
+use super::{circular, curves, plausibility, readings, residuals, values};
 
-/// How a fit was made.
+/// Method of a fit.
 pub fn method(result: &FitResult) -> Markup {
     html! {
         p {
-            "Least squares on the kinematic chain, all unknowns at once, in the directions that the readings see; covariance by the law of propagation \
-             of uncertainty (JCGM 100, JCGM 102). " (sentence_of_noise(result.noise_um, &result.noise_source)) "; held out: leaving out " (result.heldout_by) "."
+            "Least squares on the kinematic chain. All parameters are estimated together in the identifiable subspace. The covariance follows from the law of \
+             propagation of uncertainty (JCGM 100, JCGM 102). " (noise_sentence(result.noise_um, &result.noise_source))
+            ". Held-out error: each fold leaves out " (result.heldout_by) "."
         }
     }
 }
@@ -30,117 +31,119 @@ pub fn method(result: &FitResult) -> Markup {
 /// # Errors
 /// If the model cannot be evaluated.
 pub fn document(problem: &Problem<'_>, fit: &Fit, result: &FitResult) -> Result<Document, IdentifyError> {
-    let views = views(problem, fit, None)?;
-    let drawn = Drawn::new(problem, &views);
-    let spectra = spectrum::spectra(problem, &views);
-    let excess = if result.noise_source == "residual" {
-        "The uncertainties follow from this very residual, which cannot say whether the model lacks anything; `abbe trace` looks for that.".to_string()
-    } else if result.u_enlargement > 1.0 {
-        format!(
-            "The residual is {:.2} times what noise would leave: something is missing from the model, and `abbe trace` looks for it.",
-            result.u_enlargement
-        )
-    } else {
-        "The residual is what noise would leave.".to_string()
-    };
+    let series = views(problem, fit, None)?;
+    let session = SessionPlots::new(problem, &series);
+    let spectra = spectrum::spectra(problem, &series);
     let mut document = Document {
         title: format!("Fit of {}", problem.session.machine.name),
-        verdict: format!(
-            "{} of {} unknowns or combinations of them are identified from {}; they leave {} ({} held out). {excess}",
-            result.rank,
-            result.parameter_count,
-            counted(result.readings, "reading"),
-            um(result.rms_um),
-            um(result.heldout_rms_um),
-        ),
+        verdict: verdict(result),
+        figures: figures(problem, result),
+        warnings: result.warnings.clone(),
         ..Document::default()
     };
-    readings::live(&mut document, &drawn, &result.parameters);
+    readings::add_data(&mut document, &session, &result.parameters);
     plausibility::section(&mut document, &result.plausibility);
-    let nominal = nominal_result(&drawn);
-    let fitted = ModelResult {
-        rms_um: result.rms_um,
-        heldout_rms_um: result.heldout_rms_um,
-        rms_3d_um: result.rms_3d_um,
-        heldout_rms_3d_um: result.heldout_rms_3d_um,
-        noise_um: result.noise_um,
-        ..ModelResult::default()
+    let section = values::section(&mut document, problem, &result.parameters, None);
+    document.section("Values", section);
+    let before = if session.is_polar() {
+        "nominal machine and set-up"
+    } else {
+        "nominal machine, fitted set-up"
     };
-    let section = readings::before_and_after(
-        &mut document,
-        &drawn,
-        &[
-            (
-                if drawn.is_round() {
-                    "nominal machine and set-up"
-                } else {
-                    "nominal machine, fitted set-up"
-                },
-                &nominal,
-            ),
-            ("fitted", &fitted),
-        ],
-        [
-            "before, deviation of the nominal machine",
-            "after, residual of the fit",
-        ],
-    );
-    document.section("Before and after", section);
-    let section = readings::traces(&mut document, &drawn);
-    document.section("Traces", section);
-    let section = readings::parameters(&mut document, &result.parameters, None);
-    document.section("Parameters", section);
-    let section = readings::residuals(&mut document, &drawn, &spectra);
+    let section = residuals::section(&mut document, &session, &spectra, [before, "fit"]);
     document.section("Residuals", section);
+    document.section(
+        "Next test",
+        next(result, candidate_tests::has_candidates(problem)),
+    );
+    let section = readings::traces(&mut document, &session);
+    document.section("Traces", section);
     if !result.circular.is_empty() {
         document.section("Ball-bar figures", circular::section(&result.circular));
     }
-    let correlations = readings::correlations(&mut document, problem, fit);
+    let section = readings::correlations(&mut document, problem, fit);
     document.section(
-        "What else it could be",
-        html! {
-            p { "Errors that are strongly correlated are separated only by small differences; a confounded combination is not returned as a number." }
-            (correlations)
-            (readings::unobservable(&result.unobservable))
-        },
+        "Correlation and confounding",
+        html! { (section) (readings::confounded(&result.unobservable)) (readings::outliers(&result.outliers)) },
     );
-    let patterns = curves::patterns(&mut document, problem, &fit.beta)?;
-    document.section(
-        "What to measure next",
-        html! {
-            p {
-                @if result.u_enlargement > 1.0 { (prose("First `abbe trace` on the same session. ")) }
-                @if !candidate_tests::has_candidates(problem) {
-                    @if !result.unobservable.is_empty() {
-                        "A test that makes the rest identifiable has to move what these tests leave standing: "
-                        (result.unobservable.len()) (if result.unobservable.len() == 1 { " combination" } else { " combinations" }) " of parameters."
-                    }
-                } @else if result.unobservable.is_empty() {
-                    (prose("Every parameter is identifiable; `abbe plan SESSION --improve 1` names the test that lowers the uncertainties most."))
-                } @else {
-                    (prose("`abbe plan SESSION --improve 1` names the cheapest test that makes identifiable what these readings do not: "))
-                    (result.unobservable.len()) (if result.unobservable.len() == 1 { " combination." } else { " combinations." })
-                }
-            }
-            (readings::warnings(&result.outliers, &result.warnings))
-        },
-    );
-    document.section("What each error does to each test", patterns);
+    let section = curves::sensitivities(&mut document, problem, &fit.beta)?;
+    document.section("Sensitivity of each test", section);
     let section = readings::machine(&mut document, problem);
     document.section("Machine", section);
     Ok(document)
 }
 
-/// The deviation of the nominal machine as a model; nothing was fitted, so held out is no different.
-fn nominal_result(drawn: &Drawn<'_>) -> ModelResult {
-    let rms_um = drawn.views.rms_before_um(drawn.problem);
-    let rms_3d_um = (drawn.views.coordinates == 3).then(|| rms_um * 3.0_f64.sqrt());
-    ModelResult {
-        rms_um,
-        heldout_rms_um: rms_um,
-        rms_3d_um,
-        heldout_rms_3d_um: rms_3d_um,
-        noise_um: drawn.problem.noise.sigma_mm * 1e3,
-        ..ModelResult::default()
+/// Verdict in two sentences: identifiability, and agreement of residual and noise.
+fn verdict(result: &FitResult) -> String {
+    let identifiable = match result.parameter_count.saturating_sub(result.rank) {
+        0 => format!(
+            "All {} are identifiable.",
+            counted(result.parameter_count, "parameter")
+        ),
+        _ => format!(
+            "{} of {} identifiable (numerical rank {}).",
+            result.identifiable.len(),
+            counted(result.parameter_count, "parameter"),
+            result.rank
+        ),
+    };
+    let agreement = if result.noise_source == "residual" {
+        "The noise is estimated from the residual, so that the residual cannot test the model. `abbe trace` searches for unmodelled effects.".to_string()
+    } else if result.u_enlargement > 1.0 {
+        format!(
+            "The residual exceeds the noise by a factor of {:.2}: the model lacks an effect.",
+            result.u_enlargement
+        )
+    } else {
+        "The residual agrees with the noise.".to_string()
+    };
+    format!("{identifiable} {agreement}")
+}
+
+/// Key figures of the summary.
+fn figures(problem: &Problem<'_>, result: &FitResult) -> Vec<KeyFigure> {
+    let quality = Quality {
+        chi_square: result.chi_square,
+        degrees_of_freedom: result.degrees_of_freedom,
+        heldout_rms_um: result.heldout_rms_um,
+        heldout_rms_3d_um: result.heldout_rms_3d_um,
+        rank: result.rank,
+        parameters: result.parameter_count,
+        noise_um: result.noise_um,
+        noise_source: &result.noise_source,
+    };
+    let mut figures = vec![
+        summary::chi_square(&quality, None),
+        summary::held_out(&quality, None),
+        summary::rank(result.rank, result.parameter_count),
+    ];
+    let length = result.rms_3d_um.map_or("scalar readings".to_string(), |rms| {
+        format!("vector: {}", um(rms))
+    });
+    figures.push(KeyFigure::new("Residual rms", um(result.rms_um), length));
+    figures.push(summary::readings(problem, result.readings, result.outliers.len()));
+    figures
+}
+
+/// Proposals for the next step.
+fn next(result: &FitResult, has_candidates: bool) -> Markup {
+    let remaining = match result.unobservable.len() {
+        1 => "1 null-space direction remains".to_string(),
+        many => format!("{many} null-space directions remain"),
+    };
+    html! {
+        @if result.u_enlargement > 1.0 {
+            p { (prose("Run `abbe trace` on this session first: it searches for the effect behind the residual.")) }
+        }
+        @match (result.unobservable.is_empty(), has_candidates) {
+            (true, true) => p {
+                (prose("All parameters are identifiable. `abbe plan SESSION --improve 1` proposes the test that reduces the uncertainties most."))
+            },
+            (true, false) => p { "All parameters are identifiable." },
+            (false, true) => p {
+                (remaining) (prose(". `abbe plan SESSION --improve 1` proposes the fastest test that makes further parameters identifiable."))
+            },
+            (false, false) => p { (remaining) ". A further test has to move axes that these tests leave at rest." },
+        }
     }
 }

@@ -1,21 +1,23 @@
-//! The report of `abbe fit --method circle|cone|two-plane`.
+//! Report of `abbe fit --method circle|cone|two-plane`.
 
 use abbe::identify::geometric::Comparison;
 use abbe::identify::problem::Problem;
 use maud::{Markup, html};
 
-use super::document::{Document, list, table};
+use super::document::{Document, table};
+use super::format::{noise_sentence, typeset, um, unit, units, value_and_u};
 use super::plot::Plot;
 use super::plot::bars::{Row, Value, values};
-use super::readings::{self, sentence_of_noise, typeset, um, unit, value_and_u};
-use crate::cli::geometric::{error_header, error_rows};
+use super::readings;
+use crate::present::method::{error_header, error_rows};
 
-/// How the errors were found.
+/// Method of the comparison.
 pub fn method(result: &Comparison) -> Markup {
     html! {
         p {
-            "The method of the literature (" (result.method) ") and the full least-squares fit on the same readings. "
-            (sentence_of_noise(result.noise_um, &result.noise_source)) ". Bias: both on noise-free readings that were simulated with the full fit's errors, less those errors."
+            "The " (result.method) " method of the literature and the full least-squares fit, applied to the same readings. "
+            (noise_sentence(result.noise_um, &result.noise_source))
+            ". Bias: both methods are applied to noise-free readings that are simulated with the errors of the full fit; these errors are subtracted."
         }
     }
 }
@@ -24,30 +26,28 @@ pub fn method(result: &Comparison) -> Markup {
 pub fn document(problem: &Problem<'_>, result: &Comparison) -> Document {
     let mut document = Document {
         title: format!(
-            "{}: {} beside the full fit",
+            "{}: {} method and full fit",
             problem.session.machine.name, result.method
         ),
         verdict: format!(
-            "The errors of the {} method leave {} of {} in the tests that it takes; the full fit leaves {} in all tests.",
+            "The {} method reduces the rms residual of its tests from {2} to {1}. The rms residual of the full fit in all tests is {3}.",
             result.method,
             um(result.method_rms_um),
             um(result.nominal_rms_um),
             um(result.rms_um)
         ),
+        warnings: result.warnings.clone(),
         ..Document::default()
     };
     let shown = document.show(plots(result));
     document.section(
-        "Errors by both ways",
+        "Errors by both methods",
         html! {
-            (shown)
             (errors(result))
+            (shown)
         },
     );
-    document.section("Where the axes pass the standing ball", centres(result));
-    if !result.warnings.is_empty() {
-        document.section("Warnings", list(result.warnings.iter().cloned()));
-    }
+    document.section("Axis positions", centres(result));
     let section = readings::machine(&mut document, problem);
     document.section("Machine", section);
     document
@@ -55,10 +55,7 @@ pub fn document(problem: &Problem<'_>, result: &Comparison) -> Document {
 
 fn plots(result: &Comparison) -> Vec<Plot> {
     let value = |value: Option<f64>, u: Option<f64>| Some(Value { value: value?, u: u? });
-    let mut units: Vec<&str> = result.errors.iter().map(|row| row.unit.as_str()).collect();
-    units.sort_unstable();
-    units.dedup();
-    units
+    units(result.errors.iter().map(|row| row.unit.as_str()))
         .into_iter()
         .map(|name| {
             let rows: Vec<Row> = result
@@ -73,9 +70,9 @@ fn plots(result: &Comparison) -> Vec<Plot> {
                 .collect();
             values(
                 format!("errors-{name}"),
-                format!("Errors by both ways, {}", unit(name)),
-                "What a method does not tell has no mark.".to_string(),
-                &unit(name),
+                format!("Errors by both methods, {}", unit(name)),
+                "Whiskers: ± 2 u. An error that a method does not identify has no mark.".to_string(),
+                &format!("value, {}", unit(name)),
                 [&result.method, "full fit"],
                 &rows,
             )
@@ -112,7 +109,7 @@ fn centres(result: &Comparison) -> Markup {
         })
         .collect();
     html! {
-        p { "From their nominal places." }
-        (table(&["test", "centre", "µm", "u (k=1)", "radius, mm", "height of the cone, mm"], &rows))
+        p { "Position of each axis relative to the stationary ball, as deviation from nominal." }
+        (table(&["test", "centre", "µm", "u (k\u{a0}=\u{a0}1)", "radius, mm", "cone height, mm"], &rows))
     }
 }

@@ -1,19 +1,22 @@
-//! Reports: one HTML file that needs nothing else, and its plots by themselves. No mathematics: what is drawn was computed by `identify`.
+//! HTML reports and plots. Each report is one file without external resources. The calculations are in `abbe::identify`.
 //!
-//! - [`document`], [`page`]: sections, and the page around them; [`provenance`]: what it takes to do the same again;
-//! - [`drawn`], [`readings`], [`curves`]: the plots of readings and of what stands behind them; [`thin`]: fewer points, no peak lost; [`embed`]: the
-//!   data that the page brings along;
-//! - [`fit`], [`method`], [`trace`], [`plan`], [`next`], [`plausibility`]: what a report of each command holds;
-//! - [`plot`]: the drawings.
+//! - [`document`], [`page`]: contents of a report, and the page around them. [`provenance`]: inputs, version and command line.
+//! - [`fit`], [`trace`], [`plan`], [`method`], [`next_test`]: the report of each command.
+//! - [`summary`], [`values`], [`residuals`], [`effects`], [`readings`], [`circular`], [`plausibility`]: sections.
+//! - [`plots`], [`curves`]: plots of readings and of derived quantities. [`abscissae`]: what they are plotted against. [`decimate`]: decimation that keeps extremes. [`embed`]: data in the page.
+//! - [`plot`]: types of plots as SVG and PNG. [`format`]: text of values and units.
 //!
-//! Everything goes through templates that escape; only drawings of this module and the page's own style and script are taken as they are.
+//! All text passes through templates that escape markup. Only the SVG drawings, the style sheets and the script of this module are inserted verbatim.
 
+pub mod abscissae;
 pub mod circular;
 pub mod curves;
 pub mod decimate;
 pub mod document;
+pub mod effects;
 pub mod embed;
 pub mod fit;
+pub mod format;
 pub mod method;
 pub mod next_test;
 pub mod page;
@@ -23,4 +26,7 @@ pub mod plot;
 pub mod plots;
 pub mod provenance;
 pub mod readings;
+pub mod residuals;
+pub mod summary;
 pub mod trace;
+pub mod values;

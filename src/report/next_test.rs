@@ -1,4 +1,4 @@
-//! The report of `abbe plan --improve`, `--separate` and `--range`.
+//! Report of `abbe plan --improve`, `--separate` and `--range`.
 
 use abbe::identify::plan::improve::{Improvement, ProposedTest};
 use abbe::identify::plan::range::Shrinkage;
@@ -6,18 +6,19 @@ use abbe::identify::problem::Problem;
 use abbe::model::words::counted;
 use maud::{Markup, html};
 
-use super::document::{Document, list, table};
+use super::document::{Document, capitalised, list, table};
+use super::format::{typeset, unit};
 use super::plot::bars::{Fill, bars};
-use super::readings::{self, typeset};
+use super::readings;
 use crate::cli::plan::improve::{RANGES, range_rows};
 
-/// How tests are proposed.
+/// Method of the proposal.
 pub fn method() -> Markup {
     html! {
         p {
-            "Tests of a menu are judged by what they add to the information of the plan, linearised at the nominal machine: \
-             greedily, then by exchange (Fedorov; Atkinson, \
-             Donev & Tobias 2007, ch. 12). Nothing is refitted."
+            "Each candidate test is rated by the information that it adds to the plan, linearised at the nominal machine. Tests are selected one by one, \
+             then improved by exchange: V. V. Fedorov, Theory of Optimal Experiments, Academic Press, 1972; A. C. Atkinson, A. N. Donev and R. D. Tobias, \
+             Optimum Experimental Designs, with SAS, Oxford University Press, 2007, ch. 12."
         }
     }
 }
@@ -28,20 +29,17 @@ pub fn document(problem: &Problem<'_>, improvement: Option<&Improvement>, ranges
         title: format!("Next test for {}", problem.session.machine.name),
         verdict: match improvement {
             Some(found) => verdict(found),
-            None => format!(
-                "How far the sweeps of {} can shrink.",
-                counted(ranges.len(), "test")
-            ),
+            None => format!("Minimum sweep range of {}.", counted(ranges.len(), "test")),
         },
         ..Document::default()
     };
     if let Some(found) = improvement {
         let section = proposed(&mut document, found);
-        document.section("What to measure next", section);
-        document.section("What it does to the errors", uncertainties(found));
+        document.section("Proposed tests", section);
+        document.section("Uncertainty of each error", uncertainties(found));
     }
     if !ranges.is_empty() {
-        document.section("How far each sweep can shrink", shrinkages(ranges));
+        document.section("Minimum sweep ranges", shrinkages(ranges));
     }
     let section = readings::machine(&mut document, problem);
     document.section("Machine", section);
@@ -51,22 +49,27 @@ pub fn document(problem: &Problem<'_>, improvement: Option<&Improvement>, ranges
 fn verdict(found: &Improvement) -> String {
     match found.steps.as_slice() {
         [] => format!(
-            "None of {} candidate tests improves the {}, {}.",
-            counted(found.candidate_tests, "test"),
-            found.criterion,
+            "None of {} reduces the {}, {}.",
+            counted(found.candidate_tests, "candidate test"),
+            name_of(&found.criterion),
             digits(found.before)
         ),
         [.., last] => format!(
             "{} the {} from {} to {}.",
             match found.steps.len() {
-                1 => format!("One test of {} candidate tests takes", found.candidate_tests),
-                many => format!("{many} tests of {} candidate tests take", found.candidate_tests),
+                1 => format!("1 of {} candidate tests reduces", found.candidate_tests),
+                many => format!("{many} of {} candidate tests reduce", found.candidate_tests),
             },
-            found.criterion,
+            name_of(&found.criterion),
             digits(found.before),
             digits(last.after)
         ),
     }
+}
+
+/// The figure of merit without its units: they differ between the errors.
+fn name_of(figure: &str) -> &str {
+    figure.split(',').next().unwrap_or(figure)
 }
 
 fn proposed(document: &mut Document, found: &Improvement) -> Markup {
@@ -75,16 +78,16 @@ fn proposed(document: &mut Document, found: &Improvement) -> Markup {
         let name = format!("with {}", k + 1);
         (name, step.after, Fill::Named)
     }));
-    // A blind spot has no uncertainty to draw.
+    // An error that is not identifiable has no uncertainty.
     bar_rows.retain(|row| row.1.is_finite());
     let shown = document.show([bars(
         "next-test".to_string(),
-        "The plan with each proposed test".to_string(),
+        "Plan with each proposed test".to_string(),
         format!(
-            "{}; tests are added one after another.",
-            sentence(&found.criterion)
+            "{}. The tests are added one after another.",
+            capitalised(&unit(&found.criterion))
         ),
-        &found.criterion,
+        &unit(&found.criterion),
         &bar_rows,
         &[],
     )]);
@@ -101,19 +104,19 @@ fn proposed(document: &mut Document, found: &Improvement) -> Markup {
         })
         .collect();
     html! {
-        (shown)
         @if !rows.is_empty() {
             (table(
-                &["", "figure with it", "min", "workpiece ball, mm", "spindle ball, mm", "bar, mm", "opens", "test"],
+                &["number", "figure of merit", "duration, min", "workpiece ball, mm", "spindle ball, mm", "bar, mm", "makes identifiable", "test"],
                 &rows,
             ))
         }
+        (shown)
         @if !others.is_empty() {
-            h3 { "Best by themselves" }
-            (table(&["test", "figure", "min"], &others))
+            h3 { "Best single tests" }
+            (table(&["test", "figure of merit", "duration, min"], &others))
         }
         @if !found.exchanged.is_empty() {
-            h3 { "Exchanged" }
+            h3 { "Exchanges" }
             (list(found.exchanged.iter().cloned()))
         }
     }
@@ -127,7 +130,7 @@ fn row((number, step): (usize, &ProposedTest)) -> Vec<String> {
         format!(
             "{:.1}{}",
             step.duration_min,
-            if step.new_setup { " with the set-up" } else { "" }
+            if step.new_setup { " with set-up" } else { "" }
         ),
         point(step.workpiece_ball_mm),
         point(step.spindle_ball_mm),
@@ -154,31 +157,23 @@ fn uncertainties(found: &Improvement) -> Markup {
         .collect();
     let header: Vec<&str> = header.iter().map(String::as_str).collect();
     html! {
-        p { "Standard uncertainty (k = 1), µm or arcsec." }
+        p { "Predicted standard uncertainty (k = 1), µm or ″." }
         (table(&header, &rows))
     }
 }
 
 fn shrinkages(ranges: &[Shrinkage]) -> Markup {
     html! {
-        p { "About its middle, before an uncertainty doubles." }
-        (table(&RANGES, &typeset(range_rows(ranges))))
+        p { "The smallest range about the centre of each sweep at which no standard uncertainty doubles." }
+        (table(&RANGES, &typeset(range_rows(ranges)).into_iter().map(|row| row.iter().map(|cell| unit(cell)).collect()).collect::<Vec<_>>()))
     }
 }
 
-/// Three digits, or that there is no number.
+/// Three significant digits. An infinite uncertainty means that the error is not identifiable.
 fn digits(value: f64) -> String {
     if !value.is_finite() {
-        return "not seen".to_string();
+        return "not identifiable".to_string();
     }
     let decimals = (2 - value.abs().max(1e-6).log10().floor() as i32).clamp(0, 6) as usize;
     format!("{value:.decimals$}")
-}
-
-/// With a capital letter.
-fn sentence(words: &str) -> String {
-    let mut letters = words.chars();
-    letters.next().map_or(String::new(), |first| {
-        first.to_uppercase().chain(letters).collect()
-    })
 }

@@ -1,8 +1,8 @@
-//! The page around a report: head, verdict, sections, provenance, style and script.
+//! The HTML page of a report: head, summary, sections, provenance, style sheet and script.
 
 use maud::{DOCTYPE, Markup, PreEscaped, html};
 
-use super::document::{Document, prose, table};
+use super::document::{Document, capitalised, list, prose, table};
 use super::embed;
 use super::plot::{DARK, LIGHT, STYLE};
 use super::provenance::Provenance;
@@ -10,12 +10,12 @@ use super::provenance::Provenance;
 const SCRIPT: &str = include_str!("page.js");
 const PAGE_STYLE: &str = include_str!("page.css");
 
-/// The page may fetch nothing and send nothing, whatever stands in it.
+/// Content security policy: the page loads nothing and sends nothing.
 const POLICY: &str = "default-src 'none'; style-src 'unsafe-inline'; script-src 'unsafe-inline'; img-src data:; form-action 'none'; base-uri 'none'";
 
-/// The whole file.
+/// Returns the complete page.
 pub fn html(document: &Document, method: &Markup, provenance: &Provenance) -> String {
-    let live = !document.data.is_null();
+    let is_interactive = !document.data.is_null();
     html! {
         (DOCTYPE)
         html lang="en" {
@@ -31,13 +31,10 @@ pub fn html(document: &Document, method: &Markup, provenance: &Provenance) -> St
             body {
                 header {
                     h1 { (document.title) }
-                    p class="verdict" {
-                        @if !document.word.is_empty() { strong class=(format!("word {}", super::plot::file_name(&document.word))) { (document.word) } " " }
-                        (prose(&document.verdict))
-                    }
+                    (summary(document))
                     @if !provenance.about.is_empty() {
                         dl class="about" {
-                            @for (name, note) in &provenance.about { dt { (words(name)) } dd { (note) } }
+                            @for (name, note) in &provenance.about { dt { (label(name)) } dd { (note) } }
                         }
                     }
                     nav {
@@ -52,19 +49,19 @@ pub fn html(document: &Document, method: &Markup, provenance: &Provenance) -> St
                     section id="method" {
                         h2 { "Method and provenance" }
                         (method)
-                        (of(provenance))
-                        @if !document.table.is_empty() {
+                        (provenance_tables(provenance))
+                        @if !document.csv.is_empty() {
                             p class="needs-script" hidden {
                                 button id="download" type="button" { "Download all readings (CSV)" }
-                                " with deviation and residuals, none left out."
+                                " All readings with deviation and residuals, outliers included."
                             }
                         }
                     }
                 }
                 div id="tip" role="status" hidden {}
-                @if live {
+                @if is_interactive {
                     script type="application/json" id="data" { (json(&document.data)) }
-                    script type="text/plain" id="table" { (PreEscaped(embed::packed(&document.table))) }
+                    script type="text/plain" id="csv" { (PreEscaped(embed::compressed(&document.csv))) }
                     script { (PreEscaped(SCRIPT)) }
                 }
             }
@@ -73,11 +70,36 @@ pub fn html(document: &Document, method: &Markup, provenance: &Provenance) -> St
     .into_string()
 }
 
-/// JSON that may stand in a script: `<` could end it.
+/// JSON inside a script element. `<` is escaped, because it could end the element.
 fn json(value: &serde_json::Value) -> PreEscaped<String> {
     PreEscaped(value.to_string().replace('<', "\\u003c"))
 }
 
+/// Verdict, key figures and warnings.
+fn summary(document: &Document) -> Markup {
+    html! {
+        p class="verdict" {
+            @if !document.word.is_empty() {
+                strong class=(format!("word {}", super::plot::file_name(&document.word))) { (document.word) } " "
+            }
+            (prose(&document.verdict))
+        }
+        @if !document.figures.is_empty() {
+            dl class="key-figures" {
+                @for figure in &document.figures {
+                    div { dt { (figure.label) } dd { (figure.value) } dd class="note" { (figure.note) } }
+                }
+            }
+        }
+        @match document.warnings.as_slice() {
+            [] => {}
+            [one] => p class="warning" { strong { "Warning: " } (prose(&capitalised(one))) },
+            many => div class="warning" { strong { (many.len()) " warnings" } (list(many.iter().map(|one| capitalised(one)))) },
+        }
+    }
+}
+
+/// Colours, then the style sheets of page and plots.
 fn style() -> String {
     let colours = |list: &[(&str, &str)]| -> String {
         list.iter()
@@ -90,12 +112,13 @@ fn style() -> String {
     )
 }
 
-/// The name of a note in words: `serial_number` is the serial number.
-fn words(name: &str) -> String {
+/// Label of a note: `serial_number` becomes `serial number`.
+fn label(name: &str) -> String {
     name.replace('_', " ")
 }
 
-fn of(provenance: &Provenance) -> Markup {
+/// Command line, version, seed and input files.
+fn provenance_tables(provenance: &Provenance) -> Markup {
     let rows: Vec<Vec<String>> = provenance
         .inputs
         .iter()
@@ -104,7 +127,7 @@ fn of(provenance: &Provenance) -> Markup {
     html! {
         dl {
             dt { "Command" } dd { code { (provenance.command) } }
-            dt { "Version" } dd { (concat!("abbe ", env!("CARGO_PKG_VERSION"))) }
+            dt { "Program" } dd { (concat!("abbe ", env!("CARGO_PKG_VERSION"))) }
             dt { "Seed" } dd { (provenance.seed) }
         }
         div class="checksums" { (table(&["input", "bytes", "SHA-256"], &rows)) }

@@ -1,4 +1,4 @@
-//! The report of `abbe plan`.
+//! Report of `abbe plan`.
 
 use abbe::identify::IdentifyError;
 use abbe::identify::plan::candidate_tests;
@@ -8,20 +8,21 @@ use abbe::model::words::counted;
 use maud::{Markup, html};
 
 use super::curves;
-use super::document::{Document, list, prose, table};
+use super::document::{Document, KeyFigure, capitalised, folded, list, prose, table};
+use super::format::{integer, typeset, um, unit, units, value_and_u};
 use super::plot::Plot;
 use super::plot::bars::{self, Fill};
-use super::readings::{self, um, unit, value_and_u};
+use super::{readings, summary};
 
-/// Rows of a table at most; the JSON holds all.
+/// Maximum number of rows of a table. The JSON result contains all rows.
 const MAX_ROWS: usize = 30;
 
-/// How a plan is judged.
+/// Method of the analysis.
 pub fn method(analysis: &PlanAnalysis) -> Markup {
     html! {
         p {
-            "The nominal machine is linearised at every planned state; uncertainties follow from noise (" (um(analysis.noise_um))
-            " a reading) and from what is known of the set-up, by the law of propagation of uncertainty (JCGM 100, JCGM 102)."
+            "The model is linearised at the nominal machine and every planned state. The uncertainties follow from the noise (" (um(analysis.noise_um))
+            " per reading) and from the priors of the set-up by the law of propagation of uncertainty (JCGM 100, JCGM 102)."
         }
     }
 }
@@ -31,18 +32,21 @@ pub fn method(analysis: &PlanAnalysis) -> Markup {
 /// # Errors
 /// If the model cannot be evaluated.
 pub fn document(problem: &Problem<'_>, analysis: &PlanAnalysis) -> Result<Document, IdentifyError> {
-    let seen = analysis.errors.iter().filter(|error| error.u.is_some()).count();
+    let identifiable = analysis.errors.iter().filter(|error| error.u.is_some()).count();
     let mut document = Document {
         title: format!("Plan for {}", problem.session.machine.name),
         verdict: format!(
-            "{seen} of {} would be identified by {} in {}{}.",
+            "{identifiable} of {} identifiable from {} in {}{}.{}",
             counted(analysis.errors.len(), "error"),
             counted(analysis.readings, "reading"),
             counted(analysis.tests.len(), "test"),
             analysis
                 .moving_min
                 .map_or(String::new(), |min| format!(", {min:.0} min of movement")),
+            limit(analysis),
         ),
+        figures: figures(problem, analysis),
+        warnings: analysis.warnings.clone(),
         ..Document::default()
     };
     let plots = uncertainties(&analysis.errors);
@@ -51,29 +55,97 @@ pub fn document(problem: &Problem<'_>, analysis: &PlanAnalysis) -> Result<Docume
     document.section(
         "Predicted uncertainty",
         html! {
+            (table(
+                &["error", "u (k\u{a0}=\u{a0}1)", "unit", "conditional u", "largest sensitivity", "largest contributions to the variance"],
+                &rows,
+            ))
+            p class="note" { "Conditional u: standard uncertainty if all other errors were known." }
             (shown)
-            (table(&["error", "u (k=1)", "unit", "others known", "largest sensitivity", "where it comes from"], &rows))
         },
     );
-    let beta = vec![0.0; problem.parameters.list.len()];
-    let section = curves::patterns(&mut document, problem, &beta)?;
-    document.section("What each error does to each test", section);
-    let section = other_explanations(&mut document, analysis);
-    document.section("What else it could be", section);
+    let section = confounding(&mut document, analysis);
+    document.section("Correlation and confounding", section);
     document.section(
-        "What to measure next",
+        "Next test",
         next(analysis, candidate_tests::has_candidates(problem)),
     );
+    let beta = vec![0.0; problem.parameters.list.len()];
+    let section = curves::sensitivities(&mut document, problem, &beta)?;
+    document.section("Sensitivity of each test", section);
     let section = readings::machine(&mut document, problem);
     document.section("Machine", section);
     Ok(document)
 }
 
+/// Key figures of the summary.
+fn figures(problem: &Problem<'_>, analysis: &PlanAnalysis) -> Vec<KeyFigure> {
+    let identifiable = analysis.errors.iter().filter(|error| error.u.is_some()).count();
+    let mut figures = vec![
+        KeyFigure::new(
+            "Identifiable errors",
+            format!("{identifiable} of {}", analysis.errors.len()),
+            "",
+        ),
+        summary::rank(analysis.rank, analysis.parameter_count),
+    ];
+    figures.extend(worst(analysis).into_iter().map(|error| {
+        let u = error.u.unwrap_or_default();
+        let figure = format!("{}: u = {} {}", error.id, value_and_u(u, u).0, unit(&error.unit));
+        KeyFigure::new("Worst determined", figure, contribution(error))
+    }));
+    figures.push(KeyFigure::new(
+        "Condition number",
+        format!("{:.1}", analysis.indices.condition_number),
+        "scaled Jacobian of the errors",
+    ));
+    figures.push(KeyFigure::new(
+        "Readings",
+        integer(analysis.readings),
+        format!(
+            "{}; noise {}",
+            counted(problem.tests.len(), "test"),
+            um(analysis.noise_um)
+        ),
+    ));
+    figures
+}
+
+/// The identifiable error with the largest standard uncertainty in each unit.
+fn worst(analysis: &PlanAnalysis) -> Vec<&ErrorAnalysis> {
+    let mut worst: Vec<&ErrorAnalysis> = Vec::new();
+    for error in analysis.errors.iter().filter(|error| error.u.is_some()) {
+        match worst.iter_mut().find(|other| other.unit == error.unit) {
+            Some(other) if error.u > other.u => *other = error,
+            Some(_) => {}
+            None => worst.push(error),
+        }
+    }
+    worst
+}
+
+/// The largest contribution to the variance of an error.
+fn contribution(error: &ErrorAnalysis) -> String {
+    error.budget.first().map_or(String::new(), |part| {
+        format!("{:.0} % of the variance from {}", 100.0 * part.share, part.source)
+    })
+}
+
+/// Sentences about the worst determined errors.
+fn limit(analysis: &PlanAnalysis) -> String {
+    let sentences = worst(analysis).into_iter().map(|error| {
+        format!(
+            " {} is the worst determined error in {}: {}.",
+            error.id,
+            unit(&error.unit),
+            contribution(error)
+        )
+    });
+    sentences.collect()
+}
+
+/// Plots of the predicted standard uncertainties, one for each unit.
 fn uncertainties(errors: &[ErrorAnalysis]) -> Vec<Plot> {
-    let mut units: Vec<&str> = errors.iter().map(|error| error.unit.as_str()).collect();
-    units.sort_unstable();
-    units.dedup();
-    units
+    units(errors.iter().map(|error| error.unit.as_str()))
         .into_iter()
         .map(|name| {
             let rows: Vec<(String, f64, Fill)> = errors
@@ -84,7 +156,7 @@ fn uncertainties(errors: &[ErrorAnalysis]) -> Vec<Plot> {
                     let known = error.conditional_u.unwrap_or(u);
                     [
                         (error.id.clone(), u, Fill::Named),
-                        (format!("{}, others known", error.id), known, Fill::Alias),
+                        (format!("{}, conditional", error.id), known, Fill::Alias),
                     ]
                 })
                 .take(2 * MAX_ROWS)
@@ -92,20 +164,18 @@ fn uncertainties(errors: &[ErrorAnalysis]) -> Vec<Plot> {
             bars::bars(
                 format!("uncertainty-{}", name.replace('/', "-per-")),
                 format!("Predicted standard uncertainty, {}", unit(name)),
-                "And what it would be if all other errors were known.".to_string(),
-                &format!("u (k=1), {}", unit(name)),
+                "Conditional: if all other errors were known.".to_string(),
+                &format!("u (k\u{a0}=\u{a0}1), {}", unit(name)),
                 &rows,
-                &[
-                    ("key-named", "by this plan"),
-                    ("key-alias", "if the others were known"),
-                ],
+                &[("key-named", "predicted"), ("key-alias", "conditional")],
             )
         })
         .collect()
 }
 
+/// A row of the table of predicted uncertainties.
 fn row(error: &ErrorAnalysis) -> Vec<String> {
-    let figure = |u: Option<f64>| u.map_or("not seen".to_string(), |u| value_and_u(u, u).0);
+    let figure = |u: Option<f64>| u.map_or("not identifiable".to_string(), |u| value_and_u(u, u).0);
     let budget: Vec<String> = error
         .budget
         .iter()
@@ -128,18 +198,18 @@ fn row(error: &ErrorAnalysis) -> Vec<String> {
     ]
 }
 
-fn other_explanations(document: &mut Document, analysis: &PlanAnalysis) -> Markup {
+fn confounding(document: &mut Document, analysis: &PlanAnalysis) -> Markup {
     let ids = &analysis.correlation.ids;
     let shown = if ids.len() > 1 && ids.len() <= 60 {
-        document.show([readings::map(ids, &analysis.correlation.matrix)])
+        document.show([readings::correlation_map(ids, &analysis.correlation.matrix)])
     } else {
         html! {}
     };
-    let hidden = analysis.effects.as_ref().map(|effects| {
+    let confounded = analysis.effects.as_ref().map(|effects| {
         effects
             .effects
             .iter()
-            .filter(|effect| effect.verdict == "confounded" && !effect.biases.is_empty())
+            .filter(|effect| effect.verdict.starts_with("confounded") && !effect.biases.is_empty())
             .take(MAX_ROWS)
             .map(|effect| {
                 let biases = effect.biases.iter().take(2);
@@ -156,34 +226,36 @@ fn other_explanations(document: &mut Document, analysis: &PlanAnalysis) -> Marku
     });
     html! {
         (shown)
-        (readings::unobservable(&analysis.unidentifiable))
+        (readings::confounded(&analysis.unidentifiable))
         @if !analysis.determined_by_prior.is_empty() {
-            h3 { "Held by what is known of the set-up, not by readings" }
-            (list(analysis.determined_by_prior.iter().map(|held| held.why.clone())))
+            h3 { "Errors determined by the set-up priors only" }
+            (list(analysis.determined_by_prior.iter().map(|error| capitalised(&error.why))))
         }
         @if !analysis.nearly_collinear.is_empty() {
-            h3 { "Told apart, but badly" }
-            (list(analysis.nearly_collinear.iter().map(|near| near.why.clone())))
+            h3 { "Poorly separable errors" }
+            (list(analysis.nearly_collinear.iter().map(|errors| capitalised(&errors.why))))
         }
-        @if let Some(hidden) = hidden.filter(|hidden| !hidden.is_empty()) {
-            h3 { "Effects that would hide, and what they bias" }
-            (table(&["effect", "share that survives the fit", "bias a unit"], &hidden))
+        @if let Some(confounded) = confounded.filter(|rows| !rows.is_empty()) {
+            h3 { "Effects confounded with errors" }
+            (folded(
+                &counted(confounded.len(), "effect"),
+                &table(&["effect", "share of the signal in the residual", "bias per unit of the effect"], &typeset(confounded)),
+            ))
         }
     }
 }
 
-fn next(analysis: &PlanAnalysis, offered: bool) -> Markup {
+fn next(analysis: &PlanAnalysis, has_candidates: bool) -> Markup {
     html! {
         @if !analysis.leave_one_out.is_empty() {
-            h3 { "What each test contributes" }
-            (list(analysis.leave_one_out.iter().map(|without| without.why.clone())))
+            h3 { "Contribution of each test" }
+            (list(analysis.leave_one_out.iter().map(|without| capitalised(&without.why))))
         }
-        @if offered {
+        @if has_candidates {
             p {
-            (prose("`abbe plan SESSION --improve 1` names the test that lowers the uncertainties most for its time, `--separate A,B` the one that tells two \
-                    effects apart."))
+                (prose("`abbe plan SESSION --improve 1` proposes the test that reduces the largest uncertainty most. \
+                        `abbe plan SESSION --separate A,B` proposes the test that best separates two effects."))
             }
         }
-        @if !analysis.warnings.is_empty() { h3 { "Warnings" } (list(analysis.warnings.iter().cloned())) }
     }
 }

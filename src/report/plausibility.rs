@@ -1,12 +1,12 @@
-//! Conflicts between readings and session, near the top of a report.
+//! Conflicts between the readings and the statements of the session.
 
 use abbe::identify::plausibility::Plausibility;
 use maud::html;
 
 use super::document::{Document, list};
-use super::readings::um;
+use super::format::um;
 
-/// Adds a section where readings contradict the session.
+/// Adds a section if the readings contradict the session.
 pub fn section(document: &mut Document, plausibility: &Plausibility) {
     if plausibility.conflicts.is_empty() {
         return;
@@ -17,16 +17,16 @@ pub fn section(document: &mut Document, plausibility: &Plausibility) {
         .map(|conflict| conflict.words.clone());
     let suggestions = (plausibility.suggestions.iter())
         .map(|suggestion| format!("{} (residual {})", suggestion.words, um(suggestion.rms_um)));
-    let lead = match plausibility.suggestions.len() {
-        0 => "No single mistake that is tried explains this.",
-        1 => "This would be explained if",
-        _ => "This would be explained by one of these, which the readings do not separate:",
+    let introduction = match plausibility.suggestions.len() {
+        0 => "No single mistake among those examined explains the conflict.",
+        1 => "Possible cause:",
+        _ => "Possible causes, which the readings do not separate:",
     };
     document.section(
-        "The readings contradict the session",
+        "Conflict between readings and session",
         html! {
             (list(conflicts))
-            p { (lead) }
+            p { (introduction) }
             @if !plausibility.suggestions.is_empty() { (list(suggestions)) }
         },
     );

@@ -1,40 +1,43 @@
-//! What of a session is drawn: the rows that stay when points are thinned, and the plots of its readings.
+//! Plots of the readings of a session: deviations and residuals of each test, decimated for drawing.
 
 use abbe::identify::problem::Problem;
 use abbe::identify::series::{SessionSeries, TestSeries, is_round, lengths};
-use abbe::model::axis::AxisKind;
 use maud::html;
 use serde_json::json;
 
+use super::abscissae::{PlotAxis, axes_of};
 use super::decimate;
 use super::plot::lines::{ACROSS, Lines, Mark, Series, UP, span};
-use super::plot::polar::{DIVISIONS, Round, Trace, division_um};
+use super::plot::polar::{DIVISIONS, PolarSize, Traversal, division_um};
 use super::plot::scale::Scale;
 use super::plot::{Plot, polar};
 
-/// Strips of a trace in which the least and the greatest reading are kept.
-const TRACE_STRIPS: usize = 360;
-/// Strips of an axis of poses.
-const POSE_STRIPS: usize = 150;
-/// Poses that are drawn however ordinary they are, so that the bulk is seen beside the extremes.
+/// Intervals of a traversal in which the minimum and the maximum are kept.
+const TRAVERSAL_INTERVALS: usize = 360;
+/// Intervals of an axis for readings at separate poses.
+const POSE_INTERVALS: usize = 150;
+/// Number of evenly spaced poses that are drawn in addition to the extremes, so that the plot shows the whole distribution.
 const POSE_SAMPLE: usize = 500;
-/// Tests that are drawn one by one; what a session has beyond is in its data.
+/// Maximum number of tests with plots of their own. The data of the page contain all tests.
 pub const MAX_TESTS: usize = 12;
 
-/// A column of the readings.
+/// A test is affected if the RMS change of its residual is at least this multiple of the noise standard deviation.
+const MIN_CHANGE: f64 = 0.25;
+
+/// A quantity of each reading.
 #[derive(Clone, Copy, PartialEq, Eq)]
 pub enum Column {
-    /// Observed less nominal.
+    /// Observed minus nominal reading.
     Deviation,
-    /// What the model before leaves.
+    /// Residual of the first model.
     Before,
-    /// What the model after leaves.
+    /// Residual of the second model.
     After,
 }
 
 impl Column {
-    /// Its name in the page's data.
-    pub fn word(self) -> &'static str {
+    /// Name in the data of the page.
+    pub fn name(self) -> &'static str {
         match self {
             Column::Deviation => "deviation",
             Column::Before => "before",
@@ -42,7 +45,7 @@ impl Column {
         }
     }
 
-    /// Its scalars.
+    /// Its scalar values in a test, µm.
     pub fn of(self, test: &TestSeries) -> &[f64] {
         match self {
             Column::Deviation => &test.deviation_um,
@@ -52,26 +55,26 @@ impl Column {
     }
 }
 
-/// A session as it is drawn.
-pub struct Drawn<'d> {
-    /// The problem.
+/// A session prepared for plotting.
+pub struct SessionPlots<'d> {
+    /// The estimation problem.
     pub problem: &'d Problem<'d>,
-    /// Its readings.
-    pub views: &'d SessionSeries,
-    /// Rows that are drawn, by test and stretch.
+    /// Deviations, residuals and shares of all readings.
+    pub series: &'d SessionSeries,
+    /// Drawn rows of each traversal of each test.
     pub rows: Vec<Vec<Vec<usize>>>,
 }
 
-impl<'d> Drawn<'d> {
-    /// Thins the readings of a session.
-    pub fn new(problem: &'d Problem<'d>, views: &'d SessionSeries) -> Drawn<'d> {
-        let rows = views
+impl<'d> SessionPlots<'d> {
+    /// Decimates the readings of a session.
+    pub fn new(problem: &'d Problem<'d>, series: &'d SessionSeries) -> SessionPlots<'d> {
+        let rows = series
             .tests
             .iter()
             .enumerate()
             .map(|(number, test)| {
                 let columns = [Column::Deviation, Column::Before, Column::After]
-                    .map(|column| lengths(column.of(test), views.coordinates));
+                    .map(|column| lengths(column.of(test), series.coordinates));
                 test.stretches
                     .iter()
                     .map(|stretch| {
@@ -79,11 +82,13 @@ impl<'d> Drawn<'d> {
                         let columns = columns.each_ref().map(|c| part(c));
                         let columns = columns.each_ref().map(|c| c.as_slice());
                         let mut kept: Vec<usize> = if stretch.forward.is_some() {
-                            decimate::kept(&part(&test.way.values), &columns, TRACE_STRIPS)
+                            decimate::decimated_rows(&part(&test.way.values), &columns, TRAVERSAL_INTERVALS)
                         } else {
                             axes_of(problem, test, number)
                                 .iter()
-                                .flat_map(|(_, values)| decimate::kept(&part(values), &columns, POSE_STRIPS))
+                                .flat_map(|(_, values)| {
+                                    decimate::decimated_rows(&part(values), &columns, POSE_INTERVALS)
+                                })
                                 .chain(
                                     (0..stretch.rows.len())
                                         .step_by(stretch.rows.len().div_ceil(POSE_SAMPLE).max(1)),
@@ -97,96 +102,155 @@ impl<'d> Drawn<'d> {
                     .collect()
             })
             .collect();
-        Drawn { problem, views, rows }
+        SessionPlots {
+            problem,
+            series,
+            rows,
+        }
     }
 
-    /// Whether the readings are lengths about a circle.
-    pub fn is_round(&self) -> bool {
+    /// Whether the readings are lengths, which a polar plot shows about a nominal circle.
+    pub fn is_polar(&self) -> bool {
         is_round(self.problem.session.instrument)
     }
 
-    /// The tests that are drawn one by one.
-    pub fn tests(&self) -> impl Iterator<Item = (usize, &TestSeries)> {
-        self.views.tests.iter().enumerate().take(MAX_TESTS)
+    /// RMS of the change of the residual from the first to the second model, µm.
+    fn change_um(test: &TestSeries) -> f64 {
+        let squares = test
+            .before_um
+            .iter()
+            .zip(&test.after_um)
+            .map(|(before, after)| (before - after).powi(2));
+        (squares.sum::<f64>() / test.after_um.len().max(1) as f64).sqrt()
     }
 
-    /// Points of a stretch: abscissa and value.
-    fn points(&self, test: usize, stretch: usize, abscissa: &[f64], values: &[f64]) -> Vec<(f64, f64)> {
-        let rows = &self.rows[test][stretch];
+    /// Whether the second model changes the residual of a test by at least [`MIN_CHANGE`] of the noise. If no test changes, all count as affected.
+    pub fn is_affected(&self, number: usize) -> bool {
+        let min_um = MIN_CHANGE * self.problem.noise.sigma_mm * 1e3;
+        let changes = |test: &TestSeries| Self::change_um(test) >= min_um;
+        changes(&self.series.tests[number]) || !self.series.tests.iter().any(changes)
+    }
+
+    /// RMS residual of a test, µm, outliers excluded: before, after.
+    pub fn rms_um(&self, number: usize) -> [f64; 2] {
+        let test = &self.series.tests[number];
+        let coordinates = self.series.coordinates;
+        let rejected = &self.problem.rejected[number];
+        [&test.before_um, &test.after_um].map(|values| {
+            let counted = || {
+                values
+                    .iter()
+                    .enumerate()
+                    .filter(|(i, _)| !rejected[i / coordinates])
+            };
+            (counted().map(|(_, v)| v * v).sum::<f64>() / counted().count().max(1) as f64).sqrt()
+        })
+    }
+
+    /// Tests with plots of their own, with their indices.
+    pub fn tests(&self) -> impl Iterator<Item = (usize, &TestSeries)> {
+        self.series.tests.iter().enumerate().take(MAX_TESTS)
+    }
+
+    /// Drawn points of a traversal: abscissa and value.
+    fn points(&self, test: usize, traversal: usize, abscissa: &[f64], values: &[f64]) -> Vec<(f64, f64)> {
+        let rows = &self.rows[test][traversal];
         rows.iter().map(|row| (abscissa[*row], values[*row])).collect()
     }
 
-    /// The trace of a test about the nominal circle, with this round number of µm per division.
-    fn circle(&self, number: usize, column: Column, name: &str, title: String, um: Option<f64>) -> Plot {
-        let test = &self.views.tests[number];
+    /// Polar plot of a test. `um` is the scale per division; by default all points lie within the circles.
+    fn polar(&self, number: usize, column: Column, name: &str, title: String, um: Option<f64>) -> Plot {
+        let test = &self.series.tests[number];
         let values = column.of(test);
-        let traces: Vec<Trace<'_>> = test
+        let traversals: Vec<Traversal<'_>> = test
             .stretches
             .iter()
             .enumerate()
-            .map(|(k, stretch)| Trace {
+            .map(|(k, stretch)| Traversal {
                 class: class_of(stretch.forward),
-                number: Some(k),
+                index: Some(k),
                 points: self.points(number, k, &test.way.values, values),
             })
             .collect();
-        let um = um.unwrap_or_else(|| division_um(traces.iter().flat_map(|trace| &trace.points)));
-        let caption = "Magnified; the heavy circle is zero.".to_string();
+        let um = um.unwrap_or_else(|| division_um(traversals.iter().flat_map(|traversal| &traversal.points)));
+        let caption = "Magnified about the nominal circle.".to_string();
         let mut plot = polar::plot(
             format!("{name}-{}", test.name),
             title,
             caption,
             &test.way.name,
-            &traces,
+            &traversals,
             um,
         );
-        let round = Round::FULL;
-        plot.live = json!({
-            "kind": "polar", "test": number, "column": column.word(), "x0": round.side / 2.0, "y0": round.side / 2.0,
-            "r": round.nominal(), "px": round.division(), "um": um, "along": "x",
+        let size = PolarSize::LARGE;
+        plot.interaction = json!({
+            "kind": "polar", "test": number, "column": column.name(), "x0": size.side / 2.0, "y0": size.side / 2.0,
+            "r": size.nominal(), "px": size.division(), "um": um, "abscissa": "x",
         })
         .to_string();
         plot
     }
 
-    /// The trace of a test, if it goes along an angle.
-    pub fn trace(&self, number: usize) -> Option<Plot> {
-        let test = &self.views.tests[number];
-        let title = format!("{}: deviation from nominal about the circle", test.name);
-        (self.is_round() && test.way.is_angle)
-            .then(|| self.circle(number, Column::Deviation, "trace", title, None))
+    /// Polar plot of the deviation of a test, if its abscissa is an angle.
+    pub fn polar_deviation(&self, number: usize) -> Option<Plot> {
+        let test = &self.series.tests[number];
+        let title = format!("{}: deviation from nominal", test.name);
+        (self.is_polar() && test.way.is_angle)
+            .then(|| self.polar(number, Column::Deviation, "trace", title, None))
     }
 
-    /// What is left of a test before and after, at one magnification.
-    pub fn residual_circles(&self, number: usize, words: [&str; 2]) -> Option<[Plot; 2]> {
-        let test = &self.views.tests[number];
-        if !self.is_round() || !test.way.is_angle {
+    /// Whether the second model changes any residual. Otherwise the plots show one residual.
+    pub fn has_change(&self) -> bool {
+        self.series.tests.iter().any(|test| Self::change_um(test) > 0.0)
+    }
+
+    /// The residuals that the plots show.
+    fn residual_columns(&self) -> &'static [Column] {
+        if self.has_change() {
+            &[Column::Before, Column::After]
+        } else {
+            &[Column::After]
+        }
+    }
+
+    /// Polar plots of the residuals of a test, at one magnification.
+    pub fn polar_residuals(&self, number: usize, models: [&str; 2]) -> Option<Vec<Plot>> {
+        let test = &self.series.tests[number];
+        if !self.is_polar() || !test.way.is_angle {
             return None;
         }
-        let most = |values: &[f64]| values.iter().map(|v| v.abs()).fold(0.0, f64::max);
-        let um = super::plot::scale::round_up(most(&test.before_um).max(most(&test.after_um)) / DIVISIONS);
-        Some([Column::Before, Column::After].map(|column| {
-            let words = words[usize::from(column == Column::After)];
-            let name = format!("residual-{}", column.word());
-            self.circle(number, column, &name, format!("{}: {words}", test.name), Some(um))
-        }))
+        let maximum = |values: &[f64]| values.iter().map(|v| v.abs()).fold(0.0, f64::max);
+        let um =
+            super::plot::scale::round_up(maximum(&test.before_um).max(maximum(&test.after_um)) / DIVISIONS);
+        let plot = |column: &Column| {
+            let model = models[usize::from(*column == Column::After)];
+            let name = format!("residual-{}", column.name());
+            self.polar(
+                number,
+                *column,
+                &name,
+                format!("{}: {model}", test.name),
+                Some(um),
+            )
+        };
+        Some(self.residual_columns().iter().map(plot).collect())
     }
 
-    /// The deviation of a test against what it goes along; of poses against each axis.
+    /// Deviation of a test against its abscissa. For separate poses: against each axis.
     pub fn deviations(&self, number: usize) -> Vec<Plot> {
         self.against(number, &[Column::Deviation])
     }
 
-    /// Residuals of a test before and after, likewise.
+    /// Residuals of a test before and after, against the same abscissae.
     pub fn residuals(&self, number: usize) -> Vec<Plot> {
-        self.against(number, &[Column::Before, Column::After])
+        self.against(number, self.residual_columns())
     }
 
     fn against(&self, number: usize, columns: &[Column]) -> Vec<Plot> {
-        let test = &self.views.tests[number];
+        let test = &self.series.tests[number];
         let values: Vec<Vec<f64>> = columns
             .iter()
-            .map(|c| lengths(c.of(test), self.views.coordinates))
+            .map(|c| lengths(c.of(test), self.series.coordinates))
             .collect();
         axes_of(self.problem, test, number)
             .into_iter()
@@ -199,27 +263,27 @@ impl<'d> Drawn<'d> {
         number: usize,
         columns: &[Column],
         values: &[Vec<f64>],
-        axis: &Axis,
+        axis: &PlotAxis,
         abscissa: &[f64],
     ) -> Plot {
-        let test = &self.views.tests[number];
-        let three = self.views.coordinates == 3;
+        let test = &self.series.tests[number];
+        let three = self.series.coordinates == 3;
         let [low, high] = span(abscissa.iter().copied());
         let x = Scale::over(low, high, ACROSS, if axis.is_angle { 9 } else { 7 });
         let x = if axis.is_angle { x.in_degrees() } else { x };
-        let [least, most] = span(values.iter().flatten().copied());
+        let [minimum, maximum] = span(values.iter().flatten().copied());
         let is_deviation = columns == [Column::Deviation];
         let y = if three {
-            Scale::rounded(0.0, most, UP, 5)
+            Scale::rounded(0.0, maximum, UP, 5)
         } else if is_deviation {
-            let um = super::plot::scale::round_up(least.abs().max(most.abs()) / DIVISIONS);
+            let um = super::plot::scale::round_up(minimum.abs().max(maximum.abs()) / DIVISIONS);
             Scale {
                 values: [-DIVISIONS * um, DIVISIONS * um],
-                places: UP,
+                coordinates: UP,
                 step: um,
             }
         } else {
-            Scale::rounded(least.min(0.0), most.max(0.0), UP, 6)
+            Scale::rounded(minimum.min(0.0), maximum.max(0.0), UP, 6)
         };
         let is_pose = test.stretches.iter().any(|stretch| stretch.forward.is_none());
         let mark = if is_pose { Mark::Dots } else { Mark::Line };
@@ -236,9 +300,9 @@ impl<'d> Drawn<'d> {
                 class: if is_deviation {
                     class_of(stretch.forward)
                 } else {
-                    column.word()
+                    column.name()
                 },
-                live: Some((k, column.word())),
+                source: Some((k, column.name())),
                 mark,
                 points: self.points(number, k, abscissa, values),
             })
@@ -246,16 +310,17 @@ impl<'d> Drawn<'d> {
         let forward = test.stretches.iter().any(|s| s.forward == Some(true));
         let backward = test.stretches.iter().any(|s| s.forward == Some(false));
         let legend: Vec<(&str, String)> = match (is_deviation, is_pose) {
-            (true, true) => vec![("plain dots", "a pose".to_string())],
+            (true, true) => vec![("plain dots", "pose".to_string())],
             (true, false) => [("forward", forward), ("backward", backward)]
                 .into_iter()
                 .filter(|(_, there)| *there)
                 .map(|(class, _)| (class, class.to_string()))
                 .collect(),
+            (false, _) if columns.len() == 1 => Vec::new(),
             (false, true) => vec![("before dots", "before".into()), ("after dots", "after".into())],
             (false, false) => vec![("before", "before".into()), ("after", "after".into())],
         };
-        let what = match (is_deviation, three) {
+        let quantity = match (is_deviation, three) {
             (true, true) => "length of the deviation",
             (true, false) => "deviation",
             (false, true) => "length of the residual",
@@ -273,14 +338,19 @@ impl<'d> Drawn<'d> {
                 test.name,
                 axis.name
             ),
-            title: format!("{}: {what} against {}", test.name, axis.name),
+            title: format!("{}: {quantity} against {}", test.name, axis.name),
             caption: if is_deviation {
-                "Observed less what the nominal machine would read.".to_string()
+                "Observed minus nominal reading.".to_string()
             } else {
-                "Before (red; broken or large) and after (blue).".to_string()
+                let text = if columns.len() == 1 {
+                    ""
+                } else {
+                    "Before: red, dashed or large. After: blue."
+                };
+                text.to_string()
             },
             x: (x, format!("{}, {}", axis.name, axis.unit)),
-            y: (y, format!("{what}, µm")),
+            y: (y, format!("{quantity}, µm")),
             series,
             legend,
             over: html! {},
@@ -291,8 +361,8 @@ impl<'d> Drawn<'d> {
         } else {
             (1.0, y.per_unit().abs())
         };
-        plot.live = json!({
-            "kind": "line", "test": number, "column": columns[0].word(), "along": key, "x0": x.at(0.0), "kx": x.per_unit(),
+        plot.interaction = json!({
+            "kind": "line", "test": number, "column": columns[0].name(), "abscissa": key, "x0": x.at(0.0), "kx": x.per_unit(),
             "y0": y.at(0.0), "px": px, "um": um, "scaled": is_deviation && !three,
         })
         .to_string();
@@ -300,54 +370,11 @@ impl<'d> Drawn<'d> {
     }
 }
 
-/// The class of a stretch.
+/// CSS class of a traversal.
 pub fn class_of(forward: Option<bool>) -> &'static str {
     match forward {
         Some(true) => "forward",
         Some(false) => "backward",
         None => "plain",
     }
-}
-
-/// What readings are drawn against.
-pub struct Axis {
-    /// Its name.
-    pub name: String,
-    /// Its unit.
-    pub unit: &'static str,
-    /// Whether it is an angle.
-    pub is_angle: bool,
-}
-
-/// What a test's readings are drawn against, with the values: what it goes along, or for poses each axis that moves.
-pub fn axes_of(problem: &Problem<'_>, test: &TestSeries, number: usize) -> Vec<(Axis, Vec<f64>)> {
-    let along = test.stretches.iter().all(|stretch| stretch.forward.is_some());
-    let readings = problem.tests[number].readings.as_ref();
-    let (Some(readings), false) = (readings, along || test.way.moving.is_empty()) else {
-        let unit = if test.way.is_angle {
-            "°"
-        } else if test.way.axis.is_some() {
-            "mm"
-        } else {
-            "number"
-        };
-        let axis = Axis {
-            name: test.way.name.clone(),
-            unit,
-            is_angle: test.way.is_angle,
-        };
-        return vec![(axis, test.way.values.clone())];
-    };
-    let of = |axis: &usize| {
-        let is_angle = problem.session.machine.axes[*axis].kind == AxisKind::Rotary;
-        let outside = if is_angle { 1.0_f64.to_degrees() } else { 1.0 };
-        let values = readings.positions[*axis].iter().map(|q| q * outside).collect();
-        let axis = Axis {
-            name: problem.session.machine.axes[*axis].name.clone(),
-            unit: if is_angle { "°" } else { "mm" },
-            is_angle,
-        };
-        (axis, values)
-    };
-    test.way.moving.iter().map(of).collect()
 }

@@ -1,50 +1,45 @@
-//! What it takes to do the same again: inputs with checksums, version, command line, seed.
+//! Provenance of a report: input files with checksums, version, command line and seed.
 
 use std::path::PathBuf;
 
 use abbe::model::session::Session;
+use abbe::model::session::stamp::FileStamp;
 use sha2::{Digest, Sha256};
 
 /// An input file.
 pub struct Input {
-    /// Where it lies, as the command was given it.
+    /// Path, as given to the command.
     pub path: String,
-    /// Bytes.
+    /// Size, bytes.
     pub bytes: usize,
     /// SHA-256, in hexadecimal.
     pub sha256: String,
 }
 
-/// Where a report comes from.
+/// Provenance of a report.
 pub struct Provenance {
-    /// The command line.
+    /// Command line.
     pub command: String,
-    /// The seed.
+    /// Seed.
     pub seed: u64,
-    /// The inputs.
+    /// Input files.
     pub inputs: Vec<Input>,
-    /// Notes of the session file's `[about]`, by name.
+    /// Notes of the table `[about]` of the session file, with their names.
     pub about: Vec<(String, String)>,
 }
 
 impl Provenance {
-    /// Of a session that was read.
+    /// Provenance of a session.
     ///
     /// # Errors
-    /// If a file is not what was read a moment ago, so that a checksum would be that of something else: its path, and why.
+    /// If a file changed after it was read, or cannot be read. The error holds the path and the cause.
     pub fn of(session: &Session, seed: u64) -> Result<Provenance, (PathBuf, String)> {
         let inputs = session
             .files
             .iter()
-            .map(|stamp| {
-                let same = || stamp.changed().map_or(Ok(()), Err);
-                same()?;
-                let found = input(stamp.file.clone()).map_err(|cause| cause.to_string())?;
-                same()?;
-                Ok(found)
-            })
+            .map(stamped)
             .zip(&session.files)
-            .map(|(found, stamp)| found.map_err(|fault| (stamp.file.clone(), fault)))
+            .map(|(input, stamp)| input.map_err(|cause| (stamp.file.clone(), cause)))
             .collect::<Result<_, _>>()?;
         Ok(Provenance {
             command: std::env::args_os()
@@ -58,7 +53,23 @@ impl Provenance {
     }
 }
 
-fn input(path: PathBuf) -> std::io::Result<Input> {
+/// A file of a session with its checksum.
+///
+/// # Errors
+/// If the file has changed since the session was read: the change, or why it cannot be read.
+pub fn stamped(stamp: &FileStamp) -> Result<Input, String> {
+    let unchanged = || stamp.changed().map_or(Ok(()), Err);
+    unchanged()?;
+    let input = input(stamp.file.clone()).map_err(|cause| cause.to_string())?;
+    unchanged()?;
+    Ok(input)
+}
+
+/// A file with its checksum.
+///
+/// # Errors
+/// If it cannot be read.
+pub fn input(path: PathBuf) -> std::io::Result<Input> {
     let contents = std::fs::read(&path)?;
     Ok(Input {
         path: path.display().to_string(),
@@ -70,7 +81,7 @@ fn input(path: PathBuf) -> std::io::Result<Input> {
     })
 }
 
-/// An argument as a shell takes it.
+/// Quotes an argument for a shell.
 fn quoted(argument: String) -> String {
     let plain = |c: char| c.is_ascii_alphanumeric() || "-_./=:,+%@~".contains(c);
     if !argument.is_empty() && argument.chars().all(plain) {
@@ -85,7 +96,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_checksum_is_that_of_the_standard() {
+    fn checksums_agree_with_the_standard() {
         // FIPS 180-4, example of the message "abc".
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("abc");
@@ -98,7 +109,7 @@ mod tests {
     }
 
     #[test]
-    fn arguments_come_back_as_a_shell_takes_them() {
+    fn arguments_are_quoted_for_a_shell() {
         assert_eq!(quoted("a b'c".to_string()), r"'a b'\''c'");
         assert_eq!(quoted("--data=/x/y.csv".to_string()), "--data=/x/y.csv");
     }

@@ -143,7 +143,11 @@ fn a_decimal_comma_undeclared() {
 
 #[test]
 fn a_time_that_runs_backwards() {
-    with_data("2,1,180", "0.5,1,180", &["C100.csv:4", "time_s", "backwards"]);
+    with_data(
+        "2,1,180",
+        "0.5,1,180",
+        &["C100.csv:4", "time_s", "time decreases"],
+    );
 }
 
 #[test]
@@ -364,7 +368,9 @@ fn more_tests_than_the_limit() {
         let stderr = String::from_utf8(output.stderr).unwrap();
         holds(
             &stderr,
-            &[&format!("`--improve {tests}`: from 1 to 24 tests are proposed")],
+            &[&format!(
+                "`--improve {tests}`: a number of tests from 1 to 24 is expected"
+            )],
         );
     }
 }

@@ -110,11 +110,11 @@ fn tables_correct_by_the_negative_identified_curve() {
     let printed = tables(&session, &out, "linuxcnc");
     assert!(printed.contains("COMP_FILE_TYPE = 0"), "{printed}");
     assert!(
-        printed.contains("EYX: COMP_FILE corrects the positioning of a joint only"),
+        printed.contains("EYX: COMP_FILE compensates the positioning of a joint only"),
         "{printed}"
     );
     assert!(
-        printed.contains("EXX~X:lag: no table over the position"),
+        printed.contains("EXX~X:lag: a table over the position"),
         "{printed}"
     );
     assert!(
@@ -181,7 +181,7 @@ fn tables_correct_by_the_negative_identified_curve() {
     let out = folder.join("beckhoff");
     let printed = tables(&session, &out, "beckhoff");
     assert!(
-        printed.contains("EYY: what depends on the direction; the mean of both"),
+        printed.contains("EYY: the difference between the directions; the table contains the mean of both"),
         "{printed}"
     );
     let file = std::fs::read_to_string(out.join("volcomp.csv")).unwrap();
@@ -266,7 +266,8 @@ fn effects_without_a_curve_have_no_table() {
     assert_eq!(run.status.code(), Some(1));
     let message = String::from_utf8_lossy(&run.stderr).into_owned();
     assert!(
-        message.contains("nothing to compensate") && message.contains("EY0A: a location error"),
+        message.contains("no error can be compensated in this format")
+            && message.contains("EY0A: a location error"),
         "{message}"
     );
     assert!(!out.exists());
@@ -282,7 +283,7 @@ fn effects_without_a_curve_have_no_table() {
     ];
     let run = abbe(&few);
     assert_eq!(run.status.code(), Some(1));
-    assert!(String::from_utf8_lossy(&run.stderr).contains("--points 1: from 2 to 256"));
+    assert!(String::from_utf8_lossy(&run.stderr).contains("`--points 1`: a number from 2 to 256"));
 }
 
 /// A session in which X moves over ±100 mm in one test and is stationary at −300 mm in another; EXX is a polynomial over X.
@@ -387,7 +388,7 @@ fn a_stationary_axis_has_no_table() {
     let printed = String::from_utf8_lossy(&run.stderr).into_owned();
     assert_eq!(run.status.code(), Some(1), "{printed}");
     assert!(
-        printed.contains("nothing to compensate")
+        printed.contains("no error can be compensated in this format")
             && printed.contains("EXX~X:p1: its axis stands still wherever readings observe it"),
         "{printed}"
     );

@@ -4,7 +4,8 @@ use std::fs;
 use std::path::PathBuf;
 use std::process::Command;
 
-use abbe::codegen::{Equation, Language, Options, Order, SessionTest, Symbols};
+use abbe::codegen::print::{LANGUAGES, OutputLanguage};
+use abbe::codegen::{Equation, Options, Order, SessionTest, Symbols, check};
 use abbe::model::component::ErrorName;
 use abbe::model::frames::Rotation;
 use abbe::model::session::read::{self, ReadOptions};
@@ -41,7 +42,7 @@ pub(super) fn refused(arguments: &[&str], parts: &[&str]) {
 }
 
 /// The equation of the test A150 from the library.
-fn of_library(language: Language, errors: &[&str], options: &Options) -> String {
+fn of_library(language: &OutputLanguage, errors: &[&str], options: &Options) -> String {
     let session = read::session(&plan(), &ReadOptions::default()).unwrap();
     let test = session.tests.iter().find(|test| test.name == "A150").unwrap();
     let source = SessionTest::new(&session, test).unwrap();
@@ -55,14 +56,15 @@ fn of_library(language: Language, errors: &[&str], options: &Options) -> String 
         &named
     };
     let equation = Equation::of(&session.machine, &source, errors, options).unwrap();
-    equation.print(language).unwrap().trim_end().to_string() + "\n"
+    let checked = check(&equation, &source).unwrap();
+    language.print(&checked).unwrap().trim_end().to_string() + "\n"
 }
 
 #[test]
 fn every_option_reaches_the_library_in_every_language() {
     let plan = plan();
-    for language in Language::ALL {
-        let a150 = ["equation", text(&plan), "--test", "A150", "--as", language.word()];
+    for language in LANGUAGES {
+        let a150 = ["equation", text(&plan), "--test", "A150", "--as", language.word];
         assert_eq!(printed(&a150), of_library(language, &[], &Options::default()));
         let forms = [
             (
@@ -100,7 +102,7 @@ fn every_option_reaches_the_library_in_every_language() {
             let kept = ["--errors", "e_y0a,EX0C,EA0C"];
             let found = printed(&[&a150[..], &form, &kept].concat());
             let expected = of_library(language, &["EY0A", "EX0C", "EA0C"], &options);
-            assert_eq!(found, expected, "{} {order_word}", language.word());
+            assert_eq!(found, expected, "{} {order_word}", language.word);
         }
         let options = Options {
             gradient: true,
@@ -239,7 +241,7 @@ fn a_measured_session_has_equations_too() {
     let stderr = String::from_utf8(output.stderr).unwrap();
     assert!(output.status.success(), "{stderr}");
     assert!(
-        stderr.contains("A100.csv") && stderr.contains("does without readings"),
+        stderr.contains("A100.csv") && stderr.contains("made without readings"),
         "{stderr}"
     );
     let found = String::from_utf8(output.stdout).unwrap();
@@ -342,7 +344,10 @@ fn invalid_requests_are_refused_with_the_reason() {
         &["equation", text(&plan), "--test", "A200"],
         &["no test `A200`", "A100, A150, C100, C150"],
     );
-    refused_with(&["--errors", "EQ0C"], &["`EQ0C` is no error", "EX0C"]);
+    refused_with(
+        &["--errors", "EQ0C"],
+        &["`EQ0C` is no parameter of an equation", "EX0C"],
+    );
     refused_with(
         &["--errors", "EX0B"],
         &["`EX0B` is an error of axis `B`", "does not have"],
@@ -360,7 +365,7 @@ fn invalid_requests_are_refused_with_the_reason() {
     refused(&["volumetric", text(&plan)], &["chapter5.toml:1", "no `chain`"]);
     refused(
         &["volumetric", text(&machine), "--errors", "bar"],
-        &["`bar`", "an error vector has none"],
+        &["`bar`", "an error vector has no parameters"],
     );
     let folder = tempfile::tempdir().unwrap();
     let broken = folder.path().join("machine.toml");

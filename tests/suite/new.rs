@@ -51,7 +51,7 @@ fn every_template_is_copied_and_reads() {
         // Existing files are not overwritten without `--force`.
         let again = abbe(&["new", text(&made), "--template", name]);
         assert_eq!(again.status.code(), Some(1));
-        assert!(String::from_utf8_lossy(&again.stderr).contains("there and not empty"));
+        assert!(String::from_utf8_lossy(&again.stderr).contains("exists and is not empty"));
         assert!(
             abbe(&["new", text(&made), "--template", name, "--force"])
                 .status
@@ -167,9 +167,9 @@ fn any_structural_code_gives_a_plan_that_runs() {
 
 #[test]
 fn without_arguments_the_templates_are_listed() {
-    let menu = abbe(&["new"]);
-    assert!(menu.status.success());
-    assert_eq!(menu.stdout, abbe(&["new", "--list"]).stdout);
+    let listed = abbe(&["new"]);
+    assert!(listed.status.success());
+    assert_eq!(listed.stdout, abbe(&["new", "--list"]).stdout);
     let output = abbe(&["new", "somewhere"]);
     assert_eq!(output.status.code(), Some(2));
     assert!(String::from_utf8_lossy(&output.stderr).contains("--from-code"));

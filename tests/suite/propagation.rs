@@ -201,6 +201,7 @@ fn the_command_states_which_uncertainty_to_quote() {
         text(&session),
         "--monte-carlo",
         "10000",
+        "--all",
         "--json",
         text(&json),
     ]);
@@ -228,7 +229,7 @@ fn the_command_states_which_uncertainty_to_quote() {
         assert_eq!(output.status.code(), Some(status), "{stderr}");
         assert!(stderr.contains(part), "{stderr}");
     };
-    refused(1, &["--monte-carlo", "100"], "10000 runs are the fewest");
+    refused(1, &["--monte-carlo", "100"], "at least 10000 runs are needed");
     refused(
         1,
         &["--monte-carlo", "10000", "--coverage", "1"],
@@ -237,6 +238,6 @@ fn the_command_states_which_uncertainty_to_quote() {
     refused(
         2,
         &["--monte-carlo", "10000", "--method", "circle"],
-        "--monte-carlo goes with the full fit",
+        "`--monte-carlo` works with the full fit",
     );
 }

@@ -213,7 +213,7 @@ fn the_command_compares_files() {
     refused(
         2,
         &["--repeat", text(&files[1]), "--method", "cone"],
-        "--repeat compares full fits",
+        "`--repeat` compares full fits",
     );
     refused(1, &["--repeat", text(&plan)], "has no readings");
 }

@@ -1,4 +1,4 @@
-//! What reports and plots promise: whole, small enough, safe from what names hold, and true to the model.
+//! Reports and plots: completeness, size, escaping of names, and agreement with the model.
 
 use std::path::Path;
 
@@ -15,10 +15,12 @@ fn session(path: &Path) -> Session {
     read::session(path, &ReadOptions::default()).unwrap()
 }
 
-/// `∂L/∂error` of the first order, derived apart from the chain: ball at (0, R, 0), spindle ball at (−D, 0, 0), so that for a turn of A
-/// `L₀ = √(R² + D²)`, with `ca = cos A`, `sa = sin A` (thesis, Eqs. 3.20 and 3.21, to first order).
+/// `∂L/∂error` to first order, derived independently of the chain: ball at (0, R, 0), spindle ball at (−D, 0, 0), so that for a rotation of A
+/// `L₀ = √(R² + D²)`, with `ca = cos A`, `sa = sin A` (Jiang (2014), Eqs. 3.20 and 3.21, to first order).
+///
+/// Jiang (2014): Xiaogeng Jiang, *Characterising Geometric Errors in Rotary Axes of 5-axis Machine Tools*, PhD thesis, University of Birmingham, 2014.
 #[test]
-fn the_patterns_of_single_errors_are_those_of_the_closed_form() {
+fn sensitivities_agree_with_the_closed_form() {
     let session = session(&ready("hermle-c600u/chapter5.toml"));
     let (complete, noise) = abbe::identify::plan::prepared(&session, &Default::default()).unwrap();
     let problem = states::problem_by_test(&complete, noise).unwrap();
@@ -56,8 +58,8 @@ fn the_patterns_of_single_errors_are_those_of_the_closed_form() {
     assert!(compared > 1000);
 }
 
-/// Coordinates of a vector one by one: a table that lies +X of its place takes its nest along, so that the vector from nest to ball, in the frame of a
-/// table at C, changes by −(cos C, −sin C, 0).
+/// Coordinates of a vector: a table displaced along +X displaces its nest, so that the vector from nest to ball, in the frame of a table at C, changes by
+/// −(cos C, −sin C, 0).
 #[test]
 fn the_sensitivities_of_an_r_test_are_those_of_each_coordinate() {
     let session = session(&ready("r-test/measured/session.toml"));
@@ -84,7 +86,7 @@ fn the_sensitivities_of_an_r_test_are_those_of_each_coordinate() {
     assert!(vertical.columns.iter().all(|column| column.id != "EX0C"));
 }
 
-/// Wherever a robot stands, a joint that is shifted by a micrometre shifts the target by one.
+/// In every pose, a joint displaced by one micrometre displaces the target by one micrometre.
 #[test]
 fn the_sensitivity_of_poses_to_a_shift_is_one() {
     let Some(series) = data("the_sensitivity_of_poses_to_a_shift_is_one", "landgraf_ur10") else {
@@ -104,7 +106,7 @@ fn the_sensitivity_of_poses_to_a_shift_is_one() {
     }
 }
 
-/// What a page says is what the JSON says.
+/// The page shows the figures of the JSON result.
 #[test]
 fn methods_and_next_tests_have_reports() {
     let folder = tempfile::tempdir().unwrap();
@@ -155,13 +157,13 @@ fn methods_and_next_tests_have_reports() {
         shown.any(|value| (value / after - 1.0).abs() < 0.006),
         "no figure {after}"
     );
-    assert!(page.contains("How far each sweep can shrink"));
+    assert!(page.contains("Minimum sweep ranges"));
     assert!(at("next/next-test.svg").exists());
 }
 
-/// A share is what the model's readings lose when that share's unknowns are put to zero: the difference, not the derivative.
+/// A share is the change of the modelled readings if the parameters of the share are set to zero: a difference, not a derivative.
 #[test]
-fn a_share_is_what_the_readings_lose_without_it() {
+fn shares_agree_with_differences_of_the_model() {
     let session = session(&ready("hermle-c600u/measured/session.toml"));
     let (problem, fit) = abbe::identify::fit::prepare(&session, 1).unwrap();
     let views = views(&problem, &fit, None).unwrap();
@@ -192,35 +194,35 @@ fn a_share_is_what_the_readings_lose_without_it() {
     }
 }
 
-/// What the plant put in is `EZC~C:h2`; one height of the ball cannot tell it from a tilt of one order less (EFFECTS, METHOD).
+/// The simulator added `EZC~C:h2`. With one height of the ball, a tilt of the next lower order is confounded with it.
 #[test]
-fn a_trace_tells_how_it_came_to_its_effects_and_who_else_could_stand_there() {
+fn a_trace_reports_the_steps_of_its_search_and_the_competing_explanations() {
     let session = session(&ready("hermle-c600u/measured/session.toml"));
     let trace = abbe::identify::trace::trace(&session, &Default::default(), &|_| true).unwrap();
     let [competing_effects] = trace.competing_effects.as_slice() else {
         panic!(
-            "one effect was put in, {} were found",
+            "one effect was simulated, {} were found",
             trace.competing_effects.len()
         );
     };
-    let of = |id: &str| competing_effects.iter().find(|rival| rival.id == id).unwrap();
+    let of = |id: &str| competing_effects.iter().find(|effect| effect.id == id).unwrap();
     assert!(of("EZC~C:h2").named && !of("EZC~C:h2").alias);
     for id in ["EAC~C:h1", "EBC~C:h1"] {
         assert!(of(id).alias && !of(id).named, "{id}");
     }
     assert!(competing_effects.is_sorted_by(|a, b| a.evidence >= b.evidence));
-    let beaten = competing_effects
+    let rejected = competing_effects
         .iter()
-        .filter(|rival| !rival.named && !rival.alias);
-    for rival in beaten {
-        assert!(rival.evidence < of("EZC~C:h2").evidence - 2.0, "{}", rival.id);
+        .filter(|effect| !effect.named && !effect.alias);
+    for effect in rejected {
+        assert!(effect.evidence < of("EZC~C:h2").evidence - 2.0, "{}", effect.id);
     }
     assert_eq!(trace.steps[0].id, "EZC~C:h2");
     let (last, after) = (trace.steps.last().unwrap(), &trace.result.after);
     assert!((last.heldout_rms_um / after.heldout_rms_um - 1.0).abs() < 0.02);
 }
 
-/// The bundled session with names that a page might take for markup.
+/// The bundled session with markup in its names.
 pub fn with_markup_in_names(folder: &Path) {
     let from = ready("hermle-c600u/measured");
     for entry in std::fs::read_dir(&from).unwrap() {
@@ -286,7 +288,7 @@ fn names_with_markup_are_text_in_a_report() {
 }
 
 #[test]
-fn plots_come_all_or_none_and_as_png_where_that_is_built_in() {
+fn plots_are_written_completely_or_not_at_all() {
     let folder = tempfile::tempdir().unwrap();
     let plots = folder.path().join("plots");
     let session = ready("hermle-c600u/measured/session.toml");
@@ -332,7 +334,7 @@ fn plots_come_all_or_none_and_as_png_where_that_is_built_in() {
             "{message}"
         );
     }
-    // A folder that is not empty is refused before any work is done.
+    // A folder that is not empty is refused before the calculation.
     let again = abbe(&arguments);
     let message = String::from_utf8_lossy(&again.stderr).into_owned();
     assert_eq!(again.status.code(), Some(1));
@@ -343,10 +345,10 @@ fn plots_come_all_or_none_and_as_png_where_that_is_built_in() {
     let nowhere = folder.path().join("no/such/report.html");
     let refused = abbe(&["fit", text(&session), "--report", text(&nowhere)]);
     assert_eq!(refused.status.code(), Some(1));
-    assert!(refused.stdout.is_empty(), "refused before the work, not after it");
+    assert!(refused.stdout.is_empty(), "refused before the calculation");
 }
 
-/// A bound of the size of a page.
+/// Maximum size of a page.
 const MAX_BYTES: usize = 3_000_000;
 
 #[test]

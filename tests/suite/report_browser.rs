@@ -1,6 +1,6 @@
-//! Reports in a browser: nothing on the console, nothing asked for, and the sliders move the traces by what the closed form says.
+//! Reports in a browser: no console messages, no requests, sliders that agree with the closed form, and a layout without overflow.
 //!
-//! A script is added to a copy of the page; Chromium runs it and prints the document. Skipped by name where there is no Chromium.
+//! A script is added to a copy of the page. Chromium runs it and prints the document. Without Chromium the tests are skipped with a message.
 
 use std::path::{Path, PathBuf};
 use std::process::Command;
@@ -27,8 +27,8 @@ fn chromium(test: &str) -> Option<&'static str> {
     found
 }
 
-/// Opens a page with a script added to it, whose value it returns, beside what stood on the console.
-fn run(browser: &str, page: &Path, script: &str) -> (Value, Vec<String>) {
+/// Opens a page of this width (px) with a script added to it. Returns the value of the script and the messages on the console.
+fn run(browser: &str, page: &Path, width: u32, script: &str) -> (Value, Vec<String>) {
     let profile = tempfile::tempdir().unwrap();
     let copy = profile.path().join("page.html");
     let html = std::fs::read_to_string(page).unwrap();
@@ -37,7 +37,7 @@ fn run(browser: &str, page: &Path, script: &str) -> (Value, Vec<String>) {
          catch (error) {{ found = {{ fault: String(error) }}; }} \
          const element = document.createElement('pre'); element.id = 'found'; element.textContent = JSON.stringify(found); document.body.append(element); }});</script></body>"
     );
-    // Virtual time, which lets the test end as soon as the page has nothing to do, draws no frames: a timer stands for them.
+    // Virtual time ends the test as soon as the page is idle. It draws no frames, so that a timer replaces them.
     let frames = "<head><script>window.requestAnimationFrame = (call) => setTimeout(call, 16)</script>";
     let html = html.replacen("<head>", frames, 1);
     std::fs::write(&copy, html.replacen("</body>", &added, 1)).unwrap();
@@ -51,7 +51,6 @@ fn run(browser: &str, page: &Path, script: &str) -> (Value, Vec<String>) {
             "--disable-component-update",
             "--disable-sync",
             "--enable-logging=stderr",
-            "--window-size=1280,900",
             "--virtual-time-budget=8000",
             "--dump-dom",
         ])
@@ -59,6 +58,7 @@ fn run(browser: &str, page: &Path, script: &str) -> (Value, Vec<String>) {
             "--user-data-dir={}",
             profile.path().join("profile").display()
         ))
+        .arg(format!("--window-size={width},900"))
         .arg(format!("file://{}", copy.display()))
         .output()
         .unwrap();
@@ -98,9 +98,9 @@ fn report(folder: &Path, command: &str, session: &Path) -> PathBuf {
 
 const HELPERS: &str = "
     const frame = () => new Promise((done) => requestAnimationFrame(() => requestAnimationFrame(done)));
-    const plot = (kind, column, name) => [...document.querySelectorAll('svg[data-live]')].find((svg) => {
-        const live = JSON.parse(svg.dataset.live);
-        return live.kind === kind && live.column === column && svg.getAttribute('aria-label').startsWith(name);
+    const plot = (kind, column, name) => [...document.querySelectorAll('svg[data-interaction]')].find((svg) => {
+        const settings = JSON.parse(svg.dataset.interaction);
+        return settings.kind === kind && settings.column === column && svg.getAttribute('aria-label').startsWith(name);
     });
     const places = (path) => [...path.getAttribute('d').matchAll(/[ML]([-.0-9]+) ([-.0-9]+)/g)].map((m) => [Number(m[1]), Number(m[2])]);
     const slide = async (id, value) => {
@@ -118,8 +118,8 @@ const HELPERS: &str = "
 ";
 
 #[test]
-fn pages_ask_for_nothing_and_their_sliders_move_the_traces() {
-    let name = "pages_ask_for_nothing_and_their_sliders_move_the_traces";
+fn pages_request_nothing_and_sliders_agree_with_the_closed_form() {
+    let name = "pages_request_nothing_and_sliders_agree_with_the_closed_form";
     let Some(browser) = chromium(name) else { return };
     let folder = tempfile::tempdir().unwrap();
     let page = report(
@@ -130,20 +130,20 @@ fn pages_ask_for_nothing_and_their_sliders_move_the_traces() {
     let script = format!(
         "{HELPERS}
         const trace = plot('polar', 'deviation', 'C150');
-        const live = JSON.parse(trace.dataset.live);
+        const settings = JSON.parse(trace.dataset.interaction);
         const path = trace.querySelector('path[data-run=\"0\"]');
-        const radius = ([x, y]) => Math.hypot(x - live.x0, y - live.y0);
+        const radius = ([x, y]) => Math.hypot(x - settings.x0, y - settings.y0);
         const before = places(path);
         await slide('EX0C', 0);
         const without = places(path);
-        const moves = before.map((p, i) => (radius(without[i]) - radius(p)) / live.px * live.um);
-        const angles = before.map(([x, y]) => Math.atan2(live.y0 - y, x - live.x0) * 180 / Math.PI);
+        const moves = before.map((p, i) => (radius(without[i]) - radius(p)) / settings.px * settings.um);
+        const angles = before.map(([x, y]) => Math.atan2(settings.y0 - y, x - settings.x0) * 180 / Math.PI);
         await slide('EX0C', 50);
-        const half = places(path).map((p, i) => (radius(p) - radius(before[i])) / live.px * live.um);
+        const half = places(path).map((p, i) => (radius(p) - radius(before[i])) / settings.px * settings.um);
         [...document.querySelectorAll('.controls button')].find((b) => b.textContent === 'none').click();
         await frame();
-        const left = places(path).map((p) => Math.abs(radius(p) - live.r) / live.px * live.um);
-        await tick('magnify what is left', true);
+        const left = places(path).map((p) => Math.abs(radius(p) - settings.r) / settings.px * settings.um);
+        await tick('magnify the remainder', true);
         const division = trace.querySelector('.division').textContent;
         await tick('backward', false);
         const shown = [...trace.querySelectorAll('path[data-run]')].filter((p) => p.style.display !== 'none').length;
@@ -153,17 +153,17 @@ fn pages_ask_for_nothing_and_their_sliders_move_the_traces() {
         const at = new DOMPoint(...places(path)[10]).matrixTransform(trace.getScreenCTM());
         trace.dispatchEvent(new PointerEvent('pointermove', {{ clientX: at.x, clientY: at.y }}));
         const tip = document.getElementById('tip').hidden ? '' : document.getElementById('tip').textContent;
-        const bytes = Uint8Array.from(atob(document.getElementById('table').textContent), (c) => c.charCodeAt(0));
+        const bytes = Uint8Array.from(atob(document.getElementById('csv').textContent), (c) => c.charCodeAt(0));
         const csv = await new Response(new Blob([bytes]).stream().pipeThrough(new DecompressionStream('deflate'))).text();
         return {{ angles, moves, half, left: Math.max(...left), division, shown, hidden, over, tip, rows: csv.trim().split('\\n').length,
             requests: performance.getEntriesByType('resource').length, wide: document.documentElement.scrollWidth }};"
     );
-    let (found, console) = run(browser, &page, &script);
+    let (found, console) = run(browser, &page, 1280, &script);
     assert_eq!(console, Vec::<String>::new());
     assert_eq!(found["fault"], Value::Null, "{found}");
     assert_eq!(found["requests"], 0);
-    // C turns the ball at (0, R, 0) by C; the spindle ball stands at (0, 0, D): to first order ∂L/∂EX0C = −R·sin C/L₀. The error was −36.29 µm, and
-    // without it the readings differ by its share, less.
+    // C rotates the ball at (0, R, 0); the spindle ball is at (0, 0, D). To first order ∂L/∂EX0C = −R·sin C/L₀. The error is −36.29 µm, and its removal
+    // subtracts this share.
     let numbers = |key: &str| -> Vec<f64> {
         found[key]
             .as_array()
@@ -176,25 +176,25 @@ fn pages_ask_for_nothing_and_their_sliders_move_the_traces() {
     assert!(moves.len() > 100);
     for ((angle, moved), half) in angles.iter().zip(&moves).zip(&half) {
         let wanted = -36.29 * 100.0 / 150.0 * angle.to_radians().sin();
-        // Places are written to a tenth of a pixel, 0.12 µm here.
+        // Coordinates have a resolution of a tenth of a pixel, 0.14 µm here.
         assert!((moved - wanted).abs() < 0.3, "at {angle}°: {moved} {wanted}");
         assert!((half - wanted / 2.0).abs() < 0.3, "at {angle}°: {half} {wanted}");
     }
-    // Without everything only the residual is left, which the fit says is noise of 0.3 µm.
+    // Without all shares the residual remains: noise of 0.3 µm.
     let left = found["left"].as_f64().unwrap();
     assert!(left < 1.6, "{left}");
     let division: f64 = found["division"].as_str().unwrap().parse().unwrap();
     assert!(division <= 0.5, "{division}");
     assert_eq!(found["shown"], 2);
     assert_eq!(found["hidden"], true);
-    // C100 is the third test; it leaves the plot over time, before and after.
+    // C100 is the third test. Its series before and after are hidden in the plot over time.
     assert_eq!(found["over"], serde_json::json!(["of-test-2", "of-test-2"]));
     let tip = found["tip"].as_str().unwrap();
     assert!(
         tip.starts_with("C150, run ") && tip.contains("deviation") && tip.contains("line "),
         "{tip}"
     );
-    // A header and every reading, none thinned.
+    // A header and all readings, not decimated.
     assert_eq!(found["rows"], 2417);
     assert!(
         found["wide"].as_f64().unwrap() <= 1280.0,
@@ -203,19 +203,19 @@ fn pages_ask_for_nothing_and_their_sliders_move_the_traces() {
 }
 
 #[test]
-fn reports_of_plan_and_fit_say_nothing_on_the_console() {
-    let Some(browser) = chromium("reports_of_plan_and_fit_say_nothing_on_the_console") else {
+fn reports_of_plan_and_fit_write_nothing_to_the_console() {
+    let Some(browser) = chromium("reports_of_plan_and_fit_write_nothing_to_the_console") else {
         return;
     };
     let folder = tempfile::tempdir().unwrap();
     with_markup_in_names(folder.path());
     let plan = report(folder.path(), "plan", &ready("hermle-c600u/chapter5.toml"));
-    // Names that hold markup are text in the browser too: no element, no script came of them.
+    // Markup in names stays text in the browser.
     let fit = report(folder.path(), "fit", &folder.path().join("session.toml"));
     let script = "return { requests: performance.getEntriesByType('resource').length, hit: window.hit || 0, \
                   images: document.images.length, title: document.title, labels: [...document.querySelectorAll('.controls label')].map((l) => l.textContent) };";
     for page in [plan, fit] {
-        let (found, console) = run(browser, &page, script);
+        let (found, console) = run(browser, &page, 1280, script);
         assert_eq!(console, Vec::<String>::new());
         assert_eq!(
             (&found["requests"], &found["hit"], &found["images"]),
@@ -230,4 +230,83 @@ fn reports_of_plan_and_fit_say_nothing_on_the_console() {
             );
         }
     }
+}
+
+/// Opens all folded parts, then lists what exceeds its container: the page, elements outside scroll boxes, and text outside its plot.
+const OVERFLOW: &str = "
+    document.querySelectorAll('details').forEach((part) => { part.open = true; });
+    const outside = [...document.querySelectorAll('body *')].filter((element) => {
+        if (element.closest('svg') && element.tagName !== 'svg') return false;
+        if (element.parentElement.closest('.scroll')) return false;
+        const box = element.getBoundingClientRect();
+        return box.width && (box.right > innerWidth + 1 || box.left < -1);
+    });
+    const cut = [...document.querySelectorAll('svg.plot text')].filter((text) => {
+        const [box, frame] = [text.getBoundingClientRect(), text.closest('svg').getBoundingClientRect()];
+        return box.width && (box.left < frame.left - 1 || box.right > frame.right + 1 || box.bottom > frame.bottom + 1);
+    });
+    const name = (element) => `${element.tagName}.${element.getAttribute('class')}: ${element.textContent.slice(0, 40)}`;
+    return { inner: innerWidth, width: document.documentElement.scrollWidth, outside: outside.map(name), cut: cut.map(name) };";
+
+#[test]
+fn nothing_is_cut_on_narrow_and_wide_pages() {
+    let Some(browser) = chromium("nothing_is_cut_on_narrow_and_wide_pages") else {
+        return;
+    };
+    let folder = tempfile::tempdir().unwrap();
+    let measured = ready("hermle-c600u/measured/session.toml");
+    let pages = [
+        report(folder.path(), "trace", &measured),
+        report(folder.path(), "fit", &measured),
+        report(folder.path(), "plan", &ready("hermle-c600u/chapter5.toml")),
+    ];
+    for page in &pages {
+        for width in [400, 1280, 1800] {
+            let (found, _) = run(browser, page, width, OVERFLOW);
+            let name = page.display();
+            assert_eq!(found["inner"], width, "{name}: {found}");
+            assert!(
+                found["width"].as_u64().unwrap() <= u64::from(width),
+                "{name} at {width} px: {found}"
+            );
+            assert_eq!(found["outside"], serde_json::json!([]), "{name} at {width} px");
+            assert_eq!(found["cut"], serde_json::json!([]), "{name} at {width} px");
+        }
+    }
+}
+
+#[test]
+fn a_trace_shows_its_values_within_1500_px_and_folds_unaffected_tests() {
+    let Some(browser) = chromium("a_trace_shows_its_values_within_1500_px_and_folds_unaffected_tests") else {
+        return;
+    };
+    let folder = tempfile::tempdir().unwrap();
+    let page = report(
+        folder.path(),
+        "trace",
+        &ready("hermle-c600u/measured/session.toml"),
+    );
+    let script = "
+        const table = document.querySelector('#values table');
+        const isFolded = (test) => Boolean(document.querySelector(`#residuals svg[aria-label^=\"${test}\"]`).closest('details:not([open])'));
+        const tops = [...document.querySelectorAll('#residuals svg[aria-label^=\"C150\"]')].map((svg) => svg.getBoundingClientRect().top);
+        const effect = document.querySelector('#effects-and-competing-explanations .halves');
+        const [values, alternatives] = [...effect.children].map((part) => part.getBoundingClientRect());
+        return { bottom: table.getBoundingClientRect().bottom + scrollY, rows: table.rows.length,
+            folded: ['A100', 'A150', 'C100', 'C150'].map(isFolded), beside: tops[0] === tops[1],
+            alternatives: effect.querySelectorAll('tbody tr').length, right: alternatives.left >= values.right && alternatives.top === values.top };";
+    let (found, _) = run(browser, &page, 1280, script);
+    // 8 errors, amplitude and phase of the found effect, and the header.
+    assert_eq!(found["rows"], 11, "{found}");
+    assert!(found["bottom"].as_f64().unwrap() <= 1500.0, "{found}");
+    // The simulator changed the axial motion of C only, which C150 alone measures.
+    assert_eq!(
+        found["folded"],
+        serde_json::json!([true, true, true, false]),
+        "{found}"
+    );
+    assert_eq!(found["beside"], true, "{found}");
+    // The selected effect and its 8 alternatives, to the right of the values of the effect.
+    assert_eq!(found["alternatives"], 9, "{found}");
+    assert_eq!(found["right"], true, "{found}");
 }

@@ -267,6 +267,16 @@ fn written(arguments: &[&str]) -> Value {
     serde_json::from_slice(&std::fs::read(&file).unwrap()).unwrap()
 }
 
+/// The fields in front of every result of a session.
+const ENVELOPE: [&str; 6] = [
+    "schema_version",
+    "tool_version",
+    "command",
+    "session",
+    "seed",
+    "options",
+];
+
 fn has_exactly(value: &Value, design: &[&str], added: &[&str]) {
     let found: BTreeSet<&str> = value.as_object().unwrap().keys().map(String::as_str).collect();
     let wanted: BTreeSet<&str> = design.iter().copied().collect();
@@ -291,18 +301,33 @@ fn results_hold_and_have_the_fields_of_the_design() {
             "unobservable",
         ],
         &[
-            "noise_source",
-            "heldout_by",
-            "rank",
-            "unknowns",
-            "birge_ratio",
-            "u_enlargement",
-            "circular",
-            "rejected",
-            "warnings",
-        ],
+            &ENVELOPE[..],
+            &[
+                "noise_source",
+                "noise_ar_coefficients",
+                "heldout_by",
+                "rank",
+                "parameter_count",
+                "chi_square",
+                "degrees_of_freedom",
+                "birge_ratio",
+                "u_enlargement",
+                "identifiable",
+                "covariance",
+                "null_space",
+                "circular",
+                "outliers",
+                "warnings",
+            ],
+        ]
+        .concat(),
     );
-    has_exactly(&fit["parameters"][0], &["id", "value", "u", "unit"], &[]);
+    let of_a_parameter = ["expanded_u", "significant", "meaning"];
+    has_exactly(
+        &fit["parameters"][0],
+        &["id", "value", "u", "unit"],
+        &of_a_parameter,
+    );
     has_exactly(
         &schema("fit")["$defs"]["Unobservable"]["properties"],
         &["combination", "why"],
@@ -321,25 +346,39 @@ fn results_hold_and_have_the_fields_of_the_design() {
         &trace,
         &["verdict", "noise_um", "before", "after", "effects", "remainder"],
         &[
-            "noise_source",
-            "noise_ar_coefficients",
-            "readings",
-            "heldout_by",
-            "residual_before",
-            "moved",
-            "candidates",
-            "candidates_detectable",
-            "unobservable",
-            "rejected",
-            "warnings",
-            "interrupted",
-        ],
+            &ENVELOPE[..],
+            &[
+                "unique",
+                "noise_source",
+                "noise_ar_coefficients",
+                "readings",
+                "heldout_by",
+                "residual_before",
+                "changed_parameters",
+                "candidates",
+                "candidates_detectable",
+                "unobservable",
+                "null_space",
+                "outliers",
+                "warnings",
+                "interrupted",
+            ],
+        ]
+        .concat(),
     );
     for model in ["before", "after"] {
         has_exactly(
             &trace[model],
             &["rms_um", "heldout_rms_um", "parameters"],
-            &["noise_um"],
+            &[
+                "noise_um",
+                "rank",
+                "parameter_count",
+                "chi_square",
+                "degrees_of_freedom",
+                "identifiable",
+                "covariance",
+            ],
         );
     }
     let effect = &trace["effects"][0];
@@ -362,12 +401,17 @@ fn results_hold_and_have_the_fields_of_the_design() {
             "separation",
             "meaning",
             "unique",
-            "indistinguishable",
+            "explanation_count",
             "explanations",
             "separating_tests",
         ],
     );
-    has_exactly(&effect["parameters"][0], &["id", "value", "u", "unit"], &[]);
+    has_exactly(
+        &effect["parameters"][0],
+        &["id", "value", "u", "unit"],
+        &of_a_parameter,
+    );
+    assert!(effect["order"].is_u64(), "{effect}");
     has_exactly(
         &schema("trace")["$defs"]["EffectName"]["properties"],
         &["component", "driver", "shape", "order"],
@@ -382,11 +426,16 @@ fn the_other_results_hold() {
     let calibration = ready("self-calibration/measured/session.toml");
     let folder = tempfile::tempdir().unwrap();
     let (out, map) = (folder.path().join("run"), folder.path().join("map.csv"));
+    let patterns = folder.path().join("patterns.csv");
     let machine = ready("volumetric/machine.toml");
     let errors = ready("volumetric/errors.toml");
     for (subject, arguments) in [
         ("plan", vec!["plan", text(&plan)]),
         ("next-test", vec!["plan", text(&plan), "--range"]),
+        (
+            "patterns",
+            vec!["plan", text(&plan), "--patterns", text(&patterns)],
+        ),
         (
             "next-test",
             vec!["plan", text(&plan), "--separate", "EZC~C:h2,EAC~C:h1"],
@@ -464,6 +513,15 @@ fn the_other_results_hold() {
     );
 
     let session = out.join("session.toml");
+    let again = folder.path().join("again");
+    written(&["simulate", text(&plan), "--out", text(&again), "--seed", "2"]);
+    let repeated = written(&[
+        "fit",
+        text(&session),
+        "--repeat",
+        text(&again.join("session.toml")),
+    ]);
+    assert_eq!(faults(&validator("repeat"), &repeated), Vec::<String>::new());
     let compared = written(&["fit", text(&session), "--method", "cone"]);
     assert_eq!(faults(&validator("geometric"), &compared), Vec::<String>::new());
 }

@@ -354,7 +354,7 @@ fn a_direction_that_divides_the_angles_leaves_named_combinations_unidentified() 
         report
             .warnings
             .iter()
-            .any(|warning| warning.contains("no position"))
+            .any(|warning| warning.contains("the position of the axis is not estimated"))
     );
 }
 

@@ -226,9 +226,9 @@ fn invalid_simulations_are_refused_and_nothing_is_written() {
         ),
         (
             &["--effect", "EZC~C:h2.phase=1deg"],
-            "without `EZC~C:h2.amplitude`",
+            "`EZC~C:h2.phase` has a value, but `EZC~C:h2.amplitude` has none",
         ),
-        (&["--noise-um", "-1"], "not negative"),
+        (&["--noise-um", "-1"], "a standard deviation in µm is expected"),
     ] {
         let stderr = refused(&plan, &out, more);
         assert!(stderr.contains(message), "{stderr}");
@@ -238,14 +238,17 @@ fn invalid_simulations_are_refused_and_nothing_is_written() {
     fs::write(out.join("notes.txt"), "mine").unwrap();
     let stderr = refused(&plan, &out, &[]);
     assert!(
-        stderr.contains("there and not empty") && stderr.contains("--force"),
+        stderr.contains("exists and is not empty") && stderr.contains("--force"),
         "{stderr}"
     );
     assert_eq!(fs::read_dir(&out).unwrap().count(), 1);
     fs::remove_dir_all(&out).unwrap();
     let before = fs::read(&plan).unwrap();
     let stderr = refused(&plan, folder.path(), &["--force"]);
-    assert!(stderr.contains("the plan itself lies there"), "{stderr}");
+    assert!(
+        stderr.contains("this folder contains the plan itself"),
+        "{stderr}"
+    );
     assert_eq!(fs::read(&plan).unwrap(), before);
     let stderr = refused(&ready("kuka-iiwa14/session.toml"), &out, &["--data", "nowhere"]);
     assert!(stderr.contains("nowhere"), "{stderr}");

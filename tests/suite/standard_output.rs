@@ -166,8 +166,11 @@ fn standard_output_takes_one_output_and_no_folder() {
     for (arguments, words) in [
         (&["--json", "-", "--csv", "-"][..], "`-` is given for two outputs"),
         (&["--json", "-", "--report", "-"], "`-` is given for two outputs"),
-        (&["--plots", "-"], "standard output, which cannot take a folder"),
-        (&compensation, "standard output, which cannot take a folder"),
+        (
+            &["--plots", "-"],
+            "standard output, which cannot contain a folder",
+        ),
+        (&compensation, "standard output, which cannot contain a folder"),
     ] {
         let output = abbe(&[&["fit", text(&session)], arguments].concat());
         let stderr = String::from_utf8(output.stderr).unwrap();

@@ -285,13 +285,13 @@ fn an_effect_without_an_alias_is_unique() {
 fn the_line_below_the_verdict_states_whether_an_effect_is_unique() {
     let session = ready("hermle-c600u/measured/session.toml");
     let output = |only: &[&str]| {
-        let outcome = abbe(&[&["trace", text(&session)], only].concat());
+        let outcome = abbe(&[&["trace", text(&session), "--all"], only].concat());
         assert!(outcome.status.success());
         String::from_utf8(outcome.stdout).unwrap()
     };
     let all = output(&[]);
     let mut lines = all.lines();
-    assert_eq!(lines.next(), Some("Verdict: explained"));
+    assert_eq!(lines.next(), Some("Verdict: explained, 1 effect"));
     let second = lines.next().unwrap();
     let count = second
         .strip_prefix("1 of ")

@@ -245,7 +245,7 @@ fn the_command_writes_map_and_summary_and_names_what_is_wrong() {
         ),
         (
             "[[function]]\nerror = \"EXX\"\ntable = { at_deg = [0, 1], um = [0, 1] }\n",
-            "`at_mm` is meant",
+            "`at_mm` is expected for this axis",
         ),
         (
             "[[function]]\nerror = \"EXX\"\ntable = { at_mm = [1, 0], um = [0, 1] }\n",

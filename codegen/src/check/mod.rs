@@ -1,125 +1,50 @@
-//! Check of a program against the chain over dual numbers. A program that fails the check is not written.
+//! Check of an equation against the chain over dual numbers. Only a checked equation can be printed.
 
+mod absent;
+mod agreement;
 mod deviation;
 mod points;
 mod reference;
 
+pub use agreement::Agreement;
 pub use deviation::Deviation;
 
-use crate::check::points::{CheckPoint, PseudoRandom};
 use crate::equation::Equation;
 use crate::error::CodegenError;
-use crate::program::Program;
 use crate::subject::Source;
 use crate::variable::Variable;
 
-/// Number of points at which every program is checked.
-const POINTS: usize = 40;
-/// Largest relative difference that is accepted.
-const TOLERANCE: f64 = 1e-12;
-/// Sizes of the errors at the check points, mm and rad. They are far larger than real errors, so that a wrong term of any order is
-/// detected.
-const SIZES: [f64; 2] = [10.0, 0.1];
-
-/// Agreement of a program with the chain.
-#[derive(Clone, Debug, Default, PartialEq)]
-pub struct Check {
-    /// Number of points compared, with errors of up to ±10 mm and ±0.1 rad.
-    pub points: usize,
-    /// Largest difference of a value, relative to the largest value.
-    pub value: f64,
-    /// Largest difference of a derivative, relative to the largest derivative by the same parameter. Below 1 mm/mm or 1 mm/rad the
-    /// reference is 1, because the derivatives by an unobservable parameter are rounding errors only.
-    pub gradient: f64,
-    /// Largest derivative by each parameter over all points, mm/mm and mm/rad.
-    pub largest_derivatives: Vec<f64>,
+/// An equation that agrees with the chain, and what the check found. [`check()`] alone makes one.
+#[derive(Debug)]
+#[non_exhaustive]
+pub struct Checked<'e> {
+    /// The equation.
+    pub equation: &'e Equation,
+    /// Agreement of its programs with the chain.
+    pub agreement: Agreement,
+    /// Errors and instrument parameters that the form does not contain.
+    pub absent: Vec<Variable>,
+    /// Ranges of the lengths and of the positions of moving axes in the session, mm or rad.
+    pub range: Vec<(Variable, [f64; 2])>,
+    /// Deviations of a truncated or small-angle form from the exact chain over that range.
+    pub deviations: Vec<Deviation>,
 }
 
-impl Check {
-    /// The larger of the value and gradient differences.
-    pub fn largest(&self) -> f64 {
-        self.value.max(self.gradient)
-    }
-}
-
-impl Equation {
-    /// Compares programs, with or without derivatives, with the chain over dual numbers at points with large errors.
-    ///
-    /// # Errors
-    /// If they disagree; the program must then not be written.
-    pub(crate) fn confirm(&self, source: &impl Source, programs: &[&Program]) -> Result<Check, CodegenError> {
-        let mut draws = PseudoRandom::new(4);
-        let mut check = Check::default();
-        let count = self.parameters.len();
-        let mut value_scale = f64::MIN_POSITIVE;
-        let mut scales = vec![0.0_f64; count];
-        let mut difference = 0.0_f64;
-        let mut differences = vec![0.0_f64; count];
-        let mut tries = 0;
-        while check.points < POINTS && tries < 10 * POINTS {
-            tries += 1;
-            let nominal = self.draw_anywhere(source, &mut draws);
-            let size = |variable: &Variable| SIZES[usize::from(variable.is_angle())];
-            let small = self.parameters.iter().map(|p| draws.between(-size(p), size(p)));
-            let point = CheckPoint {
-                small: small.collect(),
-                nominal,
-            };
-            let (values, gradient) = self.expected(source, &point)?;
-            // Skip an impossible set-up, such as the root of a negative length.
-            if !values
-                .iter()
-                .chain(gradient.iter().flatten())
-                .all(|x| x.is_finite())
-            {
-                continue;
-            }
-            let largest = values
-                .iter()
-                .fold(0.0_f64, |largest, value| largest.max(value.abs()));
-            value_scale = value_scale.max(largest);
-            for row in &gradient {
-                for k in 0..count {
-                    scales[k] = scales[k].max(row[k].abs());
-                }
-            }
-            for program in programs {
-                let found = program.run(&point.inputs(program, &self.parameters));
-                let (found_values, found_slopes) = found.split_at(values.len());
-                for (found, expected) in found_values.iter().zip(&values) {
-                    difference = difference.max(worst(*found, *expected));
-                }
-                // A program without derivatives has no derivatives to compare.
-                for (index, (found, expected)) in
-                    found_slopes.iter().zip(gradient.iter().flatten()).enumerate()
-                {
-                    let k = index % count;
-                    differences[k] = differences[k].max(worst(*found, *expected));
-                }
-            }
-            check.points += 1;
-        }
-        check.value = difference / value_scale;
-        let relative = differences.iter().zip(&scales).map(|(d, s)| d / s.max(1.0));
-        check.gradient = relative.fold(0.0, f64::max);
-        if check.points == 0 || check.largest() > TOLERANCE {
-            return Err(CodegenError::Unconfirmed {
-                points: check.points,
-                value: check.value,
-                gradient: check.gradient,
-            });
-        }
-        check.largest_derivatives = scales;
-        Ok(check)
-    }
-}
-
-/// The absolute difference; infinite if either value is not a number.
-fn worst(found: f64, expected: f64) -> f64 {
-    let difference = (found - expected).abs();
-    if difference.is_nan() {
-        f64::INFINITY
-    } else {
-        difference
-    }
+/// Compares the programs of an equation, value and derivatives, with the chain over dual numbers; `source` is that of the equation.
+///
+/// # Errors
+/// If they disagree, if an effect has no value at a point, or if a normal form is needed and does not exist.
+pub fn check<'e>(equation: &'e Equation, source: &impl Source) -> Result<Checked<'e>, CodegenError> {
+    let value = equation.program(false);
+    let agreement = agreement::agreement(equation, source, &[&value, &equation.program(true)])?;
+    let absent = absent::absent_parameters(equation, &agreement)?;
+    let range = points::range(equation, source);
+    let deviations = deviation::deviations(equation, source, &range, &value)?;
+    Ok(Checked {
+        equation,
+        agreement,
+        absent,
+        range,
+        deviations,
+    })
 }

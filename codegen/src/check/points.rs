@@ -59,33 +59,30 @@ impl CheckPoint {
     }
 }
 
-impl Equation {
-    /// Intervals of a driver in which effects with a local shape are not zero.
-    fn intervals_of_effects(&self, driver: &Variable) -> Vec<[f64; 2]> {
-        let quantity = |variable: &Variable| match variable {
-            Variable::Driver(quantity) => Some((quantity.driver.clone(), quantity.part)),
-            Variable::Position { axis, .. } => Some((Driver::Axis(axis.clone()), DriverPart::Value)),
-            _ => None,
-        };
-        let Some((driver, part)) = quantity(driver) else {
-            return Vec::new();
-        };
-        let follows = |effect: &Effect| effect.driver == driver && effect.shape.uses() == part;
-        let effects = self.options.effects.iter();
-        effects
-            .filter(|effect| follows(effect))
-            .filter_map(|effect| effect.shape.varies_within())
-            .collect()
-    }
+/// Intervals of a driver in which effects with a local shape are not zero.
+fn intervals_of_effects(equation: &Equation, driver: &Variable) -> Vec<[f64; 2]> {
+    let (driver, part) = match driver {
+        Variable::Driver(quantity) => (quantity.driver.clone(), quantity.part),
+        Variable::Position { axis, .. } => (Driver::Axis(axis.clone()), DriverPart::Value),
+        _ => return Vec::new(),
+    };
+    let follows = |effect: &Effect| effect.driver == driver && effect.shape.uses() == part;
+    let effects = equation.options.effects.iter();
+    effects
+        .filter(|effect| follows(effect))
+        .filter_map(|effect| effect.shape.varies_within())
+        .collect()
+}
 
-    /// PseudoRandom the nominal variables over their whole range: lengths near their stated values, positions over all possible values.
-    pub(crate) fn draw_anywhere(
-        &self,
-        source: &impl Source,
-        draws: &mut PseudoRandom,
-    ) -> Vec<(Variable, f64)> {
-        let draw = |variable: Variable| {
-            let value = match &variable {
+/// Draws the nominal variables over their whole range: lengths near their stated values, positions over all possible values.
+pub(crate) fn draw_anywhere(
+    equation: &Equation,
+    source: &impl Source,
+    draws: &mut PseudoRandom,
+) -> Vec<(Variable, f64)> {
+    let draw = |variable: Variable| {
+        let value =
+            match &variable {
                 Variable::Length(name) => match source.length_mm(name) {
                     Some(value) => value * (1.0 + draws.between(-0.01, 0.01)),
                     None => UNSTATED_MM * (1.0 + draws.between(-0.5, 0.5)),
@@ -94,7 +91,7 @@ impl Equation {
                     if draws.bits() & 1 == 0 { -1.0 } else { 1.0 }
                 }
                 moving => {
-                    let places = self.intervals_of_effects(moving);
+                    let places = intervals_of_effects(equation, moving);
                     // Half of the points lie where local effects are not zero.
                     let anywhere = places.is_empty() || draws.bits() & 1 == 0;
                     let [low, high] = if anywhere {
@@ -105,32 +102,31 @@ impl Equation {
                     draws.between(low, high)
                 }
             };
-            (variable, value)
-        };
-        let nominal = self.arena.variables().into_iter().filter(|v| !v.is_small());
-        nominal.map(draw).collect()
-    }
+        (variable, value)
+    };
+    let nominal = equation.arena.variables().into_iter().filter(|v| !v.is_small());
+    nominal.map(draw).collect()
+}
 
-    /// Ranges of the nominal variables in the session: lengths as stated; axis positions between the ends of their motion, as stated by
-    /// the source or else by the machine; mm or rad.
-    pub(crate) fn range(&self, source: &impl Source) -> Vec<(Variable, [f64; 2])> {
-        let range = |variable: Variable| {
-            let ends = match &variable {
-                Variable::Length(name) => [source.length_mm(name).unwrap_or(UNSTATED_MM); 2],
-                Variable::Position { axis, .. } => {
-                    let index = self.machine.axis_index(axis);
-                    let travel = index.and_then(|index| self.machine.axes[index].travel);
-                    let stated = source.range(axis).or(travel);
-                    stated.unwrap_or_else(|| whole_range(&variable))
-                }
-                Variable::Driver(_) => whole_range(&variable),
-                Variable::Error(_) | Variable::Instrument(_) | Variable::Coefficient(_) => [0.0; 2],
-            };
-            (variable, ends)
+/// Ranges of the nominal variables in the session: lengths as stated; axis positions between the ends of their motion, as stated by
+/// the source or else by the machine; mm or rad.
+pub(crate) fn range(equation: &Equation, source: &impl Source) -> Vec<(Variable, [f64; 2])> {
+    let range = |variable: Variable| {
+        let ends = match &variable {
+            Variable::Length(name) => [source.length_mm(name).unwrap_or(UNSTATED_MM); 2],
+            Variable::Position { axis, .. } => {
+                let index = equation.machine.axis_index(axis);
+                let travel = index.and_then(|index| equation.machine.axes[index].travel);
+                let stated = source.range(axis).or(travel);
+                stated.unwrap_or_else(|| whole_range(&variable))
+            }
+            Variable::Driver(_) => whole_range(&variable),
+            Variable::Error(_) | Variable::Instrument(_) | Variable::Coefficient(_) => [0.0; 2],
         };
-        let nominal = self.arena.variables().into_iter().filter(|v| !v.is_small());
-        nominal.map(range).collect()
-    }
+        (variable, ends)
+    };
+    let nominal = equation.arena.variables().into_iter().filter(|v| !v.is_small());
+    nominal.map(range).collect()
 }
 
 /// Range of a position or another driver whose range is not stated, in its unit.
@@ -141,5 +137,15 @@ fn whole_range(moving: &Variable) -> [f64; 2] {
         [-std::f64::consts::PI, std::f64::consts::PI]
     } else {
         [-200.0, 200.0]
+    }
+}
+
+/// The absolute difference; infinite if either value is not a number.
+pub(crate) fn worst(found: f64, expected: f64) -> f64 {
+    let difference = (found - expected).abs();
+    if difference.is_nan() {
+        f64::INFINITY
+    } else {
+        difference
     }
 }

@@ -1,173 +1,143 @@
-//! Printer for C99: one function for one reading, and one for columns of readings with a loop that vectorises.
+//! C99: one function for one reading, and one for columns of readings with a loop that vectorises.
 
-use std::fmt::Write;
-
-use crate::equation::Equation;
-use crate::print::code::{Code, GROUPS};
-use crate::print::dialect::Dialect;
+use crate::check::Checked;
+use crate::print::code::{Code, GROUPS, Syntax, functions, lines, name};
+use crate::print::language::Language;
 use crate::symbol::Unary;
 
-struct C<'c, 'e>(&'c Code<'e>);
+/// C99.
+pub(crate) struct C;
 
-impl Dialect for C<'_, '_> {
-    fn number(&self, value: f64) -> String {
-        format!("{value:?}")
-    }
-    fn input(&self, index: usize) -> String {
-        self.0.inputs[index].clone()
-    }
-    fn step(&self, index: usize) -> String {
-        self.0.steps[index].clone()
-    }
-    fn product(&self, a: &str, b: &str) -> String {
-        format!("{a} * {b}")
-    }
-    fn call(&self, function: Unary, argument: &str) -> String {
-        match function {
-            Unary::Neg => format!("-({argument})"),
-            Unary::Sin => format!("sin({argument})"),
-            Unary::Cos => format!("cos({argument})"),
-            Unary::Sqrt => format!("sqrt({argument})"),
-            Unary::Exp => format!("exp({argument})"),
-            Unary::Signum => format!("(double)((({argument}) > 0.0) - (({argument}) < 0.0))"),
-            Unary::Step => format!("(double)(({argument}) >= 0.0)"),
-            Unary::Floor => format!("floor({argument})"),
-            Unary::Round => format!("round({argument})"),
-        }
-    }
-}
+const SYNTAX: Syntax = Syntax {
+    times: "*",
+    over: "/",
+    call: |function, x| match function {
+        Unary::Signum => format!("(double)((({x}) > 0.0) - (({x}) < 0.0))"),
+        Unary::Step => format!("(double)(({x}) >= 0.0)"),
+        other => format!("{}({x})", name(other)),
+    },
+    reserved: "",
+};
 
-/// Prints the file.
-pub(crate) fn print(equation: &Equation) -> String {
-    let value = Code::new(equation, false);
-    let whole = Code::new(equation, equation.options.gradient);
-    let mut file = String::from("/*\n");
-    for line in whole.header(0, ['[', ']']) {
-        let _ = writeln!(file, "{}", format!(" * {line}").trim_end());
-    }
-    let advice = match whole.program.operations().roots {
-        0 => "",
-        _ => {
-            " * Compile with -O3 -fno-math-errno, otherwise the square root prevents vectorisation of the loop over readings.\n"
-        }
-    };
-    let _ = writeln!(
-        file,
-        " * Columns: n readings; axes[a * n + i] and the results value[j * n + i]{} of reading i.\n{advice} */\n\
-         #include <math.h>\n#include <stddef.h>\n",
-        if equation.options.gradient {
+/// The advice for a file with square roots.
+const ADVICE: &str = " * Compile with -O3 -fno-math-errno, otherwise the square root prevents vectorisation of the loop \
+                      over readings.\n";
+
+impl Language for C {
+    fn print(&self, checked: &Checked<'_>) -> String {
+        let functions = functions(checked, &SYNTAX);
+        let whole = &functions[functions.len() - 1];
+        let header = whole.header(0, ['[', ']']).into_iter();
+        let header = lines(header.map(|line| format!(" * {line}").trim_end().to_string()));
+        let advice = if whole.program.operations().roots == 0 {
+            ""
+        } else {
+            ADVICE
+        };
+        let slopes = if whole.gradient {
             format!(", gradient[(j * {} + k) * n + i]", whole.errors())
         } else {
             String::new()
-        }
-    );
-    kernel(&mut file, &value, false);
-    if equation.options.gradient {
-        kernel(&mut file, &whole, true);
+        };
+        let kernels: Vec<String> = functions
+            .iter()
+            .map(|code| single(code) + "\n" + &columns(code))
+            .collect();
+        format!(
+            "/*\n{header} * Columns: n readings; axes[a * n + i] and the results value[j * n + i]{slopes} of reading i.\n\
+             {advice} */\n#include <math.h>\n#include <stddef.h>\n\n{}",
+            kernels.join("\n")
+        )
     }
-    file.truncate(file.trim_end().len());
-    file.push('\n');
-    file
 }
 
-fn kernel(file: &mut String, code: &Code<'_>, gradient: bool) {
-    let dialect = C(code);
-    let suffix = if gradient { "_gradient" } else { "" };
-    let name = format!("{}{suffix}", code.function());
-    let slopes = if gradient { ", double *gradient" } else { "" };
-    let what = if gradient { "Value and gradient" } else { "Value" };
-    let one = format!(
-        "void {name}(const double *lengths, const double *axes, const double *errors, double *value{slopes})"
-    );
-    let _ = writeln!(file, "/* {what} of one reading. */\n{one};\n\n{one}\n{{");
-    declare(file, code, "    ", &[0, 1, 2]);
-    for line in code.lines(&dialect, |name, value| {
-        format!("    const double {name} = {value};")
-    }) {
-        let _ = writeln!(file, "{line}");
-    }
-    let results = code.results(&dialect);
-    let (values, derivatives) = results.split_at(code.outputs());
-    for (index, value) in values.iter().enumerate() {
-        let _ = writeln!(file, "    value[{index}] = {value};");
-    }
-    for (index, slope) in derivatives.iter().enumerate() {
-        let _ = writeln!(file, "    gradient[{index}] = {slope};");
-    }
-    file.push_str("}\n\n");
-
-    let slopes = if gradient {
-        ", double *restrict gradient"
+/// What a function computes, and its signature as declaration and as head of the definition.
+fn head(code: &Code<'_>, of: &str, signature: &str) -> String {
+    let what = if code.gradient {
+        "Value and gradient"
     } else {
-        ""
+        "Value"
     };
-    let many = format!(
-        "void {name}_columns(size_t n, const double *restrict lengths, const double *restrict axes, const double *restrict errors, double *restrict value{slopes})"
+    format!("/* {what} of {of}. */\n{signature};\n\n{signature}\n{{\n")
+}
+
+/// The function for one reading.
+fn single(code: &Code<'_>) -> String {
+    let signature = format!(
+        "void {}(const double *lengths, const double *axes, const double *errors, double *value{})",
+        code.function(),
+        if code.gradient { ", double *gradient" } else { "" }
     );
-    let _ = writeln!(file, "/* {what} of n readings. */\n{many};\n\n{many}\n{{");
-    // Each column is a pointer of its own, so that the compiler knows that no two overlap.
-    for (number, index) in code.groups[1].clone().enumerate() {
-        if code.uses(index) {
-            let _ = writeln!(
-                file,
-                "    const double *restrict column_{} = axes + {number} * n;",
-                code.inputs[index]
-            );
+    let mut text = head(code, "one reading", &signature);
+    text += &arguments(code, &[0, 1, 2]);
+    text += &lines(code.assignments("    const double ", ";"));
+    text += &results(code, |name, index, value| {
+        format!("    {name}[{index}] = {value};\n")
+    });
+    text + "}\n"
+}
+
+/// The function for columns of readings. Each column is a pointer of its own, so that the compiler knows that no two overlap.
+fn columns(code: &Code<'_>) -> String {
+    let signature = format!(
+        "void {}_columns(size_t n, const double *restrict lengths, const double *restrict axes, \
+         const double *restrict errors, double *restrict value{})",
+        code.function(),
+        if code.gradient {
+            ", double *restrict gradient"
+        } else {
+            ""
         }
+    );
+    let mut text = head(code, "n readings", &signature);
+    let axes = code.used(1);
+    for (number, input) in &axes {
+        text += &format!("    const double *restrict column_{input} = axes + {number} * n;\n");
     }
-    for index in 0..code.outputs() {
-        let _ = writeln!(file, "    double *restrict value_{index} = value + {index} * n;");
+    text += &results(code, |name, index, _| {
+        format!("    double *restrict {name}_{index} = {name} + {index} * n;\n")
+    });
+    if axes.is_empty() {
+        text += "    (void)axes;\n";
     }
-    for index in 0..derivatives.len() {
-        let _ = writeln!(
-            file,
-            "    double *restrict gradient_{index} = gradient + {index} * n;"
-        );
-    }
-    if !code.groups[1].clone().any(|index| code.uses(index)) {
-        file.push_str("    (void)axes;\n");
-    }
-    declare(file, code, "    ", &[0, 2]);
+    text += &arguments(code, &[0, 2]);
     // gcc tests only a limited number of columns for overlap; the pragma asserts that there is none.
-    file.push_str("#if defined(__GNUC__) && !defined(__clang__)\n#pragma GCC ivdep\n#endif\n");
-    file.push_str("    for (size_t i = 0; i < n; ++i) {\n");
-    for index in code.groups[1].clone() {
-        if code.uses(index) {
-            let input = &code.inputs[index];
-            let _ = writeln!(file, "        const double {input} = column_{input}[i];");
-        }
+    text += "#if defined(__GNUC__) && !defined(__clang__)\n#pragma GCC ivdep\n#endif\n";
+    text += "    for (size_t i = 0; i < n; ++i) {\n";
+    for (_, input) in &axes {
+        text += &format!("        const double {input} = column_{input}[i];\n");
     }
-    for line in code.lines(&dialect, |name, value| {
-        format!("        const double {name} = {value};")
-    }) {
-        let _ = writeln!(file, "{line}");
-    }
-    for (index, value) in values.iter().enumerate() {
-        let _ = writeln!(file, "        value_{index}[i] = {value};");
-    }
-    for (index, slope) in derivatives.iter().enumerate() {
-        let _ = writeln!(file, "        gradient_{index}[i] = {slope};");
-    }
-    file.push_str("    }\n}\n\n");
+    text += &lines(code.assignments("        const double ", ";"));
+    text += &results(code, |name, index, value| {
+        format!("        {name}_{index}[i] = {value};\n")
+    });
+    text + "    }\n}\n"
+}
+
+/// A line for each value and each derivative, by the name of its array, its index and its expression.
+fn results(code: &Code<'_>, line: impl Fn(&str, usize, &str) -> String) -> String {
+    let (values, slopes) = code.results();
+    let of = |name: &str, results: &[String]| {
+        let lines = results
+            .iter()
+            .enumerate()
+            .map(|(index, result)| line(name, index, result));
+        lines.collect::<String>()
+    };
+    of("value", &values) + &of("gradient", &slopes)
 }
 
 /// Declares the used arguments of the given groups by name; marks a group without any as unused.
-fn declare(file: &mut String, code: &Code<'_>, indent: &str, groups: &[usize]) {
+fn arguments(code: &Code<'_>, groups: &[usize]) -> String {
+    let mut text = String::new();
     for group in groups {
-        let mut used = false;
-        for (number, index) in code.groups[*group].clone().enumerate() {
-            if code.uses(index) {
-                used = true;
-                let name = &code.inputs[index];
-                let _ = writeln!(
-                    file,
-                    "{indent}const double {name} = {}[{number}];",
-                    GROUPS[*group]
-                );
-            }
+        let used = code.used(*group);
+        for (number, input) in &used {
+            text += &format!("    const double {input} = {}[{number}];\n", GROUPS[*group]);
         }
-        if !used {
-            let _ = writeln!(file, "{indent}(void){};", GROUPS[*group]);
+        if used.is_empty() {
+            text += &format!("    (void){};\n", GROUPS[*group]);
         }
     }
+    text
 }

@@ -1,152 +1,92 @@
-//! Common part of the printers for compilers and interpreters: names of arguments and steps, and the header.
+//! Common part of the languages for compilers and interpreters: names, expressions, arguments and the header.
 
 use std::collections::HashSet;
 use std::ops::Range;
 
-use crate::equation::{Equation, Kind};
+use crate::check::Checked;
+use crate::form::Kind;
 use crate::print::dialect::{self, Dialect};
 use crate::print::notes;
 use crate::program::{Input, Label, Program};
+use crate::symbol::Unary;
 use crate::variable::{Symbols, Variable, identifier};
 
 /// Names that are reserved in Rust, C, Python or MATLAB, or that the printed code uses itself.
-const RESERVED_WORDS: &[&str] = &[
-    "as",
-    "and",
-    "assert",
-    "auto",
-    "await",
-    "axes",
-    "box",
-    "break",
-    "case",
-    "catch",
-    "char",
-    "class",
-    "const",
-    "continue",
-    "cos",
-    "crate",
-    "def",
-    "default",
-    "del",
-    "do",
-    "double",
-    "elif",
-    "else",
-    "elseif",
-    "end",
-    "enum",
-    "errors",
-    "except",
-    "exp",
-    "extern",
-    "false",
-    "finally",
-    "float",
-    "floor",
-    "fn",
-    "for",
-    "from",
-    "function",
-    "gen",
-    "global",
-    "goto",
-    "gradient",
-    "i",
-    "if",
-    "impl",
-    "import",
-    "in",
-    "inline",
-    "int",
-    "is",
-    "j",
-    "k",
-    "lambda",
-    "lengths",
-    "let",
-    "long",
-    "loop",
-    "match",
-    "mod",
-    "move",
-    "mut",
-    "n",
-    "nonlocal",
-    "not",
-    "np",
-    "or",
-    "otherwise",
-    "parfor",
-    "pass",
-    "persistent",
-    "pi",
-    "pub",
-    "raise",
-    "ref",
-    "register",
-    "restrict",
-    "return",
-    "round",
-    "self",
-    "short",
-    "sign",
-    "signed",
-    "sin",
-    "sizeof",
-    "sqrt",
-    "static",
-    "struct",
-    "super",
-    "switch",
-    "trait",
-    "true",
-    "try",
-    "type",
-    "typedef",
-    "union",
-    "unsafe",
-    "unsigned",
-    "use",
-    "value",
-    "void",
-    "volatile",
-    "where",
-    "while",
-    "with",
-    "yield",
-    "lane",
-    "at",
-    "y0",
-    "y1",
-    "j0",
-    "j1",
-    "yn",
-    "jn",
-    "gamma",
-    "main",
-    "log",
-];
+const RESERVED_WORDS: &str = "as and assert auto await axes box break case catch char class const continue cos crate def default del \
+    do double elif else elseif end enum errors except exp extern false finally float floor fn for from \
+    function gen global goto gradient i if impl import in inline int is j k lambda lengths let long loop \
+    match mod move mut n nonlocal not np or otherwise parfor pass persistent pi pub raise ref register \
+    restrict return round self short sign signed sin sizeof sqrt static struct super switch trait true try \
+    type typedef union unsafe unsigned use value void volatile where while with yield lane at y0 y1 j0 j1 yn \
+    jn gamma main log";
+
+/// How a language writes expressions.
+pub(crate) struct Syntax {
+    /// The sign of a product.
+    pub(crate) times: &'static str,
+    /// The sign of a quotient.
+    pub(crate) over: &'static str,
+    /// A function, by its [`name`], of an argument without parentheses.
+    pub(crate) call: fn(Unary, &str) -> String,
+    /// Further reserved names, separated by spaces.
+    pub(crate) reserved: &'static str,
+}
+
+/// The name of a function in most languages.
+pub(crate) fn name(function: Unary) -> &'static str {
+    match function {
+        Unary::Neg => "-",
+        Unary::Sqrt => "sqrt",
+        Unary::Sin => "sin",
+        Unary::Cos => "cos",
+        Unary::Exp => "exp",
+        Unary::Signum => "sign",
+        Unary::Step => "step",
+        Unary::Floor => "floor",
+        Unary::Round => "round",
+    }
+}
 
 /// A program with names for all its quantities.
 pub(crate) struct Code<'e> {
-    pub(crate) equation: &'e Equation,
+    pub(crate) checked: &'e Checked<'e>,
     /// The reading and, if requested, its derivatives.
     pub(crate) program: Program,
+    /// Whether the derivatives are requested.
+    pub(crate) gradient: bool,
     pub(crate) inputs: Vec<String>,
-    pub(crate) steps: Vec<String>,
+    steps: Vec<String>,
     /// Index ranges of the lengths, the axes and the errors among the inputs.
     pub(crate) groups: [Range<usize>; 3],
+    syntax: &'static Syntax,
 }
 
 /// Names of the three groups of arguments.
 pub(crate) const GROUPS: [&str; 3] = ["lengths", "axes", "errors"];
 
+/// The functions of a file: the value alone and, if requested, value and gradient.
+pub(crate) fn functions<'e>(checked: &'e Checked<'e>, syntax: &'static Syntax) -> Vec<Code<'e>> {
+    let gradient = checked.equation.options.gradient.then_some(true);
+    let requested = [false].into_iter().chain(gradient);
+    requested
+        .map(|gradient| Code::new(checked, gradient, syntax))
+        .collect()
+}
+
+/// Lines, each with a line break at its end.
+pub(crate) fn lines(lines: impl IntoIterator<Item = String>) -> String {
+    lines.into_iter().map(|line| line + "\n").collect()
+}
+
 impl<'e> Code<'e> {
-    pub(crate) fn new(equation: &'e Equation, gradient: bool) -> Self {
+    pub(crate) fn new(checked: &'e Checked<'e>, gradient: bool, syntax: &'static Syntax) -> Self {
+        let equation = checked.equation;
         let program = equation.program(gradient);
-        let mut taken: HashSet<String> = RESERVED_WORDS.iter().map(|word| (*word).to_string()).collect();
+        let mut taken: HashSet<String> = [RESERVED_WORDS, syntax.reserved]
+            .iter()
+            .flat_map(|words| words.split_whitespace())
+            .map(str::to_string)
+            .collect();
         let mut name = |requested: String| {
             let mut free = requested.clone();
             let mut number = 2;
@@ -183,7 +123,9 @@ impl<'e> Code<'e> {
         let small = count(&|input| matches!(input, Input::Plain(variable) if variable.is_small()));
         let all = program.inputs.len();
         Code {
-            equation,
+            checked,
+            gradient,
+            syntax,
             groups: [0..lengths, lengths..all - small, all - small..all],
             program,
             inputs,
@@ -193,22 +135,26 @@ impl<'e> Code<'e> {
 
     /// Number of scalar outputs of one reading.
     pub(crate) fn outputs(&self) -> usize {
-        self.equation.outputs.len()
+        self.checked.equation.outputs.len()
     }
 
     /// Number of errors and instrument parameters.
     pub(crate) fn errors(&self) -> usize {
-        self.equation.parameters.len()
+        self.checked.equation.parameters.len()
     }
 
     /// Name of the function.
-    pub(crate) fn function(&self) -> &'static str {
-        match self.equation.kind {
-            Kind::Length => "bar_length",
-            Kind::Distance => "probe_distance",
-            Kind::Coordinates => "coordinates",
-            Kind::Volumetric => "volumetric_error",
-        }
+    pub(crate) fn function(&self) -> String {
+        let name = function_name(self.checked.equation.kind);
+        format!("{name}{}", if self.gradient { "_gradient" } else { "" })
+    }
+
+    /// The arguments of a group that the program uses, each as its index in the group and its name.
+    pub(crate) fn used(&self, group: usize) -> Vec<(usize, &str)> {
+        let places = self.groups[group].clone().enumerate();
+        let used = places.filter(|(_, index)| self.uses(*index));
+        used.map(|(number, index)| (number, self.inputs[index].as_str()))
+            .collect()
     }
 
     /// Whether the program uses an input.
@@ -217,25 +163,27 @@ impl<'e> Code<'e> {
         steps.chain(&self.program.outputs).any(|tree| tree.holds(index))
     }
 
-    /// The steps as text; `assign` writes an assignment in the language.
-    pub(crate) fn lines(&self, dialect: &impl Dialect, assign: impl Fn(&str, &str) -> String) -> Vec<String> {
+    /// The assignments of the steps, each with `before` in front of the name and `end` at its end.
+    pub(crate) fn assignments(&self, before: &str, end: &str) -> Vec<String> {
         let steps = self.steps.iter().zip(&self.program.steps);
         steps
-            .map(|(name, step)| assign(name, &dialect::write(&step.value, dialect)))
+            .map(|(name, step)| format!("{before}{name} = {}{end}", dialect::write(&step.value, self)))
             .collect()
     }
 
-    /// The outputs: values, then derivatives output by output.
-    pub(crate) fn results(&self, dialect: &impl Dialect) -> Vec<String> {
+    /// The outputs: values, and derivatives output by output.
+    pub(crate) fn results(&self) -> (Vec<String>, Vec<String>) {
         let outputs = self.program.outputs.iter();
-        outputs.map(|tree| dialect::write(tree, dialect)).collect()
+        let mut values: Vec<String> = outputs.map(|tree| dialect::write(tree, self)).collect();
+        let slopes = values.split_off(self.outputs());
+        (values, slopes)
     }
 
     /// The lines of the header, without comment signs. Indices of arguments start at `first` and are enclosed in `brackets`.
     pub(crate) fn header(&self, first: usize, brackets: [char; 2]) -> Vec<String> {
         let at =
             |group: &str, number: usize| format!("{group}{}{}{}", brackets[0], number + first, brackets[1]);
-        let equation = self.equation;
+        let equation = self.checked.equation;
         let mut lines = notes::title(equation);
         lines.push(String::new());
         lines.push("Arguments in order:".to_string());
@@ -286,8 +234,39 @@ impl<'e> Code<'e> {
             operations.quotients,
             operations.roots,
         ));
-        lines.extend(notes::notes(equation));
+        lines.extend(notes::notes(self.checked));
         lines
+    }
+}
+
+impl Dialect for Code<'_> {
+    fn number(&self, value: f64) -> String {
+        format!("{value:?}")
+    }
+    fn input(&self, index: usize) -> String {
+        self.inputs[index].clone()
+    }
+    fn step(&self, index: usize) -> String {
+        self.steps[index].clone()
+    }
+    fn product(&self, a: &str, b: &str) -> String {
+        format!("{a} {} {b}", self.syntax.times)
+    }
+    fn quotient(&self, a: &str, b: &str) -> String {
+        format!("{a} {} {b}", self.syntax.over)
+    }
+    fn call(&self, function: Unary, argument: &str) -> String {
+        (self.syntax.call)(function, argument)
+    }
+}
+
+/// Name of the function that computes the value.
+pub(crate) fn function_name(kind: Kind) -> &'static str {
+    match kind {
+        Kind::Length => "bar_length",
+        Kind::Distance => "probe_distance",
+        Kind::Coordinates => "coordinates",
+        Kind::Volumetric => "volumetric_error",
     }
 }
 

@@ -1,10 +1,10 @@
 //! Expressions on one line in any language, with the necessary parentheses.
 
-use crate::program::Tree;
 use crate::symbol::{Binary, Unary};
+use crate::tree::Tree;
 
 /// Notation of a language for the elements of expressions.
-pub trait Dialect {
+pub(crate) trait Dialect {
     /// A number that is not negative.
     fn number(&self, value: f64) -> String;
     /// The name of an input.
@@ -14,9 +14,7 @@ pub trait Dialect {
     /// A product of two factors that already have the necessary parentheses.
     fn product(&self, a: &str, b: &str) -> String;
     /// A quotient.
-    fn quotient(&self, a: &str, b: &str) -> String {
-        format!("{a} / {b}")
-    }
+    fn quotient(&self, a: &str, b: &str) -> String;
     /// Whether [`Dialect::quotient`] sets a built-up fraction, whose parts need no parentheses.
     fn fractions(&self) -> bool {
         false
@@ -50,12 +48,12 @@ enum Binding {
 }
 
 /// The expression on one line.
-pub fn write(tree: &Tree, dialect: &impl Dialect) -> String {
+pub(crate) fn write(tree: &Tree, dialect: &impl Dialect) -> String {
     bound(tree, dialect).0
 }
 
 /// The expression as a factor or as a term after a minus: in parentheses if it is a sum.
-pub fn write_term(tree: &Tree, dialect: &impl Dialect) -> String {
+pub(crate) fn write_term(tree: &Tree, dialect: &impl Dialect) -> String {
     let (text, binding) = bound(tree, dialect);
     if binding < Binding::Product {
         dialect.group(&text)
@@ -66,7 +64,7 @@ pub fn write_term(tree: &Tree, dialect: &impl Dialect) -> String {
 
 /// Breaks a sum into lines of at most `width` visible characters if possible. Breaks lie before a plus or minus outside braces, in as few
 /// parentheses as the width allows. `visible` counts the characters of a piece. Every line except the first starts with its sign.
-pub fn lines(
+pub(crate) fn lines(
     terms: &[(bool, Tree)],
     dialect: &impl Dialect,
     width: usize,
@@ -206,9 +204,4 @@ fn bound(tree: &Tree, dialect: &impl Dialect) -> (String, Binding) {
             ),
         },
     }
-}
-
-/// Rounds the last digits of a number: 0.6 where nominal lengths give 0.5999999999999996.
-pub(crate) fn for_readers(value: f64) -> f64 {
-    format!("{value:.11e}").parse().unwrap_or(value)
 }

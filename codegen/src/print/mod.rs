@@ -1,123 +1,141 @@
-//! Printers, one file per language.
+//! Output languages: the registry, and one file per language.
 //!
-//! A new language is one file. A [`dialect::Dialect`] defines names, numbers, products and functions; the file defines the text around
-//! the expressions.
+//! A new language is a file that implements [`Language`] and a line in [`LANGUAGES`].
 
 mod article;
 mod c;
 mod code;
-pub mod dialect;
-mod exact;
+mod dialect;
+mod language;
 mod latex;
 mod matlab;
+mod notation;
 mod notes;
 mod python;
 mod rust;
 mod text;
-mod touch;
+mod typeset;
 mod typst;
-
-pub(crate) use article::terms_of;
 
 use abbe_model::effect::{Effect, Shape};
 
-use crate::equation::{Equation, Kind, Order};
+use crate::check::Checked;
+use crate::equation::Equation;
 use crate::error::CodegenError;
+use crate::form::{Kind, Order};
 
-/// A language in which equations are printed.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
-pub enum Language {
-    /// Plain text, UTF-8.
-    Text,
-    /// LaTeX with `amsmath`.
-    Latex,
-    /// Typst.
-    Typst,
-    /// Rust without dependencies.
-    Rust,
-    /// C99.
-    C,
-    /// Python with NumPy.
-    Python,
-    /// MATLAB or Octave.
-    Matlab,
+pub use language::Language;
+
+/// Whom a language addresses.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Audience {
+    /// Readers: text and typesetting languages, with a table of symbols.
+    Readers,
+    /// Compilers and interpreters: code with value and derivatives.
+    Compilers,
+}
+use Audience::{Compilers, Readers};
+
+/// One line of the registry.
+pub struct OutputLanguage {
+    /// The word by which it is requested.
+    pub word: &'static str,
+    /// The extension of its files.
+    pub extension: &'static str,
+    /// Whom it addresses.
+    pub audience: Audience,
+    language: &'static dyn Language,
 }
 
-impl Language {
-    /// All languages.
-    pub const ALL: [Language; 7] = [
-        Language::Text,
-        Language::Latex,
-        Language::Typst,
-        Language::Rust,
-        Language::C,
-        Language::Python,
-        Language::Matlab,
-    ];
+/// All languages, in the order in which they are listed.
+pub const LANGUAGES: &[OutputLanguage] = &[
+    entry("text", "txt", Readers, &text::Text),
+    entry("latex", "tex", Readers, &latex::Latex),
+    entry("typst", "typ", Readers, &typst::Typst),
+    entry("rust", "rs", Compilers, &rust::Rust),
+    entry("c", "c", Compilers, &c::C),
+    entry("python", "py", Compilers, &python::Python),
+    entry("matlab", "m", Compilers, &matlab::Matlab),
+];
 
-    /// The identifier of the language.
-    pub fn word(self) -> &'static str {
-        match self {
-            Language::Text => "text",
-            Language::Latex => "latex",
-            Language::Typst => "typst",
-            Language::Rust => "rust",
-            Language::C => "c",
-            Language::Python => "python",
-            Language::Matlab => "matlab",
-        }
-    }
-
-    /// The language with this identifier.
-    pub fn of_word(word: &str) -> Option<Language> {
-        Language::ALL.into_iter().find(|language| language.word() == word)
+const fn entry(
+    word: &'static str,
+    extension: &'static str,
+    audience: Audience,
+    language: &'static dyn Language,
+) -> OutputLanguage {
+    OutputLanguage {
+        word,
+        extension,
+        audience,
+        language,
     }
 }
 
-impl Equation {
-    /// Prints the equation in a language.
+/// The language with this word.
+///
+/// # Errors
+/// If there is none.
+pub fn language(word: &str) -> Result<&'static OutputLanguage, CodegenError> {
+    let found = LANGUAGES.iter().find(|language| language.word == word);
+    found.ok_or_else(|| CodegenError::NoSuchLanguage {
+        word: word.to_string(),
+        known: words(|_| true, "and"),
+    })
+}
+
+impl OutputLanguage {
+    /// Prints a checked equation.
     ///
     /// # Errors
-    /// If the requested form cannot be written in that language.
-    pub fn print(&self, language: Language) -> Result<String, CodegenError> {
-        let for_readers = matches!(language, Language::Text | Language::Latex | Language::Typst);
-        let curve = |effect: &&Effect| matches!(effect.shape, Shape::Curve { .. });
-        if let (true, Some(effect)) = (for_readers, self.options.effects.iter().find(curve)) {
-            return Err(CodegenError::CurveForReaders { effect: effect.id() });
+    /// If the language is for readers and the form is readable only as code: a curve, or derivatives of most forms.
+    pub fn print(&self, checked: &Checked<'_>) -> Result<String, CodegenError> {
+        if self.audience == Readers {
+            refuse_unreadable(checked.equation)?;
         }
-        if for_readers && self.options.gradient {
-            match (self.kind, self.options.order) {
-                (Kind::Length, Order::Exact) | (_, Order::First) => {}
-                (Kind::Length, Order::Bilinear) => {
-                    return Err(CodegenError::GradientForReaders {
-                        what: "a bilinear form",
-                    });
-                }
-                (Kind::Distance, _) => {
-                    return Err(CodegenError::GradientForReaders {
-                        what: "a probed distance",
-                    });
-                }
-                (Kind::Coordinates, _) => {
-                    return Err(CodegenError::GradientForReaders {
-                        what: "three coordinates",
-                    });
-                }
-                (Kind::Volumetric, _) => {
-                    return Err(CodegenError::GradientForReaders {
-                        what: "the error vector",
-                    });
-                }
-            }
-        }
-        Ok(match language {
-            Language::Text => text::print(self),
-            Language::Latex => latex::print(self),
-            Language::Typst => typst::print(self),
-            Language::Rust => rust::print(self),
-            Language::C => c::print(self),
-            Language::Python => python::print(self),
-            Language::Matlab => matlab::print(self),
-        })
+        Ok(self.language.print(checked))
     }
+}
+
+impl std::fmt::Debug for OutputLanguage {
+    fn fmt(&self, formatter: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        formatter.write_str(self.word)
+    }
+}
+
+/// The words of some languages: `rust, c, python or matlab`.
+fn words(some: impl Fn(&OutputLanguage) -> bool, last: &str) -> String {
+    let words: Vec<&str> = LANGUAGES
+        .iter()
+        .filter(|entry| some(entry))
+        .map(|entry| entry.word)
+        .collect();
+    match words.split_last() {
+        Some((end, rest)) if !rest.is_empty() => format!("{} {last} {end}", rest.join(", ")),
+        _ => words.concat(),
+    }
+}
+
+/// Refuses curves, which have hundreds of terms, and derivatives that have no short form.
+fn refuse_unreadable(equation: &Equation) -> Result<(), CodegenError> {
+    let languages = || words(|entry| entry.audience == Compilers, "or");
+    let curve = |effect: &&Effect| matches!(effect.shape, Shape::Curve { .. });
+    if let Some(effect) = equation.options.effects.iter().find(curve) {
+        return Err(CodegenError::CurveForReaders {
+            effect: effect.id(),
+            languages: languages(),
+        });
+    }
+    let what = match (equation.kind, equation.options.order) {
+        _ if !equation.options.gradient => return Ok(()),
+        (Kind::Length, Order::Exact) | (_, Order::First) => return Ok(()),
+        (Kind::Length, Order::Bilinear) => "a bilinear form",
+        (Kind::Distance, _) => "a probed distance",
+        (Kind::Coordinates, _) => "three coordinates",
+        (Kind::Volumetric, _) => "the error vector",
+    };
+    Err(CodegenError::GradientForReaders {
+        what,
+        languages: languages(),
+    })
 }

@@ -3,8 +3,10 @@
 use abbe_model::driver::DriverPart;
 use abbe_model::frames::Rotation;
 
-use crate::equation::{Equation, Form, Kind, Order};
+use crate::check::Checked;
+use crate::equation::Equation;
 use crate::first_order::Column;
+use crate::form::{Form, Kind, Order};
 use crate::variable::Variable;
 
 /// The title: two lines.
@@ -41,18 +43,18 @@ pub(crate) fn title(equation: &Equation) -> Vec<String> {
 }
 
 /// The notes in plain text: the check, the truncation error, and the parameters that the equation does not contain.
-pub(crate) fn notes(equation: &Equation) -> Vec<String> {
-    let symbols = equation.options.symbols;
-    notes_spelt(equation, &str::to_string, &|variable| variable.text(symbols))
+pub(crate) fn notes(checked: &Checked<'_>) -> Vec<String> {
+    let symbols = checked.equation.options.symbols;
+    notes_spelt(checked, &str::to_string, &|variable| variable.text(symbols))
 }
 
 /// The notes, with `escape` for words and `name` for names.
 pub(crate) fn notes_spelt(
-    equation: &Equation,
+    checked: &Checked<'_>,
     escape: &dyn Fn(&str) -> String,
     name: &dyn Fn(&Variable) -> String,
 ) -> Vec<String> {
-    let check = &equation.check;
+    let (equation, check) = (checked.equation, &checked.agreement);
     let of = match equation.options.order {
         Order::Exact => "the chain",
         Order::Bilinear => "the second-order series of the chain",
@@ -62,8 +64,8 @@ pub(crate) fn notes_spelt(
         "Checked against {of} with dual numbers at {} points, errors to ±10 mm and ±0.1 rad: largest relative difference {:.0e} (value), {:.0e} (gradient).",
         check.points, check.value, check.gradient
     ))];
-    if !equation.deviations.is_empty() {
-        let found = equation.deviations.iter().map(|deviation| {
+    if !checked.deviations.is_empty() {
+        let found = checked.deviations.iter().map(|deviation| {
             format!(
                 "{} µm at errors of ±{} µm and ±{}°",
                 two_digits(deviation.largest_um),
@@ -72,13 +74,13 @@ pub(crate) fn notes_spelt(
             )
         });
         let found = found.collect::<Vec<_>>().join(", ");
-        let over = range(equation);
+        let over = range(checked);
         notes.push(escape(&format!(
             "Largest deviation from the exact chain{over}: {found}."
         )));
     }
-    if !equation.absent.is_empty() {
-        let names: Vec<String> = equation.absent.iter().map(name).collect();
+    if !checked.absent.is_empty() {
+        let names: Vec<String> = checked.absent.iter().map(name).collect();
         notes.push(format!("Not contained: {}.", names.join(", ")));
     }
     if let Form::First(first, _) = &equation.form {
@@ -98,9 +100,9 @@ pub(crate) fn notes_spelt(
 }
 
 /// The range over which the truncation error was evaluated: moving axes, and lengths that the session does not state.
-fn range(equation: &Equation) -> String {
+fn range(checked: &Checked<'_>) -> String {
     let degrees = |angle: f64| two_places(angle.to_degrees());
-    let axes = equation
+    let axes = checked
         .range
         .iter()
         .filter_map(|(variable, [low, high])| match variable {
@@ -120,7 +122,7 @@ fn range(equation: &Equation) -> String {
                 high = two_places(*high),
                 unit = followed.unit
             )),
-            Variable::Length(name) if equation.kind == Kind::Volumetric => {
+            Variable::Length(name) if checked.equation.kind == Kind::Volumetric => {
                 Some(format!("{name} {} mm", two_places(*low)))
             }
             _ => None,

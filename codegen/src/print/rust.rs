@@ -1,79 +1,45 @@
-//! Printer for Rust without dependencies, for one reading and for columns of readings. Only the elementary functions need `std`.
+//! Rust without dependencies, for one reading and for columns of readings. Only the elementary functions need `std`.
 
-use std::fmt::Write;
+use crate::check::Checked;
+use crate::print::code::{Code, GROUPS, Syntax, functions, lines, name};
+use crate::print::language::Language;
 
-use crate::equation::Equation;
-use crate::print::code::Code;
-use crate::print::dialect::Dialect;
-use crate::symbol::Unary;
+/// Rust without dependencies.
+pub(crate) struct Rust;
 
-struct Rust<'c, 'e>(&'c Code<'e>);
+const SYNTAX: Syntax = Syntax {
+    times: "*",
+    over: "/",
+    call: |function, x| format!("elementary::{}({x})", name(function)),
+    reserved: "",
+};
 
-impl Dialect for Rust<'_, '_> {
-    fn number(&self, value: f64) -> String {
-        format!("{value:?}")
-    }
-    fn input(&self, index: usize) -> String {
-        self.0.inputs[index].clone()
-    }
-    fn step(&self, index: usize) -> String {
-        self.0.steps[index].clone()
-    }
-    fn product(&self, a: &str, b: &str) -> String {
-        format!("{a} * {b}")
-    }
-    fn call(&self, function: Unary, argument: &str) -> String {
-        let name = match function {
-            Unary::Neg => return format!("-({argument})"),
-            Unary::Sin => "sin",
-            Unary::Cos => "cos",
-            Unary::Sqrt => "sqrt",
-            Unary::Exp => "exp",
-            Unary::Signum => "sign",
-            Unary::Step => "step",
-            Unary::Floor => "floor",
-            Unary::Round => "round",
+impl Language for Rust {
+    fn print(&self, checked: &Checked<'_>) -> String {
+        let functions = functions(checked, &SYNTAX);
+        let whole = &functions[functions.len() - 1];
+        let header = whole.header(0, ['[', ']']).into_iter();
+        let mut file = lines(header.map(|line| format!("//! {line}").trim_end().to_string())) + "\n";
+        let axes = if checked.equation.options.effects.is_empty() {
+            "Positions of moving axes: sine and cosine of a rotary one."
+        } else {
+            "Positions of moving axes (sine and cosine of a rotary one), and other drivers of effects."
         };
-        format!("elementary::{name}({argument})")
+        let groups = [
+            "Lengths of the set-up.",
+            axes,
+            "Errors and instrument parameters.",
+        ];
+        for ((name, what), places) in GROUPS.iter().zip(groups).zip(&whole.groups) {
+            let name = name.to_uppercase();
+            file += &format!("/// {what}\npub const {name}: usize = {};\n", places.len());
+        }
+        for code in &functions {
+            file.extend(["\n", &single(code), "\n", &columns(code)]);
+        }
+        file.push('\n');
+        file + &elementary(whole)
     }
-}
-
-/// Prints the file.
-pub(crate) fn print(equation: &Equation) -> String {
-    let value = Code::new(equation, false);
-    let whole = Code::new(equation, equation.options.gradient);
-    let mut file = String::new();
-    for line in whole.header(0, ['[', ']']) {
-        let _ = writeln!(file, "{}", format!("//! {line}").trim_end());
-    }
-    file.push('\n');
-    for (name, places) in ["LENGTHS", "AXES", "ERRORS"].iter().zip(&whole.groups) {
-        let what = match *name {
-            "LENGTHS" => "Lengths of the set-up.",
-            "AXES" if whole.equation.options.effects.is_empty() => {
-                "Positions of moving axes: sine and cosine of a rotary one."
-            }
-            "AXES" => {
-                "Positions of moving axes (sine and cosine of a rotary one), and other drivers of effects."
-            }
-            _ => "Errors and instrument parameters.",
-        };
-        let _ = writeln!(file, "/// {what}\npub const {name}: usize = {};", places.len());
-    }
-    file.push('\n');
-    single(&mut file, &value, false);
-    columns(&mut file, &value, false);
-    if equation.options.gradient {
-        single(&mut file, &whole, true);
-        columns(&mut file, &whole, true);
-    }
-    elementary(&mut file, &whole);
-    file
-}
-
-fn function(code: &Code<'_>, gradient: bool) -> String {
-    let suffix = if gradient { "_gradient" } else { "" };
-    format!("{}{suffix}", code.function())
 }
 
 /// The type of one reading's value or of its gradient.
@@ -92,172 +58,151 @@ fn gathered(items: &[String]) -> String {
     }
 }
 
-fn single(file: &mut String, code: &Code<'_>, gradient: bool) {
-    let dialect = Rust(code);
-    let returned = if gradient {
-        format!("({}, {})", shape(code, "f64"), shape(code, "[f64; ERRORS]"))
+/// The function for one reading.
+fn single(code: &Code<'_>) -> String {
+    let (returned, what) = if code.gradient {
+        let types = format!("({}, {})", shape(code, "f64"), shape(code, "[f64; ERRORS]"));
+        (types, "Value and gradient")
     } else {
-        shape(code, "f64")
+        (shape(code, "f64"), "Value")
     };
-    let what = if gradient {
-        "Value and gradient of one reading."
-    } else {
-        "Value of one reading."
-    };
-    let _ = writeln!(
-        file,
-        "/// {what}\n#[inline(always)]\n#[must_use]\npub fn {}(lengths: &[f64; LENGTHS], axes: &[f64; AXES], errors: &[f64; ERRORS]) -> {returned} {{",
-        function(code, gradient)
+    let mut text = format!(
+        "/// {what} of one reading.\n#[inline(always)]\n#[must_use]\npub fn {}(lengths: &[f64; LENGTHS], \
+         axes: &[f64; AXES], errors: &[f64; ERRORS]) -> {returned} {{\n",
+        code.function()
     );
-    for (group, places) in crate::print::code::GROUPS.iter().zip(&code.groups) {
-        let names: Vec<String> = places
-            .clone()
-            .map(|index| {
-                if code.uses(index) {
-                    code.inputs[index].clone()
-                } else {
-                    "_".to_string()
-                }
-            })
-            .collect();
-        let _ = writeln!(file, "    let [{}] = *{group};", names.join(", "));
+    for (group, places) in GROUPS.iter().zip(&code.groups) {
+        let input = |index: usize| {
+            if code.uses(index) {
+                code.inputs[index].as_str()
+            } else {
+                "_"
+            }
+        };
+        let names: Vec<&str> = places.clone().map(input).collect();
+        text += &format!("    let [{}] = *{group};\n", names.join(", "));
     }
-    let mut lines = code.lines(&dialect, |name, value| format!("    let {name} = {value};"));
-    let results = code.results(&dialect);
+    let mut steps = code.assignments("    let ", ";");
+    let (values, slopes) = code.results();
     // If the last step is the only result, it needs no name.
-    if let (false, [only], Some(last)) = (gradient, results.as_slice(), lines.last())
+    if let (false, [only], Some(last)) = (code.gradient, values.as_slice(), steps.last())
         && let Some(value) = last.strip_prefix(&format!("    let {only} = "))
     {
-        let value = value.trim_end_matches(';').to_string();
-        lines.pop();
-        lines.push(format!("    {value}\n}}\n"));
-        let _ = writeln!(file, "{}", lines.join("\n"));
-        return;
+        let value = format!("    {}", value.trim_end_matches(';'));
+        steps.pop();
+        steps.push(value);
+        return text + &lines(steps) + "}\n";
     }
-    for line in lines {
-        let _ = writeln!(file, "{line}");
-    }
-    let (values, slopes) = results.split_at(code.outputs());
-    let value = gathered(values);
-    if gradient {
+    text += &lines(steps);
+    let mut value = gathered(&values);
+    if code.gradient {
         let rows: Vec<String> = if code.errors() == 0 {
             vec!["[]".to_string(); code.outputs()]
         } else {
-            slopes
-                .chunks(code.errors())
-                .map(|row| format!("[\n        {},\n    ]", row.join(",\n        ")))
-                .collect()
+            let row = |row: &[String]| format!("[\n        {},\n    ]", row.join(",\n        "));
+            slopes.chunks(code.errors()).map(row).collect()
         };
-        let _ = writeln!(file, "    let gradient = {};", gathered(&rows));
-        let _ = writeln!(file, "    ({value}, gradient)");
-    } else {
-        let _ = writeln!(file, "    {value}");
+        text += &format!("    let gradient = {};\n", gathered(&rows));
+        value = format!("({value}, gradient)");
     }
-    file.push_str("}\n\n");
+    text + &format!("    {value}\n}}\n")
 }
 
-/// Evaluates four readings at a time. The arrays of a block cannot overlap, so that the loop over its lanes is vectorised, and they are
-/// small enough to stay in registers.
-fn columns(file: &mut String, code: &Code<'_>, gradient: bool) {
-    let name = function(code, gradient);
+/// The function for columns of readings, four readings at a time. The arrays of a block cannot overlap, so that the loop over its lanes is
+/// vectorised, and they are small enough to stay in registers.
+fn columns(code: &Code<'_>) -> String {
+    let name = code.function();
     let (outputs, errors) = (code.outputs(), code.errors());
-    let slopes = if gradient {
-        format!(", gradient: &mut [&mut [f64]; {}]", outputs * errors)
+    let all = outputs * errors;
+    let only_with_gradient = |text: String| if code.gradient { text } else { String::new() };
+    let slopes = only_with_gradient(format!(", gradient: &mut [&mut [f64]; {all}]"));
+    let and = only_with_gradient(" and gradients".to_string());
+    let each = only_with_gradient(", for each derivative (output by output)".to_string());
+    let pattern = if code.gradient {
+        "(values, slopes)"
     } else {
-        String::new()
+        "values"
     };
-    let and = if gradient { " and gradients" } else { "" };
-    let _ = write!(
-        file,
-        "/// Values{and} of columns of readings: a slice for each axis input, for each output{}.\n\
-         ///\n/// # Panics\n/// If a column has another length than `value[0]`.\n\
-         pub fn {name}_columns(lengths: &[f64; LENGTHS], axes: &[&[f64]; AXES], errors: &[f64; ERRORS], value: &mut [&mut [f64]; {outputs}]{slopes}) {{\n    \
-         const LANES: usize = 4;\n    \
-         let n = value[0].len();\n    \
-         for column in axes {{\n        assert_eq!(column.len(), n, \"a column of axis positions is not as long as the values\");\n    }}\n",
-        if gradient {
-            ", for each derivative (output by output)"
-        } else {
-            ""
-        },
-    );
-    let _ = writeln!(file, "    let mut at = 0;\n    while at + LANES <= n {{");
-    let _ = writeln!(file, "        let mut v = [[0.0; LANES]; {outputs}];");
-    if gradient {
-        let _ = writeln!(file, "        let mut g = [[0.0; LANES]; {}];", outputs * errors);
-    }
-    let _ = write!(
-        file,
-        "        let mut x = [[0.0; LANES]; AXES];\n        \
-         for (block, column) in x.iter_mut().zip(axes) {{\n            block.copy_from_slice(&column[at..at + LANES]);\n        }}\n        \
-         for lane in 0..LANES {{\n"
-    );
-    let row = |index: &dyn Fn(usize) -> String, count: usize| {
-        let inputs: Vec<String> = (0..count).map(index).collect();
-        inputs.join(", ")
+    let call = |input: &dyn Fn(usize) -> String| {
+        let inputs: Vec<String> = (0..code.groups[1].len()).map(input).collect();
+        format!(
+            "let {pattern} = {name}(lengths, &[{}], errors);",
+            inputs.join(", ")
+        )
     };
-    let axes = code.groups[1].len();
-    let pattern = if gradient { "(values, slopes)" } else { "values" };
-    let _ = writeln!(
-        file,
-        "            let {pattern} = {name}(lengths, &[{}], errors);",
-        row(&|a| format!("x[{a}][lane]"), axes)
-    );
+    let block = call(&|axis| format!("x[{axis}][lane]"));
+    let rest = call(&|axis| format!("axes[{axis}][i]"));
+    let blocks_of_slopes = only_with_gradient(format!("        let mut g = [[0.0; LANES]; {all}];\n"));
+    let (mut into_block, mut into_rest) = (String::new(), String::new());
     for output in 0..outputs {
         let of = if outputs == 1 {
             String::new()
         } else {
             format!("[{output}]")
         };
-        let _ = writeln!(file, "            v[{output}][lane] = values{of};");
-        if gradient {
+        into_block += &format!("            v[{output}][lane] = values{of};\n");
+        into_rest += &format!("        value[{output}][i] = values{of};\n");
+        if code.gradient {
             for k in 0..errors {
-                let _ = writeln!(
-                    file,
-                    "            g[{}][lane] = slopes{of}[{k}];",
+                into_block += &format!(
+                    "            g[{}][lane] = slopes{of}[{k}];\n",
                     output * errors + k
                 );
             }
-        }
-    }
-    file.push_str("        }\n");
-    file.push_str("        for (column, block) in value.iter_mut().zip(&v) {\n            column[at..at + LANES].copy_from_slice(block);\n        }\n");
-    if gradient {
-        file.push_str("        for (column, block) in gradient.iter_mut().zip(&g) {\n            column[at..at + LANES].copy_from_slice(block);\n        }\n");
-    }
-    file.push_str("        at += LANES;\n    }\n    for i in at..n {\n");
-    let _ = writeln!(
-        file,
-        "        let {pattern} = {name}(lengths, &[{}], errors);",
-        row(&|a| format!("axes[{a}][i]"), axes)
-    );
-    for output in 0..outputs {
-        let of = if outputs == 1 {
-            String::new()
-        } else {
-            format!("[{output}]")
-        };
-        let _ = writeln!(file, "        value[{output}][i] = values{of};");
-        if gradient {
-            let _ = writeln!(
-                file,
-                "        for (k, slope) in slopes{of}.iter().enumerate() {{\n            gradient[{}k][i] = *slope;\n        }}",
-                if output == 0 {
-                    String::new()
-                } else {
-                    format!("{} + ", output * errors)
-                }
+            let first = if output == 0 {
+                String::new()
+            } else {
+                format!("{} + ", output * errors)
+            };
+            into_rest += &format!(
+                "        for (k, slope) in slopes{of}.iter().enumerate() {{\n            \
+                 gradient[{first}k][i] = *slope;\n        }}\n"
             );
         }
     }
-    file.push_str("    }\n}\n\n");
+    let store = |columns: &str, blocks: &str| {
+        format!(
+            "        for (column, block) in {columns}.iter_mut().zip(&{blocks}) {{\n            \
+             column[at..at + LANES].copy_from_slice(block);\n        }}\n"
+        )
+    };
+    let stored = store("value", "v") + &only_with_gradient(store("gradient", "g"));
+    format!(
+        "/// Values{and} of columns of readings: a slice for each axis input, for each output{each}.
+///
+/// # Panics
+/// If a column has another length than `value[0]`.
+pub fn {name}_columns(lengths: &[f64; LENGTHS], axes: &[&[f64]; AXES], errors: &[f64; ERRORS], \
+value: &mut [&mut [f64]; {outputs}]{slopes}) {{
+    const LANES: usize = 4;
+    let n = value[0].len();
+    for column in axes {{
+        assert_eq!(column.len(), n, \"a column of axis positions is not as long as the values\");
+    }}
+    let mut at = 0;
+    while at + LANES <= n {{
+        let mut v = [[0.0; LANES]; {outputs}];
+{blocks_of_slopes}        let mut x = [[0.0; LANES]; AXES];
+        for (block, column) in x.iter_mut().zip(axes) {{
+            block.copy_from_slice(&column[at..at + LANES]);
+        }}
+        for lane in 0..LANES {{
+            {block}
+{into_block}        }}
+{stored}        at += LANES;
+    }}
+    for i in at..n {{
+        {rest}
+{into_rest}    }}
+}}
+"
+    )
 }
 
 /// The functions that `core` lacks, if the code calls them.
-fn elementary(file: &mut String, code: &Code<'_>) {
-    let dialect = Rust(code);
-    let mut text = code.lines(&dialect, |_, value| value.to_string()).concat();
-    text.push_str(&code.results(&dialect).concat());
+fn elementary(code: &Code<'_>) -> String {
+    let (values, slopes) = code.results();
+    let text = [code.assignments("", ""), values, slopes].concat().concat();
     let functions = [
         ("sqrt", "x.sqrt()"),
         ("sin", "x.sin()"),
@@ -268,20 +213,19 @@ fn elementary(file: &mut String, code: &Code<'_>) {
         ("floor", "x.floor()"),
         ("round", "x.round()"),
     ];
-    let used: Vec<_> = functions
+    let used = functions
         .iter()
         .filter(|(name, _)| text.contains(&format!("elementary::{name}(")))
-        .collect();
+        .map(|(name, body)| {
+            format!("    #[inline(always)]\n    pub fn {name}(x: f64) -> f64 {{\n        {body}\n    }}\n")
+        });
+    let used: Vec<String> = used.collect();
     if used.is_empty() {
-        return;
+        return String::new();
     }
-    file.push_str("/// Functions that `core` lacks. In a crate without `std` replace them by those of `libm`; nothing else needs `std`.\nmod elementary {\n");
-    for (index, (name, body)) in used.iter().enumerate() {
-        let gap = if index == 0 { "" } else { "\n" };
-        let _ = write!(
-            file,
-            "{gap}    #[inline(always)]\n    pub fn {name}(x: f64) -> f64 {{\n        {body}\n    }}\n"
-        );
-    }
-    file.push_str("}\n");
+    format!(
+        "/// Functions that `core` lacks. In a crate without `std` replace them by those of `libm`; nothing else needs \
+         `std`.\nmod elementary {{\n{}}}\n",
+        used.join("\n")
+    )
 }

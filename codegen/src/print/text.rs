@@ -1,44 +1,53 @@
-//! Printer for plain text, UTF-8.
+//! Plain text, UTF-8.
 
 use std::f64::consts::{PI, TAU};
-use std::fmt::Write;
 
-use crate::equation::{Equation, Kind};
-use crate::print::article::{Article, LeftSide, NoteKind, terms_of};
-use crate::print::dialect::{self, Dialect};
+use crate::check::Checked;
+use crate::print::article::Article;
+use crate::print::article::line::NoteKind;
+use crate::print::dialect;
+use crate::print::language::Language;
+use crate::print::notation::{Notation, Spelling, rounded};
 use crate::print::notes;
-use crate::program::{Input, Label, Program};
 use crate::symbol::Unary;
+use crate::tree::terms_of;
 use crate::variable::{Symbols, Variable};
 
 /// Characters per line.
 const WIDTH: usize = 100;
 
-/// Notation of expressions in plain text.
-struct Text<'a> {
-    program: &'a Program,
-    symbols: Symbols,
-}
+/// Plain text, UTF-8.
+pub(crate) struct Text;
 
-impl Dialect for Text<'_> {
+impl Notation for Text {
     fn number(&self, value: f64) -> String {
         match value {
             PI => "π".to_string(),
             TAU => "(2·π)".to_string(),
-            value => format!("{}", dialect::for_readers(value)),
+            value => format!("{}", rounded(value)),
         }
     }
-    fn input(&self, index: usize) -> String {
-        input(&self.program.inputs[index], self.symbols)
+    fn subscripted(&self, letter: &str, subscript: &str) -> String {
+        format!("{letter}_{subscript}")
     }
-    fn step(&self, index: usize) -> String {
-        label(&self.program.steps[index].label, self.symbols)
+    fn coordinate(&self, vector: &str, prime: bool, frame: &str, coordinate: &str) -> String {
+        let prime = if prime { "′" } else { "" };
+        match frame {
+            "" => format!("{vector}{prime}.{coordinate}"),
+            frame => format!("{vector}{prime}_{frame}.{coordinate}"),
+        }
+    }
+    fn variable(&self, variable: &Variable, symbols: Symbols) -> String {
+        variable.text(symbols)
     }
     fn product(&self, a: &str, b: &str) -> String {
         format!("{a}·{b}")
     }
     fn quotient(&self, a: &str, b: &str) -> String {
         format!("{a}/{b}")
+    }
+    fn fractions(&self) -> bool {
+        false
     }
     fn call(&self, function: Unary, argument: &str) -> String {
         match function {
@@ -56,121 +65,52 @@ impl Dialect for Text<'_> {
     fn minus(&self) -> &str {
         "−"
     }
-    fn square(&self, factor: &str) -> Option<String> {
-        Some(format!("{factor}²"))
+    fn square(&self, factor: &str) -> String {
+        format!("{factor}²")
     }
-    fn keeps_order(&self) -> bool {
-        false
-    }
-}
-
-/// The symbol of an input, such as `s_a` for the sine of θ_a.
-fn input(input: &Input, symbols: Symbols) -> String {
-    let turn = |letter: &str, variable: &Variable| match variable {
-        Variable::Position { axis, .. } => format!("{letter}_{}", axis.to_lowercase()),
-        other if letter == "s" => format!("sin({})", other.text(symbols)),
-        other => format!("cos({})", other.text(symbols)),
-    };
-    match input {
-        Input::Plain(variable) => variable.text(symbols),
-        Input::Sine(variable) => turn("s", variable),
-        Input::Cosine(variable) => turn("c", variable),
+    fn partial(&self) -> &str {
+        "∂"
     }
 }
 
-/// The symbol of a step, such as `p_A.x` for a coordinate of the point p in the frame of A.
-fn label(label: &Label, symbols: Symbols) -> String {
-    match label {
-        Label::Vector {
-            letter,
-            frame,
-            prime,
-            coordinate,
-        } => {
-            let frame = if frame.is_empty() {
-                String::new()
-            } else {
-                format!("_{frame}")
-            };
-            let prime = if *prime { "′" } else { "" };
-            format!("{letter}{prime}{frame}.{}", ["x", "y", "z"][*coordinate])
-        }
-        Label::Scalar(name) => (*name).to_string(),
-        Label::Quantity(variable) => variable.text(symbols),
-        Label::Temporary(number) => format!("t{number}"),
-    }
-}
-
-fn output(kind: Kind, index: usize) -> String {
-    match kind {
-        Kind::Length => "L".to_string(),
-        Kind::Distance => "d".to_string(),
-        Kind::Coordinates => format!("m.{}", ["x", "y", "z"][index]),
-        Kind::Volumetric => format!("Δ.{}", ["x", "y", "z"][index]),
-    }
-}
-
-/// Prints the equation.
-pub(crate) fn print(equation: &Equation) -> String {
-    let article = Article::new(equation);
-    let symbols = equation.options.symbols;
-    let spelling = Text {
-        program: &article.program,
-        symbols,
-    };
-    let mut page = notes::title(equation).join("\n") + "\n";
-    for section in &article.sections {
-        let _ = writeln!(page, "\n{}", section.heading);
-        let left = |left: &LeftSide| match left {
-            LeftSide::Named(name) => label(name, symbols),
-            LeftSide::Square(name) => format!("{}²", label(name, symbols)),
-            LeftSide::Output(index) => output(equation.kind, *index),
-            LeftSide::Slope(index, parameter) => {
-                format!("∂{}/∂{}", output(equation.kind, *index), parameter.text(symbols))
-            }
+impl Language for Text {
+    fn print(&self, checked: &Checked<'_>) -> String {
+        let equation = checked.equation;
+        let article = Article::new(equation);
+        let spelling = Spelling {
+            notation: self,
+            program: &article.program,
+            symbols: equation.options.symbols,
+            kind: equation.kind,
         };
-        let lefts: Vec<String> = section.rows.iter().map(|row| left(&row.left)).collect();
-        let widest = lefts.iter().map(|left| left.chars().count()).max().unwrap_or(0);
-        for (row, left) in section.rows.iter().zip(&lefts) {
-            let relation = if row.approximate { "≈" } else { "=" };
-            let lines = dialect::lines(&terms_of(&row.right), &spelling, WIDTH, |piece| {
-                piece.chars().count()
-            });
-            let gap = " ".repeat(widest - left.chars().count());
-            let _ = write!(page, "  {left}{gap} {relation} ");
-            let _ = write!(
-                page,
-                "{}",
-                lines.join(&format!("\n  {}     ", " ".repeat(widest)))
-            );
-            match &row.remark {
-                None => page.push('\n'),
-                Some(NoteKind::NotObservable) => page.push_str("   (not observable)\n"),
-                Some(NoteKind::MultipleOf(other)) => {
-                    let _ = writeln!(
-                        page,
-                        "   (a constant multiple of that of {})",
-                        other.text(symbols)
-                    );
-                }
+        let width = |text: &str| text.chars().count();
+        let mut page = notes::title(equation).join("\n") + "\n";
+        for section in &article.sections {
+            page.extend(["\n", &section.heading, "\n"]);
+            let lefts: Vec<String> = section.rows.iter().map(|row| spelling.left(&row.left)).collect();
+            let widest = lefts.iter().map(|left| width(left)).max().unwrap_or(0);
+            let next_line = format!("\n  {}     ", " ".repeat(widest));
+            for (row, left) in section.rows.iter().zip(&lefts) {
+                let relation = if row.approximate { "≈" } else { "=" };
+                let gap = " ".repeat(widest - width(left));
+                let right = dialect::lines(&terms_of(&row.right), &spelling, WIDTH, width).join(&next_line);
+                let remark = match &row.remark {
+                    None => String::new(),
+                    Some(NoteKind::NotObservable) => "   (not observable)".to_string(),
+                    Some(NoteKind::MultipleOf(other)) => {
+                        format!("   (a constant multiple of that of {})", spelling.variable(other))
+                    }
+                };
+                page += &format!("  {left}{gap} {relation} {right}{remark}\n");
             }
         }
+        page.push_str("\nsymbols\n");
+        for (symbol, meaning, unit) in &article.symbols {
+            let names = spelling.names(symbol, ", ");
+            let gap = " ".repeat(10_usize.saturating_sub(width(&names)));
+            page += &format!("  {names}{gap} {unit:<4} {meaning}\n");
+        }
+        page.extend(["\n", &notes::notes(checked).join("\n"), "\n"]);
+        page
     }
-    page.push_str("\nsymbols\n");
-    for (symbol, meaning, unit) in &article.symbols {
-        let names = match symbol {
-            Input::Sine(variable) | Input::Cosine(variable) => format!(
-                "{}, {}",
-                input(&Input::Sine(variable.clone()), symbols),
-                input(&Input::Cosine(variable.clone()), symbols)
-            ),
-            Input::Plain(_) => input(symbol, symbols),
-        };
-        let gap = " ".repeat(10_usize.saturating_sub(names.chars().count()));
-        let _ = writeln!(page, "  {names}{gap} {unit:<4} {meaning}");
-    }
-    page.push('\n');
-    page.push_str(&notes::notes(equation).join("\n"));
-    page.push('\n');
-    page
 }

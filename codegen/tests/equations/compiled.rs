@@ -1,184 +1,11 @@
-//! Compiles or interprets printed code and compares it with dual numbers: every topology of Table 1.1 at random errors of 0.1 rad and 10
-//! mm, value and gradient, one reading at a time and in columns.
+//! Compiles or interprets printed code and compares it with dual numbers, one reading at a time and in columns.
 
 use std::fmt::Write;
 use std::path::Path;
 use std::process::Command;
 
-use abbe_codegen::program::Input;
-use abbe_codegen::{Equation, Language, Options, Variable};
-use abbe_model::chain::Machine;
-use abbe_model::component::ErrorName;
-use abbe_model::driver::{Driver, DriverPart};
-use abbe_model::frames::Rotation;
-use rand::{RngExt, SeedableRng};
-
-use crate::effects::{Bar, curve, every_shape};
-use crate::operators::Batch;
+use crate::programs::{CASES, all, check_all, points, sizes};
 use crate::tools;
-use crate::topologies::{AnyBar, CODES, Case, What, all_errors, cases, disagreement, machine, short};
-
-const CASES: usize = 19;
-
-/// One printed equation and its expected values.
-struct Printed {
-    name: String,
-    function: &'static str,
-    text: String,
-    cases: Vec<Case>,
-}
-
-fn all(language: Language) -> Vec<Printed> {
-    let mut random = rand_pcg::Pcg64::seed_from_u64(11);
-    let mut printed = Vec::new();
-    for code in CODES {
-        let machine = machine(code);
-        let errors = all_errors(&machine);
-        for what in [What::Bar, What::Volumetric] {
-            let options = Options {
-                gradient: true,
-                rotation: Some(Rotation::Exact),
-                ..Options::default()
-            };
-            let equation = match what {
-                What::Bar => Equation::of(&machine, &AnyBar, &errors, &options),
-                What::Volumetric => Equation::volumetric(&machine, &errors, &options),
-            };
-            let equation = equation.expect("an equation");
-            let (kind, function) = match what {
-                What::Bar => ("bar", "bar_length"),
-                What::Volumetric => ("vol", "volumetric_error"),
-            };
-            printed.push(Printed {
-                name: format!("{kind}_{}", short(code)),
-                function,
-                text: equation.print(language).expect("code"),
-                cases: cases(what, &machine, &errors, CASES, &mut random),
-            });
-        }
-    }
-    printed.extend(operators(language, &mut random));
-    printed.push(effects(language, &mut random));
-    let probes = crate::probe::printed(language, CASES, &mut random);
-    printed.extend(probes.into_iter().map(|(name, text, cases)| Printed {
-        name,
-        function: "probe_distance",
-        text,
-        cases,
-    }));
-    printed
-}
-
-/// Compound operands under every operator: three coordinates, each shifted by one of three errors.
-fn operators(language: Language, random: &mut impl rand::Rng) -> Vec<Printed> {
-    let machine = Machine::from_code("w b X t").expect("a code");
-    let errors: Vec<ErrorName> = ["EXX", "EYX", "EZX"]
-        .iter()
-        .filter_map(|name| ErrorName::parse(name))
-        .collect();
-    let options = Options {
-        gradient: true,
-        ..Options::default()
-    };
-    let mut printed = Vec::new();
-    for batch in Batch::all() {
-        let equation = Equation::of(&machine, &batch, &errors, &options).expect("an equation");
-        let cases = (0..CASES).map(|_| {
-            let lengths: [f64; 4] = std::array::from_fn(|_| random.random_range(50.0..150.0));
-            let (x, small) = (random.random_range(-100.0..100.0), [0.5, -2.0, 7.0]);
-            let ball = batch.coordinates(lengths);
-            Case {
-                arguments: [lengths.to_vec(), vec![x], small.to_vec()],
-                values: vec![ball[0] + small[0] + x, ball[1] + small[1], ball[2] + small[2]],
-                gradient: vec![1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0],
-            }
-        });
-        printed.push(Printed {
-            name: format!("operators_{}", batch.0),
-            function: "coordinates",
-            text: equation.print(language).expect("code"),
-            cases: cases.collect(),
-        });
-    }
-    printed
-}
-
-/// A bar with an effect of every shape, against the program that dual numbers confirmed.
-fn effects(language: Language, random: &mut impl rand::Rng) -> Printed {
-    let machine = Machine::from_code("w C b X t").expect("a code");
-    let options = Options {
-        gradient: true,
-        effects: every_shape().into_iter().chain([curve()]).collect(),
-        ..Options::default()
-    };
-    let errors: Vec<ErrorName> = ErrorName::parse("EX0C").into_iter().collect();
-    let equation = Equation::of(&machine, &Bar, &errors, &options).expect("an equation");
-    let program = equation.program(true);
-    let cases = (0..CASES).map(|_| {
-        let angle = random.random_range(-3.0..3.0_f64);
-        let mut arguments = [Vec::new(), Vec::new(), Vec::new()];
-        for input in &program.inputs {
-            let (group, value) = match input {
-                Input::Sine(_) => (1, angle.sin()),
-                Input::Cosine(_) => (1, angle.cos()),
-                Input::Plain(variable) => match variable {
-                    Variable::Length(_) => (0, random.random_range(90.0..110.0)),
-                    Variable::Position { axis, .. } if axis == "C" => (1, angle),
-                    Variable::Position { .. } => (1, random.random_range(-150.0..-50.0)),
-                    Variable::Driver(quantity) if quantity.part == DriverPart::Direction => {
-                        (1, if random.random() { 1.0 } else { -1.0 })
-                    }
-                    Variable::Driver(quantity) if quantity.driver == Driver::Time => {
-                        (1, random.random_range(0.0..4000.0))
-                    }
-                    Variable::Driver(quantity) if quantity.part == DriverPart::SinceReversal => {
-                        (1, random.random_range(0.0..0.5))
-                    }
-                    Variable::Driver(_) => (1, random.random_range(-2.0..2.0)),
-                    _ => (2, random.random_range(-0.1..0.1)),
-                },
-            };
-            arguments[group].push(value);
-        }
-        let found = program.run(&arguments.concat());
-        Case {
-            arguments,
-            values: found[..1].to_vec(),
-            gradient: found[1..].to_vec(),
-        }
-    });
-    Printed {
-        name: "effects".to_string(),
-        function: "bar_length",
-        cases: cases.collect(),
-        text: equation.print(language).expect("code"),
-    }
-}
-
-/// Compares values and gradients of the cases with rows of numbers, twice: one reading at a time, then in columns.
-fn compare(printed: &Printed, single: &str, columns: &str) {
-    for text in [single, columns] {
-        let worst = disagreement(&printed.cases, &tools::rows(text), true);
-        assert!(worst <= 1e-12, "{}: {worst:e}", printed.name);
-    }
-}
-
-fn sizes(printed: &Printed) -> [usize; 5] {
-    let case = &printed.cases[0];
-    let [lengths, axes, errors] = &case.arguments;
-    [
-        lengths.len(),
-        axes.len(),
-        errors.len(),
-        case.values.len(),
-        case.gradient.len(),
-    ]
-}
-
-fn points(printed: &Printed) -> String {
-    let row = |case: &Case| tools::line(case.arguments.concat());
-    printed.cases.iter().map(|case| row(case) + "\n").collect()
-}
 
 #[test]
 fn rust() {
@@ -187,7 +14,7 @@ fn rust() {
         return;
     };
     let folder = tools::folder("rust");
-    let all = all(Language::Rust);
+    let all = all("rust");
     let mut main = String::from("#![deny(warnings)]\n");
     for printed in &all {
         tools::write(&folder.join(format!("{}.rs", printed.name)), &printed.text);
@@ -246,16 +73,6 @@ fn rust() {
     let _ = std::fs::remove_dir_all(&folder);
 }
 
-/// Compares the output of all printed equations: rows, the word `columns`, rows, the word `next`.
-fn check_all(all: &[Printed], output: &str) {
-    let parts: Vec<&str> = output.split("next\n").collect();
-    assert_eq!(parts.len(), all.len() + 1);
-    for (printed, part) in all.iter().zip(parts) {
-        let (single, columns) = part.split_once("columns\n").expect("two parts");
-        compare(printed, single, columns);
-    }
-}
-
 #[test]
 fn c() {
     let cc = std::env::var("CC").unwrap_or_default();
@@ -263,7 +80,7 @@ fn c() {
         return;
     };
     let folder = tools::folder("c");
-    let all = all(Language::C);
+    let all = all("c");
     let mut output = String::new();
     for printed in &all {
         let function = printed.function;
@@ -334,7 +151,7 @@ fn python() {
         return;
     };
     let folder = tools::folder("python");
-    let all = all(Language::Python);
+    let all = all("python");
     let mut main = String::from(
         "import numpy as np\n\ndef show(x):\n    print(' '.join(repr(float(v)) for v in x))\n\n",
     );
@@ -376,7 +193,7 @@ fn octave() {
         return;
     };
     let folder = tools::folder("octave");
-    let all = all(Language::Matlab);
+    let all = all("matlab");
     let mut main = String::from("1;\nfunction show(x)\n  printf('%.17g ', x);\n  printf('\\n');\nend\n");
     for printed in &all {
         let (name, function) = (&printed.name, printed.function);

@@ -3,7 +3,8 @@
 use std::f64::consts::{PI, TAU};
 
 use abbe_codegen::evaluate::evaluate_f64;
-use abbe_codegen::{CodegenError, Equation, Language, Options, Order, Source, Subject, Variable};
+use abbe_codegen::print::{Audience, LANGUAGES};
+use abbe_codegen::{CodegenError, Equation, Options, Order, Source, Subject, Variable, check};
 use abbe_model::chain::Machine;
 use abbe_model::component::ErrorName;
 use abbe_model::driver::{Driver, DriverPart};
@@ -13,6 +14,8 @@ use abbe_model::effect::shape::{
 use abbe_model::effect::{Component, Effect, Shape};
 use abbe_model::instrument::{Station, ballbar::BallBar, socket::Socket};
 use abbe_model::scalar::Nominal;
+
+use crate::support::printed;
 
 /// A ball at the tool frame's origin in a socket at R's origin: the reading is the position of the ball.
 #[derive(Clone, Copy)]
@@ -280,10 +283,11 @@ fn every_form_is_confirmed_with_every_shape() {
         for curved in [false, true] {
             options.effects.extend(curved.then(curve));
             let equation = Equation::of(&machine, &Bar, &errors, &options).expect("an equation");
-            assert!(equation.check.points == 40 && equation.check.largest() < 1e-12);
-            for language in Language::ALL {
-                let for_readers = matches!(language, Language::Text | Language::Latex | Language::Typst);
-                match equation.print(language) {
+            let checked = check(&equation, &Bar).expect("agreement");
+            assert!(checked.agreement.points == 40 && checked.agreement.largest() < 1e-12);
+            for language in LANGUAGES {
+                let for_readers = language.audience == Audience::Readers;
+                match language.print(&checked) {
                     Ok(text) => assert!(!(text.contains("NaN") || curved && for_readers), "{text}"),
                     Err(refused) => {
                         let message = refused.to_string();
@@ -307,7 +311,7 @@ fn an_equation_names_driven_errors_and_their_drivers() {
         effect("bar", "time", Shape::Warmup(Warmup { tau_s: 900.0 })),
     ];
     let equation = Equation::of(&machine, &Bar, &[], &with(effects)).expect("an equation");
-    let text = equation.print(Language::Text).expect("a text");
+    let text = printed(&equation, &Bar, "text");
     for line in [
         "errors as functions of drivers\n",
         "  e_zc  = k_1·cos(2·θ_c) + k_2·sin(2·θ_c)\n",
@@ -318,7 +322,7 @@ fn an_equation_names_driven_errors_and_their_drivers() {
     ] {
         assert!(text.contains(line), "`{line}` is not in\n{text}");
     }
-    let latex = equation.print(Language::Latex).expect("a text");
+    let latex = printed(&equation, &Bar, "latex");
     assert!(
         latex.contains("e_{zc} &= k_{1} \\cos (2 \\theta_{c}) + k_{2} \\sin (2 \\theta_{c})"),
         "{latex}"
@@ -335,7 +339,7 @@ fn an_effect_confounded_with_a_location_error_is_marked() {
     };
     let errors: Vec<ErrorName> = ErrorName::parse("EX0C").into_iter().collect();
     let equation = Equation::of(&machine, &Bar, &errors, &options).expect("an equation");
-    let text = equation.print(Language::Text).expect("a text");
+    let text = printed(&equation, &Bar, "text");
     assert!(text.contains("k_1 is confounded with e_x0c"), "{text}");
 }
 

@@ -9,6 +9,7 @@ mod effects;
 mod forms;
 mod operators;
 mod probe;
+mod programs;
 mod second;
 mod seed000;
 mod seed003;

@@ -2,7 +2,7 @@
 //! bisection.
 
 use abbe_codegen::program::Input;
-use abbe_codegen::{CodegenError, Equation, Language, Options, Order, Source, Subject, Variable};
+use abbe_codegen::{CodegenError, Equation, Options, Order, Source, Subject, Variable, check};
 use abbe_model::axis::AxisKind;
 use abbe_model::chain::Machine;
 use abbe_model::component::{ErrorKind, ErrorName};
@@ -11,6 +11,7 @@ use abbe_model::scalar::Nominal;
 use nalgebra::{Matrix4, Rotation3, Vector3, Vector4};
 use rand::{RngExt, SeedableRng};
 
+use crate::support;
 use crate::topologies::Case;
 
 /// A cylinder on the table and a probe that moves straight towards it, or in a stated direction.
@@ -290,7 +291,9 @@ fn point(touch: Touch, parameters: &[Variable], size: [f64; 2], random: &mut imp
 
 fn equation(touch: Touch, order: Order) -> Equation {
     let machine = touch.machine();
-    Equation::of(&machine, &touch, &errors(&machine), &options(order)).expect("an equation")
+    let equation = Equation::of(&machine, &touch, &errors(&machine), &options(order)).expect("an equation");
+    check(&equation, &touch).expect("agreement");
+    equation
 }
 
 #[test]
@@ -396,7 +399,7 @@ fn a_direction_that_the_table_tilts_away_from_has_no_first_order() {
 
 /// Printed code to compile and run: every language, with the values that dual numbers confirmed to 1e-12.
 pub fn printed(
-    language: Language,
+    language: &str,
     count: usize,
     random: &mut impl rand::Rng,
 ) -> Vec<(String, String, Vec<Case>)> {
@@ -419,14 +422,14 @@ pub fn printed(
                 });
             }
         }
-        let text = equation.print(language).expect("code");
+        let text = support::printed(&equation, &touch, language);
         printed.push((format!("probe_{}", usize::from(stated)), text, cases));
     }
     printed
 }
 
 /// Every form, for the engines that typeset them.
-pub fn fragments(language: Language) -> Vec<String> {
+pub fn fragments(language: &str) -> Vec<String> {
     let mut fragments = Vec::new();
     for stated in [false, true] {
         for order in [Order::Exact, Order::Bilinear, Order::First] {
@@ -437,7 +440,7 @@ pub fn fragments(language: Language) -> Vec<String> {
                 ..options(order)
             };
             let equation = Equation::of(&machine, &touch, &errors(&machine), &options).expect("an equation");
-            fragments.push(equation.print(language).expect("a fragment"));
+            fragments.push(support::printed(&equation, &touch, language));
         }
     }
     fragments

@@ -358,7 +358,8 @@ fn the_first_order_term_for_term() {
         first.nominal[0],
         ring.normal_form(square.operand()).expect("a polynomial")
     );
-    let unseen: Vec<String> = equation
+    let checked = abbe_codegen::check(&equation, &Chapter5 { extended: true }).expect("agreement");
+    let unseen: Vec<String> = checked
         .absent
         .iter()
         .map(|v| v.text(abbe_codegen::Symbols::Iso))
@@ -385,8 +386,13 @@ fn truncation_errors_match_independent_figures() {
         };
         let machine = hermle(Rotation::Exact);
         let equation = Equation::of(&machine, &Chapter5 { extended }, &eight(), &options);
-        let deviations = equation.expect("an equation").deviations;
-        deviations.iter().map(|d| d.largest_um).collect::<Vec<f64>>()
+        let equation = equation.expect("an equation");
+        let checked = abbe_codegen::check(&equation, &Chapter5 { extended }).expect("agreement");
+        checked
+            .deviations
+            .iter()
+            .map(|d| d.largest_um)
+            .collect::<Vec<f64>>()
     };
     let within = |found: Vec<f64>, low: f64, high: f64| {
         assert!((low..high).contains(&found[0]), "{found:?}");

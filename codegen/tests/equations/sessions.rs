@@ -2,8 +2,11 @@
 
 use std::path::PathBuf;
 
-use abbe_codegen::{Equation, Kind, Language, Options, Order, SessionTest};
+use abbe_codegen::print::LANGUAGES;
+use abbe_codegen::{Equation, Kind, Options, Order, SessionTest, check};
 use abbe_model::session::read;
+
+use crate::support::printed;
 
 fn file(name: &str) -> PathBuf {
     PathBuf::from(env!("CARGO_MANIFEST_DIR"))
@@ -26,8 +29,9 @@ fn every_test_of_the_bundled_plans() {
                 let equation = Equation::of(&session.machine, &source, &session.unknowns, &options);
                 let equation = equation.expect("an equation");
                 assert_eq!(equation.kind, Kind::Length);
-                for language in Language::ALL {
-                    assert!(!equation.print(language).expect("a page").is_empty());
+                let checked = check(&equation, &source).expect("agreement");
+                for language in LANGUAGES {
+                    assert!(!language.print(&checked).expect("a page").is_empty());
                 }
             }
         }
@@ -49,8 +53,9 @@ fn every_test_of_the_self_calibration() {
             let equation = Equation::of(&session.machine, &source, &session.unknowns, &options);
             let equation = equation.expect("an equation");
             assert_eq!(equation.kind, Kind::Distance);
-            for language in Language::ALL {
-                assert!(!equation.print(language).expect("a page").is_empty());
+            let checked = check(&equation, &source).expect("agreement");
+            for language in LANGUAGES {
+                assert!(!language.print(&checked).expect("a page").is_empty());
             }
         }
     }
@@ -68,10 +73,7 @@ fn lengths_derived_from_the_bar_stay_expressions() {
         .expect("the test");
     let source = SessionTest::new(&session, test).expect("a plan");
     let equation = Equation::of(&session.machine, &source, &session.unknowns, &Options::default());
-    let text = equation
-        .expect("an equation")
-        .print(Language::Text)
-        .expect("text");
+    let text = printed(&equation.expect("an equation"), &source, "text");
     assert!(text.contains("√(R_e² − R²)"), "{text}");
     assert!(!text.contains("111.8"), "{text}");
 }

@@ -1,7 +1,7 @@
 //! Shared support of this crate's integration tests.
 #![allow(dead_code)]
 
-use abbe_codegen::{Source, Subject};
+use abbe_codegen::{Equation, Source, Subject, check, language};
 use abbe_model::chain::Machine;
 use abbe_model::component::ErrorName;
 use abbe_model::frames::Rotation;
@@ -61,4 +61,13 @@ pub fn eight() -> Vec<ErrorName> {
         .iter()
         .filter_map(|name| ErrorName::parse(name))
         .collect()
+}
+
+/// A checked equation in a language.
+pub fn printed(equation: &Equation, source: &impl Source, word: &str) -> String {
+    let checked = check(equation, source).expect("agreement with dual numbers");
+    language(word)
+        .expect("a language")
+        .print(&checked)
+        .expect("a page")
 }

@@ -8,17 +8,24 @@ fn required() -> bool {
     std::env::var("CI").is_ok_and(|value| value == "true")
 }
 
+/// The first program that runs with these arguments.
+pub fn first(programs: &[&str], probe: &[&str]) -> Option<PathBuf> {
+    let named = programs.iter().filter(|program| !program.is_empty());
+    let mut running = named.filter(|program| {
+        let ran = Command::new(program).args(probe).output();
+        ran.is_ok_and(|output| output.status.success())
+    });
+    running.next().map(PathBuf::from)
+}
+
 /// The first program that runs with these arguments. Without one, the test is skipped with a message, or fails if tools are required.
 pub fn find(test: &str, programs: &[&str], probe: &[&str]) -> Option<PathBuf> {
-    for program in programs.iter().filter(|program| !program.is_empty()) {
-        let ran = Command::new(program).args(probe).output();
-        if ran.is_ok_and(|output| output.status.success()) {
-            return Some(PathBuf::from(program));
-        }
+    let found = first(programs, probe);
+    if found.is_none() {
+        assert!(!required(), "{test}: none of {programs:?} runs");
+        eprintln!("skipped {test}: none of {programs:?} runs");
     }
-    assert!(!required(), "{test}: none of {programs:?} runs");
-    eprintln!("skipped {test}: none of {programs:?} runs");
-    None
+    found
 }
 
 /// A new folder for a test's files.

@@ -3,20 +3,30 @@
 use std::fmt::Write;
 use std::process::Command;
 
-use abbe_codegen::{Equation, Language, Options, Order, Symbols};
+use abbe_codegen::{Equation, Options, Order, Source, Symbols, ToolPoint};
 use abbe_model::chain::Machine;
 use abbe_model::component::{ErrorKind, ErrorName};
 use abbe_model::frames::Rotation;
 
 use crate::effects::{Bar, every_shape};
-use crate::support::{Chapter5, eight, hermle};
+use crate::support::{Chapter5, eight, hermle, printed};
 use crate::tools;
 use crate::topologies::{AnyBar, CODES, all_errors, machine};
 
+fn of(
+    machine: &Machine,
+    source: &impl Source,
+    errors: &[ErrorName],
+    options: &Options,
+    language: &str,
+) -> String {
+    let equation = Equation::of(machine, source, errors, options).expect("an equation");
+    printed(&equation, source, language)
+}
+
 /// Every form of the chapter 5 test. For every topology the exact length, its first order, and the first order of the volumetric error.
-fn fragments(language: Language) -> Vec<String> {
+fn fragments(language: &str) -> Vec<String> {
     let mut fragments = Vec::new();
-    let mut add = |equation: Equation| fragments.push(equation.print(language).expect("a fragment"));
     for rotation in [Rotation::Exact, Rotation::SmallAngle] {
         for order in [Order::Exact, Order::Bilinear, Order::First] {
             for symbols in [Symbols::Literature, Symbols::Iso] {
@@ -29,7 +39,7 @@ fn fragments(language: Language) -> Vec<String> {
                     ..Options::default()
                 };
                 let bar = Chapter5 { extended: true };
-                add(Equation::of(&hermle(rotation), &bar, &eight(), &options).expect("an equation"));
+                fragments.push(of(&hermle(rotation), &bar, &eight(), &options, language));
             }
         }
     }
@@ -41,13 +51,13 @@ fn fragments(language: Language) -> Vec<String> {
             .filter(|name| name.kind == ErrorKind::Motion)
             .cloned()
             .collect();
-        add(Equation::of(&machine, &AnyBar, &errors, &Options::default()).expect("an equation"));
+        fragments.push(of(&machine, &AnyBar, &errors, &Options::default(), language));
         let first = Options {
             order: Order::First,
             ..Options::default()
         };
-        add(Equation::of(&machine, &AnyBar, &errors, &first).expect("an equation"));
-        add(Equation::volumetric(&machine, &motions, &first).expect("an equation"));
+        fragments.push(of(&machine, &AnyBar, &errors, &first, language));
+        fragments.push(of(&machine, &ToolPoint, &motions, &first, language));
     }
     // Every declared shape.
     let machine = Machine::from_code("w C b X t").expect("a code");
@@ -58,7 +68,7 @@ fn fragments(language: Language) -> Vec<String> {
             effects: every_shape(),
             ..Options::default()
         };
-        add(Equation::of(&machine, &Bar, &eight()[4..], &options).expect("an equation"));
+        fragments.push(of(&machine, &Bar, &eight()[4..], &options, language));
     }
     fragments.extend(crate::probe::fragments(language));
     fragments
@@ -67,7 +77,7 @@ fn fragments(language: Language) -> Vec<String> {
 /// Plain text has no engine to report errors: lines must fit the page and contain no undefined value.
 #[test]
 fn text() {
-    for fragment in fragments(Language::Text) {
+    for fragment in fragments("text") {
         let equations = fragment.split("\nsymbols\n").next().expect("equations");
         for line in equations.lines().skip(2) {
             // A remark on a coefficient follows it.
@@ -88,7 +98,7 @@ fn latex() {
     let mut document = String::from(
         "\\documentclass{article}\n\\usepackage{amsmath}\n\\usepackage[a4paper,margin=18mm]{geometry}\n\\begin{document}\n",
     );
-    for fragment in fragments(Language::Latex) {
+    for fragment in fragments("latex") {
         let _ = writeln!(document, "{fragment}\n\\clearpage");
     }
     document.push_str("\\end{document}\n");
@@ -129,7 +139,7 @@ fn typst() {
     };
     let folder = tools::folder("typst");
     let mut document = String::from("#set page(paper: \"a3\", flipped: true, margin: 18mm)\n");
-    for fragment in fragments(Language::Typst) {
+    for fragment in fragments("typst") {
         let _ = writeln!(document, "{fragment}\n#pagebreak()");
     }
     tools::write(&folder.join("all.typ"), &document);

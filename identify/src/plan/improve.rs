@@ -83,7 +83,7 @@ pub struct NamedUncertainty {
     pub unit: String,
 }
 
-/// A candidate test the best candidate tests.
+/// One of the best candidate tests.
 #[derive(Clone, Debug, Serialize, JsonSchema)]
 pub struct AlternativeTest {
     /// Description of the test.

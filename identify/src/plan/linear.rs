@@ -53,7 +53,7 @@ impl Linearisation {
         let whole = merged(prior.clone(), std::iter::once(&readings));
         let preference = pivot_preference(&problem.parameters.list);
         let rank = Rank::decide(whole.parts().0.as_ref(), &size, &preference)?;
-        let covariance = fit::covariance(&whole, &rank.identifiable_basis)?;
+        let covariance = fit::parameter_covariance(&whole, &rank.identifiable_basis)?;
         Ok(Linearisation {
             tests,
             prior,
@@ -86,7 +86,7 @@ impl Linearisation {
             .map(|(_, t)| t);
         let whole = merged(self.prior.clone(), kept);
         let rank = Rank::decide(whole.parts().0.as_ref(), &self.size, &self.preference)?;
-        let covariance = fit::covariance(&whole, &rank.identifiable_basis)?;
+        let covariance = fit::parameter_covariance(&whole, &rank.identifiable_basis)?;
         Ok((rank, covariance))
     }
 }

@@ -70,7 +70,7 @@ pub fn shrinkages(problem: &Problem<'_>) -> Result<Vec<Shrinkage>, IdentifyError
                 whole.absorb(Mat::from_fn(kept.len(), white.ncols(), |i, j| white[(kept[i], j)]).as_ref());
             }
             let rank = Rank::decide(whole.parts().0.as_ref(), &linear.size, &linear.preference)?;
-            let covariance = fit::covariance(&whole, &rank.identifiable_basis)?;
+            let covariance = fit::parameter_covariance(&whole, &rank.identifiable_basis)?;
             let ratios = of_interest.iter().map(|&j| {
                 let ratio = (covariance[(j, j)] / linear.covariance[(j, j)]).sqrt();
                 (

@@ -5,7 +5,7 @@ use serde::Serialize;
 
 use crate::results::{Combination, Unobservable};
 
-/// What a plan's analysis reports.
+/// Identifiability and predicted uncertainties of planned tests.
 #[derive(Clone, Debug, Serialize, JsonSchema)]
 pub struct PlanAnalysis {
     /// Standard deviation of one scalar reading, µm.

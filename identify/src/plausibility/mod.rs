@@ -1,13 +1,13 @@
 //! Whether readings and session belong together.
 //!
-//! A session states where things are: directions and order of axes, balls, bars, units of columns. Readings that contradict a statement are told by name,
-//! with the mistake that would explain them:
+//! A session states directions and order of axes, places of balls, lengths of bars, units of columns. This module names the statements that the
+//! readings contradict, and the mistakes that explain the contradiction. Conflicts are:
 //!
 //! - set-up parameters far from their stated values, each (`pulls`) and all together;
 //! - a residual of a hundred times the noise in every test;
 //! - poses of which the model explains less than 99 % of the variance (`poses`).
 //!
-//! What may be wrong is found by refitting the session with one statement changed at a time (`hypotheses`, `suggest`).
+//! Mistakes are found by refits of the session with one statement changed at a time (`hypotheses`, `suggest`).
 
 mod hypotheses;
 mod poses;
@@ -31,28 +31,29 @@ use crate::problem::Problem;
 
 /// Share of the variance of the measured positions that a model of poses explains at least.
 const MIN_EXPLAINED: f64 = 0.99;
-/// Below this share, mistakes that explain more are looked for.
+/// Below this share, mistakes that explain more are searched.
 const WELL_EXPLAINED: f64 = 0.9999;
-/// A residual of so many times the noise in every test is that of another session.
+/// The readings are those of another session if the residual of every test is this many times the noise.
 const ANOTHER_SESSION: f64 = 100.0;
-/// A residual of so many times the noise is worth a look at the session.
+/// Mistakes are searched if the residual is this many times the noise.
 const CHECK_ABOVE_SIGMA: f64 = 5.0;
-/// Set-up parameters that are named in words; the others are counted.
+/// Maximum number of set-up parameters that a warning names; it counts the others.
 const MAX_NAMED: usize = 3;
 
-/// What the readings contradict, and what may be wrong.
+/// The statements that the readings contradict, and the mistakes that explain it.
 pub fn examine(problem: &Problem<'_>, fit: &Fit) -> Plausibility {
     if !problem.session.instrument.is_two_sided() {
         return of_poses(problem, fit);
     }
     let mut conflicts: Vec<Conflict> = residual(problem, fit).into_iter().collect();
-    conflicts.extend(set_ups(problem, &Pulls::of(problem, fit)));
+    let pulls = Pulls::of(problem, fit);
+    conflicts.extend(set_ups(problem, &pulls));
     let by_residual = conflicts.is_empty();
     let ratio = rms_mm(problem, &fit.residuals) / problem.noise.sigma_mm;
     if by_residual && ratio < CHECK_ABOVE_SIGMA {
         return Plausibility::default();
     }
-    let suggestions = suggest::suggestions(problem, &conflicts);
+    let suggestions = suggest::suggestions(problem, &conflicts, pulls.allowed());
     if by_residual && let Some(best) = suggestions.first() {
         let rms_um = rms_mm(problem, &fit.residuals) * 1e3;
         conflicts.push(Conflict {
@@ -75,7 +76,7 @@ pub fn examine(problem: &Problem<'_>, fit: &Fit) -> Plausibility {
     }
 }
 
-/// The fit as it is, unless it cannot be one of these readings: then why, with what may be wrong.
+/// The fit unchanged, or an error where the readings cannot belong to the session. The error names the mistakes that may explain it.
 ///
 /// # Errors
 /// If the fit failed, or nothing is identifiable.
@@ -98,7 +99,7 @@ pub(crate) fn checked(problem: &Problem<'_>, fit: Result<Fit, IdentifyError>) ->
         Err(error) => return Err(error),
     };
     let suggestions = if problem.session.instrument.is_two_sided() {
-        suggest::suggestions(problem, &[])
+        suggest::suggestions(problem, &[], Pulls::default().allowed())
     } else {
         poses::suggestions(problem)
     };
@@ -112,7 +113,7 @@ pub(crate) fn checked(problem: &Problem<'_>, fit: Result<Fit, IdentifyError>) ->
     Err(IdentifyError::Contradicted { found, diagnosis })
 }
 
-/// What a user should know, one warning a conflict; set-up parameters share one.
+/// One warning per conflict; set-up parameters share one. The last also names the mistakes that explain the conflicts.
 pub fn warnings(plausibility: &Plausibility) -> Vec<String> {
     let is_parameter = |conflict: &&Conflict| conflict.kind == ConflictKind::SetupParameter;
     let conflicts = &plausibility.conflicts;
@@ -139,13 +140,59 @@ pub fn warnings(plausibility: &Plausibility) -> Vec<String> {
     told
 }
 
-/// What may be wrong, in a sentence.
+/// The mistakes that may explain the conflicts, in one sentence; those of one kind share a clause.
 pub fn in_words(suggestions: &[Suggestion]) -> Option<String> {
-    let words: Vec<&str> = suggestions
-        .iter()
-        .map(|suggestion| suggestion.words.as_str())
+    let mut kinds: Vec<SuggestionKind> = Vec::new();
+    for suggestion in suggestions {
+        if !kinds.contains(&suggestion.kind) {
+            kinds.push(suggestion.kind);
+        }
+    }
+    let clauses: Vec<String> = (kinds.iter())
+        .map(|kind| {
+            let of_kind = suggestions.iter().filter(|suggestion| suggestion.kind == *kind);
+            one_clause(
+                &of_kind
+                    .map(|suggestion| suggestion.words.as_str())
+                    .collect::<Vec<&str>>(),
+            )
+        })
         .collect();
-    (!words.is_empty()).then(|| format!("this would be explained if {}", words.join(", or if ")))
+    (!clauses.is_empty()).then(|| format!("this would be explained if {}", clauses.join(", or if ")))
+}
+
+/// Clauses as one that states their common beginning and end once: "the direction of axis A or Z is reversed".
+fn one_clause(clauses: &[&str]) -> String {
+    let words: Vec<Vec<&str>> = (clauses.iter())
+        .map(|clause| clause.split(' ').collect())
+        .collect();
+    let shortest = words.iter().map(Vec::len).min().unwrap_or(0);
+    let first = &words[0];
+    let begin = (0..shortest)
+        .take_while(|i| words.iter().all(|other| other[*i] == first[*i]))
+        .count();
+    let end = (1..=shortest.saturating_sub(begin + 1))
+        .take_while(|i| {
+            words
+                .iter()
+                .all(|other| other[other.len() - i] == first[first.len() - i])
+        })
+        .count();
+    if words.len() == 1 || begin + end == 0 {
+        return clauses.join(" or ");
+    }
+    let middles: Vec<String> = (words.iter())
+        .map(|words| words[begin..words.len() - end].join(" "))
+        .collect();
+    let (last, others) = middles.split_last().expect("there is more than one clause");
+    let middle = format!("{} or {last}", others.join(", "));
+    let parts = [
+        first[..begin].join(" "),
+        middle,
+        first[first.len() - end..].join(" "),
+    ];
+    let parts: Vec<String> = parts.into_iter().filter(|part| !part.is_empty()).collect();
+    parts.join(" ")
 }
 
 /// A residual of a hundred times the noise in every test.
@@ -279,4 +326,25 @@ fn has_priors(problem: &Problem<'_>) -> bool {
     let list = &problem.parameters.list;
     list.iter()
         .any(|parameter| matches!(parameter.prior, Prior::Gaussian(_)))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::one_clause;
+
+    #[test]
+    fn clauses_of_one_kind_share_their_words() {
+        let axis = |name: &str| format!("the direction of axis {name} is reversed");
+        assert_eq!(one_clause(&[&axis("A")]), axis("A"));
+        assert_eq!(one_clause(&[&axis("A"), &axis("Z")]), axis("A or Z"));
+        assert_eq!(
+            one_clause(&[
+                "the bar of C150 is not as it is stated",
+                "the spindle ball of C150 is not as it is stated",
+                "the workpiece ball of P1 is not as it is stated",
+            ]),
+            "the bar of C150, spindle ball of C150 or workpiece ball of P1 is not as it is stated"
+        );
+        assert_eq!(one_clause(&["one", "another case"]), "one or another case");
+    }
 }

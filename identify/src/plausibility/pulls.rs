@@ -1,6 +1,6 @@
-//! Pulls of set-up parameters: how far the readings move them from where they are stated.
+//! Pulls of set-up parameters: the deviation of the estimate from the stated value, over its standard deviation.
 //!
-//! With `P` the variances that are stated, `V` the covariance after the fit, and `A = V⁻¹ − P⁻¹` what the readings say, the estimate is
+//! With `P` the stated variances, `V` the covariance after the fit, and `A = V⁻¹ − P⁻¹` the information of the readings, the estimate is
 //! `m = V A θ + V Jᵀ W ε`. If the session is right, θ scatters by `P` and ε by `κ` times the variance that the fit assumes, so that
 //!
 //! ```text
@@ -18,13 +18,13 @@ use crate::fit::Fit;
 use crate::parameters::Role;
 use crate::problem::Problem;
 
-/// Probability that a session that is right is said to be contradicted, once for the largest pull and once for all set-up parameters together.
+/// Probability that a correct session is reported as contradicted, once for the largest pull and once for all set-up parameters together.
 const SIGNIFICANCE: f64 = 1e-4;
-/// A parameter that the readings would move by less than this share of its stated uncertainty says nothing.
+/// A parameter whose estimate scatters by less than this share of its stated uncertainty is not tested.
 const MIN_SHARE: f64 = 0.1;
 /// More set-up parameters than this are tested one by one only.
 const MAX_TESTED_JOINTLY: usize = 200;
-/// Greatest autocorrelation that is credited to noise.
+/// Largest autocorrelation that is attributed to noise.
 const MAX_CORRELATED: f64 = 0.95;
 
 /// One set-up parameter with a stated uncertainty.
@@ -43,7 +43,7 @@ pub struct Pull {
 /// The pulls of a fit.
 #[derive(Clone, Debug, Default)]
 pub struct Pulls {
-    /// Of every set-up parameter that the readings tell something of.
+    /// Of every set-up parameter about which the readings contain information.
     pub each: Vec<Pull>,
     /// Absolute pull above which a parameter contradicts its statement (Bonferroni over `each`).
     pub limit: f64,
@@ -114,6 +114,13 @@ impl Pulls {
     pub fn contradicted_together(&self) -> bool {
         let law = ChiSquared::new(self.freedom as f64);
         self.freedom > 0 && law.is_ok_and(|law| law.sf(self.together) < SIGNIFICANCE)
+    }
+
+    /// By how much χ² of the set-up parameters exceeds its least value with the probability [`SIGNIFICANCE`] if their statements are right.
+    pub fn allowed(&self) -> f64 {
+        let law = ChiSquared::new(self.freedom as f64);
+        let together = law.map_or(0.0, |law| law.inverse_cdf(1.0 - SIGNIFICANCE));
+        together.max(limit(self.each.len()).powi(2))
     }
 
     /// The largest pull, absolute; 0 of none.

@@ -1,24 +1,24 @@
-//! How well a session with one statement changed fits its readings: a few Gauss–Newton steps on some of them.
+//! How well a session with one statement changed fits its readings: a fit to some of them.
+//!
+//! The fit is iterated to its minimum. A freed parameter may be poorly determined; full Gauss–Newton steps then move it by as much as its prior
+//! allows, and the square of such a step exceeds the noise.
 
 use abbe_model::session::{Prior, Session};
 
-use crate::fit::{in_directions, whole};
+use crate::fit::{minimum, whole};
 use crate::heldout::rms_mm;
 use crate::noise::Noise;
 use crate::preference::pivot_preference;
 use crate::problem::Problem;
 use crate::rank::Rank;
 
-/// Gauss–Newton steps: the first leaves the square of the errors over the size of the machine, the next nothing.
-const STEPS: usize = 3;
-
-/// What a session comes to.
+/// The fit of a session in figures.
 #[derive(Clone, Debug)]
 pub(super) struct Trial {
     /// χ² of readings and priors.
     pub chi_square: f64,
-    /// Degrees of freedom.
-    pub freedom: f64,
+    /// χ² of the readings over their degrees of freedom, at least 1: the variance of the noise over the variance that is assumed.
+    pub excess: f64,
     /// Residual over scalar readings, mm.
     pub rms_mm: f64,
     /// What the parameters cost: twice the logarithm of the volume of the priors over that after the fit.
@@ -26,9 +26,9 @@ pub(super) struct Trial {
 }
 
 impl Trial {
-    /// −2 ln of the evidence up to a constant, where the noise has `scale` times the variance that is assumed.
-    pub fn score(&self, scale: f64) -> f64 {
-        self.chi_square / scale + self.cost
+    /// −2 ln of the evidence up to a constant.
+    pub fn score(&self) -> f64 {
+        self.chi_square + self.cost
     }
 }
 
@@ -36,33 +36,13 @@ impl Trial {
 pub(super) fn trial(session: &Session, noise: &Noise) -> Option<Trial> {
     let problem = Problem::new(session, noise.clone(), 1).ok()?;
     let list = &problem.parameters.list;
+    let found = minimum(&problem, None).ok()?;
+    let nothing = vec![0.0; list.len()];
+    let of_priors = problem.prior_triangle(&found.beta).sum_of_squares_after(&nothing);
+    let chi_square = problem.sum_of_squares(&found.beta);
+    let whole = whole(&problem, &found.beta, &found.triangles);
     let size: Vec<f64> = list.iter().map(|parameter| parameter.size).collect();
-    let preference = pivot_preference(list);
-    let mut beta = vec![0.0; list.len()];
-    let mut rank: Option<Rank> = None;
-    for _ in 0..STEPS {
-        let whole = whole(&problem, &beta, &problem.triangles(&beta).ok()?);
-        let rank = match &mut rank {
-            Some(rank) => rank,
-            none => none.insert(Rank::decide(whole.parts().0.as_ref(), &size, &preference).ok()?),
-        };
-        let (r, c, _) = in_directions(&whole, &rank.identifiable_basis).parts();
-        let mut step = vec![0.0; c.len()];
-        for i in (0..c.len()).rev() {
-            let beyond: f64 = (i + 1..c.len()).map(|j| r[(i, j)] * step[j]).sum();
-            step[i] = (c[i] - beyond) / r[(i, i)];
-        }
-        for (j, value) in beta.iter_mut().enumerate() {
-            *value += (0..step.len())
-                .map(|k| rank.identifiable_basis[(j, k)] * step[k])
-                .sum::<f64>();
-        }
-        if beta.iter().any(|value| !value.is_finite()) {
-            return None;
-        }
-    }
-    let chi_square = problem.sum_of_squares(&beta);
-    let rank = rank?;
+    let rank = Rank::decide(whole.parts().0.as_ref(), &size, &pivot_preference(list)).ok()?;
     let determined: f64 = rank.singular_values.iter().map(|s| (1.0 + s * s).ln()).sum();
     let priors: f64 = (list.iter())
         .map(|parameter| match parameter.prior {
@@ -75,17 +55,18 @@ pub(super) fn trial(session: &Session, noise: &Noise) -> Option<Trial> {
         .iter()
         .filter(|parameter| parameter.prior == Prior::Free)
         .count();
+    let freedom = readings
+        .saturating_sub(free.min(found.rank.identifiable_basis.ncols()))
+        .max(1) as f64;
     chi_square.is_finite().then(|| Trial {
         chi_square,
-        freedom: readings
-            .saturating_sub(free.min(rank.identifiable_basis.ncols()))
-            .max(1) as f64,
-        rms_mm: rms_mm(&problem, &problem.residuals(&beta)),
+        excess: ((chi_square - of_priors) / freedom).max(1.0),
+        rms_mm: rms_mm(&problem, &problem.residuals(&found.beta)),
         cost: determined + priors,
     })
 }
 
-/// The session with about so many of its readings that count, evenly taken; whole if it has no more.
+/// The session with at most about `most` of its readings, evenly taken, without outliers.
 pub(super) fn thinned(problem: &Problem<'_>, most: usize) -> Session {
     let mut session = problem.session.clone();
     let each = problem.readings().div_ceil(most).max(1);

@@ -1,15 +1,15 @@
-//! What is reported of a session that its readings contradict, as it stands in JSON.
+//! Conflicts between readings and session, and the mistakes that explain them, as JSON holds them.
 
 use schemars::JsonSchema;
 use serde::Serialize;
 
-/// What the readings contradict, and what may be wrong.
+/// The statements that the readings contradict, and the mistakes that explain it.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, JsonSchema)]
 pub struct Plausibility {
     /// Statements of the session that the readings contradict, the worst first.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub conflicts: Vec<Conflict>,
-    /// What would remove the conflicts, the most probable first. Those listed are not separable by these readings.
+    /// Mistakes that remove the conflicts, the most probable first. The readings do not separate them.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub suggestions: Vec<Suggestion>,
     /// For poses: share of the variance of the measured positions that the model explains.

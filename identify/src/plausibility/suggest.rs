@@ -1,5 +1,6 @@
-//! Which single mistake would remove the conflicts: a refit with each, compared by evidence.
+//! Which single mistake would remove the conflicts: a refit with each. The likelihood decides which are listed, the evidence in what order.
 
+use abbe_model::session::Session;
 use rayon::prelude::*;
 
 use super::hypotheses::{self, Hypothesis};
@@ -8,51 +9,54 @@ use super::results::{Conflict, Suggestion, SuggestionKind};
 use crate::noise::{Noise, NoiseSource};
 use crate::problem::Problem;
 
-/// Readings that are refitted with each mistake.
+/// Number of readings that are refitted with each mistake.
 const MAX_READINGS: usize = 1500;
-/// By how much a mistake has to raise twice the logarithm of the evidence: odds of 20,000 to 1.
-const MIN_RISE: f64 = 20.0;
-/// Mistakes whose evidence is within this of the best (odds of 150 to 1) are listed too.
-const NOT_SEPARABLE: f64 = 10.0;
-/// The most that are listed.
-const MAX_LISTED: usize = 5;
-/// Up to so many things of the set-up all of them are tried, beyond it those whose parameters are contradicted.
+/// By how much a mistake has to lower χ² for it to be listed: a likelihood ratio of 150.
+const MIN_FALL: f64 = 10.0;
+/// Maximum number of mistakes that are listed.
+const MAX_LISTED: usize = 10;
+/// Up to this number all mistakes that free parameters are tried, beyond it those whose parameters are contradicted.
 const MAX_HYPOTHESES: usize = 40;
-/// By how much a mistake has to lower χ² for it to be suggested on the residual alone.
+/// If the noise of every fit exceeds the assumed variance by more than this factor, the fits are repeated with the larger variance.
+const MAX_EXCESS: f64 = 1.2;
+/// Scores that differ by less than the reciprocal of this are equal.
+const TIED: f64 = 100.0;
+/// By what factor a mistake has to lower χ² for it to be suggested on the residual alone.
 const LOWERED: f64 = 4.0;
 
 /// The mistakes that remove the conflicts of a session whose instrument reads between table and tool, the most probable first. Without conflicts
 /// only those that need no further parameter and explain most of the residual.
-pub(super) fn suggestions(problem: &Problem<'_>, conflicts: &[Conflict]) -> Vec<Suggestion> {
+///
+/// A mistake is listed if the readings do not reject it: its χ² exceeds the least χ² of all mistakes by no more than `allowed`. What the readings
+/// do not reject is ordered by evidence, which depends on the prior volume of the parameters that a mistake frees; that volume decides nothing else.
+pub(super) fn suggestions(problem: &Problem<'_>, conflicts: &[Conflict], allowed: f64) -> Vec<Suggestion> {
     let by_residual = conflicts.is_empty();
-    let noise = Noise::white(problem.noise.sigma_mm, NoiseSource::Stated);
+    let sigma_mm = problem.noise.sigma_mm;
     let stated = thinned(problem, MAX_READINGS);
-    // Where even the first steps fail, anything that fits is better.
-    let base = trial(&stated, &noise).unwrap_or(Trial {
-        chi_square: f64::INFINITY,
-        freedom: 1.0,
-        rms_mm: f64::INFINITY,
-        cost: 0.0,
-    });
     let mut list = hypotheses::of_two_sides(&stated);
     let many = list.iter().filter(|one| !needs_no_parameter(one.kind)).count() > MAX_HYPOTHESES;
     list.retain(|one| {
         needs_no_parameter(one.kind) || !(by_residual || many && !is_contradicted(one, problem, conflicts))
     });
-    let mut tried: Vec<(Hypothesis, Trial)> = list
-        .into_par_iter()
-        .filter_map(|hypothesis| trial(&hypothesis.session, &noise).map(|found| (hypothesis, found)))
-        .collect();
+    let (mut base, mut tried) = trials(&stated, list, sigma_mm);
     if by_residual {
         tried.retain(|(_, found)| found.chi_square * LOWERED < base.chi_square);
     }
-    // What even the best leaves is not for a mistake of the session to explain.
-    let excess = |found: &Trial| (found.chi_square / found.freedom).max(1.0);
-    let scale = tried
-        .iter()
-        .map(|(_, found)| excess(found))
-        .fold(excess(&base), f64::min);
-    let mut scored: Vec<(f64, Suggestion)> = (tried.into_iter())
+    // What remains with the best of them is noise: no mistake of the session explains it. Priors keep their weight.
+    let excess = (tried.iter())
+        .map(|(_, found)| found.excess)
+        .fold(base.excess, f64::min);
+    if excess > MAX_EXCESS {
+        let list = tried.into_iter().map(|(hypothesis, _)| hypothesis).collect();
+        (base, tried) = trials(&stated, list, sigma_mm * excess.sqrt());
+    }
+    let least = (tried.iter())
+        .map(|(_, found)| found.chi_square)
+        .fold(base.chi_square, f64::min);
+    let mut listed: Vec<(i64, Suggestion)> = (tried.into_iter())
+        .filter(|(_, found)| {
+            found.chi_square - least <= allowed && base.chi_square - found.chi_square >= MIN_FALL
+        })
         .map(|(hypothesis, found)| {
             let suggestion = Suggestion {
                 kind: hypothesis.kind,
@@ -60,17 +64,29 @@ pub(super) fn suggestions(problem: &Problem<'_>, conflicts: &[Conflict]) -> Vec<
                 rms_um: found.rms_mm * 1e3,
                 words: hypothesis.words,
             };
-            (found.score(scale), suggestion)
+            ((found.score() * TIED).round() as i64, suggestion)
         })
-        .filter(|(score, _)| *score < base.score(scale) - MIN_RISE)
         .collect();
-    scored.sort_by(|a, b| a.0.total_cmp(&b.0));
-    let best = scored.first().map_or(0.0, |(score, _)| *score);
-    (scored.into_iter())
-        .take_while(|(score, _)| *score <= best + NOT_SEPARABLE)
-        .take(MAX_LISTED)
-        .map(|(_, suggestion)| suggestion)
-        .collect()
+    // Stable: equal scores keep the order in which mistakes are tried.
+    listed.sort_by_key(|(score, _)| *score);
+    listed.truncate(MAX_LISTED);
+    listed.into_iter().map(|(_, suggestion)| suggestion).collect()
+}
+
+/// Fits the session as it is stated, and with each mistake that can be fitted.
+fn trials(stated: &Session, list: Vec<Hypothesis>, sigma_mm: f64) -> (Trial, Vec<(Hypothesis, Trial)>) {
+    let noise = Noise::white(sigma_mm, NoiseSource::Stated);
+    // Where the session as stated cannot be fitted, anything that can is better.
+    let base = trial(stated, &noise).unwrap_or(Trial {
+        chi_square: f64::INFINITY,
+        excess: f64::INFINITY,
+        rms_mm: f64::INFINITY,
+        cost: 0.0,
+    });
+    let tried = (list.into_par_iter())
+        .filter_map(|hypothesis| trial(&hypothesis.session, &noise).map(|found| (hypothesis, found)))
+        .collect();
+    (base, tried)
 }
 
 /// Whether a mistake is about something whose parameters the readings contradict.

@@ -1,4 +1,4 @@
-//! What a search for effects does about a session that its readings contradict.
+//! How a search for effects treats a session that its readings contradict.
 
 use abbe_model::session::Prior;
 
@@ -9,7 +9,7 @@ use crate::error::IdentifyError;
 use crate::fit::{Fit, fit};
 use crate::problem::Problem;
 
-/// Rounds of freeing what is contradicted: one conflict may hide behind another.
+/// Maximum number of rounds: a conflict may appear only after another is removed.
 const MAX_ROUNDS: usize = 5;
 
 /// A changed statement that makes the residual so many times smaller is the explanation.
@@ -25,8 +25,8 @@ pub(crate) fn is_another_session(plausibility: &Plausibility) -> bool {
     })
 }
 
-/// Frees the set-up parameters whose statements the readings contradict, as if nothing were known of them, so that no effect is claimed that only stands
-/// for a wrong statement. Returns their identifiers and the fit; `None` where nothing is contradicted.
+/// Replaces the priors of the set-up parameters whose statements the readings contradict by wide ones, so that no effect is claimed in the place of a
+/// wrong statement. Returns the identifiers of these parameters and the fit; `None` where nothing is contradicted.
 ///
 /// # Errors
 /// If the freed problem cannot be fitted.

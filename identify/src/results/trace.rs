@@ -208,7 +208,7 @@ pub struct ChangedParameter {
     pub unit: String,
 }
 
-/// What a trace reports.
+/// Effects that the declared model lacks, and the model before and after they are added.
 #[derive(Clone, Debug, PartialEq, Serialize, JsonSchema)]
 pub struct TraceResult {
     /// `clean`, `explained`, `partly-explained`, `unexplained`; `incomplete` for an interrupted trace.

@@ -1,4 +1,4 @@
-//! What a self-calibration reports, as it stands in JSON.
+//! Result of a self-calibration, as JSON has it.
 
 use abbe_model::component::{ErrorKind, ErrorName, Freedom};
 use abbe_model::session::Session;
@@ -14,58 +14,58 @@ use crate::results::{Interval, ParameterResult, Unobservable};
 
 /// Bins of a histogram in a report.
 const REPORTED_BINS: usize = 100;
-/// A circle narrower than this many standard uncertainties of its points has a centre that propagation by derivatives says too little about.
+/// Radius of a circle, in standard uncertainties of its points, below which linear propagation does not describe the uncertainty of its centre.
 const NARROW: f64 = 3.0;
 
-/// A function at one angle.
+/// Value of a function at one angle.
 #[derive(Clone, Debug, PartialEq, Serialize, JsonSchema)]
 pub struct FunctionPoint {
-    /// The angle, degrees.
+    /// Angle, degrees.
     pub at_deg: f64,
-    /// The value; `None` where the readings do not tell it.
+    /// Value, µm; `null` where it is not identifiable.
     pub value_um: Option<f64>,
-    /// Its standard uncertainty by the law of propagation (JCGM 100, 5.2); 0 where a condition fixes the value.
+    /// Standard uncertainty of the value by the law of propagation (JCGM 100, 5.2), µm; 0 where a boundary condition fixes the value.
     pub u_um: Option<f64>,
 }
 
 /// A function of an angle.
 #[derive(Clone, Debug, PartialEq, Serialize, JsonSchema)]
 pub struct FunctionResult {
-    /// Its name.
+    /// Name of the function.
     pub id: String,
-    /// Its values.
+    /// Values of the function.
     pub points: Vec<FunctionPoint>,
 }
 
-/// Runs by value.
+/// Number of Monte Carlo runs by value.
 #[derive(Clone, Debug, PartialEq, Serialize, JsonSchema)]
 pub struct Histogram {
-    /// Lower end of the first bin.
+    /// Lower end of the first bin, µm.
     pub from_um: f64,
-    /// Upper end of the last bin.
+    /// Upper end of the last bin, µm.
     pub to_um: f64,
-    /// Runs in each bin, all bins of one width.
+    /// Number of runs in each bin. All bins have the same width.
     pub counts: Vec<u64>,
-    /// Runs below the first bin.
+    /// Number of runs below the first bin.
     pub below: u64,
-    /// Runs above the last.
+    /// Number of runs above the last bin.
     pub above: u64,
 }
 
-/// What a quantity is distributed like.
+/// Distribution of a quantity over the Monte Carlo runs.
 #[derive(Clone, Debug, PartialEq, Serialize, JsonSchema)]
 pub struct DistributionResult {
     /// The quantity.
     pub id: String,
-    /// Mean over the runs.
+    /// Mean over the runs, µm.
     pub mean_um: f64,
-    /// Standard deviation over the runs.
+    /// Standard deviation over the runs, µm.
     pub u_um: f64,
-    /// The shortest coverage interval.
+    /// Shortest coverage interval, µm.
     pub shortest_interval_um: Interval,
-    /// The probabilistically symmetric one.
+    /// Probabilistically symmetric coverage interval, µm.
     pub symmetric_interval_um: Interval,
-    /// The runs by value.
+    /// Histogram of the runs.
     pub histogram: Histogram,
 }
 
@@ -74,15 +74,15 @@ pub struct DistributionResult {
 pub struct MonteCarloResult {
     /// Number of runs.
     pub runs: u64,
-    /// Seed.
+    /// Seed of the runs.
     pub seed: u64,
-    /// Coverage probability of the intervals.
+    /// Coverage probability of the intervals, 0 to 1.
     pub coverage_probability: f64,
-    /// Every quantity.
+    /// Distribution of every quantity.
     pub quantities: Vec<DistributionResult>,
 }
 
-/// What `abbe fit --method self-calibration` reports.
+/// Rotary axis, linear axes and artefact, separated from readings of one artefact.
 #[derive(Clone, Debug, PartialEq, Serialize, JsonSchema)]
 pub struct SelfCalibration {
     /// `self-calibration`.
@@ -93,7 +93,7 @@ pub struct SelfCalibration {
     pub readings: usize,
     /// Standard uncertainty of a reading, µm.
     pub noise_um: f64,
-    /// `stated`, or `residual` where it is the residual of the solution.
+    /// Source of `noise_um`: `stated` by the session, or `residual` of the solution.
     pub noise_source: String,
     /// Root mean square of the residual of the solution, µm.
     pub rms_um: f64,
@@ -109,36 +109,35 @@ pub struct SelfCalibration {
     pub rank: usize,
     /// The functions.
     pub functions: Vec<FunctionResult>,
-    /// Deviation of the radius at 0° from what is stated, where it is estimated.
+    /// Deviation of the radius at 0° from the stated one; absent where it is not estimated.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub radius: Option<ParameterResult>,
-    /// Position errors of the axis: centre of the least-squares circle.
+    /// Position errors of the axis from the centre of the least-squares circle.
     pub parameters: Vec<ParameterResult>,
-    /// The same from the angles of the turn.
+    /// Position errors of the axis from the angles of rotation.
     pub parameters_by_turn: Vec<ParameterResult>,
-    /// Radius of the circle, µm.
+    /// Radius of the least-squares circle, µm; `null` where the axis gets no position.
     pub circle_radius_um: Option<f64>,
-    /// Error motions: what the displacements leave over of the turn about that centre.
+    /// Error motions: the displacements less the rotation about that centre.
     pub error_motions: Vec<FunctionResult>,
-    /// What the readings do not tell.
+    /// The null-space directions in words.
     pub unobservable: Vec<Unobservable>,
-    /// What was drawn, where it was asked for.
+    /// The Monte Carlo runs; absent where they were not requested.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub monte_carlo: Option<MonteCarloResult>,
-    /// What a user should know.
+    /// Warnings in words.
     pub warnings: Vec<String>,
 }
 
 impl Calibration {
-    /// The calibration as it is reported.
+    /// The result of the calibration.
     pub fn report(&self, session: &Session, draws: Option<&MonteCarlo>) -> SelfCalibration {
         let axis = session.machine.axes[self.equations.axis].name.clone();
         let mut warnings = session.warnings.clone();
         warnings.extend(crate::fit::enlargement_warning(self.u_enlargement));
         if !session.effects.is_empty() {
             warnings.push(
-                "self-calibration knows nothing of the declared effects: what they move is in its functions"
-                    .into(),
+                "self-calibration does not model the declared effects: its functions include them".into(),
             );
         }
         if self.equations.reference == Reference::FirstReading {
@@ -151,12 +150,12 @@ impl Calibration {
         let position = self.has_position().then(|| self.position());
         match &position {
             None => warnings.push(
-                "the displacements of the table are not told at every position of the axis: it gets no position"
+                "the displacements of the table are not identifiable at every position of the axis: the position of the axis is not estimated"
                     .into(),
             ),
             Some(position) if position.narrow => warnings.push(format!(
-                "the circle of the displacements (radius {:.2} µm) is hardly wider than their uncertainty: its centre is far from \
-                 Gaussian; the estimate from the turn, and `--monte-carlo`, say more",
+                "the circle of the displacements (radius {:.2} µm) is close to their uncertainty: the distribution of its centre is \
+                 not Gaussian; use the estimate from the angles of rotation, or a Monte Carlo propagation",
                 position.radius_mm * 1e3
             )),
             Some(_) => {}

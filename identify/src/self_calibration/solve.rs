@@ -71,7 +71,7 @@ pub fn solve(
     // The parameters are in the order of their functions and angles.
     let preference: Vec<usize> = (0..parameters).collect();
     let rank = Rank::decide(triangle.parts().0.as_ref(), &vec![1.0; parameters], &preference)?;
-    let of_free = crate::fit::covariance(&triangle, &rank.identifiable_basis)?;
+    let of_free = crate::fit::parameter_covariance(&triangle, &rank.identifiable_basis)?;
 
     let outputs = columns + usize::from(radius);
     let spread = Mat::from_fn(outputs, parameters, |i, k| match (i < columns, k < free) {

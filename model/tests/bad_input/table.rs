@@ -67,7 +67,7 @@ fn foreign_columns() {
             &with("[columns]\nc_deg = \"angle\"\nlength_mm = 7\n"),
             Some(foreign),
         )),
-        &["column 7 of", "which has 4"],
+        &["there is no column 7 in", "which has 4"],
     );
     assert_contains(
         &error_text(session(

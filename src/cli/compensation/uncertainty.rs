@@ -1,19 +1,19 @@
-//! The standard uncertainty of every point of the tables.
+//! The standard uncertainty of each point of the compensation tables.
 
 use abbe::identify::compensation::{Compensation, ErrorCurve};
 use abbe::identify::unit::ARCSEC;
 use abbe::model::axis::AxisKind;
 use abbe::model::chain::Machine;
 
-use super::{outside, positions};
+use super::{in_file_unit, positions};
 use crate::cli::failure::Failure;
 use crate::cli::folder::NewFile;
 use crate::cli::output;
 
-/// The table's name.
+/// The file name of the table.
 pub(super) const FILE: &str = "uncertainty.csv";
 
-/// A row for each point of each curve, by direction where it depends on that: position, error and u, with their units.
+/// One row per point of each curve, and per direction if the curve depends on it: position, error and u, with their units.
 pub(super) fn table(
     machine: &Machine,
     compensation: &Compensation,
@@ -45,7 +45,7 @@ pub(super) fn table(
             for q in positions([curve], points) {
                 rows.push(vec![
                     curve.error.to_string(),
-                    format!("{:.6}", outside(kind, q)),
+                    format!("{:.6}", in_file_unit(kind, q)),
                     kind.unit().to_string(),
                     word.to_string(),
                     format!("{:.6}", curve.at(q, *direction) * display_per_internal),
@@ -60,7 +60,7 @@ pub(super) fn table(
     Ok((FILE.to_string(), text))
 }
 
-/// The same as comments under a block of an ISG CSV file: position, then u of each error's mean over both directions, mm or rad.
+/// The same as comments below a block of an ISG CSV file: position, then u of the mean of each error over both directions, mm or rad.
 pub(super) fn comments(kind: AxisKind, curves: &[&ErrorCurve], points: usize) -> String {
     let names: Vec<String> = curves.iter().map(|curve| curve.error.to_string()).collect();
     let mut lines = vec![format!(
@@ -72,7 +72,7 @@ pub(super) fn comments(kind: AxisKind, curves: &[&ErrorCurve], points: usize) ->
             .iter()
             .map(|curve| format!("{:.9}", curve.u_of_mean_at(q)))
             .collect();
-        format!("// {:.5} {}", outside(kind, q), values.join(" "))
+        format!("// {:.5} {}", in_file_unit(kind, q), values.join(" "))
     }));
     lines.join("\n")
 }

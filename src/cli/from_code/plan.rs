@@ -1,7 +1,7 @@
 //! `plan.toml` of a structural code: two tests of each rotary axis, a circle of each pair of linear axes.
 //!
-//! The balls are mounted once. Every test states where the axes stand that it does not move, so that the plan's coordinates are those that the
-//! operator types and the data contain.
+//! The balls are mounted once. Each test states the positions of the axes that it does not move. These are the coordinates that the operator enters
+//! and that the data contain.
 
 use std::fmt::Write;
 
@@ -14,17 +14,18 @@ use super::mounts::{Mounts, Setting, Side, point_text};
 const LETTERS: [&str; 3] = ["X", "Y", "Z"];
 const ANGLES: [&str; 3] = ["A", "B", "C"];
 
-const HEAD: &str = "# A plan: what would these tests identify? `abbe plan plan.toml` says it. Change it, ask again, measure when it says what you want.\n\
-    # `abbe simulate plan.toml --out run1 --error …` simulates readings; a measured test gets a line `data = \"….csv\"`.\n\n\
+const HEAD: &str = "# A plan. `abbe plan plan.toml` analyses which errors these tests identify, and with which uncertainty.\n\
+    # Change the tests until the uncertainties suffice.\n\
+    # `abbe simulate plan.toml --out run1 --error …` simulates readings. A measured test has a line `data = \"….csv\"`.\n\n\
     [machine]\n\
     # The chain and its axes, beside this file.\n\
     file = \"machine.toml\"\n\n\
     [constants]\n\
-    # From an axis to the ball that goes round it, mm; lengths below may be written over these names.\n\
+    # Distance from a rotary axis to the ball that turns about it, mm. Lengths below may be expressions of these names.\n\
     R = 100.0\n\
     # Calibrated length of the bar, mm.\n\
     R_c = 100.0\n\
-    # The same with its 50 mm extension.\n\
+    # The same with an extension of 50 mm.\n\
     R_e = 150.0\n\n\
     [instrument]\n\
     # \"ballbar\"; others are \"probe\", \"tracker\", \"socket\".\n\
@@ -34,8 +35,8 @@ const HEAD: &str = "# A plan: what would these tests identify? `abbe plan plan.t
     # Resolution of a reading, µm.\n\
     resolution_um = 0.1\n\n";
 
-/// What is known of where the balls really are.
-const PRIORS: &str = "# How well it is known where the balls really are and how long the bar really is: standard uncertainty, µm. 0 is exactly, inf not at all.\n\
+/// The priors of the set-up.
+const PRIORS: &str = "# Set-up priors: standard uncertainty of the ball positions and of the bar length, µm. 0: exactly known, inf: unknown.\n\
     workpiece_ball_u_um = [2, 2, 2]\n\
     spindle_ball_u_um = [1, 1, 1]\n\
     bar_u_um = 0.5\n";
@@ -61,9 +62,12 @@ pub fn text(bodies: &[Body]) -> String {
     text
 }
 
-/// The errors to identify.
+/// The errors to estimate.
 fn unknowns(text: &mut String, bodies: &[Body], pairs: &[[usize; 2]]) {
-    text.push_str("[unknowns]\n# The errors to identify, by ISO 230-1: EX0C is where C lies along X, EA0C its tilt about X.\nerrors = [\n");
+    text.push_str(
+        "[unknowns]\n# The errors to estimate, by ISO 230-1: EX0C is the position error of C along X, EA0C its orientation error about X.\n\
+         errors = [\n",
+    );
     let given = given(bodies);
     for (index, body) in bodies.iter().enumerate() {
         if body.kind != AxisKind::Rotary {
@@ -85,7 +89,7 @@ fn unknowns(text: &mut String, bodies: &[Body], pairs: &[[usize; 2]]) {
         for (_, along, other) in given.iter().filter(|(axis, _, _)| *axis == index) {
             let _ = write!(
                 left_out,
-                "; {own} is left out: the readings depend on its difference from E{along}0{other} only, and R lies on {name} along {along}",
+                "; {own} is omitted: the readings depend only on its difference from E{along}0{other}, so {name} defines the origin of R along {along}",
                 own = name(LETTERS[*along]),
                 along = LETTERS[*along],
                 other = bodies[*other].name,
@@ -94,7 +98,7 @@ fn unknowns(text: &mut String, bodies: &[Body], pairs: &[[usize; 2]]) {
         }
         let _ = writeln!(
             text,
-            "  {},  # where {name} lies, and its tilt{left_out}",
+            "  {},  # position and orientation of {name}{left_out}",
             listed.join(", "),
             name = body.name
         );
@@ -110,8 +114,8 @@ fn unknowns(text: &mut String, bodies: &[Body], pairs: &[[usize; 2]]) {
     text.push_str("]\n");
 }
 
-/// Offsets of axes of the head that are not to be identified, each with its direction and an axis of the table: where both sides turn about axes
-/// across a direction, the readings depend on the difference of their places along it only.
+/// Position errors of axes of the head that are not estimated, each with its direction and an axis of the table. If both sides have rotary axes
+/// across a direction, the readings depend only on the difference of their positions along it.
 fn given(bodies: &[Body]) -> Vec<(usize, usize, usize)> {
     let across = |side: Side, along: usize| {
         (0..bodies.len()).filter(move |index| {
@@ -119,7 +123,7 @@ fn given(bodies: &[Body]) -> Vec<(usize, usize, usize)> {
             body.kind == AxisKind::Rotary && body.side() == side && body.along != along
         })
     };
-    // Of each side the axis nearest to the bed carries the others.
+    // On each side the axis nearest to the bed carries the others.
     (0..3)
         .filter_map(|along| {
             let head = across(Side::Tool, along).next()?;
@@ -129,7 +133,7 @@ fn given(bodies: &[Body]) -> Vec<(usize, usize, usize)> {
         .collect()
 }
 
-/// Pairs of linear axes at right angles, without those that lie parallel to one already paired.
+/// Pairs of linear axes at right angles, with one axis per direction.
 fn pairs(bodies: &[Body]) -> Vec<[usize; 2]> {
     let mut first_along: Vec<usize> = Vec::new();
     for (index, body) in bodies.iter().enumerate() {
@@ -164,13 +168,13 @@ fn sweep(
         Side::Tool => ("spindle", "workpiece"),
     };
     let place = if extended {
-        "on the axis and beside the circle, as far as the extension reaches, so that the bar sees the tilt of the axis"
+        "on the axis outside the plane of the circle, at the reach of the extended bar, so that the orientation of the axis changes the readings"
     } else {
-        "on the axis in the plane of the circle, so that the bar sees where the axis lies"
+        "on the axis in the plane of the circle, so that the position of the axis changes the readings"
     };
     let _ = write!(
         text,
-        "\n# {name} turns the {carried} ball about the {standing} ball, which stands {place}.\n"
+        "\n# {name} turns the {carried} ball about the {standing} ball, which is {place}.\n"
     );
     remounted(text, setting, standing);
     let _ = write!(text, "[[test]]\nname = \"{name}{length}\"\n");
@@ -182,7 +186,7 @@ fn sweep(
     };
     let _ = write!(
         text,
-        "# The axis goes there and back; set the ends to what it can do. `runs` repeats both.\n\
+        "# The axis moves there and back. Adapt the ends to its travel. `runs` repeats both directions.\n\
          sweep = {{ axis = \"{name}\", from_deg = {from}, to_deg = {to}, step_deg = {step}, feed_deg_min = 500, runs = 1, both_directions = true }}\n"
     );
 }
@@ -198,12 +202,12 @@ fn circle(text: &mut String, bodies: &[Body], pair: [usize; 2], mounts: &Mounts,
     common(text, bodies, "R_c", mounts, setting, &pair);
     let _ = write!(
         text,
-        "# Two linear axes, a full turn from the first towards the second and back; `runs` repeats both.\n\
+        "# Two linear axes, a full circle from the first towards the second and back. `runs` repeats both directions.\n\
          path = {{ kind = \"circle\", plane = \"{a}{b}\", radius_mm = \"R_c\", step_deg = 2, feed_mm_min = 1000, runs = 1, both_directions = true }}\n"
     );
 }
 
-/// Says that the machine could not bring the balls together, and that one is mounted again.
+/// States that no axis can bring the balls together, so that one is mounted again.
 fn remounted(text: &mut String, setting: &Setting, ball: &str) {
     if setting.remounted_along.is_empty() {
         return;
@@ -211,12 +215,12 @@ fn remounted(text: &mut String, setting: &Setting, ball: &str) {
     let along: Vec<&str> = setting.remounted_along.iter().map(|k| LETTERS[*k]).collect();
     let _ = writeln!(
         text,
-        "# No linear axis can bring the balls there along {}: the {ball} ball is mounted again for this test.",
+        "# No linear axis can move the balls there along {}: the {ball} ball is mounted again for this test.",
         along.join(" and ")
     );
 }
 
-/// What all tests state alike: bar, balls, set-ups, what is known of them, and where the axes stand that the test does not move.
+/// The entries that all tests have: bar, balls, set-ups, priors, and positions of the axes that the test does not move.
 fn common(
     text: &mut String,
     bodies: &[Body],
@@ -232,8 +236,8 @@ fn common(
          # The workpiece ball in the frame of the table, the spindle ball in that of the tool, all axes at zero.\n\
          workpiece_ball_mm = {workpiece}\n\
          spindle_ball_mm = {spindle}\n\
-         # Tests that name the same set-up share what is mounted once: the workpiece ball, the spindle ball, the bar. Give a test names of its own\n\
-         # where you mount one of them again.\n\
+         # Tests with the same set-up names share the workpiece ball, the spindle ball and the bar, which are mounted once. Use another name for a\n\
+         # test before which one of them is mounted again.\n\
          setup = \"P{p}\"\n\
          spindle_setup = \"S{s}\"\n\
          bar_setup = \"{bar}\"\n\
@@ -256,7 +260,7 @@ fn common(
     if !at.is_empty() {
         let _ = writeln!(
             text,
-            "# Where the other axes stand, as the operator types it and the data contain it.\nat = {{ {} }}",
+            "# Positions of the other axes, as the operator enters them and the data contain them.\nat = {{ {} }}",
             at.join(", ")
         );
     }

@@ -1,9 +1,11 @@
-//! `abbe plan`.
+//! `abbe plan`: analyse identifiability and predicted uncertainty of planned tests.
 
+mod details;
 mod digits;
 pub mod improve;
-mod patterns;
-mod tables;
+pub mod patterns;
+mod screen;
+pub mod verdict;
 
 use abbe::identify::plan::clearance::Clearance;
 use abbe::identify::plan::{self, PlanOptions};
@@ -14,9 +16,9 @@ use abbe::model::session::{Prior, Session};
 use clap::Args;
 
 use super::failure::Failure;
-use super::fit::print_warnings;
+use super::message::print_warnings;
 use super::report::ReportArguments;
-use super::{CommonArguments, SessionArguments, output, read_session};
+use super::{CommonArguments, SessionArguments, json, read_session};
 
 /// `abbe plan SESSION`
 #[derive(Args)]
@@ -26,56 +28,71 @@ pub struct PlanArguments {
     #[command(flatten)]
     common: CommonArguments,
     #[command(flatten)]
-    faces: ReportArguments,
-    /// Standard deviation of a reading, in place of the session's.
+    report: ReportArguments,
+    /// List everything that the first screen folds: confounded parameters, sensitivities, budgets, correlations, observability indices, contribution
+    /// of each test, undeclared effects.
+    #[arg(long)]
+    all: bool,
+    /// Standard deviation of a reading, instead of the session's.
+    ///
+    /// Example: --noise-um 0.5
     #[arg(long, value_name = "UM")]
     noise_um: Option<f64>,
-    /// Standard uncertainty of every set-up length, in place of the session's.
+    /// Standard uncertainty of every set-up length with a prior, instead of the session's.
+    ///
+    /// Example: --setup-um 1
     #[arg(long, value_name = "UM")]
     setup_um: Option<f64>,
-    /// One spindle ball stays mounted for all tests, whatever the session says.
+    /// Use one mounted spindle ball for all tests.
     #[arg(long)]
     one_spindle_ball: bool,
-    /// Take the planned movements even where there are data.
+    /// Use the planned movements even if there are data.
     #[arg(long)]
     planned: bool,
-    /// Check that spindle and table stay clear when the table stands on end: diameters of spindle and table, height and width of the device,
-    /// shaft from jig to ball, jig.
+    /// Check the clearance of spindle and table with the table upright: diameters of spindle and table, height and width of the device, length of the
+    /// shaft from jig to ball, length of the jig.
+    ///
+    /// Example: --clearance-mm 80,320,60,80,150,50
     #[arg(long, value_name = "DS,DT,H,W,L,T", conflicts_with_all = ["improve", "separate", "range"])]
     clearance_mm: Option<String>,
-    /// Leave out what undeclared effects would do.
+    /// Do not screen undeclared effects.
     #[arg(long)]
     no_effects: bool,
     #[command(flatten)]
     improve: improve::ImproveArguments,
     #[command(flatten)]
     patterns: patterns::PatternArguments,
-    /// How far each sweep can shrink before an uncertainty doubles.
+    /// Find the smallest range of each sweep that does not double an uncertainty.
     #[arg(long)]
     range: bool,
 }
 
-/// Help of the command.
-pub const EXAMPLES: &str = "Examples:
+/// Examples of `abbe plan`.
+pub const HELP: &str = "Examples:
   abbe plan sessions/hermle-c600u/chapter5.toml
+  abbe plan sessions/hermle-c600u/chapter5.toml --all --report plan.html
+  abbe plan sessions/hermle-c600u/chapter5.toml --noise-um 0.5 --no-effects
   abbe plan sessions/hermle-c600u/chapter5.toml --setup-um 1 --no-effects --json plan.json
   abbe plan sessions/hermle-c600u/chapter5.toml --improve 2 --bars-mm 50,100,150,300
   abbe plan sessions/hermle-c600u/chapter5.toml --separate EZC~C:h2,EAC~C:h1
   abbe plan sessions/hermle-c600u/chapter5.toml --patterns patterns.csv \\
-      --error EY0A=10um --error EB0A=0.01deg";
+      --error EY0A=10um --error EB0A=0.01deg
+  abbe plan sessions/hermle-c600u/chapter5.toml --range
+
+The first screen answers in this order: identifiable errors and rank; predicted standard uncertainty u and expanded \
+uncertainty U = 2u; what is confounded; what to do next; the verdict, which names the worst determined error and what \
+limits it. --all adds sensitivities, budgets, correlations, observability indices and undeclared effects.";
 
 /// Runs `abbe plan`.
 pub fn run(arguments: &PlanArguments) -> Result<(), Failure> {
-    arguments.faces.check()?;
+    arguments.report.check()?;
     let outputs = arguments
         .common
-        .outputs(&[arguments.patterns.file(), arguments.faces.file()])?;
+        .outputs(&[arguments.patterns.file(), arguments.report.file()])?;
     let tables = outputs.tables(arguments.common.quiet);
     let mut session = read_session(&arguments.session, &outputs)?;
     if arguments.patterns.asked() {
-        return arguments
-            .patterns
-            .run(&session, arguments.common.json.as_deref(), tables);
+        return arguments.patterns.run(&session, &arguments.common, tables);
     }
     if let Some(u_um) = arguments.setup_um {
         set_priors(&mut session, positive("--setup-um", u_um)?);
@@ -104,29 +121,34 @@ pub fn run(arguments: &PlanArguments) -> Result<(), Failure> {
         analysis.warnings.extend(clearance(&session, sizes)?);
     }
     if tables {
-        tables::print(&analysis);
+        let (complete, noise) = plan::prepared(&session, &options)?;
+        let problem = plan::states::problem_by_test(&complete, noise)?;
+        let improvable = plan::candidate_tests::has_candidates(&problem);
+        screen::print(&analysis, &arguments.session, improvable, arguments.all);
     }
     print_warnings(&analysis.warnings);
     if let Some(path) = &arguments.common.json {
-        output::write_json(path, &analysis)?;
+        json::write_of_session(path, &session, arguments.common.seed, &analysis)?;
     }
-    if arguments.faces.asked() {
+    if arguments.report.asked() {
         let (complete, noise) = plan::prepared(&session, &options)?;
         let problem = plan::states::problem_by_test(&complete, noise)?;
         let document = crate::report::plan::document(&problem, &analysis)?;
         let method = crate::report::plan::method(&analysis);
         arguments
-            .faces
+            .report
             .write(&document, &method, &session, arguments.common.seed)?;
     }
     Ok(())
 }
 
-/// What `--improve`, `--separate` and `--range` ask for.
+/// Proposed tests, and ranges that suffice.
 #[derive(serde::Serialize, schemars::JsonSchema)]
 pub struct NextTest {
+    /// The tests that `--improve` or `--separate` proposes.
     #[serde(skip_serializing_if = "Option::is_none")]
     improvement: Option<plan::improve::Improvement>,
+    /// The sweeps that `--range` examines.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     ranges: Vec<plan::range::Shrinkage>,
 }
@@ -158,20 +180,20 @@ fn next_test(
     }
     let found = NextTest { improvement, ranges };
     if let Some(path) = &arguments.common.json {
-        output::write_json(path, &found)?;
+        json::write_of_session(path, session, arguments.common.seed, &found)?;
     }
-    if arguments.faces.asked() {
+    if arguments.report.asked() {
         let document =
             crate::report::next_test::document(&problem, found.improvement.as_ref(), &found.ranges);
         let method = crate::report::next_test::method();
         arguments
-            .faces
+            .report
             .write(&document, &method, session, arguments.common.seed)?;
     }
     Ok(())
 }
 
-/// What would touch: with the device where the R-tests of the session have it, else on the table and in the spindle.
+/// Collisions, with the device where the R-tests of the session have it, else both on the table and in the spindle.
 fn clearance(session: &Session, sizes: &str) -> Result<Vec<String>, Failure> {
     let numbers: Vec<f64> = sizes
         .split(',')
@@ -188,7 +210,7 @@ fn clearance(session: &Session, sizes: &str) -> Result<Vec<String>, Failure> {
     ] = numbers.as_slice()
     else {
         return Err(Failure::Other(format!(
-            "`--clearance-mm {sizes}`: it takes six lengths: diameters of spindle and table, height and width of the device, shaft, jig"
+            "`--clearance-mm {sizes}`: six lengths are expected: diameters of spindle and table, height and width of the device, shaft, jig"
         )));
     };
     if !numbers.iter().all(valid) {
@@ -229,18 +251,18 @@ fn clearance(session: &Session, sizes: &str) -> Result<Vec<String>, Failure> {
     Ok(faults.collect())
 }
 
-/// A length in µm that has to be positive, in mm.
+/// A positive length in µm, converted to mm.
 fn positive(flag: &str, um: f64) -> Result<f64, Failure> {
     if (MIN_UM..=LARGEST).contains(&um) {
         Ok(um * 1e-3)
     } else {
         Err(Failure::Other(format!(
-            "`{flag} {um}`: it has to be a positive number of µm, {MIN_UM:e} to {LARGEST:e}"
+            "`{flag} {um}`: a number of µm from {MIN_UM:e} to {LARGEST:e} is expected"
         )))
     }
 }
 
-/// Gives every set-up length that is known within an uncertainty this one.
+/// Replaces the standard uncertainty of every set-up length that has a Gaussian prior.
 fn set_priors(session: &mut Session, u_mm: f64) {
     use abbe::model::instrument::InternalUnit;
     for test in &mut session.tests {

@@ -1,26 +1,30 @@
-//! `abbe plan SESSION --patterns FILE.csv`.
+//! `abbe plan SESSION --patterns FILE.csv`: the change of the readings by each error alone.
 
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
-use abbe::identify::patterns::{Patterns, patterns, usual_sizes};
+use abbe::identify::patterns::{Pattern, Patterns, patterns, usual_sizes};
 use abbe::identify::quantity::Given;
 use abbe::model::session::Session;
 use clap::Args;
 
 use crate::cli::failure::Failure;
-use crate::cli::{output, table};
+use crate::cli::{CommonArguments, json, output, table};
 
-/// What each error alone does to the readings.
+/// Trace patterns: the change of the readings by each error alone.
 #[derive(Args)]
 pub struct PatternArguments {
-    /// Write what each error alone does to each reading: its trace pattern, by the exact chain.
+    /// Write the change of each reading by each error alone (its trace pattern), by the exact chain.
+    ///
+    /// Example: --patterns patterns.csv
     #[arg(
         long,
         value_name = "FILE.csv",
         conflicts_with_all = ["improve", "separate", "range", "report", "plots", "clearance_mm", "noise_um", "setup_um"]
     )]
     patterns: Option<PathBuf>,
-    /// Size of an error whose pattern is wanted; may be repeated. Without it: the session's unknown errors, 10 µm and 0.01°.
+    /// Size of an error for --patterns; may be repeated [default: all errors that the session estimates, 10 µm and 0.01°].
+    ///
+    /// Example: --patterns patterns.csv --error EY0A=10um --error EB0A=0.01deg
     #[arg(
         long = "error",
         value_name = "NAME=SIZE",
@@ -31,18 +35,18 @@ pub struct PatternArguments {
 }
 
 impl PatternArguments {
-    /// Where they are written.
+    /// The file of the patterns.
     pub fn file(&self) -> Option<&PathBuf> {
         self.patterns.as_ref()
     }
 
-    /// Whether patterns are asked for.
+    /// Whether patterns are requested.
     pub fn asked(&self) -> bool {
         self.patterns.is_some()
     }
 
-    /// Writes the patterns and prints how large they are.
-    pub fn run(&self, session: &Session, json: Option<&Path>, tables: bool) -> Result<(), Failure> {
+    /// Writes the patterns and prints their sizes.
+    pub fn run(&self, session: &Session, common: &CommonArguments, tables: bool) -> Result<(), Failure> {
         let given: Vec<Given> = self
             .errors
             .iter()
@@ -60,14 +64,24 @@ impl PatternArguments {
         if tables {
             print(&found);
         }
-        if let Some(path) = json {
-            output::write_json(path, &found.patterns)?;
+        if let Some(path) = &common.json {
+            let result = PatternSizes {
+                patterns: found.patterns,
+            };
+            json::write_of_session(path, session, common.seed, &result)?;
         }
         Ok(())
     }
 }
 
-/// Prints how large the patterns are.
+/// Change of the readings of each test by each error alone.
+#[derive(serde::Serialize, schemars::JsonSchema)]
+pub struct PatternSizes {
+    /// Test by test, error by error.
+    patterns: Vec<Pattern>,
+}
+
+/// Prints the sizes of the patterns.
 fn print(found: &Patterns) {
     let number = |value: f64| {
         let rounded = format!("{value:.3}");
@@ -84,7 +98,7 @@ fn print(found: &Patterns) {
             vec![
                 pattern.test.clone(),
                 pattern.error.clone(),
-                format!("{} {}", pattern.size, pattern.unit),
+                format!("{} {}", pattern.size, table::unit(&pattern.unit)),
                 number(pattern.largest_um),
                 number(pattern.mean_um),
                 number(pattern.standard_deviation_um),
@@ -98,13 +112,13 @@ fn print(found: &Patterns) {
             "size",
             "largest, µm",
             "mean, µm",
-            "std. dev., µm",
+            "standard deviation, µm",
         ],
         &rows,
     );
 }
 
-/// A line for each reading and error: test, error and its size, run, positions of the axes, deviation.
+/// One line per reading and error: test, error and its size, run, positions of the axes, deviation.
 fn csv(found: &Patterns, session: &Session) -> Result<Vec<u8>, Failure> {
     let axes = &session.machine.axes;
     let mut header: Vec<String> = ["test", "error", "size", "unit", "run"]
@@ -133,7 +147,7 @@ fn csv(found: &Patterns, session: &Session) -> Result<Vec<u8>, Failure> {
                 pattern.unit.clone(),
                 run,
             ];
-            // Without the digits that are rounding.
+            // Rounded to 1e-9 to omit rounding errors of the last digits.
             let shown = |position: f64| (position * 1e9).round() / 1e9 + 0.0;
             let at = axes.iter().zip(&states.positions);
             cells.extend(at.map(|(axis, column)| shown(axis.kind.to_display(column[row])).to_string()));

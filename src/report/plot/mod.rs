@@ -1,8 +1,7 @@
-//! Plots as SVG, in the report and each by itself, and as PNG where the feature `png` is built in.
+//! Plots as SVG, inside the report and as separate files. The feature `png` adds PNG files.
 //!
-//! The drawings are written through the same templates as the page. No plotting crate that builds with this workspace has all that is needed at once:
-//! a polar type with a magnified deviation about a nominal circle, classes that one style sheet colours on screen, in the dark and on paper, and
-//! the data attributes by which the page moves what it has drawn.
+//! The plots use the same templates as the page. Plotting crates lack three things that the reports need: a polar plot with a magnified deviation about
+//! a nominal circle, CSS classes that one style sheet colours for light screens, dark screens and print, and data attributes for the script of the page.
 
 pub mod bars;
 pub mod chain;
@@ -15,29 +14,32 @@ pub mod scale;
 
 use maud::{Markup, PreEscaped, html};
 
-/// Colours and lines of all plots.
+/// Width of a plot with straight axes, in SVG units. Two such plots stand beside one another at 1,280 px, and one fills a narrow screen with legible text.
+pub const WIDTH: f64 = 500.0;
+
+/// Style sheet of all plots.
 pub const STYLE: &str = include_str!("plot.css");
 
-/// A drawing with its words.
+/// A plot with its title and caption.
 #[derive(Clone)]
 pub struct Plot {
-    /// The file's name, without an ending.
+    /// Name of the file, without extension.
     pub name: String,
-    /// What it shows, in a few words.
+    /// Title.
     pub title: String,
-    /// How to read it.
+    /// Caption.
     pub caption: String,
-    /// Width and height.
+    /// Width and height, SVG units.
     pub size: [f64; 2],
-    /// What is drawn.
+    /// Contents of the `svg` element.
     pub inner: Markup,
-    /// What the page needs to move it: attributes as JSON; empty for a still drawing.
-    pub live: String,
+    /// Data for the script of the page, as JSON. Empty for a static plot.
+    pub interaction: String,
 }
 
 impl Plot {
-    /// A still drawing.
-    pub fn still(
+    /// A static plot.
+    pub fn new(
         name: impl Into<String>,
         title: impl Into<String>,
         caption: impl Into<String>,
@@ -50,27 +52,25 @@ impl Plot {
             caption: caption.into(),
             size,
             inner,
-            live: String::new(),
+            interaction: String::new(),
         }
     }
 
-    /// As a figure of the page, which brings the style.
+    /// The `figure` element. The page contains the style sheet.
     pub fn figure(&self) -> Markup {
         let [width, height] = self.size;
         html! {
-            figure style=(format!("--wide:{width}px")) {
+            figure class=[(width >= WIDTH).then_some("wide")] style=(format!("--width:{width}")) {
                 figcaption { b { (self.title) } " " (self.caption) }
-                div class="scroll" {
-                    svg xmlns="http://www.w3.org/2000/svg" class="plot" viewBox=(format!("0 0 {width} {height}"))
-                        role="img" aria-label=(self.title) data-live=[(!self.live.is_empty()).then_some(&self.live)] {
-                        (self.inner)
-                    }
+                svg xmlns="http://www.w3.org/2000/svg" class="plot" viewBox=(format!("0 0 {width} {height}"))
+                    role="img" aria-label=(self.title) data-interaction=[(!self.interaction.is_empty()).then_some(&self.interaction)] {
+                    (self.inner)
                 }
             }
         }
     }
 
-    /// By itself, on white, with its title above it.
+    /// A separate SVG file on a white background, with the title above the plot.
     pub fn svg(&self) -> String {
         let [width, height] = self.size;
         let lines = wrapped(&self.title, ((width - 16.0) / 7.4) as usize);
@@ -91,7 +91,7 @@ impl Plot {
     }
 }
 
-/// The style with the light colours in place of the variables: programs that draw SVG need not know those.
+/// Replaces CSS variables by the light colours, because many SVG programs do not support variables.
 fn light_style() -> String {
     let mut style = STYLE.to_string();
     for (name, colour) in LIGHT {
@@ -100,7 +100,7 @@ fn light_style() -> String {
     style
 }
 
-/// Colours on paper and on a light screen: Okabe and Ito's, which all eyes tell apart.
+/// Colours for print and light screens: the palette of Okabe and Ito, suited to colour-blind readers.
 pub const LIGHT: [(&str, &str); 12] = [
     ("paper", "#ffffff"),
     ("ink", "#1b1b1b"),
@@ -116,7 +116,7 @@ pub const LIGHT: [(&str, &str); 12] = [
     ("fourth", "#8a6d00"),
 ];
 
-/// The same in the dark.
+/// Colours for dark screens.
 pub const DARK: [(&str, &str); 12] = [
     ("paper", "#16181b"),
     ("ink", "#ececec"),
@@ -132,7 +132,7 @@ pub const DARK: [(&str, &str); 12] = [
     ("fourth", "#f0e442"),
 ];
 
-/// A name that every file system takes.
+/// A file name that is valid on every file system.
 pub fn file_name(text: &str) -> String {
     let plain = |c: char| {
         if c.is_ascii_alphanumeric() || "-_.+".contains(c) {
@@ -149,12 +149,12 @@ pub fn file_name(text: &str) -> String {
         .to_string()
 }
 
-/// Words in lines of at most so many letters; what is longer than a line stays whole.
-pub fn wrapped(text: &str, most: usize) -> Vec<String> {
+/// Wraps text into lines of at most `max` characters. A longer word stays whole.
+pub fn wrapped(text: &str, max: usize) -> Vec<String> {
     let mut lines: Vec<String> = Vec::new();
     for word in text.split_whitespace() {
         match lines.last_mut() {
-            Some(line) if line.chars().count() + 1 + word.chars().count() <= most => {
+            Some(line) if line.chars().count() + 1 + word.chars().count() <= max => {
                 line.push(' ');
                 line.push_str(word);
             }
@@ -164,45 +164,45 @@ pub fn wrapped(text: &str, most: usize) -> Vec<String> {
     lines
 }
 
-/// A name that is too long for its place, cut.
-pub fn cut(text: &str, most: usize) -> String {
-    if text.chars().count() <= most {
+/// Shortens text to at most `max` characters, with an ellipsis.
+pub fn shortened(text: &str, max: usize) -> String {
+    if text.chars().count() <= max {
         return text.to_string();
     }
-    let kept: String = text.chars().take(most.saturating_sub(1)).collect();
+    let kept: String = text.chars().take(max.saturating_sub(1)).collect();
     format!("{kept}…")
 }
 
-/// Entries of a legend, laid out in a row from the left, line after line: width of letters is guessed on the safe side.
+/// Draws a legend from the left, in as many lines as needed. Returns it with the ordinate of its last line. Text widths are estimated generously.
 pub fn legend(entries: &[(&str, String)], x: f64, y: f64, width: f64) -> (Markup, f64) {
     let mut placed = Vec::new();
-    let (mut along, mut down) = (x, y);
-    for (class, words) in entries {
-        let needed = 26.0 + 7.2 * words.chars().count() as f64;
-        if along > x && along + needed > x + width {
-            along = x;
-            down += 17.0;
+    let (mut left, mut baseline) = (x, y);
+    for (class, label) in entries {
+        let needed = 26.0 + 7.8 * label.chars().count() as f64;
+        if left > x && left + needed > x + width {
+            left = x;
+            baseline += 17.0;
         }
-        placed.push((along, down, *class, words));
-        // A filled key is as wide as the strokes, but looks nearer.
-        along += needed + if class.starts_with("key-") { 12.0 } else { 4.0 };
+        placed.push((left, baseline, *class, label));
+        // A filled key needs more space after it than a line.
+        left += needed + if class.starts_with("key-") { 12.0 } else { 4.0 };
     }
     let markup = html! {
-        @for (along, down, class, words) in &placed {
+        @for (left, baseline, class, label) in &placed {
             @if class.starts_with("key-") {
-                (key(class, *along + 9.0, *down - 4.0))
+                (key(class, *left + 9.0, *baseline - 4.0))
             } @else if class.contains("dots") {
-                path class=(class) d=(scale::dots([(along + 2.0, down - 4.0), (along + 9.0, down - 4.0), (along + 16.0, down - 4.0)])) {}
+                path class=(class) d=(scale::dots([(left + 2.0, baseline - 4.0), (left + 9.0, baseline - 4.0), (left + 16.0, baseline - 4.0)])) {}
             } @else {
-                path class=(class) d=(format!("M{along} {}h18", down - 4.0)) {}
+                path class=(class) d=(format!("M{left} {}h18", baseline - 4.0)) {}
             }
-            text x=(along + 23.0) y=(down) { (words) }
+            text x=(left + 23.0) y=(baseline) { (label) }
         }
     };
-    (markup, down)
+    (markup, baseline)
 }
 
-/// The signs of start and end.
+/// A filled key of a legend: the symbols of start and end, or the fill of a bar.
 fn key(class: &str, x: f64, y: f64) -> Markup {
     html! {
         @match class {

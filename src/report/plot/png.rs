@@ -1,4 +1,4 @@
-//! Plots as PNG (feature `png`): the SVG of a plot by itself, drawn by resvg and lettered with fonts that the program brings.
+//! Plots as PNG (feature `png`). resvg draws the SVG file of a plot with the bundled fonts.
 
 use std::sync::Arc;
 
@@ -6,14 +6,14 @@ use resvg::{tiny_skia, usvg};
 
 use super::Plot;
 
-/// The font that PNGs are lettered with, whatever the machine has.
+/// Font family of PNG files.
 const FAMILY: &str = "Ubuntu";
 
-/// The fonts of PNGs.
+/// Fonts of PNG files.
 pub struct Fonts(Arc<usvg::fontdb::Database>);
 
 impl Fonts {
-    /// The fonts that the program brings: a PNG is the same everywhere.
+    /// The bundled fonts. PNG files are the same on every computer.
     pub fn bundled() -> Fonts {
         let mut fonts = usvg::fontdb::Database::new();
         fonts.load_font_data(epaint_default_fonts::UBUNTU_LIGHT.to_vec());
@@ -27,7 +27,7 @@ impl Fonts {
     }
 }
 
-/// A plot as PNG, twice as large as it is drawn. `None` if it cannot be drawn.
+/// Draws a plot as PNG with two pixels per SVG unit. `None` if the SVG cannot be drawn.
 pub fn png(plot: &Plot, fonts: &Fonts) -> Option<Vec<u8>> {
     const PIXELS_PER_UNIT: f32 = 2.0;
     let options = usvg::Options {
@@ -38,7 +38,7 @@ pub fn png(plot: &Plot, fonts: &Fonts) -> Option<Vec<u8>> {
     let tree = usvg::Tree::from_str(&plot.svg(), &options).ok()?;
     let size = tree.size().to_int_size().scale_by(PIXELS_PER_UNIT)?;
     let mut pixels = tiny_skia::Pixmap::new(size.width(), size.height())?;
-    let twice = tiny_skia::Transform::from_scale(PIXELS_PER_UNIT, PIXELS_PER_UNIT);
-    resvg::render(&tree, twice, &mut pixels.as_mut());
+    let scale = tiny_skia::Transform::from_scale(PIXELS_PER_UNIT, PIXELS_PER_UNIT);
+    resvg::render(&tree, scale, &mut pixels.as_mut());
     pixels.encode_png().ok()
 }

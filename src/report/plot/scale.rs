@@ -1,22 +1,22 @@
-//! From values to places in a drawing, and the round numbers that are written beside it.
+//! Linear scales of plots: conversion of values to coordinates, and tick labels.
 //!
-//! Round steps are 1, 2 or 5 times a power of ten: ten lines, where a plotting crate would bring its own canvas.
+//! Tick steps are 1, 2 or 5 times a power of ten.
 
-/// The least round number (1, 2 or 5 times a power of ten) that is no less than this.
+/// Rounds up to the next number of the form 1, 2 or 5 times a power of ten.
 pub fn round_up(value: f64) -> f64 {
     if !value.is_finite() || value <= 0.0 {
         return 1.0;
     }
     let power = 10.0_f64.powf(value.log10().floor());
     let steps = [1.0, 2.0, 5.0, 10.0];
-    // 0.3 over 0.1 is 2.9999999999999996: what is a step up to rounding is that step.
+    // The tolerance covers rounding: 0.3 / 0.1 is 2.9999999999999996.
     let step = steps
         .into_iter()
         .find(|step| step * power >= value * (1.0 - 1e-9));
     step.unwrap_or(10.0) * power
 }
 
-/// A value as it is written beside an axis with this step.
+/// Formats a value with the decimal places of a tick step.
 pub fn text(value: f64, step: f64) -> String {
     let places = (-step.abs().log10() - 1e-9).ceil().clamp(0.0, 9.0) as usize;
     let rounded = format!("{value:.places$}");
@@ -27,20 +27,20 @@ pub fn text(value: f64, step: f64) -> String {
     }
 }
 
-/// A range of values laid over a range of places.
+/// A linear scale from a range of values to a range of coordinates.
 #[derive(Clone, Copy, Debug)]
 pub struct Scale {
-    /// Least and greatest value.
+    /// Minimum and maximum value.
     pub values: [f64; 2],
-    /// Their places.
-    pub places: [f64; 2],
-    /// Step between the values that are written.
+    /// Coordinates of these two values.
+    pub coordinates: [f64; 2],
+    /// Step between ticks.
     pub step: f64,
 }
 
 impl Scale {
-    /// Over exactly these values.
-    pub fn over(low: f64, high: f64, places: [f64; 2], about: usize) -> Scale {
+    /// A scale over exactly this range, with about `ticks` ticks.
+    pub fn over(low: f64, high: f64, coordinates: [f64; 2], ticks: usize) -> Scale {
         let (low, high) = if low.is_finite() && high.is_finite() && high > low {
             (low, high)
         } else if low.is_finite() {
@@ -50,14 +50,14 @@ impl Scale {
         };
         Scale {
             values: [low, high],
-            places,
-            step: round_up((high - low) / about.max(1) as f64),
+            coordinates,
+            step: round_up((high - low) / ticks.max(1) as f64),
         }
     }
 
-    /// Over these values, extended to whole steps.
-    pub fn rounded(low: f64, high: f64, places: [f64; 2], about: usize) -> Scale {
-        let scale = Scale::over(low, high, places, about);
+    /// A scale over this range, extended to whole steps.
+    pub fn rounded(low: f64, high: f64, coordinates: [f64; 2], ticks: usize) -> Scale {
+        let scale = Scale::over(low, high, coordinates, ticks);
         let whole = |value: f64| value / scale.step;
         Scale {
             values: [
@@ -68,7 +68,7 @@ impl Scale {
         }
     }
 
-    /// The same with steps that divide a turn.
+    /// The same scale with a step that divides a revolution.
     pub fn in_degrees(self) -> Scale {
         let steps = [1.0, 2.0, 5.0, 10.0, 15.0, 30.0, 45.0, 90.0, 180.0, 360.0];
         let wanted = (self.values[1] - self.values[0]) / 9.0;
@@ -79,17 +79,17 @@ impl Scale {
         }
     }
 
-    /// Places a unit.
+    /// Coordinate difference per unit of the value.
     pub fn per_unit(&self) -> f64 {
-        (self.places[1] - self.places[0]) / (self.values[1] - self.values[0])
+        (self.coordinates[1] - self.coordinates[0]) / (self.values[1] - self.values[0])
     }
 
-    /// Where a value lies.
+    /// Coordinate of a value.
     pub fn at(&self, value: f64) -> f64 {
-        self.places[0] + (value - self.values[0]) * self.per_unit()
+        self.coordinates[0] + (value - self.values[0]) * self.per_unit()
     }
 
-    /// The round values within the range.
+    /// Values of the ticks within the range.
     pub fn ticks(&self) -> Vec<f64> {
         let first = (self.values[0] / self.step - 1e-9).ceil() as i64;
         let last = (self.values[1] / self.step + 1e-9).floor() as i64;
@@ -97,8 +97,8 @@ impl Scale {
     }
 }
 
-/// A place in a drawing: a tenth of a pixel is enough, and no figure is `-0`.
-pub fn place(value: f64) -> String {
+/// Formats a coordinate to a tenth of a pixel, without negative zero.
+pub fn coordinate(value: f64) -> String {
     let rounded = (value * 10.0).round() / 10.0;
     if rounded == 0.0 {
         "0".to_string()
@@ -107,23 +107,23 @@ pub fn place(value: f64) -> String {
     }
 }
 
-/// A way through points.
+/// SVG path through points.
 pub fn polyline(points: impl IntoIterator<Item = (f64, f64)>) -> String {
     let mut path = String::new();
     for (x, y) in points {
         path.push(if path.is_empty() { 'M' } else { 'L' });
-        path.push_str(&place(x));
+        path.push_str(&coordinate(x));
         path.push(' ');
-        path.push_str(&place(y));
+        path.push_str(&coordinate(y));
     }
     path
 }
 
-/// Points by themselves: a stroke of no length at each, which a round cap makes a dot.
+/// SVG path with a dot at each point: a stroke of zero length with a round cap.
 pub fn dots(points: impl IntoIterator<Item = (f64, f64)>) -> String {
     let mut path = String::new();
     for (x, y) in points {
-        path.push_str(&format!("M{} {}h0", place(x), place(y)));
+        path.push_str(&format!("M{} {}h0", coordinate(x), coordinate(y)));
     }
     path
 }
@@ -143,7 +143,7 @@ mod tests {
     }
 
     #[test]
-    fn ticks_lie_within_the_range_and_at_their_places() {
+    fn ticks_lie_within_the_range_and_at_their_coordinates() {
         let scale = Scale::rounded(-3.2, 9.1, [100.0, 0.0], 5);
         assert_eq!(scale.values, [-5.0, 10.0]);
         assert_eq!(scale.ticks(), [-5.0, 0.0, 5.0, 10.0]);

@@ -175,7 +175,7 @@ fn a_ball_that_no_axis_moves_is_mounted_again_with_a_comment() {
         ("w b X Y C Z t", "C150", "Z"),
     ] {
         let plan = generated(code, folder.path());
-        let comment = format!("No linear axis can bring the balls there along {along}:");
+        let comment = format!("No linear axis can move the balls there along {along}:");
         let start = plan.text.find(&format!("name = \"{test}\"")).unwrap();
         assert!(plan.text[..start].contains(&comment), "{code}\n{}", plan.text);
         let first = &plan.tests[0];

@@ -1,8 +1,8 @@
-//! What the commands answer stays what it was: everything that they print and write on small sessions, kept in `snapshots/kept__*`.
+//! Kept answers: everything that the commands print and write for small sessions, compared with `snapshots/kept__*`.
 //!
-//! That an answer is right is shown elsewhere; here a change of any figure is noticed, wanted or not. Answers are the same on every processor, which
-//! `ABBE_RUNNER` checks by running the command under an emulator. Numbers may differ as those of two builds do: by
-//! rounding, or by one in the last place that is printed. A change that is wanted is taken over with `cargo insta accept`.
+//! Other tests show that an answer is right. These tests detect every change of an answer. Answers are the same on every processor; `ABBE_RUNNER`
+//! checks that by running the command under an emulator. Numbers may differ by rounding, or by one in the last printed digit.
+//! `cargo insta accept` accepts an intended change. `snapshots/compare_kept.py` compares the numbers of two versions after keys were renamed.
 
 use std::ffi::OsStr;
 use std::fmt::Write;
@@ -16,13 +16,16 @@ use serde_json::Value;
 use super::data::data;
 use super::ready;
 
-/// How far a number may lie from the kept one, relative to the larger.
+/// Largest relative difference from a kept number.
 const RELATIVE: f64 = 1e-6;
-/// And in its own unit: zeros are rounding.
+/// Largest absolute difference from a kept number: zeros are rounding.
 const ABSOLUTE: f64 = 1e-7;
 
-/// Of a longer list in a JSON document, so many entries are kept, evenly chosen.
+/// Number of entries that are kept of a longer list in a JSON document, evenly chosen.
 const KEPT_OF_A_LIST: usize = 12;
+
+/// Number of rows of a covariance matrix that are kept.
+const KEPT_OF_A_MATRIX: usize = 3;
 
 #[derive(Clone)]
 struct ToRounding;
@@ -93,7 +96,12 @@ fn lines_of(path: &str, value: &Value, lines: &mut String) {
             .iter()
             .for_each(|(key, value)| lines_of(&format!("{path}.{key}"), value, lines)),
         Value::Array(entries) => {
-            let step = entries.len().div_ceil(KEPT_OF_A_LIST).max(1);
+            let kept = if path.ends_with(".covariance.matrix") {
+                KEPT_OF_A_MATRIX
+            } else {
+                KEPT_OF_A_LIST
+            };
+            let step = entries.len().div_ceil(kept).max(1);
             if step > 1 {
                 writeln!(lines, "{path}: {} entries", entries.len()).unwrap();
             }
@@ -104,11 +112,13 @@ fn lines_of(path: &str, value: &Value, lines: &mut String) {
         Value::Number(number) if number.is_f64() => {
             writeln!(lines, "{path}: {:.9e}", number.as_f64().unwrap()).unwrap();
         }
+        // A checksum changes with the last digit of a simulated reading.
+        Value::String(_) if path.ends_with(".sha256") => writeln!(lines, "{path}: SHA-256").unwrap(),
         other => writeln!(lines, "{path}: {other}").unwrap(),
     }
 }
 
-/// What a file holds, in a form that is read easily: JSON by paths, of tables as many rows as of a list.
+/// Contents of a file in readable form: JSON by paths, tables with as many rows as a list.
 fn told(file: &Path) -> String {
     let text = fs::read_to_string(file).unwrap();
     let mut lines = String::new();
@@ -129,7 +139,7 @@ fn told(file: &Path) -> String {
     lines
 }
 
-/// The command `abbe`, as what `ABBE_RUNNER` names runs it: `ABBE_RUNNER="qemu-x86_64 -cpu Nehalem"` answers as a processor without AVX does, and
+/// The command `abbe`, run by the program that `ABBE_RUNNER` names: `ABBE_RUNNER="qemu-x86_64 -cpu Nehalem"` answers as a processor without AVX does, and
 /// `-cpu Haswell,-pcid,-x2apic,-tsc-deadline,-hle,-invpcid,-rtm` as one with AVX2 and without AVX-512 (of what it lacks the emulator warns in the answer).
 fn command_of_abbe() -> Command {
     let runner = std::env::var("ABBE_RUNNER").unwrap_or_default();
@@ -245,7 +255,7 @@ fn a_fit_by_each_method() {
     kept(
         "fit_chapter4",
         &ready("hermle-c600u"),
-        // What the noise is has to be told from the repeated runs.
+        // The noise follows from the repeated runs.
         &[(
             "plan.toml",
             coarse("chapter4.toml").replace("noise_um = 0.3\n", ""),

@@ -24,22 +24,22 @@ fn arguments_at_their_limits() {
         (
             "plan",
             &["--noise-um", "inf"],
-            "it has to be a positive number of µm, 1e-6 to 1e12",
+            "a number of µm from 1e-6 to 1e12 is expected",
         ),
         (
             "plan",
             &["--setup-um", "1e300"],
-            "it has to be a positive number of µm, 1e-6 to 1e12",
+            "a number of µm from 1e-6 to 1e12 is expected",
         ),
         (
             "simulate",
             &["--noise-um", "1e300"],
-            "not negative: 0, or 1e-6 to 1e12",
+            "a standard deviation in µm is expected: 0, or 1e-6 to 1e12",
         ),
         (
             "simulate",
             &["--noise-um", "1e-300"],
-            "not negative: 0, or 1e-6 to 1e12",
+            "a standard deviation in µm is expected: 0, or 1e-6 to 1e12",
         ),
         (
             "simulate",

@@ -1,10 +1,10 @@
-//! Sessions that their readings contradict are told by name, and correct ones are not.
+//! Sessions that their readings contradict are reported with the mistake that explains it; correct sessions are not reported.
 
 mod poses;
 mod sessions;
 
 use abbe::identify::fit::{prepare, report};
-use abbe::identify::plausibility::{Plausibility, Pulls, SuggestionKind, examine};
+use abbe::identify::plausibility::{Plausibility, Pulls, Suggestion, SuggestionKind, examine, warnings};
 use abbe::identify::trace::{TraceOptions, trace};
 use abbe::model::session::read::{self, ReadOptions};
 
@@ -24,7 +24,7 @@ const NOISES: [Noise; 3] = [
     },
 ];
 
-/// How many sessions: what `ABBE_STUDY` says, or a few.
+/// Number of sessions: `ABBE_STUDY`, or a few.
 fn sessions_of_study(few: usize) -> usize {
     let stated = std::env::var("ABBE_STUDY").ok();
     stated.and_then(|text| text.parse().ok()).unwrap_or(few)
@@ -36,7 +36,7 @@ fn found(step_deg: f64, mistake: Mistake, noise: Noise, seed: u64) -> (Plausibil
     (examine(&problem, &fit), Pulls::of(&problem, &fit).largest())
 }
 
-/// What has to be named, by kind and subject.
+/// The suggestion that has to be listed, by kind and subject.
 fn expected(mistake: Mistake) -> (SuggestionKind, &'static str) {
     match mistake {
         Mistake::None => unreachable!(),
@@ -57,7 +57,7 @@ fn each_of_ten_mistakes_is_named() {
     for step_deg in STEPS_DEG {
         for mistake in MISTAKES {
             for seed in 0..seeds {
-                let (told, largest) = found(step_deg, mistake, WHITE, 40 + seed);
+                let (told, largest) = found(step_deg, mistake, WHITE, 2000 + seed);
                 let (kind, subject) = expected(mistake);
                 let named = (told.suggestions.iter())
                     .any(|suggestion| suggestion.kind == kind && suggestion.subject == subject);
@@ -84,8 +84,36 @@ fn each_of_ten_mistakes_is_named() {
         unnamed.len()
     );
     assert!(silent.is_empty(), "{silent:#?}");
-    // A ball that is off and readings of another session do the same to a test: chance may list one without the other.
-    assert!(unnamed.len() * 20 <= runs, "{unnamed:#?}");
+    assert!(unnamed.is_empty(), "{unnamed:#?}");
+}
+
+/// With few readings the place of the ball is poorly determined in some directions: its estimate takes many iterations.
+#[test]
+fn a_ball_that_is_off_is_named_from_few_readings() {
+    for seed in 1000..1004 {
+        let (told, _) = found(STEPS_DEG[0], Mistake::SpindleBall, WHITE, seed);
+        let message = warnings(&told).join("\n");
+        println!("{seed}: {message}");
+        let first: Vec<&str> = (told.suggestions.iter().take(2))
+            .map(|suggestion| suggestion.subject.as_str())
+            .collect();
+        assert!(first.contains(&"spindle_ball[A100]"), "{seed}: {message}");
+        assert!(
+            message.contains("spindle ball") && message.contains("A100"),
+            "{message}"
+        );
+    }
+}
+
+/// Readings that are outliers enlarge the noise, not what is stated of the set-up. Runs of 13 readings are too short to reject outliers.
+#[test]
+fn mistakes_are_named_beside_outliers() {
+    for (mistake, seed) in [(Mistake::Exchanged, 1024), (Mistake::OtherSession, 1027)] {
+        let (told, _) = found(STEPS_DEG[0], mistake, NOISES[2], seed);
+        let (kind, subject) = expected(mistake);
+        let named = |suggestion: &Suggestion| suggestion.kind == kind && suggestion.subject == subject;
+        assert!(told.suggestions.iter().any(named), "{mistake:?} {seed}: {told:?}");
+    }
 }
 
 #[test]
@@ -94,7 +122,7 @@ fn correct_sessions_are_not_contradicted() {
     let (mut contradicted, mut largest_of_all) = (Vec::new(), 0.0_f64);
     for number in 0..count {
         let step_deg = STEPS_DEG[number / 3 % 3];
-        let (told, largest) = found(step_deg, Mistake::None, NOISES[number % 3], 900 + number as u64);
+        let (told, largest) = found(step_deg, Mistake::None, NOISES[number % 3], 3000 + number as u64);
         largest_of_all = largest_of_all.max(largest);
         if !told.conflicts.is_empty() {
             contradicted.push(format!("{number} {step_deg}°: {told:?}"));
@@ -107,7 +135,7 @@ fn correct_sessions_are_not_contradicted() {
     assert!(contradicted.is_empty(), "{contradicted:#?}");
 }
 
-/// If the session is right, a pull is standard normal, and χ² of all of them has its degrees of freedom as mean.
+/// If the session is correct, a pull is standard normal, and χ² of all of them has its degrees of freedom as mean.
 #[test]
 fn pulls_are_standard_normal() {
     let count = sessions_of_study(24);
@@ -142,7 +170,7 @@ fn pulls_are_standard_normal() {
     assert!((sum / number).abs() < 4.0 / freedom.sqrt(), "{}", sum / number);
 }
 
-/// The machine has no effect: what is found stands for the mistake.
+/// The machine has no effect: any effect that trace claims is in the place of the mistake.
 #[test]
 fn trace_claims_no_effect_for_a_mistake_of_the_set_up() {
     for mistake in [Mistake::SpindleBall, Mistake::Reversed("Z")] {
@@ -189,7 +217,7 @@ fn trace_stops_at_the_readings_of_another_session() {
     );
 }
 
-/// The conflict stands on the terminal, among the warnings, in JSON and in the report.
+/// The conflict is stated on the terminal, among the warnings, in JSON and in the report.
 #[test]
 fn a_conflict_is_told_everywhere() {
     let folder = tempfile::tempdir().unwrap();
@@ -217,12 +245,12 @@ fn a_conflict_is_told_everywhere() {
     );
     let read: serde_json::Value = serde_json::from_str(&std::fs::read_to_string(json).unwrap()).unwrap();
     assert_eq!(read["conflicts"][0]["kind"], "setup-parameter", "{read:#}");
-    assert!(read["suggestions"][0]["words"].is_string(), "{read:#}");
+    assert!(read["suggestions"][0]["description"].is_string(), "{read:#}");
     let page = std::fs::read_to_string(html).unwrap();
-    assert!(page.contains("The readings contradict the session"));
+    assert!(page.contains("Conflict between readings and session"));
 }
 
-/// What is reported of a correct session is as it was.
+/// The result of a correct session has neither conflicts nor suggestions.
 #[test]
 fn a_correct_session_says_nothing_of_conflicts() {
     let session = session(10.0, Mistake::None, WHITE, 900);

@@ -1,4 +1,4 @@
-//! The mistakes that are tried on a session that its readings contradict: each is a session with one statement changed.
+//! The mistakes that are tried: each is the session with one statement changed.
 
 mod set_ups;
 
@@ -30,7 +30,7 @@ impl Hypothesis {
 /// Coordinates of balls below this are zero, mm.
 const ZERO_MM: f64 = 1e-6;
 
-/// The mistakes that are tried where an instrument reads between table and tool.
+/// The mistakes that are tried for an instrument that measures between table and tool.
 pub(super) fn of_two_sides(session: &Session) -> Vec<Hypothesis> {
     let mut list = axes(session);
     list.extend(set_ups::balls(session));

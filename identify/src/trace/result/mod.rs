@@ -3,6 +3,7 @@
 mod effect;
 mod rejected;
 mod unsearched;
+mod verdict;
 
 use abbe_model::effect::Effect;
 
@@ -11,7 +12,6 @@ use super::library;
 use super::remainder::Structure;
 use super::search::Search;
 use super::start::Start;
-use crate::covariance;
 use crate::error::IdentifyError;
 use crate::fit::{self, Fit};
 use crate::heldout::{mislabelled_runs, rms_mm};
@@ -19,14 +19,11 @@ use crate::noise;
 use crate::plausibility::Plausibility;
 use crate::problem::Problem;
 use crate::results::{
-    ChangedParameter, EffectResult, ModelResult, ParameterResult, Remainder, TraceResult,
-    phases_follow_amplitudes,
+    ChangedParameter, EffectResult, ModelResult, ParameterResult, TraceResult, phases_follow_amplitudes,
 };
 pub(super) use effect::effect_name;
 pub(super) use unsearched::unsearched;
-
-/// Share of the structure's excess over noise that may remain for the found effects to count as the explanation.
-const EXPLAINED_SHARE: f64 = 0.5;
+use verdict::{not_examined, verdict};
 
 /// What a search has come to.
 pub(super) struct TraceFindings<'f, 'a> {
@@ -85,7 +82,7 @@ pub(super) fn report(findings: &TraceFindings<'_, '_>) -> Result<ReportedEffect,
         gains.push(model.gain(taken.candidate).gain);
     }
     cover(&mut after_result.parameters, after, after_fit, &moves);
-    after_result.covariance = covariance::of_parameters(after, after_fit, &after_result.parameters);
+    after_result.covariance = fit::covariance_of_parameters(after, after_fit, &after_result.parameters);
     let families = library::families()?;
     let effects: Vec<EffectResult> = (0..moves.len())
         .map(|k| {
@@ -133,7 +130,7 @@ pub(super) fn report(findings: &TraceFindings<'_, '_>) -> Result<ReportedEffect,
         candidates: findings.candidates,
         candidates_detectable: findings.candidates_seen,
         unobservable: fit::unobservable(after, &after_fit.rank),
-        null_space: covariance::null_space(after, &after_fit.rank),
+        null_space: fit::null_space(after, &after_fit.rank),
         outliers: fit::outliers(after, after_fit),
         plausibility: Plausibility::default(),
         warnings,
@@ -227,7 +224,7 @@ pub(super) fn model_result(problem: &Problem<'_>, fit: &Fit, held_out_mm: f64) -
         chi_square: fit.chi_square,
         degrees_of_freedom: fit.degrees_of_freedom,
         identifiable: fit::ids(&parameters),
-        covariance: covariance::of_parameters(problem, fit, &parameters),
+        covariance: fit::covariance_of_parameters(problem, fit, &parameters),
         parameters,
     }
 }
@@ -307,57 +304,6 @@ fn moves_by(findings: &TraceFindings<'_, '_>, k: usize, in_place: &[f64], named:
     moves
 }
 
-fn verdict(findings: &TraceFindings<'_, '_>, effects: &[EffectResult]) -> (String, Remainder) {
-    if findings.interrupted {
-        return (String::new(), not_examined());
-    }
-    let Some(after) = findings.structure_after else {
-        let word = match (effects.is_empty(), findings.stopped_early) {
-            (true, _) => "clean",
-            (false, false) => "explained",
-            (false, true) => "partly-explained",
-        };
-        let remainder = Remainder {
-            structured: false,
-            p_value: findings.last_p_value,
-            place: None,
-        };
-        return (word.to_string(), remainder);
-    };
-    let structured = after.is_significant();
-    let remainder = Remainder {
-        structured,
-        p_value: after.p_value,
-        place: structured.then(|| after.description.clone()),
-    };
-    let before = findings
-        .structure_before
-        .map_or(0.0, |structure| structure.excess);
-    let share = if before > 0.0 { after.excess / before } else { 0.0 };
-    let word = word(!effects.is_empty(), structured, share);
-    (word.to_string(), remainder)
-}
-
-/// What is said of the residual of an interrupted trace.
-fn not_examined() -> Remainder {
-    Remainder {
-        structured: false,
-        p_value: 1.0,
-        place: Some("not examined: the trace was interrupted".to_string()),
-    }
-}
-
-/// What is said of a search along runs: whether it found anything, whether structure remains, and what share of its excess over noise.
-fn word(found: bool, structured: bool, share: f64) -> &'static str {
-    match (found, structured) {
-        (false, false) => "clean",
-        (false, true) => "unexplained",
-        (true, false) => "explained",
-        (true, true) if share < EXPLAINED_SHARE => "partly-explained",
-        (true, true) => "unexplained",
-    }
-}
-
 /// Parameters that changed by more than their standard uncertainty.
 fn changed_parameters(before: &[ParameterResult], after: &[ParameterResult]) -> Vec<ChangedParameter> {
     before
@@ -377,19 +323,6 @@ fn changed_parameters(before: &[ParameterResult], after: &[ParameterResult]) -> 
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    #[test]
-    fn a_verdict_says_whether_most_of_the_structure_is_explained() {
-        for (found, structured, share, verdict) in [
-            (false, false, 0.0, "clean"),
-            (false, true, 1.0, "unexplained"),
-            (true, false, 0.9, "explained"),
-            (true, true, 0.2, "partly-explained"),
-            (true, true, 0.8, "unexplained"),
-        ] {
-            assert_eq!(word(found, structured, share), verdict);
-        }
-    }
 
     #[test]
     fn parameters_that_change_by_more_than_their_uncertainty_are_listed() {

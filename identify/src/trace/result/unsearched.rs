@@ -1,7 +1,6 @@
 //! What is reported of a trace without a search: the declared model.
 
 use super::{model_result, not_examined};
-use crate::covariance;
 use crate::fit::{self, Fit};
 use crate::noise;
 use crate::plausibility::Plausibility;
@@ -33,7 +32,7 @@ pub(in crate::trace) fn unsearched(problem: &Problem<'_>, fit: &Fit) -> TraceRes
         candidates: 0,
         candidates_detectable: 0,
         unobservable: fit::unobservable(problem, &fit.rank),
-        null_space: covariance::null_space(problem, &fit.rank),
+        null_space: fit::null_space(problem, &fit.rank),
         outliers: fit::outliers(problem, fit),
         about: problem.session.about.iter().cloned().collect(),
         plausibility: Plausibility::default(),

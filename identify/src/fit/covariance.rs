@@ -2,7 +2,8 @@
 
 use faer::Mat;
 
-use crate::fit::{Fit, Quantity, quantities};
+use super::Fit;
+use super::quantities::{Quantity, quantities};
 use crate::problem::Problem;
 use crate::rank::Rank;
 use crate::results::{Covariance, NullSpace, ParameterResult};

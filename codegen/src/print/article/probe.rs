@@ -1,20 +1,19 @@
 //! Bilinear form of a probe's reading for readers: the groups of stylus and step, and the distance in terms of them.
 
-use crate::collect::sum;
 use crate::equation::Equation;
-use crate::print::article::{
-    EquationLine, LeftSide, Section, binary, named_or_expanded, naming, quantity_heading, row, terms_of,
-};
-use crate::program::{Label, Program, Tree};
+use crate::print::article::groups::named_or_expanded;
+use crate::print::article::line::{EquationLine, LeftSide, Section, naming, quantity_heading, row};
+use crate::program::{Label, Program};
 use crate::symbol::{Binary, Unary};
 use crate::touch::{self, ProbeTerms};
+use crate::tree::{Tree, binary, negative, sum, terms_of};
 use crate::vectors::NamedVector;
 
 /// Index of the first coordinate of the step in R among the names: after two vectors, `a`, `b`, `c` and `l_n`.
 const STEP: usize = 10;
 
 /// The groups of stylus and step, and the distance in terms of them.
-pub(crate) fn groups(
+pub(crate) fn sections(
     equation: &Equation,
     touch: &ProbeTerms,
     trees: &[Tree],
@@ -102,5 +101,5 @@ fn distance_of_steps(start: usize, with_length: bool) -> Tree {
     } else {
         way
     };
-    Tree::Unary(Unary::Neg, Box::new(binary(Binary::Div, way, a)))
+    negative(binary(Binary::Div, way, a))
 }

@@ -4,13 +4,14 @@
 //! u = b/L, carried back through the chain frame by frame;   ∂L/∂e = a product with the vectors of the frame that e is an error of
 //! ```
 
-use crate::equation::{Equation, Kind};
-use crate::print::article::{
-    EquationLine, LeftSide, Section, norm_of_steps, quantity_heading, row, with_bar_parameters,
-};
-use crate::program::{Label, Naming, Program, Step, Tree};
+use crate::equation::Equation;
+use crate::form::Kind;
+use crate::print::article::groups::{norm_of_steps, with_bar_parameters};
+use crate::print::article::line::{EquationLine, LeftSide, Section, quantity_heading, row};
+use crate::program::{Label, Naming, Program, Step};
 use crate::symbol::{Binary, Operand, Symbol};
 use crate::touch::{self, ProbeTerms};
+use crate::tree::{Tree, binary};
 use crate::vectors::{self, NamedVector};
 
 /// The program and the sections: the intermediate vectors of the outputs, and the adjoint vectors.
@@ -170,7 +171,7 @@ fn value_of(program: &Program, label: &Label, own_expression: &Tree) -> Tree {
 
 /// `x/y` for `(1/y)·x`; code uses the second form to share the reciprocal.
 fn as_quotient(tree: Tree) -> Tree {
-    let over = |x: &Tree, y: &Tree| Tree::Binary(Binary::Div, Box::new(x.clone()), Box::new(y.clone()));
+    let over = |x: &Tree, y: &Tree| binary(Binary::Div, x.clone(), y.clone());
     let one_over = |tree: &Tree| match tree {
         Tree::Binary(Binary::Div, one, y) if **one == Tree::Number(1.0) => Some((**y).clone()),
         _ => None,

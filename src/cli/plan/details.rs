@@ -1,4 +1,4 @@
-//! What a plan's analysis looks like on a screen.
+//! Tables of `abbe plan --all`: sensitivity, budgets, correlation, indices, tests, undeclared effects.
 
 use abbe::identify::plan::effects::confounded_by_error;
 use abbe::identify::plan::results::{EffectDetectability, EffectsAnalysis, ErrorAnalysis, PlanAnalysis};
@@ -7,24 +7,22 @@ use abbe::model::words::counted;
 use super::digits::three_digits;
 use crate::cli::table;
 
-/// Tests side by side in the table of small plots.
-const PLOTS_ABREAST: usize = 4;
+/// Tests in one row of the table of small plots.
+const PLOTS_PER_ROW: usize = 4;
 /// Width of a small plot.
 const PLOT_WIDTH: usize = 18;
-/// Contributions listed on the screen; JSON has them all.
-const CONTRIBUTIONS: usize = 3;
-/// Effects listed on the screen in each table.
-const EFFECTS: usize = 16;
-/// Hidden effects named beside each error.
-const LIMITING_PARAMETERS: usize = 3;
+/// Contributions to a variance that are listed; the JSON lists all.
+const MAX_CONTRIBUTIONS: usize = 3;
+/// Effects in one table; the JSON lists all.
+const MAX_EFFECTS: usize = 16;
+/// Confounded effects named with each error.
+const MAX_CONFOUNDED: usize = 3;
 
-/// Prints everything.
+/// Prints the tables that the first screen folds.
 pub fn print(analysis: &PlanAnalysis) {
-    header(analysis);
-    errors(&analysis.errors);
+    sensitivity(&analysis.errors);
     budget(&analysis.errors);
     plots(analysis);
-    print_unidentifiable(analysis);
     correlation(analysis);
     indices(analysis);
     tests(analysis);
@@ -33,78 +31,40 @@ pub fn print(analysis: &PlanAnalysis) {
     }
 }
 
-fn header(analysis: &PlanAnalysis) {
-    let moving = analysis
-        .moving_min
-        .map_or(String::new(), |min| format!(", {min:.1} min of movement"));
+fn sensitivity(errors: &[ErrorAnalysis]) {
     say!(
-        "{} in {}, {}{moving}, noise {}",
-        counted(analysis.readings, "reading"),
-        counted(analysis.tests.len(), "test"),
-        counted(analysis.setup_count, "set-up"),
-        table::micrometres(analysis.noise_um)
-    );
-    say!(
-        "{} of {} parameters identifiable (rank)",
-        analysis.rank,
-        analysis.parameter_count
-    );
-}
-
-fn optional(value: Option<f64>) -> String {
-    value.map_or("—".to_string(), three_digits)
-}
-
-fn errors(errors: &[ErrorAnalysis]) {
-    say!(
-        "\nPredicted standard uncertainty, what noise and set-up contribute, and what it would be if all other errors were known;\n\
-         sensitivity of a reading, µm per unit of the error (largest, rms, the test in which it is largest):"
+        "\nSensitivity of a reading, µm per unit of the error (largest, rms, the test in which it is largest):"
     );
     let rows: Vec<Vec<String>> = errors
         .iter()
         .map(|error| {
-            let part = |noise: bool| {
-                let parts = error
-                    .budget
-                    .iter()
-                    .filter(|part| (part.source == "noise") == noise);
-                error
-                    .u
-                    .map(|_| parts.map(|part| part.u.powi(2)).sum::<f64>().sqrt())
+            let test = if error.sensitivity.largest == 0.0 {
+                "–".to_string()
+            } else {
+                error.sensitivity.largest_in_test.clone()
             };
             vec![
                 error.id.clone(),
-                error.u.map_or("not seen".to_string(), three_digits),
-                error.unit.clone(),
-                optional(part(true)),
-                optional(part(false)),
-                optional(error.conditional_u),
+                table::unit(&error.unit),
                 three_digits(error.sensitivity.largest),
                 three_digits(error.sensitivity.rms),
-                if error.sensitivity.largest == 0.0 {
-                    "—".into()
-                } else {
-                    error.sensitivity.largest_in_test.clone()
-                },
+                test,
             ]
         })
         .collect();
-    let header = [
-        "error",
-        "u (k=1)",
-        "unit",
-        "of noise",
-        "of set-up",
-        "others known",
-        "largest",
-        "rms",
-        "largest in",
-    ];
-    table::print(&header, &rows);
+    table::print_aligned(
+        &["error", "unit", "largest", "rms", "largest in"],
+        &rows,
+        &[0, 1, 4],
+    );
+}
+
+fn optional(value: Option<f64>) -> String {
+    value.map_or("–".to_string(), three_digits)
 }
 
 fn budget(errors: &[ErrorAnalysis]) {
-    say!("\nWhere the uncertainty comes from (share of the variance), and with what it is correlated:");
+    say!("\nLargest contributions to the variance of each error, and its largest correlations:");
     let width = errors
         .iter()
         .map(|error| error.id.chars().count())
@@ -114,7 +74,7 @@ fn budget(errors: &[ErrorAnalysis]) {
         let parts: Vec<String> = error
             .budget
             .iter()
-            .take(CONTRIBUTIONS)
+            .take(MAX_CONTRIBUTIONS)
             .map(|part| format!("{} {:.0} %", part.source, part.share * 100.0))
             .collect();
         let shared: Vec<String> = error
@@ -137,10 +97,10 @@ fn plots(analysis: &PlanAnalysis) {
     if analysis.errors.iter().all(|error| error.curves.is_empty()) {
         return;
     }
-    say!("\nSensitivity along the first run of each test, each row to its own scale, zero in the middle:");
-    for abreast in names.chunks(PLOTS_ABREAST) {
+    say!("\nSensitivity along the first run of each test, each row to its own scale, zero at half height:");
+    for group in names.chunks(PLOTS_PER_ROW) {
         let mut header = vec!["error"];
-        header.extend(abreast);
+        header.extend(group);
         let rows: Vec<Vec<String>> = analysis
             .errors
             .iter()
@@ -148,7 +108,7 @@ fn plots(analysis: &PlanAnalysis) {
                 let values = error.curves.iter().flat_map(|curve| &curve.values);
                 let most = values.fold(0.0_f64, |most, value| most.max(value.abs()));
                 let mut row = vec![error.id.clone()];
-                for name in abreast {
+                for name in group {
                     let curve = error.curves.iter().find(|curve| curve.test == *name);
                     row.push(curve.map_or("·".into(), |curve| small_plot(&curve.values, most)));
                 }
@@ -159,7 +119,7 @@ fn plots(analysis: &PlanAnalysis) {
     }
 }
 
-/// A row of eight-step bars, from `−most` to `most`.
+/// A plot of bars in one line, of eight heights from `−most` to `most`.
 pub fn small_plot(values: &[f64], most: f64) -> String {
     const BARS: [char; 8] = ['▁', '▂', '▃', '▄', '▅', '▆', '▇', '█'];
     let width = PLOT_WIDTH.min(values.len());
@@ -174,31 +134,6 @@ pub fn small_plot(values: &[f64], most: f64) -> String {
             BARS[((level * 7.0).round() as usize).min(7)]
         })
         .collect()
-}
-
-fn print_unidentifiable(analysis: &PlanAnalysis) {
-    let list = |title: &str, lines: Vec<&String>| {
-        if !lines.is_empty() {
-            say!("\n{title}");
-            lines.into_iter().for_each(|line| say!("  {line}"));
-        }
-    };
-    list(
-        "Blind spots:",
-        analysis.unidentifiable.iter().map(|item| &item.why).collect(),
-    );
-    list(
-        "Held by what is known of the set-up, not by readings:",
-        analysis
-            .determined_by_prior
-            .iter()
-            .map(|item| &item.why)
-            .collect(),
-    );
-    list(
-        "Nearly blind:",
-        analysis.nearly_collinear.iter().map(|item| &item.why).collect(),
-    );
 }
 
 fn correlation(analysis: &PlanAnalysis) {
@@ -219,7 +154,7 @@ fn correlation(analysis: &PlanAnalysis) {
             cells.extend(
                 row.iter()
                     .take(i + 1)
-                    .map(|value| value.map_or("—".into(), |rho| format!("{rho:+.2}"))),
+                    .map(|value| value.map_or("–".into(), |rho| format!("{rho:+.2}"))),
             );
             cells.resize(ids.len() + 1, String::new());
             cells
@@ -231,19 +166,42 @@ fn correlation(analysis: &PlanAnalysis) {
 fn indices(analysis: &PlanAnalysis) {
     let indices = &analysis.indices;
     say!(
-        "\nInformation on {} of {}, set-ups unknown within what is known of them:",
+        "\nObservability indices of {} of {}, set-up parameters within their priors:",
         indices.identifiable_count,
         counted(indices.error_count, "error")
     );
-    say!(
-        "  condition number {}; O1 {}  O2 {}  O3 {}  O4 {}  O5 {}",
-        three_digits(indices.condition_number),
-        three_digits(indices.o1),
-        three_digits(indices.o2),
-        three_digits(indices.o3),
-        three_digits(indices.o4),
-        three_digits(indices.o5)
-    );
+    let row = |name: &str, value: f64, meaning: &str| {
+        vec![name.to_string(), three_digits(value), meaning.to_string()]
+    };
+    let rows = [
+        row(
+            "condition number",
+            indices.condition_number,
+            "largest over smallest singular value",
+        ),
+        row(
+            "O1",
+            indices.o1,
+            "geometric mean of the singular values, per root of the readings: volume of the confidence region",
+        ),
+        row("O2", indices.o2, "smallest over largest singular value: evenness"),
+        row(
+            "O3",
+            indices.o3,
+            "smallest singular value: worst determined direction",
+        ),
+        row(
+            "O4",
+            indices.o4,
+            "square of the smallest over the largest singular value: noise amplification",
+        ),
+        row(
+            "O5",
+            indices.o5,
+            "reciprocal of the sum of reciprocal singular values: mean uncertainty",
+        ),
+    ];
+    table::print_aligned(&["index", "value", "meaning"], &rows, &[0, 2]);
     say!(
         "  efficiency D {}  A {}  E {}  G {}",
         three_digits(indices.d_efficiency),
@@ -257,7 +215,7 @@ fn tests(analysis: &PlanAnalysis) {
     if analysis.leave_one_out.is_empty() {
         return;
     }
-    say!("\nWhat each test contributes:");
+    say!("\nContribution of each test:");
     analysis
         .leave_one_out
         .iter()
@@ -273,37 +231,37 @@ fn effects(found: &EffectsAnalysis) {
             .collect()
     };
     let confounded = by_verdict(|verdict| verdict.starts_with("confounded"));
-    let seen = by_verdict(|verdict| verdict == "detectable");
+    let detectable = by_verdict(|verdict| verdict == "detectable");
     let none = by_verdict(|verdict| verdict == "no signal").len();
     say!(
-        "\nUndeclared effects: of {} looked at, {} would be seen, {} would hide and {none} move no reading of these tests.",
+        "\nUndeclared effects: of {} screened, {} are detectable, {} are confounded and {none} change no reading of these tests.",
         found.effects.len(),
-        seen.len(),
+        detectable.len(),
         confounded.len()
     );
     say!(
-        "\nSeen: smallest amplitude found with {:.0} % power at {:.0} % significance, of one look and of a search of the whole library of {}\n\
-         (Šidák, which is on the safe side); share of the signal that remains in the residual; what it adds to the errors until it is found;\n\
-         how many alike, of the same component and driver, are not listed. A power has its amplitude at 100 mm, or at 180°:",
+        "\nDetectable: smallest amplitude that is found with {:.0} % power at {:.0} % significance by a single test of that effect and by a search of\n\
+         the library of {} effects (Šidák, conservative); share of the signal that remains in the residual; bias of the errors while it is\n\
+         undeclared; number of further effects of the same component and driver. A power has its amplitude at 100 mm, or at 180°:",
         found.power * 100.0,
         found.significance_level * 100.0,
         found.effects_screened
     );
-    effect_table(&seen);
+    effect_table(&detectable);
     say!(
-        "\nHidden: under 1 % of the signal fraction_left the fit. A clean residual does not exclude these, and they bias:"
+        "\nConfounded: less than 1 % of the signal remains in the residual. A clean residual does not exclude these effects, and they bias:"
     );
     effect_table(&confounded);
-    say!("\nWhat may hide in each error, the strongest first:");
+    say!("\nEffects confounded with each error, the largest bias first:");
     let by_error = confounded_by_error(found);
     let width = by_error.keys().map(|id| id.chars().count()).max().unwrap_or(0);
-    for (error, limiting) in &by_error {
-        let words: Vec<String> = limiting
+    for (error, effects) in &by_error {
+        let words: Vec<String> = effects
             .iter()
-            .take(LIMITING_PARAMETERS)
-            .map(|(id, per_unit, unit)| format!("{id} {} {unit}", three_digits(*per_unit)))
+            .take(MAX_CONFOUNDED)
+            .map(|(id, per_unit, unit)| format!("{id} {} {}", three_digits(*per_unit), table::unit(unit)))
             .collect();
-        let more = match limiting.len().saturating_sub(LIMITING_PARAMETERS) {
+        let more = match effects.len().saturating_sub(MAX_CONFOUNDED) {
             0 => String::new(),
             more => format!(", {more} more"),
         };
@@ -311,17 +269,17 @@ fn effects(found: &EffectsAnalysis) {
     }
 }
 
-/// What an effect acts on and what it follows: `EZC~C` of `EZC~C:h2`.
-fn id_stem(id: &str) -> &str {
-    id.split_once(':').map_or(id, |(id_stem, _)| id_stem)
+/// Component and driver of an effect: `EZC~C` of `EZC~C:h2`.
+fn component_and_driver(id: &str) -> &str {
+    id.split_once(':').map_or(id, |(before, _)| before)
 }
 
-/// A table of effects: of those with the same component and driver the one that biases most, the others counted.
+/// A table of effects. Of those with the same component and driver it lists the one with the largest bias and counts the others.
 fn effect_table(effects: &[&EffectDetectability]) {
     let strongest =
         |effect: &EffectDetectability| effect.biases.first().map_or(0.0, |bias| bias.per_unit.abs());
     let mut sorted: Vec<&EffectDetectability> = effects.to_vec();
-    // Equal ones by name: rounding, which differs between processors, has no say.
+    // Equal rounded values are ordered by name: rounding differs between processors.
     let size =
         |effect: &EffectDetectability| three_digits(strongest(effect)).parse().unwrap_or(f64::INFINITY);
     sorted.sort_by(|a, b| f64::total_cmp(&size(b), &size(a)).then_with(|| a.id.cmp(&b.id)));
@@ -329,7 +287,7 @@ fn effect_table(effects: &[&EffectDetectability]) {
     for effect in sorted {
         match chosen
             .iter_mut()
-            .find(|(first, _)| id_stem(&first.id) == id_stem(&effect.id))
+            .find(|(first, _)| component_and_driver(&first.id) == component_and_driver(&effect.id))
         {
             Some((_, alike)) => *alike += 1,
             None => chosen.push((effect, 0)),
@@ -337,20 +295,27 @@ fn effect_table(effects: &[&EffectDetectability]) {
     }
     let rows: Vec<Vec<String>> = chosen
         .iter()
-        .take(EFFECTS)
+        .take(MAX_EFFECTS)
         .map(|(effect, alike)| {
             let biases: Vec<String> = effect
                 .biases
                 .iter()
                 .take(2)
-                .map(|bias| format!("{} {} {}", bias.id, three_digits(bias.per_unit), bias.unit))
+                .map(|bias| {
+                    format!(
+                        "{} {} {}",
+                        bias.id,
+                        three_digits(bias.per_unit),
+                        table::unit(&bias.unit)
+                    )
+                })
                 .collect();
             vec![
                 effect.id.clone(),
                 optional(effect.detectable_amplitude),
                 optional(effect.detectable_amplitude_screened),
-                effect.unit.clone(),
-                fraction_left(effect.residual_share),
+                table::unit(&effect.unit),
+                per_cent(effect.residual_share),
                 if biases.is_empty() {
                     "none".into()
                 } else {
@@ -361,18 +326,16 @@ fn effect_table(effects: &[&EffectDetectability]) {
         })
         .collect();
     table::print(
-        &[
-            "effect", "one look", "search", "unit", "survives", "biases", "alike",
-        ],
+        &["effect", "single", "search", "unit", "remains", "bias", "further"],
         &rows,
     );
-    if chosen.len() > EFFECTS {
-        say!("  … {} more in the JSON", chosen.len() - EFFECTS);
+    if chosen.len() > MAX_EFFECTS {
+        say!("  … {} more in the JSON", chosen.len() - MAX_EFFECTS);
     }
 }
 
-/// A share in per cent.
-fn fraction_left(share: f64) -> String {
+/// A share of a signal in per cent.
+fn per_cent(share: f64) -> String {
     if share < 1e-4 {
         "< 0.01 %".to_string()
     } else {

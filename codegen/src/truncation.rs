@@ -3,16 +3,17 @@
 use abbe_model::instrument::Station;
 use abbe_model::scalar::Nominal;
 
-use crate::collect::{Collector, product, sum};
-use crate::equation::{Form, PrintedFirstOrder};
+use crate::collect::Collector;
 use crate::error::CodegenError;
 use crate::first_order::{Column, FirstOrder};
+use crate::form::{Form, PrintedFirstOrder};
 use crate::normal_form::Ring;
 use crate::polynomial::Polynomial;
-use crate::program::{Input, Tree};
+use crate::program::Input;
 use crate::run::Run;
 use crate::subject::Subject;
 use crate::symbol::{Arena, Binary, Operand, Symbol, Unary};
+use crate::tree::{Tree, binary, product, sum};
 use crate::variable::Variable;
 use crate::vectors::NamedVector;
 
@@ -160,7 +161,6 @@ pub(crate) fn first<'a>(
         }
         sum(terms)
     };
-    let binary = |op, a: Tree, b: Tree| Tree::Binary(op, Box::new(a), Box::new(b));
     let output = |(coordinate, nominal): (usize, &Tree)| {
         let whole = if !read_over.is_empty() {
             let length = Tree::Unary(Unary::Sqrt, Box::new(nominal.clone()));

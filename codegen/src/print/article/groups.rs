@@ -1,0 +1,86 @@
+//! Bilinear form for readers: the coordinate groups, and the reading as a function of them.
+
+use std::collections::HashMap;
+
+use crate::equation::Equation;
+use crate::form::Kind;
+use crate::print::article::line::{EquationLine, LeftSide, Section, naming, quantity_heading, row};
+use crate::program::{Label, Naming, Program};
+use crate::symbol::{Binary, Operand, Unary};
+use crate::tree::{Tree, binary, product, sum};
+
+/// `√(x² + y² + z²)` of three steps.
+pub(crate) fn norm_of_steps(start: usize) -> Tree {
+    let square = |index| (false, binary(Binary::Mul, Tree::Step(index), Tree::Step(index)));
+    Tree::Unary(
+        Unary::Sqrt,
+        Box::new(sum((start..start + 3).map(square).collect())),
+    )
+}
+
+/// The coordinate groups, and the length as a function of them.
+pub(crate) fn sections(equation: &Equation, trees: &[Tree], complete: bool) -> (Program, Vec<Section>) {
+    if equation.kind != Kind::Length {
+        let rows = trees.iter().enumerate().map(|(index, tree)| EquationLine {
+            approximate: !complete,
+            ..row(LeftSide::Output(index), tree.clone())
+        });
+        let section = Section {
+            heading: quantity_heading(equation).to_string(),
+            rows: rows.collect(),
+        };
+        return (naming(equation, Vec::new()), vec![section]);
+    }
+    let bar = &equation.vectors[0];
+    let labels: Vec<Label> = (0..3).map(|coordinate| bar.label(coordinate)).collect();
+    let program = naming(equation, labels.clone());
+    let rows = labels
+        .into_iter()
+        .zip(trees)
+        .map(|(label, tree)| row(LeftSide::Named(label), tree.clone()));
+    let length = with_bar_parameters(equation, &program, norm_of_steps(0));
+    let sections = vec![
+        Section {
+            heading: bar.meaning.clone(),
+            rows: rows.collect(),
+        },
+        Section {
+            heading: quantity_heading(equation).to_string(),
+            rows: vec![EquationLine {
+                approximate: !complete,
+                ..row(LeftSide::Output(0), length)
+            }],
+        },
+    ];
+    (program, sections)
+}
+
+/// `d − δ_bar + δ_gain·(d − bar)`, with the parameters that are included.
+pub(crate) fn with_bar_parameters(equation: &Equation, program: &Program, distance: Tree) -> Tree {
+    let tree = |operand: Operand| named_or_expanded(equation, program, operand);
+    let [bar, gain] = equation.bar_parameters;
+    let mut terms = vec![(false, distance.clone())];
+    if let Some(bar) = bar {
+        terms.push((true, tree(bar)));
+    }
+    if let (Some(gain), Some(stated)) = (gain, equation.stated_length) {
+        let difference = sum(vec![(false, distance), (true, tree(stated))]);
+        terms.push((false, product(vec![tree(gain), difference])));
+    }
+    sum(terms)
+}
+
+/// An operand under the name of a driven error, or as its own expression.
+pub(crate) fn named_or_expanded(equation: &Equation, program: &Program, operand: Operand) -> Tree {
+    let follower = equation.driven_errors.iter().find(|(_, value)| *value == operand);
+    let named = follower.and_then(|(variable, _)| {
+        let label = Label::Quantity(variable.clone());
+        program.steps.iter().position(|step| step.label == label)
+    });
+    let none = HashMap::new();
+    let own = || {
+        let inputs = equation.inputs();
+        Program::of(&equation.arena, inputs, &[operand], &none, Naming::Labelled)
+    };
+    named.map_or_else(|| own().outputs[0].clone(), Tree::Step)
+}

@@ -1,0 +1,9 @@
+//! What every output language implements.
+
+use crate::check::Checked;
+
+/// A language in which equations are printed.
+pub trait Language: Sync {
+    /// The page or file of an equation.
+    fn print(&self, checked: &Checked<'_>) -> String;
+}

@@ -1,0 +1,255 @@
+//! Estimation of the parameters of a session from its readings.
+//!
+//! The rank is decided on the linearisation at the nominal machine. Gauss–Newton then iterates in the identifiable directions only. A
+//! non-identifiable combination keeps its nominal value and is reported as a combination, never as a number. The law of propagation gives
+//! the uncertainties, `Cov = N (Nᵀ JᵀV⁻¹J N)⁻¹ Nᵀ`. The columns of `N` span the identifiable directions (JCGM 100, 5.2; JCGM 102, 6.2).
+
+mod covariance;
+mod prepare;
+mod quantities;
+mod reported;
+
+use std::cell::RefCell;
+
+use faer::Mat;
+use statrs::distribution::{ChiSquared, ContinuousCDF};
+
+use crate::error::IdentifyError;
+use crate::heldout::{HeldOut, held_out};
+use crate::least_squares::{LeastSquares, Scaling, minimise};
+use crate::preference::pivot_preference;
+use crate::problem::Problem;
+use crate::rank::Rank;
+use crate::triangle::Triangle;
+
+pub(crate) use covariance::{null_space, of_parameters as covariance_of_parameters};
+pub use prepare::{prepare, prepare_with};
+pub(crate) use quantities::{Quantity, quantities, values_at};
+pub(crate) use reported::{ids, u_of_undetermined_phase_deg};
+pub use reported::{outliers, parameters, report, unobservable};
+
+/// The result of a fit, in internal units.
+#[derive(Clone, Debug)]
+pub struct Fit {
+    /// Estimates of all parameters. A parameter in a null-space combination holds its identifiable part only.
+    pub beta: Vec<f64>,
+    /// Identifiable and null directions.
+    pub rank: Rank,
+    /// Covariance of the parameters (identifiable part), from the noise alone.
+    pub covariance: Mat<f64>,
+    /// The triangular factors of the folds at the solution.
+    pub triangles: Vec<Triangle>,
+    /// Residuals by test, mm.
+    pub residuals: Vec<Vec<f64>>,
+    /// Held-out residuals.
+    pub held_out: HeldOut,
+    /// χ², with each prior as an observation.
+    pub chi_square: f64,
+    /// Degrees of freedom of χ², at least 1.
+    pub degrees_of_freedom: usize,
+    /// The Birge ratio `√(χ²/ν)`. It is below 1 if the readings scatter less than the assumed noise.
+    pub birge_ratio: f64,
+    /// Factor on the standard uncertainties: the Birge ratio if it is significantly above 1, else 1.
+    pub u_enlargement: f64,
+}
+
+/// Significance level of the χ² test of the residual against the noise.
+const BIRGE_SIGNIFICANCE: f64 = 1e-3;
+
+/// The least-squares problem of a session, restricted to the identifiable directions.
+struct IdentifiableDirections<'p, 'a> {
+    problem: &'p Problem<'a>,
+    basis: &'p Mat<f64>,
+    /// The last linearisation: the parameters, and the triangular factors of the folds at these values.
+    last: RefCell<(Vec<f64>, Vec<Triangle>)>,
+}
+
+impl IdentifiableDirections<'_, '_> {
+    fn beta(&self, z: &[f64]) -> Vec<f64> {
+        (0..self.basis.nrows())
+            .map(|j| (0..z.len()).map(|k| self.basis[(j, k)] * z[k]).sum())
+            .collect()
+    }
+}
+
+impl LeastSquares for IdentifiableDirections<'_, '_> {
+    fn parameters(&self) -> usize {
+        self.basis.ncols()
+    }
+
+    fn linearise(&self, z: &[f64]) -> Result<Triangle, IdentifyError> {
+        let beta = self.beta(z);
+        if self.last.borrow().0 != beta {
+            let triangles = self.problem.triangles(&beta)?;
+            self.last.replace((beta, triangles));
+        }
+        let (beta, triangles) = &*self.last.borrow();
+        Ok(in_directions(&whole(self.problem, beta, triangles), self.basis))
+    }
+
+    fn sum_of_squares(&self, z: &[f64]) -> f64 {
+        self.problem.sum_of_squares(&self.beta(z))
+    }
+}
+
+/// The triangular factor of all readings and priors.
+pub(crate) fn whole(problem: &Problem<'_>, beta: &[f64], triangles: &[Triangle]) -> Triangle {
+    let mut whole = problem.prior_triangle(beta);
+    triangles.iter().for_each(|triangle| whole.merge(triangle));
+    whole
+}
+
+/// The triangular factor of `[J·N | r]` from that of `[J | r]`.
+pub fn in_directions(triangle: &Triangle, basis: &Mat<f64>) -> Triangle {
+    let (r, c, rest) = triangle.parts();
+    let (n, rank) = (basis.nrows(), basis.ncols());
+    let reduced = &r * basis;
+    let rows = Mat::from_fn(n + 1, rank + 1, |i, j| match (i == n, j == rank) {
+        (true, true) => rest.sqrt(),
+        (true, false) => 0.0,
+        (false, true) => c[i],
+        (false, false) => reduced[(i, j)],
+    });
+    let mut result = Triangle::new(rank);
+    result.absorb(rows.as_ref());
+    result
+}
+
+/// Fits a problem, starting from the nominal machine or from given parameters.
+///
+/// # Errors
+/// If there are no parameters, the model cannot be evaluated, or the iterations do not converge.
+pub fn fit(problem: &Problem<'_>, start: Option<&[f64]>) -> Result<Fit, IdentifyError> {
+    finish(problem, minimum(problem, start)?)
+}
+
+/// The minimum of the sum of squares of readings and priors.
+pub(crate) struct Minimum {
+    /// Estimates of all parameters, in internal units (mm, rad).
+    pub beta: Vec<f64>,
+    /// The triangular factors of the folds at `beta`.
+    pub triangles: Vec<Triangle>,
+    /// The rank at the nominal machine.
+    pub rank: Rank,
+}
+
+/// Minimises the sum of squares in the identifiable directions, from the nominal machine or from given parameters.
+///
+/// # Errors
+/// If the model cannot be evaluated, or the iterations do not converge.
+pub(crate) fn minimum(problem: &Problem<'_>, start: Option<&[f64]>) -> Result<Minimum, IdentifyError> {
+    let parameter_count = problem.parameters.list.len();
+    let size: Vec<f64> = problem
+        .parameters
+        .list
+        .iter()
+        .map(|parameter| parameter.size)
+        .collect();
+    let nominal = vec![0.0; parameter_count];
+    let triangles = problem.triangles(&nominal)?;
+    let preference = pivot_preference(&problem.parameters.list);
+    let rank = Rank::decide(
+        whole(problem, &nominal, &triangles).parts().0.as_ref(),
+        &size,
+        &preference,
+    )?;
+    let restricted = IdentifiableDirections {
+        problem,
+        basis: &rank.identifiable_basis,
+        last: RefCell::new((nominal, triangles)),
+    };
+    let mut end = None;
+    if rank.identifiable_basis.ncols() > 0 {
+        let scale = Scaling::Physical(vec![1.0; rank.identifiable_basis.ncols()]);
+        let from = start.map_or_else(
+            || vec![0.0; rank.identifiable_basis.ncols()],
+            |beta| rank.coordinates(beta, &size),
+        );
+        end = Some(restricted.beta(&minimise(&restricted, &from, &scale)?.x));
+    }
+    let (last, triangles) = restricted.last.into_inner();
+    let beta = end.unwrap_or_else(|| last.clone());
+    // After the last linearisation the parameters move by a step at which nonlinearity is negligible.
+    let step: Vec<f64> = beta.iter().zip(&last).map(|(end, last)| end - last).collect();
+    let triangles = triangles.iter().map(|triangle| triangle.after(&step)).collect();
+    Ok(Minimum {
+        beta,
+        triangles,
+        rank,
+    })
+}
+
+/// Computes covariance, residuals, cross-validation and χ² at the solution.
+fn finish(problem: &Problem<'_>, minimum: Minimum) -> Result<Fit, IdentifyError> {
+    let Minimum {
+        beta,
+        triangles,
+        rank,
+    } = minimum;
+    let whole = whole(problem, &beta, &triangles);
+    let covariance = parameter_covariance(&whole, &rank.identifiable_basis)?;
+    let residuals = problem.residuals(&beta);
+    let held_out = held_out(problem, &beta, &triangles, &whole, &rank.identifiable_basis)?;
+    let zero = vec![0.0; beta.len()];
+    let chi_square: f64 = whole.sum_of_squares_after(&zero);
+    // Each prior counts as an observation in χ².
+    let degrees_of_freedom = (problem.readings() * problem.coordinates() + problem.prior_rows())
+        .saturating_sub(rank.identifiable_basis.ncols())
+        .max(1);
+    let free = degrees_of_freedom as f64;
+    Ok(Fit {
+        beta,
+        rank,
+        covariance,
+        triangles,
+        residuals,
+        held_out,
+        chi_square,
+        degrees_of_freedom,
+        birge_ratio: (chi_square / free).sqrt(),
+        u_enlargement: u_enlargement(chi_square, free),
+    })
+}
+
+/// Factor on the standard uncertainties: the Birge ratio `√(χ²/ν)` if it is significantly above 1, else 1.
+pub(crate) fn u_enlargement(chi_square: f64, free: f64) -> f64 {
+    let significance = ChiSquared::new(free).map(|law| law.sf(chi_square)).unwrap_or(1.0);
+    if significance < BIRGE_SIGNIFICANCE {
+        (chi_square / free).sqrt().max(1.0)
+    } else {
+        1.0
+    }
+}
+
+/// The warning about enlarged uncertainties, if they are enlarged.
+pub(crate) fn enlargement_warning(enlargement: f64) -> Option<String> {
+    (enlargement > 1.0).then(|| {
+        format!(
+            "the residual exceeds the noise (χ² is {:.2} times its degrees of freedom); uncertainties are enlarged by {enlargement:.2}; \
+             trace the residual to find the unmodelled effect",
+            enlargement.powi(2)
+        )
+    })
+}
+
+/// `N (NᵀRᵀRN)⁻¹ Nᵀ`.
+pub(crate) fn parameter_covariance(triangle: &Triangle, basis: &Mat<f64>) -> Result<Mat<f64>, IdentifyError> {
+    let n = basis.nrows();
+    if basis.ncols() == 0 {
+        return Ok(Mat::zeros(n, n));
+    }
+    let (r, _, _) = triangle.parts();
+    let reduced = &r * basis;
+    let svd = reduced.svd().map_err(|_| IdentifyError::Decomposition)?;
+    let singular: Vec<f64> = svd.S().column_vector().iter().copied().collect();
+    let negligible = singular[0] * 1e-14;
+    let spread = basis * svd.V();
+    let scaled = Mat::from_fn(n, singular.len(), |i, k| {
+        if singular[k] > negligible {
+            spread[(i, k)] / singular[k]
+        } else {
+            0.0
+        }
+    });
+    Ok(&scaled * scaled.transpose())
+}

@@ -1,0 +1,114 @@
+//! Preparation of a fit: the noise and the outliers that the readings show, in turn with the fit.
+
+use abbe_model::effect::Effect;
+use abbe_model::session::Session;
+use abbe_model::session::limits::MIN_UM;
+use faer::Mat;
+
+use super::Fit;
+use crate::error::IdentifyError;
+use crate::heldout::rms_mm;
+use crate::noise::{Noise, NoiseSource, PureError};
+use crate::outliers;
+use crate::parameters::Role;
+use crate::plausibility;
+use crate::problem::Problem;
+use crate::triangle::Triangle;
+
+/// Start value of the noise standard deviation if neither session nor repeats give one: 1 µm.
+const START_NOISE_MM: f64 = 1e-3;
+/// Least estimate of the noise standard deviation. Computed readings repeat exactly, but are still rounded.
+const MIN_NOISE_MM: f64 = MIN_UM * 1e-3;
+/// Maximum number of rounds that re-estimate noise and outliers.
+const MAX_ROUNDS: usize = 6;
+/// Relative change of the noise standard deviation at which the rounds stop.
+const NOISE_TOLERANCE: f64 = 1e-4;
+/// Prepares and fits a session. The noise is the stated one, that of repeats, or that of the residual. Outliers are excluded.
+///
+/// # Errors
+/// See [`Problem::new`]; also if the iterations do not converge.
+pub fn prepare(session: &Session, seed: u64) -> Result<(Problem<'_>, Fit), IdentifyError> {
+    prepare_with(session, &[], seed)
+}
+
+/// As [`prepare`], for the session with further declared effects. Noise, outliers and rank are exactly those of a session that declares
+/// them.
+///
+/// # Errors
+/// See [`prepare`].
+pub fn prepare_with<'a>(
+    session: &'a Session,
+    effects: &[Effect],
+    seed: u64,
+) -> Result<(Problem<'a>, Fit), IdentifyError> {
+    let stated = session.noise_mm.filter(|sigma| *sigma > 0.0);
+    let floor = session.resolution_mm.unwrap_or(0.0) / 12.0_f64.sqrt();
+    let first = match stated {
+        Some(sigma) => Noise::white(sigma, NoiseSource::Stated),
+        None => Noise::white(START_NOISE_MM.max(floor), NoiseSource::Residual),
+    };
+    let mut problem = Problem::new(session, first, seed)?;
+    for effect in effects {
+        problem.add_effect(effect)?;
+    }
+    if stated.is_none() {
+        problem.noise = Noise::white(
+            nominal_residual_mm(&problem)?.max(floor).max(MIN_NOISE_MM),
+            NoiseSource::Residual,
+        );
+    }
+    let mut fit = plausibility::checked(&problem, super::fit(&problem, None))?;
+    // Noise and outliers depend on the residuals, and the residuals on the fit. The returned fit always uses the returned noise.
+    for _ in 0..MAX_ROUNDS {
+        let rejected = outliers::reject(&problem, &fit);
+        let unchanged = rejected == problem.rejected;
+        problem.rejected = rejected;
+        let noise = match stated {
+            Some(_) => problem.noise.clone(),
+            None => estimated_noise(&problem, &fit, floor),
+        };
+        let settled = (noise.sigma_mm / problem.noise.sigma_mm - 1.0).abs() < NOISE_TOLERANCE;
+        if settled && unchanged {
+            break;
+        }
+        problem.noise = noise;
+        fit = plausibility::checked(&problem, super::fit(&problem, Some(&fit.beta)))?;
+    }
+    Ok((problem, fit))
+}
+
+/// Root mean square of the residual of the nominal machine, mm, after a linearised fit of the set-up quantities. It serves as the noise in
+/// the first decision on the rank. Machine errors are excluded: in a socket session, shrinking the machine to a point would explain every
+/// reading.
+fn nominal_residual_mm(problem: &Problem<'_>) -> Result<f64, IdentifyError> {
+    let list = &problem.parameters.list;
+    let nominal = vec![0.0; list.len()];
+    let mut whole = Triangle::new(list.len());
+    for triangle in problem.triangles(&nominal)? {
+        whole.merge(&triangle);
+    }
+    let (r, c, rest) = whole.parts();
+    let setups: Vec<usize> = (0..list.len()).filter(|j| list[*j].role == Role::Setup).collect();
+    let rows = Mat::from_fn(list.len(), setups.len() + 1, |i, j| match setups.get(j) {
+        Some(setup) => r[(i, *setup)],
+        None => c[i],
+    });
+    let mut setup_factor = Triangle::new(setups.len());
+    setup_factor.absorb(rows.as_ref());
+    let count = (problem.readings() * problem.coordinates()) as f64;
+    let sum_of_squares = setup_factor.parts().2 + rest;
+    Ok((sum_of_squares / count.max(1.0)).sqrt() * problem.noise.sigma_mm)
+}
+
+fn estimated_noise(problem: &Problem<'_>, fit: &Fit, floor: f64) -> Noise {
+    let pure = PureError::of(&problem.tests, &fit.residuals, |test, row| {
+        !problem.rejected[test][row]
+    });
+    if let Some(sigma) = pure.sigma_mm() {
+        return Noise::white(sigma.max(floor).max(MIN_NOISE_MM), NoiseSource::Repeats);
+    }
+    let count = (problem.readings() * problem.coordinates()) as f64;
+    let freedom = (count - fit.rank.identifiable_basis.ncols() as f64).max(1.0);
+    let sigma = rms_mm(problem, &fit.residuals) * (count / freedom).sqrt();
+    Noise::white(sigma.max(floor).max(MIN_NOISE_MM), NoiseSource::Residual)
+}

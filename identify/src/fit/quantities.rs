@@ -1,0 +1,123 @@
+//! The quantities that a fit reports: identifiable parameters, and amplitude and phase of harmonics.
+
+use super::Fit;
+use crate::parameters::Role;
+use crate::problem::Problem;
+use crate::rank::Rank;
+
+/// A reported quantity.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Quantity {
+    /// A parameter, by index.
+    Parameter(usize),
+    /// Amplitude and phase of a harmonic, by the index of its cosine coefficient.
+    Harmonic(usize),
+}
+
+/// The reported quantities in their order: those of the identifiable parameters.
+pub(crate) fn quantities(problem: &Problem<'_>, rank: &Rank) -> Vec<Quantity> {
+    let list = &problem.parameters.list;
+    let mut quantities = Vec::new();
+    let mut j = 0;
+    while j < list.len() {
+        if let Role::Coefficient {
+            effect,
+            coefficient: 0,
+        } = list[j].role
+        {
+            let effect = &problem.parameters.effects[effect];
+            let pair = effect.shape.is_wave();
+            if pair && rank.is_identifiable(j) && rank.is_identifiable(j + 1) {
+                quantities.push(Quantity::Harmonic(j));
+                j += 2;
+                continue;
+            }
+        }
+        if rank.is_identifiable(j) {
+            quantities.push(Quantity::Parameter(j));
+        }
+        j += 1;
+    }
+    quantities
+}
+
+/// Passes the reported quantities at the parameters `beta` to a function, in display units, amplitude before phase. Each phase lies within
+/// half a turn of the fit's phase.
+pub(crate) fn values_at(
+    problem: &Problem<'_>,
+    fit: &Fit,
+    quantities: &[Quantity],
+    beta: &[f64],
+    mut accept: impl FnMut(f64),
+) {
+    let list = &problem.parameters.list;
+    for quantity in quantities {
+        match *quantity {
+            Quantity::Parameter(j) => accept(beta[j] * list[j].unit.display_per_internal),
+            Quantity::Harmonic(j) => {
+                accept(beta[j].hypot(beta[j + 1]) * list[j].unit.display_per_internal);
+                let (a, b) = (fit.beta[j], fit.beta[j + 1]);
+                let off = (b * beta[j] - a * beta[j + 1]).atan2(a * beta[j] + b * beta[j + 1]);
+                accept(((-b).atan2(a) + off).to_degrees());
+            }
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::path::Path;
+
+    use abbe_model::driver::Driver;
+    use abbe_model::effect::shape::Harmonic;
+    use abbe_model::effect::{Component, Effect, Shape};
+    use abbe_model::session::read::{self, ReadOptions};
+
+    use super::*;
+    use crate::fit::{fit, prepare};
+
+    /// `A cos(nC + φ)` has the coefficients `A cos φ` and `−A sin φ`.
+    #[test]
+    fn amplitude_and_phase_of_a_harmonic_follow_from_its_coefficients() {
+        let file =
+            Path::new(env!("CARGO_MANIFEST_DIR")).join("../sessions/hermle-c600u/measured/session.toml");
+        let session = read::session(&file, &ReadOptions::default()).unwrap();
+        let (mut problem, _) = prepare(&session, 1).unwrap();
+        problem
+            .add_effect(&Effect {
+                component: Component::parse("EZC").unwrap(),
+                driver: Driver::parse("C"),
+                shape: Shape::Harmonic(Harmonic { order: 3.0 }),
+                tests: Vec::new(),
+            })
+            .unwrap();
+        let mut fit = fit(&problem, None).unwrap();
+        let quantities = quantities(&problem, &fit.rank);
+        let (place, j) = quantities
+            .iter()
+            .enumerate()
+            .find_map(|(place, quantity)| match quantity {
+                Quantity::Harmonic(j) => Some((place, *j)),
+                Quantity::Parameter(_) => None,
+            })
+            .unwrap();
+        let coefficients = |amplitude_um: f64, phase_deg: f64| {
+            let (sin, cos) = phase_deg.to_radians().sin_cos();
+            [1e-3 * amplitude_um * cos, -1e-3 * amplitude_um * sin]
+        };
+        for (present_deg, other_deg) in [(170.0, 200.0), (-20.0, 40.0), (80.0, -60.0), (0.0, 90.0)] {
+            fit.beta[j..j + 2].copy_from_slice(&coefficients(2.0, present_deg));
+            let mut other = fit.beta.clone();
+            other[j..j + 2].copy_from_slice(&coefficients(3.0, other_deg));
+            let mut values = Vec::new();
+            values_at(&problem, &fit, &quantities, &other, |value| values.push(value));
+            // No harmonic with two reported values precedes this one.
+            assert!((values[place] - 3.0).abs() < 1e-12, "{}", values[place]);
+            assert!(
+                (values[place + 1] - other_deg).abs() < 1e-9,
+                "{} and {other_deg}",
+                values[place + 1]
+            );
+        }
+    }
+}

@@ -1,0 +1,179 @@
+//! A fit in the form of its results: display units, words, and the lists of what is not identifiable and of outliers.
+
+use std::collections::BTreeMap;
+
+use super::quantities::{Quantity, quantities};
+use super::{Fit, covariance, enlargement_warning};
+use crate::circular;
+use crate::heldout::{mislabelled_runs, rms_mm};
+use crate::noise;
+use crate::parameter_description::parameter_meaning;
+use crate::plausibility;
+use crate::problem::Problem;
+use crate::rank::Rank;
+use crate::results::{FitResult, Outlier, ParameterResult, Unobservable, phases_follow_amplitudes};
+
+/// The fit in its reported form.
+pub fn report(problem: &Problem<'_>, fit: &Fit) -> FitResult {
+    let three = problem.coordinates() == 3;
+    let rms = rms_mm(problem, &fit.residuals);
+    let held = fit.held_out.rms_mm;
+    let in_3d = |rms: f64| three.then(|| rms * 3.0_f64.sqrt() * 1e3);
+    let plausibility = plausibility::examine(problem, fit);
+    let mut warnings = problem.session.warnings.clone();
+    warnings.extend(plausibility::warnings(&plausibility));
+    warnings.extend(noise::stated_against_repeats(problem, &fit.residuals));
+    warnings.extend(mislabelled_runs(&problem.tests));
+    warnings.extend(enlargement_warning(fit.u_enlargement));
+    let parameters = parameters(problem, fit);
+    FitResult {
+        noise_um: problem.noise.sigma_mm * 1e3,
+        noise_source: problem.noise.source.word().to_string(),
+        noise_ar_coefficients: problem.noise.ar_coefficients.clone(),
+        readings: problem.readings(),
+        rms_um: rms * 1e3,
+        heldout_rms_um: held * 1e3,
+        rms_3d_um: in_3d(rms),
+        heldout_rms_3d_um: in_3d(held),
+        heldout_by: problem.folds.kind.words().to_string(),
+        rank: fit.rank.identifiable_basis.ncols(),
+        parameter_count: fit.beta.len(),
+        chi_square: fit.chi_square,
+        degrees_of_freedom: fit.degrees_of_freedom,
+        birge_ratio: fit.birge_ratio,
+        u_enlargement: fit.u_enlargement,
+        identifiable: ids(&parameters),
+        covariance: covariance::of_parameters(problem, fit, &parameters),
+        parameters,
+        unobservable: unobservable(problem, &fit.rank),
+        null_space: covariance::null_space(problem, &fit.rank),
+        outliers: outliers(problem, fit),
+        circular: circular::of_session(problem.session, problem.noise.sigma_mm, &problem.rejected),
+        plausibility,
+        warnings,
+        about: problem.session.about.iter().cloned().collect(),
+        monte_carlo: None,
+    }
+}
+
+/// The identifiable parameters, in display units. A harmonic has amplitude and phase of `amplitude · cos(order · angle + phase)`.
+pub fn parameters(problem: &Problem<'_>, fit: &Fit) -> Vec<ParameterResult> {
+    let list = &problem.parameters.list;
+    let u_internal = |j: usize| fit.covariance[(j, j)].max(0.0).sqrt() * fit.u_enlargement;
+    let mut results = Vec::new();
+    for quantity in quantities(problem, &fit.rank) {
+        match quantity {
+            Quantity::Harmonic(j) => results.extend(amplitude_and_phase(problem, fit, j)),
+            Quantity::Parameter(j) => {
+                let unit = &list[j].unit;
+                let value = fit.beta[j] * unit.display_per_internal;
+                let u = u_internal(j) * unit.display_per_internal;
+                results.push(
+                    ParameterResult::new(&list[j].id, value, u, &unit.name)
+                        .with_meaning(parameter_meaning(problem, j, None)),
+                );
+            }
+        }
+    }
+    results
+}
+
+fn amplitude_and_phase(problem: &Problem<'_>, fit: &Fit, j: usize) -> [ParameterResult; 2] {
+    let id = problem.parameters.list[j].id.trim_end_matches(".cos");
+    let (a, b) = (fit.beta[j], fit.beta[j + 1]);
+    let cov = |p: usize, q: usize| fit.covariance[(p, q)] * fit.u_enlargement.powi(2);
+    let amplitude = a.hypot(b);
+    let (ca, sa) = if amplitude > 0.0 {
+        (a / amplitude, b / amplitude)
+    } else {
+        (1.0, 0.0)
+    };
+    let along = ca * ca * cov(j, j) + 2.0 * ca * sa * cov(j, j + 1) + sa * sa * cov(j + 1, j + 1);
+    let across = sa * sa * cov(j, j) - 2.0 * ca * sa * cov(j, j + 1) + ca * ca * cov(j + 1, j + 1);
+    let unit = &problem.parameters.list[j].unit;
+    let u_phase = if amplitude > 0.0 {
+        (across.max(0.0).sqrt() / amplitude)
+            .to_degrees()
+            .min(u_of_undetermined_phase_deg())
+    } else {
+        u_of_undetermined_phase_deg()
+    };
+    let display = unit.display_per_internal;
+    let u_amplitude = along.max(0.0).sqrt() * display;
+    let result = |name: &str, value: f64, u: f64, unit: &str| {
+        ParameterResult::new(format!("{id}.{name}"), value, u, unit).with_meaning(parameter_meaning(
+            problem,
+            j,
+            Some(name),
+        ))
+    };
+    let mut pair = [
+        result("amplitude", amplitude * display, u_amplitude, &unit.name),
+        result("phase", (-b).atan2(a).to_degrees(), u_phase, "deg"),
+    ];
+    phases_follow_amplitudes(&mut pair);
+    pair
+}
+
+/// The identifiers of parameters.
+pub(crate) fn ids(parameters: &[ParameterResult]) -> Vec<String> {
+    parameters.iter().map(|parameter| parameter.id.clone()).collect()
+}
+
+/// Standard uncertainty of an undetermined phase, °: the standard deviation of a uniform distribution over one turn.
+pub(crate) fn u_of_undetermined_phase_deg() -> f64 {
+    180.0 / 3.0_f64.sqrt()
+}
+
+/// The null-space combinations, in display units and in words.
+pub fn unobservable(problem: &Problem<'_>, rank: &Rank) -> Vec<Unobservable> {
+    let list = &problem.parameters.list;
+    rank.null_combinations
+        .iter()
+        .zip(&rank.pivots)
+        .map(|(row, pivot)| {
+            let others = (0..row.len()).filter(|j| j != pivot && row[*j] != 0.0);
+            let displayed: Vec<(usize, f64)> = std::iter::once(*pivot)
+                .chain(others)
+                .map(|j| (j, row[j] * list[j].size * list[j].unit.display_per_internal))
+                .collect();
+            let leading = displayed.first().map_or(1.0, |(_, value)| *value);
+            let combination: BTreeMap<String, f64> = displayed
+                .iter()
+                .map(|(j, value)| (list[*j].id.clone(), value / leading))
+                .collect();
+            let why = match displayed.as_slice() {
+                [(j, _)] => format!("no reading of these tests changes with {}", list[*j].id),
+                [(first, _), rest @ ..] => {
+                    let others: Vec<&str> = rest.iter().map(|(j, _)| list[*j].id.as_str()).collect();
+                    format!(
+                        "{} is confounded with {}: null-space direction, in this proportion they leave every reading unchanged",
+                        list[*first].id,
+                        others.join(", ")
+                    )
+                }
+                [] => String::new(),
+            };
+            Unobservable { combination, why }
+        })
+        .collect()
+}
+
+/// The excluded outliers, by test, file and line.
+pub fn outliers(problem: &Problem<'_>, fit: &Fit) -> Vec<Outlier> {
+    let coordinates = problem.coordinates();
+    let mut list = Vec::new();
+    for (number, test) in problem.tests.iter().enumerate() {
+        let Some(readings) = &test.readings else { continue };
+        for row in (0..readings.rows()).filter(|row| problem.rejected[number][*row]) {
+            let residual = &fit.residuals[number][row * coordinates..(row + 1) * coordinates];
+            list.push(Outlier {
+                test: test.name.clone(),
+                file: readings.file.display().to_string(),
+                line: readings.line.get(row).copied().unwrap_or(0),
+                residual_um: residual.iter().map(|v| v * v).sum::<f64>().sqrt() * 1e3,
+            });
+        }
+    }
+    list
+}
