@@ -2,10 +2,10 @@
 
 use abbe_model::axis::AxisKind;
 use abbe_model::component::{ErrorKind, ErrorName};
+use abbe_model::driver::DriverQuantity;
 use abbe_model::instrument::{InstrumentParameter, InternalUnit};
 
 use crate::coefficient::Coefficient;
-use crate::driver_quantity::DriverQuantity;
 
 /// A variable of an expression.
 #[derive(Clone, Debug, PartialEq)]
@@ -69,7 +69,7 @@ impl Variable {
     pub fn unit(&self) -> &'static str {
         match self {
             Variable::Instrument(unknown) if unknown.unit == InternalUnit::Ratio => "1",
-            Variable::Driver(followed) => followed.unit(),
+            Variable::Driver(followed) => followed.unit,
             Variable::Coefficient(coefficient) => coefficient.unit(),
             _ if self.is_angle() => "rad",
             _ => "mm",
@@ -101,7 +101,7 @@ impl Variable {
                     coordinate => format!("error of the {thing} in {coordinate}"),
                 }
             }
-            Variable::Driver(followed) => followed.meaning(),
+            Variable::Driver(followed) => followed.meaning.clone(),
             Variable::Coefficient(coefficient) => coefficient.meaning(),
         }
     }
@@ -114,7 +114,7 @@ impl Variable {
             Variable::Error(name) => name.to_string(),
             Variable::Instrument(unknown) if unknown.coordinate.is_empty() => unknown.thing.to_string(),
             Variable::Instrument(unknown) => format!("{}.{}", unknown.thing, unknown.coordinate),
-            Variable::Driver(followed) => followed.meaning(),
+            Variable::Driver(followed) => followed.meaning.clone(),
             Variable::Coefficient(coefficient) => coefficient.id(),
         }
     }
@@ -135,7 +135,7 @@ impl Variable {
                 "" => format!("δ_{}", unknown.thing),
                 coordinate => format!("δ_{}_{coordinate}", unknown.thing),
             },
-            Variable::Driver(followed) => followed.text(),
+            Variable::Driver(followed) => followed.text.clone(),
             Variable::Coefficient(coefficient) => format!("k_{}", coefficient.number),
         }
     }
@@ -162,7 +162,7 @@ impl Variable {
                 AxisKind::Rotary => format!("angle_{}", axis.to_lowercase()),
             },
             Variable::Instrument(_) => self.text(symbols).replace('δ', "delta"),
-            Variable::Driver(followed) => followed.identifier(),
+            Variable::Driver(followed) => followed.identifier.clone(),
             _ => self.text(symbols).replace('θ', "theta"),
         };
         identifier(&text)

@@ -12,7 +12,8 @@ mod range;
 use std::ops::Range;
 
 use abbe_model::component::{ErrorKind, ErrorName};
-use abbe_model::effect::{Component, Driver, DriverSample, Effect, Shape};
+use abbe_model::driver::{Driver, DriverPart, DriverSample};
+use abbe_model::effect::{Component, Effect};
 
 use crate::fit::Fit;
 use crate::parameters::Role;
@@ -85,7 +86,7 @@ impl ErrorCurve {
     pub fn is_directional(&self) -> bool {
         self.terms
             .iter()
-            .any(|(effect, _)| effect.shape == Shape::Backlash)
+            .any(|(effect, _)| effect.shape.uses() == DriverPart::Direction)
     }
 }
 
@@ -134,14 +135,8 @@ pub fn of_fit(problem: &Problem<'_>, fit: &Fit) -> Compensation {
                 found[coefficient] = Some(j);
             }
         }
-        let fits_table = match &effect.shape {
-            Shape::Lag
-            | Shape::ReversalSpike { .. }
-            | Shape::Drift
-            | Shape::Warmup { .. }
-            | Shape::Constant => false,
-            _ => matches!(&effect.driver, Driver::Axis(driver) if *driver == error.axis),
-        };
+        let own = matches!(&effect.driver, Driver::Axis(driver) if *driver == error.axis);
+        let fits_table = own && effect.shape.fits_position_table();
         if error.kind != ErrorKind::Motion || !fits_table {
             result.left_out.push(format!(
                 "{id}: a table over the position of its axis cannot represent it"

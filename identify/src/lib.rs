@@ -7,7 +7,7 @@
 //! - [`monte_carlo`], [`propagation`]: propagation of distributions by Monte Carlo; [`repeated`]: Type A against Type B uncertainty;
 //! - [`compensation`]: identified error motions as functions of the axis position;
 //! - [`circular`]: ball-bar characteristics of ISO 230-4 and the diagnosis of circular tests;
-//! - [`trace`]: search for the unmodelled effect behind the residual; [`effect_description`], [`parameter_description`]: effects and parameters
+//! - [`trace`]: search for the unmodelled effect behind the residual; [`parameter_description`]: parameters
 //!   in words;
 //! - [`plan`]: identifiability and expected uncertainty of a plan, before any measurement;
 //! - [`directions`]: readings and residuals of an R-test by direction;
@@ -45,8 +45,6 @@ pub mod circle;
 pub mod circular;
 pub mod compensation;
 pub mod directions;
-pub mod drivers;
-pub mod effect_description;
 pub mod error;
 pub mod fit;
 pub mod geometric;

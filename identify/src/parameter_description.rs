@@ -5,9 +5,9 @@ use abbe_model::chain::Machine;
 use abbe_model::component::{ErrorKind, ErrorName};
 use abbe_model::effect::{Component, Effect};
 
-use crate::effect_description::{component_meaning, meaning};
 use crate::parameters::Role;
 use crate::problem::Problem;
+use abbe_model::effect::description::{component_meaning, meaning};
 
 /// The description of a location error or an error motion; empty if the name is not an error of ISO 230-1.
 pub fn error_meaning(machine: &Machine, id: &str) -> String {

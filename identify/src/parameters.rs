@@ -3,12 +3,12 @@
 use std::collections::BTreeSet;
 use std::sync::Arc;
 
-use abbe_model::effect::{Component, Driver, Effect};
+use abbe_model::driver::{DriverInput, Origin};
+use abbe_model::effect::{Component, Effect};
 use abbe_model::instrument::InternalUnit;
 use abbe_model::sensitivity::{SlotValues, TestModel};
 use abbe_model::session::{Prior, Session, Test};
 
-use crate::drivers::{self, Origin};
 use crate::error::IdentifyError;
 use crate::unit::Unit;
 
@@ -214,7 +214,7 @@ impl Parameters {
         origin: &Origin,
         effect: &Effect,
     ) -> Result<(), IdentifyError> {
-        let size = match drivers::component_unit(session, &effect.component) {
+        let size = match effect.component.unit(session.instrument.unknowns()) {
             Some(unit) => physical_size(unit),
             None if effect.component == Component::TriggerDelay => 0.1,
             None => {
@@ -245,29 +245,34 @@ impl Parameters {
                 continue;
             }
             let Some(readings) = &test.readings else { continue };
-            let axis = drivers::component_axis(session, &effect.component);
-            let samples = drivers::samples(&session.machine, model, readings, origin, &effect.driver, axis)
+            let driver = effect.driver.kind();
+            let input = DriverInput {
+                machine: &session.machine,
+                model,
+                readings,
+                origin,
+                component_axis: effect.component.axis(&session.machine),
+            };
+            let samples = driver
+                .samples(&input)
                 .ok_or_else(|| IdentifyError::MissingDriver {
-                effect: effect.id(),
-                driver: effect.driver.to_string(),
-                test: test.name.clone(),
-                column: match effect.driver {
-                    Driver::Time => "time_s".to_string(),
-                    Driver::Temperature => "temperature_c".to_string(),
-                    ref other => other.to_string(),
-                },
-            })?;
+                    effect: effect.id(),
+                    driver: effect.driver.to_string(),
+                    test: test.name.clone(),
+                    column: driver
+                        .column()
+                        .map_or_else(|| effect.driver.to_string(), str::to_string),
+                })?;
             let effective = model.effective_slots();
-            let columns: Vec<Arc<Vec<f64>>> = drivers::basis_columns(&effect.shape, &samples)
-                .into_iter()
-                .map(Arc::new)
-                .collect();
+            let columns: Vec<Arc<Vec<f64>>> =
+                effect.shape.columns(&samples).into_iter().map(Arc::new).collect();
             for (k, column) in columns.iter().enumerate() {
                 largest[k] = column
                     .iter()
                     .fold(largest[k], |most, value| most.max(value.abs()));
             }
-            for (slot, factor) in drivers::component_slots(session, test, readings, &effect.component) {
+            let parameters = test.station.kind().unknowns();
+            for (slot, factor) in effect.component.slots_in(&session.machine, parameters, readings) {
                 if !effective.contains(&slot) {
                     continue;
                 }
@@ -288,7 +293,7 @@ impl Parameters {
             let dot = if name.is_empty() { "" } else { "." };
             self.push(Parameter {
                 id: format!("{id}{dot}{name}"),
-                unit: drivers::coefficient_unit(session, effect, k),
+                unit: Unit::of_effect(session, effect, k),
                 size: if largest[k] > 0.0 { size / largest[k] } else { size },
                 prior: Prior::Free,
                 role: Role::Coefficient {

@@ -16,12 +16,12 @@ use faer::Mat;
 use num_dual::DualNum;
 use rayon::prelude::*;
 
-use crate::drivers::Origin;
 use crate::error::IdentifyError;
 use crate::heldout::folds::Folds;
 use crate::noise::Noise;
 use crate::parameters::{Parameters, TestParameters};
 use crate::triangle::{BLOCK_ROWS, Triangle};
+use abbe_model::driver::Origin;
 
 /// A session with readings, its parameters, and the weights of its readings.
 #[derive(Clone)]
@@ -86,7 +86,7 @@ impl<'a> Problem<'a> {
                 Some(TestModel::new(&session.machine, station, readings))
             })
             .collect();
-        let origin = Origin::of(session);
+        let origin = session.origin();
         let parameters = Parameters::declared(session, &tests, &models)?;
         let rejected = models.iter().map(|model| vec![false; model.rows()]).collect();
         let folds = Folds::of(session, &tests, seed);

@@ -4,7 +4,6 @@
 //! `f64`. The identifiers are those of the results, so that the estimates of a fit can be simulated again.
 
 use abbe_model::component::ErrorName;
-use abbe_model::effect::Shape;
 use abbe_model::instrument::InstrumentKind;
 use abbe_model::sensitivity::TestModel;
 use abbe_model::session::readings::Readings;
@@ -12,7 +11,6 @@ use abbe_model::session::{Prior, Session, Test, planned};
 use rand_distr::{Distribution, StandardNormal};
 use rand_pcg::Pcg64;
 
-use crate::drivers::Origin;
 use crate::error::IdentifyError;
 use crate::parameters::{Parameters, Role};
 use crate::quantity::Given;
@@ -106,7 +104,7 @@ pub fn simulate(session: &Session, simulation: &Simulation) -> Result<Simulated,
         })
         .collect();
     let mut parameters = Parameters::declared(&open, &tests, &models)?;
-    let origin = Origin::of(&open);
+    let origin = open.origin();
     for effect in &session.effects {
         parameters.add_effect(&open, &tests, &models, &origin, effect)?;
     }
@@ -235,7 +233,7 @@ fn assign(
     let find = |id: &str| parameters.list.iter().position(|parameter| parameter.id == id);
     let mut used = vec![false; given.len()];
     for effect in &parameters.effects {
-        if !matches!(effect.shape, Shape::Harmonic { .. } | Shape::Periodic { .. }) {
+        if !effect.shape.is_wave() {
             continue;
         }
         let id = effect.id();

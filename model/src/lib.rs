@@ -3,7 +3,7 @@
 //!
 //! - [`scalar`]: numeric types of the chain; [`expression`]: the symbolic scalar;
 //! - [`frames`], [`axis`], [`chain`]: transformation of points through a machine;
-//! - [`component`], [`effect`]: names of errors, and their dependence on drivers; [`pattern`]: one name for several errors;
+//! - [`component`], [`effect`], [`driver`]: names of errors, and their dependence on drivers; [`pattern`]: one name for several errors;
 //! - [`instrument`]: readings from states of the axes;
 //! - [`sensitivity`]: readings and their derivatives by every component; [`replay`]: evaluation over columns of readings;
 //! - [`session`]: machine, tests and readings, and their files; [`words`]: counts in messages.
@@ -61,6 +61,7 @@ pub mod axis;
 pub mod chain;
 pub mod code;
 pub mod component;
+pub mod driver;
 pub mod effect;
 pub mod error;
 pub mod expression;

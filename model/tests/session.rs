@@ -4,7 +4,11 @@ use std::fs;
 use std::path::{Path, PathBuf};
 
 use abbe_model::chain::BodyErrors;
-use abbe_model::effect::{Component, Driver, Effect, Shape};
+use abbe_model::driver::Driver;
+use abbe_model::effect::shape::{
+    Curve, Harmonic, Local, Periodic, Polynomial, Power, ReversalSpike, Steps, Warmup,
+};
+use abbe_model::effect::{Component, Effect, Shape};
 use abbe_model::files::table::csv;
 use abbe_model::files::{self, ReadOptions};
 use abbe_model::files::{toml::write, whole};
@@ -144,59 +148,59 @@ fn written_effects_read_back_equal() {
     };
     let mut effects = vec![
         effect("EX0C", "time", Shape::Drift),
-        effect("EZC", "C", Shape::Harmonic { order: 2.0 }),
-        effect("EZC", "C", Shape::Harmonic { order: 0.5 }),
+        effect("EZC", "C", Shape::Harmonic(Harmonic { order: 2.0 })),
+        effect("EZC", "C", Shape::Harmonic(Harmonic { order: 0.5 })),
         effect(
             "EXX",
             "X",
-            Shape::Polynomial {
+            Shape::Polynomial(Polynomial {
                 degree: 3,
                 scale: 250.0,
-            },
+            }),
         ),
         effect(
             "ECC",
             "C",
-            Shape::Power {
+            Shape::Power(Power {
                 degree: 2,
                 scale: 1.0,
-            },
+            }),
         ),
-        effect("EXX", "X", Shape::Periodic { period: 10.0 }),
-        effect("EXC", "C", Shape::Periodic { period: 0.1 }),
+        effect("EXX", "X", Shape::Periodic(Periodic { period: 10.0 })),
+        effect("EXC", "C", Shape::Periodic(Periodic { period: 0.1 })),
         effect("EYY", "Y", Shape::Backlash),
         effect("EYY", "Y", Shape::Lag),
-        effect("EYY", "Y", Shape::ReversalSpike { width: 1.5 }),
-        effect("bar", "time", Shape::Warmup { tau_s: 1234.5 }),
+        effect("EYY", "Y", Shape::ReversalSpike(ReversalSpike { width: 1.5 })),
+        effect("bar", "time", Shape::Warmup(Warmup { tau_s: 1234.5 })),
         effect(
             "workpiece_ball.z",
             "temperature",
-            Shape::Polynomial {
+            Shape::Polynomial(Polynomial {
                 degree: 1,
                 scale: 1.0,
-            },
+            }),
         ),
         effect(
             "EAA",
             "gravity",
-            Shape::Polynomial {
+            Shape::Polynomial(Polynomial {
                 degree: 1,
                 scale: 1.0,
-            },
+            }),
         ),
         effect(
             "EXX",
             "X",
-            Shape::Steps {
+            Shape::Steps(Steps {
                 at: vec![-50.0, 0.1, 50.0],
-            },
+            }),
         ),
         effect(
             "ECC",
             "C",
-            Shape::Steps {
+            Shape::Steps(Steps {
                 at: vec![0.3, 1.0, 2.0_f64.to_radians()],
-            },
+            }),
         ),
         effect("EZC", "none", Shape::Constant),
         effect("trigger", "none", Shape::Constant),
@@ -206,7 +210,7 @@ fn written_effects_read_back_equal() {
         effects.push(effect(
             "EZC",
             "C",
-            Shape::Local {
+            Shape::Local(Local {
                 centre: if degrees % 2 == 0 {
                     centre.to_radians()
                 } else {
@@ -214,19 +218,19 @@ fn written_effects_read_back_equal() {
                 },
                 width: 12.0_f64.to_radians(),
                 recurs: (degrees % 3 > 0).then_some(std::f64::consts::TAU),
-            },
+            }),
         ));
     }
     for closed in [true, false] {
         effects.push(effect(
             "EZA",
             "A",
-            Shape::Curve {
+            Shape::Curve(Curve {
                 from: -20.0_f64.to_radians(),
                 to: 70.0_f64.to_radians(),
                 intervals: 9,
                 closed,
-            },
+            }),
         ));
     }
     effects[1].tests = vec!["C100".into(), "C150".into()];

@@ -6,6 +6,7 @@ use abbe::identify::problem::Problem;
 use abbe::identify::series::lengths;
 use abbe::identify::series::sensitivities::{self as sensitivity, Sensitivity, TestSensitivities};
 use abbe::identify::series::spectrum::Spectrum;
+use abbe::model::effect::shape::Harmonic;
 use abbe::model::effect::{Effect, Shape};
 use abbe::model::words::counted;
 use maud::{Markup, html};
@@ -183,7 +184,7 @@ pub fn spectrum_plot(spectrum: &Spectrum, maximum: f64, effects: &[Effect]) -> P
         .iter()
         .filter(|effect| effect.driver.to_string() == spectrum.over && effect.acts_in(&spectrum.of))
         .filter_map(|effect| match effect.shape {
-            Shape::Harmonic { order } => Some((order, effect.id())),
+            Shape::Harmonic(Harmonic { order }) => Some((order, effect.id())),
             _ => None,
         })
         .filter(|(order, _)| *order <= orders)

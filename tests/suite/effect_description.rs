@@ -3,12 +3,14 @@
 use std::collections::{BTreeSet, HashMap};
 use std::fmt::Write;
 
-use abbe::identify::effect_description::{explanations, meaning};
 use abbe::identify::problem::Problem;
 use abbe::identify::trace::library;
 use abbe::model::chain::Machine;
 use abbe::model::component::{ErrorKind, Freedom};
-use abbe::model::effect::{Component, Driver, Effect, Shape};
+use abbe::model::driver::Driver;
+use abbe::model::effect::description::{explanations, meaning};
+use abbe::model::effect::shape::{Harmonic, Periodic, Power, Steps, Warmup};
+use abbe::model::effect::{Component, Effect, Shape};
 use abbe::model::files::{ReadOptions, session as read};
 use abbe::model::session::Session;
 
@@ -123,14 +125,14 @@ fn descriptions_name_the_part_and_its_motion() {
         };
         meaning(machine, &effect).to_string()
     };
-    let power = Shape::Power {
+    let power = Shape::Power(Power {
         degree: 1,
         scale: 1.0,
-    };
-    let harmonic = |order: f64| Shape::Harmonic { order };
-    let steps = Shape::Steps {
+    });
+    let harmonic = |order: f64| Shape::Harmonic(Harmonic { order });
+    let steps = Shape::Steps(Steps {
         at: vec![-84.72, 40.0],
-    };
+    });
     for (component, driver, shape, expected) in [
         ("EZC", "C", harmonic(2.0), "C table: axial motion twice per turn"),
         ("EAC", "C", harmonic(1.0), "C table: tilt about X once per turn"),
@@ -167,7 +169,7 @@ fn descriptions_name_the_part_and_its_motion() {
         (
             "EYX",
             "X",
-            Shape::Periodic { period: 13.777 },
+            Shape::Periodic(Periodic { period: 13.777 }),
             "X slide: straightness error in Y, repeating every 13.78 mm",
         ),
         (
@@ -197,7 +199,7 @@ fn descriptions_name_the_part_and_its_motion() {
         (
             "workpiece_ball.x",
             "time",
-            Shape::Warmup { tau_s: 200.0 },
+            Shape::Warmup(Warmup { tau_s: 200.0 }),
             "workpiece ball: shift in X, warming up with a time constant of 200.0 s",
         ),
         ("bar", "none", Shape::Constant, "bar: length, constant"),
@@ -234,7 +236,7 @@ fn explanations_are_grouped_by_part() {
         let effect = Effect {
             component: Component::Axis(name),
             driver: Driver::Axis(axis.to_string()),
-            shape: Shape::Harmonic { order },
+            shape: Shape::Harmonic(Harmonic { order }),
             tests: Vec::new(),
         };
         meaning(&machine, &effect)

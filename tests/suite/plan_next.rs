@@ -5,7 +5,9 @@ use abbe::identify::plan::criterion::Goal;
 use abbe::identify::plan::improve::{ImproveOptions, improve};
 use abbe::identify::plan::test_variations::TestVariations;
 use abbe::identify::plan::{PlanOptions, analyse, separation, states};
-use abbe::model::effect::{Component, Driver, Effect, Shape};
+use abbe::model::driver::Driver;
+use abbe::model::effect::shape::Harmonic;
+use abbe::model::effect::{Component, Effect, Shape};
 use abbe::model::instrument::Station;
 use abbe::model::session::{Prior, Session};
 
@@ -123,7 +125,7 @@ fn a_second_radius_separates_tilt_and_axial_motion() {
     let harmonic = |component: &str, order: f64| Effect {
         component: Component::parse(component).unwrap(),
         driver: Driver::Axis("C".into()),
-        shape: Shape::Harmonic { order },
+        shape: Shape::Harmonic(Harmonic { order }),
         tests: Vec::new(),
     };
     let beta = vec![0.0; problem.parameters.list.len()];

@@ -6,7 +6,9 @@ use abbe::identify::plan::effects::effects;
 use abbe::identify::plan::results::EffectDetectability;
 use abbe::identify::plan::states;
 use abbe::identify::trace::library;
-use abbe::model::effect::{Driver, Shape};
+use abbe::model::driver::Driver;
+use abbe::model::effect::Shape;
+use abbe::model::effect::shape::Power;
 use abbe::model::session::Session;
 
 use super::plan_help::{machine, noise_um, session};
@@ -31,7 +33,7 @@ fn judged(plan: &Session) -> Vec<EffectDetectability> {
     let complete = states::complete(plan, true).unwrap();
     let problem = states::problem_by_test(&complete, noise_um(NOISE_UM)).unwrap();
     for candidate in library::candidates(&problem).unwrap() {
-        if let Shape::Power { scale, .. } = candidate.effect.shape {
+        if let Shape::Power(Power { scale, .. }) = candidate.effect.shape {
             let expected = match &candidate.effect.driver {
                 Driver::Axis(name) if name == "C" => PI,
                 Driver::Axis(_) => 100.0,

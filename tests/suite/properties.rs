@@ -12,7 +12,9 @@ use abbe::identify::problem::Problem;
 use abbe::identify::results::FitResult;
 use abbe::model::axis::AxisKind;
 use abbe::model::component::{ErrorKind, ErrorName, Freedom};
-use abbe::model::effect::{Component, Driver, Effect, Shape};
+use abbe::model::driver::Driver;
+use abbe::model::effect::shape::Periodic;
+use abbe::model::effect::{Component, Effect, Shape};
 use abbe::model::files::{self, ReadOptions};
 use abbe::model::instrument::Station;
 use abbe::model::instrument::ballbar::BallBar;
@@ -245,7 +247,7 @@ proptest! {
                 axis: axis.name.clone(),
             }),
             driver: Driver::Axis(axis.name.clone()),
-            shape: Shape::Periodic { period: 0.7 },
+            shape: Shape::Periodic(Periodic { period: 0.7 }),
             tests: Vec::new(),
         };
         let mut with = session.clone();

@@ -10,7 +10,9 @@ use abbe::identify::results::EffectName;
 use abbe::identify::simulate::{Simulation, simulate};
 use abbe::identify::trace::separating_tests::separate_aliases;
 use abbe::identify::trace::{TraceOptions, trace};
-use abbe::model::effect::{Component, Driver, Effect, Shape};
+use abbe::model::driver::Driver;
+use abbe::model::effect::shape::{Harmonic, Local};
+use abbe::model::effect::{Component, Effect, Shape};
 use abbe::model::files::{self, ReadOptions};
 use abbe::model::session::Session;
 
@@ -46,8 +48,8 @@ fn measured(effects: Vec<Effect>, values: &[&str], declared: usize) -> Session {
 /// EZC of order 2 and EAC of order 3, of which the first `declared` are declared.
 fn wave_and_tilt(declared: usize) -> Session {
     let waves = vec![
-        of_c("EZC", Shape::Harmonic { order: 2.0 }),
-        of_c("EAC", Shape::Harmonic { order: 3.0 }),
+        of_c("EZC", Shape::Harmonic(Harmonic { order: 2.0 })),
+        of_c("EAC", Shape::Harmonic(Harmonic { order: 3.0 })),
     ];
     let values = [
         "EZC~C:h2.amplitude=1.5um",
@@ -60,11 +62,11 @@ fn wave_and_tilt(declared: usize) -> Session {
 /// With a library of a harmonic and a nonparametric curve, a local feature is first attributed to the harmonic, which the curve then replaces.
 #[test]
 fn the_reported_model_has_the_reported_effects() {
-    let bump = Shape::Local {
+    let bump = Shape::Local(Local {
         centre: 150_f64.to_radians(),
         width: 12_f64.to_radians(),
         recurs: None,
-    };
+    });
     let session = measured(vec![of_c("EZC", bump)], &["EZC~C:local=5um"], 0);
     let options = TraceOptions {
         only: ["EZC~C:h3", "EZC~C:curve"].map(String::from).to_vec(),

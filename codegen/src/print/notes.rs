@@ -1,9 +1,9 @@
 //! Sentences about an equation, common to all printers.
 
+use abbe_model::driver::DriverPart;
 use abbe_model::frames::Rotation;
 
 use crate::check::Checked;
-use crate::driver_quantity::DriverQuantity;
 use crate::equation::Equation;
 use crate::first_order::Column;
 use crate::form::{Form, Kind, Order};
@@ -115,13 +115,13 @@ fn range(checked: &Checked<'_>) -> String {
                 two_places(*low),
                 two_places(*high)
             )),
-            Variable::Driver(DriverQuantity::Direction(_)) => None,
+            Variable::Driver(quantity) if quantity.part == DriverPart::Direction => None,
             Variable::Driver(followed) => Some(format!(
                 "{} {low} {unit} to {high} {unit}",
-                followed.text(),
+                followed.text,
                 low = two_places(*low),
                 high = two_places(*high),
-                unit = followed.unit()
+                unit = followed.unit
             )),
             Variable::Length(name) if checked.equation.kind == Kind::Volumetric => {
                 Some(format!("{name} {} mm", two_places(*low)))

@@ -4,12 +4,14 @@ use std::f64::consts::{PI, TAU};
 
 use abbe_codegen::evaluate::evaluate_f64;
 use abbe_codegen::print::{Audience, LANGUAGES};
-use abbe_codegen::{
-    CodegenError, DriverQuantity, Equation, Options, Order, Source, Subject, Variable, check,
-};
+use abbe_codegen::{CodegenError, Equation, Options, Order, Source, Subject, Variable, check};
 use abbe_model::chain::Machine;
 use abbe_model::component::ErrorName;
-use abbe_model::effect::{Component, Driver, Effect, Shape};
+use abbe_model::driver::{Driver, DriverPart};
+use abbe_model::effect::shape::{
+    Curve, Harmonic, Local, Periodic, Polynomial, Power, ReversalSpike, Steps, Warmup,
+};
+use abbe_model::effect::{Component, Effect, Shape};
 use abbe_model::instrument::{Station, ballbar::BallBar, socket::Socket};
 use abbe_model::scalar::Nominal;
 
@@ -61,12 +63,13 @@ fn bases(driver: &str, shape: Shape, at: At) -> Vec<f64> {
     let options = with(vec![effect("EYX", driver, shape)]);
     let equation = Equation::of(&machine, &Ball, &[], &options).expect("an equation");
     let variable = |variable: &Variable| match variable {
-        Variable::Position { .. } | Variable::Driver(DriverQuantity::Time | DriverQuantity::Temperature) => {
-            at.q
-        }
-        Variable::Driver(DriverQuantity::Direction(_)) => at.direction,
-        Variable::Driver(DriverQuantity::Rate(..)) => at.rate,
-        Variable::Driver(DriverQuantity::SinceReversal(..)) => at.way,
+        Variable::Position { .. } => at.q,
+        Variable::Driver(quantity) => match quantity.part {
+            DriverPart::Value => at.q,
+            DriverPart::Direction => at.direction,
+            DriverPart::Rate => at.rate,
+            DriverPart::SinceReversal => at.way,
+        },
         Variable::Coefficient(coefficient) => coefficient.number as f64,
         other => panic!("{other:?} has no place here"),
     };
@@ -99,28 +102,28 @@ fn here(q: f64) -> At {
 
 #[test]
 fn smooth_shapes_by_hand() {
-    let polynomial = Shape::Polynomial {
+    let polynomial = Shape::Polynomial(Polynomial {
         degree: 3,
         scale: 100.0,
-    };
+    });
     near(&bases("X", polynomial, HERE), &[0.37, 0.1369, 0.050653]);
-    let power = Shape::Power {
+    let power = Shape::Power(Power {
         degree: 5,
         scale: 10.0,
-    };
+    });
     near(&bases("temperature", power, here(12.0)), &[2.48832]);
-    let harmonic = Shape::Harmonic { order: 3.0 };
+    let harmonic = Shape::Harmonic(Harmonic { order: 3.0 });
     near(
         &bases("X", harmonic, here(PI / 12.0)),
         &[0.5_f64.sqrt(), 0.5_f64.sqrt()],
     );
-    let periodic = Shape::Periodic { period: 12.0 };
+    let periodic = Shape::Periodic(Periodic { period: 12.0 });
     near(
         &bases("X", periodic, here(38.0)),
         &[(TAU / 6.0).cos(), (TAU / 6.0).sin()],
     );
     near(&bases("time", Shape::Drift, here(1800.0)), &[0.5]);
-    let warmup = Shape::Warmup { tau_s: 600.0 };
+    let warmup = Shape::Warmup(Warmup { tau_s: 600.0 });
     near(&bases("time", warmup, here(1200.0)), &[1.0 - (-2.0_f64).exp()]);
     near(&bases("X", Shape::Lag, HERE), &[-4.0]);
 }
@@ -128,21 +131,25 @@ fn smooth_shapes_by_hand() {
 #[test]
 fn shapes_of_reversal_by_hand() {
     near(&bases("X", Shape::Backlash, HERE), &[0.5]);
-    let spike = Shape::ReversalSpike { width: 3.0 };
+    let spike = Shape::ReversalSpike(ReversalSpike { width: 3.0 });
     near(&bases("X", spike, HERE), &[-(-2.0_f64).exp()]);
 }
 
 #[test]
 fn shapes_with_edges_by_hand_on_both_sides() {
-    let steps = || Shape::Steps {
-        at: vec![10.0, 37.0, 50.0],
+    let steps = || {
+        Shape::Steps(Steps {
+            at: vec![10.0, 37.0, 50.0],
+        })
     };
     near(&bases("X", steps(), HERE), &[1.0, 1.0, 0.0]);
     near(&bases("X", steps(), here(36.999)), &[1.0, 0.0, 0.0]);
-    let bump = |recurs| Shape::Local {
-        centre: 30.0,
-        width: 10.0,
-        recurs,
+    let bump = |recurs| {
+        Shape::Local(Local {
+            centre: 30.0,
+            width: 10.0,
+            recurs,
+        })
     };
     let expected = 0.5 * (1.0 + (0.7 * PI).cos());
     near(&bases("X", bump(None), HERE), &[expected]);
@@ -165,11 +172,13 @@ fn cardinal(s: f64) -> f64 {
 
 #[test]
 fn curves_by_truncated_powers() {
-    let open = || Shape::Curve {
-        from: 10.0,
-        to: 60.0,
-        intervals: 5,
-        closed: false,
+    let open = || {
+        Shape::Curve(Curve {
+            from: 10.0,
+            to: 60.0,
+            intervals: 5,
+            closed: false,
+        })
     };
     // Beyond its ends a curve is constant.
     for (q, position) in [(10.0, 0.0), (22.5, 1.25), (37.0, 2.7), (59.9, 4.99), (-20.0, 0.0)] {
@@ -182,11 +191,13 @@ fn curves_by_truncated_powers() {
             &[0.0, 0.0, 0.0, 0.0, 0.0, 1.0 / 6.0, 4.0 / 6.0, 1.0 / 6.0],
         );
     }
-    let closed = || Shape::Curve {
-        from: 0.0,
-        to: 60.0,
-        intervals: 6,
-        closed: true,
+    let closed = || {
+        Shape::Curve(Curve {
+            from: 0.0,
+            to: 60.0,
+            intervals: 6,
+            closed: true,
+        })
     };
     for q in [0.0_f64, 13.0, 59.0, 73.0, -47.0] {
         let position = (q / 10.0).rem_euclid(6.0);
@@ -201,33 +212,33 @@ fn curves_by_truncated_powers() {
 /// One effect of each shape on a machine with a rotary axis; the components include an instrument parameter and a
 /// delay.
 pub fn every_shape() -> Vec<Effect> {
-    let polynomial = |degree, scale| Shape::Polynomial { degree, scale };
-    let local = Shape::Local {
+    let polynomial = |degree, scale| Shape::Polynomial(Polynomial { degree, scale });
+    let local = Shape::Local(Local {
         centre: 0.5,
         width: 0.4,
         recurs: Some(TAU),
-    };
+    });
     vec![
-        effect("EZC", "C", Shape::Harmonic { order: 2.0 }),
-        effect("EXC", "C", Shape::Periodic { period: 0.3 }),
+        effect("EZC", "C", Shape::Harmonic(Harmonic { order: 2.0 })),
+        effect("EXC", "C", Shape::Periodic(Periodic { period: 0.3 })),
         effect("EYC", "C", polynomial(2, PI)),
         effect("EX0C", "temperature", polynomial(1, 1.0)),
         effect("EY0C", "time", Shape::Drift),
         effect("EBC", "C", Shape::Backlash),
         effect("ECC", "C", Shape::Lag),
-        effect("EAC", "C", Shape::ReversalSpike { width: 0.1 }),
-        effect("EZC", "C", Shape::Steps { at: vec![-1.0, 1.0] }),
+        effect("EAC", "C", Shape::ReversalSpike(ReversalSpike { width: 0.1 })),
+        effect("EZC", "C", Shape::Steps(Steps { at: vec![-1.0, 1.0] })),
         effect("EXC", "C", local),
         effect("EBC", "gravity", polynomial(1, 1.0)),
         effect(
             "EYX",
             "X",
-            Shape::Power {
+            Shape::Power(Power {
                 degree: 3,
                 scale: 100.0,
-            },
+            }),
         ),
-        effect("bar", "time", Shape::Warmup { tau_s: 900.0 }),
+        effect("bar", "time", Shape::Warmup(Warmup { tau_s: 900.0 })),
         effect("workpiece_ball.x", "temperature", polynomial(1, 1.0)),
         effect("gain", "temperature", polynomial(1, 1.0)),
         effect("trigger", "none", Shape::Constant),
@@ -236,12 +247,12 @@ pub fn every_shape() -> Vec<Effect> {
 
 /// A curve, which is printed as code only.
 pub fn curve() -> Effect {
-    let shape = Shape::Curve {
+    let shape = Shape::Curve(Curve {
         from: 0.0,
         to: TAU,
         intervals: 4,
         closed: true,
-    };
+    });
     effect("EYC", "C", shape)
 }
 
@@ -297,8 +308,8 @@ fn every_form_is_confirmed_with_every_shape() {
 fn an_equation_names_driven_errors_and_their_drivers() {
     let machine = Machine::from_code("w C b X t").expect("a code");
     let effects = vec![
-        effect("EZC", "C", Shape::Harmonic { order: 2.0 }),
-        effect("bar", "time", Shape::Warmup { tau_s: 900.0 }),
+        effect("EZC", "C", Shape::Harmonic(Harmonic { order: 2.0 })),
+        effect("bar", "time", Shape::Warmup(Warmup { tau_s: 900.0 })),
     ];
     let equation = Equation::of(&machine, &Bar, &[], &with(effects)).expect("an equation");
     let text = printed(&equation, &Bar, "text");
@@ -340,12 +351,12 @@ fn effects_without_a_closed_form_are_refused_by_name() {
         let equation = Equation::of(&machine, &Bar, &[], &with(vec![effect]));
         equation.expect_err("no equation").to_string()
     };
-    let long = Shape::Curve {
+    let long = Shape::Curve(Curve {
         from: 0.0,
         to: TAU,
         intervals: 200,
         closed: true,
-    };
+    });
     let message = refused(effect("EZC", "C", long));
     assert!(
         message.contains("EZC~C:curve") && message.contains("200") && message.contains("fewer intervals"),

@@ -2,9 +2,10 @@
 //! errors of 0.1 rad and 10 mm, value and gradient.
 
 use abbe_codegen::program::Input;
-use abbe_codegen::{DriverQuantity, Equation, Options, ToolPoint, Variable};
+use abbe_codegen::{Equation, Options, ToolPoint, Variable};
 use abbe_model::chain::Machine;
 use abbe_model::component::ErrorName;
+use abbe_model::driver::{Driver, DriverPart};
 use abbe_model::frames::Rotation;
 use rand::{RngExt, SeedableRng};
 
@@ -131,11 +132,15 @@ fn effects(language: &str, random: &mut impl rand::Rng) -> Printed {
                     Variable::Length(_) => (0, random.random_range(90.0..110.0)),
                     Variable::Position { axis, .. } if axis == "C" => (1, angle),
                     Variable::Position { .. } => (1, random.random_range(-150.0..-50.0)),
-                    Variable::Driver(DriverQuantity::Direction(_)) => {
+                    Variable::Driver(quantity) if quantity.part == DriverPart::Direction => {
                         (1, if random.random() { 1.0 } else { -1.0 })
                     }
-                    Variable::Driver(DriverQuantity::Time) => (1, random.random_range(0.0..4000.0)),
-                    Variable::Driver(DriverQuantity::SinceReversal(..)) => (1, random.random_range(0.0..0.5)),
+                    Variable::Driver(quantity) if quantity.driver == Driver::Time => {
+                        (1, random.random_range(0.0..4000.0))
+                    }
+                    Variable::Driver(quantity) if quantity.part == DriverPart::SinceReversal => {
+                        (1, random.random_range(0.0..0.5))
+                    }
                     Variable::Driver(_) => (1, random.random_range(-2.0..2.0)),
                     _ => (2, random.random_range(-0.1..0.1)),
                 },

@@ -5,7 +5,7 @@ use std::ops::Range;
 
 use abbe_model::axis::AxisKind;
 use abbe_model::chain::Machine;
-use abbe_model::effect::DriverSample;
+use abbe_model::driver::DriverSample;
 use abbe_model::instrument::{InstrumentKind, Station};
 use abbe_model::sensitivity::{SlotValues, TestModel};
 use abbe_model::session::Test;

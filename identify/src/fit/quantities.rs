@@ -1,7 +1,5 @@
 //! The quantities that a fit reports: identifiable parameters, and amplitude and phase of harmonics.
 
-use abbe_model::effect::Shape;
-
 use super::Fit;
 use crate::parameters::Role;
 use crate::problem::Problem;
@@ -28,7 +26,7 @@ pub(crate) fn quantities(problem: &Problem<'_>, rank: &Rank) -> Vec<Quantity> {
         } = list[j].role
         {
             let effect = &problem.parameters.effects[effect];
-            let pair = matches!(effect.shape, Shape::Harmonic { .. } | Shape::Periodic { .. });
+            let pair = effect.shape.is_wave();
             if pair && rank.is_identifiable(j) && rank.is_identifiable(j + 1) {
                 quantities.push(Quantity::Harmonic(j));
                 j += 2;
@@ -70,7 +68,9 @@ pub(crate) fn values_at(
 mod tests {
     use std::path::Path;
 
-    use abbe_model::effect::{Component, Driver, Effect};
+    use abbe_model::driver::Driver;
+    use abbe_model::effect::shape::Harmonic;
+    use abbe_model::effect::{Component, Effect, Shape};
     use abbe_model::files::{self, ReadOptions};
 
     use super::*;
@@ -87,7 +87,7 @@ mod tests {
             .add_effect(&Effect {
                 component: Component::parse("EZC").unwrap(),
                 driver: Driver::parse("C"),
-                shape: Shape::Harmonic { order: 3.0 },
+                shape: Shape::Harmonic(Harmonic { order: 3.0 }),
                 tests: Vec::new(),
             })
             .unwrap();

@@ -115,7 +115,7 @@ fn finished(session: &Session, variations: &TestVariations, draft: Draft) -> Opt
             .as_ref()
             .is_some_and(|r| !r.temperature_c.is_empty())
     }) {
-        let mean = crate::drivers::Origin::of(session).temperature_c;
+        let mean = session.origin().temperature_c;
         readings.temperature_c = vec![mean; readings.rows()];
     }
     test.readings = Some(readings);

@@ -11,6 +11,7 @@
 
 use std::collections::{BTreeMap, HashMap};
 
+use abbe_model::effect::shape::Harmonic;
 use abbe_model::effect::{Effect, Shape};
 use faer::{Mat, MatRef};
 use nalgebra::DMatrix;
@@ -20,7 +21,6 @@ use super::detectability::{POWER, SIGNIFICANCE, corrected, noncentrality};
 use super::linear::{Linearisation, is_of_interest};
 use super::ranking::{largest_first, smallest_first};
 use super::results::{Bias, EffectDetectability, EffectsAnalysis};
-use crate::drivers;
 use crate::error::IdentifyError;
 use crate::parameters::physical_size;
 use crate::problem::Problem;
@@ -128,7 +128,7 @@ fn is_screened(effect: &Effect, periods: &mut HashMap<String, usize>) -> bool {
         return false;
     }
     match &effect.shape {
-        Shape::Harmonic { order } => *order <= LOW_ORDERS || HIGH_ORDERS.contains(order),
+        Shape::Harmonic(Harmonic { order }) => *order <= LOW_ORDERS || HIGH_ORDERS.contains(order),
         Shape::Periodic { .. } => {
             let count = periods
                 .entry(format!("{}~{}", effect.component, effect.driver))
@@ -159,10 +159,10 @@ fn judge(
 ) -> EffectDetectability {
     let session = problem.session;
     let effect = &candidate.effect;
-    let unit = drivers::coefficient_unit(session, effect, 0);
+    let unit = Unit::of_effect(session, effect, 0);
     // The coefficient that moves the component by its physical size somewhere in the tests, whatever the scale of the
     // coefficient.
-    let size = match drivers::component_unit(session, &effect.component) {
+    let size = match effect.component.unit(session.instrument.unknowns()) {
         Some(inside) if greatest > 0.0 => physical_size(inside) / greatest,
         Some(inside) => physical_size(inside),
         None => 0.1,
@@ -258,7 +258,7 @@ fn grouped(
     for (entry, candidate) in judged.zip(candidates) {
         let effect = &candidate.effect;
         let key = match &effect.shape {
-            Shape::Harmonic { order } if *order > LOW_ORDERS => {
+            Shape::Harmonic(Harmonic { order }) if *order > LOW_ORDERS => {
                 format!("{}~{}:h>{LOW_ORDERS}", effect.component, effect.driver)
             }
             _ => effect.id(),

@@ -5,6 +5,7 @@
 //! selected out of `m` positions is reduced by `ln C(m, n)`, the logarithm of the number of possible selections. By the union
 //! bound this penalty keeps the significance level of the search.
 
+use abbe_model::effect::shape::Steps;
 use abbe_model::effect::{Effect, Shape};
 use faer::Mat;
 use faer::prelude::Solve;
@@ -44,7 +45,7 @@ pub fn best_step_table(
     dictionary: &Candidate,
     variance: f64,
 ) -> Option<StepTable> {
-    let Shape::Steps { at } = &dictionary.effect.shape else {
+    let Shape::Steps(Steps { at }) = &dictionary.effect.shape else {
         return None;
     };
     let (d, g, own) = model.projected(number);
@@ -74,7 +75,7 @@ pub fn best_step_table(
             let mut positions: Vec<f64> = chosen.iter().map(|k| at[*k]).collect();
             positions.sort_by(f64::total_cmp);
             let effect = Effect {
-                shape: Shape::Steps { at: positions },
+                shape: Shape::Steps(Steps { at: positions }),
                 ..dictionary.effect.clone()
             };
             let candidate = Candidate {

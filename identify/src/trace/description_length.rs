@@ -3,7 +3,9 @@
 //! The value of a group of effects is its joint evidence `−ln P(χ²)` less its description length. The description length of an
 //! effect is its cost plus `ln n`, where `n` is the number of detectable effects in the library.
 
-use abbe_model::effect::{Driver, Shape};
+use abbe_model::driver::Driver;
+use abbe_model::effect::Shape;
+use abbe_model::effect::shape::Steps;
 use rayon::prelude::*;
 
 use super::columns::EffectColumns;
@@ -100,8 +102,7 @@ impl Search<'_> {
     }
 
     fn is_composed(&self, group: &[usize]) -> bool {
-        let composed =
-            |c: &usize| matches!(&self.candidates[*c].effect.shape, Shape::Steps { at } if at.len() > 2);
+        let composed = |c: &usize| matches!(&self.candidates[*c].effect.shape, Shape::Steps(Steps { at }) if at.len() > 2);
         group.iter().any(composed)
     }
 

@@ -6,6 +6,7 @@
 use std::collections::HashMap;
 use std::ops::Range;
 
+use abbe_model::effect::shape::Steps;
 use abbe_model::effect::{Effect, Shape};
 use rayon::prelude::*;
 
@@ -28,7 +29,7 @@ const MAX_EVIDENCE_DEFICIT: f64 = 4.0;
 
 /// Whether a candidate has shape numbers or positions that can be tuned off the library's grid.
 pub(super) fn can_be_tuned(candidate: &Candidate) -> bool {
-    candidate.dictionary || brackets(candidate).is_some()
+    candidate.dictionary || !brackets(candidate).is_empty()
 }
 
 /// The candidates near the best, each with its best shape numbers for addition to a model, and the step tables near the best.
@@ -54,7 +55,7 @@ pub fn refined(
         let evidence = search.evidence(gain, variance);
         best = best.max(evidence);
         let effect = &search.candidates[candidate].effect;
-        if brackets(&search.candidates[candidate]).is_none() {
+        if brackets(&search.candidates[candidate]).is_empty() {
             continue;
         }
         let best_of_id = nearest.entry(effect.id()).or_insert((candidate, evidence));
@@ -131,7 +132,7 @@ pub(super) fn refine(
     before: f64,
 ) -> Option<Effect> {
     let mut effect = original.effect.clone();
-    let brackets = brackets(original)?;
+    let brackets = brackets(original);
     let mut best = before;
     let steps = if search.has_all_folds(&model.folds) {
         STEPS
@@ -140,10 +141,13 @@ pub(super) fn refine(
     };
     // The numbers of one shape are tuned in turn.
     for _ in 0..brackets.len() {
-        for (which, low, high) in &brackets {
+        for (which, [low, high]) in brackets.iter().enumerate() {
             let value_at = |share: f64| low + (high - low) * share;
             let gain_at = |share: f64| {
-                let tuned = with_number(&effect, *which, value_at(share));
+                let tuned = Effect {
+                    shape: effect.shape.with_number(which, value_at(share)),
+                    ..effect.clone()
+                };
                 (search.gain_beside(model, &tuned).unwrap_or(0.0), tuned)
             };
             let (gain, tuned) = highest(gain_at, steps);
@@ -181,16 +185,17 @@ fn highest<T>(value_at: impl Fn(f64) -> (f64, T), steps: usize) -> (f64, T) {
 /// Moves each step position by fractions of the grid for the largest joint gain. Returns the effect and its gain.
 fn moved_steps(search: &Search<'_>, model: &TrainedModel<'_>, candidate: &Candidate) -> (Effect, f64) {
     let original = &candidate.effect;
-    let (Shape::Steps { at }, Some(mut present)) = (&original.shape, search.tuned_effect(model, original))
+    let (Shape::Steps(Steps { at }), Some(mut present)) =
+        (&original.shape, search.tuned_effect(model, original))
     else {
         return (original.clone(), 0.0);
     };
     let mut best = present.gain(model);
     let mut positions = at.clone();
     let with = |positions: &[f64]| Effect {
-        shape: Shape::Steps {
+        shape: Shape::Steps(Steps {
             at: positions.to_vec(),
-        },
+        }),
         ..original.clone()
     };
     let trained: Vec<Range<usize>> = (model.folds.iter())
@@ -217,32 +222,7 @@ fn moved_steps(search: &Search<'_>, model: &TrainedModel<'_>, candidate: &Candid
     (with(&positions), best)
 }
 
-/// The shape numbers that can be tuned, each with the interval between its neighbours on the grid.
-fn brackets(candidate: &Candidate) -> Option<Vec<(usize, f64, f64)>> {
-    match &candidate.effect.shape {
-        Shape::Periodic { period } => {
-            let near = candidate.grid / period;
-            Some(vec![(0, period / (1.0 + near), period / (1.0 - near.min(0.5)))])
-        }
-        Shape::Warmup { tau_s } => Some(vec![(0, tau_s * 0.5, tau_s * 2.0)]),
-        Shape::ReversalSpike { width } => Some(vec![(0, width * 0.4, width * 2.5)]),
-        Shape::Local { centre, width, .. } => Some(vec![
-            (0, centre - width, centre + width),
-            (1, width * 0.5, width * 2.0),
-        ]),
-        _ => None,
-    }
-}
-
-fn with_number(effect: &Effect, which: usize, value: f64) -> Effect {
-    let mut changed = effect.clone();
-    match (&mut changed.shape, which) {
-        (Shape::Periodic { period }, _) => *period = value,
-        (Shape::Warmup { tau_s }, _) => *tau_s = value,
-        (Shape::ReversalSpike { width }, _) => *width = value,
-        (Shape::Local { centre, .. }, 0) => *centre = value,
-        (Shape::Local { width, .. }, _) => *width = value,
-        _ => {}
-    }
-    changed
+/// The interval between its neighbours on the grid, for each shape number that can be tuned.
+fn brackets(candidate: &Candidate) -> Vec<[f64; 2]> {
+    candidate.effect.shape.brackets(candidate.grid)
 }

@@ -7,7 +7,9 @@
 use std::ops::Range;
 
 use abbe_model::axis::{Axis, AxisKind};
-use abbe_model::effect::{Component, Driver, Effect, Shape};
+use abbe_model::driver::Driver;
+use abbe_model::effect::shape::{Curve, Local, Periodic};
+use abbe_model::effect::{Component, Effect, Shape};
 use abbe_model::session::readings::Readings;
 
 use super::chi_square_tail::ln_chi_square_tail;
@@ -135,11 +137,11 @@ impl TestResidual<'_, '_, '_> {
                     AxisKind::Rotary => format!("{:.1}°", centre.to_degrees()),
                     AxisKind::Linear => format!("{centre:.1} mm"),
                 };
-                let shape = Shape::Local {
+                let shape = Shape::Local(Local {
                     centre,
                     width,
                     recurs: None,
-                };
+                });
                 self.add(
                     &driver,
                     shape,
@@ -156,8 +158,10 @@ impl TestResidual<'_, '_, '_> {
 
     fn waves(&mut self, axis: &Axis, driver: &Driver, span: f64) {
         let (name, test) = (&axis.name, self.name);
-        let wave = |half_cycles: usize| Shape::Periodic {
-            period: 2.0 * span / half_cycles as f64,
+        let wave = |half_cycles: usize| {
+            Shape::Periodic(Periodic {
+                period: 2.0 * span / half_cycles as f64,
+            })
         };
         for half_cycles in (2..=80).chain((84..=240).step_by(4)) {
             let period = 2.0 * span / half_cycles as f64;
@@ -222,12 +226,12 @@ fn most_half_cycles(readings: usize) -> usize {
 }
 
 fn curve(from: f64, to: f64, intervals: usize) -> Shape {
-    Shape::Curve {
+    Shape::Curve(Curve {
         from,
         to,
         intervals,
         closed: false,
-    }
+    })
 }
 
 /// Tests a residual for structure that a model, given by its orthonormal columns, does not explain.

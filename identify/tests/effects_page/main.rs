@@ -15,7 +15,9 @@ mod poses;
 
 use std::path::{Path, PathBuf};
 
-use abbe_model::effect::{Driver, Effect, Shape};
+use abbe_model::driver::Driver;
+use abbe_model::effect::shape::Warmup;
+use abbe_model::effect::{Effect, Shape};
 use abbe_model::files::{self, ReadOptions};
 use abbe_model::session::Session;
 use abbe_model::session::planned::planned_session;
@@ -136,7 +138,7 @@ fn over_time(
     let own = &effects[effect];
     let grows = |time_s: f64, mean_k: f64| match own.shape {
         Shape::Drift => time_s / 3600.0,
-        Shape::Warmup { tau_s } => 1.0 - (-time_s / tau_s).exp(),
+        Shape::Warmup(Warmup { tau_s }) => 1.0 - (-time_s / tau_s).exp(),
         _ => time_s / 3600.0 - mean_k,
     };
     if !matches!(own.driver, Driver::Time | Driver::Temperature) {

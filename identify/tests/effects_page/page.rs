@@ -4,7 +4,9 @@ use std::f64::consts::PI;
 
 use abbe_model::axis::AxisKind;
 use abbe_model::chain::Machine;
-use abbe_model::effect::{Component, Driver, Effect, Shape};
+use abbe_model::driver::Driver;
+use abbe_model::effect::shape::{Curve, Harmonic, Local, Periodic, Power, ReversalSpike, Steps, Warmup};
+use abbe_model::effect::{Component, Effect, Shape};
 
 /// A Markdown table: header and rows, with trimmed cells.
 pub struct Table {
@@ -102,34 +104,34 @@ pub fn effect(machine: &Machine, cell: &str) -> Effect {
         ("backlash", []) => Shape::Backlash,
         ("lag", []) => Shape::Lag,
         ("drift", []) => Shape::Drift,
-        ("warmup", [tau_s]) => Shape::Warmup { tau_s: *tau_s },
-        ("reversal-spike", [width]) => Shape::ReversalSpike {
+        ("warmup", [tau_s]) => Shape::Warmup(Warmup { tau_s: *tau_s }),
+        ("reversal-spike", [width]) => Shape::ReversalSpike(ReversalSpike {
             width: inside(*width),
-        },
-        ("periodic", [period]) => Shape::Periodic {
+        }),
+        ("periodic", [period]) => Shape::Periodic(Periodic {
             period: inside(*period),
-        },
-        ("steps", at) => Shape::Steps {
+        }),
+        ("steps", at) => Shape::Steps(Steps {
             at: at.iter().map(|at| inside(*at)).collect(),
-        },
-        ("local", [centre, width]) => Shape::Local {
+        }),
+        ("local", [centre, width]) => Shape::Local(Local {
             centre: inside(*centre),
             width: inside(*width),
             recurs: rotary.then_some(2.0 * PI),
-        },
-        ("curve", [intervals]) => Shape::Curve {
+        }),
+        ("curve", [intervals]) => Shape::Curve(Curve {
             from: if rotary { 0.0 } else { -100.0 },
             to: if rotary { 2.0 * PI } else { 100.0 },
             intervals: *intervals as usize,
             closed: rotary,
-        },
-        (word, []) if word.starts_with('h') => Shape::Harmonic {
+        }),
+        (word, []) if word.starts_with('h') => Shape::Harmonic(Harmonic {
             order: word[1..].parse().unwrap(),
-        },
-        (word, []) if word.starts_with("power") => Shape::Power {
+        }),
+        (word, []) if word.starts_with("power") => Shape::Power(Power {
             degree: word[5..].parse().unwrap(),
             scale,
-        },
+        }),
         _ => panic!("{text}"),
     };
     Effect {

@@ -4,7 +4,7 @@ use std::path::PathBuf;
 
 use crate::axis::AxisKind;
 use crate::chain::{AxisPosition, Machine};
-use crate::effect::DriverSample;
+use crate::driver::DriverSample;
 
 /// The file of readings, for messages about single readings.
 #[derive(Clone, Debug, PartialEq, Eq)]

@@ -4,11 +4,12 @@ use std::collections::HashMap;
 use std::ops::Range;
 use std::sync::{Arc, Mutex};
 
-use abbe_model::effect::{Component, Driver, DriverSample, Effect, Shape};
+use abbe_model::driver::{Driver, DriverInput, DriverSample};
+use abbe_model::effect::shape::Curve;
+use abbe_model::effect::{Component, Effect, Shape};
 use abbe_model::instrument::InternalUnit;
 
 use super::Columns;
-use crate::drivers;
 
 /// The basis columns of an effect in each test.
 #[derive(Clone, Debug)]
@@ -85,9 +86,9 @@ impl Columns<'_, '_> {
             let mut of_test = Vec::new();
             if effect.acts_in(&test.name) {
                 let readings = test.readings.as_ref()?;
-                let axis = drivers::component_axis(session, &effect.component);
+                let axis = effect.component.axis(&session.machine);
                 let (follows, samples) = self.driver_samples(number, &effect.driver, axis)?;
-                let make = || Arc::new(drivers::basis_columns(&effect.shape, &samples));
+                let make = || Arc::new(effect.shape.columns(&samples));
                 let basis = if keep {
                     cached(
                         &self.bases,
@@ -97,7 +98,8 @@ impl Columns<'_, '_> {
                 } else {
                     make()
                 };
-                for (slot, factor) in drivers::component_slots(session, test, readings, &effect.component) {
+                let parameters = test.station.kind().unknowns();
+                for (slot, factor) in effect.component.slots_in(&session.machine, parameters, readings) {
                     if self.slot_index[number].contains_key(&slot) {
                         of_test.push(EffectTerm {
                             target: TermTarget::Slot(slot),
@@ -116,7 +118,7 @@ impl Columns<'_, '_> {
         })
     }
 
-    /// The samples of a driver in a test, and its key in the caches. The moment of gravity differs from axis to axis.
+    /// The samples of a driver in a test, and its key in the caches. Some drivers, as the moment of gravity, differ from axis to axis.
     fn driver_samples(
         &self,
         test: usize,
@@ -124,13 +126,21 @@ impl Columns<'_, '_> {
         axis: Option<usize>,
     ) -> Option<(String, Arc<Vec<DriverSample<f64>>>)> {
         let readings = self.problem.tests[test].readings.as_ref()?;
-        let name = match driver {
-            Driver::Gravity => format!("gravity {axis:?}"),
-            other => other.to_string(),
+        let kind = driver.kind();
+        let name = if kind.is_of_component() {
+            format!("{driver} {axis:?}")
+        } else {
+            driver.to_string()
         };
         let samples = cached(&self.samples, (test, name.clone()), || {
-            let (machine, model) = (&self.problem.session.machine, &self.problem.models[test]);
-            drivers::samples(machine, model, readings, &self.problem.origin, driver, axis).map(Arc::new)
+            let input = DriverInput {
+                machine: &self.problem.session.machine,
+                model: &self.problem.models[test],
+                readings,
+                origin: &self.problem.origin,
+                component_axis: axis,
+            };
+            kind.samples(&input).map(Arc::new)
         })?;
         Some((name, samples))
     }
@@ -146,7 +156,7 @@ impl Columns<'_, '_> {
         rows: Option<&Range<usize>>,
     ) -> Option<EffectColumns> {
         let (_, samples) = self.driver_samples(test, &effect.driver, None)?;
-        let basis = Arc::new(drivers::basis_columns(&effect.shape, &samples));
+        let basis = Arc::new(effect.shape.columns(&samples));
         let factor = (by_direction || rows.is_some()).then(|| {
             let turned = |sample: &DriverSample<f64>| if by_direction { sample.direction } else { 1.0 };
             let inside = |row: usize| rows.is_none_or(|rows| rows.contains(&row));
@@ -188,12 +198,12 @@ impl Columns<'_, '_> {
             let effect = Effect {
                 component: Component::TriggerDelay,
                 driver: driver.clone(),
-                shape: Shape::Curve {
+                shape: Shape::Curve(Curve {
                     from: low,
                     to: high,
                     intervals,
                     closed: false,
-                },
+                }),
                 tests: vec![test.name.clone()],
             };
             for coordinate in 0..self.problem.coordinates() {
@@ -209,7 +219,7 @@ impl Columns<'_, '_> {
     pub fn plausible(&self, effect: &Effect, column_set: &EffectColumns) -> f64 {
         let machine_tool = self.problem.session.instrument.is_two_sided();
         let scale = if machine_tool { 1.0 } else { 10.0 };
-        let most = match drivers::component_unit(self.problem.session, &effect.component) {
+        let most = match effect.component.unit(self.problem.session.instrument.unknowns()) {
             Some(InternalUnit::Millimetre) => 0.1 * scale,
             Some(InternalUnit::Radian) => 1e-3 * scale,
             Some(InternalUnit::Ratio) => 0.1,

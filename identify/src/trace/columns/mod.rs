@@ -9,7 +9,7 @@ use std::collections::{BTreeSet, HashMap};
 use std::ops::Range;
 use std::sync::{Arc, Mutex};
 
-use abbe_model::effect::DriverSample;
+use abbe_model::driver::DriverSample;
 use abbe_model::sensitivity::Sensitivities;
 use faer::{Mat, MatMut};
 use rayon::prelude::*;

@@ -5,7 +5,9 @@ mod shapes;
 
 use abbe_model::axis::AxisKind;
 use abbe_model::component::{ErrorKind, ErrorName, Freedom};
-use abbe_model::effect::{Component, Driver, Effect, Shape};
+use abbe_model::driver::{Driver, Recorded};
+use abbe_model::effect::shape::Steps;
+use abbe_model::effect::{Component, Effect, Shape};
 use serde::Deserialize;
 
 use crate::error::IdentifyError;
@@ -15,8 +17,8 @@ use shapes::shapes;
 
 const LIBRARY: &str = include_str!("library.toml");
 
-/// Number of intervals of the travel between possible step positions.
-const STEP_POSITIONS: usize = 40;
+/// The words of the library for axes as drivers.
+const AXIS_DRIVERS: [&str; 4] = ["own", "own-rotary", "own-linear", "other"];
 
 /// A family of effects in the library.
 #[derive(Clone, Debug, Deserialize)]
@@ -25,12 +27,11 @@ pub struct Family {
     /// Description of the family.
     pub name: String,
     components: Components,
-    driver: DriverChoice,
-    shape: ShapeChoice,
+    driver: String,
+    shape: String,
+    /// The numbers of the shape's members, if the shape takes them from the library: degrees, time constants.
     #[serde(default)]
-    degrees: Vec<usize>,
-    #[serde(default)]
-    tau_s: Vec<f64>,
+    numbers: Vec<f64>,
     /// Cost of a member in the score.
     pub simplicity: f64,
     /// Whether it is searched only if no simpler candidate is significant and structure remains.
@@ -50,38 +51,6 @@ enum Components {
     Bar,
     Gain,
     Trigger,
-}
-
-#[derive(Clone, Copy, Debug, Deserialize, PartialEq)]
-#[serde(rename_all = "kebab-case")]
-enum DriverChoice {
-    None,
-    Own,
-    OwnRotary,
-    OwnLinear,
-    Other,
-    Time,
-    Temperature,
-    Gravity,
-}
-
-#[derive(Clone, Copy, Debug, Deserialize)]
-#[serde(rename_all = "kebab-case")]
-enum ShapeChoice {
-    Constant,
-    ConstantPerMount,
-    Harmonic,
-    HarmonicLow,
-    Power,
-    Periodic,
-    Backlash,
-    Lag,
-    ReversalSpike,
-    Drift,
-    Warmup,
-    Steps,
-    Local,
-    Curve,
 }
 
 #[derive(Deserialize)]
@@ -135,6 +104,16 @@ impl Candidate {
 pub fn families() -> Result<Vec<Family>, IdentifyError> {
     let library: Library = toml::from_str(LIBRARY)
         .map_err(|fault| IdentifyError::Request(format!("the library of effects cannot be read: {fault}")))?;
+    for family in &library.family {
+        let is_axis = matches!(Driver::parse(&family.driver), Driver::Axis(_));
+        if is_axis && !AXIS_DRIVERS.contains(&family.driver.as_str()) || !shapes::is_known(&family.shape) {
+            let fault = format!(
+                "the library of effects has an unknown driver or shape in \"{}\"",
+                family.name
+            );
+            return Err(IdentifyError::Request(fault));
+        }
+    }
     Ok(library.family)
 }
 
@@ -149,7 +128,7 @@ pub fn candidates(problem: &Problem<'_>) -> Result<Vec<Candidate>, IdentifyError
     let mut candidates = Vec::new();
     for (number, family) in families.iter().enumerate() {
         for component in components(problem, &sampling, family.components) {
-            for driver in drivers(problem, &sampling, family.driver, &component) {
+            for driver in drivers(problem, &sampling, &family.driver, &component) {
                 for (shape, tests, extra) in shapes(problem, &sampling, family, &component, &driver) {
                     let effect = Effect {
                         component: component.clone(),
@@ -160,7 +139,7 @@ pub fn candidates(problem: &Problem<'_>) -> Result<Vec<Candidate>, IdentifyError
                     let cost = family.simplicity + extra + tilt_cost(problem, &component);
                     let last_resort = family.last_resort;
                     let grid = grid(problem, &sampling, &effect);
-                    let dictionary = matches!(&effect.shape, Shape::Steps { at } if at.len() > 1);
+                    let dictionary = matches!(&effect.shape, Shape::Steps(Steps { at }) if at.len() > 1);
                     candidates.push(Candidate {
                         effect,
                         family: number,
@@ -191,18 +170,8 @@ pub fn candidates(problem: &Problem<'_>) -> Result<Vec<Candidate>, IdentifyError
 
 /// See [`Candidate::grid`].
 fn grid(problem: &Problem<'_>, sampling: &Sampling, effect: &Effect) -> f64 {
-    let axis = match &effect.driver {
-        Driver::Axis(name) => problem.session.machine.axis_index(name),
-        _ => None,
-    };
-    let span = axis.map_or(0.0, |axis| sampling.span(axis));
-    match &effect.shape {
-        // Adjacent frequencies differ by half a cycle over the travel.
-        Shape::Periodic { period } => 0.5 * period * period / span,
-        Shape::Steps { .. } => span / STEP_POSITIONS as f64,
-        Shape::Local { width, .. } => *width,
-        _ => 0.0,
-    }
+    let axis = effect.driver.axis(&problem.session.machine);
+    effect.shape.spacing(axis.map_or(0.0, |axis| sampling.span(axis)))
 }
 
 /// Whether a set-up quantity is a free parameter already, so that it is no further effect.
@@ -291,14 +260,10 @@ fn components(problem: &Problem<'_>, sampling: &Sampling, choice: Components) ->
     }
 }
 
-fn drivers(
-    problem: &Problem<'_>,
-    sampling: &Sampling,
-    choice: DriverChoice,
-    component: &Component,
-) -> Vec<Driver> {
+/// The drivers of a component: axes by their relation to the component's own, or the driver of that word.
+fn drivers(problem: &Problem<'_>, sampling: &Sampling, choice: &str, component: &Component) -> Vec<Driver> {
     let machine = &problem.session.machine;
-    let own = crate::drivers::component_axis(problem.session, component);
+    let own = component.axis(machine);
     let own_of_kind = |kind: Option<AxisKind>| -> Vec<Driver> {
         own.filter(|axis| kind.is_none_or(|kind| machine.axes[*axis].kind == kind))
             .map(|axis| Driver::Axis(machine.axes[axis].name.clone()))
@@ -306,34 +271,26 @@ fn drivers(
             .collect()
     };
     match choice {
-        DriverChoice::None => vec![Driver::None],
-        DriverChoice::Own => own_of_kind(None),
-        DriverChoice::OwnRotary => own_of_kind(Some(AxisKind::Rotary)),
-        DriverChoice::OwnLinear => own_of_kind(Some(AxisKind::Linear)),
+        "own" => own_of_kind(None),
+        "own-rotary" => own_of_kind(Some(AxisKind::Rotary)),
+        "own-linear" => own_of_kind(Some(AxisKind::Linear)),
         // With independent poses every axis moves at once, so that any pair of axes would be a candidate. There gravity covers
         // compliance.
-        DriverChoice::Other if sampling.is_poses() => Vec::new(),
-        DriverChoice::Other => (0..machine.axes.len())
+        "other" if sampling.is_poses() => Vec::new(),
+        "other" => (0..machine.axes.len())
             .filter(|axis| sampling.moves[*axis] && Some(*axis) != own)
             .map(|axis| Driver::Axis(machine.axes[axis].name.clone()))
             .collect(),
-        DriverChoice::Time => {
-            if sampling.has_time {
-                vec![Driver::Time]
-            } else {
-                Vec::new()
-            }
-        }
-        DriverChoice::Temperature => {
-            if sampling.has_temperature {
-                vec![Driver::Temperature]
-            } else {
-                Vec::new()
-            }
-        }
-        DriverChoice::Gravity => {
-            let turns = own.is_some_and(|axis| machine.axes[axis].kind == AxisKind::Rotary);
-            if turns { vec![Driver::Gravity] } else { Vec::new() }
+        word => {
+            let driver = Driver::parse(word);
+            let recorded = Recorded {
+                time: sampling.has_time,
+                temperature: sampling.has_temperature,
+                swept: !sampling.is_poses(),
+            };
+            let kind = own.map(|axis| machine.axes[axis].kind);
+            let observable = driver.kind().is_observable(&recorded, kind);
+            observable.then_some(driver).into_iter().collect()
         }
     }
 }

@@ -3,6 +3,7 @@
 
 mod value;
 
+use std::borrow::Cow;
 use std::fs::File;
 use std::io::Read;
 use std::ops::Range;
@@ -139,7 +140,7 @@ pub(crate) struct Table<'a> {
     /// Its location.
     pub span: Range<usize>,
     entries: Vec<Value<'a>>,
-    known_keys: Vec<&'static str>,
+    known_keys: Vec<Cow<'static, str>>,
 }
 
 impl<'a> Table<'a> {
@@ -165,10 +166,11 @@ impl<'a> Table<'a> {
     }
 
     /// The value of a key, if present.
-    pub fn take(&mut self, key: &'static str) -> Option<Value<'a>> {
+    pub fn take(&mut self, key: impl Into<Cow<'static, str>>) -> Option<Value<'a>> {
+        let key = key.into();
+        let index = self.entries.iter().position(|entry| entry.key == key);
         self.known_keys.push(key);
-        let index = self.entries.iter().position(|entry| entry.key == key)?;
-        Some(self.entries.remove(index))
+        Some(self.entries.remove(index?))
     }
 
     /// The value of a required key; `expected` names the expected value.
@@ -200,7 +202,7 @@ impl<'a> Table<'a> {
         match self.entries.first() {
             None => Ok(()),
             Some(entry) => {
-                let mut known: Vec<&str> = self.known_keys.clone();
+                let mut known: Vec<&str> = self.known_keys.iter().map(AsRef::as_ref).collect();
                 known.sort_unstable();
                 known.dedup();
                 let message = format!("{} has the unknown key `{}`", self.display_name(), entry.key);

@@ -76,7 +76,7 @@ pub(super) fn set_up(context: &Context<'_>, table: &mut Table<'_>) -> Result<Set
     let own = own.map_or(&[][..], |(_, keys)| keys);
     for (kind, keys) in INSTRUMENT_KEYS {
         for key in keys.iter().filter(|key| !own.contains(key)) {
-            if let Some(value) = table.take(key) {
+            if let Some(value) = table.take(*key) {
                 let message = format!(
                     "`{key}` belongs to a {}; this session's instrument is a {}",
                     kind.word(),

@@ -6,10 +6,12 @@
 
 use std::fmt;
 
-use abbe_model::axis::{Axis, AxisKind};
-use abbe_model::chain::Machine;
-use abbe_model::component::{ErrorKind, ErrorName, Freedom};
-use abbe_model::effect::{Component, Driver, Effect, Shape};
+use super::{Component, Effect, Shape};
+use crate::axis::{Axis, AxisKind};
+use crate::chain::Machine;
+use crate::component::{ErrorKind, ErrorName, Freedom};
+use crate::driver::Driver;
+use crate::effect::shape::EffectWords;
 
 /// The description of an effect: the part of the machine or instrument, and its error.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -41,7 +43,7 @@ pub fn meaning(machine: &Machine, effect: &Effect) -> Meaning {
 }
 
 /// The description of a component on a machine, without a driver: `C table: axial motion`.
-pub(crate) fn component_meaning(machine: &Machine, component: &Component) -> Meaning {
+pub fn component_meaning(machine: &Machine, component: &Component) -> Meaning {
     let effect = constant(component.clone());
     let terms = EffectTerms {
         machine,
@@ -103,17 +105,11 @@ struct EffectTerms<'w> {
 
 impl EffectTerms<'_> {
     fn axis_of_component(&self) -> Option<usize> {
-        match &self.effect.component {
-            Component::Axis(name) => self.machine.axis_index(&name.axis),
-            _ => None,
-        }
+        self.effect.component.axis(self.machine)
     }
 
     fn axis_of_driver(&self) -> Option<usize> {
-        match &self.effect.driver {
-            Driver::Axis(name) => self.machine.axis_index(name),
-            _ => None,
-        }
+        self.effect.driver.axis(self.machine)
     }
 
     fn follows_its_own_axis(&self) -> bool {
@@ -188,18 +184,14 @@ impl EffectTerms<'_> {
             AxisKind::Rotary => "angle",
             AxisKind::Linear => "position",
         };
-        match (&self.effect.driver, self.axis_of_driver()) {
-            (_, Some(axis)) if self.follows_its_own_axis() => format!("its {}", quantity(axis)),
-            (_, Some(axis)) => format!(
+        match self.axis_of_driver() {
+            Some(axis) if self.follows_its_own_axis() => format!("its {}", quantity(axis)),
+            Some(axis) => format!(
                 "the {} of the {}",
                 quantity(axis),
                 part_of_axis(self.machine, axis)
             ),
-            (Driver::Axis(name), None) => format!("axis {name}"),
-            (Driver::None, _) => "nothing".to_string(),
-            (Driver::Time, _) => "time".to_string(),
-            (Driver::Temperature, _) => "the temperature".to_string(),
-            (Driver::Gravity, _) => "the moment of gravity".to_string(),
+            None => self.effect.driver.kind().phrase(),
         }
     }
 
@@ -213,89 +205,16 @@ impl EffectTerms<'_> {
         }
     }
 
-    /// A position, period or width of the driver, with its unit.
-    fn at_value(&self, value: f64) -> String {
-        let rotary = self
-            .axis_of_driver()
-            .is_some_and(|axis| self.machine.axes[axis].kind == AxisKind::Rotary);
-        match self.effect.driver {
-            Driver::Time => format!("{} s", four_digits(value)),
-            Driver::Temperature => format!("{} °C", four_digits(value)),
-            Driver::Gravity => format!("{} m", four_digits(value)),
-            _ if rotary => format!("{}°", four_digits(value.to_degrees())),
-            _ => format!("{} mm", four_digits(value)),
-        }
-    }
-
     /// The motion and its dependence on the driver.
     fn what(&self) -> String {
-        let motion = self.motion();
-        match &self.effect.shape {
-            Shape::Constant => format!("{motion}, constant"),
-            Shape::Power { degree, .. } => format!("{motion}{}", self.power(*degree)),
-            Shape::Polynomial { degree, .. } => {
-                format!(
-                    "{motion}, a polynomial of degree {degree} in {}",
-                    self.driver_phrase()
-                )
-            }
-            Shape::Harmonic { order } => {
-                format!("{motion} {} per turn{}", times(*order), self.of_another_axis())
-            }
-            Shape::Periodic { period } => {
-                format!(
-                    "{motion}, repeating every {}{}",
-                    self.at_value(*period),
-                    self.of_another_axis()
-                )
-            }
-            Shape::Curve { intervals, .. } => {
-                format!(
-                    "{motion}, a nonparametric curve over {} in {intervals} intervals",
-                    self.driver_phrase()
-                )
-            }
-            Shape::Backlash => self.backlash(motion),
-            Shape::Lag => self.lag(motion),
-            Shape::ReversalSpike { width } => format!(
-                "{motion}, a spike after reversal{} that decays over {}",
-                self.of_another_axis(),
-                self.at_value(*width)
-            ),
-            Shape::Drift => format!("{motion}, drifting with {}", self.driver_phrase()),
-            Shape::Warmup { tau_s } => {
-                format!(
-                    "{motion}, warming up with a time constant of {} s",
-                    four_digits(*tau_s)
-                )
-            }
-            Shape::Steps { at } => format!("{motion}, {}{}", self.steps(at), self.of_another_axis()),
-            Shape::Local {
-                centre,
-                width,
-                recurs,
-            } => {
-                let each_turn = if recurs.is_some() { " of each turn" } else { "" };
-                format!(
-                    "{motion}, a local feature at {}{each_turn}{}, {} to either side",
-                    self.at_value(*centre),
-                    self.of_another_axis(),
-                    self.at_value(*width)
-                )
-            }
-        }
-    }
-
-    fn power(&self, degree: usize) -> String {
-        let driver_phrase = self.driver_phrase();
-        match (degree, &self.effect.driver) {
-            (1, Driver::Temperature) => ", following the temperature".to_string(),
-            (1, Driver::Gravity) => " under gravity (compliance)".to_string(),
-            (1, _) => format!(" in proportion to {driver_phrase}"),
-            (2, _) => format!(" with the square of {driver_phrase}"),
-            (3, _) => format!(" with the cube of {driver_phrase}"),
-            (degree, _) => format!(" with {driver_phrase} to the power of {degree}"),
-        }
+        self.effect.shape.describe(&EffectWords {
+            motion: self.motion(),
+            driver: self.driver_phrase(),
+            of_another_axis: self.of_another_axis(),
+            proportional: self.effect.driver.kind().proportional(),
+            is_positioning: self.is_positioning(),
+            unit: self.effect.driver_unit(self.machine),
+        })
     }
 
     /// Whether the component is the positioning error of its axis.
@@ -307,67 +226,5 @@ impl EffectTerms<'_> {
         name.kind == ErrorKind::Motion
             && self.follows_its_own_axis()
             && own.is_some_and(|axis| self.machine.axes[axis].own_freedom() == name.freedom)
-    }
-
-    fn backlash(&self, motion: String) -> String {
-        if self.is_positioning() {
-            "lost motion (backlash) at reversal".to_string()
-        } else {
-            format!(
-                "{motion} that changes at reversal{} (backlash)",
-                self.of_another_axis()
-            )
-        }
-    }
-
-    fn lag(&self, motion: String) -> String {
-        if self.is_positioning() {
-            "lag behind the command in proportion to the speed".to_string()
-        } else {
-            format!("{motion} in proportion to the speed{}", self.of_another_axis())
-        }
-    }
-
-    fn steps(&self, at: &[f64]) -> String {
-        match at {
-            [one] => format!("a step at {}", self.at_value(*one)),
-            [first, .., last] if at.len() > MAX_LISTED_STEPS => {
-                format!(
-                    "{} steps from {} to {}",
-                    at.len(),
-                    self.at_value(*first),
-                    self.at_value(*last)
-                )
-            }
-            several => {
-                let values: Vec<String> = several.iter().map(|step| self.at_value(*step)).collect();
-                format!("steps at {}", values.join(", "))
-            }
-        }
-    }
-}
-
-/// Maximum number of steps in a list.
-const MAX_LISTED_STEPS: usize = 6;
-
-/// `once`, `twice`, `17 times`.
-fn times(order: f64) -> String {
-    if order == 1.0 {
-        "once".to_string()
-    } else if order == 2.0 {
-        "twice".to_string()
-    } else {
-        format!("{order} times")
-    }
-}
-
-/// Four significant digits, at most four decimals.
-fn four_digits(value: f64) -> String {
-    let magnitude = value.abs().max(1e-3).log10().floor() as i32;
-    let text = format!("{value:.*}", (3 - magnitude).clamp(0, 4) as usize);
-    match text.strip_prefix('-') {
-        Some(zero) if zero.bytes().all(|digit| matches!(digit, b'0' | b'.')) => zero.to_string(),
-        Some(positive) => format!("−{positive}"),
-        None => text,
     }
 }
