@@ -1,5 +1,5 @@
-//! Length of the bar and its eight derivatives for the A and C tests of chapter 5, written by hand: the reference for the speed of
-//! printed code.
+//! Length of the bar and its eight derivatives for the A and C tests of chapter 5, written by hand: the reference for
+//! the speed of printed code.
 
 /// One reading. `[sin_c, cos_c, sin_a, cos_a]`; errors e_y0a, e_z0a, θ_y0a, θ_z0a, e_x0c, e_y0c, θ_x0c, θ_y0c.
 #[inline(always)]

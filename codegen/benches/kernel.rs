@@ -1,6 +1,6 @@
-//! Benchmark of printed Rust code against a kernel written by hand. The function is the chapter 5 test: value and eight derivatives, one
-//! reading at a time and in columns of 1,000, which fit in the cache. A second benchmark measures the time to derive and print an
-//! equation. `emitted.rs` is the printer's output; a test compares the two.
+//! Benchmark of printed Rust code against a kernel written by hand. The function is the chapter 5 test: value and eight
+//! derivatives, one reading at a time and in columns of 1,000, which fit in the cache. A second benchmark measures the
+//! time to derive and print an equation. `emitted.rs` is the printer's output; a test compares the two.
 #![allow(missing_docs)]
 
 use std::hint::black_box;

@@ -28,7 +28,8 @@ impl Coefficient {
     /// The coefficients of all effects, numbered consecutively.
     ///
     /// # Errors
-    /// If an effect is named twice, if the machine or the instrument lacks its component, or if its driver has no value.
+    /// If an effect is named twice, if the machine or the instrument lacks its component, or if its driver has no
+    /// value.
     pub(crate) fn of_effects(
         effects: &[Effect],
         machine: &Machine,

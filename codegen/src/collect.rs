@@ -1,4 +1,5 @@
-//! Arranges polynomials for printing: grouped by error, then by sines and cosines of the axes, with lengths in parentheses.
+//! Arranges polynomials for printing: grouped by error, then by sines and cosines of the axes, with lengths in
+//! parentheses.
 
 use std::collections::HashMap;
 
@@ -72,8 +73,8 @@ impl Collector<'_, '_> {
         positive_first(polynomial.terms().map(|term| self.length_term(term)).collect())
     }
 
-    /// Lengths as factors of a product: `R`, or `D` and `(H − Z_CA)`. The first term of a sum is positive and the sign is returned
-    /// separately. Empty for 1.
+    /// Lengths as factors of a product: `R`, or `D` and `(H − Z_CA)`. The first term of a sum is positive and the sign
+    /// is returned separately. Empty for 1.
     fn length_factors(&self, polynomial: &Polynomial) -> (bool, Vec<Tree>) {
         let shared = common(polynomial);
         let rest = polynomial

@@ -18,7 +18,8 @@ use crate::truncation::{self, FormContext};
 use crate::variable::Variable;
 use crate::vectors::{self, NamedVector};
 
-/// The closed form of one reading of one machine, as data; [`mod@crate::check`] compares it with the chain before it is printed.
+/// The closed form of one reading of one machine, as data; [`mod@crate::check`] compares it with the chain before it is
+/// printed.
 #[derive(Debug)]
 pub struct Equation {
     /// The machine, with the rotation convention of the equation.
@@ -39,7 +40,8 @@ pub struct Equation {
     pub form: Form,
     /// The intermediate vectors.
     pub vectors: Vec<NamedVector>,
-    /// The driven errors: errors and instrument parameters that are determined by effects alone, as functions of their drivers.
+    /// The driven errors: errors and instrument parameters that are determined by effects alone, as functions of their
+    /// drivers.
     pub driven_errors: Vec<(Variable, Operand)>,
     /// The stated length of the bar, for a ball bar.
     pub stated_length: Option<Operand>,
@@ -55,7 +57,8 @@ impl Equation {
     /// Derives the equation of a reading in the named errors; other errors are exactly zero.
     ///
     /// # Errors
-    /// If the machine lacks the axis of an error, if the instrument lacks a parameter, or if the form has no closed polynomial.
+    /// If the machine lacks the axis of an error, if the instrument lacks a parameter, or if the form has no closed
+    /// polynomial.
     pub fn of(
         machine: &Machine,
         source: &impl Source,
@@ -148,9 +151,9 @@ impl Equation {
         Equation::of(machine, &ToolPoint, errors, options)
     }
 
-    /// The arguments of its programs in order. First come the lengths and the positions of moving axes from workpiece to tool. A rotary
-    /// axis is given by sine and cosine, and by its angle if an effect depends on that. Then come the other drivers of effects, then
-    /// errors, instrument parameters and coefficients in the requested order.
+    /// The arguments of its programs in order. First come the lengths and the positions of moving axes from workpiece
+    /// to tool. A rotary axis is given by sine and cosine, and by its angle if an effect depends on that. Then come the
+    /// other drivers of effects, then errors, instrument parameters and coefficients in the requested order.
     pub fn inputs(&self) -> Vec<Input> {
         inputs(&self.arena, &self.machine, &self.parameters)
     }
@@ -162,8 +165,8 @@ impl Equation {
         self.outputs.iter().map(gradient).collect()
     }
 
-    /// The second derivatives of each output by each pair of parameters: output, row, column. They serve curvature terms of an error
-    /// budget and solvers with Newton steps. Printed code contains first derivatives only.
+    /// The second derivatives of each output by each pair of parameters: output, row, column. They serve curvature
+    /// terms of an error budget and solvers with Newton steps. Printed code contains first derivatives only.
     pub fn second_derivatives(&self) -> Vec<Vec<Vec<Operand>>> {
         let parameters = self.parameter_operands();
         let second = |output: &Operand| self.arena.second_derivatives(*output, &parameters);
@@ -213,7 +216,10 @@ impl Equation {
 
 /// The basis functions of curves; expanded interval by interval they have hundreds of terms.
 fn curves(run: &Run<'_, Symbol<'_>>, parameters: &[Variable]) -> Vec<Operand> {
-    let of_curve = |parameter: &Variable| matches!(parameter, Variable::Coefficient(c) if matches!(c.effect.shape, Shape::Curve { .. }));
+    let of_curve = |parameter: &Variable| match parameter {
+        Variable::Coefficient(coefficient) => matches!(coefficient.effect.shape, Shape::Curve { .. }),
+        _ => false,
+    };
     let places = (0..parameters.len()).filter(|index| of_curve(&parameters[*index]));
     places
         .flat_map(|index| run.bases(index))

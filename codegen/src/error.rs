@@ -37,7 +37,8 @@ pub enum CodegenError {
     },
     /// Derivatives that are not printed in mathematical notation.
     #[error(
-        "the derivatives of {what} are written as code only: as {languages}; at zero errors they equal the first-order coefficients"
+        "the derivatives of {what} are written as code only: as {languages}; at zero errors they equal the \
+         first-order coefficients"
     )]
     GradientForReaders {
         /// The quantity that is differentiated.
@@ -65,8 +66,8 @@ pub enum CodegenError {
     },
     /// A stated probing direction whose angle with the artefact's axis changes as the axes move.
     #[error(
-        "the first order of a distance has no short form where the angle between the stated probing `direction` and the artefact's \
-         axis changes as the axes move; use the exact or the bilinear order"
+        "the first order of a distance has no short form where the angle between the stated probing `direction` \
+         and the artefact's axis changes as the axes move; use the exact or the bilinear order"
     )]
     ObliqueProbing,
     /// An expression that has no normal form.
@@ -104,8 +105,8 @@ pub enum CodegenError {
     },
     /// A program that the check against the chain over dual numbers does not confirm; it is not written.
     #[error(
-        "the equation is not written: over {points} points it differs from the chain with dual numbers by {value:.1e} (value) \
-         and {gradient:.1e} (derivatives), relative; the limit is 1e-12"
+        "the equation is not written: over {points} points it differs from the chain with dual numbers by \
+         {value:.1e} (value) and {gradient:.1e} (derivatives), relative; the limit is 1e-12"
     )]
     Unconfirmed {
         /// Number of points compared.

@@ -56,7 +56,8 @@ impl<S: Scalar> VariableValue<S> {
 /// Evaluates `outputs`; every node is computed once.
 ///
 /// # Errors
-/// If the expression takes an exponential, a sign, a step or a rounding of an error. The chain contains no such expression.
+/// If the expression takes an exponential, a sign, a step or a rounding of an error. The chain contains no such
+/// expression.
 pub fn evaluate<S: Scalar>(
     arena: &Arena,
     outputs: &[Operand],

@@ -62,8 +62,8 @@ pub enum Column {
 }
 
 impl FirstOrder {
-    /// First-order form of a bar vector in a ring of first order; `unknowns` are the length error of the bar and the gain error of its
-    /// sensor, if included.
+    /// First-order form of a bar vector in a ring of first order; `unknowns` are the length error of the bar and the
+    /// gain error of its sensor, if included.
     pub(crate) fn of_length(
         ring: &mut Ring<'_>,
         vector: [Operand; 3],
@@ -108,8 +108,8 @@ impl FirstOrder {
         Ok(form)
     }
 
-    /// First-order form of a probe that moves straight towards the artefact's axis: the distance to the axis less the radius. The
-    /// rotation of the probing direction by errors across the axis is of second order.
+    /// First-order form of a probe that moves straight towards the artefact's axis: the distance to the axis less the
+    /// radius. The rotation of the probing direction by errors across the axis is of second order.
     pub(crate) fn of_way_to_the_axis(
         ring: &mut Ring<'_>,
         stylus: [Operand; 3],
@@ -126,8 +126,8 @@ impl FirstOrder {
         Ok(form)
     }
 
-    /// First-order form of a probe that moves in a stated direction. With `w = v₀ + d₀·u₀` from the axis to the point of contact and `L₀
-    /// = √(b₀² − a₀·c₀)`, half of the chord that the artefact cuts from the probing line,
+    /// First-order form of a probe that moves in a stated direction. With `w = v₀ + d₀·u₀` from the axis to the point
+    /// of contact and `L₀ = √(b₀² − a₀·c₀)`, half of the chord that the artefact cuts from the probing line,
     ///
     /// ```text
     /// d₀ = −(b₀ + L₀)/a₀,   ∂d/∂eᵢ = (w·(vᵢ + d₀·uᵢ) − r₀·rᵢ)/L₀
@@ -258,8 +258,8 @@ fn dot(ring: &Ring<'_>, a: &[Polynomial; 3], b: &[Polynomial; 3]) -> Polynomial 
     products.fold(Polynomial::default(), |sum, product| &sum + &product)
 }
 
-/// `a/b` if it is constant over all positions of the axes, that is, if all 2×2 minors of the coefficients, grouped by axis position,
-/// vanish.
+/// `a/b` if it is constant over all positions of the axes, that is, if all 2×2 minors of the coefficients, grouped by
+/// axis position, vanish.
 fn fixed_factor(ring: &Ring<'_>, a: &[Polynomial], b: &[Polynomial]) -> Option<(Polynomial, Polynomial)> {
     let by_motion = |column: &[Polynomial]| {
         let mut parts = Vec::new();
@@ -283,7 +283,8 @@ fn fixed_factor(ring: &Ring<'_>, a: &[Polynomial], b: &[Polynomial]) -> Option<(
     })
 }
 
-/// `a/b` if it is a polynomial. Each term of `a` is divided by the first term of `b`; the product then proves the result.
+/// `a/b` if it is a polynomial. Each term of `a` is divided by the first term of `b`; the product then proves the
+/// result.
 fn quotient(ring: &Ring<'_>, a: &Polynomial, b: &Polynomial) -> Option<Polynomial> {
     let (b_first, b_factor) = b.terms().next()?;
     let mut quotient = Polynomial::default();

@@ -15,7 +15,8 @@ pub enum Order {
     /// No truncation.
     #[default]
     Exact,
-    /// Coordinates up to products of two errors (and squares, for exact rotations); a length is the norm of these coordinates.
+    /// Coordinates up to products of two errors (and squares, for exact rotations); a length is the norm of these
+    /// coordinates.
     Bilinear,
     /// The value without errors and a coefficient for each error.
     First,
@@ -62,8 +63,8 @@ pub enum Form {
         polynomials: Vec<Polynomial>,
         /// The expressions as printed.
         printed: Vec<Tree>,
-        /// Whether the truncation omitted nothing because the chain has no further terms. This is decided for up to twelve parameters.
-        /// For more, the full normal form is not built and the value is false.
+        /// Whether the truncation omitted nothing because the chain has no further terms. This is decided for up to
+        /// twelve parameters. For more, the full normal form is not built and the value is false.
         complete: bool,
     },
     /// The value without errors and a coefficient for each error, with the printed expression of each.

@@ -2,13 +2,17 @@
 //!
 //! In the order in which one module builds on the other:
 //!
-//! - [`Variable`], [`Coefficient`], [`DriverQuantity`]: the meaning of a symbol; [`symbol`]: the arena of expressions, and [`evaluate`](mod@evaluate);
-//! - [`polynomial`], [`normal_form`]: the exact normal form, in which equality is decided; [`first_order`]: its table of sensitivities;
+//! - [`Variable`], [`Coefficient`], [`DriverQuantity`]: the meaning of a symbol; [`symbol`]: the arena of expressions,
+//!   and [`evaluate`](mod@evaluate);
+//! - [`polynomial`], [`normal_form`]: the exact normal form, in which equality is decided; [`first_order`]: its table
+//!   of sensitivities;
 //! - [`Tree`], [`program`]: an equation as a sequence of steps; [`vectors`], [`touch`]: its named quantities;
 //! - [`Source`], [`SessionTest`]: where a reading comes from; [`form`], [`equation`]: its closed form, as data;
-//! - [`check`](mod@check): the comparison with dual numbers; [`print`](mod@print): the languages in which a checked equation is printed.
+//! - [`check`](mod@check): the comparison with dual numbers; [`print`](mod@print): the languages in which a checked
+//!   equation is printed.
 //!
-//! The sensitivity of the C test with the extension bar to the location error EX0C, to first order: ∂L/∂EX0C = −R·sin C/L₀.
+//! The sensitivity of the C test with the extension bar to the location error EX0C, to first order: ∂L/∂EX0C = −R·sin
+//! C/L₀.
 //!
 //! ```
 //! use std::path::Path;

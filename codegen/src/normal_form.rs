@@ -31,7 +31,8 @@ impl<'a> Ring<'a> {
         }
     }
 
-    /// The ring of expressions truncated at `order` in errors and instrument parameters: `sin e` is `e`, `cos e` is `1 − e²/2`.
+    /// The ring of expressions truncated at `order` in errors and instrument parameters: `sin e` is `e`, `cos e` is `1
+    /// − e²/2`.
     ///
     /// # Errors
     /// If the order is above 2.
@@ -88,8 +89,9 @@ impl<'a> Ring<'a> {
         Some(Atom::Variable(VariableId(index as u32)))
     }
 
-    /// Whether two expressions are equal, decided by their normal forms. Functions that the normal form does not expand, such as an
-    /// exponential or the cosine of a multiple, are compared as terms: equal terms prove equality, different terms prove nothing.
+    /// Whether two expressions are equal, decided by their normal forms. Functions that the normal form does not
+    /// expand, such as an exponential or the cosine of a multiple, are compared as terms: equal terms prove equality,
+    /// different terms prove nothing.
     ///
     /// # Errors
     /// If one of them is not a polynomial.
@@ -100,8 +102,8 @@ impl<'a> Ring<'a> {
     /// The normal form of an expression.
     ///
     /// # Errors
-    /// If it is not a polynomial: a quotient of expressions, a root of errors, or a function of errors other than the sine or cosine of
-    /// one.
+    /// If it is not a polynomial: a quotient of expressions, a root of errors, or a function of errors other than the
+    /// sine or cosine of one.
     pub fn normal_form(&mut self, operand: Operand) -> Result<Polynomial, CodegenError> {
         let mut requested = BTreeSet::new();
         let mut pending = vec![operand];

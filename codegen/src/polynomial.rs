@@ -1,8 +1,9 @@
 //! Exact normal form: polynomials in errors, lengths, sines and cosines, with rational coefficients.
 //!
-//! Two rules make the form unique: `sin² = 1 − cos²` for every angle, and `r² = a` for the root `r = √a` of an expression without errors.
-//! A monomial therefore contains each sine and each root at most once. Two expressions are equal exactly if they have the same terms; no
-//! sampling is involved. Coefficients are ratios of integers, and every finite `f64` is one.
+//! Two rules make the form unique: `sin² = 1 − cos²` for every angle, and `r² = a` for the root `r = √a` of an
+//! expression without errors. A monomial therefore contains each sine and each root at most once. Two expressions are
+//! equal exactly if they have the same terms; no sampling is involved. Coefficients are ratios of integers, and every
+//! finite `f64` is one.
 
 use std::collections::BTreeMap;
 use std::ops::{Add, Mul, Neg, Sub};
@@ -238,7 +239,8 @@ impl Sub<&Polynomial> for &Polynomial {
 
 impl Mul<&Polynomial> for &Polynomial {
     type Output = Polynomial;
-    /// The product of polynomials without sines and roots; [`crate::normal_form::Ring::product`] applies the rules for those.
+    /// The product of polynomials without sines and roots; [`crate::normal_form::Ring::product`] applies the rules for
+    /// those.
     fn mul(self, other: &Polynomial) -> Polynomial {
         self.product(other, |_| false)
     }

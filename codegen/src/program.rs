@@ -6,7 +6,8 @@ use crate::symbol::{Arena, Binary, Node, NodeId, Operand, Unary, operands};
 use crate::tree::Tree;
 use crate::variable::Variable;
 
-/// An argument of a program: a variable, or the sine or cosine of an axis position, which is computed once per data set.
+/// An argument of a program: a variable, or the sine or cosine of an axis position, which is computed once per data
+/// set.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Input {
     /// A variable itself.

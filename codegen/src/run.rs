@@ -18,7 +18,8 @@ pub(crate) struct Run<'m, S: Scalar> {
     pub(crate) state: Vec<AxisPosition<S::Nominal>>,
     pub(crate) errors: Vec<BodyErrors<S>>,
     unknowns: Vec<(usize, S)>,
-    /// The contributions to each slot, machine errors before instrument parameters: indices of parameters, and their factors.
+    /// The contributions to each slot, machine errors before instrument parameters: indices of parameters, and their
+    /// factors.
     slots: Vec<Vec<Contribution<S::Nominal>>>,
 }
 
@@ -170,8 +171,8 @@ impl<'m, S: Scalar> Run<'m, S> {
             .read(self.machine, &self.state, &self.errors, |slot| self.unknown(slot))
     }
 
-    /// Computes the reading from its coordinate groups: the bar, or the stylus and step of a probe. `None` if the reading is the groups
-    /// themselves.
+    /// Computes the reading from its coordinate groups: the bar, or the stylus and step of a probe. `None` if the
+    /// reading is the groups themselves.
     pub(crate) fn reading_of_groups(&self, groups: &[S]) -> Option<S> {
         match (self.probe_geometry(), &self.subject) {
             (Some(geometry), _) => Some(with_groups(&geometry, groups).distance()),
@@ -183,8 +184,8 @@ impl<'m, S: Scalar> Run<'m, S> {
         }
     }
 
-    /// The reading of a ball bar from the distance between its balls, with the parameters of the bar; the distance itself for any other
-    /// subject.
+    /// The reading of a ball bar from the distance between its balls, with the parameters of the bar; the distance
+    /// itself for any other subject.
     pub(crate) fn length_reading(&self, distance: S) -> S {
         let Subject::Station(Station::BallBar(bar)) = &self.subject else {
             return distance;

@@ -8,7 +8,8 @@ use abbe_model::session::{Session, Test};
 
 use crate::subject::{Source, Subject};
 
-/// A test of a session. Named lengths and positions of moving axes stay symbols; other axes are at their stated positions.
+/// A test of a session. Named lengths and positions of moving axes stay symbols; other axes are at their stated
+/// positions.
 #[derive(Clone, Debug)]
 pub struct SessionTest<'s> {
     session: &'s Session,
@@ -18,8 +19,8 @@ pub struct SessionTest<'s> {
 }
 
 impl<'s> SessionTest<'s> {
-    /// From a test, with the positions of its readings or, for a plan, of its motion. Without either, every axis moves, except those that
-    /// the test holds at a nonzero position.
+    /// From a test, with the positions of its readings or, for a plan, of its motion. Without either, every axis moves,
+    /// except those that the test holds at a nonzero position.
     ///
     /// # Errors
     /// If a planned motion is impossible.

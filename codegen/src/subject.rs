@@ -5,10 +5,11 @@ use abbe_model::frames::Point;
 use abbe_model::instrument::{InstrumentParameter, Station};
 use abbe_model::scalar::{Nominal, Scalar};
 
-/// The nominal geometry of an equation over any nominal type: symbols give the equation, numbers its check. Implemented by a test of a
-/// session and by [`ToolPoint`].
+/// The nominal geometry of an equation over any nominal type: symbols give the equation, numbers its check. Implemented
+/// by a test of a session and by [`ToolPoint`].
 pub trait Source {
-    /// The instrument as set up, or the point whose error is computed; `length` gives the value of a named length in mm.
+    /// The instrument as set up, or the point whose error is computed; `length` gives the value of a named length in
+    /// mm.
     fn subject<N: Nominal>(&self, length: &impl Fn(&str) -> N) -> Subject<N>;
 
     /// The position at which the test holds an axis, mm or rad; `None` for a moving axis, which stays a symbol.
@@ -47,8 +48,8 @@ impl Source for ToolPoint {
 pub enum Subject<N> {
     /// A reading of an instrument.
     Station(Station<N>),
-    /// The error vector of a point of the tool frame, in the table frame: its position in the chain with errors less that in the chain
-    /// without.
+    /// The error vector of a point of the tool frame, in the table frame: its position in the chain with errors less
+    /// that in the chain without.
     Volumetric {
         /// The point, mm.
         tool: [N; 3],

@@ -1,12 +1,12 @@
-//! Quantities of a probe's reading: the stylus `v` and a step `u` in the probing direction, both perpendicular to the artefact's axis,
-//! and the radius.
+//! Quantities of a probe's reading: the stylus `v` and a step `u` in the probing direction, both perpendicular to the
+//! artefact's axis, and the radius.
 //!
 //! ```text
 //! a = u·u,   b = v·u,   c = v·v − r²,   d = −l_n·(b + √(b² − a·c))/a
 //! ```
 //!
-//! `l_n` is the length of the step in R; it is 1 for a stated direction. The sign of the root selects the nearer of the two intersections
-//! for every artefact that is hit, so that no case distinction is necessary.
+//! `l_n` is the length of the step in R; it is 1 for a stated direction. The sign of the root selects the nearer of the
+//! two intersections for every artefact that is hit, so that no case distinction is necessary.
 
 use abbe_model::instrument::probe::ProbeGeometry;
 

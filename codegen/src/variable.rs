@@ -40,7 +40,8 @@ pub enum Symbols {
 }
 
 impl Variable {
-    /// Whether it is small, so that expressions are truncated in it: an error, a parameter of the instrument, a coefficient of an effect.
+    /// Whether it is small, so that expressions are truncated in it: an error, a parameter of the instrument, a
+    /// coefficient of an effect.
     pub fn is_small(&self) -> bool {
         matches!(
             self,

@@ -1,7 +1,7 @@
 //! Named points of a chain: the ball in the frame of each axis, and the bar between the balls.
 //!
-//! The chain records nothing about them. Equal expressions are one node, so transforming the point again, step by step, finds the nodes
-//! of the reading.
+//! The chain records nothing about them. Equal expressions are one node, so transforming the point again, step by step,
+//! finds the nodes of the reading.
 
 use std::collections::HashMap;
 
@@ -14,14 +14,14 @@ use abbe_model::scalar::Nominal;
 
 use crate::program::Label;
 use crate::subject::Subject;
-use crate::symbol::Adjoints;
-use crate::symbol::{NodeId, Operand, Symbol};
+use crate::symbol::{Adjoints, NodeId, Operand, Symbol};
 
 /// A vector with a name, such as the workpiece ball in the frame of axis A.
 #[derive(Clone, Debug, PartialEq)]
 pub struct NamedVector {
-    /// `p` for a point on the workpiece side, `q` on the tool side, `b` for the bar, `u` for its unit vector. For a probe: `n`, `r`, `v`
-    /// and `u` for its step in R, the point one step ahead, the stylus and the step in the frame of the artefact.
+    /// `p` for a point on the workpiece side, `q` on the tool side, `b` for the bar, `u` for its unit vector. For a
+    /// probe: `n`, `r`, `v` and `u` for its step in R, the point one step ahead, the stylus and the step in the frame
+    /// of the artefact.
     pub letter: &'static str,
     /// The frame of its coordinates: an axis, or `R`; empty if it needs none.
     pub frame: String,
@@ -45,11 +45,8 @@ impl NamedVector {
     }
 }
 
-/// The name of a ball or point.
-struct PointName {
-    letter: &'static str,
-    meaning: &'static str,
-}
+/// The letter of a ball or point, and its meaning.
+type Body = (&'static str, &'static str);
 
 /// The named vectors of a subject, from the ball outwards.
 pub(crate) fn of_subject<'a>(
@@ -59,57 +56,43 @@ pub(crate) fn of_subject<'a>(
     errors: &[BodyErrors<Symbol<'a>>],
     unknown: &impl Fn(usize) -> Option<Symbol<'a>>,
 ) -> Vec<NamedVector> {
-    let workpiece = PointName {
-        letter: "p",
-        meaning: "workpiece ball",
+    let walk = Walk {
+        machine,
+        state,
+        errors,
     };
-    let tool = |meaning| PointName { letter: "q", meaning };
     match subject {
         Subject::Station(Station::BallBar(bar)) => {
             let p = displaced(bar.workpiece_ball, 0, unknown);
             let q = displaced(bar.spindle_ball, 3, unknown);
-            let mut vectors = on_workpiece_side(workpiece, machine, state, errors, p);
-            vectors.extend(on_tool_side(tool("spindle ball"), machine, state, errors, q));
+            let mut vectors = walk.on_workpiece_side(("p", "workpiece ball"), p);
+            vectors.extend(walk.on_tool_side(("q", "spindle ball"), q));
             let (p, q) = bar.balls(machine, state, errors, unknown);
-            vectors.push(NamedVector {
-                letter: "b",
-                frame: String::new(),
-                prime: false,
-                components: p.minus(q).0.map(Symbol::operand),
-                meaning: "bar, from the spindle ball to the workpiece ball, in R".to_string(),
-            });
+            let meaning = "bar, from the spindle ball to the workpiece ball, in R";
+            vectors.push(named("b", p.minus(q), meaning));
             vectors
         }
         Subject::Station(Station::Tracker(tracker)) => {
-            let q = displaced(tracker.target, 6, unknown);
-            on_tool_side(tool("target"), machine, state, errors, q)
+            walk.on_tool_side(("q", "target"), displaced(tracker.target, 6, unknown))
         }
         Subject::Station(Station::Socket(socket)) => {
-            let q = displaced(socket.ball, 3, unknown);
-            on_tool_side(tool("ball"), machine, state, errors, q)
+            walk.on_tool_side(("q", "ball"), displaced(socket.ball, 3, unknown))
         }
         Subject::Station(Station::Probe(probe)) => {
             let stylus = displaced(probe.stylus, probe::STYLUS, unknown);
-            let mut vectors = on_tool_side(tool("stylus"), machine, state, errors, stylus);
+            let mut vectors = walk.on_tool_side(("q", "stylus"), stylus);
             let stylus = machine.tool_point(state, errors, stylus);
             let (step, _) = probe.step_at(machine, state);
-            let ahead = PointName {
-                letter: "r",
-                meaning: "a step ahead",
-            };
             let meaning = match probe.direction {
                 Some(_) => "step of the probe in R, 1 mm in the stated direction",
                 None => "step of the probe in R, all the way to the artefact's nominal axis",
             };
             vectors.push(named("n", step, meaning));
-            vectors.extend(into_the_table(tool("stylus"), machine, state, errors, stylus));
-            vectors.extend(into_the_table(ahead, machine, state, errors, stylus.plus(step)));
+            vectors.extend(walk.through_the_table(("q", "stylus"), stylus));
+            vectors.extend(walk.through_the_table(("r", "a step ahead"), stylus.plus(step)));
             let geometry = probe.geometry(machine, state, errors, unknown);
-            vectors.push(named(
-                "v",
-                geometry.stylus,
-                "position of the stylus perpendicular to the artefact's axis",
-            ));
+            let meaning = "position of the stylus perpendicular to the artefact's axis";
+            vectors.push(named("v", geometry.stylus, meaning));
             vectors.push(named(
                 "u",
                 geometry.step,
@@ -120,21 +103,13 @@ pub(crate) fn of_subject<'a>(
         // The point that does not carry the sensors; the sensors' point is the origin of the difference.
         Subject::Station(Station::RTest(rtest)) => match rtest.setting {
             Setting::Table => {
-                let q = displaced(rtest.spindle_ball, 3, unknown);
-                on_tool_side(tool("master ball"), machine, state, errors, q)
+                walk.on_tool_side(("q", "master ball"), displaced(rtest.spindle_ball, 3, unknown))
             }
             Setting::Spindle => {
-                let p = displaced(rtest.workpiece_ball, 0, unknown);
-                let ball = PointName {
-                    letter: "p",
-                    meaning: "master ball",
-                };
-                on_workpiece_side(ball, machine, state, errors, p)
+                walk.on_workpiece_side(("p", "master ball"), displaced(rtest.workpiece_ball, 0, unknown))
             }
         },
-        Subject::Volumetric { tool: point } => {
-            on_tool_side(tool("tool point"), machine, state, errors, Point::nominal(*point))
-        }
+        Subject::Volumetric { tool } => walk.on_tool_side(("q", "tool point"), Point::nominal(*tool)),
     }
 }
 
@@ -149,118 +124,96 @@ fn named(letter: &'static str, vector: Point<Symbol<'_>>, meaning: &str) -> Name
     }
 }
 
-/// Transforms a point of R to the table frame, axis by axis.
-fn into_the_table<'a>(
-    body: PointName,
-    machine: &Machine,
-    state: &[AxisPosition<Symbol<'a>>],
-    errors: &[BodyErrors<Symbol<'a>>],
-    point: Point<Symbol<'a>>,
-) -> Vec<NamedVector> {
-    let mut vectors: Vec<NamedVector> = Vec::new();
-    let mut point = point;
-    for index in (0..machine.workpiece_side).rev() {
-        let pulled = machine.pull(index, state, errors, point);
-        if pulled != point {
-            let axis = &machine.axes[index].name;
-            vectors.push(NamedVector {
-                frame: axis.clone(),
-                ..named(
-                    body.letter,
-                    pulled,
-                    &format!("{} in the frame of axis {axis}", body.meaning),
-                )
-            });
-        }
-        point = pulled;
-    }
-    vectors
+/// A chain in one state, through which a point is transformed axis by axis.
+struct Walk<'w, 'a> {
+    machine: &'w Machine,
+    state: &'w [AxisPosition<Symbol<'a>>],
+    errors: &'w [BodyErrors<Symbol<'a>>],
 }
 
-fn on_workpiece_side<'a>(
-    body: PointName,
-    machine: &Machine,
-    state: &[AxisPosition<Symbol<'a>>],
-    errors: &[BodyErrors<Symbol<'a>>],
-    point: Point<Symbol<'a>>,
-) -> Vec<NamedVector> {
-    let steps = (0..machine.workpiece_side).map(|index| {
-        let outside = index + 1;
-        (index, (outside < machine.workpiece_side).then_some(outside))
-    });
-    along(body, machine, state, errors, point, steps)
-}
-
-fn on_tool_side<'a>(
-    body: PointName,
-    machine: &Machine,
-    state: &[AxisPosition<Symbol<'a>>],
-    errors: &[BodyErrors<Symbol<'a>>],
-    point: Point<Symbol<'a>>,
-) -> Vec<NamedVector> {
-    let steps = (machine.workpiece_side..machine.axes.len()).rev().map(|index| {
-        let outside = index.checked_sub(1).filter(|o| *o >= machine.workpiece_side);
-        (index, outside)
-    });
-    along(body, machine, state, errors, point, steps)
-}
-
-/// The point after each step; `steps` gives the axis of the step and the axis in whose frame the point then is.
-fn along<'a>(
-    body: PointName,
-    machine: &Machine,
-    state: &[AxisPosition<Symbol<'a>>],
-    errors: &[BodyErrors<Symbol<'a>>],
-    point: Point<Symbol<'a>>,
-    steps: impl Iterator<Item = (usize, Option<usize>)>,
-) -> Vec<NamedVector> {
-    let mut vectors: Vec<NamedVector> = Vec::new();
-    let start = point.0.map(Symbol::operand);
-    let mut point = point;
-    for (index, outside) in steps {
-        let axis = &machine.axes[index];
-        let (frame, frame_words) = match outside {
-            Some(outside) => {
-                let name = machine.axes[outside].name.clone();
-                (name.clone(), format!("the frame of axis {name}"))
-            }
-            None => ("R".to_string(), "R".to_string()),
-        };
-        let mut vector = |point: Point<Symbol<'a>>, prime: bool, meaning: String| {
-            let components = point.0.map(Symbol::operand);
-            let known = vectors.iter().any(|known| known.components == components);
-            let new = components.iter().any(|c| matches!(c, Operand::Node(_)));
-            if new && !known && components != start {
+impl<'a> Walk<'_, 'a> {
+    /// From R into the table frame.
+    fn through_the_table(&self, (letter, body): Body, point: Point<Symbol<'a>>) -> Vec<NamedVector> {
+        let mut vectors: Vec<NamedVector> = Vec::new();
+        let mut point = point;
+        for index in (0..self.machine.workpiece_side).rev() {
+            let pulled = self.machine.pull(index, self.state, self.errors, point);
+            if pulled != point {
+                let axis = &self.machine.axes[index].name;
                 vectors.push(NamedVector {
-                    letter: body.letter,
-                    frame: frame.clone(),
-                    prime,
-                    components,
-                    meaning,
+                    frame: axis.clone(),
+                    ..named(letter, pulled, &format!("{body} in the frame of axis {axis}"))
                 });
             }
-        };
-        let pushed = machine.push(index, state, errors, point);
-        if axis.kind == AxisKind::Rotary {
-            let origin = axis.origin_mm.map(|o| Symbol::constant(-o));
-            let turned = axis.rotate(state[index].turn, point.shifted(origin));
-            if turned != pushed {
-                // Coordinates are relative to the origin of the axis before its errors apply.
-                let from = match axis.origin_mm {
-                    [0.0, 0.0, 0.0] => String::new(),
-                    _ => format!(", from the origin of {}", axis.name),
-                };
-                let meaning = format!(
-                    "{} in {frame_words}{from}, {} without its errors",
-                    body.meaning, axis.name
-                );
-                vector(turned, true, meaning);
-            }
+            point = pulled;
         }
-        vector(pushed, false, format!("{} in {frame_words}", body.meaning));
-        point = pushed;
+        vectors
     }
-    vectors
+
+    fn on_workpiece_side(&self, body: Body, point: Point<Symbol<'a>>) -> Vec<NamedVector> {
+        let count = self.machine.workpiece_side;
+        self.along(
+            body,
+            point,
+            (0..count).map(|index| (index, Some(index + 1).filter(|outside| *outside < count))),
+        )
+    }
+
+    fn on_tool_side(&self, body: Body, point: Point<Symbol<'a>>) -> Vec<NamedVector> {
+        let first = self.machine.workpiece_side;
+        let outside = |index: usize| index.checked_sub(1).filter(|outside| *outside >= first);
+        let axes = (first..self.machine.axes.len()).rev();
+        self.along(body, point, axes.map(|index| (index, outside(index))))
+    }
+
+    /// The point after each step; `steps` gives the axis of the step and the axis in whose frame the point then is.
+    fn along(
+        &self,
+        (letter, body): Body,
+        point: Point<Symbol<'a>>,
+        steps: impl Iterator<Item = (usize, Option<usize>)>,
+    ) -> Vec<NamedVector> {
+        let machine = self.machine;
+        let mut vectors: Vec<NamedVector> = Vec::new();
+        let start = point.0.map(Symbol::operand);
+        let mut point = point;
+        for (index, outside) in steps {
+            let axis = &machine.axes[index];
+            let outside = outside.map(|outside| &machine.axes[outside].name);
+            let frame = outside.cloned().unwrap_or_else(|| "R".to_string());
+            let in_frame =
+                outside.map_or_else(|| "R".to_string(), |name| format!("the frame of axis {name}"));
+            let mut add = |point: Point<Symbol<'a>>, prime: bool, meaning: String| {
+                let vector = NamedVector {
+                    frame: frame.clone(),
+                    prime,
+                    ..named(letter, point, &meaning)
+                };
+                let known = vectors.iter().any(|known| known.components == vector.components);
+                let new = vector.components.iter().any(|c| matches!(c, Operand::Node(_)));
+                if new && !known && vector.components != start {
+                    vectors.push(vector);
+                }
+            };
+            let pushed = machine.push(index, self.state, self.errors, point);
+            if axis.kind == AxisKind::Rotary {
+                let origin = axis.origin_mm.map(|o| Symbol::constant(-o));
+                let turned = axis.rotate(self.state[index].turn, point.shifted(origin));
+                if turned != pushed {
+                    // Coordinates are relative to the origin of the axis before its errors apply.
+                    let from = match axis.origin_mm {
+                        [0.0, 0.0, 0.0] => String::new(),
+                        _ => format!(", from the origin of {}", axis.name),
+                    };
+                    let meaning = format!("{body} in {in_frame}{from}, {} without its errors", axis.name);
+                    add(turned, true, meaning);
+                }
+            }
+            add(pushed, false, format!("{body} in {in_frame}"));
+            point = pushed;
+        }
+        vectors
+    }
 }
 
 /// The unit vector of the bar, transformed back into each frame: the adjoints of the named points, by name.

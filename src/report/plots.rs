@@ -229,7 +229,7 @@ impl<'d> SessionPlots<'d> {
                 number,
                 *column,
                 &name,
-                format!("{}: {model}", test.name),
+                format!("{}: residual, {model}", test.name),
                 Some(um),
             )
         };

@@ -126,6 +126,7 @@ fn the_error_vector_in_every_language() {
         ("c", "void volumetric_error("),
         ("python", "def volumetric_error("),
         ("matlab", "= volumetric_error("),
+        ("julia", "function volumetric_error("),
     ] {
         let found = printed(&["volumetric", text(&machine), "--as", word]);
         assert!(found.contains(sign), "{word}: {found}");
@@ -133,7 +134,7 @@ fn the_error_vector_in_every_language() {
         outputs.push(found);
     }
     outputs.dedup();
-    assert_eq!(outputs.len(), 7);
+    assert_eq!(outputs.len(), LANGUAGES.len());
     let first = printed(&[
         "volumetric",
         text(&machine),

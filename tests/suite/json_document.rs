@@ -121,7 +121,7 @@ fn uncertainties_covariance_and_chi_square_agree() {
     assert_eq!(meaning("bar[A100]"), "A100: bar length");
 }
 
-/// A bar of unknown length leaves directions unidentifiable. Each row of the null space is a combination of `unobservable`.
+/// Balls at unknown positions leave directions unidentifiable. Each row of the null space is a combination of `unobservable`.
 #[test]
 fn the_null_space_has_the_rows_of_the_unobservable_combinations() {
     let plan = std::fs::read_to_string(ready("hermle-c600u/chapter5.toml")).unwrap();
@@ -132,18 +132,10 @@ fn the_null_space_has_the_rows_of_the_unobservable_combinations() {
         folder.path().join("machine.toml"),
     )
     .unwrap();
-    // A length of the bar that nobody knows, in each test.
+    // The set-up has no priors.
     let free = plan
-        .lines()
-        .map(|line| {
-            if line.starts_with("bar_u_um") {
-                "bar_u_um = inf"
-            } else {
-                line
-            }
-        })
-        .collect::<Vec<_>>()
-        .join("\n");
+        .replace("_ball_u_um = [2, 2, 2]", "_ball_u_um = [inf, inf, inf]")
+        .replace("_ball_u_um = [1, 1, 1]", "_ball_u_um = [inf, inf, inf]");
     std::fs::write(&file, free.replace("step_deg = 0.25", "step_deg = 5")).unwrap();
     let run = folder.path().join("run");
     document(&["simulate", text(&file), "--out", text(&run)]);

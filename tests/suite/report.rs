@@ -17,7 +17,6 @@ fn session(path: &Path) -> Session {
 
 /// `∂L/∂error` to first order, derived independently of the chain: ball at (0, R, 0), spindle ball at (−D, 0, 0), so that for a rotation of A
 /// `L₀ = √(R² + D²)`, with `ca = cos A`, `sa = sin A` (Jiang (2014), Eqs. 3.20 and 3.21, to first order).
-///
 /// Jiang (2014): Xiaogeng Jiang, *Characterising Geometric Errors in Rotary Axes of 5-axis Machine Tools*, PhD thesis, University of Birmingham, 2014.
 #[test]
 fn sensitivities_agree_with_the_closed_form() {
@@ -113,16 +112,12 @@ fn methods_and_next_tests_have_reports() {
     let at = |name: &str| folder.path().join(name);
     let written = |arguments: &[&str], name: &str| {
         let (page, json, plots) = (at(&format!("{name}.html")), at(&format!("{name}.json")), at(name));
-        let faces = [
-            "-q",
-            "--report",
-            text(&page),
-            "--json",
-            text(&json),
-            "--plots",
-            text(&plots),
+        let outputs = [
+            ["--report", text(&page)],
+            ["--json", text(&json)],
+            ["--plots", text(&plots)],
         ];
-        let output = abbe(&[arguments, &faces].concat());
+        let output = abbe(&[arguments, &["-q"], &outputs.concat()].concat());
         assert!(
             output.status.success(),
             "{}",
@@ -357,11 +352,11 @@ fn a_report_of_6000_readings_is_under_3_mb() {
     let draw = Recipe::new(Kind::Rotary, 5).readings(6000).draw();
     draw.write(folder.path()).unwrap();
     let path = folder.path().join("session.toml");
-    let rows: usize = session(&path)
-        .tests
+    let tests = session(&path).tests;
+    let rows: usize = tests
         .iter()
-        .filter_map(|test| test.readings.as_ref())
-        .map(|readings| readings.rows())
+        .flat_map(|test| &test.readings)
+        .map(|r| r.rows())
         .sum();
     assert!(rows >= 5_900, "{rows} readings");
     let report = folder.path().join("fit.html");

@@ -8,8 +8,8 @@ use crate::normal_form::Ring;
 use crate::symbol::VariableId;
 use crate::variable::Variable;
 
-/// The parameters that the outputs do not contain. A derivative that is not zero at some point proves that its parameter is
-/// contained; otherwise the normal form decides.
+/// The parameters that the outputs do not contain. A derivative that is not zero at some point proves that its
+/// parameter is contained; otherwise the normal form decides.
 pub(crate) fn absent_parameters(
     equation: &Equation,
     agreement: &Agreement,

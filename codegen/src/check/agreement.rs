@@ -12,8 +12,8 @@ use crate::variable::Variable;
 const POINTS: usize = 40;
 /// Largest relative difference that is accepted.
 const TOLERANCE: f64 = 1e-12;
-/// Sizes of the errors at the check points, mm and rad. They are far larger than real errors, so that a wrong term of any order is
-/// detected.
+/// Sizes of the errors at the check points, mm and rad. They are far larger than real errors, so that a wrong term of
+/// any order is detected.
 const SIZES: [f64; 2] = [10.0, 0.1];
 
 /// Agreement of a program with the chain.
@@ -23,8 +23,8 @@ pub struct Agreement {
     pub points: usize,
     /// Largest difference of a value, relative to the largest value.
     pub value: f64,
-    /// Largest difference of a derivative, relative to the largest derivative by the same parameter. Below 1 mm/mm or 1 mm/rad the
-    /// reference is 1, because the derivatives by an unobservable parameter are rounding errors only.
+    /// Largest difference of a derivative, relative to the largest derivative by the same parameter. Below 1 mm/mm or 1
+    /// mm/rad the reference is 1, because the derivatives by an unobservable parameter are rounding errors only.
     pub gradient: f64,
     /// Largest derivative by each parameter over all points, mm/mm and mm/rad.
     pub largest_derivatives: Vec<f64>,

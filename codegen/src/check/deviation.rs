@@ -22,9 +22,9 @@ pub struct Deviation {
     pub largest_um: f64,
 }
 
-/// Computes the deviations of a form from the chain with exact rotations. Errors are 10 µm and 0.01°, then ten times those. All sign
-/// combinations are evaluated (256 random ones for more than eight errors) at 60 positions within the range; one coordinate in four
-/// is at an end of its range. The result is empty for an exact form.
+/// Computes the deviations of a form from the chain with exact rotations. Errors are 10 µm and 0.01°, then ten times
+/// those. All sign combinations are evaluated (256 random ones for more than eight errors) at 60 positions within the
+/// range; one coordinate in four is at an end of its range. The result is empty for an exact form.
 pub(crate) fn deviations(
     equation: &Equation,
     source: &impl Source,

@@ -30,7 +30,8 @@ pub struct Checked<'e> {
     pub deviations: Vec<Deviation>,
 }
 
-/// Compares the programs of an equation, value and derivatives, with the chain over dual numbers; `source` is that of the equation.
+/// Compares the programs of an equation, value and derivatives, with the chain over dual numbers; `source` is that of
+/// the equation.
 ///
 /// # Errors
 /// If they disagree, if an effect has no value at a point, or if a normal form is needed and does not exist.

@@ -92,7 +92,8 @@ fn intervals_of_effects(equation: &Equation, driver: &Variable) -> Vec<[f64; 2]>
         .collect()
 }
 
-/// Draws the nominal variables over their whole range: lengths near their stated values, positions over all possible values.
+/// Draws the nominal variables over their whole range: lengths near their stated values, positions over all possible
+/// values.
 pub(crate) fn draw_anywhere(
     equation: &Equation,
     source: &impl Source,
@@ -129,8 +130,8 @@ pub(crate) fn draw_anywhere(
     nominal.map(draw).collect()
 }
 
-/// Ranges of the nominal variables in the session: lengths as stated; axis positions between the ends of their motion, as stated by
-/// the source or else by the machine; mm or rad.
+/// Ranges of the nominal variables in the session: lengths as stated; axis positions between the ends of their motion,
+/// as stated by the source or else by the machine; mm or rad.
 pub(crate) fn range(equation: &Equation, source: &impl Source) -> Vec<(Variable, [f64; 2])> {
     let range = |variable: Variable| {
         let ends = match &variable {

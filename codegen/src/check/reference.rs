@@ -149,8 +149,8 @@ fn expected_bilinear(
     Ok((values, gradient))
 }
 
-/// Computes the reading from its coordinate groups: the groups themselves, the length with the parameters of the bar, or the distance
-/// of a probe.
+/// Computes the reading from its coordinate groups: the groups themselves, the length with the parameters of the bar,
+/// or the distance of a probe.
 fn reading_of_groups(
     equation: &Equation,
     source: &impl Source,

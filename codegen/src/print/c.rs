@@ -20,8 +20,8 @@ const SYNTAX: Syntax = Syntax {
 };
 
 /// The advice for a file with square roots.
-const ADVICE: &str = " * Compile with -O3 -fno-math-errno, otherwise the square root prevents vectorisation of the loop \
-                      over readings.\n";
+const ADVICE: &str = " * Compile with -O3 -fno-math-errno, otherwise the square root prevents vectorisation of the \
+                      loop over readings.\n";
 
 impl Language for C {
     fn print(&self, checked: &Checked<'_>) -> String {
@@ -44,7 +44,8 @@ impl Language for C {
             .map(|code| single(code) + "\n" + &columns(code))
             .collect();
         format!(
-            "/*\n{header} * Columns: n readings; axes[a * n + i] and the results value[j * n + i]{slopes} of reading i.\n\
+            "/*\n{header} * Columns: n readings; axes[a * n + i] and the results value[j * n + i]{slopes} of \
+             reading i.\n\
              {advice} */\n#include <math.h>\n#include <stddef.h>\n\n{}",
             kernels.join("\n")
         )
@@ -77,7 +78,8 @@ fn single(code: &Code<'_>) -> String {
     text + "}\n"
 }
 
-/// The function for columns of readings. Each column is a pointer of its own, so that the compiler knows that no two overlap.
+/// The function for columns of readings. Each column is a pointer of its own, so that the compiler knows that no two
+/// overlap.
 fn columns(code: &Code<'_>) -> String {
     let signature = format!(
         "void {}_columns(size_t n, const double *restrict lengths, const double *restrict axes, \

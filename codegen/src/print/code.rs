@@ -12,8 +12,9 @@ use crate::symbol::Unary;
 use crate::variable::{Symbols, Variable, identifier};
 
 /// Names that are reserved in Rust, C, Python or MATLAB, or that the printed code uses itself.
-const RESERVED_WORDS: &str = "as and assert auto await axes box break case catch char class const continue cos crate def default del \
-    do double elif else elseif end enum errors except exp extern false finally float floor fn for from \
+const RESERVED_WORDS: &str = "\
+    as and assert auto await axes box break case catch char class const continue cos crate def default \
+    del do double elif else elseif end enum errors except exp extern false finally float floor fn for from \
     function gen global goto gradient i if impl import in inline int is j k lambda lengths let long loop \
     match mod move mut n nonlocal not np or otherwise parfor pass persistent pi pub raise ref register \
     restrict return round self short sign signed sin sizeof sqrt static struct super switch trait true try \
@@ -179,7 +180,8 @@ impl<'e> Code<'e> {
         (values, slopes)
     }
 
-    /// The lines of the header, without comment signs. Indices of arguments start at `first` and are enclosed in `brackets`.
+    /// The lines of the header, without comment signs. Indices of arguments start at `first` and are enclosed in
+    /// `brackets`.
     pub(crate) fn header(&self, first: usize, brackets: [char; 2]) -> Vec<String> {
         let at =
             |group: &str, number: usize| format!("{group}{}{}{}", brackets[0], number + first, brackets[1]);

@@ -62,8 +62,9 @@ pub(crate) fn write_term(tree: &Tree, dialect: &impl Dialect) -> String {
     }
 }
 
-/// Breaks a sum into lines of at most `width` visible characters if possible. Breaks lie before a plus or minus outside braces, in as few
-/// parentheses as the width allows. `visible` counts the characters of a piece. Every line except the first starts with its sign.
+/// Breaks a sum into lines of at most `width` visible characters if possible. Breaks lie before a plus or minus outside
+/// braces, in as few parentheses as the width allows. `visible` counts the characters of a piece. Every line except the
+/// first starts with its sign.
 pub(crate) fn lines(
     terms: &[(bool, Tree)],
     dialect: &impl Dialect,

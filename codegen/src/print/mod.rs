@@ -6,6 +6,7 @@ mod article;
 mod c;
 mod code;
 mod dialect;
+mod julia;
 mod language;
 mod latex;
 mod matlab;
@@ -56,6 +57,7 @@ pub const LANGUAGES: &[OutputLanguage] = &[
     entry("c", "c", Compilers, &c::C),
     entry("python", "py", Compilers, &python::Python),
     entry("matlab", "m", Compilers, &matlab::Matlab),
+    entry("julia", "jl", Compilers, &julia::Julia),
 ];
 
 const fn entry(

@@ -7,7 +7,8 @@ use crate::program::{Input, Label, Program};
 use crate::symbol::Unary;
 use crate::variable::{Symbols, Variable};
 
-/// How a language for readers spells names and operations. Arguments already have their parentheses where they need them.
+/// How a language for readers spells names and operations. Arguments already have their parentheses where they need
+/// them.
 pub(crate) trait Notation {
     /// A number that is not negative.
     fn number(&self, value: f64) -> String;

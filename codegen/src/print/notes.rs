@@ -61,7 +61,8 @@ pub(crate) fn notes_spelt(
         Order::First => "the first-order series of the chain",
     };
     let mut notes = vec![escape(&format!(
-        "Checked against {of} with dual numbers at {} points, errors to ±10 mm and ±0.1 rad: largest relative difference {:.0e} (value), {:.0e} (gradient).",
+        "Checked against {of} with dual numbers at {} points, errors to ±10 mm and ±0.1 rad: \
+         largest relative difference {:.0e} (value), {:.0e} (gradient).",
         check.points, check.value, check.gradient
     ))];
     if !checked.deviations.is_empty() {

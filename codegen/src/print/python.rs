@@ -24,7 +24,8 @@ impl Language for Python {
         let header = lines(functions[functions.len() - 1].header(0, ['[', ']']));
         let functions: String = functions.iter().map(function).collect();
         format!(
-            "\"\"\"\n{header}Each argument may be a number or an array; arrays must have one shape, that of the readings.\n\
+            "\"\"\"\n{header}Each argument may be a number or an array; arrays must have one shape, that of the \
+             readings.\n\
              \"\"\"\n\nimport numpy as np\n{functions}"
         )
     }

@@ -108,8 +108,8 @@ fn single(code: &Code<'_>) -> String {
     text + &format!("    {value}\n}}\n")
 }
 
-/// The function for columns of readings, four readings at a time. The arrays of a block cannot overlap, so that the loop over its lanes is
-/// vectorised, and they are small enough to stay in registers.
+/// The function for columns of readings, four readings at a time. The arrays of a block cannot overlap, so that the
+/// loop over its lanes is vectorised, and they are small enough to stay in registers.
 fn columns(code: &Code<'_>) -> String {
     let name = code.function();
     let (outputs, errors) = (code.outputs(), code.errors());

@@ -54,8 +54,8 @@ struct At {
     way: f64,
 }
 
-/// Basis functions of an effect on EYX of a machine with the single axis X. The derivatives of the reading in Y are the basis functions,
-/// and the reading is their sum.
+/// Basis functions of an effect on EYX of a machine with the single axis X. The derivatives of the reading in Y are the
+/// basis functions, and the reading is their sum.
 fn bases(driver: &str, shape: Shape, at: At) -> Vec<f64> {
     let machine = Machine::from_code("w b X t").expect("a code");
     let options = with(vec![effect("EYX", driver, shape)]);
@@ -155,8 +155,8 @@ fn shapes_with_edges_by_hand_on_both_sides() {
     near(&bases("X", bump(Some(100.0)), here(180.0)), &[0.0]);
 }
 
-/// The cardinal cubic B-spline by its truncated powers (de Boor, ch. IX), independent of the implementation: N(s) = Σ (−1)^k (4 over k)
-/// (s − k)₊³ / 6.
+/// The cardinal cubic B-spline by its truncated powers (de Boor, ch. IX), independent of the implementation: N(s) = Σ
+/// (−1)^k (4 over k) (s − k)₊³ / 6.
 fn cardinal(s: f64) -> f64 {
     let terms = [1.0, -4.0, 6.0, -4.0, 1.0].into_iter().enumerate();
     let sum: f64 = terms.map(|(k, c)| c * (s - k as f64).max(0.0).powi(3)).sum();
@@ -198,7 +198,8 @@ fn curves_by_truncated_powers() {
     }
 }
 
-/// One effect of each shape on a machine with a rotary axis; the components include an instrument parameter and a delay.
+/// One effect of each shape on a machine with a rotary axis; the components include an instrument parameter and a
+/// delay.
 pub fn every_shape() -> Vec<Effect> {
     let polynomial = |degree, scale| Shape::Polynomial { degree, scale };
     let local = Shape::Local {

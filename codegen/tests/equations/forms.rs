@@ -48,7 +48,7 @@ fn code_of_the_chapter_5_test() {
         ..Options::default()
     };
     let equation = chapter5(&options);
-    for word in ["rust", "c", "python", "matlab"] {
+    for word in ["rust", "c", "python", "matlab", "julia"] {
         snapshot(&format!("chapter5_{word}"), &printed(&equation, word));
     }
 }
@@ -87,7 +87,8 @@ fn derivatives_of_the_chapter_5_test() {
     snapshot("chapter5_text_derivatives", &text);
 }
 
-/// Value and gradient of the chapter 5 test take at most 70 operations, counted by running the printed Rust over a counting scalar.
+/// Value and gradient of the chapter 5 test take at most 70 operations, counted by running the printed Rust over a
+/// counting scalar.
 #[test]
 fn operations_counted_by_running_the_printed_code() {
     let rustc = std::env::var("RUSTC").unwrap_or_else(|_| "rustc".to_string());

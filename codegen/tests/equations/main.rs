@@ -7,6 +7,7 @@ mod chain;
 mod compiled;
 mod effects;
 mod forms;
+mod julia;
 mod operators;
 mod probe;
 mod programs;

@@ -1,4 +1,5 @@
-//! Every operator with compound operands on either side, as the nominal coordinates of a ball: tests the parentheses of the printed code.
+//! Every operator with compound operands on either side, as the nominal coordinates of a ball: tests the parentheses of
+//! the printed code.
 
 use abbe_codegen::{Source, Subject};
 use abbe_model::instrument::{Station, socket::Socket};

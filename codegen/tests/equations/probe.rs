@@ -1,5 +1,5 @@
-//! Tests of the probe's reading against geometry with 4 × 4 matrices: the intersection of the probing line with the cylinder, found by
-//! bisection.
+//! Tests of the probe's reading against geometry with 4 × 4 matrices: the intersection of the probing line with the
+//! cylinder, found by bisection.
 
 use abbe_codegen::program::Input;
 use abbe_codegen::{CodegenError, Equation, Options, Order, Source, Subject, Variable, check};
@@ -232,7 +232,8 @@ fn geometry(touch: Touch, parameters: &[Variable], point: &State) -> f64 {
         let p = transformed(to_artefact, start + direction * t);
         (p - axis * p.dot(&axis)).norm() - radius
     };
-    // The distance from the axis is convex along the line. Ternary search finds its minimum, bisection the crossing before it.
+    // The distance from the axis is convex along the line. Ternary search finds its minimum, bisection the crossing
+    // before it.
     let (mut low, mut high) = (-2000.0, 2000.0);
     for _ in 0..200 {
         let third = (high - low) / 3.0;

@@ -1,5 +1,5 @@
-//! Equations to print, compile and run, and the values that their code must give: every topology of Table 1.1 at random errors of 0.1 rad
-//! and 10 mm, value and gradient.
+//! Equations to print, compile and run, and the values that their code must give: every topology of Table 1.1 at random
+//! errors of 0.1 rad and 10 mm, value and gradient.
 
 use abbe_codegen::program::Input;
 use abbe_codegen::{DriverQuantity, Equation, Options, ToolPoint, Variable};

@@ -1,4 +1,5 @@
-//! Equations of seed 000 (a thesis on ball-bar tests of a five-axis machine), entered by hand as printed, decided against the chain.
+//! Equations of seed 000 (a thesis on ball-bar tests of a five-axis machine), entered by hand as printed, decided
+//! against the chain.
 
 use abbe_codegen::evaluate::evaluate;
 use abbe_codegen::symbol::length;
@@ -63,7 +64,8 @@ impl<'a> Printed<'a> {
         }
     }
 
-    /// The three groups under the root of Eq. 3.20, in its order; `shift` is the additional term of Eq. 3.21 in its first group.
+    /// The three groups under the root of Eq. 3.20, in its order; `shift` is the additional term of Eq. 3.21 in its
+    /// first group.
     fn groups(&self, shift: Symbol<'a>) -> [Symbol<'a>; 3] {
         let Printed {
             e_y0a,
@@ -220,7 +222,8 @@ fn eq_3_21_with_the_printed_d_and_with_the_right_one() {
                 .expect("a polynomial")
         );
 
-        // Without errors, at C = 0 and H = Z_CA, the distance must equal the length of the bar; only the correct D satisfies this.
+        // Without errors, at C = 0 and H = Z_CA, the distance must equal the length of the bar; only the correct D
+        // satisfies this.
         let nominal = evaluate::<Symbol<'_>>(arena, &[chain.operand()], |variable| {
             let zero = arena.symbol(Operand::constant(0.0));
             abbe_codegen::VariableValue::Nominal(match variable {
@@ -398,7 +401,8 @@ fn truncation_errors_match_independent_figures() {
         assert!((low..high).contains(&found[0]), "{found:?}");
         assert!((95.0..105.0).contains(&(found[1] / found[0])), "{found:?}");
     };
-    // Independent: 0.014 µm for all second-order terms on axis, 0.006 µm for small angles. Here: the worst of 60 random positions.
+    // Independent: 0.014 µm for all second-order terms on axis, 0.006 µm for small angles. Here: the worst of 60 random
+    // positions.
     within(worst(Order::First, Rotation::Exact, false), 0.007, 0.015);
     within(worst(Order::Exact, Rotation::SmallAngle, true), 0.004, 0.007);
     within(worst(Order::Bilinear, Rotation::SmallAngle, true), 0.004, 0.007);

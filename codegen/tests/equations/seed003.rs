@@ -1,5 +1,5 @@
-//! Tests of Section VI of seed 003 (volumetric errors of machines with two rotary axes on the table) against the chain, and of every
-//! arrangement, with the nominal rotations that the paper omits.
+//! Tests of Section VI of seed 003 (volumetric errors of machines with two rotary axes on the table) against the chain,
+//! and of every arrangement, with the nominal rotations that the paper omits.
 
 use abbe_codegen::symbol::length;
 use abbe_codegen::{Arena, Equation, Operand, Options, Ring, Source, Subject, Symbol, ToolPoint, Variable};
@@ -103,8 +103,8 @@ fn the_three_expressions_of_section_vi() {
     }
 }
 
-/// Orders of X, Y, Z with the bed at any place among them, after the two rotary axes of the table. The paper mentions ten without a list;
-/// this is the complete list.
+/// Orders of X, Y, Z with the bed at any place among them, after the two rotary axes of the table. The paper mentions
+/// ten without a list; this is the complete list.
 fn arrangements() -> Vec<String> {
     let orders = ["XYZ", "XZY", "YXZ", "YZX", "ZXY", "ZYX"];
     let mut codes = Vec::new();
@@ -143,8 +143,9 @@ fn back<'a>(arena: &'a Arena, axis: &str, v: Vector<'a>) -> Vector<'a> {
     }
 }
 
-/// The first order by rigid-body kinematics. Every error motion displaces the point that its axis carries by δ + ε × r, from the bed
-/// outwards on the tool side and with the opposite sign on the table side. The sum is rotated into the table frame.
+/// The first order by rigid-body kinematics. Every error motion displaces the point that its axis carries by δ + ε × r,
+/// from the bed outwards on the tool side and with the opposite sign on the table side. The sum is rotated into the
+/// table frame.
 fn by_rigid_bodies<'a>(arena: &'a Arena, machine: &Machine) -> Vector<'a> {
     let zero = arena.symbol(Operand::constant(0.0));
     let six = |axis: &str| {

@@ -18,7 +18,8 @@ pub fn first(programs: &[&str], probe: &[&str]) -> Option<PathBuf> {
     running.next().map(PathBuf::from)
 }
 
-/// The first program that runs with these arguments. Without one, the test is skipped with a message, or fails if tools are required.
+/// The first program that runs with these arguments. Without one, the test is skipped with a message, or fails if tools
+/// are required.
 pub fn find(test: &str, programs: &[&str], probe: &[&str]) -> Option<PathBuf> {
     let found = first(programs, probe);
     if found.is_none() {

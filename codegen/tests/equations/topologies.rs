@@ -1,4 +1,5 @@
-//! The ten structural codes of Table 1.1 of seed 000 (three of them are misprinted with a doubled axis), and a ball bar on each.
+//! The ten structural codes of Table 1.1 of seed 000 (three of them are misprinted with a doubled axis), and a ball bar
+//! on each.
 
 use abbe_codegen::{Source, Subject};
 use abbe_model::axis::AxisKind;

@@ -24,7 +24,8 @@ fn of(
     printed(&equation, source, language)
 }
 
-/// Every form of the chapter 5 test. For every topology the exact length, its first order, and the first order of the volumetric error.
+/// Every form of the chapter 5 test. For every topology the exact length, its first order, and the first order of the
+/// volumetric error.
 fn fragments(language: &str) -> Vec<String> {
     let mut fragments = Vec::new();
     for rotation in [Rotation::Exact, Rotation::SmallAngle] {

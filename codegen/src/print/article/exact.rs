@@ -1,7 +1,9 @@
-//! Exact form for readers: the named vectors, the outputs in terms of them and, if requested, the derivatives of a length:
+//! Exact form for readers: the named vectors, the outputs in terms of them and, if requested, the derivatives of a
+//! length:
 //!
 //! ```text
-//! u = b/L, carried back through the chain frame by frame;   ∂L/∂e = a product with the vectors of the frame that e is an error of
+//! u = b/L, transformed back through the chain frame by frame
+//! ∂L/∂e = a product with the vectors of the frame that e is an error of
 //! ```
 
 use crate::equation::Equation;

@@ -123,8 +123,8 @@ fn terms(
     let mut terms = Vec::new();
     for (index, sensitivity) in first.sensitivities.iter().enumerate() {
         let coefficient = &printed.coefficients[index][coordinate];
-        // A multiple stays a separate term if only one of the two columns is divided by L₀, or if its factor is a fraction, which is not
-        // shorter.
+        // A multiple stays a separate term if only one of the two columns is divided by L₀, or if its factor is a
+        // fraction, which is not shorter.
         let is_separate = match &sensitivity.column {
             Column::Distinct => true,
             Column::Zero => false,

@@ -1,4 +1,5 @@
-//! Content of an equation for readers, independent of the language: named vectors, coordinate groups or coefficients, symbols, notes.
+//! Content of an equation for readers, independent of the language: named vectors, coordinate groups or coefficients,
+//! symbols, notes.
 
 mod exact;
 mod first_order;
@@ -17,7 +18,8 @@ pub(crate) struct Article {
     /// The inputs and names to which the expressions refer.
     pub(crate) program: Program,
     pub(crate) sections: Vec<Section>,
-    /// Inputs with unit and meaning. A rotary axis is listed once, by its angle, with the symbols of its sine and cosine.
+    /// Inputs with unit and meaning. A rotary axis is listed once, by its angle, with the symbols of its sine and
+    /// cosine.
     pub(crate) symbols: Vec<(Input, String, &'static str)>,
 }
 
