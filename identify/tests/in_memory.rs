@@ -8,7 +8,8 @@ use abbe_model::component::ErrorName;
 use abbe_model::instrument::ballbar::BallBar;
 use abbe_model::instrument::{InstrumentKind, Station};
 use abbe_model::session::Session;
-use abbe_model::session::build::{Columns, NewTest};
+use abbe_model::session::build::NewTest;
+use abbe_model::session::columns::Columns;
 
 /// Offset of the axis of C, mm.
 const OFFSET: [f64; 2] = [0.012, -0.007];

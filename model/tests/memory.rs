@@ -8,7 +8,8 @@ use abbe_model::files::{self, ReadOptions};
 use abbe_model::instrument::ballbar::BallBar;
 use abbe_model::instrument::tracker::Tracker;
 use abbe_model::instrument::{InstrumentKind, Station};
-use abbe_model::session::build::{Columns, NewTest};
+use abbe_model::session::build::NewTest;
+use abbe_model::session::columns::Columns;
 use abbe_model::session::motion::Motion;
 use abbe_model::session::{Prior, Session};
 

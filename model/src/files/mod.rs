@@ -2,7 +2,8 @@
 //!
 //! - [`toml`]: machine and session files; [`table`]: data files, one module per data format;
 //! - [`SourceMap`]: the files and texts of a session that was read;
-//! - [`schema`]: JSON Schema of machine and session files; [`stamp`]: state of the files that were read; [`whole`]: files written as a whole.
+//! - [`schema`]: JSON Schema of machine and session files; [`stamp`]: state of the files that were read; [`whole`]:
+//!   files written as a whole.
 
 mod quantity;
 pub mod schema;

@@ -1,7 +1,7 @@
 //! JSON Schema of machine and session files, for editors and other programs.
 //!
-//! The readers take keys one by one, so that a message can point at each; a schema cannot be derived from their types. A test compares
-//! the schema with the keys that every reader knows. The keys of shapes come from their registry.
+//! The readers take keys one by one, so that a message can point at each; a schema cannot be derived from their types.
+//! A test compares the schema with the keys that every reader knows. The keys of shapes come from their registry.
 
 use crate::driver::{Driver, unit_suffixes};
 use crate::effect::keys::{Key, KeyForm};

@@ -4,8 +4,8 @@ use std::path::PathBuf;
 
 use super::stamp::FileStamp;
 
-/// The sources of a session that was read from files. A program that writes a changed session edits its text, so that comments and
-/// everything else remain, and it refers to the files for provenance. The lines of single readings are in
+/// The sources of a session that was read from files. A program that writes a changed session edits its text, so that
+/// comments and everything else remain, and it refers to the files for provenance. The lines of single readings are in
 /// [`Readings::origin`](crate::session::readings::Readings::origin).
 #[derive(Clone, Debug)]
 pub struct SourceMap {

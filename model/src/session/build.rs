@@ -1,7 +1,7 @@
 //! Sessions built in memory, with the checks and defaults that a session file has.
 //!
-//! A ball bar on a five-axis machine. The workpiece ball lies at radius 100 mm on the table, the spindle ball 75 mm above its centre, so
-//! that the bar has 125 mm. The axis of C is 10 µm away from its nominal position along X:
+//! A ball bar on a five-axis machine. The workpiece ball lies at radius 100 mm on the table, the spindle ball 75 mm
+//! above its centre, so that the bar has 125 mm. The axis of C is 10 µm away from its nominal position along X:
 //!
 //! ```
 //! use abbe_model::chain::Machine;
@@ -9,7 +9,8 @@
 //! use abbe_model::instrument::ballbar::BallBar;
 //! use abbe_model::instrument::{InstrumentKind, Station};
 //! use abbe_model::session::Session;
-//! use abbe_model::session::build::{Columns, NewTest};
+//! use abbe_model::session::build::NewTest;
+//! use abbe_model::session::columns::Columns;
 //!
 //! let machine = Machine::from_code("[wCAbYXZt]")?;
 //! let mut session = Session::new(machine, InstrumentKind::BallBar);
@@ -33,10 +34,10 @@
 //! # Ok::<(), abbe_model::ModelError>(())
 //! ```
 
-use super::check::{self, Fault, MIN_READINGS, MissingPosition};
+use super::check::{self, Fault};
+use super::columns::{Columns, axis_index, number};
 use super::expression::Length;
-use super::motion::{self, Motion};
-use super::readings::Readings;
+use super::motion::Motion;
 use super::{Prior, Session, Test, defaults, limits, planned, setups};
 use crate::chain::Machine;
 use crate::error::ModelError;
@@ -64,8 +65,8 @@ impl Session {
     /// [`Session::warnings`]. After an error the session is unchanged.
     ///
     /// # Errors
-    /// [`ModelError::Session`] if the test cannot be used: its name is taken, a number is out of range, its motion or its readings do not
-    /// fit its set-up.
+    /// [`ModelError::Session`] if the test cannot be used: its name is taken, a number is out of range, its motion or
+    /// its readings do not fit its set-up.
     pub fn add_test(&mut self, test: NewTest) -> Result<(), ModelError> {
         let added = test.checked(self);
         let (test, warnings) = added.map_err(|(message, help)| ModelError::Session { message, help })?;
@@ -88,21 +89,6 @@ pub struct NewTest {
     motion: Option<Motion>,
     at: Vec<(String, f64)>,
     columns: Option<Columns>,
-}
-
-/// Readings as columns, all of the same length but for those that are empty.
-#[derive(Clone, Debug, Default)]
-pub struct Columns {
-    /// Positions of axes by their name, mm or rad. Other axes stay where the test holds them.
-    pub axes: Vec<(String, Vec<f64>)>,
-    /// The number of the traversal in one direction, or empty.
-    pub run: Vec<i64>,
-    /// Time, s, or empty.
-    pub time_s: Vec<f64>,
-    /// Temperature, °C, or empty.
-    pub temperature_c: Vec<f64>,
-    /// The observed values, mm, row by row: one length each (of a ball bar: from ball to ball), or three coordinates.
-    pub observed: Vec<f64>,
 }
 
 impl NewTest {
@@ -275,101 +261,6 @@ impl NewTest {
     }
 }
 
-impl Columns {
-    /// The readings of a test.
-    fn readings(
-        &self,
-        machine: &Machine,
-        kind: InstrumentKind,
-        motion: Option<&Motion>,
-        at: &[f64],
-        listed: &[bool],
-    ) -> Result<Readings, Fault> {
-        let coordinates = kind.coordinates();
-        // A socket has no reading of its own: the ball is where it is.
-        let by_axis = self.axes.first().map_or(0, |(_, column)| column.len());
-        let rows = match kind {
-            InstrumentKind::Socket => by_axis,
-            _ => self.observed.len() / coordinates,
-        };
-        if rows < MIN_READINGS {
-            return Err((
-                format!("{rows} readings, which is not enough for a fit"),
-                "a test needs at least two readings, and as many as it has parameters".into(),
-            ));
-        }
-        let mut positions: Vec<Vec<f64>> = at.iter().map(|&position| vec![position; rows]).collect();
-        let mut read = vec![false; at.len()];
-        for (name, column) in &self.axes {
-            let axis = axis_index(machine, name)?;
-            if read[axis] {
-                return Err((format!("two columns of axis {name}"), "keep one of them".into()));
-            }
-            column_of(&format!("positions of {name}"), column, rows)?;
-            positions[axis].clone_from(column);
-            read[axis] = true;
-        }
-        match check::missing_position(
-            machine,
-            kind,
-            |axis| listed[axis],
-            |axis| read[axis],
-            &motion::named_axes(motion),
-        ) {
-            None => {}
-            Some(MissingPosition::All) => {
-                return Err(("no positions of an axis".into(), "add them to the columns".into()));
-            }
-            Some(MissingPosition::Moved(axis) | MissingPosition::NotStated(axis)) => {
-                return Err((
-                    format!("no positions of axis {}", machine.axes[axis].name),
-                    "add them to the columns, or state the position at which the test holds the axis".into(),
-                ));
-            }
-        }
-        let observed = match kind {
-            InstrumentKind::Socket => vec![0.0; rows * coordinates],
-            _ => {
-                column_of("observed values", &self.observed, rows * coordinates)?;
-                self.observed.clone()
-            }
-        };
-        for (what, column) in [("times", &self.time_s), ("temperatures", &self.temperature_c)] {
-            if !column.is_empty() {
-                column_of(what, column, rows)?;
-            }
-        }
-        if !self.run.is_empty() && self.run.len() != rows {
-            return Err(wrong_count("run numbers", self.run.len(), rows));
-        }
-        for pair in self.time_s.windows(2) {
-            if let Some(fault) = check::decreasing_time(pair[0], pair[1]) {
-                return Err((fault, "sort the readings by time, or omit the times".into()));
-            }
-        }
-        Ok(Readings {
-            origin: None,
-            run: self.run.clone(),
-            time_s: self.time_s.clone(),
-            temperature_c: self.temperature_c.clone(),
-            positions,
-            coordinates,
-            observed,
-        })
-    }
-}
-
-/// The axis of this name.
-fn axis_index(machine: &Machine, name: &str) -> Result<usize, Fault> {
-    machine.axis_index(name).ok_or_else(|| {
-        let names: Vec<&str> = machine.axes.iter().map(|axis| axis.name.as_str()).collect();
-        (
-            format!("the machine \"{}\" has no axis `{name}`", machine.name),
-            format!("its axes are {}", names.join(", ")),
-        )
-    })
-}
-
 /// Checks the nominal set-up: finite numbers, and lengths above zero.
 fn check_station(station: &Station<f64>) -> Result<(), Fault> {
     let numbers = std::cell::RefCell::new(Vec::new());
@@ -385,36 +276,5 @@ fn check_station(station: &Station<f64>) -> Result<(), Fault> {
     match fault {
         None => Ok(()),
         Some(fault) => Err((fault, "state the calibrated length, mm".into())),
-    }
-}
-
-/// Checks a column.
-fn column_of(what: &str, column: &[f64], rows: usize) -> Result<(), Fault> {
-    if column.len() != rows {
-        return Err(wrong_count(what, column.len(), rows));
-    }
-    for (row, value) in column.iter().enumerate() {
-        number(what, *value).map_err(|(message, help)| (format!("{message} (item {})", row + 1), help))?;
-    }
-    Ok(())
-}
-
-fn wrong_count(what: &str, found: usize, expected: usize) -> Fault {
-    (
-        format!("{what}: {found} where {expected} are expected"),
-        "all columns have one item for each reading".into(),
-    )
-}
-
-/// Checks that a number is finite and within [`limits::LARGEST`].
-fn number(what: &str, value: f64) -> Result<(), Fault> {
-    let fault = if value.is_finite() {
-        limits::too_large(value)
-    } else {
-        Some(value.to_string())
-    };
-    match fault {
-        None => Ok(()),
-        Some(fault) => Err((format!("{what} is {fault}"), "a finite number is expected".into())),
     }
 }

@@ -63,8 +63,9 @@ pub(crate) enum MissingPosition {
     All,
 }
 
-/// The first position that readings lack, if any. `stated` are axes whose position the test states, `read` those with a column of
-/// positions, `moved` those that move in its plan. A ball bar needs no more than the axes that move; others need every axis.
+/// The first position that readings lack, if any. `stated` are axes whose position the test states, `read` those with a
+/// column of positions, `moved` those that move in its plan. A ball bar needs no more than the axes that move; others
+/// need every axis.
 pub(crate) fn missing_position(
     machine: &Machine,
     instrument: InstrumentKind,

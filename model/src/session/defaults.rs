@@ -17,7 +17,8 @@ pub fn unknowns(machine: &Machine, kind: InstrumentKind) -> Vec<ErrorName> {
     }
 }
 
-/// The priors of an instrument's parameters, in their order: known exactly, but for the place of a tracker and of a socket.
+/// The priors of an instrument's parameters, in their order: known exactly, but for the place of a tracker and of a
+/// socket.
 pub fn priors(kind: InstrumentKind) -> Vec<Prior> {
     let parameters = kind.unknowns().iter();
     parameters
@@ -28,8 +29,8 @@ pub fn priors(kind: InstrumentKind) -> Vec<Prior> {
         .collect()
 }
 
-/// The name shared by tests with the same mounted spindle ball. The ball at a robot's flange stays mounted from socket to socket; a ball
-/// in a spindle is mounted for each test.
+/// The name shared by tests with the same mounted spindle ball. The ball at a robot's flange stays mounted from socket
+/// to socket; a ball in a spindle is mounted for each test.
 pub fn spindle_setup(kind: InstrumentKind, test: &str) -> &str {
     match kind {
         InstrumentKind::Socket => "tool",
@@ -37,8 +38,9 @@ pub fn spindle_setup(kind: InstrumentKind, test: &str) -> &str {
     }
 }
 
-/// All location errors of all axes, except the rotation of a linear axis about its own direction, which affects no reading. The joints of
-/// a robot have six each, more than its readings identify; the fit names the confounded combinations.
+/// All location errors of all axes, except the rotation of a linear axis about its own direction, which affects no
+/// reading. The joints of a robot have six each, more than its readings identify; the fit names the confounded
+/// combinations.
 fn all_location_errors(machine: &Machine) -> Vec<ErrorName> {
     let mut errors = pattern::errors(machine);
     errors.retain(|name| {
@@ -52,8 +54,8 @@ fn all_location_errors(machine: &Machine) -> Vec<ErrorName> {
     errors
 }
 
-/// The position and orientation errors of every rotary axis, in alphabetical order of the axes. The two location errors in the axis' own
-/// degrees of freedom are excluded, because its own motion is confounded with them.
+/// The position and orientation errors of every rotary axis, in alphabetical order of the axes. The two location errors
+/// in the axis' own degrees of freedom are excluded, because its own motion is confounded with them.
 fn position_and_orientation_errors(machine: &Machine) -> Vec<ErrorName> {
     let mut rotary: Vec<_> = machine
         .axes

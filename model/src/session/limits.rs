@@ -1,7 +1,7 @@
 //! Limits of numbers in input. Within them nothing overflows and angles remain accurate.
 
-/// The largest number that input may contain, in the unit of its name. A position of 10¹² is resolved to 10⁻⁴; in degrees it is three
-/// thousand million revolutions.
+/// The largest number that input may contain, in the unit of its name. A position of 10¹² is resolved to 10⁻⁴; in
+/// degrees it is three thousand million revolutions.
 pub const LARGEST: f64 = 1e12;
 
 /// The least nonzero standard deviation or step, µm: a millionth of the resolution of any sensor.

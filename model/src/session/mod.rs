@@ -1,9 +1,11 @@
 //! Sessions: a machine, a plan of tests, and the readings of the tests that were run.
 //!
-//! [`files`](crate::files) reads and writes sessions. A session is validated and in mm, rad and s.
+//! A session is validated and in mm, rad and s. [`build`] makes it in memory; [`files`](crate::files) reads and writes
+//! it.
 
 pub mod build;
 pub(crate) mod check;
+pub mod columns;
 pub mod defaults;
 pub mod expression;
 pub mod limits;
@@ -47,8 +49,8 @@ pub struct Session {
     pub socket_distances: Vec<SocketDistance>,
     /// Warnings about a usable session.
     pub warnings: Vec<String>,
-    /// Notes of `[about]` on the measurement, by name in the order of the file: `serial_number`, `operator`, `date`, `comment` and
-    /// others. No calculation uses them; reports and results repeat them.
+    /// Notes of `[about]` on the measurement, by name in the order of the file: `serial_number`, `operator`, `date`,
+    /// `comment` and others. No calculation uses them; reports and results repeat them.
     pub about: Vec<(String, String)>,
 }
 
@@ -89,7 +91,8 @@ pub struct Test {
 }
 
 impl Test {
-    /// The name of the group of tests that shares a parameter: the `setup`, the `bar_setup`, …; empty for the whole session.
+    /// The name of the group of tests that shares a parameter: the `setup`, the `bar_setup`, …; empty for the whole
+    /// session.
     pub fn group(&self, by: SharedBy) -> &str {
         match by {
             SharedBy::Setup => &self.setup,

@@ -84,15 +84,15 @@ pub enum FollowOffset {
     Touching,
 }
 
-/// Ratio of the programmed feed to the speed of the ball on its circle of `radius_mm`, for a control that treats a degree as a
-/// millimetre. The ball moves at `v = R·ω` and the rotary axis at `v·180/(π·R)` degrees,
+/// Ratio of the programmed feed to the speed of the ball on its circle of `radius_mm`, for a control that treats a
+/// degree as a millimetre. The ball moves at `v = R·ω` and the rotary axis at `v·180/(π·R)` degrees,
 ///
 /// ```text
 /// F = v · √(1 + (180/(π·R))²)
 /// ```
 ///
-/// so that the speed of the ball is `F` *divided* by the root. Eq. (12) of Yamaji, Hamabata & Ihara (2014) multiplies: it gives the feed
-/// to be programmed for a desired speed, not the actual speed for a programmed feed.
+/// so that the speed of the ball is `F` *divided* by the root. Eq. (12) of Yamaji, Hamabata & Ihara (2014) multiplies:
+/// it gives the feed to be programmed for a desired speed, not the actual speed for a programmed feed.
 ///
 /// ```
 /// use abbe_model::session::motion::programmed_over_path_feed;

@@ -15,8 +15,8 @@ pub fn balls(machine: &Machine, bar: &BallBar<f64>, at: &[f64]) -> ([f64; 3], [f
     (workpiece.0, spindle.0)
 }
 
-/// The positions of all axes at which the linear axes place the spindle ball at `requested` from the workpiece ball (mm, in R), with the
-/// rotary axes `at` their positions. `None` if that is impossible.
+/// The positions of all axes at which the linear axes place the spindle ball at `requested` from the workpiece ball
+/// (mm, in R), with the rotary axes `at` their positions. `None` if that is impossible.
 pub fn positions_for_bar(
     machine: &Machine,
     bar: &BallBar<f64>,

@@ -94,7 +94,8 @@ pub(crate) fn beyond_travel(machine: &Machine, readings: &Readings) -> Option<St
         })
 }
 
-/// Sets linear axes that a circle does not move, and that the test does not state, so that the centre of the circle lies in its plane.
+/// Sets linear axes that a circle does not move, and that the test does not state, so that the centre of the circle
+/// lies in its plane.
 pub(crate) fn centre_circle(
     machine: &Machine,
     station: &Station<f64>,

@@ -1,4 +1,5 @@
-//! Plausibility of the set-up: whether the bar spans its balls, the stylus is in front of its artefact, and the ball is in its nest.
+//! Plausibility of the set-up: whether the bar spans its balls, the stylus is in front of its artefact, and the ball is
+//! in its nest.
 
 use super::Test;
 use super::readings::Readings;
@@ -6,8 +7,8 @@ use crate::axis::AxisKind;
 use crate::chain::{BodyErrors, Machine};
 use crate::instrument::Station;
 
-/// The sensor range is one to two millimetres for a ball bar and a few for an R-test. A larger deviation is not an error of the machine,
-/// mm.
+/// The sensor range is one to two millimetres for a ball bar and a few for an R-test. A larger deviation is not an
+/// error of the machine, mm.
 const MAX_MM: f64 = 5.0;
 
 /// Balls that are closer to each other than this coincide, mm.
@@ -21,9 +22,9 @@ pub(crate) fn bar_mm(station: &Station<f64>) -> f64 {
     }
 }
 
-/// Checks that the instrument nominally fits: the distance between the balls is the length of the bar, the stylus is in front of its
-/// artefact, the ball is in its nest. If a single mistake in the positions of an axis (its sign, its unit) explains the deviation, the
-/// help names it.
+/// Checks that the instrument nominally fits: the distance between the balls is the length of the bar, the stylus is in
+/// front of its artefact, the ball is in its nest. If a single mistake in the positions of an axis (its sign, its unit)
+/// explains the deviation, the help names it.
 pub(crate) fn check(machine: &Machine, test: &Test, readings: &Readings) -> Result<(), (String, String)> {
     let Err((message, help)) = check_nominal(machine, test, readings) else {
         return Ok(());

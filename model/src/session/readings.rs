@@ -86,7 +86,8 @@ impl Readings {
         );
     }
 
-    /// The rows of each run: half-open ranges of consecutive rows with the same number. Without a run column, one range.
+    /// The rows of each run: half-open ranges of consecutive rows with the same number. Without a run column, one
+    /// range.
     pub fn runs(&self) -> Vec<std::ops::Range<usize>> {
         let rows = self.rows();
         if self.run.is_empty() {
@@ -105,8 +106,9 @@ impl Readings {
 
     /// Driver samples of an axis for every row: position, direction, speed, distance and time since the last reversal.
     ///
-    /// The direction is the sign of the backward difference of the positions within a run; the first row uses the second. An axis at rest
-    /// keeps its last direction. The speed is the central difference over time, 0 without a time column.
+    /// The direction is the sign of the backward difference of the positions within a run; the first row uses the
+    /// second. An axis at rest keeps its last direction. The speed is the central difference over time, 0 without a
+    /// time column.
     pub fn axis_samples(&self, axis: usize, kind: AxisKind) -> Vec<DriverSample<f64>> {
         let positions = &self.positions[axis];
         // Positions in a file are rounded; a smaller change is not a movement.

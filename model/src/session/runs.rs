@@ -9,8 +9,8 @@ use crate::words::counted;
 /// A run is a forward and backward run if its net advance is less than this fraction of its path length.
 const MIN_ADVANCE: f64 = 0.5;
 
-/// A description of the difference between the runs of the data and those of the stated motion, if any. Data without a `run` column are
-/// not compared.
+/// A description of the difference between the runs of the data and those of the stated motion, if any. Data without a
+/// `run` column are not compared.
 pub(crate) fn difference_from_stated(motion: Option<&Motion>, readings: &Readings) -> Option<String> {
     let (Motion::Sweep {
         runs,
@@ -66,7 +66,8 @@ pub(crate) fn difference_from_stated(motion: Option<&Motion>, readings: &Reading
     })
 }
 
-/// Net advance of a run in the direction of the motion, and its total path length: along an axis, or around a circle by the swept area.
+/// Net advance of a run in the direction of the motion, and its total path length: along an axis, or around a circle by
+/// the swept area.
 fn advance_and_length(motion: &Motion, readings: &Readings, run: &Range<usize>) -> (f64, f64) {
     let sum = |steps: &mut dyn Iterator<Item = f64>| {
         steps.fold((0.0, 0.0), |(net, whole), step| (net + step, whole + step.abs()))

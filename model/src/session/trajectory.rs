@@ -13,8 +13,8 @@ use crate::instrument::ballbar::BallBar;
 
 /// Pause between two traversals, s.
 const BETWEEN_RUNS_S: f64 = 3.0;
-/// Planned positions are rounded to this fraction of a millimetre. It is far finer than the resolution of a control and far coarser than
-/// the rounding of the solver, so that an axis that need not move does not.
+/// Planned positions are rounded to this fraction of a millimetre. It is far finer than the resolution of a control and
+/// far coarser than the rounding of the solver, so that an axis that need not move does not.
 const STEPS_PER_MM: f64 = 1e10;
 /// Largest accepted deviation of the balls from the requested path, mm.
 const POSITION_TOLERANCE_MM: f64 = 1e-6;
@@ -253,9 +253,9 @@ pub(crate) fn linear_axes(machine: &Machine) -> Vec<usize> {
         .collect()
 }
 
-/// Moves the `open` axes so that the spindle ball is nominally at `requested` from the workpiece ball, in the least-squares sense. Returns
-/// the positions of all axes, and the remaining distance, mm. The difference of the balls is affine in the linear axes, so this is one
-/// linear solve.
+/// Moves the `open` axes so that the spindle ball is nominally at `requested` from the workpiece ball, in the
+/// least-squares sense. Returns the positions of all axes, and the remaining distance, mm. The difference of the balls
+/// is affine in the linear axes, so this is one linear solve.
 pub(super) fn solve_linear_axes(
     machine: &Machine,
     bar: &BallBar<f64>,
@@ -320,8 +320,8 @@ pub(crate) fn positions(machine: &Machine, at: &[f64]) -> Vec<AxisPosition<f64>>
         .collect()
 }
 
-/// From workpiece ball to spindle ball while the linear axes follow a rotary axis. The vector has the length of the bar and points away
-/// from the axis, along the path of the carried ball, or along the axis.
+/// From workpiece ball to spindle ball while the linear axes follow a rotary axis. The vector has the length of the bar
+/// and points away from the axis, along the path of the carried ball, or along the axis.
 fn offset_vector(
     machine: &Machine,
     bar: &BallBar<f64>,

@@ -83,7 +83,8 @@ impl Role {
     }
 }
 
-/// The names of an R-test's columns before their unit: the values of the single sensors, or the vector in the frame that carries them.
+/// The names of an R-test's columns before their unit: the values of the single sensors, or the vector in the frame
+/// that carries them.
 pub(crate) fn r_test_columns(sensors: bool) -> [&'static str; 3] {
     if sensors {
         ["du", "dv", "dw"]
@@ -285,7 +286,8 @@ fn mapped_columns(
     }
 }
 
-/// Whether the first row is a row of readings instead of a header: columns are given by number only, and all of them contain numbers.
+/// Whether the first row is a row of readings instead of a header: columns are given by number only, and all of them
+/// contain numbers.
 fn are_readings(request: &Request<'_>, mapped: &[ColumnMapping], columns: &[Column], header: &Row) -> bool {
     let mut of_numbers = columns
         .iter()

@@ -1,6 +1,7 @@
 //! CSV: rows of cells in a text, with a separator between cells. Read with any layout, written with our column names.
 //!
-//! A header line, then one row per reading. A `#` starts a comment line. Empty lines, a byte order mark and CRLF are accepted.
+//! A header line, then one row per reading. A `#` starts a comment line. Empty lines, a byte order mark and CRLF are
+//! accepted.
 
 use std::path::Path;
 

@@ -1,8 +1,9 @@
 //! Duplicate rows of a file: copies by a mistake of export or editing, not repeated measurements.
 //!
-//! A row is a copy if every cell equals that of an earlier row, including the time if the file has one. Without a time column the run
-//! number decides. If a state recurs within a run and every reading of it is equal to the last digit, whole rows were copied. If some of
-//! them differ, they are repeats, and equal ones are due to the resolution. A file with neither column is taken as it is.
+//! A row is a copy if every cell equals that of an earlier row, including the time if the file has one. Without a time
+//! column the run number decides. If a state recurs within a run and every reading of it is equal to the last digit,
+//! whole rows were copied. If some of them differ, they are repeats, and equal ones are due to the resolution. A file
+//! with neither column is taken as it is.
 
 use std::collections::HashMap;
 use std::hash::{DefaultHasher, Hash, Hasher};
@@ -83,7 +84,8 @@ fn has_repeats(readings: &Readings, cells: &[u64], closed_runs: &HashMap<usize, 
         })
 }
 
-/// The last row of each run that ends at its start, with its first row: both may have the same reading. A time column distinguishes them.
+/// The last row of each run that ends at its start, with its first row: both may have the same reading. A time column
+/// distinguishes them.
 fn closed_runs(readings: &Readings) -> HashMap<usize, usize> {
     if !readings.time_s.is_empty() {
         return HashMap::new();

@@ -1,13 +1,15 @@
 //! Character encoding of a data file: stated, by its byte order mark, or detected from its bytes.
 //!
-//! Text that is not UTF-8 and has no mark is read as Latin-1, as the WHATWG Encoding Standard defines it (windows-1252). Numbers and the
-//! column names of western languages are then correct. UTF-16 without a mark is recognised by the zero bytes of its ASCII letters.
+//! Text that is not UTF-8 and has no mark is read as Latin-1, as the WHATWG Encoding Standard defines it
+//! (windows-1252). Numbers and the column names of western languages are then correct. UTF-16 without a mark is
+//! recognised by the zero bytes of its ASCII letters.
 
 use std::borrow::Cow;
 
 use encoding_rs::{Encoding, UTF_8, UTF_16BE, UTF_16LE, WINDOWS_1252};
 
-/// An encoding by one of its names, in any case: `utf-8`, `latin1`, `utf-16le`, `shift_jis`, …; `None` for an unknown name.
+/// An encoding by one of its names, in any case: `utf-8`, `latin1`, `utf-16le`, `shift_jis`, …; `None` for an unknown
+/// name.
 pub(crate) fn of_name(name: &str) -> Option<&'static Encoding> {
     let name = name.trim();
     // `Latin-1` is not a label of the standard, `latin1` is.
@@ -34,7 +36,8 @@ pub(super) fn name_of(encoding: &'static Encoding) -> &'static str {
     }
 }
 
-/// The encoding by the first bytes of a file, and the length of its byte order mark. A mark overrides a stated encoding.
+/// The encoding by the first bytes of a file, and the length of its byte order mark. A mark overrides a stated
+/// encoding.
 pub(super) fn of_start(
     bytes: &[u8],
     stated: Option<&'static Encoding>,

@@ -21,8 +21,8 @@ pub(crate) type BySocket = Vec<(Option<String>, Readings)>;
 /// Reads the rows of a data file. Returns the readings, and warnings about the file.
 ///
 /// # Errors
-/// Any cell that is not a finite number where one is expected, with file, line and column; missing or unknown columns; decreasing time;
-/// fewer than two readings.
+/// Any cell that is not a finite number where one is expected, with file, line and column; missing or unknown columns;
+/// decreasing time; fewer than two readings.
 pub(super) fn read(
     file: &Path,
     rows: &mut dyn Rows,

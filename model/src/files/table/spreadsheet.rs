@@ -1,7 +1,7 @@
 //! Spreadsheets (XLSX, XLS, ODS) as rows of cells, read by calamine.
 //!
-//! The first row that is not empty is the header; a row whose first cell begins with `#` is a comment. The display format of a cell is
-//! ignored: a number is read with all its digits, a formula by its last value.
+//! The first row that is not empty is the header; a row whose first cell begins with `#` is a comment. The display
+//! format of a cell is ignored: a number is read with all its digits, a formula by its last value.
 
 use std::fs::File;
 use std::io::{BufReader, Read};
@@ -118,7 +118,8 @@ fn rows(file: &Path, format: &Format) -> Result<(FileStamp, Vec<Row>), ModelErro
     }
 }
 
-/// Whether the parts of a ZIP file unpack to more than this number of bytes. The sizes stated in the file are not trusted.
+/// Whether the parts of a ZIP file unpack to more than this number of bytes. The sizes stated in the file are not
+/// trusted.
 fn unpacks_beyond(file: &Path, most: u64) -> bool {
     let archive = File::open(file)
         .ok()
@@ -139,8 +140,8 @@ fn unpacks_beyond(file: &Path, most: u64) -> bool {
     false
 }
 
-/// Calls the library. It may panic on a contradictory file (a row number beyond 32 bits, in builds with overflow checks); the panic
-/// becomes an ordinary error.
+/// Calls the library. It may panic on a contradictory file (a row number beyond 32 bits, in builds with overflow
+/// checks); the panic becomes an ordinary error.
 fn catch_panic<T>(read: impl FnOnce() -> Result<T, calamine::Error>) -> Result<T, calamine::Error> {
     let contradicts = || std::io::Error::other("its content is contradictory").into();
     catch_unwind(AssertUnwindSafe(read)).unwrap_or_else(|_| Err(contradicts()))
@@ -151,7 +152,8 @@ type PlacedCell = (u32, u32, Data);
 
 /// The filled cells of a sheet.
 ///
-/// Cells that the file lists one by one are read one by one: the rectangle around two cells in opposite corners would not fit in memory.
+/// Cells that the file lists one by one are read one by one: the rectangle around two cells in opposite corners would
+/// not fit in memory.
 fn cells(book: &mut Sheets<BufReader<File>>, name: &str) -> Result<Vec<PlacedCell>, calamine::Error> {
     let mut cells = Vec::new();
     match book {

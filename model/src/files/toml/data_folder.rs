@@ -1,7 +1,7 @@
 //! Access control: a session may read files beside itself, below, and in the data folder.
 //!
-//! A session from an untrusted source must not be able to name `../../secret.csv` and show its content in a message or a report. The
-//! check uses the real location of a file, with symbolic links and `..` resolved.
+//! A session from an untrusted source must not be able to name `../../secret.csv` and show its content in a message or
+//! a report. The check uses the real location of a file, with symbolic links and `..` resolved.
 
 use std::path::{Path, PathBuf};
 

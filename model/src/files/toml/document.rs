@@ -1,5 +1,5 @@
-//! TOML files with source locations: every key and value has its location, a table reports unknown keys, and a wrong value is reported
-//! with the expected type.
+//! TOML files with source locations: every key and value has its location, a table reports unknown keys, and a wrong
+//! value is reported with the expected type.
 
 mod value;
 
@@ -20,7 +20,8 @@ pub(crate) use value::Value;
 const MAX_BYTES: u64 = 8 << 20;
 /// Largest nesting depth that the TOML parser accepts.
 const MAX_DEPTH: usize = 80;
-/// Largest number of items in a list or a table of names. It exceeds every practical measurement and allows pairwise comparison.
+/// Largest number of items in a list or a table of names. It exceeds every practical measurement and allows pairwise
+/// comparison.
 const MAX_ITEMS: usize = 1000;
 
 /// A file's text with its name.

@@ -5,7 +5,8 @@ use crate::files::table::encoding;
 use crate::files::table::request::{ColumnMapping, ForeignColumn, Format};
 use crate::files::toml::document::{Table, Value};
 
-/// Reads `[format]`: separator, decimal, header, encoding, lines above the header; sheet of a spreadsheet; direction in a ball-bar file.
+/// Reads `[format]`: separator, decimal, header, encoding, lines above the header; sheet of a spreadsheet; direction in
+/// a ball-bar file.
 pub(super) fn format(mut table: Table<'_>) -> Result<Format, ModelError> {
     let mut format = Format::default();
     if let Some(value) = table.take("separator") {

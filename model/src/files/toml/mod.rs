@@ -115,8 +115,8 @@ impl Context<'_> {
     }
 }
 
-/// Reads the text of another TOML file in the same way: UTF-8 with or without byte order mark, of a limited size, unchanged while it is
-/// read. `what` names its content in messages.
+/// Reads the text of another TOML file in the same way: UTF-8 with or without byte order mark, of a limited size,
+/// unchanged while it is read. `what` names its content in messages.
 ///
 /// # Errors
 /// If the file cannot be read or is not such a text, with its name and what to do.

@@ -262,8 +262,8 @@ fn end<'a>(
     }
 }
 
-/// The speed of an axis, in degrees or millimetres per minute; `feed_mm_min` of a rotary axis is the path speed of the ball that it
-/// carries.
+/// The speed of an axis, in degrees or millimetres per minute; `feed_mm_min` of a rotary axis is the path speed of the
+/// ball that it carries.
 fn speed(
     context: &Context<'_>,
     table: &mut Table<'_>,

@@ -45,8 +45,8 @@ pub fn with_noise(original: &str, file: &Path, noise_um: f64) -> Result<String, 
     Ok(text)
 }
 
-/// The text of session `file` for use in `folder`: relative names of the machine file and of data files are adapted. Absolute names are
-/// unchanged, and so are names found in `data_directory`, which the reader searches first.
+/// The text of session `file` for use in `folder`: relative names of the machine file and of data files are adapted.
+/// Absolute names are unchanged, and so are names found in `data_directory`, which the reader searches first.
 ///
 /// # Errors
 /// If the text is not a session, or if one of the two folders does not exist.

@@ -75,7 +75,8 @@ pub(super) fn quoted(text: &str) -> String {
     quoted
 }
 
-/// A plan's text with a data file for each named test, otherwise unchanged. An existing data file of a test is replaced.
+/// A plan's text with a data file for each named test, otherwise unchanged. An existing data file of a test is
+/// replaced.
 ///
 /// # Errors
 /// If the text is not a session, or has its tests in inline tables.

@@ -14,11 +14,12 @@ const ANTICLOCKWISE: [&str; 6] = [
 const KNOWN: &str = "known words are CW, CCW, CLOCKWISE, ANTICLOCKWISE, COUNTERCLOCKWISE; for others use \
                      `[format] anticlockwise = \"…\"`, the word for the direction from the first axis of the plane towards the second";
 
-/// Whether each run goes from the first axis of the plane towards the second. If that is unknown, the error is a line, a message and what
-/// to do.
+/// Whether each run goes from the first axis of the plane towards the second. If that is unknown, the error is a line,
+/// a message and what to do.
 ///
-/// Known words keep their meaning whatever is stated, except that a stated clockwise word reverses them. Of other words, the stated one
-/// means forward and one other backward. Case is ignored; `1`, `true` and `yes` are one value, and so are `0`, `false` and `no`.
+/// Known words keep their meaning whatever is stated, except that a stated clockwise word reverses them. Of other
+/// words, the stated one means forward and one other backward. Case is ignored; `1`, `true` and `yes` are one value,
+/// and so are `0`, `false` and `no`.
 pub(super) fn of_runs(runs: &[Run], stated: Option<&str>) -> Result<Vec<bool>, (usize, String, String)> {
     // Seen from below, the direction from the first axis to the second is clockwise, and a file may call it so.
     let turned = stated.and_then(known_meaning) == Some(false);

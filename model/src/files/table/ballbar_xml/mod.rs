@@ -1,10 +1,11 @@
 //! Reader of ball-bar files in XML (`.b5r` and others), within the limits of public knowledge.
 //!
-//! There is no public description of the format. Programs that read such files rely on three facts: an element `READINGS` with numbers
-//! for each run, a `RUN_DIRECTION` beside or around it (element or attribute), and an element `PLANE` with `TEST_PLANE="XY"`. The unit of
-//! the readings and the angles at which they were taken are unknown, so nothing is assumed. `[columns]` states the unit, as `deviation_um
-//! = "READINGS"`. The test's `path` states the circle, over which the readings of a run are evenly distributed from one end to the other.
-//! A warning names everything else in the file; it is not interpreted.
+//! There is no public description of the format. Programs that read such files rely on three facts: an element
+//! `READINGS` with numbers for each run, a `RUN_DIRECTION` beside or around it (element or attribute), and an element
+//! `PLANE` with `TEST_PLANE="XY"`. The unit of the readings and the angles at which they were taken are unknown, so
+//! nothing is assumed. `[columns]` states the unit, as `deviation_um = "READINGS"`. The test's `path` states the
+//! circle, over which the readings of a run are evenly distributed from one end to the other. A warning names
+//! everything else in the file; it is not interpreted.
 
 mod contents;
 mod direction;
